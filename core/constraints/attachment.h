@@ -1,0 +1,24 @@
+// attachment: C = x0 - x1, a vector of 3  [m]. Ties particle x0 to x1, which is usually a driven particle: a moving target.
+// Compliance in m/N (0 = rigid). Its gradient is constant; the target's motion gets its gradient as the boundary's.
+#pragma once
+
+#include "core/constraints/concept.h"
+#include "core/scalar/scalar.h"
+
+namespace sheetbend {
+
+struct Attachment : OnPoints<2> {
+  static constexpr const char* name = "attachment";
+  static constexpr int rows = 3;
+  static constexpr std::array<const char*, 0> parameters{};
+
+  template <class T>
+  static void evaluate(const T* x, const T*, T* C, T* J) {
+    for (int i = 0; i < 3; ++i) {
+      C[i] = x[i] - x[3 + i];
+      for (int k = 0; k < 6; ++k) J[6 * i + k] = T(k == i ? 1.0 : k == 3 + i ? -1.0 : 0.0);
+    }
+  }
+};
+
+}  // namespace sheetbend

@@ -1,0 +1,41 @@
+// Every constraint that the program knows, one line each. Kinds are numbered in this order.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+#include <tuple>
+
+#include "core/constraints/attachment.h"
+#include "core/constraints/bend.h"
+#include "core/constraints/distance.h"
+#include "core/constraints/hinge.h"
+#include "core/constraints/planar_bend.h"
+
+namespace sheetbend {
+
+using Registry = std::tuple<  //
+    Distance,                 //
+    Bend,                     //
+    PlanarBend,               //
+    Hinge,                    //
+    Attachment>;
+
+inline constexpr int kind_count = std::tuple_size_v<Registry>;
+
+// Calls f with an object of the constraint type that `kind` numbers.
+template <int I = 0, class F>
+void with_kind(int kind, F&& f) {
+  if constexpr (I < kind_count) {
+    if (kind == I) return f(std::tuple_element_t<I, Registry>{});
+    with_kind<I + 1>(kind, f);
+  } else {
+    throw std::logic_error("constraint kind " + std::to_string(kind) + " is not in the registry");
+  }
+}
+
+template <class F>
+void for_each_kind(F&& f) {
+  for (int kind = 0; kind < kind_count; ++kind) with_kind(kind, f);
+}
+
+}  // namespace sheetbend

@@ -1,0 +1,92 @@
+// Dual<T, N>: a value and N directional derivatives, both over any scalar T, nested freely. Dual<double, 8> carries eight columns of a
+// Jacobian through one rollout; the adjoint's second derivatives are gradients on duals.
+#pragma once
+
+#include "core/scalar/scalar.h"
+
+namespace sheetbend {
+
+template <class T, int N = 1>
+struct Dual {
+  T v{};
+  T d[N]{};
+
+  Dual() = default;
+  Dual(double a) : v(a) {}
+  Dual(const T& a)
+    requires(!std::same_as<T, double>)
+      : v(a) {}
+
+  Dual& operator+=(const Dual& b) {
+    v = v + b.v;
+    for (int i = 0; i < N; ++i) d[i] = d[i] + b.d[i];
+    return *this;
+  }
+  Dual& operator-=(const Dual& b) {
+    v = v - b.v;
+    for (int i = 0; i < N; ++i) d[i] = d[i] - b.d[i];
+    return *this;
+  }
+  Dual& operator*=(const Dual& b) { return *this = *this * b; }
+
+  friend Dual operator-(const Dual& a) { return map(a, -a.v, T(-1.0)); }
+  friend Dual operator+(Dual a, const Dual& b) { return a += b; }
+  friend Dual operator-(Dual a, const Dual& b) { return a -= b; }
+  friend Dual operator*(const Dual& a, const Dual& b) { return map(a, b, a.v * b.v, b.v, a.v); }
+  friend Dual operator/(const Dual& a, const Dual& b) {
+    const T inverse = T(1.0) / b.v, q = a.v / b.v;
+    return map(a, b, q, inverse, -q * inverse);
+  }
+  friend auto operator>(const Dual& a, const Dual& b) { return a.v > b.v; }
+  friend auto operator<(const Dual& a, const Dual& b) { return a.v < b.v; }
+
+  // Chain rule: f(a) with value f and derivative fa; f(a, b) with derivatives fa, fb.
+  static Dual map(const Dual& a, const T& f, const T& fa) {
+    Dual r;
+    r.v = f;
+    for (int i = 0; i < N; ++i) r.d[i] = fa * a.d[i];
+    return r;
+  }
+  static Dual map(const Dual& a, const Dual& b, const T& f, const T& fa, const T& fb) {
+    Dual r;
+    r.v = f;
+    for (int i = 0; i < N; ++i) r.d[i] = fa * a.d[i] + fb * b.d[i];
+    return r;
+  }
+};
+
+template <class T, int N>
+Dual<T, N> sqrt(const Dual<T, N>& a) {
+  const T r = sqrt(a.v);
+  return Dual<T, N>::map(a, r, T(0.5) / r);
+}
+template <class T, int N>
+Dual<T, N> sin(const Dual<T, N>& a) { return Dual<T, N>::map(a, sin(a.v), cos(a.v)); }
+template <class T, int N>
+Dual<T, N> cos(const Dual<T, N>& a) { return Dual<T, N>::map(a, cos(a.v), -sin(a.v)); }
+template <class T, int N>
+Dual<T, N> log(const Dual<T, N>& a) { return Dual<T, N>::map(a, log(a.v), T(1.0) / a.v); }
+template <class T, int N>
+Dual<T, N> atan2(const Dual<T, N>& y, const Dual<T, N>& x) {
+  const T inverse = T(1.0) / (x.v * x.v + y.v * y.v);
+  return Dual<T, N>::map(y, x, atan2(y.v, x.v), x.v * inverse, -y.v * inverse);
+}
+template <class T, int N>
+Dual<T, N> nearest(const Dual<T, N>& a) { return Dual<T, N>(nearest(a.v)); }
+template <class M, class T, int N>
+Dual<T, N> select(const M& mask, const Dual<T, N>& a, const Dual<T, N>& b) {
+  Dual<T, N> r;
+  r.v = select(mask, a.v, b.v);
+  for (int i = 0; i < N; ++i) r.d[i] = select(mask, a.d[i], b.d[i]);
+  return r;
+}
+template <class T, int N>
+bool all_finite(const Dual<T, N>& a) {
+  bool ok = all_finite(a.v);
+  for (int i = 0; i < N; ++i) ok = ok && all_finite(a.d[i]);
+  return ok;
+}
+template <class T, int N>
+auto value_of(const Dual<T, N>& a) { return value_of(a.v); }
+
+}  // namespace sheetbend

@@ -1,0 +1,48 @@
+// The differentiable inputs of a scene, all in one flat vector: what a gradient is taken by, and where each quantity stands in it.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+namespace sheetbend {
+
+enum class Quantity : int {
+  position,        // initial state, every field in turn (particles x 3)  [m]
+  velocity,        // initial velocity, same shape  [m/s]
+  mass,            // per particle  [kg]; pinned and driven ones do not use it
+  compliance,      // per constraint, in the scene's order
+  damping,         // per constraint: beta of the Rayleigh dissipation (Macklin et al. 2016, eq. 26)
+  rest,            // the constraints' own parameters, constraint by constraint
+  boundary,        // (knots, driven particles, 3) positions  [m]
+  force,           // (knots, loaded particles, 3)  [N]
+  gravity,         // (3)  [m/s^2]
+  drag_linear,     // per particle  [N s/m]
+  drag_quadratic,  // per particle  [N s^2/m^2]
+};
+inline constexpr int quantity_count = 11;
+inline constexpr std::array<const char*, quantity_count> quantity_names{
+    "position", "velocity", "mass",    "compliance",  "damping",       "rest",
+    "boundary", "force",    "gravity", "drag_linear", "drag_quadratic"};
+
+struct Layout {
+  std::array<std::size_t, quantity_count> size{};
+  std::array<std::size_t, quantity_count + 1> offset{};
+
+  void close() {
+    for (int q = 0; q < quantity_count; ++q) offset[q + 1] = offset[q] + size[q];
+  }
+  std::size_t total() const { return offset[quantity_count]; }
+  std::size_t of(Quantity q) const { return offset[static_cast<int>(q)]; }
+  std::size_t count(Quantity q) const { return size[static_cast<int>(q)]; }
+};
+
+// A view of one flat vector by quantity; T may be const.
+template <class T>
+struct Inputs {
+  const Layout& layout;
+  T* data;
+  T* of(Quantity q) const { return data + layout.of(q); }
+};
+
+}  // namespace sheetbend

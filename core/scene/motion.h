@@ -1,0 +1,25 @@
+// Values given at knots in time: x(t) = sum_i weight_i knot_i with at most four knots, so that the adjoint is the same weights.
+// cubic is C1: Hermite pieces whose slopes are the quadratic through three neighboring knots (exact for quadratics, also on uneven knots).
+// Before the first and after the last knot the end value holds.
+#pragma once
+
+#include <array>
+#include <vector>
+
+namespace sheetbend {
+
+enum class Interpolation : int { linear, cubic };
+
+struct KnotWeights {
+  int first = 0;  // index of the first knot
+  int count = 1;
+  std::array<double, 4> weight{1.0, 0.0, 0.0, 0.0};
+};
+
+struct Knots {
+  std::vector<double> times;
+  Interpolation interpolation = Interpolation::cubic;
+  KnotWeights at(double t) const;
+};
+
+}  // namespace sheetbend

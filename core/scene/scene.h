@@ -1,0 +1,73 @@
+// A scene's topology: fields, roles, constraint groups and the times of its motions. Immutable once built; every number that can be
+// differentiated lives outside, in Inputs laid out by `layout`.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/scene/fields.h"
+#include "core/scene/layout.h"
+#include "core/scene/motion.h"
+
+namespace sheetbend {
+
+enum class Role : int { free, pinned, driven };
+
+// A named set of constraints of one kind.
+struct Group {
+  std::string name;
+  int kind = 0;
+  int first = 0, count = 0;  // constraints, in the scene's order
+  bool damped = false;       // whether its rate damping is evaluated at all
+  std::vector<int> stencil;  // (count, arity) nodes
+  int rows = 0, arity = 0, parameters = 0;
+  int first_row = 0;            // of the scene's multipliers
+  std::size_t first_value = 0;       // into Quantity::rest
+  std::size_t first_coordinate = 0;  // into arrays of all stencils' coordinates
+  std::size_t first_gradient = 0;    // into arrays of all constraints' J
+
+  std::span<const int> nodes(int i) const { return {stencil.data() + static_cast<std::size_t>(i) * arity, static_cast<std::size_t>(arity)}; }
+};
+
+struct Scene {
+  Fields fields;
+  std::vector<int> first_dof, dim;  // per node
+  std::vector<Role> role;           // per node
+  std::vector<int> driven;          // nodes whose motion is given, in the order of Quantity::boundary
+  std::vector<int> driven_slot;     // per node: place in `driven`, or -1
+  std::vector<int> loaded;          // nodes that time-dependent forces act on
+  std::vector<int> loaded_slot;
+  bool has_drag = false;
+  Knots boundary, force;
+  std::vector<Group> groups;
+  int constraints = 0, rows = 0;
+  std::size_t stencil_coordinates = 0, gradient_entries = 0;
+  Layout layout;
+
+  int dofs() const { return fields.dofs; }
+  int nodes() const { return fields.nodes; }
+};
+
+struct GroupSpec {
+  std::string name;
+  std::string kind;
+  bool damped = false;
+  std::vector<int> stencil;
+};
+
+struct SceneSpec {
+  int particles = 0;
+  std::vector<int> pinned, driven, loaded;
+  bool has_drag = false;
+  Knots boundary, force;
+  std::vector<GroupSpec> groups;
+};
+
+// Builds and validates the topology. Throws std::invalid_argument("field: what, got, fix").
+Scene build_scene(const SceneSpec& spec);
+
+// Kind number of a constraint name; throws std::invalid_argument that lists the known ones.
+int kind_of(const std::string& name);
+
+}  // namespace sheetbend

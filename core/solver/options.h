@@ -1,0 +1,31 @@
+// How a scene is stepped: substep, integrator, partition into blocks, iterations.
+#pragma once
+
+namespace sheetbend {
+
+enum class Integrator : int { bdf1, bdf2 };
+enum class Partition : int { gauss_seidel, direct };
+
+struct SolverOptions {
+  double h = 1e-3;  // substep [s]
+  Integrator integrator = Integrator::bdf2;
+  Partition partition = Partition::direct;
+  int iterations = 2;
+  int threads = 1;
+  int grain = 256;  // blocks per thread below which a color is not split
+};
+
+// One backward difference formula: x_{n+1} - history(x) = eta v_{n+1}, history(y) = now y_n + before y_{n-1}.
+// BDF1: (x - x_n)/h. BDF2: (3x - 4x_n + x_{n-1})/(2h), so eta = 2h/3. The projection sees only eta: a = alpha/eta^2, g = alpha beta/eta.
+struct Bdf {
+  double eta, now, before;
+  double extrapolate_now, extrapolate_before;  // the velocity at n+1, extrapolated (for the size of quadratic drag)
+
+  // The first substep of BDF2 is BDF1.
+  static Bdf at(const SolverOptions& o, int substep) {
+    if (o.integrator == Integrator::bdf1 || substep == 0) return {o.h, 1.0, 0.0, 1.0, 0.0};
+    return {2.0 * o.h / 3.0, 4.0 / 3.0, -1.0 / 3.0, 2.0, -1.0};
+  }
+};
+
+}  // namespace sheetbend

@@ -1,0 +1,131 @@
+#include "core/solver/ordering.h"
+
+#include <Eigen/OrderingMethods>
+#include <Eigen/SparseCore>
+#include <algorithm>
+#include <map>
+#include <numeric>
+
+namespace sheetbend {
+namespace {
+
+template <class F>
+void for_each_constraint(const Scene& scene, F&& f) {
+  for (int g = 0; g < static_cast<int>(scene.groups.size()); ++g)
+    for (int i = 0; i < scene.groups[g].count; ++i) f(g, i, scene.groups[g].nodes(i));
+}
+
+bool movable(const Scene& scene, int node) { return scene.role[node] == Role::free; }
+
+std::vector<std::vector<int>> movable_neighbors(const Scene& scene) {
+  std::vector<std::vector<int>> neighbors(scene.nodes());
+  for_each_constraint(scene, [&](int, int, std::span<const int> nodes) {
+    for (const int a : nodes)
+      for (const int b : nodes)
+        if (a != b && movable(scene, a) && movable(scene, b)) neighbors[a].push_back(b);
+  });
+  for (auto& list : neighbors) {
+    std::sort(list.begin(), list.end());
+    list.erase(std::unique(list.begin(), list.end()), list.end());
+  }
+  return neighbors;
+}
+
+// Cuthill-McKee from `start`: breadth first, neighbors by degree, then by number.
+std::vector<int> cuthill_mckee(const std::vector<std::vector<int>>& neighbors, int start) {
+  std::vector<int> order{start};
+  std::vector<char> seen(neighbors.size(), 0);
+  seen[start] = 1;
+  for (std::size_t head = 0; head < order.size(); ++head) {
+    std::vector<int> next;
+    for (const int b : neighbors[order[head]])
+      if (!seen[b]) next.push_back(b), seen[b] = 1;
+    std::stable_sort(next.begin(), next.end(), [&](int a, int b) { return neighbors[a].size() < neighbors[b].size(); });
+    order.insert(order.end(), next.begin(), next.end());
+  }
+  return order;
+}
+
+}  // namespace
+
+std::vector<Color> color_constraints(const Scene& scene) {
+  std::vector<Color> colors;
+  for (int g = 0; g < static_cast<int>(scene.groups.size()); ++g) {
+    const Group& group = scene.groups[g];
+    const std::size_t first = colors.size();
+    std::vector<std::vector<char>> taken;  // per color of this group: movable nodes already used
+    for (int i = 0; i < group.count; ++i) {
+      const auto nodes = group.nodes(i);
+      const auto clashes = [&](std::size_t c) {
+        return std::any_of(nodes.begin(), nodes.end(), [&](int n) { return movable(scene, n) && taken[c][n]; });
+      };
+      std::size_t c = 0;
+      while (c < taken.size() && clashes(c)) ++c;
+      if (c == taken.size()) {
+        taken.emplace_back(scene.nodes(), 0);
+        colors.push_back({g, {}});
+      }
+      for (const int n : nodes) taken[c][n] = 1;
+      colors[first + c].items.push_back(i);
+    }
+  }
+  return colors;
+}
+
+std::vector<std::vector<Member>> connected_chains(const Scene& scene) {
+  const auto neighbors = movable_neighbors(scene);
+  std::vector<int> component(scene.nodes(), -1), rank(scene.nodes(), -1);
+  int components = 0;
+  for (int n = 0; n < scene.nodes(); ++n) {
+    if (!movable(scene, n) || component[n] >= 0) continue;
+    // The last node of a breadth-first walk lies at an end; walking again from there numbers the chain along its length.
+    const auto order = cuthill_mckee(neighbors, cuthill_mckee(neighbors, n).back());
+    for (std::size_t k = 0; k < order.size(); ++k) {
+      component[order[k]] = components;
+      rank[order[k]] = static_cast<int>(k);
+    }
+    ++components;
+  }
+  struct Keyed {
+    int low, high;
+    Member member;
+  };
+  std::vector<std::vector<Keyed>> keyed(components);
+  for_each_constraint(scene, [&](int g, int i, std::span<const int> nodes) {
+    int low = scene.nodes(), high = -1, home = -1;
+    for (const int n : nodes)
+      if (movable(scene, n)) low = std::min(low, rank[n]), high = std::max(high, rank[n]), home = component[n];
+    keyed[home].push_back({low, high, {g, i, 0}});
+  });
+  std::vector<std::vector<Member>> chains;
+  for (auto& list : keyed) {
+    if (list.empty()) continue;
+    std::stable_sort(list.begin(), list.end(), [](const Keyed& a, const Keyed& b) {
+      return a.low != b.low ? a.low < b.low : a.high < b.high;
+    });
+    chains.emplace_back();
+    for (const Keyed& k : list) chains.back().push_back(k.member);
+  }
+  return chains;
+}
+
+void order_for_low_fill(const Scene& scene, std::vector<Member>& members) {
+  std::map<int, std::vector<int>> users;
+  for (int m = 0; m < static_cast<int>(members.size()); ++m)
+    for (const int n : scene.groups[members[m].group].nodes(members[m].item))
+      if (movable(scene, n)) users[n].push_back(m);
+  std::vector<Eigen::Triplet<double>> entries;
+  for (const auto& [node, list] : users)
+    for (const int a : list)
+      for (const int b : list) entries.emplace_back(a, b, 1.0);
+  const int n = static_cast<int>(members.size());
+  Eigen::SparseMatrix<double> graph(n, n);
+  graph.setFromTriplets(entries.begin(), entries.end());
+  Eigen::PermutationMatrix<Eigen::Dynamic> permutation;
+  Eigen::AMDOrdering<int>()(graph, permutation);
+  std::vector<Member> ordered(members.size());
+  for (int i = 0; i < n; ++i) ordered[i] = members[permutation.indices()(i)];
+  members = std::move(ordered);
+}
+
+}  // namespace sheetbend

@@ -1,0 +1,90 @@
+// A rollout: substeps from the initial state. The forward program is the same whether its states are kept (the tape) or not.
+#pragma once
+
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include "core/solver/interrupt.h"
+#include "core/solver/substep.h"
+
+namespace sheetbend {
+
+// A state became infinite or NaN.
+struct Diverged : std::runtime_error {
+  int substep, node;
+  double time;
+  Diverged(int substep_, int node_, double time_)
+      : std::runtime_error("the rollout diverged at substep " + std::to_string(substep_) + " (t = " + std::to_string(time_) +
+                           " s), first at particle " + std::to_string(node_) +
+                           ". Fix: use a smaller substep, more iterations, or check masses and stiffnesses"),
+        substep(substep_), node(node_), time(time_) {}
+};
+
+template <class T>
+class Rollout {
+ public:
+  Rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0 = 0.0)
+      : scene_(scene), plan_(plan), in_{scene.layout, inputs}, t0_(t0) {
+    for (auto* buffer : {&x_, &x_before_, &x_next_, &v_, &v_before_, &v_next_}) buffer->resize(scene.dofs());
+    record_.resize(scene, plan, false);
+    scratch_.resize(scene);
+    initial_state(scene, in_, t0, x_.data(), v_.data());
+    x_before_ = x_;
+    v_before_ = v_;
+  }
+
+  // Driven nodes start where their boundary is at t0.
+  static void initial_state(const Scene& scene, const Inputs<const T>& in, double t0, T* x, T* v) {
+    std::copy_n(in.of(Quantity::position), scene.dofs(), x);
+    std::copy_n(in.of(Quantity::velocity), scene.dofs(), v);
+    if (scene.driven.empty()) return;
+    const KnotWeights k = scene.boundary.at(t0);
+    for (std::size_t i = 0; i < scene.driven.size(); ++i)
+      at_knots(k, in.of(Quantity::boundary), static_cast<int>(scene.driven.size()), static_cast<int>(i))
+          .store(x + scene.first_dof[scene.driven[i]]);
+  }
+
+  void advance() {
+    const Bdf bdf = Bdf::at(plan_.options, step_);
+    substep(scene_, plan_, in_, bdf, time(step_ + 1), {x_.data(), x_before_.data(), v_.data(), v_before_.data()}, x_next_.data(),
+            v_next_.data(), record_, scratch_);
+    ++step_;
+    std::swap(x_before_, x_);
+    std::swap(x_, x_next_);
+    std::swap(v_before_, v_);
+    std::swap(v_, v_next_);
+    check_finite();
+  }
+
+  // Calls sink(step, x, v, lambda) for the initial state (lambda all zero) and after every substep.
+  template <class Sink>
+  void run(int steps, Sink&& sink, Interrupt* interrupt = nullptr) {
+    sink(0, x_.data(), v_.data(), record_.lambda.data());
+    for (int n = 0; n < steps; ++n) {
+      if (interrupt && n % 64 == 0) interrupt->poll();
+      advance();
+      sink(step_, x_.data(), v_.data(), record_.lambda.data());
+    }
+  }
+
+  double time(int step) const { return t0_ + step * plan_.options.h; }
+
+ private:
+  void check_finite() const {
+    for (int n = 0; n < scene_.nodes(); ++n)
+      for (int d = 0; d < scene_.dim[n]; ++d)
+        if (!all_finite(x_[scene_.first_dof[n] + d])) throw Diverged(step_, n, time(step_));
+  }
+
+  const Scene& scene_;
+  const Plan& plan_;
+  Inputs<const T> in_;
+  double t0_;
+  int step_ = 0;
+  std::vector<T> x_, x_before_, x_next_, v_, v_before_, v_next_;
+  SubstepRecord<T> record_;
+  Scratch<T> scratch_;
+};
+
+}  // namespace sheetbend

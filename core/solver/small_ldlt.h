@@ -1,0 +1,40 @@
+// LDL^T of a tiny symmetric matrix over any scalar, without pivoting: A is J W J^T plus a non-negative diagonal.
+// A row whose pivot is exactly zero (nothing of it can move) gets the solution zero.
+#pragma once
+
+#include "core/scalar/scalar.h"
+
+namespace sheetbend {
+
+template <int N, class T>
+class SmallLdlt {
+ public:
+  // Takes the lower triangle of A, row-major.
+  explicit SmallLdlt(const T* A) {
+    for (int i = 0; i < N; ++i) {
+      for (int j = 0; j < i; ++j) {
+        T sum = A[i * N + j];
+        for (int k = 0; k < j; ++k) sum -= L_[i][k] * D_[k] * L_[j][k];
+        L_[i][j] = sum * inverse_[j];
+      }
+      T sum = A[i * N + i];
+      for (int k = 0; k < i; ++k) sum -= L_[i][k] * L_[i][k] * D_[k];
+      D_[i] = sum;
+      const auto movable = sum > T(0.0);
+      inverse_[i] = select(movable, T(1.0) / select(movable, sum, T(1.0)), T(0.0));
+    }
+  }
+
+  void solve(T* b) const {
+    for (int i = 1; i < N; ++i)
+      for (int k = 0; k < i; ++k) b[i] -= L_[i][k] * b[k];
+    for (int i = 0; i < N; ++i) b[i] = b[i] * inverse_[i];
+    for (int i = N - 1; i >= 0; --i)
+      for (int k = i + 1; k < N; ++k) b[i] -= L_[k][i] * b[k];
+  }
+
+ private:
+  T L_[N][N], D_[N], inverse_[N];
+};
+
+}  // namespace sheetbend

@@ -1,0 +1,259 @@
+"""Covariance of fitted parameters when the residuals are not white.
+
+A model that is not quite right leaves residuals that are alike from one frame to the next and from one marker to its
+neighbor. Then (J'J)^-1 s^2 is far too small. The sandwich is honest:
+
+    cov = B (J' Omega J) B,   B = (J'J + P'P)^-1,   Omega = cov(residuals),  P the rows of the priors,
+
+with Omega = C (x) rho: C the covariance of the channels of a recording (marker coordinates), rho the autocorrelation over
+frames, from an autoregressive spectrum (Yule-Walker, order by the Bayesian criterion) pooled over all channels. Fitting
+takes correlation out of the residuals; the spectrum is multiplied by the ratio of observed to expected one, where the
+expectation follows exactly from B and J.
+
+Why not Newey and West (1987, Econometrica 55, 703) alone: their lagged cross products see variances that change over
+time, which Omega does not, but at 100 to 400 frames and a lag-one correlation of 0.8 their 95 % intervals cover 77 to
+93 % of the truths, those of Omega 90 to 97 % (white ones 44 to 78 %). So each parameter takes the largest of the three.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .errors import InputError
+
+_MAX_ORDER = 20
+_CORRECTIONS = 2  # the second already changes the intervals by less than 1 %
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where each residual row comes from: integer arrays of shape (rows,).
+
+    Attributes:
+        recording: which recording; rows of different recordings are independent.
+        channel: which series within it (a marker coordinate); channels of one recording may correlate.
+        frame: the place within the series: frame number in time, or point number along a static shape.
+    """
+
+    recording: np.ndarray
+    channel: np.ndarray
+    frame: np.ndarray
+
+    def __post_init__(self) -> None:
+        for field in ("recording", "channel", "frame"):
+            array = np.asarray(getattr(self, field))
+            if array.ndim != 1 or not np.issubdtype(array.dtype, np.integer):
+                raise InputError(f"layout.{field}", "must be one integer per row", array, "give shape (rows,)")
+            object.__setattr__(self, field, array)
+        if not len(self.recording) == len(self.channel) == len(self.frame):
+            lengths = (len(self.recording), len(self.channel), len(self.frame))
+            raise InputError("layout", "has arrays of different lengths", lengths, "give one entry per residual row")
+        places = np.stack([self.recording, self.channel, self.frame])
+        if np.unique(places, axis=1).shape[1] != len(self.frame):
+            fix = "number the recordings, channels and frames apart"
+            raise InputError("layout", "has two rows in one place", len(self.frame), fix)
+
+    @staticmethod
+    def series(rows: int) -> Layout:
+        """One series of `rows` equally spaced samples."""
+        zeros = np.zeros(rows, dtype=int)
+        return Layout(zeros, zeros, np.arange(rows))
+
+
+@dataclass(frozen=True)
+class Covariance:
+    """What the residuals say about the internal parameters, p of them.
+
+    Attributes:
+        matrix: (p, p) covariance.
+        degrees: (p,) effective degrees of freedom: rows/inflation - p, at least 1.
+        inflation: (p,) variance relative to that for white residuals of the same size, at least 1.
+        residual_variance: sum of squares/(rows - p).
+        autocorrelation_time: frames that count as one, 1 for white residuals.
+    """
+
+    matrix: np.ndarray
+    degrees: np.ndarray
+    inflation: np.ndarray
+    residual_variance: float
+    autocorrelation_time: float
+
+
+def covariance(
+    residuals: np.ndarray, jacobian: np.ndarray, layout: Layout | None = None, prior_jacobian: np.ndarray | None = None
+) -> Covariance:
+    """Covariance of a least-squares estimate from its residuals.
+
+    Args:
+        residuals: (rows,) weighted residuals of the data at the minimum.
+        jacobian: (rows, p) their derivative; of full column rank together with the prior rows.
+        layout: where each row comes from; one series of equally spaced samples by default.
+        prior_jacobian: (priors, p) rows of the priors; their residuals have unit variance by their meaning.
+
+    Raises:
+        InputError: shapes disagree, or there are no more rows than parameters.
+    """
+    rows, count = jacobian.shape
+    layout = Layout.series(rows) if layout is None else layout
+    if residuals.shape != (rows,) or layout.frame.shape != (rows,):
+        shapes = (residuals.shape, jacobian.shape, layout.frame.shape)
+        raise InputError("residuals", "disagree with the jacobian or the layout", shapes, "give one row to each")
+    prior = np.zeros((0, count)) if prior_jacobian is None else prior_jacobian
+    size = np.sqrt((jacobian**2).sum(0) + (prior**2).sum(0))
+    jacobian, prior = jacobian / size, prior / size
+    bread = np.linalg.inv(jacobian.T @ jacobian + prior.T @ prior)
+    absorbed = float(((jacobian @ bread) * jacobian).sum())  # parameters' worth of residual that the fit took away
+    if rows - absorbed < 0.5:
+        raise InputError("residuals", "must outnumber the free parameters", rows, f"give more than {count} rows")
+    variance = float(residuals @ residuals) / (rows - absorbed)
+    from_data = variance * (bread @ (jacobian.T @ jacobian) @ bread)
+    inflation, time = np.ones(count), 1.0
+    if variance > 0:
+        grid = _Grid(layout, residuals)
+        spectral, time = _spectral(grid, jacobian, bread)
+        robust = _newey_west(grid, jacobian @ bread) * rows / (rows - absorbed)
+        white = np.diag(from_data).copy()
+        inflation = np.maximum(np.maximum(np.diag(spectral), robust) / white, 1.0)
+        if np.all(np.diag(spectral) > 1e-6 * white):  # else its correlations mean nothing: one frame only, say
+            from_data = spectral
+        stretch = np.sqrt(inflation * white / np.diag(from_data))
+        from_data = from_data * np.outer(stretch, stretch)
+    matrix = (from_data + bread @ prior.T @ prior @ bread) / np.outer(size, size)
+    return Covariance(matrix, np.maximum(rows / inflation - absorbed, 1.0), inflation, variance, time)
+
+
+class _Grid:
+    """Rows laid out as (frames, channels) arrays, zero where there is no row."""
+
+    def __init__(self, layout: Layout, residuals: np.ndarray) -> None:
+        owner, self._recording = np.unique(layout.recording, return_inverse=True)
+        channels, self._channel = np.unique(
+            np.stack([self._recording, layout.channel]), axis=1, return_inverse=True
+        )
+        first = np.full(len(owner), np.iinfo(int).max)
+        np.minimum.at(first, self._recording, layout.frame)
+        self._frame = layout.frame - first[self._recording]
+        self.recordings = channels[0]  # of each channel
+        self.frames = int(self._frame.max()) + 1
+        self.length = 2 << (2 * self.frames - 1).bit_length()  # twice what lags need: narrow spectral peaks count
+        self.residuals = self.dense(residuals)
+        self.mask = self.dense(np.ones(len(residuals)))
+
+    def dense(self, column: np.ndarray) -> np.ndarray:
+        """(rows,) as (frames, channels)."""
+        array = np.zeros((self.frames, len(self.recordings)))
+        array[self._frame, self._channel] = column
+        return array
+
+    def scores(self, influence: np.ndarray) -> list[np.ndarray]:
+        """Per recording (frames, p): the influence (rows, p) of each frame on the estimate, summed over channels."""
+        rows = influence * self.residuals[self._frame, self._channel][:, None]
+        sums = np.zeros((self._recording.max() + 1, self.frames, influence.shape[1]))
+        np.add.at(sums, (self._recording, self._frame), rows)
+        return [sums[index, : self._frame[self._recording == index].max() + 1] for index in range(len(sums))]
+
+    def transform(self, array: np.ndarray) -> np.ndarray:
+        """Fourier transform along the frames, padded so that nothing wraps around."""
+        return np.fft.rfft(array, self.length, axis=0)
+
+    def lags(self, power: np.ndarray, count: int) -> np.ndarray:
+        """Lagged sums 0 ... count of a (cross) power spectrum (frequencies,)."""
+        return np.fft.irfft(power, self.length)[: count + 1]
+
+    def channel_covariance(self) -> np.ndarray:
+        """(channels, channels), zero between recordings, scaled to the pooled variance 1."""
+        number = self.mask.sum(0)
+        matrix = self.residuals.T @ self.residuals / np.sqrt(np.outer(number, number))
+        matrix[self.recordings[:, None] != self.recordings] = 0.0
+        return matrix * number.sum() / (self.residuals**2).sum()
+
+
+def _spectral(grid: _Grid, jacobian: np.ndarray, bread: np.ndarray) -> tuple[np.ndarray, float]:
+    """B J' Omega J B with Omega = C (x) rho, and the autocorrelation time of rho in frames."""
+    root = np.linalg.cholesky(bread)
+    columns = [grid.dense(column) for column in (jacobian @ root).T]  # H = Q Q' takes Omega to cov(residuals)
+    mixing = grid.channel_covariance()
+    rows = grid.mask.sum()
+    most = min(_MAX_ORDER, int(10 * np.log10(grid.frames)), grid.frames // 4)
+    pooled = (np.abs(grid.transform(grid.residuals)) ** 2).sum(1)
+    recursion = _levinson(grid.lags(pooled, most) / rows)
+    worth = rows * np.trace(mixing) ** 2 / (len(mixing) * (mixing**2).sum())  # rows that are worth an independent one
+    order = int(np.argmin([worth * np.log(noise) + np.log(worth) * len(a) for a, noise in recursion]))
+    observed = _spectrum(*recursion[order], grid.length)
+    pairs = grid.lags((np.abs(grid.transform(grid.mask)) ** 2) @ np.diag(mixing), most)
+    spectrum = observed
+    for step in range(_CORRECTIONS + 1):
+        spread = [_colored(grid, column, spectrum, mixing) for column in columns]
+        inner = np.array([[(q * a).sum() for a in spread] for q in columns])
+        if step < _CORRECTIONS:
+            expected = _expected_lags(grid, spectrum, pairs, columns, spread, inner)
+            spectrum = spectrum * observed / _spectrum(*_levinson(expected / rows)[order], grid.length)
+    time = max(float(spectrum[0] / np.fft.irfft(spectrum, grid.length)[0]), 1.0)
+    return root @ (inner + inner.T) @ root.T / 2, time
+
+
+def _colored(grid: _Grid, column: np.ndarray, spectrum: np.ndarray, mixing: np.ndarray) -> np.ndarray:
+    """Omega times a (frames, channels) array."""
+    filtered = np.fft.irfft(grid.transform(column) * spectrum[:, None], grid.length, axis=0)[: grid.frames]
+    return grid.mask * (filtered @ mixing)
+
+
+def _expected_lags(
+    grid: _Grid,
+    spectrum: np.ndarray,
+    pairs: np.ndarray,
+    columns: list[np.ndarray],
+    spread: list[np.ndarray],
+    inner: np.ndarray,
+) -> np.ndarray:
+    """Expected lagged sums of the fitted residuals (1 - H) e for errors e of covariance Omega.
+
+    (1 - H) Omega (1 - H)' = Omega - Q A' - A Q' + Q G Q' with A = Omega Q and G = Q' A, summed along its diagonals.
+    """
+    gains, turn = np.linalg.eigh((inner + inner.T) / 2)
+    power = np.zeros(len(spectrum))
+    for gain, weights in zip(gains, turn.T, strict=True):
+        q = grid.transform(sum(w * column for w, column in zip(weights, columns, strict=True)))
+        a = grid.transform(sum(w * column for w, column in zip(weights, spread, strict=True)))
+        power += (gain * np.abs(q) ** 2 - 2 * (q.conj() * a).real).sum(1)
+    return pairs * grid.lags(spectrum, len(pairs) - 1) + grid.lags(power, len(pairs) - 1)
+
+
+def _levinson(lags: np.ndarray) -> list[tuple[np.ndarray, float]]:
+    """Autoregressive coefficients and innovation variance of every order from 0 (Levinson's recursion)."""
+    coefficients, noise = np.zeros(0), float(lags[0])
+    fits = [(coefficients, noise)]
+    for order in range(1, len(lags)):
+        reflection = (lags[order] - coefficients @ lags[order - 1 : 0 : -1]) / noise
+        coefficients = np.append(coefficients - reflection * coefficients[::-1], reflection)
+        noise *= max(1 - reflection**2, 1e-12)
+        fits.append((coefficients, noise))
+    return fits
+
+
+def _spectrum(coefficients: np.ndarray, noise: float, length: int) -> np.ndarray:
+    """Power at the frequencies of a real transform of `length` samples."""
+    return noise / np.abs(np.fft.rfft(np.append(1.0, -coefficients), length)) ** 2
+
+
+def _newey_west(grid: _Grid, influence: np.ndarray) -> np.ndarray:
+    """(p,) variances by Bartlett-weighted lagged products, with the lag of Newey and West (1994)."""
+    scores = grid.scores(influence)
+    frames = sum(len(part) for part in scores)
+    longest = max(len(part) for part in scores) - 1
+    pilot = min(int(4 * (frames / 100) ** (2 / 9)), longest)
+
+    def product(lag: int) -> np.ndarray:
+        return sum((part[: len(part) - lag] * part[lag:]).sum(0) for part in scores)
+
+    lagged = [product(lag) for lag in range(pilot + 1)]
+    level = np.abs(lagged[0] + 2 * sum(lagged[1:]))
+    slope = 2 * sum(lag * lagged[lag] for lag in range(1, pilot + 1)) if pilot else np.zeros_like(level)
+    bandwidth = 1.1447 * (slope**2 / np.maximum(level, 1e-12 * lagged[0]) ** 2 * frames) ** (1 / 3)
+    lags = np.minimum(bandwidth.astype(int), longest // 4)
+    total = lagged[0].copy()
+    for lag in range(1, int(lags.max()) + 1):
+        total += 2 * np.maximum(1 - lag / (lags + 1), 0.0) * product(lag)
+    return np.maximum(total, 0.0)

@@ -1,0 +1,70 @@
+"""Errors that users meet: each names the field, what it got and how to put it right."""
+
+from __future__ import annotations
+
+import reprlib
+
+_short = reprlib.Repr()
+_short.maxstring = _short.maxother = 120
+
+
+class SheetbendError(Exception):
+    """Base of every error that sheetbend raises on purpose."""
+
+
+class InputError(SheetbendError, ValueError):
+    """An input is wrong; raised before any work starts.
+
+    Args:
+        field: the field, argument or file at fault, as the user writes it.
+        problem: what is wrong with it, or what it must be.
+        got: the offending value itself (shown shortened).
+        fix: what to do about it, as an instruction.
+    """
+
+    def __init__(self, field: str, problem: str, got: object, fix: str) -> None:
+        super().__init__(field, problem, got, fix)
+        self.field = field
+        self.problem = problem
+        self.got = got
+        self.fix = fix
+
+    def __str__(self) -> str:
+        return f"{self.field}: {self.problem} (got {_short.repr(self.got)}). Fix: {self.fix}."
+
+
+class SceneError(InputError):
+    """A scene (particles, constraints, boundary) is inconsistent."""
+
+
+class RecordingError(InputError):
+    """A recording, or a file that should hold one, is inconsistent."""
+
+
+class ConfigError(InputError):
+    """A configuration has an unknown key, a wrong value or a missing one."""
+
+
+class DivergenceError(SheetbendError, RuntimeError):
+    """A rollout left the finite numbers.
+
+    Args:
+        substep: index of the substep that failed, from 0.
+        time: its time, s.
+        particle: index of the first particle that is not finite.
+        where: what was being computed, in words (solver, constraint group).
+    """
+
+    def __init__(self, substep: int, time: float, particle: int, where: str) -> None:
+        super().__init__(substep, time, particle, where)
+        self.substep = substep
+        self.time = time
+        self.particle = particle
+        self.where = where
+
+    def __str__(self) -> str:
+        return (
+            f"the rollout diverged: particle {self.particle} is not finite after substep {self.substep} "
+            f"(t = {self.time:.6g} s), in {self.where}. Fix: use a smaller substep or more iterations, and "
+            "check masses, forces and boundary motion near that time."
+        )

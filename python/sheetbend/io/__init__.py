@@ -1,0 +1,52 @@
+"""Files of recordings. A format is one module with `read(path) -> Recording` and `write(recording, path)`.
+
+A reader takes the numbers as they stand in the file; length units, names and whatever else the JSON beside
+the file tells (`sidecar`) are applied here, the same for every format. To add a format, write its module
+and add its line to `FORMATS`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import ModuleType
+
+from ..errors import RecordingError
+from ..recording import Recording
+from ..recording_checks import check_seen
+from . import csv, npz, sidecar
+
+FORMATS: dict[str, ModuleType] = {
+    ".npz": npz,
+    ".csv": csv,
+}
+
+
+def read(path: Path, units: str | None = None) -> Recording:
+    """Read the recording at path and the JSON beside it; see `Recording.load`."""
+    file_format = _format(path)
+    if not path.is_file():
+        fix = "check the path; relative paths start at the working directory"
+        raise RecordingError("path", "is no file", str(path), fix)
+    if path.stat().st_size == 0:
+        raise RecordingError(str(path), "is empty", "0 bytes", "export the recording again")
+    return sidecar.apply(file_format.read(path), path, units)
+
+
+def write(recording: Recording, path: Path) -> None:
+    """Write the recording and the JSON beside it; see `Recording.save`."""
+    file_format = _format(path)
+    if not path.parent.is_dir():
+        fix = "make the folder first"
+        raise RecordingError("path", "lies in a folder that does not exist", str(path), fix)
+    check_seen(recording.positions, recording.markers)  # a piece may lack a marker; a file may not
+    sidecar.write(recording, path)
+    file_format.write(recording, path)
+
+
+def _format(path: Path) -> ModuleType:
+    try:
+        return FORMATS[path.suffix.lower()]
+    except KeyError:
+        known = " or ".join(FORMATS)
+        fix = f"use a file that ends in {known}"
+        raise RecordingError("path", "has a suffix that no reader knows", str(path), fix) from None

@@ -1,0 +1,133 @@
+"""The JSON beside a recording: what its numbers mean and where they come from.
+
+    units     text that starts with the length unit of the file, m, cm or mm ("mm" or "m, s, N"); default m
+    name      what reports call the recording; default: the file's stem
+    markers   list of names, for files that have none
+    clamped   list of names or indices of driven markers, for files that do not say
+    gravity   [x, y, z] in m/s^2
+
+All else is metadata, kept as it stands and in its own units: known values, license, attribution. Text under
+`markers` or `clamped` is a remark, kept as `markers_note` and `clamped_note`; units that say more than the
+length are kept as `units_note`. `arrays` describes the file, not the recording, and is not kept.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from ..errors import RecordingError
+from ..recording import Recording
+from ..recording_checks import checked_markers, default_markers, marker_indices
+
+METERS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+_RESERVED = ("units", "name", "markers", "clamped", "gravity", "arrays")
+
+
+def apply(recording: Recording, path: Path, units: str | None) -> Recording:
+    """The recording as read from `path`, in meters, with what the JSON beside it adds.
+
+    Args:
+        recording: as the reader gave it, lengths in the unit of the file.
+        path: the file that was read.
+        units: length unit of the file; None takes the JSON's.
+
+    Raises:
+        RecordingError: the JSON is malformed, disagrees with the file, or the unit is unknown.
+    """
+    beside = _read(path.with_suffix(".json"))
+    scale = _meters(units if units is not None else beside.get("units", "m"))
+    markers = _markers(recording, beside)
+    return Recording(
+        positions=recording.positions * scale,
+        times=recording.times,
+        markers=markers,
+        clamped=_clamped(recording, beside, markers),
+        name=beside.get("name", path.stem),
+        gravity=beside.get("gravity"),
+        metadata=_metadata(beside),
+    )
+
+
+def write(recording: Recording, path: Path) -> None:
+    """Write the JSON beside `path`.
+
+    Raises:
+        RecordingError: the metadata use a reserved key or hold what JSON cannot.
+    """
+    taken = [key for key in _RESERVED if key in recording.metadata]
+    if taken:
+        fix = f"rename it; {', '.join(_RESERVED)} are written from the recording itself"
+        raise RecordingError("metadata", "uses a reserved key", taken, fix)
+    content = {
+        "name": recording.name,
+        "units": "m",
+        "markers": recording.markers,
+        "clamped": [recording.markers[i] for i in recording.clamped],
+        **({} if recording.gravity is None else {"gravity": recording.gravity.tolist()}),
+        **recording.metadata,
+    }
+    try:
+        text = json.dumps(content, indent=1, ensure_ascii=False)
+    except (TypeError, ValueError) as error:
+        fix = "keep plain numbers, text, lists and dicts in metadata"
+        raise RecordingError("metadata", "cannot be written as JSON", str(error), fix) from error
+    path.with_suffix(".json").write_text(text + "\n", encoding="utf-8")
+
+
+def _read(path: Path) -> dict[str, Any]:
+    if not path.is_file():
+        return {}
+    try:
+        content = json.loads(path.read_text(encoding="utf-8-sig"))
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        fix = "mend it, or move it away"
+        raise RecordingError(str(path), "is malformed JSON", str(error), fix) from error
+    if not isinstance(content, dict):
+        fix = 'write {"units": "m", ...}'
+        raise RecordingError(str(path), "must be a JSON object", type(content).__name__, fix)
+    return content
+
+
+def _meters(units: Any) -> float:
+    length = units.split(",")[0].strip() if isinstance(units, str) else None
+    if length not in METERS:
+        known = ", ".join(METERS)
+        fix = f"start with one of {known}, in the JSON beside the file or as load(path, units=...)"
+        raise RecordingError("units", "names no known length unit", units, fix)
+    return METERS[length]
+
+
+def _markers(recording: Recording, beside: dict[str, Any]) -> tuple[str, ...]:
+    named = beside.get("markers", [])
+    if isinstance(named, str) or not named:
+        return recording.markers
+    in_file = recording.markers
+    names = checked_markers(named, len(in_file))
+    if in_file not in (names, default_markers(len(in_file))):
+        fix = f"use the file's names, {list(in_file)}, or leave them out"
+        raise RecordingError("markers", "in the JSON differ from the file's", named, fix)
+    return names
+
+
+def _clamped(recording: Recording, beside: dict[str, Any], markers: tuple[str, ...]) -> tuple[int, ...]:
+    said = beside.get("clamped", [])
+    if isinstance(said, str) or not said:
+        return recording.clamped
+    named = marker_indices("clamped", said, markers)
+    if recording.clamped and set(named) != set(recording.clamped):
+        fix = f"use the file's, {list(recording.clamped)}, or leave them out"
+        raise RecordingError("clamped", "in the JSON differs from the file's", said, fix)
+    return recording.clamped or named
+
+
+def _metadata(beside: dict[str, Any]) -> dict[str, Any]:
+    kept = {key: value for key, value in beside.items() if key not in _RESERVED}
+    for key in ("markers", "clamped"):
+        if isinstance(beside.get(key), str):
+            kept[f"{key}_note"] = beside[key]
+    units = beside.get("units", "m")
+    if units not in METERS:
+        kept["units_note"] = units
+    return kept
