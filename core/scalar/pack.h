@@ -17,7 +17,7 @@ struct Pack {
 
   Vector v{};
   Pack() = default;
-  Pack(double a) : v(Vector{} + a) {}
+  Pack(double a) : v(a - Vector{}) {}
   explicit Pack(const Vector& a) : v(a) {}
   double operator[](int lane) const { return v[lane]; }
   void set(int lane, double a) { v[lane] = a; }

@@ -32,13 +32,15 @@ struct Scratch {
   }
 };
 
-// x' = x + W J^T dl on one stencil.
+// x' = x + W J^T dl on one stencil. Fixed nodes are not written at all: constraints that run in parallel may share them.
 template <class K, class T>
 void apply(const SubstepState<T>& s, const Element<K, T>& e, const T* J, const T* dl) {
   T push[K::dofs]{};
   transpose_times<K>(J, dl, push);
-  for (int k = 0; k < K::arity; ++k)
+  for (int k = 0; k < K::arity; ++k) {
+    if (s.scene.role[e.nodes[k]] != Role::free) continue;
     for (int d = 0; d < 3; ++d) s.q[s.scene.first_dof[e.nodes[k]] + d] += e.w[k] * push[3 * k + d];
+  }
 }
 
 template <class T>

@@ -1,7 +1,8 @@
 """What a fit may change: named physical parameters, their bounds, scales, ties and priors.
 
-The optimizer works on an *internal* vector: one entry per free parameter, the natural logarithm of the value where the
-parameter has a log scale, the value itself elsewhere. Everything else (scenes, reports, files) sees physical values.
+The optimizer works on an *internal* vector: one entry per free parameter, the natural logarithm of the value
+where the parameter has a log scale, the value itself elsewhere. Everything else (scenes, reports, files)
+sees physical values.
 """
 
 from __future__ import annotations
@@ -9,10 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, NoReturn
 
 import numpy as np
 
 from .errors import InputError
+from .timeseries import Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,16 +26,17 @@ class Parameter:
         name: the `<group>_<quantity>` name used in scenes, files and reports.
         initial: the starting value, in `unit`. A tied parameter has none.
         lower, upper: bounds, in `unit`.
-        log: fit the natural logarithm (for quantities that are positive and known by their order of magnitude).
+        log: fit the natural logarithm (for quantities that are positive and known by their order of
+            magnitude).
         fixed: keep the initial value.
         tied_to: the parameter that this one follows: value = factor * value of `tied_to`.
         factor: see `tied_to`.
-        prior: (mean, sd). The mean is in `unit`; the sd too, but with `log` it is that of the natural logarithm
-            (0.1 means about 10 %).
+        prior: (mean, sd). The mean is in `unit`; the sd too, but with `log` it is that of the natural
+            logarithm (0.1 means about 10 %).
         unit: SI unit, for reports.
         private: one value per recording instead of one for all of them.
-        scale: a natural size in `unit` for a parameter that may well be zero (angles, offsets): precision is then judged
-            against it instead of against the value.
+        scale: a natural size in `unit` for a parameter that may well be zero (angles, offsets): precision is
+            then judged against it instead of against the value.
 
     Raises:
         InputError: a field is inconsistent; the message names it.
@@ -63,16 +67,16 @@ class Parameter:
                 "scale", "must be a size", self.scale, "give a positive number, such as 0.1 rad for an angle"
             )
 
-    def _fail(self, field: str, problem: str, got: object, fix: str) -> None:
+    def _fail(self, field: str, problem: str, got: object, fix: str) -> NoReturn:
         raise InputError(f"{self.name}.{field}", problem, got, fix)
 
     def _check_value(self) -> None:
-        bounds = (self.lower, self.upper)
-        if self.initial is None or not math.isfinite(self.initial):
-            self._fail("initial", "must be a finite number", self.initial, "give a starting value")
+        bounds, initial = (self.lower, self.upper), self.initial
+        if initial is None or not math.isfinite(initial):
+            self._fail("initial", "must be a finite number", initial, "give a starting value")
         if math.isnan(self.lower) or math.isnan(self.upper) or not self.lower < self.upper:
             self._fail("bounds", "must enclose a range", bounds, "give a lower bound below the upper one")
-        if self.log and self.initial <= 0:
+        if self.log and initial <= 0:
             self._fail(
                 "initial", "must be positive on a log scale", self.initial, "raise it or set log = false"
             )
@@ -80,7 +84,7 @@ class Parameter:
             self._fail(
                 "lower", "must be positive on a log scale", self.lower, "raise it, or leave it out for none"
             )
-        if not self.lower <= self.initial <= self.upper:
+        if not self.lower <= initial <= self.upper:
             problem = f"lies outside its bounds [{self.lower:g}, {self.upper:g}]"
             self._fail("initial", problem, self.initial, "start inside the bounds, or widen them")
         if self.factor != 1.0:
@@ -88,16 +92,16 @@ class Parameter:
                 "factor", "belongs to a tie", self.factor, "name the other parameter in tied_to, or drop it"
             )
         if self.prior is not None:
-            self._check_prior()
+            self._check_prior(self.prior)
 
-    def _check_prior(self) -> None:
+    def _check_prior(self, prior: tuple[float, float]) -> None:
         if self.fixed:
             self._fail(
                 "prior", "has no effect on a fixed parameter", self.prior, "free it, or drop the prior"
             )
-        if len(self.prior) != 2 or not all(math.isfinite(part) for part in self.prior):
+        if len(prior) != 2 or not all(math.isfinite(part) for part in prior):
             self._fail("prior", "must be two finite numbers", self.prior, "give (mean, sd)")
-        mean, sd = self.prior
+        mean, sd = prior
         if sd <= 0:
             self._fail("prior", "must have a positive sd", self.prior, "raise the sd, or fix the parameter")
         if self.log and mean <= 0:
@@ -137,7 +141,8 @@ class Parameters(Mapping[str, Parameter]):
     """An ordered mapping from name to `Parameter`, and the map between internal vectors and physical values.
 
     Raises:
-        InputError: two parameters share a name, a tie leads nowhere or in a circle, or nothing is left to fit.
+        InputError: two parameters share a name, a tie leads nowhere or in a circle, or nothing is left to
+            fit.
     """
 
     def __init__(self, parameters: Iterable[Parameter]) -> None:
@@ -190,8 +195,13 @@ class Parameters(Mapping[str, Parameter]):
             factor, here = factor * here.factor, target
         return here.name, factor
 
-    def replace(self, name: str, **changes: object) -> Parameters:
-        """The same parameters with fields of one of them changed, such as `replace("rope_EA", fixed=True)`."""
+    @property
+    def roots(self) -> Mapping[str, tuple[str, float]]:
+        """For every name the parameter that carries its value, itself or the end of its ties, and the factor to it."""
+        return self._roots
+
+    def replace(self, name: str, **changes: Any) -> Parameters:
+        """The same parameters with fields of one changed, such as `replace("rope_EA", fixed=True)`."""
         if name not in self:
             raise InputError("parameters", "have no such name", name, f"name one of: {', '.join(self)}")
         return Parameters(replace(p, **changes) if p.name == name else p for p in self.values())
@@ -211,17 +221,17 @@ class Parameters(Mapping[str, Parameter]):
                 expanded.append(replace(parameter, name=name, tied_to=target, private=False))
         return Parameters(expanded)
 
-    def initial(self) -> np.ndarray:
+    def initial(self) -> Array:
         """Internal starting vector, shape (free,)."""
-        return np.array([self[name].to_internal(self[name].initial) for name in self.free])
+        return np.array([self[name].to_internal(self._start(name)) for name in self.free])
 
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+    def bounds(self) -> tuple[Array, Array]:
         """Internal lower and upper bounds, each of shape (free,); infinite where there is none."""
         lower = np.array([self[name].to_internal(self[name].lower) for name in self.free])
         upper = np.array([self[name].to_internal(self[name].upper) for name in self.free])
         return lower, upper
 
-    def to_internal(self, values: Mapping[str, float]) -> np.ndarray:
+    def to_internal(self, values: Mapping[str, float]) -> Array:
         """Internal vector, shape (free,), of the physical values of the free parameters."""
         missing = [name for name in self.free if name not in values]
         if missing:
@@ -233,27 +243,27 @@ class Parameters(Mapping[str, Parameter]):
                 )
         return np.array([self[name].to_internal(values[name]) for name in self.free])
 
-    def to_physical(self, internal: np.ndarray) -> dict[str, float]:
-        """Physical values of all parameters (free, fixed and tied), in order, from the internal vector (free,)."""
+    def to_physical(self, internal: Array) -> dict[str, float]:
+        """Physical values of all parameters (free, fixed, tied), in order; internal: shape (free,)."""
         internal = self._vector(internal)
         values: dict[str, float] = {}
         for name, (root, factor) in self._roots.items():
             column = self._column.get(root)
-            carried = self[root].initial if column is None else self[root].to_physical(internal[column])
-            values[name] = factor * float(carried)
+            carried = self._start(root) if column is None else self[root].to_physical(internal[column])
+            values[name] = factor * carried
         return values
 
-    def diagonal(self, internal: np.ndarray) -> np.ndarray:
-        """d physical / d internal of the free parameters, shape (free,): the value on a log scale, 1 elsewhere."""
+    def diagonal(self, internal: Array) -> Array:
+        """d physical / d internal of the free ones, shape (free,): the value on a log scale, 1 elsewhere."""
         internal = self._vector(internal)
         log = np.array([self[name].log for name in self.free])
         return np.where(log, np.exp(np.where(log, internal, 0.0)), 1.0)
 
-    def chain(self, internal: np.ndarray) -> np.ndarray:
+    def chain(self, internal: Array) -> Array:
         """d (all physical values) / d internal, shape (all, free).
 
-        With a Jacobian in all physical values, `jacobian @ chain(internal)` is the one in internal coordinates; a
-        cotangent goes back through the transpose.
+        With a Jacobian in all physical values, `jacobian @ chain(internal)` is the one in internal
+        coordinates; a cotangent goes back through the transpose.
         """
         diagonal = self.diagonal(internal)
         matrix = np.zeros((len(self), len(self.free)))
@@ -263,12 +273,12 @@ class Parameters(Mapping[str, Parameter]):
                 matrix[row, column] = factor * diagonal[column]
         return matrix
 
-    def prior_residuals(self, internal: np.ndarray) -> np.ndarray:
+    def prior_residuals(self, internal: Array) -> Array:
         """(internal value - prior mean)/sd for each parameter that has a prior, shape (priors,), in order."""
         internal = self._vector(internal)
         return np.array([(internal[column] - mean) / sd for column, mean, sd in self._priors()])
 
-    def prior_jacobian(self) -> np.ndarray:
+    def prior_jacobian(self) -> Array:
         """Derivative of `prior_residuals`, shape (priors, free); it is constant."""
         priors = self._priors()
         matrix = np.zeros((len(priors), len(self.free)))
@@ -277,12 +287,18 @@ class Parameters(Mapping[str, Parameter]):
         return matrix
 
     def _priors(self) -> list[tuple[int, float, float]]:
-        with_prior = [
-            (column, self[name]) for name, column in self._column.items() if self[name].prior is not None
+        """Column, internal mean and sd of each prior."""
+        every = ((column, self[name], self[name].prior) for name, column in self._column.items())
+        return [
+            (column, p.to_internal(prior[0]), prior[1]) for column, p, prior in every if prior is not None
         ]
-        return [(column, p.to_internal(p.prior[0]), p.prior[1]) for column, p in with_prior]
 
-    def _vector(self, internal: np.ndarray) -> np.ndarray:
+    def _start(self, name: str) -> float:
+        initial = self[name].initial
+        assert initial is not None  # only tied parameters lack one, and no value starts there
+        return initial
+
+    def _vector(self, internal: Array) -> Array:
         vector = np.asarray(internal, dtype=float)
         if vector.shape != (len(self.free),):
             raise InputError(

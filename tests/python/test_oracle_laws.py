@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_bvp, solve_ivp
+
 from oracles import bending, drag, integration, modes, pendulums, ropes
 from oracles.calculus import derivative
-from scipy.integrate import solve_bvp, solve_ivp
 
 G = 9.81
 
@@ -135,7 +136,7 @@ def test_double_pendulum_agrees_with_links_as_multipliers():
 
     q1, q2 = start
     first = np.array([lengths[0] * math.sin(q1), -lengths[0] * math.cos(q1)])
-    second = first + [lengths[1] * math.sin(q2), -lengths[1] * math.cos(q2)]
+    second = first + np.array([lengths[1] * math.sin(q2), -lengths[1] * math.cos(q2)])
     y0 = np.concatenate([first, second, np.zeros(4)])
     end = solve_ivp(rate, (0.0, 0.6), y0, method="DOP853", rtol=1e-12, atol=1e-13).y[2:4, -1]
     assert pendulums.double_pendulum_tip(0.6, G, lengths, masses, start) == pytest.approx(end, abs=1e-9)

@@ -31,7 +31,9 @@ def recordings(draw: st.DrawFn) -> Recording:
     frames, markers = draw(st.integers(1, 6)), draw(st.integers(1, 4))
     times = sorted(draw(st.lists(coordinates, min_size=frames, max_size=frames, unique=True)))
     sample = st.just((np.nan,) * 3) | st.tuples(coordinates, coordinates, coordinates)
-    first = draw(st.lists(st.tuples(coordinates, coordinates, coordinates), min_size=markers, max_size=markers))
+    first = draw(
+        st.lists(st.tuples(coordinates, coordinates, coordinates), min_size=markers, max_size=markers)
+    )
     rest = draw(st.lists(sample, min_size=(frames - 1) * markers, max_size=(frames - 1) * markers))
     return Recording(
         positions=np.array(first + rest).reshape(frames, markers, 3),
@@ -40,7 +42,9 @@ def recordings(draw: st.DrawFn) -> Recording:
         clamped=draw(st.lists(st.integers(0, markers - 1), unique=True)),
         name=draw(names),
         gravity=draw(st.none() | st.tuples(coordinates, coordinates, coordinates)),
-        metadata=draw(st.dictionaries(st.text().filter(lambda key: key not in reserved), json_values, max_size=3)),
+        metadata=draw(
+            st.dictionaries(st.text().filter(lambda key: key not in reserved), json_values, max_size=3)
+        ),
     )
 
 
@@ -183,7 +187,10 @@ def test_npz_reads_its_keys_and_leaves_others(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arrays", "words"),
     [
-        ({"x": X, "t": T}, r"lacks positions and times \(got \['t', 'x'\]\).*positions \(frames, markers, 3\)"),
+        (
+            {"x": X, "t": T},
+            r"lacks positions and times \(got \['t', 'x'\]\).*positions \(frames, markers, 3\)",
+        ),
         ({"positions": X}, r"lacks times \(got \['positions'\]\)"),
         ({}, r"lacks positions and times \(got \[\]\)"),
         ({"positions": X[:0], "times": T[:0]}, "at least one frame"),
@@ -191,8 +198,14 @@ def test_npz_reads_its_keys_and_leaves_others(tmp_path: Path) -> None:
         ({"positions": X, "times": T[::-1]}, "runs backwards"),
         ({"positions": X.astype(str), "times": T}, "positions: must be real numbers"),
         ({"positions": X, "times": T, "clamped": np.array([2])}, "clamped: is out of range"),
-        ({"positions": X, "times": T, "clamped": np.array([0.5])}, "clamped: must hold marker names or indices"),
-        ({"positions": np.array([X, None], dtype=object), "times": T}, "positions: cannot be read.*plain numeric"),
+        (
+            {"positions": X, "times": T, "clamped": np.array([0.5])},
+            "clamped: must hold marker names or indices",
+        ),
+        (
+            {"positions": np.array([X, None], dtype=object), "times": T},
+            "positions: cannot be read.*plain numeric",
+        ),
     ],
 )
 def test_bad_npz_is_refused(tmp_path: Path, arrays: dict, words: str) -> None:
@@ -237,10 +250,10 @@ def test_damaged_npz_is_refused_or_reads_the_same(tmp_path: Path, data: st.DataO
 @pytest.mark.parametrize("suffix", [".npz", ".csv"])
 def test_missing_and_empty_files_are_refused(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"nothing{suffix}"
-    with pytest.raises(RecordingError, match="path: is no file .*nothing"):
+    with pytest.raises(RecordingError, match=r"path: is no file .*nothing"):
         Recording.load(path)
     path.touch()
-    with pytest.raises(RecordingError, match="is empty .*0 bytes"):
+    with pytest.raises(RecordingError, match=r"is empty .*0 bytes"):
         Recording.load(path)
     folder = tmp_path / f"folder{suffix}"
     folder.mkdir()
@@ -348,7 +361,10 @@ def test_json_that_disagrees_is_refused(tmp_path: Path) -> None:
 
 
 def test_metadata_must_fit_the_json(tmp_path: Path) -> None:
-    for metadata, words in (({"units": "mm"}, "reserved key"), ({"density": np.ones(2)}, "cannot be written")):
+    for metadata, words in (
+        ({"units": "mm"}, "reserved key"),
+        ({"density": np.ones(2)}, "cannot be written"),
+    ):
         with pytest.raises(RecordingError, match=words):
             Recording(X, T, metadata=metadata).save(tmp_path / "a.npz")
     assert list(tmp_path.iterdir()) == []

@@ -32,8 +32,8 @@ def tip_load_elastica(load: float) -> Deflection:
     """O-15: clamped inextensible strip with a dead load at the tip, `load` a = P L^2/EI. Continuous law.
 
     sqrt(a) = K(k) - F(phi, k), k^2 = (1 + sin theta_0)/2, sin phi = 1/(k sqrt 2); drop/L = 1 - 2/sqrt(a)
-    (E(k) - E(phi, k)), reach/L = sqrt(2 sin theta_0/a). Small loads: drop/L = a/3. The document grants 3e-3 L
-    at 40 links, 3e-4 L at 160; `bend_chain` is exact. d(drop)/dEI = -(a/EI) d(drop)/da.
+    (E(k) - E(phi, k)), reach/L = sqrt(2 sin theta_0/a). Small loads: drop/L = a/3. A chain of 40 links
+    is within 3e-3 L, one of 160 within 3e-4 L; `bend_chain` is exact. d(drop)/dEI = -(a/EI) d(drop)/da.
     """
 
     def elliptic(tip: float) -> tuple[float, float]:
@@ -51,8 +51,8 @@ def heavy_elastica(weight: float) -> Deflection:
     """O-17: level clamped inextensible strip under its own `weight` gamma = w L^3/B. Continuous law.
 
     theta'' = -gamma (1 - s) cos theta, theta(0) = 0, theta'(1) = 0, integrated from the tip, where it is well
-    conditioned, by DOP853 at 1e-13; B = EI and w the weight per length, or B per width and w per area. The
-    document grants 5e-3 L for 20 rows of cloth (Poisson ratio 0 or a narrow strip) and 1e-3 for 100 links;
+    conditioned, by DOP853 at 1e-13; B = EI and w the weight per length, or B per width and w per area.
+    Tolerance 5e-3 L for 20 rows of cloth (Poisson ratio 0 or a narrow strip) and 1e-3 for 100 links;
     `bend_chain` is exact. d(drop)/dB = -(gamma/B) d(drop)/d gamma.
     """
 

@@ -1,4 +1,4 @@
-"""Falling from rest against air: quadratic and linear drag. Continuous laws; the document grants 1e-3."""
+"""Falling from rest against air: quadratic and linear drag. Continuous laws; tolerance 1e-3."""
 
 import math
 

@@ -25,7 +25,7 @@ def hanging_beads_frequencies(length: float, links: int, g: float) -> NDArray[np
     """O-10a: transverse modes (n,) of a chain of n rigid links and n equal masses, the last one free.
 
     omega^2 = x_k g n/L with x_k the roots of the Laguerre polynomial L_n. Exact for the linearized chain; by
-    zero crossings at an amplitude of 1e-3 L the document grants 1e-4 after the integrator's shift. The end
+    zero crossings at an amplitude of 1e-3 L 1e-4 is the tolerance after the integrator's shift. The end
     mass is a whole one: for the half mass of a lumped rope use `chain_frequencies`. Derivatives as in
     `hanging_rope_frequencies`.
     """
@@ -33,16 +33,14 @@ def hanging_beads_frequencies(length: float, links: int, g: float) -> NDArray[np
     return np.sqrt(roots * g * links / length)
 
 
-def chain_frequencies(
-    masses: Sequence[float], link: float, g: float, tip_force: float = 0.0
-) -> NDArray[np.float64]:
+def chain_frequencies(masses: Sequence[float], link: float, g: float) -> NDArray[np.float64]:
     """O-10a: transverse modes (n,) of rigid links [m] below a fixed point, with any node masses (n,) [kg].
 
-    Eigenvalues of K u = omega^2 M u, where link j resists with (weight below it + tip_force)/link. Exact for
+    Eigenvalues of K u = omega^2 M u, where link j resists with the weight below it over its length. Exact for
     the linearized chain.
     """
     mass = np.asarray(masses, dtype=float)
-    tension = np.cumsum(mass[::-1])[::-1] * g + tip_force
+    tension = np.cumsum(mass[::-1])[::-1] * g
     stiffness = (
         np.diag(tension + np.append(tension[1:], 0.0)) - np.diag(tension[1:], 1) - np.diag(tension[1:], -1)
     )
@@ -55,7 +53,7 @@ def beaded_string_frequencies(
     """O-10b: transverse modes (N,) of N beads on a taut string between fixed ends, a = L/(N + 1) apart.
 
     omega_k = 2 sqrt(T/(m a)) sin(k pi/(2(N + 1))), bead mass m = mu a; divide by 2 pi for Hz. Exact for the
-    linearized string; the document grants 1e-4. The continuous string has pi k/L sqrt(T/mu). Derivatives:
+    linearized string; tolerance 1e-4. The continuous string has pi k/L sqrt(T/mu). Derivatives:
     omega/(2T), -omega/(2 mu), -omega/L.
     """
     spacing = length / (beads + 1)
@@ -68,8 +66,8 @@ def cantilever_frequencies(
 ) -> NDArray[np.float64]:
     """O-16a: modes (count,) of a clamped-free Euler-Bernoulli beam without gravity: b_k^2 sqrt(EI/(mu L^4)).
 
-    cos b cosh b = -1, `density` mu [kg/m], `bending_stiffness` EI [N m^2]. Continuous law; the document
-    grants 5e-3. Derivatives: omega/(2 EI), -omega/(2 mu), -2 omega/L.
+    cos b cosh b = -1, `density` mu [kg/m], `bending_stiffness` EI [N m^2]. Continuous law; tolerance 5e-3.
+    Derivatives: omega/(2 EI), -omega/(2 mu), -2 omega/L.
     """
 
     def characteristic(b: float) -> float:

@@ -55,7 +55,7 @@ def energy_retained(
 ) -> NDArray[np.float64]:
     """O-7b: (E - E_bottom)/(E_0 - E_bottom) at each step, from positions and velocities (steps + 1, 2).
 
-    The document grants 0.005, and the sequence may not rise; against `pendulum_steps` of the same h it is
+    Tolerance 0.005, and the sequence may not rise; against `pendulum_steps` of the same h it is
     exact.
     """
     energy = 0.5 * np.sum(v * v, axis=1) + g * (x[:, 1] + length)

@@ -35,7 +35,7 @@ def elastic_catenary(span: float, length: float, density: float, g: float, axial
     """O-6: elastic catenary between level points (Irvine 1981, Cable Structures). Continuous law.
 
     span = H L/EA + (2H/w) asinh(wL/2H), sag = w L^2/(8 EA) + (H/w)(sqrt(1 + (wL/2H)^2) - 1), w = density g;
-    `length` is the unstretched one. The document grants 3e-4 at n = 40; `polygon_catenary` with the same EA
+    `length` is the unstretched one. Tolerance 3e-4 at n = 40; `polygon_catenary` with the same EA
     is exact.
     """
     weight = density * g

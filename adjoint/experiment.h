@@ -1,0 +1,50 @@
+// One recording and the scene that is to explain it: residuals of simulated against measured markers as a function of the parameters.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "adjoint/markers.h"
+#include "adjoint/parameter_map.h"
+#include "core/equilibrium/equilibrium.h"
+#include "core/solver/rollout.h"
+
+namespace sheetbend {
+
+enum class Start : int { given, equilibrium };  // where a motion starts
+enum class Loss : int { squares, soft_l1, huber };
+
+struct Observations {
+  std::vector<Marker> markers;
+  std::vector<double> times;     // (frames) [s]
+  std::vector<double> measured;  // (frames, markers, 3) [m], NaN = not seen
+  std::vector<double> sigma;     // (frames, markers) [m]: residuals are divided by it
+  std::vector<int> axes{0, 1, 2};  // coordinates that count
+  Loss loss = Loss::squares;
+  double loss_scale = 1.0;  // in units of sigma
+};
+
+// The inputs of an experiment are the scene's, then an offset (3) per marker [m], then the recording's time offset [s].
+struct Experiment {
+  std::string name;
+  std::shared_ptr<const Scene> scene;
+  Plan plan;
+  ParameterMap map;
+  Observations observed;
+  bool is_static = false;  // the recording shows an equilibrium
+  Start start = Start::given;
+  double t0 = 0.0;
+  EquilibriumOptions equilibrium;
+
+  std::size_t inputs() const { return scene->layout.total() + 3 * observed.markers.size() + 1; }
+  std::size_t residual_count() const;  // one per axis of every marker and frame that was seen
+  int steps() const;                   // substeps until the last frame
+  void check() const;
+
+  // Fills residuals (residual_count) and, when not null, simulated markers (frames, markers, 3). Throws Diverged or NoEquilibrium.
+  template <class T>
+  void residuals(const T* theta, T* r, T* simulated, Interrupt* interrupt) const;
+};
+
+}  // namespace sheetbend

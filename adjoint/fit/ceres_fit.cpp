@@ -1,0 +1,109 @@
+#include "adjoint/fit/ceres_fit.h"
+
+#include <ceres/ceres.h>
+
+#include <cmath>
+
+namespace sheetbend {
+namespace {
+
+// All experiments are simulated once per point, here, before Ceres asks for residuals.
+class Point : public ceres::EvaluationCallback {
+ public:
+  Point(const EvaluationFunction& evaluation, const std::vector<double>& u)
+      : evaluation_(evaluation), u_(u), residual(evaluation.rows), jacobian(static_cast<std::size_t>(evaluation.rows) * u.size()) {}
+
+  void PrepareForEvaluation(bool with_jacobian, bool new_point) override {
+    if (!new_point && (!with_jacobian || has_jacobian_)) return;
+    if (status == EvaluationStatus::interrupted) return;
+    status = evaluation_.call(evaluation_.problem, u_.data(), residual.data(), with_jacobian ? jacobian.data() : nullptr);
+    has_jacobian_ = with_jacobian;
+    ++evaluations;
+  }
+
+ private:
+  const EvaluationFunction& evaluation_;
+  const std::vector<double>& u_;
+  bool has_jacobian_ = false;
+
+ public:
+  std::vector<double> residual, jacobian;
+  EvaluationStatus status = EvaluationStatus::ok;
+  int evaluations = 0;
+};
+
+class Residuals : public ceres::CostFunction {
+ public:
+  Residuals(const Point& point, int parameters) : point_(point) {
+    mutable_parameter_block_sizes()->push_back(parameters);
+    set_num_residuals(static_cast<int>(point.residual.size()));
+  }
+
+  bool Evaluate(double const* const*, double* residuals, double** jacobians) const override {
+    std::copy(point_.residual.begin(), point_.residual.end(), residuals);
+    if (jacobians && jacobians[0]) std::copy(point_.jacobian.begin(), point_.jacobian.end(), jacobians[0]);
+    return point_.status == EvaluationStatus::ok;
+  }
+
+ private:
+  const Point& point_;
+};
+
+class Watch : public ceres::IterationCallback {
+ public:
+  Watch(const Observe& observe, const Point& point, const std::vector<double>& u) : observe_(observe), point_(point), u_(u) {}
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& s) override {
+    if (point_.status == EvaluationStatus::interrupted) return ceres::SOLVER_ABORT;
+    return observe_({s.iteration, s.cost, s.step_norm, s.gradient_max_norm}, u_) ? ceres::SOLVER_CONTINUE : ceres::SOLVER_ABORT;
+  }
+
+ private:
+  const Observe& observe_;
+  const Point& point_;
+  const std::vector<double>& u_;
+};
+
+}  // namespace
+
+CeresResult minimize_with_ceres(const EvaluationFunction& evaluation, std::vector<double> u, const std::vector<double>& lower,
+                                const std::vector<double>& upper, const CeresOptions& options, const Observe& observe) {
+  Point point(evaluation, u);
+  Watch watch(observe, point, u);
+  ceres::Problem::Options problem_options;
+  problem_options.evaluation_callback = &point;
+  ceres::Problem problem(problem_options);
+  problem.AddParameterBlock(u.data(), static_cast<int>(u.size()));
+  problem.AddResidualBlock(new Residuals(point, static_cast<int>(u.size())), nullptr, u.data());
+  for (std::size_t i = 0; i < u.size(); ++i) {
+    if (std::isfinite(lower[i])) problem.SetParameterLowerBound(u.data(), static_cast<int>(i), lower[i]);
+    if (std::isfinite(upper[i])) problem.SetParameterUpperBound(u.data(), static_cast<int>(i), upper[i]);
+  }
+
+  ceres::Solver::Options o;
+  o.minimizer_type = ceres::TRUST_REGION;
+  o.trust_region_strategy_type = ceres::LEVENBERG_MARQUARDT;
+  o.linear_solver_type = ceres::DENSE_QR;
+  o.num_threads = 1;
+  o.max_num_iterations = options.max_iterations;
+  o.function_tolerance = options.function_tolerance;
+  o.gradient_tolerance = options.gradient_tolerance;
+  o.parameter_tolerance = options.parameter_tolerance;
+  o.max_num_consecutive_invalid_steps = 20;
+  o.logging_type = ceres::SILENT;
+  o.update_state_every_iteration = true;
+  o.callbacks.push_back(&watch);
+  ceres::Solver::Summary summary;
+  ceres::Solve(o, &problem, &summary);
+
+  CeresResult result;
+  result.u = u;
+  result.cost = summary.final_cost;
+  result.iterations = static_cast<int>(summary.iterations.size()) - 1;
+  result.evaluations = point.evaluations;
+  result.converged = summary.termination_type == ceres::CONVERGENCE;
+  result.stopped = summary.termination_type == ceres::USER_FAILURE || point.status == EvaluationStatus::interrupted;
+  result.message = summary.message;
+  return result;
+}
+
+}  // namespace sheetbend

@@ -1,0 +1,36 @@
+// Levenberg-Marquardt by Ceres on a Problem. In a module of its own: Debian's Ceres brings OpenMP, which must not load before it is asked for.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "adjoint/fit/evaluation.h"
+
+namespace sheetbend {
+
+struct CeresOptions {
+  int max_iterations = 200;
+  double function_tolerance = 1e-12, gradient_tolerance = 1e-12, parameter_tolerance = 1e-12;
+};
+
+struct CeresProgress {
+  int iteration;
+  double cost, step_norm, gradient_max;
+};
+
+struct CeresResult {
+  std::vector<double> u;
+  double cost = 0.0;
+  int iterations = 0, evaluations = 0;
+  bool converged = false, stopped = false;  // stopped: by Ctrl-C or by the observer
+  std::string message;
+};
+
+// Called after every iteration with the current point; returning false ends the fit with its best so far.
+using Observe = std::function<bool(const CeresProgress&, const std::vector<double>& u)>;
+
+CeresResult minimize_with_ceres(const EvaluationFunction& evaluation, std::vector<double> u, const std::vector<double>& lower,
+                                const std::vector<double>& upper, const CeresOptions& options, const Observe& observe);
+
+}  // namespace sheetbend

@@ -1,0 +1,62 @@
+# Finds Threads, one Eigen for the whole build, and Ceres if it can use that Eigen.
+find_package(Threads REQUIRED)
+if(SHEETBEND_PYTHON)
+  find_package(Python 3.11 REQUIRED COMPONENTS Interpreter Development.Module)
+endif()
+
+# Eigen: the system's, else the one that PyPI's cmeel-eigen puts into site-packages.
+set(eigen_origin "none")
+if(SHEETBEND_SYSTEM_EIGEN)
+  find_package(Eigen3 3.4 CONFIG QUIET)
+  if(Eigen3_FOUND)
+    set(eigen_origin "system")
+  endif()
+endif()
+if(eigen_origin STREQUAL "none")
+  if(NOT Python_EXECUTABLE)
+    find_package(Python 3.11 COMPONENTS Interpreter QUIET)
+  endif()
+  if(Python_EXECUTABLE)
+    execute_process(
+      COMMAND ${Python_EXECUTABLE} -c
+              "from importlib.metadata import distribution as d; print(d('cmeel-eigen').locate_file('cmeel.prefix'))"
+      OUTPUT_VARIABLE cmeel_prefix
+      OUTPUT_STRIP_TRAILING_WHITESPACE
+      ERROR_QUIET)
+  endif()
+  if(cmeel_prefix)
+    unset(Eigen3_DIR CACHE)
+    find_package(Eigen3 3.4 CONFIG QUIET NO_DEFAULT_PATH PATHS "${cmeel_prefix}")
+    if(Eigen3_FOUND)
+      set(eigen_origin "cmeel-eigen")
+    endif()
+  endif()
+endif()
+if(eigen_origin STREQUAL "none")
+  message(FATAL_ERROR "sheetbend needs Eigen 3.4 and found none. Fix: install libeigen3-dev (Debian, Ubuntu), "
+                      "or run 'pip install \"cmeel-eigen<4\"' with the Python of this build (${Python_EXECUTABLE}).")
+endif()
+message(STATUS "sheetbend: Eigen ${Eigen3_VERSION} (${eigen_origin}, ${Eigen3_DIR})")
+
+# Ceres was compiled against the system's Eigen: mixing in another one would break the one-definition rule.
+if(NOT SHEETBEND_CERES MATCHES "^(AUTO|ON|OFF)$")
+  message(FATAL_ERROR "SHEETBEND_CERES: must be AUTO, ON or OFF (got '${SHEETBEND_CERES}').")
+endif()
+set(Ceres_FOUND FALSE)
+if(SHEETBEND_CERES STREQUAL "OFF")
+  set(ceres_lack "switched off by SHEETBEND_CERES=OFF")
+elseif(NOT eigen_origin STREQUAL "system")
+  set(ceres_lack "Ceres needs the system's Eigen, which this build does not use. Fix: install libceres-dev and libeigen3-dev")
+else()
+  find_package(Ceres 2.1 CONFIG QUIET)
+  if(NOT Ceres_FOUND)
+    set(ceres_lack "Ceres 2.1 was not found. Fix: install libceres-dev")
+  endif()
+endif()
+if(Ceres_FOUND)
+  message(STATUS "sheetbend: Ceres ${Ceres_VERSION} (${Ceres_DIR})")
+elseif(SHEETBEND_CERES STREQUAL "ON")
+  message(FATAL_ERROR "SHEETBEND_CERES=ON: ${ceres_lack}.")
+else()
+  message(STATUS "sheetbend: no Ceres fit, SciPy's least_squares does the work (${ceres_lack})")
+endif()

@@ -1,0 +1,18 @@
+# How everything here is compiled. The floating-point flags decide bits, so they are the same in the library, modules and tests.
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_CXX_VISIBILITY_PRESET hidden)
+set(CMAKE_VISIBILITY_INLINES_HIDDEN ON)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+
+# No contraction: a fused multiply-add would give other bits on other machines. math-errno blocks inlined square roots.
+add_compile_options(-ffp-contract=off -fno-math-errno -Wall -Wextra)
+# GCC notes that packs as wide as a vector register have no stable calling convention; none crosses a public interface.
+add_compile_options(-Wno-psabi)
+
+if(SHEETBEND_SANITIZE)
+  add_compile_options(-fsanitize=${SHEETBEND_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=${SHEETBEND_SANITIZE})
+endif()

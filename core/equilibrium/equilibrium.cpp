@@ -1,0 +1,250 @@
+#include "core/equilibrium/equilibrium.h"
+
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+
+#include "core/equilibrium/residual.h"
+
+namespace sheetbend {
+namespace {
+
+constexpr double safe_residual = 1e-6;  // below this relative residual Newton may go to a saddle: it is near, and left again afterwards
+
+constexpr double energy_share = 0.1;      // of the loads' energy that softened constraints may hold
+constexpr double balanced = 1e-5;         // relative imbalance of forces below which softened constraints are stiffened
+constexpr int max_corrections = 5;      // simplified Newton steps per factorization
+constexpr int max_departures = 5;       // from saddles
+
+double largest(const std::vector<double>& v) {
+  double m = 0.0;
+  for (const double a : v) m = std::max(m, std::abs(a));
+  return m;
+}
+
+bool finite(const std::vector<double>& v) {
+  return std::all_of(v.begin(), v.end(), [](double a) { return std::isfinite(a); });
+}
+
+// Diagonal of the box around all particles.
+double scene_size(const Scene& scene, const double* x) {
+  Vec3<double> low(x), high(x);
+  for (int n = 0; n < scene.nodes(); ++n) {
+    const Vec3<double> p(x + scene.first_dof[n]);
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+  return norm(high - low);
+}
+
+// Mean distance between neighbors of a stencil.
+double mean_edge(const Scene& scene, const double* x) {
+  double sum = 0.0;
+  int count = 0;
+  for (const Group& group : scene.groups)
+    for (int i = 0; i < group.count; ++i)
+      for (int k = 1; k < group.arity; ++k, ++count)
+        sum += norm(Vec3<double>(x + scene.first_dof[group.nodes(i)[k]]) - Vec3<double>(x + scene.first_dof[group.nodes(i)[k - 1]]));
+  return count == 0 ? 0.0 : sum / count;
+}
+
+std::string not_converged(const Equilibrium& e, double tolerance) {
+  std::ostringstream text;
+  text << "equilibrium: no rest found in " << e.iterations << " iterations, relative residual " << e.residual << " (tolerance " << tolerance
+       << "). Fix: start nearer to the shape, give more iterations, or check that supports hold every part against its loads";
+  return text.str();
+}
+
+}  // namespace
+
+struct EquilibriumSolver::State {
+  const Scene& scene;
+  Inputs<const double> in;
+  const EquilibriumOptions& options;
+  std::vector<double> x, lambda, r_x, r_l, softened, soft;
+  double size, edge, weight, total = 0.0;  // of the scene, of an edge  [m]; largest and summed external force  [N]
+  double residual = 0.0, imbalance = 0.0, last_step = std::numeric_limits<double>::infinity();
+
+  State(const Scene& scene_, const double* inputs, const double* start_x, const double* start_lambda, const EquilibriumOptions& o)
+      : scene(scene_), in{scene_.layout, inputs}, options(o), r_x(scene_.dofs()), r_l(scene_.rows),
+        softened(scene_.constraints),
+        soft(scene_.groups.size(), std::numeric_limits<double>::infinity()) {
+    const double* from = start_x ? start_x : in.of(Quantity::position);
+    x.assign(from, from + scene.dofs());
+    start_lambda ? lambda.assign(start_lambda, start_lambda + scene.rows) : lambda.assign(scene.rows, 0.0);
+    place_fixed(scene, in, o.t0, x.data());
+    size = scene_size(scene, x.data());
+    edge = mean_edge(scene, x.data());
+    external_force(scene, in, o.t0, r_x.data());
+    weight = largest(r_x);
+    for (const double f : r_x) total += std::abs(f);
+    evaluate(x, lambda);
+    if (!finite(x) || !finite(r_x) || !finite(r_l))
+      throw std::invalid_argument("start: the residual is not finite. Fix: give finite inputs and a start without edges of no length or folded back");
+  }
+
+  const double* compliance() const { return in.of(Quantity::compliance); }
+
+  // A compliance for each group, never growing, at which its violated constraints hold no more than a part of the energy that the loads can
+  // give; less of it once the forces balance.
+  void soften() {
+    const double budget = energy_share * total * size;
+    for (std::size_t g = 0; g < scene.groups.size(); ++g) {
+      const Group& group = scene.groups[g];
+      double sum = 0.0;
+      with_kind(group.kind, [&]<class K>(K) {
+        for (int i = 0; i < group.count; ++i) {
+          double local[K::dofs];
+          gather<K>(scene, group, i, x.data(), local);
+          for (const double c : Evaluation<K, double>(local, rest_parameters<K>(in, group, i)).C) sum += 0.5 * c * c;
+        }
+      });
+      soft[g] = budget > 0.0 ? std::min(sum / budget, imbalance < balanced ? 0.3 * soft[g] : soft[g]) : 0.0;
+      for (int c = group.first; c < group.first + group.count; ++c) softened[c] = std::max(compliance()[c], soft[g]);
+    }
+  }
+
+  void evaluate(const std::vector<double>& at_x, const std::vector<double>& at_lambda) {
+    equilibrium_residual(scene, in, options.t0, at_x.data(), at_lambda.data(), r_x.data(), r_l.data());
+  }
+
+  // The residual at (x, lambda), relative to the forces that cancel in it and, by |J|, to the scene's size.
+  void measure() {
+    evaluate(x, lambda);
+    std::vector<double> force(scene.dofs());
+    external_force(scene, in, options.t0, force.data());
+    for (double& f : force) f = std::abs(f);
+    residual = 0.0;
+    for_each_constraint(scene, [&]<class K>(K, const Group& group, int item) {
+      double local[K::dofs];
+      gather<K>(scene, group, item, x.data(), local);
+      const Evaluation<K, double> value(local, rest_parameters<K>(in, group, item));
+      for (int j = 0; j < K::rows; ++j) {
+        const int row = group.first_row + item * K::rows + j;
+        double J2 = 0.0;
+        for (int d = 0; d < K::dofs; ++d) {
+          J2 += value.J[j * K::dofs + d] * value.J[j * K::dofs + d];
+          force[scene.first_dof[group.nodes(item)[d / 3]] + d % 3] += std::abs(value.J[j * K::dofs + d] * lambda[row]);
+        }
+        residual = std::max(residual, std::abs(r_l[row]) / (J2 > 0.0 ? std::sqrt(J2) * size : 1.0));
+      }
+    });
+    const double scale = largest(force);
+    imbalance = scale > 0.0 ? largest(r_x) / scale : 0.0;
+    residual = std::max(residual, imbalance);
+  }
+
+  bool converged() const { return residual <= options.tolerance || last_step <= options.tolerance * size; }
+
+  double energy() const {
+    std::vector<double> f(scene.dofs());
+    external_force(scene, in, options.t0, f.data());
+    double sum = 0.0;
+    for (int i = 0; i < scene.dofs(); ++i) sum -= f[i] * x[i];
+    for_each_constraint(scene, [&]<class K>(K, const Group& group, int item) {
+      for (int j = 0; j < K::rows; ++j) {
+        const double l = lambda[group.first_row + item * K::rows + j];
+        sum += 0.5 * in.of(Quantity::compliance)[group.first + item] * l * l;
+      }
+    });
+    return sum;
+  }
+};
+
+// One step of pseudo-time (of Newton for mu = 0) from an assembled matrix; false, with nothing changed, where it is not to be trusted.
+bool EquilibriumSolver::step(State& s, double mu, const double* alpha) {
+  if (!kkt_.factorize(mu, alpha)) return false;
+  if (s.options.stable && s.residual > safe_residual && kkt_.negative_modes() > 0) return false;
+  std::vector<double> x = s.x, lambda = s.lambda, dx, dl;
+  double first = 0.0, before = 0.0;
+  for (int k = 0; k < max_corrections; ++k) {
+    s.evaluate(x, lambda);
+    dx = s.r_x;
+    dl = s.r_l;
+    for (int i = 0; i < scene_.dofs(); ++i) dx[i] = -(dx[i] - mu * (x[i] - s.x[i]));
+    for (const Group& group : scene_.groups)
+      for (int i = 0; i < group.count; ++i) {
+        const int c = group.first + i, row = group.first_row + i * group.rows;
+        for (int j = row; j < row + group.rows; ++j) dl[j] = -(dl[j] + (alpha[c] - s.compliance()[c]) * lambda[j]);
+      }
+    if (!finite(dx) || !finite(dl) || !kkt_.solve(dx.data(), dl.data(), 1e-8)) return false;
+    for (int i = 0; i < scene_.dofs(); ++i) x[i] += dx[i];
+    for (int i = 0; i < scene_.rows; ++i) lambda[i] += dl[i];
+    const double size = largest(dx);
+    if (k == 0) first = size;
+    const bool negligible = size <= 1e-14 * s.size;
+    if (k > 0 && size > 0.5 * before && !negligible) return false;
+    if (negligible || (k > 0 && size < 0.02 * first)) {
+      std::swap(s.x, x);
+      std::swap(s.lambda, lambda);
+      s.last_step = mu == 0.0 ? first : std::numeric_limits<double>::infinity();
+      return true;
+    }
+    before = size;
+  }
+  return false;
+}
+
+// Moves a little along a direction of negative curvature, found by inverse iteration on the smallest K + mu that is positive definite.
+void EquilibriumSolver::leave_saddle(State& s) {
+  const double* alpha = s.compliance();
+  double mu = 1e-9 * kkt_.largest_diagonal();
+  while (!kkt_.factorize(mu, alpha) || kkt_.negative_modes() > 0) mu *= 2.0;
+  std::vector<double> v(scene_.dofs()), rows(scene_.rows);
+  for (int i = 0; i < scene_.dofs(); ++i) v[i] = std::sin(1.0 + 1.7 * i);
+  for (int k = 0; k < 8; ++k) {
+    std::fill(rows.begin(), rows.end(), 0.0);
+    kkt_.solve(v.data(), rows.data(), 1e-3);
+    const double scale = 1.0 / largest(v);
+    for (double& a : v) a *= scale;
+  }
+  for (int i = 0; i < scene_.dofs(); ++i) s.x[i] += 0.1 * s.edge * v[i];
+  s.last_step = std::numeric_limits<double>::infinity();
+}
+
+Equilibrium EquilibriumSolver::solve(const double* inputs, const double* start_x, const double* start_lambda,
+                                     const EquilibriumOptions& options, Interrupt* interrupt) {
+  State s(scene_, inputs, start_x, start_lambda, options);
+  Equilibrium result;
+  result.t0 = options.t0;
+  double mu = 0.0;
+  bool newton = start_lambda != nullptr;  // without multipliers there is no geometric stiffness yet
+  int departures = 0;
+  s.measure();
+  while (result.iterations < options.max_iterations) {
+    if (interrupt) interrupt->poll();
+    kkt_.assemble(inputs, s.x.data(), s.lambda.data(), s.edge > 0.0 ? s.weight / s.edge : 0.0);
+    ++result.iterations;
+    if (s.converged()) {
+      result.unstable_modes = kkt_.factorize(0.0, s.compliance()) ? kkt_.negative_modes() : -1;
+      result.converged = true;
+      if (!options.stable || result.unstable_modes <= 0 || departures == max_departures) break;
+      leave_saddle(s);
+      ++departures;
+      result.converged = newton = false;
+      s.measure();
+      continue;
+    }
+    bool accepted = newton && step(s, 0.0, s.compliance());
+    if (!accepted) {
+      s.soften();
+      if (mu == 0.0) {
+        kkt_.factorize(0.0, s.compliance());
+        mu = std::max(1e-6 * kkt_.largest_diagonal(), s.edge > 0.0 ? s.weight / s.edge : 0.0);
+      }
+      for (int tries = 0; tries < 40 && !(accepted = step(s, mu, s.softened.data())); ++tries) mu *= 4.0;
+      mu *= 0.1;
+    }
+    if (!accepted) break;
+    newton = true;
+    s.measure();
+  }
+  result.residual = s.residual;
+  result.energy = s.energy();
+  if (!result.converged) result.message = not_converged(result, options.tolerance);
+  result.x = std::move(s.x);
+  result.lambda = std::move(s.lambda);
+  return result;
+}
+
+}  // namespace sheetbend

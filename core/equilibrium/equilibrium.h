@@ -1,0 +1,60 @@
+// Static equilibrium of a scene: r_x = 0 and r_l = 0 of residual.h.
+//
+// Newton's method on coordinates and multipliers together (a link of any stiffness then turns freely), and where Newton's step is not trusted,
+// one implicit step of pseudo-time, mu (x' - x) = r_x(x', lambda'), 0 = r_l(x', lambda'): the proximal point method, which descends the
+// energy (pseudo-transient continuation: Kelley & Keyes 1998). A step is trusted where the Hessian K + mu is positive definite and a second,
+// simplified Newton step with the same factors is at most half of the first (the natural monotonicity test: Deuflhard 2011, section 2.1);
+// otherwise mu grows. Saddles are left along a direction of negative curvature. So a solution is stable wherever the start allows,
+// and it is the one whose basin the start lies in: several equilibria exist for soft wires, see branches.h.
+#pragma once
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "core/equilibrium/kkt.h"
+#include "core/solver/interrupt.h"
+
+namespace sheetbend {
+
+struct EquilibriumOptions {
+  int max_iterations = 200;   // evaluations of the Newton matrix
+  double tolerance = 1e-12;   // of the relative residual, or of Newton's step relative to the scene's size
+  double t0 = 0.0;            // time at which boundary and force are taken  [s]
+  bool stable = true;         // false: go to the nearest equilibrium, saddle or not
+};
+
+struct Equilibrium {
+  std::vector<double> x;       // (dofs), fixed nodes included
+  std::vector<double> lambda;  // (rows), force = J^T lambda: minus the tension for a distance, minus the moment for an angle
+  double energy = 0.0;         // of weight and forces (free nodes; zero at the origin) and elastic  [J]
+  double residual = std::numeric_limits<double>::infinity();  // largest of |r_x| / force scale and |r_l| / (|J| size)
+  int iterations = 0;          // evaluations of the Newton matrix
+  int unstable_modes = -1;     // negative eigenvalues of the energy's Hessian (on the tangent space of rigid constraints)
+  bool converged = false;
+  double t0 = 0.0;
+  std::string message;         // why not converged and what to do; empty otherwise
+};
+
+class EquilibriumSolver {
+ public:
+  // The scene must outlive the solver.
+  explicit EquilibriumSolver(const Scene& scene) : scene_(scene), kkt_(scene) {}
+
+  // Starts at start_x (dofs; null: Quantity::position), with the fixed nodes moved to their places; start_lambda (rows) makes a warm start.
+  // A result that did not converge says so, with a message. Throws std::invalid_argument where the start is not finite.
+  Equilibrium solve(const double* inputs, const double* start_x = nullptr, const double* start_lambda = nullptr,
+                    const EquilibriumOptions& options = {}, Interrupt* interrupt = nullptr);
+
+  const Scene& scene() const { return scene_; }
+
+ private:
+  struct State;
+  bool step(State& s, double mu, const double* alpha);
+  void leave_saddle(State& s);
+
+  const Scene& scene_;
+  Kkt kkt_;
+};
+
+}  // namespace sheetbend

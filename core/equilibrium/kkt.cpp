@@ -1,0 +1,222 @@
+#include "core/equilibrium/kkt.h"
+
+#include <Eigen/OrderingMethods>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/equilibrium/residual.h"
+#include "core/scalar/dual.h"
+
+namespace sheetbend {
+namespace {
+
+double largest(const std::vector<double>& v) {
+  double m = 0.0;
+  for (const double a : v) m = std::max(m, std::abs(a));
+  return m;
+}
+
+double ratio(double part, double whole) { return part == 0.0 ? 0.0 : part / whole; }
+
+// How much stiffer than the geometric stiffness a rigid row is made; refinement gains about as many digits per pass.
+constexpr double rigid_stiffness = 1e7;
+
+}  // namespace
+
+Kkt::Kkt(const Scene& scene) : scene_(scene), unknown_(scene.dofs(), -1) {
+  std::vector<int> free_dof(scene.dofs(), -1);
+  int unknowns = 0;
+  for (int n = 0; n < scene.nodes(); ++n)
+    if (scene.role[n] == Role::free)
+      for (int d = 0; d < scene.dim[n]; ++d) free_dof[scene.first_dof[n] + d] = unknowns++;
+
+  // Pairs (row, column) of K that an element touches; the diagonal is always there.
+  const auto for_each_pair = [&](const std::vector<int>& number, auto&& f) {
+    for_each_constraint(scene, [&]<class K>(K, const Group& group, int item) {
+      const auto nodes = group.nodes(item);
+      for (int a = 0; a < K::dofs; ++a)
+        for (int b = 0; b < K::dofs; ++b)
+          f(number[scene.first_dof[nodes[a / 3]] + a % 3], number[scene.first_dof[nodes[b / 3]] + b % 3]);
+    });
+  };
+  std::vector<Eigen::Triplet<double>> entries;
+  for (int i = 0; i < unknowns; ++i) entries.emplace_back(i, i, 1.0);
+  for_each_pair(free_dof, [&](int a, int b) {
+    if (a >= 0 && b >= 0) entries.emplace_back(a, b, 1.0);
+  });
+  Eigen::SparseMatrix<double> graph(unknowns, unknowns);
+  graph.setFromTriplets(entries.begin(), entries.end());
+  Eigen::PermutationMatrix<Eigen::Dynamic> order;  // order(new) = old
+  Eigen::AMDOrdering<int>()(graph, order);
+  std::vector<int> place(unknowns);
+  for (int i = 0; i < unknowns; ++i) place[order.indices()(i)] = i;
+  for (int i = 0; i < scene.dofs(); ++i)
+    if (free_dof[i] >= 0) unknown_[i] = place[free_dof[i]];
+
+  std::vector<Eigen::Triplet<double>> upper;
+  for (const auto& e : entries)
+    if (place[e.row()] <= place[e.col()]) upper.emplace_back(place[e.row()], place[e.col()], 1.0);
+  K_.resize(unknowns, unknowns);
+  K_.setFromTriplets(upper.begin(), upper.end());
+  const auto position = [&](int row, int column) {
+    const int *begin = K_.innerIndexPtr() + K_.outerIndexPtr()[column], *end = K_.innerIndexPtr() + K_.outerIndexPtr()[column + 1];
+    return static_cast<int>(std::lower_bound(begin, end, row) - K_.innerIndexPtr());
+  };
+  for_each_pair(unknown_, [&](int a, int b) { position_.push_back(a >= 0 && a <= b ? position(a, b) : -1); });
+  for (int i = 0; i < unknowns; ++i) diagonal_.push_back(position(i, i));
+  std::size_t next = 0;
+  for (const Group& group : scene.groups) {
+    first_hessian_.push_back(next);
+    next += static_cast<std::size_t>(group.count) * 9 * group.arity * group.arity;
+  }
+  H_.resize(next);
+  J_.resize(scene.gradient_entries);
+  softened_.resize(scene.constraints);
+  factor_.analyzePattern(K_);
+}
+
+void Kkt::assemble(const double* inputs, const double* x, const double* lambda, double force_stiffness) {
+  const Inputs<const double> in{scene_.layout, inputs};
+  force_stiffness_ = force_stiffness;
+  double *H = H_.data(), *J = J_.data();
+  for_each_constraint(scene_, [&]<class K>(K, const Group& group, int item) {
+    using D = Dual<double, K::dofs>;
+    constexpr int P = parameter_count<K>;
+    double local[K::dofs];
+    gather<K>(scene_, group, item, x, local);
+    D xd[K::dofs], pd[P > 0 ? P : 1], Cd[K::rows], Jd[K::rows * K::dofs];
+    for (int d = 0; d < K::dofs; ++d) {
+      xd[d].v = local[d];
+      xd[d].d[d] = 1.0;
+    }
+    for (int k = 0; k < P; ++k) pd[k].v = rest_parameters<K>(in, group, item)[k];
+    K::evaluate(xd, pd, Cd, Jd);
+    const double* l = lambda + group.first_row + item * K::rows;
+    for (int a = 0; a < K::dofs; ++a)
+      for (int b = 0; b < K::dofs; ++b) {
+        double sum = 0.0;
+        for (int j = 0; j < K::rows; ++j) sum += l[j] * Jd[j * K::dofs + a].d[b];
+        *H++ = sum;
+      }
+    for (int e = 0; e < K::rows * K::dofs; ++e) *J++ = Jd[e].v;
+  });
+}
+
+bool Kkt::factorize(double mu, const double* compliance) {
+  mu_ = mu;
+  alpha_.assign(compliance, compliance + scene_.constraints);
+  double* values = K_.valuePtr();
+  std::fill_n(values, K_.nonZeros(), 0.0);
+  for (std::size_t e = 0; e < H_.size(); ++e)
+    if (position_[e] >= 0) values[position_[e]] -= H_[e];
+  double geometric = std::max(force_stiffness_, mu);
+  for (const int d : diagonal_) geometric = std::max(geometric, std::abs(values[d]));
+  for (const int d : diagonal_) values[d] += mu;
+
+  const int* position = position_.data();
+  const double* J = J_.data();
+  for_each_constraint(scene_, [&]<class K>(K, const Group& group, int item) {
+    double J2 = 0.0;
+    for (int e = 0; e < K::rows * K::dofs; ++e) J2 = std::max(J2, J[e] * J[e]);
+    double& alpha = softened_[group.first + item];
+    alpha = std::max(alpha_[group.first + item], 0.0);
+    if (alpha == 0.0) alpha = J2 > 0.0 ? J2 / (rigid_stiffness * geometric) : 1.0;
+    for (int a = 0; a < K::dofs; ++a)
+      for (int b = 0; b < K::dofs; ++b, ++position) {
+        if (*position < 0) continue;
+        double sum = 0.0;
+        for (int j = 0; j < K::rows; ++j) sum += J[j * K::dofs + a] * J[j * K::dofs + b];
+        values[*position] += sum / alpha;
+      }
+    J += K::rows * K::dofs;
+  });
+  largest_diagonal_ = 0.0;
+  for (const int d : diagonal_) largest_diagonal_ = std::max(largest_diagonal_, std::abs(values[d]));
+  factor_.factorize(K_);
+  if (factor_.info() != Eigen::Success || !factor_.vectorD().allFinite()) return false;
+  negative_ = static_cast<int>((factor_.vectorD().array() < 0.0).count());
+  return true;
+}
+
+// K x = J^T alpha^-1 b_l - b_x,  lambda = alpha^-1 (b_l - J x), with the softened compliances.
+void Kkt::condensed_solve(const std::vector<double>& b_x, const std::vector<double>& b_l, std::vector<double>& x,
+                          std::vector<double>& lambda) const {
+  Eigen::VectorXd b(K_.rows());
+  for (int i = 0; i < scene_.dofs(); ++i)
+    if (unknown_[i] >= 0) b[unknown_[i]] = -b_x[i];
+  const auto for_each_gradient = [&](auto&& f) {
+    const double* J = J_.data();
+    for_each_constraint(scene_, [&]<class K>(K kind, const Group& group, int item) {
+      f(kind, group, item, J, 1.0 / softened_[group.first + item]);
+      J += K::rows * K::dofs;
+    });
+  };
+  for_each_gradient([&]<class K>(K, const Group& group, int item, const double* J, double stiffness) {
+    const auto nodes = group.nodes(item);
+    double push[K::dofs]{};
+    transpose_times<K>(J, &b_l[group.first_row + item * K::rows], push);
+    for (int d = 0; d < K::dofs; ++d)
+      if (const int u = unknown_[scene_.first_dof[nodes[d / 3]] + d % 3]; u >= 0) b[u] += stiffness * push[d];
+  });
+  const Eigen::VectorXd solution = factor_.solve(b);
+  for (int i = 0; i < scene_.dofs(); ++i) x[i] = unknown_[i] >= 0 ? solution[unknown_[i]] : 0.0;
+  for_each_gradient([&]<class K>(K, const Group& group, int item, const double* J, double stiffness) {
+    double local[K::dofs];
+    gather<K>(scene_, group, item, x.data(), local);
+    for (int j = 0; j < K::rows; ++j) {
+      const int row = group.first_row + item * K::rows + j;
+      double sum = b_l[row];
+      for (int d = 0; d < K::dofs; ++d) sum -= J[j * K::dofs + d] * local[d];
+      lambda[row] = stiffness * sum;
+    }
+  });
+}
+
+// r -= A (x, lambda), with the true compliances.
+void Kkt::subtract_product(const std::vector<double>& x, const std::vector<double>& lambda, std::vector<double>& r_x,
+                           std::vector<double>& r_l) const {
+  const double *H = H_.data(), *J = J_.data();
+  for (int i = 0; i < scene_.dofs(); ++i)
+    if (unknown_[i] >= 0) r_x[i] += mu_ * x[i];
+  for_each_constraint(scene_, [&]<class K>(K, const Group& group, int item) {
+    const auto nodes = group.nodes(item);
+    const int row = group.first_row + item * K::rows;
+    double local[K::dofs], push[K::dofs]{};
+    gather<K>(scene_, group, item, x.data(), local);
+    transpose_times<K>(J, &lambda[row], push);
+    for (int a = 0; a < K::dofs; ++a, H += K::dofs) {
+      const int dof = scene_.first_dof[nodes[a / 3]] + a % 3;
+      if (unknown_[dof] < 0) continue;
+      for (int b = 0; b < K::dofs; ++b) push[a] += H[b] * local[b];
+      r_x[dof] -= push[a];
+    }
+    for (int j = 0; j < K::rows; ++j, J += K::dofs) {
+      double sum = alpha_[group.first + item] * lambda[row + j];
+      for (int d = 0; d < K::dofs; ++d) sum += J[d] * local[d];
+      r_l[row + j] -= sum;
+    }
+  });
+}
+
+bool Kkt::solve(double* x, double* lambda, double accuracy) const {
+  std::vector<double> r_x(x, x + scene_.dofs()), r_l(lambda, lambda + scene_.rows), dx(r_x.size()), dl(r_l.size());
+  std::vector<double> z_x(r_x.size(), 0.0), z_l(r_l.size(), 0.0);
+  for (int i = 0; i < scene_.dofs(); ++i)
+    if (unknown_[i] < 0) r_x[i] = 0.0;
+  double change = 1.0;
+  for (int pass = 0; pass < 20; ++pass) {
+    condensed_solve(r_x, r_l, dx, dl);
+    for (std::size_t i = 0; i < dx.size(); ++i) z_x[i] += dx[i];
+    for (std::size_t i = 0; i < dl.size(); ++i) z_l[i] += dl[i];
+    const double before = std::exchange(change, std::max(ratio(largest(dx), largest(z_x)), ratio(largest(dl), largest(z_l))));
+    if (!std::isfinite(change)) return false;
+    if (change <= accuracy || (pass > 0 && change > 0.5 * before)) break;
+    subtract_product(dx, dl, r_x, r_l);
+  }
+  std::copy(z_x.begin(), z_x.end(), x);
+  std::copy(z_l.begin(), z_l.end(), lambda);
+  return change < 1e-6;
+}
+
+}  // namespace sheetbend

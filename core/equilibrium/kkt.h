@@ -1,0 +1,58 @@
+// The Newton matrix of static equilibrium,  A = [H - mu, J^T; J, alpha]  with H = sum_j lambda_j Hess(C_j), and the solution of A z = b.
+//
+// It is condensed onto the free coordinates: K = mu - H + J^T alpha^-1 J is the Hessian of the energy (plus mu), narrow for a chain and
+// positive definite at a stable equilibrium, so LDL^T in a low-fill order suffices. Rigid rows are condensed with a small compliance in place of
+// zero and the solution is refined against A itself, which also removes the rounding of stiff rows. The same trick is the augmented Lagrangian
+// step of saddle point problems (Benzi, Golub & Liesen 2005, section 8).
+//
+// Negative pivots of K count the unstable modes: inertia(-A) = inertia(K) + (0, rows), and in the limit of rigid rows the inertia of K is that
+// of the energy's Hessian on their tangent space plus one positive eigenvalue per row (Sylvester's law; Gould 1985).
+#pragma once
+
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
+#include <vector>
+
+#include "core/scene/scene.h"
+
+namespace sheetbend {
+
+class Kkt {
+ public:
+  // Finds the pattern and the elimination order; the scene must outlive this.
+  explicit Kkt(const Scene& scene);
+
+  // Evaluates H and J at x (dofs) and lambda (rows). force_stiffness [N/m], a typical force over a typical length, is the scale of stiffness where
+  // the multipliers give none.
+  void assemble(const double* inputs, const double* x, const double* lambda, double force_stiffness);
+
+  // Factors K for mu >= 0 [N/m] and the compliance of each constraint. False where K is singular to rounding.
+  bool factorize(double mu, const double* compliance);
+  int negative_modes() const { return negative_; }
+  double largest_diagonal() const { return largest_diagonal_; }
+
+  // Solves A (x, lambda) = (x, lambda) in place; entries of fixed nodes come out zero. Refines until corrections are below `accuracy`
+  // relative to the solution or stop shrinking; false if that leaves more than 1e-6.
+  bool solve(double* x, double* lambda, double accuracy = 1e-13) const;
+
+ private:
+  using Factor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Upper, Eigen::NaturalOrdering<int>>;
+
+  void condensed_solve(const std::vector<double>& b_x, const std::vector<double>& b_l, std::vector<double>& x,
+                       std::vector<double>& lambda) const;
+  void subtract_product(const std::vector<double>& x, const std::vector<double>& lambda, std::vector<double>& r_x,
+                        std::vector<double>& r_l) const;
+
+  const Scene& scene_;
+  std::vector<int> unknown_;                // per dof: place in K, or -1
+  std::vector<std::size_t> first_hessian_;  // per group, into H_ and position_: dofs x dofs per constraint
+  std::vector<int> position_;               // into K's values, -1 where fixed or below the diagonal
+  std::vector<int> diagonal_;               // likewise, per unknown
+  std::vector<double> H_, J_, alpha_, softened_;
+  double mu_ = 0.0, force_stiffness_ = 0.0, largest_diagonal_ = 0.0;
+  int negative_ = 0;
+  Eigen::SparseMatrix<double> K_;
+  Factor factor_;
+};
+
+}  // namespace sheetbend

@@ -1,0 +1,82 @@
+// The equations of static equilibrium, over any scalar. Unknowns are the coordinates x of the free nodes and the multipliers lambda:
+//
+//   r_x = f + J(x)^T lambda = 0        f = m gravity + force, at the time t0
+//   r_l = C(x) + alpha lambda = 0      alpha: compliance; 0 is a rigid constraint
+//
+// J^T lambda is the force of the constraints on the particles, so a stretched link (C = length - rest > 0) has lambda = -tension.
+// For an elastic constraint lambda = -C/alpha, and the pair is the stationarity of the energy -f.x + C.C/(2 alpha).
+// Pinned nodes stay at Quantity::position, driven ones on their boundary at t0; drag and damping do not act at rest.
+#pragma once
+
+#include <algorithm>
+
+#include "core/solver/substep.h"
+
+namespace sheetbend {
+
+// Calls f(K{}, group, item) for every constraint, in the scene's order.
+template <class F>
+void for_each_constraint(const Scene& scene, F&& f) {
+  for (const Group& group : scene.groups)
+    with_kind(group.kind, [&]<class K>(K kind) {
+      for (int i = 0; i < group.count; ++i) f(kind, group, i);
+    });
+}
+
+template <class K, class T>
+const T* rest_parameters(const Inputs<const T>& in, const Group& group, int item) {
+  return in.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(item) * parameter_count<K>;
+}
+
+// Copies a per-dof vector to the constraint's stencil.
+template <class K, class T>
+void gather(const Scene& scene, const Group& group, int item, const T* from, T* local) {
+  const auto nodes = group.nodes(item);
+  for (int k = 0; k < K::arity; ++k) std::copy_n(from + scene.first_dof[nodes[k]], 3, local + 3 * k);
+}
+
+// Writes the coordinates of pinned and driven nodes.
+template <class T>
+void place_fixed(const Scene& scene, const Inputs<const T>& in, double t0, T* x) {
+  const KnotWeights boundary = scene.driven.empty() ? KnotWeights{} : scene.boundary.at(t0);
+  for (int n = 0; n < scene.nodes(); ++n) {
+    T* to = x + scene.first_dof[n];
+    if (scene.role[n] == Role::pinned) std::copy_n(in.of(Quantity::position) + scene.first_dof[n], 3, to);
+    if (scene.role[n] == Role::driven)
+      at_knots(boundary, in.of(Quantity::boundary), static_cast<int>(scene.driven.size()), scene.driven_slot[n]).store(to);
+  }
+}
+
+// f of the free nodes, zero on the others.
+template <class T>
+void external_force(const Scene& scene, const Inputs<const T>& in, double t0, T* f) {
+  const Vec3<T> gravity(in.of(Quantity::gravity));
+  const KnotWeights knots = scene.loaded.empty() ? KnotWeights{} : scene.force.at(t0);
+  std::fill_n(f, scene.dofs(), T(0.0));
+  for (int n = 0; n < scene.nodes(); ++n) {
+    if (scene.role[n] != Role::free) continue;
+    (in.of(Quantity::mass)[n] * gravity).store(f + scene.first_dof[n]);
+    if (scene.loaded_slot[n] >= 0)
+      at_knots(knots, in.of(Quantity::force), static_cast<int>(scene.loaded.size()), scene.loaded_slot[n]).add_to(f + scene.first_dof[n]);
+  }
+}
+
+// r_x (dofs, zero on fixed nodes) and r_l (rows) at x (dofs, with the fixed nodes placed) and lambda (rows).
+template <class T>
+void equilibrium_residual(const Scene& scene, const Inputs<const T>& in, double t0, const T* x, const T* lambda, T* r_x, T* r_l) {
+  external_force(scene, in, t0, r_x);
+  for_each_constraint(scene, [&]<class K>(K, const Group& group, int item) {
+    T local[K::dofs], push[K::dofs]{};
+    gather<K>(scene, group, item, x, local);
+    const Evaluation<K, T> value(local, rest_parameters<K>(in, group, item));
+    const int row = group.first_row + item * K::rows;
+    const T& alpha = in.of(Quantity::compliance)[group.first + item];
+    for (int j = 0; j < K::rows; ++j) r_l[row + j] = value.C[j] + alpha * lambda[row + j];
+    transpose_times<K>(value.J, lambda + row, push);
+    const auto nodes = group.nodes(item);
+    for (int k = 0; k < K::arity; ++k)
+      if (scene.role[nodes[k]] == Role::free) Vec3<T>(push + 3 * k).add_to(r_x + scene.first_dof[nodes[k]]);
+  });
+}
+
+}  // namespace sheetbend

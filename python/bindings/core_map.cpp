@@ -1,0 +1,61 @@
+// The parameter map from Python: values of named quantities to inputs, cotangents and tangents through it.
+#include "adjoint/parameter_map.h"
+
+#include "core/scalar/dual.h"
+#include "python/bindings/core_module.h"
+
+namespace sheetbend::bindings {
+
+ParameterMap make_map(const py::dict& d) {
+  ParameterMap map;
+  const auto base = d["base"].cast<Array>(), coefficient = d["coefficient"].cast<Array>();
+  map.base.assign(base.data(), base.data() + base.size());
+  map.coefficient.assign(coefficient.data(), coefficient.data() + coefficient.size());
+  map.target = d["target"].cast<std::vector<int>>();
+  map.first_factor = d["first_factor"].cast<std::vector<int>>();
+  map.parameter = d["parameter"].cast<std::vector<int>>();
+  for (const int f : d["function"].cast<std::vector<int>>()) map.function.push_back(static_cast<Factor1d>(f));
+  return map;
+}
+
+void bind_map(py::module_& m) {
+  py::class_<ParameterMap>(m, "ParameterMap")
+      .def(py::init(&make_map))
+      .def("inputs",
+           [](const ParameterMap& map, const Array& theta) {
+             std::vector<double> out(map.base.size());
+             map.apply(theta.data(), out.data());
+             return to_numpy(out, {static_cast<py::ssize_t>(out.size())});
+           })
+      .def("inputs_dot",
+           [](const ParameterMap& map, const Array& theta, const Array& theta_dot) {
+             using D = Dual<double, 1>;
+             std::vector<D> in(theta.data(), theta.data() + theta.size()), out(map.base.size());
+             for (std::size_t i = 0; i < in.size(); ++i) in[i].d[0] = theta_dot.data()[i];
+             map.apply(in.data(), out.data());
+             py::array_t<double> result(static_cast<py::ssize_t>(out.size()));
+             for (std::size_t i = 0; i < out.size(); ++i) result.mutable_data()[i] = out[i].d[0];
+             return result;
+           })
+      .def("theta_bar",
+           [](const ParameterMap& map, const Array& theta, const Array& inputs_bar) {
+             expect_size(inputs_bar, map.base.size(), "inputs_bar");
+             std::vector<double> out(theta.size());
+             map.pull_back(theta.data(), inputs_bar.data(), out.data());
+             return to_numpy(out, {static_cast<py::ssize_t>(out.size())});
+           })
+      // (theta_bar, its derivative along (theta_dot, inputs_bar_dot))
+      .def("theta_bar_dot", [](const ParameterMap& map, const Array& theta, const Array& theta_dot, const Array& inputs_bar,
+                               const Array& inputs_bar_dot) {
+        using D = Dual<double, 1>;
+        std::vector<D> in(theta.data(), theta.data() + theta.size()), bar(inputs_bar.data(), inputs_bar.data() + inputs_bar.size()), out(in.size());
+        for (std::size_t i = 0; i < in.size(); ++i) in[i].d[0] = theta_dot.data()[i];
+        for (std::size_t i = 0; i < bar.size(); ++i) bar[i].d[0] = inputs_bar_dot.data()[i];
+        map.pull_back(in.data(), bar.data(), out.data());
+        py::array_t<double> value(static_cast<py::ssize_t>(out.size())), derivative(static_cast<py::ssize_t>(out.size()));
+        for (std::size_t i = 0; i < out.size(); ++i) value.mutable_data()[i] = out[i].v, derivative.mutable_data()[i] = out[i].d[0];
+        return py::make_tuple(value, derivative);
+      });
+}
+
+}  // namespace sheetbend::bindings

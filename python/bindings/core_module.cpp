@@ -1,0 +1,54 @@
+// The module sheetbend._core: scenes, rollouts and their derivatives, equilibria, least-squares problems.
+#include "python/bindings/core_module.h"
+
+#include "core/constraints/registry.h"
+#include "adjoint/equilibrium_tangents.h"
+#include "core/solver/rollout.h"
+#include "python/bindings/interrupt.h"
+
+namespace sheetbend::bindings {
+
+// The registry as Python sees it: {name: {arity, rows, parameters, periodic}}.
+py::dict constraint_kinds() {
+  py::dict kinds;
+  for_each_kind([&]<class K>(K) {
+    py::dict kind;
+    kind["arity"] = K::arity;
+    kind["rows"] = K::rows;
+    kind["parameters"] = std::vector<std::string>(K::parameters.begin(), K::parameters.end());
+    kind["periodic"] = K::periodic;
+    kinds[K::name] = kind;
+  });
+  return kinds;
+}
+
+}  // namespace sheetbend::bindings
+
+PYBIND11_MODULE(_core, m) {
+  using namespace sheetbend;
+  using namespace sheetbend::bindings;
+  m.doc() = "Compiled core of sheetbend. Use the package's Python functions; this module's shapes are flat and unchecked beyond sizes.";
+  m.def("constraint_kinds", &constraint_kinds);
+  static py::exception<Diverged> diverged(m, "Diverged", PyExc_RuntimeError);
+  static py::exception<NoEquilibrium> no_equilibrium(m, "NoEquilibrium", PyExc_RuntimeError);
+  py::register_exception_translator([](std::exception_ptr p) {
+    try {
+      if (p) std::rethrow_exception(p);
+    } catch (const Diverged& e) {
+      py::object error = py::handle(diverged)(e.what());
+      error.attr("substep") = e.substep;
+      error.attr("particle") = e.node;
+      error.attr("time") = e.time;
+      PyErr_SetObject(diverged.ptr(), error.ptr());
+    } catch (const NoEquilibrium& e) {
+      PyErr_SetString(no_equilibrium.ptr(), e.what());
+    } catch (const Interrupted&) {
+      PyErr_SetNone(PyExc_KeyboardInterrupt);
+    }
+  });
+  bind_map(m);
+  bind_scene(m);
+  bind_rollout(m);
+  bind_equilibrium(m);
+  bind_problem(m);
+}

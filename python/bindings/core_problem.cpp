@@ -1,0 +1,143 @@
+// Least-squares problems from Python: built from plain dictionaries that sheetbend.fit assembles.
+#include "adjoint/fit/problem.h"
+
+#include "adjoint/fit/evaluation.h"
+#include "python/bindings/core_module.h"
+#include "python/bindings/interrupt.h"
+
+namespace sheetbend::bindings {
+namespace {
+
+template <class V>
+V get(const py::dict& d, const char* key) {
+  return d[key].cast<V>();
+}
+
+std::vector<double> numbers(const py::dict& d, const char* key) {
+  const auto a = d[key].cast<Array>();
+  return {a.data(), a.data() + a.size()};
+}
+
+Observations make_observations(const py::dict& d) {
+  Observations o;
+  o.times = numbers(d, "times");
+  o.measured = numbers(d, "measured");
+  o.sigma = numbers(d, "sigma");
+  o.axes = get<std::vector<int>>(d, "axes");
+  const auto loss = get<std::string>(d, "loss");
+  if (loss != "squares" && loss != "soft_l1" && loss != "huber")
+    throw std::invalid_argument("loss: got '" + loss + "'. Fix: use 'squares', 'soft_l1' or 'huber'");
+  o.loss = loss == "squares" ? Loss::squares : loss == "huber" ? Loss::huber : Loss::soft_l1;
+  o.loss_scale = get<double>(d, "loss_scale");
+  for (const py::handle item : d["markers"]) {
+    const auto m = item.cast<py::dict>();
+    Marker marker;
+    marker.dof = get<std::array<int, 4>>(m, "dof");
+    marker.weight = get<std::array<double, 4>>(m, "weight");
+    marker.tangent = get<std::array<double, 4>>(m, "tangent");
+    marker.normal = get<std::array<double, 3>>(m, "normal");
+    marker.carries_offset = get<bool>(m, "carries_offset");
+    o.markers.push_back(marker);
+  }
+  return o;
+}
+
+Experiment make_experiment(const py::dict& d) {
+  Experiment e;
+  e.name = get<std::string>(d, "name");
+  e.scene = get<std::shared_ptr<Scene>>(d, "scene");
+  SolverOptions o;
+  o.h = get<double>(d, "h");
+  o.integrator = get<std::string>(d, "integrator") == "bdf1" ? Integrator::bdf1 : Integrator::bdf2;
+  o.partition = get<std::string>(d, "partition") == "direct" ? Partition::direct : Partition::gauss_seidel;
+  o.iterations = get<int>(d, "iterations");
+  e.plan = make_plan(*e.scene, o);
+  e.map = make_map(get<py::dict>(d, "map"));
+  e.observed = make_observations(get<py::dict>(d, "observed"));
+  e.is_static = get<bool>(d, "is_static");
+  e.start = get<bool>(d, "starts_at_equilibrium") ? Start::equilibrium : Start::given;
+  e.t0 = get<double>(d, "t0");
+  e.equilibrium.t0 = e.t0;
+  return e;
+}
+
+FreeParameter make_free(const py::dict& d) {
+  FreeParameter p;
+  p.name = get<std::string>(d, "name");
+  p.log_scale = get<bool>(d, "log");
+  p.slots = get<std::vector<int>>(d, "slots");
+  p.factors = get<std::vector<double>>(d, "factors");
+  p.has_prior = !d["prior"].is_none();
+  if (p.has_prior) std::tie(p.prior_mean, p.prior_sd) = d["prior"].cast<std::pair<double, double>>();
+  return p;
+}
+
+Problem make_problem(const std::vector<py::dict>& experiments, std::vector<double> theta, std::vector<std::vector<int>> slots,
+                     const std::vector<py::dict>& free, int threads) {
+  std::vector<Experiment> e;
+  std::vector<FreeParameter> f;
+  for (const py::dict& d : experiments) e.push_back(make_experiment(d));
+  for (const py::dict& d : free) f.push_back(make_free(d));
+  return Problem(std::move(e), std::move(theta), std::move(slots), std::move(f), threads);
+}
+
+// (ok, residual, jacobian or None)
+py::tuple evaluate(const Problem& p, const Array& u, bool with_jacobian) {
+  expect_size(u, p.parameters(), "u");
+  const auto rows = static_cast<py::ssize_t>(p.rows()), columns = static_cast<py::ssize_t>(p.parameters());
+  py::array_t<double> residual(rows), jacobian({with_jacobian ? rows : 0, columns});
+  double *r = residual.mutable_data(), *J = with_jacobian ? jacobian.mutable_data() : nullptr;
+  bool ok;
+  {
+    py::gil_scoped_release release;
+    SignalInterrupt interrupt;
+    ok = p.evaluate(u.data(), r, J, &interrupt);
+  }
+  return py::make_tuple(ok, residual, jacobian);
+}
+
+}  // namespace
+
+void bind_problem(py::module_& m) {
+  py::class_<Problem>(m, "Problem")
+      .def(py::init(&make_problem), py::kw_only(), py::arg("experiments"), py::arg("theta"), py::arg("slots"), py::arg("free"), py::arg("threads"))
+      .def_property_readonly("rows", &Problem::rows)
+      .def_property_readonly("data_rows", &Problem::data_rows)
+      .def_property_readonly("first_rows", &Problem::first_rows)
+      .def_property_readonly("parameters", &Problem::parameters)
+      .def_property_readonly("failure", &Problem::failure)
+      .def("evaluate", &evaluate, py::arg("u"), py::arg("jacobian") = true)
+      .def("physical",
+           [](const Problem& p, const Array& u) {
+             expect_size(u, p.parameters(), "u");
+             const auto theta = p.physical(u.data());
+             return to_numpy(theta, {static_cast<py::ssize_t>(theta.size())});
+           })
+      .def("simulate",
+           [](const Problem& p, int experiment, const Array& u) {
+             expect_size(u, p.parameters(), "u");
+             std::vector<double> markers;
+             {
+               py::gil_scoped_release release;
+               SignalInterrupt interrupt;
+               markers = p.simulate(experiment, u.data(), &interrupt);
+             }
+             return to_numpy(markers, {static_cast<py::ssize_t>(markers.size() / 3), 3});
+           })
+      // The compiled evaluation, for sheetbend._ceres; the problem must outlive it.
+      .def("evaluation", [](const Problem& p) {
+        const auto call = [](const void* problem, const double* u, double* residual, double* jacobian) {
+          SignalInterrupt interrupt;
+          try {
+            return static_cast<const Problem*>(problem)->evaluate(u, residual, jacobian, &interrupt) ? EvaluationStatus::ok
+                                                                                                   : EvaluationStatus::no_answer;
+          } catch (const Interrupted&) {
+            return EvaluationStatus::interrupted;
+          }
+        };
+        return py::capsule(new EvaluationFunction{&p, p.rows(), p.parameters(), call}, EvaluationFunction::capsule_name,
+                           [](void* f) { delete static_cast<EvaluationFunction*>(f); });
+      });
+}
+
+}  // namespace sheetbend::bindings

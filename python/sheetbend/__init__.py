@@ -1,0 +1,59 @@
+"""sheetbend: a differentiable XPBD simulator for parameter identification.
+
+Ropes (and later cloth) with exact gradients in double precision: simulate, differentiate, and fit physical parameters to recordings, with
+intervals and words for what the data cannot tell.
+"""
+
+from .baseline import no_physics
+from .equilibrium import Equilibrium, equilibria, equilibrium
+from .errors import ConfigError, DivergenceError, InputError, RecordingError, SceneError, SheetbendError
+from .experiment import Experiment
+from .fit import Fit, fit
+from .discretization import Refinement
+from .gradients import GradientReport, check_gradients
+from .markers import Place, along_rope, between, on_particle, on_rope
+from .parameters import Parameter, Parameters
+from .recording import Recording
+from .result import FitResult
+from .rope import Rope, add_rope, rope
+from .scene import KINDS, Scene
+from .simulate import Trajectory, simulate
+from .solver import Solver
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "KINDS",
+    "ConfigError",
+    "DivergenceError",
+    "Equilibrium",
+    "Experiment",
+    "Fit",
+    "FitResult",
+    "GradientReport",
+    "InputError",
+    "Parameter",
+    "Parameters",
+    "Place",
+    "Recording",
+    "RecordingError",
+    "Refinement",
+    "Rope",
+    "Scene",
+    "SceneError",
+    "SheetbendError",
+    "Solver",
+    "Trajectory",
+    "add_rope",
+    "along_rope",
+    "between",
+    "check_gradients",
+    "equilibria",
+    "equilibrium",
+    "fit",
+    "no_physics",
+    "on_particle",
+    "on_rope",
+    "rope",
+    "simulate",
+]

@@ -1,0 +1,49 @@
+"""Checks of arrays that come from users: clear errors instead of broadcasting surprises."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .errors import InputError, SceneError
+
+
+def finite(field: str, values: ArrayLike, shape: tuple[int, ...] | None, error: type[InputError]) -> np.ndarray:
+    """values as float64 of the given shape, without NaN or infinity."""
+    try:
+        array = np.array(values, dtype=float)
+    except (TypeError, ValueError) as problem:
+        raise error(field, "is not an array of numbers", type(values).__name__, "give numbers") from problem
+    if shape is not None and array.shape != shape:
+        raise error(field, "has the wrong shape", array.shape, f"give {shape}")
+    if not np.isfinite(array).all():
+        where = np.argwhere(~np.isfinite(np.atleast_1d(array)))[0].tolist()
+        raise error(field, f"is not finite at index {where}", float(array.ravel()[~np.isfinite(array.ravel())][0]), "give finite numbers")
+    return array
+
+
+def points(field: str, values: ArrayLike) -> np.ndarray:
+    """(n, 3) positions, n >= 1."""
+    array = finite(field, values, None, SceneError)
+    if array.ndim != 2 or array.shape[1] != 3 or len(array) == 0:
+        raise SceneError(field, "have the wrong shape", array.shape, "give (n, 3) with n at least 1")
+    return array
+
+
+def per_item(field: str, values: ArrayLike, count: int) -> np.ndarray:
+    """One number for all or (count,), as a new array (count,)."""
+    array = finite(field, values, None, SceneError)
+    if array.ndim > 1 or (array.ndim == 1 and array.shape != (count,)):
+        raise SceneError(field, "has the wrong shape", array.shape, f"give one number or ({count},)")
+    return np.broadcast_to(array, (count,)).copy()
+
+
+def indices(field: str, values: ArrayLike, count: int) -> list[int]:
+    """Particle indices in range; negative ones count from the end."""
+    array = np.atleast_1d(np.array(values))
+    if array.size == 0 or not np.issubdtype(array.dtype, np.integer):
+        raise SceneError(field, "must be particle indices", values, "give whole numbers")
+    bad = array[(array < -count) | (array >= count)]
+    if bad.size:
+        raise SceneError(field, "name particles that do not exist", bad[:5].tolist(), f"use 0 to {count - 1}")
+    return [int(i) % count for i in array.ravel()]

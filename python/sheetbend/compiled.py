@@ -1,0 +1,109 @@
+"""A frozen scene as the compiled core sees it: topology, the flat layout of its inputs, and the map from quantities to inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import _core
+from .errors import SceneError
+from .quantities import FUNCTIONS, Term
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+
+class CompiledScene:
+    """Built once by `Scene.compiled`.
+
+    Attributes:
+        core: the compiled topology.
+        layout: input array name -> (offset, size) in the flat input vector.
+        names: quantity names in the order of theta.
+        theta: their values.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        try:
+            self.core = _core.Scene(
+                particles=scene.particle_count,
+                pinned=sorted(scene.pinned),
+                driven=list(scene.driven),
+                boundary_times=[] if not scene.driven else list(scene.boundary_times),
+                boundary_interpolation=scene.boundary_interpolation,
+                loaded=list(scene.loaded),
+                force_times=[] if not scene.loaded else list(scene.force_times),
+                has_drag=scene.has_drag,
+                groups=[
+                    {"name": g.name, "kind": g.kind, "damped": g.damped, "stencil": g.particles.ravel().tolist()} for g in scene.groups
+                ],
+            )
+        except ValueError as error:
+            field, _, rest = str(error).partition(": ")
+            problem, _, fix = rest.partition(". Fix: ")
+            raise SceneError(field, problem, scene.name, fix or "see above") from error
+        self.layout: dict[str, tuple[int, int]] = self.core.layout
+        self.names = tuple(scene.quantities)
+        self.theta = np.array([q.value for q in scene.quantities.values()], dtype=float)
+        self._base = self._pack(scene)
+        self._terms = list(scene.terms)
+        self._map = _core.ParameterMap(self.map())
+
+    def _pack(self, scene: Scene) -> np.ndarray:
+        base = np.zeros(self.core.inputs)
+        for array, values in scene.base_arrays().items():
+            offset, size = self.layout[array]
+            base[offset : offset + size] = np.ravel(values)
+        return base
+
+    def map(self, extra: int = 0, terms: Sequence[Term] = (), names: Sequence[str] | None = None) -> dict[str, Any]:
+        """The parameter map as plain arrays; `extra` more inputs (array "extra") may follow the scene's, with their own terms."""
+        order = {name: i for i, name in enumerate(self.names if names is None else names)}
+        offsets = {array: offset for array, (offset, _) in self.layout.items()} | {"extra": self.core.inputs}
+        every = [*self._terms, *terms]
+        first = np.cumsum([0] + [len(t.factors) for t in every])
+        return {
+            "base": np.concatenate([self._base, np.zeros(extra)]),
+            "target": [offsets[t.array] + t.index for t in every],
+            "coefficient": np.array([t.coefficient for t in every], dtype=float),
+            "first_factor": first.tolist(),
+            "parameter": [order[name] for t in every for name, _ in t.factors],
+            "function": [FUNCTIONS[function] for t in every for _, function in t.factors],
+        }
+
+    def values(self, changes: Mapping[str, float] | None = None) -> np.ndarray:
+        """theta with some quantities changed, shape (quantities,)."""
+        theta = self.theta.copy()
+        for name, value in (changes or {}).items():
+            if name not in self.names:
+                raise SceneError("values", "name no quantity of the scene", name, f"name one of: {', '.join(self.names)}")
+            theta[self.names.index(name)] = value
+        return theta
+
+    def inputs(self, theta: np.ndarray | None = None) -> np.ndarray:
+        """Flat inputs, shape (core.inputs,)."""
+        return self._map.inputs(self.theta if theta is None else theta)
+
+    def inputs_dot(self, theta: np.ndarray, theta_dot: np.ndarray) -> np.ndarray:
+        """Tangent of the inputs along theta_dot."""
+        return self._map.inputs_dot(theta, theta_dot)
+
+    def theta_bar(self, theta: np.ndarray, inputs_bar: np.ndarray) -> np.ndarray:
+        """Cotangent of the quantities from that of the inputs."""
+        return self._map.theta_bar(theta, inputs_bar)
+
+    def theta_bar_dot(
+        self, theta: np.ndarray, theta_dot: np.ndarray, inputs_bar: np.ndarray, inputs_bar_dot: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Derivative of `theta_bar` along (theta_dot, inputs_bar_dot), with its value."""
+        return self._map.theta_bar_dot(theta, theta_dot, inputs_bar, inputs_bar_dot)
+
+    def unpack(self, flat: np.ndarray) -> dict[str, np.ndarray]:
+        """A flat vector of inputs (or their cotangents) by array name; vectors per particle come as (n, 3)."""
+        shaped: dict[str, np.ndarray] = {}
+        for array, (offset, size) in self.layout.items():
+            part = flat[offset : offset + size]
+            shaped[array] = part.reshape(-1, 3) if array in ("position", "velocity", "boundary", "force") else part
+        return shaped

@@ -1,0 +1,85 @@
+"""Static equilibrium of scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _core
+from .checks import finite
+from .errors import SceneError, SheetbendError
+from .scene import Scene
+from .simulate import forces_by_group
+
+
+class NoEquilibriumError(SheetbendError, RuntimeError):
+    """The solver did not reach an equilibrium from the given start."""
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A state of rest.
+
+    Attributes:
+        positions: (particles, 3) m.
+        forces: per group the multipliers (count, rows): minus the tension in N of a distance, minus the moment in N m of bending.
+        energy: of weight, forces and strain, J; of several equilibria the lowest is the most stable one.
+        unstable_modes: negative eigenvalues of the energy's Hessian; 0 = stable.
+        residual: relative force imbalance.
+        iterations: Newton matrices used.
+    """
+
+    positions: np.ndarray
+    forces: Mapping[str, np.ndarray]
+    energy: float
+    unstable_modes: int
+    residual: float
+    iterations: int
+
+
+def equilibrium(scene: Scene, start: ArrayLike | None = None, values: Mapping[str, float] | None = None, stable: bool = True) -> Equilibrium:
+    """The equilibrium that a start leads to.
+
+    Args:
+        scene: is frozen by this.
+        start: (particles, 3) m; the scene's initial positions by default.
+        values: quantities to change, by name.
+        stable: leave saddles; False goes to the nearest equilibrium whatever its stability.
+
+    Raises:
+        SceneError: the start has the wrong shape.
+        NoEquilibriumError: not converged; says how far it came and what to try.
+    """
+    compiled = scene.compiled
+    x = None if start is None else finite("start", start, (scene.particle_count, 3), SceneError).ravel()
+    out = _core.equilibrium(compiled.core, compiled.inputs(compiled.values(values)), x, stable)
+    if not out["converged"]:
+        raise NoEquilibriumError(f"{scene.name}: {out['message']}")
+    return Equilibrium(
+        out["positions"].reshape(-1, 3),
+        forces_by_group(scene, out["multipliers"]),
+        out["energy"],
+        out["unstable_modes"],
+        out["residual"],
+        out["iterations"],
+    )
+
+
+def equilibria(scene: Scene, starts: Iterable[ArrayLike], values: Mapping[str, float] | None = None, tolerance: float = 1e-6) -> list[Equilibrium]:
+    """The distinct equilibria that several starts lead to, lowest energy first. Starts that lead nowhere are left out.
+
+    Args:
+        tolerance: m; states nearer than this everywhere are one.
+    """
+    found: list[Equilibrium] = []
+    for start in starts:
+        try:
+            e = equilibrium(scene, start, values)
+        except NoEquilibriumError:
+            continue
+        if all(np.abs(e.positions - other.positions).max() > tolerance for other in found):
+            found.append(e)
+    return sorted(found, key=lambda e: e.energy)

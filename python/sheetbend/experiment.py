@@ -1,0 +1,173 @@
+"""One recording and the scene that is to explain it, as a fit takes it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .errors import InputError, RecordingError
+from .markers import Place, places_for
+from .quantities import Term, product
+from .recording import Recording
+from .scene import Scene
+from .solver import Solver
+
+Window = tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """A recording, its scene, and which parts of the recording are fitted and which only predicted.
+
+    Attributes:
+        scene: frozen by the fit.
+        recording: times may start anywhere; see `start_time`.
+        name: the recording's by default.
+        markers: places of the markers (see `places_for`).
+        fit: (start, stop) in s of the recording's own time, the part that the fit sees; all of it by default.
+        held_out: the part that is only predicted, from the same start; None = none.
+        solver: substep and method of the motion; must suit the recording (h well below the frame interval).
+        static: the recording shows an equilibrium; its frames in the window are averaged into one.
+        start: "given" (the scene's initial state) or "equilibrium" (of the scene at the start, forces included), for motions.
+        start_time: recording time at which the scene starts, s; the start of the fit window by default.
+        time_offset: name of a quantity [s] that shifts the recording's clock, or None.
+        offsets: per marker name, names of quantities that are added to its offset (tangent, normal, tangent x normal), None for none.
+        sigma: expected error of a marker, m: scales residuals against priors and between experiments.
+        axes: coordinates that count, such as "xz".
+        loss: "squares", "soft_l1" or "huber", with loss_scale in units of sigma.
+        predict: None takes part in the fit. Otherwise the recording is only predicted, with the shared parameters as fitted on the others and
+            its private ones either fitted to its own fit window ("window": initial states, offsets) or set to the mean of the others'
+            ("mean").
+    """
+
+    scene: Scene
+    recording: Recording
+    name: str = ""
+    markers: Mapping[str, Place] | Sequence[Place] | None = None
+    fit: Window | None = None
+    held_out: Window | None = None
+    solver: Solver = field(default_factory=Solver)
+    static: bool = False
+    start: str = "given"
+    start_time: float | None = None
+    time_offset: str | None = None
+    offsets: Mapping[str, tuple[str | None, str | None, str | None]] = field(default_factory=dict)
+    sigma: float = 1e-3
+    axes: str = "xyz"
+    loss: str = "squares"
+    loss_scale: float = 1.0
+    predict: str | None = None
+
+    def __post_init__(self) -> None:
+        if not self.name:
+            object.__setattr__(self, "name", self.recording.name)
+        if not (math.isfinite(self.sigma) and self.sigma > 0):
+            raise InputError(f"{self.name}.sigma", "must be positive", self.sigma, "give the expected error of a marker in m")
+        if not self.axes or set(self.axes) - set("xyz") or len(set(self.axes)) != len(self.axes):
+            raise InputError(f"{self.name}.axes", "must be some of x, y, z", self.axes, "give such as 'xz'")
+        if self.start not in ("given", "equilibrium"):
+            raise InputError(f"{self.name}.start", "is unknown", self.start, "use 'given' or 'equilibrium'")
+        if self.loss not in ("squares", "soft_l1", "huber"):
+            raise InputError(f"{self.name}.loss", "is unknown", self.loss, "use 'squares', 'soft_l1' or 'huber'")
+        if not (math.isfinite(self.loss_scale) and self.loss_scale > 0):
+            raise InputError(f"{self.name}.loss_scale", "must be positive", self.loss_scale, "give it in units of sigma")
+        if self.predict not in (None, "window", "mean"):
+            raise InputError(f"{self.name}.predict", "is unknown", self.predict, "use 'window' or 'mean', or leave it out")
+        if self.static and self.held_out is not None:
+            raise InputError(f"{self.name}.held_out", "makes no sense for an equilibrium", self.held_out, "hold out whole recordings: predict = 'mean'")
+
+    @cached_property
+    def places(self) -> tuple[Place | None, ...]:
+        """The markers' places, None where not compared."""
+        return places_for(self.scene, self.markers, self.recording.markers)
+
+    @cached_property
+    def compared(self) -> tuple[int, ...]:
+        """Indices of the markers that are compared: placed, and not on particles whose motion is given."""
+        held = self.scene.pinned | set(self.scene.driven)
+        chosen = tuple(i for i, p in enumerate(self.places) if p is not None and not set(p.particles) <= held)
+        if not chosen:
+            raise RecordingError(f"{self.name}.markers", "leave nothing to compare", len(self.places), "place markers on particles that move")
+        return chosen
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the compared markers."""
+        return tuple(self.recording.markers[i] for i in self.compared)
+
+    def fitted(self) -> Recording:
+        """The part of the recording that the fit sees, compared markers only; one mean frame for an equilibrium."""
+        return self._part(self.fit)
+
+    def held(self) -> Recording | None:
+        """The part that is only predicted."""
+        return None if self.held_out is None else self._part(self.held_out)
+
+    def _part(self, window: Window | None) -> Recording:
+        part = self.recording if window is None else self.recording.piece(*window)
+        positions = part.positions[:, list(self.compared)]
+        times = part.times
+        if self.static and len(times) > 1:
+            positions, times = np.nanmean(positions, axis=0, keepdims=True), times[:1]
+        return replace(part, positions=positions, times=times, markers=self.names, clamped=(), name=self.name)
+
+    @property
+    def t0(self) -> float:
+        """Recording time of the scene's start, s."""
+        if self.start_time is not None:
+            return self.start_time
+        return float(self.recording.times[0] if self.fit is None else self.fit[0])
+
+    def observed(self, recording: Recording) -> dict[str, Any]:
+        """Observations for the compiled core; the scene's clock starts at 0."""
+        times = np.zeros(1) if self.static else recording.times - self.t0
+        if not self.static and times[0] < -1e-9:
+            raise RecordingError(f"{self.name}.start_time", "lies after the first frame that is compared", self.t0, "start earlier")
+        measured = np.where(recording.mask[..., None], recording.positions, np.nan)
+        return {
+            "times": np.maximum(times, 0.0),
+            "measured": np.ascontiguousarray(measured),
+            "sigma": np.full(measured.shape[:2], self.sigma),
+            "axes": ["xyz".index(a) for a in self.axes],
+            "loss": self.loss,
+            "loss_scale": self.loss_scale,
+            "markers": [self.places[i].core() for i in self.compared],
+        }
+
+    def extra_terms(self) -> list[Term]:
+        """Terms of the inputs that belong to the observation: marker offsets (3 each), then the time offset."""
+        terms: list[Term] = []
+        for m, i in enumerate(self.compared):
+            wanted = self.offsets.get(self.recording.markers[i], (None, None, None))
+            terms += [product("extra", 3 * m + k, 1.0, {name: "identity"}) for k, name in enumerate(wanted) if name is not None]
+        if self.time_offset is not None:
+            terms.append(product("extra", 3 * len(self.compared), 1.0, {self.time_offset: "identity"}))
+        return terms
+
+    def core(self, recording: Recording) -> dict[str, Any]:
+        """The experiment on (part of) its recording, for the compiled core."""
+        compiled = self.scene.compiled
+        offsets = [self.places[i].offset or (0.0, 0.0, 0.0) for i in self.compared]
+        observed = self.observed(recording)
+        for marker, m in zip(observed["markers"], self.compared, strict=True):
+            marker["carries_offset"] = marker["carries_offset"] or self.recording.markers[m] in self.offsets
+        map_ = compiled.map(3 * len(offsets) + 1, self.extra_terms())
+        map_["base"][compiled.core.inputs : -1] = np.ravel(offsets)
+        return {
+            "name": self.name,
+            "scene": compiled.core,
+            "h": self.solver.h,
+            "integrator": self.solver.integrator,
+            "partition": self.solver.method,
+            "iterations": self.solver.sweeps,
+            "map": map_,
+            "observed": observed,
+            "is_static": self.static,
+            "starts_at_equilibrium": self.start == "equilibrium",
+            "t0": 0.0,
+        }

@@ -1,0 +1,33 @@
+"""What the solver itself makes up: damping by the integrator, compliance by unconverged sweeps. A fit at such a floor shows no material."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .experiment import Experiment
+from .identifiability import Floor
+from .parameters import Parameters
+
+
+def solver_floors(experiments: Sequence[Experiment], parameters: Parameters) -> dict[str, Floor]:
+    """Floors of the free parameters, by (expanded) name.
+
+    BDF1 damps a mode of frequency omega like zeta = omega h / 2, a Kelvin-Voigt time constant tau like omega tau / 2: the floor is tau = h.
+    Gauss-Seidel leaves about 0.9 h^2 / (m sweeps) of compliance in a link of node mass m: EA above length / that is not seen.
+    """
+    floors: dict[str, Floor] = {}
+    for name in parameters.free:
+        quantity = name.partition("[")[0]
+        for e in experiments:
+            if e.static or quantity not in e.scene.quantities:
+                continue
+            h, sweeps = e.solver.h, e.solver.sweeps
+            if quantity.endswith("_damping") and parameters[name].unit == "s" and e.solver.integrator == "bdf1":
+                floors[name] = Floor(h, f"BDF1 with a substep of {h:g} s damps as much by itself; use bdf2")
+            rope = next((r for r in e.scene.ropes.values() if quantity == f"{r.name}_EA"), None)
+            if rope is not None and e.solver.method == "gauss_seidel":
+                link = rope.arc_length[1] - rope.arc_length[0]
+                mass = e.scene.quantities[f"{rope.name}_density"].value * link
+                limit = link * mass * sweeps / (0.9 * h * h)
+                floors[name] = Floor(limit, f"{sweeps} Gauss-Seidel sweeps at {h:g} s hide any larger stiffness; use method = 'direct'", ceiling=True)
+    return floors

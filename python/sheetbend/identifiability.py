@@ -1,0 +1,318 @@
+"""What a fit may claim: intervals, correlations, gauges, and one verdict for each parameter.
+
+The statistics are linear at the minimum, in internal coordinates, so that an interval on a log scale is
+asymmetric in physical units and never crosses zero. Where the linear picture is poor (wide intervals), the
+profile of the cost decides: the interval holds the values at which a refit of all other parameters costs
+little more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from .covariance import Layout, covariance
+from .errors import InputError
+from .gauge import RANK_TOLERANCE, Gauge, null_space
+from .optional import require
+from .parameters import Parameter, Parameters
+from .profile import FARTHEST, Ends, profile_interval
+from .result import Correlation, Estimate
+from .timeseries import Array
+from .wording import floor_words, quantity, side_words, width_words
+
+IDENTIFIED = 0.2
+"""Largest 95 % half-width of an identified parameter, as a part of its value (or of its scale)."""
+
+_LEVEL = 0.95
+_AT_BOUND = 1e-6
+
+
+@dataclass(frozen=True)
+class Floor:
+    """A value that the solver itself makes up: at or beyond it, a fit shows no property of the material.
+
+    Attributes:
+        value: in the unit of the parameter.
+        reason: what makes it, such as "BDF1 damps by omega h/2".
+        ceiling: the limit is from above (unconverged sweeps hide any larger stiffness) instead of from below.
+    """
+
+    value: float
+    reason: str
+    ceiling: bool = False
+
+
+@dataclass(frozen=True)
+class Identifiability:
+    """What the data tell about the free parameters, in their order.
+
+    Attributes:
+        estimates: value, interval and verdict of each.
+        correlations: of every pair that has an interval.
+        rank: directions in parameter space that data and priors determine.
+        singular_values: of the column-scaled Jacobian, descending.
+        gauges: combinations that stay free, in words.
+        autocorrelation_time: frames of residual that count as one.
+    """
+
+    estimates: tuple[Estimate, ...]
+    correlations: tuple[Correlation, ...]
+    rank: int
+    singular_values: Array
+    gauges: tuple[Gauge, ...]
+    autocorrelation_time: float
+
+
+def identify(
+    parameters: Parameters,
+    internal: Array,
+    residuals: Array,
+    jacobian: Array,
+    *,
+    layout: Layout | None = None,
+    floors: Mapping[str, Floor] | None = None,
+    discretization: Mapping[str, float] | None = None,
+    profile: Callable[[str, float], float] | None = None,
+    rank_tolerance: float = RANK_TOLERANCE,
+) -> Identifiability:
+    """Judge every free parameter of a finished fit.
+
+    Args:
+        parameters: with private ones expanded.
+        internal: (free,) minimum in internal coordinates.
+        residuals: (rows,) data residuals there, weighted as in the cost.
+        jacobian: (rows, free) their derivative in internal coordinates.
+        layout: where each row comes from; one series by default.
+        floors: what the solver makes up, by parameter.
+        discretization: what refits at half the step and twice the nodes move, by parameter, in its unit.
+        profile: (name, physical value) -> cost (half the sum of squares with priors) with all others
+            refitted; it is asked about weak parameters only.
+        rank_tolerance: see `gauge.RANK_TOLERANCE`.
+
+    Raises:
+        InputError: shapes disagree, numbers are not finite, or a name is unknown.
+        MissingExtraError: scipy is not installed.
+    """
+    floors, discretization = floors or {}, discretization or {}
+    _check(parameters, internal, residuals, jacobian, {*floors, *discretization})
+    judge = _Judge(parameters, internal, residuals, jacobian, layout, rank_tolerance, profile)
+    estimates = tuple(
+        judge.estimate(column, floors.get(name), float(discretization.get(name, 0.0)))
+        for column, name in enumerate(parameters.free)
+    )
+    space = judge.space
+    return Identifiability(
+        estimates,
+        judge.correlations(),
+        space.rank,
+        space.singular_values,
+        space.gauges,
+        judge.spread.autocorrelation_time,
+    )
+
+
+def _check(
+    parameters: Parameters, internal: Array, residuals: Array, jacobian: Array, named: set[str]
+) -> None:
+    count = len(parameters.free)
+    if jacobian.shape != (len(residuals), count) or internal.shape != (count,):
+        shapes = (residuals.shape, jacobian.shape, internal.shape)
+        fix = f"give (rows,), (rows, {count}) and ({count},)"
+        raise InputError("jacobian", "disagrees with the residuals or the free parameters", shapes, fix)
+    for label, array in (("internal", internal), ("residuals", residuals), ("jacobian", jacobian)):
+        if not np.all(np.isfinite(array)):
+            bad = int((~np.isfinite(array)).sum())
+            raise InputError(
+                label, "must be finite", f"{bad} that are not", "leave gaps out of the residual rows"
+            )
+    unknown = sorted(named - set(parameters.free))
+    if unknown:
+        raise InputError(
+            "floors", "name no free parameter", unknown, f"use names of: {', '.join(parameters.free)}"
+        )
+
+
+class _Judge:
+    """The shared facts behind the estimates of one fit."""
+
+    def __init__(
+        self,
+        parameters: Parameters,
+        internal: Array,
+        residuals: Array,
+        jacobian: Array,
+        layout: Layout | None,
+        tolerance: float,
+        profile: Callable[[str, float], float] | None,
+    ) -> None:
+        self.parameters, self.internal, self.profile = parameters, internal, profile
+        self.quantile = require("scipy.special", "fit").stdtrit
+        names, log = parameters.free, [parameters[name].log for name in parameters.free]
+        prior = parameters.prior_jacobian()
+        self.space = null_space(np.vstack([jacobian, prior]), names, log, tolerance)
+        seen_by_data = null_space(jacobian, names, log, tolerance).determined
+        self.by_prior = set(self.space.determined) - set(seen_by_data)
+        lower, upper = parameters.bounds()
+        near = _AT_BOUND * np.maximum(np.abs(internal), 1e-3)
+        self.at_lower, self.at_upper = internal - lower <= near, upper - internal <= near
+        bounded = self.at_lower | self.at_upper
+        unique = [column for column in range(len(names)) if column not in self.space.pivots]
+        # A parameter at its bound stays there for the others; its own interval lets all of them move.
+        self.columns = [column for column in unique if not bounded[column]]
+        self.spread = covariance(residuals, jacobian[:, self.columns], layout, prior[:, self.columns])
+        self.wide_columns, self.wide = self.columns, self.spread
+        if len(self.columns) < len(unique):
+            self.wide_columns = unique
+            self.wide = covariance(residuals, jacobian[:, unique], layout, prior[:, unique])
+
+    def estimate(self, column: int, floor: Floor | None, discretization: float) -> Estimate:
+        """Value, interval and verdict of the parameter in that column."""
+        parameter = self.parameters[self.parameters.free[column]]
+        value = parameter.to_physical(self.internal[column])
+        if column not in self.space.determined:
+            return _open(parameter, value, discretization, self._undetermined(parameter.name))
+        columns, spread = (
+            (self.columns, self.spread) if column in self.columns else (self.wide_columns, self.wide)
+        )
+        index = columns.index(column)
+        t = float(self.quantile(spread.degrees[index], 0.5 + _LEVEL / 2))
+        reach = t * math.sqrt(spread.matrix[index, index])
+        ends = _ends(parameter, self.internal[column], reach)
+        if self._limit(column) is not None:
+            ends = _clipped(parameter, ends)
+        elif self.profile is not None and not _precise(parameter, value, ends, discretization):
+            rise = t**2 * spread.residual_variance * float(spread.inflation[index]) / 2
+            if rise > 0:
+                step = min(reach, 1.0) if parameter.log else reach
+                ends = profile_interval(
+                    partial(self.profile, parameter.name),
+                    value,
+                    rise,
+                    step=step,
+                    lower=parameter.lower,
+                    upper=parameter.upper,
+                    log=parameter.log,
+                )
+        return self._judged(column, parameter, value, ends, discretization, floor)
+
+    def _judged(
+        self,
+        column: int,
+        parameter: Parameter,
+        value: float,
+        ends: Ends,
+        discretization: float,
+        floor: Floor | None,
+    ) -> Estimate:
+        if ends == (None, None):
+            words = "the cost stays level on both sides: the data hardly depend on it"
+            return _open(parameter, value, discretization, words)
+        lower, upper = _widened(parameter, value, ends, discretization)
+        half_width = _half((lower, upper))
+        if floor is not None and (value >= floor.value if floor.ceiling else value <= floor.value):
+            verdict, words = "at its floor", floor_words(parameter, floor.value, floor.ceiling, floor.reason)
+        elif (limit := self._limit(column)) is not None:
+            verdict, words = "at a bound", f"stopped at its {limit}: widen it, or doubt the model"
+        elif lower is None or upper is None:
+            verdict, words = "one-sided", side_words(parameter, lower, upper)
+        elif _precise(parameter, value, (lower, upper)):
+            verdict, words = "identified", f"known {width_words(parameter, value, lower, upper)}"
+        else:
+            verdict, words = "weak", f"known only {width_words(parameter, value, lower, upper)}"
+        if column in self.by_prior:
+            words += "; through its prior, not through the data"
+        return Estimate(
+            name=parameter.name,
+            value=value,
+            unit=parameter.unit,
+            lower=lower,
+            upper=upper,
+            half_width=half_width,
+            statistical=_half(ends),
+            discretization=discretization,
+            verdict=verdict,
+            words=words,
+        )
+
+    def correlations(self) -> tuple[Correlation, ...]:
+        """Of every pair of parameters that has an interval."""
+        names = [self.parameters.free[column] for column in self.columns]
+        sd = np.sqrt(np.diag(self.spread.matrix))
+        pairs = [
+            (i, j)
+            for i, first in enumerate(self.columns)
+            for j, second in enumerate(self.columns[:i])
+            if {first, second} <= set(self.space.determined) and sd[i] * sd[j] > 0
+        ]
+        return tuple(
+            Correlation(
+                first=names[j], second=names[i], value=float(self.spread.matrix[i, j] / (sd[i] * sd[j]))
+            )
+            for i, j in pairs
+        )
+
+    def _undetermined(self, name: str) -> str:
+        if name in self.space.flat:
+            return "moves no residual: the data do not contain it; fix it or give it a prior"
+        words = "; ".join(gauge.words for gauge in self.space.gauges if name in gauge.members)
+        return f"{words}; fix one of them or give it a prior"
+
+    def _limit(self, column: int) -> str | None:
+        parameter = self.parameters[self.parameters.free[column]]
+        if self.at_lower[column]:
+            return f"lower bound {quantity(parameter.lower, parameter)}"
+        return f"upper bound {quantity(parameter.upper, parameter)}" if self.at_upper[column] else None
+
+
+def _open(parameter: Parameter, value: float, discretization: float, words: str) -> Estimate:
+    return Estimate(
+        name=parameter.name,
+        value=value,
+        unit=parameter.unit,
+        lower=None,
+        upper=None,
+        half_width=None,
+        statistical=None,
+        discretization=discretization,
+        verdict="not identifiable",
+        words=words,
+    )
+
+
+def _ends(parameter: Parameter, internal: float, reach: float) -> Ends:
+    """The linear interval in physical units; open where a log scale leaves a factor of a million."""
+    if parameter.log and reach > FARTHEST:
+        return None, None
+    return parameter.to_physical(internal - reach), parameter.to_physical(internal + reach)
+
+
+def _clipped(parameter: Parameter, ends: Ends) -> Ends:
+    lower, upper = ends
+    lower = parameter.lower if lower is None else max(lower, parameter.lower)
+    upper = parameter.upper if upper is None else min(upper, parameter.upper)
+    return (lower if math.isfinite(lower) else None), (upper if math.isfinite(upper) else None)
+
+
+def _widened(parameter: Parameter, value: float, ends: Ends, more: float) -> Ends:
+    """Both ends moved out by the discretization term; a factor on a log scale keeps them positive."""
+    lower, upper = ends
+    factor, shift = (1 + more / value, 0.0) if parameter.log else (1.0, more)
+    return (
+        None if lower is None else lower / factor - shift,
+        None if upper is None else upper * factor + shift,
+    )
+
+
+def _half(ends: Ends) -> float | None:
+    lower, upper = ends
+    return None if lower is None or upper is None else (upper - lower) / 2
+
+
+def _precise(parameter: Parameter, value: float, ends: Ends, more: float = 0.0) -> bool:
+    half_width = _half(ends)
+    return half_width is not None and half_width + more <= IDENTIFIED * (parameter.scale or abs(value))

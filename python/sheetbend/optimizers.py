@@ -1,0 +1,143 @@
+"""Levenberg-Marquardt on a compiled problem: Ceres where it was built in, SciPy's trust region otherwise. Both see the same function."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .errors import InputError, SheetbendError
+from .optional import require
+from .problem import FitProblem
+
+OPTIMIZERS = ("auto", "ceres", "scipy")
+
+
+@dataclass(frozen=True)
+class Progress:
+    """One iteration: its number, the cost (half the sum of squares) and the internal point."""
+
+    iteration: int
+    cost: float
+    u: np.ndarray
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """Where an optimizer ended; `interrupted` by Ctrl-C, with its best so far."""
+
+    u: np.ndarray
+    cost: float
+    iterations: int
+    evaluations: int
+    converged: bool
+    interrupted: bool
+    message: str
+
+
+Observer = Callable[[Progress], None]
+
+
+def has_ceres() -> bool:
+    """Whether the Ceres module was built."""
+    return importlib.util.find_spec("sheetbend._ceres") is not None
+
+
+def minimize(
+    problem: FitProblem, u: np.ndarray, optimizer: str = "auto", max_iterations: int = 200, tolerance: float = 1e-10, observe: Observer | None = None
+) -> tuple[Minimum, str]:
+    """Minimize half the sum of squared residuals from u (free,), inside the parameters' bounds; also returns the optimizer's name.
+
+    Raises:
+        InputError: unknown optimizer, or Ceres asked for and not built.
+        SheetbendError: the start itself has no answer (divergence, no equilibrium).
+    """
+    if optimizer not in OPTIMIZERS:
+        raise InputError("optimizer", "is unknown", optimizer, f"use one of: {', '.join(OPTIMIZERS)}")
+    if optimizer == "ceres" and not has_ceres():
+        raise InputError("optimizer", "was not built into this installation", "ceres", "install Ceres (libceres-dev) and rebuild, or use 'scipy'")
+    name = optimizer if optimizer != "auto" else "ceres" if has_ceres() else "scipy"
+    ok, r, _ = problem.evaluate(u, jacobian=False)
+    if not ok:
+        raise SheetbendError(f"the fit cannot start: {problem.core.failure or 'a residual is not finite'}")
+    best = _Best(observe, u, 0.5 * float(r @ r))
+    run = _ceres if name == "ceres" else _scipy
+    return run(problem, np.array(u, dtype=float), max_iterations, tolerance, best), name
+
+
+class _Best:
+    """Keeps the best point seen and passes progress on."""
+
+    def __init__(self, observe: Observer | None, u: np.ndarray, cost: float) -> None:
+        self.observe, self.u, self.cost = observe, np.array(u, dtype=float), cost
+
+    def __call__(self, iteration: int, cost: float, u: Sequence[float] | np.ndarray) -> None:
+        if cost <= self.cost:
+            self.u, self.cost = np.array(u, dtype=float), cost
+        if self.observe is not None:
+            self.observe(Progress(iteration, cost, np.array(u, dtype=float)))
+
+
+def _ceres(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: float, best: _Best) -> Minimum:
+    from . import _ceres as ceres
+
+    lower, upper = problem.parameters.bounds()
+    interrupted = False
+
+    def observe(iteration: int, cost: float, step: float, gradient: float, at: list[float]) -> bool:
+        best(iteration, cost, at)
+        return True
+
+    out: dict[str, Any] = {}
+    try:
+        out = ceres.minimize(
+            evaluation=problem.core.evaluation(),
+            u=u,
+            lower=lower,
+            upper=upper,
+            max_iterations=max_iterations,
+            tolerance=tolerance,
+            observe=observe,
+        )
+    except KeyboardInterrupt:
+        interrupted = True
+    if interrupted or out["stopped"]:
+        return Minimum(best.u, best.cost, out.get("iterations", 0), out.get("evaluations", 0), False, True, "interrupted: the best point so far")
+    return Minimum(np.array(out["u"]), out["cost"], out["iterations"], out["evaluations"], out["converged"], False, out["message"])
+
+
+def _scipy(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: float, best: _Best) -> Minimum:
+    optimize = require("scipy.optimize", "fit")
+    lower, upper = problem.parameters.bounds()
+    last: dict[str, Any] = {"u": None}
+    count = 0
+
+    def evaluated(at: np.ndarray, jacobian: bool) -> dict[str, Any]:
+        nonlocal count
+        if last["u"] is None or not np.array_equal(last["u"], at) or (jacobian and last["J"] is None):
+            count += 1
+            ok, r, J = problem.evaluate(at, jacobian)
+            # SciPy shortens its step where a residual is not finite.
+            last.update(u=at.copy(), r=r if ok else np.full(problem.core.rows, np.inf), J=J if jacobian and ok else None)
+            if ok:
+                best(count, 0.5 * float(r @ r), at)
+        return last
+
+    try:
+        out = optimize.least_squares(
+            lambda at: evaluated(at, False)["r"],
+            np.clip(u, lower, upper),
+            jac=lambda at: evaluated(at, True)["J"],
+            bounds=(lower, upper),
+            x_scale="jac",
+            ftol=max(tolerance, 1e-15),
+            xtol=max(tolerance, 1e-15),
+            gtol=max(tolerance, 1e-15),
+            max_nfev=max_iterations,
+        )
+    except KeyboardInterrupt:
+        return Minimum(best.u, best.cost, count, count, False, True, "interrupted: the best point so far")
+    return Minimum(out.x, float(out.cost), int(out.njev), int(out.nfev), out.status > 0, False, out.message)

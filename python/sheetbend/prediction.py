@@ -1,0 +1,113 @@
+"""How well a fitted model explains what it saw and predicts what it did not, beside a no-physics baseline."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .baseline import no_physics
+from .errors import RecordingError
+from .experiment import Experiment
+from .parameters import Parameters
+from .problem import FitProblem
+from .recording import Recording
+from .result import RecordingFit
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Measured and simulated markers of one experiment over its fitted and held-out part.
+
+    Attributes:
+        experiment: whose markers these are.
+        recording: the measured part, compared markers only.
+        simulated: (frames, markers, 3) m.
+        held_out: (frames,) which frames the fit did not see.
+        baseline: (frames, markers, 3) of the no-physics prediction on the held-out frames, NaN elsewhere; None without one.
+        baseline_words: what that prediction is.
+    """
+
+    experiment: Experiment
+    recording: Recording
+    simulated: np.ndarray
+    held_out: np.ndarray
+    baseline: np.ndarray | None = None
+    baseline_words: str = ""
+
+    def rms(self, frames: np.ndarray, predicted: np.ndarray | None = None, scored: np.ndarray | None = None) -> float | None:
+        """Root mean square distance [m] over seen markers in some frames, along the experiment's axes."""
+        axes = ["xyz".index(a) for a in self.experiment.axes]
+        predicted = self.simulated if predicted is None else predicted
+        seen = self.recording.mask[frames] if scored is None else scored
+        d2 = ((predicted - self.recording.positions)[frames][..., axes] ** 2).sum(axis=-1)
+        return float(np.sqrt(d2[seen].mean())) if seen.any() else None
+
+    def motion_about_rest(self, rest: np.ndarray) -> float:
+        """Root mean square distance [m] of the held-out measured markers from a rest position (markers, 3)."""
+        return self.rms(self.held_out, np.broadcast_to(rest, self.recording.positions.shape)) or 0.0
+
+    def errors(self, rows: int) -> RecordingFit:
+        """As a row of the report."""
+        base = None
+        if self.baseline is not None:
+            base = self.rms(self.held_out, self.baseline)
+        return RecordingFit(
+            name=self.experiment.name,
+            rows=rows,
+            rms=self.rms(~self.held_out) if rows else None,
+            held_out=self.rms(self.held_out),
+            baseline=base,
+        )
+
+
+def compare(experiments: Sequence[Experiment], parameters: Parameters, values: Mapping[str, float], threads: int = 1) -> list[Comparison]:
+    """Simulate each experiment once over its fitted and held-out parts at the fitted values.
+
+    Args:
+        parameters: as given to the fit (private ones not expanded).
+        values: by expanded name.
+    """
+    parts = [_whole(e) for e in experiments]
+    problem = FitProblem(experiments, parameters, [part for part, _ in parts], threads)
+    u = problem.parameters.to_internal(values)
+    comparisons = []
+    for e, (part, held), simulated in zip(experiments, parts, problem.simulate(u), strict=True):
+        plain = Comparison(e, part, simulated, held)
+        comparisons.append(_with_baseline(plain, experiments))
+    return comparisons
+
+
+def _whole(e: Experiment) -> tuple[Recording, np.ndarray]:
+    """The fitted and the held-out part as one recording, and which frames are held out."""
+    fitted, held = e.fitted(), e.held()
+    if held is None:
+        # A recording that is only predicted from the others' parameters is held out altogether.
+        return fitted, np.full(len(fitted.times), e.predict == "mean")
+    times = np.concatenate([fitted.times, held.times])
+    order = np.argsort(times, kind="stable")
+    if (np.diff(times[order]) <= 0).any():
+        raise RecordingError(f"{e.name}.held_out", "overlaps the fitted part", e.held_out, "hold out frames that the fit does not see")
+    positions = np.concatenate([fitted.positions, held.positions])[order]
+    flags = np.concatenate([np.zeros(len(fitted.times), bool), np.ones(len(held.times), bool)])[order]
+    return replace(fitted, positions=positions, times=times[order]), flags
+
+
+def _with_baseline(c: Comparison, experiments: Sequence[Experiment]) -> Comparison:
+    """The no-physics prediction: from the recording's own fitted part, or for a whole recording from the fitted ones with its markers."""
+    e, held = c.experiment, c.held_out
+    if not held.any():
+        return c
+    if e.held_out is not None:
+        source: list[Recording] = [e.fitted()]
+        target = e.held()
+    else:
+        source = [o.fitted() for o in experiments if o.predict is None and o.names == e.names and o.static == e.static]
+        target = c.recording
+    if not source or target is None:
+        return c
+    guess = no_physics(source, target)
+    predicted = np.full(c.simulated.shape, np.nan)
+    predicted[held] = np.where(guess.scored[..., None], guess.positions, target.positions)
+    return replace(c, baseline=predicted, baseline_words=guess.words)

@@ -1,0 +1,154 @@
+"""From experiments and parameters to the compiled least-squares problem."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from . import _core
+from .covariance import Layout
+from .errors import InputError
+from .experiment import Experiment
+from .parameters import Parameter, Parameters
+from .quantities import Quantity
+from .recording import Recording
+
+ParameterLike = Parameter | Mapping[str, Any] | None
+
+
+def quantities_of(experiments: Sequence[Experiment]) -> dict[str, Quantity]:
+    """Every named quantity of the experiments' scenes, the first scene's value first."""
+    found: dict[str, Quantity] = {}
+    for e in experiments:
+        for name, quantity in e.scene.quantities.items():
+            found.setdefault(name, quantity)
+    return found
+
+
+def as_parameters(wanted: Mapping[str, ParameterLike] | Iterable[str | Parameter], experiments: Sequence[Experiment]) -> Parameters:
+    """Complete what a user wrote: initial value, unit, log scale and natural scale come from the scenes' quantities.
+
+    Args:
+        wanted: names, `Parameter`s, or a mapping from name to `Parameter`, to a mapping of its fields, or to None.
+
+    Raises:
+        InputError: a name that no scene has; the message lists the known ones.
+    """
+    known = quantities_of(experiments)
+    items = wanted.items() if isinstance(wanted, Mapping) else [(p.name, p) if isinstance(p, Parameter) else (p, None) for p in wanted]
+    complete = []
+    for name, given in items:
+        if name not in known:
+            raise InputError("parameters", "name no quantity of the scenes", name, f"name some of: {', '.join(known)}")
+        if isinstance(given, Parameter):
+            complete.append(given)
+            continue
+        fields = dict(given or {})
+        unknown = set(fields) - set(Parameter.__dataclass_fields__)
+        if unknown:
+            raise InputError(f"parameters.{name}", "has unknown fields", sorted(unknown), f"use: {', '.join(Parameter.__dataclass_fields__)}")
+        q = known[name]
+        if "tied_to" not in fields:
+            fields.setdefault("initial", q.value)
+        defaults = {"unit": q.unit, "log": q.positive, "scale": q.scale}
+        complete.append(Parameter(name=name, **(defaults | fields)))
+    return Parameters(complete)
+
+
+class FitProblem:
+    """Experiments with shared and private parameters, compiled for one set of recordings' parts.
+
+    Attributes:
+        experiments: in order.
+        parameters: with private ones expanded to one per experiment that has them.
+        core: the compiled problem.
+    """
+
+    def __init__(
+        self,
+        experiments: Sequence[Experiment],
+        parameters: Parameters,
+        recordings: Sequence[Recording] | None = None,
+        threads: int = 1,
+        expanded: Parameters | None = None,
+    ) -> None:
+        self.experiments = tuple(experiments)
+        self.given, self.threads = parameters, threads
+        self.recordings = tuple(recordings if recordings is not None else (e.fitted() for e in experiments))
+        names = [e.name for e in experiments]
+        if len(set(names)) != len(names):
+            raise InputError("experiments", "share a name", names, "give each a name of its own")
+        self.parameters = self._expanded(parameters) if expanded is None else expanded
+        theta, slots, slot_of = self._slots(parameters)
+        self.core = _core.Problem(
+            experiments=[e.core(r) for e, r in zip(self.experiments, self.recordings, strict=True)],
+            theta=theta,
+            slots=slots,
+            free=self._free(slot_of),
+            threads=threads,
+        )
+
+    def holding(self, name: str, value: float) -> FitProblem:
+        """The same problem with one (expanded) parameter held at a value."""
+        held = self.parameters.replace(name, fixed=True, initial=value, prior=None, lower=-np.inf, upper=np.inf)
+        return FitProblem(self.experiments, self.given, self.recordings, self.threads, held)
+
+    def _expanded(self, parameters: Parameters) -> Parameters:
+        every = parameters.expand([e.name for e in self.experiments])
+        has = {f"{q}[{e.name}]" for e in self.experiments for q in e.scene.quantities}
+        private = {f"{p.name}[{e.name}]" for p in parameters.values() if p.private for e in self.experiments}
+        return Parameters(p for name, p in every.items() if name not in private or name in has)
+
+    def _slots(self, parameters: Parameters) -> tuple[list[float], list[list[int]], dict[str, int]]:
+        """theta, per experiment the place of each of its quantities in it, and the place of each expanded parameter."""
+        values = {name: p for name, p in self.parameters.items()}
+        theta: list[float] = []
+        slot_of: dict[str, int] = {}
+        slots = []
+        for e in self.experiments:
+            mine = []
+            for name, quantity in e.scene.quantities.items():
+                key = f"{name}[{e.name}]" if name in parameters and parameters[name].private else name
+                if key in values and key in slot_of:
+                    mine.append(slot_of[key])
+                    continue
+                mine.append(len(theta))
+                initial = values[key].initial if key in values else quantity.value
+                theta.append(quantity.value if initial is None else initial)
+                if key in values:
+                    slot_of[key] = mine[-1]
+            slots.append(mine)
+        return theta, slots, slot_of
+
+    def _free(self, slot_of: Mapping[str, int]) -> list[dict[str, Any]]:
+        chain = {name: (root, factor) for name, (root, factor) in self.parameters.roots.items() if name in slot_of}
+        lists = []
+        for name in self.parameters.free:
+            p = self.parameters[name]
+            tied = [(slot_of[other], factor) for other, (root, factor) in chain.items() if root == name]
+            prior = None if p.prior is None else (p.to_internal(p.prior[0]), p.prior[1])
+            lists.append({"name": name, "log": p.log, "slots": [s for s, _ in tied], "factors": [f for _, f in tied], "prior": prior})
+        return lists
+
+    def evaluate(self, u: np.ndarray, jacobian: bool = True) -> tuple[bool, np.ndarray, np.ndarray]:
+        """(ok, residuals (rows,), Jacobian (rows, free)); rows of data first, then priors. Not ok where the physics has no answer."""
+        return self.core.evaluate(u, jacobian)
+
+    def simulate(self, u: np.ndarray) -> list[np.ndarray]:
+        """Simulated markers (frames, markers, 3) of every experiment."""
+        return [self.core.simulate(i, u).reshape(r.positions.shape) for i, r in enumerate(self.recordings)]
+
+    def rows_layout(self) -> Layout:
+        """Where each data row comes from, for the covariance."""
+        recording, channel, frame = [], [], []
+        for i, (e, r) in enumerate(zip(self.experiments, self.recordings, strict=True)):
+            seen_frame, seen_marker = np.nonzero(r.mask)
+            axes = np.tile(np.arange(len(e.axes)), len(seen_frame))
+            frames, markers = np.repeat(seen_frame, len(e.axes)), np.repeat(seen_marker, len(e.axes))
+            recording.append(np.full(len(axes), i))
+            # Along a static shape the points are the series.
+            channel.append(axes if e.static else markers * len(e.axes) + axes)
+            frame.append(markers if e.static else frames)
+        return Layout(np.concatenate(recording), np.concatenate(channel), np.concatenate(frame))

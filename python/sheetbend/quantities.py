@@ -1,0 +1,60 @@
+"""Named physical quantities of a scene and how the solver's inputs are made of them.
+
+An input (a compliance, a mass, a rest length, a coordinate) is a sum of terms, each a coefficient times a product of simple functions of
+named quantities: a link's compliance is `length/segments * 1/EA`. The map and its derivative are compiled (adjoint/parameter_map.h).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from .errors import SceneError
+
+FUNCTIONS = {"identity": 0, "inverse": 1, "square": 2, "sin": 3, "cos": 4}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A named physical number of a scene, differentiable and fittable.
+
+    Attributes:
+        name: `<group>_<quantity>`.
+        value: in `unit`.
+        unit: SI.
+        positive: whether only positive values make sense (such are fitted on a log scale by default).
+        scale: a natural size in `unit` where zero is a sensible value (angles, offsets), else None.
+    """
+
+    name: str
+    value: float
+    unit: str
+    positive: bool = True
+    scale: float | None = None
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.value):
+            raise SceneError(self.name, "must be a finite number", self.value, f"give a value in {self.unit}")
+        if self.positive and not self.value > 0.0:
+            raise SceneError(self.name, "must be positive", self.value, f"give a positive value in {self.unit}")
+
+
+@dataclass(frozen=True)
+class Term:
+    """coefficient * prod f(quantity), added to entry `index` of the input array `array`."""
+
+    array: str
+    index: int
+    coefficient: float
+    factors: tuple[tuple[str, str], ...]  # (quantity, function)
+
+
+def term(array: str, index: int, coefficient: float, **functions: str) -> Term:
+    """A term with functions by quantity, such as `term("compliance", 3, 0.02, rope_EA="inverse")`."""
+    return product(array, index, coefficient, functions)
+
+
+def product(array: str, index: int, coefficient: float, functions: Mapping[str, str]) -> Term:
+    """The same, for quantity names held in a mapping."""
+    return Term(array, int(index), float(coefficient), tuple(functions.items()))

@@ -1,0 +1,259 @@
+"""The report of a fit, as plain text and for rich terminals, both from the same sections."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from .optional import require
+from .result import Estimate, FitResult, Given, RecordingFit
+from .wording import figures, short
+
+if TYPE_CHECKING:
+    from rich.console import Group
+
+CORRELATION_SHOWN = 0.3
+"""Smallest correlation (absolute value) that the report lists."""
+
+_SAME_MINIMUM = 0.01  # starts that end within 1 % of the best cost found the same minimum
+_COLORS = {
+    "identified": "green",
+    "weak": "yellow",
+    "one-sided": "yellow",
+    "at a bound": "red",
+    "at its floor": "red",
+    "not identifiable": "red",
+}
+
+
+@dataclass(frozen=True)
+class Section:
+    """A titled part of the report: a table, then notes (label, sentence)."""
+
+    title: str
+    headers: tuple[str, ...] = ()
+    rows: tuple[tuple[str, ...], ...] = ()
+    notes: tuple[tuple[str, str], ...] = ()
+
+
+def sections(result: FitResult) -> list[Section]:
+    """The report as data, empty sections left out."""
+    parts = [
+        _parameters(result),
+        _interval_parts(result.estimates),
+        _recordings(result),
+        _unknown(result),
+        _correlations(result),
+        _course(result),
+        Section("Warnings", notes=tuple(("", warning) for warning in result.warnings)),
+    ]
+    return [part for part in parts if part.rows or part.notes]
+
+
+def headline(result: FitResult) -> str:
+    """How the fit ended, in one sentence."""
+    if result.interrupted:
+        end = "interrupted, best point so far,"
+    else:
+        end = "converged" if result.converged else "did NOT converge"
+    turns = f"{result.iterations} iteration{'' if result.iterations == 1 else 's'}"
+    return f"{end} after {turns}, {result.seconds:.3g} s, {result.optimizer}"
+
+
+def plain(result: FitResult, width: int = 100) -> str:
+    """The report as plain text, at most `width` columns where the names allow it."""
+    lines = [f"Fit {headline(result)}"]
+    if result.message:
+        lines += textwrap.wrap(result.message, width, initial_indent="  ", subsequent_indent="  ")
+    for section in sections(result):
+        lines += ["", section.title, "-" * len(section.title)]
+        lines += _table(section)
+        if section.rows and section.notes:
+            lines.append("")
+        lines += _notes(section.notes, width)
+    return "\n".join(lines) + "\n"
+
+
+def rich_report(result: FitResult) -> Group:
+    """The report as a rich renderable: `rich.print(rich_report(result))`.
+
+    Raises:
+        MissingExtraError: rich is not installed.
+    """
+    console = require("rich.console", "cli")
+    text = require("rich.text", "cli").Text
+    padding = require("rich.padding", "cli").Padding
+    good = result.converged and not result.interrupted
+    parts: list[object] = [text(f"Fit {headline(result)}", style="bold green" if good else "bold red")]
+    if result.message:
+        parts.append(text(result.message, style="dim"))
+    for section in sections(result):
+        parts.append(text(f"\n{section.title}", style="bold"))
+        if section.rows:
+            parts.append(padding(_rich_table(section), (0, 0, 0, 2)))
+        for label, sentence in section.notes:
+            line = text.assemble((f"{label}: " if label else "", "cyan"), sentence)
+            parts.append(padding(line, (0, 0, 0, 2)))
+    group: Group = console.Group(*parts)
+    return group
+
+
+def _parameters(result: FitResult) -> Section:
+    rows = [_estimate_row(estimate) for estimate in result.estimates]
+    rows += [_given_row(given) for given in result.given]
+    headers = ("parameter", "value", "+/-", "95 % interval", "unit", "verdict")
+    return Section("Parameters", headers, tuple(rows))
+
+
+def _estimate_row(estimate: Estimate) -> tuple[str, ...]:
+    ends = (estimate.lower, estimate.upper)
+    numbers = (estimate.value, estimate.half_width, *ends)
+    if _lopsided(*ends):
+        value, half, lower, upper = ("" if number is None else short(number) for number in numbers)
+    else:
+        value, half, lower, upper = figures(numbers, estimate.half_width)
+    interval = (
+        "" if estimate.lower is None and estimate.upper is None else f"[{lower or '-'}, {upper or '-'}]"
+    )
+    return (estimate.name, value, half, interval, estimate.unit, estimate.verdict)
+
+
+def _lopsided(lower: float | None, upper: float | None) -> bool:
+    """Whether the ends are so far apart, or one of them so open, that no common digits suit them."""
+    return lower is None or upper is None or 0 < 3 * lower < upper
+
+
+def _given_row(given: Given) -> tuple[str, ...]:
+    return (given.name, short(given.value, 6), "", "", given.unit, given.words)
+
+
+def _interval_parts(estimates: Iterable[Estimate]) -> Section:
+    rows = [
+        (e.name, *figures((e.half_width, e.statistical, e.discretization), e.half_width), e.unit)
+        for e in estimates
+        if e.discretization > 0 and e.half_width is not None
+    ]
+    headers = ("parameter", "+/-", "statistical", "discretization", "unit")
+    return Section("Where the intervals come from", headers, tuple(rows))
+
+
+def _recordings(result: FitResult) -> Section:
+    rows = [_recording_row(recording) for recording in result.recordings]
+    headers: tuple[str, ...] = (
+        "recording",
+        "rows",
+        "fitted rms",
+        "held-out rms",
+        "baseline rms",
+        "held-out/baseline",
+        "unit",
+    )
+    if all(recording.held_out is None for recording in result.recordings):
+        headers, rows = headers[:3] + headers[-1:], [row[:3] + row[-1:] for row in rows]
+    notes = (("baseline (no physics)", result.baseline),) if result.baseline else ()
+    return Section("Recordings", headers, tuple(rows), notes)
+
+
+def _recording_row(recording: RecordingFit) -> tuple[str, ...]:
+    factor, unit = _readable(recording)
+
+    def number(value: float | None) -> str:
+        return "" if value is None else short(value * factor)
+
+    ratio = ""
+    if recording.held_out is not None and recording.baseline:
+        ratio = f"{100 * recording.held_out / recording.baseline:.3g} %"
+    errors = (number(recording.rms), number(recording.held_out), number(recording.baseline))
+    return (recording.name, f"{recording.rows:,}", *errors, ratio, unit)
+
+
+def _readable(recording: RecordingFit) -> tuple[float, str]:
+    sizes = (recording.rms or 0.0, recording.held_out or 0.0, recording.baseline or 0.0)
+    return (1e3, "mm") if recording.unit == "m" and max(sizes) < 1 else (1.0, recording.unit)
+
+
+def _unknown(result: FitResult) -> Section:
+    notes = []
+    for gauge in result.gauges:
+        members = [e.name for e in result.estimates if gauge in e.words]
+        notes.append((" and ".join(members), f"{gauge}; fix one of them or give it a prior"))
+    for estimate in result.estimates:
+        if estimate.verdict != "identified" and not any(gauge in estimate.words for gauge in result.gauges):
+            notes.append((estimate.name, estimate.words))
+    return Section("What the data cannot tell", notes=tuple(notes))
+
+
+def _correlations(result: FitResult) -> Section:
+    strong = [pair for pair in result.correlations if abs(pair.value) >= CORRELATION_SHOWN]
+    strong.sort(key=lambda pair: -abs(pair.value))
+    rows = tuple((pair.first, pair.second, f"{pair.value:+.2f}") for pair in strong)
+    title = f"Correlations (those below {CORRELATION_SHOWN:g} are left out)"
+    return Section(title, ("parameter", "with", "correlation"), rows)
+
+
+def _course(result: FitResult) -> Section:
+    notes = [
+        ("cost", f"{result.cost:.6g} over {result.rows:,} residuals, {len(result.estimates)} free parameters")
+    ]
+    if result.autocorrelation_time > 1.05:
+        time = result.autocorrelation_time
+        words = f"one frame in {time:.3g} counts as independent; the intervals allow for it"
+        notes.append(("residuals are alike from frame to frame", words))
+    if len(result.starts) > 1:
+        best = min(start.cost for start in result.starts)
+        same = sum(start.cost <= best * (1 + _SAME_MINIMUM) for start in result.starts)
+        worst = max(start.cost for start in result.starts)
+        words = f"{same} of {len(result.starts)} ended within 1 % of the best cost; the worst at {worst:.4g}"
+        notes.append(("starts", words))
+    return Section("Course", notes=tuple(notes))
+
+
+def _table(section: Section) -> list[str]:
+    if not section.rows:
+        return []
+    left = _flush_left(section)
+    lines = (section.headers, *section.rows)
+    widths = [max(len(line[column]) for line in lines) for column in range(len(section.headers))]
+    aligned = [
+        "  ".join(
+            cell.ljust(size) if flush else cell.rjust(size)
+            for cell, size, flush in zip(line, widths, left, strict=True)
+        )
+        for line in lines
+    ]
+    return [f"  {line}".rstrip() for line in aligned]
+
+
+def _flush_left(section: Section) -> list[bool]:
+    words = {"parameter", "with", "recording", "unit", "verdict"}
+    return [header in words for header in section.headers]
+
+
+def _notes(notes: Iterable[tuple[str, str]], width: int) -> list[str]:
+    lines: list[str] = []
+    for label, sentence in notes:
+        text = f"{label}: {sentence}" if label else sentence
+        lines += textwrap.wrap(
+            text,
+            width,
+            initial_indent="  ",
+            subsequent_indent="    ",
+            break_on_hyphens=False,
+            break_long_words=False,
+        )
+    return lines
+
+
+def _rich_table(section: Section) -> object:
+    box = require("rich.box", "cli")
+    table = require("rich.table", "cli").Table(
+        box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, header_style="dim"
+    )
+    text = require("rich.text", "cli").Text
+    for header, flush in zip(section.headers, _flush_left(section), strict=True):
+        table.add_column(header, justify="left" if flush else "right", no_wrap=header != "verdict")
+    for row in section.rows:
+        table.add_row(*(text(cell, style=_COLORS.get(cell, "")) for cell in row))
+    return table

@@ -1,0 +1,241 @@
+"""What a fit gives back: estimates with verdicts, errors on data it did not see, and how it went.
+
+Everything is plain data, so that `save` and `load` are exact and any JSON reader understands the file.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from .errors import InputError
+
+FORMAT = "sheetbend fit 1"
+
+VERDICTS = ("identified", "weak", "one-sided", "at a bound", "at its floor", "not identifiable")
+"""identified: 95 % half-width at most 20 % of the value; weak: above; one-sided: bounded from one side only;
+at a bound: of the user; at its floor: the solver's own stiffness or damping; not identifiable: gauge or
+flat."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """One fitted parameter.
+
+    Attributes:
+        name, value, unit: physical value in SI units.
+        lower, upper: 95 % interval, statistical and discretization parts together; None where it is open.
+        half_width: half of it, None where it is open.
+        statistical: half-width from the residuals alone, None where it is open.
+        discretization: what refits at half the step and twice the nodes move; 0 when that was not measured.
+        verdict: one of `VERDICTS`.
+        words: the verdict as a sentence.
+    """
+
+    name: str
+    value: float
+    unit: str
+    lower: float | None
+    upper: float | None
+    half_width: float | None
+    statistical: float | None
+    discretization: float
+    verdict: str
+    words: str
+
+    def __post_init__(self) -> None:
+        if self.verdict not in VERDICTS:
+            raise InputError(
+                f"{self.name}.verdict", "is unknown", self.verdict, f"use one of: {', '.join(VERDICTS)}"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Given:
+    """A parameter that was not fitted: fixed, or tied to another; `words` says which."""
+
+    name: str
+    value: float
+    unit: str
+    words: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Correlation:
+    """Correlation of two estimates in internal coordinates."""
+
+    first: str
+    second: str
+    value: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordingFit:
+    """How well one recording is explained: rms distance over markers and frames, in `unit`.
+
+    Attributes:
+        rows: number of residuals that took part in the fit.
+        rms: over the fitted part; None where all of it was held out.
+        held_out: over the part that the fit did not see; None when there is none.
+        baseline: over the same part, of a prediction without physics.
+    """
+
+    name: str
+    rows: int
+    rms: float | None = None
+    held_out: float | None = None
+    baseline: float | None = None
+    unit: str = "m"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """One start of a multi-start fit: cost at its end, and the physical values there."""
+
+    cost: float
+    iterations: int
+    converged: bool
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitResult:
+    """A finished (or interrupted) fit.
+
+    Attributes:
+        estimates: one per free parameter, in the order of the parameters.
+        given: the parameters that were not fitted.
+        correlations: of every pair of determined estimates.
+        gauges: combinations of parameters that the data leave free, in words.
+        recordings: errors per recording.
+        baseline: what the no-physics baseline predicts, in words.
+        cost: half the sum of squared residuals, priors included.
+        rows: number of data residuals.
+        autocorrelation_time: frames of residual that count as one, 1 when they are independent.
+        starts: the ends of all starts, best first.
+        optimizer, iterations, seconds, converged, interrupted, message: how it went.
+        warnings: what a reader must know before using the numbers.
+    """
+
+    estimates: tuple[Estimate, ...]
+    recordings: tuple[RecordingFit, ...]
+    cost: float
+    rows: int
+    optimizer: str
+    iterations: int
+    seconds: float
+    converged: bool
+    interrupted: bool = False
+    message: str = ""
+    given: tuple[Given, ...] = ()
+    correlations: tuple[Correlation, ...] = ()
+    gauges: tuple[str, ...] = ()
+    baseline: str = ""
+    autocorrelation_time: float = 1.0
+    starts: tuple[Start, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> Estimate:
+        """The estimate of that name; KeyError names the ones there are."""
+        for estimate in self.estimates:
+            if estimate.name == name:
+                return estimate
+        raise KeyError(f"no estimate of {name!r}; there are: {', '.join(e.name for e in self.estimates)}")
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Physical values of all parameters, fitted and given."""
+        fitted = {estimate.name: estimate.value for estimate in self.estimates}
+        return fitted | {given.name: given.value for given in self.given}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Strict JSON values: no NaN and no infinity, None in their place."""
+        out = asdict(self)
+        parameters, recordings = {}, {}
+        for estimate in out.pop("estimates"):
+            name, interval = estimate.pop("name"), [estimate.pop("lower"), estimate.pop("upper")]
+            parameters[name] = {**estimate, "interval": interval}
+        for recording in out.pop("recordings"):
+            name = recording.pop("name")
+            recordings[name] = recording
+        strict: dict[str, Any] = _strict(
+            {
+                "format": FORMAT,
+                "parameters": parameters,
+                "held_out": {name: part["held_out"] for name, part in recordings.items()},
+                "baseline": {name: part["baseline"] for name, part in recordings.items()},
+                "seconds": out.pop("seconds"),
+                "recordings": recordings,
+                "baseline_is": out.pop("baseline"),
+                **out,
+            }
+        )
+        return strict
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> FitResult:
+        """The inverse of `to_dict`.
+
+        Raises:
+            InputError: it is no fit, or one of another format.
+        """
+        found = data.get("format") if isinstance(data, Mapping) else data
+        if found != FORMAT:
+            raise InputError("format", "is not the one that this version reads", found, f"use {FORMAT!r}")
+        data = dict(data)
+        plain = {field.name for field in fields(cls)} & data.keys() - {"baseline"}
+        nested = {"given": Given, "correlations": Correlation, "starts": Start}
+        values = {name: data[name] for name in plain}
+        for name, kind in nested.items():
+            values[name] = tuple(kind(**part) for part in data[name])
+        values["estimates"] = tuple(_estimate(name, part) for name, part in data["parameters"].items())
+        values["recordings"] = tuple(
+            RecordingFit(name=name, **part) for name, part in data["recordings"].items()
+        )
+        values["gauges"], values["warnings"] = tuple(data["gauges"]), tuple(data["warnings"])
+        return cls(baseline=data["baseline_is"], **values)
+
+    def save(self, path: str | Path) -> None:
+        """Write `to_dict` as JSON."""
+        Path(path).write_text(json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+    @classmethod
+    def load(cls, path: str | Path) -> FitResult:
+        """Read what `save` wrote.
+
+        Raises:
+            InputError: the file holds no fit.
+        """
+        try:
+            data = json.loads(Path(path).read_text(encoding="utf-8"))
+        except json.JSONDecodeError as error:
+            raise InputError(
+                str(path), f"is no JSON ({error})", path, "give a file that FitResult.save wrote"
+            ) from error
+        return cls.from_dict(data)
+
+    def report(self) -> str:
+        """The report as plain text, at most 100 columns wide."""
+        from .report import plain
+
+        return plain(self)
+
+
+def _estimate(name: str, part: Mapping[str, Any]) -> Estimate:
+    lower, upper = part["interval"]
+    rest = {key: value for key, value in part.items() if key != "interval"}
+    return Estimate(name=name, lower=lower, upper=upper, **rest)
+
+
+def _strict(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _strict(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_strict(part) for part in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,288 @@
+"""Ropes: chains of particles with axial and bending stiffness, given and fitted by physical parameters that do not depend on the mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .checks import finite, points
+from .errors import SceneError
+from .quantities import Term, product
+from .scene import Array, Scene
+
+GHOST = 0.01  # length of a clamp's ghost link over a rope's link; only its direction matters
+
+
+@dataclass(frozen=True)
+class Rope:
+    """A rope in a scene: its particles in order and their material coordinates [m]. Ghosts are the clamps' direction particles."""
+
+    name: str
+    particles: Array
+    arc_length: Array
+    start_ghost: int | None = None
+    end_ghost: int | None = None
+
+    @property
+    def length(self) -> float:
+        return float(self.arc_length[-1])
+
+
+def rope(
+    length: float | None = None,
+    segments: int = 40,
+    *,
+    density: float,
+    EA: float | None = None,
+    EI: float | None = None,
+    name: str = "rope",
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+    pinned: Sequence[int] = (0,),
+    **options: object,
+) -> Scene:
+    """A scene with one rope; see `add_rope` for the options. `pinned` holds node numbers along the rope (-1 = last)."""
+    scene = Scene(name, gravity)
+    built = add_rope(scene, name, length=length, segments=segments, density=density, EA=EA, EI=EI, **options)  # type: ignore[arg-type]
+    if len(pinned):
+        scene.pin(built.particles[list(pinned)])
+    return scene
+
+
+def add_rope(
+    scene: Scene,
+    name: str = "rope",
+    *,
+    length: float | None = None,
+    segments: int = 40,
+    density: float,
+    EA: float | None = None,
+    EI: float | None = None,
+    start: ArrayLike = (0.0, 0.0, 0.0),
+    direction: ArrayLike = (1.0, 0.0, 0.0),
+    points: ArrayLike | None = None,
+    stretch_damping: float | None = None,
+    bend_damping: float | None = None,
+    drag_linear: float | None = None,
+    drag_quadratic: float | None = None,
+    clamp_start: ArrayLike | None = None,
+    clamp_end: ArrayLike | None = None,
+    clamp_angles: bool = False,
+    plane: ArrayLike | None = None,
+    set_modes: Sequence[int] = (),
+) -> Rope:
+    """Add a rope of `segments` equal links to a scene.
+
+    Quantities: `<name>_length` m, `<name>_density` kg/m, and where given `_EA` N, `_EI` N m^2, `_stretch_damping` s, `_bend_damping` s,
+    `_drag_linear` N s/m^2, `_drag_quadratic` N s^2/m^3, `_start_angle` and `_end_angle` rad, `_set_<k>` 1/m.
+
+    Args:
+        length: m; the length of `points` by default.
+        density: kg/m; nodes carry it by their Voronoi length.
+        EA: axial stiffness N; None = inextensible.
+        EI: bending stiffness N m^2; None = no bending.
+        start, direction: a straight initial shape.
+        points: (k, 3) m, an initial shape instead, resampled to equal links.
+        stretch_damping, bend_damping: Kelvin-Voigt time constants s: the damping moment is EI times the constant times the rate of curvature.
+        drag_linear, drag_quadratic: air drag per length, isotropic.
+        clamp_start, clamp_end: the rope's direction of travel at an end, held by a ghost particle half a joint away; the end is pinned.
+        clamp_angles: add `_start_angle` / `_end_angle`, rotations of the clamps about `plane`.
+        plane: unit normal of the plane that the rope stays in; needed by clamp_angles and set_modes.
+        set_modes: k of rest-curvature modes cos(k pi s / length) about `plane`; each amplitude starts at zero.
+
+    Returns:
+        Rope, also kept as `scene.ropes[name]`.
+
+    Raises:
+        SceneError: wrong or missing values; the message names the field.
+    """
+    shape, length = _shape(name, length, segments, start, direction, points)
+    for field, value in (("density", density), ("EA", EA), ("EI", EI), ("stretch_damping", stretch_damping), ("bend_damping", bend_damping)):
+        if value is not None and not value > 0:
+            raise SceneError(f"{name}.{field}", "must be positive", value, "give a positive number, or leave it out")
+    if stretch_damping is not None and EA is None:
+        raise SceneError(f"{name}.stretch_damping", "needs a finite EA", EA, "give EA, or leave it out")
+    if bend_damping is not None and EI is None:
+        raise SceneError(f"{name}.bend_damping", "needs EI", EI, "give EI, or leave it out")
+    normal = None if plane is None else _unit(f"{name}.plane", plane)
+    if normal is None and (clamp_angles or len(set_modes)):
+        raise SceneError(f"{name}.plane", "is missing", None, "give the unit normal that the clamp angles or the set turn about")
+    if len(set_modes) and EI is None:
+        raise SceneError(f"{name}.set_modes", "need EI", EI, "give EI: a rest curvature acts through bending")
+
+    nodes = scene.add_particles(shape, 0.0)
+    link = length / segments
+    arc = link * np.arange(segments + 1)
+    scene.add_quantity(f"{name}_length", length, "m")
+    scene.add_quantity(f"{name}_density", density, "kg/m")
+    _masses(scene, name, nodes, segments)
+    _stretch(scene, name, nodes, link, EA, stretch_damping)
+    ghosts = [
+        _clamp(scene, name, end, clamp, nodes, shape, link, normal if clamp_angles else None)
+        for end, clamp in (("start", clamp_start), ("end", clamp_end))
+    ]
+    if EI is not None:
+        _bending(scene, name, nodes, ghosts, arc, EI, bend_damping, normal, set_modes)
+    _drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
+    built = Rope(name, nodes, arc, *ghosts)
+    scene.ropes[name] = built
+    return built
+
+
+def resample(polyline: ArrayLike, segments: int) -> Array:
+    """(segments + 1, 3) points at equal arc lengths along a polyline (k, 3)."""
+    line = points("points", polyline)
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    if len(line) < 2 or steps.sum() <= 0:
+        raise SceneError("points", "have no length", line.shape, "give at least two distinct points")
+    s = np.concatenate([[0.0], np.cumsum(steps)])
+    wanted = np.linspace(0.0, s[-1], segments + 1)
+    return np.stack([np.interp(wanted, s, line[:, k]) for k in range(3)], axis=1)
+
+
+def _shape(name: str, length: float | None, segments: int, start: ArrayLike, direction: ArrayLike, given: ArrayLike | None) -> tuple[Array, float]:
+    if not isinstance(segments, int | np.integer) or segments < 1:
+        raise SceneError(f"{name}.segments", "must be a positive whole number", segments, "give at least 1")
+    if length is not None and not (np.isfinite(length) and length > 0):
+        raise SceneError(f"{name}.length", "must be positive", length, "give m")
+    if given is not None:
+        shape = resample(given, segments)
+        line = points("points", given)
+        return shape, float(length if length is not None else np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+    if length is None:
+        raise SceneError(f"{name}.length", "is missing", None, "give the length in m, or initial points")
+    along = _unit(f"{name}.direction", direction)
+    origin = finite(f"{name}.start", start, (3,), SceneError)
+    return origin + np.linspace(0.0, length, segments + 1)[:, None] * along, float(length)
+
+
+def _unit(field: str, vector: ArrayLike) -> Array:
+    v = finite(field, vector, (3,), SceneError)
+    size = np.linalg.norm(v)
+    if size == 0:
+        raise SceneError(field, "has no length", v.tolist(), "give a direction")
+    return v / size
+
+
+def _voronoi(segments: int) -> Array:
+    """Voronoi lengths of the nodes over the rope's length."""
+    share = np.full(segments + 1, 1.0 / segments)
+    share[[0, -1]] /= 2.0
+    return share
+
+
+def _masses(scene: Scene, name: str, nodes: Array, segments: int) -> None:
+    factors = {f"{name}_density": "identity", f"{name}_length": "identity"}
+    scene.add_terms([product("mass", n, share, factors) for n, share in zip(nodes, _voronoi(segments), strict=True)])
+
+
+def _stretch(scene: Scene, name: str, nodes: Array, link: float, EA: float | None, damping: float | None) -> None:
+    segments = len(nodes) - 1
+    group = f"{name}_stretch"
+    pairs = np.stack([nodes[:-1], nodes[1:]], axis=1)
+    scene.add_constraints("distance", pairs, name=group, rest=link, compliance=np.zeros(segments), damping=None if damping is None else np.zeros(segments))
+    _, first, _ = scene.group(group)
+    offset = _first_value(scene, group)
+    scene.groups[-1].rest[:] = 0.0
+    length = f"{name}_length"
+    terms = [product("rest", offset + i, 1.0 / segments, {length: "identity"}) for i in range(segments)]
+    if EA is not None:
+        scene.add_quantity(f"{name}_EA", EA, "N")
+        terms += [product("compliance", first + i, 1.0 / segments, {length: "identity", f"{name}_EA": "inverse"}) for i in range(segments)]
+    if damping is not None:
+        scene.add_quantity(f"{name}_stretch_damping", damping, "s")
+        factors = {f"{name}_stretch_damping": "identity", f"{name}_EA": "identity", length: "inverse"}
+        terms += [product("damping", first + i, float(segments), factors) for i in range(segments)]
+    scene.add_terms(terms)
+
+
+def _clamp(scene: Scene, name: str, end: str, clamp: ArrayLike | None, nodes: Array, shape: Array, link: float, normal: Array | None) -> int | None:
+    """Pin an end and hold its direction of travel by a ghost particle behind the start or beyond the end."""
+    if clamp is None:
+        return None
+    along = _unit(f"{name}.clamp_{end}", clamp)
+    node, place, sign = (nodes[0], shape[0], -1.0) if end == "start" else (nodes[-1], shape[-1], 1.0)
+    reach = sign * GHOST * link
+    ghost = int(scene.add_particles([place + reach * along], 1.0)[0])
+    scene.pin([node, ghost])
+    if normal is None:
+        return ghost
+    angle = scene.add_quantity(f"{name}_{end}_angle", 0.0, "rad", positive=False, scale=0.1)
+    across = np.cross(normal, along)
+    scene.add_terms(
+        [product("position", 3 * ghost + k, reach * along[k], {angle: "cos"}) for k in range(3)]
+        + [product("position", 3 * ghost + k, reach * across[k], {angle: "sin"}) for k in range(3)]
+    )
+    scene.shift_base(ghost, -reach * along)
+    return ghost
+
+
+def _bending(
+    scene: Scene,
+    name: str,
+    nodes: Array,
+    ghosts: list[int | None],
+    arc: Array,
+    EI: float,
+    damping: float | None,
+    normal: Array | None,
+    set_modes: Sequence[int],
+) -> None:
+    """Joints at the inner nodes and at clamped ends; alpha = Voronoi length / EI. A clamped end counts the rope's own half link."""
+    chain = [*([] if ghosts[0] is None else [ghosts[0]]), *nodes, *([] if ghosts[1] is None else [ghosts[1]])]
+    share = _voronoi(len(nodes) - 1)
+    at = list(range(1, len(nodes) - 1))
+    at = ([0] if ghosts[0] is not None else []) + at + ([len(nodes) - 1] if ghosts[1] is not None else [])
+    if not at:
+        raise SceneError(f"{name}.segments", "leave no joint to bend", len(nodes) - 1, "use at least 2 segments")
+    triples = np.array([chain[i : i + 3] for i in range(len(chain) - 2)])
+    group, length = f"{name}_bend", f"{name}_length"
+    ones = np.ones(len(at))
+    scene.add_constraints(
+        "planar_bend" if len(set_modes) else "bend",
+        triples,
+        name=group,
+        compliance=ones,
+        damping=None if damping is None else 0.0 * ones,
+        normal=normal if len(set_modes) else None,
+    )
+    scene.groups[-1].compliance[:] = 0.0
+    _, first, _ = scene.group(group)
+    stiffness = scene.add_quantity(f"{name}_EI", EI, "N m^2")
+    terms: list[Term] = [
+        product("compliance", first + i, share[node], {length: "identity", stiffness: "inverse"}) for i, node in enumerate(at)
+    ]
+    if damping is not None:
+        scene.add_quantity(f"{name}_bend_damping", damping, "s")
+        factors = {f"{name}_bend_damping": "identity", stiffness: "identity", length: "inverse"}
+        terms += [product("damping", first + i, 1.0 / share[node], factors) for i, node in enumerate(at)]
+    offset = _first_value(scene, group)
+    for k in set_modes:
+        mode = scene.add_quantity(f"{name}_set_{k}", 0.0, "1/m", positive=False, scale=1.0 / arc[-1])
+        terms += [
+            product("rest", offset + 4 * i + 3, share[node] * np.cos(k * np.pi * arc[node] / arc[-1]), {length: "identity", mode: "identity"})
+            for i, node in enumerate(at)
+        ]
+    scene.add_terms(terms)
+
+
+def _drag(scene: Scene, name: str, nodes: Array, segments: int, linear: float | None, quadratic: float | None) -> None:
+    for kind, value, unit in (("linear", linear, "N s/m^2"), ("quadratic", quadratic, "N s^2/m^3")):
+        if value is None:
+            continue
+        scene.has_drag = True
+        quantity = scene.add_quantity(f"{name}_drag_{kind}", value, unit, positive=value > 0)
+        factors = {quantity: "identity", f"{name}_length": "identity"}
+        scene.add_terms([product(f"drag_{kind}", n, share, factors) for n, share in zip(nodes, _voronoi(segments), strict=True)])
+
+
+def _first_value(scene: Scene, group: str) -> int:
+    """Where a group's own parameters start in the input array "rest"."""
+    start = 0
+    for g in scene.groups:
+        if g.name == group:
+            return start
+        start += g.rest.size
+    raise KeyError(group)

@@ -1,0 +1,394 @@
+"""Scenes: particles, constraint groups, boundary motion and forces, built step by step and then frozen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _core
+from .checks import finite, indices, per_item, points
+from .compiled import CompiledScene
+from .errors import SceneError
+from .quantities import Quantity, Term, product
+
+Array = np.ndarray
+KINDS: Mapping[str, Mapping[str, Any]] = _core.constraint_kinds()
+NEEDS_COMPLIANCE = ("bend", "planar_bend")
+# A damping-only element keeps the product of compliance and damping while the compliance grows: what is left of its stiffness.
+VISCOUS_COMPLIANCE = 1e12
+
+
+@dataclass(frozen=True)
+class Group:
+    """A named set of constraints of one kind: particles (count, arity), base compliance and damping (count,), rest (count, parameters)."""
+
+    name: str
+    kind: str
+    particles: Array
+    compliance: Array
+    damping: Array
+    damped: bool
+    rest: Array
+
+
+class Scene:
+    """A scene under construction; `freeze()` (done by the first simulation) ends the construction.
+
+    Every number enters either as a plain value or as a named quantity (`<group>_<quantity>`), by which gradients, fits and reports know
+    it. SI units, z up.
+    """
+
+    def __init__(self, name: str = "scene", gravity: ArrayLike = (0.0, 0.0, -9.81)) -> None:
+        self.name = name
+        self.quantities: dict[str, Quantity] = {}
+        self.terms: list[Term] = []
+        self.groups: list[Group] = []
+        self.pinned: set[int] = set()
+        self.driven: list[int] = []
+        self.boundary_times: Array = np.zeros(0)
+        self.boundary_interpolation = "cubic"
+        self.loaded: list[int] = []
+        self.force_times: Array = np.zeros(0)
+        self.has_drag = False
+        self.ropes: dict[str, Any] = {}
+        self._positions: list[Array] = []
+        self._velocities: list[Array] = []
+        self._mass: list[float] = []
+        self._drag_linear: dict[int, float] = {}
+        self._drag_quadratic: dict[int, float] = {}
+        self._boundary: list[Array] = []
+        self._forces: list[Array] = []
+        self._gravity = finite("gravity", gravity, (3,), SceneError)
+        self._frozen = False
+
+    # --- building
+
+    def add_particles(self, positions: ArrayLike, mass: ArrayLike, velocity: ArrayLike | None = None) -> Array:
+        """Add particles and return their indices.
+
+        Args:
+            positions: (n, 3) m.
+            mass: one for all or (n,), kg; zero where only named quantities make up the mass.
+            velocity: (n, 3) m/s, at rest by default.
+
+        Raises:
+            SceneError: shapes, NaN, or negative masses.
+        """
+        self._building()
+        x = points("positions", positions)
+        m = per_item("mass", mass, len(x))
+        if (m < 0).any():
+            raise SceneError("mass", "must not be negative", float(m.min()), "give kg; pin a particle to make it immovable")
+        v = np.zeros_like(x) if velocity is None else finite("velocity", velocity, x.shape, SceneError)
+        first = self.particle_count
+        self._positions += list(x)
+        self._velocities += list(v)
+        self._mass += m.tolist()
+        return np.arange(first, first + len(x))
+
+    def pin(self, particles: ArrayLike) -> None:
+        """Hold particles where they start."""
+        self._building()
+        self.pinned |= set(indices("pin", particles, self.particle_count))
+
+    def drive(self, particles: ArrayLike, times: ArrayLike, positions: ArrayLike, interpolation: str = "cubic") -> None:
+        """Give particles a motion.
+
+        Args:
+            particles: (k,) indices.
+            times: (knots,) s, increasing; one set of knots serves the whole scene.
+            positions: (knots, k, 3) m.
+            interpolation: "cubic" (C1) or "linear" (kicks at every knot).
+
+        Raises:
+            SceneError: shapes, NaN, times that do not increase, or other knots than an earlier call's.
+        """
+        self._building()
+        which = indices("drive", particles, self.particle_count)
+        t = finite("drive.times", times, None, SceneError).ravel()
+        if len(t) == 0 or (np.diff(t) <= 0).any():
+            raise SceneError("drive.times", "must increase", t[:5].tolist(), "sort the knots and drop repeated ones")
+        x = finite("drive.positions", positions, (len(t), len(which), 3), SceneError)
+        if interpolation not in ("cubic", "linear"):
+            raise SceneError("drive.interpolation", "is unknown", interpolation, "use 'cubic' or 'linear'")
+        if self.driven and (t.shape != self.boundary_times.shape or (t != self.boundary_times).any()):
+            raise SceneError("drive.times", "differ from those of particles driven before", len(t), "resample all motions to one set of knots")
+        twice = set(which) & set(self.driven)
+        if twice:
+            raise SceneError("drive.particles", "are driven already", sorted(twice), "drive each particle once")
+        self.boundary_times, self.boundary_interpolation = t, interpolation
+        self.driven += which
+        self._boundary += [x[:, k] for k in range(len(which))]
+
+    def add_force(self, particles: ArrayLike, forces: ArrayLike, times: ArrayLike = (0.0,)) -> None:
+        """Let forces act on particles: (knots, k, 3) N at `times` (knots,), linear between and constant outside the knots.
+
+        Raises:
+            SceneError: shapes, NaN, or other knots than an earlier call's.
+        """
+        self._building()
+        which = indices("add_force.particles", particles, self.particle_count)
+        t = finite("add_force.times", times, None, SceneError).ravel()
+        f = finite("add_force.forces", np.broadcast_to(forces, (len(t), len(which), 3)), (len(t), len(which), 3), SceneError)
+        if len(t) == 0 or (np.diff(t) <= 0).any():
+            raise SceneError("add_force.times", "must increase", t[:5].tolist(), "sort the knots and drop repeated ones")
+        if self.loaded and (t.shape != self.force_times.shape or (t != self.force_times).any()):
+            raise SceneError("add_force.times", "differ from those of forces added before", len(t), "use one set of knots")
+        twice = set(which) & set(self.loaded)
+        if twice:
+            raise SceneError("add_force.particles", "are loaded already", sorted(twice), "sum the forces and add them once")
+        self.force_times = t
+        self.loaded += which
+        self._forces += [f[:, k] for k in range(len(which))]
+
+    def add_constraints(
+        self,
+        kind: str,
+        particles: ArrayLike,
+        *,
+        name: str | None = None,
+        compliance: ArrayLike | None = None,
+        damping: ArrayLike | None = None,
+        viscosity: ArrayLike | None = None,
+        rest: ArrayLike | None = None,
+        normal: ArrayLike | None = None,
+    ) -> str:
+        """Add a group of constraints of one kind and return its name.
+
+        A single compliance or damping becomes the quantity `<name>_compliance` or `<name>_damping`; arrays stay per constraint (their
+        gradients are in the input arrays).
+
+        Args:
+            kind: "distance", "bend", "planar_bend", "hinge" or "attachment" (sheetbend.KINDS).
+            particles: (count, arity) indices.
+            name: of the group; the kind by default.
+            compliance: 0 = rigid; distance, attachment m/N; bend, planar_bend 1/(N m) (Voronoi length / EI); hinge rad/(N m).
+            damping: beta of the Rayleigh dissipation (Macklin et al. 2016, eq. 26): force per rate of C.
+            viscosity: the element resists the rate of C only: distance N s/m, hinge N m s/rad; excludes compliance and damping.
+            rest: (count,) rest length m (the initial length by default), planar rest (natural curvature times Voronoi length), angle rad.
+            normal: unit plane normal, (3,) or (count, 3), of planar kinds.
+
+        Raises:
+            SceneError: unknown kind, wrong shapes, negative or missing values, zero lengths, constraints that nothing can move.
+        """
+        self._building()
+        if kind not in KINDS:
+            raise SceneError("kind", "is no known constraint", kind, f"use one of: {', '.join(KINDS)}")
+        name = name or kind
+        if any(g.name == name for g in self.groups):
+            raise SceneError("name", "is taken by another group", name, "give each group a name of its own")
+        arity = KINDS[kind]["arity"]
+        stencil = np.array(indices(f"{name}.particles", particles, self.particle_count), dtype=int).reshape(-1)
+        if np.ndim(particles) != 2 or np.shape(particles)[1] != arity or len(stencil) == 0:
+            raise SceneError(f"{name}.particles", "have the wrong shape", np.shape(particles), f"give (count, {arity}) for {kind}")
+        stencil = stencil.reshape(-1, arity)
+        count = len(stencil)
+        if viscosity is not None:
+            if compliance is not None or damping is not None:
+                raise SceneError(f"{name}.viscosity", "excludes compliance and damping", viscosity, "give one or the other")
+            compliance, damping, label = np.full(count, VISCOUS_COMPLIANCE), viscosity, "viscosity"
+        else:
+            compliance, label = 0.0 if compliance is None else compliance, "damping"
+        alpha = per_item(f"{name}.compliance", compliance, count)
+        beta = per_item(f"{name}.{label}", 0.0 if damping is None else damping, count)
+        for field, values in (("compliance", alpha), (label, beta)):
+            if (values < 0).any():
+                raise SceneError(f"{name}.{field}", "must not be negative", float(values.min()), "give zero or more")
+        if kind in NEEDS_COMPLIANCE and not (alpha > 0).all():
+            why = "is rigid, and a straight rigid joint has a singular projection (rank 2 of 3)"
+            raise SceneError(f"{name}.compliance", why, float(alpha.min()), "give a positive compliance, Voronoi length / EI")
+        values = self._rest_values(name, kind, stencil, rest, normal)
+        first = sum(len(g.particles) for g in self.groups)
+        self.groups.append(Group(name, kind, stencil, alpha, beta, damping is not None, values))
+        if np.ndim(compliance) == 0 and compliance > 0:
+            self._scalar(f"{name}_compliance", "compliance", first, alpha, kind)
+        if damping is not None and np.ndim(damping) == 0:
+            self._scalar(f"{name}_{label}", "damping", first, beta, kind)
+        return name
+
+    def add_quantity(self, name: str, value: float, unit: str, positive: bool = True, scale: float | None = None) -> str:
+        """Declare a named quantity; `add_terms` says what it makes.
+
+        Raises:
+            SceneError: the name is taken, or the value is not finite (or not positive where it must be).
+        """
+        self._building()
+        if name in self.quantities:
+            raise SceneError(name, "is a quantity already", value, "give another name")
+        self.quantities[name] = Quantity(name, float(value), unit, positive, scale)
+        return name
+
+    def add_terms(self, terms: Sequence[Term]) -> None:
+        """Add terms to the inputs (array names and order as in `CompiledScene.layout`)."""
+        self._building()
+        for t in terms:
+            missing = [q for q, _ in t.factors if q not in self.quantities]
+            if missing:
+                raise SceneError("terms", "use unknown quantities", missing, "declare them with add_quantity")
+        self.terms += terms
+
+    def add_point_mass(self, particle: int, mass: float, name: str) -> None:
+        """Hang a mass [kg] on a particle as the quantity `<name>_mass`."""
+        (index,) = indices("add_point_mass.particle", [particle], self.particle_count)
+        self.add_quantity(f"{name}_mass", mass, "kg")
+        self.add_terms([product("mass", index, 1.0, {f"{name}_mass": "identity"})])
+
+    def shift_base(self, particle: int, by: ArrayLike) -> None:
+        """Move the plain part of a particle's position, (3,) m, where terms make up the rest."""
+        self._building()
+        self._positions[particle] = self._positions[particle] + np.asarray(by, dtype=float)
+
+    def set_drag(self, linear: ArrayLike | None = None, quadratic: ArrayLike | None = None) -> None:
+        """Air drag per particle: linear (n,) N s/m and quadratic (n,) N s^2/m^2, force -(c1 + c2 |v|) v."""
+        self._building()
+        for field, values, store in (("linear", linear, self._drag_linear), ("quadratic", quadratic, self._drag_quadratic)):
+            if values is None:
+                continue
+            c = per_item(f"drag.{field}", values, self.particle_count)
+            if (c < 0).any():
+                raise SceneError(f"drag.{field}", "must not be negative", float(c.min()), "give zero or more")
+            store.update(enumerate(c.tolist()))
+            self.has_drag = True
+
+    def freeze(self) -> Scene:
+        """End the construction: validates the whole scene and returns it. Later additions raise.
+
+        Raises:
+            SceneError: no particles, nothing can move, massless free particles, or particles that no constraint and no boundary holds.
+        """
+        if not self._frozen:
+            self._validate()
+            self._frozen = True
+        return self
+
+    # --- reading
+
+    @property
+    def particle_count(self) -> int:
+        return len(self._positions)
+
+    @property
+    def frozen(self) -> bool:
+        return self._frozen
+
+    @property
+    def positions(self) -> Array:
+        """Initial positions as given, (n, 3) m."""
+        return np.array(self._positions, dtype=float).reshape(-1, 3)
+
+    @property
+    def free(self) -> Array:
+        """Indices of the particles that can move."""
+        held = self.pinned | set(self.driven)
+        return np.array([i for i in range(self.particle_count) if i not in held], dtype=int)
+
+    def group(self, name: str) -> tuple[Group, int, int]:
+        """A group with its first constraint and its first multiplier row.
+
+        Raises:
+            SceneError: no such group.
+        """
+        constraint = row = 0
+        for g in self.groups:
+            if g.name == name:
+                return g, constraint, row
+            constraint += len(g.particles)
+            row += len(g.particles) * KINDS[g.kind]["rows"]
+        raise SceneError("group", "does not exist", name, f"name one of: {', '.join(g.name for g in self.groups)}")
+
+    @cached_property
+    def compiled(self) -> CompiledScene:
+        """The frozen scene as the core sees it (freezes it)."""
+        self.freeze()
+        return CompiledScene(self)
+
+    def base_arrays(self) -> dict[str, Array]:
+        """The plain parts of all input arrays, to which the quantities' terms are added."""
+        n = self.particle_count
+        return {
+            "position": self.positions,
+            "velocity": np.array(self._velocities, dtype=float),
+            "mass": np.array(self._mass),
+            "compliance": self._concatenated("compliance"),
+            "damping": self._concatenated("damping"),
+            "rest": self._concatenated("rest"),
+            "boundary": np.stack(self._boundary, axis=1) if self._boundary else np.zeros(0),
+            "force": np.stack(self._forces, axis=1) if self._forces else np.zeros(0),
+            "gravity": self._gravity,
+            "drag_linear": np.array([self._drag_linear.get(i, 0.0) for i in range(n)]),
+            "drag_quadratic": np.array([self._drag_quadratic.get(i, 0.0) for i in range(n)]),
+        }
+
+    # --- private
+
+    def _building(self) -> None:
+        if self._frozen:
+            raise SceneError(self.name, "is frozen, it has been simulated or compiled", "frozen", "add everything first, or build a new scene")
+
+    def _concatenated(self, field: str) -> Array:
+        return np.concatenate([np.ravel(getattr(g, field)) for g in self.groups]) if self.groups else np.zeros(0)
+
+    def _scalar(self, quantity: str, array: str, first: int, values: Array, kind: str) -> None:
+        """Move one value shared by a whole group into a quantity."""
+        unit = UNITS[kind][array]
+        self.add_quantity(quantity, float(values[0]), unit, positive=float(values[0]) > 0.0)
+        self.add_terms([product(array, first + i, 1.0, {quantity: "identity"}) for i in range(len(values))])
+        values[:] = 0.0
+
+    def _rest_values(self, name: str, kind: str, stencil: Array, rest: ArrayLike | None, normal: ArrayLike | None) -> Array:
+        parameters = KINDS[kind]["parameters"]
+        count = len(stencil)
+        values = np.zeros((count, len(parameters)))
+        if rest is not None and not parameters:
+            why = "has none: a rest curvature in space needs material frames (rods), which are not there yet" if kind == "bend" else "has none"
+            raise SceneError(f"{name}.rest", why, "rest", "use planar_bend with a plane normal" if kind == "bend" else "leave it out")
+        if kind == "distance":
+            x = self.positions[stencil]
+            length = np.linalg.norm(x[:, 1] - x[:, 0], axis=1) if rest is None else per_item(f"{name}.rest", rest, count)
+            if (length <= 0).any():
+                bad = int(np.argmin(length))
+                raise SceneError(f"{name}.rest", f"length of constraint {bad} is not positive", float(length[bad]), "move the particles apart or give rest")
+            values[:, 0] = length
+        elif parameters:
+            if normal is None:
+                raise SceneError(f"{name}.normal", "is missing", None, "give the unit normal of the plane, such as (0, 1, 0)")
+            n = np.broadcast_to(finite(f"{name}.normal", normal, None, SceneError), (count, 3)).copy()
+            size = np.linalg.norm(n, axis=1, keepdims=True)
+            if (size == 0).any():
+                raise SceneError(f"{name}.normal", "has no length", n[int(np.argmin(size))].tolist(), "give the normal of the plane")
+            values[:, :3] = n / size
+            values[:, 3] = 0.0 if rest is None else per_item(f"{name}.rest", rest, count)
+        return values
+
+    def _validate(self) -> None:
+        if self.particle_count == 0:
+            raise SceneError(self.name, "has no particles", 0, "add particles or a rope")
+        free = self.free
+        if len(free) == 0:
+            raise SceneError(self.name, "has nothing that can move: every particle is pinned or driven", self.particle_count, "release at least one")
+        heavy = set(np.nonzero(np.array(self._mass) > 0)[0].tolist()) | {t.index for t in self.terms if t.array == "mass"}
+        light = [int(i) for i in free if i not in heavy]
+        if light:
+            raise SceneError("mass", "is zero for free particles", light[:5], "give them a mass, or pin them")
+        used = {int(i) for g in self.groups for i in g.particles.ravel()}
+        if self.groups:
+            loose = [int(i) for i in free if i not in used]
+            if loose:
+                raise SceneError("particles", "are connected to nothing", loose[:5], "constrain them, pin them or leave them out")
+        held = self.pinned & set(self.driven)
+        if held:
+            raise SceneError("drive.particles", "are pinned too", sorted(held), "either pin or drive a particle")
+
+
+UNITS: Mapping[str, Mapping[str, str]] = {
+    "distance": {"compliance": "m/N", "damping": "N s/m"},
+    "attachment": {"compliance": "m/N", "damping": "N s/m"},
+    "bend": {"compliance": "1/(N m)", "damping": "N m s"},
+    "planar_bend": {"compliance": "1/(N m)", "damping": "N m s"},
+    "hinge": {"compliance": "rad/(N m)", "damping": "N m s/rad"},
+}

@@ -1,0 +1,93 @@
+"""Forward simulation: trajectories of scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _core
+from .checks import finite
+from .errors import DivergenceError, InputError
+from .scene import KINDS, Scene
+from .solver import Solver
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """What a rollout gives.
+
+    Attributes:
+        times: (frames,) s.
+        positions: (frames, particles, 3) m.
+        velocities: (frames, particles, 3) m/s.
+        forces: per group the constraints' multipliers (frames, count, rows) in units of force (distance: minus the tension in N; bend and
+            hinge: minus the moment in N m), zero at the initial frame.
+    """
+
+    times: np.ndarray
+    positions: np.ndarray
+    velocities: np.ndarray
+    forces: Mapping[str, np.ndarray]
+
+
+def simulate(scene: Scene, times: ArrayLike, solver: Solver | None = None, values: Mapping[str, float] | None = None) -> Trajectory:
+    """Simulate a scene from its initial state.
+
+    Args:
+        scene: is frozen by this.
+        times: (frames,) s, not decreasing, starting at or after 0; each must lie on the substep grid.
+        solver: `Solver()` by default.
+        values: quantities to change for this run, by name.
+
+    Raises:
+        InputError: times off the grid, unknown quantities.
+        DivergenceError: a state became infinite; says when and where.
+    """
+    solver = solver or Solver()
+    compiled = scene.compiled
+    steps = substeps(times, solver.h)
+    with divergence(scene):
+        out = solver.core(compiled).simulate(compiled.inputs(compiled.values(values)), steps, 0.0)
+    frames = len(steps)
+    return Trajectory(
+        np.array(steps) * solver.h,
+        out["positions"].reshape(frames, -1, 3),
+        out["velocities"].reshape(frames, -1, 3),
+        forces_by_group(scene, out["multipliers"]),
+    )
+
+
+def substeps(times: ArrayLike, h: float) -> list[int]:
+    """Substep numbers of times; raises InputError where a time lies off the grid."""
+    t = finite("times", times, None, InputError).ravel()
+    if len(t) == 0 or (t < 0).any() or (np.diff(t) < 0).any():
+        raise InputError("times", "must be ascending from 0 or later", t[:5].tolist(), "give frame times in s")
+    steps = np.rint(t / h)
+    off = np.abs(t / h - steps) > 1e-6 * np.maximum(steps, 1.0)
+    if off.any():
+        raise InputError("times", f"do not lie on the grid of substeps of {h:g} s", float(t[off][0]), "choose h so that it divides the frame interval")
+    return steps.astype(int).tolist()
+
+
+def forces_by_group(scene: Scene, multipliers: np.ndarray) -> dict[str, np.ndarray]:
+    """Multipliers (..., rows) by group, (..., count, rows)."""
+    forces, row = {}, 0
+    for g in scene.groups:
+        rows = KINDS[g.kind]["rows"]
+        part = multipliers[..., row : row + rows * len(g.particles)]
+        forces[g.name] = part.reshape(*part.shape[:-1], len(g.particles), rows)
+        row += rows * len(g.particles)
+    return forces
+
+
+@contextmanager
+def divergence(scene: Scene) -> Iterator[None]:
+    """Turns the core's divergence into the package's error."""
+    try:
+        yield
+    except _core.Diverged as error:
+        raise DivergenceError(error.substep, error.time, error.particle, scene.name) from error

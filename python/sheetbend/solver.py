@@ -1,0 +1,68 @@
+"""How a scene is stepped."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from . import _core
+from .compiled import CompiledScene
+from .errors import InputError
+
+INTEGRATORS = ("bdf1", "bdf2")
+METHODS = ("direct", "gauss_seidel")
+
+
+@dataclass(frozen=True)
+class Solver:
+    """Substep and solver of a rollout.
+
+    Attributes:
+        h: substep, s. Constant within a rollout.
+        integrator: "bdf2" (second order, the default) or "bdf1" (backward Euler: damps like zeta = omega h/2).
+        method: "direct" (each rope one block, the default) or "gauss_seidel" (colored; unconverged sweeps add about 0.9 h^2/(m sweeps) of
+            compliance per link).
+        iterations: Newton iterations of a direct block (2 by default) or sweeps (10 by default).
+        threads: of one rollout; results do not depend on it.
+        grain: constraints per thread below which a color is not split.
+    """
+
+    h: float = 1e-3
+    integrator: str = "bdf2"
+    method: str = "direct"
+    iterations: int | None = None
+    threads: int = 1
+    grain: int = 256
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.h, int | float) and math.isfinite(self.h) and self.h > 0):
+            raise InputError("solver.h", "must be a positive time in s", self.h, "give the substep, such as 1/600")
+        if self.integrator not in INTEGRATORS:
+            raise InputError("solver.integrator", "is unknown", self.integrator, f"use one of: {', '.join(INTEGRATORS)}")
+        if self.method not in METHODS:
+            raise InputError("solver.method", "is unknown", self.method, f"use one of: {', '.join(METHODS)}")
+        for field in ("iterations", "threads", "grain"):
+            value = getattr(self, field)
+            if value is not None and (not isinstance(value, int) or value < 1):
+                raise InputError(f"solver.{field}", "must be a positive whole number", value, "give at least 1")
+
+    @property
+    def sweeps(self) -> int:
+        """Iterations with the method's default filled in."""
+        return self.iterations if self.iterations is not None else (2 if self.method == "direct" else 10)
+
+    def with_h(self, h: float) -> Solver:
+        """The same solver at another substep."""
+        return replace(self, h=h)
+
+    def core(self, scene: CompiledScene) -> _core.Solver:
+        """The compiled solver for a scene."""
+        return _core.Solver(
+            scene=scene.core,
+            h=self.h,
+            integrator=self.integrator,
+            partition=self.method,
+            iterations=self.sweeps,
+            threads=self.threads,
+            grain=self.grain,
+        )

@@ -1,0 +1,110 @@
+// Oracles and yardsticks: the complex step, the relative error of one vector against another, equality of bits.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <random>
+#include <span>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "core/scalar/complex.h"
+#include "core/scene/layout.h"
+
+namespace sheetbend::testing {
+
+inline constexpr double complex_step = 0x1p-133;  // a power of two, so that dividing by it is exact
+
+// Deterministic random numbers: the same on every machine (std::uniform_real_distribution is not).
+class Random {
+ public:
+  explicit Random(unsigned seed) : bits_(seed) {}
+  double operator()(double low, double high) { return low + (high - low) * (static_cast<double>(bits_() >> 11) * 0x1p-53); }
+  std::vector<double> vector(std::size_t n, double low = -1.0, double high = 1.0) {
+    std::vector<double> v(n);
+    for (double& a : v) a = (*this)(low, high);
+    return v;
+  }
+
+ private:
+  std::mt19937_64 bits_;
+};
+
+// d f(z + t v)/dt for f that maps vectors of Complex to vectors of Complex.
+template <class F>
+std::vector<double> complex_step_along(F&& f, const std::vector<double>& z, const std::vector<double>& v) {
+  std::vector<Complex> probe(z.size());
+  for (std::size_t i = 0; i < z.size(); ++i) probe[i] = {z[i], complex_step * v[i]};
+  std::vector<double> out;
+  for (const Complex& c : f(probe)) out.push_back(c.im / complex_step);
+  return out;
+}
+
+// The gradient of f that maps vectors of Complex to a Complex.
+template <class F>
+std::vector<double> complex_step_gradient(F&& f, const std::vector<double>& z) {
+  std::vector<Complex> probe(z.begin(), z.end());
+  std::vector<double> g(z.size());
+  for (std::size_t i = 0; i < z.size(); ++i) {
+    probe[i].im = complex_step;
+    g[i] = f(probe).im / complex_step;
+    probe[i].im = 0.0;
+  }
+  return g;
+}
+
+inline double largest(std::span<const double> a) {
+  double m = 0.0;
+  for (const double v : a) m = std::max(m, std::abs(v));
+  return m;
+}
+
+// max |a - b| / max |b|. Two zero vectors agree; anything against a zero vector, and NaN, does not.
+inline double relative_error(std::span<const double> a, std::span<const double> b) {
+  if (a.size() != b.size()) return std::numeric_limits<double>::infinity();
+  double worst = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double e = std::abs(a[i] - b[i]);
+    if (!(e <= worst)) worst = e;
+    if (std::isnan(worst)) return std::numeric_limits<double>::infinity();
+  }
+  return worst == 0.0 ? 0.0 : worst / largest(b);
+}
+
+inline double dot(std::span<const double> a, std::span<const double> b) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
+  return sum;
+}
+
+// Leaves a measured error in the test's XML report.
+inline void record_error(const std::string& what, double error) {
+  ::testing::Test::RecordProperty(what, (std::ostringstream() << error).str());
+}
+
+// Compares two gradients quantity by quantity; every quantity that the scene has must matter.
+inline void expect_gradients_agree(const Layout& layout, std::span<const double> found, std::span<const double> oracle, double bound) {
+  ASSERT_EQ(found.size(), layout.total());
+  ASSERT_EQ(oracle.size(), layout.total());
+  for (int q = 0; q < quantity_count; ++q) {
+    const auto part = [&](std::span<const double> g) { return g.subspan(layout.offset[q], layout.size[q]); };
+    EXPECT_GT(largest(part(oracle)), 0.0) << quantity_names[q] << " does not matter in this scene";
+    const double error = relative_error(part(found), part(oracle));
+    EXPECT_LE(error, bound) << quantity_names[q];
+    record_error(quantity_names[q], error);
+  }
+}
+
+template <class T>
+::testing::AssertionResult same_bits(const std::vector<T>& a, const std::vector<T>& b) {
+  if (a.size() != b.size()) return ::testing::AssertionFailure() << a.size() << " numbers against " << b.size();
+  for (std::size_t i = 0; i < a.size(); ++i)
+    if (std::memcmp(&a[i], &b[i], sizeof(T)) != 0) return ::testing::AssertionFailure() << "bits first differ at number " << i;
+  return ::testing::AssertionSuccess();
+}
+
+}  // namespace sheetbend::testing

@@ -1,0 +1,140 @@
+// Random scenes that hold every registered constraint and every differentiable quantity. Each rope strings together one sample stencil
+// of every kind, jittered, and braces. Ropes start at one driven particle, so that constraints of one color, and direct blocks, share
+// it; or, as a net, at one free particle and with ties between them: one block with branches and loops.
+#pragma once
+
+#include "core/scene/scene.h"
+#include "tests/cpp/support/cases.h"
+#include "tests/cpp/support/compare.h"
+
+namespace sheetbend::testing {
+
+struct Sample {
+  Scene scene;
+  std::vector<double> inputs;
+};
+
+struct SceneShape {
+  int ropes = 5;  // the first two are damped; five of them make a net sparse
+  bool net = false;
+};
+
+namespace detail {
+
+struct SceneBuilder {
+  Random random;
+  SceneSpec spec{};
+  std::vector<double> x{};
+  struct Values {
+    std::string kind;
+    bool damped;
+    std::vector<int> stencil;
+    std::vector<double> p, compliance, damping;
+  };
+  std::vector<Values> groups{};
+
+  explicit SceneBuilder(unsigned seed) : random(seed) {}
+
+  int add_particle(double px, double py, double pz) {
+    x.insert(x.end(), {px, py, pz});
+    return static_cast<int>(x.size()) / 3 - 1;
+  }
+
+  template <class K>
+  Values& group(bool damped) {
+    for (Values& g : groups)
+      if (g.kind == K::name && g.damped == damped) return g;
+    return groups.emplace_back(Values{K::name, damped, {}, {}, {}, {}});
+  }
+
+  template <class K>
+  void add_constraint(bool damped, const std::vector<int>& nodes, const std::vector<double>& p) {
+    const Case sample = case_of<K>();
+    Values& g = group<K>(damped);
+    g.stencil.insert(g.stencil.end(), nodes.begin(), nodes.end());
+    g.p.insert(g.p.end(), p.begin(), p.end());
+    g.compliance.push_back(sample.compliance * random(0.5, 1.5));
+    g.damping.push_back(sample.damping * random(0.5, 1.5));
+  }
+
+  // Hangs a jittered sample stencil on particle `tail`; returns its last particle.
+  template <class K>
+  int add_stencil(int tail, bool damped) {
+    const Case sample = case_of<K>();
+    std::vector<int> nodes{tail};
+    for (int k = 1; k < K::arity; ++k) {
+      double at[3];
+      for (int d = 0; d < 3; ++d) at[d] = x[3 * tail + d] + sample.x[3 * k + d] - sample.x[d] + random(-0.005, 0.005);
+      nodes.push_back(add_particle(at[0], at[1], at[2]));
+    }
+    std::vector<double> p = sample.p;
+    for (double& v : p) v += random(-0.02, 0.02);
+    add_constraint<K>(damped, nodes, p);
+    return nodes.back();
+  }
+
+  void add_brace(int a, int b) {
+    const double l = std::hypot(x[3 * b] - x[3 * a], x[3 * b + 1] - x[3 * a + 1], x[3 * b + 2] - x[3 * a + 2]);
+    add_constraint<Distance>(false, {a, b}, {l * random(0.97, 1.03)});
+  }
+
+  std::vector<int> add_rope(bool damped) {
+    const int first = static_cast<int>(x.size()) / 3;
+    int tail = 0;
+    for_each_kind([&]<class K>(K) { tail = add_stencil<K>(tail, damped); });
+    std::vector<int> rope{0};
+    for (int n = first; n < static_cast<int>(x.size()) / 3; ++n) rope.push_back(n);
+    for (std::size_t k = 1; k < rope.size(); ++k) add_brace(rope[k - 1], rope[k]);
+    return rope;
+  }
+
+  void fill(const Scene& scene, std::vector<double>& inputs) {
+    const Inputs<double> in{scene.layout, inputs.data()};
+    const auto fill = [&](Quantity q, double low, double high) {
+      for (std::size_t i = 0; i < scene.layout.count(q); ++i) in.of(q)[i] = random(low, high);
+    };
+    std::copy(x.begin(), x.end(), in.of(Quantity::position));
+    fill(Quantity::velocity, -0.3, 0.3);
+    fill(Quantity::mass, 0.01, 0.03);
+    fill(Quantity::force, -0.1, 0.1);
+    fill(Quantity::gravity, -9.0, 9.0);
+    fill(Quantity::drag_linear, 0.01, 0.1);
+    fill(Quantity::drag_quadratic, 0.01, 0.1);
+    double *compliance = in.of(Quantity::compliance), *damping = in.of(Quantity::damping), *rest = in.of(Quantity::rest);
+    for (const Values& g : groups) {
+      compliance = std::copy(g.compliance.begin(), g.compliance.end(), compliance);
+      damping = std::copy(g.damping.begin(), g.damping.end(), damping);
+      rest = std::copy(g.p.begin(), g.p.end(), rest);
+    }
+    double* knot = in.of(Quantity::boundary);
+    for (std::size_t k = 0; k < scene.boundary.times.size(); ++k)
+      for (const int node : scene.driven)
+        for (int d = 0; d < 3; ++d) *knot++ = x[3 * node + d] + random(-0.01, 0.01);
+  }
+};
+
+}  // namespace detail
+
+inline Sample random_scene(unsigned seed, const SceneShape& shape = {}) {
+  detail::SceneBuilder b(seed);
+  b.add_particle(0.0, 0.0, 0.0);
+  std::vector<std::vector<int>> ropes;
+  for (int r = 0; r < shape.ropes; ++r) ropes.push_back(b.add_rope(r < 2));
+  if (shape.net)
+    for (std::size_t r = 1; r < ropes.size(); ++r)
+      for (std::size_t k = 1; k + 2 < ropes[r].size(); k += 2) b.add_brace(ropes[r - 1][k], ropes[r][k + 2]);
+  b.spec.particles = static_cast<int>(b.x.size()) / 3;
+  b.spec.driven = {shape.net ? ropes[2].back() : 0, ropes[1][ropes[1].size() / 2]};
+  b.spec.pinned = {ropes[0].back()};
+  b.spec.loaded = {ropes[0][1], ropes[2][3]};
+  b.spec.has_drag = true;
+  b.spec.boundary = {{0.0, 0.011, 0.02, 0.05}, Interpolation::cubic};
+  b.spec.force = {{0.0, 0.03}, Interpolation::linear};
+  for (const auto& g : b.groups) b.spec.groups.push_back({g.kind + (g.damped ? "_damped" : ""), g.kind, g.damped, g.stencil});
+  Sample sample{build_scene(b.spec), {}};
+  sample.inputs.resize(sample.scene.layout.total());
+  b.fill(sample.scene, sample.inputs);
+  return sample;
+}
+
+}  // namespace sheetbend::testing

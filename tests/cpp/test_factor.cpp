@@ -1,0 +1,232 @@
+// The LDL^T of direct blocks against Eigen's dense solver, on chains, trees and loops; its cost must grow linearly.
+#include "core/solver/symmetric_factor.h"
+
+#include <Eigen/Dense>
+
+#include "core/scalar/dual.h"
+#include "core/scalar/pack.h"
+#include "core/solver/plan.h"
+#include "core/solver/small_ldlt.h"
+#include "tests/cpp/support/compare.h"
+
+namespace sheetbend::testing {
+namespace {
+
+using Entries = std::vector<std::pair<int, int>>;
+
+struct Pattern {
+  const char* name;
+  bool banded;
+  Entries (*entries)(int n);
+};
+void PrintTo(const Pattern& p, std::ostream* out) { *out << p.name; }
+
+Entries chain(int n) {
+  Entries e;
+  for (int i = 0; i < n; ++i)
+    for (int j = std::max(0, i - 3); j < i; ++j) e.emplace_back(i, j);
+  return e;
+}
+
+// A binary tree with its leaves first, so that elimination fills nothing in.
+Entries tree(int n) {
+  Entries e;
+  for (int i = 0; i + 1 < n; ++i) e.emplace_back(n - 1 - (n - 2 - i) / 2, i);
+  return e;
+}
+
+Entries loop(int n) {
+  Entries e{{n - 1, 0}};
+  for (int i = 1; i < n; ++i) e.emplace_back(i, i - 1);
+  return e;
+}
+
+// Entries in no order, some twice, that fill in.
+Entries tangle(int n) {
+  Entries e;
+  Random random(n);
+  for (int k = 0; k < 2 * n; ++k) {
+    const int i = static_cast<int>(random(0, n)), j = static_cast<int>(random(0, n));
+    if (i != j) e.emplace_back(std::max(i, j), std::min(i, j));
+    if (i != j && k % 5 == 0) e.push_back(e.back());
+  }
+  return e;
+}
+
+Eigen::MatrixXd random_matrix(int n, const Entries& entries, unsigned seed) {
+  Random random(seed);
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
+  for (const auto& [i, j] : entries) A(i, j) = A(j, i) = random(-1.0, 1.0);
+  for (int i = 0; i < n; ++i) A(i, i) = A.row(i).cwiseAbs().sum() + random(0.1, 1.0);
+  return A;
+}
+
+// The factor of a matrix whose entries a function gives.
+template <class T, class F>
+Factor<T> factored(const FactorStructure& s, const Entries& entries, F&& entry) {
+  Factor<T> factor;
+  factor.reset(s);
+  for (int i = 0; i < s.size(); ++i) factor.values[s.position(i, i)] = entry(i, i);
+  for (const auto& [i, j] : entries) factor.values[s.position(i, j)] = entry(i, j);
+  factor.factorize(s);
+  return factor;
+}
+
+struct FactorOf : ::testing::TestWithParam<Pattern> {};
+INSTANTIATE_TEST_SUITE_P(, FactorOf,
+                         ::testing::Values(Pattern{"Chain", true, chain}, Pattern{"Tree", false, tree}, Pattern{"Loop", false, loop},
+                                           Pattern{"Tangle", false, tangle}),
+                         [](const auto& info) { return info.param.name; });
+
+TEST_P(FactorOf, SolvesAsEigenDoes) {
+  for (const int n : {50, 200}) {
+    const Entries entries = GetParam().entries(n);
+    const FactorStructure s(n, entries);
+    EXPECT_EQ(s.banded(), GetParam().banded) << n;
+    const Eigen::MatrixXd A = random_matrix(n, entries, n);
+    const auto factor = factored<double>(s, entries, [&](int i, int j) { return A(i, j); });
+    std::vector<double> b = Random(1).vector(n);
+    const Eigen::VectorXd expected = A.partialPivLu().solve(Eigen::Map<Eigen::VectorXd>(b.data(), n));
+    factor.solve(s, b.data());
+    EXPECT_LE(relative_error(b, {expected.data(), static_cast<std::size_t>(n)}), 1e-13);
+  }
+}
+
+TEST_P(FactorOf, CarriesTangents) {
+  const int n = 60;
+  const Entries entries = GetParam().entries(n);
+  const FactorStructure s(n, entries);
+  const Eigen::MatrixXd A = random_matrix(n, entries, 2), A_dot = random_matrix(n, entries, 3);
+  const auto factor = factored<Dual<double, 1>>(s, entries, [&](int i, int j) {
+    Dual<double, 1> a(A(i, j));
+    a.d[0] = A_dot(i, j);
+    return a;
+  });
+  const Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(n, -1.0, 2.0), x = A.partialPivLu().solve(b);
+  const Eigen::VectorXd x_dot = A.partialPivLu().solve(Eigen::VectorXd(-(A_dot * x)));
+  std::vector<Dual<double, 1>> solution(b.begin(), b.end());
+  factor.solve(s, solution.data());
+  std::vector<double> tangent;
+  for (const auto& v : solution) tangent.push_back(v.d[0]);
+  EXPECT_LE(relative_error(tangent, {x_dot.data(), static_cast<std::size_t>(n)}), 1e-12);
+}
+
+TEST_P(FactorOf, HasTheSameBitsInEveryLane) {
+  const int n = 60;
+  const Entries entries = GetParam().entries(n);
+  const FactorStructure s(n, entries);
+  std::vector<Eigen::MatrixXd> A;
+  for (int lane = 0; lane < Pack::lanes; ++lane) A.push_back(random_matrix(n, entries, lane));
+  const auto packed = factored<Pack>(s, entries, [&](int i, int j) { return per_lane([&](int lane) { return A[lane](i, j); }); });
+  std::vector<Pack> x(n, Pack(1.0));
+  packed.solve(s, x.data());
+  for (int lane = 0; lane < Pack::lanes; ++lane) {
+    std::vector<double> scalar(n, 1.0), of_lane;
+    factored<double>(s, entries, [&](int i, int j) { return A[lane](i, j); }).solve(s, scalar.data());
+    for (const Pack& v : x) of_lane.push_back(v[lane]);
+    EXPECT_TRUE(same_bits(of_lane, scalar)) << "lane " << lane;
+  }
+}
+
+// A row of zeros (a rigid constraint of which nothing can move) gets the solution zero and disturbs no other.
+TEST_P(FactorOf, RowsOfZerosGetZero) {
+  const int n = 50;
+  const Entries entries = GetParam().entries(n);
+  const FactorStructure s(n, entries);
+  Eigen::MatrixXd A = random_matrix(n, entries, 4), regular = A;
+  for (const int k : {0, 17, n - 1}) {
+    A.row(k).setZero(), A.col(k).setZero();
+    regular.row(k).setZero(), regular.col(k).setZero();
+    regular(k, k) = 1.0;
+  }
+  Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(n, 1.0, 2.0);
+  std::vector<double> x(b.begin(), b.end());
+  factored<double>(s, entries, [&](int i, int j) { return A(i, j); }).solve(s, x.data());
+  for (const int k : {0, 17, n - 1}) b[k] = 0.0;
+  const Eigen::VectorXd expected = regular.partialPivLu().solve(b);
+  for (const int k : {0, 17, n - 1}) EXPECT_EQ(x[k], 0.0) << "row " << k;
+  EXPECT_LE(relative_error(x, {expected.data(), static_cast<std::size_t>(n)}), 1e-13);
+}
+
+TEST(Factor, CanBeUsedAgain) {
+  const int n = 50;
+  const Entries entries = tree(n);
+  const FactorStructure s(n, entries);
+  Factor<double> factor = factored<double>(s, entries, [&](int i, int j) { return i == j ? 9.0 : 1.0; });
+  std::vector<double> first(n, 1.0), second(n, 1.0);
+  factor.solve(s, first.data());
+  factor.reset(s);
+  for (int i = 0; i < n; ++i) factor.values[s.position(i, i)] = 9.0;
+  for (const auto& [i, j] : entries) factor.values[s.position(i, j)] = 1.0;
+  factor.factorize(s);
+  factor.solve(s, second.data());
+  EXPECT_TRUE(same_bits(first, second));
+}
+
+TEST(Factor, RefusesEntriesOutsideItsPattern) {
+  const FactorStructure s(50, tree(50));
+  EXPECT_THROW(s.position(20, 1), std::logic_error);
+}
+
+TEST(FactorCost, GrowsLinearly) {
+  for (const int n : {100, 200, 400, 800}) {
+    EXPECT_EQ(FactorStructure(n, chain(n)).fill(), 4u * n);
+    EXPECT_EQ(FactorStructure(n, tree(n)).fill(), n - 1u);
+    EXPECT_EQ(FactorStructure(n, loop(n)).fill(), 2u * n - 3);
+  }
+}
+
+// The same through a scene: the plan's own ordering has to find the linear cost.
+std::size_t fill_of(int particles, const std::vector<int>& pairs) {
+  SceneSpec spec;
+  spec.particles = particles;
+  spec.groups = {{"links", "distance", false, pairs}};
+  const Plan plan = make_plan(build_scene(spec), {.partition = Partition::direct});
+  EXPECT_EQ(plan.blocks.size(), 1u);
+  return plan.blocks.at(0).structure.fill();
+}
+
+TEST(FactorCost, GrowsLinearlyOverRopesRingsAndTrees) {
+  const auto rope = [](int n) {
+    std::vector<int> pairs;
+    for (int i = 0; i + 1 < n; ++i) pairs.insert(pairs.end(), {i, i + 1});
+    return fill_of(n, pairs);
+  };
+  const auto ring = [](int n) {
+    std::vector<int> pairs{n - 1, 0};
+    for (int i = 0; i + 1 < n; ++i) pairs.insert(pairs.end(), {i, i + 1});
+    return fill_of(n, pairs);
+  };
+  const auto branches = [](int n) {
+    std::vector<int> pairs;
+    for (int i = 1; i < n; ++i) pairs.insert(pairs.end(), {(i - 1) / 2, i});
+    return fill_of(n, pairs);
+  };
+  for (const int n : {100, 200, 400}) {
+    EXPECT_LE(rope(n), 2u * n);
+    EXPECT_LE(ring(n), 4u * n);
+    EXPECT_LE(branches(n), 3u * n);
+  }
+}
+
+TEST(SmallLdlt, SolvesAsEigenDoesAndSkipsZeroRows) {
+  Random random(5);
+  for (int repetition = 0; repetition < 20; ++repetition) {
+    Eigen::Matrix<double, 3, 3, Eigen::RowMajor> M, A;
+    for (int i = 0; i < 9; ++i) M.data()[i] = random(-1.0, 1.0);
+    A = M * M.transpose() + 0.1 * Eigen::Matrix3d::Identity();
+    Eigen::Vector3d b(1.0, -2.0, 0.5), x = b;
+    SmallLdlt<3, double>(A.data()).solve(x.data());
+    EXPECT_LE((A * x - b).norm(), 1e-13);
+
+    A.row(1).setZero(), A.col(1).setZero();
+    x = b;
+    SmallLdlt<3, double>(A.data()).solve(x.data());
+    EXPECT_EQ(x[1], 0.0);
+    EXPECT_NEAR(A.row(0) * x, b[0], 1e-13);
+    EXPECT_NEAR(A.row(2) * x, b[2], 1e-13);
+  }
+}
+
+}  // namespace
+}  // namespace sheetbend::testing

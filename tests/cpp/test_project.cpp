@@ -1,0 +1,267 @@
+// Third rung: the block projection against its formula, its reverse and its tangent against complex step, for every registered
+// constraint as a block of one and for direct blocks that couple them all.
+#include <Eigen/Dense>
+
+#include "core/scalar/complex.h"
+#include "tests/cpp/support/mutant.h"
+#include "tests/cpp/support/projection.h"
+
+namespace sheetbend::testing {
+namespace {
+
+constexpr double bound = 1e-13, eta = 4e-3;
+using Dual1 = Dual<double, 1>;
+
+std::string part_name(std::size_t part) {
+  const char* own[] = {"coordinates", "w", "C_r", "lambda"};
+  return part < 4 ? own[part] : quantity_names[part - 4];
+}
+
+// The cotangent of theta by complex step through the forward pass. What is fixed has no inverse mass to differentiate by.
+std::vector<double> oracle_cotangent(const Projection& p, const std::vector<double>& theta, const std::vector<double>& out_bar) {
+  return complex_step_gradient(
+      [&](const std::vector<Complex>& probe) {
+        Complex sum(0.0);
+        const auto out = p.forward(probe);
+        for (std::size_t i = 0; i < out.size(); ++i) sum += Complex(out_bar[i]) * out[i];
+        return sum;
+      },
+      theta);
+}
+
+// Worst relative error over the parts of theta.
+double cotangent_error(const Projection& p, const std::vector<double>& found, const std::vector<double>& oracle, std::string* where = nullptr) {
+  const auto at = p.offsets();
+  double worst = 0.0;
+  for (std::size_t part = 0; part + 1 < at.size(); ++part) {
+    const auto of = [&](const std::vector<double>& v) { return std::span(v).subspan(at[part], at[part + 1] - at[part]); };
+    const double error = relative_error(of(found), of(oracle));
+    if (error > worst) {
+      worst = error;
+      if (where) *where = part_name(part);
+    }
+  }
+  return worst;
+}
+
+// Reverse, tangent and their dot product, at one random state. Gives the error of the reverse.
+double climb(const Projection& p, const std::vector<double>& inputs, unsigned seed) {
+  Random random(seed);
+  const auto theta = p.random_theta(inputs, random);
+  const auto out_bar = random.vector(p.scene.dofs() + p.scene.rows);
+  const auto bar = p.reverse(theta, out_bar);
+  std::string where;
+  const double error = cotangent_error(p, bar, oracle_cotangent(p, theta, out_bar), &where);
+  EXPECT_LE(error, bound) << where;
+
+  std::vector<double> direction(theta.size());
+  for (std::size_t i = 0; i < theta.size(); ++i) direction[i] = random(-1.0, 1.0) * std::abs(theta[i]);
+  std::vector<Dual1> probe(theta.size());
+  for (std::size_t i = 0; i < theta.size(); ++i) probe[i].v = theta[i], probe[i].d[0] = direction[i];
+  std::vector<double> tangent;
+  for (const Dual1& d : p.forward(probe)) tangent.push_back(d.d[0]);
+  const auto oracle = complex_step_along([&](const std::vector<Complex>& z) { return p.forward(z); }, theta, direction);
+  const std::size_t dofs = p.scene.dofs();
+  EXPECT_LE(relative_error(std::span(tangent).first(dofs), std::span(oracle).first(dofs)), bound);
+  EXPECT_LE(relative_error(std::span(tangent).subspan(dofs), std::span(oracle).subspan(dofs)), bound);
+
+  double size = 0.0;
+  for (std::size_t i = 0; i < theta.size(); ++i) size += std::abs(direction[i] * bar[i]);
+  EXPECT_LE(std::abs(dot(tangent, out_bar) - dot(direction, bar)), bound * size);
+  return error;
+}
+
+template <class K>
+class BlockOfOne : public ::testing::Test {};
+TYPED_TEST_SUITE(BlockOfOne, RegistryTypes, KindName);
+
+TYPED_TEST(BlockOfOne, DerivativesMatchComplexStep) {
+  using K = TypeParam;
+  double worst = 0.0;
+  for (const Partition partition : {Partition::gauss_seidel, Partition::direct})
+    for (const bool damped : {false, true})
+      for (int pinned = -1; pinned < K::arity; ++pinned)
+        for (unsigned seed = 0; seed < 5; ++seed) {
+          SCOPED_TRACE(::testing::Message() << "direct " << static_cast<int>(partition) << " damped " << damped << " pinned " << pinned);
+          const Sample sample = scene_of_one<K>(seed, damped, pinned < 0 ? std::vector<int>{} : std::vector<int>{pinned});
+          worst = std::max(worst, climb(Projection(sample.scene, partition, eta), sample.inputs, seed));
+        }
+  record_error("vjp", worst);
+}
+
+// The formula of the reverse, spelled out for one constraint, so that a mutant can go through it.
+template <class K>
+std::vector<double> reverse_of_one(const Projection& p, const std::vector<double>& theta, const std::vector<double>& out_bar) {
+  return p.reverse_with(theta, out_bar, [&](Projection::Run<double>& run, const SubstepCotangent<double>& bar) {
+    const Group& group = p.scene.groups[0];
+    const Element<K, double> e(run.state, group, 0, run.record.x.data());
+    const Evaluation<K, double> value(e.x, e.p);
+    double A[K::rows * K::rows], y[K::rows], z[K::dofs], u[K::dofs]{}, x_bar[K::dofs]{};
+    e.matrix(value.J, A);
+    adjoint_right_side(run.state, e, value.J, bar, y);
+    SmallLdlt<K::rows, double>(A).solve(y);
+    transpose_times<K>(value.J, run.record.dl.data(), u);
+    transpose_times<K>(value.J, y, x_bar);
+    for (int d = 0; d < K::dofs; ++d) {
+      x_bar[d] = -x_bar[d];
+      z[d] = bar.x[d] + x_bar[d];
+      bar.w[d / 3] += u[d] * z[d];
+    }
+    pull_back_element<K>(run.state, group, 0, e, value, run.record.lambda.data(), run.record.dl.data(), y, z, u, x_bar, bar);
+    add_cotangent(run.state, e, 0, x_bar, bar);
+  });
+}
+
+TYPED_TEST(BlockOfOne, MutantIsFlagged) {
+  using K = TypeParam;
+  const Sample sample = scene_of_one<K>(0, true);
+  const Projection p(sample.scene, Partition::gauss_seidel, eta);
+  Random random(0);
+  const auto theta = p.random_theta(sample.inputs, random);
+  const auto out_bar = random.vector(p.scene.dofs() + p.scene.rows);
+  const auto oracle = oracle_cotangent(p, theta, out_bar);
+  EXPECT_LE(cotangent_error(p, reverse_of_one<K>(p, theta, out_bar), oracle), bound);
+  const double mutant = cotangent_error(p, reverse_of_one<Mutant<K>>(p, theta, out_bar), oracle);
+  EXPECT_EQ(mutant > 1e4 * bound, case_of<K>().curved) << "error " << mutant << "; a linear C has no Hessian term to scale";
+}
+
+// At compliance 0 the linearized constraint holds exactly, and small compliances approach that in proportion.
+TYPED_TEST(BlockOfOne, VanishingComplianceIsTheRigidLimit) {
+  using K = TypeParam;
+  Sample sample = scene_of_one<K>(1, true);
+  const Projection p(sample.scene, Partition::gauss_seidel, eta);
+  Random random(1);
+  auto theta = p.random_theta(sample.inputs, random);
+  std::fill_n(theta.begin() + static_cast<std::ptrdiff_t>(p.offsets()[3]), p.scene.rows, 0.0);
+  double& compliance = theta[p.inputs_at() + p.scene.layout.of(Quantity::compliance)];
+  const double sample_compliance = compliance;
+
+  compliance = 0.0;
+  const auto rigid = p.forward(theta);
+  const Evaluation<K, double> value(theta.data(), &theta[p.inputs_at() + p.scene.layout.of(Quantity::rest)]);
+  for (int j = 0; j < K::rows; ++j) {
+    double left = value.C[j];
+    for (int d = 0; d < K::dofs; ++d) left += value.J[j * K::dofs + d] * (rigid[d] - theta[d]);
+    EXPECT_LE(std::abs(left), 1e-13 * largest({value.C, K::rows}));
+  }
+  double previous = 0.0;
+  for (const double fraction : {1e-4, 1e-5, 1e-6}) {
+    compliance = fraction * sample_compliance;
+    const auto out = p.forward(theta);
+    double distance = 0.0;
+    for (int d = 0; d < K::dofs; ++d) distance = std::max(distance, std::abs(out[d] - rigid[d]));
+    EXPECT_GT(distance, 0.0);
+    EXPECT_NEAR(previous == 0.0 ? 10.0 : previous / distance, 10.0, 0.1);
+    previous = distance;
+  }
+}
+
+// Dense A, s, dl and the outputs from the formulas on paper, for one block that holds all constraints of the scene.
+std::vector<double> by_formula(const Projection& p, const std::vector<double>& theta) {
+  const Scene& scene = p.scene;
+  const auto at = p.offsets();
+  const Inputs<const double> in{scene.layout, &theta[at[4]]};
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(scene.rows, scene.dofs());
+  Eigen::VectorXd s(scene.rows), a(scene.rows), g(scene.rows), w = Eigen::VectorXd::Zero(scene.dofs());
+  for (int d = 0; d < scene.dofs(); ++d)
+    if (scene.role[d / 3] == Role::free) w[d] = theta[at[1] + d / 3];
+  for (const Group& group : scene.groups)
+    with_kind(group.kind, [&]<class K>(K) {
+      for (int i = 0; i < group.count; ++i) {
+        std::vector<double> x;
+        for (const int n : group.nodes(i)) x.insert(x.end(), &theta[3 * n], &theta[3 * n] + 3);
+        const Evaluation<K, double> value(x.data(), in.of(Quantity::rest) + group.first_value + i * parameter_count<K>);
+        const double alpha = in.of(Quantity::compliance)[group.first + i], beta = in.of(Quantity::damping)[group.first + i];
+        for (int j = 0; j < K::rows; ++j) {
+          const int row = group.first_row + i * K::rows + j;
+          a[row] = alpha / (p.eta * p.eta);
+          g[row] = group.damped ? alpha * beta / p.eta : 0.0;
+          s[row] = value.C[j] + a[row] * theta[at[3] + row] + g[row] * difference<K>(value.C[j], theta[at[2] + row]);
+          for (int d = 0; d < K::dofs; ++d) J(row, 3 * group.nodes(i)[d / 3] + d % 3) = value.J[j * K::dofs + d];
+        }
+      }
+    });
+  Eigen::MatrixXd A = J * w.asDiagonal() * J.transpose();
+  A.diagonal().array() += a.array() / (1.0 + g.array());
+  const Eigen::VectorXd dl = A.partialPivLu().solve(Eigen::VectorXd(-s.array() / (1.0 + g.array())));
+  const Eigen::VectorXd dx = w.cwiseProduct(J.transpose() * dl);
+  std::vector<double> out(theta.begin(), theta.begin() + scene.dofs());
+  for (int d = 0; d < scene.dofs(); ++d) out[d] += dx[d];
+  for (int r = 0; r < scene.rows; ++r) out.push_back(theta[at[3] + r] + dl[r]);
+  return out;
+}
+
+void expect_formula(const Projection& p, const std::vector<double>& theta) {
+  const auto found = p.forward(theta), expected = by_formula(p, theta);
+  const auto moved = [&](std::vector<double> out) {
+    for (int d = 0; d < p.scene.dofs(); ++d) out[d] -= theta[d];
+    return out;
+  };
+  const auto dx = moved(found), dx_expected = moved(expected);
+  const std::size_t dofs = p.scene.dofs();
+  EXPECT_LE(relative_error(std::span(dx).first(dofs), std::span(dx_expected).first(dofs)), 1e-12);
+  EXPECT_LE(relative_error(std::span(found).subspan(dofs), std::span(expected).subspan(dofs)), 1e-12);
+}
+
+TYPED_TEST(BlockOfOne, FollowsTheFormula) {
+  using K = TypeParam;
+  for (const Partition partition : {Partition::gauss_seidel, Partition::direct})
+    for (const bool damped : {false, true}) {
+      const Sample sample = scene_of_one<K>(2, damped, {0});
+      const Projection p(sample.scene, partition, eta);
+      Random random(2);
+      expect_formula(p, p.random_theta(sample.inputs, random));
+    }
+}
+
+struct CoupledBlocks : ::testing::TestWithParam<bool> {};
+
+TEST_P(CoupledBlocks, FollowTheFormula) {
+  const Sample sample = random_scene(11, {.net = GetParam()});
+  const Projection p(sample.scene, Partition::direct, eta);
+  Random random(3);
+  expect_formula(p, p.random_theta(sample.inputs, random));
+}
+
+TEST_P(CoupledBlocks, DerivativesMatchComplexStep) {
+  double worst = 0.0;
+  for (unsigned seed = 20; seed < 23; ++seed) {
+    const Sample sample = random_scene(seed, {.net = GetParam()});
+    worst = std::max(worst, climb(Projection(sample.scene, Partition::direct, eta), sample.inputs, seed));
+  }
+  record_error("vjp", worst);
+}
+
+TEST_P(CoupledBlocks, OneSweepByColorMatchesComplexStep) {
+  const Sample sample = random_scene(30, {.net = GetParam()});
+  record_error("vjp", climb(Projection(sample.scene, Partition::gauss_seidel, eta), sample.inputs, 30));
+}
+
+// Two rigid arms of four particles and six distances that share one particle: what a double pendulum is made of.
+TEST(CoupledArms, FollowTheFormulaAndMatchComplexStep) {
+  SceneSpec spec;
+  spec.particles = 7;
+  spec.pinned = {0};
+  std::vector<int> pairs;
+  for (const auto& arm : {std::array{0, 1, 2, 3}, std::array{3, 4, 5, 6}})
+    for (int a = 0; a < 4; ++a)
+      for (int b = 0; b < a; ++b) pairs.insert(pairs.end(), {arm[b], arm[a]});
+  spec.groups = {{"arms", "distance", false, pairs}};
+  const Projection p(build_scene(spec), Partition::direct, eta);
+  const std::vector<double> x{0,    0,    0,    0.1,  0.06,  -0.05, 0.1,  -0.07, -0.04, 0.13, 0.01,
+                              0.08, 0.24, 0.07, 0.03, 0.22, -0.07,  0.04, 0.26,  0.02,  0.17};
+  std::vector<double> inputs(p.scene.layout.total());
+  std::copy(x.begin(), x.end(), inputs.begin());
+  for (int c = 0; c < p.scene.constraints; ++c) {
+    const double *a = &x[3 * pairs[2 * c]], *b = &x[3 * pairs[2 * c + 1]];
+    inputs[p.scene.layout.of(Quantity::rest) + c] = norm(Vec3<double>(b) - Vec3<double>(a));
+  }
+  Random random(4);
+  expect_formula(p, p.random_theta(inputs, random));
+  record_error("vjp", climb(p, inputs, 4));
+}
+
+INSTANTIATE_TEST_SUITE_P(, CoupledBlocks, ::testing::Bool(), [](const auto& param) { return param.param ? "Net" : "Ropes"; });
+
+}  // namespace
+}  // namespace sheetbend::testing

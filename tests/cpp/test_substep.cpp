@@ -1,0 +1,103 @@
+// Fourth rung: one substep, theta = (x, x_before, v, v_before, inputs) -> (x, v), its reverse against complex step.
+#include "adjoint/substep_vjp.h"
+#include "core/scalar/complex.h"
+#include "tests/cpp/support/programs.h"
+
+namespace sheetbend::testing {
+namespace {
+
+struct OneSubstep {
+  const Scene& scene;
+  Plan plan;
+  int number;
+  double t_next = 0.013;
+};
+
+template <class T>
+struct SubstepRun {
+  Bdf bdf;
+  Inputs<const T> in;
+  SubstepStates<T> states;
+  std::vector<T> out;
+  SubstepRecord<T> record;
+
+  SubstepRun(const OneSubstep& one, const std::vector<T>& theta)
+      : bdf(Bdf::at(one.plan.options, one.number)), in{one.scene.layout, theta.data() + 4 * one.scene.dofs()}, out(2 * one.scene.dofs()) {
+    const std::size_t dofs = one.scene.dofs();
+    states = {theta.data(), theta.data() + dofs, theta.data() + 2 * dofs, theta.data() + 3 * dofs};
+    record.resize(one.scene, one.plan, true);
+    Scratch<T> scratch;
+    scratch.resize(one.scene);
+    substep(one.scene, one.plan, in, bdf, one.t_next, states, out.data(), out.data() + dofs, record, scratch);
+  }
+};
+
+std::vector<double> reverse(const OneSubstep& one, const std::vector<double>& theta, const std::vector<double>& out_bar) {
+  SubstepRun<double> run(one, theta);
+  const int dofs = one.scene.dofs();
+  std::vector<double> bar(theta.size());
+  ReverseScratch<double> scratch(one.scene);
+  substep_vjp(one.scene, one.plan, run.in, run.bdf, one.t_next, run.states, run.record, out_bar.data(), out_bar.data() + dofs, scratch,
+              {&bar[0], &bar[dofs], &bar[2 * dofs], &bar[3 * dofs]}, {one.scene.layout, &bar[4 * dofs]});
+  return bar;
+}
+
+// States at n and n-1 that are near the scene's initial one but owe nothing to each other.
+std::vector<double> random_theta(const Sample& sample, Random& random) {
+  const std::size_t dofs = sample.scene.dofs();
+  std::vector<double> theta;
+  for (const double spread : {0.005, 0.005, 0.3, 0.3})
+    for (std::size_t i = 0; i < dofs; ++i) theta.push_back((spread < 0.1 ? sample.inputs[i] : 0.0) + random(-spread, spread));
+  theta.insert(theta.end(), sample.inputs.begin(), sample.inputs.end());
+  return theta;
+}
+
+struct Substep : ::testing::TestWithParam<Solver> {};
+INSTANTIATE_TEST_SUITE_P(, Substep, all_solvers, solver_name);
+
+TEST_P(Substep, ReverseMatchesComplexStep) {
+  const Sample sample = random_scene(40, {.net = GetParam().net});
+  const Scene& scene = sample.scene;
+  for (const int number : {0, 1}) {
+    SCOPED_TRACE(number == 0 ? "the first substep" : "a later substep");
+    const OneSubstep one{scene, make_plan(scene, GetParam().options(3)), number};
+    Random random(40 + number);
+    const auto theta = random_theta(sample, random);
+    const auto out_bar = random.vector(2 * scene.dofs());
+    const auto oracle = complex_step_gradient(
+        [&](const std::vector<Complex>& z) {
+          const auto out = SubstepRun<Complex>(one, z).out;
+          Complex sum(0.0);
+          for (std::size_t i = 0; i < out.size(); ++i) sum += Complex(out_bar[i]) * out[i];
+          return sum;
+        },
+        theta);
+    const auto bar = reverse(one, theta, out_bar);
+    const std::size_t dofs = scene.dofs();
+    const char* names[] = {"x", "x_before", "v", "v_before"};
+    for (int part = 0; part < 4; ++part)
+      EXPECT_LE(relative_error(std::span(bar).subspan(part * dofs, dofs), std::span(oracle).subspan(part * dofs, dofs)), 1e-10) << names[part];
+    // A substep reads the states that it is given, not the initial ones.
+    for (int q = 0; q < quantity_count; ++q) {
+      const auto of = [&](const std::vector<double>& g) { return std::span(g).subspan(4 * dofs + scene.layout.offset[q], scene.layout.size[q]); };
+      EXPECT_EQ(largest(of(oracle)) > 0.0, q != static_cast<int>(Quantity::position) && q != static_cast<int>(Quantity::velocity));
+      const double error = relative_error(of(bar), of(oracle));
+      EXPECT_LE(error, 1e-10) << quantity_names[q];
+      record_error(quantity_names[q], error);
+    }
+  }
+}
+
+// At rest the drag's speed has no direction; its slope is taken as zero, and nothing becomes NaN.
+TEST(SubstepAtRest, ReverseIsFinite) {
+  const Sample sample = random_scene(41);
+  const OneSubstep one{sample.scene, make_plan(sample.scene, {.h = 4e-3, .integrator = Integrator::bdf2}), 1};
+  Random random(41);
+  auto theta = random_theta(sample, random);
+  const std::size_t dofs = sample.scene.dofs();
+  std::fill_n(theta.begin() + static_cast<std::ptrdiff_t>(2 * dofs), 2 * dofs, 0.0);
+  for (const double b : reverse(one, theta, random.vector(2 * dofs))) EXPECT_TRUE(std::isfinite(b));
+}
+
+}  // namespace
+}  // namespace sheetbend::testing

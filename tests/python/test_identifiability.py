@@ -1,0 +1,325 @@
+"""Identifiability: coverage of intervals on simulated problems, gauges in words, every verdict."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from sheetbend.covariance import Layout, covariance
+from sheetbend.errors import InputError
+from sheetbend.gauge import null_space
+from sheetbend.identifiability import Floor, identify
+from sheetbend.parameters import Parameter, Parameters
+from sheetbend.profile import profile_interval
+
+special = pytest.importorskip("scipy.special")
+signal = pytest.importorskip("scipy.signal")
+
+SEEDS = 400
+
+
+def design(frames: int) -> np.ndarray:
+    """Columns like those of a motion: constant, slow, oscillating and decaying, in between."""
+    t = np.linspace(0, 1, frames)
+    return np.column_stack([np.ones(frames), t - 0.3, np.exp(-2 * t) * np.cos(40 * t), np.sin(7 * t)])
+
+
+def errors(
+    rng: np.random.Generator, correlation: float, channels: int, frames: int, common: float
+) -> np.ndarray:
+    """(channels, frames) first-order autoregressive errors; `common` is the correlation between channels."""
+    own, shared = rng.standard_normal((channels, frames + 200)), rng.standard_normal(frames + 200)
+    white = math.sqrt(1 - common) * own + math.sqrt(common) * shared
+    return signal.lfilter([1], [1, -correlation], white, axis=1)[:, 200:]
+
+
+def coverage(
+    correlation: float, frames: int, channels: int = 1, common: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Part of the seeds whose 95 % interval holds the truth: honest, and as if the residuals were white."""
+    base, rng = design(frames), np.random.default_rng(7)
+    jacobian = np.concatenate([base * (1 + 0.3 * np.sin(np.arange(4) + k)) for k in range(channels)])
+    layout = Layout(
+        np.zeros(frames * channels, dtype=int),
+        np.repeat(np.arange(channels), frames),
+        np.tile(np.arange(frames), channels),
+    )
+    inverse = np.linalg.pinv(jacobian)
+    honest, naive = np.zeros(4), np.zeros(4)
+    for _ in range(SEEDS):
+        error = errors(rng, correlation, channels, frames, common).ravel()
+        estimate = inverse @ error  # the truth is zero
+        result = covariance(error - jacobian @ estimate, jacobian, layout)
+        sd = np.sqrt(np.diag(result.matrix))
+        honest += np.abs(estimate) <= special.stdtrit(result.degrees, 0.975) * sd
+        naive += np.abs(estimate) <= special.stdtrit(len(error) - 4, 0.975) * sd / np.sqrt(result.inflation)
+    return honest / SEEDS, naive / SEEDS
+
+
+@pytest.mark.parametrize(
+    ("correlation", "frames", "channels", "common"),
+    [(0.0, 100, 1, 0.0), (0.5, 400, 1, 0.0), (0.8, 400, 1, 0.0), (0.6, 200, 4, 0.0), (0.6, 200, 4, 0.7)],
+)
+def test_intervals_cover_the_truth(correlation: float, frames: int, channels: int, common: float) -> None:
+    """95 % intervals cover 92 to 98 % on average over the parameters, and none falls far below."""
+    honest, naive = coverage(correlation, frames, channels, common)
+    assert 0.92 <= honest.mean() <= 0.98
+    assert honest.min() >= 0.90
+    if correlation > 0:
+        assert naive.mean() < 0.85  # the test can tell the two apart
+
+
+def test_white_residuals_give_the_textbook_covariance() -> None:
+    rng = np.random.default_rng(3)
+    jacobian = rng.standard_normal((5000, 3))
+    residuals = 0.2 * rng.standard_normal(5000)
+    residuals -= jacobian @ np.linalg.lstsq(jacobian, residuals, rcond=None)[0]
+    textbook = residuals @ residuals / 4997 * np.linalg.inv(jacobian.T @ jacobian)
+    result = covariance(residuals, jacobian)
+    np.testing.assert_allclose(np.diag(result.matrix), np.diag(textbook), rtol=0.1)
+    assert result.residual_variance == pytest.approx(0.04, rel=0.05)
+    assert result.autocorrelation_time == pytest.approx(1.0, abs=0.05)
+
+
+def test_prior_counts_as_one_observation_of_its_sd() -> None:
+    """One direct datum of unit noise and a prior of sd 1 on the same number: half the variance."""
+    rng = np.random.default_rng(0)
+    jacobian = np.full((10_000, 1), 0.01)  # together they tell the parameter with variance 1
+    residuals = rng.standard_normal(10_000)
+    residuals -= residuals.mean()
+    result = covariance(residuals, jacobian, prior_jacobian=np.ones((1, 1)))
+    assert result.matrix[0, 0] == pytest.approx(0.5, rel=0.1)
+
+
+def test_covariance_does_not_depend_on_units() -> None:
+    rng = np.random.default_rng(5)
+    jacobian, size = design(150), np.array([1e-9, 1.0, 1e8, 1e-3])
+    residuals = errors(rng, 0.7, 1, 150, 0.0)[0]
+    residuals -= jacobian @ np.linalg.lstsq(jacobian, residuals, rcond=None)[0]
+    plain = covariance(residuals, jacobian)
+    scaled = covariance(residuals, jacobian * size)
+    np.testing.assert_allclose(scaled.matrix * np.outer(size, size), plain.matrix, rtol=1e-8)
+
+
+def test_layout_is_checked() -> None:
+    zeros = np.zeros(3, dtype=int)
+    with pytest.raises(InputError, match="two rows in one place"):
+        Layout(zeros, zeros, zeros)
+    with pytest.raises(InputError, match="integer"):
+        Layout(zeros, zeros, np.linspace(0, 1, 3))
+    with pytest.raises(InputError, match="outnumber"):
+        covariance(np.zeros(2), np.eye(2))
+
+
+def spring(names: tuple[str, ...], powers: tuple[float, ...], rows: int = 200) -> np.ndarray:
+    """Jacobian of a motion that sees only a product of `names` to `powers`, and a sound last column."""
+    t = np.linspace(0, 1, rows)
+    return np.column_stack([power * t * np.cos(12 * t) for power in powers] + [np.sin(5 * t)])
+
+
+@pytest.mark.parametrize(
+    ("names", "powers", "words"),
+    [
+        (
+            ("rope_density", "rope_EA"),
+            (-1.0, 1.0),
+            "rope_density^+1 * rope_EA^+1 stays free: only the ratio rope_EA/rope_density is known",
+        ),
+        (
+            ("mass", "compliance"),
+            (1.0, 1.0),
+            "mass^+1 * compliance^-1 stays free: only the product mass * compliance is known",
+        ),
+        (("length", "EI"), (-3.0, 1.0), "length^+1 * EI^+3 stays free: only EI/length^3 is known"),
+    ],
+)
+def test_gauges_are_named(names: tuple[str, ...], powers: tuple[float, ...], words: str) -> None:
+    space = null_space(spring(names, powers), [*names, "sound"], [True, True, True])
+    assert [gauge.words for gauge in space.gauges] == [words]
+    assert space.rank == 2
+    assert space.determined == (2,)
+
+
+def test_mass_against_compliance_in_a_simulated_oscillator() -> None:
+    """x = cos(t sqrt(1/(m a))): from motion alone the product m a is known, each factor is not."""
+    t = np.linspace(0, 3, 300)
+    frequency = math.sqrt(1 / (0.2 * 0.01))
+    column = 0.5 * t * frequency * np.sin(t * frequency)  # d x/d ln m = d x/d ln a
+    parameters = Parameters(
+        [Parameter(name="mass", initial=0.2, log=True), Parameter(name="compliance", initial=0.01, log=True)]
+    )
+    residuals = 1e-3 * np.random.default_rng(0).standard_normal(300)
+    result = identify(parameters, parameters.initial(), residuals, np.column_stack([column, column]))
+    assert [e.verdict for e in result.estimates] == ["not identifiable"] * 2
+    assert "only the product mass * compliance is known" in result.estimates[0].words
+    held = parameters.replace("mass", fixed=True)
+    result = identify(held, held.initial(), residuals, column[:, None])
+    assert result.estimates[0].verdict == "identified"
+    known = Parameters(
+        [Parameter(name="mass", initial=0.2, log=True, prior=(0.2, 0.01)), parameters["compliance"]]
+    )
+    result = identify(known, known.initial(), residuals, np.column_stack([column, column]))
+    assert [e.verdict for e in result.estimates] == ["identified"] * 2
+    assert "through its prior" in result.estimates[1].words
+
+
+def test_two_gauges_and_linear_parameters() -> None:
+    t = np.linspace(0, 1, 100)
+    columns = [np.sin(9 * t), np.sin(9 * t), t, -t, np.cos(4 * t)]
+    names = ["density", "stiffness", "left", "right", "sound"]
+    space = null_space(np.column_stack(columns), names, [True, True, False, False, True])
+    assert {gauge.members for gauge in space.gauges} == {("density", "stiffness"), ("left", "right")}
+    assert "left +1, right +1 stays free: only right - left is known" in [
+        gauge.words for gauge in space.gauges
+    ]
+    assert space.rank == 3
+
+
+def test_sound_parameters_keep_their_interval_beside_a_gauge() -> None:
+    rng = np.random.default_rng(2)
+    jacobian = spring(("a", "b"), (1.0, 1.0))
+    residuals = 0.05 * rng.standard_normal(200)
+    residuals -= jacobian @ (np.linalg.pinv(jacobian) @ residuals)
+    three = Parameters([Parameter(name=name, initial=1.0, log=True) for name in ("a", "b", "c")])
+    two = Parameters([Parameter(name=name, initial=1.0, log=True) for name in ("a", "c")])
+    with_gauge = identify(three, np.zeros(3), residuals, jacobian).estimates[2]
+    without = identify(two, np.zeros(2), residuals, jacobian[:, 1:]).estimates[1]
+    assert with_gauge.lower == pytest.approx(without.lower, rel=1e-6)
+    assert with_gauge.upper == pytest.approx(without.upper, rel=1e-6)
+
+
+def one(
+    noise: float, column: np.ndarray | None = None, **fields: object
+) -> tuple[Parameters, np.ndarray, np.ndarray]:
+    """A problem with one parameter p at its value 1 and white residuals."""
+    column = np.ones(400) if column is None else column
+    rng = np.random.default_rng(11)
+    residuals = noise * rng.standard_normal(len(column))
+    if column.any():
+        residuals -= column * (column @ residuals) / (column @ column)
+    return Parameters([Parameter(**{"name": "p", "initial": 1.0, **fields})]), residuals, column[:, None]
+
+
+def judge(problem: tuple[Parameters, np.ndarray, np.ndarray], **options: object):
+    parameters, residuals, jacobian = problem
+    return identify(parameters, parameters.initial(), residuals, jacobian, **options).estimates[0]
+
+
+def test_identified_and_weak() -> None:
+    """The half-width is 2 sd/sqrt(400) = 0.1 sd: 20 % lies at sd 2."""
+    tight, loose = judge(one(1.0)), judge(one(4.0))
+    assert tight.verdict == "identified"
+    assert tight.half_width == pytest.approx(0.1, rel=0.15)
+    assert loose.verdict == "weak"
+    assert loose.half_width == pytest.approx(0.4, rel=0.15)
+    assert "known only to" in loose.words
+
+
+def test_scale_judges_a_parameter_that_may_be_zero() -> None:
+    assert judge(one(1.0, initial=0.0)).verdict == "weak"
+    assert judge(one(1.0, initial=0.0, scale=1.0)).verdict == "identified"
+
+
+def test_log_intervals_are_asymmetric_and_positive() -> None:
+    estimate = judge(one(8.0, log=True))
+    assert 0 < estimate.lower < 1 < estimate.upper
+    assert estimate.lower * estimate.upper == pytest.approx(1.0)
+    assert estimate.upper - 1 > 1 - estimate.lower
+
+
+def test_flat() -> None:
+    estimate = judge(one(1.0, column=np.zeros(400)))
+    assert estimate.verdict == "not identifiable"
+    assert "moves no residual" in estimate.words
+    assert estimate.lower is None
+    assert estimate.upper is None
+
+
+def test_at_a_bound() -> None:
+    estimate = judge(one(1.0, upper=1.0))
+    assert estimate.verdict == "at a bound"
+    assert estimate.upper == 1.0
+    assert "upper bound 1" in estimate.words
+
+
+def test_at_its_floor() -> None:
+    below = {"p": Floor(1.2, "BDF1 damps by omega h/2")}
+    assert judge(one(1.0), floors=below).verdict == "at its floor"
+    assert "BDF1" in judge(one(1.0), floors=below).words
+    assert judge(one(1.0), floors={"p": Floor(0.5, "no matter")}).verdict == "identified"
+    assert judge(one(1.0), floors={"p": Floor(0.5, "few sweeps", ceiling=True)}).verdict == "at its floor"
+    with pytest.raises(InputError, match="no free parameter"):
+        judge(one(1.0), floors={"q": Floor(0.5, "")})
+
+
+def test_one_sided_by_the_profile() -> None:
+    problem = one(16.0, log=True)
+    base = 0.5 * problem[1] @ problem[1]
+
+    def profile(name: str, value: float) -> float:
+        assert name == "p"
+        return base * (1 + max(0.0, -math.log(value)) ** 2)
+
+    estimate = judge(problem, profile=profile)
+    assert estimate.verdict == "one-sided"
+    assert estimate.upper is None
+    assert 0 < estimate.lower < 1
+    assert estimate.words.startswith("at least")
+    assert judge(problem, profile=lambda name, value: base).verdict == "not identifiable"
+
+
+def test_profile_is_asked_about_weak_parameters_only() -> None:
+    def never(name: str, value: float) -> float:
+        raise AssertionError(f"asked for {name} at {value}")
+
+    assert judge(one(1.0), profile=never).verdict == "identified"
+
+
+def test_profile_interval_of_known_costs() -> None:
+    assert profile_interval(lambda p: (p - 3) ** 2, 3.0, 4.0, step=0.1) == pytest.approx((1.0, 5.0), rel=5e-3)
+    log = profile_interval(lambda p: math.log(p / 3) ** 2, 3.0, 1.0, step=0.1, log=True)
+    assert log == pytest.approx((3 / math.e, 3 * math.e), rel=5e-3)
+    assert profile_interval(lambda p: (p - 3) ** 2, 3.0, 4.0, step=0.1, upper=4.0)[1] is None
+    lopsided = profile_interval(lambda p: p - 1 - math.log(p), 1.0, 1.0, step=0.5, lower=1e-9)
+    assert lopsided == pytest.approx((0.15859, 3.14619), rel=5e-3)
+
+
+def test_discretization_is_added_and_both_are_reported() -> None:
+    statistical = judge(one(1.0))
+    both = judge(one(1.0), discretization={"p": 0.05})
+    assert both.statistical == pytest.approx(statistical.half_width)
+    assert both.discretization == 0.05
+    assert both.half_width == pytest.approx(statistical.half_width + 0.05)
+    assert judge(one(1.0), discretization={"p": 0.5}).verdict == "weak"
+
+
+def test_correlations() -> None:
+    rng = np.random.default_rng(4)
+    jacobian = rng.standard_normal((3000, 2)) @ np.array([[1.0, 0.8], [0.0, 0.6]])
+    parameters = Parameters([Parameter(name="a", initial=1.0), Parameter(name="b", initial=1.0)])
+    (pair,) = identify(parameters, np.ones(2), 0.1 * rng.standard_normal(3000), jacobian).correlations
+    assert (pair.first, pair.second) == ("a", "b")
+    assert pair.value == pytest.approx(-0.8, abs=0.04)
+
+
+def test_bad_arrays_are_refused() -> None:
+    parameters, residuals, jacobian = one(1.0)
+    with pytest.raises(InputError, match="finite"):
+        judge((parameters, np.where(np.arange(400) == 3, np.nan, residuals), jacobian))
+    with pytest.raises(InputError, match="disagrees"):
+        judge((parameters, residuals, np.ones((400, 2))))
+
+
+def test_recordings_of_different_lengths_and_gaps() -> None:
+    """Three frames, one frame and sixty with gaps: nothing breaks, and independent recordings add up."""
+    rng = np.random.default_rng(1)
+    recording = np.repeat([0, 1, 2], [3, 1, 40])
+    frame = np.concatenate([np.arange(3), [0], np.sort(rng.permutation(60)[:40])])
+    layout = Layout(recording, np.zeros(44, dtype=int), frame)
+    residuals = rng.standard_normal(44)
+    residuals -= residuals.mean()
+    single = covariance(residuals, np.ones((44, 1)), layout)
+    assert single.matrix[0, 0] >= residuals @ residuals / 43 / 44 * (1 - 1e-12)
+    shifted = Layout(recording, np.zeros(44, dtype=int), frame + 1000)  # only differences of frames matter
+    np.testing.assert_allclose(covariance(residuals, np.ones((44, 1)), shifted).matrix, single.matrix)
