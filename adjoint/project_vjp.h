@@ -34,8 +34,8 @@ struct BlockVectors {
 
 // Everything after the solve, on one element; z and u are the block's, on the element's stencil. Adds Hess(C_j) v_j to x_bar.
 template <class K, class T>
-void pull_back_element(const SubstepState<T>& s, const Group& group, int item, const Element<K, T>& e, const Evaluation<K, T>& value,
-                       const T* lambda, const T* dl, const T* y, const T* z, const T* u, T* x_bar, const SubstepCotangent<T>& bar) {
+void pull_back_element(const SubstepState<T>& s, const Group& group, int item, const Element<K, T>& e, const T* lambda, const T* dl, const T* y,
+                       const T* z, const T* u, T* x_bar, const SubstepCotangent<T>& bar) {
   constexpr int P = parameter_count<K>, N = K::rows + P;
   using D = Dual<T, N>;
   T v[K::rows][K::dofs];
@@ -59,8 +59,8 @@ void pull_back_element(const SubstepState<T>& s, const Group& group, int item, c
     bar.lambda[row] += e.rates.a * s_bar;
     if (group.damped) {
       T J_dx(0.0);
-      for (int d = 0; d < K::dofs; ++d) J_dx += value.J[j * K::dofs + d] * e.w[d / 3] * u[d];
-      g_bar += s_bar * (difference<K>(value.C[j], s.C_r[row]) + J_dx);
+      for (int d = 0; d < K::dofs; ++d) J_dx += J[j * K::dofs + d].v * e.w[d / 3] * u[d];
+      g_bar += s_bar * (difference<K>(C[j].v, s.C_r[row]) + J_dx);
       bar.C_r[row] -= e.rates.g * s_bar;
     }
     for (int k = 0; k < P; ++k) {
@@ -138,7 +138,7 @@ void project_color_vjp(const SubstepState<T>& s, const SolverOptions& options, c
         }
         for (int k = 0; k < K::arity; ++k)
           if (s.scene.role[e.nodes[k]] == Role::free) bar.w[e.nodes[k]] += dot(Vec3<T>(u + 3 * k), Vec3<T>(z + 3 * k));
-        pull_back_element<K>(s, group, item, e, value, &record.lambda[e.first_row], dl, y, z, u, back, bar);
+        pull_back_element<K>(s, group, item, e, &record.lambda[e.first_row], dl, y, z, u, back, bar);
         add_cotangent(s, e, coordinate, back, bar);
       }
     });
@@ -155,19 +155,19 @@ void project_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const
       const Group& group = s.scene.groups[m.group];
       with_kind(group.kind, [&]<class K>(K) {
         const Element<K, T> e(s, group, m.item, &record.x[first_coordinate<K>(group, m.item)]);
-        body(e, Evaluation<K, T>(e.x, e.p), group, m);
+        body(e, &record.J[first_gradient<K>(group, m.item)], group, m);
       });
     }
   };
-  for_each_member([&]<class K>(const Element<K, T>& e, const Evaluation<K, T>& value, const Group&, const Member& m) {
-    adjoint_right_side(s, e, value.J, bar, y + m.first_row);
+  for_each_member([&]<class K>(const Element<K, T>& e, const T* J, const Group&, const Member& m) {
+    adjoint_right_side(s, e, J, bar, y + m.first_row);
   });
   factor.solve(block.structure, y);
   for (const int node : block.nodes) std::fill_n(block_wide.u + s.scene.first_dof[node], 3, T(0.0));
-  for_each_member([&]<class K>(const Element<K, T>& e, const Evaluation<K, T>& value, const Group& group, const Member& m) {
+  for_each_member([&]<class K>(const Element<K, T>& e, const T* J, const Group& group, const Member& m) {
     T u[K::dofs]{}, back[K::dofs]{};
-    transpose_times<K>(value.J, &record.dl[e.first_row], u);
-    transpose_times<K>(value.J, y + m.first_row, back);
+    transpose_times<K>(J, &record.dl[e.first_row], u);
+    transpose_times<K>(J, y + m.first_row, back);
     for (int d = 0; d < K::dofs; ++d) back[d] = -back[d];
     for (int d = 0; d < K::dofs; ++d)
       if (s.scene.role[e.nodes[d / 3]] == Role::free) block_wide.u[s.scene.first_dof[e.nodes[d / 3]] + d % 3] += u[d];
@@ -178,11 +178,11 @@ void project_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const
     std::copy_n(bar.x + dof, 3, block_wide.z + dof);
     bar.w[node] += dot(Vec3<T>(block_wide.u + dof), Vec3<T>(block_wide.z + dof));
   }
-  for_each_member([&]<class K>(const Element<K, T>& e, const Evaluation<K, T>& value, const Group& group, const Member& m) {
+  for_each_member([&]<class K>(const Element<K, T>& e, const T*, const Group& group, const Member& m) {
     T z[K::dofs], u[K::dofs], x_bar[K::dofs]{};
     gather_free(s, e, block_wide.z, z);
     gather_free(s, e, block_wide.u, u);
-    pull_back_element<K>(s, group, m.item, e, value, &record.lambda[e.first_row], &record.dl[e.first_row], y + m.first_row, z, u, x_bar,
+    pull_back_element<K>(s, group, m.item, e, &record.lambda[e.first_row], &record.dl[e.first_row], y + m.first_row, z, u, x_bar,
                          bar);
     add_cotangent(s, e, first_coordinate<K>(group, m.item), x_bar, bar);
   });

@@ -20,8 +20,6 @@ void rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t
   std::vector<T> v(dofs), v_before(dofs), q(dofs), v_out(dofs);
   SubstepRecord<T> record;
   record.resize(scene, plan, true);
-  Scratch<T> scratch;
-  scratch.resize(scene);
   ReverseScratch<T> reverse(scene);
 
   seed(tape.steps(), x_next_bar.data());
@@ -33,7 +31,7 @@ void rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t
     tape.velocity(n, v0, v.data());
     tape.velocity(n - 1, v0, v_before.data());
     const SubstepStates<T> states{tape.x(n), tape.x(n - 1), v.data(), v_before.data()};
-    substep(scene, plan, in, bdf, t_next, states, q.data(), v_out.data(), record, scratch);
+    substep(scene, plan, in, bdf, t_next, states, q.data(), v_out.data(), record);
     substep_vjp(scene, plan, in, bdf, t_next, states, record, x_next_bar.data(), v_next_bar.data(), reverse,
                 {x_bar.data(), x_before_bar.data(), v_bar.data(), v_before_bar.data()}, in_bar);
     std::swap(x_next_bar, x_bar);

@@ -13,10 +13,10 @@ struct StateCotangents {
 
 template <class T>
 struct ReverseScratch {
-  std::vector<T> x, fixed, lambda, w, C_r, rows, z, u;
+  std::vector<T> x, fixed, lambda, w, C_r, z, u;
 
   explicit ReverseScratch(const Scene& scene)
-      : x(scene.dofs()), fixed(scene.stencil_coordinates), lambda(scene.rows), w(scene.nodes()), C_r(scene.rows), rows(scene.rows),
+      : x(scene.dofs()), fixed(scene.stencil_coordinates), lambda(scene.rows), w(scene.nodes()), C_r(scene.rows),
         z(scene.dofs()), u(scene.dofs()) {}
 };
 
@@ -39,17 +39,18 @@ void damping_references_vjp(const Scene& scene, const Inputs<const T>& in, const
     constexpr int P = parameter_count<K>;
     const int* nodes = group.stencil.data() + static_cast<std::size_t>(item) * K::arity;
     const std::size_t value = group.first_value + static_cast<std::size_t>(item) * P;
-    Dual<T, P + 1> x[K::dofs], p[P + 1], C[K::rows], J[K::rows * K::dofs];
-    for (int d = 0; d < K::dofs; ++d) x[d].v = at[scene.first_dof[nodes[d / 3]] + d % 3];
-    for (int k = 0; k < P; ++k) {
-      p[k].v = in.of(Quantity::rest)[value + k];
-      p[k].d[k] = T(1.0);
-    }
+    using D = std::conditional_t<P == 0, T, Dual<T, P>>;
+    D x[K::dofs], p[P + 1], C[K::rows], J[K::rows * K::dofs];
+    for (int d = 0; d < K::dofs; ++d) x[d] = D(at[scene.first_dof[nodes[d / 3]] + d % 3]);
+    for (int k = 0; k < P; ++k) p[k] = D(in.of(Quantity::rest)[value + k]);
+    if constexpr (P > 0)
+      for (int k = 0; k < P; ++k) p[k].d[k] = T(1.0);
     K::evaluate(x, p, C, J);
     for (int j = 0; j < K::rows; ++j) {
       const T bar_j = scale * C_bar[j];
-      for (int d = 0; d < K::dofs; ++d) x_bar[scene.first_dof[nodes[d / 3]] + d % 3] += bar_j * J[j * K::dofs + d].v;
-      for (int k = 0; k < P; ++k) in_bar.of(Quantity::rest)[value + k] += bar_j * C[j].d[k];
+      for (int d = 0; d < K::dofs; ++d) x_bar[scene.first_dof[nodes[d / 3]] + d % 3] += bar_j * primal<T>(J[j * K::dofs + d]);
+      if constexpr (P > 0)
+        for (int k = 0; k < P; ++k) in_bar.of(Quantity::rest)[value + k] += bar_j * C[j].d[k];
     }
   };
   for (const Group& group : scene.groups) {
@@ -138,7 +139,7 @@ void substep_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in
       project_color_vjp(state, plan.options, *color, kept, cotangent);
     parallel_for(static_cast<int>(plan.blocks.size()), plan.options.threads, 1, [&](int begin, int end) {
       for (int b = begin; b < end; ++b)
-        project_block_vjp(state, plan.blocks[b], kept, kept.factors[b], scratch.rows.data(), {scratch.z.data(), scratch.u.data()}, cotangent);
+        project_block_vjp(state, plan.blocks[b], kept, kept.factors[b], record.rows.data(), {scratch.z.data(), scratch.u.data()}, cotangent);
     });
   }
   for (const Group& group : scene.groups)

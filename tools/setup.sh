@@ -1,3 +1,4 @@
+# shellcheck shell=bash
 # Set-up shared by ./run and ./test, which source it: system packages, a Python environment, sheetbend in it.
 # Every step looks first and does nothing when its work is done.
 
@@ -83,7 +84,7 @@ make_environment() {
 # What the installed package depends on: its sources, its build files and the libraries that decide what is built.
 fingerprint() {
   (
-    cd "$ROOT"
+    cd "$ROOT" || exit
     find pyproject.toml CMakeLists.txt cmake core adjoint python -type f ! -name '*.pyc' ! -path '*/.*' -print0 |
       sort -z | xargs -0 sha256sum
     "$VENV/bin/python" --version
@@ -119,7 +120,7 @@ install_sheetbend() {
   mapfile -t -O "${#tools[@]}" tools < <(build_requirements)
   pip install -q "${tools[@]}"
   say "building and installing sheetbend[$extras] (minutes the first time)"
-  pip install -q --no-build-isolation --config-settings build-dir="$ROOT/build/wheel" "$ROOT[$extras]"
+  pip install -q --no-build-isolation --config-settings build-dir="$ROOT/build/wheel" "${ROOT}[$extras]"
   echo "$found $extras" >"$STAMP"
 }
 

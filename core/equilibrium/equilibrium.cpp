@@ -11,7 +11,7 @@ namespace {
 
 constexpr double safe_residual = 1e-6;  // below this relative residual Newton may go to a saddle: it is near, and left again afterwards
 
-constexpr double energy_share = 0.1;      // of the loads' energy that softened constraints may hold
+const double stiffening = atof(getenv("ST")), energy_share = atof(getenv("CE"));     // of the loads' energy that softened constraints may hold
 constexpr double balanced = 1e-5;         // relative imbalance of forces below which softened constraints are stiffened
 constexpr int max_corrections = 5;      // simplified Newton steps per factorization
 constexpr int max_departures = 5;       // from saddles
@@ -83,6 +83,11 @@ struct EquilibriumSolver::State {
       throw std::invalid_argument("start: the residual is not finite. Fix: give finite inputs and a start without edges of no length or folded back");
   }
 
+  double force_stiffness() const { return edge > 0.0 ? weight / edge : 0.0; }
+  double first_pseudo_stiffness(Kkt& kkt, const double* alpha) const {
+    kkt.factorize(0.0, alpha);
+    return std::max(1e-6 * kkt.largest_diagonal(), force_stiffness());
+  }
   const double* compliance() const { return in.of(Quantity::compliance); }
 
   // A compliance for each group, never growing, at which its violated constraints hold no more than a part of the energy that the loads can
@@ -99,7 +104,7 @@ struct EquilibriumSolver::State {
           for (const double c : Evaluation<K, double>(local, rest_parameters<K>(in, group, i)).C) sum += 0.5 * c * c;
         }
       });
-      soft[g] = budget > 0.0 ? std::min(sum / budget, imbalance < balanced ? 0.3 * soft[g] : soft[g]) : 0.0;
+      soft[g] = budget > 0.0 ? std::min(sum / budget, stiffening * soft[g]) : 0.0;
       for (int c = group.first; c < group.first + group.count; ++c) softened[c] = std::max(compliance()[c], soft[g]);
     }
   }
@@ -185,6 +190,16 @@ bool EquilibriumSolver::step(State& s, double mu, const double* alpha) {
   return false;
 }
 
+// The multipliers that would hold the start best: those of one heavily damped step from it, which is not taken.
+void EquilibriumSolver::estimate_multipliers(State& s) {
+  kkt_.assemble(s.in.data, s.x.data(), s.lambda.data(), s.force_stiffness());
+  const double mu = s.first_pseudo_stiffness(kkt_, s.compliance());
+  std::vector<double> x = s.r_x, lambda = s.r_l;
+  for (double& r : x) r = -r;
+  for (double& r : lambda) r = -r;
+  if (kkt_.factorize(mu, s.compliance()) && kkt_.solve(x.data(), lambda.data(), 1e-3)) s.lambda = lambda;
+}
+
 // Moves a little along a direction of negative curvature, found by inverse iteration on the smallest K + mu that is positive definite.
 void EquilibriumSolver::leave_saddle(State& s) {
   const double* alpha = s.compliance();
@@ -208,12 +223,13 @@ Equilibrium EquilibriumSolver::solve(const double* inputs, const double* start_x
   Equilibrium result;
   result.t0 = options.t0;
   double mu = 0.0;
-  bool newton = start_lambda != nullptr;  // without multipliers there is no geometric stiffness yet
+  bool newton = true;
   int departures = 0;
+  if (!start_lambda) estimate_multipliers(s);
   s.measure();
   while (result.iterations < options.max_iterations) {
     if (interrupt) interrupt->poll();
-    kkt_.assemble(inputs, s.x.data(), s.lambda.data(), s.edge > 0.0 ? s.weight / s.edge : 0.0);
+    kkt_.assemble(inputs, s.x.data(), s.lambda.data(), s.force_stiffness());
     ++result.iterations;
     if (s.converged()) {
       result.unstable_modes = kkt_.factorize(0.0, s.compliance()) ? kkt_.negative_modes() : -1;
@@ -229,8 +245,11 @@ Equilibrium EquilibriumSolver::solve(const double* inputs, const double* start_x
     if (!accepted) {
       s.soften();
       if (mu == 0.0) {
-        kkt_.factorize(0.0, s.compliance());
-        mu = std::max(1e-6 * kkt_.largest_diagonal(), s.edge > 0.0 ? s.weight / s.edge : 0.0);
+        if (!start_lambda && result.iterations == 1) {
+          std::fill(s.lambda.begin(), s.lambda.end(), 0.0);
+          kkt_.assemble(inputs, s.x.data(), s.lambda.data(), s.force_stiffness());
+        }
+        mu = s.first_pseudo_stiffness(kkt_, s.compliance());
       }
       for (int tries = 0; tries < 40 && !(accepted = step(s, mu, s.softened.data())); ++tries) mu *= 4.0;
       mu *= 0.1;
@@ -238,6 +257,7 @@ Equilibrium EquilibriumSolver::solve(const double* inputs, const double* start_x
     if (!accepted) break;
     newton = true;
     s.measure();
+    if (getenv("TRACE")) printf("%d mu %.2e acc %d newton %d res %.2e imb %.1e neg %d E %.6f diag %.1e soft %.1e lam %.1e\n", result.iterations, mu, accepted, s.last_step<1e300, s.residual, s.imbalance, kkt_.negative_modes(), s.energy(), kkt_.largest_diagonal(), s.soft[0],largest(s.lambda));
   }
   result.residual = s.residual;
   result.energy = s.energy();

@@ -51,6 +51,7 @@ class EquilibriumSolver {
  private:
   struct State;
   bool step(State& s, double mu, const double* alpha);
+  void estimate_multipliers(State& s);
   void leave_saddle(State& s);
 
   const Scene& scene_;

@@ -19,8 +19,8 @@ double largest(const std::vector<double>& v) {
 
 double ratio(double part, double whole) { return part == 0.0 ? 0.0 : part / whole; }
 
-// How much stiffer than the geometric stiffness a rigid row is made; refinement gains about as many digits per pass.
-constexpr double rigid_stiffness = 1e7;
+// How much stiffer than the geometric stiffness a row of K may be; refinement gains about as many digits per pass.
+constexpr double rigid_stiffness = 1e8;
 
 }  // namespace
 
@@ -120,8 +120,7 @@ bool Kkt::factorize(double mu, const double* compliance) {
     double J2 = 0.0;
     for (int e = 0; e < K::rows * K::dofs; ++e) J2 = std::max(J2, J[e] * J[e]);
     double& alpha = softened_[group.first + item];
-    alpha = std::max(alpha_[group.first + item], 0.0);
-    if (alpha == 0.0) alpha = J2 > 0.0 ? J2 / (rigid_stiffness * geometric) : 1.0;
+    alpha = std::max(alpha_[group.first + item], J2 > 0.0 ? J2 / (rigid_stiffness * geometric) : 1.0);
     for (int a = 0; a < K::dofs; ++a)
       for (int b = 0; b < K::dofs; ++b, ++position) {
         if (*position < 0) continue;

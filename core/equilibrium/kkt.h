@@ -1,8 +1,8 @@
 // The Newton matrix of static equilibrium,  A = [H - mu, J^T; J, alpha]  with H = sum_j lambda_j Hess(C_j), and the solution of A z = b.
 //
 // It is condensed onto the free coordinates: K = mu - H + J^T alpha^-1 J is the Hessian of the energy (plus mu), narrow for a chain and
-// positive definite at a stable equilibrium, so LDL^T in a low-fill order suffices. Rigid rows are condensed with a small compliance in place of
-// zero and the solution is refined against A itself, which also removes the rounding of stiff rows. The same trick is the augmented Lagrangian
+// positive definite at a stable equilibrium, so LDL^T in a low-fill order suffices. Rigid and nearly rigid rows are condensed with a small
+// compliance of their own and the solution is refined against A itself, which also removes the rounding of stiff rows. The same trick is the augmented Lagrangian
 // step of saddle point problems (Benzi, Golub & Liesen 2005, section 8).
 //
 // Negative pivots of K count the unstable modes: inertia(-A) = inertia(K) + (0, rows), and in the limit of rigid rows the inertia of K is that

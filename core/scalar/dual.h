@@ -55,6 +55,12 @@ struct Dual {
   }
 };
 
+// The T under a Dual<T, N>, or T itself.
+template <class T>
+const T& primal(const T& a) { return a; }
+template <class T, int N>
+const T& primal(const Dual<T, N>& a) { return a.v; }
+
 template <class T, int N>
 Dual<T, N> sqrt(const Dual<T, N>& a) {
   const T r = sqrt(a.v);

@@ -9,28 +9,27 @@
 
 namespace sheetbend {
 
-// What the reverse needs of one iteration: coordinates and multipliers before each projection, the correction, and direct factors.
+// What the reverse needs of one iteration: coordinates and multipliers before each projection, the correction, and for direct blocks the
+// gradients and the factor.
 template <class T>
 struct IterationRecord {
-  std::vector<T> x, lambda, dl;
+  std::vector<T> x, lambda, dl, J;
   std::vector<Factor<T>> factors;
 
   void resize(const Scene& scene, const Plan& plan) {
     x.resize(scene.stencil_coordinates);
     lambda.resize(scene.rows);
     dl.resize(scene.rows);
+    if (!plan.blocks.empty()) J.resize(scene.gradient_entries);
     factors.resize(plan.blocks.size());
   }
 };
 
-template <class T>
-struct Scratch {
-  std::vector<T> J, rows;  // all constraints' gradients; one number per row, block by block
-  void resize(const Scene& scene) {
-    J.resize(scene.gradient_entries);
-    rows.resize(scene.rows);
-  }
-};
+// All constraints' J of a direct block stand in one array, constraint by constraint.
+template <class K>
+std::size_t first_gradient(const Group& group, int item) {
+  return group.first_gradient + static_cast<std::size_t>(item) * K::rows * K::dofs;
+}
 
 // x' = x + W J^T dl on one stencil. Fixed nodes are not written at all: constraints that run in parallel may share them.
 template <class K, class T>
@@ -68,38 +67,56 @@ void project_color(const SubstepState<T>& s, const SolverOptions& options, const
   });
 }
 
+// Calls f with n as a constant, 1 <= n <= Max.
+template <int Max, class F>
+void with_size(int n, F&& f) {
+  if constexpr (Max > 1)
+    if (n < Max) return with_size<Max - 1>(n, f);
+  f.template operator()<Max>();
+}
+
+// values[position] += w a b^T on one node, for rows x columns scalar constraints (sizes known, so that the loops unroll).
+template <int Rows, int Columns, class T>
+void add_coupling(const T& w, const T* a, int a_stride, const T* b, int b_stride, const int* position, T* values) {
+  for (int i = 0; i < Rows; ++i) {
+    const T x = w * a[i * a_stride], y = w * a[i * a_stride + 1], z = w * a[i * a_stride + 2];
+    for (int k = 0; k < Columns; ++k) {
+      const T* bk = b + k * b_stride;
+      if (const int at = position[i * Columns + k]; at >= 0) values[at] += x * bk[0] + y * bk[1] + z * bk[2];
+    }
+  }
+}
+
 // Fills the block's matrix from the gradients of all its members.
 template <class T>
 void assemble(const SubstepState<T>& s, const DirectBlock& block, const T* J, Factor<T>& factor) {
+  const auto gradient = [&](const Member& m, int slot, int& stride) {
+    const Group& group = s.scene.groups[m.group];
+    stride = 3 * group.arity;
+    return J + group.first_gradient + static_cast<std::size_t>(m.item) * group.rows * stride + 3 * slot;
+  };
   for (const Coupling& c : block.couplings) {
+    int row_stride, column_stride;
     const Member &row = block.members[c.row_member], &column = block.members[c.column_member];
-    const Group &row_group = s.scene.groups[row.group], &column_group = s.scene.groups[column.group];
-    const int row_dofs = 3 * row_group.arity, column_dofs = 3 * column_group.arity;
-    const T* Ji = J + row_group.first_gradient + static_cast<std::size_t>(row.item) * row_group.rows * row_dofs + 3 * c.row_slot;
-    const T* Jk = J + column_group.first_gradient + static_cast<std::size_t>(column.item) * column_group.rows * column_dofs + 3 * c.column_slot;
-    const T& w = s.w[c.node];
-    const int* position = &block.position[c.first_position];
-    for (int i = 0; i < row_group.rows; ++i)
-      for (int k = 0; k < column_group.rows; ++k, ++position) {
-        if (*position < 0) continue;
-        const T *a = Ji + i * row_dofs, *b = Jk + k * column_dofs;
-        factor.values[*position] += w * (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
-      }
+    const T *a = gradient(row, c.row_slot, row_stride), *b = gradient(column, c.column_slot, column_stride);
+    with_size<3>(s.scene.groups[row.group].rows, [&]<int R>() {
+      with_size<3>(s.scene.groups[column.group].rows, [&]<int C>() {
+        add_coupling<R, C>(s.w[c.node], a, row_stride, b, column_stride, &block.position[c.first_position], factor.values.data());
+      });
+    });
   }
 }
 
 template <class T>
-void project_block(const SubstepState<T>& s, const DirectBlock& block, Scratch<T>& scratch, IterationRecord<T>& record,
-                   Factor<T>& factor) {
-  std::vector<T>& J = scratch.J;
-  T* solution = scratch.rows.data() + block.first_row;
+void project_block(const SubstepState<T>& s, const DirectBlock& block, T* rows, IterationRecord<T>& record, Factor<T>& factor) {
+  T* solution = rows + block.first_row;
   factor.reset(block.structure);
   for (const Member& m : block.members) {
     const Group& group = s.scene.groups[m.group];
     with_kind(group.kind, [&]<class K>(K) {
       const Element<K, T> e(s, group, m.item);
-      T C[K::rows], *Je = &J[group.first_gradient + static_cast<std::size_t>(m.item) * K::rows * K::dofs];
-      K::evaluate(e.x, e.p, C, Je);
+      T C[K::rows];
+      K::evaluate(e.x, e.p, C, &record.J[first_gradient<K>(group, m.item)]);
       for (int j = 0; j < K::rows; ++j) {
         solution[m.first_row + j] = -(e.residual(s, group.damped, C, j) / (T(1.0) + e.rates.g));
         factor.values[block.structure.position(m.first_row + j, m.first_row + j)] += e.rates.a / (T(1.0) + e.rates.g);
@@ -107,7 +124,7 @@ void project_block(const SubstepState<T>& s, const DirectBlock& block, Scratch<T
       std::copy_n(e.x, K::dofs, &record.x[group.first_coordinate + static_cast<std::size_t>(m.item) * K::dofs]);
     });
   }
-  assemble(s, block, J.data(), factor);
+  assemble(s, block, record.J.data(), factor);
   factor.factorize(block.structure);
   factor.solve(block.structure, solution);
   for (const Member& m : block.members) {
@@ -120,7 +137,7 @@ void project_block(const SubstepState<T>& s, const DirectBlock& block, Scratch<T
         record.dl[e.first_row + j] = dl_e[j];
         s.lambda[e.first_row + j] += dl_e[j];
       }
-      apply<K>(s, e, &J[group.first_gradient + static_cast<std::size_t>(m.item) * K::rows * K::dofs], dl_e);
+      apply<K>(s, e, &record.J[first_gradient<K>(group, m.item)], dl_e);
     });
   }
 }

@@ -28,7 +28,6 @@ class Rollout {
       : scene_(scene), plan_(plan), in_{scene.layout, inputs}, t0_(t0) {
     for (auto* buffer : {&x_, &x_before_, &x_next_, &v_, &v_before_, &v_next_}) buffer->resize(scene.dofs());
     record_.resize(scene, plan, false);
-    scratch_.resize(scene);
     initial_state(scene, in_, t0, x_.data(), v_.data());
     x_before_ = x_;
     v_before_ = v_;
@@ -48,7 +47,7 @@ class Rollout {
   void advance() {
     const Bdf bdf = Bdf::at(plan_.options, step_);
     substep(scene_, plan_, in_, bdf, time(step_ + 1), {x_.data(), x_before_.data(), v_.data(), v_before_.data()}, x_next_.data(),
-            v_next_.data(), record_, scratch_);
+            v_next_.data(), record_);
     ++step_;
     std::swap(x_before_, x_);
     std::swap(x_, x_next_);
@@ -84,7 +83,6 @@ class Rollout {
   int step_ = 0;
   std::vector<T> x_, x_before_, x_next_, v_, v_before_, v_next_;
   SubstepRecord<T> record_;
-  Scratch<T> scratch_;
 };
 
 }  // namespace sheetbend

@@ -17,6 +17,7 @@ template <class T>
 struct SubstepRecord {
   std::vector<IterationRecord<T>> iterations;
   std::vector<T> w, C_r, lambda;  // effective inverse masses, damping references, multipliers after the last iteration
+  std::vector<T> rows;            // right sides and solutions of direct blocks
 
   void resize(const Scene& scene, const Plan& plan, bool keep_iterations) {
     iterations.resize(keep_iterations ? plan.options.iterations : 1);
@@ -24,6 +25,7 @@ struct SubstepRecord {
     w.resize(scene.nodes());
     C_r.resize(scene.rows);
     lambda.resize(scene.rows);
+    rows.resize(scene.rows);
   }
 };
 
@@ -111,7 +113,7 @@ void damping_references(const Scene& scene, const Inputs<const T>& in, const Bdf
 // Steps from n to n+1, writing q (x_{n+1}) and v. The record holds every iteration when it was sized so, the last one otherwise.
 template <class T>
 void substep(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf, double t_next, const SubstepStates<T>& s,
-             T* q, T* v, SubstepRecord<T>& record, Scratch<T>& scratch) {
+             T* q, T* v, SubstepRecord<T>& record) {
   predict(scene, in, bdf, t_next, s, q, record.w.data());
   damping_references(scene, in, bdf, s, record.C_r.data());
   std::fill(record.lambda.begin(), record.lambda.end(), T(0.0));
@@ -119,7 +121,7 @@ void substep(const Scene& scene, const Plan& plan, const Inputs<const T>& in, co
   for (int iteration = 0; iteration < plan.options.iterations; ++iteration) {
     IterationRecord<T>& kept = record.iterations[record.iterations.size() == 1 ? 0 : iteration];
     parallel_for(static_cast<int>(plan.blocks.size()), plan.options.threads, 1, [&](int begin, int end) {
-      for (int b = begin; b < end; ++b) project_block(state, plan.blocks[b], scratch, kept, kept.factors[b]);
+      for (int b = begin; b < end; ++b) project_block(state, plan.blocks[b], record.rows.data(), kept, kept.factors[b]);
     });
     for (const Color& color : plan.colors) project_color(state, plan.options, color, kept);
   }

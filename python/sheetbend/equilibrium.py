@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,6 +38,31 @@ class Equilibrium:
     unstable_modes: int
     residual: float
     iterations: int
+    solution: _core.EquilibriumSolution = field(repr=False)
+    scene: Scene = field(repr=False)
+    theta: np.ndarray = field(repr=False)
+
+    def gradient(self, positions_bar: ArrayLike | None = None, forces_bar: Mapping[str, ArrayLike] | None = None) -> dict[str, float]:
+        """Gradient of a loss by every named quantity, by the implicit function theorem.
+
+        Args:
+            positions_bar: (particles, 3), derivative of the loss by the positions.
+            forces_bar: per group (count, rows), derivative by `forces`.
+
+        Raises:
+            SceneError: wrong shapes.
+        """
+        x_bar = None if positions_bar is None else finite("positions_bar", positions_bar, self.positions.shape, SceneError).ravel()
+        lambda_bar = None
+        if forces_bar is not None:
+            parts = {name: np.zeros(f.shape) for name, f in self.forces.items()}
+            for name, bar in forces_bar.items():
+                self.scene.group(name)
+                parts[name] = finite(f"forces_bar.{name}", bar, parts[name].shape, SceneError)
+            lambda_bar = np.concatenate([part.ravel() for part in parts.values()])
+        compiled = self.scene.compiled
+        bar = compiled.theta_bar(self.theta, self.solution.vjp(x_bar, lambda_bar))
+        return dict(zip(compiled.names, bar.tolist(), strict=True))
 
 
 def equilibrium(scene: Scene, start: ArrayLike | None = None, values: Mapping[str, float] | None = None, stable: bool = True) -> Equilibrium:
@@ -55,16 +80,20 @@ def equilibrium(scene: Scene, start: ArrayLike | None = None, values: Mapping[st
     """
     compiled = scene.compiled
     x = None if start is None else finite("start", start, (scene.particle_count, 3), SceneError).ravel()
-    out = _core.equilibrium(compiled.core, compiled.inputs(compiled.values(values)), x, stable)
-    if not out["converged"]:
-        raise NoEquilibriumError(f"{scene.name}: {out['message']}")
+    theta = compiled.values(values)
+    out = _core.equilibrium(compiled.core, compiled.inputs(theta), x, stable)
+    if not out.converged:
+        raise NoEquilibriumError(f"{scene.name}: {out.message}")
     return Equilibrium(
-        out["positions"].reshape(-1, 3),
-        forces_by_group(scene, out["multipliers"]),
-        out["energy"],
-        out["unstable_modes"],
-        out["residual"],
-        out["iterations"],
+        out.positions.reshape(-1, 3),
+        forces_by_group(scene, out.multipliers),
+        out.energy,
+        out.unstable_modes,
+        out.residual,
+        out.iterations,
+        solution=out,
+        scene=scene,
+        theta=theta,
     )
 
 

@@ -195,7 +195,8 @@ def _predicted(
         if e.predict == "mean":
             for p in private:
                 others = [v for key, v in values.items() if key.partition("[")[0] == p.name]
-                complete[f"{p.name}[{e.name}]"] = float(np.mean(others)) if others else p.initial
+                own = e.scene.quantities[p.name].value if p.initial is None else p.initial
+                complete[f"{p.name}[{e.name}]"] = float(np.mean(others)) if others else own
         elif private:
             shared = [replace(p, fixed=True, prior=None, initial=values[p.name]) for p in wanted.values() if not p.private and p.tied_to is None]
             own = FitProblem([e], Parameters([*shared, *private]), threads=threads)

@@ -24,7 +24,8 @@ class Parameter:
 
     Attributes:
         name: the `<group>_<quantity>` name used in scenes, files and reports.
-        initial: the starting value, in `unit`. A tied parameter has none.
+        initial: the starting value, in `unit`. A tied parameter has none; a private one may leave it out and
+            starts at the value of each recording's own scene.
         lower, upper: bounds, in `unit`.
         log: fit the natural logarithm (for quantities that are positive and known by their order of
             magnitude).
@@ -72,6 +73,8 @@ class Parameter:
 
     def _check_value(self) -> None:
         bounds, initial = (self.lower, self.upper), self.initial
+        if initial is None and self.private:
+            return  # checked when expanded, with the values of the scenes
         if initial is None or not math.isfinite(initial):
             self._fail("initial", "must be a finite number", initial, "give a starting value")
         if math.isnan(self.lower) or math.isnan(self.upper) or not self.lower < self.upper:
@@ -206,8 +209,14 @@ class Parameters(Mapping[str, Parameter]):
             raise InputError("parameters", "have no such name", name, f"name one of: {', '.join(self)}")
         return Parameters(replace(p, **changes) if p.name == name else p for p in self.values())
 
-    def expand(self, recordings: Sequence[str]) -> Parameters:
-        """Turn each private parameter into one per recording, named `name[recording]`; shared ones stay."""
+    def expand(self, recordings: Sequence[str], own: Mapping[str, float] | None = None) -> Parameters:
+        """Turn each private parameter into one per recording, named `name[recording]`; shared ones stay.
+
+        Args:
+            own: by expanded name, where private parameters without an initial value start; those that are in
+                neither are left out.
+        """
+        own = own or {}
         expanded: list[Parameter] = []
         for parameter in self.values():
             if not parameter.private:
@@ -217,8 +226,14 @@ class Parameters(Mapping[str, Parameter]):
                 target = parameter.tied_to
                 if target is not None and self[target].private:
                     target = f"{target}[{recording}]"
-                name = f"{parameter.name}[{recording}]"
-                expanded.append(replace(parameter, name=name, tied_to=target, private=False))
+                name, initial = f"{parameter.name}[{recording}]", parameter.initial
+                if initial is None and target is None:
+                    if name not in own:
+                        continue
+                    initial = own[name]
+                expanded.append(
+                    replace(parameter, name=name, initial=initial, tied_to=target, private=False)
+                )
         return Parameters(expanded)
 
     def initial(self) -> Array:

@@ -50,7 +50,7 @@ def as_parameters(wanted: Mapping[str, ParameterLike] | Iterable[str | Parameter
         if unknown:
             raise InputError(f"parameters.{name}", "has unknown fields", sorted(unknown), f"use: {', '.join(Parameter.__dataclass_fields__)}")
         q = known[name]
-        if "tied_to" not in fields:
+        if "tied_to" not in fields and not fields.get("private"):
             fields.setdefault("initial", q.value)
         defaults = {"unit": q.unit, "log": q.positive, "scale": q.scale}
         complete.append(Parameter(name=name, **(defaults | fields)))
@@ -96,8 +96,8 @@ class FitProblem:
         return FitProblem(self.experiments, self.given, self.recordings, self.threads, held)
 
     def _expanded(self, parameters: Parameters) -> Parameters:
-        every = parameters.expand([e.name for e in self.experiments])
-        has = {f"{q}[{e.name}]" for e in self.experiments for q in e.scene.quantities}
+        has = {f"{name}[{e.name}]": q.value for e in self.experiments for name, q in e.scene.quantities.items()}
+        every = parameters.expand([e.name for e in self.experiments], has)
         private = {f"{p.name}[{e.name}]" for p in parameters.values() if p.private for e in self.experiments}
         return Parameters(p for name, p in every.items() if name not in private or name in has)
 

@@ -1,0 +1,217 @@
+"""From a configuration to experiments, parameters and fit options."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..discretization import Refinement
+from ..errors import ConfigError, RecordingError
+from ..experiment import Experiment
+from ..markers import Place, between, on_particle, on_rope
+from ..recording import Recording
+from ..recording_checks import marker_indices
+from ..scene import Scene
+from ..solver import Solver
+from . import schema
+from .errors import located
+from .scenes import Moment, Particles, build_scene
+
+SUBSTEPS = 10
+
+
+@dataclass(frozen=True)
+class Study:
+    """A configuration, ready to run: what `sb.fit` takes."""
+
+    config: schema.Config
+    folder: Path
+    experiments: tuple[Experiment, ...]
+    parameters: Mapping[str, Mapping[str, Any]]
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Keyword arguments of `sb.fit`."""
+        fit = self.config.fit
+        refine = None
+        if fit.halve_step or fit.double_segments:
+            finer = (lambda: build(self.config, self.folder, finer=2).experiments) if fit.double_segments else None
+            refine = Refinement(halve_step=fit.halve_step, finer=finer)
+        return {"optimizer": fit.optimizer, "starts": fit.starts, "refine": refine, "max_iterations": fit.max_iterations, "threads": fit.threads}
+
+
+def build(config: schema.Config, folder: Path, finer: int = 1) -> Study:
+    """Read the recordings and build one scene for each.
+
+    Args:
+        folder: files are relative to it.
+        finer: multiplies the segments of every rope.
+
+    Raises:
+        ConfigError: anything that cannot be built, with the path of its key.
+    """
+    experiments = tuple(_experiment(config, folder, i, finer) for i in range(len(config.recording)))
+    names = [e.name for e in experiments]
+    for i, name in enumerate(names):
+        if name in names[:i]:
+            raise ConfigError(f"recording[{i}].name", "is another recording's too", name, "give each recording a name of its own")
+    known = {q for e in experiments for q in e.scene.quantities}
+    for name in config.parameters:
+        if experiments and name not in known:
+            raise ConfigError(f"parameters.{name}", "is no quantity of the scenes", name, f"name some of: {', '.join(sorted(known))}")
+    return Study(config, folder, experiments, {name: _given(p) for name, p in config.parameters.items()})
+
+
+def scene_alone(config: schema.Config) -> tuple[Scene, Solver]:
+    """The scene of a configuration without recordings, and its solver."""
+    scene, _ = build_scene(config.experiment.name, config.scene, None, {})
+    _start_values(scene, config, {}, "")
+    return scene, solver_for(config.solver, None)
+
+
+def solver_for(section: schema.SolverSection, recording: Recording | None) -> Solver:
+    """The solver, its substep taken from the recording's median frame interval where `h` is not given."""
+    fields = section.model_dump(exclude={"h", "substeps"}, exclude_none=True)
+    if section.h is not None:
+        return Solver(h=section.h, **fields)
+    if recording is None or len(recording.times) < 2:
+        return Solver(**fields)
+    return Solver(h=float(np.median(np.diff(recording.times))) / (section.substeps or SUBSTEPS), **fields)
+
+
+def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Experiment:
+    section, path = config.recording[i], f"recording[{i}]"
+    recording = _read(section, folder, path)
+    with located(path):
+        t0 = _start(section, recording)
+        window = section.fit if section.static and section.fit else (t0, None)
+        moment = Moment(recording.piece(*window), t0, section.static)
+    shared = not section.marker
+    markers = config.marker if shared else section.marker
+    where = "marker" if shared else f"{path}.marker"
+    numbers = [_number(f"{where}[{k}].marker", m.marker, recording) for k, m in enumerate(markers)]
+    scene, particles = build_scene(recording.name, config.scene, moment, _along(config, markers, numbers, recording), finer)
+    _start_values(scene, config, section.values, path)
+    places = {recording.markers[n]: _place(f"{where}[{k}]", m, scene, particles) for k, (m, n) in enumerate(zip(markers, numbers, strict=True))}
+    plain = section.model_dump(include={"static", "start", "start_time", "predict", "sigma", "axes", "loss", "loss_scale", "time_offset"})
+    with located(path, recording.name):
+        experiment = Experiment(
+            scene=scene,
+            recording=recording,
+            markers=places or None,
+            fit=_window(section.fit),
+            held_out=_window(section.held_out),
+            solver=solver_for(config.solver, recording),
+            offsets={m: _offset(f"{path}.offsets.{m}", names, scene) for m, names in section.offsets.items()},
+            **plain,
+        )
+        _known(path, section, experiment)
+        assert experiment.compared and experiment.fitted()  # raise here, where the path is known
+    return experiment
+
+
+def _read(section: schema.RecordingSection, folder: Path, path: str) -> Recording:
+    file = folder / section.file
+    if not file.is_file():
+        raise ConfigError(f"{path}.file", "does not exist", str(file), "give a file relative to the configuration's folder")
+    try:
+        recording = Recording.load(file, section.units)
+        if section.frames is not None:
+            recording = recording.frames(slice(*section.frames))
+    except RecordingError as error:
+        raise ConfigError(f"{path}.{error.field}", error.problem, error.got, error.fix) from error
+    return replace(recording, name=section.name or recording.name)
+
+
+def _start(section: schema.RecordingSection, recording: Recording) -> float:
+    if section.start_time is not None:
+        return section.start_time
+    return section.fit[0] if section.fit is not None else float(recording.times[0])
+
+
+def _window(window: list[float] | None) -> tuple[float, float] | None:
+    return None if window is None else (window[0], window[1])
+
+
+def _number(path: str, marker: str | int, recording: Recording) -> int:
+    with located(path):
+        return marker_indices("marker", (marker,), recording.markers)[0]
+
+
+def _along(config: schema.Config, markers: list[schema.Marker], numbers: list[int], recording: Recording) -> dict[str, list[int]]:
+    """Per rope the markers on it, in order along it."""
+    ropes = [rope.name for rope in config.scene.rope]
+    if not markers:
+        return {name: list(range(len(recording.markers))) for name in ropes} if len(ropes) == 1 else {}
+    placed: dict[str, list[int]] = {}
+    for name in ropes:
+        mine = [(m.arc_length, n) for m, n in zip(markers, numbers, strict=True) if m.arc_length is not None and m.rope in (name, None)]
+        placed[name] = [n for _, n in sorted(mine)]
+    return placed
+
+
+def _place(path: str, marker: schema.Marker, scene: Scene, particles: Particles) -> Place:
+    if marker.particle is not None:
+        place = on_particle(particles.find(f"{path}.particle", marker.particle))
+    elif marker.between is not None:
+        first, second = (particles.find(f"{path}.between", r) for r in marker.between)
+        place = between(first, second, marker.fraction)
+    else:
+        name = marker.rope or (next(iter(scene.ropes)) if len(scene.ropes) == 1 else "")
+        if name not in scene.ropes:
+            raise ConfigError(f"{path}.rope", "is no rope of the scene", marker.rope, f"name one of: {', '.join(scene.ropes) or 'none'}")
+        with located(path):
+            place = on_rope(scene.ropes[name], marker.arc_length or 0.0)
+    # A zero offset still sets the frame in which offset quantities count.
+    with located(path):
+        return replace(place.with_offset(marker.offset or (0.0, 0.0, 0.0), marker.normal), offset=tuple(marker.offset) if marker.offset else None)
+
+
+def _offset(path: str, names: list[str], scene: Scene) -> tuple[str | None, str | None, str | None]:
+    if len(names) != 3:
+        raise ConfigError(path, "must be three names", names, 'give [tangent, normal, tangent x normal], "" for none')
+    for name in names:
+        if name and name not in scene.quantities:
+            raise ConfigError(path, "names no quantity", name, f"declare [scene.quantities.{name}]")
+    a, b, c = (name or None for name in names)
+    return a, b, c
+
+
+def _known(path: str, section: schema.RecordingSection, experiment: Experiment) -> None:
+    """Names that a recording uses exist."""
+    for marker in section.offsets:
+        if marker not in experiment.recording.markers:
+            fix = f"name some of: {', '.join(experiment.recording.markers)}"
+            raise ConfigError(f"{path}.offsets.{marker}", "is no marker of the recording", marker, fix)
+    if section.time_offset is not None and section.time_offset not in experiment.scene.quantities:
+        fix = f'declare [scene.quantities.{section.time_offset}] with unit = "s"'
+        raise ConfigError(f"{path}.time_offset", "names no quantity", section.time_offset, fix)
+
+
+def _start_values(scene: Scene, config: schema.Config, values: Mapping[str, float], path: str) -> None:
+    """Quantities start where the parameters do, and at what is known of this recording."""
+    for name, value in values.items():
+        if name not in scene.quantities:
+            raise ConfigError(f"{path}.values.{name}", "is no quantity of the scene", name, f"name some of: {', '.join(scene.quantities)}")
+        p = config.parameters.get(name)
+        if p is not None and not p.private:
+            fix = f"set parameters.{name}.initial, or make it private = true"
+            raise ConfigError(f"{path}.values.{name}", "is a parameter shared by all recordings", value, fix)
+    initial = {name: p.initial for name, p in config.parameters.items() if p.initial is not None and name in scene.quantities}
+    for name, value in {**initial, **values}.items():
+        with located(f"{path}.values" if name in values else "parameters"):
+            scene.quantities[name] = replace(scene.quantities[name], value=float(value))
+
+
+def _given(section: schema.ParameterSection) -> dict[str, Any]:
+    """The fields of `Parameter` that the configuration sets; a private one starts at its own scene's value."""
+    fields = section.model_dump(exclude_unset=True, exclude_none=True)
+    if section.private:
+        fields.pop("initial", None)
+    if "prior" in fields:
+        fields["prior"] = tuple(fields["prior"])
+    return fields

@@ -1,0 +1,150 @@
+"""From pydantic's and the package's errors to `ConfigError`: the dotted path of the key, what it got, how to put it right."""
+
+from __future__ import annotations
+
+import difflib
+import types
+import typing
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from ..errors import ConfigError, InputError
+
+Location = Sequence[str | int]
+
+
+def from_validation(error: ValidationError, model: type[BaseModel]) -> ConfigError:
+    """The first problem as an error; the others are its notes."""
+    found = list(dict.fromkeys(str(e) for e in (one(dict(d), model) for d in error.errors())))
+    first = one(dict(error.errors()[0]), model)
+    for other in found[1:]:
+        first.add_note(other)
+    return first
+
+
+def one(detail: Mapping[str, Any], model: type[BaseModel]) -> ConfigError:
+    """One pydantic error detail (`ValidationError.errors()`)."""
+    path, got, kind = _keys(detail["loc"], model), detail["input"], detail["type"]
+    limits = detail.get("ctx", {})
+    field = dotted(path)
+    if kind == "extra_forbidden":
+        return _unknown(path, model)
+    if kind == "missing":
+        return ConfigError(field, "is missing", None, f"add {path[-1]} to {_table(path[:-1])}")
+    if kind == "value_error":
+        problem, _, fix = str(limits["error"]).partition("|")
+        return ConfigError(field, problem, _short(got), fix or "see docs/configuration.md")
+    if kind == "string_pattern_mismatch":
+        return ConfigError(field, "has the wrong form", got, f"write it as {limits['pattern']}")
+    wanted = _WANTED.get(kind, "")
+    if kind in _LIMITS:
+        word, limit = _LIMITS[kind]
+        return ConfigError(field, f"must be {word} {limits[limit]}", got, "change the value")
+    if kind in ("too_short", "too_long"):
+        bounds = " ".join(f"{k.removesuffix('_length')} {v}" for k, v in limits.items() if k.endswith("_length"))
+        return ConfigError(field, "has the wrong number of entries", got, f"give {bounds} entries")
+    if kind == "literal_error":
+        return ConfigError(field, "is none of the choices", got, f"use {limits['expected']}")
+    return ConfigError(field, f"must be {wanted}" if wanted else detail["msg"], got, f"write {wanted}" if wanted else "see docs/configuration.md")
+
+
+_LIMITS = {
+    "greater_than": ("greater than", "gt"),
+    "greater_than_equal": ("at least", "ge"),
+    "less_than": ("less than", "lt"),
+    "less_than_equal": ("at most", "le"),
+}
+_WANTED = {
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "bool_type": "true or false",
+    "string_type": 'a text in "quotes"',
+    "list_type": "a list in [brackets]",
+    "dict_type": "a table",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "finite_number": "a finite number",
+}
+
+
+@contextmanager
+def located(path: str, prefix: str = "") -> Iterator[None]:
+    """Errors from inside get the dotted path of the table that they come from; `prefix` is the group's name, which they start with."""
+    try:
+        yield
+    except ConfigError:
+        raise
+    except InputError as error:
+        inner = error.field.removeprefix(f"{prefix}.") if prefix else error.field
+        raise ConfigError(f"{path}.{inner}", error.problem, error.got, error.fix) from error
+
+
+def dotted(path: Location) -> str:
+    """scene.rope[0].EI"""
+    text = ""
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def _table(path: Location) -> str:
+    return f"[{dotted(path)}]" if path else "the file"
+
+
+def _keys(location: Location, model: type[BaseModel]) -> list[str | int]:
+    """The location without the tags that pydantic adds for the branches of a union."""
+    kept: list[str | int] = []
+    here: Any = model
+    for part in location:
+        options = [o for o in _options(here)]
+        if isinstance(part, int):
+            here = next((typing.get_args(o)[0] for o in options if typing.get_origin(o) is list), None)
+        else:
+            models = [o for o in options if isinstance(o, type) and issubclass(o, BaseModel)]
+            tables = [o for o in options if typing.get_origin(o) is dict]
+            if models and part in models[0].model_fields:
+                here = models[0].model_fields[part].annotation
+            elif tables:
+                here = typing.get_args(tables[0])[1]
+            elif models:
+                here = None  # an unknown key
+            else:
+                continue  # a branch of a union
+        kept.append(part)
+    return kept
+
+
+def _options(annotation: Any) -> list[Any]:
+    """The branches of a union, without Annotated."""
+    if typing.get_origin(annotation) is typing.Annotated:
+        return _options(typing.get_args(annotation)[0])
+    if typing.get_origin(annotation) in (typing.Union, types.UnionType):
+        return [o for a in typing.get_args(annotation) for o in _options(a)]
+    return [annotation]
+
+
+def _unknown(path: list[str | int], model: type[BaseModel]) -> ConfigError:
+    known = _fields_at(path[:-1], model)
+    name = str(path[-1])
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.6) or [k for k in known if k.lower() == name.lower()]
+    fix = f"did you mean '{near[0]}'? The keys of {_table(path[:-1])} are: {', '.join(known)}" if near else f"use some of: {', '.join(known)}"
+    return ConfigError(dotted(path), "is no known key", name, fix)
+
+
+def _fields_at(path: Location, model: type[BaseModel]) -> list[str]:
+    here: Any = model
+    for part in path:
+        options = _options(here)
+        if isinstance(part, int):
+            here = next(typing.get_args(o)[0] for o in options if typing.get_origin(o) is list)
+            continue
+        models = [o for o in options if isinstance(o, type) and issubclass(o, BaseModel)]
+        here = models[0].model_fields[part].annotation if models else typing.get_args(next(o for o in options if typing.get_origin(o) is dict))[1]
+    return list(next(o for o in _options(here) if isinstance(o, type) and issubclass(o, BaseModel)).model_fields)
+
+
+def _short(got: Any) -> Any:
+    return sorted(got) if isinstance(got, Mapping) else got

@@ -1,0 +1,111 @@
+"""The scene sections of a configuration: what stands in [scene] and its tables."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from .section import Finite, Name, Section, Vector, key
+
+Reference = Annotated[str, Field(pattern=r"^[^:\s]+(:\S+)?$")]
+"""A particle: "NAME:INDEX" (negative ones count from the end), "NAME:start" and "NAME:end" of a rope, "NAME" of a single particle."""
+
+
+class Rope(Section):
+    """A rope, `sb.add_rope`. A list of ropes: [[scene.rope]]."""
+
+    name: Name = key("rope", "prefix of its quantities: <name>_EI and so on")
+    length: Finite | None = key(None, "rest length; that of `points` when left out", "m", gt=0)
+    segments: int = key(40, "number of equal links", ge=1)
+    density: Finite = key(..., "mass per length", "kg/m", gt=0)
+    EA: Finite | None = key(None, "axial stiffness; inextensible when left out", "N", gt=0)
+    EI: Finite | None = key(None, "bending stiffness; no bending when left out", "N m^2", gt=0)
+    start: Vector = key([0.0, 0.0, 0.0], "where a straight rope starts", "m")
+    direction: Vector = key([1.0, 0.0, 0.0], "where a straight rope points")
+    points: list[Vector] | Literal["recording"] | None = key(
+        None, 'initial shape as a polyline, or "recording": through the markers on it, as first measured (their mean when static)', "m"
+    )
+    stretch_damping: Finite | None = key(None, "Kelvin-Voigt time constant of stretching", "s", gt=0)
+    bend_damping: Finite | None = key(None, "Kelvin-Voigt time constant of bending", "s", gt=0)
+    drag_linear: Finite | None = key(None, "linear air drag per length", "N s/m^2", ge=0)
+    drag_quadratic: Finite | None = key(None, "quadratic air drag per length", "N s^2/m^3", ge=0)
+    clamp_start: Vector | None = key(None, "direction of travel at the start, held by a clamp there")
+    clamp_end: Vector | None = key(None, "direction of travel at the end, held by a clamp there")
+    clamp_angles: bool = key(False, "adds <name>_start_angle and <name>_end_angle (rad), the clamps' rotations about `plane`")
+    plane: Vector | None = key(None, "unit normal of the plane that the rope stays in")
+    set_modes: list[int] = key([], "k of rest-curvature modes cos(k pi s / length), each adds <name>_set_<k> (1/m)")
+    pinned: list[int] = key([], "nodes that are held where they start; -1 is the last")
+
+
+class Particles(Section):
+    """Single particles. A list: [[scene.particles]]."""
+
+    name: Name = key(..., "what other tables call them: NAME:0, NAME:1, ...")
+    positions: list[Vector] = key(..., "initial positions", "m", min_length=1)
+    velocity: list[Vector] | None = key(None, "initial velocities; at rest when left out", "m/s")
+    mass: Finite | list[Finite] = key(0.0, "one for all or one each; 0 where [[scene.point_mass]] gives it", "kg")
+    pinned: bool = key(False, "hold them where they start")
+
+
+class Constraints(Section):
+    """A group of constraints, `Scene.add_constraints`. A list: [[scene.constraints]]."""
+
+    name: Name | None = key(None, "prefix of its quantities; the kind when left out")
+    kind: str = key(..., "distance, bend, planar_bend, hinge or attachment")
+    particles: list[list[Reference]] = key(..., "the particles of each constraint", min_length=1)
+    compliance: Finite | list[Finite] | None = key(None, "0 = rigid; m/N, bends 1/(N m), hinge rad/(N m). One number is the quantity <name>_compliance")
+    damping: Finite | list[Finite] | None = key(None, "N s/m, angles N m s. One number is the quantity <name>_damping")
+    viscosity: Finite | list[Finite] | None = key(None, "a damper without stiffness, instead of both; <name>_viscosity")
+    rest: Finite | list[Finite] | None = key(None, "rest length m (initial when left out), planar rest, or angle rad")
+    normal: Vector | None = key(None, "plane normal of planar kinds")
+
+
+class PointMass(Section):
+    """A mass hung on a particle. A list: [[scene.point_mass]]."""
+
+    name: Name = key(..., "its quantity is <name>_mass (kg)")
+    particle: Reference = key(..., "where it hangs")
+    mass: Finite = key(..., "its mass", "kg", gt=0)
+
+
+class Force(Section):
+    """A force over time on particles. A list: [[scene.force]]; all of one scene share their times."""
+
+    name: Name | None = key(None, "adds the quantities <name>_x, <name>_y, <name>_z (N); a plain force when left out")
+    particles: list[Reference] = key(..., "each of them bears the whole force", min_length=1)
+    force: Vector = key(..., "the force", "N")
+    times: list[Finite] = key([0.0], "knots in the scene's time (0 = its start); linear between, constant outside", "s", min_length=1)
+    factors: list[Finite] | None = key(None, "share of the force at each knot; 1 when left out")
+
+
+class Drive(Section):
+    """Particles that follow markers of the recording. A list: [[scene.drive]]."""
+
+    particles: list[Reference] = key(..., "the particles that are moved", min_length=1)
+    markers: list[str | int] = key(..., "the markers they follow, one each: names or numbers", min_length=1)
+    offset: Vector = key([0.0, 0.0, 0.0], "from marker to particle", "m")
+    interpolation: Literal["cubic", "linear"] = key("cubic", "of the motion between frames")
+
+
+class ExtraQuantity(Section):
+    """A further named number, for marker offsets and clock shifts. One table each: [scene.quantities.NAME]."""
+
+    value: Finite = key(0.0, "in its unit")
+    unit: str = key("m", "for reports")
+    positive: bool = key(False, "whether only positive values make sense (it is then fitted on a log scale)")
+    scale: Finite | None = key(None, "a natural size, for what may well be zero: precision is judged against it", gt=0)
+
+
+class SceneSection(Section):
+    """[scene]: what all recordings share."""
+
+    gravity: Vector | None = key(None, "the recording's own when left out, else [0, 0, -9.81]", "m/s^2")
+    pin: list[Reference] = key([], "particles that are held where they start")
+    rope: list[Rope] = key([], "ropes")
+    particles: list[Particles] = key([], "single particles")
+    constraints: list[Constraints] = key([], "constraint groups")
+    point_mass: list[PointMass] = key([], "hung masses")
+    force: list[Force] = key([], "forces over time")
+    drive: list[Drive] = key([], "motion taken from markers")
+    quantities: dict[Name, ExtraQuantity] = key({}, "further named numbers")

@@ -1,0 +1,200 @@
+"""One recording's scene, built from the shared description."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..errors import ConfigError
+from ..quantities import product
+from ..recording import Recording
+from ..rope import add_rope
+from ..scene import Scene
+from . import scene_schema as schema
+from .errors import located
+
+EARTH = (0.0, 0.0, -9.81)  # m/s^2
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What a scene takes from its recording: the frames from the scene's start on, and the shape there."""
+
+    recording: Recording
+    t0: float
+    static: bool
+
+    @property
+    def shape(self) -> np.ndarray:
+        """(markers, 3) m at the start: the first frame of a motion, the mean of an equilibrium; NaN where not seen."""
+        x = self.recording.positions
+        if not self.static:
+            return x[0]
+        seen = np.maximum((~np.isnan(x)).sum(axis=0), 1)
+        return np.where(np.isnan(x).all(axis=0), np.nan, np.nansum(x, axis=0) / seen)
+
+
+@dataclass
+class Particles:
+    """Particle references of a configuration ("NAME:INDEX") and what they mean in a scene.
+
+    Node numbers of ropes count on the configured mesh; `finer` tells how many links one configured link has become.
+    """
+
+    finer: int = 1
+    named: dict[str, list[int]] = field(default_factory=dict)
+    ropes: set[str] = field(default_factory=set)
+
+    def add(self, path: str, name: str, particles: Sequence[int], rope: bool = False) -> None:
+        if name in self.named:
+            raise ConfigError(f"{path}.name", "is taken", name, "give every rope and every set of particles a name of its own")
+        self.named[name] = [int(p) for p in particles]
+        if rope:
+            self.ropes.add(name)
+
+    def nodes(self, path: str, rope: str, numbers: Sequence[int]) -> list[int]:
+        """Particles of node numbers of a rope."""
+        return [self._entry(path, rope, n) for n in numbers]
+
+    def find(self, path: str, reference: str) -> int:
+        """The particle of a reference.
+
+        Raises:
+            ConfigError: no such rope or set, or no such entry in it.
+        """
+        name, _, index = reference.partition(":")
+        if name not in self.named:
+            raise ConfigError(path, "names no rope and no set of particles", reference, f"use one of: {', '.join(self.named) or 'none yet'}")
+        if not index:
+            if len(self.named[name]) != 1:
+                raise ConfigError(path, f"is not one particle: '{name}' has {len(self.named[name])}", reference, f"write such as '{name}:0'")
+            return self.named[name][0]
+        number = {"start": "0", "end": "-1"}.get(index, index) if name in self.ropes else index
+        try:
+            return self._entry(path, name, int(number))
+        except ValueError:
+            raise ConfigError(path, "has no whole number behind the colon", reference, f"write such as '{name}:0'") from None
+
+    def _entry(self, path: str, name: str, number: int) -> int:
+        particles = self.named[name]
+        finer = self.finer if name in self.ropes else 1
+        at = number * finer if number >= 0 else -1 + (number + 1) * finer
+        if not -len(particles) <= at < len(particles):
+            count = (len(particles) - 1) // finer + 1
+            raise ConfigError(path, f"does not exist: '{name}' has {count} particles", number, f"use 0 to {count - 1}, or -1 for the last")
+        return particles[at]
+
+
+def build_scene(name: str, section: schema.SceneSection, moment: Moment | None, placed: dict[str, list[int]], finer: int = 1) -> tuple[Scene, Particles]:
+    """A scene and the meaning of its particle references.
+
+    Args:
+        moment: the recording's part; None without a recording.
+        placed: per rope the markers on it, in order along it, for `points = "recording"`.
+        finer: multiplies the segments of every rope.
+
+    Raises:
+        ConfigError: anything inconsistent, with the path of the table.
+    """
+    recorded = None if moment is None else moment.recording.gravity
+    gravity = section.gravity if section.gravity is not None else EARTH if recorded is None else recorded
+    scene, particles = Scene(name, gravity), Particles(finer)
+    for i, rope in enumerate(section.rope):
+        _add_rope(scene, particles, f"scene.rope[{i}]", rope, moment, placed.get(rope.name, []), finer)
+    for i, some in enumerate(section.particles):
+        path = f"scene.particles[{i}]"
+        with located(path):
+            added = scene.add_particles(some.positions, some.mass, some.velocity)
+            if some.pinned:
+                scene.pin(added)
+        particles.add(path, some.name, added.tolist())
+    for i, group in enumerate(section.constraints):
+        path = f"scene.constraints[{i}]"
+        stencils = [[particles.find(f"{path}.particles", r) for r in one] for one in group.particles]
+        with located(path, group.name or group.kind):
+            _same_length(path, stencils)
+            fields = group.model_dump(exclude={"particles", "kind"}, exclude_none=True)
+            scene.add_constraints(group.kind, stencils, **fields)
+    for i, mass in enumerate(section.point_mass):
+        path = f"scene.point_mass[{i}]"
+        with located(path):
+            scene.add_point_mass(particles.find(f"{path}.particle", mass.particle), mass.mass, mass.name)
+    for quantity, extra in section.quantities.items():
+        with located(f"scene.quantities.{quantity}"):
+            scene.add_quantity(quantity, **extra.model_dump())
+    _add_forces(scene, particles, section.force)
+    for i, drive in enumerate(section.drive):
+        _add_drive(scene, particles, f"scene.drive[{i}]", drive, moment)
+    if section.pin:
+        scene.pin([particles.find("scene.pin", r) for r in section.pin])
+    return scene, particles
+
+
+def _same_length(path: str, stencils: list[list[int]]) -> None:
+    if len({len(one) for one in stencils}) > 1:
+        raise ConfigError(f"{path}.particles", "differ in length", [len(one) for one in stencils], "give every constraint the same number")
+
+
+def _add_rope(scene: Scene, particles: Particles, path: str, rope: schema.Rope, moment: Moment | None, placed: list[int], finer: int) -> None:
+    fields = rope.model_dump(exclude={"name", "pinned", "points", "segments"}, exclude_none=True)
+    points = rope.points
+    if points == "recording":
+        points = _measured(f"{path}.points", moment, placed)
+    if rope.name in particles.named:
+        raise ConfigError(f"{path}.name", "is taken", rope.name, "give every rope a name of its own")
+    with located(path, rope.name):
+        built = add_rope(scene, rope.name, points=points, segments=finer * rope.segments, **fields)
+    particles.add(path, rope.name, built.particles.tolist(), rope=True)
+    if rope.pinned:
+        scene.pin(particles.nodes(f"{path}.pinned", rope.name, rope.pinned))
+
+
+def _measured(path: str, moment: Moment | None, placed: list[int]) -> np.ndarray:
+    if moment is None:
+        raise ConfigError(path, "needs a recording", "recording", "add a [[recording]], or give the points")
+    shape = moment.shape[placed]
+    seen = shape[~np.isnan(shape[:, 0])]
+    if len(seen) < 2:
+        raise ConfigError(path, "needs two markers on the rope that are seen at the start", len(seen), "place markers on it, or give the points")
+    return seen
+
+
+def _add_forces(scene: Scene, particles: Particles, forces: Sequence[schema.Force]) -> None:
+    """Forces, plain or made of named quantities; the terms come last, when the number of loaded particles is known."""
+    terms = []
+    for i, force in enumerate(forces):
+        path = f"scene.force[{i}]"
+        factors = [1.0] * len(force.times) if force.factors is None else force.factors
+        if len(factors) != len(force.times):
+            raise ConfigError(f"{path}.factors", "do not match the times", len(factors), f"give {len(force.times)}")
+        which = [particles.find(f"{path}.particles", r) for r in force.particles]
+        plain = np.zeros(3) if force.name else np.array(force.force)
+        first = len(scene.loaded)
+        with located(path):
+            scene.add_force(which, np.array(factors)[:, None, None] * plain, force.times)
+            if force.name is None:
+                continue
+            size = float(np.linalg.norm(force.force)) or 1.0
+            for k, axis in enumerate("xyz"):
+                quantity = scene.add_quantity(f"{force.name}_{axis}", force.force[k], "N", positive=False, scale=size)
+                terms += [(knot, first + w, k, f, quantity) for knot, f in enumerate(factors) for w in range(len(which)) if f != 0.0]
+    loaded = len(scene.loaded)
+    scene.add_terms([product("force", 3 * (knot * loaded + w) + k, f, {q: "identity"}) for knot, w, k, f, q in terms])
+
+
+def _add_drive(scene: Scene, particles: Particles, path: str, drive: schema.Drive, moment: Moment | None) -> None:
+    if moment is None:
+        raise ConfigError(path, "needs a recording", drive.markers, "add a [[recording]], or pin the particles")
+    which = [particles.find(f"{path}.particles", r) for r in drive.particles]
+    if len(drive.markers) != len(which):
+        raise ConfigError(f"{path}.markers", "do not match the particles", len(drive.markers), f"give {len(which)}")
+    with located(path):
+        followed = moment.recording.select(drive.markers)
+        if moment.static:
+            times, positions = np.zeros(1), replace(moment, recording=followed).shape[None]
+        else:
+            followed = replace(followed, clamped=tuple(range(len(which)))).filled()
+            times, positions = followed.times - moment.t0, followed.positions
+        scene.drive(which, times, positions + np.array(drive.offset), drive.interpolation)

@@ -1,0 +1,126 @@
+"""The configuration as pydantic models: every key with its default, unit and meaning."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import model_validator
+
+from .scene_schema import Reference, SceneSection
+from .section import Finite, Name, Section, Vector, Window, key
+
+
+class ExperimentSection(Section):
+    """[experiment]: what this is."""
+
+    name: Name = key(..., "names the results and their folder")
+    about: str = key("", "a sentence for the report")
+
+
+class SolverSection(Section):
+    """[solver]: how motions are stepped."""
+
+    substeps: int | None = key(None, "substeps per frame interval of each recording (its median); 10 when h is left out too", ge=1)
+    h: Finite | None = key(None, "the substep itself, instead of `substeps`", "s", gt=0)
+    integrator: Literal["bdf1", "bdf2"] = key("bdf2", "second order, or backward Euler (which damps)")
+    method: Literal["direct", "gauss_seidel"] = key("direct", "each rope one block, or colored sweeps")
+    iterations: int | None = key(None, "Newton iterations of a direct block (2) or sweeps (10)", ge=1)
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Self:
+        if self.h is not None and self.substeps is not None:
+            raise ValueError("has both h and substeps|give one of them")
+        return self
+
+
+class Marker(Section):
+    """Where a marker sits: on a rope by arc length, on a particle, or between two. A list: [[marker]], shared, or [[recording.marker]]."""
+
+    marker: str | int = key(..., "name or number in the recording")
+    rope: Name | None = key(None, "a rope, with `arc_length`; the only rope when left out")
+    arc_length: Finite | None = key(None, "material coordinate along the rope", "m")
+    particle: Reference | None = key(None, "a particle instead")
+    between: list[Reference] | None = key(None, "two particles instead, with `fraction`", min_length=2, max_length=2)
+    fraction: Finite = key(0.5, "share of the way from the first of the two to the second")
+    offset: Vector | None = key(None, "standing off along (tangent, normal, tangent x normal)", "m")
+    normal: Vector = key([0.0, 1.0, 0.0], "the normal of `offset`")
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Self:
+        places = [n for n in ("arc_length", "particle", "between") if getattr(self, n) is not None]
+        if len(places) != 1:
+            raise ValueError(f"names {' and '.join(places) or 'no place'}|give one of arc_length, particle, between")
+        return self
+
+
+class RecordingSection(Section):
+    """A recording. A list: [[recording]]; each gets a scene object of its own from the shared description."""
+
+    file: str = key(..., "NPZ or CSV, relative to the configuration")
+    name: Name | None = key(None, "the file's when left out")
+    units: Literal["m", "cm", "mm"] | None = key(None, "length unit of the file; its JSON's when left out")
+    frames: list[int] | None = key(None, "[first, stop] or [first, stop, step]: use these frames only", min_length=2, max_length=3)
+    fit: Window | None = key(None, "[start, stop] in the recording's time: what the fit sees; all when left out", "s")
+    held_out: Window | None = key(None, "[start, stop]: what is only predicted, from the same start", "s")
+    start_time: Finite | None = key(None, "recording time at which the scene starts; the start of `fit` when left out", "s")
+    static: bool = key(False, "it shows an equilibrium; the frames of `fit` are averaged")
+    start: Literal["given", "equilibrium"] = key("given", "a motion starts from the initial shape, or from the scene's equilibrium")
+    predict: Literal["window", "mean"] | None = key(
+        None, 'not fitted, only predicted: private parameters fitted to its own `fit` window ("window") or the others\' mean ("mean")'
+    )
+    sigma: Finite = key(1e-3, "expected error of a marker", "m", gt=0)
+    axes: str = key("xyz", "coordinates that count", pattern="^[xyz]{1,3}$")
+    loss: Literal["squares", "soft_l1", "huber"] = key("squares", "robust loss")
+    loss_scale: Finite = key(1.0, "where the robust loss sets in, in units of sigma", gt=0)
+    marker: list[Marker] = key([], "places of this recording's markers; those of [[marker]] when left out")
+    offsets: dict[str, list[str]] = key({}, 'per marker [a, b, c]: quantities added to its offset along (tangent, normal, tangent x normal), "" for none')
+    time_offset: str | None = key(None, "a quantity (s) that shifts the recording's clock")
+    values: dict[str, Finite] = key({}, "quantities whose value is known to differ here; for private parameters the initial value")
+
+
+class ParameterSection(Section):
+    """What is fitted. One table each: [parameters.NAME], NAME being a quantity of the scene; `info` lists them."""
+
+    initial: Finite | None = key(None, "starting value; the scene's when left out")
+    lower: Finite | None = key(None, "lower bound")
+    upper: Finite | None = key(None, "upper bound")
+    log: bool | None = key(None, "fit the logarithm; by default for what must be positive")
+    fixed: bool = key(False, "keep the initial value")
+    tied_to: str | None = key(None, "follow another parameter")
+    factor: Finite = key(1.0, "value = factor times that of `tied_to`")
+    prior: Window | None = key(None, "[mean, sd]; with log the sd is that of the natural logarithm")
+    unit: str | None = key(None, "for reports; the scene's when left out")
+    private: bool = key(False, "one value per recording")
+    scale: Finite | None = key(None, "natural size of what may be zero", gt=0)
+
+
+class FitSection(Section):
+    """[fit]: how the fit runs."""
+
+    optimizer: Literal["auto", "ceres", "scipy"] = key("auto", "Ceres where it was built, else SciPy")
+    starts: list[dict[str, Finite]] = key([], "further starting values by name; the best end wins")
+    max_iterations: int = key(200, "per start", ge=1)
+    threads: int = key(1, "over recordings and derivatives; results do not depend on it", ge=1)
+    halve_step: bool = key(False, "refit at half the substep; what moves counts in the intervals")
+    double_segments: bool = key(False, "refit with twice the segments in every rope; what moves counts in the intervals")
+    strict: bool = key(False, "exit 3 when any requested parameter is not identifiable, not only when all are")
+
+
+class OutputSection(Section):
+    """[output]: what `fit` writes beside fit.json and fitted.toml."""
+
+    figures: Literal["png", "svg", "pdf", "none"] = key("png", "format of the figures")
+
+
+class Config(Section):
+    """A whole file."""
+
+    experiment: ExperimentSection = key(..., "what this is")
+    solver: SolverSection = key(SolverSection(), "how motions are stepped")
+    scene: SceneSection = key(..., "what all recordings share")
+    marker: list[Marker] = key([], "places of markers, shared by the recordings")
+    recording: list[RecordingSection] = key([], "the recordings")
+    parameters: dict[str, ParameterSection] = key({}, "what is fitted")
+    fit: FitSection = key(FitSection(), "how the fit runs")
+    output: OutputSection = key(OutputSection(), "what is written")
+    published: dict[str, Finite | Window] = key({}, "values by others, or [lowest, highest], shown beside the estimates")
