@@ -9,8 +9,9 @@ EquilibriumDerivative::EquilibriumDerivative(const Scene& scene, const double* i
   if (!at.converged) throw NoEquilibrium(at.message);
   kkt_.assemble(inputs, at_.x.data(), at_.lambda.data(), 0.0);
   if (!kkt_.factorize(0.0, inputs_.data() + scene.layout.of(Quantity::compliance)))
-    throw NoEquilibrium("equilibrium: the Newton matrix is singular, so the shape has no derivative (a fold, or a part that moves freely). Fix: "
-                        "hold every part, or move away from the critical load");
+    throw NoEquilibrium(
+        "equilibrium: the Newton matrix is singular, so the shape has no derivative (a fold, or a part that moves freely). Fix: hold "
+        "every part, or move away from the critical load");
 }
 
 void EquilibriumDerivative::solve(std::vector<double>& x, std::vector<double>& lambda) const {

@@ -1,11 +1,12 @@
 // Static equilibrium of a scene: r_x = 0 and r_l = 0 of residual.h.
 //
-// Newton's method on coordinates and multipliers together (a link of any stiffness then turns freely), and where Newton's step is not trusted,
-// one implicit step of pseudo-time, mu (x' - x) = r_x(x', lambda'), 0 = r_l(x', lambda'): the proximal point method, which descends the
-// energy (pseudo-transient continuation: Kelley & Keyes 1998). A step is trusted where the Hessian K + mu is positive definite and a second,
-// simplified Newton step with the same factors is at most half of the first (the natural monotonicity test: Deuflhard 2011, section 2.1);
-// otherwise mu grows. Saddles are left along a direction of negative curvature. So a solution is stable wherever the start allows,
-// and it is the one whose basin the start lies in: several equilibria exist for soft wires, see branches.h.
+// Newton's method on coordinates and multipliers together (a link of any stiffness then turns freely), and where Newton's step
+// is not trusted, one implicit step of pseudo-time, mu (x' - x) = r_x(x', lambda'), 0 = r_l(x', lambda'): the proximal point
+// method, which descends the energy (pseudo-transient continuation: Kelley & Keyes 1998). A step is trusted where the Hessian
+// K is positive definite and every further, simplified Newton step with the same factors is at most half of the one before
+// (the natural monotonicity test: Deuflhard, Newton Methods for Nonlinear Problems); otherwise mu grows. Constraints that the
+// start violates by far are softened at first. Saddles are left along a direction of negative curvature. So a solution is stable
+// wherever the start allows; soft wires have several, and which one is found depends on the start (see branches.h).
 #pragma once
 
 #include <limits>
@@ -18,7 +19,7 @@
 namespace sheetbend {
 
 struct EquilibriumOptions {
-  int max_iterations = 200;   // evaluations of the Newton matrix
+  int max_iterations = 500;   // evaluations of the Newton matrix
   double tolerance = 1e-12;   // of the relative residual, or of Newton's step relative to the scene's size
   double t0 = 0.0;            // time at which boundary and force are taken  [s]
   bool stable = true;         // false: go to the nearest equilibrium, saddle or not

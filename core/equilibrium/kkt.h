@@ -1,12 +1,12 @@
 // The Newton matrix of static equilibrium,  A = [H - mu, J^T; J, alpha]  with H = sum_j lambda_j Hess(C_j), and the solution of A z = b.
 //
-// It is condensed onto the free coordinates: K = mu - H + J^T alpha^-1 J is the Hessian of the energy (plus mu), narrow for a chain and
-// positive definite at a stable equilibrium, so LDL^T in a low-fill order suffices. Rigid and nearly rigid rows are condensed with a small
-// compliance of their own and the solution is refined against A itself, which also removes the rounding of stiff rows. The same trick is the augmented Lagrangian
-// step of saddle point problems (Benzi, Golub & Liesen 2005, section 8).
+// It is condensed onto the free coordinates: K = mu - H + J^T alpha^-1 J is the Hessian of the energy (plus mu), narrow for a
+// chain and positive definite at a stable equilibrium, so LDL^T in a low-fill order suffices. Rigid and nearly rigid rows are
+// condensed with a small compliance of their own, and the solution is refined against A itself, which also removes the rounding
+// of stiff rows (the augmented Lagrangian step for saddle point systems: Benzi, Golub & Liesen 2005).
 //
-// Negative pivots of K count the unstable modes: inertia(-A) = inertia(K) + (0, rows), and in the limit of rigid rows the inertia of K is that
-// of the energy's Hessian on their tangent space plus one positive eigenvalue per row (Sylvester's law; Gould 1985).
+// Negative pivots of K count the unstable modes (Sylvester's law of inertia); in the limit of rigid rows K has one positive
+// eigenvalue per row and those of the energy's Hessian on the rows' tangent space (Gould 1985).
 #pragma once
 
 #include <Eigen/SparseCholesky>
@@ -22,8 +22,8 @@ class Kkt {
   // Finds the pattern and the elimination order; the scene must outlive this.
   explicit Kkt(const Scene& scene);
 
-  // Evaluates H and J at x (dofs) and lambda (rows). force_stiffness [N/m], a typical force over a typical length, is the scale of stiffness where
-  // the multipliers give none.
+  // Evaluates H and J at x (dofs) and lambda (rows). force_stiffness [N/m], a typical force over a typical length, is the scale
+  // of stiffness where the multipliers give none.
   void assemble(const double* inputs, const double* x, const double* lambda, double force_stiffness);
 
   // Factors K for mu >= 0 [N/m] and the compliance of each constraint. False where K is singular to rounding.

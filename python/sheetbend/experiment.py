@@ -18,6 +18,7 @@ from .scene import Scene
 from .solver import Solver
 
 Window = tuple[float, float]
+NO_SHARE = 1e-9  # interpolation weights below this are zero
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,10 +91,16 @@ class Experiment:
     def compared(self) -> tuple[int, ...]:
         """Indices of the markers that are compared: placed, and not on particles whose motion is given."""
         held = self.scene.pinned | set(self.scene.driven)
-        chosen = tuple(i for i, p in enumerate(self.places) if p is not None and not set(p.particles) <= held)
+        chosen = tuple(i for i, p in enumerate(self.places) if p is not None and not self._depends_on(i, p) <= held)
         if not chosen:
             raise RecordingError(f"{self.name}.markers", "leave nothing to compare", len(self.places), "place markers on particles that move")
         return chosen
+
+    def _depends_on(self, i: int, place: Place) -> set[int]:
+        """Particles that move a marker: weights of a node right at its place are rounding errors elsewhere."""
+        turns = place.offset is not None or self.recording.markers[i] in self.offsets
+        shares = zip(place.particles, place.weights, place.tangent, strict=True)
+        return {p for p, weight, tangent in shares if abs(weight) > NO_SHARE or (turns and tangent != 0.0)}
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -206,6 +206,8 @@ def _estimates_panel(
     log = min(ends) > 0 and max(ends) > 20 * min(ends)
     if log:
         panel.set_xscale("log")
+    else:
+        panel.ticklabel_format(axis="x", useOffset=False)
     low, high = (min(ends) / 1.5, max(ends) * 1.5) if log else _padded(min(ends), max(ends))
     panel.set_xlim(low, high)
     for row, estimate in enumerate(group):

@@ -34,7 +34,13 @@ class Trajectory:
     forces: Mapping[str, np.ndarray]
 
 
-def simulate(scene: Scene, times: ArrayLike, solver: Solver | None = None, values: Mapping[str, float] | None = None) -> Trajectory:
+def simulate(
+    scene: Scene,
+    times: ArrayLike,
+    solver: Solver | None = None,
+    values: Mapping[str, float] | None = None,
+    start: ArrayLike | None = None,
+) -> Trajectory:
     """Simulate a scene from its initial state.
 
     Args:
@@ -42,6 +48,7 @@ def simulate(scene: Scene, times: ArrayLike, solver: Solver | None = None, value
         times: (frames,) s, not decreasing, starting at or after 0; each must lie on the substep grid.
         solver: `Solver()` by default.
         values: quantities to change for this run, by name.
+        start: (particles, 3) m, positions to start from instead of the scene's, such as an equilibrium's.
 
     Raises:
         InputError: times off the grid, unknown quantities.
@@ -50,8 +57,12 @@ def simulate(scene: Scene, times: ArrayLike, solver: Solver | None = None, value
     solver = solver or Solver()
     compiled = scene.compiled
     steps = substeps(times, solver.h)
+    inputs = compiled.inputs(compiled.values(values))
+    if start is not None:
+        offset, size = compiled.layout["position"]
+        inputs[offset : offset + size] = finite("start", start, (scene.particle_count, 3), InputError).ravel()
     with divergence(scene):
-        out = solver.core(compiled).simulate(compiled.inputs(compiled.values(values)), steps, 0.0)
+        out = solver.core(compiled).simulate(inputs, steps, 0.0)
     frames = len(steps)
     return Trajectory(
         np.array(steps) * solver.h,

@@ -20,26 +20,26 @@ INSTANTIATE_TEST_SUITE_P(, Bits, all_solvers, solver_name);
 // A rollout that keeps nothing.
 std::vector<double> without_tape(const Program& p, const std::vector<double>& inputs) {
   std::vector<double> states;
-  Rollout<double>(p.scene, p.plan, inputs.data(), p.t0).run(p.steps, [&](int, const double* x, const double*, const double*) {
-    states.insert(states.end(), x, x + p.scene.dofs());
-  });
+  Rollout<double>(p.scene, p.plan, inputs.data(), p.t0)
+      .run(p.steps, [&](int, const double* x, const double*, const double*) {
+        states.insert(states.end(), x, x + p.scene.dofs());
+      });
   return states;
 }
 
 // Each substep again from the tape's states, as the reverse does.
-std::vector<double> recomputed(const Program& p, const Tape<double>& tape, const std::vector<double>& inputs) {
+std::vector<double> recomputed(const Program& p, const Tape<double>& tape,
+                               const std::vector<double>& inputs) {
   const Inputs<const double> in{p.scene.layout, inputs.data()};
   const std::size_t dofs = p.scene.dofs();
   std::vector<double> all(tape.x(0), tape.x(0) + dofs), q(dofs), v(dofs), v_before(dofs), v_out(dofs);
   SubstepRecord<double> kept;
   kept.resize(p.scene, p.plan, true);
-  Scratch<double> scratch;
-  scratch.resize(p.scene);
   for (int n = 0; n < p.steps; ++n) {
     tape.velocity(n, in.of(Quantity::velocity), v.data());
     tape.velocity(n - 1, in.of(Quantity::velocity), v_before.data());
     substep(p.scene, p.plan, in, Bdf::at(p.plan.options, n), p.t0 + (n + 1) * p.plan.options.h,
-            {tape.x(n), tape.x(n - 1), v.data(), v_before.data()}, q.data(), v_out.data(), kept, scratch);
+            {tape.x(n), tape.x(n - 1), v.data(), v_before.data()}, q.data(), v_out.data(), kept);
     all.insert(all.end(), q.begin(), q.end());
   }
   return all;
@@ -55,7 +55,8 @@ TEST_P(Bits, AreEqualWithAndWithoutTape) {
 }
 
 TEST_P(Bits, AreEqualRunAfterRun) {
-  const Sample sample = random_scene(71, {.net = GetParam().net}), again = random_scene(71, {.net = GetParam().net});
+  const Sample sample = random_scene(71, {.net = GetParam().net}),
+               again = random_scene(71, {.net = GetParam().net});
   EXPECT_TRUE(same_bits(sample.inputs, again.inputs));
   const auto first = gradient(program(sample.scene), sample.inputs);
   EXPECT_TRUE(same_bits(first, gradient(program(again.scene), again.inputs)));
@@ -69,7 +70,8 @@ TEST_P(Bits, AreEqualForEveryNumberOfThreads) {
   for (const int threads : {2, 3, 8}) {
     const Program many = program(sample.scene, threads);
     for (int repetition = 0; repetition < 3; ++repetition) {
-      EXPECT_TRUE(same_bits(states(record(many, sample.inputs), sample.scene.dofs()), forward)) << threads << " threads";
+      EXPECT_TRUE(same_bits(states(record(many, sample.inputs), sample.scene.dofs()), forward))
+          << threads << " threads";
       EXPECT_TRUE(same_bits(gradient(many, sample.inputs), reverse)) << threads << " threads";
     }
   }
@@ -83,7 +85,8 @@ TEST_P(Bits, AreEqualInEveryLane) {
   std::vector<std::vector<double>> inputs(Pack::lanes, sample.inputs);
   std::vector<Pack> packed(sample.inputs.size());
   for (int lane = 0; lane < Pack::lanes; ++lane)
-    for (std::size_t i = 0; i < packed.size(); ++i) packed[i].set(lane, inputs[lane][i] *= random(0.98, 1.02));
+    for (std::size_t i = 0; i < packed.size(); ++i)
+      packed[i].set(lane, inputs[lane][i] *= random(0.98, 1.02));
   const auto lane_of = [](const std::vector<Pack>& packs, int lane) {
     std::vector<double> out;
     for (const Pack& a : packs) out.push_back(a[lane]);
@@ -92,7 +95,8 @@ TEST_P(Bits, AreEqualInEveryLane) {
   const auto forward = states(record(p, packed), sample.scene.dofs());
   const auto reverse = gradient(p, packed);
   for (int lane = 0; lane < Pack::lanes; ++lane) {
-    EXPECT_TRUE(same_bits(lane_of(forward, lane), states(record(p, inputs[lane]), sample.scene.dofs()))) << "forward, lane " << lane;
+    EXPECT_TRUE(same_bits(lane_of(forward, lane), states(record(p, inputs[lane]), sample.scene.dofs())))
+        << "forward, lane " << lane;
     EXPECT_TRUE(same_bits(lane_of(reverse, lane), gradient(p, inputs[lane]))) << "reverse, lane " << lane;
   }
 }

@@ -1,4 +1,5 @@
-// The plan: colors that can go in parallel, chains that become narrow bands, everything found the same way every time.
+// The plan: colors that can go in parallel, chains that become narrow bands, everything found the same way
+// every time.
 #include <numeric>
 #include <set>
 
@@ -33,7 +34,8 @@ std::vector<int> shuffled(int n, unsigned seed) {
 }
 
 struct Coloring : ::testing::TestWithParam<bool> {};
-INSTANTIATE_TEST_SUITE_P(, Coloring, ::testing::Bool(), [](const auto& info) { return info.param ? "Net" : "Ropes"; });
+INSTANTIATE_TEST_SUITE_P(, Coloring, ::testing::Bool(),
+                         [](const auto& info) { return info.param ? "Net" : "Ropes"; });
 
 TEST_P(Coloring, HoldsEveryConstraintOnce) {
   const Scene scene = random_scene(80, {.net = GetParam()}).scene;
@@ -55,7 +57,8 @@ TEST_P(Coloring, SharesNoMovableParticle) {
 }
 
 TEST_P(Coloring, IsDeterministic) {
-  const auto a = color_constraints(random_scene(82, {.net = GetParam()}).scene), b = color_constraints(random_scene(82, {.net = GetParam()}).scene);
+  const auto a = color_constraints(random_scene(82, {.net = GetParam()}).scene),
+             b = color_constraints(random_scene(82, {.net = GetParam()}).scene);
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t c = 0; c < a.size(); ++c) {
     EXPECT_EQ(a[c].group, b[c].group);
@@ -67,7 +70,8 @@ TEST_P(Coloring, BlocksHoldEveryConstraintOnceAndShareNoMovableParticle) {
   const Scene scene = random_scene(83, {.net = GetParam()}).scene;
   std::set<std::pair<int, int>> seen;
   std::vector<int> home(scene.nodes(), -1);
-  const Plan plan = make_plan(scene, {.partition = Partition::direct}), again = make_plan(scene, {.partition = Partition::direct});
+  const Plan plan = make_plan(scene, {.partition = Partition::direct}),
+             again = make_plan(scene, {.partition = Partition::direct});
   for (int b = 0; b < static_cast<int>(plan.blocks.size()); ++b)
     for (std::size_t k = 0; k < plan.blocks[b].members.size(); ++k) {
       const Member& m = plan.blocks[b].members[k];
@@ -94,25 +98,40 @@ TEST(ColoringOf, ChainTakesTwoColorsAndSpokesOfADrivenHubOne) {
   EXPECT_EQ(color_constraints(build_scene(spec)).size(), 1u);
 }
 
-// Links alone couple neighbors. With joints (1 + 3 rows a particle) a joint couples to the one two particles on: 2 * 4 + 2 rows away.
+// Links alone couple neighbors. With joints (1 + 3 rows a particle) a joint couples to the one two particles
+// on: 2 * 4 + 2 rows away.
 TEST(DirectBlock, ChainIsANarrowBand) {
   for (const int n : {10, 40}) {
-    EXPECT_EQ(make_plan(rope(n, false, in_order(n)), {.partition = Partition::direct}).blocks.at(0).structure.half_bandwidth(), 1);
-    EXPECT_EQ(make_plan(rope(n, true, in_order(n)), {.partition = Partition::direct}).blocks.at(0).structure.half_bandwidth(), 10);
+    EXPECT_EQ(make_plan(rope(n, false, in_order(n)), {.partition = Partition::direct})
+                  .blocks.at(0)
+                  .structure.half_bandwidth(),
+              1);
+    EXPECT_EQ(make_plan(rope(n, true, in_order(n)), {.partition = Partition::direct})
+                  .blocks.at(0)
+                  .structure.half_bandwidth(),
+              10);
   }
 }
 
 TEST(DirectBlock, ChainIsANarrowBandHoweverItsParticlesAreNumbered) {
   for (unsigned seed = 0; seed < 20; ++seed) {
-    EXPECT_EQ(make_plan(rope(40, false, shuffled(40, seed)), {.partition = Partition::direct}).blocks.at(0).structure.half_bandwidth(), 1);
-    EXPECT_EQ(make_plan(rope(40, true, shuffled(40, seed)), {.partition = Partition::direct}).blocks.at(0).structure.half_bandwidth(), 10) << seed;
+    EXPECT_EQ(make_plan(rope(40, false, shuffled(40, seed)), {.partition = Partition::direct})
+                  .blocks.at(0)
+                  .structure.half_bandwidth(),
+              1);
+    EXPECT_EQ(make_plan(rope(40, true, shuffled(40, seed)), {.partition = Partition::direct})
+                  .blocks.at(0)
+                  .structure.half_bandwidth(),
+              10)
+        << seed;
   }
 }
 
 TEST(Plan, RefusesWhatCannotBeStepped) {
   const Scene scene = rope(3, false, in_order(3));
-  for (const SolverOptions& bad : {SolverOptions{.h = 0.0}, SolverOptions{.h = -1.0}, SolverOptions{.h = std::nan("")},
-                                   SolverOptions{.iterations = 0}, SolverOptions{.threads = 0}}) {
+  for (const SolverOptions& bad :
+       {SolverOptions{.h = 0.0}, SolverOptions{.h = -1.0}, SolverOptions{.h = std::nan("")},
+        SolverOptions{.iterations = 0}, SolverOptions{.threads = 0}}) {
     try {
       make_plan(scene, bad);
       ADD_FAILURE() << "accepted";

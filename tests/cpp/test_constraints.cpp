@@ -60,7 +60,8 @@ std::vector<double> unit(std::size_t n, std::size_t i) {
   return e;
 }
 
-// Worst relative error, over all coordinates' directions, of the gradient's derivative on duals against the complex step.
+// Worst relative error, over all coordinates' directions, of the gradient's derivative on duals against the
+// complex step.
 template <class K>
 double hessian_error(const Stencil& s, const std::vector<double>& oracle_scale) {
   const std::vector<double> z = joined(s.x, s.p);
@@ -68,7 +69,8 @@ double hessian_error(const Stencil& s, const std::vector<double>& oracle_scale) 
   for (int d = 0; d < K::dofs; ++d) {
     const auto e = unit(z.size(), d);
     const auto found = dual_along<K>(z, e), oracle = complex_step_along(evaluate_joined<K, Complex>, z, e);
-    for (std::size_t i = K::rows; i < found.size(); ++i) worst = std::max(worst, std::abs(found[i] - oracle[i]));
+    for (std::size_t i = K::rows; i < found.size(); ++i)
+      worst = std::max(worst, std::abs(found[i] - oracle[i]));
   }
   return worst == 0.0 ? 0.0 : worst / largest(oracle_scale);
 }
@@ -81,7 +83,8 @@ std::vector<double> hessians(const Stencil& s) {
   for (int b = 0; b < K::dofs; ++b) {
     const auto column = dual_along<K>(z, unit(z.size(), b));
     for (int j = 0; j < K::rows; ++j)
-      for (int a = 0; a < K::dofs; ++a) H[(j * K::dofs + a) * K::dofs + b] = column[K::rows + j * K::dofs + a];
+      for (int a = 0; a < K::dofs; ++a)
+        H[(j * K::dofs + a) * K::dofs + b] = column[K::rows + j * K::dofs + a];
   }
   return H;
 }
@@ -149,7 +152,8 @@ TYPED_TEST(Constraint, HessianMatchesComplexStepAndIsSymmetric) {
     std::vector<double> transposed(H.size());
     for (int j = 0; j < K::rows; ++j)
       for (int a = 0; a < K::dofs; ++a)
-        for (int b = 0; b < K::dofs; ++b) transposed[(j * K::dofs + b) * K::dofs + a] = H[(j * K::dofs + a) * K::dofs + b];
+        for (int b = 0; b < K::dofs; ++b)
+          transposed[(j * K::dofs + b) * K::dofs + a] = H[(j * K::dofs + a) * K::dofs + b];
     asymmetry = std::max(asymmetry, relative_error(transposed, H));
   }
   EXPECT_LE(worst, 1e-13);
@@ -160,7 +164,8 @@ TYPED_TEST(Constraint, HessianMatchesComplexStepAndIsSymmetric) {
 TYPED_TEST(Constraint, MutantHessianIsFlagged) {
   using K = TypeParam;
   const Stencil s = jittered<K>(1);
-  EXPECT_EQ(hessian_error<Mutant<K>>(s, hessians<K>(s)) > 1e4 * 1e-13, case_of<K>().curved) << "only a linear C has nothing to get wrong";
+  EXPECT_EQ(hessian_error<Mutant<K>>(s, hessians<K>(s)) > 1e4 * 1e-13, case_of<K>().curved)
+      << "only a linear C has nothing to get wrong";
 }
 
 TYPED_TEST(Constraint, ParameterDerivativesMatchComplexStep) {
@@ -172,8 +177,10 @@ TYPED_TEST(Constraint, ParameterDerivativesMatchComplexStep) {
       const auto e = unit(z.size(), K::dofs + k);
       const auto found = dual_along<K>(z, e), oracle = complex_step_along(evaluate_joined<K, Complex>, z, e);
       EXPECT_GT(largest(std::span(oracle).first(K::rows)), 0.0) << K::parameters[k];
-      EXPECT_LE(relative_error(std::span(found).first(K::rows), std::span(oracle).first(K::rows)), 1e-13) << K::parameters[k];
-      EXPECT_LE(relative_error(std::span(found).subspan(K::rows), std::span(oracle).subspan(K::rows)), 1e-13) << K::parameters[k];
+      EXPECT_LE(relative_error(std::span(found).first(K::rows), std::span(oracle).first(K::rows)), 1e-13)
+          << K::parameters[k];
+      EXPECT_LE(relative_error(std::span(found).subspan(K::rows), std::span(oracle).subspan(K::rows)), 1e-13)
+          << K::parameters[k];
     }
   }
 }
@@ -193,8 +200,8 @@ TYPED_TEST(Constraint, TranslationChangesNothing) {
     }
 }
 
-// Turning the stencil (and its normal) turns or keeps C. Infinitesimally, sum x cross g_j = C cross e_j or 0; with a normal inside
-// C, which stays, only about that normal.
+// Turning the stencil (and its normal) turns or keeps C. Infinitesimally, sum x cross g_j = C cross e_j or 0;
+// with a normal inside C, which stays, only about that normal.
 TYPED_TEST(Constraint, RotationTurnsOrKeepsC) {
   using K = TypeParam;
   const Case row = case_of<K>();
@@ -216,11 +223,10 @@ TYPED_TEST(Constraint, RotationTurnsOrKeepsC) {
     for (int j = 0; j < K::rows; ++j) {
       Vec3<double> torque;
       for (int k = 0; k < K::arity; ++k)
-        torque = torque + cross(Vec3<double>(&s.x[3 * k]), Vec3<double>(&before[K::rows + j * K::dofs + 3 * k]));
-      if (turns) {
-        const std::vector<double> e = unit(3, j);
-        torque = torque - cross(Vec3<double>(C.data()), Vec3<double>(e.data()));
-      }
+        torque =
+            torque + cross(Vec3<double>(&s.x[3 * k]), Vec3<double>(&before[K::rows + j * K::dofs + 3 * k]));
+      if constexpr (K::rows == 3)
+        if (turns) torque = torque - cross(Vec3<double>(C.data()), Vec3<double>(unit(3, j).data()));
       if (!axis.empty()) torque = {dot(torque, Vec3<double>(axis.data())), 0.0, 0.0};
       EXPECT_LE(norm(torque), 1e-14 * largest(std::span(before).subspan(K::rows))) << "row " << j;
     }
@@ -236,7 +242,8 @@ TYPED_TEST(Constraint, ScalesWithTheUnitOfLength) {
     for (double& v : x) v *= scale;
     for (std::size_t k = 0; k < p.size(); ++k) p[k] *= std::pow(scale, row.parameter_degree[k]);
     std::vector<double> expected = evaluate<K>(s.x, s.p);
-    for (int i = 0; i < static_cast<int>(expected.size()); ++i) expected[i] *= std::pow(scale, i < K::rows ? row.degree : row.degree - 1);
+    for (int i = 0; i < static_cast<int>(expected.size()); ++i)
+      expected[i] *= std::pow(scale, i < K::rows ? row.degree : row.degree - 1);
     const auto found = evaluate<K>(x, p);
     EXPECT_LE(relative_error(std::span(found).first(K::rows), std::span(expected).first(K::rows)), 1e-13);
     EXPECT_LE(relative_error(std::span(found).subspan(K::rows), std::span(expected).subspan(K::rows)), 1e-13);
@@ -255,7 +262,8 @@ TYPED_TEST(Constraint, RelabelingGivesTheSameConstraint) {
   for (int j = 0; j < K::rows; ++j) {
     expected[j] = row.sign * before[j];
     for (int d = 0; d < K::dofs; ++d)
-      expected[K::rows + j * K::dofs + d] = row.sign * before[K::rows + j * K::dofs + 3 * row.relabeling[d / 3] + d % 3];
+      expected[K::rows + j * K::dofs + d] =
+          row.sign * before[K::rows + j * K::dofs + 3 * row.relabeling[d / 3] + d % 3];
   }
   EXPECT_LE(relative_error(after, expected), 1e-14);
 }
@@ -286,7 +294,8 @@ TEST(Distance, CoincidentParticlesHaveNoDirection) {
 
 TEST(Bend, LengthIsTwiceTheTangentOfHalfTheAngle) {
   const double theta = 0.7;
-  const auto value = evaluate<Bend>({0, 0, 0, 2, 0, 0, 2 + 3 * std::cos(theta), 3 * std::sin(theta), 0}, std::vector<double>{});
+  const auto value = evaluate<Bend>({0, 0, 0, 2, 0, 0, 2 + 3 * std::cos(theta), 3 * std::sin(theta), 0},
+                                    std::vector<double>{});
   EXPECT_NEAR(value[2], 2 * std::tan(theta / 2), 1e-15);
 }
 

@@ -1,4 +1,5 @@
-// The LDL^T of direct blocks against Eigen's dense solver, on chains, trees and loops; its cost must grow linearly.
+// The LDL^T of direct blocks against Eigen's dense solver, on chains, trees and loops; its cost must grow
+// linearly.
 #include "core/solver/symmetric_factor.h"
 
 #include <Eigen/Dense>
@@ -74,8 +75,8 @@ Factor<T> factored(const FactorStructure& s, const Entries& entries, F&& entry) 
 
 struct FactorOf : ::testing::TestWithParam<Pattern> {};
 INSTANTIATE_TEST_SUITE_P(, FactorOf,
-                         ::testing::Values(Pattern{"Chain", true, chain}, Pattern{"Tree", false, tree}, Pattern{"Loop", false, loop},
-                                           Pattern{"Tangle", false, tangle}),
+                         ::testing::Values(Pattern{"Chain", true, chain}, Pattern{"Tree", false, tree},
+                                           Pattern{"Loop", false, loop}, Pattern{"Tangle", false, tangle}),
                          [](const auto& info) { return info.param.name; });
 
 TEST_P(FactorOf, SolvesAsEigenDoes) {
@@ -117,7 +118,8 @@ TEST_P(FactorOf, HasTheSameBitsInEveryLane) {
   const FactorStructure s(n, entries);
   std::vector<Eigen::MatrixXd> A;
   for (int lane = 0; lane < Pack::lanes; ++lane) A.push_back(random_matrix(n, entries, lane));
-  const auto packed = factored<Pack>(s, entries, [&](int i, int j) { return per_lane([&](int lane) { return A[lane](i, j); }); });
+  const auto packed = factored<Pack>(
+      s, entries, [&](int i, int j) { return per_lane([&](int lane) { return A[lane](i, j); }); });
   std::vector<Pack> x(n, Pack(1.0));
   packed.solve(s, x.data());
   for (int lane = 0; lane < Pack::lanes; ++lane) {

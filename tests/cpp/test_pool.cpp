@@ -25,7 +25,8 @@ std::vector<int> visits(int count, int threads, int grain) {
 TEST(Pool, VisitsEveryItemOnce) {
   for (const int count : {0, 1, 2, 7, 64, 1001})
     for (const int threads : {1, 2, 3, 8})
-      for (const int grain : {0, 1, 16}) EXPECT_EQ(visits(count, threads, grain), std::vector<int>(count, 1)) << count << " " << threads;
+      for (const int grain : {0, 1, 16})
+        EXPECT_EQ(visits(count, threads, grain), std::vector<int>(count, 1)) << count << " " << threads;
 }
 
 TEST(Pool, SplitsOnlyAboveItsGrain) {
@@ -85,7 +86,8 @@ TEST(Pool, WorksInAForkedChild) {
 #ifdef __SANITIZE_THREAD__
   GTEST_SKIP() << "ThreadSanitizer does not allow threads in a forked child";
 #endif
-  ASSERT_EQ(visits(100, 3, 1), std::vector<int>(100, 1));  // the parent's workers exist; the child has none of them
+  ASSERT_EQ(visits(100, 3, 1),
+            std::vector<int>(100, 1));  // the parent's workers exist; the child has none of them
   const pid_t child = fork();
   ASSERT_GE(child, 0);
   if (child == 0) {

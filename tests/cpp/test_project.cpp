@@ -1,5 +1,5 @@
-// Third rung: the block projection against its formula, its reverse and its tangent against complex step, for every registered
-// constraint as a block of one and for direct blocks that couple them all.
+// Third rung: the block projection against its formula, its reverse and its tangent against complex step, for
+// every registered constraint as a block of one and for direct blocks that couple them all.
 #include <Eigen/Dense>
 
 #include "core/scalar/complex.h"
@@ -17,8 +17,10 @@ std::string part_name(std::size_t part) {
   return part < 4 ? own[part] : quantity_names[part - 4];
 }
 
-// The cotangent of theta by complex step through the forward pass. What is fixed has no inverse mass to differentiate by.
-std::vector<double> oracle_cotangent(const Projection& p, const std::vector<double>& theta, const std::vector<double>& out_bar) {
+// The cotangent of theta by complex step through the forward pass. What is fixed has no inverse mass to
+// differentiate by.
+std::vector<double> oracle_cotangent(const Projection& p, const std::vector<double>& theta,
+                                     const std::vector<double>& out_bar) {
   return complex_step_gradient(
       [&](const std::vector<Complex>& probe) {
         Complex sum(0.0);
@@ -30,11 +32,14 @@ std::vector<double> oracle_cotangent(const Projection& p, const std::vector<doub
 }
 
 // Worst relative error over the parts of theta.
-double cotangent_error(const Projection& p, const std::vector<double>& found, const std::vector<double>& oracle, std::string* where = nullptr) {
+double cotangent_error(const Projection& p, const std::vector<double>& found,
+                       const std::vector<double>& oracle, std::string* where = nullptr) {
   const auto at = p.offsets();
   double worst = 0.0;
   for (std::size_t part = 0; part + 1 < at.size(); ++part) {
-    const auto of = [&](const std::vector<double>& v) { return std::span(v).subspan(at[part], at[part + 1] - at[part]); };
+    const auto of = [&](const std::vector<double>& v) {
+      return std::span(v).subspan(at[part], at[part + 1] - at[part]);
+    };
     const double error = relative_error(of(found), of(oracle));
     if (error > worst) {
       worst = error;
@@ -60,7 +65,8 @@ double climb(const Projection& p, const std::vector<double>& inputs, unsigned se
   for (std::size_t i = 0; i < theta.size(); ++i) probe[i].v = theta[i], probe[i].d[0] = direction[i];
   std::vector<double> tangent;
   for (const Dual1& d : p.forward(probe)) tangent.push_back(d.d[0]);
-  const auto oracle = complex_step_along([&](const std::vector<Complex>& z) { return p.forward(z); }, theta, direction);
+  const auto oracle =
+      complex_step_along([&](const std::vector<Complex>& z) { return p.forward(z); }, theta, direction);
   const std::size_t dofs = p.scene.dofs();
   EXPECT_LE(relative_error(std::span(tangent).first(dofs), std::span(oracle).first(dofs)), bound);
   EXPECT_LE(relative_error(std::span(tangent).subspan(dofs), std::span(oracle).subspan(dofs)), bound);
@@ -82,8 +88,10 @@ TYPED_TEST(BlockOfOne, DerivativesMatchComplexStep) {
     for (const bool damped : {false, true})
       for (int pinned = -1; pinned < K::arity; ++pinned)
         for (unsigned seed = 0; seed < 5; ++seed) {
-          SCOPED_TRACE(::testing::Message() << "direct " << static_cast<int>(partition) << " damped " << damped << " pinned " << pinned);
-          const Sample sample = scene_of_one<K>(seed, damped, pinned < 0 ? std::vector<int>{} : std::vector<int>{pinned});
+          SCOPED_TRACE(::testing::Message() << "direct " << static_cast<int>(partition) << " damped "
+                                            << damped << " pinned " << pinned);
+          const Sample sample =
+              scene_of_one<K>(seed, damped, pinned < 0 ? std::vector<int>{} : std::vector<int>{pinned});
           worst = std::max(worst, climb(Projection(sample.scene, partition, eta), sample.inputs, seed));
         }
   record_error("vjp", worst);
@@ -91,25 +99,28 @@ TYPED_TEST(BlockOfOne, DerivativesMatchComplexStep) {
 
 // The formula of the reverse, spelled out for one constraint, so that a mutant can go through it.
 template <class K>
-std::vector<double> reverse_of_one(const Projection& p, const std::vector<double>& theta, const std::vector<double>& out_bar) {
-  return p.reverse_with(theta, out_bar, [&](Projection::Run<double>& run, const SubstepCotangent<double>& bar) {
-    const Group& group = p.scene.groups[0];
-    const Element<K, double> e(run.state, group, 0, run.record.x.data());
-    const Evaluation<K, double> value(e.x, e.p);
-    double A[K::rows * K::rows], y[K::rows], z[K::dofs], u[K::dofs]{}, x_bar[K::dofs]{};
-    e.matrix(value.J, A);
-    adjoint_right_side(run.state, e, value.J, bar, y);
-    SmallLdlt<K::rows, double>(A).solve(y);
-    transpose_times<K>(value.J, run.record.dl.data(), u);
-    transpose_times<K>(value.J, y, x_bar);
-    for (int d = 0; d < K::dofs; ++d) {
-      x_bar[d] = -x_bar[d];
-      z[d] = bar.x[d] + x_bar[d];
-      bar.w[d / 3] += u[d] * z[d];
-    }
-    pull_back_element<K>(run.state, group, 0, e, value, run.record.lambda.data(), run.record.dl.data(), y, z, u, x_bar, bar);
-    add_cotangent(run.state, e, 0, x_bar, bar);
-  });
+std::vector<double> reverse_of_one(const Projection& p, const std::vector<double>& theta,
+                                   const std::vector<double>& out_bar) {
+  return p.reverse_with(theta, out_bar,
+                        [&](Projection::Run<double>& run, const SubstepCotangent<double>& bar) {
+                          const Group& group = p.scene.groups[0];
+                          const Element<K, double> e(run.state, group, 0, run.record.x.data());
+                          const Evaluation<K, double> value(e.x, e.p);
+                          double A[K::rows * K::rows], y[K::rows], z[K::dofs], u[K::dofs]{}, x_bar[K::dofs]{};
+                          e.matrix(value.J, A);
+                          adjoint_right_side(run.state, e, value.J, bar, y);
+                          SmallLdlt<K::rows, double>(A).solve(y);
+                          transpose_times<K>(value.J, run.record.dl.data(), u);
+                          transpose_times<K>(value.J, y, x_bar);
+                          for (int d = 0; d < K::dofs; ++d) {
+                            x_bar[d] = -x_bar[d];
+                            z[d] = bar.x[d] + x_bar[d];
+                            bar.w[d / 3] += u[d] * z[d];
+                          }
+                          pull_back_element<K>(run.state, group, 0, e, run.record.lambda.data(),
+                                               run.record.dl.data(), y, z, u, x_bar, bar);
+                          add_cotangent(run.state, e, 0, x_bar, bar);
+                        });
 }
 
 TYPED_TEST(BlockOfOne, MutantIsFlagged) {
@@ -122,7 +133,8 @@ TYPED_TEST(BlockOfOne, MutantIsFlagged) {
   const auto oracle = oracle_cotangent(p, theta, out_bar);
   EXPECT_LE(cotangent_error(p, reverse_of_one<K>(p, theta, out_bar), oracle), bound);
   const double mutant = cotangent_error(p, reverse_of_one<Mutant<K>>(p, theta, out_bar), oracle);
-  EXPECT_EQ(mutant > 1e4 * bound, case_of<K>().curved) << "error " << mutant << "; a linear C has no Hessian term to scale";
+  EXPECT_EQ(mutant > 1e4 * bound, case_of<K>().curved)
+      << "error " << mutant << "; a linear C has no Hessian term to scale";
 }
 
 // At compliance 0 the linearized constraint holds exactly, and small compliances approach that in proportion.
@@ -156,7 +168,8 @@ TYPED_TEST(BlockOfOne, VanishingComplianceIsTheRigidLimit) {
   }
 }
 
-// Dense A, s, dl and the outputs from the formulas on paper, for one block that holds all constraints of the scene.
+// Dense A, s, dl and the outputs from the formulas on paper, for one block that holds all constraints of the
+// scene.
 std::vector<double> by_formula(const Projection& p, const std::vector<double>& theta) {
   const Scene& scene = p.scene;
   const auto at = p.offsets();
@@ -170,14 +183,18 @@ std::vector<double> by_formula(const Projection& p, const std::vector<double>& t
       for (int i = 0; i < group.count; ++i) {
         std::vector<double> x;
         for (const int n : group.nodes(i)) x.insert(x.end(), &theta[3 * n], &theta[3 * n] + 3);
-        const Evaluation<K, double> value(x.data(), in.of(Quantity::rest) + group.first_value + i * parameter_count<K>);
-        const double alpha = in.of(Quantity::compliance)[group.first + i], beta = in.of(Quantity::damping)[group.first + i];
+        const Evaluation<K, double> value(x.data(),
+                                          in.of(Quantity::rest) + group.first_value + i * parameter_count<K>);
+        const double alpha = in.of(Quantity::compliance)[group.first + i],
+                     beta = in.of(Quantity::damping)[group.first + i];
         for (int j = 0; j < K::rows; ++j) {
           const int row = group.first_row + i * K::rows + j;
           a[row] = alpha / (p.eta * p.eta);
           g[row] = group.damped ? alpha * beta / p.eta : 0.0;
-          s[row] = value.C[j] + a[row] * theta[at[3] + row] + g[row] * difference<K>(value.C[j], theta[at[2] + row]);
-          for (int d = 0; d < K::dofs; ++d) J(row, 3 * group.nodes(i)[d / 3] + d % 3) = value.J[j * K::dofs + d];
+          s[row] = value.C[j] + a[row] * theta[at[3] + row] +
+                   g[row] * difference<K>(value.C[j], theta[at[2] + row]);
+          for (int d = 0; d < K::dofs; ++d)
+            J(row, 3 * group.nodes(i)[d / 3] + d % 3) = value.J[j * K::dofs + d];
         }
       }
     });
@@ -237,7 +254,8 @@ TEST_P(CoupledBlocks, OneSweepByColorMatchesComplexStep) {
   record_error("vjp", climb(Projection(sample.scene, Partition::gauss_seidel, eta), sample.inputs, 30));
 }
 
-// Two rigid arms of four particles and six distances that share one particle: what a double pendulum is made of.
+// Two rigid arms of four particles and six distances that share one particle: what a double pendulum is made
+// of.
 TEST(CoupledArms, FollowTheFormulaAndMatchComplexStep) {
   SceneSpec spec;
   spec.particles = 7;
@@ -248,8 +266,8 @@ TEST(CoupledArms, FollowTheFormulaAndMatchComplexStep) {
       for (int b = 0; b < a; ++b) pairs.insert(pairs.end(), {arm[b], arm[a]});
   spec.groups = {{"arms", "distance", false, pairs}};
   const Projection p(build_scene(spec), Partition::direct, eta);
-  const std::vector<double> x{0,    0,    0,    0.1,  0.06,  -0.05, 0.1,  -0.07, -0.04, 0.13, 0.01,
-                              0.08, 0.24, 0.07, 0.03, 0.22, -0.07,  0.04, 0.26,  0.02,  0.17};
+  const std::vector<double> x{0,    0,    0,    0.1,  0.06, -0.05, 0.1,  -0.07, -0.04, 0.13, 0.01,
+                              0.08, 0.24, 0.07, 0.03, 0.22, -0.07, 0.04, 0.26,  0.02,  0.17};
   std::vector<double> inputs(p.scene.layout.total());
   std::copy(x.begin(), x.end(), inputs.begin());
   for (int c = 0; c < p.scene.constraints; ++c) {
@@ -261,7 +279,8 @@ TEST(CoupledArms, FollowTheFormulaAndMatchComplexStep) {
   record_error("vjp", climb(p, inputs, 4));
 }
 
-INSTANTIATE_TEST_SUITE_P(, CoupledBlocks, ::testing::Bool(), [](const auto& param) { return param.param ? "Net" : "Ropes"; });
+INSTANTIATE_TEST_SUITE_P(, CoupledBlocks, ::testing::Bool(),
+                         [](const auto& param) { return param.param ? "Net" : "Ropes"; });
 
 }  // namespace
 }  // namespace sheetbend::testing

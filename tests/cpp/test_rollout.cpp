@@ -1,5 +1,5 @@
-// Fifth rung: gradients of whole rollouts against complex step through the templated solver; and the physics of a rollout that needs
-// no closed form.
+// Fifth rung: gradients of whole rollouts against complex step through the templated solver; and the physics
+// of a rollout that needs no closed form.
 #include "core/scalar/complex.h"
 #include "tests/cpp/support/programs.h"
 
@@ -13,12 +13,14 @@ TEST_P(RolloutOf, GradientMatchesComplexStep) {
   for (const unsigned seed : {50u, 51u}) {
     const Sample sample = random_scene(seed, {.net = GetParam().net});
     const Program program{sample.scene, make_plan(sample.scene, GetParam().options(2)), 10, 0.004};
-    const auto oracle = complex_step_gradient([&](const std::vector<Complex>& z) { return loss(program, z); }, sample.inputs);
+    const auto oracle =
+        complex_step_gradient([&](const std::vector<Complex>& z) { return loss(program, z); }, sample.inputs);
     expect_gradients_agree(sample.scene.layout, gradient(program, sample.inputs), oracle, 1e-8);
   }
 }
 
-// The scenes must hold what is hard: constraints of one color, and two blocks, that share a driven particle; branches and loops.
+// The scenes must hold what is hard: constraints of one color, and two blocks, that share a driven particle;
+// branches and loops.
 TEST(RandomScene, SharesADrivenParticleWithinAColorAndBetweenBlocks) {
   const Scene scene = random_scene(50).scene;
   int colors_sharing = 0;
@@ -40,10 +42,12 @@ TEST(RandomScene, SharesADrivenParticleWithinAColorAndBetweenBlocks) {
 
 TEST(RandomScene, NetIsSparse) {
   const Plan plan = make_plan(random_scene(50, {.net = true}).scene, {.partition = Partition::direct});
-  EXPECT_TRUE(std::any_of(plan.blocks.begin(), plan.blocks.end(), [](const DirectBlock& b) { return !b.structure.banded(); }));
+  EXPECT_TRUE(std::any_of(plan.blocks.begin(), plan.blocks.end(),
+                          [](const DirectBlock& b) { return !b.structure.banded(); }));
 }
 
-// Mass, forces and drag times c, compliance over c (and beta times c, for alpha beta is what damps): the same motion.
+// Mass, forces and drag times c, compliance over c (and beta times c, for alpha beta is what damps): the same
+// motion.
 TEST_P(RolloutOf, MassGaugeMovesNothing) {
   const Sample sample = random_scene(52, {.net = GetParam().net});
   const Program program{sample.scene, make_plan(sample.scene, GetParam().options(2)), 10};
@@ -59,7 +63,8 @@ TEST_P(RolloutOf, MassGaugeMovesNothing) {
   scale(Quantity::force, c);
   scale(Quantity::drag_linear, c);
   scale(Quantity::drag_quadratic, c);
-  EXPECT_TRUE(same_bits(states(record(program, sample.inputs), sample.scene.dofs()), states(record(program, scaled), sample.scene.dofs())));
+  EXPECT_TRUE(same_bits(states(record(program, sample.inputs), sample.scene.dofs()),
+                        states(record(program, scaled), sample.scene.dofs())));
 }
 
 // Free fall without constraints: BDF1 is implicit Euler, x_n = x_0 + n h v_0 + h^2 g n (n + 1)/2.
@@ -73,7 +78,8 @@ TEST(RolloutOfOneParticle, FallsAsImplicitEulerDoes) {
   in.of(Quantity::velocity)[0] = 2.0;
   in.of(Quantity::gravity)[2] = -10.0;
   const double h = 0.01;
-  const Tape<double> tape = record(Program{scene, make_plan(scene, {.h = h, .integrator = Integrator::bdf1}), 50}, inputs);
+  const Tape<double> tape =
+      record(Program{scene, make_plan(scene, {.h = h, .integrator = Integrator::bdf1}), 50}, inputs);
   for (int n = 0; n <= 50; ++n) {
     EXPECT_NEAR(tape.x(n)[0], 2.0 * n * h, 1e-14);
     EXPECT_NEAR(tape.x(n)[2], -10.0 * h * h * n * (n + 1) / 2, 1e-13);
@@ -85,7 +91,9 @@ TEST(RolloutThatDiverges, SaysWhereAndWhen) {
   std::vector<double> inputs = sample.inputs;
   inputs[sample.scene.layout.of(Quantity::velocity) + 3 * 4] = std::nan("");
   try {
-    record(Program{sample.scene, make_plan(sample.scene, {.partition = Partition::gauss_seidel, .iterations = 1}), 5}, inputs);
+    record(Program{sample.scene,
+                   make_plan(sample.scene, {.partition = Partition::gauss_seidel, .iterations = 1}), 5},
+           inputs);
     FAIL() << "a NaN went unnoticed";
   } catch (const Diverged& e) {
     EXPECT_EQ(e.substep, 1);
@@ -101,7 +109,8 @@ TEST(RolloutInterrupted, Stops) {
   const Sample sample = random_scene(54);
   const Plan plan = make_plan(sample.scene, {});
   StopAtOnce stop;
-  EXPECT_THROW(record_rollout<double>(sample.scene, plan, sample.inputs.data(), 0.0, 5, &stop), std::runtime_error);
+  EXPECT_THROW(record_rollout<double>(sample.scene, plan, sample.inputs.data(), 0.0, 5, &stop),
+               std::runtime_error);
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
-// The scalars that kernels run on: each gives the value that double gives, and the derivatives that the complex step gives.
+// The scalars that kernels run on: each gives the value that double gives, and the derivatives that the
+// complex step gives.
 #include "core/scalar/dual.h"
 #include "core/scalar/pack.h"
 #include "core/scalar/vec3.h"
@@ -7,8 +8,8 @@
 namespace sheetbend::testing {
 namespace {
 
-static_assert(Scalar<double> && Scalar<Complex> && Scalar<Pack> && Scalar<Dual<double, 3>> && Scalar<Dual<Pack, 2>> &&
-              Scalar<Dual<Dual<double, 1>, 1>> && Scalar<Dual<Complex, 1>>);
+static_assert(Scalar<double> && Scalar<Complex> && Scalar<Pack> && Scalar<Dual<double, 3>> &&
+              Scalar<Dual<Pack, 2>> && Scalar<Dual<Dual<double, 1>, 1>> && Scalar<Dual<Complex, 1>>);
 
 // Everything that a scalar offers, in one smooth function of two variables.
 template <class T>
@@ -22,7 +23,8 @@ T mixture(const T& a, const T& b) {
 
 constexpr double a0 = 1.7, b0 = 0.6;
 const auto oracle = [](double va, double vb) {
-  return complex_step_along([](const std::vector<Complex>& z) { return std::vector{mixture(z[0], z[1])}; }, {a0, b0}, {va, vb})[0];
+  return complex_step_along([](const std::vector<Complex>& z) { return std::vector{mixture(z[0], z[1])}; },
+                            {a0, b0}, {va, vb})[0];
 };
 
 TEST(Complex, HasTheValueOfDouble) {
@@ -31,7 +33,8 @@ TEST(Complex, HasTheValueOfDouble) {
 
 // Against a central difference once, so that the oracle itself does not stand on air.
 TEST(Complex, StepMatchesCentralDifference) {
-  const double h = 1e-6, da = (mixture(a0 + h, b0) - mixture(a0 - h, b0)) / (2 * h), db = (mixture(a0, b0 + h) - mixture(a0, b0 - h)) / (2 * h);
+  const double h = 1e-6, da = (mixture(a0 + h, b0) - mixture(a0 - h, b0)) / (2 * h),
+               db = (mixture(a0, b0 + h) - mixture(a0, b0 - h)) / (2 * h);
   EXPECT_NEAR(oracle(1, 0), da, 1e-8);
   EXPECT_NEAR(oracle(0, 1), db, 1e-8);
 }

@@ -1,4 +1,5 @@
-// Fourth rung: one substep, theta = (x, x_before, v, v_before, inputs) -> (x, v), its reverse against complex step.
+// Fourth rung: one substep, theta = (x, x_before, v, v_before, inputs) -> (x, v), its reverse against complex
+// step.
 #include "adjoint/substep_vjp.h"
 #include "core/scalar/complex.h"
 #include "tests/cpp/support/programs.h"
@@ -22,23 +23,25 @@ struct SubstepRun {
   SubstepRecord<T> record;
 
   SubstepRun(const OneSubstep& one, const std::vector<T>& theta)
-      : bdf(Bdf::at(one.plan.options, one.number)), in{one.scene.layout, theta.data() + 4 * one.scene.dofs()}, out(2 * one.scene.dofs()) {
+      : bdf(Bdf::at(one.plan.options, one.number)),
+        in{one.scene.layout, theta.data() + 4 * one.scene.dofs()},
+        out(2 * one.scene.dofs()) {
     const std::size_t dofs = one.scene.dofs();
     states = {theta.data(), theta.data() + dofs, theta.data() + 2 * dofs, theta.data() + 3 * dofs};
     record.resize(one.scene, one.plan, true);
-    Scratch<T> scratch;
-    scratch.resize(one.scene);
-    substep(one.scene, one.plan, in, bdf, one.t_next, states, out.data(), out.data() + dofs, record, scratch);
+    substep(one.scene, one.plan, in, bdf, one.t_next, states, out.data(), out.data() + dofs, record);
   }
 };
 
-std::vector<double> reverse(const OneSubstep& one, const std::vector<double>& theta, const std::vector<double>& out_bar) {
+std::vector<double> reverse(const OneSubstep& one, const std::vector<double>& theta,
+                            const std::vector<double>& out_bar) {
   SubstepRun<double> run(one, theta);
   const int dofs = one.scene.dofs();
   std::vector<double> bar(theta.size());
   ReverseScratch<double> scratch(one.scene);
-  substep_vjp(one.scene, one.plan, run.in, run.bdf, one.t_next, run.states, run.record, out_bar.data(), out_bar.data() + dofs, scratch,
-              {&bar[0], &bar[dofs], &bar[2 * dofs], &bar[3 * dofs]}, {one.scene.layout, &bar[4 * dofs]});
+  substep_vjp(one.scene, one.plan, run.in, run.bdf, one.t_next, run.states, run.record, out_bar.data(),
+              out_bar.data() + dofs, scratch, {&bar[0], &bar[dofs], &bar[2 * dofs], &bar[3 * dofs]},
+              {one.scene.layout, &bar[4 * dofs]});
   return bar;
 }
 
@@ -47,7 +50,8 @@ std::vector<double> random_theta(const Sample& sample, Random& random) {
   const std::size_t dofs = sample.scene.dofs();
   std::vector<double> theta;
   for (const double spread : {0.005, 0.005, 0.3, 0.3})
-    for (std::size_t i = 0; i < dofs; ++i) theta.push_back((spread < 0.1 ? sample.inputs[i] : 0.0) + random(-spread, spread));
+    for (std::size_t i = 0; i < dofs; ++i)
+      theta.push_back((spread < 0.1 ? sample.inputs[i] : 0.0) + random(-spread, spread));
   theta.insert(theta.end(), sample.inputs.begin(), sample.inputs.end());
   return theta;
 }
@@ -76,11 +80,17 @@ TEST_P(Substep, ReverseMatchesComplexStep) {
     const std::size_t dofs = scene.dofs();
     const char* names[] = {"x", "x_before", "v", "v_before"};
     for (int part = 0; part < 4; ++part)
-      EXPECT_LE(relative_error(std::span(bar).subspan(part * dofs, dofs), std::span(oracle).subspan(part * dofs, dofs)), 1e-10) << names[part];
+      EXPECT_LE(relative_error(std::span(bar).subspan(part * dofs, dofs),
+                               std::span(oracle).subspan(part * dofs, dofs)),
+                1e-10)
+          << names[part];
     // A substep reads the states that it is given, not the initial ones.
     for (int q = 0; q < quantity_count; ++q) {
-      const auto of = [&](const std::vector<double>& g) { return std::span(g).subspan(4 * dofs + scene.layout.offset[q], scene.layout.size[q]); };
-      EXPECT_EQ(largest(of(oracle)) > 0.0, q != static_cast<int>(Quantity::position) && q != static_cast<int>(Quantity::velocity));
+      const auto of = [&](const std::vector<double>& g) {
+        return std::span(g).subspan(4 * dofs + scene.layout.offset[q], scene.layout.size[q]);
+      };
+      EXPECT_EQ(largest(of(oracle)) > 0.0,
+                q != static_cast<int>(Quantity::position) && q != static_cast<int>(Quantity::velocity));
       const double error = relative_error(of(bar), of(oracle));
       EXPECT_LE(error, 1e-10) << quantity_names[q];
       record_error(quantity_names[q], error);

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from ..discretization import Refinement
 from ..errors import ConfigError, RecordingError
 from ..experiment import Experiment
 from ..markers import Place, between, on_particle, on_rope
+from ..problem import as_parameters
 from ..recording import Recording
 from ..recording_checks import marker_indices
 from ..scene import Scene
@@ -59,11 +61,13 @@ def build(config: schema.Config, folder: Path, finer: int = 1) -> Study:
     for i, name in enumerate(names):
         if name in names[:i]:
             raise ConfigError(f"recording[{i}].name", "is another recording's too", name, "give each recording a name of its own")
-    known = {q for e in experiments for q in e.scene.quantities}
-    for name in config.parameters:
-        if experiments and name not in known:
-            raise ConfigError(f"parameters.{name}", "is no quantity of the scenes", name, f"name some of: {', '.join(sorted(known))}")
-    return Study(config, folder, experiments, {name: _given(p) for name, p in config.parameters.items()})
+    parameters = {name: _given(p) for name, p in config.parameters.items()}
+    if experiments:
+        _check_names(config, experiments)
+    if experiments and parameters:
+        with located("parameters"):
+            as_parameters(parameters, experiments)  # raise here, where the path is known
+    return Study(config, folder, experiments, parameters)
 
 
 def scene_alone(config: schema.Config) -> tuple[Scene, Solver]:
@@ -88,8 +92,9 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
     recording = _read(section, folder, path)
     with located(path):
         t0 = _start(section, recording)
-        window = section.fit if section.static and section.fit else (t0, None)
-        moment = Moment(recording.piece(*window), t0, section.static)
+        for key in ("fit", "held_out"):
+            _check_window(f"{path}.{key}", getattr(section, key), recording)
+        moment = Moment(recording.piece(*(section.fit if section.static and section.fit else (t0, None))), t0, section.static)
     shared = not section.marker
     markers = config.marker if shared else section.marker
     where = "marker" if shared else f"{path}.marker"
@@ -110,7 +115,9 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
             **plain,
         )
         _known(path, section, experiment)
-        assert experiment.compared and experiment.fitted()  # raise here, where the path is known
+        experiment.observed(experiment.fitted())  # raise here, where the path is known
+    with located("scene"):
+        assert scene.compiled
     return experiment
 
 
@@ -138,8 +145,10 @@ def _window(window: list[float] | None) -> tuple[float, float] | None:
 
 
 def _number(path: str, marker: str | int, recording: Recording) -> int:
-    with located(path):
+    try:
         return marker_indices("marker", (marker,), recording.markers)[0]
+    except RecordingError as error:
+        raise ConfigError(path, error.problem, error.got, error.fix) from error
 
 
 def _along(config: schema.Config, markers: list[schema.Marker], numbers: list[int], recording: Recording) -> dict[str, list[int]]:
@@ -157,6 +166,8 @@ def _along(config: schema.Config, markers: list[schema.Marker], numbers: list[in
 def _place(path: str, marker: schema.Marker, scene: Scene, particles: Particles) -> Place:
     if marker.particle is not None:
         place = on_particle(particles.find(f"{path}.particle", marker.particle))
+    elif marker.arm is not None:
+        return _on_arm(path, marker, particles)
     elif marker.between is not None:
         first, second = (particles.find(f"{path}.between", r) for r in marker.between)
         place = between(first, second, marker.fraction)
@@ -171,6 +182,15 @@ def _place(path: str, marker: schema.Marker, scene: Scene, particles: Particles)
         return replace(place.with_offset(marker.offset or (0.0, 0.0, 0.0), marker.normal), offset=tuple(marker.offset) if marker.offset else None)
 
 
+def _on_arm(path: str, marker: schema.Marker, particles: Particles) -> Place:
+    if marker.arm not in particles.arms:
+        raise ConfigError(f"{path}.arm", "is no arm of the scene", marker.arm, f"name one of: {', '.join(particles.arms) or 'none'}")
+    place = particles.arms[marker.arm].place(marker.radius or 0.0)
+    along, *across = marker.offset or (0.0, 0.0, 0.0)
+    with located(path):
+        return place.with_offset((along + (marker.radius or 0.0), *across), marker.normal)
+
+
 def _offset(path: str, names: list[str], scene: Scene) -> tuple[str | None, str | None, str | None]:
     if len(names) != 3:
         raise ConfigError(path, "must be three names", names, 'give [tangent, normal, tangent x normal], "" for none')
@@ -179,6 +199,27 @@ def _offset(path: str, names: list[str], scene: Scene) -> tuple[str | None, str 
             raise ConfigError(path, "names no quantity", name, f"declare [scene.quantities.{name}]")
     a, b, c = (name or None for name in names)
     return a, b, c
+
+
+def _check_window(path: str, window: list[float] | None, recording: Recording) -> None:
+    if window is None:
+        return
+    try:
+        recording.piece(*window)
+    except RecordingError as error:
+        raise ConfigError(path, error.problem, window, error.fix) from error
+
+
+def _check_names(config: schema.Config, experiments: tuple[Experiment, ...]) -> None:
+    """Parameters and published values name quantities of the scenes."""
+    known = sorted({q for e in experiments for q in e.scene.quantities})
+    for section in ("parameters", "published"):
+        for name in getattr(config, section):
+            base = name.partition("[")[0]
+            if base not in known:
+                near = difflib.get_close_matches(base, known, n=1)
+                hint = f"did you mean '{near[0]}'? " if near else ""
+                raise ConfigError(f"{section}.{name}", "is no quantity of the scenes", name, f"{hint}There are: {', '.join(known)}")
 
 
 def _known(path: str, section: schema.RecordingSection, experiment: Experiment) -> None:
@@ -205,6 +246,21 @@ def _start_values(scene: Scene, config: schema.Config, values: Mapping[str, floa
     for name, value in {**initial, **values}.items():
         with located(f"{path}.values" if name in values else "parameters"):
             scene.quantities[name] = replace(scene.quantities[name], value=float(value))
+    for name in config.parameters:
+        root, factor = _root(config, name)
+        if root != name and root in scene.quantities and name in scene.quantities:
+            scene.quantities[name] = replace(scene.quantities[name], value=factor * scene.quantities[root].value)
+
+
+def _root(config: schema.Config, name: str) -> tuple[str, float]:
+    """The end of a parameter's ties and the factor to it; circles and loose ends, which `Parameters` reports, lead back to itself."""
+    at, factor, passed = name, 1.0, {name}
+    while (p := config.parameters.get(at)) is not None and p.tied_to is not None:
+        if p.tied_to in passed:
+            return name, 1.0
+        at, factor = p.tied_to, factor * p.factor
+        passed.add(at)
+    return at, factor
 
 
 def _given(section: schema.ParameterSection) -> dict[str, Any]:

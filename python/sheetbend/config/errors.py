@@ -12,6 +12,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from ..errors import ConfigError, InputError
+from .section import AXES, NAME, REFERENCE
 
 Location = Sequence[str | int]
 
@@ -38,19 +39,24 @@ def one(detail: Mapping[str, Any], model: type[BaseModel]) -> ConfigError:
         problem, _, fix = str(limits["error"]).partition("|")
         return ConfigError(field, problem, _short(got), fix or "see docs/configuration.md")
     if kind == "string_pattern_mismatch":
-        return ConfigError(field, "has the wrong form", got, f"write it as {limits['pattern']}")
+        return ConfigError(field, "has the wrong form", got, _FORMS.get(limits["pattern"], f"match {limits['pattern']}"))
     wanted = _WANTED.get(kind, "")
     if kind in _LIMITS:
         word, limit = _LIMITS[kind]
-        return ConfigError(field, f"must be {word} {limits[limit]}", got, "change the value")
+        return ConfigError(field, f"must be {word} {limits[limit]:g}", got, f"give a number {word} {limits[limit]:g}")
     if kind in ("too_short", "too_long"):
-        bounds = " ".join(f"{k.removesuffix('_length')} {v}" for k, v in limits.items() if k.endswith("_length"))
-        return ConfigError(field, "has the wrong number of entries", got, f"give {bounds} entries")
+        wanted = f"at least {limits['min_length']}" if kind == "too_short" else f"at most {limits['max_length']}"
+        return ConfigError(field, f"has {limits['actual_length']} entries", got, f"give {wanted}")
     if kind == "literal_error":
         return ConfigError(field, "is none of the choices", got, f"use {limits['expected']}")
     return ConfigError(field, f"must be {wanted}" if wanted else detail["msg"], got, f"write {wanted}" if wanted else "see docs/configuration.md")
 
 
+_FORMS = {
+    NAME: "use letters, digits, _ . and -, a letter first",
+    REFERENCE: "write such as 'rope:0', 'rope:end', or the name of a single particle",
+    AXES: "name some of x, y, z, such as 'xz'",
+}
 _LIMITS = {
     "greater_than": ("greater than", "gt"),
     "greater_than_equal": ("at least", "ge"),
@@ -79,7 +85,7 @@ def located(path: str, prefix: str = "") -> Iterator[None]:
         raise
     except InputError as error:
         inner = error.field.removeprefix(f"{prefix}.") if prefix else error.field
-        raise ConfigError(f"{path}.{inner}", error.problem, error.got, error.fix) from error
+        raise ConfigError(path if inner == path else f"{path}.{inner}", error.problem, error.got, error.fix) from error
 
 
 def dotted(path: Location) -> str:
@@ -91,7 +97,11 @@ def dotted(path: Location) -> str:
 
 
 def _table(path: Location) -> str:
-    return f"[{dotted(path)}]" if path else "the file"
+    """The table's header as it stands in the file."""
+    if not path:
+        return "the file"
+    header = ".".join(part for part in path if isinstance(part, str))
+    return f"[[{header}]]" if isinstance(path[-1], int) else f"[{header}]"
 
 
 def _keys(location: Location, model: type[BaseModel]) -> list[str | int]:

@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import Field
-
-from .section import Finite, Name, Section, Vector, key
-
-Reference = Annotated[str, Field(pattern=r"^[^:\s]+(:\S+)?$")]
-"""A particle: "NAME:INDEX" (negative ones count from the end), "NAME:start" and "NAME:end" of a rope, "NAME" of a single particle."""
-
+from .section import Finite, Name, Reference, Section, Vector, key
 
 class Rope(Section):
     """A rope, `sb.add_rope`. A list of ropes: [[scene.rope]]."""
@@ -46,6 +40,32 @@ class Particles(Section):
     velocity: list[Vector] | None = key(None, "initial velocities; at rest when left out", "m/s")
     mass: Finite | list[Finite] = key(0.0, "one for all or one each; 0 where [[scene.point_mass]] gives it", "kg")
     pinned: bool = key(False, "hold them where they start")
+
+
+class Pendulum(Section):
+    """A point mass on a massless rigid arm, swinging in the x-z plane, `sb.add_pendulum`. A list: [[scene.pendulum]]."""
+
+    name: Name = key("pendulum", "prefix of its quantities: <name>_length, _mass, _angle, _rate, _hinge_viscosity")
+    length: Finite = key(..., "from pivot to mass", "m", gt=0)
+    mass: Finite = key(1.0, "of the point", "kg", gt=0)
+    pivot: Vector | Name = key([0.0, 0.0, 0.0], "a fixed point, or the name of the arm whose end carries this one", "m")
+    angle: Finite = key(0.0, "initial angle from straight down towards +x", "rad")
+    rate: Finite = key(0.0, "initial rate of the angle", "rad/s")
+    viscosity: Finite | None = key(None, "of the pivot: torque over rate", "N m s/rad", gt=0)
+
+
+class Arm(Section):
+    """A rigid arm with mass, first moment and inertia, swinging in the x-z plane, `sb.add_arm`. A list: [[scene.arm]]."""
+
+    name: Name = key("arm", "prefix of its quantities: <name>_mass, _first_moment, _inertia, _length, _angle, _rate, _hinge_viscosity")
+    mass: Finite = key(..., "its mass", "kg", gt=0)
+    first_moment: Finite = key(..., "mass times distance from pivot to center of mass", "kg m", gt=0)
+    inertia: Finite = key(..., "about the pivot", "kg m^2", gt=0)
+    length: Finite = key(..., "from pivot to end, which carries the next arm", "m", gt=0)
+    pivot: Vector | Name = key([0.0, 0.0, 0.0], "a fixed point, or the name of the arm whose end carries this one", "m")
+    angle: Finite = key(0.0, "initial angle from straight down towards +x", "rad")
+    rate: Finite = key(0.0, "initial rate of the angle", "rad/s")
+    viscosity: Finite | None = key(None, "of the pivot: torque over the rate of the angle between the two arms", "N m s/rad", gt=0)
 
 
 class Constraints(Section):
@@ -104,6 +124,8 @@ class SceneSection(Section):
     pin: list[Reference] = key([], "particles that are held where they start")
     rope: list[Rope] = key([], "ropes")
     particles: list[Particles] = key([], "single particles")
+    pendulum: list[Pendulum] = key([], "simple pendulums")
+    arm: list[Arm] = key([], "rigid arms")
     constraints: list[Constraints] = key([], "constraint groups")
     point_mass: list[PointMass] = key([], "hung masses")
     force: list[Force] = key([], "forces over time")

@@ -7,10 +7,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..arm import Arm, add_arm, add_pendulum
 from ..errors import ConfigError
 from ..quantities import product
 from ..recording import Recording
-from ..rope import add_rope
+from ..rope import Rope, add_rope
 from ..scene import Scene
 from . import scene_schema as schema
 from .errors import located
@@ -38,21 +39,35 @@ class Moment:
 
 @dataclass
 class Particles:
-    """Particle references of a configuration ("NAME:INDEX") and what they mean in a scene.
+    """Particle references of a configuration ("NAME:INDEX", "NAME:LABEL") and what they mean in a scene.
 
     Node numbers of ropes count on the configured mesh; `finer` tells how many links one configured link has become.
     """
 
     finer: int = 1
     named: dict[str, list[int]] = field(default_factory=dict)
+    labels: dict[str, dict[str, int]] = field(default_factory=dict)
     ropes: set[str] = field(default_factory=set)
+    arms: dict[str, Arm] = field(default_factory=dict)
 
-    def add(self, path: str, name: str, particles: Sequence[int], rope: bool = False) -> None:
+    def free_name(self, path: str, name: str) -> str:
+        """The name, unless it is taken."""
         if name in self.named:
-            raise ConfigError(f"{path}.name", "is taken", name, "give every rope and every set of particles a name of its own")
+            raise ConfigError(f"{path}.name", "is taken", name, "give every rope, arm and set of particles a name of its own")
+        return name
+
+    def add(self, name: str, particles: Sequence[int]) -> None:
         self.named[name] = [int(p) for p in particles]
-        if rope:
-            self.ropes.add(name)
+
+    def add_rope(self, rope: Rope) -> None:
+        self.add(rope.name, rope.particles.tolist())
+        self.labels[rope.name] = {"start": int(rope.particles[0]), "end": int(rope.particles[-1])}
+        self.ropes.add(rope.name)
+
+    def add_arm(self, arm: Arm) -> None:
+        self.add(arm.name, arm.particles)
+        self.labels[arm.name] = {"pivot": arm.pivot, "end": arm.end}
+        self.arms[arm.name] = arm
 
     def nodes(self, path: str, rope: str, numbers: Sequence[int]) -> list[int]:
         """Particles of node numbers of a rope."""
@@ -71,11 +86,13 @@ class Particles:
             if len(self.named[name]) != 1:
                 raise ConfigError(path, f"is not one particle: '{name}' has {len(self.named[name])}", reference, f"write such as '{name}:0'")
             return self.named[name][0]
-        number = {"start": "0", "end": "-1"}.get(index, index) if name in self.ropes else index
-        try:
-            return self._entry(path, name, int(number))
-        except ValueError:
-            raise ConfigError(path, "has no whole number behind the colon", reference, f"write such as '{name}:0'") from None
+        labels = self.labels.get(name, {})
+        if index in labels:
+            return labels[index]
+        if not index.removeprefix("-").isdecimal():
+            words = "".join(f", '{name}:{label}'" for label in labels)
+            raise ConfigError(path, "has no whole number behind the colon", reference, f"write such as '{name}:0'{words}")
+        return self._entry(path, name, int(index))
 
     def _entry(self, path: str, name: str, number: int) -> int:
         particles = self.named[name]
@@ -105,11 +122,16 @@ def build_scene(name: str, section: schema.SceneSection, moment: Moment | None, 
         _add_rope(scene, particles, f"scene.rope[{i}]", rope, moment, placed.get(rope.name, []), finer)
     for i, some in enumerate(section.particles):
         path = f"scene.particles[{i}]"
+        particles.free_name(path, some.name)
         with located(path):
             added = scene.add_particles(some.positions, some.mass, some.velocity)
             if some.pinned:
                 scene.pin(added)
-        particles.add(path, some.name, added.tolist())
+        particles.add(some.name, added.tolist())
+    for i, pendulum in enumerate(section.pendulum):
+        _add_arm(scene, particles, f"scene.pendulum[{i}]", pendulum)
+    for i, arm in enumerate(section.arm):
+        _add_arm(scene, particles, f"scene.arm[{i}]", arm)
     for i, group in enumerate(section.constraints):
         path = f"scene.constraints[{i}]"
         stencils = [[particles.find(f"{path}.particles", r) for r in one] for one in group.particles]
@@ -142,11 +164,9 @@ def _add_rope(scene: Scene, particles: Particles, path: str, rope: schema.Rope, 
     points = rope.points
     if points == "recording":
         points = _measured(f"{path}.points", moment, placed)
-    if rope.name in particles.named:
-        raise ConfigError(f"{path}.name", "is taken", rope.name, "give every rope a name of its own")
+    particles.free_name(path, rope.name)
     with located(path, rope.name):
-        built = add_rope(scene, rope.name, points=points, segments=finer * rope.segments, **fields)
-    particles.add(path, rope.name, built.particles.tolist(), rope=True)
+        particles.add_rope(add_rope(scene, rope.name, points=points, segments=finer * rope.segments, **fields))
     if rope.pinned:
         scene.pin(particles.nodes(f"{path}.pinned", rope.name, rope.pinned))
 
@@ -159,6 +179,21 @@ def _measured(path: str, moment: Moment | None, placed: list[int]) -> np.ndarray
     if len(seen) < 2:
         raise ConfigError(path, "needs two markers on the rope that are seen at the start", len(seen), "place markers on it, or give the points")
     return seen
+
+
+def _add_arm(scene: Scene, particles: Particles, path: str, arm: schema.Arm | schema.Pendulum) -> None:
+    pivot: Arm | list[float]
+    if isinstance(arm.pivot, str):
+        if arm.pivot not in particles.arms:
+            raise ConfigError(f"{path}.pivot", "is no arm before this one", arm.pivot, f"name one of: {', '.join(particles.arms) or 'none yet'}")
+        pivot = particles.arms[arm.pivot]
+    else:
+        pivot = arm.pivot
+    fields = arm.model_dump(exclude={"name", "pivot"}, exclude_none=True)
+    particles.free_name(path, arm.name)
+    with located(path, arm.name):
+        add = add_arm if isinstance(arm, schema.Arm) else add_pendulum
+        particles.add_arm(add(scene, arm.name, pivot=pivot, **fields))
 
 
 def _add_forces(scene: Scene, particles: Particles, forces: Sequence[schema.Force]) -> None:

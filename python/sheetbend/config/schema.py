@@ -6,8 +6,8 @@ from typing import Literal, Self
 
 from pydantic import model_validator
 
-from .scene_schema import Reference, SceneSection
-from .section import Finite, Name, Section, Vector, Window, key
+from .scene_schema import SceneSection
+from .section import AXES, Finite, Name, Pair, Reference, Section, Vector, Window, key
 
 
 class ExperimentSection(Section):
@@ -34,12 +34,17 @@ class SolverSection(Section):
 
 
 class Marker(Section):
-    """Where a marker sits: on a rope by arc length, on a particle, or between two. A list: [[marker]], shared, or [[recording.marker]]."""
+    """Where a marker sits: on a rope by arc length, on a particle, on an arm, or between two particles.
+
+    A list: [[marker]], shared, or [[recording.marker]].
+    """
 
     marker: str | int = key(..., "name or number in the recording")
     rope: Name | None = key(None, "a rope, with `arc_length`; the only rope when left out")
     arc_length: Finite | None = key(None, "material coordinate along the rope", "m")
     particle: Reference | None = key(None, "a particle instead")
+    arm: Name | None = key(None, "an arm or pendulum instead, with `radius`")
+    radius: Finite | None = key(None, "distance from the arm's pivot", "m")
     between: list[Reference] | None = key(None, "two particles instead, with `fraction`", min_length=2, max_length=2)
     fraction: Finite = key(0.5, "share of the way from the first of the two to the second")
     offset: Vector | None = key(None, "standing off along (tangent, normal, tangent x normal)", "m")
@@ -47,9 +52,11 @@ class Marker(Section):
 
     @model_validator(mode="after")
     def _one_place(self) -> Self:
-        places = [n for n in ("arc_length", "particle", "between") if getattr(self, n) is not None]
+        places = [n for n in ("arc_length", "particle", "arm", "between") if getattr(self, n) is not None]
         if len(places) != 1:
-            raise ValueError(f"names {' and '.join(places) or 'no place'}|give one of arc_length, particle, between")
+            raise ValueError(f"names {' and '.join(places) or 'no place'}|give one of arc_length, particle, arm, between")
+        if (self.arm is None) != (self.radius is None):
+            raise ValueError("has only one of arm and radius|give both")
         return self
 
 
@@ -69,7 +76,7 @@ class RecordingSection(Section):
         None, 'not fitted, only predicted: private parameters fitted to its own `fit` window ("window") or the others\' mean ("mean")'
     )
     sigma: Finite = key(1e-3, "expected error of a marker", "m", gt=0)
-    axes: str = key("xyz", "coordinates that count", pattern="^[xyz]{1,3}$")
+    axes: str = key("xyz", "coordinates that count", pattern=AXES)
     loss: Literal["squares", "soft_l1", "huber"] = key("squares", "robust loss")
     loss_scale: Finite = key(1.0, "where the robust loss sets in, in units of sigma", gt=0)
     marker: list[Marker] = key([], "places of this recording's markers; those of [[marker]] when left out")
@@ -88,7 +95,7 @@ class ParameterSection(Section):
     fixed: bool = key(False, "keep the initial value")
     tied_to: str | None = key(None, "follow another parameter")
     factor: Finite = key(1.0, "value = factor times that of `tied_to`")
-    prior: Window | None = key(None, "[mean, sd]; with log the sd is that of the natural logarithm")
+    prior: Pair | None = key(None, "[mean, sd]; with log the sd is that of the natural logarithm")
     unit: str | None = key(None, "for reports; the scene's when left out")
     private: bool = key(False, "one value per recording")
     scale: Finite | None = key(None, "natural size of what may be zero", gt=0)

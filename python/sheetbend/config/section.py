@@ -5,12 +5,25 @@ from __future__ import annotations
 import copy
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Vector = Annotated[list[Finite], Field(min_length=3, max_length=3)]
-Window = Annotated[list[Finite], Field(min_length=2, max_length=2)]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_.-]*$")]
+Pair = Annotated[list[Finite], Field(min_length=2, max_length=2)]
+NAME, REFERENCE, AXES = r"^[A-Za-z][A-Za-z0-9_.-]*$", r"^[^:\s]+(:\S+)?$", "^[xyz]{1,3}$"
+Name = Annotated[str, Field(pattern=NAME)]
+Reference = Annotated[str, Field(pattern=REFERENCE)]
+"""A particle: "NAME:INDEX" (negative ones count from the end), "NAME:start" and "NAME:end" of a rope, "NAME:pivot" and "NAME:end" of an arm
+or pendulum, "NAME" of a single particle."""
+
+
+def _ascending(pair: list[float]) -> list[float]:
+    if not pair[0] < pair[1]:
+        raise ValueError("must ascend|give the smaller number first")
+    return pair
+
+
+Window = Annotated[Pair, AfterValidator(_ascending)]
 
 
 class Section(BaseModel):

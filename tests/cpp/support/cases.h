@@ -1,5 +1,6 @@
-// One row of cases per registered constraint: a sample stencil with parameters, and the symmetries that its C has. Every test that is
-// typed over the Registry, and every random scene, reads this table; a kind without a row does not compile.
+// One row of cases per registered constraint: a sample stencil with parameters, and the symmetries that its C
+// has. Every test that is typed over the Registry, and every random scene, reads this table; a kind without a
+// row does not compile.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -16,57 +17,99 @@ namespace sheetbend::testing {
 enum class UnderRotation { stays, turns };
 
 struct Case {
-  std::vector<double> x, p;           // the stencil's coordinates, away from degenerate shapes, and the parameters inside C
-  double compliance, damping;         // of a size at which a and g matter for particles of about 20 g and substeps of about 4 ms
+  std::vector<double> x,
+      p;  // the stencil's coordinates, away from degenerate shapes, and the parameters inside C
+  double compliance,
+      damping;  // of a size at which a and g matter for particles of about 20 g and substeps of about 4 ms
   UnderRotation under_rotation;
-  int normal = -1;                    // first of the three parameters that are a direction; then C only has to be symmetric about it
-  int degree;                         // C(s x) = s^degree C(x) when each parameter is scaled by s^its degree
+  int normal =
+      -1;      // first of the three parameters that are a direction; then C only has to be symmetric about it
+  int degree;  // C(s x) = s^degree C(x) when each parameter is scaled by s^its degree
   std::vector<int> parameter_degree;
-  std::vector<int> relabeling;        // of the stencil, under which C becomes sign C ...
+  std::vector<int> relabeling;  // of the stencil, under which C becomes sign C ...
   int sign;
-  std::vector<int> parameter_sign;    // ... when the parameters take these signs
-  bool curved = true;                 // whether C has second derivatives
+  std::vector<int> parameter_sign;  // ... when the parameters take these signs
+  bool curved = true;               // whether C has second derivatives
 };
 
 template <class K>
 Case case_of() {
-  static_assert(sizeof(K) == 0, "this registered constraint has no row in tests/cpp/support/cases.h: add one");
+  static_assert(sizeof(K) == 0,
+                "this registered constraint has no row in tests/cpp/support/cases.h: add one");
   return {};
 }
 
 template <>
 inline Case case_of<Distance>() {
-  return {.x = {0, 0, 0, 0.09, 0.03, -0.02}, .p = {0.11}, .compliance = 3e-4, .damping = 3.0,
-          .under_rotation = UnderRotation::stays, .degree = 1, .parameter_degree = {1},
-          .relabeling = {1, 0}, .sign = 1, .parameter_sign = {1}};
+  return {.x = {0, 0, 0, 0.09, 0.03, -0.02},
+          .p = {0.11},
+          .compliance = 3e-4,
+          .damping = 3.0,
+          .under_rotation = UnderRotation::stays,
+          .degree = 1,
+          .parameter_degree = {1},
+          .relabeling = {1, 0},
+          .sign = 1,
+          .parameter_sign = {1}};
 }
 
 template <>
 inline Case case_of<Bend>() {
-  return {.x = {0, 0, 0, 0.1, 0.02, 0.01, 0.18, 0.08, -0.03}, .p = {}, .compliance = 2.0, .damping = 5e-4,
-          .under_rotation = UnderRotation::turns, .degree = 0, .parameter_degree = {},
-          .relabeling = {2, 1, 0}, .sign = -1, .parameter_sign = {}};
+  return {.x = {0, 0, 0, 0.1, 0.02, 0.01, 0.18, 0.08, -0.03},
+          .p = {},
+          .compliance = 2.0,
+          .damping = 5e-4,
+          .under_rotation = UnderRotation::turns,
+          .degree = 0,
+          .parameter_degree = {},
+          .relabeling = {2, 1, 0},
+          .sign = -1,
+          .parameter_sign = {}};
 }
 
 template <>
 inline Case case_of<PlanarBend>() {
-  return {.x = {0, 0, 0, 0.1, 0.02, 0.01, 0.18, 0.08, -0.03}, .p = {0.0, 0.6, 0.8, 0.15}, .compliance = 2.0, .damping = 5e-4,
-          .under_rotation = UnderRotation::turns, .normal = 0, .degree = 0, .parameter_degree = {0, 0, 0, 0},
-          .relabeling = {2, 1, 0}, .sign = -1, .parameter_sign = {1, 1, 1, -1}};
+  return {.x = {0, 0, 0, 0.1, 0.02, 0.01, 0.18, 0.08, -0.03},
+          .p = {0.0, 0.6, 0.8, 0.15},
+          .compliance = 2.0,
+          .damping = 5e-4,
+          .under_rotation = UnderRotation::turns,
+          .normal = 0,
+          .degree = 0,
+          .parameter_degree = {0, 0, 0, 0},
+          .relabeling = {2, 1, 0},
+          .sign = -1,
+          .parameter_sign = {1, 1, 1, -1}};
 }
 
 template <>
 inline Case case_of<Hinge>() {
-  return {.x = {0, 0, 0, 0.1, 0.02, 0.01, 0.18, 0.08, -0.03}, .p = {0.0, 0.6, 0.8, 0.2}, .compliance = 1.0, .damping = 5e-4,
-          .under_rotation = UnderRotation::stays, .normal = 0, .degree = 0, .parameter_degree = {0, 0, 0, 0},
-          .relabeling = {2, 1, 0}, .sign = -1, .parameter_sign = {1, 1, 1, -1}};
+  return {.x = {0, 0, 0, 0.1, 0.02, 0.01, 0.18, 0.08, -0.03},
+          .p = {0.0, 0.6, 0.8, 0.2},
+          .compliance = 1.0,
+          .damping = 5e-4,
+          .under_rotation = UnderRotation::stays,
+          .normal = 0,
+          .degree = 0,
+          .parameter_degree = {0, 0, 0, 0},
+          .relabeling = {2, 1, 0},
+          .sign = -1,
+          .parameter_sign = {1, 1, 1, -1}};
 }
 
 template <>
 inline Case case_of<Attachment>() {
-  return {.x = {0, 0, 0, 0.04, 0.02, -0.03}, .p = {}, .compliance = 3e-4, .damping = 3.0,
-          .under_rotation = UnderRotation::turns, .degree = 1, .parameter_degree = {},
-          .relabeling = {1, 0}, .sign = -1, .parameter_sign = {}, .curved = false};
+  return {.x = {0, 0, 0, 0.04, 0.02, -0.03},
+          .p = {},
+          .compliance = 3e-4,
+          .damping = 3.0,
+          .under_rotation = UnderRotation::turns,
+          .degree = 1,
+          .parameter_degree = {},
+          .relabeling = {1, 0},
+          .sign = -1,
+          .parameter_sign = {},
+          .curved = false};
 }
 
 // The Registry as GoogleTest's list of types, and the names its reports use.

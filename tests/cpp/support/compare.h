@@ -1,4 +1,5 @@
-// Oracles and yardsticks: the complex step, the relative error of one vector against another, equality of bits.
+// Oracles and yardsticks: the complex step, the relative error of one vector against another, equality of
+// bits.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -23,7 +24,9 @@ inline constexpr double complex_step = 0x1p-133;  // a power of two, so that div
 class Random {
  public:
   explicit Random(unsigned seed) : bits_(seed) {}
-  double operator()(double low, double high) { return low + (high - low) * (static_cast<double>(bits_() >> 11) * 0x1p-53); }
+  double operator()(double low, double high) {
+    return low + (high - low) * (static_cast<double>(bits_() >> 11) * 0x1p-53);
+  }
   std::vector<double> vector(std::size_t n, double low = -1.0, double high = 1.0) {
     std::vector<double> v(n);
     for (double& a : v) a = (*this)(low, high);
@@ -87,7 +90,8 @@ inline void record_error(const std::string& what, double error) {
 }
 
 // Compares two gradients quantity by quantity; every quantity that the scene has must matter.
-inline void expect_gradients_agree(const Layout& layout, std::span<const double> found, std::span<const double> oracle, double bound) {
+inline void expect_gradients_agree(const Layout& layout, std::span<const double> found,
+                                   std::span<const double> oracle, double bound) {
   ASSERT_EQ(found.size(), layout.total());
   ASSERT_EQ(oracle.size(), layout.total());
   for (int q = 0; q < quantity_count; ++q) {
@@ -101,9 +105,11 @@ inline void expect_gradients_agree(const Layout& layout, std::span<const double>
 
 template <class T>
 ::testing::AssertionResult same_bits(const std::vector<T>& a, const std::vector<T>& b) {
-  if (a.size() != b.size()) return ::testing::AssertionFailure() << a.size() << " numbers against " << b.size();
+  if (a.size() != b.size())
+    return ::testing::AssertionFailure() << a.size() << " numbers against " << b.size();
   for (std::size_t i = 0; i < a.size(); ++i)
-    if (std::memcmp(&a[i], &b[i], sizeof(T)) != 0) return ::testing::AssertionFailure() << "bits first differ at number " << i;
+    if (std::memcmp(&a[i], &b[i], sizeof(T)) != 0)
+      return ::testing::AssertionFailure() << "bits first differ at number " << i;
   return ::testing::AssertionSuccess();
 }
 

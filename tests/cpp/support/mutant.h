@@ -1,4 +1,5 @@
-// A constraint whose second derivatives are wrong by one part in a million, and in nothing else: the ladder must flag it.
+// A constraint whose second derivatives are wrong by one part in a million, and in nothing else: the ladder
+// must flag it.
 #pragma once
 
 #include "core/scalar/dual.h"
@@ -11,12 +12,14 @@ struct Mutant : K {
   static void evaluate(const T* x, const T* p, T* C, T* J) {
     K::evaluate(x, p, C, J);
   }
-  // On duals the first `rows` directions are those of the coordinates; directions of parameters come after them and stay right.
+  // On duals the first `rows` directions are those of the coordinates; directions of parameters come after
+  // them and stay right.
   template <class T, int N>
   static void evaluate(const Dual<T, N>* x, const Dual<T, N>* p, Dual<T, N>* C, Dual<T, N>* J) {
     K::evaluate(x, p, C, J);
     for (int i = 0; i < K::rows * K::dofs; ++i)
-      for (int direction = 0; direction < std::min(N, K::rows); ++direction) J[i].d[direction] = J[i].d[direction] * T(1.0 + 1e-6);
+      for (int direction = 0; direction < std::min(N, K::rows); ++direction)
+        J[i].d[direction] = J[i].d[direction] * T(1.0 + 1e-6);
   }
 };
 

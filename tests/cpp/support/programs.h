@@ -1,4 +1,5 @@
-// The program that tests differentiate: a rollout with a loss over all its states, in any of the compiled scalars.
+// The program that tests differentiate: a rollout with a loss over all its states, in any of the compiled
+// scalars.
 #pragma once
 
 #include "adjoint/rollout.h"
@@ -14,7 +15,9 @@ struct Program {
 };
 
 // Weight of x[dof]^2 at a step in the loss sum_step sum_dof weight x^2.
-inline double weight(int step, int dof) { return std::remainder(0.618034 * (31 * step + 17 * dof) + 0.1, 1.0); }
+inline double weight(int step, int dof) {
+  return std::remainder(0.618034 * (31 * step + 17 * dof) + 0.1, 1.0);
+}
 
 template <class T>
 Tape<T> record(const Program& p, const std::vector<T>& inputs) {
@@ -40,7 +43,8 @@ std::vector<T> gradient(const Program& p, const std::vector<T>& inputs) {
     wanted.push_back(step);
     for (int i = 0; i < p.scene.dofs(); ++i) x_bar.push_back(T(2.0 * weight(step, i)) * tape.x(step)[i]);
   }
-  reverse_rollout<T>(p.scene, p.plan, inputs.data(), p.t0, tape, wanted, x_bar.data(), inputs_bar.data(), nullptr);
+  reverse_rollout<T>(p.scene, p.plan, inputs.data(), p.t0, tape, wanted, x_bar.data(), inputs_bar.data(),
+                     nullptr);
   return inputs_bar;
 }
 
@@ -62,10 +66,12 @@ struct Solver {
 };
 inline void PrintTo(const Solver& s, std::ostream* out) { *out << s.name; }
 
-inline const auto all_solvers = ::testing::Values(
-    Solver{"Bdf1GaussSeidel", Integrator::bdf1, Partition::gauss_seidel, false}, Solver{"Bdf2GaussSeidel", Integrator::bdf2, Partition::gauss_seidel, true},
-    Solver{"Bdf1Direct", Integrator::bdf1, Partition::direct, false}, Solver{"Bdf2Direct", Integrator::bdf2, Partition::direct, false},
-    Solver{"Bdf2DirectNet", Integrator::bdf2, Partition::direct, true});
+inline const auto all_solvers =
+    ::testing::Values(Solver{"Bdf1GaussSeidel", Integrator::bdf1, Partition::gauss_seidel, false},
+                      Solver{"Bdf2GaussSeidel", Integrator::bdf2, Partition::gauss_seidel, true},
+                      Solver{"Bdf1Direct", Integrator::bdf1, Partition::direct, false},
+                      Solver{"Bdf2Direct", Integrator::bdf2, Partition::direct, false},
+                      Solver{"Bdf2DirectNet", Integrator::bdf2, Partition::direct, true});
 
 inline std::string solver_name(const ::testing::TestParamInfo<Solver>& info) { return info.param.name; }
 

@@ -1,5 +1,6 @@
-// One pass of block projections as a function of everything that it reads, theta = (q, w, C_r, lambda, inputs) -> (q', lambda'),
-// and its reverse. The plan decides whether the blocks are single constraints by color, or direct.
+// One pass of block projections as a function of everything that it reads, theta = (q, w, C_r, lambda,
+// inputs) -> (q', lambda'), and its reverse. The plan decides whether the blocks are single constraints by
+// color, or direct.
 #pragma once
 
 #include "adjoint/project_vjp.h"
@@ -18,7 +19,8 @@ struct Projection {
   // Where the parts of theta begin; the last entry is its size.
   std::vector<std::size_t> offsets() const {
     std::vector<std::size_t> at{0};
-    for (const int size : {scene.dofs(), scene.nodes(), scene.rows, scene.rows}) at.push_back(at.back() + size);
+    for (const int size : {scene.dofs(), scene.nodes(), scene.rows, scene.rows})
+      at.push_back(at.back() + size);
     for (const std::size_t size : scene.layout.size) at.push_back(at.back() + size);
     return at;
   }
@@ -28,7 +30,9 @@ struct Projection {
   std::vector<double> random_theta(const std::vector<double>& inputs, Random& random) const {
     std::vector<double> theta(inputs.begin(), inputs.begin() + scene.dofs());
     for (double& q : theta) q += random(-0.005, 0.005);
-    const auto append = [&](const std::vector<double>& part) { theta.insert(theta.end(), part.begin(), part.end()); };
+    const auto append = [&](const std::vector<double>& part) {
+      theta.insert(theta.end(), part.begin(), part.end());
+    };
     append(random.vector(scene.nodes(), 30.0, 100.0));
     std::vector<double> C_r(scene.rows), lambda(scene.rows);
     for (const Group& group : scene.groups)
@@ -56,17 +60,27 @@ struct Projection {
     SubstepState<T> state;
 
     Run(const Projection& p, const std::vector<T>& theta_)
-        : theta(theta_), out(p.scene.dofs() + p.scene.rows), w(p.scene.nodes()),
-          state{p.scene, {p.scene.layout, &theta[p.inputs_at()]}, p.eta, &out[0], &w[0], &theta[p.offsets()[2]], &out[p.scene.dofs()]} {
+        : theta(theta_),
+          out(p.scene.dofs() + p.scene.rows),
+          w(p.scene.nodes()),
+          state{p.scene,
+                {p.scene.layout, &theta[p.inputs_at()]},
+                p.eta,
+                &out[0],
+                &w[0],
+                &theta[p.offsets()[2]],
+                &out[p.scene.dofs()]} {
       const auto at = p.offsets();
-      for (int n = 0; n < p.scene.nodes(); ++n) w[n] = p.scene.role[n] == Role::free ? theta[at[1] + n] : T(0.0);
+      for (int n = 0; n < p.scene.nodes(); ++n)
+        w[n] = p.scene.role[n] == Role::free ? theta[at[1] + n] : T(0.0);
       std::copy_n(theta.begin(), p.scene.dofs(), out.begin());
-      std::copy_n(theta.begin() + static_cast<std::ptrdiff_t>(at[3]), p.scene.rows, out.begin() + p.scene.dofs());
+      std::copy_n(theta.begin() + static_cast<std::ptrdiff_t>(at[3]), p.scene.rows,
+                  out.begin() + p.scene.dofs());
       record.resize(p.scene, p.plan);
-      Scratch<T> scratch;
-      scratch.resize(p.scene);
+      std::vector<T> rows(p.scene.rows);
       for (const Color& color : p.plan.colors) project_color(state, p.plan.options, color, record);
-      for (std::size_t b = 0; b < p.plan.blocks.size(); ++b) project_block(state, p.plan.blocks[b], scratch, record, record.factors[b]);
+      for (std::size_t b = 0; b < p.plan.blocks.size(); ++b)
+        project_block(state, p.plan.blocks[b], rows.data(), record, record.factors[b]);
     }
   };
 
@@ -81,19 +95,23 @@ struct Projection {
       for (auto color = plan.colors.rbegin(); color != plan.colors.rend(); ++color)
         project_color_vjp(run.state, plan.options, *color, run.record, bar);
       for (std::size_t b = 0; b < plan.blocks.size(); ++b)
-        project_block_vjp(run.state, plan.blocks[b], run.record, run.record.factors[b], rows.data(), {z.data(), u.data()}, bar);
+        project_block_vjp(run.state, plan.blocks[b], run.record, run.record.factors[b], rows.data(),
+                          {z.data(), u.data()}, bar);
     });
   }
 
   // Runs `reverse_blocks` on the cotangents of the outputs; gives those of theta.
   template <class F>
-  std::vector<double> reverse_with(const std::vector<double>& theta, const std::vector<double>& out_bar, F&& reverse_blocks) const {
+  std::vector<double> reverse_with(const std::vector<double>& theta, const std::vector<double>& out_bar,
+                                   F&& reverse_blocks) const {
     const auto at = offsets();
     Run<double> run(*this, theta);
     std::vector<double> bar(theta.size()), fixed(scene.stencil_coordinates);
     std::copy_n(out_bar.begin(), scene.dofs(), bar.begin());
     std::copy_n(out_bar.begin() + scene.dofs(), scene.rows, bar.begin() + static_cast<std::ptrdiff_t>(at[3]));
-    reverse_blocks(run, SubstepCotangent<double>{&bar[0], fixed.data(), &bar[at[3]], &bar[at[1]], &bar[at[2]], {scene.layout, &bar[at[4]]}});
+    reverse_blocks(
+        run, SubstepCotangent<double>{
+                 &bar[0], fixed.data(), &bar[at[3]], &bar[at[1]], &bar[at[2]], {scene.layout, &bar[at[4]]}});
     for (const Group& group : scene.groups)
       for (std::size_t c = 0; c < static_cast<std::size_t>(group.count) * group.arity * 3; ++c)
         bar[scene.first_dof[group.stencil[c / 3]] + c % 3] += fixed[group.first_coordinate + c];
@@ -116,7 +134,8 @@ Sample scene_of_one(unsigned seed, bool damped, std::vector<int> pinned = {}) {
   out.inputs.resize(out.scene.layout.total());
   const Inputs<double> in{out.scene.layout, out.inputs.data()};
   for (int d = 0; d < K::dofs; ++d) in.of(Quantity::position)[d] = sample.x[d] + random(-0.005, 0.005);
-  for (std::size_t k = 0; k < sample.p.size(); ++k) in.of(Quantity::rest)[k] = sample.p[k] + random(-0.02, 0.02);
+  for (std::size_t k = 0; k < sample.p.size(); ++k)
+    in.of(Quantity::rest)[k] = sample.p[k] + random(-0.02, 0.02);
   in.of(Quantity::compliance)[0] = sample.compliance * random(0.5, 1.5);
   in.of(Quantity::damping)[0] = sample.damping * random(0.5, 1.5);
   return out;

@@ -1,6 +1,7 @@
-// Random scenes that hold every registered constraint and every differentiable quantity. Each rope strings together one sample stencil
-// of every kind, jittered, and braces. Ropes start at one driven particle, so that constraints of one color, and direct blocks, share
-// it; or, as a net, at one free particle and with ties between them: one block with branches and loops.
+// Random scenes that hold every registered constraint and every differentiable quantity. Each rope strings
+// together one sample stencil of every kind, jittered, and braces. Ropes start at one driven particle, so
+// that constraints of one color, and direct blocks, share it; or, as a net, at one free particle and with
+// ties between them: one block with branches and loops.
 #pragma once
 
 #include "core/scene/scene.h"
@@ -64,7 +65,8 @@ struct SceneBuilder {
     std::vector<int> nodes{tail};
     for (int k = 1; k < K::arity; ++k) {
       double at[3];
-      for (int d = 0; d < 3; ++d) at[d] = x[3 * tail + d] + sample.x[3 * k + d] - sample.x[d] + random(-0.005, 0.005);
+      for (int d = 0; d < 3; ++d)
+        at[d] = x[3 * tail + d] + sample.x[3 * k + d] - sample.x[d] + random(-0.005, 0.005);
       nodes.push_back(add_particle(at[0], at[1], at[2]));
     }
     std::vector<double> p = sample.p;
@@ -74,7 +76,8 @@ struct SceneBuilder {
   }
 
   void add_brace(int a, int b) {
-    const double l = std::hypot(x[3 * b] - x[3 * a], x[3 * b + 1] - x[3 * a + 1], x[3 * b + 2] - x[3 * a + 2]);
+    const double l =
+        std::hypot(x[3 * b] - x[3 * a], x[3 * b + 1] - x[3 * a + 1], x[3 * b + 2] - x[3 * a + 2]);
     add_constraint<Distance>(false, {a, b}, {l * random(0.97, 1.03)});
   }
 
@@ -100,7 +103,8 @@ struct SceneBuilder {
     fill(Quantity::gravity, -9.0, 9.0);
     fill(Quantity::drag_linear, 0.01, 0.1);
     fill(Quantity::drag_quadratic, 0.01, 0.1);
-    double *compliance = in.of(Quantity::compliance), *damping = in.of(Quantity::damping), *rest = in.of(Quantity::rest);
+    double *compliance = in.of(Quantity::compliance), *damping = in.of(Quantity::damping),
+           *rest = in.of(Quantity::rest);
     for (const Values& g : groups) {
       compliance = std::copy(g.compliance.begin(), g.compliance.end(), compliance);
       damping = std::copy(g.damping.begin(), g.damping.end(), damping);
@@ -130,7 +134,8 @@ inline Sample random_scene(unsigned seed, const SceneShape& shape = {}) {
   b.spec.has_drag = true;
   b.spec.boundary = {{0.0, 0.011, 0.02, 0.05}, Interpolation::cubic};
   b.spec.force = {{0.0, 0.03}, Interpolation::linear};
-  for (const auto& g : b.groups) b.spec.groups.push_back({g.kind + (g.damped ? "_damped" : ""), g.kind, g.damped, g.stencil});
+  for (const auto& g : b.groups)
+    b.spec.groups.push_back({g.kind + (g.damped ? "_damped" : ""), g.kind, g.damped, g.stencil});
   Sample sample{build_scene(b.spec), {}};
   sample.inputs.resize(sample.scene.layout.total());
   b.fill(sample.scene, sample.inputs);

@@ -1,0 +1,5 @@
+"""python -m sheetbend"""
+
+from .cli import main
+
+main()

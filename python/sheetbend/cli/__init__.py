@@ -1,0 +1,22 @@
+"""The command line. `main` is what the console script calls, also in an installation without the packages that it needs."""
+
+from __future__ import annotations
+
+import sys
+
+from ..optional import MissingExtraError, require
+
+NEEDS = ("typer", "rich", "pydantic", "tomli_w")
+
+
+def main() -> None:
+    """Run the command line; exits."""
+    try:
+        for package in NEEDS:
+            require(package, "cli")
+    except MissingExtraError as error:
+        print(f"sheetbend: {error}", file=sys.stderr)
+        sys.exit(2)
+    from .app import app
+
+    app()

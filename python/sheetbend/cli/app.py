@@ -1,0 +1,38 @@
+"""The commands."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from .check import check
+from .fit import fit
+from .info import info
+from .simulate import simulate
+
+app = typer.Typer(
+    name="sheetbend",
+    help="Simulate ropes and beams, and find their physical parameters from recordings, with error bars.",
+    epilog="Exit codes: 0 done, 2 bad input, 3 not identifiable, 4 did not converge, 5 a check failed.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from .. import __version__
+
+        typer.echo(f"sheetbend {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")] = False) -> None:
+    """Simulate ropes and beams, and find their physical parameters from recordings, with error bars."""
+
+
+for command in (simulate, fit, check, info):
+    app.command()(command)

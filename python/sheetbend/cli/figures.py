@@ -1,0 +1,74 @@
+"""The figures that `sheetbend fit` writes."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .. import plotting
+from ..config import Config
+from ..fit import Fit
+from ..prediction import Comparison
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def write_figures(found: Fit, config: Config, folder: Path) -> list[str]:
+    """Measured against simulated for every recording, and the estimates; gives the files' names."""
+    form = config.output.figures
+    if form == "none":
+        return []
+    figures: dict[str, Figure] = {}
+    static = [c for c in found.comparisons if c.experiment.static]
+    if static:
+        figures["shapes"] = _shapes(static)
+    for c in found.comparisons:
+        if not c.experiment.static:
+            name = re.sub(r"[^A-Za-z0-9_.-]", "_", c.experiment.name)
+            figures[f"{name}_markers"] = _trajectories(c)
+            figures[f"{name}_residuals"] = _residuals(c)
+    published = _published(found, config)
+    figures["estimates"] = plotting.plot_estimates(found.result.estimates, published=published, title=config.experiment.name)
+    for name, figure in figures.items():
+        plotting.save(figure, folder / f"{name}.{form}")
+    return [f"{name}.{form}" for name in figures]
+
+
+def _shapes(comparisons: list[Comparison]) -> Figure:
+    spread = np.ptp(np.vstack([c.recording.positions[0] for c in comparisons if np.isfinite(c.recording.positions).any()]), axis=0)
+    first = 0 if spread[0] >= spread[1] else 1
+    return plotting.plot_shapes(
+        [c.recording.positions[0] for c in comparisons],
+        [c.simulated[0] for c in comparisons],
+        names=[c.experiment.name for c in comparisons],
+        plane=(first, 2),
+    )
+
+
+def _trajectories(c: Comparison) -> Figure:
+    x, names = c.recording.positions, c.recording.markers
+    return plotting.plot_trajectories(x, c.simulated, c.recording.times, markers=names, held_out=_held_out(c), title=c.experiment.name)
+
+
+def _residuals(c: Comparison) -> Figure:
+    x, names = c.recording.positions, c.recording.markers
+    return plotting.plot_residuals(x, c.simulated, c.recording.times, markers=names, held_out=_held_out(c), title=c.experiment.name)
+
+
+def _held_out(c: Comparison) -> tuple[float, float] | None:
+    times = c.recording.times[c.held_out]
+    return (float(times[0]), float(times[-1])) if len(times) else None
+
+
+def _published(found: Fit, config: Config) -> dict[str, float | tuple[float, float]]:
+    """By estimate; a private parameter's reference serves each of its estimates."""
+    marks: dict[str, float | tuple[float, float]] = {}
+    for estimate in found.result.estimates:
+        value = config.published.get(estimate.name, config.published.get(estimate.name.partition("[")[0]))
+        if value is not None:
+            marks[estimate.name] = (value[0], value[1]) if isinstance(value, list) else value
+    return marks

@@ -1,0 +1,99 @@
+"""sheetbend fit: parameters with error bars from the recordings of a configuration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from ..config import Config, Study, build, parse
+from ..config.values import with_values, write
+from ..errors import ConfigError
+from ..fit import Fit
+from ..fit import fit as run_fit
+from ..problem import FitProblem, as_parameters
+from ..report import plain, rich_report
+from ..result import FitResult
+from .figures import write_figures
+from .outcome import Code, Outcome, run
+from .progress import Iterations
+
+REPORT_WIDTH = 100
+
+
+def fit(
+    config: Annotated[Path, typer.Argument(help="A TOML configuration.", show_default=False)],
+    output: Annotated[Path | None, typer.Option(help="Folder for fit.json, figures, report and fitted.toml. [default: out/NAME]", show_default=False)] = None,
+    resume: Annotated[Path | None, typer.Option(help="Start from the values of an earlier fit.json.", show_default=False)] = None,
+    strict: Annotated[bool, typer.Option("--strict", help="Exit 3 when any parameter is not identifiable, not only when all are.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")] = False,
+) -> None:
+    """Fit parameters to recordings. Ctrl-C stops at the best point so far and still reports."""
+    run(lambda console: _fit(console, config, output, resume, strict), json)
+
+
+def _fit(console: Console, path: Path, output: Path | None, resume: Path | None, strict: bool) -> Outcome:
+    study = _study(path, resume)
+    config = study.config
+    folder = output if output is not None else Path("out") / config.experiment.name
+    if folder.exists() and not folder.is_dir():
+        raise ConfigError("--output", "is a file", str(folder), "give a folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    console.print(f"[bold]{config.experiment.name}[/]  {config.experiment.about}")
+    fitted = [e for e in study.experiments if e.predict is None]
+    problem = FitProblem(fitted, as_parameters(study.parameters, study.experiments))
+    _check_starts(config, problem)
+    with Iterations(console, problem.parameters) as progress:
+        found = run_fit(study.experiments, parameters=study.parameters, progress=progress, **study.options)
+    _report(console, found.result)
+    files = _write(found, study, folder)
+    console.print(f"\nwritten to {folder}: {', '.join(files)}", soft_wrap=True)
+    data = found.result.to_dict() | {"name": config.experiment.name, "output": str(folder), "files": files}
+    return Outcome(data, _code(found.result, strict or config.fit.strict))
+
+
+def _study(path: Path, resume: Path | None) -> Study:
+    config = parse(path)
+    if not config.recording:
+        raise ConfigError("recording", "is missing", None, "add a [[recording]] with its file, or use `sheetbend simulate`")
+    if all(r.predict is not None for r in config.recording):
+        raise ConfigError("recording[0].predict", "leaves nothing to fit: all recordings are only predicted", config.recording[0].predict, "leave it out for one")
+    if not config.parameters:
+        raise ConfigError("parameters", "is missing", None, "add a [parameters.NAME] for what is to be fitted; `sheetbend info` lists the names")
+    if resume is not None:
+        if not resume.is_file():
+            raise ConfigError("--resume", "is no file", str(resume), "give the fit.json of an earlier fit")
+        config = with_values(config, FitResult.load(resume).values)
+    return build(config, path.parent)
+
+
+def _check_starts(config: Config, problem: FitProblem) -> None:
+    for i, start in enumerate(config.fit.starts):
+        for name in start:
+            if name not in problem.parameters.free:
+                raise ConfigError(f"fit.starts[{i}].{name}", "is no free parameter", name, f"use some of: {', '.join(problem.parameters.free)}")
+
+
+def _report(console: Console, result: FitResult) -> None:
+    """In color in a terminal; where that is narrow its lines wrap, but no column is lost."""
+    if console.is_terminal:
+        Console(stderr=console.stderr, highlight=False, width=max(console.width, REPORT_WIDTH)).print(rich_report(result))
+    else:
+        console.print("\n" + plain(result), markup=False, soft_wrap=True, end="")
+
+
+def _write(found: Fit, study: Study, folder: Path) -> list[str]:
+    """Everything a fit leaves behind; names relative to the folder."""
+    found.save(folder / "fit.json")
+    (folder / "report.txt").write_text(plain(found.result), encoding="utf-8")
+    write(with_values(study.config, found.values), folder / "fitted.toml", study.folder)
+    return ["fit.json", "report.txt", "fitted.toml", *write_figures(found, study.config, folder)]
+
+
+def _code(result: FitResult, strict: bool) -> Code:
+    if not result.converged:
+        return Code.NOT_CONVERGED
+    unknown = [e.verdict == "not identifiable" for e in result.estimates]
+    return Code.NOT_IDENTIFIABLE if (any(unknown) if strict else all(unknown)) else Code.DONE

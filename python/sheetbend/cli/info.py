@@ -1,0 +1,93 @@
+"""sheetbend info: what is installed, and what a configuration holds."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import platform
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from .. import __version__
+from ..config import build, parse, scene_alone
+from ..experiment import Experiment
+from ..optimizers import has_ceres
+from ..scene import KINDS, Scene
+from .outcome import Outcome, run
+
+PACKAGES = ("numpy", "scipy", "torch", "matplotlib", "pydantic", "rich", "typer")
+
+
+def info(
+    config: Annotated[Path | None, typer.Argument(help="A TOML configuration.", show_default=False)] = None,
+    json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")] = False,
+) -> None:
+    """Show versions and what is built in; with a configuration also its scenes, quantities and parameters."""
+    run(lambda console: _info(console, config), json)
+
+
+def _info(console: Console, path: Path | None) -> Outcome:
+    data: dict[str, Any] = {"sheetbend": __version__, "python": platform.python_version(), "packages": _packages()}
+    data |= {"ceres": has_ceres(), "constraints": {name: kind["arity"] for name, kind in KINDS.items()}}
+    console.print(f"[bold]sheetbend {__version__}[/]  Python {data['python']}, {platform.machine()}")
+    console.print("  optimizers   ", "ceres, scipy" if has_ceres() else "scipy (Ceres was not built: install libceres-dev and reinstall)")
+    console.print("  constraints  ", ", ".join(f"{name} ({arity})" for name, arity in data["constraints"].items()))
+    console.print("  packages     ", ", ".join(f"{name} {version or 'missing'}" for name, version in data["packages"].items()))
+    if path is not None:
+        data["config"] = _config(console, path)
+    return Outcome(data)
+
+
+def _packages() -> dict[str, str | None]:
+    """Versions without importing anything."""
+    found: dict[str, str | None] = {}
+    for name in PACKAGES:
+        try:
+            found[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            found[name] = None
+    return found
+
+
+def _config(console: Console, path: Path) -> dict[str, Any]:
+    config = parse(path)
+    study = build(config, path.parent)
+    console.print(f"\n[bold]{config.experiment.name}[/]  {config.experiment.about}")
+    scenes = [_recorded(e) for e in study.experiments] or [_counts(scene_alone(config)[0])]
+    first = study.experiments[0].scene if study.experiments else scene_alone(config)[0]
+    for scene in scenes:
+        console.print("  " + ", ".join(f"{name} {_text(value)}" for name, value in scene.items()), soft_wrap=True)
+    table = Table("quantity", "value", "unit", "parameter", box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for name, q in first.quantities.items():
+        table.add_row(name, f"{q.value:.6g}", q.unit, _role(study.parameters.get(name)))
+    console.print(table)
+    return {"name": config.experiment.name, "scenes": scenes, "quantities": {n: q.value for n, q in first.quantities.items()}, "parameters": list(study.parameters)}
+
+
+def _recorded(e: Experiment) -> dict[str, Any]:
+    shown = {"recording": e.name, "frames": len(e.recording.times), "markers": len(e.compared)}
+    return shown | ({"static": True} if e.static else {"h": e.solver.h}) | _counts(e.scene)
+
+
+def _counts(scene: Scene) -> dict[str, Any]:
+    groups = {g.name: len(g.particles) for g in scene.groups}
+    return {"particles": scene.particle_count, "dofs": 3 * len(scene.free), "constraints": groups}
+
+
+def _role(fields: Any) -> str:
+    if fields is None:
+        return ""
+    if fields.get("fixed"):
+        return "fixed"
+    if "tied_to" in fields:
+        return f"tied to {fields['tied_to']}"
+    return "fitted, one per recording" if fields.get("private") else "fitted"
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, dict):
+        return "(" + ", ".join(f"{name} {count}" for name, count in value.items()) + ")"
+    return f"{value:g}" if isinstance(value, float) else str(value)

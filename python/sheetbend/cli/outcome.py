@@ -1,0 +1,83 @@
+"""How a command ends: its exit code, what it prints for people, and the JSON object on the last line of stdout."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any
+
+import typer
+from rich.console import Console
+from rich.text import Text
+
+from ..errors import InputError, SheetbendError
+from ..optional import MissingExtraError
+
+
+class Code(IntEnum):
+    """Exit codes."""
+
+    DONE = 0
+    BAD_INPUT = 2
+    NOT_IDENTIFIABLE = 3
+    NOT_CONVERGED = 4
+    CHECK_FAILED = 5
+    INTERRUPTED = 130
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a command found."""
+
+    data: Mapping[str, Any] = field(default_factory=dict)
+    code: Code = Code.DONE
+
+
+def run(command: Callable[[Console], Outcome], as_json: bool) -> None:
+    """Run a command, report its errors, and exit with its code.
+
+    With `as_json` stdout holds one JSON object and nothing else; everything for people goes to stderr.
+    """
+    console = Console(stderr=as_json, highlight=False)
+    try:
+        outcome = command(console)
+    except (InputError, MissingExtraError) as error:
+        outcome = _failed(error, Code.BAD_INPUT)
+    except SheetbendError as error:
+        outcome = _failed(error, Code.NOT_CONVERGED)
+    except KeyboardInterrupt:
+        _complain("interrupted", [])
+        outcome = Outcome({"error": {"message": "interrupted"}}, Code.INTERRUPTED)
+    if as_json:
+        print(json.dumps(strict({**outcome.data, "exit_code": int(outcome.code)}), allow_nan=False), flush=True)
+    raise typer.Exit(int(outcome.code))
+
+
+def strict(value: Any) -> Any:
+    """Plain JSON values: no NaN and no infinity, None in their place."""
+    if isinstance(value, Mapping):
+        return {key: strict(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [strict(part) for part in value]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return value
+
+
+def _failed(error: SheetbendError, code: Code) -> Outcome:
+    more = list(getattr(error, "__notes__", []))
+    _complain(str(error), more)
+    told: dict[str, Any] = {"message": str(error)}
+    if isinstance(error, InputError):
+        told |= {"field": error.field, "problem": error.problem, "got": repr(error.got), "fix": error.fix}
+    return Outcome({"error": told | ({"more": more} if more else {})}, code)
+
+
+def _complain(message: str, more: list[str]) -> None:
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    console.print(Text.assemble(("error ", "bold red"), message))
+    for other in more:
+        console.print(Text.assemble(("  and ", "red"), other))

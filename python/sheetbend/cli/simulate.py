@@ -1,0 +1,114 @@
+"""sheetbend simulate: the motion or the rest of a configuration's scene, at its starting values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich.console import Console
+
+from ..config import Study, build, parse, scene_alone
+from ..equilibrium import equilibrium
+from ..errors import ConfigError
+from ..experiment import Experiment
+from ..scene import Scene
+from ..simulate import Trajectory
+from ..simulate import simulate as run_simulation
+from ..solver import Solver
+from .outcome import Outcome, run
+
+FRAME = 0.01  # s between frames where no recording tells
+DURATION = 1.0  # s where no recording tells
+
+
+@dataclass(frozen=True)
+class Task:
+    """A scene and how it is to be run; `times` (frames,) s from its start."""
+
+    name: str
+    scene: Scene
+    solver: Solver
+    times: np.ndarray
+    static: bool = False
+    at_rest: bool = False
+
+
+def simulate(
+    config: Annotated[Path, typer.Argument(help="A TOML configuration; a fit's fitted.toml too.", show_default=False)],
+    output: Annotated[Path | None, typer.Option(help="Folder for the trajectories. [default: out/NAME]", show_default=False)] = None,
+    duration: Annotated[float | None, typer.Option(help="s; to the recording's end when left out.", show_default=False)] = None,
+    recording: Annotated[str | None, typer.Option(help="Only the scene of this recording.", show_default=False)] = None,
+    json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")] = False,
+) -> None:
+    """Simulate a scene and write its trajectory as NPZ: times, positions, velocities and the constraints' forces."""
+    run(lambda console: _simulate(console, config, output, duration, recording), json)
+
+
+def _simulate(console: Console, path: Path, output: Path | None, duration: float | None, recording: str | None) -> Outcome:
+    if duration is not None and not (np.isfinite(duration) and duration > 0):
+        raise ConfigError("--duration", "must be positive", duration, "give s")
+    study = build(parse(path), path.parent)
+    name = study.config.experiment.name
+    folder = output if output is not None else Path("out") / name
+    tasks = _tasks(study, duration, recording)
+    folder.mkdir(parents=True, exist_ok=True)
+    console.print(f"[bold]{name}[/]  {study.config.experiment.about}")
+    return Outcome({"name": name, "simulated": {task.name: _run(console, task, folder) for task in tasks}})
+
+
+def _tasks(study: Study, duration: float | None, recording: str | None) -> list[Task]:
+    experiments = [e for e in study.experiments if recording in (None, e.name)]
+    if recording is not None and not experiments:
+        known = ", ".join(e.name for e in study.experiments) or "none"
+        raise ConfigError("--recording", "is not in the configuration", recording, f"name one of: {known}")
+    if experiments:
+        return [_task(e, duration) for e in experiments]
+    scene, solver = scene_alone(study.config)
+    frame = round(max(FRAME / solver.h, 1.0)) * solver.h
+    return [Task(study.config.experiment.name, scene, solver, np.arange(0.0, (duration or DURATION) + frame / 2, frame))]
+
+
+def _task(e: Experiment, duration: float | None) -> Task:
+    """Frames as often as the recording's, on the substep grid."""
+    if e.static:
+        return Task(e.name, e.scene, e.solver, np.zeros(1), static=True)
+    frame = float(np.median(np.diff(e.recording.times)))
+    frame = max(round(frame / e.solver.h), 1) * e.solver.h
+    length = duration or float(e.recording.times[-1]) - e.t0
+    return Task(e.name, e.scene, e.solver, np.arange(0.0, length + frame / 2, frame), at_rest=e.start == "equilibrium")
+
+
+def _run(console: Console, task: Task, folder: Path) -> dict[str, Any]:
+    motion = _motion(task)
+    path = folder / f"{task.name}.npz"
+    forces = {f"force_{group}": values for group, values in motion.forces.items()}
+    np.savez_compressed(path, times=motion.times, positions=motion.positions, velocities=motion.velocities, **forces)
+    moved = np.linalg.norm(motion.positions - motion.positions[0], axis=2)
+    summary = {
+        "npz": str(path),
+        "frames": len(motion.times),
+        "particles": task.scene.particle_count,
+        "duration": float(motion.times[-1]),
+        "h": task.solver.h,
+        "largest_displacement": float(moved.max()),
+        "largest_speed": float(np.linalg.norm(motion.velocities, axis=2).max()),
+        "largest_force": {group: float(np.abs(values).max()) for group, values in motion.forces.items()},
+    }
+    told = "at rest" if task.static else f"{summary['duration']:.4g} s in {summary['frames']} frames, h = {task.solver.h:.4g} s"
+    reach = "" if task.static else f", moved up to {summary['largest_displacement']:.4g} m at up to {summary['largest_speed']:.4g} m/s"
+    console.print(f"  {task.name}: {summary['particles']} particles, {told}{reach}; {path}", soft_wrap=True)
+    return summary
+
+
+def _motion(task: Task) -> Trajectory:
+    start = None
+    if task.static or task.at_rest:
+        rest = equilibrium(task.scene)
+        if task.static:
+            still = np.zeros_like(rest.positions)[None]
+            return Trajectory(task.times, rest.positions[None], still, {group: values[None] for group, values in rest.forces.items()})
+        start = rest.positions
+    return run_simulation(task.scene, task.times, task.solver, start=start)

@@ -1,0 +1,107 @@
+"""The tables of docs/configuration.md, made from the schema: `python -m sheetbend.config.reference docs/configuration.md` renews them."""
+
+from __future__ import annotations
+
+import json
+import sys
+import types
+import typing
+from pathlib import Path
+from typing import Any
+
+from pydantic.fields import FieldInfo
+
+from . import scene_schema, schema
+from .section import AXES, NAME, REFERENCE, Section
+
+HEADERS: dict[str, type[Section]] = {
+    "[experiment]": schema.ExperimentSection,
+    "[solver]": schema.SolverSection,
+    "[scene]": scene_schema.SceneSection,
+    "[[scene.rope]]": scene_schema.Rope,
+    "[[scene.particles]]": scene_schema.Particles,
+    "[[scene.pendulum]]": scene_schema.Pendulum,
+    "[[scene.arm]]": scene_schema.Arm,
+    "[[scene.constraints]]": scene_schema.Constraints,
+    "[[scene.point_mass]]": scene_schema.PointMass,
+    "[[scene.force]]": scene_schema.Force,
+    "[[scene.drive]]": scene_schema.Drive,
+    "[scene.quantities.NAME]": scene_schema.ExtraQuantity,
+    "[[recording]]": schema.RecordingSection,
+    "[[marker]], [[recording.marker]]": schema.Marker,
+    "[parameters.NAME]": schema.ParameterSection,
+    "[fit]": schema.FitSection,
+    "[output]": schema.OutputSection,
+}
+START, END = "<!-- tables: start -->", "<!-- tables: end -->"
+
+
+def tables() -> str:
+    """Markdown: a heading, what the section is, and a table of its keys, for every section."""
+    return "\n".join(_section(header, model) for header, model in HEADERS.items())
+
+
+def renewed(text: str) -> str:
+    """A document with the part between the markers replaced by the tables."""
+    before, rest = text.split(START)
+    _, after = rest.split(END)
+    return f"{before}{START}\n\n{tables()}\n{END}{after}"
+
+
+def _section(header: str, model: type[Section]) -> str:
+    about = " ".join((model.__doc__ or "").split())
+    lines = [f"### `{header}`", "", about, "", "| key | type | default | unit | meaning |", "| --- | --- | --- | --- | --- |"]
+    lines += [_row(name, field) for name, field in model.model_fields.items()]
+    return "\n".join([*lines, ""])
+
+
+def _row(name: str, field: FieldInfo) -> str:
+    extra = field.json_schema_extra
+    unit = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+    cells = (f"`{name}`", _type(field.annotation, field.metadata), _default(field), unit, field.description or "")
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "**required**"
+    value: Any = field.get_default(call_default_factory=True, validated_data={})
+    return "" if value is None or value == {} or value == "" else f"`{json.dumps(value)}`"
+
+
+_PLAIN = {float: "number", int: "whole number", str: "text", bool: "true or false"}
+
+
+def _type(annotation: Any, metadata: list[Any]) -> str:
+    origin, parts = typing.get_origin(annotation), typing.get_args(annotation)
+    if origin is typing.Annotated:
+        return _type(parts[0], list(parts[1:]))
+    if origin in (typing.Union, types.UnionType):
+        return " or ".join(_type(part, []) for part in parts if part is not types.NoneType)
+    if origin is typing.Literal:
+        return ", ".join(f"`{json.dumps(part)}`" for part in parts)
+    if origin is list:
+        return "list of tables" if _is_section(parts[0]) else f"list of {_type(parts[0], [])}"
+    if origin is dict:
+        return "tables by name" if _is_section(parts[1]) else f"{_type(parts[1], [])} by name"
+    if annotation is str:
+        pattern = _pattern(metadata)
+        return {NAME: "name", REFERENCE: "particle", AXES: "axes"}.get(pattern, "text")
+    return _PLAIN.get(annotation, str(annotation))
+
+
+def _is_section(annotation: Any) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, Section)
+
+
+def _pattern(metadata: list[Any]) -> str:
+    for part in metadata:
+        for inner in [part, *getattr(part, "metadata", [])]:
+            if getattr(inner, "pattern", None):
+                return str(inner.pattern)
+    return ""
+
+
+if __name__ == "__main__":
+    document = Path(sys.argv[1])
+    document.write_text(renewed(document.read_text(encoding="utf-8")), encoding="utf-8")

@@ -1,0 +1,56 @@
+"""Configurations with other starting values: how a fit is written back, and resumed."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..optional import require
+from .schema import Config, ParameterSection
+
+
+def with_values(config: Config, values: Mapping[str, float]) -> Config:
+    """The configuration starting at the values (by expanded name, as in fit.json); names that it does not fit are left out.
+
+    Shared parameters start at `parameters.NAME.initial`, private ones at the recordings' `values`.
+    """
+    parameters = dict(config.parameters)
+    recordings = list(config.recording)
+    names = [r.name or Path(r.file).stem for r in recordings]
+    for name, value in values.items():
+        base, _, recording = name.removesuffix("]").partition("[")
+        section = parameters.get(base)
+        if section is None or section.tied_to is not None or not math.isfinite(value):
+            continue
+        value = _inside(section, value)
+        if recording and recording in names:
+            i = names.index(recording)
+            recordings[i] = recordings[i].model_copy(update={"values": {**recordings[i].values, base: value}})
+        elif not recording:
+            parameters[base] = section.model_copy(update={"initial": value})
+    return config.model_copy(update={"parameters": parameters, "recording": recordings})
+
+
+def write(config: Config, path: Path, folder: Path) -> None:
+    """Write a configuration as TOML with the keys that were set.
+
+    Args:
+        folder: what the recordings' files are relative to now; they are written relative to the new file.
+
+    Raises:
+        MissingExtraError: tomli-w is not installed.
+    """
+    content: dict[str, Any] = config.model_dump(exclude_unset=True, exclude_none=True)
+    for recording in content.get("recording", []):
+        recording["file"] = Path(os.path.relpath(folder / recording["file"], path.parent)).as_posix()
+    path.write_text(require("tomli_w", "cli").dumps(content), encoding="utf-8")
+
+
+def _inside(section: ParameterSection, value: float) -> float:
+    """A value that sits on a bound comes back from its logarithm a rounding error outside."""
+    lower = -math.inf if section.lower is None else section.lower
+    upper = math.inf if section.upper is None else section.upper
+    return float(min(max(value, lower), upper))

@@ -1,0 +1,15 @@
+"""PyTorch: rollouts and equilibria as differentiable functions of tensors, and a Module that learns named quantities.
+
+The only part of sheetbend that imports torch. Everything here is float64 on the CPU, and works with autograd (twice differentiable) and
+with torch.func: grad, vjp, jvp, vmap, jacrev, jacfwd, hessian. Arrays pass between torch and the core without copies.
+"""
+
+from ..optional import require
+
+require("torch", "torch")
+
+from .equilibrium import Equilibrium, equilibrium  # noqa: E402
+from .module import SceneModule  # noqa: E402
+from .simulate import Simulation, simulate  # noqa: E402
+
+__all__ = ["Equilibrium", "SceneModule", "Simulation", "equilibrium", "simulate"]

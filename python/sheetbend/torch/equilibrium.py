@@ -1,0 +1,99 @@
+"""Differentiable static equilibrium of scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple, NoReturn
+
+import numpy as np
+from numpy.typing import ArrayLike
+from torch import Tensor
+
+from .. import _core
+from ..checks import finite
+from ..equilibrium import NoEquilibriumError
+from ..errors import SceneError
+from ..scene import Scene
+from ..simulate import forces_by_group
+from .function import Value
+from .inputs import InputMap
+from .rollouts import expect_finite
+
+Array = np.ndarray
+
+
+class Equilibrium(NamedTuple):
+    """A state of rest: positions (*batch, particles, 3) m, and per group the multipliers (*batch, count, rows), see `sheetbend.Equilibrium`."""
+
+    positions: Tensor
+    forces: dict[str, Tensor]
+
+
+class Equilibria:
+    """Coordinates and multipliers (B, dofs + rows) of the equilibria for inputs (B, total), one solution and one derivative per scene."""
+
+    def __init__(self, scene: Scene, start: Array | None, stable: bool) -> None:
+        self._scene, self._start, self._stable = scene, start, stable
+        self._kept: tuple[Array, list[_core.EquilibriumSolution]] | None = None
+
+    def value(self, inputs: Array) -> Array:
+        """Raises InputError where inputs are not finite, NoEquilibriumError."""
+        return np.stack([np.concatenate([s.positions, s.multipliers]) for s in self._solutions(inputs)])
+
+    def vjp(self, inputs: Array, states_bar: Array) -> Array:
+        dofs = self._scene.compiled.core.dofs
+        solutions = self._solutions(inputs)
+        return np.stack([s.vjp(bar[:dofs], bar[dofs:]) for s, bar in zip(solutions, states_bar, strict=True)])
+
+    def jvp(self, inputs: Array, inputs_dot: Array) -> Array:
+        solutions = self._solutions(inputs)
+        return np.stack([np.concatenate(s.jvp(dot)) for s, dot in zip(solutions, inputs_dot, strict=True)])
+
+    def vjp_dot(self, *_: Array) -> NoReturn:
+        raise NotImplementedError("sheetbend.torch.equilibrium: second derivatives are not available. Fix: differentiate once")
+
+    def _solutions(self, inputs: Array) -> list[_core.EquilibriumSolution]:
+        kept = self._kept
+        if kept is not None and np.array_equal(kept[0], inputs):
+            return kept[1]
+        expect_finite(self._scene, inputs)
+        # jacrev and jacfwd repeat one scene once per row or column.
+        rows, scene_of = np.unique(inputs, axis=0, return_inverse=True)
+        distinct = [_core.equilibrium(self._scene.compiled.core, row, self._start, self._stable) for row in rows]
+        for solution in distinct:
+            if not solution.converged:
+                raise NoEquilibriumError(f"{self._scene.name}: {solution.message}")
+        solutions = [distinct[k] for k in scene_of.reshape(-1)]
+        self._kept = inputs.copy(), solutions
+        return solutions
+
+
+def equilibrium(
+    scene: Scene,
+    start: ArrayLike | None = None,
+    values: Mapping[str, Tensor | float] | None = None,
+    inputs: Mapping[str, Tensor] | None = None,
+    stable: bool = True,
+) -> Equilibrium:
+    """The equilibrium that a start leads to, once differentiable in every tensor given, by the implicit function theorem.
+
+    A batch is solved scene by scene. Second derivatives raise NotImplementedError.
+
+    Args:
+        scene: is frozen by this.
+        start: (particles, 3) m, not differentiated; the scene's initial positions by default.
+        values: quantities to change, by name: tensors (*batch,), or plain numbers.
+        inputs: input arrays to replace, as in `simulate`.
+        stable: leave saddles; False goes to the nearest equilibrium whatever its stability.
+
+    Raises:
+        SceneError: the start has the wrong shape.
+        InputError: a tensor with an unknown name, of the wrong shape or dtype, on another device, or not finite.
+        NoEquilibriumError: not converged; says how far it came and what to try.
+    """
+    x = None if start is None else finite("start", start, (scene.particle_count, 3), SceneError).ravel()
+    flat = InputMap(scene)(values or {}, inputs or {})
+    batch, dofs = flat.shape[:-1], scene.compiled.core.dofs
+    states = Value.apply(Equilibria(scene, x, stable), flat.reshape(-1, flat.shape[-1])).reshape(*batch, -1)
+    forces = forces_by_group(scene, states[..., dofs:])  # slices and reshapes only, so tensors pass
+    return Equilibrium(states[..., :dofs].reshape(*batch, -1, 3), forces)

@@ -1,0 +1,130 @@
+"""The flat inputs of a scene as torch operations on the tensors of its named quantities and arrays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+import torch
+from torch import Tensor
+
+from ..errors import InputError
+from ..quantities import FUNCTIONS
+from ..scene import Scene
+
+_TORCH: Mapping[str, Callable[[Tensor], Tensor]] = {
+    "identity": lambda x: x,
+    "inverse": torch.reciprocal,
+    "square": torch.square,
+    "sin": torch.sin,
+    "cos": torch.cos,
+}
+
+
+class ParameterMap:
+    """inputs[target] = base[target] + sum of coefficient * prod f(theta), as adjoint/parameter_map.h, in its order of operations.
+
+    Plain torch operations, so every transform differentiates and batches it by itself.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        arrays = scene.compiled.map()
+        self._base = torch.tensor(arrays["base"], dtype=torch.float64)
+        self._target = torch.tensor(arrays["target"], dtype=torch.long)
+        self._coefficient = torch.tensor(arrays["coefficient"], dtype=torch.float64)
+        parameter, function = arrays["parameter"], arrays["function"]
+        # Each quantity under each function is computed once; a term picks its factors from these, and ones fill up short terms.
+        pairs = sorted(set(zip(function, parameter, strict=True)))
+        self._groups = [
+            (_TORCH[name], torch.tensor([p for f, p in pairs if f == number], dtype=torch.long)) for name, number in FUNCTIONS.items()
+        ]
+        place = {pair: i for i, pair in enumerate(pairs)}
+        first = arrays["first_factor"]
+        factors = [[place[function[k], parameter[k]] for k in range(a, b)] for a, b in zip(first, first[1:], strict=False)]
+        longest = max(map(len, factors), default=0)
+        self._factors = torch.tensor([f + [len(pairs)] * (longest - len(f)) for f in factors], dtype=torch.long).reshape(-1, longest)
+
+    def __call__(self, theta: Tensor) -> Tensor:
+        """(..., quantities) to (..., total)."""
+        functions = [f(theta.index_select(-1, which)) for f, which in self._groups]
+        values = torch.cat([*functions, theta.new_ones(*theta.shape[:-1], 1)], -1)
+        product = self._coefficient
+        for column in self._factors.unbind(1):
+            product = product * values.index_select(-1, column)
+        return self._base.expand(*theta.shape[:-1], -1).index_add(-1, self._target, product.expand(*theta.shape[:-1], -1))
+
+
+class InputMap:
+    """From tensors by name to flat inputs (*batch, total)."""
+
+    def __init__(self, scene: Scene) -> None:
+        compiled = scene.compiled
+        self._names, self._layout = compiled.names, compiled.layout
+        self._shapes = {name: tuple(array.shape) for name, array in scene.base_arrays().items()}
+        self._theta = torch.tensor(compiled.theta, dtype=torch.float64)
+        self._map = ParameterMap(scene)
+
+    def __call__(self, values: Mapping[str, Tensor | float], arrays: Mapping[str, Tensor]) -> Tensor:
+        """Quantities (*batch,) and arrays (*batch, ...), whose batch dimensions broadcast, to (*batch, total).
+
+        Raises:
+            InputError: unknown name, not a tensor, not float64, not on the CPU, wrong shape, batches that do not broadcast.
+        """
+        batches = {name: self._batch_of_value(name, value) for name, value in values.items()}
+        batches |= {name: self._batch_of_array(name, array) for name, array in arrays.items()}
+        batch = _broadcast(batches)
+        flat = self._map(self._quantities(values, batch))
+        if not arrays:
+            return flat
+        parts = [
+            arrays[name].reshape(*batches[name], size).expand(*batch, size) if name in arrays else flat[..., offset : offset + size]
+            for name, (offset, size) in self._layout.items()
+        ]
+        return torch.cat(parts, -1)
+
+    def _batch_of_value(self, name: str, value: Tensor | float) -> tuple[int, ...]:
+        field = f"values.{name}"
+        if name not in self._names:
+            raise InputError(field, "is no quantity of the scene", name, f"name one of: {', '.join(self._names)}")
+        return () if isinstance(value, int | float) else _dense(field, value)
+
+    def _batch_of_array(self, name: str, array: Tensor) -> tuple[int, ...]:
+        field = f"inputs.{name}"
+        present = [n for n, (_, size) in self._layout.items() if size > 0]
+        if name not in present:
+            raise InputError(field, "is no input array of the scene", name, f"name one of: {', '.join(present)}")
+        shape, wanted = _dense(field, array), self._shapes[name]
+        dims = len(shape) - len(wanted)
+        if dims < 0 or shape[dims:] != wanted:
+            raise InputError(field, "has the wrong shape", shape, f"give {wanted}, with batch dimensions in front if any")
+        return shape[:dims]
+
+    def _quantities(self, values: Mapping[str, Tensor | float], batch: tuple[int, ...]) -> Tensor:
+        """(*batch, quantities)."""
+        if not values:
+            return self._theta.expand(*batch, -1)
+        each = [values.get(name, default) for name, default in zip(self._names, self._theta, strict=True)]
+        return torch.stack([torch.as_tensor(v, dtype=torch.float64).expand(batch) for v in each], -1)
+
+
+def _dense(field: str, tensor: object) -> tuple[int, ...]:
+    """The shape of a dense float64 tensor on the CPU, or an error that says what else it is."""
+    if not isinstance(tensor, Tensor):
+        raise InputError(field, "is not a tensor", type(tensor).__name__, "give a torch tensor of float64")
+    if tensor.device.type != "cpu":
+        raise InputError(field, "is not on the CPU", str(tensor.device), "move it there with .cpu()")
+    if tensor.dtype != torch.float64:
+        raise InputError(field, "is not float64", str(tensor.dtype), "convert it with .double()")
+    if tensor.layout != torch.strided:
+        raise InputError(field, "is not dense", str(tensor.layout), "convert it with .to_dense()")
+    return tuple(tensor.shape)
+
+
+def _broadcast(batches: Mapping[str, tuple[int, ...]]) -> tuple[int, ...]:
+    try:
+        batch = tuple(torch.broadcast_shapes(*batches.values()))
+    except RuntimeError as error:
+        raise InputError("batch", "dimensions do not broadcast", dict(batches), "give all the same batch dimensions, or none") from error
+    if math.prod(batch) == 0:
+        raise InputError("batch", "is empty", batch, "give at least one scene")
+    return batch
