@@ -49,7 +49,8 @@ def renewed(text: str) -> str:
 
 
 def _section(header: str, model: type[Section]) -> str:
-    about = " ".join((model.__doc__ or "").split())
+    about = " ".join((model.__doc__ or "").split()).removeprefix(f"{header}: ")
+    about = about[0].upper() + about[1:]
     lines = [f"### `{header}`", "", about, "", "| key | type | default | unit | meaning |", "| --- | --- | --- | --- | --- |"]
     lines += [_row(name, field) for name, field in model.model_fields.items()]
     return "\n".join([*lines, ""])
@@ -59,7 +60,7 @@ def _row(name: str, field: FieldInfo) -> str:
     extra = field.json_schema_extra
     unit = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
     cells = (f"`{name}`", _type(field.annotation, field.metadata), _default(field), unit, field.description or "")
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+    return "| " + " | ".join(cell.replace("|", "\\|").replace("<", "\\<") for cell in cells) + " |"
 
 
 def _default(field: FieldInfo) -> str:
@@ -80,6 +81,8 @@ def _type(annotation: Any, metadata: list[Any]) -> str:
         return " or ".join(_type(part, []) for part in parts if part is not types.NoneType)
     if origin is typing.Literal:
         return ", ".join(f"`{json.dumps(part)}`" for part in parts)
+    if origin is list and _count(metadata):
+        return f"{_count(metadata)} numbers"
     if origin is list:
         return "list of tables" if _is_section(parts[0]) else f"list of {_type(parts[0], [])}"
     if origin is dict:
@@ -88,6 +91,14 @@ def _type(annotation: Any, metadata: list[Any]) -> str:
         pattern = _pattern(metadata)
         return {NAME: "name", REFERENCE: "particle", AXES: "axes"}.get(pattern, "text")
     return _PLAIN.get(annotation, str(annotation))
+
+
+def _count(metadata: list[Any]) -> int:
+    """The number of entries where it is fixed."""
+    inner = [part for one in metadata for part in [one, *getattr(one, "metadata", [])]]
+    least = {part.min_length for part in inner if hasattr(part, "min_length")}
+    most = {part.max_length for part in inner if hasattr(part, "max_length")}
+    return least.pop() if least and least == most else 0
 
 
 def _is_section(annotation: Any) -> bool:
