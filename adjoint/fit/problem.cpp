@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
+#include <set>
 
 #include "adjoint/equilibrium_tangents.h"
 #include "core/scalar/dual.h"
@@ -25,9 +26,13 @@ Problem::Problem(std::vector<Experiment> experiments, std::vector<double> theta,
                  std::vector<FreeParameter> free, int threads)
     : experiments_(std::move(experiments)), theta_(std::move(theta)), slots_(std::move(slots_of_experiment)), free_(std::move(free)),
       first_row_{0}, threads_(threads) {
-  for (const Experiment& e : experiments_) {
-    e.check();
-    first_row_.push_back(first_row_.back() + static_cast<int>(e.residual_count()));
+  for (std::size_t i = 0; i < experiments_.size(); ++i) {
+    experiments_[i].check();
+    first_row_.push_back(first_row_.back() + static_cast<int>(experiments_[i].residual_count()));
+    const std::set<int> used(slots_[i].begin(), slots_[i].end());
+    columns_.emplace_back();
+    for (int k = 0; k < parameters(); ++k)
+      if (std::any_of(free_[k].slots.begin(), free_[k].slots.end(), [&](int slot) { return used.contains(slot); })) columns_[i].push_back(k);
   }
   for (const FreeParameter& p : free_) priors_ += p.has_prior;
 }
@@ -48,43 +53,53 @@ std::vector<T> Problem::local_theta(const std::vector<T>& theta, int experiment)
   return local;
 }
 
-// One sweep carries N columns of the Jacobian of one experiment; the first sweep also writes the residuals.
+// The first sweep of an experiment also writes its residuals.
 template <int N>
-void Problem::evaluate_columns(const double* u, int experiment, int first_column, double* residual, double* jacobian,
-                               Interrupt* interrupt) const {
+void Problem::evaluate_columns(const double* u, int experiment, int first, double* residual, double* jacobian, Interrupt* interrupt) const {
   using D = Dual<double, N>;
-  const int columns = std::min(N, parameters() - first_column);
+  const std::vector<int>& columns = columns_[experiment];
+  const int count = std::min(N, static_cast<int>(columns.size()) - first);
   std::vector<D> duals(u, u + parameters()), theta(theta_.size());
-  for (int k = 0; k < columns; ++k) duals[first_column + k].d[k] = 1.0;
+  for (int k = 0; k < count; ++k) duals[columns[first + k]].d[k] = 1.0;
   set_theta(duals.data(), theta.data());
   const int rows = first_row_[experiment + 1] - first_row_[experiment];
   std::vector<D> r(rows);
   experiments_[experiment].residuals(local_theta(theta, experiment).data(), r.data(), static_cast<D*>(nullptr), interrupt);
   for (int i = 0; i < rows; ++i) {
     const std::size_t row = first_row_[experiment] + i;
-    if (first_column == 0) residual[row] = r[i].v;
-    for (int k = 0; k < columns; ++k) jacobian[row * parameters() + first_column + k] = r[i].d[k];
+    if (first == 0) residual[row] = r[i].v;
+    for (int k = 0; k < count; ++k) jacobian[row * parameters() + columns[first + k]] = r[i].d[k];
   }
 }
 
+std::vector<Problem::Sweep> Problem::sweeps(bool jacobian) const {
+  std::vector<Sweep> list;
+  for (int e = 0; e < static_cast<int>(experiments_.size()); ++e) {
+    const int columns = jacobian ? static_cast<int>(columns_[e].size()) : 0;
+    if (columns == 0) list.push_back({e, 0, 0});
+    for (int first = 0; first < columns; first += 8) list.push_back({e, first, columns - first <= 4 ? 4 : 8});
+  }
+  return list;
+}
+
 bool Problem::evaluate(const double* u, double* residual, double* jacobian, Interrupt* interrupt) const {
-  const int p = parameters(), n = static_cast<int>(experiments_.size());
-  const int width = jacobian ? (p <= 4 ? 4 : 8) : std::max(p, 1);
-  const int sweeps = (p + width - 1) / width;
+  const int p = parameters();
+  if (jacobian) std::fill_n(jacobian, static_cast<std::size_t>(rows()) * p, 0.0);
+  const std::vector<Sweep> jobs = sweeps(jacobian != nullptr);
   std::mutex failing;
   bool ok = true;
-  parallel_for(n * sweeps, threads_, 1, [&](int begin, int end) {
+  parallel_for(static_cast<int>(jobs.size()), threads_, 1, [&](int begin, int end) {
     for (int job = begin; job < end; ++job) {
-      const int e = job / sweeps, column = (job % sweeps) * width;
+      const auto [e, first, width] = jobs[job];
       try {
-        if (!jacobian) {
+        if (width == 0) {
           std::vector<double> theta(theta_.size());
           set_theta(u, theta.data());
           experiments_[e].residuals(local_theta(theta, e).data(), residual + first_row_[e], static_cast<double*>(nullptr), interrupt);
         } else if (width == 4) {
-          evaluate_columns<4>(u, e, column, residual, jacobian, interrupt);
+          evaluate_columns<4>(u, e, first, residual, jacobian, interrupt);
         } else {
-          evaluate_columns<8>(u, e, column, residual, jacobian, interrupt);
+          evaluate_columns<8>(u, e, first, residual, jacobian, interrupt);
         }
       } catch (const Diverged& error) {
         std::lock_guard lock(failing);

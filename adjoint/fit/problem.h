@@ -46,12 +46,19 @@ class Problem {
   template <class T>
   std::vector<T> local_theta(const std::vector<T>& theta, int experiment) const;
   template <int N>
-  void evaluate_columns(const double* u, int experiment, int first_column, double* residual, double* jacobian, Interrupt* interrupt) const;
+  void evaluate_columns(const double* u, int experiment, int first, double* residual, double* jacobian, Interrupt* interrupt) const;
+
+  // A rollout that carries `width` columns of an experiment's Jacobian, or none.
+  struct Sweep {
+    int experiment, first, width;
+  };
+  std::vector<Sweep> sweeps(bool jacobian) const;
 
   std::vector<Experiment> experiments_;
   std::vector<double> theta_;
   std::vector<std::vector<int>> slots_;  // per experiment: where its parameters stand in theta
   std::vector<FreeParameter> free_;
+  std::vector<std::vector<int>> columns_;  // per experiment: the free parameters that reach it; its other columns are zero
   std::vector<int> first_row_;
   int priors_ = 0, threads_ = 1;
   mutable std::string failure_;

@@ -84,7 +84,18 @@ struct EquilibriumSolver::State {
           "start: the residual is not finite. Fix: give finite inputs and a start without edges of no length or folded back");
   }
 
-  double force_stiffness() const { return edge > 0.0 ? weight / edge : 0.0; }
+  // A scale of stiffness that is there before any multiplier: of the loads or, without loads, a part of the softest constraint's.
+  double force_stiffness() const {
+    if (weight > 0.0 && edge > 0.0) return weight / edge;
+    double softest = std::numeric_limits<double>::infinity();
+    for_each_constraint(scene, [&]<class K>(K, const Group& group, int item) {
+      double local[K::dofs], J2 = 0.0;
+      gather<K>(scene, group, item, x.data(), local);
+      for (const double j : Evaluation<K, double>(local, rest_parameters<K>(in, group, item)).J) J2 = std::max(J2, j * j);
+      if (const double alpha = compliance()[group.first + item]; alpha > 0.0) softest = std::min(softest, J2 / alpha);
+    });
+    return std::isfinite(softest) ? 1e-4 * softest : 0.0;
+  }
   double first_pseudo_stiffness(Kkt& kkt, const double* alpha) const {
     kkt.factorize(0.0, alpha);
     return std::max(1e-6 * kkt.largest_diagonal(), force_stiffness());

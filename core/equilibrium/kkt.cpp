@@ -120,7 +120,9 @@ bool Kkt::factorize(double mu, const double* compliance) {
     double J2 = 0.0;
     for (int e = 0; e < K::rows * K::dofs; ++e) J2 = std::max(J2, J[e] * J[e]);
     double& alpha = softened_[group.first + item];
-    alpha = std::max(alpha_[group.first + item], J2 > 0.0 ? J2 / (rigid_stiffness * geometric) : 1.0);
+    alpha = alpha_[group.first + item];
+    if (J2 > 0.0 && geometric > 0.0) alpha = std::max(alpha, J2 / (rigid_stiffness * geometric));
+    if (alpha == 0.0) alpha = 1.0;  // a rigid row without any scale of stiffness
     for (int a = 0; a < K::dofs; ++a)
       for (int b = 0; b < K::dofs; ++b, ++position) {
         if (*position < 0) continue;

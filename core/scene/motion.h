@@ -1,5 +1,5 @@
 // Values given at knots in time: x(t) = sum_i weight_i knot_i with at most four knots, so that the adjoint is the same weights.
-// cubic is C1: Hermite pieces whose slopes are the quadratic through three neighboring knots (exact for quadratics, also on uneven knots).
+// cubic is C1: Hermite pieces whose slopes are the quadratic through three neighboring knots (exact for quadratics on inner pieces, also on uneven knots; one-sided slopes at the ends).
 // Before the first and after the last knot the end value holds.
 #pragma once
 

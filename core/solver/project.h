@@ -99,8 +99,8 @@ void assemble(const SubstepState<T>& s, const DirectBlock& block, const T* J, Fa
     int row_stride, column_stride;
     const Member &row = block.members[c.row_member], &column = block.members[c.column_member];
     const T *a = gradient(row, c.row_slot, row_stride), *b = gradient(column, c.column_slot, column_stride);
-    with_size<3>(s.scene.groups[row.group].rows, [&]<int R>() {
-      with_size<3>(s.scene.groups[column.group].rows, [&]<int C>() {
+    with_size<max_rows>(s.scene.groups[row.group].rows, [&]<int R>() {
+      with_size<max_rows>(s.scene.groups[column.group].rows, [&]<int C>() {
         add_coupling<R, C>(s.w[c.node], a, row_stride, b, column_stride, &block.position[c.first_position], factor.values.data());
       });
     });

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <condition_variable>
 #include <deque>
 #include <exception>
@@ -93,17 +94,20 @@ class Pool {
   std::size_t size_ = 0;
 };
 
-// One pool per process; leaked on purpose, so that detached workers never outlive what they touch.
+// One pool per process; leaked on purpose, so that detached workers never outlive what they touch. No lock is held here that a fork could
+// leave locked: two threads that race for the first pool of a process both make one, and one is used.
 Pool& pool() {
-  static std::mutex guard;
-  static Pool* instance = nullptr;
-  static pid_t owner = 0;
-  std::lock_guard lock(guard);
-  if (instance == nullptr || owner != getpid()) {
-    instance = new Pool;
-    owner = getpid();
+  struct Owned {
+    pid_t process;
+    Pool pool;
+  };
+  static std::atomic<Owned*> instance = nullptr;
+  Owned* current = instance.load();
+  while (current == nullptr || current->process != getpid()) {
+    auto fresh = std::make_unique<Owned>(getpid());
+    if (instance.compare_exchange_strong(current, fresh.get())) return fresh.release()->pool;
   }
-  return *instance;
+  return current->pool;
 }
 
 }  // namespace

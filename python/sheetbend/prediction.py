@@ -103,7 +103,7 @@ def _with_baseline(c: Comparison, experiments: Sequence[Experiment]) -> Comparis
         source: list[Recording] = [e.fitted()]
         target = e.held()
     else:
-        source = [o.fitted() for o in experiments if o.predict is None and o.names == e.names and o.static == e.static]
+        source = [o.fitted() for o in experiments if o.predict is None and _alike(o, e)]
         target = c.recording
     if not source or target is None:
         return c
@@ -111,3 +111,8 @@ def _with_baseline(c: Comparison, experiments: Sequence[Experiment]) -> Comparis
     predicted = np.full(c.simulated.shape, np.nan)
     predicted[held] = np.where(guess.scored[..., None], guess.positions, target.positions)
     return replace(c, baseline=predicted, baseline_words=guess.words)
+
+
+def _alike(one: Experiment, other: Experiment) -> bool:
+    """Whether two recordings show the same thing, so that one predicts the other without physics."""
+    return one.names == other.names and one.static == other.static and set(one.scene.quantities) == set(other.scene.quantities)

@@ -81,7 +81,7 @@ class FitProblem:
         if len(set(names)) != len(names):
             raise InputError("experiments", "share a name", names, "give each a name of its own")
         self.parameters = self._expanded(parameters) if expanded is None else expanded
-        theta, slots, slot_of = self._slots(parameters)
+        theta, slots, slot_of = self._slots()
         self.core = _core.Problem(
             experiments=[e.core(r) for e, r in zip(self.experiments, self.recordings, strict=True)],
             theta=theta,
@@ -95,13 +95,30 @@ class FitProblem:
         held = self.parameters.replace(name, fixed=True, initial=value, prior=None, lower=-np.inf, upper=np.inf)
         return FitProblem(self.experiments, self.given, self.recordings, self.threads, held)
 
+    def around(self, name: str) -> FitProblem:
+        """The part that one free (expanded) parameter is tied to, through shared parameters; the rest of the minimum does not depend on it."""
+        free = set(self.parameters.free)
+        free_of = [{self.parameters.roots[key][0] for key in self._keys(e).values() if key in self.parameters} & free for e in self.experiments]
+        names: set[str] = {name}
+        chosen: list[int] = []
+        while (reached := [i for i, mine in enumerate(free_of) if mine & names]) != chosen:
+            chosen = reached
+            names |= set().union(*(free_of[i] for i in chosen))
+        part = Parameters(p for key, p in self.parameters.items() if self.parameters.roots[key][0] in names | (set(self.parameters) - free))
+        return FitProblem([self.experiments[i] for i in chosen], self.given, [self.recordings[i] for i in chosen], self.threads, part)
+
+    def _keys(self, e: Experiment) -> dict[str, str]:
+        """Expanded parameter name of each quantity of an experiment, whether or not it is a parameter."""
+        private = {p.name for p in self.given.values() if p.private}
+        return {name: f"{name}[{e.name}]" if name in private else name for name in e.scene.quantities}
+
     def _expanded(self, parameters: Parameters) -> Parameters:
         has = {f"{name}[{e.name}]": q.value for e in self.experiments for name, q in e.scene.quantities.items()}
         every = parameters.expand([e.name for e in self.experiments], has)
         private = {f"{p.name}[{e.name}]" for p in parameters.values() if p.private for e in self.experiments}
         return Parameters(p for name, p in every.items() if name not in private or name in has)
 
-    def _slots(self, parameters: Parameters) -> tuple[list[float], list[list[int]], dict[str, int]]:
+    def _slots(self) -> tuple[list[float], list[list[int]], dict[str, int]]:
         """theta, per experiment the place of each of its quantities in it, and the place of each expanded parameter."""
         values = {name: p for name, p in self.parameters.items()}
         theta: list[float] = []
@@ -109,8 +126,8 @@ class FitProblem:
         slots = []
         for e in self.experiments:
             mine = []
-            for name, quantity in e.scene.quantities.items():
-                key = f"{name}[{e.name}]" if name in parameters and parameters[name].private else name
+            for name, key in self._keys(e).items():
+                quantity = e.scene.quantities[name]
                 if key in values and key in slot_of:
                     mine.append(slot_of[key])
                     continue

@@ -28,8 +28,7 @@ std::vector<double> without_tape(const Program& p, const std::vector<double>& in
 }
 
 // Each substep again from the tape's states, as the reverse does.
-std::vector<double> recomputed(const Program& p, const Tape<double>& tape,
-                               const std::vector<double>& inputs) {
+std::vector<double> recomputed(const Program& p, const Tape<double>& tape, const std::vector<double>& inputs) {
   const Inputs<const double> in{p.scene.layout, inputs.data()};
   const std::size_t dofs = p.scene.dofs();
   std::vector<double> all(tape.x(0), tape.x(0) + dofs), q(dofs), v(dofs), v_before(dofs), v_out(dofs);
@@ -55,8 +54,7 @@ TEST_P(Bits, AreEqualWithAndWithoutTape) {
 }
 
 TEST_P(Bits, AreEqualRunAfterRun) {
-  const Sample sample = random_scene(71, {.net = GetParam().net}),
-               again = random_scene(71, {.net = GetParam().net});
+  const Sample sample = random_scene(71, {.net = GetParam().net}), again = random_scene(71, {.net = GetParam().net});
   EXPECT_TRUE(same_bits(sample.inputs, again.inputs));
   const auto first = gradient(program(sample.scene), sample.inputs);
   EXPECT_TRUE(same_bits(first, gradient(program(again.scene), again.inputs)));
@@ -85,8 +83,7 @@ TEST_P(Bits, AreEqualInEveryLane) {
   std::vector<std::vector<double>> inputs(Pack::lanes, sample.inputs);
   std::vector<Pack> packed(sample.inputs.size());
   for (int lane = 0; lane < Pack::lanes; ++lane)
-    for (std::size_t i = 0; i < packed.size(); ++i)
-      packed[i].set(lane, inputs[lane][i] *= random(0.98, 1.02));
+    for (std::size_t i = 0; i < packed.size(); ++i) packed[i].set(lane, inputs[lane][i] *= random(0.98, 1.02));
   const auto lane_of = [](const std::vector<Pack>& packs, int lane) {
     std::vector<double> out;
     for (const Pack& a : packs) out.push_back(a[lane]);

@@ -34,8 +34,7 @@ std::vector<int> shuffled(int n, unsigned seed) {
 }
 
 struct Coloring : ::testing::TestWithParam<bool> {};
-INSTANTIATE_TEST_SUITE_P(, Coloring, ::testing::Bool(),
-                         [](const auto& info) { return info.param ? "Net" : "Ropes"; });
+INSTANTIATE_TEST_SUITE_P(, Coloring, ::testing::Bool(), [](const auto& info) { return info.param ? "Net" : "Ropes"; });
 
 TEST_P(Coloring, HoldsEveryConstraintOnce) {
   const Scene scene = random_scene(80, {.net = GetParam()}).scene;
@@ -106,10 +105,9 @@ TEST(DirectBlock, ChainIsANarrowBand) {
                   .blocks.at(0)
                   .structure.half_bandwidth(),
               1);
-    EXPECT_EQ(make_plan(rope(n, true, in_order(n)), {.partition = Partition::direct})
-                  .blocks.at(0)
-                  .structure.half_bandwidth(),
-              10);
+    EXPECT_EQ(
+        make_plan(rope(n, true, in_order(n)), {.partition = Partition::direct}).blocks.at(0).structure.half_bandwidth(),
+        10);
   }
 }
 
@@ -129,9 +127,8 @@ TEST(DirectBlock, ChainIsANarrowBandHoweverItsParticlesAreNumbered) {
 
 TEST(Plan, RefusesWhatCannotBeStepped) {
   const Scene scene = rope(3, false, in_order(3));
-  for (const SolverOptions& bad :
-       {SolverOptions{.h = 0.0}, SolverOptions{.h = -1.0}, SolverOptions{.h = std::nan("")},
-        SolverOptions{.iterations = 0}, SolverOptions{.threads = 0}}) {
+  for (const SolverOptions& bad : {SolverOptions{.h = 0.0}, SolverOptions{.h = -1.0}, SolverOptions{.h = std::nan("")},
+                                   SolverOptions{.iterations = 0}, SolverOptions{.threads = 0}}) {
     try {
       make_plan(scene, bad);
       ADD_FAILURE() << "accepted";

@@ -69,8 +69,7 @@ double hessian_error(const Stencil& s, const std::vector<double>& oracle_scale) 
   for (int d = 0; d < K::dofs; ++d) {
     const auto e = unit(z.size(), d);
     const auto found = dual_along<K>(z, e), oracle = complex_step_along(evaluate_joined<K, Complex>, z, e);
-    for (std::size_t i = K::rows; i < found.size(); ++i)
-      worst = std::max(worst, std::abs(found[i] - oracle[i]));
+    for (std::size_t i = K::rows; i < found.size(); ++i) worst = std::max(worst, std::abs(found[i] - oracle[i]));
   }
   return worst == 0.0 ? 0.0 : worst / largest(oracle_scale);
 }
@@ -83,8 +82,7 @@ std::vector<double> hessians(const Stencil& s) {
   for (int b = 0; b < K::dofs; ++b) {
     const auto column = dual_along<K>(z, unit(z.size(), b));
     for (int j = 0; j < K::rows; ++j)
-      for (int a = 0; a < K::dofs; ++a)
-        H[(j * K::dofs + a) * K::dofs + b] = column[K::rows + j * K::dofs + a];
+      for (int a = 0; a < K::dofs; ++a) H[(j * K::dofs + a) * K::dofs + b] = column[K::rows + j * K::dofs + a];
   }
   return H;
 }
@@ -223,8 +221,7 @@ TYPED_TEST(Constraint, RotationTurnsOrKeepsC) {
     for (int j = 0; j < K::rows; ++j) {
       Vec3<double> torque;
       for (int k = 0; k < K::arity; ++k)
-        torque =
-            torque + cross(Vec3<double>(&s.x[3 * k]), Vec3<double>(&before[K::rows + j * K::dofs + 3 * k]));
+        torque = torque + cross(Vec3<double>(&s.x[3 * k]), Vec3<double>(&before[K::rows + j * K::dofs + 3 * k]));
       if constexpr (K::rows == 3)
         if (turns) torque = torque - cross(Vec3<double>(C.data()), Vec3<double>(unit(3, j).data()));
       if (!axis.empty()) torque = {dot(torque, Vec3<double>(axis.data())), 0.0, 0.0};
@@ -294,8 +291,8 @@ TEST(Distance, CoincidentParticlesHaveNoDirection) {
 
 TEST(Bend, LengthIsTwiceTheTangentOfHalfTheAngle) {
   const double theta = 0.7;
-  const auto value = evaluate<Bend>({0, 0, 0, 2, 0, 0, 2 + 3 * std::cos(theta), 3 * std::sin(theta), 0},
-                                    std::vector<double>{});
+  const auto value =
+      evaluate<Bend>({0, 0, 0, 2, 0, 0, 2 + 3 * std::cos(theta), 3 * std::sin(theta), 0}, std::vector<double>{});
   EXPECT_NEAR(value[2], 2 * std::tan(theta / 2), 1e-15);
 }
 

@@ -118,8 +118,8 @@ TEST_P(FactorOf, HasTheSameBitsInEveryLane) {
   const FactorStructure s(n, entries);
   std::vector<Eigen::MatrixXd> A;
   for (int lane = 0; lane < Pack::lanes; ++lane) A.push_back(random_matrix(n, entries, lane));
-  const auto packed = factored<Pack>(
-      s, entries, [&](int i, int j) { return per_lane([&](int lane) { return A[lane](i, j); }); });
+  const auto packed =
+      factored<Pack>(s, entries, [&](int i, int j) { return per_lane([&](int lane) { return A[lane](i, j); }); });
   std::vector<Pack> x(n, Pack(1.0));
   packed.solve(s, x.data());
   for (int lane = 0; lane < Pack::lanes; ++lane) {

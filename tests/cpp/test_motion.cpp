@@ -29,9 +29,7 @@ double slope(const Knots& knots, const std::vector<double>& values, double t, do
 
 struct Motion : ::testing::TestWithParam<Interpolation> {};
 INSTANTIATE_TEST_SUITE_P(, Motion, ::testing::Values(Interpolation::linear, Interpolation::cubic),
-                         [](const auto& param) {
-                           return param.param == Interpolation::linear ? "Linear" : "Cubic";
-                         });
+                         [](const auto& param) { return param.param == Interpolation::linear ? "Linear" : "Cubic"; });
 
 TEST_P(Motion, WeightsSumToOneAndStayInside) {
   const Knots knots{uneven, GetParam()};
@@ -48,8 +46,7 @@ TEST_P(Motion, WeightsSumToOneAndStayInside) {
 TEST_P(Motion, PassesThroughItsKnotsAndHoldsItsEnds) {
   const Knots knots{uneven, GetParam()};
   const std::vector<double> values{3, -1, 4, 1, -5, 9};
-  for (std::size_t i = 0; i < uneven.size(); ++i)
-    EXPECT_NEAR(value(knots, values, uneven[i]), values[i], 1e-14);
+  for (std::size_t i = 0; i < uneven.size(); ++i) EXPECT_NEAR(value(knots, values, uneven[i]), values[i], 1e-14);
   EXPECT_EQ(value(knots, values, -1.0), 3.0);
   EXPECT_EQ(value(knots, values, 2.0), 9.0);
 }
@@ -63,8 +60,7 @@ TEST_P(Motion, OneAndTwoKnotsWork) {
 TEST(LinearMotion, IsExactForLines) {
   const auto line = [](double t) { return 3.0 - 2.0 * t; };
   for (int i = 0; i <= 100; ++i)
-    EXPECT_NEAR(value({uneven, Interpolation::linear}, sampled(uneven, line), i / 100.0), line(i / 100.0),
-                1e-14);
+    EXPECT_NEAR(value({uneven, Interpolation::linear}, sampled(uneven, line), i / 100.0), line(i / 100.0), 1e-14);
 }
 
 // Exact where three knots give both slopes; in the end pieces the outer slope is one-sided.
@@ -75,16 +71,14 @@ TEST(CubicMotion, IsExactForQuadraticsOnUnevenKnots) {
   for (double t = uneven[1]; t <= uneven[4]; t += 1.0 / 512)
     EXPECT_NEAR(value(knots, values, t), parabola(t), 1e-14) << t;
   const auto line = [](double t) { return 3.0 - 2.0 * t; };
-  for (int i = 0; i <= 100; ++i)
-    EXPECT_NEAR(value(knots, sampled(uneven, line), i / 100.0), line(i / 100.0), 1e-14);
+  for (int i = 0; i <= 100; ++i) EXPECT_NEAR(value(knots, sampled(uneven, line), i / 100.0), line(i / 100.0), 1e-14);
 }
 
 TEST(CubicMotion, HasContinuousSlopes) {
   const Knots knots{uneven, Interpolation::cubic};
   const std::vector<double> values{3, -1, 4, 1, -5, 9};
   for (std::size_t i = 1; i + 1 < uneven.size(); ++i) {
-    const double h = 1e-3, left = slope(knots, values, uneven[i], -h),
-                 right = slope(knots, values, uneven[i], h);
+    const double h = 1e-3, left = slope(knots, values, uneven[i], -h), right = slope(knots, values, uneven[i], h);
     EXPECT_NEAR(left / right, 1.0, 1e-9) << "knot " << i;
   }
 }

@@ -86,8 +86,7 @@ TEST(Pool, WorksInAForkedChild) {
 #ifdef __SANITIZE_THREAD__
   GTEST_SKIP() << "ThreadSanitizer does not allow threads in a forked child";
 #endif
-  ASSERT_EQ(visits(100, 3, 1),
-            std::vector<int>(100, 1));  // the parent's workers exist; the child has none of them
+  ASSERT_EQ(visits(100, 3, 1), std::vector<int>(100, 1));  // the parent's workers exist; the child has none of them
   const pid_t child = fork();
   ASSERT_GE(child, 0);
   if (child == 0) {

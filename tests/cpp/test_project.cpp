@@ -32,8 +32,8 @@ std::vector<double> oracle_cotangent(const Projection& p, const std::vector<doub
 }
 
 // Worst relative error over the parts of theta.
-double cotangent_error(const Projection& p, const std::vector<double>& found,
-                       const std::vector<double>& oracle, std::string* where = nullptr) {
+double cotangent_error(const Projection& p, const std::vector<double>& found, const std::vector<double>& oracle,
+                       std::string* where = nullptr) {
   const auto at = p.offsets();
   double worst = 0.0;
   for (std::size_t part = 0; part + 1 < at.size(); ++part) {
@@ -65,8 +65,7 @@ double climb(const Projection& p, const std::vector<double>& inputs, unsigned se
   for (std::size_t i = 0; i < theta.size(); ++i) probe[i].v = theta[i], probe[i].d[0] = direction[i];
   std::vector<double> tangent;
   for (const Dual1& d : p.forward(probe)) tangent.push_back(d.d[0]);
-  const auto oracle =
-      complex_step_along([&](const std::vector<Complex>& z) { return p.forward(z); }, theta, direction);
+  const auto oracle = complex_step_along([&](const std::vector<Complex>& z) { return p.forward(z); }, theta, direction);
   const std::size_t dofs = p.scene.dofs();
   EXPECT_LE(relative_error(std::span(tangent).first(dofs), std::span(oracle).first(dofs)), bound);
   EXPECT_LE(relative_error(std::span(tangent).subspan(dofs), std::span(oracle).subspan(dofs)), bound);
@@ -88,8 +87,8 @@ TYPED_TEST(BlockOfOne, DerivativesMatchComplexStep) {
     for (const bool damped : {false, true})
       for (int pinned = -1; pinned < K::arity; ++pinned)
         for (unsigned seed = 0; seed < 5; ++seed) {
-          SCOPED_TRACE(::testing::Message() << "direct " << static_cast<int>(partition) << " damped "
-                                            << damped << " pinned " << pinned);
+          SCOPED_TRACE(::testing::Message()
+                       << "direct " << static_cast<int>(partition) << " damped " << damped << " pinned " << pinned);
           const Sample sample =
               scene_of_one<K>(seed, damped, pinned < 0 ? std::vector<int>{} : std::vector<int>{pinned});
           worst = std::max(worst, climb(Projection(sample.scene, partition, eta), sample.inputs, seed));
@@ -101,26 +100,24 @@ TYPED_TEST(BlockOfOne, DerivativesMatchComplexStep) {
 template <class K>
 std::vector<double> reverse_of_one(const Projection& p, const std::vector<double>& theta,
                                    const std::vector<double>& out_bar) {
-  return p.reverse_with(theta, out_bar,
-                        [&](Projection::Run<double>& run, const SubstepCotangent<double>& bar) {
-                          const Group& group = p.scene.groups[0];
-                          const Element<K, double> e(run.state, group, 0, run.record.x.data());
-                          const Evaluation<K, double> value(e.x, e.p);
-                          double A[K::rows * K::rows], y[K::rows], z[K::dofs], u[K::dofs]{}, x_bar[K::dofs]{};
-                          e.matrix(value.J, A);
-                          adjoint_right_side(run.state, e, value.J, bar, y);
-                          SmallLdlt<K::rows, double>(A).solve(y);
-                          transpose_times<K>(value.J, run.record.dl.data(), u);
-                          transpose_times<K>(value.J, y, x_bar);
-                          for (int d = 0; d < K::dofs; ++d) {
-                            x_bar[d] = -x_bar[d];
-                            z[d] = bar.x[d] + x_bar[d];
-                            bar.w[d / 3] += u[d] * z[d];
-                          }
-                          pull_back_element<K>(run.state, group, 0, e, run.record.lambda.data(),
-                                               run.record.dl.data(), y, z, u, x_bar, bar);
-                          add_cotangent(run.state, e, 0, x_bar, bar);
-                        });
+  return p.reverse_with(theta, out_bar, [&](Projection::Run<double>& run, const SubstepCotangent<double>& bar) {
+    const Group& group = p.scene.groups[0];
+    const Element<K, double> e(run.state, group, 0, run.record.x.data());
+    const Evaluation<K, double> value(e.x, e.p);
+    double A[K::rows * K::rows], y[K::rows], z[K::dofs], u[K::dofs]{}, x_bar[K::dofs]{};
+    e.matrix(value.J, A);
+    adjoint_right_side(run.state, e, value.J, bar, y);
+    SmallLdlt<K::rows, double>(A).solve(y);
+    transpose_times<K>(value.J, run.record.dl.data(), u);
+    transpose_times<K>(value.J, y, x_bar);
+    for (int d = 0; d < K::dofs; ++d) {
+      x_bar[d] = -x_bar[d];
+      z[d] = bar.x[d] + x_bar[d];
+      bar.w[d / 3] += u[d] * z[d];
+    }
+    pull_back_element<K>(run.state, group, 0, e, run.record.lambda.data(), run.record.dl.data(), y, z, u, x_bar, bar);
+    add_cotangent(run.state, e, 0, x_bar, bar);
+  });
 }
 
 TYPED_TEST(BlockOfOne, MutantIsFlagged) {
@@ -183,18 +180,15 @@ std::vector<double> by_formula(const Projection& p, const std::vector<double>& t
       for (int i = 0; i < group.count; ++i) {
         std::vector<double> x;
         for (const int n : group.nodes(i)) x.insert(x.end(), &theta[3 * n], &theta[3 * n] + 3);
-        const Evaluation<K, double> value(x.data(),
-                                          in.of(Quantity::rest) + group.first_value + i * parameter_count<K>);
+        const Evaluation<K, double> value(x.data(), in.of(Quantity::rest) + group.first_value + i * parameter_count<K>);
         const double alpha = in.of(Quantity::compliance)[group.first + i],
                      beta = in.of(Quantity::damping)[group.first + i];
         for (int j = 0; j < K::rows; ++j) {
           const int row = group.first_row + i * K::rows + j;
           a[row] = alpha / (p.eta * p.eta);
           g[row] = group.damped ? alpha * beta / p.eta : 0.0;
-          s[row] = value.C[j] + a[row] * theta[at[3] + row] +
-                   g[row] * difference<K>(value.C[j], theta[at[2] + row]);
-          for (int d = 0; d < K::dofs; ++d)
-            J(row, 3 * group.nodes(i)[d / 3] + d % 3) = value.J[j * K::dofs + d];
+          s[row] = value.C[j] + a[row] * theta[at[3] + row] + g[row] * difference<K>(value.C[j], theta[at[2] + row]);
+          for (int d = 0; d < K::dofs; ++d) J(row, 3 * group.nodes(i)[d / 3] + d % 3) = value.J[j * K::dofs + d];
         }
       }
     });

@@ -42,8 +42,8 @@ TEST(RandomScene, SharesADrivenParticleWithinAColorAndBetweenBlocks) {
 
 TEST(RandomScene, NetIsSparse) {
   const Plan plan = make_plan(random_scene(50, {.net = true}).scene, {.partition = Partition::direct});
-  EXPECT_TRUE(std::any_of(plan.blocks.begin(), plan.blocks.end(),
-                          [](const DirectBlock& b) { return !b.structure.banded(); }));
+  EXPECT_TRUE(
+      std::any_of(plan.blocks.begin(), plan.blocks.end(), [](const DirectBlock& b) { return !b.structure.banded(); }));
 }
 
 // Mass, forces and drag times c, compliance over c (and beta times c, for alpha beta is what damps): the same
@@ -91,8 +91,7 @@ TEST(RolloutThatDiverges, SaysWhereAndWhen) {
   std::vector<double> inputs = sample.inputs;
   inputs[sample.scene.layout.of(Quantity::velocity) + 3 * 4] = std::nan("");
   try {
-    record(Program{sample.scene,
-                   make_plan(sample.scene, {.partition = Partition::gauss_seidel, .iterations = 1}), 5},
+    record(Program{sample.scene, make_plan(sample.scene, {.partition = Partition::gauss_seidel, .iterations = 1}), 5},
            inputs);
     FAIL() << "a NaN went unnoticed";
   } catch (const Diverged& e) {
@@ -109,8 +108,7 @@ TEST(RolloutInterrupted, Stops) {
   const Sample sample = random_scene(54);
   const Plan plan = make_plan(sample.scene, {});
   StopAtOnce stop;
-  EXPECT_THROW(record_rollout<double>(sample.scene, plan, sample.inputs.data(), 0.0, 5, &stop),
-               std::runtime_error);
+  EXPECT_THROW(record_rollout<double>(sample.scene, plan, sample.inputs.data(), 0.0, 5, &stop), std::runtime_error);
 }
 
 }  // namespace

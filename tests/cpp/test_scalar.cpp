@@ -8,8 +8,8 @@
 namespace sheetbend::testing {
 namespace {
 
-static_assert(Scalar<double> && Scalar<Complex> && Scalar<Pack> && Scalar<Dual<double, 3>> &&
-              Scalar<Dual<Pack, 2>> && Scalar<Dual<Dual<double, 1>, 1>> && Scalar<Dual<Complex, 1>>);
+static_assert(Scalar<double> && Scalar<Complex> && Scalar<Pack> && Scalar<Dual<double, 3>> && Scalar<Dual<Pack, 2>> &&
+              Scalar<Dual<Dual<double, 1>, 1>> && Scalar<Dual<Complex, 1>>);
 
 // Everything that a scalar offers, in one smooth function of two variables.
 template <class T>
@@ -23,13 +23,11 @@ T mixture(const T& a, const T& b) {
 
 constexpr double a0 = 1.7, b0 = 0.6;
 const auto oracle = [](double va, double vb) {
-  return complex_step_along([](const std::vector<Complex>& z) { return std::vector{mixture(z[0], z[1])}; },
-                            {a0, b0}, {va, vb})[0];
+  return complex_step_along([](const std::vector<Complex>& z) { return std::vector{mixture(z[0], z[1])}; }, {a0, b0},
+                            {va, vb})[0];
 };
 
-TEST(Complex, HasTheValueOfDouble) {
-  EXPECT_NEAR(mixture(Complex(a0), Complex(b0)).re, mixture(a0, b0), 1e-15);
-}
+TEST(Complex, HasTheValueOfDouble) { EXPECT_NEAR(mixture(Complex(a0), Complex(b0)).re, mixture(a0, b0), 1e-15); }
 
 // Against a central difference once, so that the oracle itself does not stand on air.
 TEST(Complex, StepMatchesCentralDifference) {

@@ -23,12 +23,11 @@ TEST_P(ForwardOverReverse, MatchesComplexStepOfTheGradient) {
     for (std::size_t i = layout.offset[q]; i < layout.offset[q + 1]; ++i)
       direction[i] = random(-1.0, 1.0) * std::abs(sample.inputs[i]);
     std::vector<Dual1> probe(layout.total());
-    for (std::size_t i = 0; i < probe.size(); ++i)
-      probe[i].v = sample.inputs[i], probe[i].d[0] = direction[i];
+    for (std::size_t i = 0; i < probe.size(); ++i) probe[i].v = sample.inputs[i], probe[i].d[0] = direction[i];
     std::vector<double> product;
     for (const Dual1& d : gradient(program, probe)) product.push_back(d.d[0]);
-    const auto oracle = complex_step_along(
-        [&](const std::vector<Complex>& z) { return gradient(program, z); }, sample.inputs, direction);
+    const auto oracle = complex_step_along([&](const std::vector<Complex>& z) { return gradient(program, z); },
+                                           sample.inputs, direction);
     expect_gradients_agree(layout, product, oracle, 1e-8);
   }
 }

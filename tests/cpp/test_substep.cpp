@@ -80,8 +80,7 @@ TEST_P(Substep, ReverseMatchesComplexStep) {
     const std::size_t dofs = scene.dofs();
     const char* names[] = {"x", "x_before", "v", "v_before"};
     for (int part = 0; part < 4; ++part)
-      EXPECT_LE(relative_error(std::span(bar).subspan(part * dofs, dofs),
-                               std::span(oracle).subspan(part * dofs, dofs)),
+      EXPECT_LE(relative_error(std::span(bar).subspan(part * dofs, dofs), std::span(oracle).subspan(part * dofs, dofs)),
                 1e-10)
           << names[part];
     // A substep reads the states that it is given, not the initial ones.

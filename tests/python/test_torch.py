@@ -1,8 +1,8 @@
-"""sheetbend.torch: derivatives under autograd and torch.func, batches, errors, the Module, threads, and company with Ceres.
+"""sheetbend.torch: derivatives under autograd and torch.func, batches, errors, the Module, threads, Ceres beside it.
 
-Bounds: gradcheck and gradgradcheck 1e-8 relative to the largest derivative, in unit-scaled variables with steps of our own (with torch's
-default of 1e-6 rounding alone makes 1e-6 of the small derivatives). Reverse against forward mode 1e-12. Batched against one by one: the
-same bits.
+Bounds: gradcheck and gradgradcheck 1e-8 relative to the largest derivative, in unit-scaled variables with steps of our
+own (with torch's default of 1e-6 rounding alone makes 1e-6 of the small derivatives). Reverse against forward mode
+1e-12. Batched against one by one: the same bits.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from torch.func import grad, hessian, jacfwd, jacrev, jvp, vjp, vmap  # noqa: E4
 SOLVER = sb.Solver(h=1 / 100)
 TIMES = np.array([0.0, 0.05, 0.10])
 NAMES = ("rope_EI", "rope_EA", "rope_density", "rope_bend_damping", "rope_drag_linear", "rope_length")
-# Difference steps where rounding (falls with the step) and curvature (grows with its square) stay below the bound: positions bend the
-# response most, velocities and damping move it least.
+# Difference steps where rounding (falls with the step) and curvature (grows with its square) stay below the bound:
+# positions bend the response most, velocities and damping move it least.
 STEPS = {
     "position": 3e-6,
     "velocity": 1e-3,
@@ -50,7 +50,15 @@ def scene() -> sb.Scene:
     """5 nodes: the first one driven, a force on the last, every quantity of a rope without clamps."""
     scene = sb.Scene("five nodes")
     rope = sb.add_rope(
-        scene, length=1.0, segments=4, density=0.05, EA=50.0, EI=1e-2, bend_damping=0.01, stretch_damping=1e-3, drag_linear=0.02
+        scene,
+        length=1.0,
+        segments=4,
+        density=0.05,
+        EA=50.0,
+        EI=1e-2,
+        bend_damping=0.01,
+        stretch_damping=1e-3,
+        drag_linear=0.02,
     )
     knots = np.linspace(0.0, 0.2, 5)
     motion = np.stack([0.0 * knots, 0.02 * np.sin(20.0 * knots), 0.01 * np.cos(9.0 * knots)], axis=1)
@@ -61,11 +69,17 @@ def scene() -> sb.Scene:
 
 @pytest.fixture(scope="module")
 def positions(scene: sb.Scene) -> Callable[[Tensor], Tensor]:
-    """Positions by relative changes u (quantities,) of the quantities: unit-scaled, so that one difference step suits all."""
+    """Positions by relative changes u (quantities,) of the quantities: unit-scaled, so that one step suits all.
+
+    A change of length acts at once against EA; a tenth of it bends the response as much as the others do.
+    """
     start = torch.tensor([scene.quantities[n].value for n in NAMES], dtype=torch.float64)
+    share = torch.tensor([0.1 if n == "rope_length" else 1.0 for n in NAMES], dtype=torch.float64)
 
     def f(u: Tensor) -> Tensor:
-        return st.simulate(scene, TIMES, SOLVER, values=dict(zip(NAMES, (start * (1.0 + u)).unbind(), strict=True)))
+        return st.simulate(
+            scene, TIMES, SOLVER, values=dict(zip(NAMES, (start * (1.0 + share * u)).unbind(), strict=True))
+        )
 
     return f
 
@@ -113,7 +127,13 @@ def test_positions_are_those_of_simulate_to_the_bit(scene: sb.Scene) -> None:
 def test_inputs_are_those_of_the_compiled_map(scene: sb.Scene, clamp: bool) -> None:
     """To the bit, but for sines and cosines, where torch has its own (clamp angles)."""
     if clamp:
-        options = {"clamp_start": (1, 0, 0), "clamp_angles": True, "plane": (0, 1, 0), "set_modes": (0, 1), "pinned": ()}
+        options = {
+            "clamp_start": (1, 0, 0),
+            "clamp_angles": True,
+            "plane": (0, 1, 0),
+            "set_modes": (0, 1),
+            "pinned": (),
+        }
         scene = sb.rope(1.0, 4, density=0.05, EI=1e-2, **options)
     theta = scene.compiled.theta + 0.3
     values = dict(zip(scene.compiled.names, torch.tensor(theta), strict=True))
@@ -174,14 +194,15 @@ def test_hessians_by_every_order_of_modes_agree(loss: Callable[[Tensor], Tensor]
     by_modes.append(torch.autograd.functional.hessian(loss, u))
     for other in by_modes[1:]:
         assert relative(other, by_modes[0]) < 1e-12
-    differences = torch.stack([(grad(loss)(u + d) - grad(loss)(u - d)) / 6e-5 for d in 3e-5 * torch.eye(len(u), dtype=torch.float64)])
-    assert relative(by_modes[0], differences) < 1e-7
+    steps = 1e-5 * torch.eye(len(u), dtype=torch.float64)
+    differences = torch.stack([(grad(loss)(u + d) - grad(loss)(u - d)) / 2e-5 for d in steps])
+    assert relative(by_modes[0], differences) < BOUND
 
 
 def test_derivatives_beyond_raise_by_name(loss: Callable[[Tensor], Tensor]) -> None:
-    with pytest.raises(NotImplementedError, match="function.VjpDot: third derivatives"):
+    with pytest.raises(NotImplementedError, match=r"function\.VjpDot: third derivatives"):
         grad(lambda u: hessian(loss)(u).sum())(zero())
-    with pytest.raises(NotImplementedError, match="function.Jvp: forward over forward"):
+    with pytest.raises(NotImplementedError, match=r"function\.Jvp: forward over forward"):
         jacfwd(jacfwd(loss))(zero())
 
 
@@ -202,20 +223,22 @@ def test_jacobians_agree(positions: Callable[[Tensor], Tensor]) -> None:
 
 @pytest.mark.parametrize("transform", [lambda f: f, grad, hessian, lambda f: jacfwd(grad(f))])
 @pytest.mark.parametrize("count", [1, 3, 11])
-def test_vmap_gives_the_bits_of_a_loop(loss: Callable[[Tensor], Tensor], transform: Callable, count: int) -> None:
+def test_vmap_is_a_loop(loss: Callable[[Tensor], Tensor], transform: Callable, count: int) -> None:
     f, us = transform(loss), scattered(count)
     mapped, looped = vmap(f)(us), torch.stack([f(u) for u in us])
-    # torch's own operations around the rollout (sin, sums, products) may round otherwise in batches; positions below may not.
+    # torch's own operations around the rollout (sin, sums) may round otherwise in batches; the rollout below may not.
     assert relative(mapped, looped) < 1e-13
 
 
 @pytest.mark.parametrize("count", [1, 3, 11])
-def test_batches_of_positions_and_cotangents_have_the_bits_of_a_loop(positions: Callable[[Tensor], Tensor], count: int) -> None:
+def test_vmap_of_rollouts_has_the_bits_of_a_loop(positions: Callable[[Tensor], Tensor], count: int) -> None:
     us = scattered(count)
     bars = torch.tensor(np.random.default_rng(6).standard_normal((count, 3, 5, 3)))
     assert torch.equal(vmap(positions)(us), torch.stack([positions(u) for u in us]))
     pull = vmap(lambda u, bar: vjp(positions, u)[1](bar)[0])
-    assert torch.equal(pull(us, bars), torch.stack([vjp(positions, u)[1](bar)[0] for u, bar in zip(us, bars, strict=True)]))
+    assert torch.equal(
+        pull(us, bars), torch.stack([vjp(positions, u)[1](bar)[0] for u, bar in zip(us, bars, strict=True)])
+    )
 
 
 def test_nested_vmap_and_other_dimensions(positions: Callable[[Tensor], Tensor]) -> None:
@@ -227,14 +250,19 @@ def test_nested_vmap_and_other_dimensions(positions: Callable[[Tensor], Tensor])
 
 def test_leading_dimensions_are_a_batch(scene: sb.Scene) -> None:
     EI = torch.tensor([[0.5e-2, 1e-2, 2e-2]], dtype=torch.float64, requires_grad=True)  # (1, 3)
-    gravity = torch.tensor([[[0.0, 0.0, -9.81]], [[0.0, 0.0, -1.62]]], dtype=torch.float64, requires_grad=True)  # (2, 1, 3)
+    gravity = torch.tensor(
+        [[[0.0, 0.0, -9.81]], [[0.0, 0.0, -1.62]]], dtype=torch.float64, requires_grad=True
+    )  # (2, 1, 3)
     x = st.simulate(scene, TIMES, SOLVER, values={"rope_EI": EI}, inputs={"gravity": gravity})
     assert x.shape == (2, 3, 3, 5, 3)
     looped = torch.stack(
-        [torch.stack([st.simulate(scene, TIMES, SOLVER, {"rope_EI": e}, {"gravity": g[0]}) for e in EI[0]]) for g in gravity]
+        [
+            torch.stack([st.simulate(scene, TIMES, SOLVER, {"rope_EI": e}, {"gravity": g[0]}) for e in EI[0]])
+            for g in gravity
+        ]
     )
     assert torch.equal(x, looped)
-    together, apart = torch.autograd.grad(x.square().sum(), (EI, gravity)), torch.autograd.grad(looped.square().sum(), (EI, gravity))
+    together, apart = (torch.autograd.grad(result.square().sum(), (EI, gravity)) for result in (x, looped))
     for a, b in zip(together, apart, strict=True):
         assert a.shape == b.shape
         assert relative(a, b) < 1e-13
@@ -263,6 +291,14 @@ def test_a_batch_is_one_call_of_the_core(scene: sb.Scene) -> None:
     assert calls == ["record", "states", "vjp"]  # the tape is kept for backward
 
 
+def test_a_tape_serves_its_own_inputs_only(scene: sb.Scene) -> None:
+    core, inputs, bar = SOLVER.core(scene.compiled), scene.compiled.inputs()[None], np.ones((1, 3, 15))
+    keeping, fresh = (st.rollouts.Rollouts(scene, core, [0, 5, 10], keep) for keep in (True, False))
+    assert np.array_equal(keeping.value(inputs), fresh.value(inputs))
+    assert np.array_equal(keeping.vjp(inputs, bar), fresh.vjp(inputs, bar))
+    assert np.array_equal(keeping.vjp(1.1 * inputs, bar), fresh.vjp(1.1 * inputs, bar))
+
+
 def test_a_tensor_changed_between_forward_and_backward_is_noticed(scene: sb.Scene) -> None:
     gravity = array(scene, "gravity").requires_grad_()
     copy = gravity * 1.0
@@ -271,6 +307,11 @@ def test_a_tensor_changed_between_forward_and_backward_is_noticed(scene: sb.Scen
     with torch.no_grad():
         copy.mul_(0.5)  # the flat inputs are a copy of their own: the graph still stands
     assert torch.equal(torch.autograd.grad(x.sum(), gravity)[0], expected[0])
+
+
+def test_tensors_and_arrays_share_memory() -> None:
+    tensor = torch.ones(2, 3, dtype=torch.float64, requires_grad=True)
+    assert np.shares_memory(st.function._array(tensor), tensor.detach().numpy())
 
 
 def test_strided_tensors_are_taken(scene: sb.Scene) -> None:
@@ -289,8 +330,16 @@ double = torch.float64
 @pytest.mark.parametrize(
     ("values", "inputs", "message"),
     [
-        ({"rope_EI": torch.tensor(1e-2)}, {}, r"values\.rope_EI: is not float64 .*float32.*Fix: convert it with \.double\(\)"),
-        ({"rope_EI": torch.tensor(1.0, dtype=double, device="meta")}, {}, r"values\.rope_EI: is not on the CPU .*meta.*\.cpu\(\)"),
+        (
+            {"rope_EI": torch.tensor(1e-2)},
+            {},
+            r"values\.rope_EI: is not float64 .*float32.*Fix: convert it with \.double\(\)",
+        ),
+        (
+            {"rope_EI": torch.tensor(1.0, dtype=double, device="meta")},
+            {},
+            r"values\.rope_EI: is not on the CPU .*meta.*\.cpu\(\)",
+        ),
         ({"rope_EI": np.array(1e-2)}, {}, r"values\.rope_EI: is not a tensor .*ndarray"),
         ({"rope_ei": torch.tensor(1.0, dtype=double)}, {}, r"values\.rope_ei: is no quantity .*name one of: .*rope_EI"),
         ({}, {"masses": torch.ones(5, dtype=double)}, r"inputs\.masses: is no input array .*name one of: .*mass"),
@@ -298,10 +347,18 @@ double = torch.float64
         ({}, {"velocity": torch.ones(15, dtype=double)}, r"inputs\.velocity: has the wrong shape .*give \(5, 3\)"),
         ({}, {"gravity": torch.tensor(1.0, dtype=double)}, r"inputs\.gravity: has the wrong shape .*\(\).*give \(3,\)"),
         ({}, {"mass": torch.ones(5, dtype=double).to_sparse()}, r"inputs\.mass: is not dense"),
-        ({"rope_EI": torch.ones(2, dtype=double), "rope_EA": torch.ones(3, dtype=double)}, {}, "batch: dimensions do not broadcast"),
+        (
+            {"rope_EI": torch.ones(2, dtype=double), "rope_EA": torch.ones(3, dtype=double)},
+            {},
+            "batch: dimensions do not broadcast",
+        ),
         ({"rope_EI": torch.ones(0, dtype=double)}, {}, "batch: is empty"),
         ({"rope_EI": torch.tensor(torch.nan, dtype=double)}, {}, "compliance: is not finite"),
-        ({"rope_density": torch.tensor([0.05, torch.inf], dtype=double)}, {}, "mass: is not finite in scene 1 of the batch"),
+        (
+            {"rope_density": torch.tensor([0.05, torch.inf], dtype=double)},
+            {},
+            "mass: is not finite in scene 1 of the batch",
+        ),
     ],
 )
 def test_wrong_tensors_are_named(scene: sb.Scene, values: dict, inputs: dict, message: str) -> None:
@@ -351,7 +408,9 @@ def test_equilibrium_forces_have_their_shapes(hanging: sb.Scene) -> None:
     rest = st.equilibrium(hanging, values={"rope_EI": torch.tensor([1e-2, 2e-2], dtype=double)})
     assert rest.positions.shape == (2, hanging.particle_count, 3)
     expected = sb.equilibrium(hanging, values={"rope_EI": 1e-2})
-    assert {name: tuple(f.shape) for name, f in rest.forces.items()} == {name: (2, *f.shape) for name, f in expected.forces.items()}
+    for name, force in expected.forces.items():
+        assert np.abs(rest.forces[name][0].numpy() - force).max() < 1e-9
+        assert rest.forces[name].shape == (2, *force.shape)
     with pytest.raises(sb.SceneError, match="start: has the wrong shape"):
         st.equilibrium(hanging, start=np.zeros((2, 3)))
 
@@ -360,7 +419,7 @@ def test_equilibrium_forces_have_their_shapes(hanging: sb.Scene) -> None:
 
 
 def small_rope(EI: float) -> sb.Scene:
-    return sb.rope(0.5, 8, density=0.05, EA=1e3, EI=EI, bend_damping=0.02, pinned=[0, 1])
+    return sb.rope(0.5, 8, density=0.05, EA=1e3, EI=EI, bend_damping=0.02, clamp_start=(1, 0, 0), pinned=())
 
 
 FRAMES = np.arange(31) / 100
@@ -373,13 +432,12 @@ def test_module_names_its_parameters_and_keeps_them_positive() -> None:
     module = st.SceneModule(scene, FRAMES, FINE, learn=["rope_EI", "rope_start_angle"])
     assert list(module.state_dict()) == ["rope_EI", "rope_start_angle"]
     assert float(module.state_dict()["rope_EI"]) == np.log(1e-3)
-    assert float(module.values()["rope_EI"]) == pytest.approx(1e-3, rel=1e-15)
-    assert float(module.values()["rope_start_angle"]) == 0.0
+    assert module.values()["rope_EI"].item() == pytest.approx(1e-3, rel=1e-15)
+    assert module.values()["rope_start_angle"].item() == 0.0
     assert "rope_EI=0.001 N m^2" in repr(module)
-    torch.optim.SGD(module.parameters(), lr=1.0)
     with torch.no_grad():
         module.rope_EI -= 20.0
-    assert float(module.values()["rope_EI"]) > 0.0
+    assert module.values()["rope_EI"].item() > 0.0
     other = st.SceneModule(scene, FRAMES, FINE, learn=["rope_EI", "rope_start_angle"])
     other.load_state_dict(module.state_dict())
     assert torch.equal(other.rope_EI, module.rope_EI)
@@ -389,7 +447,7 @@ def test_module_names_its_parameters_and_keeps_them_positive() -> None:
 
 @pytest.mark.parametrize("learn", [[], "rope_EI", ["EI"]])
 def test_module_refuses_other_names(learn: object) -> None:
-    with pytest.raises(sb.InputError, match="learn: .*rope_EI"):
+    with pytest.raises(sb.InputError, match=r"learn: .*rope_EI"):
         st.SceneModule(small_rope(1e-3), FRAMES, FINE, learn=learn)
 
 
@@ -397,40 +455,53 @@ def test_module_takes_batches_of_overrides() -> None:
     module = st.SceneModule(small_rope(1e-3), FRAMES, FINE, learn=["rope_EI"])
     density = torch.tensor([0.03, 0.05, 0.07], dtype=double)
     batch = module(rope_density=density)
-    assert batch.shape == (3, 31, 9, 3)
+    assert batch.shape == (3, 31, module._simulation.scene.particle_count, 3)
     assert torch.equal(batch, torch.stack([module(rope_density=d) for d in density]))
     batch.sum().backward()
     assert module.rope_EI.grad is not None
     assert torch.equal(module(rope_EI=1e-3, inputs={"gravity": torch.zeros(3, dtype=double)})[-1], module()[0])
 
 
-@pytest.mark.parametrize("optimizer", ["adam", "lbfgs"])
-def test_training_recovers_the_stiffness_of_a_twin(optimizer: str) -> None:
-    true = {"rope_EI": 4e-3, "rope_bend_damping": 0.02}
-    target = torch.tensor(sb.simulate(small_rope(true["rope_EI"]), FRAMES, FINE).positions)
-    module = st.SceneModule(small_rope(1e-3), FRAMES, FINE, learn=list(true))
-    with torch.no_grad():
-        module.rope_bend_damping += np.log(2.0)
+def test_module_as_an_ensemble() -> None:
+    """torch.func.functional_call puts stacked parameters in, vmap maps over them."""
+    module = st.SceneModule(small_rope(1e-3), FRAMES, FINE, learn=["rope_EI"])
+    stacked = {"rope_EI": torch.tensor([0.5e-3, 1e-3, 2e-3], dtype=double).log()}
+    mapped = vmap(lambda parameters: torch.func.functional_call(module, parameters))(stacked)
+    assert torch.equal(mapped, module(rope_EI=stacked["rope_EI"].exp()))
 
+
+def train(
+    module: st.SceneModule, target: Tensor, optimizer: torch.optim.Optimizer, steps: int, decay: float = 1.0
+) -> None:
     def cost() -> Tensor:
-        optimizer_.zero_grad()
+        optimizer.zero_grad()
         value = 1e4 * (module() - target).square().mean()
         value.backward()
         return value
 
-    if optimizer == "adam":
-        optimizer_ = torch.optim.Adam(module.parameters(), lr=0.1)
-        schedule = torch.optim.lr_scheduler.ExponentialLR(optimizer_, 0.97)
-        for _ in range(150):
-            optimizer_.step(cost)
-            schedule.step()
-        bound = 1e-3
-    else:
-        optimizer_ = torch.optim.LBFGS(module.parameters(), max_iter=60, tolerance_grad=1e-14, tolerance_change=1e-16, line_search_fn="strong_wolfe")
-        optimizer_.step(cost)
-        bound = 1e-6
-    for name, value in module.values().items():
-        assert float(value) == pytest.approx(true[name], rel=bound), name
+    schedule = torch.optim.lr_scheduler.ExponentialLR(optimizer, decay)
+    for _ in range(steps):
+        optimizer.step(cost)
+        schedule.step()
+
+
+def test_training_recovers_the_stiffness_of_a_twin() -> None:
+    target = torch.tensor(sb.simulate(small_rope(4e-3), FRAMES, FINE).positions)
+    module = st.SceneModule(small_rope(1e-3), FRAMES, FINE, learn=["rope_EI"])
+    train(module, target, torch.optim.Adam(module.parameters(), lr=0.2), steps=120, decay=0.96)
+    assert module.values()["rope_EI"].item() == pytest.approx(4e-3, rel=1e-3)
+
+
+def test_training_recovers_stiffness_and_damping_together() -> None:
+    """They share a curved valley, which a quasi-Newton method follows."""
+    target = torch.tensor(sb.simulate(small_rope(4e-3), FRAMES, FINE).positions)
+    module = st.SceneModule(small_rope(1e-3), FRAMES, FINE, learn=["rope_EI", "rope_bend_damping"])
+    with torch.no_grad():
+        module.rope_bend_damping += np.log(2.0)
+    options = {"line_search_fn": "strong_wolfe", "tolerance_grad": 1e-14, "tolerance_change": 1e-16}
+    train(module, target, torch.optim.LBFGS(module.parameters(), max_iter=60, **options), steps=1)
+    assert module.values()["rope_EI"].item() == pytest.approx(4e-3, rel=1e-6)
+    assert module.values()["rope_bend_damping"].item() == pytest.approx(0.02, rel=1e-6)
 
 
 # --- threads and company
@@ -496,7 +567,8 @@ import numpy as np, sheetbend as sb
 def fit():
     rope = lambda EI: sb.rope(0.5, 6, density=0.05, EA=1e3, EI=EI, pinned=[0])
     times, solver = np.arange(31) / 100, sb.Solver(h=1 / 200)
-    x = sb.simulate(rope(2e-3), times, solver).positions[:, 1:] + 1e-5 * np.random.default_rng(0).standard_normal((31, 6, 3))
+    noise = 1e-5 * np.random.default_rng(0).standard_normal((31, 6, 3))
+    x = sb.simulate(rope(2e-3), times, solver).positions[:, 1:] + noise
     recording = sb.Recording(positions=x, times=times, name="twin")
     places = [sb.on_particle(i) for i in range(1, 7)]
     found = sb.fit(rope(1e-3), recording, ["rope_EI"], markers=places, solver=solver, sigma=1e-5, optimizer="ceres")

@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import plotting
 from ..config import Config
+from ..equilibrium import equilibrium
 from ..fit import Fit
 from ..prediction import Comparison
 
@@ -25,7 +26,7 @@ def write_figures(found: Fit, config: Config, folder: Path) -> list[str]:
     figures: dict[str, Figure] = {}
     static = [c for c in found.comparisons if c.experiment.static]
     if static:
-        figures["shapes"] = _shapes(static)
+        figures["shapes"] = _shapes(found, static)
     for c in found.comparisons:
         if not c.experiment.static:
             name = re.sub(r"[^A-Za-z0-9_.-]", "_", c.experiment.name)
@@ -38,15 +39,25 @@ def write_figures(found: Fit, config: Config, folder: Path) -> list[str]:
     return [f"{name}.{form}" for name in figures]
 
 
-def _shapes(comparisons: list[Comparison]) -> Figure:
+def _shapes(found: Fit, comparisons: list[Comparison]) -> Figure:
     spread = np.ptp(np.vstack([c.recording.positions[0] for c in comparisons if np.isfinite(c.recording.positions).any()]), axis=0)
     first = 0 if spread[0] >= spread[1] else 1
     return plotting.plot_shapes(
         [c.recording.positions[0] for c in comparisons],
-        [c.simulated[0] for c in comparisons],
+        [_line(found, c) for c in comparisons],
         names=[c.experiment.name for c in comparisons],
         plane=(first, 2),
     )
+
+
+def _line(found: Fit, c: Comparison) -> np.ndarray:
+    """The rope from end to end; the markers alone where there is not exactly one rope."""
+    scene, name = c.experiment.scene, c.experiment.name
+    if len(scene.ropes) != 1:
+        return c.simulated[0]
+    (rope,) = scene.ropes.values()
+    values = {q: found.values.get(f"{q}[{name}]", found.values.get(q, quantity.value)) for q, quantity in scene.quantities.items()}
+    return equilibrium(scene, values=values).positions[rope.particles]
 
 
 def _trajectories(c: Comparison) -> Figure:

@@ -95,11 +95,12 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
         for key in ("fit", "held_out"):
             _check_window(f"{path}.{key}", getattr(section, key), recording)
         moment = Moment(recording.piece(*(section.fit if section.static and section.fit else (t0, None))), t0, section.static)
+    ropes = _shown(config, section, path)
     shared = not section.marker
     markers = config.marker if shared else section.marker
     where = "marker" if shared else f"{path}.marker"
     numbers = [_number(f"{where}[{k}].marker", m.marker, recording) for k, m in enumerate(markers)]
-    scene, particles = build_scene(recording.name, config.scene, moment, _along(config, markers, numbers, recording), finer)
+    scene, particles = build_scene(recording.name, config.scene, moment, _along(ropes, markers, numbers, recording), finer, ropes)
     _start_values(scene, config, section.values, path)
     places = {recording.markers[n]: _place(f"{where}[{k}]", m, scene, particles) for k, (m, n) in enumerate(zip(markers, numbers, strict=True))}
     plain = section.model_dump(include={"static", "start", "start_time", "predict", "sigma", "axes", "loss", "loss_scale", "time_offset"})
@@ -151,9 +152,17 @@ def _number(path: str, marker: str | int, recording: Recording) -> int:
         raise ConfigError(path, error.problem, error.got, error.fix) from error
 
 
-def _along(config: schema.Config, markers: list[schema.Marker], numbers: list[int], recording: Recording) -> dict[str, list[int]]:
+def _shown(config: schema.Config, section: schema.RecordingSection, path: str) -> list[str]:
+    """Names of the ropes that a recording shows."""
+    every = [rope.name for rope in config.scene.rope]
+    unknown = [name for name in section.ropes or () if name not in every]
+    if unknown:
+        raise ConfigError(f"{path}.ropes", "name no rope of the scene", unknown, f"name some of: {', '.join(every) or 'none'}")
+    return every if section.ropes is None else section.ropes
+
+
+def _along(ropes: list[str], markers: list[schema.Marker], numbers: list[int], recording: Recording) -> dict[str, list[int]]:
     """Per rope the markers on it, in order along it."""
-    ropes = [rope.name for rope in config.scene.rope]
     if not markers:
         return {name: list(range(len(recording.markers))) for name in ropes} if len(ropes) == 1 else {}
     placed: dict[str, list[int]] = {}

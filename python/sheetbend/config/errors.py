@@ -19,10 +19,13 @@ Location = Sequence[str | int]
 
 def from_validation(error: ValidationError, model: type[BaseModel]) -> ConfigError:
     """The first problem as an error; the others are its notes."""
-    found = list(dict.fromkeys(str(e) for e in (one(dict(d), model) for d in error.errors())))
-    first = one(dict(error.errors()[0]), model)
-    for other in found[1:]:
-        first.add_note(other)
+    by_path: dict[str, list[Mapping[str, Any]]] = {}
+    for detail in error.errors():
+        by_path.setdefault(dotted(_keys(detail["loc"], model)), []).append(dict(detail))
+    # Every branch of a union complains; the one whose type fits knows more than the others.
+    first, *others = (one(min(details, key=lambda d: d["type"].endswith("_type")), model) for details in by_path.values())
+    for other in others:
+        first.add_note(str(other))
     return first
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -104,13 +104,21 @@ class Particles:
         return particles[at]
 
 
-def build_scene(name: str, section: schema.SceneSection, moment: Moment | None, placed: dict[str, list[int]], finer: int = 1) -> tuple[Scene, Particles]:
+def build_scene(
+    name: str,
+    section: schema.SceneSection,
+    moment: Moment | None,
+    placed: Mapping[str, list[int]],
+    finer: int = 1,
+    ropes: Sequence[str] | None = None,
+) -> tuple[Scene, Particles]:
     """A scene and the meaning of its particle references.
 
     Args:
         moment: the recording's part; None without a recording.
         placed: per rope the markers on it, in order along it, for `points = "recording"`.
         finer: multiplies the segments of every rope.
+        ropes: names of the ropes to build; None = all.
 
     Raises:
         ConfigError: anything inconsistent, with the path of the table.
@@ -119,6 +127,8 @@ def build_scene(name: str, section: schema.SceneSection, moment: Moment | None, 
     gravity = section.gravity if section.gravity is not None else EARTH if recorded is None else recorded
     scene, particles = Scene(name, gravity), Particles(finer)
     for i, rope in enumerate(section.rope):
+        if ropes is not None and rope.name not in ropes:
+            continue
         _add_rope(scene, particles, f"scene.rope[{i}]", rope, moment, placed.get(rope.name, []), finer)
     for i, some in enumerate(section.particles):
         path = f"scene.particles[{i}]"

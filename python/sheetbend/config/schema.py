@@ -66,6 +66,7 @@ class RecordingSection(Section):
     file: str = key(..., "NPZ or CSV, relative to the configuration")
     name: Name | None = key(None, "the file's when left out")
     units: Literal["m", "cm", "mm"] | None = key(None, "length unit of the file; its JSON's when left out")
+    ropes: list[Name] | None = key(None, "names of the ropes that it shows; all when left out", min_length=1)
     frames: list[int] | None = key(None, "[first, stop] or [first, stop, step]: use these frames only", min_length=2, max_length=3)
     fit: Window | None = key(None, "[start, stop] in the recording's time: what the fit sees; all when left out", "s")
     held_out: Window | None = key(None, "[start, stop]: what is only predicted, from the same start", "s")

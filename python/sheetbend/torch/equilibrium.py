@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple, NoReturn
+from typing import Any, NamedTuple, NoReturn, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +15,7 @@ from ..equilibrium import NoEquilibriumError
 from ..errors import SceneError
 from ..scene import Scene
 from ..simulate import forces_by_group
-from .function import Value
+from .function import respond
 from .inputs import InputMap
 from .rollouts import expect_finite
 
@@ -23,14 +23,19 @@ Array = np.ndarray
 
 
 class Equilibrium(NamedTuple):
-    """A state of rest: positions (*batch, particles, 3) m, and per group the multipliers (*batch, count, rows), see `sheetbend.Equilibrium`."""
+    """A state of rest.
+
+    Attributes:
+        positions: (*batch, particles, 3) m.
+        forces: per group the multipliers (*batch, count, rows), as in `sheetbend.Equilibrium`.
+    """
 
     positions: Tensor
-    forces: dict[str, Tensor]
+    forces: Mapping[str, Tensor]
 
 
 class Equilibria:
-    """Coordinates and multipliers (B, dofs + rows) of the equilibria for inputs (B, total), one solution and one derivative per scene."""
+    """Coordinates and multipliers (B, dofs + rows) of the equilibria for inputs (B, total), scene by scene."""
 
     def __init__(self, scene: Scene, start: Array | None, stable: bool) -> None:
         self._scene, self._start, self._stable = scene, start, stable
@@ -50,7 +55,9 @@ class Equilibria:
         return np.stack([np.concatenate(s.jvp(dot)) for s, dot in zip(solutions, inputs_dot, strict=True)])
 
     def vjp_dot(self, *_: Array) -> NoReturn:
-        raise NotImplementedError("sheetbend.torch.equilibrium: second derivatives are not available. Fix: differentiate once")
+        raise NotImplementedError(
+            "sheetbend.torch.equilibrium: second derivatives are not available. Fix: differentiate once"
+        )
 
     def _solutions(self, inputs: Array) -> list[_core.EquilibriumSolution]:
         kept = self._kept
@@ -75,9 +82,9 @@ def equilibrium(
     inputs: Mapping[str, Tensor] | None = None,
     stable: bool = True,
 ) -> Equilibrium:
-    """The equilibrium that a start leads to, once differentiable in every tensor given, by the implicit function theorem.
+    """The equilibrium that a start leads to, differentiable in every tensor given, by the implicit function theorem.
 
-    A batch is solved scene by scene. Second derivatives raise NotImplementedError.
+    Once: second derivatives raise NotImplementedError. A batch is solved scene by scene.
 
     Args:
         scene: is frozen by this.
@@ -94,6 +101,6 @@ def equilibrium(
     x = None if start is None else finite("start", start, (scene.particle_count, 3), SceneError).ravel()
     flat = InputMap(scene)(values or {}, inputs or {})
     batch, dofs = flat.shape[:-1], scene.compiled.core.dofs
-    states = Value.apply(Equilibria(scene, x, stable), flat.reshape(-1, flat.shape[-1])).reshape(*batch, -1)
-    forces = forces_by_group(scene, states[..., dofs:])  # slices and reshapes only, so tensors pass
+    states = respond(Equilibria(scene, x, stable), flat.reshape(-1, flat.shape[-1])).reshape(*batch, -1)
+    forces: Any = forces_by_group(scene, cast(Any, states[..., dofs:]))  # slices and reshapes only, so tensors pass
     return Equilibrium(states[..., :dofs].reshape(*batch, -1, 3), forces)

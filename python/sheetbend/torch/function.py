@@ -1,15 +1,17 @@
 """Autograd Functions from a scene's flat inputs to its states, and for their derivatives.
 
-A Function whose backward calls compiled code directly passes gradcheck and yet fails under torch.func, where the arguments of backward are
-wrapped tensors. Here every derivative is a Function of its own with a vmap rule, so backward and jvp only ever call Functions:
+A Function whose backward calls compiled code directly passes gradcheck and yet fails under torch.func, where the
+arguments of backward are wrapped tensors. Here every derivative is a Function of its own with a vmap rule, so backward
+and jvp only ever call Functions:
 
     Value     inputs -> states             backward: Vjp                     jvp: Jvp
     Vjp       states_bar -> inputs_bar     backward: VjpDot and Jvp          jvp: VjpDot
     Jvp       inputs_dot -> states_dot     backward: VjpDot and Vjp          jvp: refused
     VjpDot    derivative of Vjp            refused: a third derivative
 
-Jvp's backward by the inputs is the gradient of <states_bar, J inputs_dot> = <inputs_dot, J^T states_bar>, hence VjpDot again: second
-derivatives are symmetric. All tensors have a leading batch dimension; a vmap rule folds the mapped dimension into it.
+Jvp's backward by the inputs is the gradient of <states_bar, J inputs_dot> = <inputs_dot, J^T states_bar>, hence VjpDot
+again: second derivatives are symmetric. All tensors have a leading batch dimension; a vmap rule folds the mapped
+dimension into it.
 """
 
 from __future__ import annotations
@@ -41,7 +43,7 @@ class Response(Protocol):
 
 
 class _ResponseFunction(Function):
-    """What the four have in common: arguments (response, *tensors), one tensor out, a batch dimension in front of each."""
+    """What the four have in common: arguments (response, *tensors), one tensor out, each with a batch dimension."""
 
     @staticmethod
     def setup_context(ctx: Any, inputs: tuple[Any, ...], output: Tensor) -> None:
@@ -50,12 +52,20 @@ class _ResponseFunction(Function):
         ctx.save_for_forward(*tensors)
 
     @classmethod
-    def vmap(cls, info: Any, in_dims: tuple[int | None, ...], response: Response, *tensors: Tensor) -> tuple[Tensor, int]:
+    def vmap(
+        cls, info: Any, in_dims: tuple[int | None, ...], response: Response, *tensors: Tensor
+    ) -> tuple[Tensor, int]:
         mapped = [
-            t.expand(info.batch_size, *t.shape) if dim is None else t.movedim(dim, 0) for t, dim in zip(tensors, in_dims[1:], strict=True)
+            tensor.expand(info.batch_size, *tensor.shape) if dim is None else tensor.movedim(dim, 0)
+            for tensor, dim in zip(tensors, in_dims[1:], strict=True)
         ]
-        out = cls.apply(response, *(t.flatten(0, 1) for t in mapped))
-        return out.unflatten(0, mapped[0].shape[:2]), 0
+        out = _apply(cls, response, *(tensor.flatten(0, 1) for tensor in mapped))
+        return out.reshape(*mapped[0].shape[:2], *out.shape[1:]), 0
+
+
+def respond(response: Response, inputs: Tensor) -> Tensor:
+    """States (B, ...) from inputs (B, total), differentiable."""
+    return _apply(Value, response, inputs)
 
 
 class Value(_ResponseFunction):
@@ -68,12 +78,12 @@ class Value(_ResponseFunction):
     @staticmethod
     def backward(ctx: Any, states_bar: Tensor) -> tuple[None, Tensor]:
         (inputs,) = ctx.saved_tensors
-        return None, Vjp.apply(ctx.response, inputs, states_bar)
+        return None, _apply(Vjp, ctx.response, inputs, states_bar)
 
     @staticmethod
     def jvp(ctx: Any, _: None, inputs_dot: Tensor) -> Tensor:
         (inputs,) = ctx.saved_tensors
-        return Jvp.apply(ctx.response, inputs, inputs_dot)
+        return _apply(Jvp, ctx.response, inputs, inputs_dot)
 
 
 class Vjp(_ResponseFunction):
@@ -88,15 +98,15 @@ class Vjp(_ResponseFunction):
         inputs, states_bar = ctx.saved_tensors
         by_inputs = by_bar = None
         if ctx.needs_input_grad[1]:
-            by_inputs = VjpDot.apply(ctx.response, inputs, direction, states_bar, torch.zeros_like(states_bar))
+            by_inputs = _apply(VjpDot, ctx.response, inputs, direction, states_bar, torch.zeros_like(states_bar))
         if ctx.needs_input_grad[2]:
-            by_bar = Jvp.apply(ctx.response, inputs, direction)
+            by_bar = _apply(Jvp, ctx.response, inputs, direction)
         return None, by_inputs, by_bar
 
     @staticmethod
     def jvp(ctx: Any, _: None, inputs_dot: Tensor, states_bar_dot: Tensor) -> Tensor:
         inputs, states_bar = ctx.saved_tensors
-        return VjpDot.apply(ctx.response, inputs, inputs_dot, states_bar, states_bar_dot)
+        return _apply(VjpDot, ctx.response, inputs, inputs_dot, states_bar, states_bar_dot)
 
 
 class Jvp(_ResponseFunction):
@@ -111,9 +121,9 @@ class Jvp(_ResponseFunction):
         inputs, inputs_dot = ctx.saved_tensors
         by_inputs = by_dot = None
         if ctx.needs_input_grad[1]:
-            by_inputs = VjpDot.apply(ctx.response, inputs, inputs_dot, states_bar, torch.zeros_like(states_bar))
+            by_inputs = _apply(VjpDot, ctx.response, inputs, inputs_dot, states_bar, torch.zeros_like(states_bar))
         if ctx.needs_input_grad[2]:
-            by_dot = Vjp.apply(ctx.response, inputs, states_bar)
+            by_dot = _apply(Vjp, ctx.response, inputs, states_bar)
         return None, by_inputs, by_dot
 
     @staticmethod
@@ -141,6 +151,11 @@ class VjpDot(_ResponseFunction):
 
 
 _THIRD = "sheetbend.torch.function.VjpDot: third derivatives are not available. Fix: differentiate at most twice"
+
+
+def _apply(function: type[Function], response: Response, *tensors: Tensor) -> Tensor:
+    out: Tensor = function.apply(response, *tensors)  # type: ignore[no-untyped-call]
+    return out
 
 
 def _array(tensor: Tensor) -> Array:

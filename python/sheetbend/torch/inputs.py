@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from itertools import pairwise
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -22,7 +24,7 @@ _TORCH: Mapping[str, Callable[[Tensor], Tensor]] = {
 
 
 class ParameterMap:
-    """inputs[target] = base[target] + sum of coefficient * prod f(theta), as adjoint/parameter_map.h, in its order of operations.
+    """inputs[target] = base[target] + sum of coefficient * prod f(theta), in the order of adjoint/parameter_map.h.
 
     Plain torch operations, so every transform differentiates and batches it by itself.
     """
@@ -33,25 +35,28 @@ class ParameterMap:
         self._target = torch.tensor(arrays["target"], dtype=torch.long)
         self._coefficient = torch.tensor(arrays["coefficient"], dtype=torch.float64)
         parameter, function = arrays["parameter"], arrays["function"]
-        # Each quantity under each function is computed once; a term picks its factors from these, and ones fill up short terms.
+        # Each quantity under each function is computed once; terms pick factors from these, ones fill up short terms.
         pairs = sorted(set(zip(function, parameter, strict=True)))
         self._groups = [
-            (_TORCH[name], torch.tensor([p for f, p in pairs if f == number], dtype=torch.long)) for name, number in FUNCTIONS.items()
+            (_TORCH[name], torch.tensor([p for f, p in pairs if f == number], dtype=torch.long))
+            for name, number in FUNCTIONS.items()
         ]
         place = {pair: i for i, pair in enumerate(pairs)}
         first = arrays["first_factor"]
-        factors = [[place[function[k], parameter[k]] for k in range(a, b)] for a, b in zip(first, first[1:], strict=False)]
+        factors = [[place[function[k], parameter[k]] for k in range(a, b)] for a, b in pairwise(first)]
         longest = max(map(len, factors), default=0)
-        self._factors = torch.tensor([f + [len(pairs)] * (longest - len(f)) for f in factors], dtype=torch.long).reshape(-1, longest)
+        filled = [f + [len(pairs)] * (longest - len(f)) for f in factors]
+        self._factors = torch.tensor(filled, dtype=torch.long).reshape(-1, longest)
 
     def __call__(self, theta: Tensor) -> Tensor:
         """(..., quantities) to (..., total)."""
+        batch = theta.shape[:-1]
         functions = [f(theta.index_select(-1, which)) for f, which in self._groups]
-        values = torch.cat([*functions, theta.new_ones(*theta.shape[:-1], 1)], -1)
+        values = torch.cat([*functions, theta.new_ones(*batch, 1)], -1)
         product = self._coefficient
         for column in self._factors.unbind(1):
             product = product * values.index_select(-1, column)
-        return self._base.expand(*theta.shape[:-1], -1).index_add(-1, self._target, product.expand(*theta.shape[:-1], -1))
+        return self._base.expand(*batch, -1).index_add(-1, self._target, product.expand(*batch, -1))
 
 
 class InputMap:
@@ -68,7 +73,8 @@ class InputMap:
         """Quantities (*batch,) and arrays (*batch, ...), whose batch dimensions broadcast, to (*batch, total).
 
         Raises:
-            InputError: unknown name, not a tensor, not float64, not on the CPU, wrong shape, batches that do not broadcast.
+            InputError: unknown name, not a tensor, not float64, not on the CPU, wrong shape, batches that do not
+                broadcast.
         """
         batches = {name: self._batch_of_value(name, value) for name, value in values.items()}
         batches |= {name: self._batch_of_array(name, array) for name, array in arrays.items()}
@@ -77,7 +83,9 @@ class InputMap:
         if not arrays:
             return flat
         parts = [
-            arrays[name].reshape(*batches[name], size).expand(*batch, size) if name in arrays else flat[..., offset : offset + size]
+            arrays[name].reshape(*batches[name], size).expand(*batch, size)
+            if name in arrays
+            else flat[..., offset : offset + size]
             for name, (offset, size) in self._layout.items()
         ]
         return torch.cat(parts, -1)
@@ -96,7 +104,7 @@ class InputMap:
         shape, wanted = _dense(field, array), self._shapes[name]
         dims = len(shape) - len(wanted)
         if dims < 0 or shape[dims:] != wanted:
-            raise InputError(field, "has the wrong shape", shape, f"give {wanted}, with batch dimensions in front if any")
+            raise InputError(field, "has the wrong shape", shape, f"give {wanted}, batch dimensions before it if any")
         return shape[:dims]
 
     def _quantities(self, values: Mapping[str, Tensor | float], batch: tuple[int, ...]) -> Tensor:
@@ -122,9 +130,10 @@ def _dense(field: str, tensor: object) -> tuple[int, ...]:
 
 def _broadcast(batches: Mapping[str, tuple[int, ...]]) -> tuple[int, ...]:
     try:
-        batch = tuple(torch.broadcast_shapes(*batches.values()))
-    except RuntimeError as error:
-        raise InputError("batch", "dimensions do not broadcast", dict(batches), "give all the same batch dimensions, or none") from error
+        batch = np.broadcast_shapes(*batches.values())
+    except ValueError as error:
+        fix = "give all the same batch dimensions, or none"
+        raise InputError("batch", "dimensions do not broadcast", dict(batches), fix) from error
     if math.prod(batch) == 0:
         raise InputError("batch", "is empty", batch, "give at least one scene")
     return batch

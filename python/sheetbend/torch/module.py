@@ -18,8 +18,9 @@ from .simulate import Simulation
 class SceneModule(nn.Module):
     """A simulated scene as a module with one scalar parameter per learned quantity, under the quantity's name.
 
-    A positive quantity is stored as its natural logarithm, so that no optimizer step can make it negative and a step means a relative
-    change; `state_dict()["rope_EI"]` is thus log(EI). The others are stored as they are. `values()` gives physical values.
+    A positive quantity is stored as its natural logarithm, so that no optimizer step can make it negative and a step
+    means a relative change; `state_dict()["rope_EI"]` is thus log(EI). The others are stored as they are. `values()`
+    gives physical values.
 
     Args:
         scene, times, solver: as `sheetbend.torch.simulate`.
@@ -31,13 +32,14 @@ class SceneModule(nn.Module):
 
     def __init__(self, scene: Scene, times: ArrayLike, solver: Solver | None = None, *, learn: Sequence[str]) -> None:
         super().__init__()
+        fix = f"name some of: {', '.join(scene.quantities)}"
         if isinstance(learn, str) or len(learn) == 0:
-            raise InputError("learn", "must be a list of quantities", learn, f"name some of: {', '.join(scene.quantities)}")
+            raise InputError("learn", "must be a list of quantities", learn, fix)
         self._simulation = Simulation(scene, times, solver)
         self._positive: dict[str, bool] = {}
         for name in learn:
             if name not in scene.quantities:
-                raise InputError("learn", "names no quantity of the scene", name, f"name some of: {', '.join(scene.quantities)}")
+                raise InputError("learn", "names no quantity of the scene", name, fix)
             q = scene.quantities[name]
             self._positive[name] = q.positive
             stored = math.log(q.value) if q.positive else q.value
@@ -45,7 +47,8 @@ class SceneModule(nn.Module):
 
     def values(self) -> dict[str, Tensor]:
         """Physical values of the learned quantities in SI units, differentiable."""
-        return {name: self.get_parameter(name).exp() if positive else self.get_parameter(name) for name, positive in self._positive.items()}
+        stored = dict(self.named_parameters())
+        return {name: stored[name].exp() if positive else stored[name] for name, positive in self._positive.items()}
 
     def forward(self, inputs: Mapping[str, Tensor] | None = None, **overrides: Tensor | float) -> Tensor:
         """Positions (*batch, frames, particles, 3) m.
@@ -60,5 +63,5 @@ class SceneModule(nn.Module):
         return self._simulation({**self.values(), **overrides}, inputs)
 
     def extra_repr(self) -> str:
-        quantities = self._simulation.scene.quantities
-        return ", ".join(f"{name}={float(value):.6g} {quantities[name].unit}".rstrip() for name, value in self.values().items())
+        units = {name: q.unit for name, q in self._simulation.scene.quantities.items()}
+        return ", ".join(f"{name}={value.item():.6g} {units[name]}".rstrip() for name, value in self.values().items())

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from .. import _core
 from ..errors import InputError
 from ..scene import Scene
 from ..simulate import divergence
@@ -18,8 +17,8 @@ Array = np.ndarray
 class Rollouts:
     """Positions (B, frames, dofs) at the wanted substeps from inputs (B, total).
 
-    A batch of several goes through the core in one call, eight scenes at a time in the lanes of a vector; a batch of one takes the scalar
-    path. Both give the same bits.
+    A batch of several goes through the core in one call, eight scenes at a time in the lanes of a vector; a batch of
+    one takes the scalar path. Both give the same bits.
 
     Args:
         core: the compiled solver of the scene.
@@ -27,32 +26,39 @@ class Rollouts:
         keep_tape: keep the tape of a single rollout for the `vjp` that will follow, which else records it again.
     """
 
-    def __init__(self, scene: Scene, core: _core.Solver, steps: Sequence[int], keep_tape: bool) -> None:
+    def __init__(self, scene: Scene, core: Any, steps: Sequence[int], keep_tape: bool) -> None:
         self._scene, self._core, self._steps, self._keep_tape = scene, core, list(steps), keep_tape
-        self._kept: tuple[Array, _core.Tape] | None = None
+        self._kept: tuple[Array, Any] | None = None
 
     def value(self, inputs: Array) -> Array:
         """Positions. Raises InputError where inputs are not finite, DivergenceError."""
         expect_finite(self._scene, inputs)
+        out: Array
         with divergence(self._scene):
             if len(inputs) != 1:
-                return self._core.simulate_batch(inputs, self._steps, 0.0)
-            if not self._keep_tape:
-                return self._core.simulate(inputs[0], self._steps, 0.0)["positions"][None]
-            self._kept = inputs.copy(), self._record(inputs)
-            return self._core.states(self._kept[1], self._steps)[None]
+                out = self._core.simulate_batch(inputs, self._steps, 0.0)
+                return out
+            if self._keep_tape:
+                self._kept = inputs.copy(), self._record(inputs)
+                out = self._core.states(self._kept[1], self._steps)
+            else:
+                out = self._core.simulate(inputs[0], self._steps, 0.0)["positions"]
+            return out[None]
 
     def vjp(self, inputs: Array, states_bar: Array) -> Array:
         """One call of the core for the whole batch."""
+        out: Array
         with divergence(self._scene):
             if len(inputs) != 1:
-                return self._core.vjp_batch(inputs, self._steps, states_bar, 0.0)
+                out = self._core.vjp_batch(inputs, self._steps, states_bar, 0.0)
+                return out
             kept = self._kept
             tape = kept[1] if kept is not None and np.array_equal(kept[0], inputs) else self._record(inputs)
-            return self._core.vjp(inputs[0], tape, self._steps, states_bar[0], 0.0)[None]
+            out = self._core.vjp(inputs[0], tape, self._steps, states_bar[0], 0.0)
+            return out[None]
 
     def jvp(self, inputs: Array, inputs_dot: Array) -> Array:
-        """One call per distinct scene of the batch, each with up to eight tangents per rollout: the core has no lanes for tangents."""
+        """One call per distinct scene, eight tangents to a rollout: the core has no lanes of scenes for tangents."""
         out = np.empty((len(inputs), len(self._steps), self._scene.compiled.core.dofs))
         _, first, scene_of = np.unique(inputs, axis=0, return_index=True, return_inverse=True)
         scene_of = scene_of.reshape(-1)
@@ -67,7 +73,9 @@ class Rollouts:
         out = np.empty_like(inputs)
         with divergence(self._scene):
             for b in range(len(inputs)):
-                out[b] = self._core.vjp_dot(inputs[b], inputs_dot[b], self._steps, states_bar[b], states_bar_dot[b], 0.0)[1]
+                out[b] = self._core.vjp_dot(
+                    inputs[b], inputs_dot[b], self._steps, states_bar[b], states_bar_dot[b], 0.0
+                )[1]
         return out
 
     def _record(self, inputs: Array) -> Any:

@@ -11,7 +11,7 @@ from torch import Tensor
 from ..scene import Scene
 from ..simulate import substeps
 from ..solver import Solver
-from .function import Value
+from .function import respond
 from .inputs import InputMap
 from .rollouts import Rollouts
 
@@ -25,12 +25,14 @@ class Simulation:
         self._inputs = InputMap(scene)
         self._core = self.solver.core(scene.compiled)
 
-    def __call__(self, values: Mapping[str, Tensor | float] | None = None, inputs: Mapping[str, Tensor] | None = None) -> Tensor:
+    def __call__(
+        self, values: Mapping[str, Tensor | float] | None = None, inputs: Mapping[str, Tensor] | None = None
+    ) -> Tensor:
         flat = self._inputs(values or {}, inputs or {})
         batch = flat.shape[:-1]
         keep_tape = torch.is_grad_enabled() and flat.requires_grad
         rollouts = Rollouts(self.scene, self._core, self._steps, keep_tape)
-        states = Value.apply(rollouts, flat.reshape(-1, flat.shape[-1]))
+        states = respond(rollouts, flat.reshape(-1, flat.shape[-1]))
         return states.reshape(*batch, len(self._steps), -1, 3)
 
 
@@ -43,27 +45,30 @@ def simulate(
 ) -> Tensor:
     """Positions of a simulated scene, differentiable in every tensor given.
 
-    Gradients are those of the discrete rollout, to rounding: reverse mode by the adjoint, forward mode by tangents, second derivatives by
-    forward over reverse (double backward, torch.func.hessian). Third derivatives raise NotImplementedError.
+    Gradients are those of the discrete rollout, to rounding: reverse mode by the adjoint, forward mode by tangents,
+    second derivatives by forward over reverse (double backward, torch.func.hessian). Forward over forward and third
+    derivatives raise NotImplementedError.
 
-    Leading batch dimensions simulate many scenes: forward and reverse are one call of the core, eight scenes to a vector and spread over
-    `solver.threads`. Tangents take one call per distinct scene, second derivatives one per scene.
+    Leading batch dimensions, and torch.func.vmap, simulate many scenes: forward and reverse are one call of the core,
+    eight scenes to a vector and spread over `solver.threads`. Tangents take one call per distinct scene, second
+    derivatives one per scene.
 
     Args:
         scene: is frozen by this.
         times: (frames,) s on the substep grid.
         solver: `Solver()` by default.
         values: quantities to change, by name: tensors (*batch,), or plain numbers.
-        inputs: input arrays to replace, by name: tensors (*batch, ...), whatever quantities made them up. "position", "velocity"
-            (particles, 3), "mass" (particles,), "compliance", "damping" (constraints,), "rest" (all rest parameters,), "boundary"
-            (knots, driven, 3), "force" (knots, loaded, 3), "gravity" (3,), "drag_linear", "drag_quadratic" (particles,). Constraints and
-            rest parameters come group after group, as the groups were added.
+        inputs: input arrays to replace, by name: tensors (*batch, ...), whatever quantities made them up. "position",
+            "velocity" (particles, 3), "mass" (particles,), "compliance", "damping" (constraints,), "rest" (all rest
+            parameters,), "boundary" (knots, driven, 3), "force" (knots, loaded, 3), "gravity" (3,), "drag_linear",
+            "drag_quadratic" (particles,). Constraints and rest parameters come group after group, as added.
 
     Returns:
         (*batch, frames, particles, 3) m, float64.
 
     Raises:
-        InputError: times off the grid; a tensor with an unknown name, of the wrong shape or dtype, on another device, or not finite.
+        InputError: times off the grid; a tensor with an unknown name, of the wrong shape or dtype, on another device,
+            or not finite.
         DivergenceError: a state became infinite; says when and where.
     """
     return Simulation(scene, times, solver)(values, inputs)

@@ -22,9 +22,8 @@ struct Case {
   double compliance,
       damping;  // of a size at which a and g matter for particles of about 20 g and substeps of about 4 ms
   UnderRotation under_rotation;
-  int normal =
-      -1;      // first of the three parameters that are a direction; then C only has to be symmetric about it
-  int degree;  // C(s x) = s^degree C(x) when each parameter is scaled by s^its degree
+  int normal = -1;  // first of the three parameters that are a direction; then C only has to be symmetric about it
+  int degree;       // C(s x) = s^degree C(x) when each parameter is scaled by s^its degree
   std::vector<int> parameter_degree;
   std::vector<int> relabeling;  // of the stencil, under which C becomes sign C ...
   int sign;
@@ -34,8 +33,7 @@ struct Case {
 
 template <class K>
 Case case_of() {
-  static_assert(sizeof(K) == 0,
-                "this registered constraint has no row in tests/cpp/support/cases.h: add one");
+  static_assert(sizeof(K) == 0, "this registered constraint has no row in tests/cpp/support/cases.h: add one");
   return {};
 }
 

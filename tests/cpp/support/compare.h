@@ -90,8 +90,8 @@ inline void record_error(const std::string& what, double error) {
 }
 
 // Compares two gradients quantity by quantity; every quantity that the scene has must matter.
-inline void expect_gradients_agree(const Layout& layout, std::span<const double> found,
-                                   std::span<const double> oracle, double bound) {
+inline void expect_gradients_agree(const Layout& layout, std::span<const double> found, std::span<const double> oracle,
+                                   double bound) {
   ASSERT_EQ(found.size(), layout.total());
   ASSERT_EQ(oracle.size(), layout.total());
   for (int q = 0; q < quantity_count; ++q) {
@@ -105,8 +105,7 @@ inline void expect_gradients_agree(const Layout& layout, std::span<const double>
 
 template <class T>
 ::testing::AssertionResult same_bits(const std::vector<T>& a, const std::vector<T>& b) {
-  if (a.size() != b.size())
-    return ::testing::AssertionFailure() << a.size() << " numbers against " << b.size();
+  if (a.size() != b.size()) return ::testing::AssertionFailure() << a.size() << " numbers against " << b.size();
   for (std::size_t i = 0; i < a.size(); ++i)
     if (std::memcmp(&a[i], &b[i], sizeof(T)) != 0)
       return ::testing::AssertionFailure() << "bits first differ at number " << i;

@@ -15,9 +15,7 @@ struct Program {
 };
 
 // Weight of x[dof]^2 at a step in the loss sum_step sum_dof weight x^2.
-inline double weight(int step, int dof) {
-  return std::remainder(0.618034 * (31 * step + 17 * dof) + 0.1, 1.0);
-}
+inline double weight(int step, int dof) { return std::remainder(0.618034 * (31 * step + 17 * dof) + 0.1, 1.0); }
 
 template <class T>
 Tape<T> record(const Program& p, const std::vector<T>& inputs) {
@@ -43,8 +41,7 @@ std::vector<T> gradient(const Program& p, const std::vector<T>& inputs) {
     wanted.push_back(step);
     for (int i = 0; i < p.scene.dofs(); ++i) x_bar.push_back(T(2.0 * weight(step, i)) * tape.x(step)[i]);
   }
-  reverse_rollout<T>(p.scene, p.plan, inputs.data(), p.t0, tape, wanted, x_bar.data(), inputs_bar.data(),
-                     nullptr);
+  reverse_rollout<T>(p.scene, p.plan, inputs.data(), p.t0, tape, wanted, x_bar.data(), inputs_bar.data(), nullptr);
   return inputs_bar;
 }
 

@@ -19,8 +19,7 @@ struct Projection {
   // Where the parts of theta begin; the last entry is its size.
   std::vector<std::size_t> offsets() const {
     std::vector<std::size_t> at{0};
-    for (const int size : {scene.dofs(), scene.nodes(), scene.rows, scene.rows})
-      at.push_back(at.back() + size);
+    for (const int size : {scene.dofs(), scene.nodes(), scene.rows, scene.rows}) at.push_back(at.back() + size);
     for (const std::size_t size : scene.layout.size) at.push_back(at.back() + size);
     return at;
   }
@@ -30,9 +29,7 @@ struct Projection {
   std::vector<double> random_theta(const std::vector<double>& inputs, Random& random) const {
     std::vector<double> theta(inputs.begin(), inputs.begin() + scene.dofs());
     for (double& q : theta) q += random(-0.005, 0.005);
-    const auto append = [&](const std::vector<double>& part) {
-      theta.insert(theta.end(), part.begin(), part.end());
-    };
+    const auto append = [&](const std::vector<double>& part) { theta.insert(theta.end(), part.begin(), part.end()); };
     append(random.vector(scene.nodes(), 30.0, 100.0));
     std::vector<double> C_r(scene.rows), lambda(scene.rows);
     for (const Group& group : scene.groups)
@@ -71,11 +68,9 @@ struct Projection {
                 &theta[p.offsets()[2]],
                 &out[p.scene.dofs()]} {
       const auto at = p.offsets();
-      for (int n = 0; n < p.scene.nodes(); ++n)
-        w[n] = p.scene.role[n] == Role::free ? theta[at[1] + n] : T(0.0);
+      for (int n = 0; n < p.scene.nodes(); ++n) w[n] = p.scene.role[n] == Role::free ? theta[at[1] + n] : T(0.0);
       std::copy_n(theta.begin(), p.scene.dofs(), out.begin());
-      std::copy_n(theta.begin() + static_cast<std::ptrdiff_t>(at[3]), p.scene.rows,
-                  out.begin() + p.scene.dofs());
+      std::copy_n(theta.begin() + static_cast<std::ptrdiff_t>(at[3]), p.scene.rows, out.begin() + p.scene.dofs());
       record.resize(p.scene, p.plan);
       std::vector<T> rows(p.scene.rows);
       for (const Color& color : p.plan.colors) project_color(state, p.plan.options, color, record);
@@ -109,9 +104,8 @@ struct Projection {
     std::vector<double> bar(theta.size()), fixed(scene.stencil_coordinates);
     std::copy_n(out_bar.begin(), scene.dofs(), bar.begin());
     std::copy_n(out_bar.begin() + scene.dofs(), scene.rows, bar.begin() + static_cast<std::ptrdiff_t>(at[3]));
-    reverse_blocks(
-        run, SubstepCotangent<double>{
-                 &bar[0], fixed.data(), &bar[at[3]], &bar[at[1]], &bar[at[2]], {scene.layout, &bar[at[4]]}});
+    reverse_blocks(run, SubstepCotangent<double>{
+                            &bar[0], fixed.data(), &bar[at[3]], &bar[at[1]], &bar[at[2]], {scene.layout, &bar[at[4]]}});
     for (const Group& group : scene.groups)
       for (std::size_t c = 0; c < static_cast<std::size_t>(group.count) * group.arity * 3; ++c)
         bar[scene.first_dof[group.stencil[c / 3]] + c % 3] += fixed[group.first_coordinate + c];
@@ -134,8 +128,7 @@ Sample scene_of_one(unsigned seed, bool damped, std::vector<int> pinned = {}) {
   out.inputs.resize(out.scene.layout.total());
   const Inputs<double> in{out.scene.layout, out.inputs.data()};
   for (int d = 0; d < K::dofs; ++d) in.of(Quantity::position)[d] = sample.x[d] + random(-0.005, 0.005);
-  for (std::size_t k = 0; k < sample.p.size(); ++k)
-    in.of(Quantity::rest)[k] = sample.p[k] + random(-0.02, 0.02);
+  for (std::size_t k = 0; k < sample.p.size(); ++k) in.of(Quantity::rest)[k] = sample.p[k] + random(-0.02, 0.02);
   in.of(Quantity::compliance)[0] = sample.compliance * random(0.5, 1.5);
   in.of(Quantity::damping)[0] = sample.damping * random(0.5, 1.5);
   return out;

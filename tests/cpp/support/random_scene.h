@@ -65,8 +65,7 @@ struct SceneBuilder {
     std::vector<int> nodes{tail};
     for (int k = 1; k < K::arity; ++k) {
       double at[3];
-      for (int d = 0; d < 3; ++d)
-        at[d] = x[3 * tail + d] + sample.x[3 * k + d] - sample.x[d] + random(-0.005, 0.005);
+      for (int d = 0; d < 3; ++d) at[d] = x[3 * tail + d] + sample.x[3 * k + d] - sample.x[d] + random(-0.005, 0.005);
       nodes.push_back(add_particle(at[0], at[1], at[2]));
     }
     std::vector<double> p = sample.p;
@@ -76,8 +75,7 @@ struct SceneBuilder {
   }
 
   void add_brace(int a, int b) {
-    const double l =
-        std::hypot(x[3 * b] - x[3 * a], x[3 * b + 1] - x[3 * a + 1], x[3 * b + 2] - x[3 * a + 2]);
+    const double l = std::hypot(x[3 * b] - x[3 * a], x[3 * b + 1] - x[3 * a + 1], x[3 * b + 2] - x[3 * a + 2]);
     add_constraint<Distance>(false, {a, b}, {l * random(0.97, 1.03)});
   }
 

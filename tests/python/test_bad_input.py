@@ -1,0 +1,326 @@
+"""Bad input to scenes, ropes, solvers, simulations, experiments and fits: refused by an error that names the field, what it got and a fix."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from sheetbend.equilibrium import NoEquilibriumError
+
+NAN, INF = math.nan, math.inf
+
+
+def three() -> sb.Scene:
+    """Three particles in a row."""
+    scene = sb.Scene("three")
+    scene.add_particles([[0, 0, 0], [1, 0, 0], [2, 0, 0]], 1.0)
+    return scene
+
+
+def linked() -> sb.Scene:
+    """The same, linked and held at one end."""
+    scene = three()
+    scene.add_constraints("distance", [[0, 1], [1, 2]], name="links", compliance=1e-3)
+    scene.pin([0])
+    return scene
+
+
+def rope(**options: Any) -> sb.Scene:
+    return sb.rope(**({"length": 1.0, "segments": 4, "density": 0.05, "EA": 1e3} | options))
+
+
+def recording(markers: int = 1) -> sb.Recording:
+    rng = np.random.default_rng(0)
+    return sb.Recording(positions=rng.standard_normal((5, markers, 3)), times=np.arange(5) / 60, name="r")
+
+
+def experiment(**fields: Any) -> sb.Experiment:
+    given = {"scene": linked(), "recording": recording(), "markers": [sb.on_particle(2)], "solver": sb.Solver(h=1 / 60)}
+    return sb.Experiment(**(given | fields))
+
+
+def fit(**options: Any) -> sb.Fit:
+    given = {"recording": recording(), "parameters": ["rope_EA"], "markers": [sb.on_particle(2)], "solver": sb.Solver(h=1 / 60)}
+    return sb.fit(rope(), **(given | options))
+
+
+def link(kind: str = "distance", particles: Any = ((0, 1),), **options: Any) -> Callable[[], Any]:
+    return lambda: three().add_constraints(kind, particles, name="g", **options)
+
+
+def hinge(**options: Any) -> Callable[[], Any]:
+    return link("hinge", [[0, 1, 2]], **({"viscosity": 1.0, "normal": (0, 1, 0)} | options))
+
+
+def drive(particles: Any = (1,), times: Any = (0.0, 1.0), positions: Any = None, **options: Any) -> Callable[[], Any]:
+    moved = np.zeros((2, 1, 3)) if positions is None else positions
+    return lambda: three().drive(particles, times, moved, **options)
+
+
+def push(particles: Any = (1,), forces: Any = ((0, 0, 1),), times: Any = (0.0,)) -> Callable[[], Any]:
+    return lambda: three().add_force(particles, forces, times)
+
+
+def after(*steps: Callable[[sb.Scene], Any], scene: Callable[[], sb.Scene] = three) -> Callable[[], Any]:
+    """Do the steps to a new scene, one after the other."""
+
+    def run() -> None:
+        built = scene()
+        for step in steps:
+            step(built)
+
+    return run
+
+
+def frozen(step: Callable[[sb.Scene], Any]) -> Callable[[], Any]:
+    return after(lambda s: s.freeze(), step, scene=linked)
+
+
+SCENE = {
+    "gravity of the wrong shape": ("gravity", lambda: sb.Scene(gravity=(0, 0))),
+    "gravity not finite": ("gravity", lambda: sb.Scene(gravity=(0, 0, NAN))),
+    "positions of the wrong shape": ("positions", lambda: three().add_particles([[0, 0]], 1.0)),
+    "no positions": ("positions", lambda: three().add_particles(np.zeros((0, 3)), 1.0)),
+    "positions not finite": ("positions", lambda: three().add_particles([[0, NAN, 0]], 1.0)),
+    "positions of text": ("positions", lambda: three().add_particles([["a", "b", "c"]], 1.0)),
+    "negative mass": ("mass", lambda: three().add_particles([[0, 0, 0]], -1.0)),
+    "mass not finite": ("mass", lambda: three().add_particles([[0, 0, 0]], INF)),
+    "no mass": ("mass", lambda: three().add_particles([[0, 0, 0]], None)),
+    "masses of the wrong shape": ("mass", lambda: three().add_particles([[0, 0, 0]], [1.0, 2.0])),
+    "velocities of the wrong shape": ("velocity", lambda: three().add_particles([[0, 0, 0]], 1.0, velocity=[0, 0, 0])),
+    "velocity not finite": ("velocity", lambda: three().add_particles([[0, 0, 0]], 1.0, velocity=[[0, NAN, 0]])),
+    "pin beyond": ("pin", lambda: three().pin([3])),
+    "pin nothing": ("pin", lambda: three().pin([])),
+    "pin a fraction": ("pin", lambda: three().pin([0.5])),
+    "drive beyond": ("drive", drive(particles=[7])),
+    "drive backwards in time": ("drive.times", drive(times=[1.0, 0.0])),
+    "drive at no time": ("drive.times", drive(times=[], positions=np.zeros((0, 1, 3)))),
+    "drive at NaN": ("drive.times", drive(times=[0.0, NAN])),
+    "drive by the wrong shape": ("drive.positions", drive(positions=np.zeros((2, 3)))),
+    "drive to NaN": ("drive.positions", drive(positions=np.full((2, 1, 3), NAN))),
+    "drive by an unknown interpolation": ("drive.interpolation", drive(interpolation="quintic")),
+    "drive twice": ("drive.particles", after(*[lambda s: s.drive([1], [0, 1], np.zeros((2, 1, 3)))] * 2)),
+    "drive with other knots": (
+        "drive.times",
+        after(lambda s: s.drive([1], [0, 1], np.zeros((2, 1, 3))), lambda s: s.drive([2], [0, 2], np.zeros((2, 1, 3)))),
+    ),
+    "driven and pinned": ("drive.particles", after(lambda s: s.drive([0], [0, 1], np.zeros((2, 1, 3))), lambda s: s.freeze(), scene=linked)),
+    "force beyond": ("add_force.particles", push(particles=[9])),
+    "force not finite": ("add_force.forces", push(forces=[[0, 0, NAN]])),
+    "force backwards in time": ("add_force.times", push(forces=np.zeros((2, 1, 3)), times=[1.0, 0.0])),
+    "force twice": ("add_force.particles", after(*[lambda s: s.add_force([1], [[0, 0, 1]])] * 2)),
+    "force with other knots": (
+        "add_force.times",
+        after(lambda s: s.add_force([1], [[0, 0, 1]]), lambda s: s.add_force([2], [[0, 0, 1]], times=[1.0])),
+    ),
+    "unknown kind": ("kind", link("spring")),
+    "group name taken": ("name", after(lambda s: s.add_constraints("distance", [[0, 1]], name="links"), scene=linked)),
+    "stencil of the wrong size": ("g.particles", link(particles=[[0, 1, 2]])),
+    "stencil of one dimension": ("g.particles", link(particles=[0, 1])),
+    "stencil beyond": ("g.particles", link(particles=[[0, 5]])),
+    "no stencil": ("g.particles", link(particles=np.zeros((0, 2), dtype=int))),
+    "stencil of fractions": ("g.particles", link(particles=[[0.0, 1.0]])),
+    "a particle linked to itself": ("g", after(lambda s: s.add_constraints("distance", [[0, 0], [1, 2]], name="g", rest=1.0), lambda s: s.compiled)),
+    "zero length": ("g.rest", after(lambda s: s.add_particles([[0, 0, 0]], 1.0), lambda s: s.add_constraints("distance", [[0, 3]], name="g"))),
+    "negative rest": ("g.rest", link(rest=-1.0)),
+    "rest not finite": ("g.rest", link(rest=NAN)),
+    "rests of the wrong shape": ("g.rest", link(rest=[1.0, 1.0])),
+    "negative compliance": ("g.compliance", link(compliance=-1e-3)),
+    "compliance not finite": ("g.compliance", link(compliance=INF)),
+    "compliances of the wrong shape": ("g.compliance", link(compliance=[1.0, 2.0])),
+    "negative damping": ("g.damping", link(compliance=1.0, damping=-1.0)),
+    "damping not finite": ("g.damping", link(compliance=1.0, damping=NAN)),
+    "negative viscosity": ("g.viscosity", hinge(viscosity=-1.0)),
+    "viscosity and compliance": ("g.viscosity", hinge(compliance=1.0)),
+    "viscosity and damping": ("g.viscosity", hinge(damping=1.0)),
+    "no normal": ("g.normal", hinge(normal=None)),
+    "normal without length": ("g.normal", hinge(normal=(0, 0, 0))),
+    "normal not finite": ("g.normal", hinge(normal=(0, NAN, 0))),
+    "quantity taken": ("links_compliance", after(lambda s: s.add_quantity("links_compliance", 1.0, "m/N"), scene=linked)),
+    "quantity not finite": ("q", lambda: three().add_quantity("q", NAN, "m")),
+    "quantity not positive": ("q", lambda: three().add_quantity("q", 0.0, "m")),
+    "term of an unknown quantity": ("terms", lambda: three().add_terms([sb.quantities.term("mass", 0, 1.0, q="identity")])),
+    "point mass beyond": ("add_point_mass.particle", lambda: three().add_point_mass(9, 1.0, "p")),
+    "negative point mass": ("p_mass", lambda: three().add_point_mass(1, -1.0, "p")),
+    "negative drag": ("drag.linear", lambda: three().set_drag(linear=-1.0)),
+    "negative quadratic drag": ("drag.quadratic", lambda: three().set_drag(quadratic=[0, 0, -1])),
+    "drags of the wrong shape": ("drag.linear", lambda: three().set_drag(linear=[1.0, 2.0])),
+    "unknown group": ("group", lambda: linked().group("ropes")),
+    "no particles": ("scene", lambda: sb.Scene().freeze()),
+    "everything pinned": ("three", after(lambda s: s.pin([0, 1, 2]), lambda s: s.freeze())),
+    "massless and free": ("mass", after(lambda s: s.add_particles([[3, 0, 0]], 0.0), lambda s: s.freeze())),
+    "connected to nothing": ("particles", after(lambda s: s.add_particles([[9, 0, 0]], 1.0), lambda s: s.freeze(), scene=linked)),
+    "a link between held particles": ("links", after(lambda s: s.pin([1]), lambda s: s.compiled, scene=linked)),
+}
+
+FROZEN = {
+    "add_particles": lambda s: s.add_particles([[0, 0, 0]], 1.0),
+    "pin": lambda s: s.pin([1]),
+    "drive": lambda s: s.drive([1], [0, 1], np.zeros((2, 1, 3))),
+    "add_force": lambda s: s.add_force([1], [[0, 0, 1]]),
+    "add_constraints": lambda s: s.add_constraints("distance", [[0, 1]]),
+    "add_quantity": lambda s: s.add_quantity("q", 1.0, "m"),
+    "add_terms": lambda s: s.add_terms([]),
+    "add_point_mass": lambda s: s.add_point_mass(1, 1.0, "p"),
+    "shift_base": lambda s: s.shift_base(1, (0, 0, 0)),
+    "set_drag": lambda s: s.set_drag(linear=1.0),
+    "add_rope": lambda s: sb.add_rope(s, length=1.0, density=1.0),
+}
+
+ROPE = {
+    "no length": ("rope.length", lambda: rope(length=None)),
+    "zero length": ("rope.length", lambda: rope(length=0.0)),
+    "length not finite": ("rope.length", lambda: rope(length=NAN)),
+    "no segments": ("rope.segments", lambda: rope(segments=0)),
+    "half a segment": ("rope.segments", lambda: rope(segments=2.5)),
+    "zero density": ("rope.density", lambda: rope(density=0.0)),
+    "density not finite": ("rope.density", lambda: rope(density=NAN)),
+    "negative EA": ("rope.EA", lambda: rope(EA=-1.0)),
+    "infinite EA": ("rope_EA", lambda: rope(EA=INF)),
+    "zero EI": ("rope.EI", lambda: rope(EI=0.0)),
+    "negative stretch damping": ("rope.stretch_damping", lambda: rope(stretch_damping=-1.0)),
+    "stretch damping without EA": ("rope.stretch_damping", lambda: rope(EA=None, stretch_damping=1.0)),
+    "bend damping without EI": ("rope.bend_damping", lambda: rope(bend_damping=1.0)),
+    "drag not finite": ("rope_drag_linear", lambda: rope(drag_linear=NAN)),
+    "no joint to bend": ("rope.segments", lambda: rope(segments=1, EI=1e-3)),
+    "direction without length": ("rope.direction", lambda: rope(direction=(0, 0, 0))),
+    "start not finite": ("rope.start", lambda: rope(start=(0, NAN, 0))),
+    "a single point": ("points", lambda: rope(points=[(0, 0, 0)])),
+    "points in one place": ("points", lambda: rope(points=[(0, 0, 0), (0, 0, 0)])),
+    "clamp without length": ("rope.clamp_start", lambda: rope(EI=1e-3, clamp_start=(0, 0, 0))),
+    "clamp not finite": ("rope.clamp_end", lambda: rope(EI=1e-3, clamp_end=(0, NAN, 0))),
+    "clamp angles without a plane": ("rope.plane", lambda: rope(EI=1e-3, clamp_start=(1, 0, 0), clamp_angles=True)),
+    "a set without a plane": ("rope.plane", lambda: rope(EI=1e-3, set_modes=(1,))),
+    "a set without EI": ("rope.set_modes", lambda: rope(plane=(0, 1, 0), set_modes=(1,))),
+    "a mode twice": ("rope_set_1", lambda: rope(EI=1e-3, plane=(0, 1, 0), set_modes=(1, 1))),
+    "a rope's name twice": ("rope_length", after(*[lambda s: sb.add_rope(s, length=1.0, density=1.0)] * 2)),
+    "everything pinned": ("rope", lambda: rope(segments=1, pinned=(0, 1)).freeze()),
+    "marker beyond the end": ("arc_length", lambda: sb.on_rope(rope().ropes["rope"], 1.5)),
+    "marker by an unknown interpolation": ("interpolation", lambda: sb.on_rope(rope().ropes["rope"], 0.5, "quintic")),
+}
+
+SOLVER = {
+    "zero substep": ("solver.h", lambda: sb.Solver(h=0.0)),
+    "negative substep": ("solver.h", lambda: sb.Solver(h=-1e-3)),
+    "substep not finite": ("solver.h", lambda: sb.Solver(h=NAN)),
+    "infinite substep": ("solver.h", lambda: sb.Solver(h=INF)),
+    "substep of text": ("solver.h", lambda: sb.Solver(h="1/600")),
+    "unknown integrator": ("solver.integrator", lambda: sb.Solver(integrator="rk4")),
+    "unknown method": ("solver.method", lambda: sb.Solver(method="jacobi")),
+    "no iterations": ("solver.iterations", lambda: sb.Solver(iterations=0)),
+    "half an iteration": ("solver.iterations", lambda: sb.Solver(iterations=1.5)),
+    "no threads": ("solver.threads", lambda: sb.Solver(threads=0)),
+    "no grain": ("solver.grain", lambda: sb.Solver(grain=-1)),
+    "time off the grid": ("times", lambda: sb.simulate(rope(), [0.0, 0.00037])),
+    "negative time": ("times", lambda: sb.simulate(rope(), [-0.1, 0.0])),
+    "times backwards": ("times", lambda: sb.simulate(rope(), [0.2, 0.1])),
+    "no times": ("times", lambda: sb.simulate(rope(), [])),
+    "time not finite": ("times", lambda: sb.simulate(rope(), [0.0, NAN])),
+    "unknown value": ("values", lambda: sb.simulate(rope(), [0.0, 0.1], values={"rope_EB": 1.0})),
+    "gradient check off the grid": ("times", lambda: sb.check_gradients(rope(), [0.00037])),
+    "equilibrium from the wrong shape": ("start", lambda: sb.equilibrium(rope(), start=[[0, 0, 0]])),
+    "equilibrium from NaN": ("start", lambda: sb.equilibrium(rope(), start=np.full((5, 3), NAN))),
+}
+
+EXPERIMENT = {
+    "zero sigma": ("r.sigma", lambda: experiment(sigma=0.0)),
+    "sigma not finite": ("r.sigma", lambda: experiment(sigma=NAN)),
+    "no axes": ("r.axes", lambda: experiment(axes="")),
+    "unknown axis": ("r.axes", lambda: experiment(axes="xw")),
+    "axis twice": ("r.axes", lambda: experiment(axes="xx")),
+    "unknown start": ("r.start", lambda: experiment(start="rest")),
+    "unknown loss": ("r.loss", lambda: experiment(loss="cauchy")),
+    "negative loss scale": ("r.loss_scale", lambda: experiment(loss_scale=-1.0)),
+    "unknown prediction": ("r.predict", lambda: experiment(predict="median")),
+    "held-out part of an equilibrium": ("r.held_out", lambda: experiment(static=True, held_out=(0.0, 1.0))),
+    "window beyond the recording": ("piece", lambda: experiment(fit=(50.0, 60.0)).fitted()),
+    "window backwards": ("piece", lambda: experiment(fit=(0.05, 0.01)).fitted()),
+    "too many markers": ("markers", lambda: experiment(markers=[sb.on_particle(2)] * 3).places),
+    "unknown marker": ("markers", lambda: experiment(markers={"nose": sb.on_particle(2)}).places),
+    "no places and no rope": ("markers", lambda: experiment(markers=None).places),
+    "only held markers": ("r.markers", lambda: experiment(markers=[sb.on_particle(0)]).compared),
+    "start after the first frame": ("r.start_time", lambda: fit(start_time=0.05)),
+    "offset not finite": ("offset", lambda: sb.on_particle(1).with_offset((0, NAN, 0))),
+    "offset about no normal": ("normal", lambda: sb.on_particle(1).with_offset((0, 1, 0), normal=(0, 0, 0))),
+}
+
+FIT = {
+    "nothing to fit": ("parameters", lambda: fit(parameters=[])),
+    "unknown parameter": ("parameters", lambda: fit(parameters=["rope_EB"])),
+    "unknown field of a parameter": ("parameters.rope_EA", lambda: fit(parameters={"rope_EA": {"max": 1.0}})),
+    "start outside the bounds": ("rope_EA.initial", lambda: fit(parameters={"rope_EA": {"upper": 1.0}})),
+    "negative start on a log scale": ("rope_EA.initial", lambda: fit(parameters={"rope_EA": {"initial": -1.0}})),
+    "start not finite": ("rope_EA.initial", lambda: fit(parameters={"rope_EA": {"initial": NAN}})),
+    "no recording": ("recording", lambda: sb.fit(rope(), parameters=["rope_EA"])),
+    "recording with experiments": ("recording", lambda: sb.fit([experiment()], recording(), ["links_compliance"])),
+    "no experiments": ("experiments", lambda: sb.fit([], parameters=["links_compliance"])),
+    "two of one name": ("experiments", lambda: sb.fit([experiment(), experiment()], parameters=["links_compliance"])),
+    "all only predicted": ("experiments", lambda: sb.fit([experiment(predict="mean")], parameters=["links_compliance"])),
+    "unknown optimizer": ("optimizer", lambda: fit(optimizer="adam")),
+    "unknown name in a start": ("starts", lambda: fit(starts=[{"rope_EI": 1.0}])),
+}
+
+
+@pytest.mark.parametrize("table", [SCENE, ROPE, SOLVER, EXPERIMENT, FIT], ids=["scene", "rope", "solver", "experiment", "fit"])
+def test_the_error_names_field_value_and_fix(table):
+    for case, (field, act) in table.items():
+        with pytest.raises(sb.InputError) as caught:
+            act()
+        error = caught.value
+        assert error.field == field, case
+        assert error.problem and len(error.fix) > 3 and error.fix != "see above", case
+        text = str(error)
+        assert text.startswith(f"{field}: ") and "(got " in text and "Fix: " in text, case
+
+
+@pytest.mark.parametrize("step", FROZEN.values(), ids=FROZEN)
+def test_a_frozen_scene_refuses_additions(step):
+    with pytest.raises(sb.SceneError, match="frozen") as caught:
+        frozen(step)()
+    assert "new scene" in caught.value.fix
+
+
+@pytest.mark.parametrize("kind", ["bend", "planar_bend"])
+@pytest.mark.parametrize("compliance", [None, 0.0, [0.0]])
+def test_rigid_bending_is_refused_with_its_reason(kind, compliance):
+    normal = (0, 1, 0) if kind == "planar_bend" else None
+    with pytest.raises(sb.SceneError, match=r"rank 2 of 3.*EI"):
+        three().add_constraints(kind, [[0, 1, 2]], compliance=compliance, normal=normal)
+
+
+def test_a_rest_curvature_in_space_is_refused_with_its_reason():
+    with pytest.raises(sb.SceneError, match=r"material frames \(rods\).*planar_bend"):
+        three().add_constraints("bend", [[0, 1, 2]], compliance=1.0, rest=0.1)
+
+
+@pytest.mark.parametrize("run", [lambda s, t, h: sb.simulate(s, t, h), lambda s, t, h: sb.check_gradients(s, t, h)], ids=["simulate", "check"])
+def test_divergence_says_when_and_where(run):
+    """A force that leaves the range of numbers on particle 2 half-way through."""
+    scene = linked()
+    scene.add_force([2], np.array([[[0, 0, 0]], [[0, 0, 0]], [[1e308, 0, 0]]]), times=[0.0, 0.5, 0.51])
+    scene.set_drag(quadratic=1.0)
+    with pytest.raises(sb.DivergenceError) as caught:
+        run(scene, [0.0, 1.0], sb.Solver(h=0.01))
+    error = caught.value
+    assert 0.5 <= error.time <= 0.55
+    assert error.substep == pytest.approx(error.time / 0.01)
+    assert error.particle in (1, 2)
+    for part in ("diverged", f"particle {error.particle}", f"substep {error.substep}", "t = 0.5", "three", "Fix:"):
+        assert part in str(error)
+
+
+def test_a_fit_that_cannot_start_says_why():
+    scene = linked()
+    scene.add_force([2], [[1e308, 0, 0]])
+    scene.set_drag(quadratic=1.0)
+    with pytest.raises(sb.SheetbendError, match="cannot start.*diverged"):
+        sb.fit(experiment(scene=scene), parameters=["links_compliance"])
+
+
+def test_no_equilibrium_is_an_error_of_its_own():
+    with pytest.raises(NoEquilibriumError, match=r"(?s)no rest.*Fix"):
+        sb.equilibrium(rope(pinned=()))
