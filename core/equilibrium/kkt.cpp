@@ -110,8 +110,8 @@ bool Kkt::factorize(double mu, const double* compliance) {
   std::fill_n(values, K_.nonZeros(), 0.0);
   for (std::size_t e = 0; e < H_.size(); ++e)
     if (position_[e] >= 0) values[position_[e]] -= H_[e];
-  double geometric = std::max(force_stiffness_, mu);
-  for (const int d : diagonal_) geometric = std::max(geometric, std::abs(values[d]));
+  geometric_ = std::max(force_stiffness_, mu);
+  for (const int d : diagonal_) geometric_ = std::max(geometric_, std::abs(values[d]));
   for (const int d : diagonal_) values[d] += mu;
 
   const int* position = position_.data();
@@ -121,7 +121,7 @@ bool Kkt::factorize(double mu, const double* compliance) {
     for (int e = 0; e < K::rows * K::dofs; ++e) J2 = std::max(J2, J[e] * J[e]);
     double& alpha = softened_[group.first + item];
     alpha = alpha_[group.first + item];
-    if (J2 > 0.0 && geometric > 0.0) alpha = std::max(alpha, J2 / (rigid_stiffness * geometric));
+    if (J2 > 0.0 && geometric_ > 0.0) alpha = std::max(alpha, J2 / (rigid_stiffness * geometric_));
     if (alpha == 0.0) alpha = 1.0;  // a rigid row without any scale of stiffness
     for (int a = 0; a < K::dofs; ++a)
       for (int b = 0; b < K::dofs; ++b, ++position) {
@@ -205,12 +205,16 @@ bool Kkt::solve(double* x, double* lambda, double accuracy) const {
   std::vector<double> z_x(r_x.size(), 0.0), z_l(r_l.size(), 0.0);
   for (int i = 0; i < scene_.dofs(); ++i)
     if (unknown_[i] < 0) r_x[i] = 0.0;
+  // Either part of a solution may vanish; corrections to it count relative to what such a right-hand side moves as a rule.
+  const double J = largest(J_);
+  const double move = std::max(ratio(largest(r_x), geometric_), ratio(largest(r_l), J)), push = ratio(geometric_ * move, J);
   double change = 1.0;
   for (int pass = 0; pass < 20; ++pass) {
     condensed_solve(r_x, r_l, dx, dl);
     for (std::size_t i = 0; i < dx.size(); ++i) z_x[i] += dx[i];
     for (std::size_t i = 0; i < dl.size(); ++i) z_l[i] += dl[i];
-    const double before = std::exchange(change, std::max(ratio(largest(dx), largest(z_x)), ratio(largest(dl), largest(z_l))));
+    const double before = std::exchange(
+        change, std::max(ratio(largest(dx), std::max(largest(z_x), move)), ratio(largest(dl), std::max(largest(z_l), push))));
     if (!std::isfinite(change)) return false;
     if (change <= accuracy || (pass > 0 && change > 0.5 * before)) break;
     subtract_product(dx, dl, r_x, r_l);

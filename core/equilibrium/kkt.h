@@ -49,7 +49,7 @@ class Kkt {
   std::vector<int> position_;               // into K's values, -1 where fixed or below the diagonal
   std::vector<int> diagonal_;               // likewise, per unknown
   std::vector<double> H_, J_, alpha_, softened_;
-  double mu_ = 0.0, force_stiffness_ = 0.0, largest_diagonal_ = 0.0;
+  double mu_ = 0.0, force_stiffness_ = 0.0, geometric_ = 0.0, largest_diagonal_ = 0.0;
   int negative_ = 0;
   Eigen::SparseMatrix<double> K_;
   Factor factor_;
