@@ -1,6 +1,7 @@
 // The equilibrium of a scene over the scalars of a fit: the double solution, with tangents by the implicit function theorem.
 #pragma once
 
+#include <mutex>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -14,8 +15,23 @@ struct NoEquilibrium : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// Coordinates (dofs) of the equilibrium that the start Quantity::position leads to. Throws NoEquilibrium. T: double, Dual<double, 4>, Dual<double, 8>.
+// Where the solves of one experiment begin: the first one where its start Quantity::position is, all later ones at the solution of the
+// first. That saves most of their iterations and keeps them on its branch. They remain functions of their inputs, whatever was solved in
+// between and by which thread.
+class EquilibriumAnchor {
+ public:
+  // Throws NoEquilibrium.
+  Equilibrium solve(const Scene& scene, const double* inputs, const EquilibriumOptions& options, Interrupt* interrupt);
+
+ private:
+  std::mutex setting_;
+  bool set_ = false;
+  std::vector<double> x_, lambda_;
+};
+
+// Coordinates (dofs) of the equilibrium. Throws NoEquilibrium. T: double, Dual<double, 4>, Dual<double, 8>.
 template <class T>
-std::vector<T> equilibrium_coordinates(const Scene& scene, const T* inputs, const EquilibriumOptions& options, Interrupt* interrupt);
+std::vector<T> equilibrium_coordinates(const Scene& scene, const T* inputs, const EquilibriumOptions& options, EquilibriumAnchor& anchor,
+                                       Interrupt* interrupt);
 
 }  // namespace sheetbend

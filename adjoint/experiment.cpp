@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "adjoint/equilibrium_tangents.h"
 #include "core/scalar/dual.h"
 
 namespace sheetbend {
@@ -81,7 +80,7 @@ void Experiment::residuals(const T* theta, T* r, T* simulated, Interrupt* interr
   const T time_offset = in.back();
   ResidualWriter<T> writer(*this, offsets, r, simulated);
   if (is_static || start == Start::equilibrium) {
-    const std::vector<T> x = equilibrium_coordinates<T>(*scene, in.data(), equilibrium, interrupt);
+    const std::vector<T> x = equilibrium_coordinates<T>(*scene, in.data(), equilibrium, *anchor, interrupt);
     if (is_static) return writer.frame(0, x.data());
     std::copy(x.begin(), x.end(), in.begin() + static_cast<std::ptrdiff_t>(scene->layout.of(Quantity::position)));
   }

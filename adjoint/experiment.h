@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "adjoint/equilibrium_tangents.h"
 #include "adjoint/markers.h"
 #include "adjoint/parameter_map.h"
-#include "core/equilibrium/equilibrium.h"
 #include "core/solver/rollout.h"
 
 namespace sheetbend {
@@ -36,6 +36,7 @@ struct Experiment {
   Start start = Start::given;
   double t0 = 0.0;
   EquilibriumOptions equilibrium;
+  std::shared_ptr<EquilibriumAnchor> anchor = std::make_shared<EquilibriumAnchor>();
 
   std::size_t inputs() const { return scene->layout.total() + 3 * observed.markers.size() + 1; }
   std::size_t residual_count() const;  // one per axis of every marker and frame that was seen

@@ -154,7 +154,7 @@ def _hang(
 ) -> Arm:
     """Particles at points (along, across) of the arm, in parts of its length, the end first; their initial state by angle and rate."""
     carrier = pivot if isinstance(pivot, Arm) else None
-    root = carrier.root if carrier else finite(f"{name}.pivot", pivot, (3,), SceneError)
+    root = pivot.root if isinstance(pivot, Arm) else finite(f"{name}.pivot", pivot, (3,), SceneError)
     scene.add_quantity(f"{name}_length", length, "m")
     scene.add_quantity(f"{name}_angle", angle, "rad", positive=False, scale=0.1)
     scene.add_quantity(f"{name}_rate", rate, "rad/s", positive=False, scale=1.0)

@@ -40,6 +40,7 @@ class Experiment:
         offsets: per marker name, names of quantities that are added to its offset (tangent, normal, tangent x normal), None for none.
         sigma: expected error of a marker, m: scales residuals against priors and between experiments.
         axes: coordinates that count, such as "xz".
+        radius: distance of the markers from a pivot, m: errors are then reported as angles in rad, rms distance/radius; None = in m.
         loss: "squares", "soft_l1" or "huber", with loss_scale in units of sigma.
         predict: None takes part in the fit. Otherwise the recording is only predicted, with the shared parameters as fitted on the others and
             its private ones either fitted to its own fit window ("window": initial states, offsets) or set to the mean of the others'
@@ -60,17 +61,22 @@ class Experiment:
     offsets: Mapping[str, tuple[str | None, str | None, str | None]] = field(default_factory=dict)
     sigma: float = 1e-3
     axes: str = "xyz"
+    radius: float | None = None
     loss: str = "squares"
     loss_scale: float = 1.0
     predict: str | None = None
 
     def __post_init__(self) -> None:
+        if not isinstance(self.recording, Recording):
+            raise InputError("recording", "is no Recording", self.recording, "read the file: sb.Recording.load(path)")
         if not self.name:
             object.__setattr__(self, "name", self.recording.name)
         if not (math.isfinite(self.sigma) and self.sigma > 0):
             raise InputError(f"{self.name}.sigma", "must be positive", self.sigma, "give the expected error of a marker in m")
         if not self.axes or set(self.axes) - set("xyz") or len(set(self.axes)) != len(self.axes):
             raise InputError(f"{self.name}.axes", "must be some of x, y, z", self.axes, "give such as 'xz'")
+        if self.radius is not None and not (math.isfinite(self.radius) and self.radius > 0):
+            raise InputError(f"{self.name}.radius", "must be positive", self.radius, "give the markers' distance from their pivot in m")
         if self.start not in ("given", "equilibrium"):
             raise InputError(f"{self.name}.start", "is unknown", self.start, "use 'given' or 'equilibrium'")
         if self.loss not in ("squares", "soft_l1", "huber"):
@@ -79,6 +85,13 @@ class Experiment:
             raise InputError(f"{self.name}.loss_scale", "must be positive", self.loss_scale, "give it in units of sigma")
         if self.predict not in (None, "window", "mean"):
             raise InputError(f"{self.name}.predict", "is unknown", self.predict, "use 'window' or 'mean', or leave it out")
+        if self.start_time is not None and not math.isfinite(self.start_time):
+            raise InputError(f"{self.name}.start_time", "must be finite", self.start_time, "give a time of the recording in s")
+        for part, window in (("fit", self.fit), ("held_out", self.held_out)):
+            if window is not None and len(window) != 2:
+                raise InputError(f"{self.name}.{part}", "must be (start, stop)", window, "give two times of the recording in s")
+        if self.fit is not None and self.held_out is not None and max(self.fit[0], self.held_out[0]) < min(self.fit[1], self.held_out[1]):
+            raise InputError(f"{self.name}.held_out", "overlaps the fitted part", self.held_out, "hold out frames that the fit does not see")
         if self.static and self.held_out is not None:
             raise InputError(f"{self.name}.held_out", "makes no sense for an equilibrium", self.held_out, "hold out whole recordings: predict = 'mean'")
 
@@ -86,6 +99,11 @@ class Experiment:
     def places(self) -> tuple[Place | None, ...]:
         """The markers' places, None where not compared."""
         return places_for(self.scene, self.markers, self.recording.markers)
+
+    @property
+    def compared_places(self) -> list[Place]:
+        """Places of the compared markers."""
+        return [place for i in self.compared if (place := self.places[i]) is not None]
 
     @cached_property
     def compared(self) -> tuple[int, ...]:
@@ -143,11 +161,12 @@ class Experiment:
             "axes": ["xyz".index(a) for a in self.axes],
             "loss": self.loss,
             "loss_scale": self.loss_scale,
-            "markers": [self.places[i].core() for i in self.compared],
+            "markers": [place.core() for place in self.compared_places],
         }
 
     def extra_terms(self) -> list[Term]:
         """Terms of the inputs that belong to the observation: marker offsets (3 each), then the time offset."""
+        self._check_names()
         terms: list[Term] = []
         for m, i in enumerate(self.compared):
             wanted = self.offsets.get(self.recording.markers[i], (None, None, None))
@@ -156,10 +175,22 @@ class Experiment:
             terms.append(product("extra", 3 * len(self.compared), 1.0, {self.time_offset: "identity"}))
         return terms
 
+    def _check_names(self) -> None:
+        known = self.scene.quantities
+        for marker, wanted in self.offsets.items():
+            if marker not in self.recording.markers:
+                raise InputError(f"{self.name}.offsets", "name no marker", marker, f"use some of: {', '.join(self.recording.markers)}")
+            unknown = [name for name in wanted if name is not None and name not in known]
+            if unknown or len(wanted) != 3:
+                fix = f"give three, each None or one of: {', '.join(known)}"
+                raise InputError(f"{self.name}.offsets", f"of '{marker}' are not three quantities of the scene", wanted, fix)
+        if self.time_offset is not None and self.time_offset not in known:
+            raise InputError(f"{self.name}.time_offset", "names no quantity of the scene", self.time_offset, f"use one of: {', '.join(known)}")
+
     def core(self, recording: Recording) -> dict[str, Any]:
         """The experiment on (part of) its recording, for the compiled core."""
         compiled = self.scene.compiled
-        offsets = [self.places[i].offset or (0.0, 0.0, 0.0) for i in self.compared]
+        offsets = [place.offset or (0.0, 0.0, 0.0) for place in self.compared_places]
         observed = self.observed(recording)
         for marker, m in zip(observed["markers"], self.compared, strict=True):
             marker["carries_offset"] = marker["carries_offset"] or self.recording.markers[m] in self.offsets

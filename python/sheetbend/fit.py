@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from .errors import InputError
 from .experiment import Experiment
 from .floors import solver_floors
 from .identifiability import Identifiability, identify
-from .optimizers import Minimum, Observer, minimize
+from .optimizers import Minimum, Observer, minimize, refit
 from .parameters import Parameter, Parameters
 from .prediction import Comparison, compare
 from .problem import FitProblem, ParameterLike, as_parameters
@@ -23,6 +23,7 @@ from .recording import Recording
 from .result import Estimate, FitResult, Given, Start
 from .scene import Scene
 
+PROFILE_TOLERANCE = 1e-7  # relative, of the cost: an interval's rise is many times that
 INACCURATE = 0.5  # a start whose cost exceeds the best by this share ended elsewhere
 
 
@@ -83,7 +84,7 @@ def fit(
         progress: called after every iteration.
 
     Returns:
-        Fit. On Ctrl-C it holds the best point so far, marked `interrupted`.
+        Fit. On Ctrl-C it holds the best point so far, marked `interrupted`, with linear intervals: whatever needs a refit is left out.
 
     Raises:
         InputError: anything inconsistent, named, before work starts.
@@ -91,18 +92,28 @@ def fit(
     """
     experiments = _experiments(scene, recording, experiment)
     wanted = as_parameters(parameters, experiments)
+    for option, given in (("max_iterations", max_iterations), ("threads", threads)):
+        if given < 1:
+            raise InputError(option, "must be positive", given, "give at least 1")
     began = time.perf_counter()
     fitted = [e for e in experiments if e.predict is None]
     if not fitted:
         raise InputError("experiments", "leave nothing to fit: all are only predicted", len(experiments), "set predict to None for at least one")
     problem = FitProblem(fitted, wanted, threads=threads)
-    ends, name = _minimize_all(problem, optimizer, starts, max_iterations, progress)
+    ends, name, interrupted = _minimize_all(problem, optimizer, starts, max_iterations, progress)
     best = ends[0]
-    refined = {} if refine is None or best.interrupted else refined_estimates(refine, experiments, wanted, problem, best.u, name, threads)
-    judged = _judge(problem, best.u, refined, name)
     values = problem.parameters.to_physical(best.u)
-    every, all_values, extra = _predicted(experiments, wanted, values, name, threads)
-    comparisons = compare(every, wanted, all_values, threads)
+
+    def conclude(refitter: str | None) -> tuple[Identifiability, dict[str, float], tuple[Given, ...]]:
+        refined = {} if refine is None or refitter is None else refined_estimates(refine, experiments, wanted, problem, best.u, refitter, threads)
+        return _judge(problem, best.u, refined, refitter), *_predicted(experiments, wanted, values, refitter, threads)
+
+    try:
+        judged, all_values, extra = conclude(None if interrupted else name)
+    except KeyboardInterrupt:
+        interrupted = True
+        judged, all_values, extra = conclude(None)
+    comparisons = compare(experiments, wanted, all_values, threads)
     rows = problem.core.first_rows
     count = {e.name: rows[i + 1] - rows[i] for i, e in enumerate(fitted)}
     result = FitResult(
@@ -114,7 +125,7 @@ def fit(
         iterations=best.iterations,
         seconds=time.perf_counter() - began,
         converged=best.converged,
-        interrupted=best.interrupted,
+        interrupted=interrupted,
         message=best.message,
         given=_given(problem.parameters, values) + extra,
         correlations=judged.correlations,
@@ -122,7 +133,7 @@ def fit(
         baseline="; ".join(dict.fromkeys(c.baseline_words for c in comparisons if c.baseline_words)),
         autocorrelation_time=judged.autocorrelation_time,
         starts=tuple(Start(cost=m.cost, iterations=m.iterations, converged=m.converged, values=problem.parameters.to_physical(m.u)) for m in ends),
-        warnings=_warnings(ends, best),
+        warnings=_warnings(ends, best, interrupted),
     )
     return Fit(result, tuple(comparisons), wanted)
 
@@ -142,8 +153,8 @@ def _experiments(scene: Scene | Experiment | Sequence[Experiment], recording: Re
 
 def _minimize_all(
     problem: FitProblem, optimizer: str, starts: Sequence[Mapping[str, float]], max_iterations: int, progress: Observer | None
-) -> tuple[list[Minimum], str]:
-    """Ends of all starts, best first."""
+) -> tuple[list[Minimum], str, bool]:
+    """Ends of all starts, best first; the optimizer's name; whether Ctrl-C ended the search."""
     first = problem.parameters.to_physical(problem.parameters.initial())
     points = [problem.parameters.initial()]
     for changes in starts:
@@ -151,25 +162,27 @@ def _minimize_all(
         if unknown:
             raise InputError("starts", "name no free parameter", sorted(unknown), f"use: {', '.join(problem.parameters.free)}")
         points.append(problem.parameters.to_internal(first | dict(changes)))
-    ends = []
+    ends: list[Minimum] = []
+    interrupted, name = False, ""
     for u in points:
-        end, name = minimize(problem, u, optimizer, max_iterations, observe=progress)
+        try:
+            end, name = minimize(problem, u, optimizer, max_iterations, observe=progress)
+        except KeyboardInterrupt:  # before the first point of this start
+            if not ends:
+                raise
+            interrupted = True
+            break
         ends.append(end)
         if end.interrupted:
+            interrupted = True
             break
-    return sorted(ends, key=lambda m: m.cost), name
+    return sorted(ends, key=lambda m: m.cost), name, interrupted
 
 
-def _judge(problem: FitProblem, u: np.ndarray, refined: Mapping[str, float], optimizer: str) -> Identifiability:
+def _judge(problem: FitProblem, u: np.ndarray, refined: Mapping[str, float], refitter: str | None) -> Identifiability:
+    """Verdicts and intervals; without a refitter the intervals are the linear ones."""
     _, r, J = problem.evaluate(u)
     rows = problem.core.data_rows
-
-    def profile(name: str, value: float) -> float:
-        """Cost with one parameter held and the others refitted."""
-        held = problem.holding(name, value)
-        end, _ = minimize(held, held.parameters.to_internal(problem.parameters.to_physical(u)), optimizer, 50)
-        return end.cost
-
     return identify(
         problem.parameters,
         u,
@@ -178,33 +191,63 @@ def _judge(problem: FitProblem, u: np.ndarray, refined: Mapping[str, float], opt
         layout=problem.rows_layout(),
         floors=solver_floors(problem.experiments, problem.parameters),
         discretization=refined,
-        profile=profile if len(problem.parameters.free) > 1 else None,
+        profile=None if refitter is None or len(problem.parameters.free) == 1 else _profile(problem, u, refitter),
+        cost=lambda at: _cost(problem, at),
     )
 
 
+def _cost(problem: FitProblem, u: np.ndarray) -> float:
+    ok, r, _ = problem.evaluate(u, jacobian=False)
+    return 0.5 * float(r @ r) if ok else np.inf
+
+
+def _profile(problem: FitProblem, u: np.ndarray, refitter: str) -> Callable[[str, float], float]:
+    """(name, value) -> cost with that parameter held and the others refitted, of the experiments that it reaches."""
+    values = problem.parameters.to_physical(u)
+    ends: dict[str, dict[float, np.ndarray]] = {}  # by name and value held: where the others ended, all internal
+
+    def cost(name: str, value: float) -> float:
+        part, parameter = problem.around(name), problem.parameters[name]
+        if part.parameters.free == (name,):
+            return _cost(part, part.parameters.to_internal({name: value}))
+        held = part.holding(name, value)
+        mean, sd = parameter.prior or (value, 1.0)
+        pull = (parameter.to_internal(value) - parameter.to_internal(mean)) / sd
+        at = parameter.to_internal(value)
+        known = ends.setdefault(name, {parameter.to_internal(values[name]): held.parameters.to_internal(values)})
+        start = known[min(known, key=lambda other: abs(other - at))]
+        if not np.isfinite(_cost(held, start)):
+            return np.inf  # the motion diverges: out of the question
+        end = refit(held, start, refitter, 50, PROFILE_TOLERANCE)
+        known[at] = end.u
+        return end.cost + 0.5 * pull**2
+
+    return cost
+
+
 def _predicted(
-    experiments: Sequence[Experiment], wanted: Parameters, values: Mapping[str, float], optimizer: str, threads: int
-) -> tuple[list[Experiment], dict[str, float], tuple[Given, ...]]:
-    """Private parameters of the experiments that are only predicted, fitted to their own windows or taken as the others' mean."""
+    experiments: Sequence[Experiment], wanted: Parameters, values: Mapping[str, float], refitter: str | None, threads: int
+) -> tuple[dict[str, float], tuple[Given, ...]]:
+    """All values, with the private parameters of the experiments that are only predicted: fitted to their own windows or the others' mean."""
     complete = dict(values)
     given: list[Given] = []
     for e in experiments:
         if e.predict is None:
             continue
         private = [p for p in wanted.values() if p.private and p.tied_to is None and p.name in e.scene.quantities]
-        if e.predict == "mean":
+        if e.predict == "mean" or refitter is None:
+            words = "mean of the fitted recordings"
             for p in private:
                 others = [v for key, v in values.items() if key.partition("[")[0] == p.name]
                 own = e.scene.quantities[p.name].value if p.initial is None else p.initial
                 complete[f"{p.name}[{e.name}]"] = float(np.mean(others)) if others else own
         elif private:
+            words = "fitted to the recording's own first window"
             shared = [replace(p, fixed=True, prior=None, initial=values[p.name]) for p in wanted.values() if not p.private and p.tied_to is None]
-            own = FitProblem([e], Parameters([*shared, *private]), threads=threads)
-            end, _ = minimize(own, own.parameters.initial(), optimizer)
-            complete |= own.parameters.to_physical(end.u)
-        words = "mean of the fitted recordings" if e.predict == "mean" else "fitted to the recording's own first window"
+            problem = FitProblem([e], Parameters([*shared, *private]), threads=threads)
+            complete |= problem.parameters.to_physical(refit(problem, problem.parameters.initial(), refitter).u)
         given += [Given(name=f"{p.name}[{e.name}]", value=complete[f"{p.name}[{e.name}]"], unit=p.unit, words=words) for p in private]
-    return list(experiments), complete, tuple(given)
+    return complete, tuple(given)
 
 
 def _given(parameters: Parameters, values: Mapping[str, float]) -> tuple[Given, ...]:
@@ -216,8 +259,10 @@ def _given(parameters: Parameters, values: Mapping[str, float]) -> tuple[Given, 
     return tuple(rows)
 
 
-def _warnings(ends: Sequence[Minimum], best: Minimum) -> tuple[str, ...]:
+def _warnings(ends: Sequence[Minimum], best: Minimum, interrupted: bool) -> tuple[str, ...]:
     warnings = []
+    if interrupted:
+        warnings.append("interrupted: intervals are the linear ones, without profiles and without refits on a finer discretization")
     elsewhere = [m for m in ends if m.cost > best.cost * (1.0 + INACCURATE)]
     if elsewhere:
         warnings.append(f"{len(elsewhere)} of {len(ends)} starts ended in a worse minimum: the cost has several")

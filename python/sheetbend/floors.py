@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from .experiment import Experiment
@@ -12,7 +13,8 @@ from .parameters import Parameters
 def solver_floors(experiments: Sequence[Experiment], parameters: Parameters) -> dict[str, Floor]:
     """Floors of the free parameters, by (expanded) name.
 
-    BDF1 damps a mode of frequency omega like zeta = omega h / 2, a Kelvin-Voigt time constant tau like omega tau / 2: the floor is tau = h.
+    BDF1 damps a mode of frequency omega like zeta = omega h / 2, a Kelvin-Voigt time constant tau like omega tau / 2: the floor is tau = h,
+    that of a loss factor omega h.
     Gauss-Seidel leaves about 0.9 h^2 / (m sweeps) of compliance in a link of node mass m: EA above length / that is not seen.
     """
     floors: dict[str, Floor] = {}
@@ -24,6 +26,10 @@ def solver_floors(experiments: Sequence[Experiment], parameters: Parameters) -> 
             h, sweeps = e.solver.h, e.solver.sweeps
             if quantity.endswith("_damping") and parameters[name].unit == "s" and e.solver.integrator == "bdf1":
                 floors[name] = Floor(h, f"BDF1 with a substep of {h:g} s damps as much by itself; use bdf2")
+            if quantity.endswith("_loss_factor") and e.solver.integrator == "bdf1":
+                frequency = e.scene.quantities[quantity.replace("_loss_factor", "_loss_frequency")].value
+                words = f"BDF1 with a substep of {h:g} s damps as much by itself; use bdf2"
+                floors[name] = Floor(2.0 * math.pi * frequency * h, words)
             rope = next((r for r in e.scene.ropes.values() if quantity == f"{r.name}_EA"), None)
             if rope is not None and e.solver.method == "gauss_seidel":
                 link = rope.arc_length[1] - rope.arc_length[0]

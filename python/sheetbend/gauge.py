@@ -37,6 +37,11 @@ class Gauge:
     exponents: tuple[float, ...]
     words: str
 
+    @property
+    def powers(self) -> tuple[float, ...]:
+        """Of the first member, for each of the others: what is known is other * first^-power."""
+        return tuple(_rounded(step / self.exponents[0]) for step in self.exponents[1:])
+
 
 @dataclass(frozen=True)
 class NullSpace:

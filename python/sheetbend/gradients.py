@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from . import _core
 from .compiled import CompiledScene
 from .scene import Scene
 from .simulate import divergence, substeps
@@ -17,6 +18,7 @@ from .solver import Solver
 COMPLEX_STEP_BOUND = 1e-8
 DOT_PRODUCT_BOUND = 1e-9
 DIFFERENCES_BOUND = 1e-4
+STEP_FACTORS = (1e4, 1e2, 1.0, 1e-2)
 
 
 @dataclass(frozen=True)
@@ -111,6 +113,7 @@ class _Probe:
 
     def __init__(self, core: Any, inputs: np.ndarray, steps: Sequence[int], weights: np.ndarray) -> None:
         self.core, self.inputs, self.steps, self.weights = core, inputs, steps, weights
+        self.rounding = np.finfo(float).eps * float(np.abs(core.simulate(inputs, steps, 0.0)["positions"] * weights).sum())
 
     def complex_step(self, direction: np.ndarray) -> float:
         return float((self.core.complex_step(self.inputs, direction, self.steps, 0.0) * self.weights).sum())
@@ -119,11 +122,23 @@ class _Probe:
         return float((self.core.simulate(inputs, self.steps, 0.0)["positions"] * self.weights).sum())
 
     def differences(self, direction: np.ndarray, step: float) -> float:
-        """Central differences with one Richardson step."""
-        coarse, fine = (
-            (self.loss(self.inputs + e * direction) - self.loss(self.inputs - e * direction)) / (2.0 * e) for e in (step, step / 2.0)
-        )
-        return (4.0 * fine - coarse) / 3.0
+        """Central differences with one Richardson step, at the step size where truncation and rounding together are least.
+
+        No single step suits all: rounding drowns a faint gradient at small ones, and rigid links turn soft at large ones. How much halving
+        the step changes the differences tells their truncation error (Ridders 1982).
+        """
+
+        def at(size: float) -> tuple[float, float]:
+            try:
+                coarse, fine = self._central(direction, size), self._central(direction, size / 2.0)
+            except _core.Diverged:  # a step as large as a mass
+                return np.inf, np.nan
+            return abs(fine - coarse) + self.rounding / size, (4.0 * fine - coarse) / 3.0
+
+        return min(at(step * factor) for factor in STEP_FACTORS)[1]
+
+    def _central(self, direction: np.ndarray, step: float) -> float:
+        return (self.loss(self.inputs + step * direction) - self.loss(self.inputs - step * direction)) / (2.0 * step)
 
 
 def _quantity_row(compiled: CompiledScene, probe: _Probe, theta: np.ndarray, adjoint: np.ndarray, name: str) -> GradientRow:

@@ -1,16 +1,16 @@
 """What a fit may claim: intervals, correlations, gauges, and one verdict for each parameter.
 
 The statistics are linear at the minimum, in internal coordinates, so that an interval on a log scale is
-asymmetric in physical units and never crosses zero. Where the linear picture is poor (wide intervals), the
-profile of the cost decides: the interval holds the values at which a refit of all other parameters costs
-little more.
+asymmetric in physical units and never crosses zero. Where an interval is wide and the cost at its ends is not
+what the linear picture says, the profile of the cost decides: the interval then holds the values at which a
+refit of all other parameters costs little more.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -23,13 +23,15 @@ from .parameters import Parameter, Parameters
 from .profile import FARTHEST, Ends, profile_interval
 from .result import Correlation, Estimate
 from .timeseries import Array
-from .wording import floor_words, quantity, side_words, width_words
+from .wording import figures, floor_words, quantity, side_words, width_words
 
 IDENTIFIED = 0.2
 """Largest 95 % half-width of an identified parameter, as a part of its value (or of its scale)."""
 
 _LEVEL = 0.95
 _AT_BOUND = 1e-6
+_OPEN = 30.0  # natural scales: data that leave more of a parameter open, all others known, do not contain it
+_LINEAR = 0.2  # a rise of the cost that differs by less from the linear picture's confirms it
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,7 @@ def identify(
     floors: Mapping[str, Floor] | None = None,
     discretization: Mapping[str, float] | None = None,
     profile: Callable[[str, float], float] | None = None,
+    cost: Callable[[Array], float] | None = None,
     rank_tolerance: float = RANK_TOLERANCE,
 ) -> Identifiability:
     """Judge every free parameter of a finished fit.
@@ -92,6 +95,8 @@ def identify(
         discretization: what refits at half the step and twice the nodes move, by parameter, in its unit.
         profile: (name, physical value) -> cost (half the sum of squares with priors) with all others
             refitted; it is asked about weak parameters only.
+        cost: (internal point) -> cost there, infinite where it has none; where it rises towards both linear
+            ends of a parameter as the linear picture says, no profile is needed.
         rank_tolerance: see `gauge.RANK_TOLERANCE`.
 
     Raises:
@@ -100,7 +105,7 @@ def identify(
     """
     floors, discretization = floors or {}, discretization or {}
     _check(parameters, internal, residuals, jacobian, {*floors, *discretization})
-    judge = _Judge(parameters, internal, residuals, jacobian, layout, rank_tolerance, profile)
+    judge = _Judge(parameters, internal, residuals, jacobian, layout, rank_tolerance, profile, cost)
     estimates = tuple(
         judge.estimate(column, floors.get(name), float(discretization.get(name, 0.0)))
         for column, name in enumerate(parameters.free)
@@ -149,12 +154,14 @@ class _Judge:
         layout: Layout | None,
         tolerance: float,
         profile: Callable[[str, float], float] | None,
+        cost: Callable[[Array], float] | None,
     ) -> None:
-        self.parameters, self.internal, self.profile = parameters, internal, profile
+        self.parameters, self.internal, self.profile, self.cost = parameters, internal, profile, cost
         self.quantile = require("scipy.special", "fit").stdtrit
         names, log = parameters.free, [parameters[name].log for name in parameters.free]
         prior = parameters.prior_jacobian()
-        self.space = null_space(np.vstack([jacobian, prior]), names, log, tolerance)
+        self.rows = np.vstack([jacobian, prior])
+        self.space = null_space(self.rows, names, log, tolerance)
         seen_by_data = null_space(jacobian, names, log, tolerance).determined
         self.by_prior = set(self.space.determined) - set(seen_by_data)
         lower, upper = parameters.bounds()
@@ -165,10 +172,14 @@ class _Judge:
         # A parameter at its bound stays there for the others; its own interval lets all of them move.
         self.columns = [column for column in unique if not bounded[column]]
         self.spread = covariance(residuals, jacobian[:, self.columns], layout, prior[:, self.columns])
+        # Half-widths that the data would leave with all other parameters known and without priors.
+        size = np.maximum(np.linalg.norm(jacobian, axis=0), np.finfo(float).tiny)
+        self.alone = 2 * math.sqrt(self.spread.residual_variance) / size
         self.wide_columns, self.wide = self.columns, self.spread
         if len(self.columns) < len(unique):
             self.wide_columns = unique
             self.wide = covariance(residuals, jacobian[:, unique], layout, prior[:, unique])
+        self.space = replace(self.space, gauges=tuple(self._measured(gauge) for gauge in self.space.gauges))
 
     def estimate(self, column: int, floor: Floor | None, discretization: float) -> Estimate:
         """Value, interval and verdict of the parameter in that column."""
@@ -176,6 +187,10 @@ class _Judge:
         value = parameter.to_physical(self.internal[column])
         if column not in self.space.determined:
             return _open(parameter, value, discretization, self._undetermined(parameter.name))
+        alone = float(self.alone[column])
+        if not parameter.log and parameter.scale is not None and alone > _OPEN * parameter.scale:
+            words = f"the data hardly depend on it: they would leave it open to {quantity(alone, parameter)} if all others were known"
+            return _open(parameter, value, discretization, words)
         columns, spread = (
             (self.columns, self.spread) if column in self.columns else (self.wide_columns, self.wide)
         )
@@ -187,7 +202,7 @@ class _Judge:
             ends = _clipped(parameter, ends)
         elif self.profile is not None and not _precise(parameter, value, ends, discretization):
             rise = t**2 * spread.residual_variance * float(spread.inflation[index]) / 2
-            if rise > 0:
+            if rise > 0 and not self._confirmed(column, reach):
                 step = min(reach, 1.0) if parameter.log else reach
                 ends = profile_interval(
                     partial(self.profile, parameter.name),
@@ -239,6 +254,26 @@ class _Judge:
             words=words,
         )
 
+    def _confirmed(self, column: int, reach: float) -> bool:
+        """Whether the cost at both ends, the others moved along as the linear picture has it, is what it predicts."""
+        if self.cost is None or column not in self.columns:
+            return False
+        index = self.columns.index(column)
+        size = np.linalg.norm(self.rows[:, self.columns], axis=0)
+        _, R = np.linalg.qr(self.rows[:, self.columns] / size)
+        inverse = np.linalg.solve(R, np.linalg.solve(R.T, np.eye(len(size))[index])) / (size * size[index])
+        direction = np.zeros(len(self.internal))
+        direction[self.columns] = inverse / inverse[index]
+        expected = reach**2 / (2 * inverse[index])
+        lower, upper = self.parameters.bounds()
+        here = self.cost(self.internal)
+        for end in (self.internal - reach * direction, self.internal + reach * direction):
+            if (end < lower).any() or (end > upper).any():
+                return False
+            if not abs(self.cost(end) - here - expected) <= _LINEAR * expected:
+                return False
+        return True
+
     def correlations(self) -> tuple[Correlation, ...]:
         """Of every pair of parameters that has an interval."""
         names = [self.parameters.free[column] for column in self.columns]
@@ -261,6 +296,30 @@ class _Judge:
             return "moves no residual: the data do not contain it; fix it or give it a prior"
         words = "; ".join(gauge.words for gauge in self.space.gauges if name in gauge.members)
         return f"{words}; fix one of them or give it a prior"
+
+    def _measured(self, gauge: Gauge) -> Gauge:
+        """The gauge with the values of what is known all the same, where they follow from its parameters alone.
+
+        Those are monomials, so all of them must be on a log scale; none may take part in another gauge or sit at a bound.
+        """
+        free = self.parameters.free
+        columns = [free.index(name) for name in gauge.members]
+        others = {name for other in self.space.gauges if other is not gauge for name in other.members}
+        varied = [column for column in columns if column not in self.space.pivots]
+        monomials = all(self.parameters[name].log for name in gauge.members)
+        if not monomials or others & set(gauge.members) or not set(varied) <= set(self.columns):
+            return gauge
+        values = []
+        for column, power in zip(columns[1:], gauge.powers, strict=True):
+            row = np.zeros(len(self.columns))  # the pivot is held, which moves no combination
+            for member, weight in ((column, 1.0), (columns[0], -power)):
+                if member in varied:
+                    row[self.columns.index(member)] = weight
+            value = math.exp(self.internal[column] - power * self.internal[columns[0]])
+            degrees = min(self.spread.degrees[self.columns.index(member)] for member in varied)
+            reach = float(self.quantile(degrees, 0.5 + _LEVEL / 2)) * math.sqrt(row @ self.spread.matrix @ row)
+            values.append(" +/- ".join(figures((value, value * math.sinh(reach)), value * math.sinh(reach))))
+        return replace(gauge, words=f"{gauge.words}: {', '.join(values)}")
 
     def _limit(self, column: int) -> str | None:
         parameter = self.parameters[self.parameters.free[column]]

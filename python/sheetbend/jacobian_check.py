@@ -15,11 +15,12 @@ from .problem import FitProblem
 
 BOUND = 1e-4  # the differences' own accuracy limits it
 STEP = 1e-3  # of the internal coordinate: the logarithm, or the parameter's scale
+SMALLEST = 1e-4  # of the largest residual, or of one standard deviation; smaller columns are judged as if they were that large
 
 
 @dataclass(frozen=True)
 class JacobianRow:
-    """The column of one parameter: its largest entry, and the largest gap to central differences relative to that."""
+    """The column of one parameter: its largest entry, and the largest gap to central differences relative to that (or to `SMALLEST`)."""
 
     name: str
     largest: float
@@ -71,8 +72,8 @@ def check_jacobian(problem: FitProblem, recording: str = "") -> JacobianReport:
         exact, rough = J[:, column], (4.0 * fine - coarse) / 3.0
         largest = float(np.abs(exact).max())
         gap = float(np.abs(exact - rough).max())
-        # A parameter that nothing depends on here has a zero column, and differences that are nothing but rounding.
-        relative = gap / largest if largest > 0.0 else gap / max(float(np.abs(r).max()), 1.0)
+        # Where nothing depends on a parameter, its column and the differences are nothing but rounding.
+        relative = gap / max(largest, SMALLEST * max(float(np.abs(r).max()), 1.0))
         rows.append(JacobianRow(name, largest, relative, relative <= BOUND))
     return JacobianReport(recording, len(r), tuple(rows))
 

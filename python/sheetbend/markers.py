@@ -93,8 +93,17 @@ def places_for(scene: Scene, markers: Mapping[str, Place] | Sequence[Place] | No
         markers: by marker name, in the recording's order, or None: equally spaced along the only rope.
 
     Raises:
-        SceneError: unknown names, a wrong number, or no rope (or several) to spread markers along.
+        SceneError: unknown names, a wrong number, particles that do not exist, or no rope (or several) to spread markers along.
     """
+    places = _places_for(scene, markers, names)
+    for name, place in zip(names, places, strict=True):
+        if place is not None and not all(0 <= p < scene.particle_count for p in place.particles):
+            fix = f"use particles 0 to {scene.particle_count - 1}"
+            raise SceneError("markers", f"put '{name}' on particles that do not exist", place.particles, fix)
+    return places
+
+
+def _places_for(scene: Scene, markers: Mapping[str, Place] | Sequence[Place] | None, names: Sequence[str]) -> tuple[Place | None, ...]:
     if markers is None:
         if len(scene.ropes) != 1:
             raise SceneError("markers", "are not placed, and the scene has not exactly one rope", len(scene.ropes), "give their places")

@@ -68,6 +68,18 @@ def minimize(
     return run(problem, np.array(u, dtype=float), max_iterations, tolerance, best), name
 
 
+def refit(problem: FitProblem, u: np.ndarray, optimizer: str, max_iterations: int = 200, tolerance: float = 1e-10) -> Minimum:
+    """`minimize` for a step of larger work (a profile, a refinement), which Ctrl-C ends as a whole.
+
+    Raises:
+        KeyboardInterrupt: an interrupted end is worth nothing to the caller.
+    """
+    end, _ = minimize(problem, u, optimizer, max_iterations, tolerance)
+    if end.interrupted:
+        raise KeyboardInterrupt
+    return end
+
+
 class _Best:
     """Keeps the best point seen and passes progress on."""
 

@@ -7,6 +7,7 @@ writes it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -74,10 +75,41 @@ def plot_trajectories(
     return figure
 
 
+@dataclass(frozen=True)
+class Motion:
+    """One coordinate of one recording over time: its name, times (frames,) s, measured and simulated (frames,) m, held-out span s."""
+
+    name: str
+    times: Array
+    measured: Array
+    simulated: Array
+    held_out: tuple[float, float] | None = None
+
+
+def plot_motions(motions: Sequence[Motion], *, title: str = "") -> Figure:
+    """One coordinate of each of several recordings, measured (dots) against simulated (line), one panel each."""
+    if not motions:
+        raise InputError("motions", "are empty", 0, "give at least one")
+    figure = _figure(7.2, 0.6 + 1.75 * len(motions), title or " ")
+    for panel, motion in zip(figure.subplots(len(motions), 1, squeeze=False)[:, 0], motions, strict=True):
+        _clean(panel)
+        panel.plot(motion.times, 1e3 * motion.measured, ".", color=GRAY, markersize=4, markeredgewidth=0)
+        panel.plot(motion.times, 1e3 * motion.simulated, color=ACCENT, linewidth=1.3)
+        panel.margins(x=0)
+        panel.set_title(motion.name, fontsize=9, color=INK, loc="left", pad=4)
+        panel.set_ylabel("[mm]")
+        _shade(panel, motion.held_out)
+    panel.set_xlabel("time [s]")
+    shaded = [("shaded: held out", INK)] if any(motion.held_out for motion in motions) else []
+    _key(figure, [("measured", GRAY), ("simulated", ACCENT), *shaded])
+    return figure
+
+
 def plot_shapes(
     measured: Sequence[Array],
     simulated: Sequence[Array],
     *,
+    rings: Sequence[Array] = (),
     names: Sequence[str] = (),
     plane: tuple[int, int] = (0, 2),
     title: str = "",
@@ -87,6 +119,7 @@ def plot_shapes(
     Args:
         measured: of each shape (points, 3) m.
         simulated: of each shape (nodes, 3) m, in order along the line.
+        rings: of each shape the simulated markers (points, 3) m, where they do not lie on the line; none when left out.
         names: of the shapes.
         plane: the two axes that are drawn, 0 to 2.
         title: above the figure.
@@ -112,6 +145,8 @@ def plot_shapes(
         panel.plot(*(1e3 * line[:, plane]).T, color=ACCENT, linewidth=1.4)
         panel.set_title(label, fontsize=9, color=INK, loc="left", pad=4)
         panel.set_aspect("equal", adjustable="box")
+    for panel, ring in zip(panels, rings, strict=False):
+        panel.plot(*(1e3 * ring[:, plane]).T, "o", color=ACCENT, markersize=7, markerfacecolor="none")
     for index, panel in enumerate(panels[: len(measured)]):
         if index % columns == 0:
             panel.set_ylabel(f"{_AXES[plane[1]]} [mm]")
@@ -268,8 +303,8 @@ def _shade(panel: Axes, span: tuple[float, float] | None) -> None:
 def _name_shade(panel: Axes, span: tuple[float, float] | None) -> None:
     if span is not None:
         place = ("data", "axes fraction")
-        style: dict[str, Any] = {"va": "top", "fontsize": 8, "color": GRAY}
-        panel.annotate("held out", (span[0], 1), (3, -3), xycoords=place, textcoords="offset points", **style)
+        style: dict[str, Any] = {"va": "bottom", "fontsize": 8, "color": GRAY}
+        panel.annotate("held out", (span[0], 1), (0, 3), xycoords=place, textcoords="offset points", **style)
 
 
 def _key(parent: Axes | Figure, entries: Sequence[tuple[str, str]]) -> None:

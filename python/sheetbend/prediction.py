@@ -10,6 +10,7 @@ import numpy as np
 from .baseline import no_physics
 from .errors import RecordingError
 from .experiment import Experiment
+from .oscillation import along, dominant_direction, first_frequency
 from .parameters import Parameters
 from .problem import FitProblem
 from .recording import Recording
@@ -44,21 +45,41 @@ class Comparison:
         d2 = ((predicted - self.recording.positions)[frames][..., axes] ** 2).sum(axis=-1)
         return float(np.sqrt(d2[seen].mean())) if seen.any() else None
 
-    def motion_about_rest(self, rest: np.ndarray) -> float:
-        """Root mean square distance [m] of the held-out measured markers from a rest position (markers, 3)."""
-        return self.rms(self.held_out, np.broadcast_to(rest, self.recording.positions.shape)) or 0.0
+    def motion(self) -> float | None:
+        """Root mean square distance [m] of the held-out measured markers from their mean there: what a prediction has to explain."""
+        positions = self.recording.positions[self.held_out]
+        seen = ~np.isnan(positions)
+        mean = np.where(seen, positions, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
+        return self.rms(self.held_out, np.broadcast_to(mean, self.recording.positions.shape))
+
+    def frequencies(self) -> tuple[float | None, float | None]:
+        """First frequency [Hz] of the held-out part, measured and simulated, along the direction in which the measured markers move most."""
+        axes = ["xyz".index(a) for a in self.experiment.axes]
+        times = self.recording.times[self.held_out]
+        measured, simulated = (x[self.held_out][..., axes] for x in (self.recording.positions, self.simulated))
+        direction = dominant_direction(measured)
+        first, second = (first_frequency(times, along(x, direction)) for x in (measured, simulated))
+        return first, second
 
     def errors(self, rows: int) -> RecordingFit:
-        """As a row of the report."""
-        base = None
-        if self.baseline is not None:
-            base = self.rms(self.held_out, self.baseline)
+        """As a row of the report: distances in m, or angles in rad where the experiment has a radius."""
+        radius = self.experiment.radius
+
+        def error(distance: float | None) -> float | None:
+            return distance if distance is None or radius is None else distance / radius
+
+        moves = self.held_out.any() and not self.experiment.static
+        measured, simulated = self.frequencies() if moves else (None, None)
         return RecordingFit(
             name=self.experiment.name,
             rows=rows,
-            rms=self.rms(~self.held_out) if rows else None,
-            held_out=self.rms(self.held_out),
-            baseline=base,
+            rms=error(self.rms(~self.held_out)) if rows else None,
+            held_out=error(self.rms(self.held_out)),
+            baseline=None if self.baseline is None else error(self.rms(self.held_out, self.baseline)),
+            motion=error(self.motion()) if moves else None,
+            measured_frequency=measured,
+            simulated_frequency=simulated,
+            unit="m" if radius is None else "rad",
         )
 
 

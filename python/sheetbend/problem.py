@@ -45,15 +45,18 @@ def as_parameters(wanted: Mapping[str, ParameterLike] | Iterable[str | Parameter
         if isinstance(given, Parameter):
             complete.append(given)
             continue
-        fields = dict(given or {})
+        fields: dict[str, Any] = dict(given or {})
         unknown = set(fields) - set(Parameter.__dataclass_fields__)
         if unknown:
             raise InputError(f"parameters.{name}", "has unknown fields", sorted(unknown), f"use: {', '.join(Parameter.__dataclass_fields__)}")
         q = known[name]
         if "tied_to" not in fields and not fields.get("private"):
             fields.setdefault("initial", q.value)
-        defaults = {"unit": q.unit, "log": q.positive, "scale": q.scale}
-        complete.append(Parameter(name=name, **(defaults | fields)))
+        defaults: dict[str, Any] = {"unit": q.unit, "log": q.positive, "scale": q.scale}
+        merged = defaults | fields
+        if q.positive and not merged["log"]:
+            merged.setdefault("lower", 0.0)
+        complete.append(Parameter(name=name, **merged))
     return Parameters(complete)
 
 

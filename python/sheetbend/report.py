@@ -44,6 +44,7 @@ def sections(result: FitResult) -> list[Section]:
         _parameters(result),
         _interval_parts(result.estimates),
         _recordings(result),
+        _held_out_motion(result),
         _unknown(result),
         _correlations(result),
         _course(result),
@@ -55,7 +56,7 @@ def sections(result: FitResult) -> list[Section]:
 def headline(result: FitResult) -> str:
     """How the fit ended, in one sentence."""
     if result.interrupted:
-        end = "interrupted, best point so far,"
+        end = "converged, then interrupted," if result.converged else "interrupted, best point so far,"
     else:
         end = "converged" if result.converged else "did NOT converge"
     turns = f"{result.iterations} iteration{'' if result.iterations == 1 else 's'}"
@@ -167,6 +168,24 @@ def _recording_row(recording: RecordingFit) -> tuple[str, ...]:
         ratio = f"{100 * recording.held_out / recording.baseline:.3g} %"
     errors = (number(recording.rms), number(recording.held_out), number(recording.baseline))
     return (recording.name, f"{recording.rows:,}", *errors, ratio, unit)
+
+
+def _held_out_motion(result: FitResult) -> Section:
+    """How much of the motion that the fit did not see is predicted, and its rhythm."""
+    rows = [_motion_row(recording) for recording in result.recordings if recording.motion]
+    headers = ("recording", "motion rms", "unit", "held-out/motion", "frequency measured", "simulated", "difference")
+    note = "of the measured markers about their mean over the held-out part; frequencies in Hz, from the highest peak there"
+    return Section("Held-out motion", headers, tuple(rows), (("motion", note),) if rows else ())
+
+
+def _motion_row(recording: RecordingFit) -> tuple[str, ...]:
+    factor, unit = _readable(recording)
+    motion, error = recording.motion or 0.0, recording.held_out
+    share = "" if error is None else f"{100 * error / motion:.3g} %"
+    measured, simulated = recording.measured_frequency, recording.simulated_frequency
+    rhythm = ["" if f is None else f"{f:.2f}" for f in (measured, simulated)]
+    difference = f"{100 * (simulated / measured - 1):+.2g} %" if measured and simulated else ""
+    return (recording.name, short(motion * factor), unit, share, *rhythm, difference)
 
 
 def _readable(recording: RecordingFit) -> tuple[float, str]:

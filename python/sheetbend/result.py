@@ -82,6 +82,8 @@ class RecordingFit:
         rms: over the fitted part; None where all of it was held out.
         held_out: over the part that the fit did not see; None when there is none.
         baseline: over the same part, of a prediction without physics.
+        motion: over the same part, of the measured markers about their mean; None for an equilibrium.
+        measured_frequency, simulated_frequency: first frequency there, Hz; None where the part shows fewer than three periods.
     """
 
     name: str
@@ -89,6 +91,9 @@ class RecordingFit:
     rms: float | None = None
     held_out: float | None = None
     baseline: float | None = None
+    motion: float | None = None
+    measured_frequency: float | None = None
+    simulated_frequency: float | None = None
     unit: str = "m"
 
 

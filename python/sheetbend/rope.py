@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .checks import finite, points
+from .checks import finite, indices, points
 from .errors import SceneError
 from .quantities import Term, product
 from .scene import Array, Scene
@@ -47,7 +47,7 @@ def rope(
     scene = Scene(name, gravity)
     built = add_rope(scene, name, length=length, segments=segments, density=density, EA=EA, EI=EI, **options)  # type: ignore[arg-type]
     if len(pinned):
-        scene.pin(built.particles[list(pinned)])
+        scene.pin(built.particles[indices("rope.pinned", pinned, len(built.particles))])
     return scene
 
 
@@ -65,6 +65,8 @@ def add_rope(
     points: ArrayLike | None = None,
     stretch_damping: float | None = None,
     bend_damping: float | None = None,
+    loss_factor: float | None = None,
+    loss_frequency: float | None = None,
     drag_linear: float | None = None,
     drag_quadratic: float | None = None,
     clamp_start: ArrayLike | None = None,
@@ -76,7 +78,8 @@ def add_rope(
     """Add a rope of `segments` equal links to a scene.
 
     Quantities: `<name>_length` m, `<name>_density` kg/m, and where given `_EA` N, `_EI` N m^2, `_stretch_damping` s, `_bend_damping` s,
-    `_drag_linear` N s/m^2, `_drag_quadratic` N s^2/m^3, `_start_angle` and `_end_angle` rad, `_set_<k>` 1/m.
+    `_loss_factor`, `_loss_frequency` Hz, `_drag_linear` N s/m^2, `_drag_quadratic` N s^2/m^3, `_start_angle` and `_end_angle` rad,
+    `_set_<k>` 1/m.
 
     Args:
         length: m; the length of `points` by default.
@@ -86,6 +89,8 @@ def add_rope(
         start, direction: a straight initial shape.
         points: (k, 3) m, an initial shape instead, resampled to equal links.
         stretch_damping, bend_damping: Kelvin-Voigt time constants s: the damping moment is EI times the constant times the rate of curvature.
+        loss_factor: energy lost per radian of vibration over the energy stored, in stretching and bending alike, at loss_frequency (Hz);
+            instead of the two time constants: tau = loss_factor / (2 pi loss_frequency). In rubbers it varies less with frequency than tau.
         drag_linear, drag_quadratic: air drag per length, isotropic.
         clamp_start, clamp_end: the rope's direction of travel at an end, held by a ghost particle half a joint away; the end is pinned.
         clamp_angles: add `_start_angle` / `_end_angle`, rotations of the clamps about `plane`.
@@ -109,6 +114,8 @@ def add_rope(
     normal = None if plane is None else _unit(f"{name}.plane", plane)
     if normal is None and (clamp_angles or len(set_modes)):
         raise SceneError(f"{name}.plane", "is missing", None, "give the unit normal that the clamp angles or the set turn about")
+    if any(k != int(k) or k < 0 for k in set_modes):
+        raise SceneError(f"{name}.set_modes", "must be whole numbers from 0 on", set_modes, "give such as (0, 1)")
     if len(set_modes) and EI is None:
         raise SceneError(f"{name}.set_modes", "need EI", EI, "give EI: a rest curvature acts through bending")
 
@@ -117,14 +124,15 @@ def add_rope(
     arc = link * np.arange(segments + 1)
     scene.add_quantity(f"{name}_length", length, "m")
     scene.add_quantity(f"{name}_density", density, "kg/m")
+    taus = _time_constants(scene, name, loss_factor, loss_frequency, EA, EI, stretch_damping, bend_damping)
     _masses(scene, name, nodes, segments)
-    _stretch(scene, name, nodes, link, EA, stretch_damping)
+    _stretch(scene, name, nodes, link, EA, taus[0])
     ghosts = [
         _clamp(scene, name, end, clamp, nodes, shape, link, normal if clamp_angles else None)
         for end, clamp in (("start", clamp_start), ("end", clamp_end))
     ]
     if EI is not None:
-        _bending(scene, name, nodes, ghosts, arc, EI, bend_damping, normal, set_modes)
+        _bending(scene, name, nodes, ghosts, arc, EI, taus[1], normal, set_modes)
     _drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
     built = Rope(name, nodes, arc, *ghosts)
     scene.ropes[name] = built
@@ -178,7 +186,42 @@ def _masses(scene: Scene, name: str, nodes: Array, segments: int) -> None:
     scene.add_terms([product("mass", n, share, factors) for n, share in zip(nodes, _voronoi(segments), strict=True)])
 
 
-def _stretch(scene: Scene, name: str, nodes: Array, link: float, EA: float | None, damping: float | None) -> None:
+TimeConstant = tuple[float, dict[str, str]]
+"""A constant and the functions of quantities that it multiplies."""
+
+
+def _time_constants(
+    scene: Scene,
+    name: str,
+    factor: float | None,
+    frequency: float | None,
+    EA: float | None,
+    EI: float | None,
+    stretch: float | None,
+    bend: float | None,
+) -> tuple[TimeConstant | None, TimeConstant | None]:
+    """Kelvin-Voigt time constants of stretching and bending, as terms; adds their quantities."""
+
+    def own(kind: str, value: float | None) -> TimeConstant | None:
+        return None if value is None else (1.0, {scene.add_quantity(f"{name}_{kind}_damping", value, "s"): "identity"})
+
+    if factor is None and frequency is None:
+        return own("stretch", stretch), own("bend", bend)
+    if factor is None or not factor > 0:
+        raise SceneError(f"{name}.loss_factor", "must be positive", factor, "give it together with loss_frequency")
+    if frequency is None or not frequency > 0:
+        raise SceneError(f"{name}.loss_frequency", "must be positive", frequency, "give the frequency of the motion in Hz")
+    if stretch is not None or bend is not None:
+        fix = "leave out stretch_damping and bend_damping, or it"
+        raise SceneError(f"{name}.loss_factor", "stands beside a time constant", factor, fix)
+    if EA is None and EI is None:
+        raise SceneError(f"{name}.loss_factor", "needs EA or EI", factor, "give a stiffness, or leave it out")
+    eta = scene.add_quantity(f"{name}_loss_factor", factor, "")
+    tau = (0.5 / np.pi, {eta: "identity", scene.add_quantity(f"{name}_loss_frequency", frequency, "Hz"): "inverse"})
+    return (None if EA is None else tau), (None if EI is None else tau)
+
+
+def _stretch(scene: Scene, name: str, nodes: Array, link: float, EA: float | None, damping: TimeConstant | None) -> None:
     segments = len(nodes) - 1
     group = f"{name}_stretch"
     pairs = np.stack([nodes[:-1], nodes[1:]], axis=1)
@@ -192,9 +235,9 @@ def _stretch(scene: Scene, name: str, nodes: Array, link: float, EA: float | Non
         scene.add_quantity(f"{name}_EA", EA, "N")
         terms += [product("compliance", first + i, 1.0 / segments, {length: "identity", f"{name}_EA": "inverse"}) for i in range(segments)]
     if damping is not None:
-        scene.add_quantity(f"{name}_stretch_damping", damping, "s")
-        factors = {f"{name}_stretch_damping": "identity", f"{name}_EA": "identity", length: "inverse"}
-        terms += [product("damping", first + i, float(segments), factors) for i in range(segments)]
+        scale, tau = damping
+        factors = {**tau, f"{name}_EA": "identity", length: "inverse"}
+        terms += [product("damping", first + i, scale * segments, factors) for i in range(segments)]
     scene.add_terms(terms)
 
 
@@ -226,7 +269,7 @@ def _bending(
     ghosts: list[int | None],
     arc: Array,
     EI: float,
-    damping: float | None,
+    damping: TimeConstant | None,
     normal: Array | None,
     set_modes: Sequence[int],
 ) -> None:
@@ -255,9 +298,9 @@ def _bending(
         product("compliance", first + i, share[node], {length: "identity", stiffness: "inverse"}) for i, node in enumerate(at)
     ]
     if damping is not None:
-        scene.add_quantity(f"{name}_bend_damping", damping, "s")
-        factors = {f"{name}_bend_damping": "identity", stiffness: "identity", length: "inverse"}
-        terms += [product("damping", first + i, 1.0 / share[node], factors) for i, node in enumerate(at)]
+        scale, tau = damping
+        factors = {**tau, stiffness: "identity", length: "inverse"}
+        terms += [product("damping", first + i, scale / share[node], factors) for i, node in enumerate(at)]
     offset = _first_value(scene, group)
     for k in set_modes:
         mode = scene.add_quantity(f"{name}_set_{k}", 0.0, "1/m", positive=False, scale=1.0 / arc[-1])

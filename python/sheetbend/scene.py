@@ -183,10 +183,10 @@ class Scene:
         if any(g.name == name for g in self.groups):
             raise SceneError("name", "is taken by another group", name, "give each group a name of its own")
         arity = KINDS[kind]["arity"]
-        stencil = np.array(indices(f"{name}.particles", particles, self.particle_count), dtype=int).reshape(-1)
-        if np.ndim(particles) != 2 or np.shape(particles)[1] != arity or len(stencil) == 0:
+        flat = indices(f"{name}.particles", particles, self.particle_count)
+        if np.ndim(particles) != 2 or np.shape(particles)[1] != arity or not flat:
             raise SceneError(f"{name}.particles", "have the wrong shape", np.shape(particles), f"give (count, {arity}) for {kind}")
-        stencil = stencil.reshape(-1, arity)
+        stencil = np.array(flat, dtype=int).reshape(-1, arity)
         count = len(stencil)
         if viscosity is not None:
             if compliance is not None or damping is not None:
@@ -205,7 +205,7 @@ class Scene:
         values = self._rest_values(name, kind, stencil, rest, normal)
         first = sum(len(g.particles) for g in self.groups)
         self.groups.append(Group(name, kind, stencil, alpha, beta, damping is not None, values))
-        if np.ndim(compliance) == 0 and compliance > 0:
+        if np.ndim(compliance) == 0 and alpha[0] > 0:
             self._scalar(f"{name}_compliance", "compliance", first, alpha, kind)
         if damping is not None and np.ndim(damping) == 0:
             self._scalar(f"{name}_{label}", "damping", first, beta, kind)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import subprocess
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -42,15 +43,38 @@ def test_copied_recordings_keep_their_licence() -> None:
     assert [str(f.relative_to(ROOT)) for f in folders if not (f / "LICENSE.source").exists()] == []
 
 
-PYTHON_BLOCKS = [
-    pytest.param(block, id=f"{name}-{i}")
-    for name in ("README.md", "CONTRIBUTING.md")
-    for i, block in enumerate(re.findall(r"```python\n(.*?)```", (ROOT / name).read_text() if (ROOT / name).exists() else "", re.S))
-]
+TEXTS = [name for pattern in ("*.md", "docs/*.md", "experiments/*/README.md", "adjoint/*.md") for name in sorted(ROOT.glob(pattern))]
 
 
-@pytest.mark.parametrize("block", PYTHON_BLOCKS)
+def blocks(language: str) -> list[object]:
+    return [
+        pytest.param(block, id=f"{text.relative_to(ROOT)}-{i}")
+        for text in TEXTS
+        for i, block in enumerate(re.findall(rf"```{language}\n(.*?)```", text.read_text(), re.S))
+    ]
+
+
+@pytest.mark.parametrize("block", blocks("python"))
 def test_code_in_the_texts_runs(block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "experiments").symlink_to(ROOT / "experiments")
     exec(compile(block, "README", "exec"), {"__name__": "readme"})
+
+
+@pytest.mark.parametrize("block", blocks("toml"))
+def test_configurations_in_the_texts_load(block: str, tmp_path: Path) -> None:
+    config = pytest.importorskip("sheetbend.config")
+    (tmp_path / "text.toml").write_text(block)
+    if "[experiment]" not in block:
+        tomllib.loads(block)
+        return
+    motion = sb.simulate(sb.rope(1.0, 10, density=0.05, EI=1e-3), [k / 20 for k in range(21)])
+    sb.Recording(positions=motion.positions, times=motion.times).save(tmp_path / "swing.npz")
+    study = config.load(tmp_path / "text.toml")
+    assert study.experiments and study.parameters
+
+
+@pytest.mark.parametrize("text", TEXTS, ids=lambda text: str(text.relative_to(ROOT)))
+def test_links_lead_somewhere(text: Path) -> None:
+    links = [link.partition("#")[0] for link in re.findall(r"\]\(([^)\s]+)\)", text.read_text()) if not re.match(r"https?://|#", link)]
+    assert [link for link in links if not (text.parent / link).exists()] == []

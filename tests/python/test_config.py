@@ -271,6 +271,28 @@ class TestBuild:
         assert e.solver.h == pytest.approx(0.02 / 4)
 
 
+    def test_a_recording_leaves_out_what_it_does_without(self, folder: Path) -> None:
+        scene = """
+        [[scene.point_mass]]
+        name = "load"
+        particle = "rope:end"
+        mass = 0.02
+        [[scene.force]]
+        name = "pull"
+        particles = ["rope:end"]
+        force = [0, 0, -1]
+        [scene.quantities.delay]
+        unit = "s"
+        """
+        second = '\n[[recording]]\nfile = "swing.npz"\nname = "bare"\nleave_out = ["load", "pull", "delay"]\n'
+        text = extended(folder, scene).read_text().replace("[parameters.rope_EI]", f"{second}\n[parameters.rope_EI]")
+        loaded, bare = load(written(folder, text)).experiments
+        assert set(loaded.scene.quantities) - set(bare.scene.quantities) == {"load_mass", "pull_x", "pull_y", "pull_z", "delay"}
+        assert not bare.scene.loaded
+        with pytest.raises(sb.ConfigError, match="delay, load, pull"):
+            load(written(folder, text.replace('leave_out = ["load"', 'leave_out = ["lord"')))
+
+
 class TestValues:
     def test_written_configuration_starts_at_the_values(self, folder: Path) -> None:
         text = ROPE.replace("[parameters.rope_bend_damping]", "[parameters.rope_bend_damping]\nprivate = true")

@@ -131,6 +131,14 @@ def test_report_says_what_must_be_said(result: FitResult) -> None:
     assert "discretization" in text
 
 
+def test_report_of_a_motion_that_was_not_fitted(result: FitResult) -> None:
+    moving = dataclasses.replace(result.recordings[0], motion=0.0142, measured_frequency=4.35, simulated_frequency=4.27)
+    text = plain(dataclasses.replace(result, recordings=(moving, result.recordings[1])))
+    (line,) = [line for line in text.split("Held-out motion")[1].splitlines() if line.startswith("  gravity_b")]
+    assert line.split() == ["gravity_b", "14.2", "mm", "15", "%", "4.35", "4.27", "-1.8", "%"]
+    assert "Held-out motion" not in plain(result)
+
+
 def test_report_of_a_fit_that_failed(result: FitResult) -> None:
     assert "did NOT converge" in plain(dataclasses.replace(result, converged=False))
     assert "interrupted" in plain(dataclasses.replace(result, converged=False, interrupted=True))
@@ -222,6 +230,18 @@ def test_trajectory_figure(motion: tuple[np.ndarray, ...], tmp_path: Path) -> No
         plot_trajectories(measured[:, :3], simulated, times)
     with pytest.raises(InputError, match="match the frames"):
         plot_trajectories(measured, simulated, times[:-1])
+
+
+def test_motions_share_a_figure() -> None:
+    pytest.importorskip("matplotlib")
+    from sheetbend.plotting import Motion, plot_motions
+
+    times = np.linspace(0, 1, 50)
+    figure = plot_motions([Motion("a", times, np.sin(times), np.cos(times), (0.5, 1.0)), Motion("b", times, times, times)])
+    assert [axes.get_title("left") for axes in figure.axes] == ["a", "b"]
+    assert [len(axes.patches) for axes in figure.axes] == [1, 0]
+    with pytest.raises(InputError, match="empty"):
+        plot_motions([])
 
 
 def test_shape_and_estimate_figures(result: FitResult) -> None:

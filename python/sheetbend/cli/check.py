@@ -31,11 +31,15 @@ def check(
 
 def _check(console: Console, path: Path) -> Outcome:
     study = build(parse(path), path.parent)
-    gradients, jacobians = {}, {}
+    gradients: dict[str, GradientReport] = {}
+    jacobians: dict[str, JacobianReport] = {}
     for name, report in _reports(study):
         console.print(str(report), markup=False, soft_wrap=True)
-        (gradients if isinstance(report, GradientReport) else jacobians)[name] = report
-    passed = all(r.passed for r in [*gradients.values(), *jacobians.values()])
+        if isinstance(report, GradientReport):
+            gradients[name] = report
+        else:
+            jacobians[name] = report
+    passed = all(r.passed for r in gradients.values()) and all(r.passed for r in jacobians.values())
     data = {
         "name": study.config.experiment.name,
         "passed": passed,

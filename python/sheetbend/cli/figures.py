@@ -27,11 +27,13 @@ def write_figures(found: Fit, config: Config, folder: Path) -> list[str]:
     static = [c for c in found.comparisons if c.experiment.static]
     if static:
         figures["shapes"] = _shapes(found, static)
-    for c in found.comparisons:
-        if not c.experiment.static:
-            name = re.sub(r"[^A-Za-z0-9_.-]", "_", c.experiment.name)
-            figures[f"{name}_markers"] = _trajectories(c)
-            figures[f"{name}_residuals"] = _residuals(c)
+    moving = [c for c in found.comparisons if not c.experiment.static]
+    if len(moving) > 1:
+        figures["motions"] = plotting.plot_motions([_liveliest(c) for c in moving], title=config.experiment.name)
+    for c in moving:
+        name = re.sub(r"[^A-Za-z0-9_.-]", "_", c.experiment.name)
+        figures[f"{name}_markers"] = _trajectories(c)
+        figures[f"{name}_residuals"] = _residuals(c)
     published = _published(found, config)
     figures["estimates"] = plotting.plot_estimates(found.result.estimates, published=published, title=config.experiment.name)
     for name, figure in figures.items():
@@ -40,14 +42,36 @@ def write_figures(found: Fit, config: Config, folder: Path) -> list[str]:
 
 
 def _shapes(found: Fit, comparisons: list[Comparison]) -> Figure:
-    spread = np.ptp(np.vstack([c.recording.positions[0] for c in comparisons if np.isfinite(c.recording.positions).any()]), axis=0)
-    first = 0 if spread[0] >= spread[1] else 1
     return plotting.plot_shapes(
         [c.recording.positions[0] for c in comparisons],
         [_line(found, c) for c in comparisons],
+        rings=[c.simulated[0] if _stands_off(c) else c.simulated[:0, 0] for c in comparisons],
         names=[c.experiment.name for c in comparisons],
-        plane=(first, 2),
+        plane=_plane(comparisons),
     )
+
+
+def _plane(comparisons: list[Comparison]) -> tuple[int, int]:
+    """The two axes that count; where all three do, upwards and the wider of the others."""
+    axes = {tuple(sorted("xyz".index(a) for a in c.experiment.axes)) for c in comparisons}
+    if len(axes) == 1 and len(only := axes.pop()) == 2:
+        return only[0], only[1]
+    spread = np.ptp(np.vstack([c.recording.positions[0] for c in comparisons if np.isfinite(c.recording.positions).any()]), axis=0)
+    return (0 if spread[0] >= spread[1] else 1), 2
+
+
+def _stands_off(c: Comparison) -> bool:
+    """Whether markers stand off the line that carries them."""
+    places = (c.experiment.places[i] for i in c.experiment.compared)
+    return any(place is not None and place.offset is not None for place in places)
+
+
+def _liveliest(c: Comparison) -> plotting.Motion:
+    """The coordinate that moves most, of the marker that moves most."""
+    x = c.recording.positions
+    marker, axis = np.unravel_index(np.argmax(np.nanvar(x, axis=0)), x.shape[1:])
+    name = f"{c.experiment.name}: {c.recording.markers[marker]}, {'xyz'[axis]}"
+    return plotting.Motion(name, c.recording.times, x[:, marker, axis], c.simulated[:, marker, axis], _held_out(c))
 
 
 def _line(found: Fit, c: Comparison) -> np.ndarray:

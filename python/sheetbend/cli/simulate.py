@@ -84,8 +84,8 @@ def _task(e: Experiment, duration: float | None) -> Task:
 def _run(console: Console, task: Task, folder: Path) -> dict[str, Any]:
     motion = _motion(task)
     path = folder / f"{task.name}.npz"
-    forces = {f"force_{group}": values for group, values in motion.forces.items()}
-    np.savez_compressed(path, times=motion.times, positions=motion.positions, velocities=motion.velocities, **forces)
+    arrays: dict[str, Any] = {f"force_{group}": values for group, values in motion.forces.items()}
+    np.savez_compressed(path, times=motion.times, positions=motion.positions, velocities=motion.velocities, **arrays)
     moved = np.linalg.norm(motion.positions - motion.positions[0], axis=2)
     summary = {
         "npz": str(path),

@@ -21,9 +21,12 @@ from ..scene import Scene
 from ..solver import Solver
 from . import schema
 from .errors import located
+from .scene_schema import SceneSection
 from .scenes import Moment, Particles, build_scene
 
 SUBSTEPS = 10
+OPTIONAL = ("particles", "constraints", "point_mass", "force")
+"""Lists of the scene that a recording can leave out by name."""
 
 
 @dataclass(frozen=True)
@@ -100,10 +103,11 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
     markers = config.marker if shared else section.marker
     where = "marker" if shared else f"{path}.marker"
     numbers = [_number(f"{where}[{k}].marker", m.marker, recording) for k, m in enumerate(markers)]
-    scene, particles = build_scene(recording.name, config.scene, moment, _along(ropes, markers, numbers, recording), finer, ropes)
+    described = _without(config.scene, section.leave_out, path)
+    scene, particles = build_scene(recording.name, described, moment, _along(ropes, markers, numbers, recording), finer, ropes)
     _start_values(scene, config, section.values, path)
     places = {recording.markers[n]: _place(f"{where}[{k}]", m, scene, particles) for k, (m, n) in enumerate(zip(markers, numbers, strict=True))}
-    plain = section.model_dump(include={"static", "start", "start_time", "predict", "sigma", "axes", "loss", "loss_scale", "time_offset"})
+    plain = section.model_dump(include={"static", "start", "start_time", "predict", "sigma", "axes", "radius", "loss", "loss_scale", "time_offset"})
     with located(path, recording.name):
         experiment = Experiment(
             scene=scene,
@@ -161,6 +165,18 @@ def _shown(config: schema.Config, section: schema.RecordingSection, path: str) -
     return every if section.ropes is None else section.ropes
 
 
+def _without(scene: SceneSection, names: list[str], path: str) -> SceneSection:
+    """The scene's description less what a recording leaves out."""
+    every = {part.name for key in OPTIONAL for part in getattr(scene, key) if part.name} | set(scene.quantities)
+    unknown = [name for name in names if name not in every]
+    if unknown:
+        fix = f"name some of: {', '.join(sorted(every)) or 'none'}"
+        raise ConfigError(f"{path}.leave_out", "name nothing that can be left out", unknown, fix)
+    kept = {key: [part for part in getattr(scene, key) if part.name not in names] for key in OPTIONAL}
+    quantities = {name: q for name, q in scene.quantities.items() if name not in names}
+    return scene.model_copy(update={**kept, "quantities": quantities})
+
+
 def _along(ropes: list[str], markers: list[schema.Marker], numbers: list[int], recording: Recording) -> dict[str, list[int]]:
     """Per rope the markers on it, in order along it."""
     if not markers:
@@ -188,7 +204,8 @@ def _place(path: str, marker: schema.Marker, scene: Scene, particles: Particles)
             place = on_rope(scene.ropes[name], marker.arc_length or 0.0)
     # A zero offset still sets the frame in which offset quantities count.
     with located(path):
-        return replace(place.with_offset(marker.offset or (0.0, 0.0, 0.0), marker.normal), offset=tuple(marker.offset) if marker.offset else None)
+        framed = place.with_offset(marker.offset or (0.0, 0.0, 0.0), marker.normal)
+    return framed if marker.offset else replace(framed, offset=None)
 
 
 def _on_arm(path: str, marker: schema.Marker, particles: Particles) -> Place:

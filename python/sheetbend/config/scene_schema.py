@@ -22,6 +22,10 @@ class Rope(Section):
     )
     stretch_damping: Finite | None = key(None, "Kelvin-Voigt time constant of stretching", "s", gt=0)
     bend_damping: Finite | None = key(None, "Kelvin-Voigt time constant of bending", "s", gt=0)
+    loss_factor: Finite | None = key(
+        None, "of stretching and bending, instead of the time constants: tau = loss_factor / (2 pi loss_frequency)", gt=0
+    )
+    loss_frequency: Finite | None = key(None, "frequency of the motion at which `loss_factor` holds", "Hz", gt=0)
     drag_linear: Finite | None = key(None, "linear air drag per length", "N s/m^2", ge=0)
     drag_quadratic: Finite | None = key(None, "quadratic air drag per length", "N s^2/m^3", ge=0)
     clamp_start: Vector | None = key(None, "direction of travel at the start, held by a clamp there")

@@ -171,9 +171,7 @@ def _same_length(path: str, stencils: list[list[int]]) -> None:
 
 def _add_rope(scene: Scene, particles: Particles, path: str, rope: schema.Rope, moment: Moment | None, placed: list[int], finer: int) -> None:
     fields = rope.model_dump(exclude={"name", "pinned", "points", "segments"}, exclude_none=True)
-    points = rope.points
-    if points == "recording":
-        points = _measured(f"{path}.points", moment, placed)
+    points = _measured(f"{path}.points", moment, placed) if rope.points == "recording" else rope.points
     particles.free_name(path, rope.name)
     with located(path, rope.name):
         particles.add_rope(add_rope(scene, rope.name, points=points, segments=finer * rope.segments, **fields))

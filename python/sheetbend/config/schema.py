@@ -67,6 +67,9 @@ class RecordingSection(Section):
     name: Name | None = key(None, "the file's when left out")
     units: Literal["m", "cm", "mm"] | None = key(None, "length unit of the file; its JSON's when left out")
     ropes: list[Name] | None = key(None, "names of the ropes that it shows; all when left out", min_length=1)
+    leave_out: list[Name] = key(
+        [], "names of particles, constraints, hung masses, forces and further quantities that its scene does without"
+    )
     frames: list[int] | None = key(None, "[first, stop] or [first, stop, step]: use these frames only", min_length=2, max_length=3)
     fit: Window | None = key(None, "[start, stop] in the recording's time: what the fit sees; all when left out", "s")
     held_out: Window | None = key(None, "[start, stop]: what is only predicted, from the same start", "s")
@@ -78,6 +81,7 @@ class RecordingSection(Section):
     )
     sigma: Finite = key(1e-3, "expected error of a marker", "m", gt=0)
     axes: str = key("xyz", "coordinates that count", pattern=AXES)
+    radius: Finite | None = key(None, "distance of the markers from a pivot: the report then gives errors as angles, rms distance/radius", "m", gt=0)
     loss: Literal["squares", "soft_l1", "huber"] = key("squares", "robust loss")
     loss_scale: Finite = key(1.0, "where the robust loss sets in, in units of sigma", gt=0)
     marker: list[Marker] = key([], "places of this recording's markers; those of [[marker]] when left out")
@@ -109,8 +113,8 @@ class FitSection(Section):
     starts: list[dict[str, Finite]] = key([], "further starting values by name; the best end wins")
     max_iterations: int = key(200, "per start", ge=1)
     threads: int = key(1, "over recordings and derivatives; results do not depend on it", ge=1)
-    halve_step: bool = key(False, "refit at half the substep; what moves counts in the intervals")
-    double_segments: bool = key(False, "refit with twice the segments in every rope; what moves counts in the intervals")
+    halve_step: bool = key(False, "refit at half the substep; what moves, carried on to the limit, counts in the intervals")
+    double_segments: bool = key(False, "refit with twice the segments in every rope; what moves, carried on to the limit, counts in the intervals")
     strict: bool = key(False, "exit 3 when any requested parameter is not identifiable, not only when all are")
 
 

@@ -1,0 +1,17 @@
+"""Types of the module that links Ceres; it is built where Ceres is installed and loads when a fit asks for it."""
+
+from collections.abc import Callable
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+def minimize(
+    *,
+    evaluation: object,
+    u: ArrayLike,
+    lower: ArrayLike,
+    upper: ArrayLike,
+    max_iterations: int,
+    tolerance: float,
+    observe: Callable[..., bool],
+) -> dict[str, Any]: ...

@@ -1,0 +1,193 @@
+// The implicit derivative of an equilibrium: against its own residual, its transpose, and equilibria solved again.
+#include <gtest/gtest.h>
+
+#include "adjoint/equilibrium_vjp.h"
+#include "tests/cpp/support/compare.h"
+#include "tests/cpp/support/ropes.h"
+
+namespace sheetbend::testing {
+namespace {
+
+struct AtRest {
+  Scene scene;
+  std::vector<double> inputs;
+  Equilibrium rest;
+};
+
+AtRest at_rest(Scene scene, std::vector<double> inputs) {
+  Equilibrium rest = EquilibriumSolver(scene).solve(inputs.data(), nullptr, nullptr, {.t0 = 0.007});
+  EXPECT_TRUE(rest.converged) << rest.message;
+  return {std::move(scene), std::move(inputs), std::move(rest)};
+}
+
+// A hanging rope with every kind of constraint and every quantity that acts at rest; its last particle is tied to a driven one.
+AtRest every_kind() {
+  const int n = 10;
+  SceneSpec spec;
+  spec.particles = n + 2;
+  spec.pinned = {0};
+  spec.driven = {n + 1};
+  spec.loaded = {4, 7};
+  spec.boundary.times = {0.0, 0.011, 0.02, 0.05};
+  spec.force.times = {0.0, 0.03};
+  for_each_kind([&]<class K>(K) {
+    GroupSpec group{K::name, K::name, false, {}};
+    if constexpr (std::same_as<K, Attachment>)
+      group.stencil = {n, n + 1};
+    else
+      for (int k = 0; k + K::arity <= n + 1; ++k)
+        for (int i = 0; i < K::arity; ++i) group.stencil.push_back(k + i);
+    spec.groups.push_back(group);
+  });
+  AtRest s{build_scene(spec), {}, {}};
+  s.inputs.assign(s.scene.layout.total(), 0.0);
+  const Inputs<double> in{s.scene.layout, s.inputs.data()};
+  Random random(11);
+  const auto fill = [&](Quantity q, double low, double high) {
+    for (std::size_t i = 0; i < s.scene.layout.count(q); ++i) in.of(q)[i] = random(low, high);
+  };
+  fill(Quantity::mass, 0.01, 0.03);
+  fill(Quantity::force, -0.1, 0.1);
+  fill(Quantity::gravity, -1.0, 1.0);
+  in.of(Quantity::gravity)[2] = -g;
+  for (int k = 0; k < n + 2; ++k) {
+    const double t = std::min(k, n) / static_cast<double>(n);
+    Vec3<double>(0.6 * t, random(-0.01, 0.01), -1.5 * t * (1.0 - t)).store(in.of(Quantity::position) + 3 * k);
+  }
+  for (std::size_t knot = 0; knot < 4; ++knot)
+    Vec3<double>(0.6 + random(-0.01, 0.01), random(-0.01, 0.01), random(-0.01, 0.01)).store(in.of(Quantity::boundary) + 3 * knot);
+  for (const Group& group : s.scene.groups)
+    for (int i = 0; i < group.count; ++i) {
+      double* p = in.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(i) * group.parameters;
+      if (group.parameters == 1) *p = random(0.09, 0.11);
+      if (group.parameters == 4) {
+        Vec3<double>(0.1, 0.99, -0.1).store(p);
+        p[3] = random(-0.2, 0.2);
+      }
+      in.of(Quantity::compliance)[group.first + i] = random(1.0, 2.0) * (group.arity == 2 ? 1e-3 : 1e2);
+    }
+  return at_rest(std::move(s.scene), std::move(s.inputs));
+}
+
+AtRest rigid_catenary() {
+  Rope rope = make_catenary(10, 0.6, 0.2);
+  Random random(3);
+  for (std::size_t i = 0; i < rope.scene.layout.count(Quantity::force); ++i) rope.of(Quantity::force)[i] = random(-0.1, 0.1);
+  return at_rest(std::move(rope.scene), std::move(rope.inputs));
+}
+
+AtRest soft_wire() {
+  Rope wire = make_wire(6e-5, 1e4);
+  return at_rest(std::move(wire.scene), std::move(wire.inputs));
+}
+
+struct Derivative : ::testing::TestWithParam<AtRest (*)()> {};
+INSTANTIATE_TEST_SUITE_P(, Derivative, ::testing::Values(&every_kind, &rigid_catenary, &soft_wire));
+
+// The residual, in complex arithmetic, stays zero along the tangents.
+TEST_P(Derivative, TangentsKeepTheResidualZero) {
+  const AtRest s = GetParam()();
+  Random random(7);
+  std::vector<Dual<double, 8>> p(s.inputs.begin(), s.inputs.end()), x(s.scene.dofs()), lambda(s.scene.rows);
+  for (std::size_t i = 0; i < p.size(); ++i)
+    for (double& d : p[i].d) d = random(-1.0, 1.0) * s.inputs[i];
+  const EquilibriumDerivative derivative(s.scene, s.inputs.data(), s.rest);
+  derivative.jvp(p.data(), x.data(), lambda.data());
+  const auto along = [](const Dual<double, 8>& a, double step) { return Complex(a.v, step * a.d[5]); };
+  std::vector<Complex> pc(p.size()), xc(x.size()), lc(lambda.size()), r_x(x.size()), r_l(lambda.size());
+  const auto residual = [&](bool with_state) {
+    for (std::size_t i = 0; i < p.size(); ++i) pc[i] = along(p[i], complex_step);
+    for (std::size_t i = 0; i < x.size(); ++i) xc[i] = along(x[i], with_state ? complex_step : 0.0);
+    for (std::size_t i = 0; i < lambda.size(); ++i) lc[i] = along(lambda[i], with_state ? complex_step : 0.0);
+    const Inputs<const Complex> in{s.scene.layout, pc.data()};
+    place_fixed(s.scene, in, s.rest.t0, xc.data());
+    equilibrium_residual(s.scene, in, s.rest.t0, xc.data(), lc.data(), r_x.data(), r_l.data());
+    std::pair<double, double> worst;
+    for (const Complex& r : r_x) worst.first = std::max(worst.first, std::abs(r.im) / complex_step);
+    for (const Complex& r : r_l) worst.second = std::max(worst.second, std::abs(r.im) / complex_step);
+    return worst;
+  };
+  const auto fixed = residual(false), moving = residual(true);
+  EXPECT_LE(moving.first, 1e-9 * fixed.first);
+  EXPECT_LE(moving.second, 1e-9 * fixed.second);
+  record_error("r_x", moving.first / fixed.first);
+  record_error("r_l", moving.second / fixed.second);
+
+  std::vector<Complex> x_complex(x.size());
+  for (std::size_t i = 0; i < p.size(); ++i) pc[i] = along(p[i], complex_step);
+  derivative.jvp(pc.data(), x_complex.data(), static_cast<Complex*>(nullptr));
+  std::vector<double> a, b;
+  for (std::size_t i = 0; i < x.size(); ++i) a.push_back(x_complex[i].im / complex_step), b.push_back(x[i].d[5]);
+  EXPECT_LE(relative_error(a, b), 1e-9);
+}
+
+// <x_bar, x_dot> + <lambda_bar, lambda_dot> = <inputs_bar, inputs_dot>, quantity by quantity.
+TEST_P(Derivative, CotangentsAreTheTransposeOfTangents) {
+  const AtRest s = GetParam()();
+  Random random(8);
+  const EquilibriumDerivative derivative(s.scene, s.inputs.data(), s.rest);
+  std::vector<double> x_bar = random.vector(s.scene.dofs()), lambda_bar = random.vector(s.scene.rows), inputs_bar(s.inputs.size());
+  for (int r = 0; r < s.scene.rows; ++r) lambda_bar[r] /= largest(s.rest.lambda);
+  derivative.vjp(x_bar.data(), lambda_bar.data(), inputs_bar.data());
+  for (int q = 0; q < quantity_count; ++q) {
+    std::vector<Dual<double, 1>> p(s.inputs.begin(), s.inputs.end()), x(s.scene.dofs()), lambda(s.scene.rows);
+    double by_inputs = 0.0, by_state = 0.0, scale = 0.0;
+    for (std::size_t i = s.scene.layout.offset[q]; i < s.scene.layout.offset[q + 1]; ++i) {
+      p[i].d[0] = random(-1.0, 1.0) * s.inputs[i];
+      by_inputs += p[i].d[0] * inputs_bar[i];
+      scale += std::abs(p[i].d[0] * inputs_bar[i]);
+    }
+    derivative.jvp(p.data(), x.data(), lambda.data());
+    for (int i = 0; i < s.scene.dofs(); ++i) by_state += x_bar[i] * x[i].d[0], scale += std::abs(x_bar[i] * x[i].d[0]);
+    for (int i = 0; i < s.scene.rows; ++i) by_state += lambda_bar[i] * lambda[i].d[0], scale += std::abs(lambda_bar[i] * lambda[i].d[0]);
+    EXPECT_NEAR(by_inputs, by_state, 1e-10 * scale) << quantity_names[q];
+    record_error(quantity_names[q], scale > 0.0 ? std::abs(by_inputs - by_state) / scale : 0.0);
+  }
+}
+
+// Against equilibria solved again at inputs moved to both sides: central differences, Richardson-extrapolated from two steps.
+TEST_P(Derivative, MatchesEquilibriaSolvedAgain) {
+  const AtRest s = GetParam()();
+  EquilibriumSolver solver(s.scene);
+  const EquilibriumDerivative derivative(s.scene, s.inputs.data(), s.rest);
+  for (const Quantity q : {Quantity::position, Quantity::mass, Quantity::compliance, Quantity::rest, Quantity::boundary, Quantity::force,
+                           Quantity::gravity}) {
+    Random random(9);
+    std::vector<Dual<double, 1>> p(s.inputs.begin(), s.inputs.end()), x(s.scene.dofs()), lambda(s.scene.rows);
+    for (std::size_t i = 0; i < s.scene.layout.count(q); ++i) {
+      const std::size_t at = s.scene.layout.of(q) + i;
+      p[at].d[0] = random(-1.0, 1.0) * (q == Quantity::position ? 0.1 : s.inputs[at]);
+    }
+    derivative.jvp(p.data(), x.data(), lambda.data());
+    const auto moved = [&](double step) {
+      std::vector<double> in(s.inputs);
+      for (std::size_t i = 0; i < in.size(); ++i) in[i] += step * p[i].d[0];
+      const Equilibrium e = solver.solve(in.data(), s.rest.x.data(), s.rest.lambda.data(), {.tolerance = 1e-14, .t0 = s.rest.t0});
+      EXPECT_TRUE(e.converged) << e.message;
+      return e;
+    };
+    const double step = 1e-3;
+    const Equilibrium a = moved(step), b = moved(-step), c = moved(0.5 * step), d = moved(-0.5 * step);
+    const auto difference = [&](const std::vector<double>& a, const std::vector<double>& b, const std::vector<double>& c,
+                                const std::vector<double>& d, std::size_t i) {
+      return (4.0 * (c[i] - d[i]) / step - (a[i] - b[i]) / (2.0 * step)) / 3.0;
+    };
+    std::vector<double> x_dot, x_fd, l_dot, l_fd;
+    for (std::size_t i = 0; i < x.size(); ++i) x_dot.push_back(x[i].d[0]), x_fd.push_back(difference(a.x, b.x, c.x, d.x, i));
+    for (std::size_t i = 0; i < lambda.size(); ++i)
+      l_dot.push_back(lambda[i].d[0]), l_fd.push_back(difference(a.lambda, b.lambda, c.lambda, d.lambda, i));
+    // A quantity that does not act (no force on the wire, a compliance of zero) leaves nothing but the solver's own rounding.
+    const auto expect_equal = [&](const std::vector<double>& found, const std::vector<double>& expected) {
+      if (largest(expected) == 0.0)
+        EXPECT_LE(largest(found), 1e-10) << quantity_names[static_cast<int>(q)];
+      else
+        EXPECT_LE(relative_error(found, expected), 1e-7) << quantity_names[static_cast<int>(q)];
+    };
+    expect_equal(x_fd, x_dot);
+    expect_equal(l_fd, l_dot);
+    record_error(std::string(quantity_names[static_cast<int>(q)]) + "_x", relative_error(x_fd, x_dot));
+  }
+}
+
+}  // namespace
+}  // namespace sheetbend::testing

@@ -1,0 +1,142 @@
+"""Every key of every section of a configuration, taken from the schema: wrong type, missing, not finite, beyond its limit, misspelled."""
+
+from __future__ import annotations
+
+import copy
+import math
+import re
+import types
+import typing
+from pathlib import Path
+from typing import Any
+
+import pytest
+import sheetbend as sb
+
+pytest.importorskip("pydantic")
+pytest.importorskip("tomli_w")
+
+import tomli_w
+from sheetbend.config import parse
+from sheetbend.config.reference import HEADERS
+from sheetbend.config.section import Finite
+
+WHOLE: dict[str, Any] = {
+    "experiment": {"name": "all"},
+    "solver": {},
+    "scene": {
+        "rope": [{"density": 0.05}],
+        "particles": [{"name": "a", "positions": [[0, 0, 0]]}],
+        "pendulum": [{"length": 1.0}],
+        "arm": [{"mass": 1.0, "first_moment": 0.1, "inertia": 0.1, "length": 0.5}],
+        "constraints": [{"kind": "distance", "particles": [["a", "rope:0"]]}],
+        "point_mass": [{"name": "p", "particle": "a", "mass": 1.0}],
+        "force": [{"particles": ["a"], "force": [0, 0, 1]}],
+        "drive": [{"particles": ["a"], "markers": ["m0"]}],
+        "quantities": {"NAME": {}},
+    },
+    "marker": [{"marker": "m0", "particle": "a"}],
+    "recording": [{"file": "r.npz", "marker": [{"marker": "m0", "particle": "a"}]}],
+    "parameters": {"NAME": {}},
+    "fit": {},
+    "output": {},
+}
+"""One table of every section, with what it must have; a configuration that parses."""
+
+SECTIONS = [(path.strip("[]"), model) for header, model in HEADERS.items() for path in header.split(", ")]
+FIELDS = [pytest.param(path, name, id=f"{path}.{name}") for path, model in SECTIONS for name in model.model_fields]
+
+
+def section(config: dict[str, Any], path: str) -> tuple[dict[str, Any], str]:
+    """The table of a section (of a list, the first), and its dotted path in errors."""
+    here: Any = config
+    told = ""
+    for part in path.split("."):
+        here, told = here[part], f"{told}.{part}" if told else part
+        if isinstance(here, list):
+            here, told = here[0], f"{told}[0]"
+    return here, told
+
+
+def refused(folder: Path, path: str, name: str, *value: Any) -> sb.ConfigError:
+    """The error about a key that is set to a value, or left out."""
+    config = copy.deepcopy(WHOLE)
+    table, told = section(config, path)
+    table.pop(name, None)
+    if value:
+        table[name] = value[0]
+    file = folder / "all.toml"
+    file.write_text(tomli_w.dumps(config))
+    with pytest.raises(sb.ConfigError) as caught:
+        parse(file)
+    error = caught.value
+    assert re.match(re.escape(f"{told}.{name}") + r"(\[|\.|$)", error.field), (path, name, value, str(error))
+    assert error.problem and len(error.fix) > 3 and "Fix: " in str(error)
+    return error
+
+
+def model_of(path: str) -> Any:
+    return dict(SECTIONS)[path]
+
+
+def branches(annotation: Any) -> list[Any]:
+    """The types that a key may have, without None and without their limits."""
+    if typing.get_origin(annotation) is typing.Annotated:
+        return branches(typing.get_args(annotation)[0])
+    if typing.get_origin(annotation) in (typing.Union, types.UnionType):
+        return [branch for part in typing.get_args(annotation) for branch in branches(part)]
+    return [] if annotation is type(None) else [annotation]
+
+
+def is_number(annotation: Any) -> bool:
+    return branches(annotation) == [float]
+
+
+def is_vector(annotation: Any) -> bool:
+    """Whether a key is a list of numbers of a given length; all of them have two or three."""
+    return [str(branch) for branch in branches(annotation)] == [str(list[Finite])]
+
+
+def limits(path: str, name: str) -> dict[str, float]:
+    """gt and ge of a key that is one number."""
+    field = model_of(path).model_fields[name]
+    return {bound: getattr(part, bound) for part in field.metadata for bound in ("gt", "ge") if hasattr(part, bound)}
+
+
+def test_the_whole_configuration_parses(tmp_path: Path) -> None:
+    file = tmp_path / "all.toml"
+    file.write_text(tomli_w.dumps(WHOLE))
+    parse(file)
+
+
+@pytest.mark.parametrize(("path", "name"), FIELDS)
+def test_a_value_of_another_type(tmp_path: Path, path: str, name: str) -> None:
+    annotation = model_of(path).model_fields[name].annotation
+    refused(tmp_path, path, name, 1.5 if typing.get_origin(annotation) is dict else {"not": ["at", "all"]})
+    if is_number(annotation):
+        refused(tmp_path, path, name, "1.0")
+        refused(tmp_path, path, name, True)
+
+
+@pytest.mark.parametrize(("path", "name"), FIELDS)
+def test_missing_out_of_range_and_not_finite(tmp_path: Path, path: str, name: str) -> None:
+    field = model_of(path).model_fields[name]
+    if field.is_required():
+        error = refused(tmp_path, path, name)
+        assert error.problem == "is missing"
+    for bound, limit in limits(path, name).items():
+        beyond = int(limit) - (bound == "ge")
+        error = refused(tmp_path, path, name, beyond)
+        assert f"{limit:g}" in error.fix
+    if is_number(field.annotation):
+        for value in (math.nan, math.inf, -math.inf):
+            refused(tmp_path, path, name, value)
+    if is_vector(field.annotation) and name not in ("times", "factors"):  # which may have any length
+        for vector in ([], [0.0], [0.0] * 4, [0.0, math.nan], [0.0, 0.0, math.inf]):
+            refused(tmp_path, path, name, vector)
+
+
+@pytest.mark.parametrize(("path", "name"), FIELDS)
+def test_a_misspelled_key_is_guessed(tmp_path: Path, path: str, name: str) -> None:
+    error = refused(tmp_path, path, f"{name}x", 1.0)
+    assert error.problem == "is no known key" and name in error.fix

@@ -1,0 +1,165 @@
+"""Ceres and SciPy on one problem: the same residuals, the same answer; the Jacobian that both see; what Ctrl-C leaves."""
+
+from __future__ import annotations
+
+import importlib
+import signal
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from pytest import approx
+from sheetbend.discretization import Refinement
+from sheetbend.optimizers import Progress, has_ceres, minimize
+from sheetbend.problem import FitProblem, as_parameters
+
+fitting = importlib.import_module("sheetbend.fit")  # the name in the package is the function
+
+SOLVER = sb.Solver(h=1 / 400)
+WANTED = {"rope_EI": {"initial": 3e-3}, "rope_bend_damping": {"initial": 0.03}, "rope_density": {"prior": (0.05, 0.1)}}
+needs_ceres = pytest.mark.skipif(not has_ceres(), reason="built without Ceres")
+
+
+def rope() -> sb.Scene:
+    return sb.rope(0.5, 6, density=0.05, EA=1e3, EI=2e-3, bend_damping=0.02, clamp_start=(1, 0, 0))
+
+
+def swinging(noise: float = 1e-4, seed: int = 0, **fields: object) -> sb.Experiment:
+    at = [2, 4, 6]
+    clean = sb.simulate(rope(), np.arange(31) / 100, SOLVER)
+    positions = clean.positions[:, at] + noise * np.random.default_rng(seed).standard_normal((31, 3, 3))
+    recording = sb.Recording(positions=positions, times=clean.times, name=f"swing{seed}")
+    given = {"markers": [sb.on_particle(i) for i in at], "solver": SOLVER, "sigma": 1e-4}
+    return sb.Experiment(scene=rope(), recording=recording, **(given | fields))
+
+
+def hanging(seed: int = 0) -> sb.Experiment:
+    shape = sb.equilibrium(rope()).positions[None, 1:7]
+    noisy = shape + 1e-4 * np.random.default_rng(seed).standard_normal(shape.shape)
+    recording = sb.Recording(positions=noisy, times=[0.0], name="shape")
+    return sb.Experiment(scene=rope(), recording=recording, markers=[sb.on_particle(i) for i in range(1, 7)], static=True, sigma=1e-4)
+
+
+def problem_of(*experiments: sb.Experiment) -> FitProblem:
+    return FitProblem(experiments, as_parameters(WANTED, experiments))
+
+
+@needs_ceres
+@pytest.mark.parametrize("loss", ["squares", "soft_l1", "huber"])
+def test_ceres_and_scipy_give_the_same_answer(loss):
+    """As asked for, within a thousandth of the intervals; iterated until the cost is level to rounding, 1e-4 standard errors."""
+    experiments = [swinging(loss=loss), hanging()]
+    ceres, scipy = (sb.fit(experiments, parameters=WANTED, optimizer=name) for name in ("ceres", "scipy"))
+    assert (ceres.result.optimizer, scipy.result.optimizer) == ("ceres", "scipy")
+    assert ceres.result.converged and scipy.result.converged
+    assert ceres.result.cost == approx(scipy.result.cost, rel=1e-9)
+    for name in WANTED:
+        one, other = ceres[name], scipy[name]
+        assert one.value == approx(other.value, abs=1e-3 * other.half_width)
+        assert (one.verdict, one.half_width) == (other.verdict, approx(other.half_width, rel=1e-3))
+
+    problem = problem_of(*experiments)
+    ends = [minimize(problem, problem.parameters.initial(), name, tolerance=1e-15)[0].u for name in ("ceres", "scipy")]
+    _, _, jacobian = problem.evaluate(ends[0])
+    standard_errors = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
+    assert (np.abs(ends[0] - ends[1]) / standard_errors).max() < 1e-4
+
+
+AT_REST = ("rope_EI", "rope_density")
+
+
+@pytest.mark.parametrize(
+    ("experiments", "wanted"),
+    [((swinging(),), WANTED), ((hanging(),), AT_REST), ((swinging(start="equilibrium"),), AT_REST), ((swinging(), hanging()), WANTED)],
+    ids=["motion", "static", "from equilibrium", "both"],
+)
+def test_the_jacobian_is_the_residuals_own(experiments, wanted):
+    """Columns against differences of fourth order in the internal coordinates."""
+    problem = FitProblem(experiments, as_parameters(wanted, experiments))
+    u = problem.parameters.initial()
+    ok, _, jacobian = problem.evaluate(u)
+    assert ok
+
+    def along(column: int, step: float) -> np.ndarray:
+        ends = [problem.evaluate(u + sign * step * np.eye(len(u))[column], jacobian=False)[1] for sign in (1.0, -1.0)]
+        return (ends[0] - ends[1]) / (2.0 * step)
+
+    for column in range(len(u)):
+        expected = (4.0 * along(column, 1e-3) - along(column, 2e-3)) / 3.0
+        assert np.abs(expected).max() > 1.0
+        assert jacobian[:, column] == approx(expected, abs=1e-7 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_threads_leave_the_fit_alone(threads):
+    experiments = [swinging(seed=1), swinging(seed=2), hanging()]
+    found = sb.fit(experiments, parameters=WANTED, threads=threads)
+    assert found.values == sb.fit(experiments, parameters=WANTED).values
+
+
+def interrupt_at(iteration: int):
+    """An observer that presses Ctrl-C."""
+
+    def observe(progress: Progress) -> None:
+        if progress.iteration >= iteration:
+            signal.raise_signal(signal.SIGINT)
+
+    return observe
+
+
+OPTIMIZERS = [pytest.param("ceres", marks=needs_ceres), "scipy"]
+
+
+@pytest.mark.parametrize("optimizer", OPTIMIZERS)
+def test_an_interrupted_search_returns_its_best_point(optimizer):
+    problem = problem_of(swinging())
+    u = problem.parameters.initial()
+    start = 0.5 * float(np.square(problem.evaluate(u)[1]).sum())
+    end, _ = minimize(problem, u, optimizer, observe=interrupt_at(2))
+    assert end.interrupted and not end.converged
+    _, residuals, _ = problem.evaluate(end.u)
+    assert end.cost == approx(0.5 * float(residuals @ residuals)) and end.cost <= start
+
+
+@pytest.mark.parametrize("optimizer", OPTIMIZERS)
+def test_an_interrupted_fit_refits_nothing(optimizer, monkeypatch):
+    """Profiles and refinements would go on for many times what was interrupted."""
+
+    def never(*_: object, **__: object) -> None:
+        raise AssertionError("a refit after Ctrl-C")
+
+    monkeypatch.setattr(fitting, "refit", never)
+    monkeypatch.setattr(fitting, "refined_estimates", never)
+    found = sb.fit([swinging()], parameters=WANTED, optimizer=optimizer, refine=Refinement(), progress=interrupt_at(2))
+    assert found.result.interrupted and not found.result.converged
+    assert "best point so far" in found.report() and "linear" in found.report()
+    assert all(e.discretization == 0.0 for e in found.result.estimates)
+
+
+def test_ctrl_c_during_the_refits_keeps_the_converged_values(monkeypatch):
+    whole = sb.fit([swinging()], parameters=WANTED)
+
+    def pressed(*_: object) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(fitting, "refined_estimates", pressed)
+    found = sb.fit([swinging()], parameters=WANTED, refine=Refinement())
+    assert found.result.interrupted and found.result.converged
+    assert found.values == whole.values
+    assert found.report().startswith("Fit converged, then interrupted,")
+
+
+def test_ctrl_c_at_a_further_start_keeps_the_first(monkeypatch):
+    whole = sb.fit([swinging()], parameters=WANTED)
+    exact, starts = fitting.minimize, []
+
+    def second_is_interrupted(*arguments: object, **options: object) -> object:
+        starts.append(arguments)
+        if len(starts) == 2:
+            raise KeyboardInterrupt
+        return exact(*arguments, **options)
+
+    monkeypatch.setattr(fitting, "minimize", second_is_interrupted)
+    found = sb.fit([swinging()], parameters=WANTED, starts=[{"rope_EI": 1e-2}, {"rope_EI": 1e-3}])
+    assert len(starts) == 2 and len(found.result.starts) == 1
+    assert found.result.interrupted and found.values == whole.values
