@@ -4,7 +4,8 @@
 
 namespace sheetbend {
 
-Equilibrium EquilibriumAnchor::solve(const Scene& scene, const double* inputs, const EquilibriumOptions& options, Interrupt* interrupt) {
+Equilibrium EquilibriumAnchor::solve(const Scene& scene, const double* inputs, const EquilibriumOptions& options,
+                                     Interrupt* interrupt) {
   EquilibriumSolver solver(scene);
   std::unique_lock lock(setting_);
   const bool known = set_;
@@ -27,8 +28,9 @@ Equilibrium EquilibriumAnchor::solve(const Scene& scene, const double* inputs, c
 namespace {
 
 template <int N>
-std::vector<Dual<double, N>> with_tangents(const Scene& scene, const Dual<double, N>* inputs, const EquilibriumOptions& options,
-                                           EquilibriumAnchor& anchor, Interrupt* interrupt) {
+std::vector<Dual<double, N>> with_tangents(const Scene& scene, const Dual<double, N>* inputs,
+                                           const EquilibriumOptions& options, EquilibriumAnchor& anchor,
+                                           Interrupt* interrupt) {
   std::vector<double> values(scene.layout.total());
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = inputs[i].v;
   const Equilibrium e = anchor.solve(scene, values.data(), options, interrupt);
@@ -40,18 +42,20 @@ std::vector<Dual<double, N>> with_tangents(const Scene& scene, const Dual<double
 }  // namespace
 
 template <>
-std::vector<double> equilibrium_coordinates(const Scene& scene, const double* inputs, const EquilibriumOptions& options, EquilibriumAnchor& anchor,
-                                            Interrupt* interrupt) {
+std::vector<double> equilibrium_coordinates(const Scene& scene, const double* inputs, const EquilibriumOptions& options,
+                                            EquilibriumAnchor& anchor, Interrupt* interrupt) {
   return anchor.solve(scene, inputs, options, interrupt).x;
 }
 template <>
-std::vector<Dual<double, 4>> equilibrium_coordinates(const Scene& scene, const Dual<double, 4>* inputs, const EquilibriumOptions& options,
-                                                     EquilibriumAnchor& anchor, Interrupt* interrupt) {
+std::vector<Dual<double, 4>> equilibrium_coordinates(const Scene& scene, const Dual<double, 4>* inputs,
+                                                     const EquilibriumOptions& options, EquilibriumAnchor& anchor,
+                                                     Interrupt* interrupt) {
   return with_tangents(scene, inputs, options, anchor, interrupt);
 }
 template <>
-std::vector<Dual<double, 8>> equilibrium_coordinates(const Scene& scene, const Dual<double, 8>* inputs, const EquilibriumOptions& options,
-                                                     EquilibriumAnchor& anchor, Interrupt* interrupt) {
+std::vector<Dual<double, 8>> equilibrium_coordinates(const Scene& scene, const Dual<double, 8>* inputs,
+                                                     const EquilibriumOptions& options, EquilibriumAnchor& anchor,
+                                                     Interrupt* interrupt) {
   return with_tangents(scene, inputs, options, anchor, interrupt);
 }
 

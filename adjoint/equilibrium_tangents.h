@@ -31,7 +31,7 @@ class EquilibriumAnchor {
 
 // Coordinates (dofs) of the equilibrium. Throws NoEquilibrium. T: double, Dual<double, 4>, Dual<double, 8>.
 template <class T>
-std::vector<T> equilibrium_coordinates(const Scene& scene, const T* inputs, const EquilibriumOptions& options, EquilibriumAnchor& anchor,
-                                       Interrupt* interrupt);
+std::vector<T> equilibrium_coordinates(const Scene& scene, const T* inputs, const EquilibriumOptions& options,
+                                       EquilibriumAnchor& anchor, Interrupt* interrupt);
 
 }  // namespace sheetbend

@@ -10,13 +10,16 @@ EquilibriumDerivative::EquilibriumDerivative(const Scene& scene, const double* i
   kkt_.assemble(inputs, at_.x.data(), at_.lambda.data(), 0.0);
   if (!kkt_.factorize(0.0, inputs_.data() + scene.layout.of(Quantity::compliance)))
     throw NoEquilibrium(
-        "equilibrium: the Newton matrix is singular, so the shape has no derivative (a fold, or a part that moves freely). Fix: hold "
+        "equilibrium: the Newton matrix is singular, so the shape has no derivative (a fold, or a part that moves "
+        "freely). Fix: hold "
         "every part, or move away from the critical load");
 }
 
 void EquilibriumDerivative::solve(std::vector<double>& x, std::vector<double>& lambda) const {
   if (!kkt_.solve(x.data(), lambda.data()))
-    throw NoEquilibrium("equilibrium: the linear solve of the derivative lost its accuracy. Fix: check for redundant rigid constraints");
+    throw NoEquilibrium(
+        "equilibrium: the linear solve of the derivative lost its accuracy. Fix: check for redundant rigid "
+        "constraints");
 }
 
 void EquilibriumDerivative::vjp(const double* x_bar, const double* lambda_bar, double* inputs_bar) const {
@@ -55,7 +58,8 @@ void EquilibriumDerivative::vjp(const double* x_bar, const double* lambda_bar, d
         rest_bar[k] -= sum;
       }
       for (int d = 0; d < K::dofs; ++d)
-        fixed[scene_.first_dof[group.nodes(item)[d / 3]] + d % 3] -= l * J[j * K::dofs + d].d[P] + vj * J[j * K::dofs + d].v;
+        fixed[scene_.first_dof[group.nodes(item)[d / 3]] + d % 3] -=
+            l * J[j * K::dofs + d].d[P] + vj * J[j * K::dofs + d].v;
     }
   });
 
@@ -67,12 +71,14 @@ void EquilibriumDerivative::vjp(const double* x_bar, const double* lambda_bar, d
     if (scene_.role[n] == Role::pinned) {
       held.add_to(bar.of(Quantity::position) + scene_.first_dof[n]);
     } else if (scene_.role[n] == Role::driven) {
-      pull_back_knots(boundary, held, bar.of(Quantity::boundary), static_cast<int>(scene_.driven.size()), scene_.driven_slot[n]);
+      pull_back_knots(boundary, held, bar.of(Quantity::boundary), static_cast<int>(scene_.driven.size()),
+                      scene_.driven_slot[n]);
     } else {
       bar.of(Quantity::mass)[n] -= dot(un, gravity);
       (-in.of(Quantity::mass)[n] * un).add_to(bar.of(Quantity::gravity));
       if (scene_.loaded_slot[n] >= 0)
-        pull_back_knots(force, -un, bar.of(Quantity::force), static_cast<int>(scene_.loaded.size()), scene_.loaded_slot[n]);
+        pull_back_knots(force, -un, bar.of(Quantity::force), static_cast<int>(scene_.loaded.size()),
+                        scene_.loaded_slot[n]);
     }
   }
 }

@@ -23,7 +23,8 @@ T robust_scale(const Observations& o, const T& distance2) {
 template <class T>
 class ResidualWriter {
  public:
-  ResidualWriter(const Experiment& e, const T* offsets, T* r, T* simulated) : o_(e.observed), offsets_(offsets), r_(r), simulated_(simulated) {}
+  ResidualWriter(const Experiment& e, const T* offsets, T* r, T* simulated)
+      : o_(e.observed), offsets_(offsets), r_(r), simulated_(simulated) {}
 
   // The state at the time of one frame.
   void frame(std::size_t f, const T* x) {
@@ -63,10 +64,12 @@ int Experiment::steps() const {
 
 void Experiment::check() const {
   const std::size_t frames = observed.times.size(), markers = observed.markers.size();
-  if (frames == 0 || markers == 0) throw std::invalid_argument(name + ": nothing is observed. Fix: give frames and markers");
+  if (frames == 0 || markers == 0)
+    throw std::invalid_argument(name + ": nothing is observed. Fix: give frames and markers");
   if (observed.measured.size() != 3 * frames * markers || observed.sigma.size() != frames * markers)
     throw std::invalid_argument(name + ": measured and sigma must be (frames, markers, 3) and (frames, markers)");
-  if (is_static && frames != 1) throw std::invalid_argument(name + ": an equilibrium has one frame. Fix: give each shape as a recording");
+  if (is_static && frames != 1)
+    throw std::invalid_argument(name + ": an equilibrium has one frame. Fix: give each shape as a recording");
   if (map.base.size() != inputs()) throw std::invalid_argument(name + ": the parameter map does not fit the scene");
   if (residual_count() == 0) throw std::invalid_argument(name + ": every marker is missing in every frame");
 }
@@ -112,7 +115,9 @@ void Experiment::residuals(const T* theta, T* r, T* simulated, Interrupt* interr
 }
 
 template void Experiment::residuals<double>(const double*, double*, double*, Interrupt*) const;
-template void Experiment::residuals<Dual<double, 4>>(const Dual<double, 4>*, Dual<double, 4>*, Dual<double, 4>*, Interrupt*) const;
-template void Experiment::residuals<Dual<double, 8>>(const Dual<double, 8>*, Dual<double, 8>*, Dual<double, 8>*, Interrupt*) const;
+template void Experiment::residuals<Dual<double, 4>>(const Dual<double, 4>*, Dual<double, 4>*, Dual<double, 4>*,
+                                                     Interrupt*) const;
+template void Experiment::residuals<Dual<double, 8>>(const Dual<double, 8>*, Dual<double, 8>*, Dual<double, 8>*,
+                                                     Interrupt*) const;
 
 }  // namespace sheetbend

@@ -17,9 +17,9 @@ enum class Loss : int { squares, soft_l1, huber };
 
 struct Observations {
   std::vector<Marker> markers;
-  std::vector<double> times;     // (frames) [s]
-  std::vector<double> measured;  // (frames, markers, 3) [m], NaN = not seen
-  std::vector<double> sigma;     // (frames, markers) [m]: residuals are divided by it
+  std::vector<double> times;       // (frames) [s]
+  std::vector<double> measured;    // (frames, markers, 3) [m], NaN = not seen
+  std::vector<double> sigma;       // (frames, markers) [m]: residuals are divided by it
   std::vector<int> axes{0, 1, 2};  // coordinates that count
   Loss loss = Loss::squares;
   double loss_scale = 1.0;  // in units of sigma

@@ -4,6 +4,7 @@
 namespace sheetbend {
 
 template Tape<double> record_rollout<double>(const Scene&, const Plan&, const double*, double, int, Interrupt*);
-template void reverse_rollout<double>(const Scene&, const Plan&, const double*, double, const Tape<double>&, const std::vector<int>&, const double*, double*, Interrupt*);
+template void reverse_rollout<double>(const Scene&, const Plan&, const double*, double, const Tape<double>&,
+                                      const std::vector<int>&, const double*, double*, Interrupt*);
 
 }  // namespace sheetbend

@@ -3,6 +3,7 @@
 
 namespace sheetbend {
 
-template Tape<Dual<double, 8>> record_rollout<Dual<double, 8>>(const Scene&, const Plan&, const Dual<double, 8>*, double, int, Interrupt*);
+template Tape<Dual<double, 8>> record_rollout<Dual<double, 8>>(const Scene&, const Plan&, const Dual<double, 8>*,
+                                                               double, int, Interrupt*);
 
 }  // namespace sheetbend

@@ -38,8 +38,8 @@ Vec3<T> marker_position(const Marker& m, const T* x, const T* offset) {
 template <class T>
 std::array<T, 4> cubic_weights(const T& u) {
   const T one(1.0), two(2.0), half(0.5), sixth(1.0 / 6.0);
-  return {-(u * (u - one) * (u - two) * sixth), (u + one) * (u - one) * (u - two) * half, -((u + one) * u * (u - two) * half),
-          (u + one) * u * (u - one) * sixth};
+  return {-(u * (u - one) * (u - two) * sixth), (u + one) * (u - one) * (u - two) * half,
+          -((u + one) * u * (u - two) * half), (u + one) * u * (u - one) * sixth};
 }
 
 }  // namespace sheetbend

@@ -18,11 +18,11 @@ namespace sheetbend {
 // Cotangents during the reverse of one substep.
 template <class T>
 struct SubstepCotangent {
-  T* x;         // of the coordinates
-  T* fixed;     // of pinned and driven nodes, kept per stencil (constraints of one color may share such a node)
-  T* lambda;    // of the multipliers
-  T* w;         // of the effective inverse masses, accumulated
-  T* C_r;       // of the damping references, accumulated
+  T* x;       // of the coordinates
+  T* fixed;   // of pinned and driven nodes, kept per stencil (constraints of one color may share such a node)
+  T* lambda;  // of the multipliers
+  T* w;       // of the effective inverse masses, accumulated
+  T* C_r;     // of the damping references, accumulated
   Inputs<T> inputs;
 };
 
@@ -34,8 +34,8 @@ struct BlockVectors {
 
 // Everything after the solve, on one element; z and u are the block's, on the element's stencil. Adds Hess(C_j) v_j to x_bar.
 template <class K, class T>
-void pull_back_element(const SubstepState<T>& s, const Group& group, int item, const Element<K, T>& e, const T* lambda, const T* dl, const T* y,
-                       const T* z, const T* u, T* x_bar, const SubstepCotangent<T>& bar) {
+void pull_back_element(const SubstepState<T>& s, const Group& group, int item, const Element<K, T>& e, const T* lambda,
+                       const T* dl, const T* y, const T* z, const T* u, T* x_bar, const SubstepCotangent<T>& bar) {
   constexpr int P = parameter_count<K>, N = K::rows + P;
   using D = Dual<T, N>;
   T v[K::rows][K::dofs];
@@ -74,7 +74,8 @@ void pull_back_element(const SubstepState<T>& s, const Group& group, int item, c
   T& alpha_bar = bar.inputs.of(Quantity::compliance)[c];
   alpha_bar += a_bar * T(1.0 / (s.eta * s.eta));
   if (group.damped) {
-    const T alpha = s.inputs.of(Quantity::compliance)[c], beta = s.inputs.of(Quantity::damping)[c], ge = g_bar * T(1.0 / s.eta);
+    const T alpha = s.inputs.of(Quantity::compliance)[c], beta = s.inputs.of(Quantity::damping)[c],
+            ge = g_bar * T(1.0 / s.eta);
     alpha_bar += ge * beta;
     bar.inputs.of(Quantity::damping)[c] += ge * alpha;
   }
@@ -87,9 +88,11 @@ std::size_t first_coordinate(const Group& group, int item) {
 
 // Adds a stencil's cotangent to where it belongs.
 template <class K, class T>
-void add_cotangent(const SubstepState<T>& s, const Element<K, T>& e, std::size_t coordinate, const T* local, const SubstepCotangent<T>& bar) {
+void add_cotangent(const SubstepState<T>& s, const Element<K, T>& e, std::size_t coordinate, const T* local,
+                   const SubstepCotangent<T>& bar) {
   for (int k = 0; k < K::arity; ++k) {
-    T* to = s.scene.role[e.nodes[k]] == Role::free ? bar.x + s.scene.first_dof[e.nodes[k]] : bar.fixed + coordinate + 3 * k;
+    T* to =
+        s.scene.role[e.nodes[k]] == Role::free ? bar.x + s.scene.first_dof[e.nodes[k]] : bar.fixed + coordinate + 3 * k;
     for (int d = 0; d < 3; ++d) to[d] += local[3 * k + d];
   }
 }
@@ -103,7 +106,8 @@ void gather_free(const SubstepState<T>& s, const Element<K, T>& e, const T* from
 
 // lambda'_bar + J W x'_bar on one element.
 template <class K, class T>
-void adjoint_right_side(const SubstepState<T>& s, const Element<K, T>& e, const T* J, const SubstepCotangent<T>& bar, T* y) {
+void adjoint_right_side(const SubstepState<T>& s, const Element<K, T>& e, const T* J, const SubstepCotangent<T>& bar,
+                        T* y) {
   T x_bar[K::dofs];
   gather_free(s, e, bar.x, x_bar);
   for (int j = 0; j < K::rows; ++j) {
@@ -114,8 +118,8 @@ void adjoint_right_side(const SubstepState<T>& s, const Element<K, T>& e, const 
 }
 
 template <class T>
-void project_color_vjp(const SubstepState<T>& s, const SolverOptions& options, const Color& color, const IterationRecord<T>& record,
-                       const SubstepCotangent<T>& bar) {
+void project_color_vjp(const SubstepState<T>& s, const SolverOptions& options, const Color& color,
+                       const IterationRecord<T>& record, const SubstepCotangent<T>& bar) {
   const Group& group = s.scene.groups[color.group];
   with_kind(group.kind, [&]<class K>(K) {
     parallel_for(static_cast<int>(color.items.size()), options.threads, options.grain, [&](int begin, int end) {
@@ -147,8 +151,9 @@ void project_color_vjp(const SubstepState<T>& s, const SolverOptions& options, c
 
 // The block touches its own movable nodes of z and u only.
 template <class T>
-void project_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const IterationRecord<T>& record, const Factor<T>& factor,
-                       T* rows, const BlockVectors<T>& block_wide, const SubstepCotangent<T>& bar) {
+void project_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const IterationRecord<T>& record,
+                       const Factor<T>& factor, T* rows, const BlockVectors<T>& block_wide,
+                       const SubstepCotangent<T>& bar) {
   T* y = rows + block.first_row;
   const auto for_each_member = [&](auto&& body) {
     for (const Member& m : block.members) {
@@ -182,8 +187,8 @@ void project_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const
     T z[K::dofs], u[K::dofs], x_bar[K::dofs]{};
     gather_free(s, e, block_wide.z, z);
     gather_free(s, e, block_wide.u, u);
-    pull_back_element<K>(s, group, m.item, e, &record.lambda[e.first_row], &record.dl[e.first_row], y + m.first_row, z, u, x_bar,
-                         bar);
+    pull_back_element<K>(s, group, m.item, e, &record.lambda[e.first_row], &record.dl[e.first_row], y + m.first_row, z,
+                         u, x_bar, bar);
     add_cotangent(s, e, first_coordinate<K>(group, m.item), x_bar, bar);
   });
 }

@@ -6,17 +6,17 @@
 namespace sheetbend {
 
 template <class T>
-Tape<T> record_rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0, int steps, Interrupt* interrupt) {
+Tape<T> record_rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0, int steps,
+                       Interrupt* interrupt) {
   Tape<T> tape(scene, plan, steps);
   Rollout<T> rollout(scene, plan, inputs, t0);
-  rollout.run(
-      steps, [&](int step, const T* x, const T*, const T*) { tape.record(step, x); }, interrupt);
+  rollout.run(steps, [&](int step, const T* x, const T*, const T*) { tape.record(step, x); }, interrupt);
   return tape;
 }
 
 template <class T>
-void reverse_rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0, const Tape<T>& tape, const std::vector<int>& wanted,
-                     const T* x_bar, T* inputs_bar, Interrupt* interrupt) {
+void reverse_rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0, const Tape<T>& tape,
+                     const std::vector<int>& wanted, const T* x_bar, T* inputs_bar, Interrupt* interrupt) {
   const std::size_t dofs = scene.dofs();
   std::size_t left = wanted.size();
   const auto seed = [&](int step, T* bar) {

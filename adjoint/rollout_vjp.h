@@ -9,8 +9,8 @@ namespace sheetbend {
 // Reverses the rollout that `tape` recorded. seed(step, x_bar) adds the loss's cotangent of x at `step` (0 .. steps) to x_bar; inputs_bar (layout.total())
 // receives, added, the gradient by every input. Cost: one forward substep and its reverse per substep; memory: the tape.
 template <class T, class Seed>
-void rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t0, const Tape<T>& tape, Seed&& seed, T* inputs_bar,
-                 Interrupt* interrupt = nullptr) {
+void rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t0, const Tape<T>& tape, Seed&& seed,
+                 T* inputs_bar, Interrupt* interrupt = nullptr) {
   const Inputs<const T> in{scene.layout, inputs};
   const Inputs<T> in_bar{scene.layout, inputs_bar};
   const std::size_t dofs = scene.dofs();
@@ -46,8 +46,8 @@ void rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t
   for (int node = 0; node < scene.nodes(); ++node) {
     const int dof = scene.first_dof[node];
     if (scene.role[node] == Role::driven)
-      pull_back_knots(boundary, Vec3<T>(&x_next_bar[dof]), in_bar.of(Quantity::boundary), static_cast<int>(scene.driven.size()),
-                      scene.driven_slot[node]);
+      pull_back_knots(boundary, Vec3<T>(&x_next_bar[dof]), in_bar.of(Quantity::boundary),
+                      static_cast<int>(scene.driven.size()), scene.driven_slot[node]);
     else
       Vec3<T>(&x_next_bar[dof]).add_to(in_bar.of(Quantity::position) + dof);
     Vec3<T>(&v_next_bar[dof]).add_to(in_bar.of(Quantity::velocity) + dof);

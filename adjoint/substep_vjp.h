@@ -16,8 +16,13 @@ struct ReverseScratch {
   std::vector<T> x, fixed, lambda, w, C_r, z, u;
 
   explicit ReverseScratch(const Scene& scene)
-      : x(scene.dofs()), fixed(scene.stencil_coordinates), lambda(scene.rows), w(scene.nodes()), C_r(scene.rows),
-        z(scene.dofs()), u(scene.dofs()) {}
+      : x(scene.dofs()),
+        fixed(scene.stencil_coordinates),
+        lambda(scene.rows),
+        w(scene.nodes()),
+        C_r(scene.rows),
+        z(scene.dofs()),
+        u(scene.dofs()) {}
 };
 
 template <class T>
@@ -28,14 +33,16 @@ void pull_back_history(const Bdf& bdf, const T& bar, T& now_bar, T& before_bar) 
 
 template <class T>
 void pull_back_knots(const KnotWeights& k, const Vec3<T>& bar, T* values_bar, int slots, int slot) {
-  for (int i = 0; i < k.count; ++i) (T(k.weight[i]) * bar).add_to(values_bar + 3 * ((static_cast<std::size_t>(k.first) + i) * slots + slot));
+  for (int i = 0; i < k.count; ++i)
+    (T(k.weight[i]) * bar).add_to(values_bar + 3 * ((static_cast<std::size_t>(k.first) + i) * slots + slot));
 }
 
 // Reverse of damping_references().
 template <class T>
-void damping_references_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, const SubstepStates<T>& s, const T* C_r_bar,
-                            const StateCotangents<T>& bar, const Inputs<T>& in_bar) {
-  const auto pull_back = [&]<class K>(K, const Group& group, int item, const T* at, const T* C_bar, const T& scale, T* x_bar) {
+void damping_references_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, const SubstepStates<T>& s,
+                            const T* C_r_bar, const StateCotangents<T>& bar, const Inputs<T>& in_bar) {
+  const auto pull_back = [&]<class K>(K, const Group& group, int item, const T* at, const T* C_bar, const T& scale,
+                                      T* x_bar) {
     constexpr int P = parameter_count<K>;
     const int* nodes = group.stencil.data() + static_cast<std::size_t>(item) * K::arity;
     const std::size_t value = group.first_value + static_cast<std::size_t>(item) * P;
@@ -48,7 +55,8 @@ void damping_references_vjp(const Scene& scene, const Inputs<const T>& in, const
     K::evaluate(x, p, C, J);
     for (int j = 0; j < K::rows; ++j) {
       const T bar_j = scale * C_bar[j];
-      for (int d = 0; d < K::dofs; ++d) x_bar[scene.first_dof[nodes[d / 3]] + d % 3] += bar_j * primal<T>(J[j * K::dofs + d]);
+      for (int d = 0; d < K::dofs; ++d)
+        x_bar[scene.first_dof[nodes[d / 3]] + d % 3] += bar_j * primal<T>(J[j * K::dofs + d]);
       if constexpr (P > 0)
         for (int k = 0; k < P; ++k) in_bar.of(Quantity::rest)[value + k] += bar_j * C[j].d[k];
     }
@@ -67,8 +75,9 @@ void damping_references_vjp(const Scene& scene, const Inputs<const T>& in, const
 
 // Reverse of predict(), given the cotangents of q and w.
 template <class T>
-void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, double t_next, const SubstepStates<T>& s, const T* w,
-                 const T* q_bar, const T* w_bar, const StateCotangents<T>& bar, const Inputs<T>& in_bar) {
+void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, double t_next,
+                 const SubstepStates<T>& s, const T* w, const T* q_bar, const T* w_bar, const StateCotangents<T>& bar,
+                 const Inputs<T>& in_bar) {
   const Vec3<T> gravity(in.of(Quantity::gravity));
   const KnotWeights boundary = scene.driven.empty() ? KnotWeights{} : scene.boundary.at(t_next);
   const KnotWeights force = scene.loaded.empty() ? KnotWeights{} : scene.force.at(t_next);
@@ -81,7 +90,8 @@ void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, 
       continue;
     }
     if (scene.role[n] == Role::driven) {
-      pull_back_knots(boundary, qb, in_bar.of(Quantity::boundary), static_cast<int>(scene.driven.size()), scene.driven_slot[n]);
+      pull_back_knots(boundary, qb, in_bar.of(Quantity::boundary), static_cast<int>(scene.driven.size()),
+                      scene.driven_slot[n]);
       continue;
     }
     const T m = in.of(Quantity::mass)[n];
@@ -99,7 +109,8 @@ void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, 
     in_bar.of(Quantity::mass)[n] += m_eff_bar + dot(P_bar, v_history + eta * gravity);
     (eta * m * P_bar).add_to(in_bar.of(Quantity::gravity));
     if (scene.loaded_slot[n] >= 0)
-      pull_back_knots(force, eta * P_bar, in_bar.of(Quantity::force), static_cast<int>(scene.loaded.size()), scene.loaded_slot[n]);
+      pull_back_knots(force, eta * P_bar, in_bar.of(Quantity::force), static_cast<int>(scene.loaded.size()),
+                      scene.loaded_slot[n]);
     const T x_bar[3] = {qb.x, qb.y, qb.z}, v_bar[3] = {m * P_bar.x, m * P_bar.y, m * P_bar.z};
     for (int d = 0; d < 3; ++d) {
       pull_back_history(bdf, x_bar[d], bar.x[dof + d], bar.x_before[dof + d]);
@@ -111,7 +122,8 @@ void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, 
       in_bar.of(Quantity::drag_linear)[n] += eta * m_eff_bar;
       in_bar.of(Quantity::drag_quadratic)[n] += eta * speed * m_eff_bar;
       const auto moving = v2 > T(0.0);
-      const T along = select(moving, eta * in.of(Quantity::drag_quadratic)[n] * m_eff_bar / select(moving, speed, T(1.0)), T(0.0));
+      const T along =
+          select(moving, eta * in.of(Quantity::drag_quadratic)[n] * m_eff_bar / select(moving, speed, T(1.0)), T(0.0));
       (T(bdf.extrapolate_now) * along * v).add_to(bar.v + dof);
       if (bdf.extrapolate_before != 0.0) (T(bdf.extrapolate_before) * along * v).add_to(bar.v_before + dof);
     }
@@ -120,15 +132,16 @@ void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, 
 
 // Given the cotangents of x_{n+1} and v_{n+1}, adds to those of the states before and of the inputs. The record is the substep's own, recomputed.
 template <class T>
-void substep_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf, double t_next, const SubstepStates<T>& s,
-                 SubstepRecord<T>& record, const T* x_next_bar, const T* v_next_bar, ReverseScratch<T>& scratch,
-                 const StateCotangents<T>& bar, const Inputs<T>& in_bar) {
+void substep_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf, double t_next,
+                 const SubstepStates<T>& s, SubstepRecord<T>& record, const T* x_next_bar, const T* v_next_bar,
+                 ReverseScratch<T>& scratch, const StateCotangents<T>& bar, const Inputs<T>& in_bar) {
   for (int i = 0; i < scene.dofs(); ++i) {
     const T back = v_next_bar[i] * T(1.0 / bdf.eta);
     scratch.x[i] = x_next_bar[i] + back;
     pull_back_history(bdf, -back, bar.x[i], bar.x_before[i]);
   }
-  for (auto* buffer : {&scratch.fixed, &scratch.lambda, &scratch.w, &scratch.C_r}) std::fill(buffer->begin(), buffer->end(), T(0.0));
+  for (auto* buffer : {&scratch.fixed, &scratch.lambda, &scratch.w, &scratch.C_r})
+    std::fill(buffer->begin(), buffer->end(), T(0.0));
 
   const SubstepState<T> state{scene, in, bdf.eta, nullptr, record.w.data(), record.C_r.data(), record.lambda.data()};
   const SubstepCotangent<T> cotangent{scratch.x.data(), scratch.fixed.data(), scratch.lambda.data(),
@@ -139,7 +152,8 @@ void substep_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in
       project_color_vjp(state, plan.options, *color, kept, cotangent);
     parallel_for(static_cast<int>(plan.blocks.size()), plan.options.threads, 1, [&](int begin, int end) {
       for (int b = begin; b < end; ++b)
-        project_block_vjp(state, plan.blocks[b], kept, kept.factors[b], record.rows.data(), {scratch.z.data(), scratch.u.data()}, cotangent);
+        project_block_vjp(state, plan.blocks[b], kept, kept.factors[b], record.rows.data(),
+                          {scratch.z.data(), scratch.u.data()}, cotangent);
     });
   }
   for (const Group& group : scene.groups)

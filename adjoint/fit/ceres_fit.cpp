@@ -11,12 +11,16 @@ namespace {
 class Point : public ceres::EvaluationCallback {
  public:
   Point(const EvaluationFunction& evaluation, const std::vector<double>& u)
-      : evaluation_(evaluation), u_(u), residual(evaluation.rows), jacobian(static_cast<std::size_t>(evaluation.rows) * u.size()) {}
+      : evaluation_(evaluation),
+        u_(u),
+        residual(evaluation.rows),
+        jacobian(static_cast<std::size_t>(evaluation.rows) * u.size()) {}
 
   void PrepareForEvaluation(bool with_jacobian, bool new_point) override {
     if (!new_point && (!with_jacobian || has_jacobian_)) return;
     if (status == EvaluationStatus::interrupted) return;
-    status = evaluation_.call(evaluation_.problem, u_.data(), residual.data(), with_jacobian ? jacobian.data() : nullptr);
+    status =
+        evaluation_.call(evaluation_.problem, u_.data(), residual.data(), with_jacobian ? jacobian.data() : nullptr);
     has_jacobian_ = with_jacobian;
     ++evaluations;
   }
@@ -51,10 +55,12 @@ class Residuals : public ceres::CostFunction {
 
 class Watch : public ceres::IterationCallback {
  public:
-  Watch(const Observe& observe, const Point& point, const std::vector<double>& u) : observe_(observe), point_(point), u_(u) {}
+  Watch(const Observe& observe, const Point& point, const std::vector<double>& u)
+      : observe_(observe), point_(point), u_(u) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& s) override {
     if (point_.status == EvaluationStatus::interrupted) return ceres::SOLVER_ABORT;
-    return observe_({s.iteration, s.cost, s.step_norm, s.gradient_max_norm}, u_) ? ceres::SOLVER_CONTINUE : ceres::SOLVER_ABORT;
+    return observe_({s.iteration, s.cost, s.step_norm, s.gradient_max_norm}, u_) ? ceres::SOLVER_CONTINUE
+                                                                                 : ceres::SOLVER_ABORT;
   }
 
  private:
@@ -65,8 +71,9 @@ class Watch : public ceres::IterationCallback {
 
 }  // namespace
 
-CeresResult minimize_with_ceres(const EvaluationFunction& evaluation, std::vector<double> u, const std::vector<double>& lower,
-                                const std::vector<double>& upper, const CeresOptions& options, const Observe& observe) {
+CeresResult minimize_with_ceres(const EvaluationFunction& evaluation, std::vector<double> u,
+                                const std::vector<double>& lower, const std::vector<double>& upper,
+                                const CeresOptions& options, const Observe& observe) {
   Point point(evaluation, u);
   Watch watch(observe, point, u);
   ceres::Problem::Options problem_options;

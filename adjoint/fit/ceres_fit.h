@@ -30,7 +30,8 @@ struct CeresResult {
 // Called after every iteration with the current point; returning false ends the fit with its best so far.
 using Observe = std::function<bool(const CeresProgress&, const std::vector<double>& u)>;
 
-CeresResult minimize_with_ceres(const EvaluationFunction& evaluation, std::vector<double> u, const std::vector<double>& lower,
-                                const std::vector<double>& upper, const CeresOptions& options, const Observe& observe);
+CeresResult minimize_with_ceres(const EvaluationFunction& evaluation, std::vector<double> u,
+                                const std::vector<double>& lower, const std::vector<double>& upper,
+                                const CeresOptions& options, const Observe& observe);
 
 }  // namespace sheetbend

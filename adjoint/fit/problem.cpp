@@ -22,17 +22,22 @@ Dual<double, N> exp(const Dual<double, N>& a) {
 
 }  // namespace
 
-Problem::Problem(std::vector<Experiment> experiments, std::vector<double> theta, std::vector<std::vector<int>> slots_of_experiment,
-                 std::vector<FreeParameter> free, int threads)
-    : experiments_(std::move(experiments)), theta_(std::move(theta)), slots_(std::move(slots_of_experiment)), free_(std::move(free)),
-      first_row_{0}, threads_(threads) {
+Problem::Problem(std::vector<Experiment> experiments, std::vector<double> theta,
+                 std::vector<std::vector<int>> slots_of_experiment, std::vector<FreeParameter> free, int threads)
+    : experiments_(std::move(experiments)),
+      theta_(std::move(theta)),
+      slots_(std::move(slots_of_experiment)),
+      free_(std::move(free)),
+      first_row_{0},
+      threads_(threads) {
   for (std::size_t i = 0; i < experiments_.size(); ++i) {
     experiments_[i].check();
     first_row_.push_back(first_row_.back() + static_cast<int>(experiments_[i].residual_count()));
     const std::set<int> used(slots_[i].begin(), slots_[i].end());
     columns_.emplace_back();
     for (int k = 0; k < parameters(); ++k)
-      if (std::any_of(free_[k].slots.begin(), free_[k].slots.end(), [&](int slot) { return used.contains(slot); })) columns_[i].push_back(k);
+      if (std::any_of(free_[k].slots.begin(), free_[k].slots.end(), [&](int slot) { return used.contains(slot); }))
+        columns_[i].push_back(k);
   }
   for (const FreeParameter& p : free_) priors_ += p.has_prior;
 }
@@ -55,7 +60,8 @@ std::vector<T> Problem::local_theta(const std::vector<T>& theta, int experiment)
 
 // The first sweep of an experiment also writes its residuals.
 template <int N>
-void Problem::evaluate_columns(const double* u, int experiment, int first, double* residual, double* jacobian, Interrupt* interrupt) const {
+void Problem::evaluate_columns(const double* u, int experiment, int first, double* residual, double* jacobian,
+                               Interrupt* interrupt) const {
   using D = Dual<double, N>;
   const std::vector<int>& columns = columns_[experiment];
   const int count = std::min(N, static_cast<int>(columns.size()) - first);
@@ -64,7 +70,8 @@ void Problem::evaluate_columns(const double* u, int experiment, int first, doubl
   set_theta(duals.data(), theta.data());
   const int rows = first_row_[experiment + 1] - first_row_[experiment];
   std::vector<D> r(rows);
-  experiments_[experiment].residuals(local_theta(theta, experiment).data(), r.data(), static_cast<D*>(nullptr), interrupt);
+  experiments_[experiment].residuals(local_theta(theta, experiment).data(), r.data(), static_cast<D*>(nullptr),
+                                     interrupt);
   for (int i = 0; i < rows; ++i) {
     const std::size_t row = first_row_[experiment] + i;
     if (first == 0) residual[row] = r[i].v;
@@ -95,7 +102,8 @@ bool Problem::evaluate(const double* u, double* residual, double* jacobian, Inte
         if (width == 0) {
           std::vector<double> theta(theta_.size());
           set_theta(u, theta.data());
-          experiments_[e].residuals(local_theta(theta, e).data(), residual + first_row_[e], static_cast<double*>(nullptr), interrupt);
+          experiments_[e].residuals(local_theta(theta, e).data(), residual + first_row_[e],
+                                    static_cast<double*>(nullptr), interrupt);
         } else if (width == 4) {
           evaluate_columns<4>(u, e, first, residual, jacobian, interrupt);
         } else {
@@ -117,7 +125,8 @@ bool Problem::evaluate(const double* u, double* residual, double* jacobian, Inte
     if (!free_[i].has_prior) continue;
     residual[row] = (u[i] - free_[i].prior_mean) / free_[i].prior_sd;
     if (jacobian)
-      for (int k = 0; k < p; ++k) jacobian[static_cast<std::size_t>(row) * p + k] = k == i ? 1.0 / free_[i].prior_sd : 0.0;
+      for (int k = 0; k < p; ++k)
+        jacobian[static_cast<std::size_t>(row) * p + k] = k == i ? 1.0 / free_[i].prior_sd : 0.0;
     ++row;
   }
   return ok && std::all_of(residual, residual + rows(), [](double r) { return std::isfinite(r); });

@@ -22,8 +22,8 @@ struct FreeParameter {
 
 class Problem {
  public:
-  Problem(std::vector<Experiment> experiments, std::vector<double> theta, std::vector<std::vector<int>> slots_of_experiment,
-          std::vector<FreeParameter> free, int threads);
+  Problem(std::vector<Experiment> experiments, std::vector<double> theta,
+          std::vector<std::vector<int>> slots_of_experiment, std::vector<FreeParameter> free, int threads);
 
   int parameters() const { return static_cast<int>(free_.size()); }
   int data_rows() const { return first_row_.back(); }
@@ -46,7 +46,8 @@ class Problem {
   template <class T>
   std::vector<T> local_theta(const std::vector<T>& theta, int experiment) const;
   template <int N>
-  void evaluate_columns(const double* u, int experiment, int first, double* residual, double* jacobian, Interrupt* interrupt) const;
+  void evaluate_columns(const double* u, int experiment, int first, double* residual, double* jacobian,
+                        Interrupt* interrupt) const;
 
   // A rollout that carries `width` columns of an experiment's Jacobian, or none.
   struct Sweep {
@@ -58,7 +59,8 @@ class Problem {
   std::vector<double> theta_;
   std::vector<std::vector<int>> slots_;  // per experiment: where its parameters stand in theta
   std::vector<FreeParameter> free_;
-  std::vector<std::vector<int>> columns_;  // per experiment: the free parameters that reach it; its other columns are zero
+  std::vector<std::vector<int>>
+      columns_;  // per experiment: the free parameters that reach it; its other columns are zero
   std::vector<int> first_row_;
   int priors_ = 0, threads_ = 1;
   mutable std::string failure_;

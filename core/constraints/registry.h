@@ -22,7 +22,9 @@ using Registry = std::tuple<  //
     Attachment>;
 
 inline constexpr int kind_count = std::tuple_size_v<Registry>;
-inline constexpr int max_rows = []<class... K>(std::tuple<K...>*) { return std::max({K::rows...}); }(static_cast<Registry*>(nullptr));
+inline constexpr int max_rows = []<class... K>(std::tuple<K...>*) {
+  return std::max({K::rows...});
+}(static_cast<Registry*>(nullptr));
 
 // Calls f with an object of the constraint type that `kind` numbers.
 template <int I = 0, class F>

@@ -39,8 +39,8 @@ Branches equilibrium_branches(const Scene& scene, const double* inputs, const st
     branches.messages.push_back(e.message);
     branches.of_start.push_back(-1);
     if (!e.converged) continue;
-    const auto known =
-        std::find_if(found.begin(), found.end(), [&](const Equilibrium& other) { return relative_distance(other.x, e.x) <= same; });
+    const auto known = std::find_if(found.begin(), found.end(),
+                                    [&](const Equilibrium& other) { return relative_distance(other.x, e.x) <= same; });
     branches.of_start.back() = static_cast<int>(known - found.begin());
     if (known == found.end()) found.push_back(std::move(e));
   }

@@ -10,11 +10,12 @@
 namespace sheetbend {
 namespace {
 
-constexpr double near_rest = 1e-6;     // relative residual below which Newton may go to a saddle (it is left again afterwards)
-constexpr double energy_share = 0.1;   // of the loads' energy that softened constraints may hold
-constexpr double stiffening = 0.9;     // of softened constraints, per iteration
-constexpr int max_corrections = 5;     // simplified Newton steps per factorization
-constexpr int max_departures = 5;      // from saddles
+constexpr double near_rest =
+    1e-6;  // relative residual below which Newton may go to a saddle (it is left again afterwards)
+constexpr double energy_share = 0.1;  // of the loads' energy that softened constraints may hold
+constexpr double stiffening = 0.9;    // of softened constraints, per iteration
+constexpr int max_corrections = 5;    // simplified Newton steps per factorization
+constexpr int max_departures = 5;     // from saddles
 
 double largest(const std::vector<double>& v) {
   double m = 0.0;
@@ -44,14 +45,17 @@ double mean_edge(const Scene& scene, const double* x) {
   for (const Group& group : scene.groups)
     for (int i = 0; i < group.count; ++i)
       for (int k = 1; k < group.arity; ++k, ++count)
-        sum += norm(Vec3<double>(x + scene.first_dof[group.nodes(i)[k]]) - Vec3<double>(x + scene.first_dof[group.nodes(i)[k - 1]]));
+        sum += norm(Vec3<double>(x + scene.first_dof[group.nodes(i)[k]]) -
+                    Vec3<double>(x + scene.first_dof[group.nodes(i)[k - 1]]));
   return count == 0 ? 0.0 : sum / count;
 }
 
 std::string not_converged(const Equilibrium& e, double tolerance) {
   std::ostringstream text;
-  text << "equilibrium: no rest found in " << e.iterations << " iterations, relative residual " << e.residual << " (tolerance " << tolerance
-       << "). Fix: start nearer to the shape, give more iterations, or check that supports hold every part against its loads";
+  text << "equilibrium: no rest found in " << e.iterations << " iterations, relative residual " << e.residual
+       << " (tolerance " << tolerance
+       << "). Fix: start nearer to the shape, give more iterations, or check that supports hold every part against its "
+          "loads";
   return text.str();
 }
 
@@ -65,8 +69,13 @@ struct EquilibriumSolver::State {
   double size, edge, weight, total = 0.0;  // of the scene, of an edge  [m]; largest and summed external force  [N]
   double residual = 0.0, last_step = std::numeric_limits<double>::infinity();
 
-  State(const Scene& scene_, const double* inputs, const double* start_x, const double* start_lambda, const EquilibriumOptions& o)
-      : scene(scene_), in{scene_.layout, inputs}, options(o), r_x(scene_.dofs()), r_l(scene_.rows),
+  State(const Scene& scene_, const double* inputs, const double* start_x, const double* start_lambda,
+        const EquilibriumOptions& o)
+      : scene(scene_),
+        in{scene_.layout, inputs},
+        options(o),
+        r_x(scene_.dofs()),
+        r_l(scene_.rows),
         softened(scene_.constraints),
         soft(scene_.groups.size(), std::numeric_limits<double>::infinity()) {
     const double* from = start_x ? start_x : in.of(Quantity::position);
@@ -81,7 +90,8 @@ struct EquilibriumSolver::State {
     evaluate(x, lambda);
     if (!finite(x) || !finite(r_x) || !finite(r_l))
       throw std::invalid_argument(
-          "start: the residual is not finite. Fix: give finite inputs and a start without edges of no length or folded back");
+          "start: the residual is not finite. Fix: give finite inputs and a start without edges of no length or folded "
+          "back");
   }
 
   // A scale of stiffness that is there before any multiplier: of the loads or, without loads, a part of the softest constraint's.
@@ -91,7 +101,8 @@ struct EquilibriumSolver::State {
     for_each_constraint(scene, [&]<class K>(K, const Group& group, int item) {
       double local[K::dofs], J2 = 0.0;
       gather<K>(scene, group, item, x.data(), local);
-      for (const double j : Evaluation<K, double>(local, rest_parameters<K>(in, group, item)).J) J2 = std::max(J2, j * j);
+      for (const double j : Evaluation<K, double>(local, rest_parameters<K>(in, group, item)).J)
+        J2 = std::max(J2, j * j);
       if (const double alpha = compliance()[group.first + item]; alpha > 0.0) softest = std::min(softest, J2 / alpha);
     });
     return std::isfinite(softest) ? 1e-4 * softest : 0.0;
@@ -154,7 +165,8 @@ struct EquilibriumSolver::State {
   // A Newton step of no length counts near rest only: at a fold K is so stiff that every step is short. Without loads the residual at rest
   // is rounding relative to rounding.
   bool converged() const {
-    return residual <= options.tolerance || ((residual <= near_rest || total == 0.0) && last_step <= options.tolerance * size);
+    return residual <= options.tolerance ||
+           ((residual <= near_rest || total == 0.0) && last_step <= options.tolerance * size);
   }
 
   double energy() const {

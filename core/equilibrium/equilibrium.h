@@ -19,22 +19,23 @@
 namespace sheetbend {
 
 struct EquilibriumOptions {
-  int max_iterations = 500;   // evaluations of the Newton matrix
-  double tolerance = 1e-12;   // of the relative residual, or of Newton's step relative to the scene's size
-  double t0 = 0.0;            // time at which boundary and force are taken  [s]
-  bool stable = true;         // false: go to the nearest equilibrium, saddle or not
+  int max_iterations = 500;  // evaluations of the Newton matrix
+  double tolerance = 1e-12;  // of the relative residual, or of Newton's step relative to the scene's size
+  double t0 = 0.0;           // time at which boundary and force are taken  [s]
+  bool stable = true;        // false: go to the nearest equilibrium, saddle or not
 };
 
 struct Equilibrium {
-  std::vector<double> x;       // (dofs), fixed nodes included
-  std::vector<double> lambda;  // (rows), force = J^T lambda: minus the tension for a distance, minus the moment for an angle
-  double energy = 0.0;         // of weight and forces (free nodes; zero at the origin) and elastic  [J]
+  std::vector<double> x;  // (dofs), fixed nodes included
+  std::vector<double>
+      lambda;           // (rows), force = J^T lambda: minus the tension for a distance, minus the moment for an angle
+  double energy = 0.0;  // of weight and forces (free nodes; zero at the origin) and elastic  [J]
   double residual = std::numeric_limits<double>::infinity();  // largest of |r_x| / force scale and |r_l| / (|J| size)
-  int iterations = 0;          // evaluations of the Newton matrix
-  int unstable_modes = -1;     // negative eigenvalues of the energy's Hessian (on the tangent space of rigid constraints)
+  int iterations = 0;                                         // evaluations of the Newton matrix
+  int unstable_modes = -1;  // negative eigenvalues of the energy's Hessian (on the tangent space of rigid constraints)
   bool converged = false;
   double t0 = 0.0;
-  std::string message;         // why not converged and what to do; empty otherwise
+  std::string message;  // why not converged and what to do; empty otherwise
 };
 
 class EquilibriumSolver {

@@ -60,7 +60,8 @@ Kkt::Kkt(const Scene& scene) : scene_(scene), unknown_(scene.dofs(), -1) {
   K_.resize(unknowns, unknowns);
   K_.setFromTriplets(upper.begin(), upper.end());
   const auto position = [&](int row, int column) {
-    const int *begin = K_.innerIndexPtr() + K_.outerIndexPtr()[column], *end = K_.innerIndexPtr() + K_.outerIndexPtr()[column + 1];
+    const int *begin = K_.innerIndexPtr() + K_.outerIndexPtr()[column],
+              *end = K_.innerIndexPtr() + K_.outerIndexPtr()[column + 1];
     return static_cast<int>(std::lower_bound(begin, end, row) - K_.innerIndexPtr());
   };
   for_each_pair(unknown_, [&](int a, int b) { position_.push_back(a >= 0 && a <= b ? position(a, b) : -1); });
@@ -207,14 +208,15 @@ bool Kkt::solve(double* x, double* lambda, double accuracy) const {
     if (unknown_[i] < 0) r_x[i] = 0.0;
   // Either part of a solution may vanish; corrections to it count relative to what such a right-hand side moves as a rule.
   const double J = largest(J_);
-  const double move = std::max(ratio(largest(r_x), geometric_), ratio(largest(r_l), J)), push = ratio(geometric_ * move, J);
+  const double move = std::max(ratio(largest(r_x), geometric_), ratio(largest(r_l), J)),
+               push = ratio(geometric_ * move, J);
   double change = 1.0;
   for (int pass = 0; pass < 20; ++pass) {
     condensed_solve(r_x, r_l, dx, dl);
     for (std::size_t i = 0; i < dx.size(); ++i) z_x[i] += dx[i];
     for (std::size_t i = 0; i < dl.size(); ++i) z_l[i] += dl[i];
-    const double before = std::exchange(
-        change, std::max(ratio(largest(dx), std::max(largest(z_x), move)), ratio(largest(dl), std::max(largest(z_l), push))));
+    const double before = std::exchange(change, std::max(ratio(largest(dx), std::max(largest(z_x), move)),
+                                                         ratio(largest(dl), std::max(largest(z_l), push))));
     if (!std::isfinite(change)) return false;
     if (change <= accuracy || (pass > 0 && change > 0.5 * before)) break;
     subtract_product(dx, dl, r_x, r_l);

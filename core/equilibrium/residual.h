@@ -43,7 +43,8 @@ void place_fixed(const Scene& scene, const Inputs<const T>& in, double t0, T* x)
     T* to = x + scene.first_dof[n];
     if (scene.role[n] == Role::pinned) std::copy_n(in.of(Quantity::position) + scene.first_dof[n], 3, to);
     if (scene.role[n] == Role::driven)
-      at_knots(boundary, in.of(Quantity::boundary), static_cast<int>(scene.driven.size()), scene.driven_slot[n]).store(to);
+      at_knots(boundary, in.of(Quantity::boundary), static_cast<int>(scene.driven.size()), scene.driven_slot[n])
+          .store(to);
   }
 }
 
@@ -57,13 +58,15 @@ void external_force(const Scene& scene, const Inputs<const T>& in, double t0, T*
     if (scene.role[n] != Role::free) continue;
     (in.of(Quantity::mass)[n] * gravity).store(f + scene.first_dof[n]);
     if (scene.loaded_slot[n] >= 0)
-      at_knots(knots, in.of(Quantity::force), static_cast<int>(scene.loaded.size()), scene.loaded_slot[n]).add_to(f + scene.first_dof[n]);
+      at_knots(knots, in.of(Quantity::force), static_cast<int>(scene.loaded.size()), scene.loaded_slot[n])
+          .add_to(f + scene.first_dof[n]);
   }
 }
 
 // r_x (dofs, zero on fixed nodes) and r_l (rows) at x (dofs, with the fixed nodes placed) and lambda (rows).
 template <class T>
-void equilibrium_residual(const Scene& scene, const Inputs<const T>& in, double t0, const T* x, const T* lambda, T* r_x, T* r_l) {
+void equilibrium_residual(const Scene& scene, const Inputs<const T>& in, double t0, const T* x, const T* lambda, T* r_x,
+                          T* r_l) {
   external_force(scene, in, t0, r_x);
   for_each_constraint(scene, [&]<class K>(K, const Group& group, int item) {
     T local[K::dofs], push[K::dofs]{};

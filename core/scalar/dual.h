@@ -57,9 +57,13 @@ struct Dual {
 
 // The T under a Dual<T, N>, or T itself.
 template <class T>
-const T& primal(const T& a) { return a; }
+const T& primal(const T& a) {
+  return a;
+}
 template <class T, int N>
-const T& primal(const Dual<T, N>& a) { return a.v; }
+const T& primal(const Dual<T, N>& a) {
+  return a.v;
+}
 
 template <class T, int N>
 Dual<T, N> sqrt(const Dual<T, N>& a) {
@@ -67,18 +71,26 @@ Dual<T, N> sqrt(const Dual<T, N>& a) {
   return Dual<T, N>::map(a, r, T(0.5) / r);
 }
 template <class T, int N>
-Dual<T, N> sin(const Dual<T, N>& a) { return Dual<T, N>::map(a, sin(a.v), cos(a.v)); }
+Dual<T, N> sin(const Dual<T, N>& a) {
+  return Dual<T, N>::map(a, sin(a.v), cos(a.v));
+}
 template <class T, int N>
-Dual<T, N> cos(const Dual<T, N>& a) { return Dual<T, N>::map(a, cos(a.v), -sin(a.v)); }
+Dual<T, N> cos(const Dual<T, N>& a) {
+  return Dual<T, N>::map(a, cos(a.v), -sin(a.v));
+}
 template <class T, int N>
-Dual<T, N> log(const Dual<T, N>& a) { return Dual<T, N>::map(a, log(a.v), T(1.0) / a.v); }
+Dual<T, N> log(const Dual<T, N>& a) {
+  return Dual<T, N>::map(a, log(a.v), T(1.0) / a.v);
+}
 template <class T, int N>
 Dual<T, N> atan2(const Dual<T, N>& y, const Dual<T, N>& x) {
   const T inverse = T(1.0) / (x.v * x.v + y.v * y.v);
   return Dual<T, N>::map(y, x, atan2(y.v, x.v), x.v * inverse, -y.v * inverse);
 }
 template <class T, int N>
-Dual<T, N> nearest(const Dual<T, N>& a) { return Dual<T, N>(nearest(a.v)); }
+Dual<T, N> nearest(const Dual<T, N>& a) {
+  return Dual<T, N>(nearest(a.v));
+}
 template <class M, class T, int N>
 Dual<T, N> select(const M& mask, const Dual<T, N>& a, const Dual<T, N>& b) {
   Dual<T, N> r;
@@ -93,6 +105,8 @@ bool all_finite(const Dual<T, N>& a) {
   return ok;
 }
 template <class T, int N>
-auto value_of(const Dual<T, N>& a) { return value_of(a.v); }
+auto value_of(const Dual<T, N>& a) {
+  return value_of(a.v);
+}
 
 }  // namespace sheetbend

@@ -13,20 +13,23 @@ namespace {
 void check_nodes(const std::string& field, const std::vector<int>& nodes, int count) {
   for (const int node : nodes)
     if (node < 0 || node >= count)
-      refuse(field + ": particle " + std::to_string(node) + " does not exist. Fix: use 0 to " + std::to_string(count - 1));
+      refuse(field + ": particle " + std::to_string(node) + " does not exist. Fix: use 0 to " +
+             std::to_string(count - 1));
 }
 
 void check_knots(const std::string& field, const Knots& knots, bool needed) {
   if (needed && knots.times.empty()) refuse(field + ": no knot times. Fix: give at least one");
   for (std::size_t i = 1; i < knots.times.size(); ++i)
     if (!(knots.times[i] > knots.times[i - 1]))
-      refuse(field + ": time " + std::to_string(knots.times[i]) + " at knot " + std::to_string(i) + " does not increase. Fix: sort the knots");
+      refuse(field + ": time " + std::to_string(knots.times[i]) + " at knot " + std::to_string(i) +
+             " does not increase. Fix: sort the knots");
 }
 
 std::vector<int> slots(const std::vector<int>& list, int count, const std::string& field) {
   std::vector<int> slot(count, -1);
   for (std::size_t i = 0; i < list.size(); ++i) {
-    if (slot[list[i]] >= 0) refuse(field + ": particle " + std::to_string(list[i]) + " is listed twice. Fix: list it once");
+    if (slot[list[i]] >= 0)
+      refuse(field + ": particle " + std::to_string(list[i]) + " is listed twice. Fix: list it once");
     slot[list[i]] = static_cast<int>(i);
   }
   return slot;
@@ -42,7 +45,8 @@ Group build_group(const GroupSpec& spec, const Scene& scene) {
   g.first_row = scene.rows;
   with_kind(g.kind, [&]<class K>(K) { g.arity = K::arity, g.rows = K::rows, g.parameters = parameter_count<K>; });
   if (g.stencil.size() % g.arity != 0)
-    refuse(spec.name + ": " + std::to_string(g.stencil.size()) + " indices. Fix: a " + spec.kind + " takes " + std::to_string(g.arity) + " each");
+    refuse(spec.name + ": " + std::to_string(g.stencil.size()) + " indices. Fix: a " + spec.kind + " takes " +
+           std::to_string(g.arity) + " each");
   g.count = static_cast<int>(g.stencil.size()) / g.arity;
   check_nodes(spec.name, g.stencil, scene.nodes());
   for (int i = 0; i < g.count; ++i) {
@@ -50,7 +54,8 @@ Group build_group(const GroupSpec& spec, const Scene& scene) {
     const std::string where = spec.name + ": constraint " + std::to_string(i);
     for (int a = 0; a < g.arity; ++a)
       for (int b = 0; b < a; ++b)
-        if (nodes[a] == nodes[b]) refuse(where + " uses particle " + std::to_string(nodes[a]) + " twice. Fix: use distinct particles");
+        if (nodes[a] == nodes[b])
+          refuse(where + " uses particle " + std::to_string(nodes[a]) + " twice. Fix: use distinct particles");
     if (std::none_of(nodes.begin(), nodes.end(), [&](int n) { return scene.role[n] == Role::free; }))
       refuse(where + " holds only pinned or driven particles. Fix: leave it out, nothing can move");
   }
@@ -111,8 +116,17 @@ Scene build_scene(const SceneSpec& spec) {
   }
 
   const std::size_t dofs = s.dofs(), nodes = s.nodes(), m = s.constraints;
-  s.layout.size = {dofs, dofs, nodes, m, m, values, s.boundary.times.size() * s.driven.size() * 3,
-                   s.force.times.size() * s.loaded.size() * 3, 3, nodes, nodes};
+  s.layout.size = {dofs,
+                   dofs,
+                   nodes,
+                   m,
+                   m,
+                   values,
+                   s.boundary.times.size() * s.driven.size() * 3,
+                   s.force.times.size() * s.loaded.size() * 3,
+                   3,
+                   nodes,
+                   nodes};
   s.layout.close();
   return s;
 }

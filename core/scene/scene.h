@@ -22,12 +22,14 @@ struct Group {
   bool damped = false;       // whether its rate damping is evaluated at all
   std::vector<int> stencil;  // (count, arity) nodes
   int rows = 0, arity = 0, parameters = 0;
-  int first_row = 0;            // of the scene's multipliers
+  int first_row = 0;                 // of the scene's multipliers
   std::size_t first_value = 0;       // into Quantity::rest
   std::size_t first_coordinate = 0;  // into arrays of all stencils' coordinates
   std::size_t first_gradient = 0;    // into arrays of all constraints' J
 
-  std::span<const int> nodes(int i) const { return {stencil.data() + static_cast<std::size_t>(i) * arity, static_cast<std::size_t>(arity)}; }
+  std::span<const int> nodes(int i) const {
+    return {stencil.data() + static_cast<std::size_t>(i) * arity, static_cast<std::size_t>(arity)};
+  }
 };
 
 struct Scene {

@@ -14,10 +14,10 @@ struct SubstepState {
   const Scene& scene;
   Inputs<const T> inputs;
   double eta;
-  T* q;           // coordinates, being corrected
-  const T* w;     // effective inverse mass per node; 0 for pinned and driven
-  const T* C_r;   // reference values of damped rows
-  T* lambda;      // multipliers, reset at the substep's start
+  T* q;          // coordinates, being corrected
+  const T* w;    // effective inverse mass per node; 0 for pinned and driven
+  const T* C_r;  // reference values of damped rows
+  T* lambda;     // multipliers, reset at the substep's start
 };
 
 template <class T>
@@ -34,8 +34,7 @@ struct Element {
   int first_row;
   T x[K::dofs], w[K::arity];
 
-  Element(const SubstepState<T>& s, const Group& group, int item)
-      : Element(s, group, item, nullptr) {}
+  Element(const SubstepState<T>& s, const Group& group, int item) : Element(s, group, item, nullptr) {}
 
   // With the coordinates given (from a record) instead of gathered.
   Element(const SubstepState<T>& s, const Group& group, int item, const T* recorded)

@@ -100,9 +100,8 @@ std::vector<std::vector<Member>> connected_chains(const Scene& scene) {
   std::vector<std::vector<Member>> chains;
   for (auto& list : keyed) {
     if (list.empty()) continue;
-    std::stable_sort(list.begin(), list.end(), [](const Keyed& a, const Keyed& b) {
-      return a.low != b.low ? a.low < b.low : a.high < b.high;
-    });
+    std::stable_sort(list.begin(), list.end(),
+                     [](const Keyed& a, const Keyed& b) { return a.low != b.low ? a.low < b.low : a.high < b.high; });
     chains.emplace_back();
     for (const Keyed& k : list) chains.back().push_back(k.member);
   }

@@ -71,7 +71,8 @@ void check(const SolverOptions& o) {
     throw std::invalid_argument("h: the substep is " + std::to_string(o.h) + " s. Fix: give a positive time");
   if (o.iterations < 1)
     throw std::invalid_argument("iterations: got " + std::to_string(o.iterations) + ". Fix: give at least 1");
-  if (o.threads < 1) throw std::invalid_argument("threads: got " + std::to_string(o.threads) + ". Fix: give at least 1");
+  if (o.threads < 1)
+    throw std::invalid_argument("threads: got " + std::to_string(o.threads) + ". Fix: give at least 1");
 }
 
 }  // namespace
@@ -83,7 +84,8 @@ Plan make_plan(const Scene& scene, const SolverOptions& options) {
     plan.colors = color_constraints(scene);
   else
     for (auto& members : connected_chains(scene)) {
-      const int first_row = plan.blocks.empty() ? 0 : plan.blocks.back().first_row + plan.blocks.back().structure.size();
+      const int first_row =
+          plan.blocks.empty() ? 0 : plan.blocks.back().first_row + plan.blocks.back().structure.size();
       plan.blocks.push_back(make_block(scene, std::move(members)));
       plan.blocks.back().first_row = first_row;
     }

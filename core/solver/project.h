@@ -43,7 +43,8 @@ void apply(const SubstepState<T>& s, const Element<K, T>& e, const T* J, const T
 }
 
 template <class T>
-void project_color(const SubstepState<T>& s, const SolverOptions& options, const Color& color, IterationRecord<T>& record) {
+void project_color(const SubstepState<T>& s, const SolverOptions& options, const Color& color,
+                   IterationRecord<T>& record) {
   const Group& group = s.scene.groups[color.group];
   with_kind(group.kind, [&]<class K>(K) {
     parallel_for(static_cast<int>(color.items.size()), options.threads, options.grain, [&](int begin, int end) {
@@ -101,14 +102,16 @@ void assemble(const SubstepState<T>& s, const DirectBlock& block, const T* J, Fa
     const T *a = gradient(row, c.row_slot, row_stride), *b = gradient(column, c.column_slot, column_stride);
     with_size<max_rows>(s.scene.groups[row.group].rows, [&]<int R>() {
       with_size<max_rows>(s.scene.groups[column.group].rows, [&]<int C>() {
-        add_coupling<R, C>(s.w[c.node], a, row_stride, b, column_stride, &block.position[c.first_position], factor.values.data());
+        add_coupling<R, C>(s.w[c.node], a, row_stride, b, column_stride, &block.position[c.first_position],
+                           factor.values.data());
       });
     });
   }
 }
 
 template <class T>
-void project_block(const SubstepState<T>& s, const DirectBlock& block, T* rows, IterationRecord<T>& record, Factor<T>& factor) {
+void project_block(const SubstepState<T>& s, const DirectBlock& block, T* rows, IterationRecord<T>& record,
+                   Factor<T>& factor) {
   T* solution = rows + block.first_row;
   factor.reset(block.structure);
   for (const Member& m : block.members) {

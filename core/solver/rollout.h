@@ -15,10 +15,12 @@ struct Diverged : std::runtime_error {
   int substep, node;
   double time;
   Diverged(int substep_, int node_, double time_)
-      : std::runtime_error("the rollout diverged at substep " + std::to_string(substep_) + " (t = " + std::to_string(time_) +
-                           " s), first at particle " + std::to_string(node_) +
+      : std::runtime_error("the rollout diverged at substep " + std::to_string(substep_) +
+                           " (t = " + std::to_string(time_) + " s), first at particle " + std::to_string(node_) +
                            ". Fix: use a smaller substep, more iterations, or check masses and stiffnesses"),
-        substep(substep_), node(node_), time(time_) {}
+        substep(substep_),
+        node(node_),
+        time(time_) {}
 };
 
 template <class T>
@@ -46,8 +48,8 @@ class Rollout {
 
   void advance() {
     const Bdf bdf = Bdf::at(plan_.options, step_);
-    substep(scene_, plan_, in_, bdf, time(step_ + 1), {x_.data(), x_before_.data(), v_.data(), v_before_.data()}, x_next_.data(),
-            v_next_.data(), record_);
+    substep(scene_, plan_, in_, bdf, time(step_ + 1), {x_.data(), x_before_.data(), v_.data(), v_before_.data()},
+            x_next_.data(), v_next_.data(), record_);
     ++step_;
     std::swap(x_before_, x_);
     std::swap(x_, x_next_);

@@ -52,7 +52,8 @@ Vec3<T> extrapolated_velocity(const Bdf& bdf, const SubstepStates<T>& s, int dof
 // x* = history(x) + eta v*, (m + eta c) v* = m history(v) + eta (m gravity + f), c = c1 + c2 |v|. Drag is implicit: it adds eta c to the mass
 // that this substep's projections see, so the reaction of the constraints feels it too. Driven nodes go where their boundary is.
 template <class T>
-void predict(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, double t_next, const SubstepStates<T>& s, T* q, T* w) {
+void predict(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, double t_next, const SubstepStates<T>& s,
+             T* q, T* w) {
   const T* mass = in.of(Quantity::mass);
   const Vec3<T> gravity(in.of(Quantity::gravity));
   const KnotWeights boundary = scene.driven.empty() ? KnotWeights{} : scene.boundary.at(t_next);
@@ -67,7 +68,8 @@ void predict(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, doub
     }
     if (scene.role[n] == Role::driven) {
       w[n] = T(0.0);
-      at_knots(boundary, in.of(Quantity::boundary), static_cast<int>(scene.driven.size()), scene.driven_slot[n]).store(q + dof);
+      at_knots(boundary, in.of(Quantity::boundary), static_cast<int>(scene.driven.size()), scene.driven_slot[n])
+          .store(q + dof);
       continue;
     }
     T m_eff = mass[n];
@@ -89,7 +91,8 @@ void predict(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, doub
 
 // C_r = C(x_n) for BDF1, (4 C(x_n) - C(x_{n-1}))/3 for BDF2 (angles kept on one branch).
 template <class T>
-void damping_references(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, const SubstepStates<T>& s, T* C_r) {
+void damping_references(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, const SubstepStates<T>& s,
+                        T* C_r) {
   for (const Group& group : scene.groups) {
     if (!group.damped) continue;
     with_kind(group.kind, [&]<class K>(K) {
@@ -112,8 +115,8 @@ void damping_references(const Scene& scene, const Inputs<const T>& in, const Bdf
 
 // Steps from n to n+1, writing q (x_{n+1}) and v. The record holds every iteration when it was sized so, the last one otherwise.
 template <class T>
-void substep(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf, double t_next, const SubstepStates<T>& s,
-             T* q, T* v, SubstepRecord<T>& record) {
+void substep(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf, double t_next,
+             const SubstepStates<T>& s, T* q, T* v, SubstepRecord<T>& record) {
   predict(scene, in, bdf, t_next, s, q, record.w.data());
   damping_references(scene, in, bdf, s, record.C_r.data());
   std::fill(record.lambda.begin(), record.lambda.end(), T(0.0));

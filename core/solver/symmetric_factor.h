@@ -29,9 +29,9 @@ class FactorStructure {
 
   int n_ = 0, band_ = 0;
   bool banded_ = true;
-  std::vector<int> row_start_, row_column_;      // lower triangle of A by rows (sparse only), diagonal last in its row
-  std::vector<int> pattern_start_, pattern_;     // columns of each row of L, in an order in which they can be eliminated
-  std::vector<int> column_start_;                // L by columns
+  std::vector<int> row_start_, row_column_;   // lower triangle of A by rows (sparse only), diagonal last in its row
+  std::vector<int> pattern_start_, pattern_;  // columns of each row of L, in an order in which they can be eliminated
+  std::vector<int> column_start_;             // L by columns
 };
 
 template <class T>
@@ -118,7 +118,9 @@ class Factor {
       for (int q = s.column_start_[j]; q < s.column_start_[j + 1]; ++q) b[j] -= lower_[q] * b[lower_row_[q]];
   }
 
-  T& at(const FactorStructure& s, int i, int j) { return values[static_cast<std::size_t>(i) * (s.band_ + 1) + s.band_ - i + j]; }
+  T& at(const FactorStructure& s, int i, int j) {
+    return values[static_cast<std::size_t>(i) * (s.band_ + 1) + s.band_ - i + j];
+  }
 
  public:
   static constexpr int max_band = 64;

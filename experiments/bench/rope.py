@@ -41,12 +41,18 @@ def measure(segments: int) -> tuple[float, float]:
 
 def processor() -> str:
     lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
-    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.processor() or platform.machine())
+    return next(
+        (line.partition(":")[2].strip() for line in lines if line.startswith("model name")),
+        platform.processor() or platform.machine(),
+    )
 
 
 def main(sizes: list[int]) -> None:
     print(f"{processor()}, one thread, double precision, BDF2, {sb.Solver().sweeps} Newton iterations per substep")
-    print(f"{'segments':>8}  {'forward [us]':>12}  {'gradient [us]':>13}  {'ratio':>5}   (per substep; the gradient includes the forward run)")
+    print(
+        f"{'segments':>8}  {'forward [us]':>12}  {'gradient [us]':>13}  {'ratio':>5}"
+        "   (per substep; the gradient includes the forward run)"
+    )
     for n in sizes:
         forward, gradient = measure(n)
         print(f"{n:8d}  {forward:12.1f}  {gradient:13.1f}  {gradient / forward:5.2f}", flush=True)

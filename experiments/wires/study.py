@@ -1,6 +1,8 @@
-"""What wires.toml does not show by itself: which part of the model explains how much, rehangings one by one, predictions, branches.
+"""What wires.toml does not show by itself: which part of the model explains how much, rehangings one by one,
+predictions, branches.
 
-Run from the repository's root: python experiments/wires/study.py. It prints its tables and writes them to out/wires/study.json.
+Run from the repository's root: python experiments/wires/study.py. It prints its tables and writes them to
+out/wires/study.json.
 """
 
 import json
@@ -17,7 +19,9 @@ PUBLISHED = {"white": 5, "black": 14, "red": 17}  # standard deviation of EI ove
 
 def study(wire, shapes=(0, 1, 2), angles=True, modes=(1,), predicted=None):
     """One wire of wires.toml with parts of the model left out; `predicted` is a shape that the fit does not see."""
-    rope = next(r for r in CONFIG.scene.rope if r.name == wire).model_copy(update={"clamp_angles": angles, "set_modes": list(modes)})
+    rope = next(r for r in CONFIG.scene.rope if r.name == wire).model_copy(
+        update={"clamp_angles": angles, "set_modes": list(modes)}
+    )
     shown = [r for r in CONFIG.recording if r.ropes == [wire]]
     recordings = [shown[k].model_copy(update={"predict": "mean" if k == predicted else None}) for k in shapes]
     given = CONFIG.parameters
@@ -25,7 +29,10 @@ def study(wire, shapes=(0, 1, 2), angles=True, modes=(1,), predicted=None):
     parameters |= {f"{wire}_set_{k}": given[f"{wire}_set_1"] for k in modes}
     parameters |= {f"{wire}_{end}_angle": given[f"{wire}_{end}_angle"] for end in ("start", "end") if angles}
     scene = CONFIG.scene.model_copy(update={"rope": [rope]})
-    return build(CONFIG.model_copy(update={"scene": scene, "recording": recordings, "parameters": parameters, "published": {}}), FILE.parent)
+    return build(
+        CONFIG.model_copy(update={"scene": scene, "recording": recordings, "parameters": parameters, "published": {}}),
+        FILE.parent,
+    )
 
 
 def fitted(part, **options):
@@ -40,19 +47,34 @@ def gap(comparison, shape=None):
 
 def explained(wire):
     """EI and mean gap as parts of the model come in."""
-    variants = {"EI alone": (False, ()), "EI, set": (False, (1,)), "EI, angles": (True, ()), "EI, angles, set": (True, (1,))}
+    variants = {
+        "EI alone": (False, ()),
+        "EI, set": (False, (1,)),
+        "EI, angles": (True, ()),
+        "EI, angles, set": (True, (1,)),
+    }
     rows = {}
     for name, (angles, modes) in variants.items():
         fit = fitted(study(wire, angles=angles, modes=modes))
         e = fit[f"{wire}_EI"]
-        rows[name] = {"EI": e.value, "lower": e.lower, "upper": e.upper, "gap_mm": float(np.mean([gap(c) for c in fit.comparisons])), "cost": fit.result.cost}
+        rows[name] = {
+            "EI": e.value,
+            "lower": e.lower,
+            "upper": e.upper,
+            "gap_mm": float(np.mean([gap(c) for c in fit.comparisons])),
+            "cost": fit.result.cost,
+        }
     return rows
 
 
 def one_by_one(wire):
     """EI alone, each shape by itself."""
     alone = [fitted(study(wire, shapes=(k,), angles=False, modes=()))[f"{wire}_EI"].value for k in range(3)]
-    return {"EI": alone, "sd_percent": 100 * float(np.std(alone, ddof=1) / np.mean(alone)), "published_percent": PUBLISHED[wire]}
+    return {
+        "EI": alone,
+        "sd_percent": 100 * float(np.std(alone, ddof=1) / np.mean(alone)),
+        "published_percent": PUBLISHED[wire],
+    }
 
 
 def leave_one_out(wire):
@@ -61,7 +83,14 @@ def leave_one_out(wire):
     for k in range(3):
         fit = fitted(study(wire, predicted=k))
         c = next(c for c in fit.comparisons if c.experiment.predict)
-        rows.append({"shape": c.experiment.name, "EI": fit[f"{wire}_EI"].value, "gap_mm": gap(c), "baseline_mm": gap(c, c.baseline)})
+        rows.append(
+            {
+                "shape": c.experiment.name,
+                "EI": fit[f"{wire}_EI"].value,
+                "gap_mm": gap(c),
+                "baseline_mm": gap(c, c.baseline),
+            }
+        )
     return rows
 
 
@@ -74,7 +103,12 @@ def refinement():
         e = fit[f"{wire}_EI"]
         shapes = [gap(c) for c in fit.comparisons if c.experiment.name.startswith(wire)]
         moved, known = 100 * e.discretization / e.value, 100 * e.half_width / e.value
-        rows[wire] = {"EI": e.value, "gap_mm": float(np.mean(shapes)), "moved_percent": moved, "half_width_percent": known}
+        rows[wire] = {
+            "EI": e.value,
+            "gap_mm": float(np.mean(shapes)),
+            "moved_percent": moved,
+            "half_width_percent": known,
+        }
     return rows
 
 
@@ -85,19 +119,26 @@ def uniform_set(wire):
 
 
 def branches(wire):
-    """Shapes that the wire can hang in at its fitted values, from several starts, and how far each is from the first photograph."""
+    """Shapes that the wire can hang in at its fitted values, from several starts, and how far each is from the first
+    photograph."""
     part = study(wire)
     fit = fitted(part)
     first, c = part.experiments[0], fit.comparisons[0]
     scene, rope = first.scene, first.scene.ropes[wire]
-    values = {q: fit.values.get(f"{q}[{first.name}]", fit.values.get(q, scene.quantities[q].value)) for q in scene.quantities}
+    values = {
+        q: fit.values.get(f"{q}[{first.name}]", fit.values.get(q, scene.quantities[q].value)) for q in scene.quantities
+    }
     start = sb.equilibrium(scene).positions
     ends, s = start[rope.particles][[0, -1]], (rope.arc_length / rope.length)[:, None]
     starts = [start]
     for turns in (-2, 0, 1, 2):  # a circle through both ends, closed so many times; 0: sagging without a loop
         a = 2 * np.pi * turns * s
         r = 1.5 / (2 * np.pi * max(abs(turns), 1))
-        loop = np.hstack([np.sign(turns) * np.sin(a), 0 * s, np.cos(a) - 1]) if turns else np.hstack([0 * s, 0 * s, -3 * np.sin(np.pi * s)])
+        loop = (
+            np.hstack([np.sign(turns) * np.sin(a), 0 * s, np.cos(a) - 1])
+            if turns
+            else np.hstack([0 * s, 0 * s, -3 * np.sin(np.pi * s)])
+        )
         x = start.copy()
         x[rope.particles] = ends[0] + s * (ends[1] - ends[0]) + r * loop
         starts.append(x)
@@ -106,9 +147,21 @@ def branches(wire):
     for e in sb.equilibria(scene, starts, values, tolerance=1e-4):
         x = e.positions[rope.particles]
         near = np.stack([np.interp(np.linspace(0, 1, 51)[1:-1], s[:, 0], x[:, k]) for k in range(3)], axis=1)
-        rows.append({"energy_J": e.energy, "gap_mm": 1e3 * float(np.linalg.norm(near - measured, axis=-1).mean()), "turning_over_2_pi": turning(x)})
-    again = fitted(part, starts=[{f"{wire}_EI": factor * fit[f"{wire}_EI"].value} for factor in (0.25, 4.0)]).result.starts
-    return {"shapes": rows, "EI_of_starts": [start.values[f"{wire}_EI"] for start in again], "cost_of_starts": [start.cost for start in again]}
+        rows.append(
+            {
+                "energy_J": e.energy,
+                "gap_mm": 1e3 * float(np.linalg.norm(near - measured, axis=-1).mean()),
+                "turning_over_2_pi": turning(x),
+            }
+        )
+    again = fitted(
+        part, starts=[{f"{wire}_EI": factor * fit[f"{wire}_EI"].value} for factor in (0.25, 4.0)]
+    ).result.starts
+    return {
+        "shapes": rows,
+        "EI_of_starts": [start.values[f"{wire}_EI"] for start in again],
+        "cost_of_starts": [start.cost for start in again],
+    }
 
 
 def turning(x):

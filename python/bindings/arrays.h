@@ -22,7 +22,8 @@ inline py::array_t<double> to_numpy(const std::vector<double>& values, std::vect
 
 inline void expect_size(const Array& a, std::size_t size, const char* name) {
   if (static_cast<std::size_t>(a.size()) != size)
-    throw std::invalid_argument(std::string(name) + ": got " + std::to_string(a.size()) + " numbers. Fix: give " + std::to_string(size));
+    throw std::invalid_argument(std::string(name) + ": got " + std::to_string(a.size()) + " numbers. Fix: give " +
+                                std::to_string(size));
 }
 
 }  // namespace sheetbend::bindings

@@ -11,10 +11,10 @@ using namespace sheetbend;
 namespace {
 
 // observe(iteration, cost, step_norm, gradient_max, u) -> bool: go on?
-py::dict minimize(const py::capsule& evaluation, std::vector<double> u, const std::vector<double>& lower, const std::vector<double>& upper,
-                  int max_iterations, double tolerance, const py::function& observe) {
-  const auto* function = static_cast<const EvaluationFunction*>(
-      PyCapsule_GetPointer(evaluation.ptr(), EvaluationFunction::capsule_name));
+py::dict minimize(const py::capsule& evaluation, std::vector<double> u, const std::vector<double>& lower,
+                  const std::vector<double>& upper, int max_iterations, double tolerance, const py::function& observe) {
+  const auto* function =
+      static_cast<const EvaluationFunction*>(PyCapsule_GetPointer(evaluation.ptr(), EvaluationFunction::capsule_name));
   if (function == nullptr) throw py::error_already_set();
   if (static_cast<int>(u.size()) != function->parameters) throw std::invalid_argument("u: does not fit the problem");
   CeresOptions options;
@@ -51,6 +51,6 @@ py::dict minimize(const py::capsule& evaluation, std::vector<double> u, const st
 
 PYBIND11_MODULE(_ceres, m) {
   m.doc() = "Levenberg-Marquardt by Ceres on a sheetbend problem.";
-  m.def("minimize", &minimize, py::kw_only(), py::arg("evaluation"), py::arg("u"), py::arg("lower"), py::arg("upper"), py::arg("max_iterations"),
-        py::arg("tolerance"), py::arg("observe"));
+  m.def("minimize", &minimize, py::kw_only(), py::arg("evaluation"), py::arg("u"), py::arg("lower"), py::arg("upper"),
+        py::arg("max_iterations"), py::arg("tolerance"), py::arg("observe"));
 }

@@ -25,7 +25,8 @@ Solution solve(std::shared_ptr<Scene> scene, const Array& inputs, const std::opt
   SignalInterrupt interrupt;
   EquilibriumOptions options;
   options.stable = stable;
-  s.at = EquilibriumSolver(*s.scene).solve(s.inputs.data(), start ? start->data() : nullptr, nullptr, options, &interrupt);
+  s.at =
+      EquilibriumSolver(*s.scene).solve(s.inputs.data(), start ? start->data() : nullptr, nullptr, options, &interrupt);
   return s;
 }
 
@@ -35,7 +36,8 @@ py::array_t<double> vjp(const Solution& s, const std::optional<Array>& x_bar, co
   std::vector<double> bar(s.inputs.size());
   {
     py::gil_scoped_release release;
-    EquilibriumDerivative(*s.scene, s.inputs.data(), s.at).vjp(x_bar ? x_bar->data() : nullptr, lambda_bar ? lambda_bar->data() : nullptr, bar.data());
+    EquilibriumDerivative(*s.scene, s.inputs.data(), s.at)
+        .vjp(x_bar ? x_bar->data() : nullptr, lambda_bar ? lambda_bar->data() : nullptr, bar.data());
   }
   return to_numpy(bar, {static_cast<py::ssize_t>(bar.size())});
 }
@@ -62,8 +64,11 @@ py::tuple jvp(const Solution& s, const Array& inputs_dot) {
 
 void bind_equilibrium(py::module_& m) {
   py::class_<Solution>(m, "EquilibriumSolution")
-      .def_property_readonly("positions", [](const Solution& s) { return to_numpy(s.at.x, {static_cast<py::ssize_t>(s.at.x.size())}); })
-      .def_property_readonly("multipliers", [](const Solution& s) { return to_numpy(s.at.lambda, {static_cast<py::ssize_t>(s.at.lambda.size())}); })
+      .def_property_readonly(
+          "positions", [](const Solution& s) { return to_numpy(s.at.x, {static_cast<py::ssize_t>(s.at.x.size())}); })
+      .def_property_readonly(
+          "multipliers",
+          [](const Solution& s) { return to_numpy(s.at.lambda, {static_cast<py::ssize_t>(s.at.lambda.size())}); })
       .def_property_readonly("energy", [](const Solution& s) { return s.at.energy; })
       .def_property_readonly("residual", [](const Solution& s) { return s.at.residual; })
       .def_property_readonly("iterations", [](const Solution& s) { return s.at.iterations; })
@@ -72,7 +77,8 @@ void bind_equilibrium(py::module_& m) {
       .def_property_readonly("message", [](const Solution& s) { return s.at.message; })
       .def("vjp", &vjp, py::arg("x_bar") = py::none(), py::arg("lambda_bar") = py::none())
       .def("jvp", &jvp, py::arg("inputs_dot"));
-  m.def("equilibrium", &solve, py::arg("scene"), py::arg("inputs"), py::arg("start") = py::none(), py::arg("stable") = true);
+  m.def("equilibrium", &solve, py::arg("scene"), py::arg("inputs"), py::arg("start") = py::none(),
+        py::arg("stable") = true);
 }
 
 }  // namespace sheetbend::bindings

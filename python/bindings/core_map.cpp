@@ -45,15 +45,18 @@ void bind_map(py::module_& m) {
              return to_numpy(out, {static_cast<py::ssize_t>(out.size())});
            })
       // (theta_bar, its derivative along (theta_dot, inputs_bar_dot))
-      .def("theta_bar_dot", [](const ParameterMap& map, const Array& theta, const Array& theta_dot, const Array& inputs_bar,
-                               const Array& inputs_bar_dot) {
+      .def("theta_bar_dot", [](const ParameterMap& map, const Array& theta, const Array& theta_dot,
+                               const Array& inputs_bar, const Array& inputs_bar_dot) {
         using D = Dual<double, 1>;
-        std::vector<D> in(theta.data(), theta.data() + theta.size()), bar(inputs_bar.data(), inputs_bar.data() + inputs_bar.size()), out(in.size());
+        std::vector<D> in(theta.data(), theta.data() + theta.size()),
+            bar(inputs_bar.data(), inputs_bar.data() + inputs_bar.size()), out(in.size());
         for (std::size_t i = 0; i < in.size(); ++i) in[i].d[0] = theta_dot.data()[i];
         for (std::size_t i = 0; i < bar.size(); ++i) bar[i].d[0] = inputs_bar_dot.data()[i];
         map.pull_back(in.data(), bar.data(), out.data());
-        py::array_t<double> value(static_cast<py::ssize_t>(out.size())), derivative(static_cast<py::ssize_t>(out.size()));
-        for (std::size_t i = 0; i < out.size(); ++i) value.mutable_data()[i] = out[i].v, derivative.mutable_data()[i] = out[i].d[0];
+        py::array_t<double> value(static_cast<py::ssize_t>(out.size())),
+            derivative(static_cast<py::ssize_t>(out.size()));
+        for (std::size_t i = 0; i < out.size(); ++i)
+          value.mutable_data()[i] = out[i].v, derivative.mutable_data()[i] = out[i].d[0];
         return py::make_tuple(value, derivative);
       });
 }

@@ -1,8 +1,8 @@
 // The module sheetbend._core: scenes, rollouts and their derivatives, equilibria, least-squares problems.
 #include "python/bindings/core_module.h"
 
-#include "core/constraints/registry.h"
 #include "adjoint/equilibrium_tangents.h"
+#include "core/constraints/registry.h"
 #include "core/solver/rollout.h"
 #include "python/bindings/interrupt.h"
 
@@ -27,7 +27,9 @@ py::dict constraint_kinds() {
 PYBIND11_MODULE(_core, m) {
   using namespace sheetbend;
   using namespace sheetbend::bindings;
-  m.doc() = "Compiled core of sheetbend. Use the package's Python functions; this module's shapes are flat and unchecked beyond sizes.";
+  m.doc() =
+      "Compiled core of sheetbend. Use the package's Python functions; this module's shapes are flat and unchecked "
+      "beyond sizes.";
   m.def("constraint_kinds", &constraint_kinds);
   static py::exception<Diverged> diverged(m, "Diverged", PyExc_RuntimeError);
   static py::exception<NoEquilibrium> no_equilibrium(m, "NoEquilibrium", PyExc_RuntimeError);

@@ -72,8 +72,8 @@ FreeParameter make_free(const py::dict& d) {
   return p;
 }
 
-Problem make_problem(const std::vector<py::dict>& experiments, std::vector<double> theta, std::vector<std::vector<int>> slots,
-                     const std::vector<py::dict>& free, int threads) {
+Problem make_problem(const std::vector<py::dict>& experiments, std::vector<double> theta,
+                     std::vector<std::vector<int>> slots, const std::vector<py::dict>& free, int threads) {
   std::vector<Experiment> e;
   std::vector<FreeParameter> f;
   for (const py::dict& d : experiments) e.push_back(make_experiment(d));
@@ -100,7 +100,8 @@ py::tuple evaluate(const Problem& p, const Array& u, bool with_jacobian) {
 
 void bind_problem(py::module_& m) {
   py::class_<Problem>(m, "Problem")
-      .def(py::init(&make_problem), py::kw_only(), py::arg("experiments"), py::arg("theta"), py::arg("slots"), py::arg("free"), py::arg("threads"))
+      .def(py::init(&make_problem), py::kw_only(), py::arg("experiments"), py::arg("theta"), py::arg("slots"),
+           py::arg("free"), py::arg("threads"))
       .def_property_readonly("rows", &Problem::rows)
       .def_property_readonly("data_rows", &Problem::data_rows)
       .def_property_readonly("first_rows", &Problem::first_rows)
@@ -129,8 +130,9 @@ void bind_problem(py::module_& m) {
         const auto call = [](const void* problem, const double* u, double* residual, double* jacobian) {
           SignalInterrupt interrupt;
           try {
-            return static_cast<const Problem*>(problem)->evaluate(u, residual, jacobian, &interrupt) ? EvaluationStatus::ok
-                                                                                                   : EvaluationStatus::no_answer;
+            return static_cast<const Problem*>(problem)->evaluate(u, residual, jacobian, &interrupt)
+                       ? EvaluationStatus::ok
+                       : EvaluationStatus::no_answer;
           } catch (const Interrupted&) {
             return EvaluationStatus::interrupted;
           }

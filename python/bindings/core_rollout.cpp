@@ -21,14 +21,15 @@ struct Solver {
 using Steps = std::vector<int>;
 using Release = py::gil_scoped_release;
 
-Solver make_solver(std::shared_ptr<Scene> scene, double h, const std::string& integrator, const std::string& partition, int iterations,
-                   int threads, int grain) {
+Solver make_solver(std::shared_ptr<Scene> scene, double h, const std::string& integrator, const std::string& partition,
+                   int iterations, int threads, int grain) {
   SolverOptions o;
   o.h = h;
   o.iterations = iterations;
   o.threads = threads;
   o.grain = grain;
-  if (integrator != "bdf1" && integrator != "bdf2") throw std::invalid_argument("integrator: got '" + integrator + "'. Fix: use 'bdf1' or 'bdf2'");
+  if (integrator != "bdf1" && integrator != "bdf2")
+    throw std::invalid_argument("integrator: got '" + integrator + "'. Fix: use 'bdf1' or 'bdf2'");
   if (partition != "direct" && partition != "gauss_seidel")
     throw std::invalid_argument("partition: got '" + partition + "'. Fix: use 'direct' or 'gauss_seidel'");
   o.integrator = integrator == "bdf1" ? Integrator::bdf1 : Integrator::bdf2;
@@ -40,7 +41,8 @@ Solver make_solver(std::shared_ptr<Scene> scene, double h, const std::string& in
 void check(const Solver& s, const Array& inputs, std::size_t batch, const Steps& steps) {
   expect_size(inputs, batch * s.scene->layout.total(), "inputs");
   for (std::size_t i = 0; i < steps.size(); ++i)
-    if (steps[i] < 0 || (i > 0 && steps[i] < steps[i - 1])) throw std::invalid_argument("steps: must be ascending and not negative");
+    if (steps[i] < 0 || (i > 0 && steps[i] < steps[i - 1]))
+      throw std::invalid_argument("steps: must be ascending and not negative");
   if (steps.empty()) throw std::invalid_argument("steps: empty. Fix: ask for at least one");
 }
 
@@ -74,7 +76,8 @@ py::dict simulate(const Solver& s, const Array& inputs, const Steps& steps, doub
         },
         &interrupt);
   }
-  const auto f = static_cast<py::ssize_t>(steps.size()), d = static_cast<py::ssize_t>(dofs), r = static_cast<py::ssize_t>(rows);
+  const auto f = static_cast<py::ssize_t>(steps.size()), d = static_cast<py::ssize_t>(dofs),
+             r = static_cast<py::ssize_t>(rows);
   py::dict out;
   out["positions"] = to_numpy(x, {f, d});
   out["velocities"] = to_numpy(v, {f, d});
@@ -84,7 +87,8 @@ py::dict simulate(const Solver& s, const Array& inputs, const Steps& steps, doub
 
 py::array_t<double> states(const Solver& s, const Tape<double>& tape, const Steps& steps) {
   const std::size_t dofs = s.scene->dofs();
-  return to_numpy(pick(tape, steps, dofs, [](double x) { return x; }), {static_cast<py::ssize_t>(steps.size()), static_cast<py::ssize_t>(dofs)});
+  return to_numpy(pick(tape, steps, dofs, [](double x) { return x; }),
+                  {static_cast<py::ssize_t>(steps.size()), static_cast<py::ssize_t>(dofs)});
 }
 
 py::tuple jvp(const Solver& s, const Array& inputs, const Array& inputs_dot, const Steps& steps, double t0) {
@@ -106,7 +110,8 @@ py::tuple jvp(const Solver& s, const Array& inputs, const Array& inputs_dot, con
       x = pick(tape, steps, dofs, [](const D& a) { return a.v; });
       for (std::size_t k = 0; k < width; ++k) {
         const auto column = pick(tape, steps, dofs, [k](const D& a) { return a.d[k]; });
-        std::copy(column.begin(), column.end(), x_dot.begin() + static_cast<std::ptrdiff_t>((first + k) * frames * dofs));
+        std::copy(column.begin(), column.end(),
+                  x_dot.begin() + static_cast<std::ptrdiff_t>((first + k) * frames * dofs));
       }
     }
   }
@@ -115,7 +120,8 @@ py::tuple jvp(const Solver& s, const Array& inputs, const Array& inputs_dot, con
 }
 
 // Derivative of the states along one direction by complex step: an independent path for checks.
-py::array_t<double> complex_step(const Solver& s, const Array& inputs, const Array& direction, const Steps& steps, double t0) {
+py::array_t<double> complex_step(const Solver& s, const Array& inputs, const Array& direction, const Steps& steps,
+                                 double t0) {
   check(s, inputs, 1, steps);
   expect_size(direction, s.scene->layout.total(), "direction");
   constexpr double step = 1e-40;
@@ -131,7 +137,8 @@ py::array_t<double> complex_step(const Solver& s, const Array& inputs, const Arr
   return to_numpy(x_dot, {static_cast<py::ssize_t>(steps.size()), static_cast<py::ssize_t>(s.scene->dofs())});
 }
 
-py::array_t<double> vjp(const Solver& s, const Array& inputs, const Tape<double>& tape, const Steps& steps, const Array& x_bar, double t0) {
+py::array_t<double> vjp(const Solver& s, const Array& inputs, const Tape<double>& tape, const Steps& steps,
+                        const Array& x_bar, double t0) {
   check(s, inputs, 1, steps);
   expect_size(x_bar, steps.size() * s.scene->dofs(), "x_bar");
   std::vector<double> bar(s.scene->layout.total());
@@ -144,8 +151,8 @@ py::array_t<double> vjp(const Solver& s, const Array& inputs, const Tape<double>
 }
 
 // Forward over reverse: the VJP and its derivative along (inputs_dot, x_bar_dot).
-py::tuple vjp_dot(const Solver& s, const Array& inputs, const Array& inputs_dot, const Steps& steps, const Array& x_bar, const Array& x_bar_dot,
-                  double t0) {
+py::tuple vjp_dot(const Solver& s, const Array& inputs, const Array& inputs_dot, const Steps& steps, const Array& x_bar,
+                  const Array& x_bar_dot, double t0) {
   using D = Dual<double, 1>;
   check(s, inputs, 1, steps);
   const std::size_t total = s.scene->layout.total();
@@ -218,10 +225,12 @@ py::array_t<double> batch(const Solver& s, const Array& inputs, const Steps& ste
 }  // namespace
 
 void bind_rollout(py::module_& m) {
-  py::class_<Tape<double>>(m, "Tape").def_property_readonly("bytes", &Tape<double>::bytes).def_property_readonly("steps", &Tape<double>::steps);
+  py::class_<Tape<double>>(m, "Tape")
+      .def_property_readonly("bytes", &Tape<double>::bytes)
+      .def_property_readonly("steps", &Tape<double>::steps);
   py::class_<Solver>(m, "Solver")
-      .def(py::init(&make_solver), py::kw_only(), py::arg("scene"), py::arg("h"), py::arg("integrator"), py::arg("partition"), py::arg("iterations"),
-           py::arg("threads"), py::arg("grain"))
+      .def(py::init(&make_solver), py::kw_only(), py::arg("scene"), py::arg("h"), py::arg("integrator"),
+           py::arg("partition"), py::arg("iterations"), py::arg("threads"), py::arg("grain"))
       .def("simulate", &simulate, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
       .def(
           "record",
@@ -234,22 +243,30 @@ void bind_rollout(py::module_& m) {
           py::arg("inputs"), py::arg("steps"), py::arg("t0"), py::keep_alive<0, 1>())
       .def("states", &states, py::arg("tape"), py::arg("steps"))
       .def("vjp", &vjp, py::arg("inputs"), py::arg("tape"), py::arg("steps"), py::arg("x_bar"), py::arg("t0"))
-      .def("vjp_dot", &vjp_dot, py::arg("inputs"), py::arg("inputs_dot"), py::arg("steps"), py::arg("x_bar"), py::arg("x_bar_dot"), py::arg("t0"))
+      .def("vjp_dot", &vjp_dot, py::arg("inputs"), py::arg("inputs_dot"), py::arg("steps"), py::arg("x_bar"),
+           py::arg("x_bar_dot"), py::arg("t0"))
       .def("jvp", &jvp, py::arg("inputs"), py::arg("inputs_dot"), py::arg("steps"), py::arg("t0"))
       .def("complex_step", &complex_step, py::arg("inputs"), py::arg("direction"), py::arg("steps"), py::arg("t0"))
       .def(
           "simulate_batch",
-          [](const Solver& s, const Array& inputs, const Steps& steps, double t0) { return batch(s, inputs, steps, nullptr, t0); },
+          [](const Solver& s, const Array& inputs, const Steps& steps, double t0) {
+            return batch(s, inputs, steps, nullptr, t0);
+          },
           py::arg("inputs"), py::arg("steps"), py::arg("t0"))
       .def(
           "vjp_batch",
-          [](const Solver& s, const Array& inputs, const Steps& steps, const Array& x_bar, double t0) { return batch(s, inputs, steps, &x_bar, t0); },
+          [](const Solver& s, const Array& inputs, const Steps& steps, const Array& x_bar, double t0) {
+            return batch(s, inputs, steps, &x_bar, t0);
+          },
           py::arg("inputs"), py::arg("steps"), py::arg("x_bar"), py::arg("t0"))
-      .def_property_readonly("blocks", [](const Solver& s) {
-        std::vector<std::tuple<int, int, bool>> blocks;
-        for (const DirectBlock& b : s.plan.blocks) blocks.emplace_back(b.structure.size(), b.structure.half_bandwidth(), b.structure.banded());
-        return blocks;
-      })
+      .def_property_readonly("blocks",
+                             [](const Solver& s) {
+                               std::vector<std::tuple<int, int, bool>> blocks;
+                               for (const DirectBlock& b : s.plan.blocks)
+                                 blocks.emplace_back(b.structure.size(), b.structure.half_bandwidth(),
+                                                     b.structure.banded());
+                               return blocks;
+                             })
       .def_property_readonly("colors", [](const Solver& s) { return s.plan.colors.size(); });
 }
 

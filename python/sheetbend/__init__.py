@@ -1,15 +1,15 @@
 """sheetbend: a differentiable XPBD simulator for parameter identification.
 
-Ropes (and later cloth) with exact gradients in double precision: simulate, differentiate, and fit physical parameters to recordings, with
-intervals and words for what the data cannot tell.
+Ropes (and later cloth) with exact gradients in double precision: simulate, differentiate, and fit physical parameters
+to recordings, with intervals and words for what the data cannot tell.
 """
 
 from .baseline import no_physics
+from .discretization import Refinement
 from .equilibrium import Equilibrium, equilibria, equilibrium
 from .errors import ConfigError, DivergenceError, InputError, RecordingError, SceneError, SheetbendError
 from .experiment import Experiment
 from .fit import Fit, fit
-from .discretization import Refinement
 from .gradients import GradientReport, check_gradients
 from .markers import Place, along_rope, between, on_particle, on_rope
 from .parameters import Parameter, Parameters

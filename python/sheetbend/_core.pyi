@@ -1,4 +1,5 @@
-"""Types of the compiled module: the core, its adjoint and the least-squares evaluation. Arrays are C-contiguous float64."""
+"""Types of the compiled module: the core, its adjoint and the least-squares evaluation. Arrays are C-contiguous
+float64."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -59,12 +60,20 @@ class Solver:
     def states(self, tape: Tape, steps: Sequence[int]) -> Array: ...  # (frames, dofs)
     def vjp(self, inputs: ArrayLike, tape: Tape, steps: Sequence[int], x_bar: ArrayLike, t0: float) -> Array: ...
     def vjp_dot(
-        self, inputs: ArrayLike, inputs_dot: ArrayLike, steps: Sequence[int], x_bar: ArrayLike, x_bar_dot: ArrayLike, t0: float
+        self,
+        inputs: ArrayLike,
+        inputs_dot: ArrayLike,
+        steps: Sequence[int],
+        x_bar: ArrayLike,
+        x_bar_dot: ArrayLike,
+        t0: float,
     ) -> tuple[Array, Array]: ...
     def jvp(self, inputs: ArrayLike, inputs_dot: ArrayLike, steps: Sequence[int], t0: float) -> tuple[Array, Array]: ...
     def complex_step(self, inputs: ArrayLike, direction: ArrayLike, steps: Sequence[int], t0: float) -> Array: ...
     def simulate_batch(self, inputs: ArrayLike, steps: Sequence[int], t0: float) -> Array: ...  # (batch, frames, dofs)
-    def vjp_batch(self, inputs: ArrayLike, steps: Sequence[int], x_bar: ArrayLike, t0: float) -> Array: ...  # (batch, inputs)
+    def vjp_batch(
+        self, inputs: ArrayLike, steps: Sequence[int], x_bar: ArrayLike, t0: float
+    ) -> Array: ...  # (batch, inputs)
     @property
     def blocks(self) -> list[tuple[int, int, bool]]: ...  # rows, half bandwidth, banded
     @property
@@ -90,14 +99,18 @@ class EquilibriumSolution:
     def vjp(self, x_bar: ArrayLike | None = None, lambda_bar: ArrayLike | None = None) -> Array: ...
     def jvp(self, inputs_dot: ArrayLike) -> tuple[Array, Array]: ...
 
-def equilibrium(scene: Scene, inputs: ArrayLike, start: ArrayLike | None = None, stable: bool = True) -> EquilibriumSolution: ...
+def equilibrium(
+    scene: Scene, inputs: ArrayLike, start: ArrayLike | None = None, stable: bool = True
+) -> EquilibriumSolution: ...
 
 class ParameterMap:
     def __init__(self, arg0: Mapping[str, Any], /) -> None: ...
     def inputs(self, arg0: ArrayLike, /) -> Array: ...
     def inputs_dot(self, arg0: ArrayLike, arg1: ArrayLike, /) -> Array: ...
     def theta_bar(self, arg0: ArrayLike, arg1: ArrayLike, /) -> Array: ...
-    def theta_bar_dot(self, arg0: ArrayLike, arg1: ArrayLike, arg2: ArrayLike, arg3: ArrayLike, /) -> tuple[Array, Array]: ...
+    def theta_bar_dot(
+        self, arg0: ArrayLike, arg1: ArrayLike, arg2: ArrayLike, arg3: ArrayLike, /
+    ) -> tuple[Array, Array]: ...
 
 class Problem:
     def __init__(

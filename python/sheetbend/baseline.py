@@ -198,9 +198,7 @@ def _words(kind: str, errors: dict[str, float]) -> str:
 def _check_same_markers(one: Recording, other: Recording) -> None:
     if one.markers != other.markers:
         fix = f"select the same markers in both: {', '.join(one.markers)}"
-        raise RecordingError(
-            "markers", f"of {other.name} differ from those of {one.name}", other.markers, fix
-        )
+        raise RecordingError("markers", f"of {other.name} differ from those of {one.name}", other.markers, fix)
 
 
 def _is_gripped_rope(recording: Recording) -> bool:
@@ -227,8 +225,6 @@ def _arc_length_share(recording: Recording) -> Array:
     if not together.any(axis=0).all():
         i = int(np.flatnonzero(~together.any(axis=0))[0])
         pair = recording.markers[i : i + 2]
-        raise RecordingError(
-            "markers", "are never seen together", pair, "select markers that are, or a longer piece"
-        )
+        raise RecordingError("markers", "are never seen together", pair, "select markers that are, or a longer piece")
     arc = np.append(0.0, np.cumsum(np.nanmedian(distance, axis=0)))
     return arc / arc[-1]

@@ -18,7 +18,12 @@ def finite(field: str, values: ArrayLike, shape: tuple[int, ...] | None, error: 
         raise error(field, "has the wrong shape", array.shape, f"give {shape}")
     if not np.isfinite(array).all():
         where = np.argwhere(~np.isfinite(np.atleast_1d(array)))[0].tolist()
-        raise error(field, f"is not finite at index {where}", float(array.ravel()[~np.isfinite(array.ravel())][0]), "give finite numbers")
+        raise error(
+            field,
+            f"is not finite at index {where}",
+            float(array.ravel()[~np.isfinite(array.ravel())][0]),
+            "give finite numbers",
+        )
     return array
 
 

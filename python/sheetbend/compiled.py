@@ -1,4 +1,4 @@
-"""A frozen scene as the compiled core sees it: topology, the flat layout of its inputs, and the map from quantities to inputs."""
+"""A frozen scene as the compiled core sees it: topology, the flat layout of its inputs, the map from quantities."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ class CompiledScene:
                 force_times=[] if not scene.loaded else list(scene.force_times),
                 has_drag=scene.has_drag,
                 groups=[
-                    {"name": g.name, "kind": g.kind, "damped": g.damped, "stencil": g.particles.ravel().tolist()} for g in scene.groups
+                    {"name": g.name, "kind": g.kind, "damped": g.damped, "stencil": g.particles.ravel().tolist()}
+                    for g in scene.groups
                 ],
             )
         except ValueError as error:
@@ -59,7 +60,8 @@ class CompiledScene:
         return base
 
     def map(self, extra: int = 0, terms: Sequence[Term] = (), names: Sequence[str] | None = None) -> dict[str, Any]:
-        """The parameter map as plain arrays; `extra` more inputs (array "extra") may follow the scene's, with their own terms."""
+        """The parameter map as plain arrays; `extra` more inputs (array "extra") may follow the scene's, with their
+        own terms."""
         order = {name: i for i, name in enumerate(self.names if names is None else names)}
         offsets = {array: offset for array, (offset, _) in self.layout.items()} | {"extra": self.core.inputs}
         every = [*self._terms, *terms]
@@ -78,7 +80,9 @@ class CompiledScene:
         theta = self.theta.copy()
         for name, value in (changes or {}).items():
             if name not in self.names:
-                raise SceneError("values", "name no quantity of the scene", name, f"name one of: {', '.join(self.names)}")
+                raise SceneError(
+                    "values", "name no quantity of the scene", name, f"name one of: {', '.join(self.names)}"
+                )
             theta[self.names.index(name)] = value
         return theta
 

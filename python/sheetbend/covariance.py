@@ -52,15 +52,11 @@ class Layout:
         for field in ("recording", "channel", "frame"):
             array = np.asarray(getattr(self, field))
             if array.ndim != 1 or not np.issubdtype(array.dtype, np.integer):
-                raise InputError(
-                    f"layout.{field}", "must be one integer per row", array, "give shape (rows,)"
-                )
+                raise InputError(f"layout.{field}", "must be one integer per row", array, "give shape (rows,)")
             object.__setattr__(self, field, array)
         if not len(self.recording) == len(self.channel) == len(self.frame):
             lengths = (len(self.recording), len(self.channel), len(self.frame))
-            raise InputError(
-                "layout", "has arrays of different lengths", lengths, "give one entry per residual row"
-            )
+            raise InputError("layout", "has arrays of different lengths", lengths, "give one entry per residual row")
         places = np.stack([self.recording, self.channel, self.frame])
         if np.unique(places, axis=1).shape[1] != len(self.frame):
             fix = "number the recordings, channels and frames apart"
@@ -113,20 +109,14 @@ def covariance(
     layout = Layout.series(rows) if layout is None else layout
     if residuals.shape != (rows,) or layout.frame.shape != (rows,):
         shapes = (residuals.shape, jacobian.shape, layout.frame.shape)
-        raise InputError(
-            "residuals", "disagree with the jacobian or the layout", shapes, "give one row to each"
-        )
+        raise InputError("residuals", "disagree with the jacobian or the layout", shapes, "give one row to each")
     prior = np.zeros((0, count)) if prior_jacobian is None else prior_jacobian
     size = np.sqrt((jacobian**2).sum(0) + (prior**2).sum(0))
     jacobian, prior = jacobian / size, prior / size
     bread = np.linalg.inv(jacobian.T @ jacobian + prior.T @ prior)
-    absorbed = float(
-        ((jacobian @ bread) * jacobian).sum()
-    )  # parameters' worth of residual that the fit took away
+    absorbed = float(((jacobian @ bread) * jacobian).sum())  # parameters' worth of residual that the fit took away
     if rows - absorbed < 0.5:
-        raise InputError(
-            "residuals", "must outnumber the free parameters", rows, f"give more than {count} rows"
-        )
+        raise InputError("residuals", "must outnumber the free parameters", rows, f"give more than {count} rows")
     variance = float(residuals @ residuals) / (rows - absorbed)
     from_data = variance * (bread @ (jacobian.T @ jacobian) @ bread)
     inflation, time = np.ones(count), 1.0
@@ -136,9 +126,7 @@ def covariance(
         robust = _newey_west(grid, jacobian @ bread) * rows / (rows - absorbed)
         white = np.diag(from_data).copy()
         inflation = np.maximum(np.maximum(np.diag(spectral), robust) / white, 1.0)
-        if np.all(
-            np.diag(spectral) > 1e-6 * white
-        ):  # else its correlations mean nothing: one frame only, say
+        if np.all(np.diag(spectral) > 1e-6 * white):  # else its correlations mean nothing: one frame only, say
             from_data = spectral
         stretch = np.sqrt(inflation * white / np.diag(from_data))
         from_data = from_data * np.outer(stretch, stretch)
@@ -151,17 +139,13 @@ class _Grid:
 
     def __init__(self, layout: Layout, residuals: Array) -> None:
         owner, self._recording = np.unique(layout.recording, return_inverse=True)
-        channels, self._channel = np.unique(
-            np.stack([self._recording, layout.channel]), axis=1, return_inverse=True
-        )
+        channels, self._channel = np.unique(np.stack([self._recording, layout.channel]), axis=1, return_inverse=True)
         first = np.full(len(owner), np.iinfo(int).max)
         np.minimum.at(first, self._recording, layout.frame)
         self._frame = layout.frame - first[self._recording]
         self.recordings = channels[0]  # of each channel
         self.frames = int(self._frame.max()) + 1
-        self.length = (
-            2 << (2 * self.frames - 1).bit_length()
-        )  # twice what lags need: narrow spectral peaks count
+        self.length = 2 << (2 * self.frames - 1).bit_length()  # twice what lags need: narrow spectral peaks count
         self.residuals = self.dense(residuals)
         self.mask = self.dense(np.ones(len(residuals)))
 
@@ -204,9 +188,7 @@ def _spectral(grid: _Grid, jacobian: Array, bread: Array) -> tuple[Array, float]
     most = min(_MAX_ORDER, int(10 * np.log10(grid.frames)), grid.frames // 4)
     pooled = (np.abs(grid.transform(grid.residuals)) ** 2).sum(1)
     recursion = _levinson(grid.lags(pooled, most) / rows)
-    worth = (
-        rows * np.trace(mixing) ** 2 / (len(mixing) * (mixing**2).sum())
-    )  # rows that are worth an independent one
+    worth = rows * np.trace(mixing) ** 2 / (len(mixing) * (mixing**2).sum())  # rows that are worth an independent one
     order = int(np.argmin([worth * np.log(noise) + np.log(worth) * len(a) for a, noise in recursion]))
     observed = _spectrum(*recursion[order], grid.length)
     pairs = grid.lags((np.abs(grid.transform(grid.mask)) ** 2) @ np.diag(mixing), most)

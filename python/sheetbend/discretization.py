@@ -1,8 +1,8 @@
 """The second half of an interval: what a finer discretization would move.
 
-A parameter is physical only if the next mesh and the next time step agree about it. The refits start at the estimate and cost about as much
-as the fit itself. A halving removes 1 - 2^-p of an error of order p, so what it moves is carried on to the limit (Richardson): 4/3 of it for
-meshes and BDF2, twice for BDF1.
+A parameter is physical only if the next mesh and the next time step agree about it. The refits start at the estimate
+and cost about as much as the fit itself. A halving removes 1 - 2^-p of an error of order p, so what it moves is
+carried on to the limit (Richardson): 4/3 of it for meshes and BDF2, twice for BDF1.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ def refined_estimates(
     optimizer: str,
     threads: int = 1,
 ) -> dict[str, float]:
-    """By how much each free parameter would move up to the limit, in its unit: root sum of squares over the refits. Ctrl-C passes through."""
+    """By how much each free parameter would move up to the limit, in its unit: root sum of squares over the refits.
+    Ctrl-C passes through."""
     moved: dict[str, float] = dict.fromkeys(problem.parameters.free, 0.0)
     here = problem.parameters.to_physical(u)
     for refined, to_limit in _refits(refinement, experiments):
@@ -61,7 +62,12 @@ def _refits(refinement: Refinement, experiments: Sequence[Experiment]) -> list[t
     refits = []
     if refinement.halve_step and moving:
         first_order = any(e.solver.integrator == "bdf1" for e in moving)
-        refits.append(([replace(e, solver=e.solver.with_h(e.solver.h / 2)) for e in fitted], 2.0 if first_order else _SECOND_ORDER))
+        refits.append(
+            (
+                [replace(e, solver=e.solver.with_h(e.solver.h / 2)) for e in fitted],
+                2.0 if first_order else _SECOND_ORDER,
+            )
+        )
     if refinement.finer is not None:
         refits.append(([e for e in refinement.finer() if e.predict is None], _SECOND_ORDER))
     return refits

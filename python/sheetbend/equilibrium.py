@@ -25,7 +25,8 @@ class Equilibrium:
 
     Attributes:
         positions: (particles, 3) m.
-        forces: per group the multipliers (count, rows): minus the tension in N of a distance, minus the moment in N m of bending.
+        forces: per group the multipliers (count, rows): minus the tension in N of a distance, minus the moment in N m
+            of bending.
         energy: of weight, forces and strain, J; of several equilibria the lowest is the most stable one.
         unstable_modes: negative eigenvalues of the energy's Hessian; 0 = stable.
         residual: relative force imbalance.
@@ -42,7 +43,9 @@ class Equilibrium:
     scene: Scene = field(repr=False)
     theta: np.ndarray = field(repr=False)
 
-    def gradient(self, positions_bar: ArrayLike | None = None, forces_bar: Mapping[str, ArrayLike] | None = None) -> dict[str, float]:
+    def gradient(
+        self, positions_bar: ArrayLike | None = None, forces_bar: Mapping[str, ArrayLike] | None = None
+    ) -> dict[str, float]:
         """Gradient of a loss by every named quantity, by the implicit function theorem.
 
         Args:
@@ -52,7 +55,11 @@ class Equilibrium:
         Raises:
             SceneError: wrong shapes.
         """
-        x_bar = None if positions_bar is None else finite("positions_bar", positions_bar, self.positions.shape, SceneError).ravel()
+        x_bar = (
+            None
+            if positions_bar is None
+            else finite("positions_bar", positions_bar, self.positions.shape, SceneError).ravel()
+        )
         lambda_bar = None
         if forces_bar is not None:
             parts = {name: np.zeros(f.shape) for name, f in self.forces.items()}
@@ -65,7 +72,9 @@ class Equilibrium:
         return dict(zip(compiled.names, bar.tolist(), strict=True))
 
 
-def equilibrium(scene: Scene, start: ArrayLike | None = None, values: Mapping[str, float] | None = None, stable: bool = True) -> Equilibrium:
+def equilibrium(
+    scene: Scene, start: ArrayLike | None = None, values: Mapping[str, float] | None = None, stable: bool = True
+) -> Equilibrium:
     """The equilibrium that a start leads to.
 
     Args:
@@ -97,7 +106,9 @@ def equilibrium(scene: Scene, start: ArrayLike | None = None, values: Mapping[st
     )
 
 
-def equilibria(scene: Scene, starts: Iterable[ArrayLike], values: Mapping[str, float] | None = None, tolerance: float = 1e-6) -> list[Equilibrium]:
+def equilibria(
+    scene: Scene, starts: Iterable[ArrayLike], values: Mapping[str, float] | None = None, tolerance: float = 1e-6
+) -> list[Equilibrium]:
     """The distinct equilibria that several starts lead to, lowest energy first. Starts that lead nowhere are left out.
 
     Args:

@@ -34,17 +34,20 @@ class Experiment:
         held_out: the part that is only predicted, from the same start; None = none.
         solver: substep and method of the motion; must suit the recording (h well below the frame interval).
         static: the recording shows an equilibrium; its frames in the window are averaged into one.
-        start: "given" (the scene's initial state) or "equilibrium" (of the scene at the start, forces included), for motions.
+        start: "given" (the scene's initial state) or "equilibrium" (of the scene at the start, forces included), for
+            motions.
         start_time: recording time at which the scene starts, s; the start of the fit window by default.
         time_offset: name of a quantity [s] that shifts the recording's clock, or None.
-        offsets: per marker name, names of quantities that are added to its offset (tangent, normal, tangent x normal), None for none.
+        offsets: per marker name, names of quantities that are added to its offset (tangent, normal, tangent x normal),
+            None for none.
         sigma: expected error of a marker, m: scales residuals against priors and between experiments.
         axes: coordinates that count, such as "xz".
-        radius: distance of the markers from a pivot, m: errors are then reported as angles in rad, rms distance/radius; None = in m.
+        radius: distance of the markers from a pivot, m: errors are then reported as angles in rad, rms
+            distance/radius; None = in m.
         loss: "squares", "soft_l1" or "huber", with loss_scale in units of sigma.
-        predict: None takes part in the fit. Otherwise the recording is only predicted, with the shared parameters as fitted on the others and
-            its private ones either fitted to its own fit window ("window": initial states, offsets) or set to the mean of the others'
-            ("mean").
+        predict: None takes part in the fit. Otherwise the recording is only predicted, with the shared parameters as
+            fitted on the others and its private ones either fitted to its own fit window ("window": initial states,
+            offsets) or set to the mean of the others' ("mean").
     """
 
     scene: Scene
@@ -72,28 +75,57 @@ class Experiment:
         if not self.name:
             object.__setattr__(self, "name", self.recording.name)
         if not (math.isfinite(self.sigma) and self.sigma > 0):
-            raise InputError(f"{self.name}.sigma", "must be positive", self.sigma, "give the expected error of a marker in m")
+            raise InputError(
+                f"{self.name}.sigma", "must be positive", self.sigma, "give the expected error of a marker in m"
+            )
         if not self.axes or set(self.axes) - set("xyz") or len(set(self.axes)) != len(self.axes):
             raise InputError(f"{self.name}.axes", "must be some of x, y, z", self.axes, "give such as 'xz'")
         if self.radius is not None and not (math.isfinite(self.radius) and self.radius > 0):
-            raise InputError(f"{self.name}.radius", "must be positive", self.radius, "give the markers' distance from their pivot in m")
+            raise InputError(
+                f"{self.name}.radius",
+                "must be positive",
+                self.radius,
+                "give the markers' distance from their pivot in m",
+            )
         if self.start not in ("given", "equilibrium"):
             raise InputError(f"{self.name}.start", "is unknown", self.start, "use 'given' or 'equilibrium'")
         if self.loss not in ("squares", "soft_l1", "huber"):
             raise InputError(f"{self.name}.loss", "is unknown", self.loss, "use 'squares', 'soft_l1' or 'huber'")
         if not (math.isfinite(self.loss_scale) and self.loss_scale > 0):
-            raise InputError(f"{self.name}.loss_scale", "must be positive", self.loss_scale, "give it in units of sigma")
+            raise InputError(
+                f"{self.name}.loss_scale", "must be positive", self.loss_scale, "give it in units of sigma"
+            )
         if self.predict not in (None, "window", "mean"):
-            raise InputError(f"{self.name}.predict", "is unknown", self.predict, "use 'window' or 'mean', or leave it out")
+            raise InputError(
+                f"{self.name}.predict", "is unknown", self.predict, "use 'window' or 'mean', or leave it out"
+            )
         if self.start_time is not None and not math.isfinite(self.start_time):
-            raise InputError(f"{self.name}.start_time", "must be finite", self.start_time, "give a time of the recording in s")
+            raise InputError(
+                f"{self.name}.start_time", "must be finite", self.start_time, "give a time of the recording in s"
+            )
         for part, window in (("fit", self.fit), ("held_out", self.held_out)):
             if window is not None and len(window) != 2:
-                raise InputError(f"{self.name}.{part}", "must be (start, stop)", window, "give two times of the recording in s")
-        if self.fit is not None and self.held_out is not None and max(self.fit[0], self.held_out[0]) < min(self.fit[1], self.held_out[1]):
-            raise InputError(f"{self.name}.held_out", "overlaps the fitted part", self.held_out, "hold out frames that the fit does not see")
+                raise InputError(
+                    f"{self.name}.{part}", "must be (start, stop)", window, "give two times of the recording in s"
+                )
+        if (
+            self.fit is not None
+            and self.held_out is not None
+            and max(self.fit[0], self.held_out[0]) < min(self.fit[1], self.held_out[1])
+        ):
+            raise InputError(
+                f"{self.name}.held_out",
+                "overlaps the fitted part",
+                self.held_out,
+                "hold out frames that the fit does not see",
+            )
         if self.static and self.held_out is not None:
-            raise InputError(f"{self.name}.held_out", "makes no sense for an equilibrium", self.held_out, "hold out whole recordings: predict = 'mean'")
+            raise InputError(
+                f"{self.name}.held_out",
+                "makes no sense for an equilibrium",
+                self.held_out,
+                "hold out whole recordings: predict = 'mean'",
+            )
 
     @cached_property
     def places(self) -> tuple[Place | None, ...]:
@@ -111,7 +143,12 @@ class Experiment:
         held = self.scene.pinned | set(self.scene.driven)
         chosen = tuple(i for i, p in enumerate(self.places) if p is not None and not self._depends_on(i, p) <= held)
         if not chosen:
-            raise RecordingError(f"{self.name}.markers", "leave nothing to compare", len(self.places), "place markers on particles that move")
+            raise RecordingError(
+                f"{self.name}.markers",
+                "leave nothing to compare",
+                len(self.places),
+                "place markers on particles that move",
+            )
         return chosen
 
     def _depends_on(self, i: int, place: Place) -> set[int]:
@@ -152,7 +189,9 @@ class Experiment:
         """Observations for the compiled core; the scene's clock starts at 0."""
         times = np.zeros(1) if self.static else recording.times - self.t0
         if not self.static and times[0] < -1e-9:
-            raise RecordingError(f"{self.name}.start_time", "lies after the first frame that is compared", self.t0, "start earlier")
+            raise RecordingError(
+                f"{self.name}.start_time", "lies after the first frame that is compared", self.t0, "start earlier"
+            )
         measured = np.where(recording.mask[..., None], recording.positions, np.nan)
         return {
             "times": np.maximum(times, 0.0),
@@ -170,7 +209,11 @@ class Experiment:
         terms: list[Term] = []
         for m, i in enumerate(self.compared):
             wanted = self.offsets.get(self.recording.markers[i], (None, None, None))
-            terms += [product("extra", 3 * m + k, 1.0, {name: "identity"}) for k, name in enumerate(wanted) if name is not None]
+            terms += [
+                product("extra", 3 * m + k, 1.0, {name: "identity"})
+                for k, name in enumerate(wanted)
+                if name is not None
+            ]
         if self.time_offset is not None:
             terms.append(product("extra", 3 * len(self.compared), 1.0, {self.time_offset: "identity"}))
         return terms
@@ -179,13 +222,25 @@ class Experiment:
         known = self.scene.quantities
         for marker, wanted in self.offsets.items():
             if marker not in self.recording.markers:
-                raise InputError(f"{self.name}.offsets", "name no marker", marker, f"use some of: {', '.join(self.recording.markers)}")
+                raise InputError(
+                    f"{self.name}.offsets",
+                    "name no marker",
+                    marker,
+                    f"use some of: {', '.join(self.recording.markers)}",
+                )
             unknown = [name for name in wanted if name is not None and name not in known]
             if unknown or len(wanted) != 3:
                 fix = f"give three, each None or one of: {', '.join(known)}"
-                raise InputError(f"{self.name}.offsets", f"of '{marker}' are not three quantities of the scene", wanted, fix)
+                raise InputError(
+                    f"{self.name}.offsets", f"of '{marker}' are not three quantities of the scene", wanted, fix
+                )
         if self.time_offset is not None and self.time_offset not in known:
-            raise InputError(f"{self.name}.time_offset", "names no quantity of the scene", self.time_offset, f"use one of: {', '.join(known)}")
+            raise InputError(
+                f"{self.name}.time_offset",
+                "names no quantity of the scene",
+                self.time_offset,
+                f"use one of: {', '.join(known)}",
+            )
 
     def core(self, recording: Recording) -> dict[str, Any]:
         """The experiment on (part of) its recording, for the compiled core."""

@@ -78,13 +78,15 @@ def fit(
         parameters: what to fit: names of quantities, `Parameter`s, or a mapping from name to fields of `Parameter`.
         optimizer: "ceres", "scipy", or "auto" (Ceres where it was built).
         starts: further starting values by name; the best end wins, all are reported.
-        refine: also refit on a finer discretization, and count what that moves as a part of the intervals (see `discretization`).
+        refine: also refit on a finer discretization, and count what that moves as a part of the intervals (see
+            `discretization`).
         max_iterations: per start.
         threads: over experiments and Jacobian columns; the result does not depend on it.
         progress: called after every iteration.
 
     Returns:
-        Fit. On Ctrl-C it holds the best point so far, marked `interrupted`, with linear intervals: whatever needs a refit is left out.
+        Fit. On Ctrl-C it holds the best point so far, marked `interrupted`, with linear intervals: whatever needs a
+        refit is left out.
 
     Raises:
         InputError: anything inconsistent, named, before work starts.
@@ -98,14 +100,23 @@ def fit(
     began = time.perf_counter()
     fitted = [e for e in experiments if e.predict is None]
     if not fitted:
-        raise InputError("experiments", "leave nothing to fit: all are only predicted", len(experiments), "set predict to None for at least one")
+        raise InputError(
+            "experiments",
+            "leave nothing to fit: all are only predicted",
+            len(experiments),
+            "set predict to None for at least one",
+        )
     problem = FitProblem(fitted, wanted, threads=threads)
     ends, name, interrupted = _minimize_all(problem, optimizer, starts, max_iterations, progress)
     best = ends[0]
     values = problem.parameters.to_physical(best.u)
 
     def conclude(refitter: str | None) -> tuple[Identifiability, dict[str, float], tuple[Given, ...]]:
-        refined = {} if refine is None or refitter is None else refined_estimates(refine, experiments, wanted, problem, best.u, refitter, threads)
+        refined = (
+            {}
+            if refine is None or refitter is None
+            else refined_estimates(refine, experiments, wanted, problem, best.u, refitter, threads)
+        )
         return _judge(problem, best.u, refined, refitter), *_predicted(experiments, wanted, values, refitter, threads)
 
     try:
@@ -132,19 +143,31 @@ def fit(
         gauges=tuple(g.words for g in judged.gauges),
         baseline="; ".join(dict.fromkeys(c.baseline_words for c in comparisons if c.baseline_words)),
         autocorrelation_time=judged.autocorrelation_time,
-        starts=tuple(Start(cost=m.cost, iterations=m.iterations, converged=m.converged, values=problem.parameters.to_physical(m.u)) for m in ends),
+        starts=tuple(
+            Start(
+                cost=m.cost, iterations=m.iterations, converged=m.converged, values=problem.parameters.to_physical(m.u)
+            )
+            for m in ends
+        ),
         warnings=_warnings(ends, best, interrupted),
     )
     return Fit(result, tuple(comparisons), wanted)
 
 
-def _experiments(scene: Scene | Experiment | Sequence[Experiment], recording: Recording | None, fields: Mapping[str, Any]) -> list[Experiment]:
+def _experiments(
+    scene: Scene | Experiment | Sequence[Experiment], recording: Recording | None, fields: Mapping[str, Any]
+) -> list[Experiment]:
     if isinstance(scene, Scene):
         if recording is None:
             raise InputError("recording", "is missing", None, "give the recording that the scene is to explain")
         return [Experiment(scene=scene, recording=recording, **fields)]
     if recording is not None or fields:
-        raise InputError("recording", "goes with a single scene", sorted(fields) or "recording", "put everything into the experiments")
+        raise InputError(
+            "recording",
+            "goes with a single scene",
+            sorted(fields) or "recording",
+            "put everything into the experiments",
+        )
     experiments = [scene] if isinstance(scene, Experiment) else list(scene)
     if not experiments:
         raise InputError("experiments", "are empty", 0, "give at least one")
@@ -152,7 +175,11 @@ def _experiments(scene: Scene | Experiment | Sequence[Experiment], recording: Re
 
 
 def _minimize_all(
-    problem: FitProblem, optimizer: str, starts: Sequence[Mapping[str, float]], max_iterations: int, progress: Observer | None
+    problem: FitProblem,
+    optimizer: str,
+    starts: Sequence[Mapping[str, float]],
+    max_iterations: int,
+    progress: Observer | None,
 ) -> tuple[list[Minimum], str, bool]:
     """Ends of all starts, best first; the optimizer's name; whether Ctrl-C ended the search."""
     first = problem.parameters.to_physical(problem.parameters.initial())
@@ -160,7 +187,9 @@ def _minimize_all(
     for changes in starts:
         unknown = set(changes) - set(problem.parameters.free)
         if unknown:
-            raise InputError("starts", "name no free parameter", sorted(unknown), f"use: {', '.join(problem.parameters.free)}")
+            raise InputError(
+                "starts", "name no free parameter", sorted(unknown), f"use: {', '.join(problem.parameters.free)}"
+            )
         points.append(problem.parameters.to_internal(first | dict(changes)))
     ends: list[Minimum] = []
     interrupted, name = False, ""
@@ -226,9 +255,14 @@ def _profile(problem: FitProblem, u: np.ndarray, refitter: str) -> Callable[[str
 
 
 def _predicted(
-    experiments: Sequence[Experiment], wanted: Parameters, values: Mapping[str, float], refitter: str | None, threads: int
+    experiments: Sequence[Experiment],
+    wanted: Parameters,
+    values: Mapping[str, float],
+    refitter: str | None,
+    threads: int,
 ) -> tuple[dict[str, float], tuple[Given, ...]]:
-    """All values, with the private parameters of the experiments that are only predicted: fitted to their own windows or the others' mean."""
+    """All values, with the private parameters of the experiments that are only predicted: fitted to their own windows
+    or the others' mean."""
     complete = dict(values)
     given: list[Given] = []
     for e in experiments:
@@ -243,10 +277,17 @@ def _predicted(
                 complete[f"{p.name}[{e.name}]"] = float(np.mean(others)) if others else own
         elif private:
             words = "fitted to the recording's own first window"
-            shared = [replace(p, fixed=True, prior=None, initial=values[p.name]) for p in wanted.values() if not p.private and p.tied_to is None]
+            shared = [
+                replace(p, fixed=True, prior=None, initial=values[p.name])
+                for p in wanted.values()
+                if not p.private and p.tied_to is None
+            ]
             problem = FitProblem([e], Parameters([*shared, *private]), threads=threads)
             complete |= problem.parameters.to_physical(refit(problem, problem.parameters.initial(), refitter).u)
-        given += [Given(name=f"{p.name}[{e.name}]", value=complete[f"{p.name}[{e.name}]"], unit=p.unit, words=words) for p in private]
+        given += [
+            Given(name=f"{p.name}[{e.name}]", value=complete[f"{p.name}[{e.name}]"], unit=p.unit, words=words)
+            for p in private
+        ]
     return complete, tuple(given)
 
 
@@ -254,7 +295,13 @@ def _given(parameters: Parameters, values: Mapping[str, float]) -> tuple[Given, 
     rows = []
     for name, p in parameters.items():
         if not p.free:
-            words = "fixed" if p.tied_to is None else f"{p.factor:g} times {p.tied_to}" if p.factor != 1.0 else f"equal to {p.tied_to}"
+            words = (
+                "fixed"
+                if p.tied_to is None
+                else f"{p.factor:g} times {p.tied_to}"
+                if p.factor != 1.0
+                else f"equal to {p.tied_to}"
+            )
             rows.append(Given(name=name, value=values[name], unit=p.unit, words=words))
     return tuple(rows)
 
@@ -262,11 +309,12 @@ def _given(parameters: Parameters, values: Mapping[str, float]) -> tuple[Given, 
 def _warnings(ends: Sequence[Minimum], best: Minimum, interrupted: bool) -> tuple[str, ...]:
     warnings = []
     if interrupted:
-        warnings.append("interrupted: intervals are the linear ones, without profiles and without refits on a finer discretization")
+        warnings.append(
+            "interrupted: intervals are the linear ones, without profiles and without refits on a finer discretization"
+        )
     elsewhere = [m for m in ends if m.cost > best.cost * (1.0 + INACCURATE)]
     if elsewhere:
         warnings.append(f"{len(elsewhere)} of {len(ends)} starts ended in a worse minimum: the cost has several")
     if not best.converged and not best.interrupted:
         warnings.append(f"the fit did not converge: {best.message}")
     return tuple(warnings)
-

@@ -1,4 +1,5 @@
-"""What the solver itself makes up: damping by the integrator, compliance by unconverged sweeps. A fit at such a floor shows no material."""
+"""What the solver itself makes up: damping by the integrator, compliance by unconverged sweeps. A fit at such a floor
+shows no material."""
 
 from __future__ import annotations
 
@@ -13,9 +14,10 @@ from .parameters import Parameters
 def solver_floors(experiments: Sequence[Experiment], parameters: Parameters) -> dict[str, Floor]:
     """Floors of the free parameters, by (expanded) name.
 
-    BDF1 damps a mode of frequency omega like zeta = omega h / 2, a Kelvin-Voigt time constant tau like omega tau / 2: the floor is tau = h,
-    that of a loss factor omega h.
-    Gauss-Seidel leaves about 0.9 h^2 / (m sweeps) of compliance in a link of node mass m: EA above length / that is not seen.
+    BDF1 damps a mode of frequency omega like zeta = omega h / 2, a Kelvin-Voigt time constant tau like omega tau / 2:
+    the floor is tau = h, that of a loss factor omega h.
+    Gauss-Seidel leaves about 0.9 h^2 / (m sweeps) of compliance in a link of node mass m: EA above length / that is
+    not seen.
     """
     floors: dict[str, Floor] = {}
     for name in parameters.free:
@@ -35,5 +37,9 @@ def solver_floors(experiments: Sequence[Experiment], parameters: Parameters) -> 
                 link = rope.arc_length[1] - rope.arc_length[0]
                 mass = e.scene.quantities[f"{rope.name}_density"].value * link
                 limit = link * mass * sweeps / (0.9 * h * h)
-                floors[name] = Floor(limit, f"{sweeps} Gauss-Seidel sweeps at {h:g} s hide any larger stiffness; use method = 'direct'", ceiling=True)
+                floors[name] = Floor(
+                    limit,
+                    f"{sweeps} Gauss-Seidel sweeps at {h:g} s hide any larger stiffness; use method = 'direct'",
+                    ceiling=True,
+                )
     return floors

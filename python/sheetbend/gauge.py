@@ -85,9 +85,7 @@ def null_space(
     values = np.append(values, np.zeros(len(seen) - values.size))
     rank = int((values > tolerance * values[0]).sum())
     basis, columns = _echelon(right[rank:])
-    gauges = tuple(
-        _gauge(row / size[seen], [names[i] for i in seen], [log[i] for i in seen]) for row in basis
-    )
+    gauges = tuple(_gauge(row / size[seen], [names[i] for i in seen], [log[i] for i in seen]) for row in basis)
     hidden = [int(i) for i in np.flatnonzero(flat)]
     involved = {seen[i] for i in np.flatnonzero(np.any(basis != 0, axis=0))} | set(hidden)
     return NullSpace(
@@ -122,8 +120,7 @@ def _gauge(direction: Array, names: Sequence[str], log: Sequence[bool]) -> Gauge
     if all(log[i] for i in part):
         free = " * ".join(f"{name}^{step:+g}" for name, step in zip(members, steps, strict=True))
         known = ", ".join(
-            _monomial(members[0], name, step / steps[0])
-            for name, step in zip(members[1:], steps[1:], strict=True)
+            _monomial(members[0], name, step / steps[0]) for name, step in zip(members[1:], steps[1:], strict=True)
         )
     else:
         labels = [f"ln {names[i]}" if log[i] else names[i] for i in part]

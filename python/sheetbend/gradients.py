@@ -58,30 +58,55 @@ class GradientReport:
     def to_dict(self) -> dict[str, Any]:
         """For JSON: each gradient by name with its relative errors and pass or fail."""
         gradients = {
-            r.name: {"size": r.size, "gradient": r.gradient, "complex_step": r.complex_step, "differences": r.differences, "passed": r.passed}
+            r.name: {
+                "size": r.size,
+                "gradient": r.gradient,
+                "complex_step": r.complex_step,
+                "differences": r.differences,
+                "passed": r.passed,
+            }
             for r in self.rows
         }
-        return {"scene": self.scene, "steps": self.steps, "gradients": gradients, "dot_product": self.dot_product, "passed": self.passed}
+        return {
+            "scene": self.scene,
+            "steps": self.steps,
+            "gradients": gradients,
+            "dot_product": self.dot_product,
+            "passed": self.passed,
+        }
 
     def __str__(self) -> str:
-        lines = [f"Gradient check of '{self.scene}' over {self.steps} substeps: {'passed' if self.passed else 'FAILED'}"]
+        lines = [
+            f"Gradient check of '{self.scene}' over {self.steps} substeps: {'passed' if self.passed else 'FAILED'}"
+        ]
         width = max(len(r.name) for r in self.rows)
         lines.append(f"  {'':{width}}  {'entries':>7}  {'largest':>9}  {'complex step':>12}  {'differences':>11}")
         for r in self.rows:
             mark = "" if r.passed else "  <- fails"
-            lines.append(f"  {r.name:{width}}  {r.size:7d}  {r.gradient:9.2e}  {r.complex_step:12.1e}  {r.differences:11.1e}{mark}")
+            lines.append(
+                f"  {r.name:{width}}  {r.size:7d}  {r.gradient:9.2e}"
+                f"  {r.complex_step:12.1e}  {r.differences:11.1e}{mark}"
+            )
         lines.append(f"  dot product <Jv, w> = <v, J'w>: {self.dot_product:.1e}")
-        lines.append(f"  bounds: complex step {COMPLEX_STEP_BOUND:g}, differences {DIFFERENCES_BOUND:g}, dot product {DOT_PRODUCT_BOUND:g}")
+        lines.append(
+            f"  bounds: complex step {COMPLEX_STEP_BOUND:g}, differences {DIFFERENCES_BOUND:g},"
+            f" dot product {DOT_PRODUCT_BOUND:g}"
+        )
         return "\n".join(lines)
 
 
 def check_gradients(
-    scene: Scene, times: ArrayLike, solver: Solver | None = None, samples: int = 6, seed: int = 0, values: Mapping[str, float] | None = None
+    scene: Scene,
+    times: ArrayLike,
+    solver: Solver | None = None,
+    samples: int = 6,
+    seed: int = 0,
+    values: Mapping[str, float] | None = None,
 ) -> GradientReport:
     """Check the adjoint of a scene's rollout for every named quantity and every input array.
 
-    The loss is a random linear combination of all positions at `times`. Arrays with more than `samples` entries are tested on the largest
-    gradient entries and on random ones.
+    The loss is a random linear combination of all positions at `times`. Arrays with more than `samples` entries are
+    tested on the largest gradient entries and on random ones.
 
     Args:
         times: (frames,) s on the substep grid; a short stretch of motion is enough.
@@ -113,7 +138,9 @@ class _Probe:
 
     def __init__(self, core: Any, inputs: np.ndarray, steps: Sequence[int], weights: np.ndarray) -> None:
         self.core, self.inputs, self.steps, self.weights = core, inputs, steps, weights
-        self.rounding = np.finfo(float).eps * float(np.abs(core.simulate(inputs, steps, 0.0)["positions"] * weights).sum())
+        self.rounding = np.finfo(float).eps * float(
+            np.abs(core.simulate(inputs, steps, 0.0)["positions"] * weights).sum()
+        )
 
     def complex_step(self, direction: np.ndarray) -> float:
         return float((self.core.complex_step(self.inputs, direction, self.steps, 0.0) * self.weights).sum())
@@ -122,10 +149,11 @@ class _Probe:
         return float((self.core.simulate(inputs, self.steps, 0.0)["positions"] * self.weights).sum())
 
     def differences(self, direction: np.ndarray, step: float) -> float:
-        """Central differences with one Richardson step, at the step size where truncation and rounding together are least.
+        """Central differences with one Richardson step, at the step size where truncation and rounding together are
+        least.
 
-        No single step suits all: rounding drowns a faint gradient at small ones, and rigid links turn soft at large ones. How much halving
-        the step changes the differences tells their truncation error (Ridders 1982).
+        No single step suits all: rounding drowns a faint gradient at small ones, and rigid links turn soft at large
+        ones. How much halving the step changes the differences tells their truncation error (Ridders 1982).
         """
 
         def at(size: float) -> tuple[float, float]:
@@ -141,7 +169,9 @@ class _Probe:
         return (self.loss(self.inputs + step * direction) - self.loss(self.inputs - step * direction)) / (2.0 * step)
 
 
-def _quantity_row(compiled: CompiledScene, probe: _Probe, theta: np.ndarray, adjoint: np.ndarray, name: str) -> GradientRow:
+def _quantity_row(
+    compiled: CompiledScene, probe: _Probe, theta: np.ndarray, adjoint: np.ndarray, name: str
+) -> GradientRow:
     direction = np.zeros(len(theta))
     direction[compiled.names.index(name)] = 1.0
     gradient = float(compiled.theta_bar(theta, adjoint) @ direction)
@@ -151,7 +181,9 @@ def _quantity_row(compiled: CompiledScene, probe: _Probe, theta: np.ndarray, adj
     return _row(name, 1, np.array([gradient]), np.array([exact]), np.array([rough]))
 
 
-def _array_row(compiled: CompiledScene, probe: _Probe, adjoint: np.ndarray, name: str, samples: int, rng: np.random.Generator) -> GradientRow:
+def _array_row(
+    compiled: CompiledScene, probe: _Probe, adjoint: np.ndarray, name: str, samples: int, rng: np.random.Generator
+) -> GradientRow:
     offset, size = compiled.layout[name]
     part = adjoint[offset : offset + size]
     largest = np.argsort(-np.abs(part))[: samples // 2]
@@ -180,7 +212,14 @@ def _present(compiled: CompiledScene) -> list[str]:
     return [name for name, (_, size) in compiled.layout.items() if size > 0]
 
 
-def _dot_product(core: Any, inputs: np.ndarray, steps: Sequence[int], weights: np.ndarray, adjoint: np.ndarray, rng: np.random.Generator) -> float:
+def _dot_product(
+    core: Any,
+    inputs: np.ndarray,
+    steps: Sequence[int],
+    weights: np.ndarray,
+    adjoint: np.ndarray,
+    rng: np.random.Generator,
+) -> float:
     """<J v, w> by tangents against <v, J^T w> by the adjoint, relative to the size of its terms."""
     v = rng.standard_normal(len(inputs)) * np.maximum(np.abs(inputs), 1e-3)
     _, x_dot = core.jvp(inputs, v[None], steps, 0.0)

@@ -121,9 +121,7 @@ def identify(
     )
 
 
-def _check(
-    parameters: Parameters, internal: Array, residuals: Array, jacobian: Array, named: set[str]
-) -> None:
+def _check(parameters: Parameters, internal: Array, residuals: Array, jacobian: Array, named: set[str]) -> None:
     count = len(parameters.free)
     if jacobian.shape != (len(residuals), count) or internal.shape != (count,):
         shapes = (residuals.shape, jacobian.shape, internal.shape)
@@ -132,14 +130,10 @@ def _check(
     for label, array in (("internal", internal), ("residuals", residuals), ("jacobian", jacobian)):
         if not np.all(np.isfinite(array)):
             bad = int((~np.isfinite(array)).sum())
-            raise InputError(
-                label, "must be finite", f"{bad} that are not", "leave gaps out of the residual rows"
-            )
+            raise InputError(label, "must be finite", f"{bad} that are not", "leave gaps out of the residual rows")
     unknown = sorted(named - set(parameters.free))
     if unknown:
-        raise InputError(
-            "floors", "name no free parameter", unknown, f"use names of: {', '.join(parameters.free)}"
-        )
+        raise InputError("floors", "name no free parameter", unknown, f"use names of: {', '.join(parameters.free)}")
 
 
 class _Judge:
@@ -189,11 +183,10 @@ class _Judge:
             return _open(parameter, value, discretization, self._undetermined(parameter.name))
         alone = float(self.alone[column])
         if not parameter.log and parameter.scale is not None and alone > _OPEN * parameter.scale:
-            words = f"the data hardly depend on it: they would leave it open to {quantity(alone, parameter)} if all others were known"
+            left = quantity(alone, parameter)
+            words = f"the data hardly depend on it: they would leave it open to {left} if all others were known"
             return _open(parameter, value, discretization, words)
-        columns, spread = (
-            (self.columns, self.spread) if column in self.columns else (self.wide_columns, self.wide)
-        )
+        columns, spread = (self.columns, self.spread) if column in self.columns else (self.wide_columns, self.wide)
         index = columns.index(column)
         t = float(self.quantile(spread.degrees[index], 0.5 + _LEVEL / 2))
         reach = t * math.sqrt(spread.matrix[index, index])
@@ -285,9 +278,7 @@ class _Judge:
             if {first, second} <= set(self.space.determined) and sd[i] * sd[j] > 0
         ]
         return tuple(
-            Correlation(
-                first=names[j], second=names[i], value=float(self.spread.matrix[i, j] / (sd[i] * sd[j]))
-            )
+            Correlation(first=names[j], second=names[i], value=float(self.spread.matrix[i, j] / (sd[i] * sd[j])))
             for i, j in pairs
         )
 
@@ -300,7 +291,8 @@ class _Judge:
     def _measured(self, gauge: Gauge) -> Gauge:
         """The gauge with the values of what is known all the same, where they follow from its parameters alone.
 
-        Those are monomials, so all of them must be on a log scale; none may take part in another gauge or sit at a bound.
+        Those are monomials, so all of them must be on a log scale; none may take part in another gauge or sit at a
+        bound.
         """
         free = self.parameters.free
         columns = [free.index(name) for name in gauge.members]

@@ -15,12 +15,15 @@ from .problem import FitProblem
 
 BOUND = 1e-4  # the differences' own accuracy limits it
 STEP = 1e-3  # of the internal coordinate: the logarithm, or the parameter's scale
-SMALLEST = 1e-4  # of the largest residual, or of one standard deviation; smaller columns are judged as if they were that large
+SMALLEST = (
+    1e-4  # of the largest residual, or of one standard deviation; smaller columns are judged as if they were that large
+)
 
 
 @dataclass(frozen=True)
 class JacobianRow:
-    """The column of one parameter: its largest entry, and the largest gap to central differences relative to that (or to `SMALLEST`)."""
+    """The column of one parameter: its largest entry, and the largest gap to central differences relative to that (or
+    to `SMALLEST`)."""
 
     name: str
     largest: float
@@ -50,12 +53,16 @@ class JacobianReport:
         verdict = "passed" if self.passed else "FAILED"
         lines = [f"Jacobian check of '{self.recording}' over {self.residuals} residuals: {verdict}"]
         lines.append(f"  {'':{width}}  {'largest':>9}  {'differences':>11}")
-        lines += [f"  {r.name:{width}}  {r.largest:9.2e}  {r.differences:11.1e}{'' if r.passed else '  <- fails'}" for r in self.rows]
+        lines += [
+            f"  {r.name:{width}}  {r.largest:9.2e}  {r.differences:11.1e}{'' if r.passed else '  <- fails'}"
+            for r in self.rows
+        ]
         return "\n".join([*lines, f"  bound: {BOUND:g}"])
 
 
 def check_jacobian(problem: FitProblem, recording: str = "") -> JacobianReport:
-    """Compare the residuals' Jacobian at the start with central differences, one Richardson step, in internal coordinates.
+    """Compare the residuals' Jacobian at the start with central differences, one Richardson step, in internal
+    coordinates.
 
     Raises:
         SheetbendError: the start itself diverges or has no equilibrium.

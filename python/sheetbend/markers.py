@@ -17,9 +17,11 @@ from .scene import Scene
 
 @dataclass(frozen=True)
 class Place:
-    """A material point: weights on up to four particles, weights of its tangent, and an offset in the frame (t, n, t x n).
+    """A material point: weights on up to four particles, weights of its tangent, and an offset in the frame (t, n, t x
+    n).
 
-    t is the rope's direction there, n the given normal made perpendicular to it. Offset components that are texts name quantities.
+    t is the rope's direction there, n the given normal made perpendicular to it. Offset components that are texts name
+    quantities.
     """
 
     particles: tuple[int, ...]
@@ -86,14 +88,17 @@ def along_rope(rope: Rope, count: int, interpolation: str = "cubic") -> tuple[Pl
     return tuple(on_rope(rope, s, interpolation) for s in np.linspace(0.0, rope.length, count))
 
 
-def places_for(scene: Scene, markers: Mapping[str, Place] | Sequence[Place] | None, names: Sequence[str]) -> tuple[Place | None, ...]:
+def places_for(
+    scene: Scene, markers: Mapping[str, Place] | Sequence[Place] | None, names: Sequence[str]
+) -> tuple[Place | None, ...]:
     """One place per marker of a recording, None for markers that are not compared.
 
     Args:
         markers: by marker name, in the recording's order, or None: equally spaced along the only rope.
 
     Raises:
-        SceneError: unknown names, a wrong number, particles that do not exist, or no rope (or several) to spread markers along.
+        SceneError: unknown names, a wrong number, particles that do not exist, or no rope (or several) to spread
+            markers along.
     """
     places = _places_for(scene, markers, names)
     for name, place in zip(names, places, strict=True):
@@ -103,10 +108,17 @@ def places_for(scene: Scene, markers: Mapping[str, Place] | Sequence[Place] | No
     return places
 
 
-def _places_for(scene: Scene, markers: Mapping[str, Place] | Sequence[Place] | None, names: Sequence[str]) -> tuple[Place | None, ...]:
+def _places_for(
+    scene: Scene, markers: Mapping[str, Place] | Sequence[Place] | None, names: Sequence[str]
+) -> tuple[Place | None, ...]:
     if markers is None:
         if len(scene.ropes) != 1:
-            raise SceneError("markers", "are not placed, and the scene has not exactly one rope", len(scene.ropes), "give their places")
+            raise SceneError(
+                "markers",
+                "are not placed, and the scene has not exactly one rope",
+                len(scene.ropes),
+                "give their places",
+            )
         (only,) = scene.ropes.values()
         return along_rope(only, len(names))
     if isinstance(markers, Mapping):
@@ -115,7 +127,9 @@ def _places_for(scene: Scene, markers: Mapping[str, Place] | Sequence[Place] | N
             raise SceneError("markers", "are not in the recording", unknown, f"name some of: {', '.join(names)}")
         return tuple(markers.get(name) for name in names)
     if len(markers) != len(names):
-        raise SceneError("markers", "do not match the recording's", len(markers), f"give {len(names)} places, or a mapping by name")
+        raise SceneError(
+            "markers", "do not match the recording's", len(markers), f"give {len(names)} places, or a mapping by name"
+        )
     return tuple(markers)
 
 
@@ -126,5 +140,8 @@ def _lagrange(knots: np.ndarray, x: float) -> tuple[list[float], list[float]]:
         others = [k for j, k in enumerate(knots) if j != i]
         scale = float(np.prod([knots[i] - k for k in others]))
         weights.append(float(np.prod([x - k for k in others])) / scale)
-        slopes.append(sum(float(np.prod([x - k for j, k in enumerate(others) if j != skip])) for skip in range(len(others))) / scale)
+        slopes.append(
+            sum(float(np.prod([x - k for j, k in enumerate(others) if j != skip])) for skip in range(len(others)))
+            / scale
+        )
     return weights, slopes

@@ -1,4 +1,5 @@
-"""Levenberg-Marquardt on a compiled problem: Ceres where it was built in, SciPy's trust region otherwise. Both see the same function."""
+"""Levenberg-Marquardt on a compiled problem: Ceres where it was built in, SciPy's trust region otherwise. Both see the
+same function."""
 
 from __future__ import annotations
 
@@ -47,9 +48,15 @@ def has_ceres() -> bool:
 
 
 def minimize(
-    problem: FitProblem, u: np.ndarray, optimizer: str = "auto", max_iterations: int = 200, tolerance: float = 1e-10, observe: Observer | None = None
+    problem: FitProblem,
+    u: np.ndarray,
+    optimizer: str = "auto",
+    max_iterations: int = 200,
+    tolerance: float = 1e-10,
+    observe: Observer | None = None,
 ) -> tuple[Minimum, str]:
-    """Minimize half the sum of squared residuals from u (free,), inside the parameters' bounds; also returns the optimizer's name.
+    """Minimize half the sum of squared residuals from u (free,), inside the parameters' bounds; also returns the
+    optimizer's name.
 
     Raises:
         InputError: unknown optimizer, or Ceres asked for and not built.
@@ -58,7 +65,12 @@ def minimize(
     if optimizer not in OPTIMIZERS:
         raise InputError("optimizer", "is unknown", optimizer, f"use one of: {', '.join(OPTIMIZERS)}")
     if optimizer == "ceres" and not has_ceres():
-        raise InputError("optimizer", "was not built into this installation", "ceres", "install Ceres (libceres-dev) and rebuild, or use 'scipy'")
+        raise InputError(
+            "optimizer",
+            "was not built into this installation",
+            "ceres",
+            "install Ceres (libceres-dev) and rebuild, or use 'scipy'",
+        )
     name = optimizer if optimizer != "auto" else "ceres" if has_ceres() else "scipy"
     ok, r, _ = problem.evaluate(u, jacobian=False)
     if not ok:
@@ -68,7 +80,9 @@ def minimize(
     return run(problem, np.array(u, dtype=float), max_iterations, tolerance, best), name
 
 
-def refit(problem: FitProblem, u: np.ndarray, optimizer: str, max_iterations: int = 200, tolerance: float = 1e-10) -> Minimum:
+def refit(
+    problem: FitProblem, u: np.ndarray, optimizer: str, max_iterations: int = 200, tolerance: float = 1e-10
+) -> Minimum:
     """`minimize` for a step of larger work (a profile, a refinement), which Ctrl-C ends as a whole.
 
     Raises:
@@ -117,8 +131,18 @@ def _ceres(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: f
     except KeyboardInterrupt:
         interrupted = True
     if interrupted or out["stopped"]:
-        return Minimum(best.u, best.cost, out.get("iterations", 0), out.get("evaluations", 0), False, True, "interrupted: the best point so far")
-    return Minimum(np.array(out["u"]), out["cost"], out["iterations"], out["evaluations"], out["converged"], False, out["message"])
+        return Minimum(
+            best.u,
+            best.cost,
+            out.get("iterations", 0),
+            out.get("evaluations", 0),
+            False,
+            True,
+            "interrupted: the best point so far",
+        )
+    return Minimum(
+        np.array(out["u"]), out["cost"], out["iterations"], out["evaluations"], out["converged"], False, out["message"]
+    )
 
 
 def _scipy(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: float, best: _Best) -> Minimum:
@@ -133,7 +157,9 @@ def _scipy(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: f
             count += 1
             ok, r, J = problem.evaluate(at, jacobian)
             # SciPy shortens its step where a residual is not finite.
-            last.update(u=at.copy(), r=r if ok else np.full(problem.core.rows, np.inf), J=J if jacobian and ok else None)
+            last.update(
+                u=at.copy(), r=r if ok else np.full(problem.core.rows, np.inf), J=J if jacobian and ok else None
+            )
             if ok:
                 best(count, 0.5 * float(r @ r), at)
         return last

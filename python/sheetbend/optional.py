@@ -22,9 +22,7 @@ class MissingExtraError(SheetbendError, ImportError):
         self.extra = extra
 
     def __str__(self) -> str:
-        return (
-            f"this needs {self.package}, which is not installed. Fix: pip install 'sheetbend[{self.extra}]'."
-        )
+        return f"this needs {self.package}, which is not installed. Fix: pip install 'sheetbend[{self.extra}]'."
 
 
 def require(module: str, extra: str) -> ModuleType:

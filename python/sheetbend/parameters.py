@@ -64,9 +64,7 @@ class Parameter:
         else:
             self._check_tie()
         if self.scale is not None and not (math.isfinite(self.scale) and self.scale > 0):
-            self._fail(
-                "scale", "must be a size", self.scale, "give a positive number, such as 0.1 rad for an angle"
-            )
+            self._fail("scale", "must be a size", self.scale, "give a positive number, such as 0.1 rad for an angle")
 
     def _fail(self, field: str, problem: str, got: object, fix: str) -> NoReturn:
         raise InputError(f"{self.name}.{field}", problem, got, fix)
@@ -80,28 +78,20 @@ class Parameter:
         if math.isnan(self.lower) or math.isnan(self.upper) or not self.lower < self.upper:
             self._fail("bounds", "must enclose a range", bounds, "give a lower bound below the upper one")
         if self.log and initial <= 0:
-            self._fail(
-                "initial", "must be positive on a log scale", self.initial, "raise it or set log = false"
-            )
+            self._fail("initial", "must be positive on a log scale", self.initial, "raise it or set log = false")
         if self.log and self.lower <= 0 and math.isfinite(self.lower):
-            self._fail(
-                "lower", "must be positive on a log scale", self.lower, "raise it, or leave it out for none"
-            )
+            self._fail("lower", "must be positive on a log scale", self.lower, "raise it, or leave it out for none")
         if not self.lower <= initial <= self.upper:
             problem = f"lies outside its bounds [{self.lower:g}, {self.upper:g}]"
             self._fail("initial", problem, self.initial, "start inside the bounds, or widen them")
         if self.factor != 1.0:
-            self._fail(
-                "factor", "belongs to a tie", self.factor, "name the other parameter in tied_to, or drop it"
-            )
+            self._fail("factor", "belongs to a tie", self.factor, "name the other parameter in tied_to, or drop it")
         if self.prior is not None:
             self._check_prior(self.prior)
 
     def _check_prior(self, prior: tuple[float, float]) -> None:
         if self.fixed:
-            self._fail(
-                "prior", "has no effect on a fixed parameter", self.prior, "free it, or drop the prior"
-            )
+            self._fail("prior", "has no effect on a fixed parameter", self.prior, "free it, or drop the prior")
         if len(prior) != 2 or not all(math.isfinite(part) for part in prior):
             self._fail("prior", "must be two finite numbers", self.prior, "give (mean, sd)")
         mean, sd = prior
@@ -120,9 +110,7 @@ class Parameter:
         if math.isfinite(self.lower) or math.isfinite(self.upper):
             self._fail("bounds", problem, (self.lower, self.upper), f"set the bounds of {self.tied_to}")
         if not math.isfinite(self.factor) or self.factor == 0:
-            self._fail(
-                "factor", "must be finite and not zero", self.factor, "give the ratio of the two values"
-            )
+            self._fail("factor", "must be finite and not zero", self.factor, "give the ratio of the two values")
 
     @property
     def free(self) -> bool:
@@ -152,16 +140,12 @@ class Parameters(Mapping[str, Parameter]):
         self._parameters: dict[str, Parameter] = {}
         for parameter in parameters:
             if parameter.name in self._parameters:
-                raise InputError(
-                    "parameters", "hold a name twice", parameter.name, "give each a name of its own"
-                )
+                raise InputError("parameters", "hold a name twice", parameter.name, "give each a name of its own")
             self._parameters[parameter.name] = parameter
         self._roots = {name: self._root(name) for name in self._parameters}
         self.free: tuple[str, ...] = tuple(name for name, parameter in self.items() if parameter.free)
         if not self.free:
-            raise InputError(
-                "parameters", "leave nothing to fit", list(self), "free at least one: fixed = false"
-            )
+            raise InputError("parameters", "leave nothing to fit", list(self), "free at least one: fixed = false")
         self._column = {name: column for column, name in enumerate(self.free)}
 
     def __getitem__(self, name: str) -> Parameter:
@@ -182,18 +166,14 @@ class Parameters(Mapping[str, Parameter]):
         while here.tied_to is not None:
             if here.tied_to not in self._parameters:
                 known = ", ".join(other for other in self if other != here.name) or "none"
-                raise InputError(
-                    f"{here.name}.tied_to", "is no parameter", here.tied_to, f"name one of: {known}"
-                )
+                raise InputError(f"{here.name}.tied_to", "is no parameter", here.tied_to, f"name one of: {known}")
             target = self._parameters[here.tied_to]
             if target.private and not here.private:
                 fix = "set private = true here too"
                 raise InputError(f"{here.name}.tied_to", "has one value per recording", target.name, fix)
             if target.name in path:
                 circle = " -> ".join([*path, target.name])
-                raise InputError(
-                    f"{name}.tied_to", "leads back to itself", circle, "break the circle of ties"
-                )
+                raise InputError(f"{name}.tied_to", "leads back to itself", circle, "break the circle of ties")
             path.append(target.name)
             factor, here = factor * here.factor, target
         return here.name, factor
@@ -231,9 +211,7 @@ class Parameters(Mapping[str, Parameter]):
                     if name not in own:
                         continue
                     initial = own[name]
-                expanded.append(
-                    replace(parameter, name=name, initial=initial, tied_to=target, private=False)
-                )
+                expanded.append(replace(parameter, name=name, initial=initial, tied_to=target, private=False))
         return Parameters(expanded)
 
     def initial(self) -> Array:
@@ -253,9 +231,7 @@ class Parameters(Mapping[str, Parameter]):
             raise InputError("values", "lack free parameters", missing, "give every free parameter a value")
         for name in self.free:
             if self[name].log and not values[name] > 0:
-                raise InputError(
-                    name, "must be positive on a log scale", values[name], "give a positive value"
-                )
+                raise InputError(name, "must be positive on a log scale", values[name], "give a positive value")
         return np.array([self[name].to_internal(values[name]) for name in self.free])
 
     def to_physical(self, internal: Array) -> dict[str, float]:
@@ -304,9 +280,7 @@ class Parameters(Mapping[str, Parameter]):
     def _priors(self) -> list[tuple[int, float, float]]:
         """Column, internal mean and sd of each prior."""
         every = ((column, self[name], self[name].prior) for name, column in self._column.items())
-        return [
-            (column, p.to_internal(prior[0]), prior[1]) for column, p, prior in every if prior is not None
-        ]
+        return [(column, p.to_internal(prior[0]), prior[1]) for column, p, prior in every if prior is not None]
 
     def _start(self, name: str) -> float:
         initial = self[name].initial
@@ -316,7 +290,5 @@ class Parameters(Mapping[str, Parameter]):
     def _vector(self, internal: Array) -> Array:
         vector = np.asarray(internal, dtype=float)
         if vector.shape != (len(self.free),):
-            raise InputError(
-                "internal", "has the wrong shape", vector.shape, f"give shape ({len(self.free)},)"
-            )
+            raise InputError("internal", "has the wrong shape", vector.shape, f"give shape ({len(self.free)},)")
         return vector

@@ -77,7 +77,8 @@ def plot_trajectories(
 
 @dataclass(frozen=True)
 class Motion:
-    """One coordinate of one recording over time: its name, times (frames,) s, measured and simulated (frames,) m, held-out span s."""
+    """One coordinate of one recording over time: its name, times (frames,) s, measured and simulated (frames,) m,
+    held-out span s."""
 
     name: str
     times: Array
@@ -126,9 +127,7 @@ def plot_shapes(
     """
     if not measured or len(measured) != len(simulated):
         got = (len(measured), len(simulated))
-        raise InputError(
-            "measured", "must hold one shape per simulated one, at least one", got, "pair them up"
-        )
+        raise InputError("measured", "must hold one shape per simulated one, at least one", got, "pair them up")
     columns = min(3, len(measured))
     rows = -(-len(measured) // columns)
     width, height = np.ptp(_finite(np.vstack([*measured, *simulated])[:, plane]), axis=0)
@@ -191,9 +190,7 @@ def plot_residuals(
     panel.margins(x=0)
     panel.set_xlabel("time [s]")
     panel.set_ylabel("distance [mm]")
-    _key(
-        panel, [("each marker", GRAY), (f"worst marker: {names[worst]}", WARM), ("all markers, rms", ACCENT)]
-    )
+    _key(panel, [("each marker", GRAY), (f"worst marker: {names[worst]}", WARM), ("all markers, rms", ACCENT)])
     return figure
 
 
@@ -218,9 +215,7 @@ def plot_estimates(
         groups.setdefault(estimate.unit, []).append(estimate)
     sizes = [len(group) for group in groups.values()]
     figure = _figure(7.2, 0.55 + 0.3 * sum(sizes) + 0.55 * len(groups), title or " ")
-    panels = figure.subplots(len(groups), 1, squeeze=False, height_ratios=[size + 0.6 for size in sizes])[
-        :, 0
-    ]
+    panels = figure.subplots(len(groups), 1, squeeze=False, height_ratios=[size + 0.6 for size in sizes])[:, 0]
     for panel, (unit, group) in zip(panels, groups.items(), strict=True):
         _estimates_panel(panel, group, published)
         panel.set_xlabel(f"[{unit or '1'}]", labelpad=2)
@@ -255,14 +250,10 @@ def _estimates_panel(
         face = color if known else "white"
         panel.plot(estimate.value, row, "o", color=color, markersize=5, markerfacecolor=face)
         if not known:
-            panel.text(
-                1.01, row, estimate.verdict, transform=panel.get_yaxis_transform(), va="center", color=GRAY
-            )
+            panel.text(1.01, row, estimate.verdict, transform=panel.get_yaxis_transform(), va="center", color=GRAY)
         if estimate.name in published:
             marks = np.atleast_1d(published[estimate.name])
-            panel.plot(
-                marks, np.full(len(marks), row), "|", color=WARM, markersize=11, markeredgewidth=1.6, zorder=3
-            )
+            panel.plot(marks, np.full(len(marks), row), "|", color=WARM, markersize=11, markeredgewidth=1.6, zorder=3)
             panel.plot(marks, np.full(len(marks), row), color=WARM, linewidth=0.8, zorder=3)
     panel.set_yticks(range(len(group)), [estimate.name for estimate in group])
     panel.tick_params(axis="y", length=0)
@@ -275,9 +266,7 @@ def _padded(low: float, high: float) -> tuple[float, float]:
 
 
 def _figure(width: float, height: float, title: str) -> Figure:
-    figure: Figure = require("matplotlib.figure", "plot").Figure(
-        figsize=(width, height), layout="constrained"
-    )
+    figure: Figure = require("matplotlib.figure", "plot").Figure(figsize=(width, height), layout="constrained")
     require("matplotlib.backends.backend_agg", "plot").FigureCanvasAgg(figure)
     if title:
         figure.suptitle(title, fontsize=11, color=INK, x=0.01, ha="left", weight="bold")
@@ -316,9 +305,7 @@ def _key(parent: Axes | Figure, entries: Sequence[tuple[str, str]]) -> None:
     coordinates, corner = ("axes fraction", (1, 0)) if inside else ("figure fraction", (1, 1))
     offset = {"xybox": (0, 4 if inside else -4), "boxcoords": "offset points"}
     parent.add_artist(
-        boxes.AnnotationBbox(
-            row, (1, 1), box_alignment=corner, xycoords=coordinates, frameon=False, pad=0, **offset
-        )
+        boxes.AnnotationBbox(row, (1, 1), box_alignment=corner, xycoords=coordinates, frameon=False, pad=0, **offset)
     )
 
 

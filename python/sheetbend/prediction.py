@@ -26,7 +26,8 @@ class Comparison:
         recording: the measured part, compared markers only.
         simulated: (frames, markers, 3) m.
         held_out: (frames,) which frames the fit did not see.
-        baseline: (frames, markers, 3) of the no-physics prediction on the held-out frames, NaN elsewhere; None without one.
+        baseline: (frames, markers, 3) of the no-physics prediction on the held-out frames, NaN elsewhere; None without
+            one.
         baseline_words: what that prediction is.
     """
 
@@ -37,7 +38,9 @@ class Comparison:
     baseline: np.ndarray | None = None
     baseline_words: str = ""
 
-    def rms(self, frames: np.ndarray, predicted: np.ndarray | None = None, scored: np.ndarray | None = None) -> float | None:
+    def rms(
+        self, frames: np.ndarray, predicted: np.ndarray | None = None, scored: np.ndarray | None = None
+    ) -> float | None:
         """Root mean square distance [m] over seen markers in some frames, along the experiment's axes."""
         axes = ["xyz".index(a) for a in self.experiment.axes]
         predicted = self.simulated if predicted is None else predicted
@@ -46,14 +49,16 @@ class Comparison:
         return float(np.sqrt(d2[seen].mean())) if seen.any() else None
 
     def motion(self) -> float | None:
-        """Root mean square distance [m] of the held-out measured markers from their mean there: what a prediction has to explain."""
+        """Root mean square distance [m] of the held-out measured markers from their mean there: what a prediction has
+        to explain."""
         positions = self.recording.positions[self.held_out]
         seen = ~np.isnan(positions)
         mean = np.where(seen, positions, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
         return self.rms(self.held_out, np.broadcast_to(mean, self.recording.positions.shape))
 
     def frequencies(self) -> tuple[float | None, float | None]:
-        """First frequency [Hz] of the held-out part, measured and simulated, along the direction in which the measured markers move most."""
+        """First frequency [Hz] of the held-out part, measured and simulated, along the direction in which the measured
+        markers move most."""
         axes = ["xyz".index(a) for a in self.experiment.axes]
         times = self.recording.times[self.held_out]
         measured, simulated = (x[self.held_out][..., axes] for x in (self.recording.positions, self.simulated))
@@ -83,7 +88,9 @@ class Comparison:
         )
 
 
-def compare(experiments: Sequence[Experiment], parameters: Parameters, values: Mapping[str, float], threads: int = 1) -> list[Comparison]:
+def compare(
+    experiments: Sequence[Experiment], parameters: Parameters, values: Mapping[str, float], threads: int = 1
+) -> list[Comparison]:
     """Simulate each experiment once over its fitted and held-out parts at the fitted values.
 
     Args:
@@ -109,14 +116,17 @@ def _whole(e: Experiment) -> tuple[Recording, np.ndarray]:
     times = np.concatenate([fitted.times, held.times])
     order = np.argsort(times, kind="stable")
     if (np.diff(times[order]) <= 0).any():
-        raise RecordingError(f"{e.name}.held_out", "overlaps the fitted part", e.held_out, "hold out frames that the fit does not see")
+        raise RecordingError(
+            f"{e.name}.held_out", "overlaps the fitted part", e.held_out, "hold out frames that the fit does not see"
+        )
     positions = np.concatenate([fitted.positions, held.positions])[order]
     flags = np.concatenate([np.zeros(len(fitted.times), bool), np.ones(len(held.times), bool)])[order]
     return replace(fitted, positions=positions, times=times[order]), flags
 
 
 def _with_baseline(c: Comparison, experiments: Sequence[Experiment]) -> Comparison:
-    """The no-physics prediction: from the recording's own fitted part, or for a whole recording from the fitted ones with its markers."""
+    """The no-physics prediction: from the recording's own fitted part, or for a whole recording from the fitted ones
+    with its markers."""
     e, held = c.experiment, c.held_out
     if not held.any():
         return c
@@ -136,4 +146,8 @@ def _with_baseline(c: Comparison, experiments: Sequence[Experiment]) -> Comparis
 
 def _alike(one: Experiment, other: Experiment) -> bool:
     """Whether two recordings show the same thing, so that one predicts the other without physics."""
-    return one.names == other.names and one.static == other.static and set(one.scene.quantities) == set(other.scene.quantities)
+    return (
+        one.names == other.names
+        and one.static == other.static
+        and set(one.scene.quantities) == set(other.scene.quantities)
+    )

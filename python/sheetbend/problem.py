@@ -27,7 +27,9 @@ def quantities_of(experiments: Sequence[Experiment]) -> dict[str, Quantity]:
     return found
 
 
-def as_parameters(wanted: Mapping[str, ParameterLike] | Iterable[str | Parameter], experiments: Sequence[Experiment]) -> Parameters:
+def as_parameters(
+    wanted: Mapping[str, ParameterLike] | Iterable[str | Parameter], experiments: Sequence[Experiment]
+) -> Parameters:
     """Complete what a user wrote: initial value, unit, log scale and natural scale come from the scenes' quantities.
 
     Args:
@@ -37,7 +39,11 @@ def as_parameters(wanted: Mapping[str, ParameterLike] | Iterable[str | Parameter
         InputError: a name that no scene has; the message lists the known ones.
     """
     known = quantities_of(experiments)
-    items = wanted.items() if isinstance(wanted, Mapping) else [(p.name, p) if isinstance(p, Parameter) else (p, None) for p in wanted]
+    items = (
+        wanted.items()
+        if isinstance(wanted, Mapping)
+        else [(p.name, p) if isinstance(p, Parameter) else (p, None) for p in wanted]
+    )
     complete = []
     for name, given in items:
         if name not in known:
@@ -48,7 +54,12 @@ def as_parameters(wanted: Mapping[str, ParameterLike] | Iterable[str | Parameter
         fields: dict[str, Any] = dict(given or {})
         unknown = set(fields) - set(Parameter.__dataclass_fields__)
         if unknown:
-            raise InputError(f"parameters.{name}", "has unknown fields", sorted(unknown), f"use: {', '.join(Parameter.__dataclass_fields__)}")
+            raise InputError(
+                f"parameters.{name}",
+                "has unknown fields",
+                sorted(unknown),
+                f"use: {', '.join(Parameter.__dataclass_fields__)}",
+            )
         q = known[name]
         if "tied_to" not in fields and not fields.get("private"):
             fields.setdefault("initial", q.value)
@@ -99,16 +110,26 @@ class FitProblem:
         return FitProblem(self.experiments, self.given, self.recordings, self.threads, held)
 
     def around(self, name: str) -> FitProblem:
-        """The part that one free (expanded) parameter is tied to, through shared parameters; the rest of the minimum does not depend on it."""
+        """The part that one free (expanded) parameter is tied to, through shared parameters; the rest of the minimum
+        does not depend on it."""
         free = set(self.parameters.free)
-        free_of = [{self.parameters.roots[key][0] for key in self._keys(e).values() if key in self.parameters} & free for e in self.experiments]
+        free_of = [
+            {self.parameters.roots[key][0] for key in self._keys(e).values() if key in self.parameters} & free
+            for e in self.experiments
+        ]
         names: set[str] = {name}
         chosen: list[int] = []
         while (reached := [i for i, mine in enumerate(free_of) if mine & names]) != chosen:
             chosen = reached
             names |= set().union(*(free_of[i] for i in chosen))
-        part = Parameters(p for key, p in self.parameters.items() if self.parameters.roots[key][0] in names | (set(self.parameters) - free))
-        return FitProblem([self.experiments[i] for i in chosen], self.given, [self.recordings[i] for i in chosen], self.threads, part)
+        part = Parameters(
+            p
+            for key, p in self.parameters.items()
+            if self.parameters.roots[key][0] in names | (set(self.parameters) - free)
+        )
+        return FitProblem(
+            [self.experiments[i] for i in chosen], self.given, [self.recordings[i] for i in chosen], self.threads, part
+        )
 
     def _keys(self, e: Experiment) -> dict[str, str]:
         """Expanded parameter name of each quantity of an experiment, whether or not it is a parameter."""
@@ -123,7 +144,7 @@ class FitProblem:
 
     def _slots(self) -> tuple[list[float], list[list[int]], dict[str, int]]:
         """theta, per experiment the place of each of its quantities in it, and the place of each expanded parameter."""
-        values = {name: p for name, p in self.parameters.items()}
+        values = dict(self.parameters)
         theta: list[float] = []
         slot_of: dict[str, int] = {}
         slots = []
@@ -149,11 +170,20 @@ class FitProblem:
             p = self.parameters[name]
             tied = [(slot_of[other], factor) for other, (root, factor) in chain.items() if root == name]
             prior = None if p.prior is None else (p.to_internal(p.prior[0]), p.prior[1])
-            lists.append({"name": name, "log": p.log, "slots": [s for s, _ in tied], "factors": [f for _, f in tied], "prior": prior})
+            lists.append(
+                {
+                    "name": name,
+                    "log": p.log,
+                    "slots": [s for s, _ in tied],
+                    "factors": [f for _, f in tied],
+                    "prior": prior,
+                }
+            )
         return lists
 
     def evaluate(self, u: np.ndarray, jacobian: bool = True) -> tuple[bool, np.ndarray, np.ndarray]:
-        """(ok, residuals (rows,), Jacobian (rows, free)); rows of data first, then priors. Not ok where the physics has no answer."""
+        """(ok, residuals (rows,), Jacobian (rows, free)); rows of data first, then priors. Not ok where the physics
+        has no answer."""
         return self.core.evaluate(u, jacobian)
 
     def simulate(self, u: np.ndarray) -> list[np.ndarray]:

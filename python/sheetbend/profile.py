@@ -44,9 +44,7 @@ def profile_interval(
         2^14 steps (on a log scale: a factor of a million).
     """
     if not (rise > 0 and step > 0):
-        raise InputError(
-            "profile_interval", "needs a positive rise and step", (rise, step), "give both above 0"
-        )
+        raise InputError("profile_interval", "needs a positive rise and step", (rise, step), "give both above 0")
     here = Parameter(name="profile", initial=value, lower=lower, upper=upper, log=log)
     start, best = here.to_internal(value), profile(value)
 

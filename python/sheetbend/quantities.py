@@ -1,7 +1,9 @@
 """Named physical quantities of a scene and how the solver's inputs are made of them.
 
-An input (a compliance, a mass, a rest length, a coordinate) is a sum of terms, each a coefficient times a product of simple functions of
-named quantities: a link's compliance is `length/segments * 1/EA`. The map and its derivative are compiled (adjoint/parameter_map.h).
+An input (a compliance, a mass, a rest length, a coordinate) is a sum of terms, each a coefficient times a product of
+simple functions of
+named quantities: a link's compliance is `length/segments * 1/EA`. The map and its derivative are compiled
+(adjoint/parameter_map.h).
 """
 
 from __future__ import annotations

@@ -190,9 +190,7 @@ class Recording:
         if kind not in timeseries.KINDS:
             raise RecordingError("kind", "is unknown", kind, f"use one of {', '.join(timeseries.KINDS)}")
         gap = self._max_gap(max_gap)
-        return self._derive(
-            positions=timeseries.interpolate(self.times, self.positions, at, kind, gap), times=at
-        )
+        return self._derive(positions=timeseries.interpolate(self.times, self.positions, at, kind, gap), times=at)
 
     def shifted(self, t0: float) -> Recording:
         """The same recording on a clock whose zero is the old time t0 (s): times - t0."""

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 CORRELATION_SHOWN = 0.3
 """Smallest correlation (absolute value) that the report lists."""
+CORRELATIONS_SHOWN = 15
+"""Number of correlations that the report lists at most; fit.json has them all."""
 
 _SAME_MINIMUM = 0.01  # starts that end within 1 % of the best cost found the same minimum
 _COLORS = {
@@ -115,9 +117,7 @@ def _estimate_row(estimate: Estimate) -> tuple[str, ...]:
         value, half, lower, upper = ("" if number is None else short(number) for number in numbers)
     else:
         value, half, lower, upper = figures(numbers, estimate.half_width)
-    interval = (
-        "" if estimate.lower is None and estimate.upper is None else f"[{lower or '-'}, {upper or '-'}]"
-    )
+    interval = "" if estimate.lower is None and estimate.upper is None else f"[{lower or '-'}, {upper or '-'}]"
     return (estimate.name, value, half, interval, estimate.unit, estimate.verdict)
 
 
@@ -174,7 +174,10 @@ def _held_out_motion(result: FitResult) -> Section:
     """How much of the motion that the fit did not see is predicted, and its rhythm."""
     rows = [_motion_row(recording) for recording in result.recordings if recording.motion]
     headers = ("recording", "motion rms", "unit", "held-out/motion", "frequency measured", "simulated", "difference")
-    note = "of the measured markers about their mean over the held-out part; frequencies in Hz, from the highest peak there"
+    note = (
+        "of the measured markers about their mean over the held-out part; "
+        "frequencies in Hz, from the highest peak there"
+    )
     return Section("Held-out motion", headers, tuple(rows), (("motion", note),) if rows else ())
 
 
@@ -207,19 +210,19 @@ def _unknown(result: FitResult) -> Section:
 def _correlations(result: FitResult) -> Section:
     strong = [pair for pair in result.correlations if abs(pair.value) >= CORRELATION_SHOWN]
     strong.sort(key=lambda pair: -abs(pair.value))
-    rows = tuple((pair.first, pair.second, f"{pair.value:+.2f}") for pair in strong)
-    title = f"Correlations (those below {CORRELATION_SHOWN:g} are left out)"
-    return Section(title, ("parameter", "with", "correlation"), rows)
+    rows = tuple((pair.first, pair.second, f"{pair.value:+.2f}") for pair in strong[:CORRELATIONS_SHOWN])
+    left_out = f"those below {CORRELATION_SHOWN:g} are left out"
+    if len(strong) > len(rows):
+        left_out = f"the {len(rows)} strongest of {len(strong)} above {CORRELATION_SHOWN:g}"
+    return Section(f"Correlations ({left_out})", ("parameter", "with", "correlation"), rows)
 
 
 def _course(result: FitResult) -> Section:
-    notes = [
-        ("cost", f"{result.cost:.6g} over {result.rows:,} residuals, {len(result.estimates)} free parameters")
-    ]
+    notes = [("cost", f"{result.cost:.6g} over {result.rows:,} residuals, {len(result.estimates)} free parameters")]
     if result.autocorrelation_time > 1.05:
         time = result.autocorrelation_time
-        words = f"one frame in {time:.3g} counts as independent; the intervals allow for it"
-        notes.append(("residuals are alike from frame to frame", words))
+        words = f"one in {time:.3g} counts as independent; the intervals allow for it"
+        notes.append(("neighboring residuals are alike", words))
     if len(result.starts) > 1:
         best = min(start.cost for start in result.starts)
         same = sum(start.cost <= best * (1 + _SAME_MINIMUM) for start in result.starts)
@@ -267,9 +270,7 @@ def _notes(notes: Iterable[tuple[str, str]], width: int) -> list[str]:
 
 def _rich_table(section: Section) -> object:
     box = require("rich.box", "cli")
-    table = require("rich.table", "cli").Table(
-        box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, header_style="dim"
-    )
+    table = require("rich.table", "cli").Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, header_style="dim")
     text = require("rich.text", "cli").Text
     for header, flush in zip(section.headers, _flush_left(section), strict=True):
         table.add_column(header, justify="left" if flush else "right", no_wrap=header != "verdict")

@@ -18,8 +18,8 @@ FORMAT = "sheetbend fit 1"
 
 VERDICTS = ("identified", "weak", "one-sided", "at a bound", "at its floor", "not identifiable")
 """identified: 95 % half-width at most 20 % of the value; weak: above; one-sided: bounded from one side only;
-at a bound: of the user; at its floor: the solver's own stiffness or damping; not identifiable: gauge or
-flat."""
+at a bound: of the user; at its floor: the solver's own stiffness or damping; not
+identifiable: gauge or flat."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,9 +49,7 @@ class Estimate:
 
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:
-            raise InputError(
-                f"{self.name}.verdict", "is unknown", self.verdict, f"use one of: {', '.join(VERDICTS)}"
-            )
+            raise InputError(f"{self.name}.verdict", "is unknown", self.verdict, f"use one of: {', '.join(VERDICTS)}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,7 +81,8 @@ class RecordingFit:
         held_out: over the part that the fit did not see; None when there is none.
         baseline: over the same part, of a prediction without physics.
         motion: over the same part, of the measured markers about their mean; None for an equilibrium.
-        measured_frequency, simulated_frequency: first frequency there, Hz; None where the part shows fewer than three periods.
+        measured_frequency, simulated_frequency: first frequency there, Hz; None where the part shows fewer than three
+            periods.
     """
 
     name: str
@@ -198,9 +197,7 @@ class FitResult:
         for name, kind in nested.items():
             values[name] = tuple(kind(**part) for part in data[name])
         values["estimates"] = tuple(_estimate(name, part) for name, part in data["parameters"].items())
-        values["recordings"] = tuple(
-            RecordingFit(name=name, **part) for name, part in data["recordings"].items()
-        )
+        values["recordings"] = tuple(RecordingFit(name=name, **part) for name, part in data["recordings"].items())
         values["gauges"], values["warnings"] = tuple(data["gauges"]), tuple(data["warnings"])
         return cls(baseline=data["baseline_is"], **values)
 

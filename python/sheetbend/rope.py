@@ -1,4 +1,5 @@
-"""Ropes: chains of particles with axial and bending stiffness, given and fitted by physical parameters that do not depend on the mesh."""
+"""Ropes: chains of particles with axial and bending stiffness, given and fitted by physical parameters that do not
+depend on the mesh."""
 
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ GHOST = 0.01  # length of a clamp's ghost link over a rope's link; only its dire
 
 @dataclass(frozen=True)
 class Rope:
-    """A rope in a scene: its particles in order and their material coordinates [m]. Ghosts are the clamps' direction particles."""
+    """A rope in a scene: its particles in order and their material coordinates [m]. Ghosts give clamps their direction."""
 
     name: str
     particles: Array
@@ -77,9 +78,9 @@ def add_rope(
 ) -> Rope:
     """Add a rope of `segments` equal links to a scene.
 
-    Quantities: `<name>_length` m, `<name>_density` kg/m, and where given `_EA` N, `_EI` N m^2, `_stretch_damping` s, `_bend_damping` s,
-    `_loss_factor`, `_loss_frequency` Hz, `_drag_linear` N s/m^2, `_drag_quadratic` N s^2/m^3, `_start_angle` and `_end_angle` rad,
-    `_set_<k>` 1/m.
+    Quantities: `<name>_length` m, `<name>_density` kg/m, and where given `_EA` N, `_EI` N m^2, `_stretch_damping` s,
+    `_bend_damping` s, `_loss_factor`, `_loss_frequency` Hz, `_drag_linear` N s/m^2, `_drag_quadratic` N s^2/m^3,
+    `_start_angle` and `_end_angle` rad, `_set_<k>` 1/m.
 
     Args:
         length: m; the length of `points` by default.
@@ -88,11 +89,14 @@ def add_rope(
         EI: bending stiffness N m^2; None = no bending.
         start, direction: a straight initial shape.
         points: (k, 3) m, an initial shape instead, resampled to equal links.
-        stretch_damping, bend_damping: Kelvin-Voigt time constants s: the damping moment is EI times the constant times the rate of curvature.
-        loss_factor: energy lost per radian of vibration over the energy stored, in stretching and bending alike, at loss_frequency (Hz);
-            instead of the two time constants: tau = loss_factor / (2 pi loss_frequency). In rubbers it varies less with frequency than tau.
+        stretch_damping, bend_damping: Kelvin-Voigt time constants s: the damping moment is EI times the constant times
+            the rate of curvature.
+        loss_factor: energy lost per radian of vibration over the energy stored, in stretching and bending alike, at
+            loss_frequency (Hz); instead of the two time constants: tau = loss_factor / (2 pi loss_frequency). In
+            rubbers it varies less with frequency than tau.
         drag_linear, drag_quadratic: air drag per length, isotropic.
-        clamp_start, clamp_end: the rope's direction of travel at an end, held by a ghost particle half a joint away; the end is pinned.
+        clamp_start, clamp_end: the rope's direction of travel at an end, held by a ghost particle half a joint away;
+            the end is pinned.
         clamp_angles: add `_start_angle` / `_end_angle`, rotations of the clamps about `plane`.
         plane: unit normal of the plane that the rope stays in; needed by clamp_angles and set_modes.
         set_modes: k of rest-curvature modes cos(k pi s / length) about `plane`; each amplitude starts at zero.
@@ -104,7 +108,13 @@ def add_rope(
         SceneError: wrong or missing values; the message names the field.
     """
     shape, length = _shape(name, length, segments, start, direction, points)
-    for field, value in (("density", density), ("EA", EA), ("EI", EI), ("stretch_damping", stretch_damping), ("bend_damping", bend_damping)):
+    for field, value in (
+        ("density", density),
+        ("EA", EA),
+        ("EI", EI),
+        ("stretch_damping", stretch_damping),
+        ("bend_damping", bend_damping),
+    ):
         if value is not None and not value > 0:
             raise SceneError(f"{name}.{field}", "must be positive", value, "give a positive number, or leave it out")
     if stretch_damping is not None and EA is None:
@@ -113,7 +123,9 @@ def add_rope(
         raise SceneError(f"{name}.bend_damping", "needs EI", EI, "give EI, or leave it out")
     normal = None if plane is None else _unit(f"{name}.plane", plane)
     if normal is None and (clamp_angles or len(set_modes)):
-        raise SceneError(f"{name}.plane", "is missing", None, "give the unit normal that the clamp angles or the set turn about")
+        raise SceneError(
+            f"{name}.plane", "is missing", None, "give the unit normal that the clamp angles or the set turn about"
+        )
     if any(k != int(k) or k < 0 for k in set_modes):
         raise SceneError(f"{name}.set_modes", "must be whole numbers from 0 on", set_modes, "give such as (0, 1)")
     if len(set_modes) and EI is None:
@@ -150,7 +162,9 @@ def resample(polyline: ArrayLike, segments: int) -> Array:
     return np.stack([np.interp(wanted, s, line[:, k]) for k in range(3)], axis=1)
 
 
-def _shape(name: str, length: float | None, segments: int, start: ArrayLike, direction: ArrayLike, given: ArrayLike | None) -> tuple[Array, float]:
+def _shape(
+    name: str, length: float | None, segments: int, start: ArrayLike, direction: ArrayLike, given: ArrayLike | None
+) -> tuple[Array, float]:
     if not isinstance(segments, int | np.integer) or segments < 1:
         raise SceneError(f"{name}.segments", "must be a positive whole number", segments, "give at least 1")
     if length is not None and not (np.isfinite(length) and length > 0):
@@ -210,7 +224,9 @@ def _time_constants(
     if factor is None or not factor > 0:
         raise SceneError(f"{name}.loss_factor", "must be positive", factor, "give it together with loss_frequency")
     if frequency is None or not frequency > 0:
-        raise SceneError(f"{name}.loss_frequency", "must be positive", frequency, "give the frequency of the motion in Hz")
+        raise SceneError(
+            f"{name}.loss_frequency", "must be positive", frequency, "give the frequency of the motion in Hz"
+        )
     if stretch is not None or bend is not None:
         fix = "leave out stretch_damping and bend_damping, or it"
         raise SceneError(f"{name}.loss_factor", "stands beside a time constant", factor, fix)
@@ -221,11 +237,20 @@ def _time_constants(
     return (None if EA is None else tau), (None if EI is None else tau)
 
 
-def _stretch(scene: Scene, name: str, nodes: Array, link: float, EA: float | None, damping: TimeConstant | None) -> None:
+def _stretch(
+    scene: Scene, name: str, nodes: Array, link: float, EA: float | None, damping: TimeConstant | None
+) -> None:
     segments = len(nodes) - 1
     group = f"{name}_stretch"
     pairs = np.stack([nodes[:-1], nodes[1:]], axis=1)
-    scene.add_constraints("distance", pairs, name=group, rest=link, compliance=np.zeros(segments), damping=None if damping is None else np.zeros(segments))
+    scene.add_constraints(
+        "distance",
+        pairs,
+        name=group,
+        rest=link,
+        compliance=np.zeros(segments),
+        damping=None if damping is None else np.zeros(segments),
+    )
     _, first, _ = scene.group(group)
     offset = _first_value(scene, group)
     scene.groups[-1].rest[:] = 0.0
@@ -233,7 +258,10 @@ def _stretch(scene: Scene, name: str, nodes: Array, link: float, EA: float | Non
     terms = [product("rest", offset + i, 1.0 / segments, {length: "identity"}) for i in range(segments)]
     if EA is not None:
         scene.add_quantity(f"{name}_EA", EA, "N")
-        terms += [product("compliance", first + i, 1.0 / segments, {length: "identity", f"{name}_EA": "inverse"}) for i in range(segments)]
+        terms += [
+            product("compliance", first + i, 1.0 / segments, {length: "identity", f"{name}_EA": "inverse"})
+            for i in range(segments)
+        ]
     if damping is not None:
         scale, tau = damping
         factors = {**tau, f"{name}_EA": "identity", length: "inverse"}
@@ -241,7 +269,16 @@ def _stretch(scene: Scene, name: str, nodes: Array, link: float, EA: float | Non
     scene.add_terms(terms)
 
 
-def _clamp(scene: Scene, name: str, end: str, clamp: ArrayLike | None, nodes: Array, shape: Array, link: float, normal: Array | None) -> int | None:
+def _clamp(
+    scene: Scene,
+    name: str,
+    end: str,
+    clamp: ArrayLike | None,
+    nodes: Array,
+    shape: Array,
+    link: float,
+    normal: Array | None,
+) -> int | None:
     """Pin an end and hold its direction of travel by a ghost particle behind the start or beyond the end."""
     if clamp is None:
         return None
@@ -273,7 +310,8 @@ def _bending(
     normal: Array | None,
     set_modes: Sequence[int],
 ) -> None:
-    """Joints at the inner nodes and at clamped ends; alpha = Voronoi length / EI. A clamped end counts the rope's own half link."""
+    """Joints at the inner nodes and at clamped ends; alpha = Voronoi length / EI. A clamped end counts the rope's own
+    half link."""
     chain = [*([] if ghosts[0] is None else [ghosts[0]]), *nodes, *([] if ghosts[1] is None else [ghosts[1]])]
     share = _voronoi(len(nodes) - 1)
     at = list(range(1, len(nodes) - 1))
@@ -295,7 +333,8 @@ def _bending(
     _, first, _ = scene.group(group)
     stiffness = scene.add_quantity(f"{name}_EI", EI, "N m^2")
     terms: list[Term] = [
-        product("compliance", first + i, share[node], {length: "identity", stiffness: "inverse"}) for i, node in enumerate(at)
+        product("compliance", first + i, share[node], {length: "identity", stiffness: "inverse"})
+        for i, node in enumerate(at)
     ]
     if damping is not None:
         scale, tau = damping
@@ -305,7 +344,12 @@ def _bending(
     for k in set_modes:
         mode = scene.add_quantity(f"{name}_set_{k}", 0.0, "1/m", positive=False, scale=1.0 / arc[-1])
         terms += [
-            product("rest", offset + 4 * i + 3, share[node] * np.cos(k * np.pi * arc[node] / arc[-1]), {length: "identity", mode: "identity"})
+            product(
+                "rest",
+                offset + 4 * i + 3,
+                share[node] * np.cos(k * np.pi * arc[node] / arc[-1]),
+                {length: "identity", mode: "identity"},
+            )
             for i, node in enumerate(at)
         ]
     scene.add_terms(terms)
@@ -318,7 +362,9 @@ def _drag(scene: Scene, name: str, nodes: Array, segments: int, linear: float | 
         scene.has_drag = True
         quantity = scene.add_quantity(f"{name}_drag_{kind}", value, unit, positive=value > 0)
         factors = {quantity: "identity", f"{name}_length": "identity"}
-        scene.add_terms([product(f"drag_{kind}", n, share, factors) for n, share in zip(nodes, _voronoi(segments), strict=True)])
+        scene.add_terms(
+            [product(f"drag_{kind}", n, share, factors) for n, share in zip(nodes, _voronoi(segments), strict=True)]
+        )
 
 
 def _first_value(scene: Scene, group: str) -> int:

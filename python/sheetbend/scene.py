@@ -19,13 +19,15 @@ from .quantities import Quantity, Term, product
 Array = np.ndarray
 KINDS: Mapping[str, Mapping[str, Any]] = _core.constraint_kinds()
 NEEDS_COMPLIANCE = ("bend", "planar_bend")
-# A damping-only element keeps the product of compliance and damping while the compliance grows: what is left of its stiffness.
+# A damping-only element keeps the product of compliance and damping while the compliance grows: what is left of its
+# stiffness.
 VISCOUS_COMPLIANCE = 1e12
 
 
 @dataclass(frozen=True)
 class Group:
-    """A named set of constraints of one kind: particles (count, arity), base compliance and damping (count,), rest (count, parameters)."""
+    """A named set of constraints of one kind: particles (count, arity), base compliance and damping (count,), rest
+    (count, parameters)."""
 
     name: str
     kind: str
@@ -39,8 +41,8 @@ class Group:
 class Scene:
     """A scene under construction; `freeze()` (done by the first simulation) ends the construction.
 
-    Every number enters either as a plain value or as a named quantity (`<group>_<quantity>`), by which gradients, fits and reports know
-    it. SI units, z up.
+    Every number enters either as a plain value or as a named quantity (`<group>_<quantity>`), by which gradients, fits
+    and reports know it. SI units, z up.
     """
 
     def __init__(self, name: str = "scene", gravity: ArrayLike = (0.0, 0.0, -9.81)) -> None:
@@ -83,7 +85,9 @@ class Scene:
         x = points("positions", positions)
         m = per_item("mass", mass, len(x))
         if (m < 0).any():
-            raise SceneError("mass", "must not be negative", float(m.min()), "give kg; pin a particle to make it immovable")
+            raise SceneError(
+                "mass", "must not be negative", float(m.min()), "give kg; pin a particle to make it immovable"
+            )
         v = np.zeros_like(x) if velocity is None else finite("velocity", velocity, x.shape, SceneError)
         first = self.particle_count
         self._positions += list(x)
@@ -117,7 +121,12 @@ class Scene:
         if interpolation not in ("cubic", "linear"):
             raise SceneError("drive.interpolation", "is unknown", interpolation, "use 'cubic' or 'linear'")
         if self.driven and (t.shape != self.boundary_times.shape or (t != self.boundary_times).any()):
-            raise SceneError("drive.times", "differ from those of particles driven before", len(t), "resample all motions to one set of knots")
+            raise SceneError(
+                "drive.times",
+                "differ from those of particles driven before",
+                len(t),
+                "resample all motions to one set of knots",
+            )
         twice = set(which) & set(self.driven)
         if twice:
             raise SceneError("drive.particles", "are driven already", sorted(twice), "drive each particle once")
@@ -126,7 +135,8 @@ class Scene:
         self._boundary += [x[:, k] for k in range(len(which))]
 
     def add_force(self, particles: ArrayLike, forces: ArrayLike, times: ArrayLike = (0.0,)) -> None:
-        """Let forces act on particles: (knots, k, 3) N at `times` (knots,), linear between and constant outside the knots.
+        """Let forces act on particles: (knots, k, 3) N at `times` (knots,), linear between and constant outside the
+        knots.
 
         Raises:
             SceneError: shapes, NaN, or other knots than an earlier call's.
@@ -134,14 +144,22 @@ class Scene:
         self._building()
         which = indices("add_force.particles", particles, self.particle_count)
         t = finite("add_force.times", times, None, SceneError).ravel()
-        f = finite("add_force.forces", np.broadcast_to(forces, (len(t), len(which), 3)), (len(t), len(which), 3), SceneError)
+        f = finite(
+            "add_force.forces", np.broadcast_to(forces, (len(t), len(which), 3)), (len(t), len(which), 3), SceneError
+        )
         if len(t) == 0 or (np.diff(t) <= 0).any():
-            raise SceneError("add_force.times", "must increase", t[:5].tolist(), "sort the knots and drop repeated ones")
+            raise SceneError(
+                "add_force.times", "must increase", t[:5].tolist(), "sort the knots and drop repeated ones"
+            )
         if self.loaded and (t.shape != self.force_times.shape or (t != self.force_times).any()):
-            raise SceneError("add_force.times", "differ from those of forces added before", len(t), "use one set of knots")
+            raise SceneError(
+                "add_force.times", "differ from those of forces added before", len(t), "use one set of knots"
+            )
         twice = set(which) & set(self.loaded)
         if twice:
-            raise SceneError("add_force.particles", "are loaded already", sorted(twice), "sum the forces and add them once")
+            raise SceneError(
+                "add_force.particles", "are loaded already", sorted(twice), "sum the forces and add them once"
+            )
         self.force_times = t
         self.loaded += which
         self._forces += [f[:, k] for k in range(len(which))]
@@ -160,21 +178,25 @@ class Scene:
     ) -> str:
         """Add a group of constraints of one kind and return its name.
 
-        A single compliance or damping becomes the quantity `<name>_compliance` or `<name>_damping`; arrays stay per constraint (their
-        gradients are in the input arrays).
+        A single compliance or damping becomes the quantity `<name>_compliance` or `<name>_damping`; arrays stay per
+        constraint (their gradients are in the input arrays).
 
         Args:
             kind: "distance", "bend", "planar_bend", "hinge" or "attachment" (sheetbend.KINDS).
             particles: (count, arity) indices.
             name: of the group; the kind by default.
-            compliance: 0 = rigid; distance, attachment m/N; bend, planar_bend 1/(N m) (Voronoi length / EI); hinge rad/(N m).
+            compliance: 0 = rigid; distance, attachment m/N; bend, planar_bend 1/(N m) (Voronoi length / EI); hinge
+                rad/(N m).
             damping: beta of the Rayleigh dissipation (Macklin et al. 2016, eq. 26): force per rate of C.
-            viscosity: the element resists the rate of C only: distance N s/m, hinge N m s/rad; excludes compliance and damping.
-            rest: (count,) rest length m (the initial length by default), planar rest (natural curvature times Voronoi length), angle rad.
+            viscosity: the element resists the rate of C only: distance N s/m, hinge N m s/rad; excludes compliance and
+                damping.
+            rest: (count,) rest length m (the initial length by default), planar rest (natural curvature times Voronoi
+                length), angle rad.
             normal: unit plane normal, (3,) or (count, 3), of planar kinds.
 
         Raises:
-            SceneError: unknown kind, wrong shapes, negative or missing values, zero lengths, constraints that nothing can move.
+            SceneError: unknown kind, wrong shapes, negative or missing values, zero lengths, constraints that nothing
+                can move.
         """
         self._building()
         if kind not in KINDS:
@@ -185,12 +207,16 @@ class Scene:
         arity = KINDS[kind]["arity"]
         flat = indices(f"{name}.particles", particles, self.particle_count)
         if np.ndim(particles) != 2 or np.shape(particles)[1] != arity or not flat:
-            raise SceneError(f"{name}.particles", "have the wrong shape", np.shape(particles), f"give (count, {arity}) for {kind}")
+            raise SceneError(
+                f"{name}.particles", "have the wrong shape", np.shape(particles), f"give (count, {arity}) for {kind}"
+            )
         stencil = np.array(flat, dtype=int).reshape(-1, arity)
         count = len(stencil)
         if viscosity is not None:
             if compliance is not None or damping is not None:
-                raise SceneError(f"{name}.viscosity", "excludes compliance and damping", viscosity, "give one or the other")
+                raise SceneError(
+                    f"{name}.viscosity", "excludes compliance and damping", viscosity, "give one or the other"
+                )
             compliance, damping, label = np.full(count, VISCOUS_COMPLIANCE), viscosity, "viscosity"
         else:
             compliance, label = 0.0 if compliance is None else compliance, "damping"
@@ -201,7 +227,9 @@ class Scene:
                 raise SceneError(f"{name}.{field}", "must not be negative", float(values.min()), "give zero or more")
         if kind in NEEDS_COMPLIANCE and not (alpha > 0).all():
             why = "is rigid, and a straight rigid joint has a singular projection (rank 2 of 3)"
-            raise SceneError(f"{name}.compliance", why, float(alpha.min()), "give a positive compliance, Voronoi length / EI")
+            raise SceneError(
+                f"{name}.compliance", why, float(alpha.min()), "give a positive compliance, Voronoi length / EI"
+            )
         values = self._rest_values(name, kind, stencil, rest, normal)
         first = sum(len(g.particles) for g in self.groups)
         self.groups.append(Group(name, kind, stencil, alpha, beta, damping is not None, values))
@@ -211,7 +239,9 @@ class Scene:
             self._scalar(f"{name}_{label}", "damping", first, beta, kind)
         return name
 
-    def add_quantity(self, name: str, value: float, unit: str, positive: bool = True, scale: float | None = None) -> str:
+    def add_quantity(
+        self, name: str, value: float, unit: str, positive: bool = True, scale: float | None = None
+    ) -> str:
         """Declare a named quantity; `add_terms` says what it makes.
 
         Raises:
@@ -246,7 +276,10 @@ class Scene:
     def set_drag(self, linear: ArrayLike | None = None, quadratic: ArrayLike | None = None) -> None:
         """Air drag per particle: linear (n,) N s/m and quadratic (n,) N s^2/m^2, force -(c1 + c2 |v|) v."""
         self._building()
-        for field, values, store in (("linear", linear, self._drag_linear), ("quadratic", quadratic, self._drag_quadratic)):
+        for field, values, store in (
+            ("linear", linear, self._drag_linear),
+            ("quadratic", quadratic, self._drag_quadratic),
+        ):
             if values is None:
                 continue
             c = per_item(f"drag.{field}", values, self.particle_count)
@@ -259,7 +292,8 @@ class Scene:
         """End the construction: validates the whole scene and returns it. Later additions raise.
 
         Raises:
-            SceneError: no particles, nothing can move, massless free particles, or particles that no constraint and no boundary holds.
+            SceneError: no particles, nothing can move, massless free particles, or particles that no constraint and no
+                boundary holds.
         """
         if not self._frozen:
             self._validate()
@@ -328,7 +362,12 @@ class Scene:
 
     def _building(self) -> None:
         if self._frozen:
-            raise SceneError(self.name, "is frozen, it has been simulated or compiled", "frozen", "add everything first, or build a new scene")
+            raise SceneError(
+                self.name,
+                "is frozen, it has been simulated or compiled",
+                "frozen",
+                "add everything first, or build a new scene",
+            )
 
     def _concatenated(self, field: str) -> Array:
         return np.concatenate([np.ravel(getattr(g, field)) for g in self.groups]) if self.groups else np.zeros(0)
@@ -340,27 +379,46 @@ class Scene:
         self.add_terms([product(array, first + i, 1.0, {quantity: "identity"}) for i in range(len(values))])
         values[:] = 0.0
 
-    def _rest_values(self, name: str, kind: str, stencil: Array, rest: ArrayLike | None, normal: ArrayLike | None) -> Array:
+    def _rest_values(
+        self, name: str, kind: str, stencil: Array, rest: ArrayLike | None, normal: ArrayLike | None
+    ) -> Array:
         parameters = KINDS[kind]["parameters"]
         count = len(stencil)
         values = np.zeros((count, len(parameters)))
         if rest is not None and not parameters:
-            why = "has none: a rest curvature in space needs material frames (rods), which are not there yet" if kind == "bend" else "has none"
-            raise SceneError(f"{name}.rest", why, "rest", "use planar_bend with a plane normal" if kind == "bend" else "leave it out")
+            why = (
+                "has none: a rest curvature in space needs material frames (rods), which are not there yet"
+                if kind == "bend"
+                else "has none"
+            )
+            raise SceneError(
+                f"{name}.rest", why, "rest", "use planar_bend with a plane normal" if kind == "bend" else "leave it out"
+            )
         if kind == "distance":
             x = self.positions[stencil]
-            length = np.linalg.norm(x[:, 1] - x[:, 0], axis=1) if rest is None else per_item(f"{name}.rest", rest, count)
+            length = (
+                np.linalg.norm(x[:, 1] - x[:, 0], axis=1) if rest is None else per_item(f"{name}.rest", rest, count)
+            )
             if (length <= 0).any():
                 bad = int(np.argmin(length))
-                raise SceneError(f"{name}.rest", f"length of constraint {bad} is not positive", float(length[bad]), "move the particles apart or give rest")
+                raise SceneError(
+                    f"{name}.rest",
+                    f"length of constraint {bad} is not positive",
+                    float(length[bad]),
+                    "move the particles apart or give rest",
+                )
             values[:, 0] = length
         elif parameters:
             if normal is None:
-                raise SceneError(f"{name}.normal", "is missing", None, "give the unit normal of the plane, such as (0, 1, 0)")
+                raise SceneError(
+                    f"{name}.normal", "is missing", None, "give the unit normal of the plane, such as (0, 1, 0)"
+                )
             n = np.broadcast_to(finite(f"{name}.normal", normal, None, SceneError), (count, 3)).copy()
             size = np.linalg.norm(n, axis=1, keepdims=True)
             if (size == 0).any():
-                raise SceneError(f"{name}.normal", "has no length", n[int(np.argmin(size))].tolist(), "give the normal of the plane")
+                raise SceneError(
+                    f"{name}.normal", "has no length", n[int(np.argmin(size))].tolist(), "give the normal of the plane"
+                )
             values[:, :3] = n / size
             values[:, 3] = 0.0 if rest is None else per_item(f"{name}.rest", rest, count)
         return values
@@ -370,8 +428,15 @@ class Scene:
             raise SceneError(self.name, "has no particles", 0, "add particles or a rope")
         free = self.free
         if len(free) == 0:
-            raise SceneError(self.name, "has nothing that can move: every particle is pinned or driven", self.particle_count, "release at least one")
-        heavy = set(np.nonzero(np.array(self._mass) > 0)[0].tolist()) | {t.index for t in self.terms if t.array == "mass"}
+            raise SceneError(
+                self.name,
+                "has nothing that can move: every particle is pinned or driven",
+                self.particle_count,
+                "release at least one",
+            )
+        heavy = set(np.nonzero(np.array(self._mass) > 0)[0].tolist()) | {
+            t.index for t in self.terms if t.array == "mass"
+        }
         light = [int(i) for i in free if i not in heavy]
         if light:
             raise SceneError("mass", "is zero for free particles", light[:5], "give them a mass, or pin them")
@@ -379,7 +444,9 @@ class Scene:
         if self.groups:
             loose = [int(i) for i in free if i not in used]
             if loose:
-                raise SceneError("particles", "are connected to nothing", loose[:5], "constrain them, pin them or leave them out")
+                raise SceneError(
+                    "particles", "are connected to nothing", loose[:5], "constrain them, pin them or leave them out"
+                )
         held = self.pinned & set(self.driven)
         if held:
             raise SceneError("drive.particles", "are pinned too", sorted(held), "either pin or drive a particle")

@@ -24,8 +24,8 @@ class Trajectory:
         times: (frames,) s.
         positions: (frames, particles, 3) m.
         velocities: (frames, particles, 3) m/s.
-        forces: per group the constraints' multipliers (frames, count, rows) in units of force (distance: minus the tension in N; bend and
-            hinge: minus the moment in N m), zero at the initial frame.
+        forces: per group the constraints' multipliers (frames, count, rows) in units of force (distance: minus the
+            tension in N; bend and hinge: minus the moment in N m), zero at the initial frame.
     """
 
     times: np.ndarray
@@ -80,7 +80,12 @@ def substeps(times: ArrayLike, h: float) -> list[int]:
     steps = np.rint(t / h)
     off = np.abs(t / h - steps) > 1e-6 * np.maximum(steps, 1.0)
     if off.any():
-        raise InputError("times", f"do not lie on the grid of substeps of {h:g} s", float(t[off][0]), "choose h so that it divides the frame interval")
+        raise InputError(
+            "times",
+            f"do not lie on the grid of substeps of {h:g} s",
+            float(t[off][0]),
+            "choose h so that it divides the frame interval",
+        )
     return steps.astype(int).tolist()
 
 

@@ -20,8 +20,8 @@ class Solver:
     Attributes:
         h: substep, s. Constant within a rollout.
         integrator: "bdf2" (second order, the default) or "bdf1" (backward Euler: damps like zeta = omega h/2).
-        method: "direct" (each rope one block, the default) or "gauss_seidel" (colored; unconverged sweeps add about 0.9 h^2/(m sweeps) of
-            compliance per link).
+        method: "direct" (each rope one block, the default) or "gauss_seidel" (colored; unconverged sweeps add about
+            0.9 h^2/(m sweeps) of compliance per link).
         iterations: Newton iterations of a direct block (2 by default) or sweeps (10 by default).
         threads: of one rollout; results do not depend on it.
         grain: constraints per thread below which a color is not split.
@@ -38,7 +38,9 @@ class Solver:
         if not (isinstance(self.h, int | float) and math.isfinite(self.h) and self.h > 0):
             raise InputError("solver.h", "must be a positive time in s", self.h, "give the substep, such as 1/600")
         if self.integrator not in INTEGRATORS:
-            raise InputError("solver.integrator", "is unknown", self.integrator, f"use one of: {', '.join(INTEGRATORS)}")
+            raise InputError(
+                "solver.integrator", "is unknown", self.integrator, f"use one of: {', '.join(INTEGRATORS)}"
+            )
         if self.method not in METHODS:
             raise InputError("solver.method", "is unknown", self.method, f"use one of: {', '.join(METHODS)}")
         for field in ("iterations", "threads", "grain"):

@@ -42,9 +42,7 @@ def quantity(value: float, parameter: Parameter) -> str:
 def floor_words(parameter: Parameter, value: float, ceiling: bool, reason: str) -> str:
     """Of a parameter at or beyond what the solver makes up."""
     side = "above" if ceiling else "below"
-    return (
-        f"at or {side} {quantity(value, parameter)}, the solver's own ({reason}): no property of the material"
-    )
+    return f"at or {side} {quantity(value, parameter)}, the solver's own ({reason}): no property of the material"
 
 
 def side_words(parameter: Parameter, lower: float | None, upper: float | None) -> str:

@@ -50,8 +50,10 @@ TEST(Equilibrium, CantileverWithTipLoadIsTheElastica) {
       rope.of(Quantity::force)[5] = -0.01 * c.a;
       const Equilibrium e = rope.solve();
       ASSERT_TRUE(e.converged) << e.message;
-      EXPECT_NEAR(-rope.point(e, links).z, c.drop, links == 40 ? 3e-3 : 3e-4) << "a = " << c.a << ", " << links << " links";
-      EXPECT_NEAR(1.0 - rope.point(e, links).x, c.shortening, links == 40 ? 3e-3 : 3e-4) << "a = " << c.a << ", " << links << " links";
+      EXPECT_NEAR(-rope.point(e, links).z, c.drop, links == 40 ? 3e-3 : 3e-4)
+          << "a = " << c.a << ", " << links << " links";
+      EXPECT_NEAR(1.0 - rope.point(e, links).x, c.shortening, links == 40 ? 3e-3 : 3e-4)
+          << "a = " << c.a << ", " << links << " links";
       EXPECT_EQ(e.unstable_modes, 0);
     }
 }
@@ -66,8 +68,10 @@ TEST(Equilibrium, HeavyCantileverIsTheElastica) {
       Rope rope = make_cantilever(links, 0.05 * g / c.gamma, 0.05);
       const Equilibrium e = rope.solve();
       ASSERT_TRUE(e.converged) << e.message;
-      EXPECT_NEAR(-rope.point(e, links).z, c.drop, links == 40 ? 3e-3 : 3e-4) << "gamma = " << c.gamma << ", " << links << " links";
-      EXPECT_NEAR(rope.point(e, links).x, c.reach, links == 40 ? 3e-3 : 3e-4) << "gamma = " << c.gamma << ", " << links << " links";
+      EXPECT_NEAR(-rope.point(e, links).z, c.drop, links == 40 ? 3e-3 : 3e-4)
+          << "gamma = " << c.gamma << ", " << links << " links";
+      EXPECT_NEAR(rope.point(e, links).x, c.reach, links == 40 ? 3e-3 : 3e-4)
+          << "gamma = " << c.gamma << ", " << links << " links";
     }
 }
 
@@ -75,7 +79,8 @@ TEST(Equilibrium, HeavyCantileverIsTheElastica) {
 TEST(Equilibrium, EndCoupleRollsUpTheLinks) {
   for (const int n : {10, 20, 40}) {
     const double EI = 0.01, l = 1.0 / n, phi = 2.0 * std::numbers::pi / n;
-    Rope rope = make_rope({.links = n, .density = 0.0, .EI = EI, .clamp_first = true, .hold_last = false, .clamp_share = 1.0});
+    Rope rope =
+        make_rope({.links = n, .density = 0.0, .EI = EI, .clamp_first = true, .hold_last = false, .clamp_share = 1.0});
     rope.set_position(-1, -l, 0.0, 0.0);
     Random random(n);
     double x = 0.0, z = 0.0;
@@ -147,7 +152,8 @@ TEST(Equilibrium, TellsStableFromUnstable) {
 // Euler's column, clamped below and free above: P = pi^2 EI / (4 L^2). Above it two sideways directions are unstable.
 TEST(Equilibrium, ColumnBucklesAtEulersLoad) {
   for (const double share : {0.98, 1.02}) {
-    Rope column = make_rope({.links = 40, .density = 0.0, .EA = 1e6, .EI = 0.01, .clamp_first = true, .hold_last = false});
+    Rope column =
+        make_rope({.links = 40, .density = 0.0, .EA = 1e6, .EI = 0.01, .clamp_first = true, .hold_last = false});
     for (int k = -1; k <= 40; ++k) column.set_position(k, 0.0, 0.0, k / 40.0);
     column.of(Quantity::force)[5] = -share * std::numbers::pi * std::numbers::pi * 0.01 / 4.0;
     const Equilibrium e = column.solve({.stable = false});
@@ -208,7 +214,9 @@ TEST(Equilibrium, SaysSoWhenThereIsNone) {
 
 TEST(Branches, KeepsDistinctShapesByEnergy) {
   const Rope wire = make_wire(1e-3, 1e4);
-  const auto start = [](const Rope& r) { return std::vector<double>(r.inputs.begin(), r.inputs.begin() + r.scene.dofs()); };
+  const auto start = [](const Rope& r) {
+    return std::vector<double>(r.inputs.begin(), r.inputs.begin() + r.scene.dofs());
+  };
   const Rope again = make_wire(1e-3, 1e4, -0.9), cut = make_catenary(10, 0.6, 0.2);
   const Branches b = equilibrium_branches(wire.scene, wire.inputs.data(), {start(wire), start(again)});
   EXPECT_EQ(b.found.size(), 1u);
@@ -217,7 +225,8 @@ TEST(Branches, KeepsDistinctShapesByEnergy) {
   Rope standing = cut;
   const Equilibrium hanging = cut.solve();
   for (int k = 0; k <= 10; ++k) standing.set_position(k, hanging.x[3 * k], 0.0, -hanging.x[3 * k + 2]);
-  const Branches both = equilibrium_branches(cut.scene, cut.inputs.data(), {start(standing), start(cut)}, {.stable = false});
+  const Branches both =
+      equilibrium_branches(cut.scene, cut.inputs.data(), {start(standing), start(cut)}, {.stable = false});
   ASSERT_EQ(both.found.size(), 2u);
   EXPECT_EQ(both.of_start, (std::vector<int>{1, 0}));
   EXPECT_LT(both.found[0].energy, both.found[1].energy);

@@ -55,7 +55,8 @@ AtRest every_kind() {
     Vec3<double>(0.6 * t, random(-0.01, 0.01), -1.5 * t * (1.0 - t)).store(in.of(Quantity::position) + 3 * k);
   }
   for (std::size_t knot = 0; knot < 4; ++knot)
-    Vec3<double>(0.6 + random(-0.01, 0.01), random(-0.01, 0.01), random(-0.01, 0.01)).store(in.of(Quantity::boundary) + 3 * knot);
+    Vec3<double>(0.6 + random(-0.01, 0.01), random(-0.01, 0.01), random(-0.01, 0.01))
+        .store(in.of(Quantity::boundary) + 3 * knot);
   for (const Group& group : s.scene.groups)
     for (int i = 0; i < group.count; ++i) {
       double* p = in.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(i) * group.parameters;
@@ -72,7 +73,8 @@ AtRest every_kind() {
 AtRest rigid_catenary() {
   Rope rope = make_catenary(10, 0.6, 0.2);
   Random random(3);
-  for (std::size_t i = 0; i < rope.scene.layout.count(Quantity::force); ++i) rope.of(Quantity::force)[i] = random(-0.1, 0.1);
+  for (std::size_t i = 0; i < rope.scene.layout.count(Quantity::force); ++i)
+    rope.of(Quantity::force)[i] = random(-0.1, 0.1);
   return at_rest(std::move(rope.scene), std::move(rope.inputs));
 }
 
@@ -126,7 +128,8 @@ TEST_P(Derivative, CotangentsAreTheTransposeOfTangents) {
   const AtRest s = GetParam()();
   Random random(8);
   const EquilibriumDerivative derivative(s.scene, s.inputs.data(), s.rest);
-  std::vector<double> x_bar = random.vector(s.scene.dofs()), lambda_bar = random.vector(s.scene.rows), inputs_bar(s.inputs.size());
+  std::vector<double> x_bar = random.vector(s.scene.dofs()), lambda_bar = random.vector(s.scene.rows),
+                      inputs_bar(s.inputs.size());
   for (int r = 0; r < s.scene.rows; ++r) lambda_bar[r] /= largest(s.rest.lambda);
   derivative.vjp(x_bar.data(), lambda_bar.data(), inputs_bar.data());
   for (int q = 0; q < quantity_count; ++q) {
@@ -139,7 +142,8 @@ TEST_P(Derivative, CotangentsAreTheTransposeOfTangents) {
     }
     derivative.jvp(p.data(), x.data(), lambda.data());
     for (int i = 0; i < s.scene.dofs(); ++i) by_state += x_bar[i] * x[i].d[0], scale += std::abs(x_bar[i] * x[i].d[0]);
-    for (int i = 0; i < s.scene.rows; ++i) by_state += lambda_bar[i] * lambda[i].d[0], scale += std::abs(lambda_bar[i] * lambda[i].d[0]);
+    for (int i = 0; i < s.scene.rows; ++i)
+      by_state += lambda_bar[i] * lambda[i].d[0], scale += std::abs(lambda_bar[i] * lambda[i].d[0]);
     EXPECT_NEAR(by_inputs, by_state, 1e-10 * scale) << quantity_names[q];
     record_error(quantity_names[q], scale > 0.0 ? std::abs(by_inputs - by_state) / scale : 0.0);
   }
@@ -150,8 +154,8 @@ TEST_P(Derivative, MatchesEquilibriaSolvedAgain) {
   const AtRest s = GetParam()();
   EquilibriumSolver solver(s.scene);
   const EquilibriumDerivative derivative(s.scene, s.inputs.data(), s.rest);
-  for (const Quantity q : {Quantity::position, Quantity::mass, Quantity::compliance, Quantity::rest, Quantity::boundary, Quantity::force,
-                           Quantity::gravity}) {
+  for (const Quantity q : {Quantity::position, Quantity::mass, Quantity::compliance, Quantity::rest, Quantity::boundary,
+                           Quantity::force, Quantity::gravity}) {
     Random random(9);
     std::vector<Dual<double, 1>> p(s.inputs.begin(), s.inputs.end()), x(s.scene.dofs()), lambda(s.scene.rows);
     for (std::size_t i = 0; i < s.scene.layout.count(q); ++i) {
@@ -162,18 +166,20 @@ TEST_P(Derivative, MatchesEquilibriaSolvedAgain) {
     const auto moved = [&](double step) {
       std::vector<double> in(s.inputs);
       for (std::size_t i = 0; i < in.size(); ++i) in[i] += step * p[i].d[0];
-      const Equilibrium e = solver.solve(in.data(), s.rest.x.data(), s.rest.lambda.data(), {.tolerance = 1e-14, .t0 = s.rest.t0});
+      const Equilibrium e =
+          solver.solve(in.data(), s.rest.x.data(), s.rest.lambda.data(), {.tolerance = 1e-14, .t0 = s.rest.t0});
       EXPECT_TRUE(e.converged) << e.message;
       return e;
     };
     const double step = 1e-3;
     const Equilibrium a = moved(step), b = moved(-step), c = moved(0.5 * step), d = moved(-0.5 * step);
-    const auto difference = [&](const std::vector<double>& a, const std::vector<double>& b, const std::vector<double>& c,
-                                const std::vector<double>& d, std::size_t i) {
+    const auto difference = [&](const std::vector<double>& a, const std::vector<double>& b,
+                                const std::vector<double>& c, const std::vector<double>& d, std::size_t i) {
       return (4.0 * (c[i] - d[i]) / step - (a[i] - b[i]) / (2.0 * step)) / 3.0;
     };
     std::vector<double> x_dot, x_fd, l_dot, l_fd;
-    for (std::size_t i = 0; i < x.size(); ++i) x_dot.push_back(x[i].d[0]), x_fd.push_back(difference(a.x, b.x, c.x, d.x, i));
+    for (std::size_t i = 0; i < x.size(); ++i)
+      x_dot.push_back(x[i].d[0]), x_fd.push_back(difference(a.x, b.x, c.x, d.x, i));
     for (std::size_t i = 0; i < lambda.size(); ++i)
       l_dot.push_back(lambda[i].d[0]), l_fd.push_back(difference(a.lambda, b.lambda, c.lambda, d.lambda, i));
     // A quantity that does not act (no force on the wire, a compliance of zero) leaves nothing but the solver's own rounding.

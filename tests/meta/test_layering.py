@@ -52,6 +52,12 @@ def test_optional_packages_are_imported_lazily() -> None:
         if part in ("torch", "cli", "config"):
             continue
         for node in ast.parse(path.read_text()).body:
-            names = [a.name for a in node.names] if isinstance(node, ast.Import) else [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            names = (
+                [a.name for a in node.names]
+                if isinstance(node, ast.Import)
+                else [node.module or ""]
+                if isinstance(node, ast.ImportFrom)
+                else []
+            )
             offenders += [(path.name, n) for n in names if n.partition(".")[0] in heavy]
     assert offenders == []

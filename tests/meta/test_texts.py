@@ -22,8 +22,21 @@ def tracked() -> list[Path]:
 
 
 def test_no_path_of_a_machine_and_no_registry_host() -> None:
-    pattern = re.compile("|".join([r"/wor" + "k/", r"/home/[a-z]", r"/roo" + "t/", r"pypi\.or" + "g", r"registry\.npm" + "js", r"deb\.deb" + "ian"]))
-    found = [str(p.relative_to(ROOT)) for p in tracked() if p.suffix in TEXT and pattern.search(p.read_text(errors="ignore"))]
+    pattern = re.compile(
+        "|".join(
+            [
+                r"/wor" + "k/",
+                r"/home/[a-z]",
+                r"/roo" + "t/",
+                r"pypi\.or" + "g",
+                r"registry\.npm" + "js",
+                r"deb\.deb" + "ian",
+            ]
+        )
+    )
+    found = [
+        str(p.relative_to(ROOT)) for p in tracked() if p.suffix in TEXT and pattern.search(p.read_text(errors="ignore"))
+    ]
     assert found == []
 
 
@@ -43,7 +56,11 @@ def test_copied_recordings_keep_their_licence() -> None:
     assert [str(f.relative_to(ROOT)) for f in folders if not (f / "LICENSE.source").exists()] == []
 
 
-TEXTS = [name for pattern in ("*.md", "docs/*.md", "experiments/*/README.md", "adjoint/*.md") for name in sorted(ROOT.glob(pattern))]
+TEXTS = [
+    name
+    for pattern in ("*.md", "docs/*.md", "experiments/*/README.md", "adjoint/*.md")
+    for name in sorted(ROOT.glob(pattern))
+]
 
 
 def blocks(language: str) -> list[object]:
@@ -76,5 +93,9 @@ def test_configurations_in_the_texts_load(block: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", TEXTS, ids=lambda text: str(text.relative_to(ROOT)))
 def test_links_lead_somewhere(text: Path) -> None:
-    links = [link.partition("#")[0] for link in re.findall(r"\]\(([^)\s]+)\)", text.read_text()) if not re.match(r"https?://|#", link)]
+    links = [
+        link.partition("#")[0]
+        for link in re.findall(r"\]\(([^)\s]+)\)", text.read_text())
+        if not re.match(r"https?://|#", link)
+    ]
     assert [link for link in links if not (text.parent / link).exists()] == []

@@ -1,4 +1,5 @@
-"""Derivatives of rollouts and of equilibria for the physics tests, each by two independent paths, and estimators of what a motion shows."""
+"""Derivatives of rollouts and of equilibria for the physics tests, each by two independent paths, and estimators of
+what a motion shows."""
 
 from __future__ import annotations
 
@@ -80,7 +81,8 @@ def sensitivity(
 def static_sensitivity(
     rest: sb.Equilibrium, direction: Direction, weights: Array | None = None, forces: Mapping[str, Array] | None = None
 ) -> tuple[float, float]:
-    """d(sum of weights * positions + sum of force weights * forces)/d(direction) of an equilibrium, forward and reverse.
+    """d(sum of weights * positions + sum of force weights * forces)/d(direction) of an equilibrium, forward and
+    reverse.
 
     Args:
         weights: (particles, 3).
@@ -104,7 +106,10 @@ def slope_along(estimate: Callable[[Array], float], series: Array, series_dot: A
     Central differences along the known tangent, with one Richardson step; good to about 1e-9 relative.
     """
     scale = 1e-3 * float(np.abs(series).max()) / float(np.abs(series_dot).max())
-    coarse, fine = ((estimate(series + e * series_dot) - estimate(series - e * series_dot)) / (2.0 * e) for e in (scale, scale / 2.0))
+    coarse, fine = (
+        (estimate(series + e * series_dot) - estimate(series - e * series_dot)) / (2.0 * e)
+        for e in (scale, scale / 2.0)
+    )
     return (4.0 * fine - coarse) / 3.0
 
 

@@ -14,18 +14,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 import sheetbend as sb
 
 pytest.importorskip("typer")
 pytest.importorskip("rich")
 pytest.importorskip("tomli_w")
 
-from typer.testing import CliRunner, Result
-
 from sheetbend import cli
 from sheetbend.cli.app import app
 from sheetbend.gradients import GradientReport, GradientRow
+from typer.testing import CliRunner, Result
 
 ROPE = """\
 [experiment]
@@ -115,7 +113,14 @@ class TestFit:
         result = run("fit", config, "--output", "there")
         assert result.exit_code == 0, result.output
         names = {p.name for p in Path("there").iterdir()}
-        assert names == {"fit.json", "report.txt", "fitted.toml", "swing_markers.svg", "swing_residuals.svg", "estimates.svg"}
+        assert names == {
+            "fit.json",
+            "report.txt",
+            "fitted.toml",
+            "swing_markers.svg",
+            "swing_residuals.svg",
+            "estimates.svg",
+        }
         saved = sb.FitResult.load("there/fit.json")
         assert saved["rope_EI"].value == pytest.approx(1e-3, rel=0.05)
         assert "rope_EI" in result.stdout and "identified" in result.stdout and "iteration" in result.stdout
@@ -145,15 +150,23 @@ class TestFit:
         assert resumed["iterations"] <= 1
 
     def test_nothing_identifiable_exits_3(self, config: Path) -> None:
-        # Only the product of density and gravity pulls on an inextensible rope without bending, and motion does not show it either.
+        # Only the product of density and gravity pulls on an inextensible rope without bending, and motion does not
+        # show it either.
         edited(config, "EA = 1e3\nEI = 2e-3\nbend_damping = 0.02\n", "")
-        edited(config, "[parameters.rope_EI]\nlower = 1e-5\nupper = 1.0\n\n[parameters.rope_bend_damping]\n", "[parameters.rope_density]\n")
+        edited(
+            config,
+            "[parameters.rope_EI]\nlower = 1e-5\nupper = 1.0\n\n[parameters.rope_bend_damping]\n",
+            "[parameters.rope_density]\n",
+        )
         found = last_line(run("fit", config, "--json"))
         assert found["parameters"]["rope_density"]["verdict"] == "not identifiable"
         assert found["exit_code"] == 3
 
     def test_strict_exits_3_when_one_is_not_identifiable(self, config: Path) -> None:
-        config.write_text(config.read_text() + '\n[scene.quantities.idle]\nvalue = 1.0\nunit = "m"\nscale = 1.0\n\n[parameters.idle]\n')
+        config.write_text(
+            config.read_text()
+            + '\n[scene.quantities.idle]\nvalue = 1.0\nunit = "m"\nscale = 1.0\n\n[parameters.idle]\n'
+        )
         found = last_line(run("fit", config, "--json"))
         assert found["parameters"]["idle"]["verdict"] == "not identifiable" and found["exit_code"] == 0
         assert last_line(run("fit", config, "--json", "--strict"))["exit_code"] == 3
@@ -180,7 +193,9 @@ class TestFit:
         recorded(tmp_path, 100)
         edited(tmp_path / "my.toml", "substeps = 4", "substeps = 30")
         command = [sys.executable, "-m", "sheetbend", "fit", "my.toml", "--json"]
-        with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=dict(os.environ)) as process:
+        with subprocess.Popen(
+            command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=dict(os.environ)
+        ) as process:
             assert process.stderr is not None and process.stdout is not None
             for line in process.stderr:
                 if line.startswith("iteration"):
@@ -189,7 +204,8 @@ class TestFit:
             stopped = time.perf_counter()
             rest = process.stderr.read()
             found = json.loads(process.stdout.read().splitlines()[-1])
-            # One evaluation more and the report take less than a second here; a profile or the rest of the fit takes minutes.
+            # One evaluation more and the report take less than a second here; a profile or the rest of the fit takes
+            # minutes.
             assert time.perf_counter() - stopped < 20.0
         assert process.returncode == 4, rest
         assert found["interrupted"] and not found["converged"]
@@ -231,8 +247,12 @@ class TestCheck:
         assert result.exit_code == 5 and "<- fails" in result.stdout
 
     @pytest.mark.parametrize("static", [False, True])
-    @pytest.mark.parametrize("wrong", [lambda J: 1.001 * J, np.zeros_like, lambda J: J + 1.0], ids=["scaled", "zero", "moved"])
-    def test_a_wrong_jacobian_exits_5(self, config: Path, monkeypatch: pytest.MonkeyPatch, wrong: Callable, static: bool) -> None:
+    @pytest.mark.parametrize(
+        "wrong", [lambda J: 1.001 * J, np.zeros_like, lambda J: J + 1.0], ids=["scaled", "zero", "moved"]
+    )
+    def test_a_wrong_jacobian_exits_5(
+        self, config: Path, monkeypatch: pytest.MonkeyPatch, wrong: Callable, static: bool
+    ) -> None:
         from sheetbend.problem import FitProblem
 
         exact = FitProblem.evaluate
@@ -279,7 +299,9 @@ class TestSimulate:
         assert found["frames"] == 11 and found["duration"] == pytest.approx(0.1)
 
     @pytest.mark.parametrize(
-        ("options", "field"), [(("--duration", "-1"), "--duration"), (("--recording", "other"), "--recording")], ids=["duration", "recording"]
+        ("options", "field"),
+        [(("--duration", "-1"), "--duration"), (("--recording", "other"), "--recording")],
+        ids=["duration", "recording"],
     )
     def test_bad_options(self, config: Path, options: tuple[str, str], field: str) -> None:
         assert last_line(run("simulate", config, "--json", *options))["error"]["field"] == field
@@ -294,7 +316,11 @@ class TestInfo:
     def test_configuration(self, config: Path) -> None:
         found = last_line(run("info", config, "--json"))["config"]
         (scene,) = found["scenes"]
-        assert scene["particles"] == 7 and scene["dofs"] == 18 and scene["constraints"] == {"rope_stretch": 6, "rope_bend": 5}
+        assert (
+            scene["particles"] == 7
+            and scene["dofs"] == 18
+            and scene["constraints"] == {"rope_stretch": 6, "rope_bend": 5}
+        )
         assert found["parameters"] == ["rope_EI", "rope_bend_damping"] and found["quantities"]["rope_length"] == 0.6
 
 
@@ -313,7 +339,9 @@ class TestBadInput:
         assert result.exit_code == 2 and "nowhere.toml" in result.stderr and result.stdout == ""
 
     @pytest.mark.parametrize(
-        ("cut", "field"), [("[[recording]]", "recording"), ("[parameters.rope_EI]", "parameters")], ids=["recording", "parameters"]
+        ("cut", "field"),
+        [("[[recording]]", "recording"), ("[parameters.rope_EI]", "parameters")],
+        ids=["recording", "parameters"],
     )
     def test_nothing_to_fit(self, config: Path, cut: str, field: str) -> None:
         text = config.read_text()
@@ -342,7 +370,9 @@ class TestBadInput:
 
 class TestInstallation:
     @pytest.mark.parametrize("package", cli.NEEDS)
-    def test_missing_packages_are_one_clear_sentence(self, package: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def test_missing_packages_are_one_clear_sentence(
+        self, package: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    ) -> None:
         monkeypatch.setitem(sys.modules, package, None)
         with pytest.raises(SystemExit) as ended:
             cli.main()
@@ -351,8 +381,11 @@ class TestInstallation:
         assert package in line and "pip install 'sheetbend[cli]'" in line
 
     def test_module_runs_and_stays_light(self) -> None:
-        code = "import sys; from sheetbend.cli.app import app; print([m for m in ('torch', 'scipy', 'matplotlib') if m in sys.modules])"
+        heavy = "('torch', 'scipy', 'matplotlib')"
+        code = f"import sys; from sheetbend.cli.app import app; print([m for m in {heavy} if m in sys.modules])"
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
         assert done.stdout.strip() == "[]"
-        version = subprocess.run([sys.executable, "-m", "sheetbend", "--version"], capture_output=True, text=True, check=True)
+        version = subprocess.run(
+            [sys.executable, "-m", "sheetbend", "--version"], capture_output=True, text=True, check=True
+        )
         assert version.stdout.strip() == f"sheetbend {sb.__version__}"

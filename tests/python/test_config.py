@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 import sheetbend as sb
 
 pytest.importorskip("pydantic")
@@ -80,7 +79,9 @@ def changed(folder: Path, old: str, new: str) -> Path:
 
 def extended(folder: Path, scene: str, recording: str = "", parameters: str = "") -> Path:
     """ROPE with more tables in the scene, and more keys in the recording."""
-    text = ROPE.replace("[[recording]]", f"{scene}\n[[recording]]").replace("sigma = 1e-4", f"sigma = 1e-4\n{recording}")
+    text = ROPE.replace("[[recording]]", f"{scene}\n[[recording]]").replace(
+        "sigma = 1e-4", f"sigma = 1e-4\n{recording}"
+    )
     return written(folder, text + parameters)
 
 
@@ -158,7 +159,11 @@ class TestBuild:
 
     def test_driven_particles_follow_their_markers_on_the_scenes_clock(self, folder: Path) -> None:
         drive = '[[scene.drive]]\nparticles = ["rope:0"]\nmarkers = ["m0"]\noffset = [0, 0.01, 0]\n'
-        text = ROPE.replace("pinned = [0]\n", "").replace("fit = [0.0, 0.2]", "fit = [0.05, 0.2]").replace("[[recording]]", f"{drive}\n[[recording]]")
+        text = (
+            ROPE.replace("pinned = [0]\n", "")
+            .replace("fit = [0.0, 0.2]", "fit = [0.05, 0.2]")
+            .replace("[[recording]]", f"{drive}\n[[recording]]")
+        )
         (e,) = load(written(folder, text)).experiments
         measured = sb.Recording.load(folder / "swing.npz").piece(0.05)
         np.testing.assert_allclose(e.scene.boundary_times, measured.times - 0.05, atol=1e-12)
@@ -250,7 +255,10 @@ class TestBuild:
         assert e.scene.quantities["rope_EA"].value == pytest.approx(2e3)
 
     def test_refinement_doubles_segments_and_keeps_node_numbers(self, folder: Path) -> None:
-        scene = '[[scene.point_mass]]\nname = "a"\nparticle = "rope:2"\nmass = 1.0\n[[scene.point_mass]]\nname = "b"\nparticle = "rope:-2"\nmass = 1.0\n'
+        scene = (
+            '[[scene.point_mass]]\nname = "a"\nparticle = "rope:2"\nmass = 1.0\n'
+            '[[scene.point_mass]]\nname = "b"\nparticle = "rope:-2"\nmass = 1.0\n'
+        )
         study = load(extended(folder, scene, parameters="\n[fit]\ndouble_segments = true\n"))
         refine = study.options["refine"]
         (finer,) = refine.finer()
@@ -260,7 +268,14 @@ class TestBuild:
 
     def test_a_recording_shows_some_of_the_ropes(self, folder: Path) -> None:
         other = '[[scene.rope]]\nname = "other"\nsegments = 3\ndensity = 0.1\npoints = "recording"\npinned = [0]\n'
-        study = load(extended(folder, other, 'ropes = ["rope"]', '[[recording]]\nfile = "swing.npz"\nname = "second"\nropes = ["other"]\n'))
+        study = load(
+            extended(
+                folder,
+                other,
+                'ropes = ["rope"]',
+                '[[recording]]\nfile = "swing.npz"\nname = "second"\nropes = ["other"]\n',
+            )
+        )
         first, second = study.experiments
         assert set(first.scene.ropes) == {"rope"} and set(second.scene.ropes) == {"other"}
         assert first.places[2] is not None and len(second.names) == 6
@@ -269,7 +284,6 @@ class TestBuild:
         (e,) = load(changed(folder, "sigma = 1e-4", "sigma = 1e-4\nframes = [0, 31, 2]")).experiments
         assert len(e.recording.times) == 16
         assert e.solver.h == pytest.approx(0.02 / 4)
-
 
     def test_a_recording_leaves_out_what_it_does_without(self, folder: Path) -> None:
         scene = """
@@ -287,7 +301,13 @@ class TestBuild:
         second = '\n[[recording]]\nfile = "swing.npz"\nname = "bare"\nleave_out = ["load", "pull", "delay"]\n'
         text = extended(folder, scene).read_text().replace("[parameters.rope_EI]", f"{second}\n[parameters.rope_EI]")
         loaded, bare = load(written(folder, text)).experiments
-        assert set(loaded.scene.quantities) - set(bare.scene.quantities) == {"load_mass", "pull_x", "pull_y", "pull_z", "delay"}
+        assert set(loaded.scene.quantities) - set(bare.scene.quantities) == {
+            "load_mass",
+            "pull_x",
+            "pull_y",
+            "pull_z",
+            "delay",
+        }
         assert not bare.scene.loaded
         with pytest.raises(sb.ConfigError, match="delay, load, pull"):
             load(written(folder, text.replace('leave_out = ["load"', 'leave_out = ["lord"')))
@@ -337,20 +357,90 @@ BAD = [
     ("pinned = [0]", "clamp_angles = true", "scene.rope[0].plane", "normal"),
     ('points = "recording"', 'points = "measured"', "scene.rope[0].points", "recording"),
     ("length = 0.6", "length = inf", "scene.rope[0].length", "finite"),
-    ("[[recording]]", '[[scene.particles]]\nname = "a"\npositions = []\n[[recording]]', "scene.particles[0].positions", "at least 1"),
-    ("[[recording]]", '[[scene.particles]]\nname = "rope"\npositions = [[0, 0, 1]]\n[[recording]]', "scene.particles[0].name", "name of its own"),
-    ("[[recording]]", '[[scene.particles]]\nname = "a"\npositions = [[0, 0, 1]]\nmass = -1.0\n[[recording]]', "scene.particles[0].mass", "give kg"),
-    ("[[recording]]", '[[scene.particles]]\nname = "a"\npositions = [[0, 0, 1]]\n[[recording]]', "scene.mass", "give them a mass"),
-    ("[[recording]]", '[[scene.constraints]]\nkind = "spring"\nparticles = [["rope:0", "rope:2"]]\n[[recording]]', "scene.constraints[0].kind", "distance"),
-    ("[[recording]]", '[[scene.constraints]]\nkind = "distance"\nparticles = [["rope:0"]]\n[[recording]]', "scene.constraints[0].particles", "(count, 2)"),
-    ("[[recording]]", '[[scene.point_mass]]\nname = "a"\nparticle = "rope:9"\nmass = 1.0\n[[recording]]', "scene.point_mass[0].particle", "0 to 6"),
-    ("[[recording]]", '[[scene.force]]\nparticles = ["rope:1"]\nforce = [0, 0, 1]\nfactors = [1, 0]\n[[recording]]', "scene.force[0].factors", "give 1"),
-    ("[[recording]]", '[[scene.force]]\nparticles = ["rope:1"]\nforce = [0, 0, 1]\ntimes = [1, 0]\n[[recording]]', "scene.force[0].add_force.times", "sort"),
-    ("[[recording]]", '[[scene.drive]]\nparticles = ["rope:1"]\nmarkers = ["m0", "m1"]\n[[recording]]', "scene.drive[0].markers", "give 1"),
-    ("[[recording]]", '[[scene.drive]]\nparticles = ["rope:1"]\nmarkers = ["x"]\n[[recording]]', "scene.drive[0].select", "choose from m0"),
-    ("[[recording]]", '[[scene.arm]]\nmass = 1\nfirst_moment = 1\ninertia = 1\nlength = 0.5\n[[recording]]', "scene.arm[0].mass", "give more than"),
-    ("[[recording]]", '[[scene.pendulum]]\nlength = 1.0\npivot = "no"\n[[recording]]', "scene.pendulum[0].pivot", "name one of"),
-    ("[[recording]]", "[scene.quantities.a]\nvalue = -1.0\npositive = true\n[[recording]]", "scene.quantities.a.a", "positive"),
+    (
+        "[[recording]]",
+        '[[scene.particles]]\nname = "a"\npositions = []\n[[recording]]',
+        "scene.particles[0].positions",
+        "at least 1",
+    ),
+    (
+        "[[recording]]",
+        '[[scene.particles]]\nname = "rope"\npositions = [[0, 0, 1]]\n[[recording]]',
+        "scene.particles[0].name",
+        "name of its own",
+    ),
+    (
+        "[[recording]]",
+        '[[scene.particles]]\nname = "a"\npositions = [[0, 0, 1]]\nmass = -1.0\n[[recording]]',
+        "scene.particles[0].mass",
+        "give kg",
+    ),
+    (
+        "[[recording]]",
+        '[[scene.particles]]\nname = "a"\npositions = [[0, 0, 1]]\n[[recording]]',
+        "scene.mass",
+        "give them a mass",
+    ),
+    (
+        "[[recording]]",
+        '[[scene.constraints]]\nkind = "spring"\nparticles = [["rope:0", "rope:2"]]\n[[recording]]',
+        "scene.constraints[0].kind",
+        "distance",
+    ),
+    (
+        "[[recording]]",
+        '[[scene.constraints]]\nkind = "distance"\nparticles = [["rope:0"]]\n[[recording]]',
+        "scene.constraints[0].particles",
+        "(count, 2)",
+    ),
+    (
+        "[[recording]]",
+        '[[scene.point_mass]]\nname = "a"\nparticle = "rope:9"\nmass = 1.0\n[[recording]]',
+        "scene.point_mass[0].particle",
+        "0 to 6",
+    ),
+    (
+        "[[recording]]",
+        '[[scene.force]]\nparticles = ["rope:1"]\nforce = [0, 0, 1]\nfactors = [1, 0]\n[[recording]]',
+        "scene.force[0].factors",
+        "give 1",
+    ),
+    (
+        "[[recording]]",
+        '[[scene.force]]\nparticles = ["rope:1"]\nforce = [0, 0, 1]\ntimes = [1, 0]\n[[recording]]',
+        "scene.force[0].add_force.times",
+        "sort",
+    ),
+    (
+        "[[recording]]",
+        '[[scene.drive]]\nparticles = ["rope:1"]\nmarkers = ["m0", "m1"]\n[[recording]]',
+        "scene.drive[0].markers",
+        "give 1",
+    ),
+    (
+        "[[recording]]",
+        '[[scene.drive]]\nparticles = ["rope:1"]\nmarkers = ["x"]\n[[recording]]',
+        "scene.drive[0].select",
+        "choose from m0",
+    ),
+    (
+        "[[recording]]",
+        "[[scene.arm]]\nmass = 1\nfirst_moment = 1\ninertia = 1\nlength = 0.5\n[[recording]]",
+        "scene.arm[0].mass",
+        "give more than",
+    ),
+    (
+        "[[recording]]",
+        '[[scene.pendulum]]\nlength = 1.0\npivot = "no"\n[[recording]]',
+        "scene.pendulum[0].pivot",
+        "name one of",
+    ),
+    (
+        "[[recording]]",
+        "[scene.quantities.a]\nvalue = -1.0\npositive = true\n[[recording]]",
+        "scene.quantities.a.a",
+        "positive",
+    ),
     ('file = "swing.npz"', 'file = "no.npz"', "recording[0].file", "relative to the configuration"),
     ('file = "swing.npz"\n', "", "recording[0].file", "add file to [[recording]]"),
     ('file = "swing.npz"', 'file = "my.toml"', "recording[0].", ".npz"),
@@ -376,9 +466,26 @@ BAD = [
     ("sigma = 1e-4", "marker = [{ marker = 'm0' }]", "recording[0].marker[0]", "arc_length"),
     ("sigma = 1e-4", "marker = [{ marker = 'x', arc_length = 0.1 }]", "recording[0].marker[0].marker", "m0"),
     ("sigma = 1e-4", "marker = [{ marker = 'm1', arc_length = 0.1 }]", "scene.rope[0].points", "place markers on it"),
-    ("sigma = 1e-4", "marker = [{ marker = 'm0', arc_length = 9.1 }, { marker = 'm1', arc_length = 0.1 }]", "recording[0].marker[0].arc_length", "0 to 0.6"),
-    ("sigma = 1e-4", "marker = [{ marker = 'm0', arc_length = 0.0 }, { marker = 'm1', arc_length = 0.1 }, { marker = 'm2', rope = 'wire', arc_length = 0.1 }]", "recording[0].marker[2].rope", "name one of: rope"),
-    ("sigma = 1e-4", "marker = [{ marker = 'm0', arc_length = 0.0 }, { marker = 'm1', arc_length = 0.1 }, { marker = 'm2', arm = 'a', radius = 0.1 }]", "recording[0].marker[2].arm", "none"),
+    (
+        "sigma = 1e-4",
+        "marker = [{ marker = 'm0', arc_length = 9.1 }, { marker = 'm1', arc_length = 0.1 }]",
+        "recording[0].marker[0].arc_length",
+        "0 to 0.6",
+    ),
+    (
+        "sigma = 1e-4",
+        "marker = [{ marker = 'm0', arc_length = 0.0 }, { marker = 'm1', arc_length = 0.1 }, "
+        "{ marker = 'm2', rope = 'wire', arc_length = 0.1 }]",
+        "recording[0].marker[2].rope",
+        "name one of: rope",
+    ),
+    (
+        "sigma = 1e-4",
+        "marker = [{ marker = 'm0', arc_length = 0.0 }, { marker = 'm1', arc_length = 0.1 }, "
+        "{ marker = 'm2', arm = 'a', radius = 0.1 }]",
+        "recording[0].marker[2].arm",
+        "none",
+    ),
     ("sigma = 1e-4", "marker = [{ marker = 'm0', arm = 'a' }]", "recording[0].marker[0]", "give both"),
     ("[parameters.rope_EI]", "[parameters.rope_IE]", "parameters.rope_IE", "did you mean 'rope_EI'"),
     ("lower = 1e-5", "lower = 0.1", "parameters.rope_EI.initial", "inside the bounds"),
@@ -394,7 +501,9 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("old", "new", "field", "fix"), BAD, ids=[f"{field}-{i}" for i, (_, _, field, _) in enumerate(BAD)])
+@pytest.mark.parametrize(
+    ("old", "new", "field", "fix"), BAD, ids=[f"{field}-{i}" for i, (_, _, field, _) in enumerate(BAD)]
+)
 def test_bad_input_is_named_with_its_fix(folder: Path, old: str, new: str, field: str, fix: str) -> None:
     with pytest.raises(sb.ConfigError) as caught:
         load(changed(folder, old, new))

@@ -1,4 +1,5 @@
-"""Every key of every section of a configuration, taken from the schema: wrong type, missing, not finite, beyond its limit, misspelled."""
+"""Every key of every section of a configuration, taken from the schema: wrong type, missing, not finite, beyond its
+limit, misspelled."""
 
 from __future__ import annotations
 

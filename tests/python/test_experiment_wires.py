@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 import sheetbend as sb
 
 FOLDER = Path(__file__).parents[2] / "experiments" / "wires"
@@ -61,9 +60,13 @@ def test_fit_stays_on_the_measured_branch(study):
     fit = study.fitted(study.study("white", shapes=(0,)))
     (c,) = fit.comparisons
     scene = c.experiment.scene
-    values = {q: fit.values.get(f"{q}[{c.experiment.name}]", fit.values.get(q, scene.quantities[q].value)) for q in scene.quantities}
+    values = {
+        q: fit.values.get(f"{q}[{c.experiment.name}]", fit.values.get(q, scene.quantities[q].value))
+        for q in scene.quantities
+    }
     rest = sb.equilibrium(scene, values=values)
     assert rest.unstable_modes == 0
-    # The wire leaves one holder outwards and reaches the other from outside: one turn, clockwise. Other branches turn otherwise.
+    # The wire leaves one holder outwards and reaches the other from outside: one turn, clockwise. Other branches turn
+    # otherwise.
     assert study.turning(rest.positions[scene.ropes["white"].particles]) == pytest.approx(-1, abs=0.2)
     assert np.linalg.norm(c.simulated - c.recording.positions, axis=-1).max() < 0.02

@@ -25,18 +25,14 @@ def design(frames: int) -> np.ndarray:
     return np.column_stack([np.ones(frames), t - 0.3, np.exp(-2 * t) * np.cos(40 * t), np.sin(7 * t)])
 
 
-def errors(
-    rng: np.random.Generator, correlation: float, channels: int, frames: int, common: float
-) -> np.ndarray:
+def errors(rng: np.random.Generator, correlation: float, channels: int, frames: int, common: float) -> np.ndarray:
     """(channels, frames) first-order autoregressive errors; `common` is the correlation between channels."""
     own, shared = rng.standard_normal((channels, frames + 200)), rng.standard_normal(frames + 200)
     white = math.sqrt(1 - common) * own + math.sqrt(common) * shared
     return signal.lfilter([1], [1, -correlation], white, axis=1)[:, 200:]
 
 
-def coverage(
-    correlation: float, frames: int, channels: int = 1, common: float = 0.0
-) -> tuple[np.ndarray, np.ndarray]:
+def coverage(correlation: float, frames: int, channels: int = 1, common: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Part of the seeds whose 95 % interval holds the truth: honest, and as if the residuals were white."""
     base, rng = design(frames), np.random.default_rng(7)
     jacobian = np.concatenate([base * (1 + 0.3 * np.sin(np.arange(4) + k)) for k in range(channels)])
@@ -156,9 +152,7 @@ def test_mass_against_compliance_in_a_simulated_oscillator() -> None:
     held = parameters.replace("mass", fixed=True)
     result = identify(held, held.initial(), residuals, column[:, None])
     assert result.estimates[0].verdict == "identified"
-    known = Parameters(
-        [Parameter(name="mass", initial=0.2, log=True, prior=(0.2, 0.01)), parameters["compliance"]]
-    )
+    known = Parameters([Parameter(name="mass", initial=0.2, log=True, prior=(0.2, 0.01)), parameters["compliance"]])
     result = identify(known, known.initial(), residuals, np.column_stack([column, column]))
     assert [e.verdict for e in result.estimates] == ["identified"] * 2
     assert "through its prior" in result.estimates[1].words
@@ -170,9 +164,7 @@ def test_two_gauges_and_linear_parameters() -> None:
     names = ["density", "stiffness", "left", "right", "sound"]
     space = null_space(np.column_stack(columns), names, [True, True, False, False, True])
     assert {gauge.members for gauge in space.gauges} == {("density", "stiffness"), ("left", "right")}
-    assert "left +1, right +1 stays free: only right - left is known" in [
-        gauge.words for gauge in space.gauges
-    ]
+    assert "left +1, right +1 stays free: only right - left is known" in [gauge.words for gauge in space.gauges]
     assert space.rank == 3
 
 
@@ -189,9 +181,7 @@ def test_sound_parameters_keep_their_interval_beside_a_gauge() -> None:
     assert with_gauge.upper == pytest.approx(without.upper, rel=1e-6)
 
 
-def one(
-    noise: float, column: np.ndarray | None = None, **fields: object
-) -> tuple[Parameters, np.ndarray, np.ndarray]:
+def one(noise: float, column: np.ndarray | None = None, **fields: object) -> tuple[Parameters, np.ndarray, np.ndarray]:
     """A problem with one parameter p at its value 1 and white residuals."""
     column = np.ones(400) if column is None else column
     rng = np.random.default_rng(11)

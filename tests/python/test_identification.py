@@ -1,4 +1,5 @@
-"""Identification: twins are recovered, intervals mean what they say, what cannot be known is said, and bias falls with the substep."""
+"""Identification: twins are recovered, intervals mean what they say, what cannot be known is said, and bias falls with
+the substep."""
 
 from __future__ import annotations
 
@@ -10,14 +11,15 @@ import sheetbend as sb
 from pytest import approx
 from scipy.integrate import solve_ivp
 from sheetbend.problem import FitProblem, as_parameters
-
 from support import observed_orders
 
 G = 9.81
 DOWN = (0.0, 0.0, -1.0)
 
 
-def seen(scene: sb.Scene, times: np.ndarray, solver: sb.Solver, particles: list[int], noise: float = 0.0, seed: int = 0) -> sb.Recording:
+def seen(
+    scene: sb.Scene, times: np.ndarray, solver: sb.Solver, particles: list[int], noise: float = 0.0, seed: int = 0
+) -> sb.Recording:
     """What markers on particles show of a scene's motion."""
     positions = sb.simulate(scene, times, solver).positions[:, particles]
     noisy = positions + noise * np.random.default_rng(seed).standard_normal(positions.shape)
@@ -47,12 +49,20 @@ def bent_strip() -> tuple[sb.Scene, sb.Recording, dict]:
 
 
 def bouncing_rope() -> tuple[sb.Scene, sb.Recording, dict]:
-    scene, at, s = sb.rope(1.0, 5, density=0.05, EA=10.0, direction=DOWN, stretch_damping=0.01), [3, 5], sb.Solver(h=1 / 480)
+    scene, at, s = (
+        sb.rope(1.0, 5, density=0.05, EA=10.0, direction=DOWN, stretch_damping=0.01),
+        [3, 5],
+        sb.Solver(h=1 / 480),
+    )
     return scene, seen(scene, np.arange(61) / 120, s, at), {"markers": markers(at), "solver": s}
 
 
 def swaying_strip() -> tuple[sb.Scene, sb.Recording, dict]:
-    scene, at, s = sb.rope(0.5, 10, density=0.05, EI=2e-3, clamp_start=(1, 0, 0), bend_damping=0.02), [5, 10], sb.Solver(h=1 / 480)
+    scene, at, s = (
+        sb.rope(0.5, 10, density=0.05, EI=2e-3, clamp_start=(1, 0, 0), bend_damping=0.02),
+        [5, 10],
+        sb.Solver(h=1 / 480),
+    )
     return scene, seen(scene, np.arange(61) / 120, s, at), {"markers": markers(at), "solver": s}
 
 
@@ -99,7 +109,8 @@ def test_two_parameters_of_one_motion():
 
 
 def test_intervals_mean_what_they_say():
-    """Over seeds: the estimates scatter as sigma^2 (J'J)^-1 says, and 95 % intervals hold the truth 92 to 98 times of 100."""
+    """Over seeds: the estimates scatter as sigma^2 (J'J)^-1 says, and 95 % intervals hold the truth 92 to 98 times of
+    100."""
     sigma, seeds, s = 2e-3, 400, sb.Solver(h=1 / 60)
     scene = sb.Scene("spring")
     scene.add_particles([[0, 0, 0], [0, 0, -1.0]], 0.2, velocity=[[0, 0, 0], [0, 0, 1.0]])
@@ -124,7 +135,7 @@ def test_intervals_mean_what_they_say():
         scatter += np.outer(error, error) / seeds
         covered += [found[name].lower <= truth[name] <= found[name].upper for name in truth]
     assert np.trace(precision @ scatter) / 2 == approx(1.0, abs=0.1)
-    assert 0.92 <= (covered / seeds).min() and (covered / seeds).max() <= 0.98
+    assert (covered / seeds).min() >= 0.92 and (covered / seeds).max() <= 0.98
 
 
 # --- what cannot be known
@@ -166,7 +177,8 @@ def test_statics_tell_stiffness_over_density_only():
 
 
 def test_gauss_seidel_hides_the_stiffness():
-    """A rope of EA = 1e4 N fitted with one sweep: its stiffness is above what the sweeps' own compliance lets through."""
+    """A rope of EA = 1e4 N fitted with one sweep: its stiffness is above what the sweeps' own compliance lets
+    through."""
     at = [5, 10, 15, 20]
     scene = sb.rope(1.0, 20, density=0.05, EA=1e4)
     recording = seen(scene, np.arange(31) / 60, sb.Solver(h=1 / 600), at, noise=1e-3)
@@ -186,7 +198,11 @@ def test_bdf1_makes_damping_of_its_own():
     scene = sb.rope(1.0, 5, density=0.05, EA=10.0, direction=DOWN, stretch_damping=1e-5)
     recording = seen(scene, np.arange(31) / 60, sb.Solver(h=h / 16), [5])
     found = sb.fit(
-        scene, recording, {"rope_stretch_damping": {"lower": 1e-7}}, markers=markers([5]), solver=sb.Solver(h=h, integrator="bdf1")
+        scene,
+        recording,
+        {"rope_stretch_damping": {"lower": 1e-7}},
+        markers=markers([5]),
+        solver=sb.Solver(h=h, integrator="bdf1"),
     )
     assert found["rope_stretch_damping"].verdict == "at its floor"
 
@@ -197,9 +213,19 @@ def test_bdf1_makes_damping_of_its_own():
 def pendulum_recording() -> sb.Recording:
     """A pendulum of 1 m released at 30 degrees, by DOP853."""
     times = np.arange(1, 121) / 60
-    run = solve_ivp(lambda _, y: [y[1], -G * math.sin(y[0])], (0.0, 2.0), [math.pi / 6, 0.0], "DOP853", times, rtol=1e-12, atol=1e-13)
+    run = solve_ivp(
+        lambda _, y: [y[1], -G * math.sin(y[0])],
+        (0.0, 2.0),
+        [math.pi / 6, 0.0],
+        "DOP853",
+        times,
+        rtol=1e-12,
+        atol=1e-13,
+    )
     q = run.y[0]
-    return sb.Recording(positions=np.stack([np.sin(q), 0 * q, -np.cos(q)], axis=1)[:, None], times=times, name="pendulum")
+    return sb.Recording(
+        positions=np.stack([np.sin(q), 0 * q, -np.cos(q)], axis=1)[:, None], times=times, name="pendulum"
+    )
 
 
 def pendulum_with_free_length() -> sb.Scene:
@@ -221,7 +247,13 @@ def test_bias_falls_with_the_substep(integrator, order, per_frame):
     for count in per_frame:
         s = sb.Solver(h=1 / 60 / count, integrator=integrator)
         found = sb.fit(
-            pendulum_with_free_length(), recording, {"excess": {"initial": 0.05}}, markers=markers([1]), solver=s, start_time=0.0, axes="xz"
+            pendulum_with_free_length(),
+            recording,
+            {"excess": {"initial": 0.05}},
+            markers=markers([1]),
+            solver=s,
+            start_time=0.0,
+            axes="xz",
         )
         bias.append(found["excess"].value)
     assert abs(bias[-1]) < 2e-3

@@ -1,4 +1,5 @@
-"""What must not change: momentum, energy that only falls, the same motion seen from elsewhere, and the same bits however it is computed."""
+"""What must not change: momentum, energy that only falls, the same motion seen from elsewhere, and the same bits
+however it is computed."""
 
 from __future__ import annotations
 
@@ -7,7 +8,6 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 from scipy.spatial.transform import Rotation
-
 from support import observed_orders, steps
 
 G = 9.81
@@ -20,9 +20,14 @@ SOLVERS = {
 
 
 def arc(
-    turn: Rotation | None = None, shift: np.ndarray | None = None, pinned: bool = True, speed: float = 1.0, bend_damping: float | None = 1e-5
+    turn: Rotation | None = None,
+    shift: np.ndarray | None = None,
+    pinned: bool = True,
+    speed: float = 1.0,
+    bend_damping: float | None = 1e-5,
 ) -> sb.Scene:
-    """A bent rope with everything on it: stretch, bending, damping, drag, a hinge, a spring to a point, a force; seen from elsewhere."""
+    """A bent rope with everything on it: stretch, bending, damping, drag, a hinge, a spring to a point, a force; seen
+    from elsewhere."""
     turn = turn or Rotation.identity()
     shift = np.zeros(3) if shift is None else shift
     s = np.linspace(0.0, 1.0, 9)
@@ -31,7 +36,9 @@ def arc(
     link, each = float(np.linalg.norm(x[1] - x[0])), np.arange(9)
     scene = sb.Scene("arc", gravity=turn.apply([0, 0, -G]) if pinned else (0, 0, 0))
     scene.add_particles(x, 0.01 + 0.005 * s, velocity=v)
-    scene.add_constraints("distance", np.stack([each[:-1], each[1:]], axis=1), name="stretch", compliance=1e-4, damping=0.5)
+    scene.add_constraints(
+        "distance", np.stack([each[:-1], each[1:]], axis=1), name="stretch", compliance=1e-4, damping=0.5
+    )
     triples = np.stack([each[:-2], each[1:-1], each[2:]], axis=1)
     scene.add_constraints("bend", triples, name="bend", compliance=link / 2e-3, damping=bend_damping)
     if pinned:
@@ -74,8 +81,11 @@ def test_angular_momentum_is_lost_to_the_integrator_alone(integrator, order):
     assert observed_orders(lost) == approx(order, abs=0.25)
 
 
-def spun_arc(damping: float | None, axis: tuple[float, float, float], rate: float, count: int, h: float) -> tuple[sb.Scene, float, float]:
-    """A free arc in the xz plane, set spinning: the scene, its angular momentum [kg m^2/s] at the start, and how much of it is lost."""
+def spun_arc(
+    damping: float | None, axis: tuple[float, float, float], rate: float, count: int, h: float
+) -> tuple[sb.Scene, float, float]:
+    """A free arc in the xz plane, set spinning: the scene, its angular momentum [kg m^2/s] at the start, and how much
+    of it is lost."""
     s = np.linspace(0.0, np.pi / 2, 9)
     points = np.stack([np.sin(s) - 0.6, 0 * s, 0.6 - np.cos(s)], axis=1)
     scene = sb.rope(points=points, segments=8, density=0.05, EI=0.1, bend_damping=damping, pinned=(), gravity=(0, 0, 0))
@@ -96,7 +106,8 @@ def test_bend_damping_does_not_resist_a_turn_in_the_plane_of_the_bend(damping):
 
 
 def test_bend_damping_resists_a_turn_out_of_the_plane_of_the_bend():
-    """A limit of the vector C = kappa b (docs/decisions.md): turned at a rate omega it changes by omega x C, which beta opposes.
+    """A limit of the vector C = kappa b (docs/decisions.md): turned at a rate omega it changes by omega x C, which
+    beta opposes.
 
     The torque about a unit axis n is omega times the sum of beta |n x C|^2 over the joints.
     """
@@ -105,7 +116,9 @@ def test_bend_damping_resists_a_turn_out_of_the_plane_of_the_bend():
     scene, _, lost = spun_arc(5e-3, axis, rate, count, h)
     edges = np.diff(scene.positions, axis=0)
     size = np.linalg.norm(edges, axis=1)
-    kappa_b = 2 * np.cross(edges[:-1], edges[1:]) / (size[:-1] * size[1:] + (edges[:-1] * edges[1:]).sum(axis=1))[:, None]
+    kappa_b = (
+        2 * np.cross(edges[:-1], edges[1:]) / (size[:-1] * size[1:] + (edges[:-1] * edges[1:]).sum(axis=1))[:, None]
+    )
     beta = scene.compiled.unpack(scene.compiled.inputs())["damping"][8:]
     assert beta == approx(5e-3 * 0.1 / size[0], rel=1e-2)
     torque = rate * (beta * (np.cross(axis, kappa_b) ** 2).sum(axis=1)).sum()
@@ -147,7 +160,7 @@ def test_turned_and_moved_scenes_move_alike(options):
 
 
 def test_gradients_turn_with_the_scene():
-    turn, times, s = Rotation.from_rotvec([0.4, -1.1, 0.7]), steps(1 / 480, 60), sb.Solver(h=1 / 480)
+    turn, s = Rotation.from_rotvec([0.4, -1.1, 0.7]), sb.Solver(h=1 / 480)
     weights = np.random.default_rng(0).standard_normal((61, 9, 3))
     bars = []
     for scene, seed in ((arc(), weights), (arc(turn), turn.apply(weights.reshape(-1, 3)).reshape(weights.shape))):
@@ -192,7 +205,17 @@ def grid(ropes: int = 6) -> sb.Scene:
     """Several ropes side by side: many blocks, and colors with enough in them to split."""
     scene = sb.Scene("ropes")
     for k in range(ropes):
-        rope = sb.add_rope(scene, f"rope{k}", length=1.0, segments=12, density=0.05, EA=100.0, EI=1e-3, start=(0, 0.1 * k, 0), drag_linear=0.01)
+        rope = sb.add_rope(
+            scene,
+            f"rope{k}",
+            length=1.0,
+            segments=12,
+            density=0.05,
+            EA=100.0,
+            EI=1e-3,
+            start=(0, 0.1 * k, 0),
+            drag_linear=0.01,
+        )
         scene.pin(rope.particles[[0]])
     return scene
 
@@ -224,7 +247,9 @@ def test_tape_tangents_and_lanes_leave_the_bits_alone(options):
     assert np.array_equal(seen, plain)
 
     rng = np.random.default_rng(3)
-    batch = inputs * (1.0 + 1e-3 * rng.standard_normal((11, len(inputs))))  # eleven scenes: a full pack and part of another
+    batch = inputs * (
+        1.0 + 1e-3 * rng.standard_normal((11, len(inputs)))
+    )  # eleven scenes: a full pack and part of another
     lanes = core.simulate_batch(batch, every, 0.0)
     weights = rng.standard_normal((11, len(every), plain.shape[1]))
     bars = core.vjp_batch(batch, every, weights, 0.0)

@@ -1,4 +1,5 @@
-"""Ceres and SciPy on one problem: the same residuals, the same answer; the Jacobian that both see; what Ctrl-C leaves."""
+"""Ceres and SciPy on one problem: the same residuals, the same answer; the Jacobian that both see; what Ctrl-C
+leaves."""
 
 from __future__ import annotations
 
@@ -37,7 +38,9 @@ def hanging(seed: int = 0) -> sb.Experiment:
     shape = sb.equilibrium(rope()).positions[None, 1:7]
     noisy = shape + 1e-4 * np.random.default_rng(seed).standard_normal(shape.shape)
     recording = sb.Recording(positions=noisy, times=[0.0], name="shape")
-    return sb.Experiment(scene=rope(), recording=recording, markers=[sb.on_particle(i) for i in range(1, 7)], static=True, sigma=1e-4)
+    return sb.Experiment(
+        scene=rope(), recording=recording, markers=[sb.on_particle(i) for i in range(1, 7)], static=True, sigma=1e-4
+    )
 
 
 def problem_of(*experiments: sb.Experiment) -> FitProblem:
@@ -47,7 +50,8 @@ def problem_of(*experiments: sb.Experiment) -> FitProblem:
 @needs_ceres
 @pytest.mark.parametrize("loss", ["squares", "soft_l1", "huber"])
 def test_ceres_and_scipy_give_the_same_answer(loss):
-    """As asked for, within a thousandth of the intervals; iterated until the cost is level to rounding, 1e-4 standard errors."""
+    """As asked for, within a thousandth of the intervals; iterated until the cost is level to rounding, 1e-4 standard
+    errors."""
     experiments = [swinging(loss=loss), hanging()]
     ceres, scipy = (sb.fit(experiments, parameters=WANTED, optimizer=name) for name in ("ceres", "scipy"))
     assert (ceres.result.optimizer, scipy.result.optimizer) == ("ceres", "scipy")
@@ -70,7 +74,12 @@ AT_REST = ("rope_EI", "rope_density")
 
 @pytest.mark.parametrize(
     ("experiments", "wanted"),
-    [((swinging(),), WANTED), ((hanging(),), AT_REST), ((swinging(start="equilibrium"),), AT_REST), ((swinging(), hanging()), WANTED)],
+    [
+        ((swinging(),), WANTED),
+        ((hanging(),), AT_REST),
+        ((swinging(start="equilibrium"),), AT_REST),
+        ((swinging(), hanging()), WANTED),
+    ],
     ids=["motion", "static", "from equilibrium", "both"],
 )
 def test_the_jacobian_is_the_residuals_own(experiments, wanted):

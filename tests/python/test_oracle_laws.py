@@ -4,19 +4,16 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_bvp, solve_ivp
-
 from oracles import bending, drag, integration, modes, pendulums, ropes
 from oracles.calculus import derivative
+from scipy.integrate import solve_bvp, solve_ivp
 
 G = 9.81
 
 
 def test_derivative_is_accurate_for_scalars_and_arrays():
     assert derivative(math.exp, 1.0) == pytest.approx(math.e, rel=1e-12)
-    assert derivative(lambda x: [x**3, math.sin(x), 5.0], 0.0, 0.5) == pytest.approx(
-        [0.0, 1.0, 0.0], abs=1e-12
-    )
+    assert derivative(lambda x: [x**3, math.sin(x), 5.0], 0.0, 0.5) == pytest.approx([0.0, 1.0, 0.0], abs=1e-12)
     with pytest.raises(ValueError, match="step"):
         derivative(math.exp, 1.0, -0.1)
 
@@ -68,9 +65,7 @@ def test_spring_sag_and_static_multiplier(order):
     assert u[-1] == pytest.approx(integration.spring_sag(1e-3, 1.0, G), rel=1e-12)
     # C + a lambda = 0 at rest, with a = alpha/h^2 or 9 alpha/(4 h^2)
     scale = 1.0 if order == 1 else 4.0 / 9.0
-    assert integration.static_multiplier(G, h, order) == pytest.approx(
-        -u[-1] * scale * h * h / 1e-3, rel=1e-12
-    )
+    assert integration.static_multiplier(G, h, order) == pytest.approx(-u[-1] * scale * h * h / 1e-3, rel=1e-12)
 
 
 def test_amplification_factors_are_roots_of_the_schemes():
@@ -83,9 +78,7 @@ def test_amplification_factors_are_roots_of_the_schemes():
 
 def test_rotor_agrees_with_a_projected_pair():
     x, v, angle = np.array([1.0, 0.0]), np.array([0.0, 0.1]), 0.0
-    for advanced, momentum in zip(
-        integration.rotor_angles(0.1, 30), integration.rotor_momentum(0.1, 30), strict=True
-    ):
+    for advanced, momentum in zip(integration.rotor_angles(0.1, 30), integration.rotor_momentum(0.1, 30), strict=True):
         new = (x + v) / np.hypot(*(x + v))  # h = 1; the other particle is at -x
         v, x, angle = new - x, new, angle + advanced
         assert x == pytest.approx([math.cos(angle), math.sin(angle)], abs=1e-13)
@@ -114,8 +107,7 @@ def test_pendulum_steps_converge_with_the_integrators_order():
     exact = np.array([math.sin(angle), -math.cos(angle)])
     for order in (1, 2):
         errors = [
-            np.hypot(*(pendulums.pendulum_steps(1.0, G, 1.0, 1 / n, n, order)[0][-1] - exact))
-            for n in (1000, 2000)
+            np.hypot(*(pendulums.pendulum_steps(1.0, G, 1.0, 1 / n, n, order)[0][-1] - exact)) for n in (1000, 2000)
         ]
         assert math.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.02)
 
@@ -177,9 +169,7 @@ def test_polygon_is_in_equilibrium(links, axial_stiffness):
 
 
 @pytest.mark.parametrize("sweeps", [1, 3])
-@pytest.mark.parametrize(
-    "order", [range(8), range(7, -1, -1), [0, 2, 4, 6, 1, 3, 5, 7]], ids=["down", "up", "colored"]
-)
+@pytest.mark.parametrize("order", [range(8), range(7, -1, -1), [0, 2, 4, 6, 1, 3, 5, 7]], ids=["down", "up", "colored"])
 def test_gauss_seidel_extension_agrees_with_time_stepping(order, sweeps):
     links, length, density, axial_stiffness, h = 8, 0.5, 0.1, 30.0, 1 / 100
     w = np.full(links + 1, links / (density * length))

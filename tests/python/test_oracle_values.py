@@ -8,7 +8,6 @@ from decimal import Decimal
 
 import numpy as np
 import pytest
-
 from oracles import bending, drag, integration, modes, pendulums, ropes
 from oracles.calculus import derivative
 
@@ -177,9 +176,7 @@ def test_double_pendulum_tip(t, x, z):
     ],
 )
 def test_double_pendulum_derivatives(t, by_length, by_mass):
-    assert_prints(
-        derivative(lambda x: pendulums.double_pendulum_tip(t, G, lengths=(x, 1.0)), 1.0), *by_length
-    )
+    assert_prints(derivative(lambda x: pendulums.double_pendulum_tip(t, G, lengths=(x, 1.0)), 1.0), *by_length)
     assert_prints(derivative(lambda x: pendulums.double_pendulum_tip(t, G, masses=(1.0, x)), 1.0), *by_mass)
 
 
@@ -223,9 +220,7 @@ def test_polygon_catenary(links, force, sag):
 def test_elastic_catenary(axial_stiffness, force, sag):
     rope = ropes.elastic_catenary(0.6, 1.0, 0.05, G, axial_stiffness)
     assert_prints(rope, force, sag)
-    errors = [
-        np.subtract(ropes.polygon_catenary(0.6, 1.0, n, 0.05, G, axial_stiffness), rope) for n in (40, 80)
-    ]
+    errors = [np.subtract(ropes.polygon_catenary(0.6, 1.0, n, 0.05, G, axial_stiffness), rope) for n in (40, 80)]
     assert np.log2(errors[0] / errors[1]) == pytest.approx([2.0, 2.0], abs=0.02)
 
 
@@ -237,9 +232,7 @@ def test_hanging_extension():
     assert np.sum(forces) / 20 / 10.0 == pytest.approx(ropes.hanging_extension(1.0, 0.05, G, 10.0), rel=1e-13)
 
 
-@pytest.mark.parametrize(
-    ("links", "sweeps", "extension"), [(20, 1, "30.741"), (20, 4, "7.621"), (40, 1, "129.5")]
-)
+@pytest.mark.parametrize(("links", "sweeps", "extension"), [(20, 1, "30.741"), (20, 4, "7.621"), (40, 1, "129.5")])
 def test_gauss_seidel_extension(links, sweeps, extension):
     exact = ropes.gauss_seidel_extension(1.0, 0.05, G, math.inf, 1 / 240, sweeps, range(links))
     assert_prints(1e3 * exact, extension)
@@ -324,9 +317,7 @@ def test_heavy_elastica(weight, degrees, drop, reach, chord):
     assert_prints(math.degrees(shape.chord_angle), chord)
 
 
-@pytest.mark.parametrize(
-    ("weight", "slope"), [(1, ".120480"), (4, ".077845"), (8, ".035546"), (20, ".006543")]
-)
+@pytest.mark.parametrize(("weight", "slope"), [(1, ".120480"), (4, ".077845"), (8, ".035546"), (20, ".006543")])
 def test_heavy_elastica_derivative(weight, slope):
     assert_prints(derivative(lambda x: bending.heavy_elastica(x).drop, weight), slope)
 

@@ -15,9 +15,7 @@ def mixed() -> Parameters:
         [
             Parameter(name="rope_EA", initial=1e4, lower=1e2, upper=1e6, log=True, unit="N"),
             Parameter(name="rope_density", initial=0.05, fixed=True, unit="kg/m"),
-            Parameter(
-                name="angle", initial=0.1, lower=-1.0, upper=1.0, prior=(0.0, 0.2), unit="rad", scale=0.1
-            ),
+            Parameter(name="angle", initial=0.1, lower=-1.0, upper=1.0, prior=(0.0, 0.2), unit="rad", scale=0.1),
             Parameter(name="core_EA", tied_to="rope_EA", factor=0.5, unit="N"),
             Parameter(name="skin_EA", tied_to="core_EA", factor=-4.0, unit="N"),
             Parameter(name="drag", initial=0.3, log=True, prior=(0.2, 0.5)),

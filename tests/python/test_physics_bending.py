@@ -1,16 +1,16 @@
-"""Bending against closed forms: large deflections, pure moments, vibrations. Values, and derivatives by tangents and by the adjoint."""
+"""Bending against closed forms: large deflections, pure moments, vibrations. Values, and derivatives by tangents and
+by the adjoint."""
 
 import math
 
 import numpy as np
 import pytest
 import sheetbend as sb
+from oracles import bending, integration, modes
+from oracles.calculus import derivative
 from pytest import approx
 from scipy.linalg import eigh
 from scipy.optimize import brentq
-
-from oracles import bending, integration, modes
-from oracles.calculus import derivative
 from support import observed_orders, pick, slope_along, static_sensitivity, step_factor, steps, tangents, twice
 
 G = 9.81
@@ -102,14 +102,17 @@ def test_planar_bend_is_bend_in_its_plane():
 
 
 def rolled(links: int, stiffness: float, moment: float) -> tuple[sb.Scene, np.ndarray]:
-    """A chain whose first link is fixed, rolled into a regular polygon, with a couple on its last link; and the polygon's nodes."""
+    """A chain whose first link is fixed, rolled into a regular polygon, with a couple on its last link; and the
+    polygon's nodes."""
     link = LENGTH / links
     angle = 2.0 * math.pi / links * np.arange(links + 1)
     ends = np.cumsum(link * np.stack([np.cos(angle), 0 * angle, np.sin(angle)], axis=1), axis=0)
     nodes = np.concatenate([np.zeros((1, 3)), ends])
     scene = sb.Scene("roll-up", gravity=NO_GRAVITY)
     scene.add_particles(nodes, DENSITY * link)
-    scene.add_constraints("distance", np.stack([np.arange(1, links + 1), np.arange(2, links + 2)], axis=1), name="links", rest=link)
+    scene.add_constraints(
+        "distance", np.stack([np.arange(1, links + 1), np.arange(2, links + 2)], axis=1), name="links", rest=link
+    )
     triples = np.stack([np.arange(links), np.arange(1, links + 1), np.arange(2, links + 2)], axis=1)
     scene.add_constraints("bend", triples, name="joints", compliance=np.full(links, link / stiffness))
     scene.pin([0, 1])
@@ -136,7 +139,9 @@ def test_roll_up(links, ratio):
     tip = pick(scene, links + 1, X)
     by_stiffness = static_sensitivity(rest, by_compliance, tip)
     by_moment = static_sensitivity(rest, {"force": force / moment}, tip)
-    assert by_stiffness == approx(twice(-by_moment[0] * moment / EI), rel=1e-7)  # the shape knows M/EI only: dM/dEI = M/EI
+    assert by_stiffness == approx(
+        twice(-by_moment[0] * moment / EI), rel=1e-7
+    )  # the shape knows M/EI only: dM/dEI = M/EI
     assert abs(by_moment[0]) > 1e-2 * LENGTH / moment
 
     elsewhere = sb.equilibrium(rolled(links, EI, 0.999 * moment)[0], stable=False)
@@ -183,7 +188,13 @@ def test_cantilever_vibration(order, mode):
 
     def estimate(values):
         seen = float(np.angle(step_factor(values)))
-        return brentq(lambda w: integration.numerical_frequency(w, h, order) * h - seen, 0.5 * seen / h, 2 * seen / h, xtol=1e-15, rtol=1e-15)
+        return brentq(
+            lambda w: integration.numerical_frequency(w, h, order) * h - seen,
+            0.5 * seen / h,
+            2 * seen / h,
+            xtol=1e-15,
+            rtol=1e-15,
+        )
 
     assert estimate(series(motion)) == approx(omega, rel=1e-5)
     by_stiffness = slope_along(estimate, series(motion), series(tangents(scene, times, s, "rope_EI")))

@@ -1,14 +1,14 @@
-"""Rollouts of one particle, one link and two links against closed forms: forward values, and derivatives by tangents and by the adjoint."""
+"""Rollouts of one particle, one link and two links against closed forms: forward values, and derivatives by tangents
+and by the adjoint."""
 
 import math
 
 import numpy as np
 import pytest
 import sheetbend as sb
-from pytest import approx
-
 from oracles import integration, pendulums
 from oracles.calculus import derivative
+from pytest import approx
 from support import observed_orders, period, place, sensitivity, slope_along, step_factor, steps, tangents, twice
 
 G = 9.81
@@ -42,7 +42,9 @@ def test_free_fall(order):
 @pytest.mark.parametrize("what", ["gravity", "velocity", "position", "mass"])
 def test_free_fall_derivatives(order, what):
     scene, times = falling(), steps(0.01, 100)
-    expected = {"gravity": integration.free_fall_dg(100, 0.01, order), "velocity": 1.0, "position": 1.0, "mass": 0.0}[what]
+    expected = {"gravity": integration.free_fall_dg(100, 0.01, order), "velocity": 1.0, "position": 1.0, "mass": 0.0}[
+        what
+    ]
     direction = {"mass": [1.0]} if what == "mass" else {what: [0.0, 0.0, 1.0]}
     both = sensitivity(scene, times, solver(0.01, order), place(101, scene, 100, 0, Z), direction)
     assert both == approx(twice(expected), rel=1e-12, abs=1e-13)
@@ -53,14 +55,18 @@ def test_free_fall_derivatives(order, what):
 
 def spring(damping: float | None = None, stretch: float = 0.5, velocity: float = 0.0, mass: float = 1.0) -> sb.Scene:
     scene = sb.Scene("spring", gravity=(0.0, 0.0, 0.0))
-    scene.add_particles([[0.0, 0.0, 0.0], [1.0 + stretch, 0.0, 0.0]], mass, velocity=[[0.0, 0.0, 0.0], [velocity, 0.0, 0.0]])
+    scene.add_particles(
+        [[0.0, 0.0, 0.0], [1.0 + stretch, 0.0, 0.0]], mass, velocity=[[0.0, 0.0, 0.0], [velocity, 0.0, 0.0]]
+    )
     scene.add_constraints("distance", [[0, 1]], name="spring", rest=1.0, compliance=1e-3, damping=damping)
     scene.pin([0])
     return scene
 
 
 @pytest.mark.parametrize("h", [1 / 60, 1 / 240, 1 / 1000])
-@pytest.mark.parametrize(("method", "iterations"), [("direct", 1), ("direct", 2), ("gauss_seidel", 1), ("gauss_seidel", 5)])
+@pytest.mark.parametrize(
+    ("method", "iterations"), [("direct", 1), ("direct", 2), ("gauss_seidel", 1), ("gauss_seidel", 5)]
+)
 def test_spring_is_backward_euler(h, method, iterations):
     s = solver(h, 1, method, iterations)
     scene, times = spring(), steps(h, 10)
@@ -175,7 +181,14 @@ def test_pendulum_is_its_discrete_program(order, method, iterations):
 
 @pytest.mark.parametrize(
     ("order", "h", "error"),
-    [(1, 1 / 60, 2.2e-3), (1, 1 / 600, 3.3e-4), (1, 1 / 6000, 3.4e-5), (2, 1 / 60, 1.2e-3), (2, 1 / 240, 7.3e-5), (2, 1 / 600, 1.2e-5)],
+    [
+        (1, 1 / 60, 2.2e-3),
+        (1, 1 / 600, 3.3e-4),
+        (1, 1 / 6000, 3.4e-5),
+        (2, 1 / 60, 1.2e-3),
+        (2, 1 / 240, 7.3e-5),
+        (2, 1 / 600, 1.2e-5),
+    ],
 )
 def test_pendulum_period(order, h, error):
     amplitude = math.radians(30)
@@ -208,18 +221,28 @@ def test_pendulum_derivatives_of_the_discrete_program():
     scene, times = pendulum(amplitude), steps(1 / 120, 200)
     whole = {"rest": [1.0], "position": [0, 0, 0, math.sin(amplitude), 0, -math.cos(amplitude)]}
     for order in ORDERS:
+
         def tip(length, g, order=order):
             return pendulums.pendulum_steps(length, g, amplitude, h, count, order)[0][-1, 0]
 
         weights = place(count + 1, scene, count, 1, X)
         by_length, by_g = derivative(lambda a: tip(a, G), 1.0), derivative(lambda g: tip(1.0, g), G)
         assert sensitivity(scene, times, solver(h, order), weights, whole) == approx(twice(by_length), rel=1e-8)
-        assert sensitivity(scene, times, solver(h, order), weights, {"gravity": [0, 0, -1.0]}) == approx(twice(by_g), rel=1e-8)
+        assert sensitivity(scene, times, solver(h, order), weights, {"gravity": [0, 0, -1.0]}) == approx(
+            twice(by_g), rel=1e-8
+        )
 
 
 @pytest.mark.parametrize(
     ("order", "h", "retained"),
-    [(1, 1 / 60, 0.467), (1, 1 / 600, 0.924), (1, 1 / 6000, 0.992), (2, 1 / 60, 0.9944), (2, 1 / 240, 0.99973), (2, 1 / 600, 0.99996)],
+    [
+        (1, 1 / 60, 0.467),
+        (1, 1 / 600, 0.924),
+        (1, 1 / 6000, 0.992),
+        (2, 1 / 60, 0.9944),
+        (2, 1 / 240, 0.99973),
+        (2, 1 / 600, 0.99996),
+    ],
 )
 def test_pendulum_energy(order, h, retained):
     amplitude, count = math.radians(30), round(4.2 / h)
@@ -227,7 +250,9 @@ def test_pendulum_energy(order, h, retained):
     x, v = motion.positions[:, 1, [X, Z]], motion.velocities[:, 1, [X, Z]]
     energy = pendulums.energy_retained(x, v, 1.0, G)
     assert energy[-1] == approx(retained, abs=0.005)
-    assert energy == approx(pendulums.energy_retained(*pendulums.pendulum_steps(1.0, G, amplitude, h, count, order), 1.0, G), abs=1e-9)
+    assert energy == approx(
+        pendulums.energy_retained(*pendulums.pendulum_steps(1.0, G, amplitude, h, count, order), 1.0, G), abs=1e-9
+    )
     if order == 1:
         assert np.all(np.diff(energy) <= 1e-12)
 
@@ -259,7 +284,9 @@ def test_charged_dumbbell(order):
         return slope_along(lambda y: period(times, y), motion[:, 0, Y], tangents(scene, times, s, direction)[:, 0, Y])
 
     assert by({"force": field * pull}) == approx(-exact / (2 * charge), rel=tolerance)
-    assert by({"rest": [1.0], "position": np.stack([half, -half]) / length}) == approx(exact / (2 * length), rel=tolerance)
+    assert by({"rest": [1.0], "position": np.stack([half, -half]) / length}) == approx(
+        exact / (2 * length), rel=tolerance
+    )
     assert by({"mass": [1.0, 1.0]}) == approx(exact / (2 * mass), rel=tolerance)
 
 
@@ -315,7 +342,9 @@ def test_double_pendulum(end, order, counts, tolerance):
         slopes = [tangents(scene, times, s, d)[-1, 2, [X, Z]] for d in (length, {"mass": [0.0, 0.0, 1.0]})]
         both = sensitivity(scene, times, s, place(2, scene, 1, 2, Z), length)
         assert both == approx(twice(slopes[0][1]), rel=1e-9)
-        errors.append([np.linalg.norm(shown - tip), np.linalg.norm(slopes[0] - by_length), np.linalg.norm(slopes[1] - by_mass)])
+        errors.append(
+            [np.linalg.norm(shown - tip), np.linalg.norm(slopes[0] - by_length), np.linalg.norm(slopes[1] - by_mass)]
+        )
     # Extrapolation to h = 0 meets the reference: the error itself falls with the order.
     for coarse, fine in zip(*errors, strict=True):
         assert observed_orders([coarse, fine]) == approx(order, abs=tolerance)

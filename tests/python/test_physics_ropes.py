@@ -1,4 +1,5 @@
-"""Ropes against closed forms: at rest, vibrating, falling against air. Values, and derivatives by tangents and by the adjoint."""
+"""Ropes against closed forms: at rest, vibrating, falling against air. Values, and derivatives by tangents and by the
+adjoint."""
 
 import math
 from collections.abc import Callable
@@ -6,12 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import sheetbend as sb
+from oracles import drag, integration, modes, ropes
+from oracles.calculus import derivative
 from pytest import approx
 from scipy.linalg import eigh
 from scipy.optimize import brentq
-
-from oracles import drag, integration, modes, ropes
-from oracles.calculus import derivative
 from support import (
     observed_orders,
     pick,
@@ -38,7 +38,14 @@ def hanging(segments: int, EA: float | None, **options) -> sb.Scene:
 def between_levels(span: float, length: float, segments: int, EA: float | None = None) -> sb.Scene:
     """A rope hung between level points, from a V a little off its plane's symmetry."""
     depth = 0.5 * math.sqrt(length**2 - span**2)
-    return sb.rope(length, segments, density=DENSITY, EA=EA, points=[(0, 0, 0), (span / 2, 0, -depth), (span, 0, 0)], pinned=(0, -1))
+    return sb.rope(
+        length,
+        segments,
+        density=DENSITY,
+        EA=EA,
+        points=[(0, 0, 0), (span / 2, 0, -depth), (span, 0, 0)],
+        pinned=(0, -1),
+    )
 
 
 # --- O-8, 9: hanging straight
@@ -87,7 +94,9 @@ def test_gauss_seidel_makes_a_rope_longer(segments, sweeps, printed):
     assert shown == approx(extension(EA), abs=1e-10)
     assert shown == approx(printed, rel=0.15)  # the estimate (n-1)^2 g h^2/(2K), which knows no order
     expected = derivative(extension, EA)
-    assert sensitivity(scene, times, s, place(2, scene, 1, segments, Z, -1.0), "rope_EA") == approx(twice(expected), rel=1e-7)
+    assert sensitivity(scene, times, s, place(2, scene, 1, segments, Z, -1.0), "rope_EA") == approx(
+        twice(expected), rel=1e-7
+    )
 
 
 @pytest.mark.parametrize("mass", [1.0, 2.5])
@@ -127,7 +136,9 @@ def test_catenary(segments, EA):
     assert -rest.forces["rope_stretch"][:, 0] == approx(tension, rel=1e-8)
     assert rest.unstable_modes == 0
     if segments == 40:
-        continuous = ropes.catenary(0.6, 1.0, DENSITY, G) if EA is None else ropes.elastic_catenary(0.6, 1.0, DENSITY, G, EA)
+        continuous = (
+            ropes.catenary(0.6, 1.0, DENSITY, G) if EA is None else ropes.elastic_catenary(0.6, 1.0, DENSITY, G, EA)
+        )
         assert -rest.positions[:, Z].min() == approx(continuous.sag, abs=3e-4)
 
 
@@ -164,7 +175,12 @@ def test_catenary_derivatives_near_the_continuous_ones():
         rest = sb.equilibrium(scene)
         sag = pick(scene, segments // 2, Z, -1.0)
         end = {"position": np.eye(3 * (segments + 1))[3 * segments]}
-        gaps.append([static_sensitivity(rest, "rope_length", sag)[1] - 0.595828507, static_sensitivity(rest, end, sag)[1] + 0.388410536])
+        gaps.append(
+            [
+                static_sensitivity(rest, "rope_length", sag)[1] - 0.595828507,
+                static_sensitivity(rest, end, sag)[1] + 0.388410536,
+            ]
+        )
         assert static_sensitivity(rest, "rope_density", sag) == approx((0.0, 0.0), abs=1e-9)
     for column in np.transpose(gaps):
         assert abs(column[-1]) < 5e-4
@@ -172,10 +188,13 @@ def test_catenary_derivatives_near_the_continuous_ones():
 
 
 def test_rollout_stays_at_the_equilibrium():
-    """A rollout from rest stays within a second-order trace of h: XPBD's fixed point is not quite that of the statics."""
+    """A rollout from rest stays within a second-order trace of h: XPBD's fixed point is not quite that of the
+    statics."""
     moved = []
     for h in (1 / 120, 1 / 240, 1 / 480):
-        scene = sb.rope(1.0, 10, density=DENSITY, drag_linear=0.4, points=[(0, 0, 0), (0.3, 0, -0.4), (0.6, 0, 0)], pinned=(0, -1))
+        scene = sb.rope(
+            1.0, 10, density=DENSITY, drag_linear=0.4, points=[(0, 0, 0), (0.3, 0, -0.4), (0.6, 0, 0)], pinned=(0, -1)
+        )
         nodes = sb.equilibrium(scene).positions
         end = sb.simulate(scene, [0.0, 4.0], sb.Solver(h=h), start=nodes).positions[-1]
         moved.append(np.abs(end - nodes).max())
@@ -193,13 +212,16 @@ def chain(masses: np.ndarray, link: float, shape: np.ndarray) -> sb.Scene:
     scene = sb.Scene("chain")
     scene.add_particles(np.stack([offsets, 0 * drops, -drops], axis=1), np.concatenate([[1.0], masses]))
     count = len(masses)
-    scene.add_constraints("distance", np.stack([np.arange(count), np.arange(1, count + 1)], axis=1), name="links", rest=link)
+    scene.add_constraints(
+        "distance", np.stack([np.arange(count), np.arange(1, count + 1)], axis=1), name="links", rest=link
+    )
     scene.pin([0])
     return scene
 
 
 def hanging_modes(masses: np.ndarray, links: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Squared frequencies (n,) and shapes (n, n) of transverse modes: each link resists with the weight below it over its length."""
+    """Squared frequencies (n,) and shapes (n, n) of transverse modes: each link resists with the weight below it over
+    its length."""
     tension = np.cumsum(masses[::-1])[::-1] * G / links
     stiffness = np.diag(tension + np.append(tension[1:], 0.0)) - np.diag(tension[1:], 1) - np.diag(tension[1:], -1)
     return eigh(stiffness, np.diag(masses))
@@ -208,8 +230,8 @@ def hanging_modes(masses: np.ndarray, links: np.ndarray) -> tuple[np.ndarray, np
 def projected_frequency(squared: float, h: float, order: int) -> float:
     """Frequency whose implicit discretization is what XPBD makes of a tension's stiffness `squared` = omega^2.
 
-    The links' directions are those of the prediction y, so that u = (1 - eta^2 omega^2) y where backward Euler has u = y/(1 + eta^2
-    omega^2): omega^2/(1 - eta^2 omega^2), with eta = h or 2h/3.
+    The links' directions are those of the prediction y, so that u = (1 - eta^2 omega^2) y where backward Euler has u =
+    y/(1 + eta^2 omega^2): omega^2/(1 - eta^2 omega^2), with eta = h or 2h/3.
     """
     eta = h if order == 1 else 2.0 * h / 3.0
     return math.sqrt(squared / (1.0 - eta * eta * squared))
@@ -220,7 +242,13 @@ def shown_frequency(h: float, order: int) -> Callable[[np.ndarray], float]:
 
     def estimate(series: np.ndarray) -> float:
         seen = float(np.angle(step_factor(series)))
-        return brentq(lambda omega: integration.numerical_frequency(omega, h, order) * h - seen, 0.5 * seen / h, 2.0 * seen / h, xtol=1e-15, rtol=1e-15)
+        return brentq(
+            lambda omega: integration.numerical_frequency(omega, h, order) * h - seen,
+            0.5 * seen / h,
+            2.0 * seen / h,
+            xtol=1e-15,
+            rtol=1e-15,
+        )
 
     return estimate
 
@@ -308,7 +336,9 @@ def test_falling_sheet_and_rope_reach_terminal_velocity():
     for scene, expected, end in ((particle, 1.633826, 3.0), (rope, 9.133366, 12.0)):
         fall = sb.simulate(scene, [0.0, end], sb.Solver(h=1 / 500))
         assert fall.velocities[-1, :, Z] == approx(-expected, rel=1e-6)
-        assert drag.terminal_velocity(0.2 if scene is particle else DENSITY / diameter, G, coefficient, air) == approx(expected, rel=1e-6)
+        assert drag.terminal_velocity(0.2 if scene is particle else DENSITY / diameter, G, coefficient, air) == approx(
+            expected, rel=1e-6
+        )
 
 
 @pytest.mark.parametrize(("integrator", "order"), [("bdf1", 1), ("bdf2", 2)])

@@ -1,4 +1,5 @@
-"""Scenes that hypothesis draws: chains, trees and loops with every constraint, driven, damped and loaded. What holds for all of them."""
+"""Scenes that hypothesis draws: chains, trees and loops with every constraint, driven, damped and loaded. What holds
+for all of them."""
 
 from __future__ import annotations
 
@@ -7,7 +8,6 @@ import sheetbend as sb
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from pytest import approx
-
 from support import inputs_dot
 
 unhurried = settings(deadline=None, max_examples=30)
@@ -37,7 +37,9 @@ def scenes(draw: st.DrawFn) -> sb.Scene:
         scene.add_constraints("hinge", joints, name="joints", viscosity=1e-4, normal=(0, 1, 0))
     elif joints and kind != "none":
         normal = (0, 1, 0) if kind == "planar_bend" else None
-        scene.add_constraints(kind, joints, name="joints", compliance=50.0, damping=draw(st.sampled_from([None, 1e-4])), normal=normal)
+        scene.add_constraints(
+            kind, joints, name="joints", compliance=50.0, damping=draw(st.sampled_from([None, 1e-4])), normal=normal
+        )
     held = draw(st.sampled_from(["pinned", "driven", "free"]))
     if held == "pinned":
         scene.pin([0])
@@ -87,7 +89,9 @@ def test_adjoint_and_tangents_are_transposes(scene, solver, seed):
 def test_bits_do_not_depend_on_threads_or_tape(scene, solver):
     core, inputs = solver.core(scene.compiled), scene.compiled.inputs()
     alone = core.simulate(inputs, FRAMES, 0.0)["positions"]
-    again = sb.Solver(h=solver.h, integrator=solver.integrator, method=solver.method, iterations=solver.iterations, threads=3, grain=1)
+    again = sb.Solver(
+        h=solver.h, integrator=solver.integrator, method=solver.method, iterations=solver.iterations, threads=3, grain=1
+    )
     assert np.array_equal(alone, again.core(scene.compiled).simulate(inputs, FRAMES, 0.0)["positions"])
     zero = inputs_dot(scene, {"gravity": np.zeros(3)})
     assert np.array_equal(alone.ravel(), np.ravel(core.jvp(inputs, zero[None], FRAMES, 0.0)[0]))
@@ -111,7 +115,9 @@ def test_a_moved_scene_moves_alike(scene, solver, shift):
 def test_a_wrong_number_anywhere_is_refused_by_name(data):
     """One entry of one argument that is not finite, or negative where it must not be."""
     bad = data.draw(st.sampled_from([np.nan, np.inf, -np.inf]))
-    field = data.draw(st.sampled_from(["positions", "mass", "velocity", "compliance", "damping", "rest", "gravity", "forces"]))
+    field = data.draw(
+        st.sampled_from(["positions", "mass", "velocity", "compliance", "damping", "rest", "gravity", "forces"])
+    )
     count = data.draw(st.integers(2, 6))
 
     def numbers(name: str, shape: tuple[int, ...]) -> np.ndarray:
@@ -122,7 +128,9 @@ def test_a_wrong_number_anywhere_is_refused_by_name(data):
 
     try:
         scene = sb.Scene("drawn", gravity=numbers("gravity", (3,)))
-        scene.add_particles(numbers("positions", (count, 3)), numbers("mass", (count,)), velocity=numbers("velocity", (count, 3)))
+        scene.add_particles(
+            numbers("positions", (count, 3)), numbers("mass", (count,)), velocity=numbers("velocity", (count, 3))
+        )
         links = [(k, k + 1) for k in range(count - 1)]
         each = {name: numbers(name, (count - 1,)) for name in ("compliance", "damping", "rest")}
         scene.add_constraints("distance", links, name="links", **each)

@@ -31,9 +31,7 @@ def recordings(draw: st.DrawFn) -> Recording:
     frames, markers = draw(st.integers(1, 6)), draw(st.integers(1, 4))
     times = sorted(draw(st.lists(coordinates, min_size=frames, max_size=frames, unique=True)))
     sample = st.just((np.nan,) * 3) | st.tuples(coordinates, coordinates, coordinates)
-    first = draw(
-        st.lists(st.tuples(coordinates, coordinates, coordinates), min_size=markers, max_size=markers)
-    )
+    first = draw(st.lists(st.tuples(coordinates, coordinates, coordinates), min_size=markers, max_size=markers))
     rest = draw(st.lists(sample, min_size=(frames - 1) * markers, max_size=(frames - 1) * markers))
     return Recording(
         positions=np.array(first + rest).reshape(frames, markers, 3),
@@ -42,9 +40,7 @@ def recordings(draw: st.DrawFn) -> Recording:
         clamped=draw(st.lists(st.integers(0, markers - 1), unique=True)),
         name=draw(names),
         gravity=draw(st.none() | st.tuples(coordinates, coordinates, coordinates)),
-        metadata=draw(
-            st.dictionaries(st.text().filter(lambda key: key not in reserved), json_values, max_size=3)
-        ),
+        metadata=draw(st.dictionaries(st.text().filter(lambda key: key not in reserved), json_values, max_size=3)),
     )
 
 

@@ -108,9 +108,7 @@ def test_bad_field_is_refused_by_name(fields: dict, field: str, words: str) -> N
 
 def test_errors_are_one_family_and_survive_pickling() -> None:
     error = RecordingError("times", "runs backwards", (2.0, 1.0), "sort them")
-    assert (
-        isinstance(error, InputError) and isinstance(error, SheetbendError) and isinstance(error, ValueError)
-    )
+    assert isinstance(error, InputError) and isinstance(error, SheetbendError) and isinstance(error, ValueError)
     assert str(error) == "times: runs backwards (got (2.0, 1.0)). Fix: sort them."
     again = pickle.loads(pickle.dumps(error))
     assert type(again) is RecordingError and str(again) == str(error) and again.got == (2.0, 1.0)

@@ -21,9 +21,7 @@ from sheetbend.wording import short
 GAUGE = "rope_density^+1 * rope_EA^+1 stays free: only the ratio rope_EA/rope_density is known"
 
 
-def estimate(
-    name: str, value: float, half: float | None, verdict: str, words: str, **more: object
-) -> Estimate:
+def estimate(name: str, value: float, half: float | None, verdict: str, words: str, **more: object) -> Estimate:
     ends = {"lower": None, "upper": None} if half is None else {"lower": value - half, "upper": value + half}
     fields = {"unit": "N", "half_width": half, "statistical": half, "discretization": 0.0, **ends, **more}
     return Estimate(name=name, value=value, verdict=verdict, words=words, **fields)
@@ -33,16 +31,10 @@ def estimate(
 def result() -> FitResult:
     return FitResult(
         estimates=(
-            estimate(
-                "beam_E", 281300.0, 5213.0, "identified", "known to 1.9 %", unit="Pa", discretization=900.0
-            ),
+            estimate("beam_E", 281300.0, 5213.0, "identified", "known to 1.9 %", unit="Pa", discretization=900.0),
             estimate("beam_damping", 3.1234e-5, 2.1e-6, "weak", "known only to 30 %", unit="s"),
-            estimate(
-                "rope_EA", 1e4, None, "not identifiable", f"{GAUGE}; fix one of them or give it a prior"
-            ),
-            estimate(
-                "rope_density", 0.05, None, "not identifiable", f"{GAUGE}; fix one of them or give it a prior"
-            ),
+            estimate("rope_EA", 1e4, None, "not identifiable", f"{GAUGE}; fix one of them or give it a prior"),
+            estimate("rope_density", 0.05, None, "not identifiable", f"{GAUGE}; fix one of them or give it a prior"),
             estimate("grip", 5e3, None, "one-sided", "at least 930 N: larger values do as well", lower=930.0),
         ),
         given=(Given(name="mass", value=0.052, unit="kg", words="fixed"),),
@@ -237,7 +229,9 @@ def test_motions_share_a_figure() -> None:
     from sheetbend.plotting import Motion, plot_motions
 
     times = np.linspace(0, 1, 50)
-    figure = plot_motions([Motion("a", times, np.sin(times), np.cos(times), (0.5, 1.0)), Motion("b", times, times, times)])
+    figure = plot_motions(
+        [Motion("a", times, np.sin(times), np.cos(times), (0.5, 1.0)), Motion("b", times, times, times)]
+    )
     assert [axes.get_title("left") for axes in figure.axes] == ["a", "b"]
     assert [len(axes.patches) for axes in figure.axes] == [1, 0]
     with pytest.raises(InputError, match="empty"):

@@ -1,4 +1,4 @@
-"""The command line. `main` is what the console script calls, also in an installation without the packages that it needs."""
+"""The command line. `main` is what the console script calls, also where the packages that it needs are missing."""
 
 from __future__ import annotations
 

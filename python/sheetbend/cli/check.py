@@ -23,9 +23,12 @@ FITTED_FRAMES = 5
 
 def check(
     config: Annotated[Path, typer.Argument(help="A TOML configuration.", show_default=False)],
-    json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")] = False,
+    json: Annotated[
+        bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
+    ] = False,
 ) -> None:
-    """Check the gradients of every recording's scene over a short stretch, and the residuals' Jacobian; exit 5 where one fails."""
+    """Check the gradients of every recording's scene over a short stretch, and the residuals' Jacobian; exit 5 where
+    one fails."""
     run(lambda console: _check(console, config), json)
 
 

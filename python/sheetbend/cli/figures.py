@@ -35,7 +35,9 @@ def write_figures(found: Fit, config: Config, folder: Path) -> list[str]:
         figures[f"{name}_markers"] = _trajectories(c)
         figures[f"{name}_residuals"] = _residuals(c)
     published = _published(found, config)
-    figures["estimates"] = plotting.plot_estimates(found.result.estimates, published=published, title=config.experiment.name)
+    figures["estimates"] = plotting.plot_estimates(
+        found.result.estimates, published=published, title=config.experiment.name
+    )
     for name, figure in figures.items():
         plotting.save(figure, folder / f"{name}.{form}")
     return [f"{name}.{form}" for name in figures]
@@ -56,7 +58,9 @@ def _plane(comparisons: list[Comparison]) -> tuple[int, int]:
     axes = {tuple(sorted("xyz".index(a) for a in c.experiment.axes)) for c in comparisons}
     if len(axes) == 1 and len(only := axes.pop()) == 2:
         return only[0], only[1]
-    spread = np.ptp(np.vstack([c.recording.positions[0] for c in comparisons if np.isfinite(c.recording.positions).any()]), axis=0)
+    spread = np.ptp(
+        np.vstack([c.recording.positions[0] for c in comparisons if np.isfinite(c.recording.positions).any()]), axis=0
+    )
     return (0 if spread[0] >= spread[1] else 1), 2
 
 
@@ -80,18 +84,25 @@ def _line(found: Fit, c: Comparison) -> np.ndarray:
     if len(scene.ropes) != 1:
         return c.simulated[0]
     (rope,) = scene.ropes.values()
-    values = {q: found.values.get(f"{q}[{name}]", found.values.get(q, quantity.value)) for q, quantity in scene.quantities.items()}
+    values = {
+        q: found.values.get(f"{q}[{name}]", found.values.get(q, quantity.value))
+        for q, quantity in scene.quantities.items()
+    }
     return equilibrium(scene, values=values).positions[rope.particles]
 
 
 def _trajectories(c: Comparison) -> Figure:
     x, names = c.recording.positions, c.recording.markers
-    return plotting.plot_trajectories(x, c.simulated, c.recording.times, markers=names, held_out=_held_out(c), title=c.experiment.name)
+    return plotting.plot_trajectories(
+        x, c.simulated, c.recording.times, markers=names, held_out=_held_out(c), title=c.experiment.name
+    )
 
 
 def _residuals(c: Comparison) -> Figure:
     x, names = c.recording.positions, c.recording.markers
-    return plotting.plot_residuals(x, c.simulated, c.recording.times, markers=names, held_out=_held_out(c), title=c.experiment.name)
+    return plotting.plot_residuals(
+        x, c.simulated, c.recording.times, markers=names, held_out=_held_out(c), title=c.experiment.name
+    )
 
 
 def _held_out(c: Comparison) -> tuple[float, float] | None:

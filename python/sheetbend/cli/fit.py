@@ -25,10 +25,21 @@ REPORT_WIDTH = 100
 
 def fit(
     config: Annotated[Path, typer.Argument(help="A TOML configuration.", show_default=False)],
-    output: Annotated[Path | None, typer.Option(help="Folder for fit.json, figures, report and fitted.toml. [default: out/NAME]", show_default=False)] = None,
-    resume: Annotated[Path | None, typer.Option(help="Start from the values of an earlier fit.json.", show_default=False)] = None,
-    strict: Annotated[bool, typer.Option("--strict", help="Exit 3 when any parameter is not identifiable, not only when all are.")] = False,
-    json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")] = False,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for fit.json, figures, report and fitted.toml. [default: out/NAME]", show_default=False
+        ),
+    ] = None,
+    resume: Annotated[
+        Path | None, typer.Option(help="Start from the values of an earlier fit.json.", show_default=False)
+    ] = None,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Exit 3 when any parameter is not identifiable, not only when all are.")
+    ] = False,
+    json: Annotated[
+        bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
+    ] = False,
 ) -> None:
     """Fit parameters to recordings. Ctrl-C stops at the best point so far and still reports."""
     run(lambda console: _fit(console, config, output, resume, strict), json)
@@ -57,11 +68,23 @@ def _fit(console: Console, path: Path, output: Path | None, resume: Path | None,
 def _study(path: Path, resume: Path | None) -> Study:
     config = parse(path)
     if not config.recording:
-        raise ConfigError("recording", "is missing", None, "add a [[recording]] with its file, or use `sheetbend simulate`")
+        raise ConfigError(
+            "recording", "is missing", None, "add a [[recording]] with its file, or use `sheetbend simulate`"
+        )
     if all(r.predict is not None for r in config.recording):
-        raise ConfigError("recording[0].predict", "leaves nothing to fit: all recordings are only predicted", config.recording[0].predict, "leave it out for one")
+        raise ConfigError(
+            "recording[0].predict",
+            "leaves nothing to fit: all recordings are only predicted",
+            config.recording[0].predict,
+            "leave it out for one",
+        )
     if not config.parameters:
-        raise ConfigError("parameters", "is missing", None, "add a [parameters.NAME] for what is to be fitted; `sheetbend info` lists the names")
+        raise ConfigError(
+            "parameters",
+            "is missing",
+            None,
+            "add a [parameters.NAME] for what is to be fitted; `sheetbend info` lists the names",
+        )
     if resume is not None:
         if not resume.is_file():
             raise ConfigError("--resume", "is no file", str(resume), "give the fit.json of an earlier fit")
@@ -73,13 +96,20 @@ def _check_starts(config: Config, problem: FitProblem) -> None:
     for i, start in enumerate(config.fit.starts):
         for name in start:
             if name not in problem.parameters.free:
-                raise ConfigError(f"fit.starts[{i}].{name}", "is no free parameter", name, f"use some of: {', '.join(problem.parameters.free)}")
+                raise ConfigError(
+                    f"fit.starts[{i}].{name}",
+                    "is no free parameter",
+                    name,
+                    f"use some of: {', '.join(problem.parameters.free)}",
+                )
 
 
 def _report(console: Console, result: FitResult) -> None:
     """In color in a terminal; where that is narrow its lines wrap, but no column is lost."""
     if console.is_terminal:
-        Console(stderr=console.stderr, highlight=False, width=max(console.width, REPORT_WIDTH)).print(rich_report(result))
+        Console(stderr=console.stderr, highlight=False, width=max(console.width, REPORT_WIDTH)).print(
+            rich_report(result)
+        )
     else:
         console.print("\n" + plain(result), markup=False, soft_wrap=True, end="")
 

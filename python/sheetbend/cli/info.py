@@ -23,7 +23,9 @@ PACKAGES = ("numpy", "scipy", "torch", "matplotlib", "pydantic", "rich", "typer"
 
 def info(
     config: Annotated[Path | None, typer.Argument(help="A TOML configuration.", show_default=False)] = None,
-    json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")] = False,
+    json: Annotated[
+        bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
+    ] = False,
 ) -> None:
     """Show versions and what is built in; with a configuration also its scenes, quantities and parameters."""
     run(lambda console: _info(console, config), json)
@@ -33,9 +35,14 @@ def _info(console: Console, path: Path | None) -> Outcome:
     data: dict[str, Any] = {"sheetbend": __version__, "python": platform.python_version(), "packages": _packages()}
     data |= {"ceres": has_ceres(), "constraints": {name: kind["arity"] for name, kind in KINDS.items()}}
     console.print(f"[bold]sheetbend {__version__}[/]  Python {data['python']}, {platform.machine()}")
-    console.print("  optimizers   ", "ceres, scipy" if has_ceres() else "scipy (Ceres was not built: install libceres-dev and reinstall)")
+    console.print(
+        "  optimizers   ",
+        "ceres, scipy" if has_ceres() else "scipy (Ceres was not built: install libceres-dev and reinstall)",
+    )
     console.print("  constraints  ", ", ".join(f"{name} ({arity})" for name, arity in data["constraints"].items()))
-    console.print("  packages     ", ", ".join(f"{name} {version or 'missing'}" for name, version in data["packages"].items()))
+    console.print(
+        "  packages     ", ", ".join(f"{name} {version or 'missing'}" for name, version in data["packages"].items())
+    )
     if path is not None:
         data["config"] = _config(console, path)
     return Outcome(data)
@@ -64,7 +71,12 @@ def _config(console: Console, path: Path) -> dict[str, Any]:
     for name, q in first.quantities.items():
         table.add_row(name, f"{q.value:.6g}", q.unit, _role(study.parameters.get(name)))
     console.print(table)
-    return {"name": config.experiment.name, "scenes": scenes, "quantities": {n: q.value for n, q in first.quantities.items()}, "parameters": list(study.parameters)}
+    return {
+        "name": config.experiment.name,
+        "scenes": scenes,
+        "quantities": {n: q.value for n, q in first.quantities.items()},
+        "parameters": list(study.parameters),
+    }
 
 
 def _recorded(e: Experiment) -> dict[str, Any]:

@@ -27,7 +27,9 @@ class Iterations:
             self.live.start()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         if self.live is not None:
             self.live.stop()
 
@@ -43,5 +45,7 @@ class Iterations:
         shown = self.parameters.free[:SHOWN]
         parts = [f"{name} {values[name]:.4g} {self.parameters[name].unit}".rstrip() for name in shown]
         more = len(self.parameters.free) - len(shown)
-        line = Text.assemble((f"iteration {progress.iteration:3d}", "bold"), f"  cost {progress.cost:.6g}  ", ("  ".join(parts), "cyan"))
+        line = Text.assemble(
+            (f"iteration {progress.iteration:3d}", "bold"), f"  cost {progress.cost:.6g}  ", ("  ".join(parts), "cyan")
+        )
         return line.append(f"  and {more} more", style="dim") if more else line

@@ -38,16 +38,24 @@ class Task:
 
 def simulate(
     config: Annotated[Path, typer.Argument(help="A TOML configuration; a fit's fitted.toml too.", show_default=False)],
-    output: Annotated[Path | None, typer.Option(help="Folder for the trajectories. [default: out/NAME]", show_default=False)] = None,
-    duration: Annotated[float | None, typer.Option(help="s; to the recording's end when left out.", show_default=False)] = None,
+    output: Annotated[
+        Path | None, typer.Option(help="Folder for the trajectories. [default: out/NAME]", show_default=False)
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="s; to the recording's end when left out.", show_default=False)
+    ] = None,
     recording: Annotated[str | None, typer.Option(help="Only the scene of this recording.", show_default=False)] = None,
-    json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")] = False,
+    json: Annotated[
+        bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
+    ] = False,
 ) -> None:
     """Simulate a scene and write its trajectory as NPZ: times, positions, velocities and the constraints' forces."""
     run(lambda console: _simulate(console, config, output, duration, recording), json)
 
 
-def _simulate(console: Console, path: Path, output: Path | None, duration: float | None, recording: str | None) -> Outcome:
+def _simulate(
+    console: Console, path: Path, output: Path | None, duration: float | None, recording: str | None
+) -> Outcome:
     if duration is not None and not (np.isfinite(duration) and duration > 0):
         raise ConfigError("--duration", "must be positive", duration, "give s")
     study = build(parse(path), path.parent)
@@ -68,7 +76,9 @@ def _tasks(study: Study, duration: float | None, recording: str | None) -> list[
         return [_task(e, duration) for e in experiments]
     scene, solver = scene_alone(study.config)
     frame = round(max(FRAME / solver.h, 1.0)) * solver.h
-    return [Task(study.config.experiment.name, scene, solver, np.arange(0.0, (duration or DURATION) + frame / 2, frame))]
+    return [
+        Task(study.config.experiment.name, scene, solver, np.arange(0.0, (duration or DURATION) + frame / 2, frame))
+    ]
 
 
 def _task(e: Experiment, duration: float | None) -> Task:
@@ -97,8 +107,16 @@ def _run(console: Console, task: Task, folder: Path) -> dict[str, Any]:
         "largest_speed": float(np.linalg.norm(motion.velocities, axis=2).max()),
         "largest_force": {group: float(np.abs(values).max()) for group, values in motion.forces.items()},
     }
-    told = "at rest" if task.static else f"{summary['duration']:.4g} s in {summary['frames']} frames, h = {task.solver.h:.4g} s"
-    reach = "" if task.static else f", moved up to {summary['largest_displacement']:.4g} m at up to {summary['largest_speed']:.4g} m/s"
+    told = (
+        "at rest"
+        if task.static
+        else f"{summary['duration']:.4g} s in {summary['frames']} frames, h = {task.solver.h:.4g} s"
+    )
+    reach = (
+        ""
+        if task.static
+        else f", moved up to {summary['largest_displacement']:.4g} m at up to {summary['largest_speed']:.4g} m/s"
+    )
     console.print(f"  {task.name}: {summary['particles']} particles, {told}{reach}; {path}", soft_wrap=True)
     return summary
 
@@ -109,6 +127,8 @@ def _motion(task: Task) -> Trajectory:
         rest = equilibrium(task.scene)
         if task.static:
             still = np.zeros_like(rest.positions)[None]
-            return Trajectory(task.times, rest.positions[None], still, {group: values[None] for group, values in rest.forces.items()})
+            return Trajectory(
+                task.times, rest.positions[None], still, {group: values[None] for group, values in rest.forces.items()}
+            )
         start = rest.positions
     return run_simulation(task.scene, task.times, task.solver, start=start)

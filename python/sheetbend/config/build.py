@@ -46,7 +46,13 @@ class Study:
         if fit.halve_step or fit.double_segments:
             finer = (lambda: build(self.config, self.folder, finer=2).experiments) if fit.double_segments else None
             refine = Refinement(halve_step=fit.halve_step, finer=finer)
-        return {"optimizer": fit.optimizer, "starts": fit.starts, "refine": refine, "max_iterations": fit.max_iterations, "threads": fit.threads}
+        return {
+            "optimizer": fit.optimizer,
+            "starts": fit.starts,
+            "refine": refine,
+            "max_iterations": fit.max_iterations,
+            "threads": fit.threads,
+        }
 
 
 def build(config: schema.Config, folder: Path, finer: int = 1) -> Study:
@@ -63,7 +69,9 @@ def build(config: schema.Config, folder: Path, finer: int = 1) -> Study:
     names = [e.name for e in experiments]
     for i, name in enumerate(names):
         if name in names[:i]:
-            raise ConfigError(f"recording[{i}].name", "is another recording's too", name, "give each recording a name of its own")
+            raise ConfigError(
+                f"recording[{i}].name", "is another recording's too", name, "give each recording a name of its own"
+            )
     parameters = {name: _given(p) for name, p in config.parameters.items()}
     if experiments:
         _check_names(config, experiments)
@@ -97,17 +105,37 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
         t0 = _start(section, recording)
         for key in ("fit", "held_out"):
             _check_window(f"{path}.{key}", getattr(section, key), recording)
-        moment = Moment(recording.piece(*(section.fit if section.static and section.fit else (t0, None))), t0, section.static)
+        moment = Moment(
+            recording.piece(*(section.fit if section.static and section.fit else (t0, None))), t0, section.static
+        )
     ropes = _shown(config, section, path)
     shared = not section.marker
     markers = config.marker if shared else section.marker
     where = "marker" if shared else f"{path}.marker"
     numbers = [_number(f"{where}[{k}].marker", m.marker, recording) for k, m in enumerate(markers)]
     described = _without(config.scene, section.leave_out, path)
-    scene, particles = build_scene(recording.name, described, moment, _along(ropes, markers, numbers, recording), finer, ropes)
+    scene, particles = build_scene(
+        recording.name, described, moment, _along(ropes, markers, numbers, recording), finer, ropes
+    )
     _start_values(scene, config, section.values, path)
-    places = {recording.markers[n]: _place(f"{where}[{k}]", m, scene, particles) for k, (m, n) in enumerate(zip(markers, numbers, strict=True))}
-    plain = section.model_dump(include={"static", "start", "start_time", "predict", "sigma", "axes", "radius", "loss", "loss_scale", "time_offset"})
+    places = {
+        recording.markers[n]: _place(f"{where}[{k}]", m, scene, particles)
+        for k, (m, n) in enumerate(zip(markers, numbers, strict=True))
+    }
+    plain = section.model_dump(
+        include={
+            "static",
+            "start",
+            "start_time",
+            "predict",
+            "sigma",
+            "axes",
+            "radius",
+            "loss",
+            "loss_scale",
+            "time_offset",
+        }
+    )
     with located(path, recording.name):
         experiment = Experiment(
             scene=scene,
@@ -129,7 +157,9 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
 def _read(section: schema.RecordingSection, folder: Path, path: str) -> Recording:
     file = folder / section.file
     if not file.is_file():
-        raise ConfigError(f"{path}.file", "does not exist", str(file), "give a file relative to the configuration's folder")
+        raise ConfigError(
+            f"{path}.file", "does not exist", str(file), "give a file relative to the configuration's folder"
+        )
     try:
         recording = Recording.load(file, section.units)
         if section.frames is not None:
@@ -161,7 +191,9 @@ def _shown(config: schema.Config, section: schema.RecordingSection, path: str) -
     every = [rope.name for rope in config.scene.rope]
     unknown = [name for name in section.ropes or () if name not in every]
     if unknown:
-        raise ConfigError(f"{path}.ropes", "name no rope of the scene", unknown, f"name some of: {', '.join(every) or 'none'}")
+        raise ConfigError(
+            f"{path}.ropes", "name no rope of the scene", unknown, f"name some of: {', '.join(every) or 'none'}"
+        )
     return every if section.ropes is None else section.ropes
 
 
@@ -177,13 +209,19 @@ def _without(scene: SceneSection, names: list[str], path: str) -> SceneSection:
     return scene.model_copy(update={**kept, "quantities": quantities})
 
 
-def _along(ropes: list[str], markers: list[schema.Marker], numbers: list[int], recording: Recording) -> dict[str, list[int]]:
+def _along(
+    ropes: list[str], markers: list[schema.Marker], numbers: list[int], recording: Recording
+) -> dict[str, list[int]]:
     """Per rope the markers on it, in order along it."""
     if not markers:
         return {name: list(range(len(recording.markers))) for name in ropes} if len(ropes) == 1 else {}
     placed: dict[str, list[int]] = {}
     for name in ropes:
-        mine = [(m.arc_length, n) for m, n in zip(markers, numbers, strict=True) if m.arc_length is not None and m.rope in (name, None)]
+        mine = [
+            (m.arc_length, n)
+            for m, n in zip(markers, numbers, strict=True)
+            if m.arc_length is not None and m.rope in (name, None)
+        ]
         placed[name] = [n for _, n in sorted(mine)]
     return placed
 
@@ -199,7 +237,12 @@ def _place(path: str, marker: schema.Marker, scene: Scene, particles: Particles)
     else:
         name = marker.rope or (next(iter(scene.ropes)) if len(scene.ropes) == 1 else "")
         if name not in scene.ropes:
-            raise ConfigError(f"{path}.rope", "is no rope of the scene", marker.rope, f"name one of: {', '.join(scene.ropes) or 'none'}")
+            raise ConfigError(
+                f"{path}.rope",
+                "is no rope of the scene",
+                marker.rope,
+                f"name one of: {', '.join(scene.ropes) or 'none'}",
+            )
         with located(path):
             place = on_rope(scene.ropes[name], marker.arc_length or 0.0)
     # A zero offset still sets the frame in which offset quantities count.
@@ -210,7 +253,9 @@ def _place(path: str, marker: schema.Marker, scene: Scene, particles: Particles)
 
 def _on_arm(path: str, marker: schema.Marker, particles: Particles) -> Place:
     if marker.arm not in particles.arms:
-        raise ConfigError(f"{path}.arm", "is no arm of the scene", marker.arm, f"name one of: {', '.join(particles.arms) or 'none'}")
+        raise ConfigError(
+            f"{path}.arm", "is no arm of the scene", marker.arm, f"name one of: {', '.join(particles.arms) or 'none'}"
+        )
     place = particles.arms[marker.arm].place(marker.radius or 0.0)
     along, *across = marker.offset or (0.0, 0.0, 0.0)
     with located(path):
@@ -245,7 +290,9 @@ def _check_names(config: schema.Config, experiments: tuple[Experiment, ...]) -> 
             if base not in known:
                 near = difflib.get_close_matches(base, known, n=1)
                 hint = f"did you mean '{near[0]}'? " if near else ""
-                raise ConfigError(f"{section}.{name}", "is no quantity of the scenes", name, f"{hint}There are: {', '.join(known)}")
+                raise ConfigError(
+                    f"{section}.{name}", "is no quantity of the scenes", name, f"{hint}There are: {', '.join(known)}"
+                )
 
 
 def _known(path: str, section: schema.RecordingSection, experiment: Experiment) -> None:
@@ -263,12 +310,19 @@ def _start_values(scene: Scene, config: schema.Config, values: Mapping[str, floa
     """Quantities start where the parameters do, and at what is known of this recording."""
     for name, value in values.items():
         if name not in scene.quantities:
-            raise ConfigError(f"{path}.values.{name}", "is no quantity of the scene", name, f"name some of: {', '.join(scene.quantities)}")
+            raise ConfigError(
+                f"{path}.values.{name}",
+                "is no quantity of the scene",
+                name,
+                f"name some of: {', '.join(scene.quantities)}",
+            )
         p = config.parameters.get(name)
         if p is not None and not p.private:
             fix = f"set parameters.{name}.initial, or make it private = true"
             raise ConfigError(f"{path}.values.{name}", "is a parameter shared by all recordings", value, fix)
-    initial = {name: p.initial for name, p in config.parameters.items() if p.initial is not None and name in scene.quantities}
+    initial = {
+        name: p.initial for name, p in config.parameters.items() if p.initial is not None and name in scene.quantities
+    }
     for name, value in {**initial, **values}.items():
         with located(f"{path}.values" if name in values else "parameters"):
             scene.quantities[name] = replace(scene.quantities[name], value=float(value))
@@ -279,7 +333,8 @@ def _start_values(scene: Scene, config: schema.Config, values: Mapping[str, floa
 
 
 def _root(config: schema.Config, name: str) -> tuple[str, float]:
-    """The end of a parameter's ties and the factor to it; circles and loose ends, which `Parameters` reports, lead back to itself."""
+    """The end of a parameter's ties and the factor to it; circles and loose ends, which `Parameters` reports, lead
+    back to itself."""
     at, factor, passed = name, 1.0, {name}
     while (p := config.parameters.get(at)) is not None and p.tied_to is not None:
         if p.tied_to in passed:

@@ -1,4 +1,4 @@
-"""From pydantic's and the package's errors to `ConfigError`: the dotted path of the key, what it got, how to put it right."""
+"""From pydantic's and the package's errors to `ConfigError`: the path of the key, what it got, how to put it right."""
 
 from __future__ import annotations
 
@@ -23,7 +23,9 @@ def from_validation(error: ValidationError, model: type[BaseModel]) -> ConfigErr
     for detail in error.errors():
         by_path.setdefault(dotted(_keys(detail["loc"], model)), []).append(dict(detail))
     # Every branch of a union complains; the one whose type fits knows more than the others.
-    first, *others = (one(min(details, key=lambda d: d["type"].endswith("_type")), model) for details in by_path.values())
+    first, *others = (
+        one(min(details, key=lambda d: d["type"].endswith("_type")), model) for details in by_path.values()
+    )
     for other in others:
         first.add_note(str(other))
     return first
@@ -42,7 +44,9 @@ def one(detail: Mapping[str, Any], model: type[BaseModel]) -> ConfigError:
         problem, _, fix = str(limits["error"]).partition("|")
         return ConfigError(field, problem, _short(got), fix or "see docs/configuration.md")
     if kind == "string_pattern_mismatch":
-        return ConfigError(field, "has the wrong form", got, _FORMS.get(limits["pattern"], f"match {limits['pattern']}"))
+        return ConfigError(
+            field, "has the wrong form", got, _FORMS.get(limits["pattern"], f"match {limits['pattern']}")
+        )
     wanted = _WANTED.get(kind, "")
     if kind in _LIMITS:
         word, limit = _LIMITS[kind]
@@ -52,7 +56,12 @@ def one(detail: Mapping[str, Any], model: type[BaseModel]) -> ConfigError:
         return ConfigError(field, f"has {limits['actual_length']} entries", got, f"give {wanted}")
     if kind == "literal_error":
         return ConfigError(field, "is none of the choices", got, f"use {limits['expected']}")
-    return ConfigError(field, f"must be {wanted}" if wanted else detail["msg"], got, f"write {wanted}" if wanted else "see docs/configuration.md")
+    return ConfigError(
+        field,
+        f"must be {wanted}" if wanted else detail["msg"],
+        got,
+        f"write {wanted}" if wanted else "see docs/configuration.md",
+    )
 
 
 _FORMS = {
@@ -81,7 +90,8 @@ _WANTED = {
 
 @contextmanager
 def located(path: str, prefix: str = "") -> Iterator[None]:
-    """Errors from inside get the dotted path of the table that they come from; `prefix` is the group's name, which they start with."""
+    """Errors from inside get the dotted path of the table that they come from; `prefix` is the group's name, which
+    they start with."""
     try:
         yield
     except ConfigError:
@@ -112,7 +122,7 @@ def _keys(location: Location, model: type[BaseModel]) -> list[str | int]:
     kept: list[str | int] = []
     here: Any = model
     for part in location:
-        options = [o for o in _options(here)]
+        options = list(_options(here))
         if isinstance(part, int):
             here = next((typing.get_args(o)[0] for o in options if typing.get_origin(o) is list), None)
         else:
@@ -143,7 +153,11 @@ def _unknown(path: list[str | int], model: type[BaseModel]) -> ConfigError:
     known = _fields_at(path[:-1], model)
     name = str(path[-1])
     near = difflib.get_close_matches(name, known, n=1, cutoff=0.6) or [k for k in known if k.lower() == name.lower()]
-    fix = f"did you mean '{near[0]}'? The keys of {_table(path[:-1])} are: {', '.join(known)}" if near else f"use some of: {', '.join(known)}"
+    fix = (
+        f"did you mean '{near[0]}'? The keys of {_table(path[:-1])} are: {', '.join(known)}"
+        if near
+        else f"use some of: {', '.join(known)}"
+    )
     return ConfigError(dotted(path), "is no known key", name, fix)
 
 
@@ -155,7 +169,11 @@ def _fields_at(path: Location, model: type[BaseModel]) -> list[str]:
             here = next(typing.get_args(o)[0] for o in options if typing.get_origin(o) is list)
             continue
         models = [o for o in options if isinstance(o, type) and issubclass(o, BaseModel)]
-        here = models[0].model_fields[part].annotation if models else typing.get_args(next(o for o in options if typing.get_origin(o) is dict))[1]
+        here = (
+            models[0].model_fields[part].annotation
+            if models
+            else typing.get_args(next(o for o in options if typing.get_origin(o) is dict))[1]
+        )
     return list(next(o for o in _options(here) if isinstance(o, type) and issubclass(o, BaseModel)).model_fields)
 
 

@@ -17,7 +17,8 @@ def load(path: str | Path) -> Study:
     """Read, check and build a configuration.
 
     Raises:
-        ConfigError: the file is missing, no TOML, or a key is unknown, missing or wrong; more problems are in its notes.
+        ConfigError: the file is missing, no TOML, or a key is unknown, missing or wrong; more problems are in its
+            notes.
     """
     path = Path(path)
     return build(parse(path), path.parent)

@@ -1,4 +1,5 @@
-"""The tables of docs/configuration.md, made from the schema: `python -m sheetbend.config.reference docs/configuration.md` renews them."""
+"""The tables of docs/configuration.md, made from the schema: `python -m sheetbend.config.reference
+docs/configuration.md` renews them."""
 
 from __future__ import annotations
 
@@ -51,7 +52,14 @@ def renewed(text: str) -> str:
 def _section(header: str, model: type[Section]) -> str:
     about = " ".join((model.__doc__ or "").split()).removeprefix(f"{header}: ")
     about = about[0].upper() + about[1:]
-    lines = [f"### `{header}`", "", about, "", "| key | type | default | unit | meaning |", "| --- | --- | --- | --- | --- |"]
+    lines = [
+        f"### `{header}`",
+        "",
+        about,
+        "",
+        "| key | type | default | unit | meaning |",
+        "| --- | --- | --- | --- | --- |",
+    ]
     lines += [_row(name, field) for name, field in model.model_fields.items()]
     return "\n".join([*lines, ""])
 

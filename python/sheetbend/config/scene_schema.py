@@ -6,6 +6,7 @@ from typing import Literal
 
 from .section import Finite, Name, Reference, Section, Vector, key
 
+
 class Rope(Section):
     """A rope, `sb.add_rope`. A list of ropes: [[scene.rope]]."""
 
@@ -18,19 +19,26 @@ class Rope(Section):
     start: Vector = key([0.0, 0.0, 0.0], "where a straight rope starts", "m")
     direction: Vector = key([1.0, 0.0, 0.0], "where a straight rope points")
     points: list[Vector] | Literal["recording"] | None = key(
-        None, 'initial shape as a polyline, or "recording": through the markers on it, as first measured (their mean when static)', "m"
+        None,
+        'initial shape as a polyline, or "recording": through the markers on it, as first measured '
+        "(their mean when static)",
+        "m",
     )
     stretch_damping: Finite | None = key(None, "Kelvin-Voigt time constant of stretching", "s", gt=0)
     bend_damping: Finite | None = key(None, "Kelvin-Voigt time constant of bending", "s", gt=0)
     loss_factor: Finite | None = key(
-        None, "of stretching and bending, instead of the time constants: tau = loss_factor / (2 pi loss_frequency)", gt=0
+        None,
+        "of stretching and bending, instead of the time constants: tau = loss_factor / (2 pi loss_frequency)",
+        gt=0,
     )
     loss_frequency: Finite | None = key(None, "frequency of the motion at which `loss_factor` holds", "Hz", gt=0)
     drag_linear: Finite | None = key(None, "linear air drag per length", "N s/m^2", ge=0)
     drag_quadratic: Finite | None = key(None, "quadratic air drag per length", "N s^2/m^3", ge=0)
     clamp_start: Vector | None = key(None, "direction of travel at the start, held by a clamp there")
     clamp_end: Vector | None = key(None, "direction of travel at the end, held by a clamp there")
-    clamp_angles: bool = key(False, "adds <name>_start_angle and <name>_end_angle (rad), the clamps' rotations about `plane`")
+    clamp_angles: bool = key(
+        False, "adds <name>_start_angle and <name>_end_angle (rad), the clamps' rotations about `plane`"
+    )
     plane: Vector | None = key(None, "unit normal of the plane that the rope stays in")
     set_modes: list[int] = key([], "k of rest-curvature modes cos(k pi s / length), each adds <name>_set_<k> (1/m)")
     pinned: list[int] = key([], "nodes that are held where they start; -1 is the last")
@@ -47,7 +55,8 @@ class Particles(Section):
 
 
 class Pendulum(Section):
-    """A point mass on a massless rigid arm, swinging in the x-z plane, `sb.add_pendulum`. A list: [[scene.pendulum]]."""
+    """A point mass on a massless rigid arm, swinging in the x-z plane, `sb.add_pendulum`. A list:
+    [[scene.pendulum]]."""
 
     name: Name = key("pendulum", "prefix of its quantities: <name>_length, _mass, _angle, _rate, _hinge_viscosity")
     length: Finite = key(..., "from pivot to mass", "m", gt=0)
@@ -59,9 +68,13 @@ class Pendulum(Section):
 
 
 class Arm(Section):
-    """A rigid arm with mass, first moment and inertia, swinging in the x-z plane, `sb.add_arm`. A list: [[scene.arm]]."""
+    """A rigid arm with mass, first moment and inertia, swinging in the x-z plane, `sb.add_arm`. A list:
+    [[scene.arm]]."""
 
-    name: Name = key("arm", "prefix of its quantities: <name>_mass, _first_moment, _inertia, _length, _angle, _rate, _hinge_viscosity")
+    name: Name = key(
+        "arm",
+        "prefix of its quantities: <name>_mass, _first_moment, _inertia, _length, _angle, _rate, _hinge_viscosity",
+    )
     mass: Finite = key(..., "its mass", "kg", gt=0)
     first_moment: Finite = key(..., "mass times distance from pivot to center of mass", "kg m", gt=0)
     inertia: Finite = key(..., "about the pivot", "kg m^2", gt=0)
@@ -69,7 +82,9 @@ class Arm(Section):
     pivot: Vector | Name = key([0.0, 0.0, 0.0], "a fixed point, or the name of the arm whose end carries this one", "m")
     angle: Finite = key(0.0, "initial angle from straight down towards +x", "rad")
     rate: Finite = key(0.0, "initial rate of the angle", "rad/s")
-    viscosity: Finite | None = key(None, "of the pivot: torque over the rate of the angle between the two arms", "N m s/rad", gt=0)
+    viscosity: Finite | None = key(
+        None, "of the pivot: torque over the rate of the angle between the two arms", "N m s/rad", gt=0
+    )
 
 
 class Constraints(Section):
@@ -78,7 +93,9 @@ class Constraints(Section):
     name: Name | None = key(None, "prefix of its quantities; the kind when left out")
     kind: str = key(..., "distance, bend, planar_bend, hinge or attachment")
     particles: list[list[Reference]] = key(..., "the particles of each constraint", min_length=1)
-    compliance: Finite | list[Finite] | None = key(None, "0 = rigid; m/N, bends 1/(N m), hinge rad/(N m). One number is the quantity <name>_compliance")
+    compliance: Finite | list[Finite] | None = key(
+        None, "0 = rigid; m/N, bends 1/(N m), hinge rad/(N m). One number is the quantity <name>_compliance"
+    )
     damping: Finite | list[Finite] | None = key(None, "N s/m, angles N m s. One number is the quantity <name>_damping")
     viscosity: Finite | list[Finite] | None = key(None, "a damper without stiffness, instead of both; <name>_viscosity")
     rest: Finite | list[Finite] | None = key(None, "rest length m (initial when left out), planar rest, or angle rad")
@@ -99,7 +116,9 @@ class Force(Section):
     name: Name | None = key(None, "adds the quantities <name>_x, <name>_y, <name>_z (N); a plain force when left out")
     particles: list[Reference] = key(..., "each of them bears the whole force", min_length=1)
     force: Vector = key(..., "the force", "N")
-    times: list[Finite] = key([0.0], "knots in the scene's time (0 = its start); linear between, constant outside", "s", min_length=1)
+    times: list[Finite] = key(
+        [0.0], "knots in the scene's time (0 = its start); linear between, constant outside", "s", min_length=1
+    )
     factors: list[Finite] | None = key(None, "share of the force at each knot; 1 when left out")
 
 

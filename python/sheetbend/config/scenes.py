@@ -53,7 +53,9 @@ class Particles:
     def free_name(self, path: str, name: str) -> str:
         """The name, unless it is taken."""
         if name in self.named:
-            raise ConfigError(f"{path}.name", "is taken", name, "give every rope, arm and set of particles a name of its own")
+            raise ConfigError(
+                f"{path}.name", "is taken", name, "give every rope, arm and set of particles a name of its own"
+            )
         return name
 
     def add(self, name: str, particles: Sequence[int]) -> None:
@@ -81,17 +83,29 @@ class Particles:
         """
         name, _, index = reference.partition(":")
         if name not in self.named:
-            raise ConfigError(path, "names no rope and no set of particles", reference, f"use one of: {', '.join(self.named) or 'none yet'}")
+            raise ConfigError(
+                path,
+                "names no rope and no set of particles",
+                reference,
+                f"use one of: {', '.join(self.named) or 'none yet'}",
+            )
         if not index:
             if len(self.named[name]) != 1:
-                raise ConfigError(path, f"is not one particle: '{name}' has {len(self.named[name])}", reference, f"write such as '{name}:0'")
+                raise ConfigError(
+                    path,
+                    f"is not one particle: '{name}' has {len(self.named[name])}",
+                    reference,
+                    f"write such as '{name}:0'",
+                )
             return self.named[name][0]
         labels = self.labels.get(name, {})
         if index in labels:
             return labels[index]
         if not index.removeprefix("-").isdecimal():
             words = "".join(f", '{name}:{label}'" for label in labels)
-            raise ConfigError(path, "has no whole number behind the colon", reference, f"write such as '{name}:0'{words}")
+            raise ConfigError(
+                path, "has no whole number behind the colon", reference, f"write such as '{name}:0'{words}"
+            )
         return self._entry(path, name, int(index))
 
     def _entry(self, path: str, name: str, number: int) -> int:
@@ -100,7 +114,12 @@ class Particles:
         at = number * finer if number >= 0 else -1 + (number + 1) * finer
         if not -len(particles) <= at < len(particles):
             count = (len(particles) - 1) // finer + 1
-            raise ConfigError(path, f"does not exist: '{name}' has {count} particles", number, f"use 0 to {count - 1}, or -1 for the last")
+            raise ConfigError(
+                path,
+                f"does not exist: '{name}' has {count} particles",
+                number,
+                f"use 0 to {count - 1}, or -1 for the last",
+            )
         return particles[at]
 
 
@@ -166,10 +185,23 @@ def build_scene(
 
 def _same_length(path: str, stencils: list[list[int]]) -> None:
     if len({len(one) for one in stencils}) > 1:
-        raise ConfigError(f"{path}.particles", "differ in length", [len(one) for one in stencils], "give every constraint the same number")
+        raise ConfigError(
+            f"{path}.particles",
+            "differ in length",
+            [len(one) for one in stencils],
+            "give every constraint the same number",
+        )
 
 
-def _add_rope(scene: Scene, particles: Particles, path: str, rope: schema.Rope, moment: Moment | None, placed: list[int], finer: int) -> None:
+def _add_rope(
+    scene: Scene,
+    particles: Particles,
+    path: str,
+    rope: schema.Rope,
+    moment: Moment | None,
+    placed: list[int],
+    finer: int,
+) -> None:
     fields = rope.model_dump(exclude={"name", "pinned", "points", "segments"}, exclude_none=True)
     points = _measured(f"{path}.points", moment, placed) if rope.points == "recording" else rope.points
     particles.free_name(path, rope.name)
@@ -185,7 +217,12 @@ def _measured(path: str, moment: Moment | None, placed: list[int]) -> np.ndarray
     shape = moment.shape[placed]
     seen = shape[~np.isnan(shape[:, 0])]
     if len(seen) < 2:
-        raise ConfigError(path, "needs two markers on the rope that are seen at the start", len(seen), "place markers on it, or give the points")
+        raise ConfigError(
+            path,
+            "needs two markers on the rope that are seen at the start",
+            len(seen),
+            "place markers on it, or give the points",
+        )
     return seen
 
 
@@ -193,7 +230,12 @@ def _add_arm(scene: Scene, particles: Particles, path: str, arm: schema.Arm | sc
     pivot: Arm | list[float]
     if isinstance(arm.pivot, str):
         if arm.pivot not in particles.arms:
-            raise ConfigError(f"{path}.pivot", "is no arm before this one", arm.pivot, f"name one of: {', '.join(particles.arms) or 'none yet'}")
+            raise ConfigError(
+                f"{path}.pivot",
+                "is no arm before this one",
+                arm.pivot,
+                f"name one of: {', '.join(particles.arms) or 'none yet'}",
+            )
         pivot = particles.arms[arm.pivot]
     else:
         pivot = arm.pivot
@@ -222,7 +264,12 @@ def _add_forces(scene: Scene, particles: Particles, forces: Sequence[schema.Forc
             size = float(np.linalg.norm(force.force)) or 1.0
             for k, axis in enumerate("xyz"):
                 quantity = scene.add_quantity(f"{force.name}_{axis}", force.force[k], "N", positive=False, scale=size)
-                terms += [(knot, first + w, k, f, quantity) for knot, f in enumerate(factors) for w in range(len(which)) if f != 0.0]
+                terms += [
+                    (knot, first + w, k, f, quantity)
+                    for knot, f in enumerate(factors)
+                    for w in range(len(which))
+                    if f != 0.0
+                ]
     loaded = len(scene.loaded)
     scene.add_terms([product("force", 3 * (knot * loaded + w) + k, f, {q: "identity"}) for knot, w, k, f, q in terms])
 

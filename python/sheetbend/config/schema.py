@@ -20,7 +20,9 @@ class ExperimentSection(Section):
 class SolverSection(Section):
     """[solver]: how motions are stepped."""
 
-    substeps: int | None = key(None, "substeps per frame interval of each recording (its median); 10 when h is left out too", ge=1)
+    substeps: int | None = key(
+        None, "substeps per frame interval of each recording (its median); 10 when h is left out too", ge=1
+    )
     h: Finite | None = key(None, "the substep itself, instead of `substeps`", "s", gt=0)
     integrator: Literal["bdf1", "bdf2"] = key("bdf2", "second order, or backward Euler (which damps)")
     method: Literal["direct", "gauss_seidel"] = key("direct", "each rope one block, or colored sweeps")
@@ -54,7 +56,9 @@ class Marker(Section):
     def _one_place(self) -> Self:
         places = [n for n in ("arc_length", "particle", "arm", "between") if getattr(self, n) is not None]
         if len(places) != 1:
-            raise ValueError(f"names {' and '.join(places) or 'no place'}|give one of arc_length, particle, arm, between")
+            raise ValueError(
+                f"names {' and '.join(places) or 'no place'}|give one of arc_length, particle, arm, between"
+            )
         if (self.arm is None) != (self.radius is None):
             raise ValueError("has only one of arm and radius|give both")
         return self
@@ -70,24 +74,42 @@ class RecordingSection(Section):
     leave_out: list[Name] = key(
         [], "names of particles, constraints, hung masses, forces and further quantities that its scene does without"
     )
-    frames: list[int] | None = key(None, "[first, stop] or [first, stop, step]: use these frames only", min_length=2, max_length=3)
+    frames: list[int] | None = key(
+        None, "[first, stop] or [first, stop, step]: use these frames only", min_length=2, max_length=3
+    )
     fit: Window | None = key(None, "[start, stop] in the recording's time: what the fit sees; all when left out", "s")
     held_out: Window | None = key(None, "[start, stop]: what is only predicted, from the same start", "s")
-    start_time: Finite | None = key(None, "recording time at which the scene starts; the start of `fit` when left out", "s")
+    start_time: Finite | None = key(
+        None, "recording time at which the scene starts; the start of `fit` when left out", "s"
+    )
     static: bool = key(False, "it shows an equilibrium; the frames of `fit` are averaged")
-    start: Literal["given", "equilibrium"] = key("given", "a motion starts from the initial shape, or from the scene's equilibrium")
+    start: Literal["given", "equilibrium"] = key(
+        "given", "a motion starts from the initial shape, or from the scene's equilibrium"
+    )
     predict: Literal["window", "mean"] | None = key(
-        None, 'not fitted, only predicted: private parameters fitted to its own `fit` window ("window") or the others\' mean ("mean")'
+        None,
+        'not fitted, only predicted: private parameters fitted to its own `fit` window ("window") '
+        'or the others\' mean ("mean")',
     )
     sigma: Finite = key(1e-3, "expected error of a marker", "m", gt=0)
     axes: str = key("xyz", "coordinates that count", pattern=AXES)
-    radius: Finite | None = key(None, "distance of the markers from a pivot: the report then gives errors as angles, rms distance/radius", "m", gt=0)
+    radius: Finite | None = key(
+        None,
+        "distance of the markers from a pivot: the report then gives errors as angles, rms distance/radius",
+        "m",
+        gt=0,
+    )
     loss: Literal["squares", "soft_l1", "huber"] = key("squares", "robust loss")
     loss_scale: Finite = key(1.0, "where the robust loss sets in, in units of sigma", gt=0)
     marker: list[Marker] = key([], "places of this recording's markers; those of [[marker]] when left out")
-    offsets: dict[str, list[str]] = key({}, 'per marker [a, b, c]: quantities added to its offset along (tangent, normal, tangent x normal), "" for none')
+    offsets: dict[str, list[str]] = key(
+        {},
+        'per marker [a, b, c]: quantities added to its offset along (tangent, normal, tangent x normal), "" for none',
+    )
     time_offset: str | None = key(None, "a quantity (s) that shifts the recording's clock")
-    values: dict[str, Finite] = key({}, "quantities whose value is known to differ here; for private parameters the initial value")
+    values: dict[str, Finite] = key(
+        {}, "quantities whose value is known to differ here; for private parameters the initial value"
+    )
 
 
 class ParameterSection(Section):
@@ -113,8 +135,13 @@ class FitSection(Section):
     starts: list[dict[str, Finite]] = key([], "further starting values by name; the best end wins")
     max_iterations: int = key(200, "per start", ge=1)
     threads: int = key(1, "over recordings and derivatives; results do not depend on it", ge=1)
-    halve_step: bool = key(False, "refit at half the substep; what moves, carried on to the limit, counts in the intervals")
-    double_segments: bool = key(False, "refit with twice the segments in every rope; what moves, carried on to the limit, counts in the intervals")
+    halve_step: bool = key(
+        False, "refit at half the substep; what moves, carried on to the limit, counts in the intervals"
+    )
+    double_segments: bool = key(
+        False,
+        "refit with twice the segments in every rope; what moves, carried on to the limit, counts in the intervals",
+    )
     strict: bool = key(False, "exit 3 when any requested parameter is not identifiable, not only when all are")
 
 
@@ -135,4 +162,6 @@ class Config(Section):
     parameters: dict[str, ParameterSection] = key({}, "what is fitted")
     fit: FitSection = key(FitSection(), "how the fit runs")
     output: OutputSection = key(OutputSection(), "what is written")
-    published: dict[str, Finite | Window] = key({}, "values by others, or [lowest, highest], shown beside the estimates")
+    published: dict[str, Finite | Window] = key(
+        {}, "values by others, or [lowest, highest], shown beside the estimates"
+    )

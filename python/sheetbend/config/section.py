@@ -13,8 +13,8 @@ Pair = Annotated[list[Finite], Field(min_length=2, max_length=2)]
 NAME, REFERENCE, AXES = r"^[A-Za-z][A-Za-z0-9_.-]*$", r"^[^:\s]+(:\S+)?$", "^[xyz]{1,3}$"
 Name = Annotated[str, Field(pattern=NAME)]
 Reference = Annotated[str, Field(pattern=REFERENCE)]
-"""A particle: "NAME:INDEX" (negative ones count from the end), "NAME:start" and "NAME:end" of a rope, "NAME:pivot" and "NAME:end" of an arm
-or pendulum, "NAME" of a single particle."""
+"""A particle: "NAME:INDEX" (negative ones count from the end), "NAME:start" and "NAME:end" of a rope, "NAME:pivot" and
+"NAME:end" of an arm or pendulum, "NAME" of a single particle."""
 
 
 def _ascending(pair: list[float]) -> list[float]:
@@ -35,5 +35,7 @@ class Section(BaseModel):
 def key(default: Any, about: str, unit: str = "", **limits: Any) -> Any:
     """A key with its default (`...` = required), what it means, and its unit."""
     if isinstance(default, list | dict):
-        return Field(default_factory=lambda: copy.copy(default), description=about, json_schema_extra={"unit": unit}, **limits)
+        return Field(
+            default_factory=lambda: copy.copy(default), description=about, json_schema_extra={"unit": unit}, **limits
+        )
     return Field(default, description=about, json_schema_extra={"unit": unit}, **limits)

@@ -13,7 +13,8 @@ from .schema import Config, ParameterSection
 
 
 def with_values(config: Config, values: Mapping[str, float]) -> Config:
-    """The configuration starting at the values (by expanded name, as in fit.json); names that it does not fit are left out.
+    """The configuration starting at the values (by expanded name, as in fit.json); names that it does not fit are left
+    out.
 
     Shared parameters start at `parameters.NAME.initial`, private ones at the recordings' `values`.
     """

@@ -53,7 +53,8 @@ inline Rope make_rope(const RopeShape& s) {
   Rope rope{build_scene(spec), {}, s.links, first};
   rope.inputs.assign(rope.scene.layout.total(), 0.0);
   const double l = s.length / s.links;
-  for (int k = 0; k <= s.links; ++k) rope.of(Quantity::mass)[first + k] = s.density * l * (k == 0 || k == s.links ? 0.5 : 1.0);
+  for (int k = 0; k <= s.links; ++k)
+    rope.of(Quantity::mass)[first + k] = s.density * l * (k == 0 || k == s.links ? 0.5 : 1.0);
   for (int k = 0; k < s.links; ++k) {
     rope.of(Quantity::rest)[k] = l;
     rope.of(Quantity::compliance)[k] = s.EA > 0.0 ? l / s.EA : 0.0;
@@ -79,7 +80,8 @@ inline Rope make_catenary(int links, double span, double depth, double EA = 0.0)
 
 // Horizontal along x from its clamp at the origin, free at the other end.
 inline Rope make_cantilever(int links, double EI, double density) {
-  Rope rope = make_rope({.links = links, .density = density, .EA = 1e7, .EI = EI, .clamp_first = true, .hold_last = false});
+  Rope rope =
+      make_rope({.links = links, .density = density, .EA = 1e7, .EI = EI, .clamp_first = true, .hold_last = false});
   for (int k = -1; k <= links; ++k) rope.set_position(k, static_cast<double>(k) / links, 0.0, 0.0);
   return rope;
 }
@@ -88,10 +90,12 @@ inline Rope make_cantilever(int links, double EI, double density) {
 inline Rope make_wire(double EI, double EA, double up = -1.0, double sideways = 0.0) {
   const int n = 200;
   const double length = 1.5, gap = 0.125, radius = length / (2.0 * std::numbers::pi);
-  Rope rope = make_rope({.links = n, .length = length, .density = 0.0174, .EA = EA, .EI = EI, .clamp_first = true, .clamp_last = true});
+  Rope rope = make_rope(
+      {.links = n, .length = length, .density = 0.0174, .EA = EA, .EI = EI, .clamp_first = true, .clamp_last = true});
   for (int k = 0; k <= n; ++k) {
     const double s = static_cast<double>(k) / n, turn = 2.0 * std::numbers::pi * s;
-    rope.set_position(k, gap * (0.5 - s) + radius * std::sin(turn), sideways * std::sin(turn), up * radius * (1.0 - std::cos(turn)));
+    rope.set_position(k, gap * (0.5 - s) + radius * std::sin(turn), sideways * std::sin(turn),
+                      up * radius * (1.0 - std::cos(turn)));
   }
   rope.set_position(0, 0.5 * gap, 0.0, 0.0);
   rope.set_position(n, -0.5 * gap, 0.0, 0.0);

@@ -41,15 +41,11 @@ def chain_frequencies(masses: Sequence[float], link: float, g: float) -> NDArray
     """
     mass = np.asarray(masses, dtype=float)
     tension = np.cumsum(mass[::-1])[::-1] * g
-    stiffness = (
-        np.diag(tension + np.append(tension[1:], 0.0)) - np.diag(tension[1:], 1) - np.diag(tension[1:], -1)
-    )
+    stiffness = np.diag(tension + np.append(tension[1:], 0.0)) - np.diag(tension[1:], 1) - np.diag(tension[1:], -1)
     return np.sqrt(eigh(stiffness / link, np.diag(mass), eigvals_only=True))
 
 
-def beaded_string_frequencies(
-    beads: int, tension: float, density: float, length: float
-) -> NDArray[np.float64]:
+def beaded_string_frequencies(beads: int, tension: float, density: float, length: float) -> NDArray[np.float64]:
     """O-10b: transverse modes (N,) of N beads on a taut string between fixed ends, a = L/(N + 1) apart.
 
     omega_k = 2 sqrt(T/(m a)) sin(k pi/(2(N + 1))), bead mass m = mu a; divide by 2 pi for Hz. Exact for the
@@ -61,9 +57,7 @@ def beaded_string_frequencies(
     return 2.0 * math.sqrt(tension / density) / spacing * np.sin(0.5 * math.pi * k / (beads + 1))
 
 
-def cantilever_frequencies(
-    length: float, density: float, bending_stiffness: float, count: int
-) -> NDArray[np.float64]:
+def cantilever_frequencies(length: float, density: float, bending_stiffness: float, count: int) -> NDArray[np.float64]:
     """O-16a: modes (count,) of a clamped-free Euler-Bernoulli beam without gravity: b_k^2 sqrt(EI/(mu L^4)).
 
     cos b cosh b = -1, `density` mu [kg/m], `bending_stiffness` EI [N m^2]. Continuous law; tolerance 5e-3.
@@ -74,8 +68,5 @@ def cantilever_frequencies(
         return math.cos(b) + 1.0 / math.cosh(b)
 
     # cos b = -1/cosh b has exactly one root in each interval ((k - 1) pi, k pi).
-    b = [
-        brentq(characteristic, (k - 1) * math.pi, k * math.pi, xtol=1e-15, rtol=1e-15)
-        for k in range(1, count + 1)
-    ]
+    b = [brentq(characteristic, (k - 1) * math.pi, k * math.pi, xtol=1e-15, rtol=1e-15) for k in range(1, count + 1)]
     return np.square(b) * math.sqrt(bending_stiffness / density) / length**2

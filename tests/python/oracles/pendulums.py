@@ -50,9 +50,7 @@ def pendulum_steps(
     return x, v
 
 
-def energy_retained(
-    x: NDArray[np.float64], v: NDArray[np.float64], length: float, g: float
-) -> NDArray[np.float64]:
+def energy_retained(x: NDArray[np.float64], v: NDArray[np.float64], length: float, g: float) -> NDArray[np.float64]:
     """O-7b: (E - E_bottom)/(E_0 - E_bottom) at each step, from positions and velocities (steps + 1, 2).
 
     Tolerance 0.005, and the sequence may not rise; against `pendulum_steps` of the same h it is

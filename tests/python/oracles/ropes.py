@@ -139,9 +139,7 @@ def gauss_seidel_extension(
         multiplier = np.zeros_like(e)
         for _ in range(sweeps):
             for j in order:
-                change = -(e[j] + compliance * multiplier[j]) / (
-                    inverse_mass[j] + inverse_mass[j + 1] + compliance
-                )
+                change = -(e[j] + compliance * multiplier[j]) / (inverse_mass[j] + inverse_mass[j + 1] + compliance)
                 multiplier[j] += change
                 e[j] += (inverse_mass[j] + inverse_mass[j + 1]) * change
                 if j > 0:
