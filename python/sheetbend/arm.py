@@ -261,7 +261,7 @@ def _hinge(scene: Scene, arm: Arm, pivot: ArrayLike | Arm, viscosity: float | No
     if isinstance(pivot, Arm):
         before = pivot.pivot
     else:
-        before = int(scene.add_particles([arm.root + (0.0, 0.0, 1.0)], 0.0)[0])
+        before = int(scene.add_particles([np.add(arm.root, (0.0, 0.0, 1.0))], 0.0)[0])
         scene.pin([before])
     scene.add_constraints(
         "hinge", [(before, arm.pivot, arm.end)], name=f"{arm.name}_hinge", viscosity=viscosity, normal=(0.0, 1.0, 0.0)

@@ -19,7 +19,7 @@ GHOST = 0.01  # length of a clamp's ghost link over a rope's link; only its dire
 
 @dataclass(frozen=True)
 class Rope:
-    """A rope in a scene: its particles in order and their material coordinates [m]. Ghosts give clamps their direction."""
+    """A rope in a scene: particles in order, material coordinates [m], and the ghosts that give clamps a direction."""
 
     name: str
     particles: Array
