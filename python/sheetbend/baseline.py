@@ -35,7 +35,8 @@ class NoPhysics:
 
     Attributes:
         kind: "hold", "rest" or "blend".
-        words: a sentence for reports: what it predicts, its error, and the errors of the others that apply.
+        words: for reports, what it predicts.
+        errors: rms error of each baseline that applies, m.
         positions: (frames, markers, 3) m, the prediction.
         rms: its error, m (`rms_about` over `scored`).
         scored: (frames, markers) bool, the samples that count: free, seen, and not given to the prediction.
@@ -44,6 +45,7 @@ class NoPhysics:
 
     kind: str
     words: str
+    errors: dict[str, float]
     positions: Array
     rms: float
     scored: NDArray[np.bool_]
@@ -186,13 +188,7 @@ def no_physics(fitted: Recording | Sequence[Recording], held_out: Recording) -> 
         raise RecordingError("held_out", "has no baseline: one frame, of markers not seen before", 1, fix)
     errors = {kind: rms_about(held_out, prediction, scored) for kind, prediction in candidates.items()}
     kind = min(errors, key=errors.__getitem__)
-    return NoPhysics(kind, _words(kind, errors), candidates[kind], errors[kind], scored)
-
-
-def _words(kind: str, errors: dict[str, float]) -> str:
-    others = [f"{other} {1e3 * error:.3g} mm" for other, error in errors.items() if other != kind]
-    weaker = f"; weaker: {', '.join(others)}" if others else ""
-    return f"{kind}: {_IN_WORDS[kind]} ({1e3 * errors[kind]:.3g} mm rms{weaker})"
+    return NoPhysics(kind, f"{kind}: {_IN_WORDS[kind]}", errors, candidates[kind], errors[kind], scored)
 
 
 def _check_same_markers(one: Recording, other: Recording) -> None:

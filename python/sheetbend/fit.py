@@ -15,12 +15,13 @@ from .errors import InputError
 from .experiment import Experiment
 from .floors import solver_floors
 from .identifiability import Identifiability, identify
+from .leave_one_out import MEANING, companions, each_left_out
 from .optimizers import Minimum, Observer, minimize, refit
 from .parameters import Parameter, Parameters
-from .prediction import Comparison, compare
+from .prediction import Comparison, compare, predicted_values
 from .problem import FitProblem, ParameterLike, as_parameters
 from .recording import Recording
-from .result import Estimate, FitResult, Given, Start
+from .result import Estimate, FitResult, Given, RecordingFit, Start
 from .scene import Scene
 
 PROFILE_TOLERANCE = 1e-7  # relative, of the cost: an interval's rise is many times that
@@ -66,6 +67,7 @@ def fit(
     optimizer: str = "auto",
     starts: Sequence[Mapping[str, float]] = (),
     refine: Refinement | None = None,
+    leave_one_out: bool = False,
     max_iterations: int = 200,
     threads: int = 1,
     progress: Observer | None = None,
@@ -80,6 +82,7 @@ def fit(
         starts: further starting values by name; the best end wins, all are reported.
         refine: also refit on a finer discretization, and count what that moves as a part of the intervals (see
             `discretization`).
+        leave_one_out: also predict every recording that holds nothing out by a fit to the others.
         max_iterations: per start.
         threads: over experiments and Jacobian columns; the result does not depend on it.
         progress: called after every iteration.
@@ -106,6 +109,9 @@ def fit(
             len(experiments),
             "set predict to None for at least one",
         )
+    if leave_one_out:
+        for e in fitted:
+            companions(e, fitted, wanted)
     problem = FitProblem(fitted, wanted, threads=threads)
     ends, name, interrupted = _minimize_all(problem, optimizer, starts, max_iterations, progress)
     best = ends[0]
@@ -117,10 +123,15 @@ def fit(
             if refine is None or refitter is None
             else refined_estimates(refine, experiments, wanted, problem, best.u, refitter, threads)
         )
-        return _judge(problem, best.u, refined, refitter), *_predicted(experiments, wanted, values, refitter, threads)
+        return _judge(problem, best.u, refined, refitter), *predicted_values(
+            experiments, wanted, values, refitter, threads
+        )
 
+    left_out: dict[str, Comparison] = {}
     try:
         judged, all_values, extra = conclude(None if interrupted else name)
+        if leave_one_out and not interrupted:
+            left_out = each_left_out(fitted, wanted, values, name, threads)
     except KeyboardInterrupt:
         interrupted = True
         judged, all_values, extra = conclude(None)
@@ -129,7 +140,7 @@ def fit(
     count = {e.name: rows[i + 1] - rows[i] for i, e in enumerate(fitted)}
     result = FitResult(
         estimates=judged.estimates,
-        recordings=tuple(c.errors(count.get(c.experiment.name, 0)) for c in comparisons),
+        recordings=tuple(_errors(c, count, left_out) for c in comparisons),
         cost=best.cost,
         rows=problem.core.data_rows,
         optimizer=name,
@@ -141,7 +152,10 @@ def fit(
         given=_given(problem.parameters, values) + extra,
         correlations=judged.correlations,
         gauges=tuple(g.words for g in judged.gauges),
-        baseline="; ".join(dict.fromkeys(c.baseline_words for c in comparisons if c.baseline_words)),
+        baseline="; ".join(
+            dict.fromkeys(c.baseline_words for c in (*comparisons, *left_out.values()) if c.baseline_words)
+        ),
+        held_out_is=MEANING if left_out else "",
         autocorrelation_time=judged.autocorrelation_time,
         starts=tuple(
             Start(
@@ -254,41 +268,12 @@ def _profile(problem: FitProblem, u: np.ndarray, refitter: str) -> Callable[[str
     return cost
 
 
-def _predicted(
-    experiments: Sequence[Experiment],
-    wanted: Parameters,
-    values: Mapping[str, float],
-    refitter: str | None,
-    threads: int,
-) -> tuple[dict[str, float], tuple[Given, ...]]:
-    """All values, with the private parameters of the experiments that are only predicted: fitted to their own windows
-    or the others' mean."""
-    complete = dict(values)
-    given: list[Given] = []
-    for e in experiments:
-        if e.predict is None:
-            continue
-        private = [p for p in wanted.values() if p.private and p.tied_to is None and p.name in e.scene.quantities]
-        if e.predict == "mean" or refitter is None:
-            words = "mean of the fitted recordings"
-            for p in private:
-                others = [v for key, v in values.items() if key.partition("[")[0] == p.name]
-                own = e.scene.quantities[p.name].value if p.initial is None else p.initial
-                complete[f"{p.name}[{e.name}]"] = float(np.mean(others)) if others else own
-        elif private:
-            words = "fitted to the recording's own first window"
-            shared = [
-                replace(p, fixed=True, prior=None, initial=values[p.name])
-                for p in wanted.values()
-                if not p.private and p.tied_to is None
-            ]
-            problem = FitProblem([e], Parameters([*shared, *private]), threads=threads)
-            complete |= problem.parameters.to_physical(refit(problem, problem.parameters.initial(), refitter).u)
-        given += [
-            Given(name=f"{p.name}[{e.name}]", value=complete[f"{p.name}[{e.name}]"], unit=p.unit, words=words)
-            for p in private
-        ]
-    return complete, tuple(given)
+def _errors(c: Comparison, rows: Mapping[str, int], left_out: Mapping[str, Comparison]) -> RecordingFit:
+    found = c.errors(rows.get(c.experiment.name, 0))
+    if c.experiment.name not in left_out:
+        return found
+    other = left_out[c.experiment.name].errors(0)
+    return replace(other, rows=found.rows, rms=found.rms)
 
 
 def _given(parameters: Parameters, values: Mapping[str, float]) -> tuple[Given, ...]:

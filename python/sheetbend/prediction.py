@@ -10,11 +10,12 @@ import numpy as np
 from .baseline import no_physics
 from .errors import RecordingError
 from .experiment import Experiment
+from .optimizers import refit
 from .oscillation import along, dominant_direction, first_frequency
 from .parameters import Parameters
 from .problem import FitProblem
 from .recording import Recording
-from .result import RecordingFit
+from .result import Given, RecordingFit
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,43 @@ class Comparison:
             simulated_frequency=simulated,
             unit="m" if radius is None else "rad",
         )
+
+
+def predicted_values(
+    experiments: Sequence[Experiment],
+    wanted: Parameters,
+    values: Mapping[str, float],
+    refitter: str | None,
+    threads: int,
+) -> tuple[dict[str, float], tuple[Given, ...]]:
+    """All values, with the private parameters of the experiments that are only predicted: fitted to their own windows
+    or the others' mean."""
+    complete = dict(values)
+    given: list[Given] = []
+    for e in experiments:
+        if e.predict is None:
+            continue
+        private = [p for p in wanted.values() if p.private and p.tied_to is None and p.name in e.scene.quantities]
+        if e.predict == "mean" or refitter is None:
+            words = "mean of the fitted recordings"
+            for p in private:
+                others = [v for key, v in values.items() if key.partition("[")[0] == p.name]
+                own = e.scene.quantities[p.name].value if p.initial is None else p.initial
+                complete[f"{p.name}[{e.name}]"] = float(np.mean(others)) if others else own
+        elif private:
+            words = "fitted to the recording's own first window"
+            shared = [
+                replace(p, fixed=True, prior=None, initial=values[p.name])
+                for p in wanted.values()
+                if not p.private and p.tied_to is None
+            ]
+            problem = FitProblem([e], Parameters([*shared, *private]), threads=threads)
+            complete |= problem.parameters.to_physical(refit(problem, problem.parameters.initial(), refitter).u)
+        given += [
+            Given(name=f"{p.name}[{e.name}]", value=complete[f"{p.name}[{e.name}]"], unit=p.unit, words=words)
+            for p in private
+        ]
+    return complete, tuple(given)
 
 
 def compare(

@@ -153,7 +153,11 @@ def _recordings(result: FitResult) -> Section:
     )
     if all(recording.held_out is None for recording in result.recordings):
         headers, rows = headers[:3] + headers[-1:], [row[:3] + row[-1:] for row in rows]
-    notes = (("baseline (no physics)", result.baseline),) if result.baseline else ()
+    notes = tuple(
+        (label, words)
+        for label, words in (("held out", result.held_out_is), ("baseline (no physics)", result.baseline))
+        if words
+    )
     return Section("Recordings", headers, tuple(rows), notes)
 
 

@@ -117,6 +117,7 @@ class FitResult:
         gauges: combinations of parameters that the data leave free, in words.
         recordings: errors per recording.
         baseline: what the no-physics baseline predicts, in words.
+        held_out_is: what was held out, in words, where it is not a part of each recording.
         cost: half the sum of squared residuals, priors included.
         rows: number of data residuals.
         autocorrelation_time: frames of residual that count as one, 1 when they are independent.
@@ -139,6 +140,7 @@ class FitResult:
     correlations: tuple[Correlation, ...] = ()
     gauges: tuple[str, ...] = ()
     baseline: str = ""
+    held_out_is: str = ""
     autocorrelation_time: float = 1.0
     starts: tuple[Start, ...] = ()
     warnings: tuple[str, ...] = ()

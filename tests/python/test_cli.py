@@ -15,11 +15,6 @@ from typing import Any
 import numpy as np
 import pytest
 import sheetbend as sb
-
-pytest.importorskip("typer")
-pytest.importorskip("rich")
-pytest.importorskip("tomli_w")
-
 from sheetbend import cli
 from sheetbend.cli.app import app
 from sheetbend.gradients import GradientReport, GradientRow

@@ -8,9 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sheetbend as sb
-
-pytest.importorskip("pydantic")
-
 from sheetbend.config import load, parse
 from sheetbend.config.reference import renewed
 from sheetbend.config.values import with_values, write

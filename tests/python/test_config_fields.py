@@ -13,10 +13,6 @@ from typing import Any
 
 import pytest
 import sheetbend as sb
-
-pytest.importorskip("pydantic")
-pytest.importorskip("tomli_w")
-
 import tomli_w
 from sheetbend.config import parse
 from sheetbend.config.reference import HEADERS

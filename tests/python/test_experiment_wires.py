@@ -13,7 +13,6 @@ GAP = {"white": 5.0, "black": 12.0, "red": 10.0}  # mm, the goal for the mean ov
 
 @pytest.fixture(scope="module")
 def study():
-    pytest.importorskip("pydantic")
     spec = importlib.util.spec_from_file_location("wires_study", FOLDER / "study.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

@@ -6,15 +6,13 @@ import math
 
 import numpy as np
 import pytest
+from scipy import signal, special
 from sheetbend.covariance import Layout, covariance
 from sheetbend.errors import InputError
 from sheetbend.gauge import null_space
 from sheetbend.identifiability import Floor, identify
 from sheetbend.parameters import Parameter, Parameters
 from sheetbend.profile import profile_interval
-
-special = pytest.importorskip("scipy.special")
-signal = pytest.importorskip("scipy.signal")
 
 SEEDS = 400
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 from sheetbend.errors import InputError
 from sheetbend.optional import MissingExtraError, require
 from sheetbend.report import figures, plain, rich_report
@@ -137,7 +138,7 @@ def test_report_of_a_fit_that_failed(result: FitResult) -> None:
 
 
 def test_rich_report_shows_the_same(result: FitResult) -> None:
-    console = pytest.importorskip("rich.console").Console(width=100, record=True, file=io.StringIO())
+    console = Console(width=100, record=True, file=io.StringIO())
     console.print(rich_report(result))
     text = console.export_text()
     for words in ("beam_E", "281300", "not identifiable", "17.3 %", "-0.71"):

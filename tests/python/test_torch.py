@@ -17,12 +17,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import sheetbend as sb
-
-torch = pytest.importorskip("torch")
-st = pytest.importorskip("sheetbend.torch")
-
-from torch.autograd import gradcheck, gradgradcheck  # noqa: E402
-from torch.func import grad, hessian, jacfwd, jacrev, jvp, vjp, vmap  # noqa: E402
+import sheetbend.torch as st
+import torch
+from torch.autograd import gradcheck, gradgradcheck
+from torch.func import grad, hessian, jacfwd, jacrev, jvp, vjp, vmap
 
 SOLVER = sb.Solver(h=1 / 100)
 TIMES = np.array([0.0, 0.05, 0.10])

@@ -50,6 +50,7 @@ class Study:
             "optimizer": fit.optimizer,
             "starts": fit.starts,
             "refine": refine,
+            "leave_one_out": fit.leave_one_out,
             "max_iterations": fit.max_iterations,
             "threads": fit.threads,
         }

@@ -142,6 +142,7 @@ class FitSection(Section):
         False,
         "refit with twice the segments in every rope; what moves, carried on to the limit, counts in the intervals",
     )
+    leave_one_out: bool = key(False, "also predict every recording that holds nothing out by a fit to the others")
     strict: bool = key(False, "exit 3 when any requested parameter is not identifiable, not only when all are")
 
 
