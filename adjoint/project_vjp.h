@@ -1,16 +1,9 @@
-// The reverse of the block projection, once for every constraint and every solver. With cotangents x'_bar and lambda'_bar:
-//
-//   y = A^-1 (lambda'_bar + J W x'_bar)        s_bar = -y/(1+g)        z = x'_bar - J^T y        dx = W J^T dl
-//   v_j = dl_j W z - y_j dx                    one direction per scalar constraint
-//   x_bar = z + sum_j Hess(C_j) v_j            lambda_bar = lambda'_bar + a s_bar      a_bar = s_bar . lambda'
-//   w_bar_i = (J^T dl)_i . z_i                 g_bar = s_bar . (C - C_r + J dx)        C_r_bar = -g s_bar
-//   p_bar = sum_j -y_j dC_j/dp + v_j . dJ_j/dp
-//
-// Only "solve with A" differs between solvers. Hess(C_j) v_j and the parameter derivatives are one evaluation of the constraint on dual
-// numbers with rows + parameters directions. DERIVATION.md beside this file derives it.
+// The reverse of the block projection over a substep's state: a color of single constraints, or a direct block. The mathematics is
+// element_vjp.h's; here numbers are gathered and cotangents put where they belong.
 #pragma once
 
-#include "core/scalar/dual.h"
+#include "adjoint/element_vjp.h"
+#include "adjoint/rates_vjp.h"
 #include "core/solver/substep.h"
 
 namespace sheetbend {
@@ -32,63 +25,24 @@ struct BlockVectors {
   T *z, *u;
 };
 
-// Everything after the solve, on one element; z and u are the block's, on the element's stencil. Adds Hess(C_j) v_j to x_bar.
+// Adds an element's cotangents to those of the multipliers, references and inputs.
 template <class K, class T>
-void pull_back_element(const SubstepState<T>& s, const Group& group, int item, const Element<K, T>& e, const T* lambda,
-                       const T* dl, const T* y, const T* z, const T* u, T* x_bar, const SubstepCotangent<T>& bar) {
-  constexpr int P = parameter_count<K>, N = K::rows + P;
-  using D = Dual<T, N>;
-  T v[K::rows][K::dofs];
-  D x[K::dofs], p[P > 0 ? P : 1], C[K::rows], J[K::rows * K::dofs];
-  for (int d = 0; d < K::dofs; ++d) {
-    x[d].v = e.x[d];
-    for (int j = 0; j < K::rows; ++j) x[d].d[j] = v[j][d] = e.w[d / 3] * (dl[j] * z[d] - y[j] * u[d]);
-  }
-  for (int k = 0; k < P; ++k) {
-    p[k].v = e.p[k];
-    p[k].d[K::rows + k] = T(1.0);
-  }
-  K::evaluate(x, p, C, J);
-
-  T a_bar(0.0), g_bar(0.0);
+void add_element(const SubstepState<T>& s, const Group& group, int item, const ElementCotangent<K, T>& own,
+                 const SubstepCotangent<T>& bar) {
+  const int first_row = group.first_row + item * K::rows;
   for (int j = 0; j < K::rows; ++j) {
-    const int row = e.first_row + j;
-    const T s_bar = -(y[j] / (T(1.0) + e.rates.g));
-    for (int d = 0; d < K::dofs; ++d) x_bar[d] += J[j * K::dofs + d].d[j];
-    a_bar += s_bar * (lambda[j] + dl[j]);
-    bar.lambda[row] += e.rates.a * s_bar;
-    if (group.damped) {
-      T J_dx(0.0);
-      for (int d = 0; d < K::dofs; ++d) J_dx += J[j * K::dofs + d].v * e.w[d / 3] * u[d];
-      g_bar += s_bar * (difference<K>(C[j].v, s.C_r[row]) + J_dx);
-      bar.C_r[row] -= e.rates.g * s_bar;
-    }
-    for (int k = 0; k < P; ++k) {
-      T p_bar = -(y[j] * C[j].d[K::rows + k]);
-      for (int d = 0; d < K::dofs; ++d) p_bar += v[j][d] * J[j * K::dofs + d].d[K::rows + k];
-      bar.inputs.of(Quantity::rest)[group.first_value + static_cast<std::size_t>(item) * P + k] += p_bar;
-    }
+    bar.lambda[first_row + j] += own.lambda[j];
+    if (group.damped) bar.C_r[first_row + j] += own.C_r[j];
   }
-  // a = alpha/eta^2, g = alpha beta/eta
-  const int c = group.first + item;
-  T& alpha_bar = bar.inputs.of(Quantity::compliance)[c];
-  alpha_bar += a_bar * T(1.0 / (s.eta * s.eta));
-  if (group.damped) {
-    const T alpha = s.inputs.of(Quantity::compliance)[c], beta = s.inputs.of(Quantity::damping)[c],
-            ge = g_bar * T(1.0 / s.eta);
-    alpha_bar += ge * beta;
-    bar.inputs.of(Quantity::damping)[c] += ge * alpha;
-  }
-}
-
-template <class K>
-std::size_t first_coordinate(const Group& group, int item) {
-  return group.first_coordinate + static_cast<std::size_t>(item) * K::dofs;
+  constexpr int P = parameter_count<K>;
+  for (int k = 0; k < P; ++k)
+    bar.inputs.of(Quantity::rest)[group.first_value + static_cast<std::size_t>(item) * P + k] += own.p[k];
+  add_rates(s.inputs, group, item, s.eta, own.a, own.g, bar.inputs);
 }
 
 // Adds a stencil's cotangent to where it belongs.
 template <class K, class T>
-void add_cotangent(const SubstepState<T>& s, const Element<K, T>& e, std::size_t coordinate, const T* local,
+void add_cotangent(const SubstepState<T>& s, const Placed<K, T>& e, std::size_t coordinate, const T* local,
                    const SubstepCotangent<T>& bar) {
   for (int k = 0; k < K::arity; ++k) {
     T* to =
@@ -99,14 +53,14 @@ void add_cotangent(const SubstepState<T>& s, const Element<K, T>& e, std::size_t
 
 // Gathers a per-dof vector on the stencil; zero where nothing can move.
 template <class K, class T>
-void gather_free(const SubstepState<T>& s, const Element<K, T>& e, const T* from, T* local) {
+void gather_free(const SubstepState<T>& s, const Placed<K, T>& e, const T* from, T* local) {
   for (int d = 0; d < K::dofs; ++d)
     local[d] = s.scene.role[e.nodes[d / 3]] == Role::free ? from[s.scene.first_dof[e.nodes[d / 3]] + d % 3] : T(0.0);
 }
 
 // lambda'_bar + J W x'_bar on one element.
 template <class K, class T>
-void adjoint_right_side(const SubstepState<T>& s, const Element<K, T>& e, const T* J, const SubstepCotangent<T>& bar,
+void adjoint_right_side(const SubstepState<T>& s, const Placed<K, T>& e, const T* J, const SubstepCotangent<T>& bar,
                         T* y) {
   T x_bar[K::dofs];
   gather_free(s, e, bar.x, x_bar);
@@ -126,24 +80,16 @@ void project_color_vjp(const SubstepState<T>& s, const SolverOptions& options, c
       for (int n = begin; n < end; ++n) {
         const int item = color.items[n];
         const std::size_t coordinate = first_coordinate<K>(group, item);
-        const Element<K, T> e(s, group, item, &record.x[coordinate]);
-        const Evaluation<K, T> value(e.x, e.p);
-        const T* dl = &record.dl[e.first_row];
-        T A[K::rows * K::rows], y[K::rows], z[K::dofs], u[K::dofs]{}, back[K::dofs]{};
-        e.matrix(value.J, A);
-        adjoint_right_side(s, e, value.J, bar, y);
-        SmallLdlt<K::rows, T>(A).solve(y);
-        transpose_times<K>(value.J, dl, u);
-        transpose_times<K>(value.J, y, back);
-        gather_free(s, e, bar.x, z);
-        for (int d = 0; d < K::dofs; ++d) {
-          z[d] -= back[d];
-          back[d] = -back[d];
-        }
+        const Placed<K, T> e(s, group, item, &record.x[coordinate]);
+        T x_bar[K::dofs], w_bar[K::arity];
+        ElementCotangent<K, T> own;
+        gather_free(s, e, bar.x, x_bar);
+        correction_vjp(e, &record.lambda[e.first_row], e.references(s, group), &record.dl[e.first_row],
+                       bar.lambda + e.first_row, x_bar, w_bar, own);
         for (int k = 0; k < K::arity; ++k)
-          if (s.scene.role[e.nodes[k]] == Role::free) bar.w[e.nodes[k]] += dot(Vec3<T>(u + 3 * k), Vec3<T>(z + 3 * k));
-        pull_back_element<K>(s, group, item, e, &record.lambda[e.first_row], dl, y, z, u, back, bar);
-        add_cotangent(s, e, coordinate, back, bar);
+          if (s.scene.role[e.nodes[k]] == Role::free) bar.w[e.nodes[k]] += w_bar[k];
+        add_element(s, group, item, own, bar);
+        add_cotangent(s, e, coordinate, x_bar, bar);
       }
     });
   });
@@ -159,17 +105,17 @@ void project_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const
     for (const Member& m : block.members) {
       const Group& group = s.scene.groups[m.group];
       with_kind(group.kind, [&]<class K>(K) {
-        const Element<K, T> e(s, group, m.item, &record.x[first_coordinate<K>(group, m.item)]);
+        const Placed<K, T> e(s, group, m.item, &record.x[first_coordinate<K>(group, m.item)]);
         body(e, &record.J[first_gradient<K>(group, m.item)], group, m);
       });
     }
   };
-  for_each_member([&]<class K>(const Element<K, T>& e, const T* J, const Group&, const Member& m) {
+  for_each_member([&]<class K>(const Placed<K, T>& e, const T* J, const Group&, const Member& m) {
     adjoint_right_side(s, e, J, bar, y + m.first_row);
   });
   factor.solve(block.structure, y);
   for (const int node : block.nodes) std::fill_n(block_wide.u + s.scene.first_dof[node], 3, T(0.0));
-  for_each_member([&]<class K>(const Element<K, T>& e, const T* J, const Group& group, const Member& m) {
+  for_each_member([&]<class K>(const Placed<K, T>& e, const T* J, const Group& group, const Member& m) {
     T u[K::dofs]{}, back[K::dofs]{};
     transpose_times<K>(J, &record.dl[e.first_row], u);
     transpose_times<K>(J, y + m.first_row, back);
@@ -183,12 +129,14 @@ void project_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const
     std::copy_n(bar.x + dof, 3, block_wide.z + dof);
     bar.w[node] += dot(Vec3<T>(block_wide.u + dof), Vec3<T>(block_wide.z + dof));
   }
-  for_each_member([&]<class K>(const Element<K, T>& e, const T*, const Group& group, const Member& m) {
+  for_each_member([&]<class K>(const Placed<K, T>& e, const T*, const Group& group, const Member& m) {
     T z[K::dofs], u[K::dofs], x_bar[K::dofs]{};
     gather_free(s, e, block_wide.z, z);
     gather_free(s, e, block_wide.u, u);
-    pull_back_element<K>(s, group, m.item, e, &record.lambda[e.first_row], &record.dl[e.first_row], y + m.first_row, z,
-                         u, x_bar, bar);
+    ElementCotangent<K, T> own;
+    pull_back<K>(e, &record.lambda[e.first_row], e.references(s, group), &record.dl[e.first_row], y + m.first_row, z, u,
+                 x_bar, own);
+    add_element(s, group, m.item, own, bar);
     add_cotangent(s, e, first_coordinate<K>(group, m.item), x_bar, bar);
   });
 }

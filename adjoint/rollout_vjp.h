@@ -20,7 +20,7 @@ void rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t
   std::vector<T> v(dofs), v_before(dofs), q(dofs), v_out(dofs);
   SubstepRecord<T> record;
   record.resize(scene, plan, true);
-  ReverseScratch<T> reverse(scene);
+  ReverseScratch<T> reverse(scene, plan);
 
   seed(tape.steps(), x_next_bar.data());
   for (int n = tape.steps() - 1; n >= 0; --n) {
@@ -41,6 +41,7 @@ void rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t
     std::swap(v_bar, v_before_bar);
     std::fill(v_before_bar.begin(), v_before_bar.end(), T(0.0));
   }
+  if constexpr (in_packs<T>) finish(scene, plan.packs, in, in_bar, reverse.packs);
   // x_next_bar and v_next_bar now belong to the initial state; driven nodes started on their boundary.
   const KnotWeights boundary = scene.driven.empty() ? KnotWeights{} : scene.boundary.at(t0);
   for (int node = 0; node < scene.nodes(); ++node) {

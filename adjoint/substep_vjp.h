@@ -1,6 +1,7 @@
 // The reverse of one substep: velocity read-off, projections in reverse order, damping references, prediction.
 #pragma once
 
+#include "adjoint/packs/packed_reverse.h"
 #include "adjoint/project_vjp.h"
 
 namespace sheetbend {
@@ -14,15 +15,18 @@ struct StateCotangents {
 template <class T>
 struct ReverseScratch {
   std::vector<T> x, fixed, lambda, w, C_r, z, u;
+  PackCotangents packs;
 
-  explicit ReverseScratch(const Scene& scene)
+  ReverseScratch(const Scene& scene, const Plan& plan)
       : x(scene.dofs()),
         fixed(scene.stencil_coordinates),
         lambda(scene.rows),
         w(scene.nodes()),
         C_r(scene.rows),
         z(scene.dofs()),
-        u(scene.dofs()) {}
+        u(scene.dofs()) {
+    if constexpr (in_packs<T>) packs.resize(plan.packs);
+  }
 };
 
 template <class T>
@@ -130,20 +134,15 @@ void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, 
   }
 }
 
-// Given the cotangents of x_{n+1} and v_{n+1}, adds to those of the states before and of the inputs. The record is the substep's own, recomputed.
+// Reverse of project(): scratch.x goes from the cotangent of the corrected coordinates to that of the predicted ones.
 template <class T>
-void substep_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf, double t_next,
-                 const SubstepStates<T>& s, SubstepRecord<T>& record, const T* x_next_bar, const T* v_next_bar,
-                 ReverseScratch<T>& scratch, const StateCotangents<T>& bar, const Inputs<T>& in_bar) {
-  for (int i = 0; i < scene.dofs(); ++i) {
-    const T back = v_next_bar[i] * T(1.0 / bdf.eta);
-    scratch.x[i] = x_next_bar[i] + back;
-    pull_back_history(bdf, -back, bar.x[i], bar.x_before[i]);
-  }
-  for (auto* buffer : {&scratch.fixed, &scratch.lambda, &scratch.w, &scratch.C_r})
-    std::fill(buffer->begin(), buffer->end(), T(0.0));
-
-  const SubstepState<T> state{scene, in, bdf.eta, nullptr, record.w.data(), record.C_r.data(), record.lambda.data()};
+void project_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in, double eta, SubstepRecord<T>& record,
+                 ReverseScratch<T>& scratch, const Inputs<T>& in_bar) {
+  if constexpr (in_packs<T>)
+    if (!plan.colors.empty())
+      return reverse_sweeps(scene, plan.packs, plan.options, in, record.packs, scratch.x.data(), scratch.w.data(),
+                            scratch.C_r.data(), in_bar, scratch.packs);
+  const SubstepState<T> state{scene, in, eta, nullptr, record.w.data(), record.C_r.data(), record.lambda.data()};
   const SubstepCotangent<T> cotangent{scratch.x.data(), scratch.fixed.data(), scratch.lambda.data(),
                                       scratch.w.data(), scratch.C_r.data(),   in_bar};
   for (int iteration = plan.options.iterations - 1; iteration >= 0; --iteration) {
@@ -164,6 +163,22 @@ void substep_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in
         const std::size_t from = group.first_coordinate + (static_cast<std::size_t>(i) * group.arity + k) * 3;
         for (int d = 0; d < 3; ++d) scratch.x[scene.first_dof[node] + d] += scratch.fixed[from + d];
       }
+}
+
+// Given the cotangents of x_{n+1} and v_{n+1}, adds to those of the states before and of the inputs. The record is the substep's own, recomputed.
+template <class T>
+void substep_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf, double t_next,
+                 const SubstepStates<T>& s, SubstepRecord<T>& record, const T* x_next_bar, const T* v_next_bar,
+                 ReverseScratch<T>& scratch, const StateCotangents<T>& bar, const Inputs<T>& in_bar) {
+  for (int i = 0; i < scene.dofs(); ++i) {
+    const T back = v_next_bar[i] * T(1.0 / bdf.eta);
+    scratch.x[i] = x_next_bar[i] + back;
+    pull_back_history(bdf, -back, bar.x[i], bar.x_before[i]);
+  }
+  for (auto* buffer : {&scratch.fixed, &scratch.lambda, &scratch.w, &scratch.C_r})
+    std::fill(buffer->begin(), buffer->end(), T(0.0));
+
+  project_vjp(scene, plan, in, bdf.eta, record, scratch, in_bar);
   damping_references_vjp(scene, in, bdf, s, scratch.C_r.data(), bar, in_bar);
   predict_vjp(scene, in, bdf, t_next, s, record.w.data(), scratch.x.data(), scratch.w.data(), bar, in_bar);
 }

@@ -6,40 +6,79 @@
 
 namespace sheetbend {
 
-struct Pack {
+// Its pieces are as wide as a register of the instruction set that is compiled for: compilers take wider vectors apart badly.
+struct alignas(64) Pack {  // laid out the same on every instruction set
   static constexpr int lanes = 8;
-  typedef double Vector __attribute__((vector_size(64)));
-  typedef long long Bits __attribute__((vector_size(64)));
+#if defined(__AVX512F__)
+  static constexpr int width = 8;
+#elif defined(__AVX__)
+  static constexpr int width = 4;
+#else
+  static constexpr int width = 2;
+#endif
+  static constexpr int pieces = lanes / width;
+  typedef double Vector __attribute__((vector_size(8 * width), may_alias));
+  typedef long long Bits __attribute__((vector_size(8 * width)));
 
   struct Mask {
-    Bits bits;
+    Bits bits[pieces];
   };
 
-  Vector v{};
-  Pack() = default;
-  Pack(double a) : v(a - Vector{}) {}
-  explicit Pack(const Vector& a) : v(a) {}
-  double operator[](int lane) const { return v[lane]; }
-  void set(int lane, double a) { v[lane] = a; }
+  Vector v[pieces];
+  Pack() : Pack(0.0) {}
+  Pack(double a) {
+    for (Vector& piece : v) piece = a - Vector{};
+  }
+  double operator[](int lane) const { return v[lane / width][lane % width]; }
+  void set(int lane, double a) { v[lane / width][lane % width] = a; }
 
-  Pack& operator+=(const Pack& b) { return v += b.v, *this; }
-  Pack& operator-=(const Pack& b) { return v -= b.v, *this; }
-  Pack& operator*=(const Pack& b) { return v *= b.v, *this; }
+  Pack& operator+=(const Pack& b) { return *this = *this + b; }
+  Pack& operator-=(const Pack& b) { return *this = *this - b; }
+  Pack& operator*=(const Pack& b) { return *this = *this * b; }
+
+  // f on every piece of one or two packs.
+  template <class F>
+  static Pack map(const Pack& a, const Pack& b, F&& f) {
+    Pack r{Raw{}};
+    for (int i = 0; i < pieces; ++i) r.v[i] = f(a.v[i], b.v[i]);
+    return r;
+  }
+  friend Pack operator-(const Pack& a) {
+    return map(a, a, [](const Vector& x, const Vector&) { return -x; });
+  }
+  friend Pack operator+(const Pack& a, const Pack& b) {
+    return map(a, b, [](const Vector& x, const Vector& y) { return x + y; });
+  }
+  friend Pack operator-(const Pack& a, const Pack& b) {
+    return map(a, b, [](const Vector& x, const Vector& y) { return x - y; });
+  }
+  friend Pack operator*(const Pack& a, const Pack& b) {
+    return map(a, b, [](const Vector& x, const Vector& y) { return x * y; });
+  }
+  friend Pack operator/(const Pack& a, const Pack& b) {
+    return map(a, b, [](const Vector& x, const Vector& y) { return x / y; });
+  }
+  friend Mask operator>(const Pack& a, const Pack& b) {
+    Mask m;
+    for (int i = 0; i < pieces; ++i) m.bits[i] = a.v[i] > b.v[i];
+    return m;
+  }
+  friend Mask operator<(const Pack& a, const Pack& b) { return b > a; }
+  friend Pack select(const Mask& m, const Pack& a, const Pack& b) {
+    Pack r{Raw{}};
+    for (int i = 0; i < pieces; ++i) r.v[i] = m.bits[i] ? a.v[i] : b.v[i];
+    return r;
+  }
+
+ private:
+  struct Raw {};
+  explicit Pack(Raw) {}
 };
-
-inline Pack operator-(const Pack& a) { return Pack(-a.v); }
-inline Pack operator+(const Pack& a, const Pack& b) { return Pack(a.v + b.v); }
-inline Pack operator-(const Pack& a, const Pack& b) { return Pack(a.v - b.v); }
-inline Pack operator*(const Pack& a, const Pack& b) { return Pack(a.v * b.v); }
-inline Pack operator/(const Pack& a, const Pack& b) { return Pack(a.v / b.v); }
-inline Pack::Mask operator>(const Pack& a, const Pack& b) { return {a.v > b.v}; }
-inline Pack::Mask operator<(const Pack& a, const Pack& b) { return {a.v < b.v}; }
-inline Pack select(const Pack::Mask& m, const Pack& a, const Pack& b) { return Pack(m.bits ? a.v : b.v); }
 
 template <class F>
 Pack per_lane(F&& f) {
   Pack r;
-  for (int i = 0; i < Pack::lanes; ++i) r.v[i] = f(i);
+  for (int i = 0; i < Pack::lanes; ++i) r.set(i, f(i));
   return r;
 }
 inline Pack sqrt(const Pack& a) {

@@ -79,10 +79,11 @@ void check(const SolverOptions& o) {
 
 Plan make_plan(const Scene& scene, const SolverOptions& options) {
   check(options);
-  Plan plan{options, {}, {}};
-  if (options.partition == Partition::gauss_seidel)
+  Plan plan{options, {}, {}, {}};
+  if (options.partition == Partition::gauss_seidel) {
     plan.colors = color_constraints(scene);
-  else
+    plan.packs = pack_colors(scene, plan.colors);
+  } else
     for (auto& members : connected_chains(scene)) {
       const int first_row =
           plan.blocks.empty() ? 0 : plan.blocks.back().first_row + plan.blocks.back().structure.size();

@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "core/packs/packed_colors.h"
 #include "core/scene/scene.h"
 #include "core/solver/options.h"
 #include "core/solver/symmetric_factor.h"
@@ -40,6 +41,7 @@ struct DirectBlock {
 struct Plan {
   SolverOptions options;
   std::vector<Color> colors;
+  PackPlan packs;  // the same colors, eight constraints at a time
   std::vector<DirectBlock> blocks;
 };
 

@@ -2,9 +2,8 @@
 // Once for a color of blocks of one, once for a direct block; both go through Element.
 #pragma once
 
-#include "core/solver/element.h"
+#include "core/solver/placed.h"
 #include "core/solver/plan.h"
-#include "core/solver/small_ldlt.h"
 #include "core/threads/pool.h"
 
 namespace sheetbend {
@@ -31,15 +30,28 @@ std::size_t first_gradient(const Group& group, int item) {
   return group.first_gradient + static_cast<std::size_t>(item) * K::rows * K::dofs;
 }
 
-// x' = x + W J^T dl on one stencil. Fixed nodes are not written at all: constraints that run in parallel may share them.
+// x' = x + W push on one stencil. Fixed nodes are not written at all: constraints that run in parallel may share them.
 template <class K, class T>
-void apply(const SubstepState<T>& s, const Element<K, T>& e, const T* J, const T* dl) {
-  T push[K::dofs]{};
-  transpose_times<K>(J, dl, push);
+void apply(const SubstepState<T>& s, const Placed<K, T>& e, const T* push) {
   for (int k = 0; k < K::arity; ++k) {
     if (s.scene.role[e.nodes[k]] != Role::free) continue;
     for (int d = 0; d < 3; ++d) s.q[s.scene.first_dof[e.nodes[k]] + d] += e.w[k] * push[3 * k + d];
   }
+}
+
+// lambda' = lambda + dl, and what the reverse needs of it.
+template <class K, class T>
+void correct_multipliers(const SubstepState<T>& s, const Placed<K, T>& e, const T* dl, IterationRecord<T>& record) {
+  for (int row = e.first_row, j = 0; j < K::rows; ++row, ++j) {
+    record.lambda[row] = s.lambda[row];
+    record.dl[row] = dl[j];
+    s.lambda[row] += dl[j];
+  }
+}
+
+template <class K>
+std::size_t first_coordinate(const Group& group, int item) {
+  return group.first_coordinate + static_cast<std::size_t>(item) * K::dofs;
 }
 
 template <class T>
@@ -50,19 +62,11 @@ void project_color(const SubstepState<T>& s, const SolverOptions& options, const
     parallel_for(static_cast<int>(color.items.size()), options.threads, options.grain, [&](int begin, int end) {
       for (int n = begin; n < end; ++n) {
         const int item = color.items[n];
-        const Element<K, T> e(s, group, item);
-        const Evaluation<K, T> value(e.x, e.p);
-        T A[K::rows * K::rows], dl[K::rows];
-        e.matrix(value.J, A);
-        for (int j = 0; j < K::rows; ++j) dl[j] = -(e.residual(s, group.damped, value.C, j) / (T(1.0) + e.rates.g));
-        SmallLdlt<K::rows, T>(A).solve(dl);
-        std::copy_n(e.x, K::dofs, &record.x[group.first_coordinate + static_cast<std::size_t>(item) * K::dofs]);
-        for (int j = 0; j < K::rows; ++j) {
-          record.lambda[e.first_row + j] = s.lambda[e.first_row + j];
-          record.dl[e.first_row + j] = dl[j];
-          s.lambda[e.first_row + j] += dl[j];
-        }
-        apply<K>(s, e, value.J, dl);
+        const Placed<K, T> e(s, group, item);
+        const Correction<K, T> correction(e, s.lambda + e.first_row, e.references(s, group));
+        std::copy_n(e.x, K::dofs, &record.x[first_coordinate<K>(group, item)]);
+        correct_multipliers(s, e, correction.dl, record);
+        apply(s, e, correction.push);
       }
     });
   });
@@ -117,14 +121,15 @@ void project_block(const SubstepState<T>& s, const DirectBlock& block, T* rows, 
   for (const Member& m : block.members) {
     const Group& group = s.scene.groups[m.group];
     with_kind(group.kind, [&]<class K>(K) {
-      const Element<K, T> e(s, group, m.item);
+      const Placed<K, T> e(s, group, m.item);
       T C[K::rows];
       K::evaluate(e.x, e.p, C, &record.J[first_gradient<K>(group, m.item)]);
       for (int j = 0; j < K::rows; ++j) {
-        solution[m.first_row + j] = -(e.residual(s, group.damped, C, j) / (T(1.0) + e.rates.g));
-        factor.values[block.structure.position(m.first_row + j, m.first_row + j)] += e.rates.a / (T(1.0) + e.rates.g);
+        solution[m.first_row + j] = 
+            -(e.residual(C, s.lambda + e.first_row, e.references(s, group), j) * e.rates.scale);
+        factor.values[block.structure.position(m.first_row + j, m.first_row + j)] += e.rates.a * e.rates.scale;
       }
-      std::copy_n(e.x, K::dofs, &record.x[group.first_coordinate + static_cast<std::size_t>(m.item) * K::dofs]);
+      std::copy_n(e.x, K::dofs, &record.x[first_coordinate<K>(group, m.item)]);
     });
   }
   assemble(s, block, record.J.data(), factor);
@@ -133,14 +138,11 @@ void project_block(const SubstepState<T>& s, const DirectBlock& block, T* rows, 
   for (const Member& m : block.members) {
     const Group& group = s.scene.groups[m.group];
     with_kind(group.kind, [&]<class K>(K) {
-      const Element<K, T> e(s, group, m.item);
-      const T* dl_e = &solution[m.first_row];
-      for (int j = 0; j < K::rows; ++j) {
-        record.lambda[e.first_row + j] = s.lambda[e.first_row + j];
-        record.dl[e.first_row + j] = dl_e[j];
-        s.lambda[e.first_row + j] += dl_e[j];
-      }
-      apply<K>(s, e, &record.J[first_gradient<K>(group, m.item)], dl_e);
+      const Placed<K, T> e(s, group, m.item);
+      T push[K::dofs]{};
+      transpose_times<K>(&record.J[first_gradient<K>(group, m.item)], &solution[m.first_row], push);
+      correct_multipliers(s, e, &solution[m.first_row], record);
+      apply(s, e, push);
     });
   }
 }

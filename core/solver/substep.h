@@ -13,19 +13,26 @@ struct SubstepStates {
   const T *x, *x_before, *v, *v_before;  // at n and n-1 (n-1 unused by BDF1)
 };
 
+// Whether colors go through the kernels of core/packs; other scalars go one constraint at a time.
+template <class T>
+inline constexpr bool in_packs = std::is_same_v<T, double>;
+
 template <class T>
 struct SubstepRecord {
   std::vector<IterationRecord<T>> iterations;
   std::vector<T> w, C_r, lambda;  // effective inverse masses, damping references, multipliers after the last iteration
   std::vector<T> rows;            // right sides and solutions of direct blocks
+  PackState packs;                // of colors in double precision, which go eight constraints at a time
 
   void resize(const Scene& scene, const Plan& plan, bool keep_iterations) {
     iterations.resize(keep_iterations ? plan.options.iterations : 1);
-    for (auto& i : iterations) i.resize(scene, plan);
+    if (!in_packs<T> || plan.colors.empty())
+      for (auto& i : iterations) i.resize(scene, plan);
     w.resize(scene.nodes());
     C_r.resize(scene.rows);
     lambda.resize(scene.rows);
     rows.resize(scene.rows);
+    if constexpr (in_packs<T>) packs.resize(plan.packs, keep_iterations ? plan.options.iterations : 0);
   }
 };
 
@@ -113,6 +120,29 @@ void damping_references(const Scene& scene, const Inputs<const T>& in, const Bdf
   }
 }
 
+// All iterations, on q.
+template <class T>
+void project(const Scene& scene, const Plan& plan, const Inputs<const T>& in, double eta, T* q,
+             SubstepRecord<T>& record) {
+  const SolverOptions& o = plan.options;
+  if constexpr (in_packs<T>)
+    if (!plan.colors.empty()) {
+      begin_sweeps(scene, plan.packs, in, eta, q, record.w.data(), record.C_r.data(), record.packs);
+      for (int iteration = 0; iteration < o.iterations; ++iteration)
+        sweep(plan.packs, o.threads, o.grain, iteration, record.packs);
+      return end_sweeps(scene, plan.packs, record.packs, q, record.lambda.data());
+    }
+  const SubstepState<T> state{scene, in, eta, q, record.w.data(), record.C_r.data(), record.lambda.data()};
+  for (int iteration = 0; iteration < o.iterations; ++iteration) {
+    IterationRecord<T>& kept = record.iterations[record.iterations.size() == 1 ? 0 : iteration];
+    parallel_for(static_cast<int>(plan.blocks.size()), o.threads, 1, [&](int begin, int end) {
+      for (int b = begin; b < end; ++b)
+        project_block(state, plan.blocks[b], record.rows.data(), kept, kept.factors[b]);
+    });
+    for (const Color& color : plan.colors) project_color(state, o, color, kept);
+  }
+}
+
 // Steps from n to n+1, writing q (x_{n+1}) and v. The record holds every iteration when it was sized so, the last one otherwise.
 template <class T>
 void substep(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf, double t_next,
@@ -120,14 +150,7 @@ void substep(const Scene& scene, const Plan& plan, const Inputs<const T>& in, co
   predict(scene, in, bdf, t_next, s, q, record.w.data());
   damping_references(scene, in, bdf, s, record.C_r.data());
   std::fill(record.lambda.begin(), record.lambda.end(), T(0.0));
-  const SubstepState<T> state{scene, in, bdf.eta, q, record.w.data(), record.C_r.data(), record.lambda.data()};
-  for (int iteration = 0; iteration < plan.options.iterations; ++iteration) {
-    IterationRecord<T>& kept = record.iterations[record.iterations.size() == 1 ? 0 : iteration];
-    parallel_for(static_cast<int>(plan.blocks.size()), plan.options.threads, 1, [&](int begin, int end) {
-      for (int b = begin; b < end; ++b) project_block(state, plan.blocks[b], record.rows.data(), kept, kept.factors[b]);
-    });
-    for (const Color& color : plan.colors) project_color(state, plan.options, color, kept);
-  }
+  project(scene, plan, in, bdf.eta, q, record);
   for (int i = 0; i < scene.dofs(); ++i) v[i] = (q[i] - history(bdf, s.x[i], s.x_before[i])) * T(1.0 / bdf.eta);
 }
 

@@ -102,20 +102,13 @@ std::vector<double> reverse_of_one(const Projection& p, const std::vector<double
                                    const std::vector<double>& out_bar) {
   return p.reverse_with(theta, out_bar, [&](Projection::Run<double>& run, const SubstepCotangent<double>& bar) {
     const Group& group = p.scene.groups[0];
-    const Element<K, double> e(run.state, group, 0, run.record.x.data());
-    const Evaluation<K, double> value(e.x, e.p);
-    double A[K::rows * K::rows], y[K::rows], z[K::dofs], u[K::dofs]{}, x_bar[K::dofs]{};
-    e.matrix(value.J, A);
-    adjoint_right_side(run.state, e, value.J, bar, y);
-    SmallLdlt<K::rows, double>(A).solve(y);
-    transpose_times<K>(value.J, run.record.dl.data(), u);
-    transpose_times<K>(value.J, y, x_bar);
-    for (int d = 0; d < K::dofs; ++d) {
-      x_bar[d] = -x_bar[d];
-      z[d] = bar.x[d] + x_bar[d];
-      bar.w[d / 3] += u[d] * z[d];
-    }
-    pull_back_element<K>(run.state, group, 0, e, run.record.lambda.data(), run.record.dl.data(), y, z, u, x_bar, bar);
+    const Placed<K, double> e(run.state, group, 0, run.record.x.data());
+    double x_bar[K::dofs];
+    ElementCotangent<K, double> own;
+    std::copy_n(bar.x, K::dofs, x_bar);
+    correction_vjp(e, run.record.lambda.data(), e.references(run.state, group), run.record.dl.data(), bar.lambda, x_bar,
+                   bar.w, own);
+    add_element(run.state, group, 0, own, bar);
     add_cotangent(run.state, e, 0, x_bar, bar);
   });
 }

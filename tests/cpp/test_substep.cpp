@@ -38,10 +38,11 @@ std::vector<double> reverse(const OneSubstep& one, const std::vector<double>& th
   SubstepRun<double> run(one, theta);
   const int dofs = one.scene.dofs();
   std::vector<double> bar(theta.size());
-  ReverseScratch<double> scratch(one.scene);
+  ReverseScratch<double> scratch(one.scene, one.plan);
   substep_vjp(one.scene, one.plan, run.in, run.bdf, one.t_next, run.states, run.record, out_bar.data(),
               out_bar.data() + dofs, scratch, {&bar[0], &bar[dofs], &bar[2 * dofs], &bar[3 * dofs]},
               {one.scene.layout, &bar[4 * dofs]});
+  finish(one.scene, one.plan.packs, run.in, {one.scene.layout, &bar[4 * dofs]}, scratch.packs);
   return bar;
 }
 

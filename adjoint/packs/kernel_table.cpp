@@ -1,0 +1,25 @@
+// Compiled once per instruction set, with the namespace `sheetbend` renamed (-Dsheetbend=sheetbend_...): templates and inline functions of two
+// variants are then different functions, and the linker cannot put one in the place of the other.
+#include "adjoint/packs/project_packs_vjp.h"
+#include "core/constraints/registry.h"
+
+#define SHEETBEND_JOIN_(a, b) a##b
+#define SHEETBEND_JOIN(a, b) SHEETBEND_JOIN_(a, b)
+
+namespace {
+
+template <std::size_t... I>
+constexpr sheetbend_packs::KernelTable table(const char* name, std::index_sequence<I...>) {
+  return {name,
+          {&sheetbend::project_packs<std::tuple_element_t<I, sheetbend::Registry>>...},
+          {&sheetbend::project_packs_vjp<std::tuple_element_t<I, sheetbend::Registry>>...}};
+}
+
+constexpr sheetbend_packs::KernelTable kernels =
+    table(SHEETBEND_VARIANT_NAME, std::make_index_sequence<sheetbend::kind_count>{});
+
+}  // namespace
+
+extern "C" const sheetbend_packs::KernelTable* SHEETBEND_JOIN(sheetbend_kernels_, SHEETBEND_VARIANT)() {
+  return &kernels;
+}

@@ -1,0 +1,108 @@
+#include "adjoint/packs/packed_reverse.h"
+
+#include <algorithm>
+
+#include "adjoint/rates_vjp.h"
+#include "core/threads/pool.h"
+
+namespace sheetbend {
+namespace {
+
+constexpr int lanes = sheetbend_packs::lanes;
+
+void clear(std::vector<Pack>& v) { std::fill(v.begin(), v.end(), Pack(0.0)); }
+
+void load_cotangents(const Scene& scene, const PackPlan& plan, const double* x_bar, PackCotangents& bar) {
+  clear(bar.rows);
+  for (int n = 0; n < plan.nodes; ++n) std::copy_n(x_bar + scene.first_dof[n], 3, bar.row(n));
+  for (auto& color : bar.colors) {
+    clear(color.lambda);
+    clear(color.C_r);
+  }
+}
+
+void hand_on(const Scene& scene, const PackPlan& plan, PackCotangents& bar, double* x_bar, double* w_bar, double* C_r_bar) {
+  for (int n = 0; n < plan.nodes; ++n) {
+    std::copy_n(bar.row(n), 3, x_bar + scene.first_dof[n]);
+    w_bar[n] += bar.row(n)[3];
+  }
+  for (std::size_t g = 0; g < plan.ghosts.size(); ++g)
+    for (int d = 0; d < 3; ++d)
+      x_bar[scene.first_dof[plan.ghosts[g]] + d] += bar.row(plan.nodes + static_cast<int>(g))[d];
+  for (std::size_t c = 0; c < plan.colors.size(); ++c) {
+    const PackedColor& color = plan.colors[c];
+    if (!color.damped) continue;
+    for (int lane = 0; lane < color.count; ++lane)
+      for (int j = 0; j < color.rows; ++j)
+        C_r_bar[scene.groups[color.group].first_row + color.items[lane] * color.rows + j] +=
+            numbers(bar.colors[c].C_r)[lane_at(lane, color.rows, j)];
+  }
+}
+
+}  // namespace
+
+void PackCotangents::resize(const PackPlan& plan) {
+  eta = 0.0;
+  rows.assign((static_cast<std::size_t>(plan.rows()) * sheetbend_packs::row + lanes - 1) / lanes, Pack(0.0));
+  colors.resize(plan.colors.size());
+  for (std::size_t c = 0; c < colors.size(); ++c) {
+    const PackedColor& color = plan.colors[c];
+    const std::size_t packs = color.packs;
+    colors[c].values.assign(packs * (2 + color.parameters), Pack(0.0));
+    colors[c].lambda.assign(packs * color.rows, Pack(0.0));
+    colors[c].C_r.assign(color.damped ? packs * color.rows : 0, Pack(0.0));
+  }
+}
+
+void reverse_sweeps(const Scene& scene, const PackPlan& plan, const SolverOptions& options, const Inputs<const double>& in,
+                    PackState& state, double* x_bar, double* w_bar, double* C_r_bar, const Inputs<double>& in_bar,
+                    PackCotangents& bar) {
+  if (bar.eta != state.eta) finish(scene, plan, in, in_bar, bar);
+  bar.eta = state.eta;
+  load_cotangents(scene, plan, x_bar, bar);
+  const auto& kernels = pack_kernels();
+  for (int iteration = options.iterations - 1; iteration >= 0; --iteration)
+    for (int c = static_cast<int>(plan.colors.size()) - 1; c >= 0; --c) {
+      const PackedColor& color = plan.colors[c];
+      PackState::ColorState& primal = state.colors[c];
+      PackCotangents::ColorCotangents& own = bar.colors[c];
+      const sheetbend_packs::Reverse reverse{color.nodes.data(),
+                                             state.row(0),
+                                             numbers(primal.values),
+                                             color.damped ? numbers(primal.C_r) : nullptr,
+                                             numbers(primal.records[iteration]),
+                                             bar.row(0),
+                                             numbers(own.values),
+                                             numbers(own.lambda),
+                                             color.damped ? numbers(own.C_r) : nullptr};
+      const auto kernel = kernels.project_vjp[color.kind];
+      if (options.threads == 1)
+        kernel(reverse, 0, color.packs);
+      else
+        parallel_for(color.packs, options.threads, std::max(1, options.grain / lanes),
+                     [&](int begin, int end) { kernel(reverse, begin, end); });
+    }
+  hand_on(scene, plan, bar, x_bar, w_bar, C_r_bar);
+}
+
+void finish(const Scene& scene, const PackPlan& plan, const Inputs<const double>& in, const Inputs<double>& in_bar,
+            PackCotangents& bar) {
+  if (bar.eta == 0.0) return;
+  for (std::size_t c = 0; c < plan.colors.size(); ++c) {
+    const PackedColor& color = plan.colors[c];
+    const Group& group = scene.groups[color.group];
+    const int parts = 2 + color.parameters;
+    for (int lane = 0; lane < color.count; ++lane) {
+      const double* values = numbers(bar.colors[c].values);
+      const int item = color.items[lane];
+      add_rates(in, group, item, bar.eta, values[lane_at(lane, parts, 0)], values[lane_at(lane, parts, 1)], in_bar);
+      for (int k = 0; k < color.parameters; ++k)
+        in_bar.of(Quantity::rest)[group.first_value + static_cast<std::size_t>(item) * color.parameters + k] +=
+            values[lane_at(lane, parts, 2 + k)];
+    }
+    clear(bar.colors[c].values);
+  }
+  bar.eta = 0.0;
+}
+
+}  // namespace sheetbend

@@ -1,0 +1,71 @@
+// Colors in packs of eight: where each constraint's lane is, and the arrays that the kernels work on.
+#pragma once
+
+#include <vector>
+
+#include "core/packs/kernels.h"
+#include "core/scalar/pack.h"
+#include "core/scene/scene.h"
+
+namespace sheetbend {
+
+struct Color;
+
+// A vector of packs as plain numbers, and where entry `part` of `parts` stands in it for a lane.
+inline double* numbers(std::vector<Pack>& v) { return reinterpret_cast<double*>(v.data()); }
+inline long lane_at(int lane, int parts, int part) {
+  return (static_cast<long>(lane / sheetbend_packs::lanes) * parts + part) * sheetbend_packs::lanes +
+         lane % sheetbend_packs::lanes;
+}
+
+// One color, eight constraints to a pack; a short last pack repeats its last constraint.
+struct PackedColor {
+  int kind, group, count, packs;
+  int rows, arity, parameters;
+  bool damped;
+  std::vector<int> items;  // (packs, 8)
+  std::vector<int> nodes;  // (packs, arity, 8) places of their rows in PackState
+  int value_count() const { return (damped ? 3 : 1) + parameters; }
+  int record_size() const { return 3 * arity + 2 * rows; }
+};
+
+// Rows: one per node, then one per use of a fixed node (its own, so that constraints of one color never share a row).
+struct PackPlan {
+  std::vector<PackedColor> colors;
+  std::vector<int> ghosts;  // the fixed nodes behind the rows after the nodes' own
+  int nodes = 0;
+  int rows() const { return nodes + static_cast<int>(ghosts.size()); }
+};
+
+PackPlan pack_colors(const Scene& scene, const std::vector<Color>& colors);
+
+// The numbers of one substep in the kernels' order.
+struct PackState {
+  struct ColorState {
+    std::vector<Pack> values, lambda, C_r;
+    std::vector<std::vector<Pack>> records;  // per iteration; empty where nothing is kept
+  };
+  std::vector<Pack> rows;
+  std::vector<ColorState> colors;
+  double eta = 0.0;  // of `values`; 0 where they are not filled yet
+
+  void resize(const PackPlan& plan, int kept_iterations);
+  double* row(int node) { return reinterpret_cast<double*>(rows.data()) + sheetbend_packs::row * static_cast<long>(node); }
+};
+
+// Fills values for eta (nothing to do when they are there: one state serves one vector of inputs), rows from q (dofs) and w (nodes),
+// references from C_r (rows of the scene); clears the multipliers.
+void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const double>& in, double eta, const double* q,
+                  const double* w, const double* C_r, PackState& state);
+
+// One pass over all colors; keeps what the reverse needs where `state` has records.
+void sweep(const PackPlan& plan, int threads, int grain, int iteration, PackState& state);
+
+// Writes q of the nodes and the multipliers in the scene's order.
+void end_sweeps(const Scene& scene, const PackPlan& plan, PackState& state, double* q, double* lambda);
+
+// The kernels of this machine: the widest that it can run, or the one that the environment variable SHEETBEND_ISA names (x86-64-v4,
+// x86-64-v3, x86-64-v2, portable). Throws std::runtime_error for one that it cannot run.
+const sheetbend_packs::KernelTable& pack_kernels();
+
+}  // namespace sheetbend
