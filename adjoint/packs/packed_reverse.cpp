@@ -54,13 +54,12 @@ void PackCotangents::resize(const PackPlan& plan) {
   }
 }
 
-void reverse_sweeps(const Scene& scene, const PackPlan& plan, const SolverOptions& options, const Inputs<const double>& in,
-                    PackState& state, double* x_bar, double* w_bar, double* C_r_bar, const Inputs<double>& in_bar,
+void reverse_sweeps(const Scene& scene, const PackPlan& plan, const sheetbend_packs::KernelTable& kernels,
+                    const SolverOptions& options, const Inputs<const double>& in, PackState& state, double* x_bar, double* w_bar, double* C_r_bar, const Inputs<double>& in_bar,
                     PackCotangents& bar) {
   if (bar.eta != state.eta) finish(scene, plan, in, in_bar, bar);
   bar.eta = state.eta;
   load_cotangents(scene, plan, x_bar, bar);
-  const auto& kernels = pack_kernels();
   for (int iteration = options.iterations - 1; iteration >= 0; --iteration)
     for (int c = static_cast<int>(plan.colors.size()) - 1; c >= 0; --c) {
       const PackedColor& color = plan.colors[c];

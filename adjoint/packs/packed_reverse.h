@@ -21,8 +21,8 @@ struct PackCotangents {
 
 // Reverses all iterations that `state` recorded. x_bar (dofs) is that of the coordinates after them, and becomes that of those before, fixed
 // nodes included; w_bar (nodes) and C_r_bar (rows of the scene) are added to.
-void reverse_sweeps(const Scene& scene, const PackPlan& plan, const SolverOptions& options, const Inputs<const double>& in,
-                    PackState& state, double* x_bar, double* w_bar, double* C_r_bar, const Inputs<double>& in_bar,
+void reverse_sweeps(const Scene& scene, const PackPlan& plan, const sheetbend_packs::KernelTable& kernels,
+                    const SolverOptions& options, const Inputs<const double>& in, PackState& state, double* x_bar, double* w_bar, double* C_r_bar, const Inputs<double>& in_bar,
                     PackCotangents& bar);
 
 // Adds the gathered cotangents of the constraints' values to those of the inputs, and forgets them.

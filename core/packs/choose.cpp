@@ -16,13 +16,23 @@ SHEETBEND_DECLARE(v4)
 namespace sheetbend {
 namespace {
 
-struct Variant {
-  const char* name;
-  bool runs;
-  const sheetbend_packs::KernelTable* (*table)();
-};
-
 const sheetbend_packs::KernelTable& choose() {
+  const auto available = available_kernels();
+  const char* wanted = std::getenv("SHEETBEND_ISA");
+  if (!wanted) return *available.front();
+  std::string names;
+  for (const auto* kernels : available) {
+    if (std::string(wanted) == kernels->name) return *kernels;
+    names += (names.empty() ? "" : ", ") + std::string(kernels->name);
+  }
+  throw std::runtime_error("SHEETBEND_ISA: this machine or build has no kernels '" + std::string(wanted) +
+                           "'. Fix: unset it, or use one of: " + names);
+}
+
+}  // namespace
+
+std::vector<const sheetbend_packs::KernelTable*> available_kernels() {
+  std::vector<const sheetbend_packs::KernelTable*> available;
 #ifdef SHEETBEND_X86_KERNELS
   __builtin_cpu_init();
   const bool v2 = __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt");
@@ -31,24 +41,13 @@ const sheetbend_packs::KernelTable& choose() {
   const bool v4 = v3 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
                   __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
                   __builtin_cpu_supports("avx512vl");
-  const Variant variants[] = {{"x86-64-v4", v4, sheetbend_kernels_v4},
-                              {"x86-64-v3", v3, sheetbend_kernels_v3},
-                              {"x86-64-v2", v2, sheetbend_kernels_v2},
-                              {"portable", true, sheetbend_kernels_portable}};
-#else
-  const Variant variants[] = {{"portable", true, sheetbend_kernels_portable}};
+  if (v4) available.push_back(sheetbend_kernels_v4());
+  if (v3) available.push_back(sheetbend_kernels_v3());
+  if (v2) available.push_back(sheetbend_kernels_v2());
 #endif
-  const char* wanted = std::getenv("SHEETBEND_ISA");
-  for (const Variant& v : variants)
-    if (wanted ? std::string(wanted) == v.name : v.runs) {
-      if (!v.runs) break;
-      return *v.table();
-    }
-  throw std::runtime_error("SHEETBEND_ISA: this machine or build cannot run '" + std::string(wanted) +
-                           "'. Fix: unset it, or use portable");
+  available.push_back(sheetbend_kernels_portable());
+  return available;
 }
-
-}  // namespace
 
 const sheetbend_packs::KernelTable& pack_kernels() {
   static const sheetbend_packs::KernelTable& chosen = choose();

@@ -102,8 +102,8 @@ void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const d
   for (std::size_t g = 0; g < plan.ghosts.size(); ++g) fill(plan.nodes + static_cast<int>(g), plan.ghosts[g]);
 }
 
-void sweep(const PackPlan& plan, int threads, int grain, int iteration, PackState& state) {
-  const auto& kernels = pack_kernels();
+void sweep(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, int threads, int grain, int iteration,
+           PackState& state) {
   for (std::size_t c = 0; c < plan.colors.size(); ++c) {
     const PackedColor& color = plan.colors[c];
     PackState::ColorState& own = state.colors[c];

@@ -59,13 +59,16 @@ void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const d
                   const double* w, const double* C_r, PackState& state);
 
 // One pass over all colors; keeps what the reverse needs where `state` has records.
-void sweep(const PackPlan& plan, int threads, int grain, int iteration, PackState& state);
+void sweep(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, int threads, int grain, int iteration,
+           PackState& state);
 
 // Writes q of the nodes and the multipliers in the scene's order.
 void end_sweeps(const Scene& scene, const PackPlan& plan, PackState& state, double* q, double* lambda);
 
-// The kernels of this machine: the widest that it can run, or the one that the environment variable SHEETBEND_ISA names (x86-64-v4,
-// x86-64-v3, x86-64-v2, portable). Throws std::runtime_error for one that it cannot run.
+// The kernels that this machine can run, widest first: of x86-64-v4, x86-64-v3, x86-64-v2, portable. They give the same bits.
+std::vector<const sheetbend_packs::KernelTable*> available_kernels();
+
+// The first of them, or the one that the environment variable SHEETBEND_ISA names. Throws std::runtime_error for one that cannot run.
 const sheetbend_packs::KernelTable& pack_kernels();
 
 }  // namespace sheetbend

@@ -34,31 +34,27 @@ struct Element {
   void matrix(const T* J, T* A) const {
     for (int i = 0; i < K::rows; ++i)
       for (int j = 0; j <= i; ++j) {
-        T sum(0.0);
-        for (int k = 0; k < K::arity; ++k) {
-          T product(0.0);
-          for (int d = 0; d < 3; ++d) product += J[i * K::dofs + 3 * k + d] * J[j * K::dofs + 3 * k + d];
-          sum += w[k] * product;
-        }
+        T sum = w[0] * dot(Vec3<T>(J + i * K::dofs), Vec3<T>(J + j * K::dofs));
+        for (int k = 1; k < K::arity; ++k)
+          sum += w[k] * dot(Vec3<T>(J + i * K::dofs + 3 * k), Vec3<T>(J + j * K::dofs + 3 * k));
         A[i * K::rows + j] = i == j ? sum + rates.a * rates.scale : sum;
       }
   }
 };
 
-// out += J^T y, on the stencil.
+// out = J^T y, on the stencil.
 template <class K, class T>
 void transpose_times(const T* J, const T* y, T* out) {
   for (int d = 0; d < K::dofs; ++d) {
-    T sum = J[d] * y[0];
-    for (int j = 1; j < K::rows; ++j) sum += J[j * K::dofs + d] * y[j];
-    out[d] += sum;
+    out[d] = J[d] * y[0];
+    for (int j = 1; j < K::rows; ++j) out[d] += J[j * K::dofs + d] * y[j];
   }
 }
 
 // The projection of one constraint by itself: dl, and the push J^T dl that its particles get times their inverse masses.
 template <class K, class T>
 struct Correction {
-  T dl[K::rows], push[K::dofs]{};
+  T dl[K::rows], push[K::dofs];
 
   Correction(const Element<K, T>& e, const T* lambda, const T* C_r) {
     const Evaluation<K, T> value(e.x, e.p);

@@ -129,7 +129,7 @@ void project(const Scene& scene, const Plan& plan, const Inputs<const T>& in, do
     if (!plan.colors.empty()) {
       begin_sweeps(scene, plan.packs, in, eta, q, record.w.data(), record.C_r.data(), record.packs);
       for (int iteration = 0; iteration < o.iterations; ++iteration)
-        sweep(plan.packs, o.threads, o.grain, iteration, record.packs);
+        sweep(plan.packs, pack_kernels(), o.threads, o.grain, iteration, record.packs);
       return end_sweeps(scene, plan.packs, record.packs, q, record.lambda.data());
     }
   const SubstepState<T> state{scene, in, eta, q, record.w.data(), record.C_r.data(), record.lambda.data()};

@@ -1,0 +1,115 @@
+// Colors eight constraints at a time: every instruction set gives the bits of the single-constraint kernels, whatever the color's length.
+#include "adjoint/packs/packed_reverse.h"
+#include "adjoint/project_vjp.h"
+#include "tests/cpp/support/random_scene.h"
+
+namespace sheetbend::testing {
+namespace {
+
+constexpr double eta = 1.0 / 300.0;
+
+struct Packs : ::testing::TestWithParam<bool> {
+  Sample sample = random_scene(60, {.net = GetParam()});
+  const Scene& scene = sample.scene;
+  Plan plan = make_plan(scene, {.h = eta, .partition = Partition::gauss_seidel, .iterations = 3});
+  Inputs<const double> in{scene.layout, sample.inputs.data()};
+  std::vector<double> q, w, C_r, x_bar;
+
+  Packs() {
+    Random random(61);
+    q.assign(sample.inputs.begin(), sample.inputs.begin() + scene.dofs());
+    for (double& a : q) a += random(-0.005, 0.005);
+    for (int n = 0; n < scene.nodes(); ++n) w.push_back(scene.role[n] == Role::free ? random(30.0, 100.0) : 0.0);
+    C_r = random.vector(scene.rows, -0.01, 0.01);
+    x_bar = random.vector(scene.dofs());
+  }
+
+  struct Forward {
+    std::vector<double> q, lambda;
+    PackState state;
+  };
+  Forward forward(const sheetbend_packs::KernelTable& kernels, int threads) const {
+    Forward f{q, std::vector<double>(scene.rows), {}};
+    f.state.resize(plan.packs, plan.options.iterations);
+    begin_sweeps(scene, plan.packs, in, eta, q.data(), w.data(), C_r.data(), f.state);
+    for (int i = 0; i < plan.options.iterations; ++i) sweep(plan.packs, kernels, threads, 1, i, f.state);
+    end_sweeps(scene, plan.packs, f.state, f.q.data(), f.lambda.data());
+    return f;
+  }
+
+  // Cotangents of coordinates, inverse masses, references and inputs, one after the other.
+  std::vector<double> reverse(const sheetbend_packs::KernelTable& kernels, int threads) const {
+    Forward f = forward(kernels, threads);
+    SolverOptions options = plan.options;
+    options.threads = threads;
+    options.grain = 1;
+    PackCotangents bar;
+    bar.resize(plan.packs);
+    std::vector<double> all = x_bar;
+    all.resize(scene.dofs() + scene.nodes() + scene.rows + scene.layout.total());
+    double *w_bar = &all[scene.dofs()], *C_r_bar = w_bar + scene.nodes();
+    const Inputs<double> in_bar{scene.layout, C_r_bar + scene.rows};
+    reverse_sweeps(scene, plan.packs, kernels, options, in, f.state, all.data(), w_bar, C_r_bar, in_bar, bar);
+    finish(scene, plan.packs, in, in_bar, bar);
+    return all;
+  }
+
+  // The same by the kernels of one constraint.
+  struct Singly {
+    std::vector<double> q, lambda, reverse;
+  };
+  Singly singly() const {
+    Singly s{q, std::vector<double>(scene.rows), x_bar};
+    const SubstepState<double> state{scene, in, eta, s.q.data(), w.data(), C_r.data(), s.lambda.data()};
+    std::vector<IterationRecord<double>> records(plan.options.iterations);
+    for (auto& record : records) {
+      record.resize(scene, plan);
+      for (const Color& color : plan.colors) project_color(state, plan.options, color, record);
+    }
+    s.reverse.resize(scene.dofs() + scene.nodes() + scene.rows + scene.layout.total());
+    double *w_bar = &s.reverse[scene.dofs()], *C_r_bar = w_bar + scene.nodes();
+    std::vector<double> fixed(scene.stencil_coordinates), lambda(scene.rows);
+    const SubstepCotangent<double> bar{s.reverse.data(), fixed.data(), lambda.data(), w_bar, C_r_bar,
+                                       {scene.layout, C_r_bar + scene.rows}};
+    for (int i = plan.options.iterations - 1; i >= 0; --i)
+      for (auto color = plan.colors.rbegin(); color != plan.colors.rend(); ++color)
+        project_color_vjp(state, plan.options, *color, records[i], bar);
+    for (const Group& group : scene.groups)
+      for (std::size_t c = 0; c < group.stencil.size() * 3; ++c)
+        s.reverse[scene.first_dof[group.stencil[c / 3]] + c % 3] += fixed[group.first_coordinate + c];
+    return s;
+  }
+};
+INSTANTIATE_TEST_SUITE_P(, Packs, ::testing::Bool(), [](const auto& info) { return info.param ? "Net" : "Ropes"; });
+
+TEST_P(Packs, ForwardHasTheBitsOfOneAtATime) {
+  const Singly expected = singly();
+  for (const auto* kernels : available_kernels())
+    for (const int threads : {1, 3}) {
+      const Forward found = forward(*kernels, threads);
+      EXPECT_TRUE(same_bits(found.q, expected.q)) << kernels->name << ", threads " << threads;
+      EXPECT_TRUE(same_bits(found.lambda, expected.lambda)) << kernels->name << ", threads " << threads;
+    }
+}
+
+TEST_P(Packs, ReverseAgreesWithOneAtATime) {
+  EXPECT_LE(relative_error(reverse(pack_kernels(), 1), singly().reverse), 1e-14);
+}
+
+TEST_P(Packs, ReverseHasTheSameBitsOnEveryInstructionSet) {
+  const auto expected = reverse(pack_kernels(), 1);
+  for (const auto* kernels : available_kernels())
+    for (const int threads : {1, 3})
+      EXPECT_TRUE(same_bits(reverse(*kernels, threads), expected)) << kernels->name << ", threads " << threads;
+}
+
+TEST_P(Packs, RepeatedLanesCountOnce) {
+  for (const PackedColor& color : plan.packs.colors) {
+    EXPECT_EQ(static_cast<int>(color.items.size()), color.packs * sheetbend_packs::lanes);
+    for (std::size_t lane = color.count; lane < color.items.size(); ++lane)
+      EXPECT_EQ(color.items[lane], color.items[color.count - 1]);
+  }
+}
+
+}  // namespace
+}  // namespace sheetbend::testing
