@@ -124,8 +124,9 @@ class Parameter:
         return math.log(value) if value > 0 else -math.inf
 
     def to_physical(self, internal: float) -> float:
-        """The physical value of an internal coordinate."""
-        return math.exp(internal) if self.log else float(internal)
+        """The physical value of an internal coordinate; infinite where an optimizer strays too far."""
+        with np.errstate(over="ignore"):
+            return float(np.exp(internal)) if self.log else float(internal)
 
 
 class Parameters(Mapping[str, Parameter]):
