@@ -2,8 +2,8 @@
 // element_vjp.h's; here numbers are gathered and cotangents put where they belong.
 #pragma once
 
-#include "adjoint/element_vjp.h"
-#include "adjoint/rates_vjp.h"
+#include "adjoint/element/element_vjp.h"
+#include "adjoint/element/rates_vjp.h"
 #include "core/solver/substep.h"
 
 namespace sheetbend {

@@ -140,7 +140,8 @@ void project_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in
                  ReverseScratch<T>& scratch, const Inputs<T>& in_bar) {
   if constexpr (in_packs<T>)
     if (!plan.colors.empty())
-      return reverse_sweeps(scene, plan.packs, pack_kernels(), plan.options, in, record.packs, scratch.x.data(), scratch.w.data(),
+      return reverse_sweeps(scene, plan.packs, pack_kernels(), plan.options.iterations, plan.options.threads,
+                            plan.options.grain, in, record.packs, scratch.x.data(), scratch.w.data(),
                             scratch.C_r.data(), in_bar, scratch.packs);
   const SubstepState<T> state{scene, in, eta, nullptr, record.w.data(), record.C_r.data(), record.lambda.data()};
   const SubstepCotangent<T> cotangent{scratch.x.data(), scratch.fixed.data(), scratch.lambda.data(),

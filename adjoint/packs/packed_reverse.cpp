@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "adjoint/rates_vjp.h"
+#include "adjoint/element/rates_vjp.h"
 #include "core/threads/pool.h"
 
 namespace sheetbend {
@@ -21,7 +21,8 @@ void load_cotangents(const Scene& scene, const PackPlan& plan, const double* x_b
   }
 }
 
-void hand_on(const Scene& scene, const PackPlan& plan, PackCotangents& bar, double* x_bar, double* w_bar, double* C_r_bar) {
+void hand_on(const Scene& scene, const PackPlan& plan, PackCotangents& bar, double* x_bar, double* w_bar,
+             double* C_r_bar) {
   for (int n = 0; n < plan.nodes; ++n) {
     std::copy_n(bar.row(n), 3, x_bar + scene.first_dof[n]);
     w_bar[n] += bar.row(n)[3];
@@ -55,12 +56,12 @@ void PackCotangents::resize(const PackPlan& plan) {
 }
 
 void reverse_sweeps(const Scene& scene, const PackPlan& plan, const sheetbend_packs::KernelTable& kernels,
-                    const SolverOptions& options, const Inputs<const double>& in, PackState& state, double* x_bar, double* w_bar, double* C_r_bar, const Inputs<double>& in_bar,
-                    PackCotangents& bar) {
+                    int iterations, int threads, int grain, const Inputs<const double>& in, PackState& state,
+                    double* x_bar, double* w_bar, double* C_r_bar, const Inputs<double>& in_bar, PackCotangents& bar) {
   if (bar.eta != state.eta) finish(scene, plan, in, in_bar, bar);
   bar.eta = state.eta;
   load_cotangents(scene, plan, x_bar, bar);
-  for (int iteration = options.iterations - 1; iteration >= 0; --iteration)
+  for (int iteration = iterations - 1; iteration >= 0; --iteration)
     for (int c = static_cast<int>(plan.colors.size()) - 1; c >= 0; --c) {
       const PackedColor& color = plan.colors[c];
       PackState::ColorState& primal = state.colors[c];
@@ -75,10 +76,10 @@ void reverse_sweeps(const Scene& scene, const PackPlan& plan, const sheetbend_pa
                                              numbers(own.lambda),
                                              color.damped ? numbers(own.C_r) : nullptr};
       const auto kernel = kernels.project_vjp[color.kind];
-      if (options.threads == 1)
+      if (threads == 1)
         kernel(reverse, 0, color.packs);
       else
-        parallel_for(color.packs, options.threads, std::max(1, options.grain / lanes),
+        parallel_for(color.packs, threads, std::max(1, grain / lanes),
                      [&](int begin, int end) { kernel(reverse, begin, end); });
     }
   hand_on(scene, plan, bar, x_bar, w_bar, C_r_bar);

@@ -2,7 +2,6 @@
 #pragma once
 
 #include "core/packs/packed_colors.h"
-#include "core/solver/options.h"
 
 namespace sheetbend {
 
@@ -16,14 +15,16 @@ struct PackCotangents {
   double eta = 0.0;
 
   void resize(const PackPlan& plan);
-  double* row(int node) { return reinterpret_cast<double*>(rows.data()) + sheetbend_packs::row * static_cast<long>(node); }
+  double* row(int node) {
+    return reinterpret_cast<double*>(rows.data()) + sheetbend_packs::row * static_cast<long>(node);
+  }
 };
 
 // Reverses all iterations that `state` recorded. x_bar (dofs) is that of the coordinates after them, and becomes that of those before, fixed
 // nodes included; w_bar (nodes) and C_r_bar (rows of the scene) are added to.
 void reverse_sweeps(const Scene& scene, const PackPlan& plan, const sheetbend_packs::KernelTable& kernels,
-                    const SolverOptions& options, const Inputs<const double>& in, PackState& state, double* x_bar, double* w_bar, double* C_r_bar, const Inputs<double>& in_bar,
-                    PackCotangents& bar);
+                    int iterations, int threads, int grain, const Inputs<const double>& in, PackState& state,
+                    double* x_bar, double* w_bar, double* C_r_bar, const Inputs<double>& in_bar, PackCotangents& bar);
 
 // Adds the gathered cotangents of the constraints' values to those of the inputs, and forgets them.
 void finish(const Scene& scene, const PackPlan& plan, const Inputs<const double>& in, const Inputs<double>& in_bar,

@@ -1,7 +1,7 @@
 // The reverse of project_packs: eight constraints of one color at a time.
 #pragma once
 
-#include "adjoint/element_vjp.h"
+#include "adjoint/element/element_vjp.h"
 #include "core/packs/project_packs.h"
 
 namespace sheetbend {
@@ -37,7 +37,7 @@ template <class K>
       store_rows(r.rows_bar, nodes + k * lanes, incoming[3 * k] + x_bar[3 * k], incoming[3 * k + 1] + x_bar[3 * k + 1],
                  incoming[3 * k + 2] + x_bar[3 * k + 2], node_w_bar[k] + w_bar[k]);
     const auto add = [](double* to, const Pack& by) { store(to, load(to) + by); };
-    double* values_bar = r.values_bar + n * (2 + parameter_count<K>) * lanes;
+    double* values_bar = r.values_bar + n * (2 + parameter_count<K>)*lanes;
     add(values_bar, own.a);
     if (damped) add(values_bar + lanes, own.g);
     for (int k = 0; k < parameter_count<K>; ++k) add(values_bar + (2 + k) * lanes, own.p[k]);

@@ -10,12 +10,13 @@ inline constexpr int max_kinds = 32;
 
 // One color. Lanes come last everywhere: (packs, ..., 8).
 struct Forward {
-  const int* nodes;      // (packs, arity, 8) where the particles' rows begin
-  double* rows;          // (rows, 4)
-  const double* values;  // (packs, value_count, 8): a, then where damped g and 1/(1+g), then the constraint's own parameters
-  double* lambda;        // (packs, rows of the constraint, 8)
-  const double* C_r;     // likewise; null where nothing is damped
-  double* record;        // (packs, dofs + 2 rows, 8): x, lambda and dl for the reverse; null where nothing is kept
+  const int* nodes;  // (packs, arity, 8) where the particles' rows begin
+  double* rows;      // (rows, 4)
+  const double*
+      values;      // (packs, value_count, 8): a, then where damped g and 1/(1+g), then the constraint's own parameters
+  double* lambda;  // (packs, rows of the constraint, 8)
+  const double* C_r;  // likewise; null where nothing is damped
+  double* record;     // (packs, dofs + 2 rows, 8): x, lambda and dl for the reverse; null where nothing is kept
 };
 
 struct Reverse {

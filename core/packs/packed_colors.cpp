@@ -2,8 +2,7 @@
 
 #include <algorithm>
 
-#include "core/solver/element.h"
-#include "core/solver/plan.h"
+#include "core/element/element.h"
 #include "core/threads/pool.h"
 
 namespace sheetbend {
@@ -17,7 +16,8 @@ void for_each_lane(const PackedColor& color, F&& f) {
   for (int i = 0; i < static_cast<int>(color.items.size()); ++i) f(i, color.items[i]);
 }
 
-void fill_values(const Scene& scene, const PackedColor& color, const Inputs<const double>& in, double eta, double* values) {
+void fill_values(const Scene& scene, const PackedColor& color, const Inputs<const double>& in, double eta,
+                 double* values) {
   const Group& group = scene.groups[color.group];
   const int parts = color.value_count();
   for_each_lane(color, [&](int lane, int item) {
@@ -42,8 +42,9 @@ PackPlan pack_colors(const Scene& scene, const std::vector<Color>& colors) {
   for (const Color& color : colors) {
     const Group& group = scene.groups[color.group];
     const int count = static_cast<int>(color.items.size());
-    PackedColor p{group.kind, color.group, count, (count + lanes - 1) / lanes, group.rows, group.arity, group.parameters,
-                  group.damped, color.items, {}};
+    PackedColor p{
+        group.kind,   color.group, count, (count + lanes - 1) / lanes, group.rows, group.arity, group.parameters,
+        group.damped, color.items, {}};
     p.items.resize(static_cast<std::size_t>(p.packs) * lanes, color.items.back());
     p.nodes.resize(p.items.size() * group.arity);
     for_each_lane(p, [&](int lane, int item) {
@@ -89,7 +90,8 @@ void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const d
     if (color.damped)
       for_each_lane(color, [&](int lane, int item) {
         for (int j = 0; j < color.rows; ++j)
-          numbers(own.C_r)[lane_at(lane, color.rows, j)] = C_r[scene.groups[color.group].first_row + item * color.rows + j];
+          numbers(own.C_r)[lane_at(lane, color.rows, j)] =
+              C_r[scene.groups[color.group].first_row + item * color.rows + j];
       });
   }
   state.eta = eta;
@@ -107,14 +109,18 @@ void sweep(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, in
   for (std::size_t c = 0; c < plan.colors.size(); ++c) {
     const PackedColor& color = plan.colors[c];
     PackState::ColorState& own = state.colors[c];
-    const sheetbend_packs::Forward forward{
-        color.nodes.data(), state.row(0), numbers(own.values), numbers(own.lambda), color.damped ? numbers(own.C_r) : nullptr,
-        own.records.empty() ? nullptr : numbers(own.records[iteration])};
+    const sheetbend_packs::Forward forward{color.nodes.data(),
+                                           state.row(0),
+                                           numbers(own.values),
+                                           numbers(own.lambda),
+                                           color.damped ? numbers(own.C_r) : nullptr,
+                                           own.records.empty() ? nullptr : numbers(own.records[iteration])};
     const auto kernel = kernels.project[color.kind];
     if (threads == 1)
       kernel(forward, 0, color.packs);
     else
-      parallel_for(color.packs, threads, std::max(1, grain / lanes), [&](int begin, int end) { kernel(forward, begin, end); });
+      parallel_for(color.packs, threads, std::max(1, grain / lanes),
+                   [&](int begin, int end) { kernel(forward, begin, end); });
   }
 }
 

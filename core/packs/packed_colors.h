@@ -9,7 +9,11 @@
 
 namespace sheetbend {
 
-struct Color;
+// Constraints of one group that share no movable node.
+struct Color {
+  int group;
+  std::vector<int> items;
+};
 
 // A vector of packs as plain numbers, and where entry `part` of `parts` stands in it for a lane.
 inline double* numbers(std::vector<Pack>& v) { return reinterpret_cast<double*>(v.data()); }
@@ -50,7 +54,9 @@ struct PackState {
   double eta = 0.0;  // of `values`; 0 where they are not filled yet
 
   void resize(const PackPlan& plan, int kept_iterations);
-  double* row(int node) { return reinterpret_cast<double*>(rows.data()) + sheetbend_packs::row * static_cast<long>(node); }
+  double* row(int node) {
+    return reinterpret_cast<double*>(rows.data()) + sheetbend_packs::row * static_cast<long>(node);
+  }
 };
 
 // Fills values for eta (nothing to do when they are there: one state serves one vector of inputs), rows from q (dofs) and w (nodes),

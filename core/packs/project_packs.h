@@ -2,9 +2,9 @@
 // and store the same numbers.
 #pragma once
 
+#include "core/element/element.h"
 #include "core/packs/kernels.h"
 #include "core/packs/lanes.h"
-#include "core/solver/element.h"
 
 namespace sheetbend {
 

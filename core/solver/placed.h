@@ -2,8 +2,8 @@
 #pragma once
 
 #include "core/constraints/registry.h"
+#include "core/element/element.h"
 #include "core/scene/scene.h"
-#include "core/solver/element.h"
 
 namespace sheetbend {
 

@@ -11,12 +11,6 @@
 
 namespace sheetbend {
 
-// Constraints of one group that share no movable node.
-struct Color {
-  int group;
-  std::vector<int> items;
-};
-
 // A reference to constraint `item` of group `group`.
 struct Member {
   int group, item;

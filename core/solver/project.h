@@ -125,8 +125,7 @@ void project_block(const SubstepState<T>& s, const DirectBlock& block, T* rows, 
       T C[K::rows];
       K::evaluate(e.x, e.p, C, &record.J[first_gradient<K>(group, m.item)]);
       for (int j = 0; j < K::rows; ++j) {
-        solution[m.first_row + j] = 
-            -(e.residual(C, s.lambda + e.first_row, e.references(s, group), j) * e.rates.scale);
+        solution[m.first_row + j] = -(e.residual(C, s.lambda + e.first_row, e.references(s, group), j) * e.rates.scale);
         factor.values[block.structure.position(m.first_row + j, m.first_row + j)] += e.rates.a * e.rates.scale;
       }
       std::copy_n(e.x, K::dofs, &record.x[first_coordinate<K>(group, m.item)]);

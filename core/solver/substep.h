@@ -136,8 +136,7 @@ void project(const Scene& scene, const Plan& plan, const Inputs<const T>& in, do
   for (int iteration = 0; iteration < o.iterations; ++iteration) {
     IterationRecord<T>& kept = record.iterations[record.iterations.size() == 1 ? 0 : iteration];
     parallel_for(static_cast<int>(plan.blocks.size()), o.threads, 1, [&](int begin, int end) {
-      for (int b = begin; b < end; ++b)
-        project_block(state, plan.blocks[b], record.rows.data(), kept, kept.factors[b]);
+      for (int b = begin; b < end; ++b) project_block(state, plan.blocks[b], record.rows.data(), kept, kept.factors[b]);
     });
     for (const Color& color : plan.colors) project_color(state, o, color, kept);
   }

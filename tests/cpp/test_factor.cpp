@@ -4,10 +4,10 @@
 
 #include <Eigen/Dense>
 
+#include "core/element/small_ldlt.h"
 #include "core/scalar/dual.h"
 #include "core/scalar/pack.h"
 #include "core/solver/plan.h"
-#include "core/solver/small_ldlt.h"
 #include "tests/cpp/support/compare.h"
 
 namespace sheetbend::testing {

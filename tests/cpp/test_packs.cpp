@@ -40,16 +40,14 @@ struct Packs : ::testing::TestWithParam<bool> {
   // Cotangents of coordinates, inverse masses, references and inputs, one after the other.
   std::vector<double> reverse(const sheetbend_packs::KernelTable& kernels, int threads) const {
     Forward f = forward(kernels, threads);
-    SolverOptions options = plan.options;
-    options.threads = threads;
-    options.grain = 1;
     PackCotangents bar;
     bar.resize(plan.packs);
     std::vector<double> all = x_bar;
     all.resize(scene.dofs() + scene.nodes() + scene.rows + scene.layout.total());
     double *w_bar = &all[scene.dofs()], *C_r_bar = w_bar + scene.nodes();
     const Inputs<double> in_bar{scene.layout, C_r_bar + scene.rows};
-    reverse_sweeps(scene, plan.packs, kernels, options, in, f.state, all.data(), w_bar, C_r_bar, in_bar, bar);
+    reverse_sweeps(scene, plan.packs, kernels, plan.options.iterations, threads, 1, in, f.state, all.data(), w_bar,
+                   C_r_bar, in_bar, bar);
     finish(scene, plan.packs, in, in_bar, bar);
     return all;
   }
@@ -69,8 +67,8 @@ struct Packs : ::testing::TestWithParam<bool> {
     s.reverse.resize(scene.dofs() + scene.nodes() + scene.rows + scene.layout.total());
     double *w_bar = &s.reverse[scene.dofs()], *C_r_bar = w_bar + scene.nodes();
     std::vector<double> fixed(scene.stencil_coordinates), lambda(scene.rows);
-    const SubstepCotangent<double> bar{s.reverse.data(), fixed.data(), lambda.data(), w_bar, C_r_bar,
-                                       {scene.layout, C_r_bar + scene.rows}};
+    const SubstepCotangent<double> bar{
+        s.reverse.data(), fixed.data(), lambda.data(), w_bar, C_r_bar, {scene.layout, C_r_bar + scene.rows}};
     for (int i = plan.options.iterations - 1; i >= 0; --i)
       for (auto color = plan.colors.rbegin(); color != plan.colors.rend(); ++color)
         project_color_vjp(state, plan.options, *color, records[i], bar);

@@ -5,7 +5,7 @@
 #pragma once
 
 #include "core/constraints/concept.h"
-#include "core/solver/small_ldlt.h"
+#include "core/element/small_ldlt.h"
 
 namespace sheetbend {
 
@@ -19,8 +19,8 @@ struct Rates {
 
 template <class K, class T>
 struct Element {
-  T x[K::dofs], w[K::arity];                                // coordinates and effective inverse masses on the stencil
-  T p[parameter_count<K> > 0 ? parameter_count<K> : 1]{};   // the constraint's own parameters
+  T x[K::dofs], w[K::arity];                               // coordinates and effective inverse masses on the stencil
+  T p[parameter_count<K> > 0 ? parameter_count<K> : 1]{};  // the constraint's own parameters
   Rates<T> rates;
 
   // C_r is null where nothing is damped.

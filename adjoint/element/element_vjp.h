@@ -10,8 +10,8 @@
 // numbers with rows + parameters directions. DERIVATION.md beside this file derives it. Where the numbers are stored is not known here.
 #pragma once
 
+#include "core/element/element.h"
 #include "core/scalar/dual.h"
-#include "core/solver/element.h"
 
 namespace sheetbend {
 
