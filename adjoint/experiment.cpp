@@ -96,7 +96,7 @@ void Experiment::residuals(const T* theta, T* r, T* simulated, Interrupt* interr
   Rollout<T> rollout(*scene, plan, in.data(), t0);
   rollout.run(
       last,
-      [&](int step, const T* state, const T*, const T*) {
+      [&](int step, const T* state, const T*) {
         std::copy_n(state, dofs, &ring[(step % 4) * dofs]);
         for (; next_frame < observed.times.size(); ++next_frame) {
           const T place = (T(observed.times[next_frame] - t0) + time_offset) * T(1.0 / plan.options.h);

@@ -10,7 +10,7 @@ Tape<T> record_rollout(const Scene& scene, const Plan& plan, const T* inputs, do
                        Interrupt* interrupt) {
   Tape<T> tape(scene, plan, steps);
   Rollout<T> rollout(scene, plan, inputs, t0);
-  rollout.run(steps, [&](int step, const T* x, const T*, const T*) { tape.record(step, x); }, interrupt);
+  rollout.run(steps, [&](int step, const T* x, const T*) { tape.record(step, x); }, interrupt);
   return tape;
 }
 

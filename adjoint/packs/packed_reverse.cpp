@@ -14,7 +14,7 @@ void clear(std::vector<Pack>& v) { std::fill(v.begin(), v.end(), Pack(0.0)); }
 
 void load_cotangents(const Scene& scene, const PackPlan& plan, const double* x_bar, PackCotangents& bar) {
   clear(bar.rows);
-  for (int n = 0; n < plan.nodes; ++n) std::copy_n(x_bar + scene.first_dof[n], 3, bar.row(n));
+  for (int n = 0; n < plan.nodes; ++n) Vec3<double>(x_bar + scene.first_dof[n]).store(bar.row(n));
   for (auto& color : bar.colors) {
     clear(color.lambda);
     clear(color.C_r);
@@ -24,7 +24,7 @@ void load_cotangents(const Scene& scene, const PackPlan& plan, const double* x_b
 void hand_on(const Scene& scene, const PackPlan& plan, PackCotangents& bar, double* x_bar, double* w_bar,
              double* C_r_bar) {
   for (int n = 0; n < plan.nodes; ++n) {
-    std::copy_n(bar.row(n), 3, x_bar + scene.first_dof[n]);
+    Vec3<double>(bar.row(n)).store(x_bar + scene.first_dof[n]);
     w_bar[n] += bar.row(n)[3];
   }
   for (std::size_t g = 0; g < plan.ghosts.size(); ++g)

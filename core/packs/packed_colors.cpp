@@ -97,7 +97,7 @@ void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const d
   state.eta = eta;
   const auto fill = [&](int row, int node) {
     double* to = state.row(row);
-    std::copy_n(q + scene.first_dof[node], 3, to);
+    Vec3<double>(q + scene.first_dof[node]).store(to);
     to[3] = w[node];
   };
   for (int n = 0; n < plan.nodes; ++n) fill(n, n);
@@ -124,15 +124,18 @@ void sweep(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, in
   }
 }
 
-void end_sweeps(const Scene& scene, const PackPlan& plan, PackState& state, double* q, double* lambda) {
-  for (int n = 0; n < plan.nodes; ++n) std::copy_n(state.row(n), 3, q + scene.first_dof[n]);
+void end_sweeps(const Scene& scene, const PackPlan& plan, PackState& state, double* q) {
+  for (int n = 0; n < plan.nodes; ++n) Vec3<double>(state.row(n)).store(q + scene.first_dof[n]);
+}
+
+void unpack_multipliers(const Scene& scene, const PackPlan& plan, PackState& state, double* lambda) {
   for (std::size_t c = 0; c < plan.colors.size(); ++c) {
     const PackedColor& color = plan.colors[c];
     const double* own = numbers(state.colors[c].lambda);
-    for_each_lane(color, [&](int lane, int item) {
+    for (int lane = 0; lane < color.count; ++lane)
       for (int j = 0; j < color.rows; ++j)
-        lambda[scene.groups[color.group].first_row + item * color.rows + j] = own[lane_at(lane, color.rows, j)];
-    });
+        lambda[scene.groups[color.group].first_row + color.items[lane] * color.rows + j] =
+            own[lane_at(lane, color.rows, j)];
   }
 }
 

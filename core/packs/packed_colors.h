@@ -5,6 +5,7 @@
 
 #include "core/packs/kernels.h"
 #include "core/scalar/pack.h"
+#include "core/scalar/vec3.h"
 #include "core/scene/scene.h"
 
 namespace sheetbend {
@@ -68,8 +69,11 @@ void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const d
 void sweep(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, int threads, int grain, int iteration,
            PackState& state);
 
-// Writes q of the nodes and the multipliers in the scene's order.
-void end_sweeps(const Scene& scene, const PackPlan& plan, PackState& state, double* q, double* lambda);
+// Writes q of the nodes.
+void end_sweeps(const Scene& scene, const PackPlan& plan, PackState& state, double* q);
+
+// Writes the multipliers in the scene's order, (rows).
+void unpack_multipliers(const Scene& scene, const PackPlan& plan, PackState& state, double* lambda);
 
 // The kernels that this machine can run, widest first: of x86-64-v4, x86-64-v3, x86-64-v2, portable. They give the same bits.
 std::vector<const sheetbend_packs::KernelTable*> available_kernels();

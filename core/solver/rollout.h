@@ -58,21 +58,31 @@ class Rollout {
     check_finite();
   }
 
-  // Calls sink(step, x, v, lambda) for the initial state (lambda all zero) and after every substep.
+  // Calls sink(step, x, v) for the initial state and after every substep.
   template <class Sink>
   void run(int steps, Sink&& sink, Interrupt* interrupt = nullptr) {
-    sink(0, x_.data(), v_.data(), record_.lambda.data());
+    sink(0, x_.data(), v_.data());
     for (int n = 0; n < steps; ++n) {
       if (interrupt && n % 64 == 0) interrupt->poll();
       advance();
-      sink(step_, x_.data(), v_.data(), record_.lambda.data());
+      sink(step_, x_.data(), v_.data());
     }
+  }
+
+  // The last substep's multipliers (rows); zero before the first.
+  const T* multipliers() {
+    if constexpr (in_packs<T>)
+      if (!plan_.colors.empty()) unpack_multipliers(scene_, plan_.packs, record_.packs, record_.lambda.data());
+    return record_.lambda.data();
   }
 
   double time(int step) const { return t0_ + step * plan_.options.h; }
 
  private:
   void check_finite() const {
+    bool finite = true;
+    for (const T& a : x_) finite &= all_finite(a);
+    if (finite) return;
     for (int n = 0; n < scene_.nodes(); ++n)
       for (int d = 0; d < scene_.dim[n]; ++d)
         if (!all_finite(x_[scene_.first_dof[n] + d])) throw Diverged(step_, n, time(step_));

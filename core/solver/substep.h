@@ -20,9 +20,10 @@ inline constexpr bool in_packs = std::is_same_v<T, double>;
 template <class T>
 struct SubstepRecord {
   std::vector<IterationRecord<T>> iterations;
-  std::vector<T> w, C_r, lambda;  // effective inverse masses, damping references, multipliers after the last iteration
-  std::vector<T> rows;            // right sides and solutions of direct blocks
-  PackState packs;                // of colors in double precision, which go eight constraints at a time
+  std::vector<T> w, C_r,
+      lambda;  // effective inverse masses, damping references, multipliers (those of packed colors stay in `packs`)
+  std::vector<T> rows;  // right sides and solutions of direct blocks
+  PackState packs;      // of colors in double precision, which go eight constraints at a time
 
   void resize(const Scene& scene, const Plan& plan, bool keep_iterations) {
     iterations.resize(keep_iterations ? plan.options.iterations : 1);
@@ -70,7 +71,7 @@ void predict(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, doub
     const int dof = scene.first_dof[n];
     if (scene.role[n] == Role::pinned) {
       w[n] = T(0.0);
-      std::copy_n(s.x + dof, 3, q + dof);
+      Vec3<T>(s.x + dof).store(q + dof);
       continue;
     }
     if (scene.role[n] == Role::driven) {
@@ -130,7 +131,7 @@ void project(const Scene& scene, const Plan& plan, const Inputs<const T>& in, do
       begin_sweeps(scene, plan.packs, in, eta, q, record.w.data(), record.C_r.data(), record.packs);
       for (int iteration = 0; iteration < o.iterations; ++iteration)
         sweep(plan.packs, pack_kernels(), o.threads, o.grain, iteration, record.packs);
-      return end_sweeps(scene, plan.packs, record.packs, q, record.lambda.data());
+      return end_sweeps(scene, plan.packs, record.packs, q);
     }
   const SubstepState<T> state{scene, in, eta, q, record.w.data(), record.C_r.data(), record.lambda.data()};
   for (int iteration = 0; iteration < o.iterations; ++iteration) {

@@ -66,8 +66,9 @@ py::dict simulate(const Solver& s, const Array& inputs, const Steps& steps, doub
     std::size_t next = 0;
     rollout.run(
         steps.back(),
-        [&](int step, const double* xs, const double* vs, const double* lambda) {
+        [&](int step, const double* xs, const double* vs) {
           const double eta = Bdf::at(s.plan.options, std::max(step - 1, 0)).eta;
+          const double* lambda = next < steps.size() && steps[next] == step ? rollout.multipliers() : nullptr;
           for (; next < steps.size() && steps[next] == step; ++next) {
             std::copy_n(xs, dofs, &x[next * dofs]);
             std::copy_n(vs, dofs, &v[next * dofs]);

@@ -20,10 +20,9 @@ INSTANTIATE_TEST_SUITE_P(, Bits, all_solvers, solver_name);
 // A rollout that keeps nothing.
 std::vector<double> without_tape(const Program& p, const std::vector<double>& inputs) {
   std::vector<double> states;
-  Rollout<double>(p.scene, p.plan, inputs.data(), p.t0)
-      .run(p.steps, [&](int, const double* x, const double*, const double*) {
-        states.insert(states.end(), x, x + p.scene.dofs());
-      });
+  Rollout<double>(p.scene, p.plan, inputs.data(), p.t0).run(p.steps, [&](int, const double* x, const double*) {
+    states.insert(states.end(), x, x + p.scene.dofs());
+  });
   return states;
 }
 

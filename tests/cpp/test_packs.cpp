@@ -33,7 +33,8 @@ struct Packs : ::testing::TestWithParam<bool> {
     f.state.resize(plan.packs, plan.options.iterations);
     begin_sweeps(scene, plan.packs, in, eta, q.data(), w.data(), C_r.data(), f.state);
     for (int i = 0; i < plan.options.iterations; ++i) sweep(plan.packs, kernels, threads, 1, i, f.state);
-    end_sweeps(scene, plan.packs, f.state, f.q.data(), f.lambda.data());
+    end_sweeps(scene, plan.packs, f.state, f.q.data());
+    unpack_multipliers(scene, plan.packs, f.state, f.lambda.data());
     return f;
   }
 
