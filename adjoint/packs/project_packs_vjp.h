@@ -7,7 +7,7 @@
 namespace sheetbend {
 
 template <class K>
-[[gnu::flatten]] void project_packs_vjp(const sheetbend_packs::Reverse& r, int begin, int end) {
+[[SHEETBEND_FLATTEN]] void project_packs_vjp(const sheetbend_packs::Reverse& r, int begin, int end) {
   using sheetbend_packs::lanes;
   const bool damped = r.C_r != nullptr;
   for (long n = begin; n < end; ++n) {

@@ -29,7 +29,7 @@ void load_values(const double* values, bool damped, Element<K, Pack>& e) {
 }
 
 template <class K>
-[[gnu::flatten]] void project_packs(const sheetbend_packs::Forward& f, int begin, int end) {
+[[SHEETBEND_FLATTEN]] void project_packs(const sheetbend_packs::Forward& f, int begin, int end) {
   using sheetbend_packs::lanes;
   const bool damped = f.C_r != nullptr;
   for (long n = begin; n < end; ++n) {
