@@ -58,19 +58,6 @@ void gather_free(const SubstepState<T>& s, const Placed<K, T>& e, const T* from,
     local[d] = s.scene.role[e.nodes[d / 3]] == Role::free ? from[s.scene.first_dof[e.nodes[d / 3]] + d % 3] : T(0.0);
 }
 
-// lambda'_bar + J W x'_bar on one element.
-template <class K, class T>
-void adjoint_right_side(const SubstepState<T>& s, const Placed<K, T>& e, const T* J, const SubstepCotangent<T>& bar,
-                        T* y) {
-  T x_bar[K::dofs];
-  gather_free(s, e, bar.x, x_bar);
-  for (int j = 0; j < K::rows; ++j) {
-    T sum = bar.lambda[e.first_row + j];
-    for (int d = 0; d < K::dofs; ++d) sum += J[j * K::dofs + d] * (e.w[d / 3] * x_bar[d]);
-    y[j] = sum;
-  }
-}
-
 template <class T>
 void project_color_vjp(const SubstepState<T>& s, const SolverOptions& options, const Color& color,
                        const IterationRecord<T>& record, const SubstepCotangent<T>& bar) {
@@ -111,7 +98,9 @@ void project_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const
     }
   };
   for_each_member([&]<class K>(const Placed<K, T>& e, const T* J, const Group&, const Member& m) {
-    adjoint_right_side(s, e, J, bar, y + m.first_row);
+    T x_bar[K::dofs];
+    gather_free(s, e, bar.x, x_bar);
+    adjoint_right_side<K, T>(e, J, bar.lambda + e.first_row, x_bar, y + m.first_row);
   });
   factor.solve(block.structure, y);
   for (const int node : block.nodes) std::fill_n(block_wide.u + s.scene.first_dof[node], 3, T(0.0));

@@ -60,6 +60,15 @@ void pull_back(const Element<K, T>& e, const T* lambda, const T* C_r, const T* d
   }
 }
 
+// y = lambda'_bar + J W x'_bar.
+template <class K, class T>
+void adjoint_right_side(const Element<K, T>& e, const T* J, const T* lambda_bar, const T* x_bar, T* y) {
+  for (int j = 0; j < K::rows; ++j) {
+    y[j] = lambda_bar[j];
+    for (int d = 0; d < K::dofs; ++d) y[j] += J[j * K::dofs + d] * (e.w[d / 3] * x_bar[d]);
+  }
+}
+
 // The reverse of Correction: a constraint by itself. x_bar (dofs) goes in as x'_bar, zero where nothing can move, and comes out as what is to be
 // added to it; w_bar (arity) and bar are written.
 template <class K, class T>
@@ -68,10 +77,7 @@ void correction_vjp(const Element<K, T>& e, const T* lambda, const T* C_r, const
   const Evaluation<K, T> value(e.x, e.p);
   T A[K::rows * K::rows], y[K::rows], z[K::dofs], u[K::dofs]{}, back[K::dofs]{};
   e.matrix(value.J, A);
-  for (int j = 0; j < K::rows; ++j) {
-    y[j] = lambda_bar[j];
-    for (int d = 0; d < K::dofs; ++d) y[j] += value.J[j * K::dofs + d] * (e.w[d / 3] * x_bar[d]);
-  }
+  adjoint_right_side(e, value.J, lambda_bar, x_bar, y);
   SmallLdlt<K::rows, T>(A).solve(y);
   transpose_times<K>(value.J, dl, u);
   transpose_times<K>(value.J, y, back);

@@ -3,18 +3,15 @@
 #include <algorithm>
 
 #include "adjoint/element/rates_vjp.h"
-#include "core/threads/pool.h"
 
 namespace sheetbend {
 namespace {
 
-constexpr int lanes = sheetbend_packs::lanes;
-
 void clear(std::vector<Pack>& v) { std::fill(v.begin(), v.end(), Pack(0.0)); }
 
 void load_cotangents(const Scene& scene, const PackPlan& plan, const double* x_bar, PackCotangents& bar) {
-  clear(bar.rows);
-  for (int n = 0; n < plan.nodes; ++n) Vec3<double>(x_bar + scene.first_dof[n]).store(bar.row(n));
+  bar.rows.clear();
+  for (int n = 0; n < plan.nodes; ++n) Vec3<double>(x_bar + scene.first_dof[n]).store(bar.rows.at(n));
   for (auto& color : bar.colors) {
     clear(color.lambda);
     clear(color.C_r);
@@ -24,12 +21,12 @@ void load_cotangents(const Scene& scene, const PackPlan& plan, const double* x_b
 void hand_on(const Scene& scene, const PackPlan& plan, PackCotangents& bar, double* x_bar, double* w_bar,
              double* C_r_bar) {
   for (int n = 0; n < plan.nodes; ++n) {
-    Vec3<double>(bar.row(n)).store(x_bar + scene.first_dof[n]);
-    w_bar[n] += bar.row(n)[3];
+    Vec3<double>(bar.rows.at(n)).store(x_bar + scene.first_dof[n]);
+    w_bar[n] += bar.rows.at(n)[3];
   }
   for (std::size_t g = 0; g < plan.ghosts.size(); ++g)
     for (int d = 0; d < 3; ++d)
-      x_bar[scene.first_dof[plan.ghosts[g]] + d] += bar.row(plan.nodes + static_cast<int>(g))[d];
+      x_bar[scene.first_dof[plan.ghosts[g]] + d] += bar.rows.at(plan.nodes + static_cast<int>(g))[d];
   for (std::size_t c = 0; c < plan.colors.size(); ++c) {
     const PackedColor& color = plan.colors[c];
     if (!color.damped) continue;
@@ -44,7 +41,7 @@ void hand_on(const Scene& scene, const PackPlan& plan, PackCotangents& bar, doub
 
 void PackCotangents::resize(const PackPlan& plan) {
   eta = 0.0;
-  rows.assign((static_cast<std::size_t>(plan.rows()) * sheetbend_packs::row + lanes - 1) / lanes, Pack(0.0));
+  rows.assign(plan.rows());
   colors.resize(plan.colors.size());
   for (std::size_t c = 0; c < colors.size(); ++c) {
     const PackedColor& color = plan.colors[c];
@@ -67,20 +64,15 @@ void reverse_sweeps(const Scene& scene, const PackPlan& plan, const sheetbend_pa
       PackState::ColorState& primal = state.colors[c];
       PackCotangents::ColorCotangents& own = bar.colors[c];
       const sheetbend_packs::Reverse reverse{color.nodes.data(),
-                                             state.row(0),
+                                             state.rows.at(0),
                                              numbers(primal.values),
                                              color.damped ? numbers(primal.C_r) : nullptr,
                                              numbers(primal.records[iteration]),
-                                             bar.row(0),
+                                             bar.rows.at(0),
                                              numbers(own.values),
                                              numbers(own.lambda),
                                              color.damped ? numbers(own.C_r) : nullptr};
-      const auto kernel = kernels.project_vjp[color.kind];
-      if (threads == 1)
-        kernel(reverse, 0, color.packs);
-      else
-        parallel_for(color.packs, threads, std::max(1, grain / lanes),
-                     [&](int begin, int end) { kernel(reverse, begin, end); });
+      run_kernel(kernels.project_vjp[color.kind], reverse, color.packs, threads, grain);
     }
   hand_on(scene, plan, bar, x_bar, w_bar, C_r_bar);
 }

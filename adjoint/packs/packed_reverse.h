@@ -10,14 +10,11 @@ struct PackCotangents {
   struct ColorCotangents {
     std::vector<Pack> values, lambda, C_r;
   };
-  std::vector<Pack> rows;
+  Rows rows;
   std::vector<ColorCotangents> colors;
   double eta = 0.0;
 
   void resize(const PackPlan& plan);
-  double* row(int node) {
-    return reinterpret_cast<double*>(rows.data()) + sheetbend_packs::row * static_cast<long>(node);
-  }
 };
 
 // Reverses all iterations that `state` recorded. x_bar (dofs) is that of the coordinates after them, and becomes that of those before, fixed

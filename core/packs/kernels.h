@@ -8,6 +8,10 @@ inline constexpr int lanes = 8;
 inline constexpr int row = 4;  // numbers per particle: coordinates and inverse mass, so that one load brings all
 inline constexpr int max_kinds = 32;
 
+// Numbers per constraint in `values` and `record` below.
+constexpr int value_count(bool damped, int parameters) { return (damped ? 3 : 1) + parameters; }
+constexpr int record_size(int dofs, int rows) { return dofs + 2 * rows; }
+
 // One color. Lanes come last everywhere: (packs, ..., 8).
 struct Forward {
   const int* nodes;  // (packs, arity, 8) where the particles' rows begin

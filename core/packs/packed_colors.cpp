@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "core/element/element.h"
-#include "core/threads/pool.h"
 
 namespace sheetbend {
 namespace {
@@ -68,7 +67,7 @@ PackPlan pack_colors(const Scene& scene, const std::vector<Color>& colors) {
 
 void PackState::resize(const PackPlan& plan, int kept_iterations) {
   eta = 0.0;
-  rows.assign((static_cast<std::size_t>(plan.rows()) * sheetbend_packs::row + lanes - 1) / lanes, Pack(0.0));
+  rows.assign(plan.rows());
   colors.resize(plan.colors.size());
   for (std::size_t c = 0; c < colors.size(); ++c) {
     const PackedColor& color = plan.colors[c];
@@ -96,7 +95,7 @@ void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const d
   }
   state.eta = eta;
   const auto fill = [&](int row, int node) {
-    double* to = state.row(row);
+    double* to = state.rows.at(row);
     Vec3<double>(q + scene.first_dof[node]).store(to);
     to[3] = w[node];
   };
@@ -110,22 +109,17 @@ void sweep(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, in
     const PackedColor& color = plan.colors[c];
     PackState::ColorState& own = state.colors[c];
     const sheetbend_packs::Forward forward{color.nodes.data(),
-                                           state.row(0),
+                                           state.rows.at(0),
                                            numbers(own.values),
                                            numbers(own.lambda),
                                            color.damped ? numbers(own.C_r) : nullptr,
                                            own.records.empty() ? nullptr : numbers(own.records[iteration])};
-    const auto kernel = kernels.project[color.kind];
-    if (threads == 1)
-      kernel(forward, 0, color.packs);
-    else
-      parallel_for(color.packs, threads, std::max(1, grain / lanes),
-                   [&](int begin, int end) { kernel(forward, begin, end); });
+    run_kernel(kernels.project[color.kind], forward, color.packs, threads, grain);
   }
 }
 
 void end_sweeps(const Scene& scene, const PackPlan& plan, PackState& state, double* q) {
-  for (int n = 0; n < plan.nodes; ++n) Vec3<double>(state.row(n)).store(q + scene.first_dof[n]);
+  for (int n = 0; n < plan.nodes; ++n) Vec3<double>(state.rows.at(n)).store(q + scene.first_dof[n]);
 }
 
 void unpack_multipliers(const Scene& scene, const PackPlan& plan, PackState& state, double* lambda) {

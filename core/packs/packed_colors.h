@@ -1,12 +1,14 @@
 // Colors in packs of eight: where each constraint's lane is, and the arrays that the kernels work on.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "core/packs/kernels.h"
 #include "core/scalar/pack.h"
 #include "core/scalar/vec3.h"
 #include "core/scene/scene.h"
+#include "core/threads/pool.h"
 
 namespace sheetbend {
 
@@ -23,6 +25,28 @@ inline long lane_at(int lane, int parts, int part) {
          lane % sheetbend_packs::lanes;
 }
 
+// Rows of particles, or their cotangents.
+class Rows {
+ public:
+  void assign(int count) {
+    constexpr int per_pack = Pack::lanes / sheetbend_packs::row;
+    packs_.assign((static_cast<std::size_t>(count) + per_pack - 1) / per_pack, Pack(0.0));
+  }
+  void clear() { std::fill(packs_.begin(), packs_.end(), Pack(0.0)); }
+  double* at(int row) { return numbers(packs_) + sheetbend_packs::row * static_cast<long>(row); }
+
+ private:
+  std::vector<Pack> packs_;
+};
+
+// Runs a kernel over a color's packs; below `grain` constraints per thread it uses fewer threads.
+template <class Arrays>
+void run_kernel(void (*kernel)(const Arrays&, int, int), const Arrays& arrays, int packs, int threads, int grain) {
+  if (threads == 1) return kernel(arrays, 0, packs);
+  parallel_for(packs, threads, std::max(1, grain / sheetbend_packs::lanes),
+               [&](int begin, int end) { kernel(arrays, begin, end); });
+}
+
 // One color, eight constraints to a pack; a short last pack repeats its last constraint.
 struct PackedColor {
   int kind, group, count, packs;
@@ -30,8 +54,8 @@ struct PackedColor {
   bool damped;
   std::vector<int> items;  // (packs, 8)
   std::vector<int> nodes;  // (packs, arity, 8) places of their rows in PackState
-  int value_count() const { return (damped ? 3 : 1) + parameters; }
-  int record_size() const { return 3 * arity + 2 * rows; }
+  int value_count() const { return sheetbend_packs::value_count(damped, parameters); }
+  int record_size() const { return sheetbend_packs::record_size(3 * arity, rows); }
 };
 
 // Rows: one per node, then one per use of a fixed node (its own, so that constraints of one color never share a row).
@@ -50,14 +74,11 @@ struct PackState {
     std::vector<Pack> values, lambda, C_r;
     std::vector<std::vector<Pack>> records;  // per iteration; empty where nothing is kept
   };
-  std::vector<Pack> rows;
+  Rows rows;
   std::vector<ColorState> colors;
   double eta = 0.0;  // of `values`; 0 where they are not filled yet
 
   void resize(const PackPlan& plan, int kept_iterations);
-  double* row(int node) {
-    return reinterpret_cast<double*>(rows.data()) + sheetbend_packs::row * static_cast<long>(node);
-  }
 };
 
 // Fills values for eta (nothing to do when they are there: one state serves one vector of inputs), rows from q (dofs) and w (nodes),

@@ -9,12 +9,11 @@
 namespace sheetbend {
 
 template <class K>
-inline constexpr int record_size = K::dofs + 2 * K::rows;
+inline constexpr int record_size = sheetbend_packs::record_size(K::dofs, K::rows);
 
-// Numbers of `values` per pack.
 template <class K>
 constexpr int value_count(bool damped) {
-  return (damped ? 3 : 1) + parameter_count<K>;
+  return sheetbend_packs::value_count(damped, parameter_count<K>);
 }
 
 template <class K>
@@ -25,7 +24,8 @@ void load_values(const double* values, bool damped, Element<K, Pack>& e) {
     e.rates.g = load(values + lanes);
     e.rates.scale = load(values + 2 * lanes);
   }
-  for (int k = 0; k < parameter_count<K>; ++k) e.p[k] = load(values + ((damped ? 3 : 1) + k) * lanes);
+  for (int k = 0; k < parameter_count<K>; ++k)
+    e.p[k] = load(values + (sheetbend_packs::value_count(damped, 0) + k) * lanes);
 }
 
 template <class K>

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import RecordingError
 from .recording import Recording
-from .timeseries import Array
+from .timeseries import Array, mean_position
 
 _IN_WORDS = {
     "hold": "every marker stays where it is first seen",
@@ -80,10 +80,7 @@ def rest_baseline(
         _check_same_markers(recordings[0], other)
     if start is not None or stop is not None:
         recordings = [recording.piece(start, stop) for recording in recordings]
-    x = np.concatenate([recording.positions for recording in recordings])
-    seen = ~np.isnan(x[:, :, :1])
-    count = seen.sum(axis=0)
-    return np.where(count > 0, np.where(seen, x, 0).sum(axis=0) / np.maximum(count, 1), np.nan)
+    return mean_position(np.concatenate([recording.positions for recording in recordings]))
 
 
 def blend_baseline(recording: Recording) -> Array:

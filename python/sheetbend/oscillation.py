@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .timeseries import Array
+from .timeseries import Array, mean_position
 
 FEWEST_PERIODS = 3.0
 """Below this many periods a window and a trend cannot be told from a frequency."""
@@ -15,7 +15,7 @@ _PADDING = 32  # zero padding of the spectrum; a parabola through its peak does 
 
 def dominant_direction(positions: Array) -> Array:
     """Unit vector (markers, axes) along which the markers move most together, about their mean; NaN = not seen."""
-    motion = np.nan_to_num(_about_mean(positions)).reshape(len(positions), -1)
+    motion = np.nan_to_num(positions - mean_position(positions)).reshape(len(positions), -1)
     _, vectors = np.linalg.eigh(motion.T @ motion)
     direction: Array = vectors[:, -1].reshape(positions.shape[1:])
     return direction
@@ -23,7 +23,7 @@ def dominant_direction(positions: Array) -> Array:
 
 def along(positions: Array, direction: Array) -> Array:
     """That coordinate of the motion (frames,) m; unseen markers count as being at their mean."""
-    coordinate: Array = np.einsum("fmk,mk->f", np.nan_to_num(_about_mean(positions)), direction)
+    coordinate: Array = np.einsum("fmk,mk->f", np.nan_to_num(positions - mean_position(positions)), direction)
     return coordinate
 
 
@@ -54,10 +54,3 @@ def first_frequency(times: Array, series: Array) -> float | None:
     peak = k + 0.5 * (low - high) / (low - 2.0 * mid + high)
     frequency = peak / (_PADDING * n * (t[1] - t[0]))
     return float(frequency) if frequency * duration >= FEWEST_PERIODS else None
-
-
-def _about_mean(positions: Array) -> Array:
-    seen = ~np.isnan(positions)
-    mean = np.where(seen, positions, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
-    motion: Array = positions - mean
-    return motion

@@ -16,6 +16,7 @@ from .parameters import Parameters
 from .problem import FitProblem
 from .recording import Recording
 from .result import Given, RecordingFit
+from .timeseries import mean_position
 
 
 @dataclass(frozen=True)
@@ -52,9 +53,7 @@ class Comparison:
     def motion(self) -> float | None:
         """Root mean square distance [m] of the held-out measured markers from their mean there: what a prediction has
         to explain."""
-        positions = self.recording.positions[self.held_out]
-        seen = ~np.isnan(positions)
-        mean = np.where(seen, positions, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
+        mean = mean_position(self.recording.positions[self.held_out])
         return self.rms(self.held_out, np.broadcast_to(mean, self.recording.positions.shape))
 
     def frequencies(self) -> tuple[float | None, float | None]:

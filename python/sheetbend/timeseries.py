@@ -21,6 +21,14 @@ def default_max_gap(times: Array) -> float:
     return float(_DEFAULT_GAP_INTERVALS * np.median(np.diff(times))) if len(times) > 1 else 0.0
 
 
+def mean_position(positions: Array) -> Array:
+    """Mean over the frames in which a marker is seen, (markers, axes); NaN where it never is."""
+    seen = ~np.isnan(positions)
+    count = seen.sum(axis=0)
+    total = np.where(seen, positions, 0.0).sum(axis=0)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
 def interpolate(times: Array, positions: Array, at: Array, kind: Kind, max_gap: float) -> Array:
     """Positions of every marker at other times, NaN where its neighboring samples are too far apart.
 

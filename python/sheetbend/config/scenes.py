@@ -13,6 +13,7 @@ from ..quantities import product
 from ..recording import Recording
 from ..rope import Rope, add_rope
 from ..scene import Scene
+from ..timeseries import mean_position
 from . import scene_schema as schema
 from .errors import located
 
@@ -31,10 +32,7 @@ class Moment:
     def shape(self) -> np.ndarray:
         """(markers, 3) m at the start: the first frame of a motion, the mean of an equilibrium; NaN where not seen."""
         x = self.recording.positions
-        if not self.static:
-            return x[0]
-        seen = np.maximum((~np.isnan(x)).sum(axis=0), 1)
-        return np.where(np.isnan(x).all(axis=0), np.nan, np.nansum(x, axis=0) / seen)
+        return mean_position(x) if self.static else x[0]
 
 
 @dataclass
