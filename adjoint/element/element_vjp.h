@@ -7,7 +7,7 @@
 //   p_bar = sum_j -y_j dC_j/dp + v_j . dJ_j/dp
 //
 // Only "solve with A" differs between solvers. Hess(C_j) v_j and the parameter derivatives are one evaluation of the constraint on dual
-// numbers with rows + parameters directions. DERIVATION.md beside this file derives it. Where the numbers are stored is not known here.
+// numbers with rows + parameters directions. ../DERIVATION.md derives it. Where the numbers are stored is not known here.
 #pragma once
 
 #include "core/element/element.h"
@@ -23,41 +23,68 @@ struct ElementCotangent {
   T lambda[K::rows]{}, C_r[K::rows]{};
 };
 
-// Everything after the solve; z and u = J^T dl are the block's, on the element's stencil. Adds Hess(C_j) v_j to x_bar.
+// The second derivatives along v (rows of dofs), added to x_bar and to bar.p, with C and J at the point. By the constraint's own geometry,
+// otherwise by one evaluation on dual numbers.
 template <class K, class T>
-void pull_back(const Element<K, T>& e, const T* lambda, const T* C_r, const T* dl, const T* y, const T* z, const T* u,
-               T* x_bar, ElementCotangent<K, T>& bar) {
-  constexpr int P = parameter_count<K>, N = K::rows + P;
-  using D = Dual<T, N>;
-  T v[K::rows][K::dofs];
-  D x[K::dofs], p[P > 0 ? P : 1], C[K::rows], J[K::rows * K::dofs];
-  for (int d = 0; d < K::dofs; ++d) {
-    x[d].v = e.x[d];
-    for (int j = 0; j < K::rows; ++j) x[d].d[j] = v[j][d] = e.w[d / 3] * (dl[j] * z[d] - y[j] * u[d]);
+void second_order(const Element<K, T>& e, const Kept<K, T>& at, const T* v, const T* y, T* C, T* J, T* x_bar,
+                  ElementCotangent<K, T>& bar) {
+  constexpr int P = parameter_count<K>;
+  if constexpr (HasGeometry<K>) {
+    at.values(e.p, C);
+    at.gradient(J);
+    at.add_hessian_times(v, x_bar);
+    for (int k = 0; k < P; ++k) bar.p[k] += y[k];  // C = f(x) - p
+  } else {
+    using D = Dual<T, K::rows + P>;
+    D x[K::dofs], p[P > 0 ? P : 1], C_dual[K::rows], J_dual[K::rows * K::dofs];
+    for (int d = 0; d < K::dofs; ++d) {
+      x[d].v = at.x[d];
+      for (int j = 0; j < K::rows; ++j) x[d].d[j] = v[j * K::dofs + d];
+    }
+    for (int k = 0; k < P; ++k) {
+      p[k].v = e.p[k];
+      p[k].d[K::rows + k] = T(1.0);
+    }
+    K::evaluate(x, p, C_dual, J_dual);
+    for (int j = 0; j < K::rows; ++j) {
+      C[j] = C_dual[j].v;
+      for (int d = 0; d < K::dofs; ++d) {
+        J[j * K::dofs + d] = J_dual[j * K::dofs + d].v;
+        x_bar[d] += J_dual[j * K::dofs + d].d[j];
+      }
+      for (int k = 0; k < P; ++k) {
+        T p_bar = -(y[j] * C_dual[j].d[K::rows + k]);
+        for (int d = 0; d < K::dofs; ++d) p_bar += v[j * K::dofs + d] * J_dual[j * K::dofs + d].d[K::rows + k];
+        bar.p[k] += p_bar;
+      }
+    }
   }
-  for (int k = 0; k < P; ++k) {
-    p[k].v = e.p[k];
-    p[k].d[K::rows + k] = T(1.0);
-  }
-  K::evaluate(x, p, C, J);
+}
 
+// Everything after the solve; v holds the directions, u = J^T dl is the block's, on the element's stencil. Adds Hess(C_j) v_j to x_bar.
+template <class K, class T>
+void pull_back(const Element<K, T>& e, const Kept<K, T>& at, const T* lambda, const T* C_r, const T* dl, const T* y,
+               const T* v, const T* u, T* x_bar, ElementCotangent<K, T>& bar) {
+  T C[K::rows], J[K::rows * K::dofs];
+  second_order(e, at, v, y, C, J, x_bar, bar);
   for (int j = 0; j < K::rows; ++j) {
     const T s_bar = -(y[j] * e.rates.scale);
-    for (int d = 0; d < K::dofs; ++d) x_bar[d] += J[j * K::dofs + d].d[j];
     bar.a += s_bar * (lambda[j] + dl[j]);
     bar.lambda[j] += e.rates.a * s_bar;
     if (C_r) {
       T J_dx(0.0);
-      for (int d = 0; d < K::dofs; ++d) J_dx += J[j * K::dofs + d].v * e.w[d / 3] * u[d];
-      bar.g += s_bar * (difference<K>(C[j].v, C_r[j]) + J_dx);
+      for (int d = 0; d < K::dofs; ++d) J_dx += J[j * K::dofs + d] * e.w[d / 3] * u[d];
+      bar.g += s_bar * (difference<K>(C[j], C_r[j]) + J_dx);
       bar.C_r[j] -= e.rates.g * s_bar;
     }
-    for (int k = 0; k < P; ++k) {
-      T p_bar = -(y[j] * C[j].d[K::rows + k]);
-      for (int d = 0; d < K::dofs; ++d) p_bar += v[j][d] * J[j * K::dofs + d].d[K::rows + k];
-      bar.p[k] += p_bar;
-    }
   }
+}
+
+// v_j = W (dl_j z - y_j u).
+template <class K, class T>
+void directions(const Element<K, T>& e, const T* dl, const T* y, const T* z, const T* u, T* v) {
+  for (int j = 0; j < K::rows; ++j)
+    for (int d = 0; d < K::dofs; ++d) v[j * K::dofs + d] = e.w[d / 3] * (dl[j] * z[d] - y[j] * u[d]);
 }
 
 // y = lambda'_bar + J W x'_bar.
@@ -72,21 +99,39 @@ void adjoint_right_side(const Element<K, T>& e, const T* J, const T* lambda_bar,
 // The reverse of Correction: a constraint by itself. x_bar (dofs) goes in as x'_bar, zero where nothing can move, and comes out as what is to be
 // added to it; w_bar (arity) and bar are written.
 template <class K, class T>
-void correction_vjp(const Element<K, T>& e, const T* lambda, const T* C_r, const T* dl, const T* lambda_bar, T* x_bar,
-                    T* w_bar, ElementCotangent<K, T>& bar) {
-  const Evaluation<K, T> value(e.x, e.p);
-  T A[K::rows * K::rows], y[K::rows], z[K::dofs], u[K::dofs]{}, back[K::dofs]{};
-  e.matrix(value.J, A);
-  adjoint_right_side(e, value.J, lambda_bar, x_bar, y);
-  SmallLdlt<K::rows, T>(A).solve(y);
-  transpose_times<K>(value.J, dl, u);
-  transpose_times<K>(value.J, y, back);
-  for (int d = 0; d < K::dofs; ++d) {
-    z[d] = x_bar[d] - back[d];
-    x_bar[d] = -back[d];
+void correction_vjp(const Element<K, T>& e, const Kept<K, T>& at, const T* lambda, const T* C_r, const T* dl,
+                    const T* lambda_bar, T* x_bar, T* w_bar, ElementCotangent<K, T>& bar) {
+  T J[K::rows * K::dofs], y[K::rows], u[K::dofs], back[K::dofs], v[K::rows * K::dofs];
+  if constexpr (HasGeometry<K>) {
+    at.gradient(J);
+  } else {
+    T C[K::rows];
+    K::evaluate(at.x, e.p, C, J);
   }
-  for (int k = 0; k < K::arity; ++k) w_bar[k] = dot(Vec3<T>(u + 3 * k), Vec3<T>(z + 3 * k));
-  pull_back(e, lambda, C_r, dl, y, z, u, x_bar, bar);
+  transpose_times<K>(J, dl, u);
+  if constexpr (K::unit_gradients) {
+    // Hess(C) W J^T = 0, so of v = dl W (x'_bar - 2 y J^T) the first part is enough, and |J_k| = 1
+    T along[K::arity];
+    y[0] = lambda_bar[0];
+    unrolled<K::arity>([&](int k) {
+      along[k] = dot(Vec3<T>(J + 3 * k), Vec3<T>(x_bar + 3 * k));
+      y[0] += e.w[k] * along[k];
+    });
+    e.solve(J, y);
+    unrolled<K::arity>([&](int k) { w_bar[k] = dl[0] * (along[k] - y[0]); });
+    unrolled<K::dofs>([&](int d) { v[d] = dl[0] * (e.w[d / 3] * x_bar[d]); });
+    transpose_times<K>(J, y, back);
+  } else {
+    adjoint_right_side(e, J, lambda_bar, x_bar, y);
+    e.solve(J, y);
+    transpose_times<K>(J, y, back);
+    T z[K::dofs];
+    for (int d = 0; d < K::dofs; ++d) z[d] = x_bar[d] - back[d];
+    for (int k = 0; k < K::arity; ++k) w_bar[k] = dot(Vec3<T>(u + 3 * k), Vec3<T>(z + 3 * k));
+    directions(e, dl, y, z, u, v);
+  }
+  unrolled<K::dofs>([&](int d) { x_bar[d] = -back[d]; });
+  pull_back(e, at, lambda, C_r, dl, y, v, u, x_bar, bar);
 }
 
 }  // namespace sheetbend

@@ -8,18 +8,22 @@
 
 namespace {
 
+using namespace sheetbend_packs;
+
 template <std::size_t... I>
-constexpr sheetbend_packs::KernelTable table(const char* name, std::index_sequence<I...>) {
+constexpr KernelTable table(const char* name, std::index_sequence<I...>) {
   return {name,
-          {&sheetbend::project_packs<std::tuple_element_t<I, sheetbend::Registry>>...},
-          {&sheetbend::project_packs_vjp<std::tuple_element_t<I, sheetbend::Registry>>...}};
+          {{&sheetbend::project_packs<std::tuple_element_t<I, sheetbend::Registry>, across_color>...},
+           {&sheetbend::project_packs<std::tuple_element_t<I, sheetbend::Registry>, across_scenes>...}},
+          {{&sheetbend::project_packs_vjp<std::tuple_element_t<I, sheetbend::Registry>, across_color>...},
+           {&sheetbend::project_packs_vjp<std::tuple_element_t<I, sheetbend::Registry>, across_scenes>...}}};
 }
 
-constexpr sheetbend_packs::KernelTable kernels =
+constexpr KernelTable kernels =
     table(SHEETBEND_VARIANT_NAME, std::make_index_sequence<sheetbend::kind_count>{});
 
 }  // namespace
 
-extern "C" const sheetbend_packs::KernelTable* SHEETBEND_JOIN(sheetbend_kernels_, SHEETBEND_VARIANT)() {
+extern "C" const KernelTable* SHEETBEND_JOIN(sheetbend_kernels_, SHEETBEND_VARIANT)() {
   return &kernels;
 }

@@ -10,8 +10,16 @@
 //
 // x holds the stencil's coordinates one node after the other (dofs of them), J is row-major (rows x dofs) and fully written.
 // `periodic = true` says that C is an angle: differences of it (rate damping) are taken the short way round.
+//
+// Two shortcuts make hot constraints cheaper; a constraint without them works the same, and tests compare the two routes:
+//   `unit_gradients = true` (one row): |dC/dx_k| = 1 on every particle k whatever x is. Then J W J^T = sum w, and its derivative,
+//     2 Hess(C) W J^T, is zero.
+//   template <class T> struct Geometry: what the reverse can use in place of x and dual numbers, where the parameters are
+//     subtracted, C = f(x) - p. It has `size` numbers, Geometry(x), keep(to), kept(from), values(p, C), gradient(J) and
+//     add_hessian_times(v, out) for one row. See distance.h.
 #pragma once
 
+#include <algorithm>
 #include <array>
 
 #include "core/scalar/vec3.h"
@@ -23,10 +31,33 @@ struct OnPoints {
   static constexpr int arity = Arity;
   static constexpr int dofs = 3 * Arity;
   static constexpr bool periodic = false;
+  static constexpr bool unit_gradients = false;
 };
 
 template <class K>
 inline constexpr int parameter_count = static_cast<int>(K::parameters.size());
+
+template <class K>
+concept HasGeometry = requires { K::template Geometry<double>::size; };
+
+// What a projection leaves for its reverse: the constraint's own geometry, otherwise the coordinates.
+template <class K, class T>
+struct Kept {
+  static constexpr int size = K::dofs;
+  T x[K::dofs];
+  explicit Kept(const T* from) { std::copy_n(from, K::dofs, x); }
+  void keep(T* to) const { std::copy_n(x, K::dofs, to); }
+  static Kept kept(const T* from) { return Kept(from); }
+};
+template <HasGeometry K, class T>
+struct Kept<K, T> : K::template Geometry<T> {
+  using Base = typename K::template Geometry<T>;
+  explicit Kept(const T* x) : Base(x) {}
+  static Kept kept(const T* from) { return Kept(Base::kept(from)); }
+
+ private:
+  explicit Kept(const Base& base) : Base(base) {}
+};
 
 // C and J of one constraint, on the stack.
 template <class K, class T>
@@ -34,6 +65,21 @@ struct Evaluation {
   T C[K::rows];
   T J[K::rows * K::dofs];
   Evaluation(const T* x, const T* p) { K::evaluate(x, p, C, J); }
+  void gradient(T* out) const { std::copy_n(J, K::rows * K::dofs, out); }
+};
+
+// The same with what the reverse keeps; a constraint's own geometry stands for its gradient too.
+template <class K, class T>
+struct Linearization : Evaluation<K, T> {
+  Kept<K, T> at;
+  Linearization(const T* x, const T* p) : Evaluation<K, T>(x, p), at(x) {}
+};
+template <HasGeometry K, class T>
+struct Linearization<K, T> {
+  Kept<K, T> at;
+  T C[K::rows];
+  Linearization(const T* x, const T* p) : at(x) { at.values(p, C); }
+  void gradient(T* out) const { at.gradient(out); }
 };
 
 // a - b, for angles the short way round.

@@ -6,6 +6,7 @@
 
 #include "core/constraints/concept.h"
 #include "core/element/small_ldlt.h"
+#include "core/scalar/unrolled.h"
 
 namespace sheetbend {
 
@@ -22,6 +23,7 @@ struct Element {
   T x[K::dofs], w[K::arity];                               // coordinates and effective inverse masses on the stencil
   T p[parameter_count<K> > 0 ? parameter_count<K> : 1]{};  // the constraint's own parameters
   Rates<T> rates;
+  T inverse{};  // of the matrix, where the gradients are unit vectors and it does not depend on x
 
   // C_r is null where nothing is damped.
   T residual(const T* C, const T* lambda, const T* C_r, int row) const {
@@ -32,23 +34,43 @@ struct Element {
 
   // A = J W J^T + a/(1+g), lower triangle, row-major.
   void matrix(const T* J, T* A) const {
-    for (int i = 0; i < K::rows; ++i)
+    unrolled<K::rows>([&](int i) {
       for (int j = 0; j <= i; ++j) {
         T sum = w[0] * dot(Vec3<T>(J + i * K::dofs), Vec3<T>(J + j * K::dofs));
         for (int k = 1; k < K::arity; ++k)
           sum += w[k] * dot(Vec3<T>(J + i * K::dofs + 3 * k), Vec3<T>(J + j * K::dofs + 3 * k));
         A[i * K::rows + j] = i == j ? sum + rates.a * rates.scale : sum;
       }
+    });
+  }
+
+  // b = A^-1 b.
+  void solve(const T* J, T* b) const {
+    if constexpr (K::unit_gradients) {
+      b[0] = b[0] * inverse;
+    } else {
+      T A[K::rows * K::rows];
+      matrix(J, A);
+      SmallLdlt<K::rows, T>(A).solve(b);
+    }
   }
 };
+
+// The inverse of A = sum w + a/(1+g), for one row with unit gradients.
+template <int Arity, class T>
+T inverse_of_unit_matrix(const T* w, const Rates<T>& rates) {
+  T sum = w[0];
+  for (int k = 1; k < Arity; ++k) sum += w[k];
+  return inverse_or_zero(sum + rates.a * rates.scale);
+}
 
 // out = J^T y, on the stencil.
 template <class K, class T>
 void transpose_times(const T* J, const T* y, T* out) {
-  for (int d = 0; d < K::dofs; ++d) {
+  unrolled<K::dofs>([&](int d) {
     out[d] = J[d] * y[0];
     for (int j = 1; j < K::rows; ++j) out[d] += J[j * K::dofs + d] * y[j];
-  }
+  });
 }
 
 // The projection of one constraint by itself: dl, and the push J^T dl that its particles get times their inverse masses.
@@ -56,13 +78,12 @@ template <class K, class T>
 struct Correction {
   T dl[K::rows], push[K::dofs];
 
-  Correction(const Element<K, T>& e, const T* lambda, const T* C_r) {
-    const Evaluation<K, T> value(e.x, e.p);
-    T A[K::rows * K::rows];
-    e.matrix(value.J, A);
+  Correction(const Element<K, T>& e, const Linearization<K, T>& value, const T* lambda, const T* C_r) {
+    T J[K::rows * K::dofs];
+    value.gradient(J);
     for (int j = 0; j < K::rows; ++j) dl[j] = -(e.residual(value.C, lambda, C_r, j) * e.rates.scale);
-    SmallLdlt<K::rows, T>(A).solve(dl);
-    transpose_times<K>(value.J, dl, push);
+    e.solve(J, dl);
+    transpose_times<K>(J, dl, push);
   }
 };
 

@@ -20,8 +20,7 @@ class SmallLdlt {
       T sum = A[i * N + i];
       for (int k = 0; k < i; ++k) sum -= L_[i][k] * L_[i][k] * D_[k];
       D_[i] = sum;
-      const auto movable = sum > T(0.0);
-      inverse_[i] = select(movable, T(1.0) / select(movable, sum, T(1.0)), T(0.0));
+      inverse_[i] = inverse_or_zero(sum);
     }
   }
 

@@ -1,6 +1,8 @@
 // Rows of particles to lanes and back: eight times [x, y, z, w] become four packs. Nodes are given as places of their first number.
+// Where the lanes are scenes, a row is four packs already.
 #pragma once
 
+#include "core/packs/kernels.h"
 #include "core/scalar/pack.h"
 
 namespace sheetbend {
@@ -12,6 +14,27 @@ typedef double Row __attribute__((vector_size(32), may_alias));
 
 inline const Row& row_at(const double* rows, int place) { return *reinterpret_cast<const Row*>(rows + place); }
 inline Row& row_at(double* rows, int place) { return *reinterpret_cast<Row*>(rows + place); }
+
+template <sheetbend_packs::Layout>
+struct Particles;
+
+template <>
+struct Particles<sheetbend_packs::across_scenes> {
+  const int* nodes;
+  Particles(const int* all, long n, int arity)
+      : nodes(all + n / sheetbend_packs::lanes * arity * sheetbend_packs::lanes + n % sheetbend_packs::lanes) {}
+  long place(int k) const { return static_cast<long>(nodes[k * sheetbend_packs::lanes]) * sheetbend_packs::lanes; }
+  void load_row(const double* rows, int k, Pack* x, Pack* w) const {
+    const Pack* from = reinterpret_cast<const Pack*>(rows + place(k));
+    for (int d = 0; d < 3; ++d) x[d] = from[d];
+    if (w) *w = from[3];
+  }
+  void store_row(double* rows, int k, const Pack* x, const Pack* w) const {
+    Pack* to = reinterpret_cast<Pack*>(rows + place(k));
+    for (int d = 0; d < 3; ++d) to[d] = x[d];
+    if (w) to[3] = *w;
+  }
+};
 
 #if defined(__AVX512F__)
 
@@ -92,5 +115,18 @@ inline void store_rows(double* rows, const int* nodes, const Pack& x, const Pack
 }
 
 #endif
+
+template <>
+struct Particles<sheetbend_packs::across_color> {
+  const int* nodes;
+  Particles(const int* all, long n, int arity) : nodes(all + n * arity * sheetbend_packs::lanes) {}
+  void load_row(const double* rows, int k, Pack* x, Pack* w) const {
+    Pack ignored;
+    load_rows(rows, nodes + k * sheetbend_packs::lanes, x[0], x[1], x[2], w ? *w : ignored);
+  }
+  void store_row(double* rows, int k, const Pack* x, const Pack* w) const {
+    store_rows(rows, nodes + k * sheetbend_packs::lanes, x[0], x[1], x[2], w ? *w : x[2]);
+  }
+};
 
 }  // namespace sheetbend

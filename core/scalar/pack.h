@@ -25,7 +25,7 @@ struct alignas(64) Pack {  // laid out the same on every instruction set
   };
 
   Vector v[pieces];
-  Pack() : Pack(0.0) {}
+  Pack() = default;  // without a value, as a double: arrays of packs need no loop that clears them
   Pack(double a) {
     for (Vector& piece : v) piece = a - Vector{};
   }
@@ -39,7 +39,7 @@ struct alignas(64) Pack {  // laid out the same on every instruction set
   // f on every piece of one or two packs.
   template <class F>
   static Pack map(const Pack& a, const Pack& b, F&& f) {
-    Pack r{Raw{}};
+    Pack r;
     for (int i = 0; i < pieces; ++i) r.v[i] = f(a.v[i], b.v[i]);
     return r;
   }
@@ -65,14 +65,10 @@ struct alignas(64) Pack {  // laid out the same on every instruction set
   }
   friend Mask operator<(const Pack& a, const Pack& b) { return b > a; }
   friend Pack select(const Mask& m, const Pack& a, const Pack& b) {
-    Pack r{Raw{}};
+    Pack r;
     for (int i = 0; i < pieces; ++i) r.v[i] = m.bits[i] ? a.v[i] : b.v[i];
     return r;
   }
-
- private:
-  struct Raw {};
-  explicit Pack(Raw) {}
 };
 
 template <class F>
@@ -82,7 +78,19 @@ Pack per_lane(F&& f) {
   return r;
 }
 inline Pack sqrt(const Pack& a) {
-  return per_lane([&](int i) { return __builtin_sqrt(a[i]); });
+  return Pack::map(a, a, [](const Pack::Vector& x, const Pack::Vector&) {
+#if defined(__AVX512F__)
+    return Pack::Vector(__builtin_ia32_sqrtpd512_mask(x, x, 255, 4));  // 4: the current rounding mode
+#elif defined(__AVX__)
+    return Pack::Vector(__builtin_ia32_sqrtpd256(x));
+#elif defined(__SSE2__)
+    return Pack::Vector(__builtin_ia32_sqrtpd(x));
+#else
+    Pack::Vector r;
+    for (int i = 0; i < Pack::width; ++i) r[i] = __builtin_sqrt(x[i]);
+    return r;
+#endif
+  });
 }
 inline Pack sin(const Pack& a) {
   return per_lane([&](int i) { return std::sin(a[i]); });

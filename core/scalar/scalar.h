@@ -39,4 +39,11 @@ T sqrt_or_zero(const T& a) {
   return select(a > T(0.0), sqrt(select(a > T(0.0), a, T(1.0))), T(0.0));
 }
 
+// 1/a where a is positive, otherwise 0.
+template <class T>
+T inverse_or_zero(const T& a) {
+  const auto positive = a > T(0.0);
+  return select(positive, T(1.0) / select(positive, a, T(1.0)), T(0.0));
+}
+
 }  // namespace sheetbend

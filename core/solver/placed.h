@@ -38,6 +38,7 @@ struct Placed : Element<K, T> {
       const T* from = recorded ? recorded + 3 * k : s.q + s.scene.first_dof[nodes[k]];
       for (int d = 0; d < 3; ++d) this->x[3 * k + d] = from[d];
     }
+    if constexpr (K::unit_gradients) this->inverse = inverse_of_unit_matrix<K::arity>(this->w, this->rates);
   }
 
   const T* references(const SubstepState<T>& s, const Group& group) const {

@@ -63,7 +63,7 @@ void project_color(const SubstepState<T>& s, const SolverOptions& options, const
       for (int n = begin; n < end; ++n) {
         const int item = color.items[n];
         const Placed<K, T> e(s, group, item);
-        const Correction<K, T> correction(e, s.lambda + e.first_row, e.references(s, group));
+        const Correction<K, T> correction(e, {e.x, e.p}, s.lambda + e.first_row, e.references(s, group));
         std::copy_n(e.x, K::dofs, &record.x[first_coordinate<K>(group, item)]);
         correct_multipliers(s, e, correction.dl, record);
         apply(s, e, correction.push);

@@ -106,7 +106,7 @@ std::vector<double> reverse_of_one(const Projection& p, const std::vector<double
     double x_bar[K::dofs];
     ElementCotangent<K, double> own;
     std::copy_n(bar.x, K::dofs, x_bar);
-    correction_vjp(e, run.record.lambda.data(), e.references(run.state, group), run.record.dl.data(), bar.lambda, x_bar,
+    correction_vjp(e, Kept<K, double>(e.x), run.record.lambda.data(), e.references(run.state, group), run.record.dl.data(), bar.lambda, x_bar,
                    bar.w, own);
     add_element(run.state, group, 0, own, bar);
     add_cotangent(run.state, e, 0, x_bar, bar);
@@ -125,6 +125,20 @@ TYPED_TEST(BlockOfOne, MutantIsFlagged) {
   const double mutant = cotangent_error(p, reverse_of_one<Mutant<K>>(p, theta, out_bar), oracle);
   EXPECT_EQ(mutant > 1e4 * bound, case_of<K>().curved)
       << "error " << mutant << "; a linear C has no Hessian term to scale";
+}
+
+TYPED_TEST(BlockOfOne, ShortcutsGiveWhatTheGeneralRouteGives) {
+  using K = TypeParam;
+  for (const bool damped : {false, true}) {
+    const Sample sample = scene_of_one<K>(3, damped);
+    const Projection p(sample.scene, Partition::gauss_seidel, eta);
+    Random random(3);
+    const auto theta = p.random_theta(sample.inputs, random);
+    const auto out_bar = random.vector(p.scene.dofs() + p.scene.rows);
+    EXPECT_LE(cotangent_error(p, reverse_of_one<K>(p, theta, out_bar),
+                              reverse_of_one<WithoutShortcuts<K>>(p, theta, out_bar)),
+              bound);
+  }
 }
 
 // At compliance 0 the linearized constraint holds exactly, and small compliances approach that in proportion.

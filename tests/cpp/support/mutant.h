@@ -1,4 +1,4 @@
-// A constraint whose second derivatives are wrong by one part in a million, and in nothing else: the ladder
+// The same constraint without its shortcuts (concept.h), and one whose second derivatives are wrong by one part in a million, and in nothing else: the ladder
 // must flag it.
 #pragma once
 
@@ -7,7 +7,14 @@
 namespace sheetbend::testing {
 
 template <class K>
-struct Mutant : K {
+struct WithoutShortcuts : K {
+  static constexpr bool unit_gradients = false;
+  template <class T>
+  struct Geometry;  // hides the constraint's own
+};
+
+template <class K>
+struct Mutant : WithoutShortcuts<K> {
   template <class T>
   static void evaluate(const T* x, const T* p, T* C, T* J) {
     K::evaluate(x, p, C, J);
