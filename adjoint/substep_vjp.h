@@ -2,7 +2,7 @@
 #pragma once
 
 #include "adjoint/packs/packed_reverse.h"
-#include "adjoint/project_vjp.h"
+#include "adjoint/project_block_vjp.h"
 
 namespace sheetbend {
 

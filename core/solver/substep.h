@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "core/solver/project.h"
+#include "core/solver/project_block.h"
 
 namespace sheetbend {
 

@@ -3,7 +3,7 @@
 // color, or direct.
 #pragma once
 
-#include "adjoint/project_vjp.h"
+#include "adjoint/project_block_vjp.h"
 #include "tests/cpp/support/random_scene.h"
 
 namespace sheetbend::testing {
