@@ -15,7 +15,7 @@ struct StateCotangents {
 template <class T>
 struct ReverseScratch {
   std::vector<T> x, fixed, lambda, w, C_r, z, u;
-  PackCotangents packs;
+  PackCotangents<std::conditional_t<in_packs<T>, T, double>> packs;
 
   ReverseScratch(const Scene& scene, const Plan& plan)
       : x(scene.dofs()),

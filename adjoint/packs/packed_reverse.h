@@ -5,12 +5,13 @@
 
 namespace sheetbend {
 
-// Cotangents in the kernels' order. Those of the constraints' values gather over substeps of one eta; finish() hands them on.
+// Cotangents in the kernels' order (T: double, Pack). Those of the constraints' values gather over substeps of one eta; finish() hands them on.
+template <class T>
 struct PackCotangents {
   struct ColorCotangents {
     std::vector<Pack> values, lambda, C_r;
   };
-  Rows rows;
+  Rows<T> rows;
   std::vector<ColorCotangents> colors;
   double eta = 0.0;
 
@@ -19,12 +20,14 @@ struct PackCotangents {
 
 // Reverses all iterations that `state` recorded. x_bar (dofs) is that of the coordinates after them, and becomes that of those before, fixed
 // nodes included; w_bar (nodes) and C_r_bar (rows of the scene) are added to.
+template <class T>
 void reverse_sweeps(const Scene& scene, const PackPlan& plan, const sheetbend_packs::KernelTable& kernels,
-                    int iterations, int threads, int grain, const Inputs<const double>& in, PackState& state,
-                    double* x_bar, double* w_bar, double* C_r_bar, const Inputs<double>& in_bar, PackCotangents& bar);
+                    int iterations, int threads, int grain, const Inputs<const T>& in, PackState<T>& state, T* x_bar,
+                    T* w_bar, T* C_r_bar, const Inputs<T>& in_bar, PackCotangents<T>& bar);
 
 // Adds the gathered cotangents of the constraints' values to those of the inputs, and forgets them.
-void finish(const Scene& scene, const PackPlan& plan, const Inputs<const double>& in, const Inputs<double>& in_bar,
-            PackCotangents& bar);
+template <class T>
+void finish(const Scene& scene, const PackPlan& plan, const Inputs<const T>& in, const Inputs<T>& in_bar,
+            PackCotangents<T>& bar);
 
 }  // namespace sheetbend

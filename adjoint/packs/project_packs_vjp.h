@@ -6,13 +6,13 @@
 
 namespace sheetbend {
 
-template <class K, Layout layout, bool damped>
-[[SHEETBEND_FLATTEN]] void project_range_vjp(const sheetbend_packs::Reverse& r, int begin, int end) {
+template <class K, Layout layout, class Damped>
+[[SHEETBEND_FLATTEN]] void project_range_vjp(const sheetbend_packs::Reverse& r, Damped damped, int begin, int end) {
   const auto gather = [&](long n)
                           __attribute__((always_inline)) { return GatheredStencil<K, layout>(r.rows_bar, r.nodes, n, true); };
   const auto reverse = [&](long n, const GatheredStencil<K, layout>& now) __attribute__((always_inline)) {
     Element<K, Pack> e;
-    load_values<K, damped>(r.values, n, e);
+    load_values(r.values, damped, n, e);
     const Pack* record = packs_at(r.record, n * record_size<K>);
     auto at = Kept<K, Pack>::kept(record);
     const Pack *lambda = record + Kept<K, Pack>::size, *dl = lambda + K::rows;
@@ -39,7 +39,7 @@ template <class K, Layout layout, bool damped>
 
 template <class K, Layout layout>
 void project_packs_vjp(const sheetbend_packs::Reverse& r, int begin, int end) {
-  r.C_r ? project_range_vjp<K, layout, true>(r, begin, end) : project_range_vjp<K, layout, false>(r, begin, end);
+  with_damped<K>(r.C_r != nullptr, [&](auto damped) { project_range_vjp<K, layout>(r, damped, begin, end); });
 }
 
 }  // namespace sheetbend

@@ -57,11 +57,9 @@ struct Element {
 };
 
 // The inverse of A = sum w + a/(1+g), for one row with unit gradients.
-template <int Arity, class T>
-T inverse_of_unit_matrix(const T* w, const Rates<T>& rates) {
-  T sum = w[0];
-  for (int k = 1; k < Arity; ++k) sum += w[k];
-  return inverse_or_zero(sum + rates.a * rates.scale);
+template <class T>
+T inverse_of_unit_matrix(const T& sum_of_w, const Rates<T>& rates) {
+  return inverse_or_zero(sum_of_w + rates.a * rates.scale);
 }
 
 // out = J^T y, on the stencil.

@@ -1,7 +1,6 @@
 #include "core/packs/packed_colors.h"
 
-#include <algorithm>
-
+#include "core/constraints/registry.h"
 #include "core/element/element.h"
 
 namespace sheetbend {
@@ -9,27 +8,49 @@ namespace {
 
 constexpr int lanes = sheetbend_packs::lanes;
 
-// Calls f(lane index in the color, item) for every lane, the repeated ones included.
-template <class F>
-void for_each_lane(const PackedColor& color, F&& f) {
-  for (int i = 0; i < static_cast<int>(color.items.size()); ++i) f(i, color.items[i]);
+// Calls f(i, item) for every constraint of the color, those that only fill up a pack included.
+template <class T, class F>
+void for_each_entry(const PackedColor& color, F&& f) {
+  const int count = std::is_same_v<T, Pack> ? color.count : static_cast<int>(color.items.size());
+  for (int i = 0; i < count; ++i) f(i, color.items[i]);
 }
 
-void fill_values(const Scene& scene, const PackedColor& color, const Inputs<const double>& in, double eta,
-                 double* values) {
+template <class T>
+void fill_values(const Scene& scene, const PackedColor& color, const Inputs<const T>& in, double eta,
+                 std::vector<Pack>& values) {
   const Group& group = scene.groups[color.group];
   const int parts = color.value_count();
-  for_each_lane(color, [&](int lane, int item) {
-    const Rates<double> rates(in.of(Quantity::compliance)[group.first + item],
-                              color.damped ? in.of(Quantity::damping)[group.first + item] : 0.0, eta);
-    values[lane_at(lane, parts, 0)] = rates.a;
+  for_each_entry<T>(color, [&](int i, int item) {
+    int part = 0;
+    const auto put = [&](const T& value) { entry<T>(values, i, parts, part++) = value; };
+    const Rates<T> rates(in.of(Quantity::compliance)[group.first + item],
+                         color.damped ? in.of(Quantity::damping)[group.first + item] : T(0.0), eta);
+    put(rates.a);
     if (color.damped) {
-      values[lane_at(lane, parts, 1)] = rates.g;
-      values[lane_at(lane, parts, 2)] = rates.scale;
+      put(rates.g);
+      put(rates.scale);
     }
     for (int k = 0; k < color.parameters; ++k)
-      values[lane_at(lane, parts, parts - color.parameters + k)] =
-          in.of(Quantity::rest)[group.first_value + static_cast<std::size_t>(item) * color.parameters + k];
+      put(in.of(Quantity::rest)[group.first_value + static_cast<std::size_t>(item) * color.parameters + k]);
+  });
+}
+
+// The inverse masses, and the inverses of the matrices that depend on nothing else.
+template <class T>
+void fill_weights(const Scene& scene, const PackedColor& color, const T* w, std::vector<Pack>& values) {
+  const Group& group = scene.groups[color.group];
+  const int parts = color.value_count(), first = parts - color.arity;
+  for_each_entry<T>(color, [&](int i, int item) {
+    T sum(0.0);
+    for (int k = 0; k < color.arity; ++k) {
+      const T& own = entry<T>(values, i, parts, first + k) = w[group.nodes(item)[k]];
+      sum = k == 0 ? own : sum + own;
+    }
+    if (!color.unit_gradients) return;
+    Rates<T> rates;
+    rates.a = entry<T>(values, i, parts, 0);
+    if (color.damped) rates.scale = entry<T>(values, i, parts, 2);
+    entry<T>(values, i, parts, first - 1) = inverse_of_unit_matrix(sum, rates);
   });
 }
 
@@ -41,12 +62,21 @@ PackPlan pack_colors(const Scene& scene, const std::vector<Color>& colors) {
   for (const Color& color : colors) {
     const Group& group = scene.groups[color.group];
     const int count = static_cast<int>(color.items.size());
-    PackedColor p{
-        group.kind,   color.group, count, (count + lanes - 1) / lanes, group.rows, group.arity, group.parameters,
-        group.damped, color.items, {}};
-    p.items.resize(static_cast<std::size_t>(p.packs) * lanes, color.items.back());
+    PackedColor p{.kind = group.kind,
+                  .group = color.group,
+                  .count = count,
+                  .rows = group.rows,
+                  .arity = group.arity,
+                  .parameters = group.parameters,
+                  .damped = group.damped,
+                  .items = color.items};
+    with_kind(group.kind, [&]<class K>(K) {
+      p.kept = Kept<K, double>::size;
+      p.unit_gradients = K::unit_gradients;
+    });
+    p.items.resize((p.items.size() + lanes - 1) / lanes * lanes, color.items.back());
     p.nodes.resize(p.items.size() * group.arity);
-    for_each_lane(p, [&](int lane, int item) {
+    for_each_entry<double>(p, [&](int lane, int item) {
       for (int k = 0; k < group.arity; ++k) {
         int& to = p.nodes[lane_at(lane, group.arity, k)];
         const int node = group.nodes(item)[k];
@@ -65,13 +95,14 @@ PackPlan pack_colors(const Scene& scene, const std::vector<Color>& colors) {
   return plan;
 }
 
-void PackState::resize(const PackPlan& plan, int kept_iterations) {
+template <class T>
+void PackState<T>::resize(const PackPlan& plan, int kept_iterations) {
   eta = 0.0;
   rows.assign(plan.rows());
   colors.resize(plan.colors.size());
   for (std::size_t c = 0; c < colors.size(); ++c) {
     const PackedColor& color = plan.colors[c];
-    const std::size_t packs = color.packs;
+    const std::size_t packs = color.packs<T>();
     colors[c].values.assign(packs * color.value_count(), Pack(0.0));
     colors[c].lambda.assign(packs * color.rows, Pack(0.0));
     colors[c].C_r.assign(color.damped ? packs * color.rows : 0, Pack(0.0));
@@ -79,58 +110,68 @@ void PackState::resize(const PackPlan& plan, int kept_iterations) {
   }
 }
 
-void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const double>& in, double eta, const double* q,
-                  const double* w, const double* C_r, PackState& state) {
+template <class T>
+void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const T>& in, double eta, const T* q,
+                  const T* w, const T* C_r, PackState<T>& state) {
+  const bool fresh = state.eta != eta;
   for (std::size_t c = 0; c < plan.colors.size(); ++c) {
     const PackedColor& color = plan.colors[c];
-    PackState::ColorState& own = state.colors[c];
-    if (state.eta != eta) fill_values(scene, color, in, eta, numbers(own.values));
+    typename PackState<T>::ColorState& own = state.colors[c];
+    if (fresh) fill_values(scene, color, in, eta, own.values);
+    if (fresh || scene.has_drag) fill_weights(scene, color, w, own.values);
     std::fill(own.lambda.begin(), own.lambda.end(), Pack(0.0));
     if (color.damped)
-      for_each_lane(color, [&](int lane, int item) {
+      for_each_entry<T>(color, [&](int i, int item) {
         for (int j = 0; j < color.rows; ++j)
-          numbers(own.C_r)[lane_at(lane, color.rows, j)] =
-              C_r[scene.groups[color.group].first_row + item * color.rows + j];
+          entry<T>(own.C_r, i, color.rows, j) = C_r[scene.groups[color.group].first_row + item * color.rows + j];
       });
   }
   state.eta = eta;
-  const auto fill = [&](int row, int node) {
-    double* to = state.rows.at(row);
-    Vec3<double>(q + scene.first_dof[node]).store(to);
-    to[3] = w[node];
-  };
-  for (int n = 0; n < plan.nodes; ++n) fill(n, n);
-  for (std::size_t g = 0; g < plan.ghosts.size(); ++g) fill(plan.nodes + static_cast<int>(g), plan.ghosts[g]);
+  for (int n = 0; n < plan.nodes; ++n) Vec3<T>(q + scene.first_dof[n]).store(state.rows.at(n));
+  for (std::size_t g = 0; g < plan.ghosts.size(); ++g)
+    Vec3<T>(q + scene.first_dof[plan.ghosts[g]]).store(state.rows.at(plan.nodes + static_cast<int>(g)));
 }
 
+template <class T>
 void sweep(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, int threads, int grain, int iteration,
-           PackState& state) {
+           PackState<T>& state) {
   for (std::size_t c = 0; c < plan.colors.size(); ++c) {
     const PackedColor& color = plan.colors[c];
-    PackState::ColorState& own = state.colors[c];
+    typename PackState<T>::ColorState& own = state.colors[c];
     const sheetbend_packs::Forward forward{color.nodes.data(),
-                                           state.rows.at(0),
+                                           state.rows.data(),
                                            numbers(own.values),
                                            numbers(own.lambda),
                                            color.damped ? numbers(own.C_r) : nullptr,
                                            own.records.empty() ? nullptr : numbers(own.records[iteration])};
-    run_kernel(kernels.project[color.kind], forward, color.packs, threads, grain);
+    run_kernel(kernels.project[layout_of<T>][color.kind], forward, color.packs<T>(), threads, grain);
   }
 }
 
-void end_sweeps(const Scene& scene, const PackPlan& plan, PackState& state, double* q) {
-  for (int n = 0; n < plan.nodes; ++n) Vec3<double>(state.rows.at(n)).store(q + scene.first_dof[n]);
+template <class T>
+void end_sweeps(const Scene& scene, const PackPlan& plan, PackState<T>& state, T* q) {
+  for (int n = 0; n < plan.nodes; ++n) Vec3<T>(state.rows.at(n)).store(q + scene.first_dof[n]);
 }
 
-void unpack_multipliers(const Scene& scene, const PackPlan& plan, PackState& state, double* lambda) {
+template <class T>
+void unpack_multipliers(const Scene& scene, const PackPlan& plan, PackState<T>& state, T* lambda) {
   for (std::size_t c = 0; c < plan.colors.size(); ++c) {
     const PackedColor& color = plan.colors[c];
-    const double* own = numbers(state.colors[c].lambda);
-    for (int lane = 0; lane < color.count; ++lane)
+    for (int i = 0; i < color.count; ++i)
       for (int j = 0; j < color.rows; ++j)
-        lambda[scene.groups[color.group].first_row + color.items[lane] * color.rows + j] =
-            own[lane_at(lane, color.rows, j)];
+        lambda[scene.groups[color.group].first_row + color.items[i] * color.rows + j] =
+            entry<T>(state.colors[c].lambda, i, color.rows, j);
   }
 }
+
+#define SHEETBEND_INSTANTIATE(T)                                                                                   \
+  template struct PackState<T>;                                                                                    \
+  template void begin_sweeps<T>(const Scene&, const PackPlan&, const Inputs<const T>&, double, const T*, const T*, \
+                                const T*, PackState<T>&);                                                          \
+  template void sweep<T>(const PackPlan&, const sheetbend_packs::KernelTable&, int, int, int, PackState<T>&);      \
+  template void end_sweeps<T>(const Scene&, const PackPlan&, PackState<T>&, T*);                                   \
+  template void unpack_multipliers<T>(const Scene&, const PackPlan&, PackState<T>&, T*);
+SHEETBEND_INSTANTIATE(double)
+SHEETBEND_INSTANTIATE(Pack)
 
 }  // namespace sheetbend

@@ -1,4 +1,5 @@
-// Colors in packs of eight: where each constraint's lane is, and the arrays that the kernels work on.
+// Colors in packs: where each constraint's numbers are, and the arrays that the kernels work on. For one scene (T = double) a pack is eight
+// constraints of a color; for eight scenes in lanes (T = Pack) it is one constraint.
 #pragma once
 
 #include <algorithm>
@@ -11,6 +12,14 @@
 #include "core/threads/pool.h"
 
 namespace sheetbend {
+
+// Scalars whose colors go through the kernels; others go one constraint at a time.
+template <class T>
+inline constexpr bool in_packs = std::is_same_v<T, double> || std::is_same_v<T, Pack>;
+
+template <class T>
+inline constexpr sheetbend_packs::Layout layout_of =
+    std::is_same_v<T, Pack> ? sheetbend_packs::across_scenes : sheetbend_packs::across_color;
 
 // Constraints of one group that share no movable node.
 struct Color {
@@ -25,15 +34,26 @@ inline long lane_at(int lane, int parts, int part) {
          lane % sheetbend_packs::lanes;
 }
 
+// Number `part` of `parts` of the color's constraint `i`.
+template <class T>
+T& entry(std::vector<Pack>& v, int i, int parts, int part) {
+  if constexpr (std::is_same_v<T, Pack>)
+    return v[static_cast<std::size_t>(i) * parts + part];
+  else
+    return numbers(v)[lane_at(i, parts, part)];
+}
+
 // Rows of particles, or their cotangents.
+template <class T>
 class Rows {
  public:
   void assign(int count) {
-    constexpr int per_pack = Pack::lanes / sheetbend_packs::row;
-    packs_.assign((static_cast<std::size_t>(count) + per_pack - 1) / per_pack, Pack(0.0));
+    constexpr int per_pack = sizeof(Pack) / sizeof(T);
+    packs_.assign((static_cast<std::size_t>(count) * sheetbend_packs::row + per_pack - 1) / per_pack, Pack(0.0));
   }
   void clear() { std::fill(packs_.begin(), packs_.end(), Pack(0.0)); }
-  double* at(int row) { return numbers(packs_) + sheetbend_packs::row * static_cast<long>(row); }
+  T* at(int row) { return reinterpret_cast<T*>(packs_.data()) + sheetbend_packs::row * static_cast<long>(row); }
+  double* data() { return numbers(packs_); }
 
  private:
   std::vector<Pack> packs_;
@@ -49,13 +69,18 @@ void run_kernel(void (*kernel)(const Arrays&, int, int), const Arrays& arrays, i
 
 // One color, eight constraints to a pack; a short last pack repeats its last constraint.
 struct PackedColor {
-  int kind, group, count, packs;
-  int rows, arity, parameters;
-  bool damped;
+  int kind, group, count;
+  int rows, arity, parameters, kept;
+  bool damped, unit_gradients;
   std::vector<int> items;  // (packs, 8)
   std::vector<int> nodes;  // (packs, arity, 8) places of their rows in PackState
-  int value_count() const { return sheetbend_packs::value_count(damped, parameters); }
-  int record_size() const { return sheetbend_packs::record_size(3 * arity, rows); }
+
+  template <class T>
+  int packs() const {
+    return std::is_same_v<T, Pack> ? count : static_cast<int>(items.size()) / sheetbend_packs::lanes;
+  }
+  int value_count() const { return sheetbend_packs::value_count(damped, parameters, unit_gradients, arity); }
+  int record_size() const { return sheetbend_packs::record_size(kept, rows); }
 };
 
 // Rows: one per node, then one per use of a fixed node (its own, so that constraints of one color never share a row).
@@ -68,33 +93,38 @@ struct PackPlan {
 
 PackPlan pack_colors(const Scene& scene, const std::vector<Color>& colors);
 
-// The numbers of one substep in the kernels' order.
+// The numbers of one substep in the kernels' order. T: double, Pack.
+template <class T>
 struct PackState {
   struct ColorState {
     std::vector<Pack> values, lambda, C_r;
     std::vector<std::vector<Pack>> records;  // per iteration; empty where nothing is kept
   };
-  Rows rows;
+  Rows<T> rows;
   std::vector<ColorState> colors;
   double eta = 0.0;  // of `values`; 0 where they are not filled yet
 
   void resize(const PackPlan& plan, int kept_iterations);
 };
 
-// Fills values for eta (nothing to do when they are there: one state serves one vector of inputs), rows from q (dofs) and w (nodes),
-// references from C_r (rows of the scene); clears the multipliers.
-void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const double>& in, double eta, const double* q,
-                  const double* w, const double* C_r, PackState& state);
+// Fills values for eta (nothing to do when they are there and no drag changes w: one state serves one vector of inputs), rows from q (dofs),
+// weights from w (nodes), references from C_r (rows of the scene); clears the multipliers.
+template <class T>
+void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const T>& in, double eta, const T* q,
+                  const T* w, const T* C_r, PackState<T>& state);
 
 // One pass over all colors; keeps what the reverse needs where `state` has records.
+template <class T>
 void sweep(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, int threads, int grain, int iteration,
-           PackState& state);
+           PackState<T>& state);
 
 // Writes q of the nodes.
-void end_sweeps(const Scene& scene, const PackPlan& plan, PackState& state, double* q);
+template <class T>
+void end_sweeps(const Scene& scene, const PackPlan& plan, PackState<T>& state, T* q);
 
 // Writes the multipliers in the scene's order, (rows).
-void unpack_multipliers(const Scene& scene, const PackPlan& plan, PackState& state, double* lambda);
+template <class T>
+void unpack_multipliers(const Scene& scene, const PackPlan& plan, PackState<T>& state, T* lambda);
 
 // The kernels that this machine can run, widest first: of x86-64-v4, x86-64-v3, x86-64-v2, portable. They give the same bits.
 std::vector<const sheetbend_packs::KernelTable*> available_kernels();

@@ -25,13 +25,13 @@ inline const Pack* packs_at(const double* from, long pack) { return reinterpret_
 inline Pack* packs_at(double* from, long pack) { return reinterpret_cast<Pack*>(from) + pack; }
 
 // The numbers of pack n in the order that kernels.h gives: the constraint's own parameters, and the rest.
-template <class K, bool damped>
-const Pack* parameters_of(const double* values, long n) {
+template <class K>
+const Pack* parameters_of(const double* values, bool damped, long n) {
   return packs_at(values, n * value_count<K>(damped) + (damped ? 3 : 1));
 }
 
-template <class K, bool damped>
-void load_values(const double* values, long n, Element<K, Pack>& e) {
+template <class K>
+void load_values(const double* values, bool damped, long n, Element<K, Pack>& e) {
   const Pack* from = packs_at(values, n * value_count<K>(damped));
   e.rates.a = *from++;
   if (damped) {
@@ -70,19 +70,19 @@ struct GatheredStencil {
   }
 };
 
-template <class K, Layout layout, bool damped>
-[[SHEETBEND_FLATTEN]] void project_range(const sheetbend_packs::Forward& f, int begin, int end) {
+template <class K, Layout layout, class Damped>
+[[SHEETBEND_FLATTEN]] void project_range(const sheetbend_packs::Forward& f, Damped damped, int begin, int end) {
   struct Evaluated : GatheredStencil<K, layout> {
     Linearization<K, Pack> value;
     Evaluated(const double* rows, const int* nodes, long n, const Pack* p)
         : GatheredStencil<K, layout>(rows, nodes, n, false), value(this->x, p) {}
   };
   const auto evaluate = [&](long n) __attribute__((always_inline)) {
-    return Evaluated(f.rows, f.nodes, n, parameters_of<K, damped>(f.values, n));
+    return Evaluated(f.rows, f.nodes, n, parameters_of<K>(f.values, damped, n));
   };
   const auto correct = [&](long n, const Evaluated& at) __attribute__((always_inline)) {
     Element<K, Pack> e;
-    load_values<K, damped>(f.values, n, e);
+    load_values(f.values, damped, n, e);
     Pack* lambda = packs_at(f.lambda, n * K::rows);
     Correction<K, Pack> correction(e, at.value, lambda, damped ? packs_at(f.C_r, n * K::rows) : nullptr);
     if (f.record) {
@@ -102,9 +102,19 @@ template <class K, Layout layout, bool damped>
   overlapped(begin, end, evaluate, correct);
 }
 
+// Calls f with whether the constraints are damped: as a constant for the hot kinds, those with a geometry of their own (the others would only
+// compile longer).
+template <class K, class F>
+void with_damped(bool damped, F&& f) {
+  if constexpr (HasGeometry<K>)
+    damped ? f(std::true_type{}) : f(std::false_type{});
+  else
+    f(damped);
+}
+
 template <class K, Layout layout>
 void project_packs(const sheetbend_packs::Forward& f, int begin, int end) {
-  f.C_r ? project_range<K, layout, true>(f, begin, end) : project_range<K, layout, false>(f, begin, end);
+  with_damped<K>(f.C_r != nullptr, [&](auto damped) { project_range<K, layout>(f, damped, begin, end); });
 }
 
 }  // namespace sheetbend

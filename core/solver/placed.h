@@ -38,7 +38,11 @@ struct Placed : Element<K, T> {
       const T* from = recorded ? recorded + 3 * k : s.q + s.scene.first_dof[nodes[k]];
       for (int d = 0; d < 3; ++d) this->x[3 * k + d] = from[d];
     }
-    if constexpr (K::unit_gradients) this->inverse = inverse_of_unit_matrix<K::arity>(this->w, this->rates);
+    if constexpr (K::unit_gradients) {
+      T sum = this->w[0];
+      for (int k = 1; k < K::arity; ++k) sum += this->w[k];
+      this->inverse = inverse_of_unit_matrix(sum, this->rates);
+    }
   }
 
   const T* references(const SubstepState<T>& s, const Group& group) const {

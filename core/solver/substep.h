@@ -13,17 +13,13 @@ struct SubstepStates {
   const T *x, *x_before, *v, *v_before;  // at n and n-1 (n-1 unused by BDF1)
 };
 
-// Whether colors go through the kernels of core/packs; other scalars go one constraint at a time.
-template <class T>
-inline constexpr bool in_packs = std::is_same_v<T, double>;
-
 template <class T>
 struct SubstepRecord {
   std::vector<IterationRecord<T>> iterations;
   std::vector<T> w, C_r,
       lambda;  // effective inverse masses, damping references, multipliers (those of packed colors stay in `packs`)
   std::vector<T> rows;  // right sides and solutions of direct blocks
-  PackState packs;      // of colors in double precision, which go eight constraints at a time
+  PackState<std::conditional_t<in_packs<T>, T, double>> packs;  // of colors that go through the kernels
 
   void resize(const Scene& scene, const Plan& plan, bool keep_iterations) {
     iterations.resize(keep_iterations ? plan.options.iterations : 1);

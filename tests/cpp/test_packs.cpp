@@ -26,7 +26,7 @@ struct Packs : ::testing::TestWithParam<bool> {
 
   struct Forward {
     std::vector<double> q, lambda;
-    PackState state;
+    PackState<double> state;
   };
   Forward forward(const sheetbend_packs::KernelTable& kernels, int threads) const {
     Forward f{q, std::vector<double>(scene.rows), {}};
@@ -41,7 +41,7 @@ struct Packs : ::testing::TestWithParam<bool> {
   // Cotangents of coordinates, inverse masses, references and inputs, one after the other.
   std::vector<double> reverse(const sheetbend_packs::KernelTable& kernels, int threads) const {
     Forward f = forward(kernels, threads);
-    PackCotangents bar;
+    PackCotangents<double> bar;
     bar.resize(plan.packs);
     std::vector<double> all = x_bar;
     all.resize(scene.dofs() + scene.nodes() + scene.rows + scene.layout.total());
@@ -104,7 +104,8 @@ TEST_P(Packs, ReverseHasTheSameBitsOnEveryInstructionSet) {
 
 TEST_P(Packs, RepeatedLanesCountOnce) {
   for (const PackedColor& color : plan.packs.colors) {
-    EXPECT_EQ(static_cast<int>(color.items.size()), color.packs * sheetbend_packs::lanes);
+    EXPECT_EQ(static_cast<int>(color.items.size()), color.packs<double>() * sheetbend_packs::lanes);
+    EXPECT_EQ(color.count, color.packs<Pack>());
     for (std::size_t lane = color.count; lane < color.items.size(); ++lane)
       EXPECT_EQ(color.items[lane], color.items[color.count - 1]);
   }
