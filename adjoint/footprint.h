@@ -6,6 +6,25 @@
 
 namespace sheetbend {
 
+template <class V>
+std::size_t size_in_bytes(const std::vector<V>& v) {
+  return sizeof(V) * v.size();
+}
+
+// Colors or blocks: what was found once about the scene.
+inline std::size_t plan_bytes(const Plan& plan) {
+  std::size_t bytes = size_in_bytes(plan.packs.ghosts);
+  for (const Color& color : plan.colors) bytes += size_in_bytes(color.items);
+  for (const PackedColor& color : plan.packs.colors) bytes += size_in_bytes(color.items) + size_in_bytes(color.nodes);
+  for (const DirectBlock& block : plan.blocks) {
+    bytes += size_in_bytes(block.members) + size_in_bytes(block.nodes) + size_in_bytes(block.couplings) +
+             size_in_bytes(block.position);
+    // A sparse pattern: rows and columns of the matrix, and of its factor.
+    if (!block.structure.banded()) bytes += 2 * sizeof(int) * (block.structure.values() + block.structure.fill());
+  }
+  return bytes;
+}
+
 // Factors of the direct blocks.
 template <class T>
 std::size_t factor_bytes(const Plan& plan) {

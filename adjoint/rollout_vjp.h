@@ -89,12 +89,12 @@ void rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t
     tape.velocity(n - 1, v0, v_before.data());
     return {tape.x(n), tape.x(n - 1), v.data(), v_before.data()};
   };
-  StateReverse<T> reverse(scene, plan);
   std::optional<Rollout<T>> forward;
+  if (tape.states() < tape.steps()) forward.emplace(scene, plan, inputs, t0);
+  StateReverse<T> reverse(scene, plan);
   long recomputed = 0;
   const auto advance = [&](const Advance& a) {
     if (tape.holds(a.keep, a.to)) return;
-    if (!forward) forward.emplace(scene, plan, inputs, t0);
     tape.forget_after(a.from);
     forward->restart(a.from, state(a.from));
     for (int n = a.from + 1; n <= a.to; ++n) {

@@ -25,11 +25,11 @@ struct BudgetTooSmall : std::runtime_error {
 
 struct TapePlan {
   int steps = 0, states = 0, lanes = 1, at_once = 1;  // `at_once` tapes of `lanes` scenes each stand side by side
-  std::size_t inputs = 0, frames = 0, forward = 0, reverse = 0, tape = 0;  // bytes, of all of them
-  std::size_t least = 0;                                                   // the smallest budget that works
-  long recomputed = 0;                                                     // substeps, of one tape
+  std::size_t inputs = 0, frames = 0, plan = 0, forward = 0, reverse = 0, heap = 0, tape = 0;  // bytes, of all of them
+  std::size_t least = 0;  // the smallest budget that works
+  long recomputed = 0;    // substeps, of one tape
 
-  std::size_t working() const { return inputs + frames + forward + reverse; }
+  std::size_t working() const { return inputs + frames + plan + forward + reverse + heap; }
 };
 
 // `scenes` rollouts with `frames` states each, of a scalar T; a vector of scenes is one scalar. `border` counts the arrays that the caller holds
@@ -49,8 +49,10 @@ TapePlan plan_tape(const Scene& scene, const Plan& plan, int steps, std::size_t 
     p.inputs += 2 * sizeof(T) * total * p.at_once;
     p.frames += 2 * sizeof(T) * frames * dofs * p.at_once;
   }
+  p.plan = plan_bytes(plan);
   p.forward = p.at_once * rollout_bytes<T>(scene, plan);
   p.reverse = p.at_once * reverse_bytes<T>(scene, plan);
+  p.heap = p.working() / 50;  // holes that the allocator leaves
   const int window = Tape<T>::window(plan), least = Schedule::least(steps, window);
   const std::size_t state = p.at_once * sizeof(T) * dofs;
   p.least = p.working() + least * state;

@@ -120,8 +120,10 @@ void bind_gradient(py::module_& m, py::class_<Solver>& solver) {
       .def_readonly("states", &TapePlan::states)
       .def_readonly("inputs", &TapePlan::inputs)
       .def_readonly("frames", &TapePlan::frames)
+      .def_readonly("plan", &TapePlan::plan)
       .def_readonly("forward", &TapePlan::forward)
       .def_readonly("reverse", &TapePlan::reverse)
+      .def_readonly("heap", &TapePlan::heap)
       .def_readonly("tape", &TapePlan::tape)
       .def_readonly("least", &TapePlan::least)
       .def_readonly("recomputed", &TapePlan::recomputed);

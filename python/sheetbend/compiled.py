@@ -60,8 +60,8 @@ class CompiledScene:
         return base
 
     def map(self, extra: int = 0, terms: Sequence[Term] = (), names: Sequence[str] | None = None) -> dict[str, Any]:
-        """The parameter map as plain arrays, one entry per term and input it goes to; `extra` more inputs (array "extra") may follow the scene's, with their
-        own terms."""
+        """The parameter map as plain arrays, one entry per term and input that it goes to; `extra` more inputs (array
+        "extra") may follow the scene's, with their own terms."""
         order = {name: i for i, name in enumerate(self.names if names is None else names)}
         offsets = {array: offset for array, (offset, _) in self.layout.items()} | {"extra": self.core.inputs}
         every = [*self._terms, *terms]

@@ -30,8 +30,9 @@ class TapePlan:
         states: boundaries that the tape holds at most.
         tape: its bytes.
         working: bytes of everything else, by what it is: "inputs" (and the gradient), "frames" (positions and their
-            cotangents), "forward" (states and record of a substep), "reverse" (cotangents, and the record that a
-            substep is reversed from). The scene itself is not counted.
+            cotangents), "plan" (colors or blocks), "forward" (states and record of a substep), "reverse" (cotangents,
+            and the record that a substep is reversed from), "heap" (what allocators waste). The scene itself is not
+            counted.
         recomputed: substeps that the forward program runs again.
         budget: bytes, or None.
         least: the smallest budget that would do, bytes.
@@ -99,7 +100,8 @@ def tape_plan(scene: Scene, times: ArrayLike, solver: Solver | None = None, scen
 
 def as_plan(plan: _core.TapePlan, solver: Solver) -> TapePlan:
     """The core's plan in the package's words."""
-    working = {"inputs": plan.inputs, "frames": plan.frames, "forward": plan.forward, "reverse": plan.reverse}
+    names = ("inputs", "frames", "plan", "forward", "reverse", "heap")
+    working = {name: getattr(plan, name) for name in names}
     return TapePlan(plan.steps, plan.states, plan.tape, working, plan.recomputed, solver.budget, plan.least)
 
 

@@ -67,8 +67,8 @@ def simulate(
         (*batch, frames, particles, 3) m, float64.
 
     Raises:
-        InputError: times off the grid; a budget below the least that works; a tensor with an unknown name, of the wrong shape or dtype, on another device,
-            or not finite.
+        InputError: times off the grid; a budget below the least that works; a tensor with an unknown name, of the wrong
+            shape or dtype, on another device, or not finite.
         DivergenceError: a state became infinite; says when and where.
     """
     return Simulation(scene, times, solver)(values, inputs)
