@@ -3,6 +3,7 @@
 
 namespace sheetbend {
 
-template Tape<Complex> record_rollout<Complex>(const Scene&, const Plan&, const Complex*, double, int, Interrupt*);
+template void rollout_states<Complex>(const Scene&, const Plan&, const Complex*, double, const std::vector<int>&,
+                                      Complex*, Interrupt*);
 
 }  // namespace sheetbend

@@ -3,8 +3,11 @@
 
 namespace sheetbend {
 
-template Tape<double> record_rollout<double>(const Scene&, const Plan&, const double*, double, int, Interrupt*);
-template void reverse_rollout<double>(const Scene&, const Plan&, const double*, double, const Tape<double>&,
+template void rollout_states<double>(const Scene&, const Plan&, const double*, double, const std::vector<int>&, double*,
+                                     Interrupt*);
+template Tape<double> record_rollout<double>(const Scene&, const Plan&, const double*, double, const std::vector<int>&,
+                                             double*, int, Interrupt*);
+template void reverse_rollout<double>(const Scene&, const Plan&, const double*, double, Tape<double>&,
                                       const std::vector<int>&, const double*, double*, Interrupt*);
 
 }  // namespace sheetbend

@@ -3,7 +3,7 @@
 
 namespace sheetbend {
 
-template Tape<Dual<double, 8>> record_rollout<Dual<double, 8>>(const Scene&, const Plan&, const Dual<double, 8>*,
-                                                               double, int, Interrupt*);
+template void rollout_states<Dual<double, 8>>(const Scene&, const Plan&, const Dual<double, 8>*, double,
+                                              const std::vector<int>&, Dual<double, 8>*, Interrupt*);
 
 }  // namespace sheetbend

@@ -1,19 +1,30 @@
-// Rollouts and their derivatives for the scalars that the program uses, compiled once (instances_*.cpp).
+// Rollouts and their derivatives for the scalars that the program uses, compiled once (instances_*.cpp). States are (wanted.size(), dofs), at
+// the substeps `wanted` (ascending).
 #pragma once
+
+#include <limits>
 
 #include "adjoint/rollout_vjp.h"
 #include "adjoint/tape.h"
 
 namespace sheetbend {
 
-// Runs `steps` substeps and keeps the tape. T: double, Pack, Complex, Dual<double, 1>, Dual<double, 8>.
-template <class T>
-Tape<T> record_rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0, int steps,
-                       Interrupt* interrupt);
+inline constexpr int every_state = std::numeric_limits<int>::max();
 
-// Cotangents x_bar (wanted.size(), dofs) of the states at the substeps `wanted` (ascending), to inputs_bar (added). T: double, Pack, Dual<double, 1>.
+// The states alone. T: double, Pack, Complex, Dual<double, 8>.
 template <class T>
-void reverse_rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0, const Tape<T>& tape,
+void rollout_states(const Scene& scene, const Plan& plan, const T* inputs, double t0, const std::vector<int>& wanted,
+                    T* states, Interrupt* interrupt);
+
+// The same, and a tape of at most `kept` states up to the last one wanted. T: double, Pack, Dual<double, 1>.
+template <class T>
+Tape<T> record_rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0, const std::vector<int>& wanted,
+                       T* states, int kept, Interrupt* interrupt);
+
+// Cotangents x_bar of the wanted states to inputs_bar (added). The tape serves for any number of reverses; what was dropped from it is
+// computed again. T: double, Pack, Dual<double, 1>.
+template <class T>
+void reverse_rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0, Tape<T>& tape,
                      const std::vector<int>& wanted, const T* x_bar, T* inputs_bar, Interrupt* interrupt);
 
 }  // namespace sheetbend

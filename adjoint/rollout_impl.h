@@ -6,16 +6,40 @@
 namespace sheetbend {
 
 template <class T>
-Tape<T> record_rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0, int steps,
-                       Interrupt* interrupt) {
-  Tape<T> tape(scene, plan, steps);
+void rollout_states(const Scene& scene, const Plan& plan, const T* inputs, double t0, const std::vector<int>& wanted,
+                    T* states, Interrupt* interrupt) {
   Rollout<T> rollout(scene, plan, inputs, t0);
-  rollout.run(steps, [&](int step, const T* x, const T*) { tape.record(step, x); }, interrupt);
+  auto next = wanted.begin();
+  const auto write = [&](int step, const T* x, const T*) {
+    for (; next != wanted.end() && *next == step; ++next) states = std::copy_n(x, scene.dofs(), states);
+  };
+  rollout.run(wanted.back(), write, interrupt);
+}
+
+template <class T>
+Tape<T> record_rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0, const std::vector<int>& wanted,
+                       T* states, int kept, Interrupt* interrupt) {
+  const int steps = wanted.back();
+  Tape<T> tape(scene, plan, steps, kept);
+  std::vector<char> keep(steps + 1, 0);
+  keep[0] = 1;
+  Schedule schedule = tape.schedule();
+  for (auto action = schedule.next(); action && std::holds_alternative<Advance>(*action); action = schedule.next()) {
+    const Advance& advance = std::get<Advance>(*action);
+    std::fill(keep.begin() + advance.keep, keep.begin() + advance.to + 1, 1);
+  }
+  Rollout<T> rollout(scene, plan, inputs, t0);
+  auto next = wanted.begin();
+  const auto write = [&](int step, const T* x, const T*) {
+    if (keep[step]) tape.record(step, x);
+    for (; next != wanted.end() && *next == step; ++next) states = std::copy_n(x, scene.dofs(), states);
+  };
+  rollout.run(steps, write, interrupt);
   return tape;
 }
 
 template <class T>
-void reverse_rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0, const Tape<T>& tape,
+void reverse_rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0, Tape<T>& tape,
                      const std::vector<int>& wanted, const T* x_bar, T* inputs_bar, Interrupt* interrupt) {
   const std::size_t dofs = scene.dofs();
   std::size_t left = wanted.size();

@@ -1,58 +1,124 @@
-// The adjoint of a rollout: walks the tape backwards, recomputes each substep and reverses it.
+// The adjoint of a rollout: follows the tape's schedule backwards, recomputes each substep and reverses it.
 #pragma once
+
+#include <optional>
 
 #include "adjoint/substep_vjp.h"
 #include "adjoint/tape.h"
 
 namespace sheetbend {
 
-// Reverses the rollout that `tape` recorded. seed(step, x_bar) adds the loss's cotangent of x at `step` (0 .. steps) to x_bar; inputs_bar (layout.total())
-// receives, added, the gradient by every input. Cost: one forward substep and its reverse per substep; memory: the tape.
-template <class T, class Seed>
-void rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t0, const Tape<T>& tape, Seed&& seed,
-                 T* inputs_bar, Interrupt* interrupt = nullptr) {
-  const Inputs<const T> in{scene.layout, inputs};
-  const Inputs<T> in_bar{scene.layout, inputs_bar};
-  const std::size_t dofs = scene.dofs();
-  const T* v0 = in.of(Quantity::velocity);
-  // Cotangents of x and v at n+1, n and n-1, and the primal states around them.
-  std::vector<T> x_next_bar(dofs), x_bar(dofs), x_before_bar(dofs), v_next_bar(dofs), v_bar(dofs), v_before_bar(dofs);
-  std::vector<T> v(dofs), v_before(dofs), q(dofs), v_out(dofs);
-  SubstepRecord<T> record;
-  record.resize(scene, plan, true);
-  ReverseScratch<T> reverse(scene, plan);
+// Cotangents of the states at n+1, n and n-1, and the reverse of the substep between the first two.
+template <class T>
+class StateReverse {
+ public:
+  std::vector<T> x_next_bar, v_next_bar;
 
-  seed(tape.steps(), x_next_bar.data());
-  for (int n = tape.steps() - 1; n >= 0; --n) {
-    if (interrupt && n % 64 == 0) interrupt->poll();
-    seed(n, x_bar.data());
-    const Bdf bdf = Bdf::at(plan.options, n);
-    const double t_next = t0 + (n + 1) * plan.options.h;
-    tape.velocity(n, v0, v.data());
-    tape.velocity(n - 1, v0, v_before.data());
-    const SubstepStates<T> states{tape.x(n), tape.x(n - 1), v.data(), v_before.data()};
-    substep(scene, plan, in, bdf, t_next, states, q.data(), v_out.data(), record);
-    substep_vjp(scene, plan, in, bdf, t_next, states, record, x_next_bar.data(), v_next_bar.data(), reverse,
-                {x_bar.data(), x_before_bar.data(), v_bar.data(), v_before_bar.data()}, in_bar);
-    std::swap(x_next_bar, x_bar);
-    std::swap(x_bar, x_before_bar);
-    std::fill(x_before_bar.begin(), x_before_bar.end(), T(0.0));
-    std::swap(v_next_bar, v_bar);
-    std::swap(v_bar, v_before_bar);
-    std::fill(v_before_bar.begin(), v_before_bar.end(), T(0.0));
+  StateReverse(const Scene& scene, const Plan& plan)
+      : scene_(scene), plan_(plan), record_(whole(scene, plan)), scratch_(scene, plan) {
+    for (auto* buffer : {&x_next_bar, &v_next_bar, &x_bar_, &v_bar_, &x_before_bar_, &v_before_bar_, &q_, &v_out_})
+      buffer->resize(scene.dofs());
   }
-  if constexpr (in_packs<T>) finish(scene, plan.packs, in, in_bar, reverse.packs);
-  // x_next_bar and v_next_bar now belong to the initial state; driven nodes started on their boundary.
+
+  // From step n + 1 to n; seed adds the loss's cotangent at n.
+  template <class Seed>
+  void step(int n, const Inputs<const T>& in, double t_next, const SubstepStates<T>& states, Seed&& seed,
+            const Inputs<T>& in_bar) {
+    const Bdf bdf = Bdf::at(plan_.options, n);
+    seed(n, x_bar_.data());
+    substep(scene_, plan_, in, bdf, t_next, states, q_.data(), v_out_.data(), record_);
+    substep_vjp(scene_, plan_, in, bdf, t_next, states, record_, x_next_bar.data(), v_next_bar.data(), scratch_,
+                {x_bar_.data(), x_before_bar_.data(), v_bar_.data(), v_before_bar_.data()}, in_bar);
+    shift(x_next_bar, x_bar_, x_before_bar_);
+    shift(v_next_bar, v_bar_, v_before_bar_);
+  }
+
+  void finish(const Inputs<const T>& in, const Inputs<T>& in_bar) {
+    if constexpr (in_packs<T>) sheetbend::finish(scene_, plan_.packs, in, in_bar, scratch_.packs);
+  }
+
+ private:
+  static SubstepRecord<T> whole(const Scene& scene, const Plan& plan) {
+    SubstepRecord<T> record;
+    record.resize(scene, plan, true);
+    return record;
+  }
+
+  static void shift(std::vector<T>& next, std::vector<T>& now, std::vector<T>& before) {
+    std::swap(next, now);
+    std::swap(now, before);
+    std::fill(before.begin(), before.end(), T(0.0));
+  }
+
+  const Scene& scene_;
+  const Plan& plan_;
+  std::vector<T> x_bar_, v_bar_, x_before_bar_, v_before_bar_, q_, v_out_;
+  SubstepRecord<T> record_;
+  ReverseScratch<T> scratch_;
+};
+
+// Cotangents of the initial state to those of the inputs: driven nodes started on their boundary.
+template <class T>
+void initial_state_vjp(const Scene& scene, double t0, const T* x_bar, const T* v_bar, const Inputs<T>& in_bar) {
   const KnotWeights boundary = scene.driven.empty() ? KnotWeights{} : scene.boundary.at(t0);
   for (int node = 0; node < scene.nodes(); ++node) {
     const int dof = scene.first_dof[node];
     if (scene.role[node] == Role::driven)
-      pull_back_knots(boundary, Vec3<T>(&x_next_bar[dof]), in_bar.of(Quantity::boundary),
+      pull_back_knots(boundary, Vec3<T>(x_bar + dof), in_bar.of(Quantity::boundary),
                       static_cast<int>(scene.driven.size()), scene.driven_slot[node]);
     else
-      Vec3<T>(&x_next_bar[dof]).add_to(in_bar.of(Quantity::position) + dof);
-    Vec3<T>(&v_next_bar[dof]).add_to(in_bar.of(Quantity::velocity) + dof);
+      Vec3<T>(x_bar + dof).add_to(in_bar.of(Quantity::position) + dof);
+    Vec3<T>(v_bar + dof).add_to(in_bar.of(Quantity::velocity) + dof);
   }
+}
+
+// Reverses the rollout that `tape` recorded. seed(step, x_bar) adds the loss's cotangent of x at `step` (0 .. steps) to x_bar; inputs_bar (layout.total())
+// receives, added, the gradient by every input. Cost: one forward substep and its reverse per substep, and a forward substep for each
+// that the tape's schedule advances again.
+template <class T, class Seed>
+void rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t0, Tape<T>& tape, Seed&& seed,
+                 T* inputs_bar, Interrupt* interrupt = nullptr) {
+  const Inputs<const T> in{scene.layout, inputs};
+  const Inputs<T> in_bar{scene.layout, inputs_bar};
+  std::vector<T> v(scene.dofs()), v_before(plan.options.integrator == Integrator::bdf1 ? 0 : scene.dofs());
+  // The state at a boundary, from the tape; BDF1 has no use for what was before.
+  const auto state = [&](int n) -> SubstepStates<T> {
+    const T* v0 = in.of(Quantity::velocity);
+    tape.velocity(n, v0, v.data());
+    if (v_before.empty()) return {tape.x(n), tape.x(n), v.data(), v.data()};
+    tape.velocity(n - 1, v0, v_before.data());
+    return {tape.x(n), tape.x(n - 1), v.data(), v_before.data()};
+  };
+  std::optional<Rollout<T>> forward;
+  if (tape.states() < tape.steps()) forward.emplace(scene, plan, inputs, t0);
+  StateReverse<T> reverse(scene, plan);
+  long recomputed = 0;
+  const auto advance = [&](const Advance& a) {
+    if (tape.holds(a.keep, a.to)) return;
+    tape.forget_after(a.from);
+    forward->restart(a.from, state(a.from));
+    for (int n = a.from + 1; n <= a.to; ++n) {
+      if (interrupt && n % 64 == 0) interrupt->poll();
+      forward->advance();
+      if (n >= a.keep) tape.record(n, forward->x());
+      ++recomputed;
+    }
+  };
+
+  seed(tape.steps(), reverse.x_next_bar.data());
+  Schedule schedule = tape.schedule();
+  while (const auto action = schedule.next()) {
+    if (const auto* a = std::get_if<Advance>(&*action)) {
+      advance(*a);
+      continue;
+    }
+    const int n = std::get<Reverse>(*action).step;
+    if (interrupt && n % 64 == 0) interrupt->poll();
+    reverse.step(n, in, t0 + (n + 1) * plan.options.h, state(n), seed, in_bar);
+  }
+  reverse.finish(in, in_bar);
+  initial_state_vjp(scene, t0, reverse.x_next_bar.data(), reverse.v_next_bar.data(), in_bar);
+  tape.count_recomputed(recomputed);
 }
 
 }  // namespace sheetbend

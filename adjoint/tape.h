@@ -1,9 +1,11 @@
-// The tape of a rollout: the coordinates at every substep boundary. Velocities follow from them, and a substep is recomputed before it
-// is reversed, so nothing inside a substep is kept.
+// The tape of a rollout: the coordinates at substep boundaries, at all of them or at those that checkpoints.h keeps. Velocities follow from
+// them, and a substep is recomputed before it is reversed, so nothing inside a substep is kept.
 #pragma once
 
+#include <stdexcept>
 #include <vector>
 
+#include "adjoint/checkpoints.h"
 #include "core/solver/rollout.h"
 
 namespace sheetbend {
@@ -11,14 +13,41 @@ namespace sheetbend {
 template <class T>
 class Tape {
  public:
-  Tape(const Scene& scene, const Plan& plan, int steps) : scene_(scene), plan_(plan), steps_(steps) {
-    x_.resize(static_cast<std::size_t>(steps + 1) * scene.dofs());
+  // `states` boundaries fit, at least Schedule::least; more than `steps` are never needed.
+  Tape(const Scene& scene, const Plan& plan, int steps, int states)
+      : scene_(scene), plan_(plan), steps_(steps), states_(std::min(states, std::max(1, steps))), slot_(steps + 1, -1) {
+    x_.resize(static_cast<std::size_t>(states_) * scene.dofs());
+    for (int slot = states_; slot-- > 0;) spare_.push_back(slot);
   }
 
-  void record(int step, const T* x) { std::copy_n(x, scene_.dofs(), x_.data() + at(step)); }
-  const T* x(int step) const { return x_.data() + at(step < 0 ? 0 : step); }
+  // Boundaries whose coordinates a restart needs: the velocities at n and n-1 are read off them.
+  static int window(const Plan& plan) { return plan.options.integrator == Integrator::bdf1 ? 2 : 4; }
+
+  Schedule schedule() const { return {steps_, states_, window(plan_)}; }
   int steps() const { return steps_; }
+  int states() const { return states_; }
   std::size_t bytes() const { return x_.size() * sizeof(T); }
+  long recomputed() const { return recomputed_; }  // substeps that the last reverse advanced again
+  void count_recomputed(long substeps) { recomputed_ = substeps; }
+
+  void record(int step, const T* x) {
+    if (slot_[step] < 0) {
+      if (spare_.empty()) throw std::logic_error("the tape is full");
+      slot_[step] = spare_.back();
+      spare_.pop_back();
+    }
+    std::copy_n(x, scene_.dofs(), at(step));
+  }
+  bool holds(int first, int last) const {
+    return std::all_of(slot_.begin() + first, slot_.begin() + last + 1, [](int slot) { return slot >= 0; });
+  }
+  void forget_after(int step) {
+    for (auto slot = slot_.begin() + step + 1; slot != slot_.end(); ++slot)
+      if (*slot >= 0) spare_.push_back(std::exchange(*slot, -1));
+  }
+
+  // Coordinates at `step`; before the start they are the initial ones.
+  const T* x(int step) const { return x_.data() + offset(step < 0 ? 0 : step); }
 
   // The velocity that the forward program had at `step`; v0 is the initial one.
   void velocity(int step, const T* v0, T* v) const {
@@ -27,15 +56,19 @@ class Tape {
       return;
     }
     const Bdf bdf = Bdf::at(plan_.options, step - 1);
-    const T *next = x(step), *now = x(step - 1), *before = x(step - 2);
+    const T *next = x(step), *now = x(step - 1), *before = bdf.before == 0.0 ? now : x(step - 2);
     for (int i = 0; i < scene_.dofs(); ++i) v[i] = (next[i] - history(bdf, now[i], before[i])) * T(1.0 / bdf.eta);
   }
 
  private:
-  std::size_t at(int step) const { return static_cast<std::size_t>(step) * scene_.dofs(); }
+  std::size_t offset(int step) const { return static_cast<std::size_t>(slot_[step]) * scene_.dofs(); }
+  T* at(int step) { return x_.data() + offset(step); }
+
   const Scene& scene_;
   const Plan& plan_;
-  int steps_;
+  int steps_, states_;
+  long recomputed_ = 0;
+  std::vector<int> slot_, spare_;  // per boundary where it stands in x_, or -1
   std::vector<T> x_;
 };
 

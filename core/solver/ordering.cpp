@@ -69,6 +69,7 @@ std::vector<Color> color_constraints(const Scene& scene) {
       colors[first + c].items.push_back(i);
     }
   }
+  for (Color& color : colors) color.items.shrink_to_fit();
   return colors;
 }
 

@@ -58,6 +58,17 @@ class Rollout {
     check_finite();
   }
 
+  // Goes on from another state, at `step`.
+  void restart(int step, const SubstepStates<T>& s) {
+    step_ = step;
+    std::copy_n(s.x, x_.size(), x_.data());
+    std::copy_n(s.x_before, x_.size(), x_before_.data());
+    std::copy_n(s.v, v_.size(), v_.data());
+    std::copy_n(s.v_before, v_.size(), v_before_.data());
+  }
+
+  const T* x() const { return x_.data(); }
+
   // Calls sink(step, x, v) for the initial state and after every substep.
   template <class Sink>
   void run(int steps, Sink&& sink, Interrupt* interrupt = nullptr) {

@@ -35,7 +35,7 @@ def measure(segments: int) -> tuple[float, float]:
     inputs, solver, frames = scene.compiled.inputs(), sb.Solver(h=H).core(scene.compiled), [SUBSTEPS]
     x_bar = np.ones((1, scene.compiled.core.dofs))
     forward = best_us(lambda: solver.simulate(inputs, frames, 0.0))
-    gradient = best_us(lambda: solver.vjp(inputs, solver.record(inputs, SUBSTEPS, 0.0), frames, x_bar, 0.0))
+    gradient = best_us(lambda: solver.vjp(inputs, solver.record(inputs, frames, 0.0)[1], frames, x_bar, 0.0))
     return forward, gradient
 
 

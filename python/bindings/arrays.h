@@ -20,6 +20,12 @@ inline py::array_t<double> to_numpy(const std::vector<double>& values, std::vect
   return out;
 }
 
+// An array, or a list, of whole numbers.
+inline std::vector<int> whole_numbers(const py::handle& values) {
+  const auto a = values.cast<py::array_t<int, py::array::c_style | py::array::forcecast>>();
+  return {a.data(), a.data() + a.size()};
+}
+
 inline void expect_size(const Array& a, std::size_t size, const char* name) {
   if (static_cast<std::size_t>(a.size()) != size)
     throw std::invalid_argument(std::string(name) + ": got " + std::to_string(a.size()) + " numbers. Fix: give " +

@@ -11,10 +11,10 @@ ParameterMap make_map(const py::dict& d) {
   const auto base = d["base"].cast<Array>(), coefficient = d["coefficient"].cast<Array>();
   map.base.assign(base.data(), base.data() + base.size());
   map.coefficient.assign(coefficient.data(), coefficient.data() + coefficient.size());
-  map.target = d["target"].cast<std::vector<int>>();
-  map.first_factor = d["first_factor"].cast<std::vector<int>>();
-  map.parameter = d["parameter"].cast<std::vector<int>>();
-  for (const int f : d["function"].cast<std::vector<int>>()) map.function.push_back(static_cast<Factor1d>(f));
+  map.target = whole_numbers(d["target"]);
+  map.first_factor = whole_numbers(d["first_factor"]);
+  map.parameter = whole_numbers(d["parameter"]);
+  for (const int f : whole_numbers(d["function"])) map.function.push_back(static_cast<Factor1d>(f));
   return map;
 }
 
@@ -23,9 +23,9 @@ void bind_map(py::module_& m) {
       .def(py::init(&make_map))
       .def("inputs",
            [](const ParameterMap& map, const Array& theta) {
-             std::vector<double> out(map.base.size());
-             map.apply(theta.data(), out.data());
-             return to_numpy(out, {static_cast<py::ssize_t>(out.size())});
+             py::array_t<double> out(static_cast<py::ssize_t>(map.base.size()));
+             map.apply(theta.data(), out.mutable_data());
+             return out;
            })
       .def("inputs_dot",
            [](const ParameterMap& map, const Array& theta, const Array& theta_dot) {

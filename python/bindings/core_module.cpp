@@ -2,6 +2,7 @@
 #include "python/bindings/core_module.h"
 
 #include "adjoint/equilibrium_tangents.h"
+#include "adjoint/tape_plan.h"
 #include "core/constraints/registry.h"
 #include "core/solver/rollout.h"
 #include "python/bindings/interrupt.h"
@@ -33,6 +34,7 @@ PYBIND11_MODULE(_core, m) {
   m.def("constraint_kinds", &constraint_kinds);
   static py::exception<Diverged> diverged(m, "Diverged", PyExc_RuntimeError);
   static py::exception<NoEquilibrium> no_equilibrium(m, "NoEquilibrium", PyExc_RuntimeError);
+  static py::exception<BudgetTooSmall> too_small(m, "BudgetTooSmall", PyExc_ValueError);
   py::register_exception_translator([](std::exception_ptr p) {
     try {
       if (p) std::rethrow_exception(p);
@@ -42,6 +44,10 @@ PYBIND11_MODULE(_core, m) {
       error.attr("particle") = e.node;
       error.attr("time") = e.time;
       PyErr_SetObject(diverged.ptr(), error.ptr());
+    } catch (const BudgetTooSmall& e) {
+      py::object error = py::handle(too_small)(e.what());
+      error.attr("needed") = e.needed;
+      PyErr_SetObject(too_small.ptr(), error.ptr());
     } catch (const NoEquilibrium& e) {
       PyErr_SetString(no_equilibrium.ptr(), e.what());
     } catch (const Interrupted&) {

@@ -27,7 +27,7 @@ std::shared_ptr<const Scene> make_scene(int particles, std::vector<int> pinned, 
   spec.force = {std::move(force_times), Interpolation::linear};
   for (const py::dict& g : groups)
     spec.groups.push_back({g["name"].cast<std::string>(), g["kind"].cast<std::string>(), g["damped"].cast<bool>(),
-                           g["stencil"].cast<std::vector<int>>()});
+                           whole_numbers(g["stencil"])});
   return std::make_shared<const Scene>(build_scene(spec));
 }
 

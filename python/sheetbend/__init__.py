@@ -15,10 +15,12 @@ from .markers import Place, along_rope, between, on_particle, on_rope
 from .parameters import Parameter, Parameters
 from .recording import Recording
 from .result import FitResult
+from .rollout import Gradient, Rollout, rollout
 from .rope import Rope, add_rope, rope
 from .scene import KINDS, Scene
 from .simulate import Trajectory, simulate
 from .solver import Solver
+from .tape import TapePlan, tape_plan
 
 __version__ = "0.1.0"
 
@@ -30,6 +32,7 @@ __all__ = [
     "Experiment",
     "Fit",
     "FitResult",
+    "Gradient",
     "GradientReport",
     "InputError",
     "Parameter",
@@ -38,11 +41,13 @@ __all__ = [
     "Recording",
     "RecordingError",
     "Refinement",
+    "Rollout",
     "Rope",
     "Scene",
     "SceneError",
     "SheetbendError",
     "Solver",
+    "TapePlan",
     "Trajectory",
     "add_rope",
     "along_rope",
@@ -54,6 +59,8 @@ __all__ = [
     "no_physics",
     "on_particle",
     "on_rope",
+    "rollout",
     "rope",
     "simulate",
+    "tape_plan",
 ]

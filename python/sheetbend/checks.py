@@ -45,10 +45,16 @@ def per_item(field: str, values: ArrayLike, count: int) -> np.ndarray:
 
 def indices(field: str, values: ArrayLike, count: int) -> list[int]:
     """Particle indices in range; negative ones count from the end."""
+    found: list[int] = index_array(field, values, count).tolist()
+    return found
+
+
+def index_array(field: str, values: ArrayLike, count: int) -> np.ndarray:
+    """The same as one array."""
     array = np.atleast_1d(np.array(values))
     if array.size == 0 or not np.issubdtype(array.dtype, np.integer):
         raise SceneError(field, "must be particle indices", values, "give whole numbers")
     bad = array[(array < -count) | (array >= count)]
     if bad.size:
         raise SceneError(field, "name particles that do not exist", bad[:5].tolist(), f"use 0 to {count - 1}")
-    return [int(i) % count for i in array.ravel()]
+    return array.ravel().astype(np.int64) % count

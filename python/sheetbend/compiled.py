@@ -37,7 +37,7 @@ class CompiledScene:
                 force_times=[] if not scene.loaded else list(scene.force_times),
                 has_drag=scene.has_drag,
                 groups=[
-                    {"name": g.name, "kind": g.kind, "damped": g.damped, "stencil": g.particles.ravel().tolist()}
+                    {"name": g.name, "kind": g.kind, "damped": g.damped, "stencil": g.particles.ravel()}
                     for g in scene.groups
                 ],
             )
@@ -60,19 +60,24 @@ class CompiledScene:
         return base
 
     def map(self, extra: int = 0, terms: Sequence[Term] = (), names: Sequence[str] | None = None) -> dict[str, Any]:
-        """The parameter map as plain arrays; `extra` more inputs (array "extra") may follow the scene's, with their
-        own terms."""
+        """The parameter map as plain arrays, one entry per term and input that it goes to; `extra` more inputs (array
+        "extra") may follow the scene's, with their own terms."""
         order = {name: i for i, name in enumerate(self.names if names is None else names)}
         offsets = {array: offset for array, (offset, _) in self.layout.items()} | {"extra": self.core.inputs}
         every = [*self._terms, *terms]
-        first = np.cumsum([0] + [len(t.factors) for t in every])
+        entries = [np.size(t.index) for t in every]
+        factors = np.repeat([len(t.factors) for t in every], entries).astype(int)
+        parameter = [[order[name] for name, _ in t.factors] for t in every]
+        function = [[FUNCTIONS[f] for _, f in t.factors] for t in every]
         return {
-            "base": np.concatenate([self._base, np.zeros(extra)]),
-            "target": [offsets[t.array] + t.index for t in every],
-            "coefficient": np.array([t.coefficient for t in every], dtype=float),
-            "first_factor": first.tolist(),
-            "parameter": [order[name] for t in every for name, _ in t.factors],
-            "function": [FUNCTIONS[function] for t in every for _, function in t.factors],
+            "base": np.concatenate([self._base, np.zeros(extra)]) if extra else self._base,
+            "target": _joined([offsets[t.array] + np.ravel(t.index) for t in every]),
+            "coefficient": _joined(
+                [np.broadcast_to(t.coefficient, k) for t, k in zip(every, entries, strict=True)]
+            ).astype(float),
+            "first_factor": np.concatenate([[0], np.cumsum(factors)]),
+            "parameter": _joined([np.tile(p, k) for p, k in zip(parameter, entries, strict=True)]),
+            "function": _joined([np.tile(f, k) for f, k in zip(function, entries, strict=True)]),
         }
 
     def values(self, changes: Mapping[str, float] | None = None) -> np.ndarray:
@@ -111,3 +116,8 @@ class CompiledScene:
             part = flat[offset : offset + size]
             shaped[array] = part.reshape(-1, 3) if array in ("position", "velocity", "boundary", "force") else part
         return shaped
+
+
+def _joined(parts: Sequence[np.ndarray]) -> np.ndarray:
+    """Whole numbers or coefficients, one array after the other."""
+    return np.concatenate(parts) if parts else np.zeros(0, dtype=int)

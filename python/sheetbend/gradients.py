@@ -14,6 +14,7 @@ from .compiled import CompiledScene
 from .scene import Scene
 from .simulate import divergence, substeps
 from .solver import Solver
+from .tape import budget
 
 COMPLEX_STEP_BOUND = 1e-8
 DOT_PRODUCT_BOUND = 1e-9
@@ -122,8 +123,8 @@ def check_gradients(
     core = solver.core(compiled)
     theta = compiled.values(values)
     inputs = compiled.inputs(theta)
-    with divergence(scene):
-        tape = core.record(inputs, steps[-1], 0.0)
+    with divergence(scene), budget(solver):
+        _, tape = core.record(inputs, steps, 0.0, solver.budget)
         weights = rng.standard_normal((len(steps), compiled.core.dofs))
         adjoint = core.vjp(inputs, tape, steps, weights, 0.0)
         probe = _Probe(core, inputs, steps, weights)

@@ -12,6 +12,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from .errors import SceneError
 
 FUNCTIONS = {"identity": 0, "inverse": 1, "square": 2, "sin": 3, "cos": 4}
@@ -44,11 +46,12 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Term:
-    """coefficient * prod f(quantity), added to entry `index` of the input array `array`."""
+    """coefficient * prod f(quantity), added to entry `index` of the input array `array`; or to several entries, with
+    index (k,), each distinct, and one coefficient for all or (k,)."""
 
     array: str
-    index: int
-    coefficient: float
+    index: int | np.ndarray
+    coefficient: float | np.ndarray
     factors: tuple[tuple[str, str], ...]  # (quantity, function)
 
 

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from .checks import finite, indices, per_item, points
+from .checks import finite, index_array, indices, per_item, points
+from .column import Column
 from .compiled import CompiledScene
 from .errors import SceneError
 from .quantities import Quantity, Term, product
@@ -58,11 +59,8 @@ class Scene:
         self.force_times: Array = np.zeros(0)
         self.has_drag = False
         self.ropes: dict[str, Any] = {}
-        self._positions: list[Array] = []
-        self._velocities: list[Array] = []
-        self._mass: list[float] = []
-        self._drag_linear: dict[int, float] = {}
-        self._drag_quadratic: dict[int, float] = {}
+        self._positions, self._velocities, self._mass = Column(3), Column(3), Column()
+        self._drag: dict[str, Array] = {}
         self._boundary: list[Array] = []
         self._forces: list[Array] = []
         self._gravity = finite("gravity", gravity, (3,), SceneError)
@@ -90,9 +88,9 @@ class Scene:
             )
         v = np.zeros_like(x) if velocity is None else finite("velocity", velocity, x.shape, SceneError)
         first = self.particle_count
-        self._positions += list(x)
-        self._velocities += list(v)
-        self._mass += m.tolist()
+        self._positions.extend(x)
+        self._velocities.extend(v)
+        self._mass.extend(m)
         return np.arange(first, first + len(x))
 
     def pin(self, particles: ArrayLike) -> None:
@@ -205,12 +203,12 @@ class Scene:
         if any(g.name == name for g in self.groups):
             raise SceneError("name", "is taken by another group", name, "give each group a name of its own")
         arity = KINDS[kind]["arity"]
-        flat = indices(f"{name}.particles", particles, self.particle_count)
-        if np.ndim(particles) != 2 or np.shape(particles)[1] != arity or not flat:
+        flat = index_array(f"{name}.particles", particles, self.particle_count)
+        if np.ndim(particles) != 2 or np.shape(particles)[1] != arity:
             raise SceneError(
                 f"{name}.particles", "have the wrong shape", np.shape(particles), f"give (count, {arity}) for {kind}"
             )
-        stencil = np.array(flat, dtype=int).reshape(-1, arity)
+        stencil = flat.reshape(-1, arity)
         count = len(stencil)
         if viscosity is not None:
             if compliance is not None or damping is not None:
@@ -271,21 +269,18 @@ class Scene:
     def shift_base(self, particle: int, by: ArrayLike) -> None:
         """Move the plain part of a particle's position, (3,) m, where terms make up the rest."""
         self._building()
-        self._positions[particle] = self._positions[particle] + np.asarray(by, dtype=float)
+        self._positions.values[particle] += np.asarray(by, dtype=float)
 
     def set_drag(self, linear: ArrayLike | None = None, quadratic: ArrayLike | None = None) -> None:
         """Air drag per particle: linear (n,) N s/m and quadratic (n,) N s^2/m^2, force -(c1 + c2 |v|) v."""
         self._building()
-        for field, values, store in (
-            ("linear", linear, self._drag_linear),
-            ("quadratic", quadratic, self._drag_quadratic),
-        ):
+        for field, values in (("linear", linear), ("quadratic", quadratic)):
             if values is None:
                 continue
             c = per_item(f"drag.{field}", values, self.particle_count)
             if (c < 0).any():
                 raise SceneError(f"drag.{field}", "must not be negative", float(c.min()), "give zero or more")
-            store.update(enumerate(c.tolist()))
+            self._drag[field] = c
             self.has_drag = True
 
     def freeze(self) -> Scene:
@@ -313,13 +308,14 @@ class Scene:
     @property
     def positions(self) -> Array:
         """Initial positions as given, (n, 3) m."""
-        return np.array(self._positions, dtype=float).reshape(-1, 3)
+        return self._positions.values.copy()
 
     @property
     def free(self) -> Array:
         """Indices of the particles that can move."""
-        held = self.pinned | set(self.driven)
-        return np.array([i for i in range(self.particle_count) if i not in held], dtype=int)
+        held = np.zeros(self.particle_count, dtype=bool)
+        held[[*self.pinned, *self.driven]] = True
+        return np.flatnonzero(~held)
 
     def group(self, name: str) -> tuple[Group, int, int]:
         """A group with its first constraint and its first multiplier row.
@@ -343,19 +339,18 @@ class Scene:
 
     def base_arrays(self) -> dict[str, Array]:
         """The plain parts of all input arrays, to which the quantities' terms are added."""
-        n = self.particle_count
         return {
             "position": self.positions,
-            "velocity": np.array(self._velocities, dtype=float),
-            "mass": np.array(self._mass),
+            "velocity": self._velocities.values.copy(),
+            "mass": self._mass.values.copy(),
             "compliance": self._concatenated("compliance"),
             "damping": self._concatenated("damping"),
             "rest": self._concatenated("rest"),
             "boundary": np.stack(self._boundary, axis=1) if self._boundary else np.zeros(0),
             "force": np.stack(self._forces, axis=1) if self._forces else np.zeros(0),
             "gravity": self._gravity,
-            "drag_linear": np.array([self._drag_linear.get(i, 0.0) for i in range(n)]),
-            "drag_quadratic": np.array([self._drag_quadratic.get(i, 0.0) for i in range(n)]),
+            "drag_linear": self._drag_of("linear"),
+            "drag_quadratic": self._drag_of("quadratic"),
         }
 
     # --- private
@@ -372,11 +367,16 @@ class Scene:
     def _concatenated(self, field: str) -> Array:
         return np.concatenate([np.ravel(getattr(g, field)) for g in self.groups]) if self.groups else np.zeros(0)
 
+    def _drag_of(self, field: str) -> Array:
+        """Zero for particles that came after the drag was set."""
+        given = self._drag.get(field, np.zeros(0))
+        return np.concatenate([given, np.zeros(self.particle_count - len(given))])
+
     def _scalar(self, quantity: str, array: str, first: int, values: Array, kind: str) -> None:
         """Move one value shared by a whole group into a quantity."""
         unit = UNITS[kind][array]
         self.add_quantity(quantity, float(values[0]), unit, positive=float(values[0]) > 0.0)
-        self.add_terms([product(array, first + i, 1.0, {quantity: "identity"}) for i in range(len(values))])
+        self.add_terms([Term(array, first + np.arange(len(values)), 1.0, ((quantity, "identity"),))])
         values[:] = 0.0
 
     def _rest_values(
@@ -434,19 +434,21 @@ class Scene:
                 self.particle_count,
                 "release at least one",
             )
-        heavy = set(np.nonzero(np.array(self._mass) > 0)[0].tolist()) | {
-            t.index for t in self.terms if t.array == "mass"
-        }
-        light = [int(i) for i in free if i not in heavy]
-        if light:
-            raise SceneError("mass", "is zero for free particles", light[:5], "give them a mass, or pin them")
-        used = {int(i) for g in self.groups for i in g.particles.ravel()}
+        heavy = self._mass.values > 0
+        for t in self.terms:
+            if t.array == "mass":
+                heavy[t.index] = True
+        light = free[~heavy[free]]
+        if light.size:
+            raise SceneError("mass", "is zero for free particles", light[:5].tolist(), "give them a mass, or pin them")
         if self.groups:
-            loose = [int(i) for i in free if i not in used]
-            if loose:
-                raise SceneError(
-                    "particles", "are connected to nothing", loose[:5], "constrain them, pin them or leave them out"
-                )
+            used = np.zeros(self.particle_count, dtype=bool)
+            for g in self.groups:
+                used[g.particles] = True
+            loose = free[~used[free]]
+            if loose.size:
+                fix = "constrain them, pin them or leave them out"
+                raise SceneError("particles", "are connected to nothing", loose[:5].tolist(), fix)
         held = self.pinned & set(self.driven)
         if held:
             raise SceneError("drive.particles", "are pinned too", sorted(held), "either pin or drive a particle")

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from . import _core
 from .compiled import CompiledScene
 from .errors import InputError
+from .memory import in_bytes
 
 INTEGRATORS = ("bdf1", "bdf2")
 METHODS = ("direct", "gauss_seidel")
@@ -25,6 +26,9 @@ class Solver:
         iterations: Newton iterations of a direct block (2 by default) or sweeps (10 by default).
         threads: of one rollout; results do not depend on it.
         grain: constraints per thread below which a color is not split.
+        memory: budget of a gradient through a rollout, such as "2 GB" or a number of bytes: what does not fit on the
+            tape is computed again, with the same result. None = keep every substep boundary. `tape_plan` tells what a
+            budget costs. Tangents (`fit`, forward mode) keep no tape.
     """
 
     h: float = 1e-3
@@ -33,6 +37,7 @@ class Solver:
     iterations: int | None = None
     threads: int = 1
     grain: int = 256
+    memory: str | int | None = None
 
     def __post_init__(self) -> None:
         if not (isinstance(self.h, int | float) and math.isfinite(self.h) and self.h > 0):
@@ -47,6 +52,13 @@ class Solver:
             value = getattr(self, field)
             if value is not None and (not isinstance(value, int) or value < 1):
                 raise InputError(f"solver.{field}", "must be a positive whole number", value, "give at least 1")
+        if self.memory is not None:
+            in_bytes("solver.memory", self.memory)
+
+    @property
+    def budget(self) -> int | None:
+        """`memory` in bytes."""
+        return None if self.memory is None else in_bytes("solver.memory", self.memory)
 
     @property
     def sweeps(self) -> int:

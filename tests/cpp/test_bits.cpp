@@ -17,15 +17,6 @@ struct Bits : ::testing::TestWithParam<Solver> {
 };
 INSTANTIATE_TEST_SUITE_P(, Bits, all_solvers, solver_name);
 
-// A rollout that keeps nothing.
-std::vector<double> without_tape(const Program& p, const std::vector<double>& inputs) {
-  std::vector<double> states;
-  Rollout<double>(p.scene, p.plan, inputs.data(), p.t0).run(p.steps, [&](int, const double* x, const double*) {
-    states.insert(states.end(), x, x + p.scene.dofs());
-  });
-  return states;
-}
-
 // Each substep again from the tape's states, as the reverse does.
 std::vector<double> recomputed(const Program& p, const Tape<double>& tape, const std::vector<double>& inputs) {
   const Inputs<const double> in{p.scene.layout, inputs.data()};
@@ -46,10 +37,9 @@ std::vector<double> recomputed(const Program& p, const Tape<double>& tape, const
 TEST_P(Bits, AreEqualWithAndWithoutTape) {
   const Sample sample = random_scene(70, {.net = GetParam().net});
   const Program p = program(sample.scene);
-  const Tape<double> tape = record(p, sample.inputs);
-  const auto taped = states(tape, sample.scene.dofs());
-  EXPECT_TRUE(same_bits(taped, without_tape(p, sample.inputs)));
-  EXPECT_TRUE(same_bits(taped, recomputed(p, tape, sample.inputs)));
+  const auto recorded = record(p, sample.inputs);
+  EXPECT_TRUE(same_bits(recorded.states, states(p, sample.inputs)));
+  EXPECT_TRUE(same_bits(recorded.states, recomputed(p, recorded.tape, sample.inputs)));
 }
 
 TEST_P(Bits, AreEqualRunAfterRun) {
@@ -62,13 +52,12 @@ TEST_P(Bits, AreEqualRunAfterRun) {
 TEST_P(Bits, AreEqualForEveryNumberOfThreads) {
   const Sample sample = random_scene(72, {.net = GetParam().net});
   const Program one = program(sample.scene);
-  const auto forward = states(record(one, sample.inputs), sample.scene.dofs());
+  const auto forward = states(one, sample.inputs);
   const auto reverse = gradient(one, sample.inputs);
   for (const int threads : {2, 3, 8}) {
     const Program many = program(sample.scene, threads);
     for (int repetition = 0; repetition < 3; ++repetition) {
-      EXPECT_TRUE(same_bits(states(record(many, sample.inputs), sample.scene.dofs()), forward))
-          << threads << " threads";
+      EXPECT_TRUE(same_bits(states(many, sample.inputs), forward)) << threads << " threads";
       EXPECT_TRUE(same_bits(gradient(many, sample.inputs), reverse)) << threads << " threads";
     }
   }
@@ -88,11 +77,10 @@ TEST_P(Bits, AreEqualInEveryLane) {
     for (const Pack& a : packs) out.push_back(a[lane]);
     return out;
   };
-  const auto forward = states(record(p, packed), sample.scene.dofs());
+  const auto forward = states(p, packed);
   const auto reverse = gradient(p, packed);
   for (int lane = 0; lane < Pack::lanes; ++lane) {
-    EXPECT_TRUE(same_bits(lane_of(forward, lane), states(record(p, inputs[lane]), sample.scene.dofs())))
-        << "forward, lane " << lane;
+    EXPECT_TRUE(same_bits(lane_of(forward, lane), states(p, inputs[lane]))) << "forward, lane " << lane;
     // A single scene's colors sum the cotangents of their values over substeps before they scale them: equal to rounding.
     EXPECT_LE(relative_error(lane_of(reverse, lane), gradient(p, inputs[lane])), 1e-13) << "reverse, lane " << lane;
   }

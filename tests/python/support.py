@@ -71,7 +71,7 @@ def sensitivity(
     compiled, frames = scene.compiled, substeps(times, solver.h)
     core, inputs = solver.core(compiled), compiled.inputs()
     forward = float((tangents(scene, times, solver, direction) * weights).sum())
-    tape = core.record(inputs, frames[-1], 0.0)
+    _, tape = core.record(inputs, frames, 0.0)
     bar = core.vjp(inputs, tape, frames, np.reshape(weights, (len(frames), -1)), 0.0)
     if isinstance(direction, str):
         return forward, float(compiled.theta_bar(compiled.theta, bar)[compiled.names.index(direction)])

@@ -336,6 +336,8 @@ BAD = [
     ("substeps = 4", "substeps = 4\nh = 0.1", "solver", "give one of them"),
     ("substeps = 4", "h = -1.0", "solver.h", "greater than 0"),
     ("substeps = 4", "integrator = 'rk4'", "solver.integrator", "'bdf1' or 'bdf2'"),
+    ("substeps = 4", "memory = '2 XB'", "solver.memory", "units are B, kB, MB"),
+    ("substeps = 4", "memory = 0", "solver.memory", "give bytes"),
     ("gravity = [0, 0, -9.81]", "gravity = [0, -9.81]", "scene.gravity", "at least 3"),
     ("gravity = [0, 0, -9.81]", "gravity = 9.81", "scene.gravity", "a list"),
     ("gravity = [0, 0, -9.81]", "gravty = [0, 0, 1]", "scene.gravty", "did you mean 'gravity'"),

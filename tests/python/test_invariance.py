@@ -165,7 +165,7 @@ def test_gradients_turn_with_the_scene():
     bars = []
     for scene, seed in ((arc(), weights), (arc(turn), turn.apply(weights.reshape(-1, 3)).reshape(weights.shape))):
         core, inputs, every = s.core(scene.compiled), scene.compiled.inputs(), list(range(61))
-        bar = core.vjp(inputs, core.record(inputs, 60, 0.0), every, seed.reshape(61, -1), 0.0)
+        bar = core.vjp(inputs, core.record(inputs, every, 0.0)[1], every, seed.reshape(61, -1), 0.0)
         bars.append(scene.compiled.unpack(bar))
     here, there = bars
     for name in ("mass", "compliance", "damping", "drag_linear", "drag_quadratic"):
@@ -229,7 +229,7 @@ def test_threads_leave_the_bits_alone(options):
         s = sb.Solver(h=1 / 480, threads=threads, grain=1, **options)
         core, inputs = s.core(scene.compiled), scene.compiled.inputs()
         motion = core.simulate(inputs, [20, 40], 0.0)
-        bar = core.vjp(inputs, core.record(inputs, 40, 0.0), [40], weights, 0.0)
+        bar = core.vjp(inputs, core.record(inputs, [40], 0.0)[1], [40], weights, 0.0)
         results.append((motion["positions"], motion["velocities"], motion["multipliers"], bar))
     for other in results[1:]:
         for a, b in zip(results[0], other, strict=True):
@@ -241,8 +241,9 @@ def test_tape_tangents_and_lanes_leave_the_bits_alone(options):
     scene = arc()
     core, inputs, every = sb.Solver(h=1 / 480, **options).core(scene.compiled), scene.compiled.inputs(), [0, 1, 2, 50]
     plain = core.simulate(inputs, every, 0.0)["positions"]
-    tape = core.record(inputs, 50, 0.0)
-    assert np.array_equal(core.states(tape, every), plain)
+    recorded, _ = core.record(inputs, every, 0.0)
+    assert np.array_equal(recorded, plain)
+    assert np.array_equal(core.states(inputs, every, 0.0), plain)
     seen, _ = core.jvp(inputs, np.ones((3, len(inputs))), every, 0.0)
     assert np.array_equal(seen, plain)
 
@@ -255,7 +256,7 @@ def test_tape_tangents_and_lanes_leave_the_bits_alone(options):
     bars = core.vjp_batch(batch, every, weights, 0.0)
     for k in range(11):
         assert np.array_equal(lanes[k], core.simulate(batch[k], every, 0.0)["positions"])
-        bar = core.vjp(batch[k], core.record(batch[k], 50, 0.0), every, weights[k], 0.0)
+        bar = core.vjp(batch[k], core.record(batch[k], every, 0.0)[1], every, weights[k], 0.0)
         # Colors of a single scene sum the cotangents of their coefficients in another order: equal to rounding.
         assert np.abs(bars[k] - bar).max() <= 1e-13 * np.abs(bar).max()
         assert np.array_equal(bars[k], bar) or options.get("method") == "gauss_seidel"

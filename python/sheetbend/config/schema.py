@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Literal, Self
 
-from pydantic import model_validator
+from pydantic import field_validator, model_validator
 
+from ..errors import InputError
+from ..memory import in_bytes
 from .scene_schema import SceneSection
 from .section import AXES, Finite, Name, Pair, Reference, Section, Vector, Window, key
 
@@ -27,6 +29,21 @@ class SolverSection(Section):
     integrator: Literal["bdf1", "bdf2"] = key("bdf2", "second order, or backward Euler (which damps)")
     method: Literal["direct", "gauss_seidel"] = key("direct", "each rope one block, or colored sweeps")
     iterations: int | None = key(None, "Newton iterations of a direct block (2) or sweeps (10)", ge=1)
+    memory: str | int | None = key(
+        None,
+        'budget of an adjoint gradient (`check`), such as "2 GB" or a number of bytes: what does not fit is computed '
+        "again; a fit carries tangents forward and keeps no tape",
+    )
+
+    @field_validator("memory")
+    @classmethod
+    def _amount(cls, memory: str | int | None) -> str | int | None:
+        if memory is not None:
+            try:
+                in_bytes("memory", memory)
+            except InputError as error:
+                raise ValueError(f"{error.problem}|{error.fix}") from error
+        return memory
 
     @model_validator(mode="after")
     def _one_of_both(self) -> Self:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from itertools import pairwise
 
 import numpy as np
 import torch
@@ -34,19 +33,18 @@ class ParameterMap:
         self._base = torch.tensor(arrays["base"], dtype=torch.float64)
         self._target = torch.tensor(arrays["target"], dtype=torch.long)
         self._coefficient = torch.tensor(arrays["coefficient"], dtype=torch.float64)
-        parameter, function = arrays["parameter"], arrays["function"]
         # Each quantity under each function is computed once; terms pick factors from these, ones fill up short terms.
-        pairs = sorted(set(zip(function, parameter, strict=True)))
+        each = np.stack([arrays["function"], arrays["parameter"]], 1).astype(np.int64).reshape(-1, 2)
+        pairs, place = np.unique(each, axis=0, return_inverse=True)
         self._groups = [
-            (_TORCH[name], torch.tensor([p for f, p in pairs if f == number], dtype=torch.long))
-            for name, number in FUNCTIONS.items()
+            (_TORCH[name], torch.from_numpy(pairs[pairs[:, 0] == number, 1])) for name, number in FUNCTIONS.items()
         ]
-        place = {pair: i for i, pair in enumerate(pairs)}
-        first = arrays["first_factor"]
-        factors = [[place[function[k], parameter[k]] for k in range(a, b)] for a, b in pairwise(first)]
-        longest = max(map(len, factors), default=0)
-        filled = [f + [len(pairs)] * (longest - len(f)) for f in factors]
-        self._factors = torch.tensor(filled, dtype=torch.long).reshape(-1, longest)
+        first = np.asarray(arrays["first_factor"])
+        count = np.diff(first)
+        filled = np.full((len(count), int(count.max(initial=0))), len(pairs))
+        for k in range(filled.shape[1]):
+            filled[count > k, k] = place.ravel()[first[:-1][count > k] + k]
+        self._factors = torch.from_numpy(filled)
 
     def __call__(self, theta: Tensor) -> Tensor:
         """(..., quantities) to (..., total)."""

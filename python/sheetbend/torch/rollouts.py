@@ -10,6 +10,8 @@ import numpy as np
 from ..errors import InputError
 from ..scene import Scene
 from ..simulate import divergence
+from ..solver import Solver
+from ..tape import budget
 
 Array = np.ndarray
 
@@ -23,11 +25,13 @@ class Rollouts:
     Args:
         core: the compiled solver of the scene.
         steps: wanted substeps, ascending.
+        solver: its memory is the budget of a gradient.
         keep_tape: keep the tape of a single rollout for the `vjp` that will follow, which else records it again.
     """
 
-    def __init__(self, scene: Scene, core: Any, steps: Sequence[int], keep_tape: bool) -> None:
+    def __init__(self, scene: Scene, core: Any, steps: Sequence[int], keep_tape: bool, solver: Solver) -> None:
         self._scene, self._core, self._steps, self._keep_tape = scene, core, list(steps), keep_tape
+        self._solver = solver
         self._kept: tuple[Array, Any] | None = None
 
     def value(self, inputs: Array) -> Array:
@@ -39,21 +43,21 @@ class Rollouts:
                 out = self._core.simulate_batch(inputs, self._steps, 0.0)
                 return out
             if self._keep_tape:
-                self._kept = inputs.copy(), self._record(inputs)
-                out = self._core.states(self._kept[1], self._steps)
+                out, tape = self._record(inputs)
+                self._kept = inputs, tape  # no copy: torch itself refuses a saved tensor that has changed
             else:
-                out = self._core.simulate(inputs[0], self._steps, 0.0)["positions"]
+                out = self._core.states(inputs[0], self._steps, 0.0)
             return out[None]
 
     def vjp(self, inputs: Array, states_bar: Array) -> Array:
         """One call of the core for the whole batch."""
         out: Array
-        with divergence(self._scene):
+        with divergence(self._scene), budget(self._solver):
             if len(inputs) != 1:
-                out = self._core.vjp_batch(inputs, self._steps, states_bar, 0.0)
+                out = self._core.vjp_batch(inputs, self._steps, states_bar, 0.0, self._solver.budget)
                 return out
             kept = self._kept
-            tape = kept[1] if kept is not None and np.array_equal(kept[0], inputs) else self._record(inputs)
+            tape = kept[1] if kept is not None and np.array_equal(kept[0], inputs) else self._record(inputs)[1]
             out = self._core.vjp(inputs[0], tape, self._steps, states_bar[0], 0.0)
             return out[None]
 
@@ -71,15 +75,17 @@ class Rollouts:
     def vjp_dot(self, inputs: Array, inputs_dot: Array, states_bar: Array, states_bar_dot: Array) -> Array:
         """One call per scene of the batch: the core has no lanes for second derivatives."""
         out = np.empty_like(inputs)
-        with divergence(self._scene):
+        with divergence(self._scene), budget(self._solver):
             for b in range(len(inputs)):
                 out[b] = self._core.vjp_dot(
-                    inputs[b], inputs_dot[b], self._steps, states_bar[b], states_bar_dot[b], 0.0
+                    inputs[b], inputs_dot[b], self._steps, states_bar[b], states_bar_dot[b], 0.0, self._solver.budget
                 )[1]
         return out
 
-    def _record(self, inputs: Array) -> Any:
-        return self._core.record(inputs[0], self._steps[-1], 0.0)
+    def _record(self, inputs: Array) -> tuple[Array, Any]:
+        with budget(self._solver):
+            states, tape = self._core.record(inputs[0], self._steps, 0.0, self._solver.budget)
+        return states, tape
 
 
 def expect_finite(scene: Scene, inputs: Array) -> None:

@@ -31,7 +31,7 @@ class Simulation:
         flat = self._inputs(values or {}, inputs or {})
         batch = flat.shape[:-1]
         keep_tape = torch.is_grad_enabled() and flat.requires_grad
-        rollouts = Rollouts(self.scene, self._core, self._steps, keep_tape)
+        rollouts = Rollouts(self.scene, self._core, self._steps, keep_tape, self.solver)
         states = respond(rollouts, flat.reshape(-1, flat.shape[-1]))
         return states.reshape(*batch, len(self._steps), -1, 3)
 
@@ -56,7 +56,7 @@ def simulate(
     Args:
         scene: is frozen by this.
         times: (frames,) s on the substep grid.
-        solver: `Solver()` by default.
+        solver: `Solver()` by default; its `memory` is the budget of a gradient (see `sheetbend.tape_plan`).
         values: quantities to change, by name: tensors (*batch,), or plain numbers.
         inputs: input arrays to replace, by name: tensors (*batch, ...), whatever quantities made them up. "position",
             "velocity" (particles, 3), "mass" (particles,), "compliance", "damping" (constraints,), "rest" (all rest
@@ -67,8 +67,8 @@ def simulate(
         (*batch, frames, particles, 3) m, float64.
 
     Raises:
-        InputError: times off the grid; a tensor with an unknown name, of the wrong shape or dtype, on another device,
-            or not finite.
+        InputError: times off the grid; a budget below the least that works; a tensor with an unknown name, of the wrong
+            shape or dtype, on another device, or not finite.
         DivergenceError: a state became infinite; says when and where.
     """
     return Simulation(scene, times, solver)(values, inputs)

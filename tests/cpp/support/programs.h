@@ -2,6 +2,8 @@
 // scalars.
 #pragma once
 
+#include <numeric>
+
 #include "adjoint/rollout.h"
 #include "tests/cpp/support/random_scene.h"
 
@@ -17,38 +19,56 @@ struct Program {
 // Weight of x[dof]^2 at a step in the loss sum_step sum_dof weight x^2.
 inline double weight(int step, int dof) { return std::remainder(0.618034 * (31 * step + 17 * dof) + 0.1, 1.0); }
 
+inline std::vector<int> every_step(const Program& p) {
+  std::vector<int> steps(p.steps + 1);
+  std::iota(steps.begin(), steps.end(), 0);
+  return steps;
+}
+
+// States (steps + 1, dofs) without a tape.
 template <class T>
-Tape<T> record(const Program& p, const std::vector<T>& inputs) {
-  return record_rollout<T>(p.scene, p.plan, inputs.data(), p.t0, p.steps, nullptr);
+std::vector<T> states(const Program& p, const std::vector<T>& inputs) {
+  std::vector<T> all((p.steps + 1) * p.scene.dofs());
+  rollout_states<T>(p.scene, p.plan, inputs.data(), p.t0, every_step(p), all.data(), nullptr);
+  return all;
+}
+
+// The same, and the tape.
+template <class T>
+struct Recorded {
+  std::vector<T> states;
+  Tape<T> tape;
+};
+template <class T>
+Recorded<T> record(const Program& p, const std::vector<T>& inputs, int kept = every_state) {
+  std::vector<T> all((p.steps + 1) * p.scene.dofs());
+  Tape<T> tape = record_rollout<T>(p.scene, p.plan, inputs.data(), p.t0, every_step(p), all.data(), kept, nullptr);
+  return {std::move(all), std::move(tape)};
 }
 
 template <class T>
 T loss(const Program& p, const std::vector<T>& inputs) {
-  const Tape<T> tape = record(p, inputs);
+  const std::vector<T> all = states(p, inputs);
   T sum(0.0);
-  for (int step = 0; step <= p.steps; ++step)
-    for (int i = 0; i < p.scene.dofs(); ++i) sum += T(weight(step, i)) * tape.x(step)[i] * tape.x(step)[i];
+  for (int step = 0, at = 0; step <= p.steps; ++step)
+    for (int i = 0; i < p.scene.dofs(); ++i, ++at) sum += T(weight(step, i)) * all[at] * all[at];
   return sum;
 }
 
-// The loss's gradient by all inputs, by tape and reverse.
+// The loss's gradient by all inputs, by reverse.
 template <class T>
-std::vector<T> gradient(const Program& p, const std::vector<T>& inputs) {
-  const Tape<T> tape = record(p, inputs);
-  std::vector<int> wanted;
+std::vector<T> gradient(const Program& p, const std::vector<T>& inputs, Recorded<T>& recorded) {
   std::vector<T> x_bar, inputs_bar(inputs.size());
-  for (int step = 0; step <= p.steps; ++step) {
-    wanted.push_back(step);
-    for (int i = 0; i < p.scene.dofs(); ++i) x_bar.push_back(T(2.0 * weight(step, i)) * tape.x(step)[i]);
-  }
-  reverse_rollout<T>(p.scene, p.plan, inputs.data(), p.t0, tape, wanted, x_bar.data(), inputs_bar.data(), nullptr);
+  for (int step = 0, at = 0; step <= p.steps; ++step)
+    for (int i = 0; i < p.scene.dofs(); ++i, ++at) x_bar.push_back(T(2.0 * weight(step, i)) * recorded.states[at]);
+  reverse_rollout<T>(p.scene, p.plan, inputs.data(), p.t0, recorded.tape, every_step(p), x_bar.data(),
+                     inputs_bar.data(), nullptr);
   return inputs_bar;
 }
-
-// The tape's states (steps + 1, dofs).
 template <class T>
-std::vector<T> states(const Tape<T>& tape, int dofs) {
-  return {tape.x(0), tape.x(tape.steps()) + dofs};
+std::vector<T> gradient(const Program& p, const std::vector<T>& inputs) {
+  Recorded<T> recorded = record(p, inputs);
+  return gradient(p, inputs, recorded);
 }
 
 // The ways to solve that a rollout's tests go through.

@@ -1,0 +1,139 @@
+// Gradients from Python: tapes and what they will cost, VJPs and second derivatives, single and in lanes. `memory` is a budget in bytes, None
+// without one. Shapes as in core_rollout.cpp.
+#include <optional>
+
+#include "adjoint/rollout.h"
+#include "adjoint/tape_plan.h"
+#include "core/scalar/dual.h"
+#include "core/threads/pool.h"
+#include "python/bindings/interrupt.h"
+#include "python/bindings/solver.h"
+
+namespace sheetbend::bindings {
+namespace {
+
+using Memory = std::optional<std::size_t>;
+
+template <class T>
+TapePlan plan_of(const Solver& s, const Steps& steps, std::size_t scenes, const Memory& memory) {
+  return plan_tape<T>(*s.scene, s.plan, steps.back(), steps.size(), scenes, memory.value_or(no_budget));
+}
+
+TapePlan tape_plan(const Solver& s, const Steps& steps, std::size_t scenes, const Memory& memory) {
+  return scenes == 1 ? plan_of<double>(s, steps, 1, memory) : plan_of<Pack>(s, steps, scenes, memory);
+}
+
+// (states, tape); the tape refers to the solver.
+py::tuple record(const py::object& self, const Array& inputs, const Steps& steps, double t0, const Memory& memory) {
+  const auto& s = self.cast<const Solver&>();
+  check(s, inputs, 1, steps);
+  const TapePlan plan = plan_of<double>(s, steps, 1, memory);
+  auto states = empty({steps.size(), static_cast<std::size_t>(s.scene->dofs())});
+  double* x = states.mutable_data();
+  py::object tape = py::cast([&] {
+    Release release;
+    SignalInterrupt interrupt;
+    return record_rollout(*s.scene, s.plan, inputs.data(), t0, steps, x, plan.states, &interrupt);
+  }());
+  py::detail::keep_alive_impl(tape, self);
+  return py::make_tuple(states, tape);
+}
+
+py::array_t<double> vjp(const Solver& s, const Array& inputs, Tape<double>& tape, const Steps& steps,
+                        const Array& x_bar, double t0) {
+  check(s, inputs, 1, steps);
+  expect_size(x_bar, steps.size() * s.scene->dofs(), "x_bar");
+  auto out = zeros({s.scene->layout.total()});
+  double* inputs_bar = out.mutable_data();
+  Release release;
+  SignalInterrupt interrupt;
+  reverse_rollout(*s.scene, s.plan, inputs.data(), t0, tape, steps, x_bar.data(), inputs_bar, &interrupt);
+  return out;
+}
+
+// Forward over reverse: the VJP and its derivative along (inputs_dot, x_bar_dot).
+py::tuple vjp_dot(const Solver& s, const Array& inputs, const Array& inputs_dot, const Steps& steps, const Array& x_bar,
+                  const Array& x_bar_dot, double t0, const Memory& memory) {
+  using D = Dual<double, 1>;
+  check(s, inputs, 1, steps);
+  const std::size_t total = s.scene->layout.total(), size = steps.size() * s.scene->dofs();
+  expect_size(inputs_dot, total, "inputs_dot");
+  expect_size(x_bar, size, "x_bar");
+  expect_size(x_bar_dot, size, "x_bar_dot");
+  const TapePlan plan = plan_of<D>(s, steps, 1, memory);
+  auto values = empty({total}), derivatives = empty({total});
+  double *value = values.mutable_data(), *derivative = derivatives.mutable_data();
+  {
+    Release release;
+    SignalInterrupt interrupt;
+    const auto duals = [](const Array& v, const Array& d) {
+      std::vector<D> out(v.data(), v.data() + v.size());
+      for (std::size_t i = 0; i < out.size(); ++i) out[i].d[0] = d.data()[i];
+      return out;
+    };
+    const std::vector<D> in = duals(inputs, inputs_dot), seed = duals(x_bar, x_bar_dot);
+    std::vector<D> x(size), bar(total);
+    auto tape = record_rollout(*s.scene, s.plan, in.data(), t0, steps, x.data(), plan.states, &interrupt);
+    reverse_rollout(*s.scene, s.plan, in.data(), t0, tape, steps, seed.data(), bar.data(), &interrupt);
+    for (std::size_t i = 0; i < total; ++i) value[i] = bar[i].v, derivative[i] = bar[i].d[0];
+  }
+  return py::make_tuple(values, derivatives);
+}
+
+// Gradients (B, total) of a batch, eight scenes at a time.
+py::array_t<double> vjp_batch(const Solver& s, const Array& inputs, const Steps& steps, const Array& x_bar, double t0,
+                              const Memory& memory) {
+  const std::size_t total = s.scene->layout.total(), size = steps.size() * s.scene->dofs();
+  const std::size_t count = static_cast<std::size_t>(inputs.size()) / total;
+  check(s, inputs, count, steps);
+  expect_size(x_bar, count * size, "x_bar");
+  const TapePlan plan = plan_of<Pack>(s, steps, count, memory);
+  auto out = empty({count, total});
+  double* inputs_bar = out.mutable_data();
+  Release release;
+  SignalInterrupt interrupt;
+  const int packs = static_cast<int>((count + Pack::lanes - 1) / Pack::lanes);
+  parallel_for(packs, s.plan.options.threads, 1, [&](int begin, int end) {
+    for (int p = begin; p < end; ++p) {
+      const std::size_t first = static_cast<std::size_t>(p) * Pack::lanes;
+      const auto in = to_lanes(inputs.data(), count, first, total);
+      std::vector<Pack> x(size), bar(total);
+      auto tape = record_rollout(*s.scene, s.plan, in.data(), t0, steps, x.data(), plan.states, &interrupt);
+      x = to_lanes(x_bar.data(), count, first, size);
+      reverse_rollout(*s.scene, s.plan, in.data(), t0, tape, steps, x.data(), bar.data(), &interrupt);
+      from_lanes(bar, inputs_bar, count, first);
+    }
+  });
+  return out;
+}
+
+}  // namespace
+
+void bind_gradient(py::module_& m, py::class_<Solver>& solver) {
+  py::class_<Tape<double>>(m, "Tape")
+      .def_property_readonly("bytes", &Tape<double>::bytes)
+      .def_property_readonly("steps", &Tape<double>::steps)
+      .def_property_readonly("states", &Tape<double>::states)
+      .def_property_readonly("recomputed", &Tape<double>::recomputed);
+  py::class_<TapePlan>(m, "TapePlan")
+      .def_readonly("steps", &TapePlan::steps)
+      .def_readonly("states", &TapePlan::states)
+      .def_readonly("inputs", &TapePlan::inputs)
+      .def_readonly("frames", &TapePlan::frames)
+      .def_readonly("plan", &TapePlan::plan)
+      .def_readonly("forward", &TapePlan::forward)
+      .def_readonly("reverse", &TapePlan::reverse)
+      .def_readonly("heap", &TapePlan::heap)
+      .def_readonly("tape", &TapePlan::tape)
+      .def_readonly("least", &TapePlan::least)
+      .def_readonly("recomputed", &TapePlan::recomputed);
+  solver.def("tape_plan", &tape_plan, py::arg("steps"), py::arg("scenes") = 1, py::arg("memory") = py::none())
+      .def("record", &record, py::arg("inputs"), py::arg("steps"), py::arg("t0"), py::arg("memory") = py::none())
+      .def("vjp", &vjp, py::arg("inputs"), py::arg("tape"), py::arg("steps"), py::arg("x_bar"), py::arg("t0"))
+      .def("vjp_dot", &vjp_dot, py::arg("inputs"), py::arg("inputs_dot"), py::arg("steps"), py::arg("x_bar"),
+           py::arg("x_bar_dot"), py::arg("t0"), py::arg("memory") = py::none())
+      .def("vjp_batch", &vjp_batch, py::arg("inputs"), py::arg("steps"), py::arg("x_bar"), py::arg("t0"),
+           py::arg("memory") = py::none());
+}
+
+}  // namespace sheetbend::bindings

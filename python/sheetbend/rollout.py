@@ -1,0 +1,100 @@
+"""A rollout that can be differentiated, in NumPy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _core
+from .checks import finite
+from .errors import InputError
+from .scene import Scene
+from .simulate import divergence, substeps
+from .solver import Solver
+from .tape import TapePlan, as_plan, budget
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Gradient:
+    """Derivatives of a number by everything that a rollout depends on.
+
+    Attributes:
+        quantities: by named quantity.
+        inputs: by input array, in its shape: "position", "velocity" (particles, 3), "mass" (particles,), "compliance",
+            "damping" (constraints,), "rest" (all rest parameters,), "boundary", "force" (knots times particles, 3),
+            "gravity" (3,), "drag_linear", "drag_quadratic" (particles,).
+        recomputed: substeps that the forward program ran again, and `tape` the bytes of the tape; both as planned.
+        tape: see above.
+    """
+
+    quantities: Mapping[str, float]
+    inputs: Mapping[str, Array]
+    recomputed: int
+    tape: int
+
+
+class Rollout:
+    """What `rollout` gives: positions now, gradients when asked.
+
+    Attributes:
+        times: (frames,) s.
+        positions: (frames, particles, 3) m.
+        plan: what the gradient costs.
+    """
+
+    def __init__(self, scene: Scene, times: ArrayLike, solver: Solver, values: Mapping[str, float] | None) -> None:
+        self._scene, self._solver, self._compiled = scene, solver, scene.compiled
+        self._core = solver.core(self._compiled)
+        self._steps = substeps(times, solver.h)
+        self._theta = self._compiled.values(values)
+        self._inputs = self._compiled.inputs(self._theta)
+        with budget(solver):
+            self.plan: TapePlan = as_plan(self._core.tape_plan(self._steps, 1, solver.budget), solver)
+        self._tape: _core.Tape
+        with divergence(scene):
+            states, self._tape = self._core.record(self._inputs, self._steps, 0.0, solver.budget)
+        self.times: Array = np.array(self._steps) * solver.h
+        self.positions: Array = states.reshape(len(self._steps), -1, 3)
+
+    def gradient(self, positions_bar: ArrayLike) -> Gradient:
+        """The gradient of a loss whose derivative by the positions is `positions_bar`, (frames, particles, 3).
+
+        May be called again, with other cotangents.
+
+        Raises:
+            InputError: wrong shape, NaN.
+        """
+        bar = np.asarray(positions_bar, dtype=float)
+        if bar.shape != self.positions.shape or not np.isfinite(bar).all():
+            bar = finite("positions_bar", positions_bar, self.positions.shape, InputError)
+        inputs_bar = self._core.vjp(self._inputs, self._tape, self._steps, bar, 0.0)
+        by_quantity = self._compiled.theta_bar(self._theta, inputs_bar)
+        return Gradient(
+            dict(zip(self._compiled.names, by_quantity.tolist(), strict=True)),
+            self._compiled.unpack(inputs_bar),
+            self._tape.recomputed,
+            self._tape.bytes,
+        )
+
+
+def rollout(
+    scene: Scene, times: ArrayLike, solver: Solver | None = None, values: Mapping[str, float] | None = None
+) -> Rollout:
+    """Simulate a scene and keep what its gradient needs, within `solver.memory`.
+
+    Args:
+        scene: is frozen by this.
+        times: (frames,) s on the substep grid, where the loss looks; memory grows with their number, so give no more.
+        solver: `Solver()` by default.
+        values: quantities to change for this run, by name.
+
+    Raises:
+        InputError: times off the grid, unknown quantities, a budget below the least that works.
+        DivergenceError: a state became infinite; says when and where.
+    """
+    return Rollout(scene, times, solver or Solver(), values)

@@ -1,0 +1,120 @@
+"""What the gradient of a rollout costs in memory and in substeps computed again, told before it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from numpy.typing import ArrayLike
+
+from . import _core
+from .errors import InputError
+from .memory import in_words, least_in_words
+from .scene import Scene
+from .simulate import substeps
+from .solver import Solver
+
+
+@dataclass(frozen=True)
+class TapePlan:
+    """A tape under a budget, for one gradient.
+
+    Without a budget, or with a large one, the tape keeps the positions at every substep boundary. Otherwise it keeps
+    those of some boundaries, placed by binomial checkpointing (Griewank & Walther 2000), and the forward program runs
+    again between them. Every substep is recomputed once more as it is reversed; that is part of any gradient here and
+    not counted.
+
+    Attributes:
+        steps: substeps of the rollout.
+        states: boundaries that the tape holds at most.
+        tape: its bytes.
+        working: bytes of everything else, by what it is: "inputs" (and the gradient), "frames" (positions and their
+            cotangents), "plan" (colors or blocks), "forward" (states and record of a substep), "reverse" (cotangents,
+            and the record that a substep is reversed from), "heap" (what allocators waste). The scene itself is not
+            counted.
+        recomputed: substeps that the forward program runs again.
+        budget: bytes, or None.
+        least: the smallest budget that would do, bytes.
+    """
+
+    steps: int
+    states: int
+    tape: int
+    working: Mapping[str, int]
+    recomputed: int
+    budget: int | None
+    least: int
+
+    @property
+    def policy(self) -> str:
+        """ "every boundary" or "binomial"."""
+        return "every boundary" if self.states >= self.steps else "binomial"
+
+    @property
+    def total(self) -> int:
+        """Bytes of tape and working memory."""
+        return self.tape + sum(self.working.values())
+
+    @property
+    def recomputation(self) -> float:
+        """Substeps computed again, as a share of the rollout's."""
+        return self.recomputed / max(1, self.steps)
+
+    def __str__(self) -> str:
+        kept = f"{self.states} of {self.steps} states" if self.policy == "binomial" else f"all {self.steps} states"
+        again = (
+            f"{self.recomputed} substeps run again ({self.recomputation:.2f} per substep)"
+            if self.recomputed
+            else "no substep runs again"
+        )
+        budget = "no budget" if self.budget is None else f"budget {in_words(self.budget)}"
+        parts = ", ".join(f"{name} {in_words(size)}" for name, size in self.working.items())
+        return (
+            f"gradient over {self.steps} substeps: {in_words(self.total)} ({budget}, least {in_words(self.least)})\n"
+            f"  tape     {in_words(self.tape)}: {self.policy}, {kept}; {again}\n"
+            f"  working  {in_words(sum(self.working.values()))}: {parts}"
+        )
+
+
+def tape_plan(scene: Scene, times: ArrayLike, solver: Solver | None = None, scenes: int = 1) -> TapePlan:
+    """What a gradient through `times` will cost, without running anything.
+
+    Args:
+        scene: is frozen by this.
+        times: (frames,) s on the substep grid: where the loss looks.
+        solver: its `memory` is the budget; `Solver()` by default.
+        scenes: batch size; a batch goes eight scenes to a vector, one vector per thread at a time.
+
+    Raises:
+        InputError: times off the grid; a budget below the least that works.
+    """
+    solver = solver or Solver()
+    if not isinstance(scenes, int) or scenes < 1:
+        raise InputError("scenes", "must be a positive whole number", scenes, "give the size of the batch, at least 1")
+    steps = substeps(times, solver.h)
+    with budget(solver):
+        plan = solver.core(scene.compiled).tape_plan(steps, scenes, solver.budget)
+    return as_plan(plan, solver)
+
+
+def as_plan(plan: _core.TapePlan, solver: Solver) -> TapePlan:
+    """The core's plan in the package's words."""
+    names = ("inputs", "frames", "plan", "forward", "reverse", "heap")
+    working = {name: getattr(plan, name) for name in names}
+    return TapePlan(plan.steps, plan.states, plan.tape, working, plan.recomputed, solver.budget, plan.least)
+
+
+@contextmanager
+def budget(solver: Solver) -> Iterator[None]:
+    """Turns the core's refusal of a budget into the package's error."""
+    try:
+        yield
+    except _core.BudgetTooSmall as error:
+        raise InputError(
+            "solver.memory",
+            f"is too small for this gradient, which needs {least_in_words(error.needed)} even when it keeps the fewest "
+            "states",
+            solver.memory,
+            f'give at least memory = "{least_in_words(error.needed)}", ask for fewer frames at a time, or leave it out',
+        ) from error

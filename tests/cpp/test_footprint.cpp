@@ -1,0 +1,105 @@
+// The bytes that a gradient is said to need against those that it allocates: this program counts every allocation.
+#include <algorithm>
+#include <cstdlib>
+#include <new>
+
+#include "adjoint/tape_plan.h"
+#include "core/scalar/dual.h"
+#include "tests/cpp/support/programs.h"
+
+namespace {
+std::size_t live = 0, peak = 0;
+
+// The size stands in front of what is handed out.
+void* counted(std::size_t size, std::size_t alignment) {
+  char* block = static_cast<char*>(std::aligned_alloc(alignment, (size + 2 * alignment - 1) / alignment * alignment));
+  if (!block) throw std::bad_alloc();
+  char* p = block + alignment;
+  new (p - sizeof(std::size_t)) std::size_t(size);
+  live += size;
+  peak = std::max(peak, live);
+  return p;
+}
+
+void release(void* p, std::size_t alignment) {
+  if (!p) return;
+  char* given = static_cast<char*>(p);
+  live -= *reinterpret_cast<std::size_t*>(given - sizeof(std::size_t));
+  std::free(given - alignment);
+}
+
+constexpr std::size_t ordinary = alignof(std::max_align_t);
+}  // namespace
+
+void* operator new(std::size_t size) { return counted(size, ordinary); }
+void* operator new(std::size_t size, std::align_val_t a) { return counted(size, static_cast<std::size_t>(a)); }
+void operator delete(void* p) noexcept { release(p, ordinary); }
+void operator delete(void* p, std::size_t) noexcept { release(p, ordinary); }
+void operator delete(void* p, std::align_val_t a) noexcept { release(p, static_cast<std::size_t>(a)); }
+void operator delete(void* p, std::size_t, std::align_val_t a) noexcept { release(p, static_cast<std::size_t>(a)); }
+
+namespace sheetbend::testing {
+namespace {
+
+struct Footprint : ::testing::TestWithParam<Solver> {};
+INSTANTIATE_TEST_SUITE_P(, Footprint, all_solvers, solver_name);
+
+// What `run` has allocated at its highest.
+template <class Run>
+double peak_of(Run&& run) {
+  const std::size_t before = peak = live;
+  run();
+  return static_cast<double>(peak - before);
+}
+
+// Bookkeeping (lists of lists, padding to whole packs) is not counted: a few kilobytes.
+template <class T>
+void expect_footprint(const Scene& scene, const Plan& plan, const std::vector<T>& inputs) {
+  const auto agrees = [](double found, std::size_t told) {
+    EXPECT_NEAR(found, static_cast<double>(told), 6144.0 + 0.02 * static_cast<double>(told));
+  };
+  agrees(peak_of([&] {
+           Rollout<T> rollout(scene, plan, inputs.data());
+           rollout.advance();
+         }),
+         rollout_bytes<T>(scene, plan));
+  const Inputs<const T> in{scene.layout, inputs.data()};
+  std::vector<T> v(scene.dofs()), v_before(scene.dofs()), inputs_bar(inputs.size());
+  const T* x = in.of(Quantity::position);
+  agrees(peak_of([&] {
+           StateReverse<T> reverse(scene, plan);
+           reverse.step(
+               1, in, 0.0, {x, x, v.data(), v_before.data()}, [](int, T*) {},
+               Inputs<T>{scene.layout, inputs_bar.data()});
+         }),
+         reverse_bytes<T>(scene, plan) - 2 * sizeof(T) * scene.dofs());
+}
+
+TEST_P(Footprint, IsWhatIsAllocated) {
+  const Sample sample = random_scene(77, {.net = GetParam().net});
+  const Plan plan = make_plan(sample.scene, GetParam().options(3));
+  expect_footprint<double>(sample.scene, plan, sample.inputs);
+  expect_footprint<Pack>(sample.scene, plan, {sample.inputs.begin(), sample.inputs.end()});
+  expect_footprint<Dual<double, 1>>(sample.scene, plan, {sample.inputs.begin(), sample.inputs.end()});
+}
+
+TEST_P(Footprint, KeepsToTheBudget) {
+  const Sample sample = random_scene(78, {.net = GetParam().net});
+  const Plan plan = make_plan(sample.scene, GetParam().options(2));
+  const TapePlan whole = plan_tape<double>(sample.scene, plan, 500, 3, 1, no_budget);
+  EXPECT_EQ(whole.states, 500);
+  EXPECT_EQ(whole.recomputed, 0);
+  for (const double share : {0.0, 0.1, 0.5, 1.0}) {
+    const auto budget = whole.least + static_cast<std::size_t>(share * (whole.working() + whole.tape - whole.least));
+    const TapePlan p = plan_tape<double>(sample.scene, plan, 500, 3, 1, budget);
+    EXPECT_LE(p.working() + p.tape, budget);
+    EXPECT_EQ(p.recomputed == 0, share == 1.0);
+  }
+  EXPECT_THROW(plan_tape<double>(sample.scene, plan, 500, 3, 1, whole.least - 1), BudgetTooSmall);
+  const TapePlan batch = plan_tape<Pack>(sample.scene, plan, 500, 3, 20, no_budget);
+  EXPECT_EQ(batch.lanes, 8);
+  EXPECT_EQ(batch.at_once, 1);
+}
+
+}  // namespace
+}  // namespace sheetbend::testing
