@@ -37,24 +37,25 @@ std::size_t factor_bytes(const Plan& plan) {
   return bytes;
 }
 
-inline std::size_t row_bytes(const PackPlan& plan) {
-  return sizeof(double) * sheetbend_packs::row * static_cast<std::size_t>(plan.rows());
+template <class T>
+std::size_t row_bytes(const PackPlan& plan) {
+  return sizeof(T) * sheetbend_packs::row * static_cast<std::size_t>(plan.rows());
 }
 
 template <class T>
 std::size_t substep_bytes(const Scene& scene, const Plan& plan, bool keeps_iterations) {
   const std::size_t rows = scene.rows, kept = keeps_iterations ? plan.options.iterations : 1;
-  std::size_t bytes = sizeof(T) * (scene.nodes() + 3 * rows);
-  if (!in_packs<T> || plan.colors.empty()) {
+  std::size_t bytes = sizeof(T) * ((scene.has_drag ? 2 : 1) * static_cast<std::size_t>(scene.nodes()) + 3 * rows);
+  if (!sweeps_packs<T>(plan)) {
     const std::size_t gradients = plan.blocks.empty() ? 0 : scene.gradient_entries;
     return bytes + kept * (sizeof(T) * (scene.stencil_coordinates + 2 * rows + gradients) + factor_bytes<T>(plan));
   }
   for (const PackedColor& color : plan.packs.colors) {
     const std::size_t own =
         color.value_count() + color.rows * (color.damped ? 2 : 1) + (keeps_iterations ? kept * color.record_size() : 0);
-    bytes += sizeof(Pack) * color.packs * own;
+    if constexpr (in_packs<T>) bytes += sizeof(Pack) * color.packs<T>() * own;
   }
-  return bytes + row_bytes(plan.packs);
+  return bytes + row_bytes<T>(plan.packs);
 }
 
 template <class T>
@@ -65,12 +66,13 @@ std::size_t rollout_bytes(const Scene& scene, const Plan& plan) {
 template <class T>
 std::size_t reverse_bytes(const Scene& scene, const Plan& plan) {
   const std::size_t dofs = scene.dofs(), rows = scene.rows, nodes = scene.nodes();
-  // Cotangents, the two states recomputed and two velocities; then ReverseScratch.
-  std::size_t bytes = sizeof(T) * (10 * dofs + 3 * dofs + scene.stencil_coordinates + 2 * rows + nodes);
+  // Cotangents, the two velocities and the coordinates recomputed; then ReverseScratch.
+  std::size_t bytes = sizeof(T) * (9 * dofs + rows);
+  if (!sweeps_packs<T>(plan)) return bytes + sizeof(T) * (3 * dofs + scene.stencil_coordinates + rows + nodes) + substep_bytes<T>(scene, plan, true);
   if constexpr (in_packs<T>) {
     for (const PackedColor& color : plan.packs.colors)
-      bytes += sizeof(Pack) * color.packs * (2 + color.parameters + color.rows * (color.damped ? 2 : 1));
-    if (!plan.colors.empty()) bytes += row_bytes(plan.packs);
+      bytes += sizeof(Pack) * color.packs<T>() * (2 + color.parameters + color.rows * (color.damped ? 2 : 1));
+    bytes += row_bytes<T>(plan.packs);
   }
   return bytes + substep_bytes<T>(scene, plan, true);
 }

@@ -16,7 +16,7 @@ class StateReverse {
 
   StateReverse(const Scene& scene, const Plan& plan)
       : scene_(scene), plan_(plan), record_(whole(scene, plan)), scratch_(scene, plan) {
-    for (auto* buffer : {&x_next_bar, &v_next_bar, &x_bar_, &v_bar_, &x_before_bar_, &v_before_bar_, &q_, &v_out_})
+    for (auto* buffer : {&x_next_bar, &v_next_bar, &x_bar_, &v_bar_, &x_before_bar_, &v_before_bar_, &q_})
       buffer->resize(scene.dofs());
   }
 
@@ -26,7 +26,7 @@ class StateReverse {
             const Inputs<T>& in_bar) {
     const Bdf bdf = Bdf::at(plan_.options, n);
     seed(n, x_bar_.data());
-    substep(scene_, plan_, in, bdf, t_next, states, q_.data(), v_out_.data(), record_);
+    correct(scene_, plan_, in, bdf, t_next, states, q_.data(), record_);
     substep_vjp(scene_, plan_, in, bdf, t_next, states, record_, x_next_bar.data(), v_next_bar.data(), scratch_,
                 {x_bar_.data(), x_before_bar_.data(), v_bar_.data(), v_before_bar_.data()}, in_bar);
     shift(x_next_bar, x_bar_, x_before_bar_);
@@ -52,7 +52,7 @@ class StateReverse {
 
   const Scene& scene_;
   const Plan& plan_;
-  std::vector<T> x_bar_, v_bar_, x_before_bar_, v_before_bar_, q_, v_out_;
+  std::vector<T> x_bar_, v_bar_, x_before_bar_, v_before_bar_, q_;
   SubstepRecord<T> record_;
   ReverseScratch<T> scratch_;
 };

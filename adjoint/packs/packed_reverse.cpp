@@ -10,9 +10,9 @@ namespace {
 void clear(std::vector<Pack>& v) { std::fill(v.begin(), v.end(), Pack(0.0)); }
 
 template <class T>
-void load_cotangents(const Scene& scene, const PackPlan& plan, const T* x_bar, PackCotangents<T>& bar) {
-  bar.rows.clear();
-  for (int n = 0; n < plan.nodes; ++n) Vec3<T>(x_bar + scene.first_dof[n]).store(bar.rows.at(n));
+void begin(const PackPlan& plan, PackCotangents<T>& bar) {
+  for (int n = 0; n < plan.nodes; ++n) bar.rows.at(n)[3] = T(0.0);
+  std::fill(bar.rows.at(plan.nodes), bar.rows.at(plan.rows()), T(0.0));
   for (auto& color : bar.colors) {
     clear(color.lambda);
     clear(color.C_r);
@@ -20,13 +20,9 @@ void load_cotangents(const Scene& scene, const PackPlan& plan, const T* x_bar, P
 }
 
 template <class T>
-void hand_on(const Scene& scene, const PackPlan& plan, PackCotangents<T>& bar, T* x_bar, T* w_bar, T* C_r_bar) {
-  for (int n = 0; n < plan.nodes; ++n) {
-    Vec3<T>(bar.rows.at(n)).store(x_bar + scene.first_dof[n]);
-    w_bar[n] += bar.rows.at(n)[3];
-  }
+void end(const Scene& scene, const PackPlan& plan, PackCotangents<T>& bar, T* C_r_bar) {
   for (std::size_t g = 0; g < plan.ghosts.size(); ++g)
-    Vec3<T>(bar.rows.at(plan.nodes + static_cast<int>(g))).add_to(x_bar + scene.first_dof[plan.ghosts[g]]);
+    Vec3<T>(bar.rows.at(plan.nodes + static_cast<int>(g))).add_to(bar.rows.at(plan.ghosts[g]));
   for (std::size_t c = 0; c < plan.colors.size(); ++c) {
     const PackedColor& color = plan.colors[c];
     if (!color.damped) continue;
@@ -55,11 +51,11 @@ void PackCotangents<T>::resize(const PackPlan& plan) {
 
 template <class T>
 void reverse_sweeps(const Scene& scene, const PackPlan& plan, const sheetbend_packs::KernelTable& kernels,
-                    int iterations, int threads, int grain, const Inputs<const T>& in, PackState<T>& state, T* x_bar,
-                    T* w_bar, T* C_r_bar, const Inputs<T>& in_bar, PackCotangents<T>& bar) {
+                    int iterations, int threads, int grain, const Inputs<const T>& in, PackState<T>& state,
+                    T* C_r_bar, const Inputs<T>& in_bar, PackCotangents<T>& bar) {
   if (bar.eta != state.eta) finish(scene, plan, in, in_bar, bar);
   bar.eta = state.eta;
-  load_cotangents(scene, plan, x_bar, bar);
+  begin(plan, bar);
   for (int iteration = iterations - 1; iteration >= 0; --iteration)
     for (int c = static_cast<int>(plan.colors.size()) - 1; c >= 0; --c) {
       const PackedColor& color = plan.colors[c];
@@ -75,7 +71,7 @@ void reverse_sweeps(const Scene& scene, const PackPlan& plan, const sheetbend_pa
                                              color.damped ? numbers(own.C_r) : nullptr};
       run_kernel(kernels.project_vjp[layout_of<T>][color.kind], reverse, color.packs<T>(), threads, grain);
     }
-  hand_on(scene, plan, bar, x_bar, w_bar, C_r_bar);
+  end(scene, plan, bar, C_r_bar);
 }
 
 template <class T>
@@ -102,8 +98,7 @@ void finish(const Scene& scene, const PackPlan& plan, const Inputs<const T>& in,
 #define SHEETBEND_INSTANTIATE(T)                                                                                     \
   template struct PackCotangents<T>;                                                                                 \
   template void reverse_sweeps<T>(const Scene&, const PackPlan&, const sheetbend_packs::KernelTable&, int, int, int, \
-                                  const Inputs<const T>&, PackState<T>&, T*, T*, T*, const Inputs<T>&,               \
-                                  PackCotangents<T>&);                                                               \
+                                  const Inputs<const T>&, PackState<T>&, T*, const Inputs<T>&, PackCotangents<T>&);  \
   template void finish<T>(const Scene&, const PackPlan&, const Inputs<const T>&, const Inputs<T>&, PackCotangents<T>&);
 SHEETBEND_INSTANTIATE(double)
 SHEETBEND_INSTANTIATE(Pack)

@@ -18,12 +18,12 @@ struct PackCotangents {
   void resize(const PackPlan& plan);
 };
 
-// Reverses all iterations that `state` recorded. x_bar (dofs) is that of the coordinates after them, and becomes that of those before, fixed
-// nodes included; w_bar (nodes) and C_r_bar (rows of the scene) are added to.
+// Reverses all iterations that `state` recorded. The nodes' rows of `bar` hold the cotangents of the coordinates after them, and then of those
+// before, with those of the inverse masses in the fourth place; C_r_bar (rows of the scene) is added to.
 template <class T>
 void reverse_sweeps(const Scene& scene, const PackPlan& plan, const sheetbend_packs::KernelTable& kernels,
-                    int iterations, int threads, int grain, const Inputs<const T>& in, PackState<T>& state, T* x_bar,
-                    T* w_bar, T* C_r_bar, const Inputs<T>& in_bar, PackCotangents<T>& bar);
+                    int iterations, int threads, int grain, const Inputs<const T>& in, PackState<T>& state,
+                    T* C_r_bar, const Inputs<T>& in_bar, PackCotangents<T>& bar);
 
 // Adds the gathered cotangents of the constraints' values to those of the inputs, and forgets them.
 template <class T>

@@ -62,17 +62,11 @@ PackPlan pack_colors(const Scene& scene, const std::vector<Color>& colors) {
   for (const Color& color : colors) {
     const Group& group = scene.groups[color.group];
     const int count = static_cast<int>(color.items.size());
-    PackedColor p{.kind = group.kind,
-                  .group = color.group,
-                  .count = count,
-                  .rows = group.rows,
-                  .arity = group.arity,
-                  .parameters = group.parameters,
-                  .damped = group.damped,
-                  .items = color.items};
+    PackedColor p;
+    p.kind = group.kind, p.group = color.group, p.count = count, p.damped = group.damped, p.items = color.items;
     with_kind(group.kind, [&]<class K>(K) {
-      p.kept = Kept<K, double>::size;
-      p.unit_gradients = K::unit_gradients;
+      p.rows = K::rows, p.arity = K::arity, p.parameters = parameter_count<K>;
+      p.kept = Kept<K, double>::size, p.unit_gradients = K::unit_gradients;
     });
     p.items.resize((p.items.size() + lanes - 1) / lanes * lanes, color.items.back());
     p.nodes.resize(p.items.size() * group.arity);
@@ -111,8 +105,8 @@ void PackState<T>::resize(const PackPlan& plan, int kept_iterations) {
 }
 
 template <class T>
-void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const T>& in, double eta, const T* q,
-                  const T* w, const T* C_r, PackState<T>& state) {
+void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const T>& in, double eta, const T* w,
+                  const T* C_r, PackState<T>& state) {
   const bool fresh = state.eta != eta;
   for (std::size_t c = 0; c < plan.colors.size(); ++c) {
     const PackedColor& color = plan.colors[c];
@@ -127,9 +121,8 @@ void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const T
       });
   }
   state.eta = eta;
-  for (int n = 0; n < plan.nodes; ++n) Vec3<T>(q + scene.first_dof[n]).store(state.rows.at(n));
   for (std::size_t g = 0; g < plan.ghosts.size(); ++g)
-    Vec3<T>(q + scene.first_dof[plan.ghosts[g]]).store(state.rows.at(plan.nodes + static_cast<int>(g)));
+    Vec3<T>(state.rows.at(plan.ghosts[g])).store(state.rows.at(plan.nodes + static_cast<int>(g)));
 }
 
 template <class T>
@@ -149,11 +142,6 @@ void sweep(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, in
 }
 
 template <class T>
-void end_sweeps(const Scene& scene, const PackPlan& plan, PackState<T>& state, T* q) {
-  for (int n = 0; n < plan.nodes; ++n) Vec3<T>(state.rows.at(n)).store(q + scene.first_dof[n]);
-}
-
-template <class T>
 void unpack_multipliers(const Scene& scene, const PackPlan& plan, PackState<T>& state, T* lambda) {
   for (std::size_t c = 0; c < plan.colors.size(); ++c) {
     const PackedColor& color = plan.colors[c];
@@ -167,9 +155,8 @@ void unpack_multipliers(const Scene& scene, const PackPlan& plan, PackState<T>& 
 #define SHEETBEND_INSTANTIATE(T)                                                                                   \
   template struct PackState<T>;                                                                                    \
   template void begin_sweeps<T>(const Scene&, const PackPlan&, const Inputs<const T>&, double, const T*, const T*, \
-                                const T*, PackState<T>&);                                                          \
+                                PackState<T>&);                                                                    \
   template void sweep<T>(const PackPlan&, const sheetbend_packs::KernelTable&, int, int, int, PackState<T>&);      \
-  template void end_sweeps<T>(const Scene&, const PackPlan&, PackState<T>&, T*);                                   \
   template void unpack_multipliers<T>(const Scene&, const PackPlan&, PackState<T>&, T*);
 SHEETBEND_INSTANTIATE(double)
 SHEETBEND_INSTANTIATE(Pack)

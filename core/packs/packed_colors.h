@@ -107,20 +107,16 @@ struct PackState {
   void resize(const PackPlan& plan, int kept_iterations);
 };
 
-// Fills values for eta (nothing to do when they are there and no drag changes w: one state serves one vector of inputs), rows from q (dofs),
-// weights from w (nodes), references from C_r (rows of the scene); clears the multipliers.
+// Fills values for eta (nothing to do when they are there and no drag changes w: one state serves one vector of inputs), weights from w
+// (nodes), references from C_r (rows of the scene), the rows of uses of fixed nodes from the nodes' own; clears the multipliers.
 template <class T>
-void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const T>& in, double eta, const T* q,
-                  const T* w, const T* C_r, PackState<T>& state);
+void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const T>& in, double eta, const T* w,
+                  const T* C_r, PackState<T>& state);
 
 // One pass over all colors; keeps what the reverse needs where `state` has records.
 template <class T>
 void sweep(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, int threads, int grain, int iteration,
            PackState<T>& state);
-
-// Writes q of the nodes.
-template <class T>
-void end_sweeps(const Scene& scene, const PackPlan& plan, PackState<T>& state, T* q);
 
 // Writes the multipliers in the scene's order, (rows).
 template <class T>

@@ -92,6 +92,8 @@ Scene build_scene(const SceneSpec& spec) {
   for (const int n : spec.pinned) s.role[n] = Role::pinned;
   for (const int n : spec.driven) s.role[n] = Role::driven;
   s.driven = spec.driven;
+  for (int n = 0; n < s.nodes(); ++n)
+    if (s.role[n] == Role::pinned) s.pinned.push_back(n);
   s.driven_slot = slots(spec.driven, s.nodes(), "driven");
   s.loaded = spec.loaded;
   s.loaded_slot = slots(spec.loaded, s.nodes(), "loaded");

@@ -39,6 +39,12 @@ struct Plan {
   std::vector<DirectBlock> blocks;
 };
 
+// Whether this plan's constraints go through the kernels of core/packs.
+template <class T>
+bool sweeps_packs(const Plan& plan) {
+  return in_packs<T> && !plan.colors.empty();
+}
+
 Plan make_plan(const Scene& scene, const SolverOptions& options);
 
 }  // namespace sheetbend

@@ -48,14 +48,15 @@ class Rollout {
 
   void advance() {
     const Bdf bdf = Bdf::at(plan_.options, step_);
-    substep(scene_, plan_, in_, bdf, time(step_ + 1), {x_.data(), x_before_.data(), v_.data(), v_before_.data()},
-            x_next_.data(), v_next_.data(), record_);
+    const bool finite =
+        substep(scene_, plan_, in_, bdf, time(step_ + 1), {x_.data(), x_before_.data(), v_.data(), v_before_.data()},
+                x_next_.data(), v_next_.data(), record_);
     ++step_;
     std::swap(x_before_, x_);
     std::swap(x_, x_next_);
     std::swap(v_before_, v_);
     std::swap(v_, v_next_);
-    check_finite();
+    if (!finite) throw_diverged();
   }
 
   // Goes on from another state, at `step`.
@@ -83,17 +84,14 @@ class Rollout {
   // The last substep's multipliers (rows); zero before the first.
   const T* multipliers() {
     if constexpr (in_packs<T>)
-      if (!plan_.colors.empty()) unpack_multipliers(scene_, plan_.packs, record_.packs, record_.lambda.data());
+      if (sweeps_packs<T>(plan_)) unpack_multipliers(scene_, plan_.packs, record_.packs, record_.lambda.data());
     return record_.lambda.data();
   }
 
   double time(int step) const { return t0_ + step * plan_.options.h; }
 
  private:
-  void check_finite() const {
-    bool finite = true;
-    for (const T& a : x_) finite &= all_finite(a);
-    if (finite) return;
+  void throw_diverged() const {
     for (int n = 0; n < scene_.nodes(); ++n)
       for (int d = 0; d < scene_.dim[n]; ++d)
         if (!all_finite(x_[scene_.first_dof[n] + d])) throw Diverged(step_, n, time(step_));

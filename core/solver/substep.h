@@ -2,96 +2,40 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 
+#include "core/solver/predict.h"
 #include "core/solver/project_block.h"
 
 namespace sheetbend {
 
-// The states that a substep reads and the one it writes.
-template <class T>
-struct SubstepStates {
-  const T *x, *x_before, *v, *v_before;  // at n and n-1 (n-1 unused by BDF1)
-};
-
 template <class T>
 struct SubstepRecord {
   std::vector<IterationRecord<T>> iterations;
-  std::vector<T> w, C_r,
-      lambda;  // effective inverse masses, damping references, multipliers (those of packed colors stay in `packs`)
-  std::vector<T> rows;  // right sides and solutions of direct blocks
+  Weights<T> weights;
+  std::vector<T> C_r, lambda;  // damping references, multipliers (those of packed colors stay in `packs`)
+  std::vector<T> rows;         // right sides and solutions of direct blocks
   PackState<std::conditional_t<in_packs<T>, T, double>> packs;  // of colors that go through the kernels
 
   void resize(const Scene& scene, const Plan& plan, bool keep_iterations) {
     iterations.resize(keep_iterations ? plan.options.iterations : 1);
-    if (!in_packs<T> || plan.colors.empty())
+    if (!sweeps_packs<T>(plan))
       for (auto& i : iterations) i.resize(scene, plan);
-    w.resize(scene.nodes());
+    weights.w.resize(scene.nodes());
+    if (scene.has_drag) weights.kept.resize(scene.nodes());
     C_r.resize(scene.rows);
     lambda.resize(scene.rows);
     rows.resize(scene.rows);
     if constexpr (in_packs<T>) packs.resize(plan.packs, keep_iterations ? plan.options.iterations : 0);
   }
-};
 
-template <class T>
-T history(const Bdf& bdf, const T& now, const T& before) {
-  return bdf.before == 0.0 ? now : T(bdf.now) * now + T(bdf.before) * before;
-}
-
-// Value of something given at knots, (knots, slots, 3), for one slot.
-template <class T>
-Vec3<T> at_knots(const KnotWeights& k, const T* values, int slots, int slot) {
-  Vec3<T> sum;
-  for (int i = 0; i < k.count; ++i)
-    sum = sum + T(k.weight[i]) * Vec3<T>(values + 3 * ((static_cast<std::size_t>(k.first) + i) * slots + slot));
-  return sum;
-}
-
-// The speed that quadratic drag is linearized at.
-template <class T>
-Vec3<T> extrapolated_velocity(const Bdf& bdf, const SubstepStates<T>& s, int dof) {
-  return T(bdf.extrapolate_now) * Vec3<T>(s.v + dof) + T(bdf.extrapolate_before) * Vec3<T>(s.v_before + dof);
-}
-
-// x* = history(x) + eta v*, (m + eta c) v* = m history(v) + eta (m gravity + f), c = c1 + c2 |v|. Drag is implicit: it adds eta c to the mass
-// that this substep's projections see, so the reaction of the constraints feels it too. Driven nodes go where their boundary is.
-template <class T>
-void predict(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, double t_next, const SubstepStates<T>& s,
-             T* q, T* w) {
-  const T* mass = in.of(Quantity::mass);
-  const Vec3<T> gravity(in.of(Quantity::gravity));
-  const KnotWeights boundary = scene.driven.empty() ? KnotWeights{} : scene.boundary.at(t_next);
-  const KnotWeights force = scene.loaded.empty() ? KnotWeights{} : scene.force.at(t_next);
-  const T eta(bdf.eta);
-  for (int n = 0; n < scene.nodes(); ++n) {
-    const int dof = scene.first_dof[n];
-    if (scene.role[n] == Role::pinned) {
-      w[n] = T(0.0);
-      Vec3<T>(s.x + dof).store(q + dof);
-      continue;
-    }
-    if (scene.role[n] == Role::driven) {
-      w[n] = T(0.0);
-      at_knots(boundary, in.of(Quantity::boundary), static_cast<int>(scene.driven.size()), scene.driven_slot[n])
-          .store(q + dof);
-      continue;
-    }
-    T m_eff = mass[n];
-    if (scene.has_drag) {
-      const Vec3<T> v = extrapolated_velocity(bdf, s, dof);
-      m_eff += eta * (in.of(Quantity::drag_linear)[n] + in.of(Quantity::drag_quadratic)[n] * sqrt_or_zero(dot(v, v)));
-    }
-    w[n] = T(1.0) / m_eff;
-    Vec3<T> f = mass[n] * gravity;
-    if (scene.loaded_slot[n] >= 0)
-      f = f + at_knots(force, in.of(Quantity::force), static_cast<int>(scene.loaded.size()), scene.loaded_slot[n]);
-    for (int d = 0; d < 3; ++d) {
-      const T fd = d == 0 ? f.x : d == 1 ? f.y : f.z;
-      const T momentum = mass[n] * history(bdf, s.v[dof + d], s.v_before[dof + d]) + eta * fd;
-      q[dof + d] = history(bdf, s.x[dof + d], s.x_before[dof + d]) + eta * (w[n] * momentum);
-    }
+  // Where the coordinates are while they are corrected: in the kernels' rows, or in q.
+  Coordinates<T> coordinates(const Plan& plan, T* q) {
+    if constexpr (in_packs<T>)
+      if (sweeps_packs<T>(plan)) return {packs.rows.at(0), sheetbend_packs::row};
+    return {q, 3};
   }
-}
+};
 
 // C_r = C(x_n) for BDF1, (4 C(x_n) - C(x_{n-1}))/3 for BDF2 (angles kept on one branch).
 template <class T>
@@ -117,19 +61,20 @@ void damping_references(const Scene& scene, const Inputs<const T>& in, const Bdf
   }
 }
 
-// All iterations, on q.
+// All iterations.
 template <class T>
 void project(const Scene& scene, const Plan& plan, const Inputs<const T>& in, double eta, T* q,
              SubstepRecord<T>& record) {
   const SolverOptions& o = plan.options;
   if constexpr (in_packs<T>)
-    if (!plan.colors.empty()) {
-      begin_sweeps(scene, plan.packs, in, eta, q, record.w.data(), record.C_r.data(), record.packs);
+    if (sweeps_packs<T>(plan)) {
+      begin_sweeps(scene, plan.packs, in, eta, record.weights.w.data(), record.C_r.data(), record.packs);
       for (int iteration = 0; iteration < o.iterations; ++iteration)
         sweep(plan.packs, pack_kernels(), o.threads, o.grain, iteration, record.packs);
-      return end_sweeps(scene, plan.packs, record.packs, q);
+      return;
     }
-  const SubstepState<T> state{scene, in, eta, q, record.w.data(), record.C_r.data(), record.lambda.data()};
+  std::fill(record.lambda.begin(), record.lambda.end(), T(0.0));
+  const SubstepState<T> state{scene, in, eta, q, record.weights.w.data(), record.C_r.data(), record.lambda.data()};
   for (int iteration = 0; iteration < o.iterations; ++iteration) {
     IterationRecord<T>& kept = record.iterations[record.iterations.size() == 1 ? 0 : iteration];
     parallel_for(static_cast<int>(plan.blocks.size()), o.threads, 1, [&](int begin, int end) {
@@ -139,15 +84,42 @@ void project(const Scene& scene, const Plan& plan, const Inputs<const T>& in, do
   }
 }
 
-// Steps from n to n+1, writing q (x_{n+1}) and v. The record holds every iteration when it was sized so, the last one otherwise.
+// What the reverse repeats of a substep: everything but the velocity. The record holds every iteration when it was sized so, the last one
+// otherwise; q (dofs) is used where the coordinates are not in the record.
 template <class T>
-void substep(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf, double t_next,
-             const SubstepStates<T>& s, T* q, T* v, SubstepRecord<T>& record) {
-  predict(scene, in, bdf, t_next, s, q, record.w.data());
+void correct(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf, double t_next,
+             const SubstepStates<T>& s, T* q, SubstepRecord<T>& record) {
+  weigh(scene, in, bdf, s, record.weights);
+  predict(scene, in, bdf, t_next, s, record.weights, plan.options.threads, record.coordinates(plan, q));
   damping_references(scene, in, bdf, s, record.C_r.data());
-  std::fill(record.lambda.begin(), record.lambda.end(), T(0.0));
   project(scene, plan, in, bdf.eta, q, record);
-  for (int i = 0; i < scene.dofs(); ++i) v[i] = (q[i] - history(bdf, s.x[i], s.x_before[i])) * T(1.0 / bdf.eta);
+}
+
+// v = (q - history(x))/eta, and q to x_next. Says whether all of q is finite.
+template <class T>
+bool read_off(const Scene& scene, const Bdf& bdf, const SubstepStates<T>& s, int threads, const Coordinates<T>& q,
+              T* x_next, T* v) {
+  std::atomic<bool> finite = true;
+  parallel_for(scene.nodes(), threads, points_per_thread, [&](int begin, int end) {
+    T difference[4] = {T(0.0), T(0.0), T(0.0), T(0.0)};  // q - q, which only what is finite has as zero
+    for_each_point<T>(begin, end, [&](int n, auto how) {
+      const int dof = scene.first_dof[n];
+      const auto now = how.load(q.of(n));
+      how.store(x_next + dof, now);
+      how.store(v + dof, scaled(T(1.0 / bdf.eta), now - history(bdf, how, s.x + dof, s.x_before + dof)));
+      how.store(difference, how.load(difference) + (now - now));
+    });
+    if (!all_finite(difference[0]) || !all_finite(difference[1]) || !all_finite(difference[2])) finite = false;
+  });
+  return finite;
+}
+
+// Steps from n to n+1, writing x_next and v. Says whether the state is finite.
+template <class T>
+bool substep(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf, double t_next,
+             const SubstepStates<T>& s, T* x_next, T* v, SubstepRecord<T>& record) {
+  correct(scene, plan, in, bdf, t_next, s, x_next, record);
+  return read_off(scene, bdf, s, plan.options.threads, record.coordinates(plan, x_next), x_next, v);
 }
 
 }  // namespace sheetbend

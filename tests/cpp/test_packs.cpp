@@ -31,9 +31,10 @@ struct Packs : ::testing::TestWithParam<bool> {
   Forward forward(const sheetbend_packs::KernelTable& kernels, int threads) const {
     Forward f{q, std::vector<double>(scene.rows), {}};
     f.state.resize(plan.packs, plan.options.iterations);
-    begin_sweeps(scene, plan.packs, in, eta, q.data(), w.data(), C_r.data(), f.state);
+    for (int n = 0; n < scene.nodes(); ++n) Vec3<double>(&q[scene.first_dof[n]]).store(f.state.rows.at(n));
+    begin_sweeps(scene, plan.packs, in, eta, w.data(), C_r.data(), f.state);
     for (int i = 0; i < plan.options.iterations; ++i) sweep(plan.packs, kernels, threads, 1, i, f.state);
-    end_sweeps(scene, plan.packs, f.state, f.q.data());
+    for (int n = 0; n < scene.nodes(); ++n) Vec3<double>(f.state.rows.at(n)).store(&f.q[scene.first_dof[n]]);
     unpack_multipliers(scene, plan.packs, f.state, f.lambda.data());
     return f;
   }
@@ -47,8 +48,12 @@ struct Packs : ::testing::TestWithParam<bool> {
     all.resize(scene.dofs() + scene.nodes() + scene.rows + scene.layout.total());
     double *w_bar = &all[scene.dofs()], *C_r_bar = w_bar + scene.nodes();
     const Inputs<double> in_bar{scene.layout, C_r_bar + scene.rows};
-    reverse_sweeps(scene, plan.packs, kernels, plan.options.iterations, threads, 1, in, f.state, all.data(), w_bar,
-                   C_r_bar, in_bar, bar);
+    for (int n = 0; n < scene.nodes(); ++n) Vec3<double>(&x_bar[scene.first_dof[n]]).store(bar.rows.at(n));
+    reverse_sweeps(scene, plan.packs, kernels, plan.options.iterations, threads, 1, in, f.state, C_r_bar, in_bar, bar);
+    for (int n = 0; n < scene.nodes(); ++n) {
+      Vec3<double>(bar.rows.at(n)).store(&all[scene.first_dof[n]]);
+      w_bar[n] = bar.rows.at(n)[3];
+    }
     finish(scene, plan.packs, in, in_bar, bar);
     return all;
   }
