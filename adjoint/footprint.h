@@ -52,7 +52,8 @@ std::size_t substep_bytes(const Scene& scene, const Plan& plan, bool keeps_itera
   for (const PackedColor& color : plan.packs.colors) {
     const std::size_t own =
         color.value_count() + color.rows * (color.damped ? 2 : 1) + (keeps_iterations ? kept * color.record_size() : 0);
-    bytes += sizeof(Pack) * color.packs * own;
+    bytes += sizeof(Pack) * color.packs * own + sizeof(PackState::ColorState);
+    if (keeps_iterations) bytes += kept * sizeof(std::vector<Pack>);
   }
   return bytes + row_bytes(plan.packs);
 }
@@ -65,11 +66,13 @@ std::size_t rollout_bytes(const Scene& scene, const Plan& plan) {
 template <class T>
 std::size_t reverse_bytes(const Scene& scene, const Plan& plan) {
   const std::size_t dofs = scene.dofs(), rows = scene.rows, nodes = scene.nodes();
-  // Cotangents, the two states recomputed and two velocities; then ReverseScratch.
-  std::size_t bytes = sizeof(T) * (10 * dofs + 3 * dofs + scene.stencil_coordinates + 2 * rows + nodes);
+  // Cotangents, what the substep writes, velocities; then ReverseScratch.
+  const std::size_t states = 6 + 2 + (plan.options.integrator == Integrator::bdf1 ? 1 : 2) + 3;
+  std::size_t bytes = sizeof(T) * (states * dofs + scene.stencil_coordinates + 2 * rows + nodes);
   if constexpr (in_packs<T>) {
     for (const PackedColor& color : plan.packs.colors)
-      bytes += sizeof(Pack) * color.packs * (2 + color.parameters + color.rows * (color.damped ? 2 : 1));
+      bytes += sizeof(Pack) * color.packs * (2 + color.parameters + color.rows * (color.damped ? 2 : 1)) +
+               sizeof(PackCotangents::ColorCotangents);
     if (!plan.colors.empty()) bytes += row_bytes(plan.packs);
   }
   return bytes + substep_bytes<T>(scene, plan, true);

@@ -74,7 +74,7 @@ class Rollout {
   void run(int steps, Sink&& sink, Interrupt* interrupt = nullptr) {
     sink(0, x_.data(), v_.data());
     for (int n = 0; n < steps; ++n) {
-      if (interrupt && n % 64 == 0) interrupt->poll();
+      poll(interrupt, n, scene_.dofs());
       advance();
       sink(step_, x_.data(), v_.data());
     }
