@@ -45,15 +45,19 @@ std::size_t row_bytes(const PackPlan& plan) {
 template <class T>
 std::size_t substep_bytes(const Scene& scene, const Plan& plan, bool keeps_iterations) {
   const std::size_t rows = scene.rows, kept = keeps_iterations ? plan.options.iterations : 1;
-  std::size_t bytes = sizeof(T) * ((scene.has_drag ? 2 : 1) * static_cast<std::size_t>(scene.nodes()) + 3 * rows);
+  std::size_t bytes =
+      sizeof(T) * ((scene.has_drag ? 2 : 1) * static_cast<std::size_t>(scene.nodes()) + damped_rows(scene));
   if (!sweeps_packs<T>(plan)) {
+    bytes += 2 * sizeof(T) * rows;
     const std::size_t gradients = plan.blocks.empty() ? 0 : scene.gradient_entries;
     return bytes + kept * (sizeof(T) * (scene.stencil_coordinates + 2 * rows + gradients) + factor_bytes<T>(plan));
   }
   for (const PackedColor& color : plan.packs.colors) {
     const std::size_t own =
         color.value_count() + color.rows * (color.damped ? 2 : 1) + (keeps_iterations ? kept * color.record_size() : 0);
-    if constexpr (in_packs<T>) bytes += sizeof(Pack) * color.packs<T>() * own;
+    if constexpr (in_packs<T>)
+      bytes += sizeof(Pack) * color.packs<T>() * own + sizeof(typename PackState<T>::ColorState);
+    if (keeps_iterations) bytes += kept * sizeof(std::vector<Pack>);
   }
   return bytes + row_bytes<T>(plan.packs);
 }
@@ -66,12 +70,16 @@ std::size_t rollout_bytes(const Scene& scene, const Plan& plan) {
 template <class T>
 std::size_t reverse_bytes(const Scene& scene, const Plan& plan) {
   const std::size_t dofs = scene.dofs(), rows = scene.rows, nodes = scene.nodes();
-  // Cotangents, the two velocities and the coordinates recomputed; then ReverseScratch.
-  std::size_t bytes = sizeof(T) * (9 * dofs + rows);
-  if (!sweeps_packs<T>(plan)) return bytes + sizeof(T) * (3 * dofs + scene.stencil_coordinates + rows + nodes) + substep_bytes<T>(scene, plan, true);
+  // Cotangents, velocities, where the coordinates are corrected; then ReverseScratch.
+  const std::size_t states = 6 + (plan.options.integrator == Integrator::bdf1 ? 1 : 2);
+  std::size_t bytes = sizeof(T) * (states * dofs + damped_rows(scene));
+  if (!sweeps_packs<T>(plan))
+    return bytes + sizeof(T) * (4 * dofs + scene.stencil_coordinates + rows + nodes) +
+           substep_bytes<T>(scene, plan, true);
   if constexpr (in_packs<T>) {
     for (const PackedColor& color : plan.packs.colors)
-      bytes += sizeof(Pack) * color.packs<T>() * (2 + color.parameters + color.rows * (color.damped ? 2 : 1));
+      bytes += sizeof(Pack) * color.packs<T>() * (2 + color.parameters + color.rows * (color.damped ? 2 : 1)) +
+               sizeof(typename PackCotangents<T>::ColorCotangents);
     bytes += row_bytes<T>(plan.packs);
   }
   return bytes + substep_bytes<T>(scene, plan, true);

@@ -49,13 +49,12 @@ void project_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const
     bar.w[node] += dot(Vec3<T>(block_wide.u + dof), Vec3<T>(block_wide.z + dof));
   }
   for_each_member([&]<class K>(const Placed<K, T>& e, const T*, const Group& group, const Member& m) {
-    T z[K::dofs], u[K::dofs], v[K::rows * K::dofs], x_bar[K::dofs]{};
+    T z[K::dofs], u[K::dofs], x_bar[K::dofs]{};
     gather_free(s, e, block_wide.z, z);
     gather_free(s, e, block_wide.u, u);
     ElementCotangent<K, T> own;
-    directions(e, &record.dl[e.first_row], y + m.first_row, z, u, v);
     pull_back<K>(e, Kept<K, T>(e.x), &record.lambda[e.first_row], e.references(s, group), &record.dl[e.first_row],
-                 y + m.first_row, v, u, x_bar, own);
+                 y + m.first_row, z, u, x_bar, own);
     add_element(s, group, m.item, own, bar);
     add_cotangent(s, e, first_coordinate<K>(group, m.item), x_bar, bar);
   });

@@ -98,7 +98,7 @@ void rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t
     tape.forget_after(a.from);
     forward->restart(a.from, state(a.from));
     for (int n = a.from + 1; n <= a.to; ++n) {
-      if (interrupt && n % 64 == 0) interrupt->poll();
+      poll(interrupt, n, scene.dofs());
       forward->advance();
       if (n >= a.keep) tape.record(n, forward->x());
       ++recomputed;
@@ -113,7 +113,7 @@ void rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t
       continue;
     }
     const int n = std::get<Reverse>(*action).step;
-    if (interrupt && n % 64 == 0) interrupt->poll();
+    poll(interrupt, n, scene.dofs());
     reverse.step(n, in, t0 + (n + 1) * plan.options.h, state(n), seed, in_bar);
   }
   reverse.finish(in, in_bar);

@@ -14,7 +14,7 @@ struct ReverseScratch {
   PackCotangents<std::conditional_t<in_packs<T>, T, double>> packs;
 
   ReverseScratch(const Scene& scene, const Plan& plan)
-      : C_r(scene.rows) {
+      : C_r(damped_rows(scene)) {
     if (sweeps_packs<T>(plan)) {
       if constexpr (in_packs<T>) packs.resize(plan.packs);
       return;

@@ -23,68 +23,68 @@ struct ElementCotangent {
   T lambda[K::rows]{}, C_r[K::rows]{};
 };
 
-// The second derivatives along v (rows of dofs), added to x_bar and to bar.p, with C and J at the point. By the constraint's own geometry,
-// otherwise by one evaluation on dual numbers.
+// What does not need second derivatives: C and J dx are the constraint's row j.
 template <class K, class T>
-void second_order(const Element<K, T>& e, const Kept<K, T>& at, const T* v, const T* y, T* C, T* J, T* x_bar,
-                  ElementCotangent<K, T>& bar) {
+void pull_back_rates(const Element<K, T>& e, const T* lambda, const T* C_r, const T* dl, const T* y, int j, const T& C,
+                     const T& J_dx, ElementCotangent<K, T>& bar) {
+  const T s_bar = -(y[j] * e.rates.scale);
+  bar.a += s_bar * (lambda[j] + dl[j]);
+  bar.lambda[j] += e.rates.a * s_bar;
+  if (!C_r) return;
+  bar.g += s_bar * (difference<K>(C, C_r[j]) + J_dx);
+  bar.C_r[j] -= e.rates.g * s_bar;
+}
+
+// Everything after the solve; z and u = J^T dl are the block's, on the element's stencil. Adds Hess(C_j) v_j to x_bar. The second derivatives
+// are the constraint's own geometry's, otherwise one evaluation on dual numbers. `alone`: a block of one with unit gradients. There
+// Hess(C) W J^T = 0, so that of v = W (dl z - y u) the first part is enough.
+template <bool alone = false, class K, class T>
+void pull_back(const Element<K, T>& e, const Kept<K, T>& at, const T* lambda, const T* C_r, const T* dl, const T* y,
+               const T* z, const T* u, T* x_bar, ElementCotangent<K, T>& bar) {
   constexpr int P = parameter_count<K>;
+  const auto v = [&](int j, int d) {
+    if constexpr (alone)
+      return dl[j] * (e.w[d / 3] * z[d]);
+    else
+      return e.w[d / 3] * (dl[j] * z[d] - y[j] * u[d]);
+  };
   if constexpr (HasGeometry<K>) {
-    at.values(e.p, C);
-    at.gradient(J);
-    at.add_hessian_times(v, x_bar);
+    T C[1], J_dx(0.0), along[K::dofs];
+    unrolled<K::dofs>([&](int d) { along[d] = v(0, d); });
+    at.add_hessian_times(along, x_bar);
+    if (C_r) {
+      T J[K::dofs];
+      at.values(e.p, C);
+      at.gradient(J);
+      for (int d = 0; d < K::dofs; ++d) J_dx += J[d] * e.w[d / 3] * u[d];
+    }
+    pull_back_rates(e, lambda, C_r, dl, y, 0, C[0], J_dx, bar);
     for (int k = 0; k < P; ++k) bar.p[k] += y[k];  // C = f(x) - p
   } else {
     using D = Dual<T, K::rows + P>;
-    D x[K::dofs], p[P > 0 ? P : 1], C_dual[K::rows], J_dual[K::rows * K::dofs];
+    D x[K::dofs], p[P > 0 ? P : 1], C[K::rows], J[K::rows * K::dofs];
     for (int d = 0; d < K::dofs; ++d) {
       x[d].v = at.x[d];
-      for (int j = 0; j < K::rows; ++j) x[d].d[j] = v[j * K::dofs + d];
+      for (int j = 0; j < K::rows; ++j) x[d].d[j] = v(j, d);
     }
     for (int k = 0; k < P; ++k) {
       p[k].v = e.p[k];
       p[k].d[K::rows + k] = T(1.0);
     }
-    K::evaluate(x, p, C_dual, J_dual);
+    K::evaluate(x, p, C, J);
     for (int j = 0; j < K::rows; ++j) {
-      C[j] = C_dual[j].v;
-      for (int d = 0; d < K::dofs; ++d) {
-        J[j * K::dofs + d] = J_dual[j * K::dofs + d].v;
-        x_bar[d] += J_dual[j * K::dofs + d].d[j];
-      }
+      T J_dx(0.0);
+      if (C_r)
+        for (int d = 0; d < K::dofs; ++d) J_dx += J[j * K::dofs + d].v * e.w[d / 3] * u[d];
+      pull_back_rates(e, lambda, C_r, dl, y, j, C[j].v, J_dx, bar);
+      for (int d = 0; d < K::dofs; ++d) x_bar[d] += J[j * K::dofs + d].d[j];
       for (int k = 0; k < P; ++k) {
-        T p_bar = -(y[j] * C_dual[j].d[K::rows + k]);
-        for (int d = 0; d < K::dofs; ++d) p_bar += v[j * K::dofs + d] * J_dual[j * K::dofs + d].d[K::rows + k];
+        T p_bar = -(y[j] * C[j].d[K::rows + k]);
+        for (int d = 0; d < K::dofs; ++d) p_bar += x[d].d[j] * J[j * K::dofs + d].d[K::rows + k];
         bar.p[k] += p_bar;
       }
     }
   }
-}
-
-// Everything after the solve; v holds the directions, u = J^T dl is the block's, on the element's stencil. Adds Hess(C_j) v_j to x_bar.
-template <class K, class T>
-void pull_back(const Element<K, T>& e, const Kept<K, T>& at, const T* lambda, const T* C_r, const T* dl, const T* y,
-               const T* v, const T* u, T* x_bar, ElementCotangent<K, T>& bar) {
-  T C[K::rows], J[K::rows * K::dofs];
-  second_order(e, at, v, y, C, J, x_bar, bar);
-  for (int j = 0; j < K::rows; ++j) {
-    const T s_bar = -(y[j] * e.rates.scale);
-    bar.a += s_bar * (lambda[j] + dl[j]);
-    bar.lambda[j] += e.rates.a * s_bar;
-    if (C_r) {
-      T J_dx(0.0);
-      for (int d = 0; d < K::dofs; ++d) J_dx += J[j * K::dofs + d] * e.w[d / 3] * u[d];
-      bar.g += s_bar * (difference<K>(C[j], C_r[j]) + J_dx);
-      bar.C_r[j] -= e.rates.g * s_bar;
-    }
-  }
-}
-
-// v_j = W (dl_j z - y_j u).
-template <class K, class T>
-void directions(const Element<K, T>& e, const T* dl, const T* y, const T* z, const T* u, T* v) {
-  for (int j = 0; j < K::rows; ++j)
-    for (int d = 0; d < K::dofs; ++d) v[j * K::dofs + d] = e.w[d / 3] * (dl[j] * z[d] - y[j] * u[d]);
 }
 
 // y = lambda'_bar + J W x'_bar.
@@ -101,16 +101,15 @@ void adjoint_right_side(const Element<K, T>& e, const T* J, const T* lambda_bar,
 template <class K, class T>
 void correction_vjp(const Element<K, T>& e, const Kept<K, T>& at, const T* lambda, const T* C_r, const T* dl,
                     const T* lambda_bar, T* x_bar, T* w_bar, ElementCotangent<K, T>& bar) {
-  T J[K::rows * K::dofs], y[K::rows], u[K::dofs], back[K::dofs], v[K::rows * K::dofs];
+  T J[K::rows * K::dofs], y[K::rows], z[K::dofs], u[K::dofs], back[K::dofs];
   if constexpr (HasGeometry<K>) {
     at.gradient(J);
   } else {
     T C[K::rows];
     K::evaluate(at.x, e.p, C, J);
   }
-  transpose_times<K>(J, dl, u);
   if constexpr (K::unit_gradients) {
-    // Hess(C) W J^T = 0, so of v = dl W (x'_bar - 2 y J^T) the first part is enough, and |J_k| = 1
+    // |J_k| = 1; and since Hess(C) W J^T = 0, z may be x'_bar itself
     T along[K::arity];
     y[0] = lambda_bar[0];
     unrolled<K::arity>([&](int k) {
@@ -119,19 +118,19 @@ void correction_vjp(const Element<K, T>& e, const Kept<K, T>& at, const T* lambd
     });
     e.solve(J, y);
     unrolled<K::arity>([&](int k) { w_bar[k] = dl[0] * (along[k] - y[0]); });
-    unrolled<K::dofs>([&](int d) { v[d] = dl[0] * (e.w[d / 3] * x_bar[d]); });
+    transpose_times<K>(J, dl, u);
     transpose_times<K>(J, y, back);
+    unrolled<K::dofs>([&](int d) { z[d] = x_bar[d]; });
   } else {
     adjoint_right_side(e, J, lambda_bar, x_bar, y);
     e.solve(J, y);
+    transpose_times<K>(J, dl, u);
     transpose_times<K>(J, y, back);
-    T z[K::dofs];
     for (int d = 0; d < K::dofs; ++d) z[d] = x_bar[d] - back[d];
     for (int k = 0; k < K::arity; ++k) w_bar[k] = dot(Vec3<T>(u + 3 * k), Vec3<T>(z + 3 * k));
-    directions(e, dl, y, z, u, v);
   }
   unrolled<K::dofs>([&](int d) { x_bar[d] = -back[d]; });
-  pull_back(e, at, lambda, C_r, dl, y, v, u, x_bar, bar);
+  pull_back<K::unit_gradients>(e, at, lambda, C_r, dl, y, z, u, x_bar, bar);
 }
 
 }  // namespace sheetbend

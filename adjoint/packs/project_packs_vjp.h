@@ -7,7 +7,7 @@
 namespace sheetbend {
 
 template <class K, Layout layout, class Damped>
-[[SHEETBEND_FLATTEN]] void project_range_vjp(const sheetbend_packs::Reverse& r, Damped damped, int begin, int end) {
+inline __attribute__((always_inline)) void project_range_vjp(const sheetbend_packs::Reverse& r, Damped damped, int begin, int end) {
   const auto gather = [&](long n)
                           __attribute__((always_inline)) { return GatheredStencil<K, layout>(r.rows_bar, r.nodes, n, true); };
   const auto reverse = [&](long n, const GatheredStencil<K, layout>& now) __attribute__((always_inline)) {
@@ -38,7 +38,7 @@ template <class K, Layout layout, class Damped>
 }
 
 template <class K, Layout layout>
-void project_packs_vjp(const sheetbend_packs::Reverse& r, int begin, int end) {
+[[SHEETBEND_FLATTEN]] void project_packs_vjp(const sheetbend_packs::Reverse& r, int begin, int end) {
   with_damped<K>(r.C_r != nullptr, [&](auto damped) { project_range_vjp<K, layout>(r, damped, begin, end); });
 }
 

@@ -40,13 +40,12 @@ inline constexpr int parameter_count = static_cast<int>(K::parameters.size());
 template <class K>
 concept HasGeometry = requires { K::template Geometry<double>::size; };
 
-// What a projection leaves for its reverse: the constraint's own geometry, otherwise the coordinates.
+// What a projection leaves for its reverse: the constraint's own geometry, otherwise the coordinates (where they are).
 template <class K, class T>
 struct Kept {
   static constexpr int size = K::dofs;
-  T x[K::dofs];
-  explicit Kept(const T* from) { std::copy_n(from, K::dofs, x); }
-  void keep(T* to) const { std::copy_n(x, K::dofs, to); }
+  const T* x;
+  explicit Kept(const T* from) : x(from) {}
   static Kept kept(const T* from) { return Kept(from); }
 };
 template <HasGeometry K, class T>
@@ -65,21 +64,25 @@ struct Evaluation {
   T C[K::rows];
   T J[K::rows * K::dofs];
   Evaluation(const T* x, const T* p) { K::evaluate(x, p, C, J); }
-  void gradient(T* out) const { std::copy_n(J, K::rows * K::dofs, out); }
 };
 
-// The same with what the reverse keeps; a constraint's own geometry stands for its gradient too.
+// C, and J or the geometry that it comes from.
 template <class K, class T>
 struct Linearization : Evaluation<K, T> {
-  Kept<K, T> at;
-  Linearization(const T* x, const T* p) : Evaluation<K, T>(x, p), at(x) {}
+  using Evaluation<K, T>::Evaluation;
+  void keep(const T* x, T* to) const { std::copy_n(x, K::dofs, to); }
+  const T* gradient(T*) const { return this->J; }
 };
 template <HasGeometry K, class T>
 struct Linearization<K, T> {
   Kept<K, T> at;
   T C[K::rows];
   Linearization(const T* x, const T* p) : at(x) { at.values(p, C); }
-  void gradient(T* out) const { at.gradient(out); }
+  void keep(const T*, T* to) const { at.keep(to); }
+  const T* gradient(T* scratch) const {
+    at.gradient(scratch);
+    return scratch;
+  }
 };
 
 // a - b, for angles the short way round.

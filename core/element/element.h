@@ -77,8 +77,8 @@ struct Correction {
   T dl[K::rows], push[K::dofs];
 
   Correction(const Element<K, T>& e, const Linearization<K, T>& value, const T* lambda, const T* C_r) {
-    T J[K::rows * K::dofs];
-    value.gradient(J);
+    T scratch[K::rows * K::dofs];
+    const T* J = value.gradient(scratch);
     for (int j = 0; j < K::rows; ++j) dl[j] = -(e.residual(value.C, lambda, C_r, j) * e.rates.scale);
     e.solve(J, dl);
     transpose_times<K>(J, dl, push);

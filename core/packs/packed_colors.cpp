@@ -100,7 +100,8 @@ void PackState<T>::resize(const PackPlan& plan, int kept_iterations) {
     colors[c].values.assign(packs * color.value_count(), Pack(0.0));
     colors[c].lambda.assign(packs * color.rows, Pack(0.0));
     colors[c].C_r.assign(color.damped ? packs * color.rows : 0, Pack(0.0));
-    colors[c].records.assign(kept_iterations, std::vector<Pack>(packs * color.record_size(), Pack(0.0)));
+    colors[c].records.resize(kept_iterations);
+    for (auto& record : colors[c].records) record.assign(packs * color.record_size(), Pack(0.0));
   }
 }
 

@@ -71,7 +71,7 @@ struct GatheredStencil {
 };
 
 template <class K, Layout layout, class Damped>
-[[SHEETBEND_FLATTEN]] void project_range(const sheetbend_packs::Forward& f, Damped damped, int begin, int end) {
+inline __attribute__((always_inline)) void project_range(const sheetbend_packs::Forward& f, Damped damped, int begin, int end) {
   struct Evaluated : GatheredStencil<K, layout> {
     Linearization<K, Pack> value;
     Evaluated(const double* rows, const int* nodes, long n, const Pack* p)
@@ -87,7 +87,7 @@ template <class K, Layout layout, class Damped>
     Correction<K, Pack> correction(e, at.value, lambda, damped ? packs_at(f.C_r, n * K::rows) : nullptr);
     if (f.record) {
       Pack* to = packs_at(f.record, n * record_size<K>);
-      at.value.at.keep(to);
+      at.value.keep(at.x, to);
       for (int j = 0; j < K::rows; ++j) {
         to[Kept<K, Pack>::size + j] = lambda[j];
         to[Kept<K, Pack>::size + K::rows + j] = correction.dl[j];
@@ -105,7 +105,7 @@ template <class K, Layout layout, class Damped>
 // Calls f with whether the constraints are damped: as a constant for the hot kinds, those with a geometry of their own (the others would only
 // compile longer).
 template <class K, class F>
-void with_damped(bool damped, F&& f) {
+inline __attribute__((always_inline)) void with_damped(bool damped, F&& f) {
   if constexpr (HasGeometry<K>)
     damped ? f(std::true_type{}) : f(std::false_type{});
   else
@@ -113,7 +113,7 @@ void with_damped(bool damped, F&& f) {
 }
 
 template <class K, Layout layout>
-void project_packs(const sheetbend_packs::Forward& f, int begin, int end) {
+[[SHEETBEND_FLATTEN]] void project_packs(const sheetbend_packs::Forward& f, int begin, int end) {
   with_damped<K>(f.C_r != nullptr, [&](auto damped) { project_range<K, layout>(f, damped, begin, end); });
 }
 

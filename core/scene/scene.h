@@ -67,6 +67,13 @@ struct SceneSpec {
   std::vector<GroupSpec> groups;
 };
 
+// Rows whose damping needs a reference: all of them, or none.
+inline std::size_t damped_rows(const Scene& scene) {
+  for (const Group& group : scene.groups)
+    if (group.damped) return scene.rows;
+  return 0;
+}
+
 // Builds and validates the topology. Throws std::invalid_argument("field: what, got, fix").
 Scene build_scene(const SceneSpec& spec);
 

@@ -75,7 +75,7 @@ class Rollout {
   void run(int steps, Sink&& sink, Interrupt* interrupt = nullptr) {
     sink(0, x_.data(), v_.data());
     for (int n = 0; n < steps; ++n) {
-      if (interrupt && n % 64 == 0) interrupt->poll();
+      poll(interrupt, n, scene_.dofs());
       advance();
       sink(step_, x_.data(), v_.data());
     }
@@ -84,7 +84,10 @@ class Rollout {
   // The last substep's multipliers (rows); zero before the first.
   const T* multipliers() {
     if constexpr (in_packs<T>)
-      if (sweeps_packs<T>(plan_)) unpack_multipliers(scene_, plan_.packs, record_.packs, record_.lambda.data());
+      if (sweeps_packs<T>(plan_)) {
+        record_.lambda.resize(scene_.rows);
+        unpack_multipliers(scene_, plan_.packs, record_.packs, record_.lambda.data());
+      }
     return record_.lambda.data();
   }
 

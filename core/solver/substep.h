@@ -13,20 +13,22 @@ template <class T>
 struct SubstepRecord {
   std::vector<IterationRecord<T>> iterations;
   Weights<T> weights;
-  std::vector<T> C_r, lambda;  // damping references, multipliers (those of packed colors stay in `packs`)
-  std::vector<T> rows;         // right sides and solutions of direct blocks
-  PackState<std::conditional_t<in_packs<T>, T, double>> packs;  // of colors that go through the kernels
+  std::vector<T> C_r;           // damping references
+  std::vector<T> lambda, rows;  // multipliers; right sides and solutions of direct blocks
+  PackState<std::conditional_t<in_packs<T>, T, double>> packs;  // all of that where colors go through the kernels
 
   void resize(const Scene& scene, const Plan& plan, bool keep_iterations) {
-    iterations.resize(keep_iterations ? plan.options.iterations : 1);
-    if (!sweeps_packs<T>(plan))
-      for (auto& i : iterations) i.resize(scene, plan);
     weights.w.resize(scene.nodes());
     if (scene.has_drag) weights.kept.resize(scene.nodes());
-    C_r.resize(scene.rows);
+    C_r.resize(damped_rows(scene));
+    if (sweeps_packs<T>(plan)) {
+      if constexpr (in_packs<T>) packs.resize(plan.packs, keep_iterations ? plan.options.iterations : 0);
+      return;
+    }
+    iterations.resize(keep_iterations ? plan.options.iterations : 1);
+    for (auto& i : iterations) i.resize(scene, plan);
     lambda.resize(scene.rows);
     rows.resize(scene.rows);
-    if constexpr (in_packs<T>) packs.resize(plan.packs, keep_iterations ? plan.options.iterations : 0);
   }
 
   // Where the coordinates are while they are corrected: in the kernels' rows, or in q.

@@ -28,8 +28,9 @@ class Gradient:
         inputs: by input array, in its shape: "position", "velocity" (particles, 3), "mass" (particles,), "compliance",
             "damping" (constraints,), "rest" (all rest parameters,), "boundary", "force" (knots times particles, 3),
             "gravity" (3,), "drag_linear", "drag_quadratic" (particles,).
-        recomputed: substeps that the forward program ran again, and `tape` the bytes of the tape; both as planned.
-        tape: see above.
+        recomputed: substeps that the forward program ran again: as planned, or more where the same rollout was
+            differentiated before and its tape no longer holds what it held.
+        tape: bytes of the tape.
     """
 
     quantities: Mapping[str, float]
