@@ -61,7 +61,7 @@ void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, 
   gravity_bars.resize(chunks);
   parallel_for(chunks, threads, 1, [&](int first, int last) {
     for (int chunk = first; chunk < last; ++chunk) {
-      T sum[4] = {T(0.0), T(0.0), T(0.0), T(0.0)};
+      PointSum<T> sum;
       const int begin = chunk * points_per_thread, end = std::min(begin + points_per_thread, scene.nodes());
       for_each_point<T>(begin, end, [&](int n, auto how) {
         if (scene.role[n] != Role::free) return;
@@ -71,10 +71,10 @@ void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, 
         if (scene.has_drag) v_bar = scaled(weights.kept[n], v_bar);
         pull_back_history(bdf, how, x_bar, bar.x + dof, bar.x_before + dof);
         pull_back_history(bdf, how, v_bar, bar.v + dof, bar.v_before + dof);
-        how.store(sum, how.load(sum) + scaled(eta, v_bar));
+        sum.add(scaled(eta, v_bar));
         mass_bar[n] -= w[n] * w[n] * w_bar.of(n);
       });
-      gravity_bars[chunk] = Vec3<T>(sum);
+      gravity_bars[chunk] = sum.total();
     }
   });
   for (const Vec3<T>& sum : gravity_bars) sum.add_to(in_bar.of(Quantity::gravity));

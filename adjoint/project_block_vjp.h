@@ -53,7 +53,7 @@ void project_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const
     gather_free(s, e, block_wide.z, z);
     gather_free(s, e, block_wide.u, u);
     ElementCotangent<K, T> own;
-    pull_back<K>(e, Kept<K, T>(e.x), &record.lambda[e.first_row], e.references(s, group), &record.dl[e.first_row],
+    pull_back<false, K, T>(e, Kept<K, T>(e.x), &record.lambda[e.first_row], e.references(s, group), &record.dl[e.first_row],
                  y + m.first_row, z, u, x_bar, own);
     add_element(s, group, m.item, own, bar);
     add_cotangent(s, e, first_coordinate<K>(group, m.item), x_bar, bar);

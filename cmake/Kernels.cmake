@@ -15,15 +15,16 @@ foreach(variant IN LISTS variants)
     set(name x86-64-${variant})
     target_compile_options(sheetbend_kernels_${variant} PRIVATE -march=${name})
   endif()
-  # Inlined as a whole where a pack is one or two registers; with four, the compiler takes a minute longer for what old machines gain.
-  set(flatten)
-  if(variant MATCHES "v3|v4")
-    set(flatten gnu::flatten)
-  endif()
+  # Kernels are inlined as a whole: what is passed through memory costs more than what is computed. gcc's own limits stop short of that.
   if(NOT SHEETBEND_SANITIZE)
     target_compile_options(sheetbend_kernels_${variant} PRIVATE -O3)
+    if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+      foreach(limit max-inline-insns-auto max-inline-insns-single max-inline-insns-small large-function-growth
+                    inline-unit-growth large-unit-insns large-stack-frame large-stack-frame-growth)
+        target_compile_options(sheetbend_kernels_${variant} PRIVATE "SHELL:--param ${limit}=100000")
+      endforeach()
+    endif()
   endif()
-  target_compile_definitions(sheetbend_kernels_${variant} PRIVATE SHEETBEND_FLATTEN=${flatten})
   target_compile_definitions(sheetbend_kernels_${variant} PRIVATE sheetbend=sheetbend_${variant} SHEETBEND_VARIANT=${variant}
                                                           SHEETBEND_VARIANT_NAME="${name}")
   list(APPEND kernel_objects $<TARGET_OBJECTS:sheetbend_kernels_${variant}>)

@@ -61,7 +61,8 @@ void reverse_sweeps(const Scene& scene, const PackPlan& plan, const sheetbend_pa
       const PackedColor& color = plan.colors[c];
       typename PackState<T>::ColorState& primal = state.colors[c];
       typename PackCotangents<T>::ColorCotangents& own = bar.colors[c];
-      const sheetbend_packs::Reverse reverse{color.nodes.data(),
+      const sheetbend_packs::Reverse reverse{color.count,
+                                             color.nodes.data(),
                                              numbers(primal.values),
                                              color.damped ? numbers(primal.C_r) : nullptr,
                                              numbers(primal.records[iteration]),

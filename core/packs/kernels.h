@@ -23,6 +23,7 @@ constexpr int record_size(int kept, int rows) { return kept + 2 * rows; }
 
 // One color. Lanes come last everywhere: (packs, ..., 8).
 struct Forward {
+  int count;  // constraints; across a color the rest of the last pack repeats the last one
   const int* nodes;  // where the particles' rows begin
   double* rows;
   const double* values;  // (packs, value_count, 8): a, where damped g and 1/(1+g), the constraint's own parameters, the inverse of a matrix
@@ -33,6 +34,7 @@ struct Forward {
 };
 
 struct Reverse {
+  int count;
   const int* nodes;
   const double* values;
   const double* C_r;

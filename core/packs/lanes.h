@@ -1,5 +1,5 @@
-// Rows of particles to lanes and back: eight times [x, y, z, w] become four packs. Nodes are given as places of their first number.
-// Where the lanes are scenes, a row is four packs already.
+// What a kernel loads and stores: a register's lanes of a pack, and the rows of the particles there. Of packs across one color, the rows
+// [x, y, z, w] of as many particles as there are lanes become three or four registers, and back.
 #pragma once
 
 #include "core/packs/kernels.h"
@@ -7,42 +7,45 @@
 
 namespace sheetbend {
 
-inline Pack load(const double* from) { return *reinterpret_cast<const Pack*>(from); }
-inline void store(double* to, const Pack& p) { *reinterpret_cast<Pack*>(to) = p; }
+using Wide = Lanes<register_lanes>;
+inline constexpr int parts_per_pack = sheetbend_packs::lanes / register_lanes;
+
+// A kernel's place: part n % parts_per_pack of pack n / parts_per_pack.
+inline long pack_of(long n) { return n / parts_per_pack; }
+inline long lane_of(long n) { return n % parts_per_pack * register_lanes; }
+
+// The places of packs [0, packs): a color's last ones only where constraints are, so that none is projected twice.
+inline long places(sheetbend_packs::Layout layout, int packs, int count) {
+  const long all = static_cast<long>(packs) * parts_per_pack;
+  if (layout == sheetbend_packs::across_scenes) return all;
+  return std::min(all, (static_cast<long>(count) + register_lanes - 1) / register_lanes);
+}
+
+// The numbers of one place in an array (packs, count, 8).
+template <class T>
+class Strip {
+ public:
+  Strip(T* base, long n, int count) : data_(base + pack_of(n) * count * sheetbend_packs::lanes + lane_of(n)) {}
+  Wide operator[](int i) const { return *reinterpret_cast<const Wide*>(data_ + i * sheetbend_packs::lanes); }
+  void set(int i, const Wide& value) const { *reinterpret_cast<Wide*>(data_ + i * sheetbend_packs::lanes) = value; }
+  void add(int i, const Wide& value) const { set(i, (*this)[i] + value); }
+
+ private:
+  T* data_;
+};
 
 typedef double Row __attribute__((vector_size(32), may_alias));
 
 inline const Row& row_at(const double* rows, int place) { return *reinterpret_cast<const Row*>(rows + place); }
 inline Row& row_at(double* rows, int place) { return *reinterpret_cast<Row*>(rows + place); }
 
-template <sheetbend_packs::Layout>
-struct Particles;
-
-template <>
-struct Particles<sheetbend_packs::across_scenes> {
-  const int* nodes;
-  Particles(const int* all, long n, int arity)
-      : nodes(all + n / sheetbend_packs::lanes * arity * sheetbend_packs::lanes + n % sheetbend_packs::lanes) {}
-  long place(int k) const { return static_cast<long>(nodes[k * sheetbend_packs::lanes]) * sheetbend_packs::lanes; }
-  void load_row(const double* rows, int k, Pack* x, Pack* w) const {
-    const Pack* from = reinterpret_cast<const Pack*>(rows + place(k));
-    for (int d = 0; d < 3; ++d) x[d] = from[d];
-    if (w) *w = from[3];
-  }
-  void store_row(double* rows, int k, const Pack* x, const Pack* w) const {
-    Pack* to = reinterpret_cast<Pack*>(rows + place(k));
-    for (int d = 0; d < 3; ++d) to[d] = x[d];
-    if (w) to[3] = *w;
-  }
-};
-
 #if defined(__AVX512F__)
 
-inline Pack::Vector two_rows(const double* rows, int low, int high) {
+inline Wide::Vector two_rows(const double* rows, int low, int high) {
   return __builtin_shufflevector(row_at(rows, low), row_at(rows, high), 0, 1, 2, 3, 4, 5, 6, 7);
 }
 
-inline void load_rows(const double* rows, const int* nodes, Pack& x, Pack& y, Pack& z, Pack& w) {
+inline void load_rows(const double* rows, const int* nodes, Wide& x, Wide& y, Wide& z, Wide& w) {
   // [a b] holds rows a and b; xy01: x0 x4 x1 x5, y0 y4 y1 y5 and so on
   const auto r04 = two_rows(rows, nodes[0], nodes[4]), r15 = two_rows(rows, nodes[1], nodes[5]);
   const auto r26 = two_rows(rows, nodes[2], nodes[6]), r37 = two_rows(rows, nodes[3], nodes[7]);
@@ -56,7 +59,7 @@ inline void load_rows(const double* rows, const int* nodes, Pack& x, Pack& y, Pa
   w.v[0] = __builtin_shufflevector(yw01, yw23, 2, 3, 10, 11, 6, 7, 14, 15);
 }
 
-inline void store_rows(double* rows, const int* nodes, const Pack& x, const Pack& y, const Pack& z, const Pack& w) {
+inline void store_rows(double* rows, const int* nodes, const Wide& x, const Wide& y, const Wide& z, const Wide& w) {
   const auto xy02 = __builtin_shufflevector(x.v[0], y.v[0], 0, 8, 2, 10, 4, 12, 6, 14);
   const auto xy13 = __builtin_shufflevector(x.v[0], y.v[0], 1, 9, 3, 11, 5, 13, 7, 15);
   const auto zw02 = __builtin_shufflevector(z.v[0], w.v[0], 0, 8, 2, 10, 4, 12, 6, 14);
@@ -65,7 +68,7 @@ inline void store_rows(double* rows, const int* nodes, const Pack& x, const Pack
   const auto r26 = __builtin_shufflevector(xy02, zw02, 2, 3, 10, 11, 6, 7, 14, 15);
   const auto r15 = __builtin_shufflevector(xy13, zw13, 0, 1, 8, 9, 4, 5, 12, 13);
   const auto r37 = __builtin_shufflevector(xy13, zw13, 2, 3, 10, 11, 6, 7, 14, 15);
-  const auto put = [&](int i, const Pack::Vector& two) {
+  const auto put = [&](int i, const Wide::Vector& two) {
     row_at(rows, nodes[i]) = __builtin_shufflevector(two, two, 0, 1, 2, 3);
     row_at(rows, nodes[i + 4]) = __builtin_shufflevector(two, two, 4, 5, 6, 7);
   };
@@ -75,7 +78,7 @@ inline void store_rows(double* rows, const int* nodes, const Pack& x, const Pack
   put(3, r37);
 }
 
-#else
+#elif defined(__AVX__)
 
 // The transpose of a 4 x 4 block, in place.
 inline void transpose(Row& a, Row& b, Row& c, Row& d) {
@@ -87,46 +90,90 @@ inline void transpose(Row& a, Row& b, Row& c, Row& d) {
   d = __builtin_shufflevector(ab1, cd1, 2, 3, 6, 7);
 }
 
-inline Row& half(Pack& p, int i) { return reinterpret_cast<Row*>(&p)[i]; }
-inline const Row& half(const Pack& p, int i) { return reinterpret_cast<const Row*>(&p)[i]; }
-
-inline void load_rows(const double* rows, const int* nodes, Pack& x, Pack& y, Pack& z, Pack& w) {
-  for (int h = 0; h < 2; ++h) {
-    const int* n = nodes + 4 * h;
-    Row a = row_at(rows, n[0]), b = row_at(rows, n[1]), c = row_at(rows, n[2]), d = row_at(rows, n[3]);
-    transpose(a, b, c, d);
-    half(x, h) = a;
-    half(y, h) = b;
-    half(z, h) = c;
-    half(w, h) = d;
-  }
+inline void load_rows(const double* rows, const int* nodes, Wide& x, Wide& y, Wide& z, Wide& w) {
+  Row a = row_at(rows, nodes[0]), b = row_at(rows, nodes[1]), c = row_at(rows, nodes[2]), d = row_at(rows, nodes[3]);
+  transpose(a, b, c, d);
+  x.v[0] = a, y.v[0] = b, z.v[0] = c, w.v[0] = d;
 }
 
-inline void store_rows(double* rows, const int* nodes, const Pack& x, const Pack& y, const Pack& z, const Pack& w) {
-  for (int h = 0; h < 2; ++h) {
-    const int* n = nodes + 4 * h;
-    Row a = half(x, h), b = half(y, h), c = half(z, h), d = half(w, h);
-    transpose(a, b, c, d);
-    row_at(rows, n[0]) = a;
-    row_at(rows, n[1]) = b;
-    row_at(rows, n[2]) = c;
-    row_at(rows, n[3]) = d;
-  }
+inline void store_rows(double* rows, const int* nodes, const Wide& x, const Wide& y, const Wide& z, const Wide& w) {
+  Row a = x.v[0], b = y.v[0], c = z.v[0], d = w.v[0];
+  transpose(a, b, c, d);
+  row_at(rows, nodes[0]) = a;
+  row_at(rows, nodes[1]) = b;
+  row_at(rows, nodes[2]) = c;
+  row_at(rows, nodes[3]) = d;
+}
+
+#else
+
+inline const Wide::Vector& pair_at(const double* rows, int place) {
+  return *reinterpret_cast<const Wide::Vector*>(rows + place);
+}
+inline Wide::Vector& pair_at(double* rows, int place) { return *reinterpret_cast<Wide::Vector*>(rows + place); }
+
+inline void load_rows(const double* rows, const int* nodes, Wide& x, Wide& y, Wide& z, Wide& w) {
+  const auto xy0 = pair_at(rows, nodes[0]), xy1 = pair_at(rows, nodes[1]);
+  const auto zw0 = pair_at(rows, nodes[0] + 2), zw1 = pair_at(rows, nodes[1] + 2);
+  x.v[0] = __builtin_shufflevector(xy0, xy1, 0, 2);
+  y.v[0] = __builtin_shufflevector(xy0, xy1, 1, 3);
+  z.v[0] = __builtin_shufflevector(zw0, zw1, 0, 2);
+  w.v[0] = __builtin_shufflevector(zw0, zw1, 1, 3);
+}
+
+inline void store_rows(double* rows, const int* nodes, const Wide& x, const Wide& y, const Wide& z, const Wide& w) {
+  pair_at(rows, nodes[0]) = __builtin_shufflevector(x.v[0], y.v[0], 0, 2);
+  pair_at(rows, nodes[1]) = __builtin_shufflevector(x.v[0], y.v[0], 1, 3);
+  pair_at(rows, nodes[0] + 2) = __builtin_shufflevector(z.v[0], w.v[0], 0, 2);
+  pair_at(rows, nodes[1] + 2) = __builtin_shufflevector(z.v[0], w.v[0], 1, 3);
 }
 
 #endif
 
+// The particles of one place; w, where given, is the fourth number of their rows.
+template <sheetbend_packs::Layout>
+class Particles;
+
 template <>
-struct Particles<sheetbend_packs::across_color> {
-  const int* nodes;
-  Particles(const int* all, long n, int arity) : nodes(all + n * arity * sheetbend_packs::lanes) {}
-  void load_row(const double* rows, int k, Pack* x, Pack* w) const {
-    Pack ignored;
-    load_rows(rows, nodes + k * sheetbend_packs::lanes, x[0], x[1], x[2], w ? *w : ignored);
+class Particles<sheetbend_packs::across_color> {
+ public:
+  Particles(const int* nodes, long n, int arity)
+      : nodes_(nodes + pack_of(n) * arity * sheetbend_packs::lanes + lane_of(n)) {}
+  void load(const double* rows, int k, Wide* x, Wide* w) const {
+    Wide ignored;
+    load_rows(rows, nodes_ + k * sheetbend_packs::lanes, x[0], x[1], x[2], w ? *w : ignored);
   }
-  void store_row(double* rows, int k, const Pack* x, const Pack* w) const {
-    store_rows(rows, nodes + k * sheetbend_packs::lanes, x[0], x[1], x[2], w ? *w : x[2]);
+  void store(double* rows, int k, const Wide* x, const Wide* w) const {
+    store_rows(rows, nodes_ + k * sheetbend_packs::lanes, x[0], x[1], x[2], w ? *w : x[2]);
   }
+
+ private:
+  const int* nodes_;
+};
+
+// Where the lanes are scenes, a row is four packs already; a pack's nodes stand in one lane of `nodes`.
+template <>
+class Particles<sheetbend_packs::across_scenes> {
+ public:
+  Particles(const int* nodes, long n, int arity)
+      : nodes_(nodes + pack_of(n) / sheetbend_packs::lanes * arity * sheetbend_packs::lanes +
+               pack_of(n) % sheetbend_packs::lanes),
+        lane_(lane_of(n)) {}
+  void load(const double* rows, int k, Wide* x, Wide* w) const {
+    for (int d = 0; d < 3; ++d) x[d] = *reinterpret_cast<const Wide*>(rows + place(k, d));
+    if (w) *w = *reinterpret_cast<const Wide*>(rows + place(k, 3));
+  }
+  void store(double* rows, int k, const Wide* x, const Wide* w) const {
+    for (int d = 0; d < 3; ++d) *reinterpret_cast<Wide*>(rows + place(k, d)) = x[d];
+    if (w) *reinterpret_cast<Wide*>(rows + place(k, 3)) = *w;
+  }
+
+ private:
+  long place(int k, int d) const {
+    return (static_cast<long>(nodes_[k * sheetbend_packs::lanes]) + d) * sheetbend_packs::lanes + lane_;
+  }
+  const int* nodes_;
+  long lane_;
 };
 
 }  // namespace sheetbend

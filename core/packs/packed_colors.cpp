@@ -132,7 +132,8 @@ void sweep(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, in
   for (std::size_t c = 0; c < plan.colors.size(); ++c) {
     const PackedColor& color = plan.colors[c];
     typename PackState<T>::ColorState& own = state.colors[c];
-    const sheetbend_packs::Forward forward{color.nodes.data(),
+    const sheetbend_packs::Forward forward{color.count,
+                                           color.nodes.data(),
                                            state.rows.data(),
                                            numbers(own.values),
                                            numbers(own.lambda),

@@ -1,5 +1,5 @@
-// The projection of eight constraints at a time: of one color, or of eight scenes. The lanes of a color's short last pack repeat its last
-// constraint: they compute and store the same numbers.
+// The projection of as many constraints at a time as a register has lanes: of one color, or of as many scenes. The lanes of a color's short last
+// pack repeat its last constraint: they compute and store the same numbers.
 #pragma once
 
 #include <type_traits>
@@ -14,44 +14,43 @@ namespace sheetbend {
 using sheetbend_packs::Layout;
 
 template <class K>
-inline constexpr int record_size = sheetbend_packs::record_size(Kept<K, Pack>::size, K::rows);
+inline constexpr int record_size = sheetbend_packs::record_size(Kept<K, Wide>::size, K::rows);
 
 template <class K>
 constexpr int value_count(bool damped) {
   return sheetbend_packs::value_count(damped, parameter_count<K>, K::unit_gradients, K::arity);
 }
 
-inline const Pack* packs_at(const double* from, long pack) { return reinterpret_cast<const Pack*>(from) + pack; }
-inline Pack* packs_at(double* from, long pack) { return reinterpret_cast<Pack*>(from) + pack; }
-
-// The numbers of pack n in the order that kernels.h gives: the constraint's own parameters, and the rest.
+// The numbers of place n in the order that kernels.h gives: the constraint's own parameters, and the rest.
 template <class K>
-const Pack* parameters_of(const double* values, bool damped, long n) {
-  return packs_at(values, n * value_count<K>(damped) + (damped ? 3 : 1));
+void load_parameters(const double* values, bool damped, long n, Wide* p) {
+  const Strip from(values, n, value_count<K>(damped));
+  for (int k = 0; k < parameter_count<K>; ++k) p[k] = from[(damped ? 3 : 1) + k];
 }
 
 template <class K>
-void load_values(const double* values, bool damped, long n, Element<K, Pack>& e) {
-  const Pack* from = packs_at(values, n * value_count<K>(damped));
-  e.rates.a = *from++;
+void load_values(const double* values, bool damped, long n, Element<K, Wide>& e) {
+  const Strip from(values, n, value_count<K>(damped));
+  int next = 0;
+  e.rates.a = from[next++];
   if (damped) {
-    e.rates.g = *from++;
-    e.rates.scale = *from++;
+    e.rates.g = from[next++];
+    e.rates.scale = from[next++];
   }
-  for (int k = 0; k < parameter_count<K>; ++k) e.p[k] = *from++;
-  if constexpr (K::unit_gradients) e.inverse = *from++;
-  for (int k = 0; k < K::arity; ++k) e.w[k] = *from++;
+  for (int k = 0; k < parameter_count<K>; ++k) e.p[k] = from[next++];
+  if constexpr (K::unit_gradients) e.inverse = from[next++];
+  for (int k = 0; k < K::arity; ++k) e.w[k] = from[next++];
 }
 
-// Runs second(n, first(n)) for every n, the first of the next pack before the second of this one where registers allow: what takes long in
-// the first (square roots, divisions) then overlaps the loads and stores around it. Packs of one color share nothing.
+// Runs second(n, first(n)) for every n. With registers to spare, the first of the next place comes before the second of this one: what takes
+// long in the first (square roots, divisions) then overlaps the loads and stores around it. Places of one color share no particle.
 template <class First, class Second>
 inline __attribute__((always_inline)) void overlapped(long begin, long end, First&& first, Second&& second) {
   if (begin >= end) return;
-  if constexpr (Pack::pieces == 1) {
+  if constexpr (register_lanes == 8) {
     auto now = first(begin);
     for (long n = begin; n + 1 < end; ++n) {
-      auto next = first(n + 1);
+      auto next = first(n + 1);  // not const: gcc keeps const aggregates in memory
       second(n, now);
       now = next;
     }
@@ -63,41 +62,55 @@ inline __attribute__((always_inline)) void overlapped(long begin, long end, Firs
 
 template <class K, Layout layout>
 struct GatheredStencil {
-  Pack x[K::dofs], w[K::arity];
+  Wide x[K::dofs], w[K::arity];
   GatheredStencil(const double* rows, const int* nodes, long n, bool with_w) {
     const Particles<layout> particles(nodes, n, K::arity);
-    unrolled<K::arity>([&](int k) { particles.load_row(rows, k, x + 3 * k, with_w ? w + k : nullptr); });
+    unrolled<K::arity>([&](int k) { particles.load(rows, k, x + 3 * k, with_w ? w + k : nullptr); });
   }
 };
 
+template <class K>
+struct LoadedParameters {
+  Wide p[parameter_count<K> > 0 ? parameter_count<K> : 1];
+  LoadedParameters(const double* values, bool damped, long n) { load_parameters<K>(values, damped, n, p); }
+};
+
 template <class K, Layout layout, class Damped>
-inline __attribute__((always_inline)) void project_range(const sheetbend_packs::Forward& f, Damped damped, int begin, int end) {
+inline __attribute__((always_inline)) void project_range(const sheetbend_packs::Forward& f, Damped damped, long begin,
+                                                         long end) {
   struct Evaluated : GatheredStencil<K, layout> {
-    Linearization<K, Pack> value;
-    Evaluated(const double* rows, const int* nodes, long n, const Pack* p)
+    Linearization<K, Wide> value;
+    Evaluated(const double* rows, const int* nodes, long n, const Wide* p)
         : GatheredStencil<K, layout>(rows, nodes, n, false), value(this->x, p) {}
   };
   const auto evaluate = [&](long n) __attribute__((always_inline)) {
-    return Evaluated(f.rows, f.nodes, n, parameters_of<K>(f.values, damped, n));
+    return Evaluated(f.rows, f.nodes, n, LoadedParameters<K>(f.values, damped, n).p);
   };
   const auto correct = [&](long n, const Evaluated& at) __attribute__((always_inline)) {
-    Element<K, Pack> e;
+    Element<K, Wide> e;
     load_values(f.values, damped, n, e);
-    Pack* lambda = packs_at(f.lambda, n * K::rows);
-    Correction<K, Pack> correction(e, at.value, lambda, damped ? packs_at(f.C_r, n * K::rows) : nullptr);
+    const Strip multipliers(f.lambda, n, K::rows);
+    Wide lambda[K::rows], C_r[K::rows];
+    for (int j = 0; j < K::rows; ++j) lambda[j] = multipliers[j];
+    if (damped)
+      for (int j = 0; j < K::rows; ++j) C_r[j] = Strip(f.C_r, n, K::rows)[j];
+    Correction<K, Wide> correction(e, at.value, lambda, damped ? C_r : nullptr);
     if (f.record) {
-      Pack* to = packs_at(f.record, n * record_size<K>);
-      at.value.keep(at.x, to);
+      const Strip to(f.record, n, record_size<K>);
+      constexpr int kept = Kept<K, Wide>::size;
+      Wide numbers[kept];
+      at.value.keep(at.x, numbers);
+      unrolled<kept>([&](int i) { to.set(i, numbers[i]); });
       for (int j = 0; j < K::rows; ++j) {
-        to[Kept<K, Pack>::size + j] = lambda[j];
-        to[Kept<K, Pack>::size + K::rows + j] = correction.dl[j];
+        to.set(kept + j, lambda[j]);
+        to.set(kept + K::rows + j, correction.dl[j]);
       }
     }
-    for (int j = 0; j < K::rows; ++j) lambda[j] += correction.dl[j];
+    for (int j = 0; j < K::rows; ++j) multipliers.set(j, lambda[j] + correction.dl[j]);
     const Particles<layout> particles(f.nodes, n, K::arity);
-    Pack moved[K::dofs];
+    Wide moved[K::dofs];
     unrolled<K::dofs>([&](int d) { moved[d] = at.x[d] + e.w[d / 3] * correction.push[d]; });
-    unrolled<K::arity>([&](int k) { particles.store_row(f.rows, k, moved + 3 * k, nullptr); });
+    unrolled<K::arity>([&](int k) { particles.store(f.rows, k, moved + 3 * k, nullptr); });
   };
   overlapped(begin, end, evaluate, correct);
 }
@@ -113,8 +126,10 @@ inline __attribute__((always_inline)) void with_damped(bool damped, F&& f) {
 }
 
 template <class K, Layout layout>
-[[SHEETBEND_FLATTEN]] void project_packs(const sheetbend_packs::Forward& f, int begin, int end) {
-  with_damped<K>(f.C_r != nullptr, [&](auto damped) { project_range<K, layout>(f, damped, begin, end); });
+void project_packs(const sheetbend_packs::Forward& f, int begin, int end) {
+  with_damped<K>(f.C_r != nullptr, [&](auto damped) {
+    project_range<K, layout>(f, damped, places(layout, begin, f.count), places(layout, end, f.count));
+  });
 }
 
 }  // namespace sheetbend

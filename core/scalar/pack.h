@@ -1,21 +1,28 @@
-// Pack: eight doubles that go through a kernel together, one scene (or window, or start) per lane. Arithmetic, square roots and
-// divisions are IEEE, so each lane has the bits that the scalar code would give. Transcendentals call the scalar function per lane.
+// Lanes<N>: N doubles that go through a kernel together. A Pack of eight holds one scene (or window, or start) per lane, or eight constraints;
+// the kernels work on as many lanes as one register has. Arithmetic, square roots and divisions are IEEE, so each lane has the bits that the
+// scalar code would give. Transcendentals call the scalar function per lane.
 #pragma once
+
+#include <algorithm>
 
 #include "core/scalar/scalar.h"
 
 namespace sheetbend {
 
-// Its pieces are as wide as a register of the instruction set that is compiled for: compilers take wider vectors apart badly.
-struct alignas(64) Pack {  // laid out the same on every instruction set
-  static constexpr int lanes = 8;
+// Doubles in a register of the instruction set that is compiled for.
 #if defined(__AVX512F__)
-  static constexpr int width = 8;
+inline constexpr int register_lanes = 8;
 #elif defined(__AVX__)
-  static constexpr int width = 4;
+inline constexpr int register_lanes = 4;
 #else
-  static constexpr int width = 2;
+inline constexpr int register_lanes = 2;
 #endif
+
+// Its pieces are registers: compilers take wider vectors apart badly. It is laid out the same on every instruction set.
+template <int N>
+struct alignas(8 * N) Lanes {
+  static constexpr int lanes = N;
+  static constexpr int width = std::min(N, register_lanes);
   static constexpr int pieces = lanes / width;
   typedef double Vector __attribute__((vector_size(8 * width), may_alias));
   typedef long long Bits __attribute__((vector_size(8 * width)));
@@ -25,91 +32,102 @@ struct alignas(64) Pack {  // laid out the same on every instruction set
   };
 
   Vector v[pieces];
-  Pack() = default;  // without a value, as a double: arrays of packs need no loop that clears them
-  Pack(double a) {
+  Lanes() = default;  // without a value, as a double: arrays of them need no loop that clears them
+  Lanes(double a) {
     for (Vector& piece : v) piece = a - Vector{};
   }
   double operator[](int lane) const { return v[lane / width][lane % width]; }
   void set(int lane, double a) { v[lane / width][lane % width] = a; }
 
-  Pack& operator+=(const Pack& b) { return *this = *this + b; }
-  Pack& operator-=(const Pack& b) { return *this = *this - b; }
-  Pack& operator*=(const Pack& b) { return *this = *this * b; }
+  Lanes& operator+=(const Lanes& b) { return *this = *this + b; }
+  Lanes& operator-=(const Lanes& b) { return *this = *this - b; }
+  Lanes& operator*=(const Lanes& b) { return *this = *this * b; }
 
   // f on every piece of one or two packs.
   template <class F>
-  static Pack map(const Pack& a, const Pack& b, F&& f) {
-    Pack r;
+  static Lanes map(const Lanes& a, const Lanes& b, F&& f) {
+    Lanes r;
     for (int i = 0; i < pieces; ++i) r.v[i] = f(a.v[i], b.v[i]);
     return r;
   }
-  friend Pack operator-(const Pack& a) {
+  friend Lanes operator-(const Lanes& a) {
     return map(a, a, [](const Vector& x, const Vector&) { return -x; });
   }
-  friend Pack operator+(const Pack& a, const Pack& b) {
+  friend Lanes operator+(const Lanes& a, const Lanes& b) {
     return map(a, b, [](const Vector& x, const Vector& y) { return x + y; });
   }
-  friend Pack operator-(const Pack& a, const Pack& b) {
+  friend Lanes operator-(const Lanes& a, const Lanes& b) {
     return map(a, b, [](const Vector& x, const Vector& y) { return x - y; });
   }
-  friend Pack operator*(const Pack& a, const Pack& b) {
+  friend Lanes operator*(const Lanes& a, const Lanes& b) {
     return map(a, b, [](const Vector& x, const Vector& y) { return x * y; });
   }
-  friend Pack operator/(const Pack& a, const Pack& b) {
+  friend Lanes operator/(const Lanes& a, const Lanes& b) {
     return map(a, b, [](const Vector& x, const Vector& y) { return x / y; });
   }
-  friend Mask operator>(const Pack& a, const Pack& b) {
+  friend Mask operator>(const Lanes& a, const Lanes& b) {
     Mask m;
     for (int i = 0; i < pieces; ++i) m.bits[i] = a.v[i] > b.v[i];
     return m;
   }
-  friend Mask operator<(const Pack& a, const Pack& b) { return b > a; }
-  friend Pack select(const Mask& m, const Pack& a, const Pack& b) {
-    Pack r;
+  friend Mask operator<(const Lanes& a, const Lanes& b) { return b > a; }
+  friend Lanes select(const Mask& m, const Lanes& a, const Lanes& b) {
+    Lanes r;
     for (int i = 0; i < pieces; ++i) r.v[i] = m.bits[i] ? a.v[i] : b.v[i];
     return r;
   }
 };
 
-template <class F>
-Pack per_lane(F&& f) {
-  Pack r;
-  for (int i = 0; i < Pack::lanes; ++i) r.set(i, f(i));
+using Pack = Lanes<8>;
+
+template <int N = Pack::lanes, class F>
+Lanes<N> per_lane(F&& f) {
+  Lanes<N> r;
+  for (int i = 0; i < N; ++i) r.set(i, f(i));
   return r;
 }
-inline Pack sqrt(const Pack& a) {
-  return Pack::map(a, a, [](const Pack::Vector& x, const Pack::Vector&) {
+template <int N>
+Lanes<N> sqrt(const Lanes<N>& a) {
+  using Vector = typename Lanes<N>::Vector;
+  return Lanes<N>::map(a, a, [](const Vector& x, const Vector&) {
 #if defined(__AVX512F__)
-    return Pack::Vector(__builtin_ia32_sqrtpd512_mask(x, x, 255, 4));  // 4: the current rounding mode
-#elif defined(__AVX__)
-    return Pack::Vector(__builtin_ia32_sqrtpd256(x));
-#elif defined(__SSE2__)
-    return Pack::Vector(__builtin_ia32_sqrtpd(x));
-#else
-    Pack::Vector r;
-    for (int i = 0; i < Pack::width; ++i) r[i] = __builtin_sqrt(x[i]);
-    return r;
+    if constexpr (sizeof(Vector) == 64) return Vector(__builtin_ia32_sqrtpd512_mask(x, x, 255, 4));  // 4: as rounded now
 #endif
+#if defined(__AVX__)
+    if constexpr (sizeof(Vector) == 32) return Vector(__builtin_ia32_sqrtpd256(x));
+#endif
+#if defined(__SSE2__)
+    if constexpr (sizeof(Vector) == 16) return Vector(__builtin_ia32_sqrtpd(x));
+#endif
+    Vector r;
+    for (int i = 0; i < Lanes<N>::width; ++i) r[i] = __builtin_sqrt(x[i]);
+    return r;
   });
 }
-inline Pack sin(const Pack& a) {
-  return per_lane([&](int i) { return std::sin(a[i]); });
+template <int N>
+Lanes<N> sin(const Lanes<N>& a) {
+  return per_lane<N>([&](int i) { return std::sin(a[i]); });
 }
-inline Pack cos(const Pack& a) {
-  return per_lane([&](int i) { return std::cos(a[i]); });
+template <int N>
+Lanes<N> cos(const Lanes<N>& a) {
+  return per_lane<N>([&](int i) { return std::cos(a[i]); });
 }
-inline Pack log(const Pack& a) {
-  return per_lane([&](int i) { return std::log(a[i]); });
+template <int N>
+Lanes<N> log(const Lanes<N>& a) {
+  return per_lane<N>([&](int i) { return std::log(a[i]); });
 }
-inline Pack atan2(const Pack& y, const Pack& x) {
-  return per_lane([&](int i) { return std::atan2(y[i], x[i]); });
+template <int N>
+Lanes<N> atan2(const Lanes<N>& y, const Lanes<N>& x) {
+  return per_lane<N>([&](int i) { return std::atan2(y[i], x[i]); });
 }
-inline Pack nearest(const Pack& a) {
-  return per_lane([&](int i) { return std::nearbyint(a[i]); });
+template <int N>
+Lanes<N> nearest(const Lanes<N>& a) {
+  return per_lane<N>([&](int i) { return std::nearbyint(a[i]); });
 }
-inline bool all_finite(const Pack& a) {
+template <int N>
+bool all_finite(const Lanes<N>& a) {
   bool ok = true;
-  for (int i = 0; i < Pack::lanes; ++i) ok = ok && std::isfinite(a[i]);
+  for (int i = 0; i < N; ++i) ok = ok && std::isfinite(a[i]);
   return ok;
 }
 

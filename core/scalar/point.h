@@ -41,6 +41,21 @@ struct InFours {
   }
 };
 
+// A sum over points that stays in registers.
+template <class T>
+struct PointSum {
+  Vec3<T> sum;
+  void add(const Vec3<T>& p) { sum = sum + p; }
+  Vec3<T> total() const { return sum; }
+};
+template <>
+struct PointSum<double> {
+  InFours::Point sum{};
+  void add(const InFours::Point& p) { sum = sum + p; }
+  void add(const Vec3<double>& p) { add(InFours::Point{{p.x, p.y}, {p.z, 0.0}}); }
+  Vec3<double> total() const { return {sum.low[0], sum.low[1], sum.high[0]}; }
+};
+
 // Calls f(n, how) for the points [begin, end), `how` being the way to load and store them; the last one is touched exactly.
 template <class T, class F>
 void for_each_point(int begin, int end, F&& f) {

@@ -103,15 +103,16 @@ bool read_off(const Scene& scene, const Bdf& bdf, const SubstepStates<T>& s, int
               T* x_next, T* v) {
   std::atomic<bool> finite = true;
   parallel_for(scene.nodes(), threads, points_per_thread, [&](int begin, int end) {
-    T difference[4] = {T(0.0), T(0.0), T(0.0), T(0.0)};  // q - q, which only what is finite has as zero
+    PointSum<T> difference;  // q - q, which only what is finite has as zero
     for_each_point<T>(begin, end, [&](int n, auto how) {
       const int dof = scene.first_dof[n];
       const auto now = how.load(q.of(n));
       how.store(x_next + dof, now);
       how.store(v + dof, scaled(T(1.0 / bdf.eta), now - history(bdf, how, s.x + dof, s.x_before + dof)));
-      how.store(difference, how.load(difference) + (now - now));
+      difference.add(now - now);
     });
-    if (!all_finite(difference[0]) || !all_finite(difference[1]) || !all_finite(difference[2])) finite = false;
+    const Vec3<T> d = difference.total();
+    if (!all_finite(d.x) || !all_finite(d.y) || !all_finite(d.z)) finite = false;
   });
   return finite;
 }
