@@ -42,6 +42,8 @@ void rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t
     std::fill(v_before_bar.begin(), v_before_bar.end(), T(0.0));
   }
   if constexpr (in_packs<T>) finish(scene, plan.packs, in, in_bar, reverse.packs);
+  for (std::size_t b = 0; b < plan.blocks.size(); ++b)
+    finish_block(scene, plan.blocks[b], in, in_bar, reverse.blocks[b]);
   // x_next_bar and v_next_bar now belong to the initial state; driven nodes started on their boundary.
   const KnotWeights boundary = scene.driven.empty() ? KnotWeights{} : scene.boundary.at(t0);
   for (int node = 0; node < scene.nodes(); ++node) {

@@ -3,6 +3,7 @@
 
 #include "adjoint/packs/packed_reverse.h"
 #include "adjoint/project_block_vjp.h"
+#include "adjoint/project_vjp.h"
 
 namespace sheetbend {
 
@@ -14,8 +15,9 @@ struct StateCotangents {
 
 template <class T>
 struct ReverseScratch {
-  std::vector<T> x, fixed, lambda, w, C_r, z, u;
+  std::vector<T> x, fixed, lambda, w, C_r;
   PackCotangents packs;
+  std::vector<BlockCotangents<T>> blocks;
 
   ReverseScratch(const Scene& scene, const Plan& plan)
       : x(scene.dofs()),
@@ -23,8 +25,8 @@ struct ReverseScratch {
         lambda(scene.rows),
         w(scene.nodes()),
         C_r(scene.rows),
-        z(scene.dofs()),
-        u(scene.dofs()) {
+        blocks(plan.blocks.size()) {
+    for (std::size_t b = 0; b < blocks.size(); ++b) blocks[b].resize(scene, plan.blocks[b]);
     if constexpr (in_packs<T>) packs.resize(plan.packs);
   }
 };
@@ -136,26 +138,33 @@ void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, 
 
 // Reverse of project(): scratch.x goes from the cotangent of the corrected coordinates to that of the predicted ones.
 template <class T>
-void project_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in, double eta, SubstepRecord<T>& record,
-                 ReverseScratch<T>& scratch, const Inputs<T>& in_bar) {
+void project_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf,
+                 SubstepRecord<T>& record, ReverseScratch<T>& scratch, const StateCotangents<T>& bar,
+                 const Inputs<T>& in_bar) {
   if constexpr (in_packs<T>)
     if (!plan.colors.empty())
       return reverse_sweeps(scene, plan.packs, pack_kernels(), plan.options.iterations, plan.options.threads,
                             plan.options.grain, in, record.packs, scratch.x.data(), scratch.w.data(),
                             scratch.C_r.data(), in_bar, scratch.packs);
-  const SubstepState<T> state{scene, in, eta, nullptr, record.w.data(), record.C_r.data(), record.lambda.data()};
+  const SubstepState<T> state{scene, in, bdf.eta, nullptr, record.w.data(), record.C_r.data(), record.lambda.data()};
   const SubstepCotangent<T> cotangent{scratch.x.data(), scratch.fixed.data(), scratch.lambda.data(),
                                       scratch.w.data(), scratch.C_r.data(),   in_bar};
-  for (int iteration = plan.options.iterations - 1; iteration >= 0; --iteration) {
-    const IterationRecord<T>& kept = record.iterations[iteration];
+  parallel_for(static_cast<int>(plan.blocks.size()), plan.options.threads, 1, [&](int begin, int end) {
+    for (int b = begin; b < end; ++b) {
+      BlockCotangents<T>& own = scratch.blocks[b];
+      begin_block_vjp(state, plan.blocks[b], scratch.x.data(), scratch.lambda.data(), in_bar, own);
+      for (int iteration = plan.options.iterations - 1; iteration >= 0; --iteration)
+        project_block_vjp(state, plan.blocks[b], pack_kernels(), record.blocks[b], iteration, own);
+      end_block_vjp(state, plan.blocks[b], scratch.x.data(), scratch.w.data(), own);
+      refer_block_vjp(state, plan.blocks[b], pack_kernels(), bdf.before, record.blocks[b], bar.x, bar.x_before, own);
+    }
+  });
+  for (std::size_t b = 0; b < plan.blocks.size(); ++b)
+    add_fixed(scene, plan.blocks[b], scratch.blocks[b], scratch.x.data(), bar.x, bar.x_before);
+  if (plan.colors.empty()) return;
+  for (int iteration = plan.options.iterations - 1; iteration >= 0; --iteration)
     for (auto color = plan.colors.rbegin(); color != plan.colors.rend(); ++color)
-      project_color_vjp(state, plan.options, *color, kept, cotangent);
-    parallel_for(static_cast<int>(plan.blocks.size()), plan.options.threads, 1, [&](int begin, int end) {
-      for (int b = begin; b < end; ++b)
-        project_block_vjp(state, plan.blocks[b], kept, kept.factors[b], record.rows.data(),
-                          {scratch.z.data(), scratch.u.data()}, cotangent);
-    });
-  }
+      project_color_vjp(state, plan.options, *color, record.iterations[iteration], cotangent);
   for (const Group& group : scene.groups)
     for (int i = 0; i < group.count; ++i)
       for (int k = 0; k < group.arity; ++k) {
@@ -179,8 +188,8 @@ void substep_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in
   for (auto* buffer : {&scratch.fixed, &scratch.lambda, &scratch.w, &scratch.C_r})
     std::fill(buffer->begin(), buffer->end(), T(0.0));
 
-  project_vjp(scene, plan, in, bdf.eta, record, scratch, in_bar);
-  damping_references_vjp(scene, in, bdf, s, scratch.C_r.data(), bar, in_bar);
+  project_vjp(scene, plan, in, bdf, record, scratch, bar, in_bar);
+  if (plan.blocks.empty()) damping_references_vjp(scene, in, bdf, s, scratch.C_r.data(), bar, in_bar);
   predict_vjp(scene, in, bdf, t_next, s, record.w.data(), scratch.x.data(), scratch.w.data(), bar, in_bar);
 }
 

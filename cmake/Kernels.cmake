@@ -1,4 +1,4 @@
-# adjoint/packs/kernel_table.cpp, once per instruction set; core/packs/choose.cpp takes one at run time. Renaming the namespace keeps the variants'
+# adjoint/packs/kernel_table.cpp and adjoint/blocks/kernel_table.cpp, once per instruction set; core/packs/choose.cpp takes one at run time. Renaming the namespace keeps the variants'
 # templates and inline functions apart.
 set(variants portable)
 # Sanitizers need minutes per instruction set for kernels that are inlined as a whole: there is one, not inlined.
@@ -9,7 +9,7 @@ endif()
 set(kernel_objects)
 foreach(variant IN LISTS variants)
   set(name ${variant})
-  add_library(sheetbend_kernels_${variant} OBJECT adjoint/packs/kernel_table.cpp)
+  add_library(sheetbend_kernels_${variant} OBJECT adjoint/packs/kernel_table.cpp adjoint/blocks/kernel_table.cpp)
   target_include_directories(sheetbend_kernels_${variant} PRIVATE ${PROJECT_SOURCE_DIR})
   if(NOT variant STREQUAL "portable")
     set(name x86-64-${variant})

@@ -6,13 +6,16 @@
 #define SHEETBEND_JOIN_(a, b) a##b
 #define SHEETBEND_JOIN(a, b) SHEETBEND_JOIN_(a, b)
 
+extern "C" const sheetbend_blocks::Table SHEETBEND_JOIN(sheetbend_blocks_, SHEETBEND_VARIANT);
+
 namespace {
 
 template <std::size_t... I>
 constexpr sheetbend_packs::KernelTable table(const char* name, std::index_sequence<I...>) {
   return {name,
           {&sheetbend::project_packs<std::tuple_element_t<I, sheetbend::Registry>>...},
-          {&sheetbend::project_packs_vjp<std::tuple_element_t<I, sheetbend::Registry>>...}};
+          {&sheetbend::project_packs_vjp<std::tuple_element_t<I, sheetbend::Registry>>...},
+          &SHEETBEND_JOIN(sheetbend_blocks_, SHEETBEND_VARIANT)};
 }
 
 constexpr sheetbend_packs::KernelTable kernels =

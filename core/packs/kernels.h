@@ -2,6 +2,10 @@
 // chosen at run time. This namespace is the only one that the compiled variants share; see kernel_table.h.
 #pragma once
 
+namespace sheetbend_blocks {
+struct Table;  // core/blocks/kernels.h
+}
+
 namespace sheetbend_packs {
 
 inline constexpr int lanes = 8;
@@ -39,6 +43,7 @@ struct KernelTable {
   const char* name;
   void (*project[max_kinds])(const Forward&, int begin, int end);
   void (*project_vjp[max_kinds])(const Reverse&, int begin, int end);
+  const sheetbend_blocks::Table* blocks;
 };
 
 }  // namespace sheetbend_packs

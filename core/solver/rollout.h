@@ -73,6 +73,8 @@ class Rollout {
   const T* multipliers() {
     if constexpr (in_packs<T>)
       if (!plan_.colors.empty()) unpack_multipliers(scene_, plan_.packs, record_.packs, record_.lambda.data());
+    for (std::size_t b = 0; b < plan_.blocks.size(); ++b)
+      unpack_multipliers(plan_.blocks[b], record_.blocks[b], record_.lambda.data());
     return record_.lambda.data();
   }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/solver/project.h"
 #include "core/solver/project_block.h"
 
 namespace sheetbend {
@@ -21,18 +22,20 @@ template <class T>
 struct SubstepRecord {
   std::vector<IterationRecord<T>> iterations;
   std::vector<T> w, C_r,
-      lambda;  // effective inverse masses, damping references, multipliers (those of packed colors stay in `packs`)
-  std::vector<T> rows;  // right sides and solutions of direct blocks
-  PackState packs;      // of colors in double precision, which go eight constraints at a time
+      lambda;       // effective inverse masses, damping references, multipliers (those of packs and blocks stay there)
+  PackState packs;  // of colors in double precision, which go eight constraints at a time
+  std::vector<BlockState<T>> blocks;
 
   void resize(const Scene& scene, const Plan& plan, bool keep_iterations) {
     iterations.resize(keep_iterations ? plan.options.iterations : 1);
-    if (!in_packs<T> || plan.colors.empty())
-      for (auto& i : iterations) i.resize(scene, plan);
+    if (!in_packs<T> && !plan.colors.empty())
+      for (auto& i : iterations) i.resize(scene);
     w.resize(scene.nodes());
     C_r.resize(scene.rows);
     lambda.resize(scene.rows);
-    rows.resize(scene.rows);
+    blocks.resize(plan.blocks.size());
+    for (std::size_t b = 0; b < blocks.size(); ++b)
+      blocks[b].resize(scene, plan.blocks[b], keep_iterations ? plan.options.iterations : 0);
     if constexpr (in_packs<T>) packs.resize(plan.packs, keep_iterations ? plan.options.iterations : 0);
   }
 };
@@ -121,11 +124,13 @@ void damping_references(const Scene& scene, const Inputs<const T>& in, const Bdf
   }
 }
 
-// All iterations, on q.
+// All iterations, on q, with the damping references that they need.
 template <class T>
-void project(const Scene& scene, const Plan& plan, const Inputs<const T>& in, double eta, T* q,
-             SubstepRecord<T>& record) {
+void project(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf, const SubstepStates<T>& s,
+             T* q, SubstepRecord<T>& record) {
   const SolverOptions& o = plan.options;
+  const double eta = bdf.eta;
+  if (plan.blocks.empty()) damping_references(scene, in, bdf, s, record.C_r.data());
   if constexpr (in_packs<T>)
     if (!plan.colors.empty()) {
       begin_sweeps(scene, plan.packs, in, eta, q, record.w.data(), record.C_r.data(), record.packs);
@@ -133,14 +138,21 @@ void project(const Scene& scene, const Plan& plan, const Inputs<const T>& in, do
         sweep(plan.packs, pack_kernels(), o.threads, o.grain, iteration, record.packs);
       return end_sweeps(scene, plan.packs, record.packs, q);
     }
-  const SubstepState<T> state{scene, in, eta, q, record.w.data(), record.C_r.data(), record.lambda.data()};
-  for (int iteration = 0; iteration < o.iterations; ++iteration) {
-    IterationRecord<T>& kept = record.iterations[record.iterations.size() == 1 ? 0 : iteration];
-    parallel_for(static_cast<int>(plan.blocks.size()), o.threads, 1, [&](int begin, int end) {
-      for (int b = begin; b < end; ++b) project_block(state, plan.blocks[b], record.rows.data(), kept, kept.factors[b]);
-    });
-    for (const Color& color : plan.colors) project_color(state, o, color, kept);
-  }
+  const SubstepState<T> state{
+      scene, in, eta, q, record.w.data(), plan.blocks.empty() ? record.C_r.data() : nullptr, record.lambda.data()};
+  parallel_for(static_cast<int>(plan.blocks.size()), o.threads, 1, [&](int begin, int end) {
+    for (int b = begin; b < end; ++b) {
+      begin_block(state, plan.blocks[b], record.blocks[b]);
+      refer_block(state, plan.blocks[b], pack_kernels(), bdf.before, s.x, s.x_before, record.blocks[b]);
+      for (int iteration = 0; iteration < o.iterations; ++iteration)
+        project_block(state, plan.blocks[b], pack_kernels(), record.blocks[b], iteration);
+      end_block(state, plan.blocks[b], record.blocks[b]);
+    }
+  });
+  if (plan.colors.empty()) return;
+  for (int iteration = 0; iteration < o.iterations; ++iteration)
+    for (const Color& color : plan.colors)
+      project_color(state, o, color, record.iterations[record.iterations.size() == 1 ? 0 : iteration]);
 }
 
 // Steps from n to n+1, writing q (x_{n+1}) and v. The record holds every iteration when it was sized so, the last one otherwise.
@@ -148,9 +160,8 @@ template <class T>
 void substep(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf, double t_next,
              const SubstepStates<T>& s, T* q, T* v, SubstepRecord<T>& record) {
   predict(scene, in, bdf, t_next, s, q, record.w.data());
-  damping_references(scene, in, bdf, s, record.C_r.data());
   std::fill(record.lambda.begin(), record.lambda.end(), T(0.0));
-  project(scene, plan, in, bdf.eta, q, record);
+  project(scene, plan, in, bdf, s, q, record);
   for (int i = 0; i < scene.dofs(); ++i) v[i] = (q[i] - history(bdf, s.x[i], s.x_before[i])) * T(1.0 / bdf.eta);
 }
 
