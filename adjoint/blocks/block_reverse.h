@@ -28,8 +28,7 @@ template <class K, class T>
     ElementCotangent<K, W> own;
     pull_back(e, lambda, r.damped ? C_r : nullptr, dl, y, z, u, x_bar, own);
 
-    for (int k = 0; k < K::arity; ++k)
-      add_to_particle(numbers_of<T>(b.x_bar), nodes + k * Pack::lanes, r.count - n * Pack::lanes, x_bar + 3 * k);
+    add_to_particles<K::arity>(numbers_of<T>(b.x_bar), nodes, r.count - n * Pack::lanes, x_bar);
     const auto add_row = [&](double* to, int j, const W& by) {
       scatter(numbers_of<T>(to), rows, j, gather(numbers_of<T>(to), rows, j) + by);
     };
@@ -68,8 +67,7 @@ void pull_back_reference(const sheetbend_blocks::Run& r, int n, const double* pa
     if constexpr (P > 0)
       for (int k = 0; k < P; ++k) values_bar[2 + k] += bar * C[j].d[k];
   }
-  for (int k = 0; k < K::arity; ++k)
-    add_to_particle(numbers_of<T>(x_bar), nodes + k * Pack::lanes, r.count - n * Pack::lanes, by + 3 * k);
+  add_to_particles<K::arity>(numbers_of<T>(x_bar), nodes, r.count - n * Pack::lanes, by);
 }
 
 template <class K, class T>

@@ -3,6 +3,8 @@
 // that no loop is cut short. Columns are kept as they are before the division by their pivot: l = column / pivot.
 #pragma once
 
+#include <iterator>
+
 #include "core/scalar/scalar.h"
 
 namespace sheetbend {

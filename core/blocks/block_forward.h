@@ -31,18 +31,6 @@ template <class K, class T>
   }
 }
 
-// A += w G G^T of one particle's `count` gradient rows G, which follow one another from `column` on.
-template <class T>
-void add_window(const T* G, int count, const T& w, int band, T* column) {
-  for (int k = 0; k < count; ++k, column += band + 1) {
-    const T *Gk = G + 4 * k, wx = w * Gk[0], wy = w * Gk[1], wz = w * Gk[2];
-    for (int i = 0; i < count - k; ++i) {
-      const T* Gi = Gk + 4 * i;
-      column[i] += wx * Gi[0] + wy * Gi[1] + wz * Gi[2];
-    }
-  }
-}
-
 template <class K, class T>
 [[SHEETBEND_FLATTEN]] void refer_run(const sheetbend_blocks::References& b, const sheetbend_blocks::Run& r) {
   using W = Wide<T>;
@@ -63,6 +51,18 @@ template <class K, class T>
       for (int j = 0; j < K::rows; ++j) C_r[j] -= W(b.before) * difference<K>(now.C[j], before.C[j]);
     }
     for (int j = 0; j < K::rows; ++j) scatter(numbers_of<T>(b.C_r), rows, j, C_r[j]);
+  }
+}
+
+// A += w G G^T of one particle's `count` gradient rows G, which follow one another from `column` on.
+template <class T>
+void add_window(const T* G, int count, const T& w, int band, T* column) {
+  for (int k = 0; k < count; ++k, column += band + 1) {
+    const T *Gk = G + 4 * k, wx = w * Gk[0], wy = w * Gk[1], wz = w * Gk[2];
+    for (int i = 0; i < count - k; ++i) {
+      const T* Gi = Gk + 4 * i;
+      column[i] += wx * Gi[0] + wy * Gi[1] + wz * Gi[2];
+    }
   }
 }
 

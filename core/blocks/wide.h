@@ -50,17 +50,19 @@ void load_particle(const T* rows, const int* place, Wide<T>* x, Wide<T>& w) {
   }
 }
 
-// Members of one pack may share a particle, so they add one after the other.
-template <class T>
-void add_to_particle(T* rows, const int* place, [[maybe_unused]] int members, const Wide<T>* x) {
+// Adds x (arity, 3) to the rows of a stencil's particles. Members of one pack may share a particle, so they add one after the other.
+template <int Arity, class T>
+void add_to_particles(T* rows, const int* nodes, [[maybe_unused]] int members, const Wide<T>* x) {
   if constexpr (members_in_lanes<T>) {
     constexpr int at[] = {0, 4, 8, 12, 16, 20, 24, 28};
-    Pack by[sheetbend_blocks::row];
-    store_rows(reinterpret_cast<double*>(by), at, x[0], x[1], x[2], Pack(0.0));
+    Pack by[Arity][sheetbend_blocks::row];
+    for (int k = 0; k < Arity; ++k)
+      store_rows(reinterpret_cast<double*>(by[k]), at, x[3 * k], x[3 * k + 1], x[3 * k + 2], Pack(0.0));
     for (int lane = 0; lane < std::min(members, Pack::lanes); ++lane)
-      row_at(rows, place[lane]) += row_at(reinterpret_cast<double*>(by), at[lane]);
+      for (int k = 0; k < Arity; ++k)
+        row_at(rows, nodes[k * Pack::lanes + lane]) += row_at(reinterpret_cast<double*>(by[k]), at[lane]);
   } else {
-    for (int d = 0; d < 3; ++d) rows[*place + d] += x[d];
+    for (int d = 0; d < 3 * Arity; ++d) rows[nodes[d / 3 * Pack::lanes] + d % 3] += x[d];
   }
 }
 

@@ -250,6 +250,25 @@ TEST_P(CoupledBlocks, HaveTheSameBitsOnEveryInstructionSet) {
   }
 }
 
+TEST_P(CoupledBlocks, DampingReferencesHaveTheSameBitsOnEveryInstructionSet) {
+  const Sample sample = random_scene(26, {.net = GetParam()});
+  const Projection p(sample.scene, Partition::direct, eta);
+  Random random(26);
+  const Projection::Run<double> run(p, p.random_theta(sample.inputs, random));
+  std::vector<double> x = run.theta, x_before = run.theta;
+  for (double& a : x_before) a += random(-0.005, 0.005);
+  const auto references = [&](const DirectBlock& block, const sheetbend_packs::KernelTable& kernels) {
+    BlockState<double> state;
+    state.resize(p.scene, block, 0);
+    begin_block(run.state, block, state);
+    refer_block(run.state, block, kernels, -1.0 / 3.0, x.data(), x_before.data(), state);
+    return std::vector<double>(state.C_r.data(), state.C_r.data() + block.size());
+  };
+  for (const DirectBlock& block : p.plan.blocks)
+    for (const auto* kernels : available_kernels())
+      EXPECT_TRUE(same_bits(references(block, *kernels), references(block, pack_kernels()))) << kernels->name;
+}
+
 // Eight states in the lanes against one state at a time.
 TEST_P(CoupledBlocks, HaveTheSameBitsInEveryLane) {
   const Sample sample = random_scene(25, {.net = GetParam()});
