@@ -17,23 +17,52 @@ inline std::size_t plan_bytes(const Plan& plan) {
   for (const Color& color : plan.colors) bytes += size_in_bytes(color.items);
   for (const PackedColor& color : plan.packs.colors) bytes += size_in_bytes(color.items) + size_in_bytes(color.nodes);
   for (const DirectBlock& block : plan.blocks) {
-    bytes += size_in_bytes(block.members) + size_in_bytes(block.nodes) + size_in_bytes(block.couplings) +
-             size_in_bytes(block.position);
+    bytes += size_in_bytes(block.members) + size_in_bytes(block.particles) + size_in_bytes(block.window) +
+             size_in_bytes(block.window_rows) + size_in_bytes(block.multipliers) + size_in_bytes(block.positions);
+    for (const MemberRun& run : block.runs)
+      bytes += size_in_bytes(run.items) + size_in_bytes(run.nodes) + size_in_bytes(run.gradients) +
+               size_in_bytes(run.first_row);
     // A sparse pattern: rows and columns of the matrix, and of its factor.
     if (!block.structure.banded()) bytes += 2 * sizeof(int) * (block.structure.values() + block.structure.fill());
   }
   return bytes;
 }
 
-// Factors of the direct blocks.
+// An array of Numbers, which is a whole number of packs.
 template <class T>
-std::size_t factor_bytes(const Plan& plan) {
-  std::size_t bytes = 0;
-  for (const DirectBlock& block : plan.blocks) {
-    const FactorStructure& s = block.structure;
-    bytes += sizeof(Factor<T>) + sizeof(T) * (s.values() + s.size());
-    if (!s.banded()) bytes += (sizeof(T) + sizeof(int)) * (s.fill() + s.size());
+std::size_t numbers_bytes(std::size_t count) {
+  const std::size_t pack = sizeof(Wide<T>);
+  return sizeof(Numbers<T>) + (count * sizeof(T) + pack - 1) / pack * pack;
+}
+
+// One direct block's BlockState.
+template <class T>
+std::size_t block_bytes(const Scene& scene, const DirectBlock& block, int kept_iterations) {
+  const FactorStructure& s = block.structure;
+  const std::size_t rows = Factor<T>::right_side(s), iterations = std::max(1, kept_iterations);
+  const auto of = [](std::size_t count) { return numbers_bytes<T>(count); };
+  const std::size_t particles = of(sheetbend_blocks::row * block.particles.size());
+  std::size_t factor = sizeof(Factor<T>) + sizeof(T) * (s.values() + rows);
+  if (!s.banded()) factor += (sizeof(T) + sizeof(int)) * (s.fill() + s.size());
+  std::size_t bytes = sizeof(BlockState<T>) + 2 * of(s.size()) + (block.damped ? 2 * particles : 0) +
+                      iterations * (of(sheetbend_blocks::row * block.window_rows.size()) + of(rows) + particles + factor) +
+                      (kept_iterations + 1) * (particles + of(s.size()));
+  for (const MemberRun& run : block.runs) {
+    const Group& group = scene.groups[run.group];
+    bytes += of(run.items.size() * sheetbend_blocks::value_count(group.damped, group.parameters));
   }
+  return bytes;
+}
+
+// One direct block's BlockCotangents.
+template <class T>
+std::size_t block_cotangent_bytes(const Scene& scene, const DirectBlock& block) {
+  const auto of = [](std::size_t count) { return numbers_bytes<T>(count); };
+  const std::size_t particles = of(sheetbend_blocks::row * block.particles.size());
+  std::size_t bytes = sizeof(BlockCotangents<T>) + (block.damped ? 4 : 2) * particles +
+                      of(Factor<T>::right_side(block.structure)) + 2 * of(block.size());
+  for (const MemberRun& run : block.runs)
+    bytes += of(run.items.size() * (2 + scene.groups[run.group].parameters));
   return bytes;
 }
 
@@ -44,22 +73,21 @@ std::size_t row_bytes(const PackPlan& plan) {
 
 template <class T>
 std::size_t substep_bytes(const Scene& scene, const Plan& plan, bool keeps_iterations) {
-  const std::size_t rows = scene.rows, kept = keeps_iterations ? plan.options.iterations : 1;
-  std::size_t bytes =
-      sizeof(T) * ((scene.has_drag ? 2 : 1) * static_cast<std::size_t>(scene.nodes()) + damped_rows(scene));
-  if (!sweeps_packs<T>(plan)) {
-    bytes += 2 * sizeof(T) * rows;
-    const std::size_t gradients = plan.blocks.empty() ? 0 : scene.gradient_entries;
-    return bytes + kept * (sizeof(T) * (scene.stencil_coordinates + 2 * rows + gradients) + factor_bytes<T>(plan));
+  const int kept = keeps_iterations ? plan.options.iterations : 0;
+  std::size_t bytes = sizeof(T) * (scene.has_drag ? 2 : 1) * static_cast<std::size_t>(scene.nodes());
+  for (const DirectBlock& block : plan.blocks) bytes += block_bytes<T>(scene, block, kept);
+  if (plan.colors.empty()) return bytes;
+  bytes += sizeof(T) * damped_rows(scene);
+  if constexpr (in_packs<T>) {
+    for (const PackedColor& color : plan.packs.colors) {
+      const std::size_t own = color.value_count() + color.rows * (color.damped ? 2 : 1) + kept * color.record_size();
+      bytes += sizeof(Pack) * color.packs<T>() * own + sizeof(typename PackState<T>::ColorState) +
+               kept * sizeof(std::vector<Pack>);
+    }
+    return bytes + row_bytes<T>(plan.packs);
+  } else {
+    return bytes + sizeof(T) * (scene.rows + std::max(1, kept) * (scene.stencil_coordinates + 2 * scene.rows));
   }
-  for (const PackedColor& color : plan.packs.colors) {
-    const std::size_t own =
-        color.value_count() + color.rows * (color.damped ? 2 : 1) + (keeps_iterations ? kept * color.record_size() : 0);
-    if constexpr (in_packs<T>)
-      bytes += sizeof(Pack) * color.packs<T>() * own + sizeof(typename PackState<T>::ColorState);
-    if (keeps_iterations) bytes += kept * sizeof(std::vector<Pack>);
-  }
-  return bytes + row_bytes<T>(plan.packs);
 }
 
 template <class T>
@@ -71,18 +99,20 @@ template <class T>
 std::size_t reverse_bytes(const Scene& scene, const Plan& plan) {
   const std::size_t dofs = scene.dofs(), rows = scene.rows, nodes = scene.nodes();
   // Cotangents, velocities, where the coordinates are corrected; then ReverseScratch.
-  const std::size_t states = 6 + (plan.options.integrator == Integrator::bdf1 ? 1 : 2);
-  std::size_t bytes = sizeof(T) * (states * dofs + damped_rows(scene));
-  if (!sweeps_packs<T>(plan))
-    return bytes + sizeof(T) * (4 * dofs + scene.stencil_coordinates + rows + nodes) +
-           substep_bytes<T>(scene, plan, true);
+  const std::size_t states = 7 + (plan.options.integrator == Integrator::bdf1 ? 1 : 2);
+  std::size_t bytes = sizeof(T) * states * dofs + substep_bytes<T>(scene, plan, true);
+  for (const DirectBlock& block : plan.blocks) bytes += block_cotangent_bytes<T>(scene, block);
+  if (!sweeps_packs<T>(plan)) bytes += sizeof(T) * (dofs + nodes);
+  if (plan.colors.empty()) return bytes;
+  bytes += sizeof(T) * damped_rows(scene);
   if constexpr (in_packs<T>) {
     for (const PackedColor& color : plan.packs.colors)
       bytes += sizeof(Pack) * color.packs<T>() * (2 + color.parameters + color.rows * (color.damped ? 2 : 1)) +
                sizeof(typename PackCotangents<T>::ColorCotangents);
-    bytes += row_bytes<T>(plan.packs);
+    return bytes + row_bytes<T>(plan.packs);
+  } else {
+    return bytes + sizeof(T) * (scene.stencil_coordinates + rows);
   }
-  return bytes + substep_bytes<T>(scene, plan, true);
 }
 
 }  // namespace sheetbend

@@ -1,63 +1,139 @@
-// The reverse of the block projection of a direct block. The mathematics is element_vjp.h's, with the block's own factors.
+// The reverse of the block projection of a direct block, over the numbers that its forward kept. The kernels are in adjoint/blocks.
 #pragma once
 
-#include "adjoint/project_vjp.h"
+#include "adjoint/blocks/block_reverse.h"
+#include "adjoint/element/rates_vjp.h"
 #include "core/solver/project_block.h"
 
 namespace sheetbend {
 
-// Block-wide vectors of one reverse: z = x'_bar - J^T y and u = J^T dl.
 template <class T>
-struct BlockVectors {
-  T *z, *u;
+const sheetbend_blocks::Reverse& reverse_kernels(const sheetbend_packs::KernelTable& kernels) {
+  if constexpr (has_compiled_kernels<T>)
+    return (std::is_same_v<T, Pack> ? kernels.blocks->many : kernels.blocks->one).reverse;
+  else
+    return ReverseKernels<T>::all;
+}
+
+// Cotangents in the block's order. Those of the constraints' values gather over substeps of one eta; finish_block() hands them on.
+template <class T>
+struct BlockCotangents {
+  Numbers<T> x, z, y, lambda, C_r;
+  Numbers<T> x_now, x_before;      // of the states that damping refers to
+  std::vector<Numbers<T>> values;  // per run
+  double eta = 0.0;
+
+  void resize(const Scene& scene, const DirectBlock& block) {
+    for (auto* a : {&x, &z}) a->assign(block.particles.size() * sheetbend_blocks::row);
+    if (block.damped)
+      for (auto* a : {&x_now, &x_before}) a->assign(block.particles.size() * sheetbend_blocks::row);
+    y.assign(Factor<T>::right_side(block.structure));
+    for (auto* a : {&lambda, &C_r}) a->assign(block.size());
+    values.resize(block.runs.size());
+    for (std::size_t r = 0; r < values.size(); ++r)
+      values[r].assign(block.runs[r].items.size() * (2 + scene.groups[block.runs[r].group].parameters));
+  }
 };
 
-// The block touches its own movable nodes of z and u only.
+// Adds the gathered cotangents of the constraints' values to those of the inputs, and forgets them.
 template <class T>
-void project_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const IterationRecord<T>& record,
-                       const Factor<T>& factor, T* rows, const BlockVectors<T>& block_wide,
-                       const SubstepCotangent<T>& bar) {
-  T* y = rows + block.first_row;
-  const auto for_each_member = [&](auto&& body) {
-    for (const Member& m : block.members) {
-      const Group& group = s.scene.groups[m.group];
-      with_kind(group.kind, [&]<class K>(K) {
-        const Placed<K, T> e(s, group, m.item, &record.x[first_coordinate<K>(group, m.item)]);
-        body(e, &record.J[first_gradient<K>(group, m.item)], group, m);
-      });
+void finish_block(const Scene& scene, const DirectBlock& block, const Inputs<const T>& in, const Inputs<T>& in_bar,
+                  BlockCotangents<T>& bar) {
+  if (bar.eta == 0.0) return;
+  for (std::size_t r = 0; r < block.runs.size(); ++r) {
+    const MemberRun& run = block.runs[r];
+    const Group& group = scene.groups[run.group];
+    const int count = 2 + group.parameters;
+    for (int i = 0; i < run.count; ++i) {
+      const auto value = [&](int part) { return bar.values[r][member_number<T>(i, count, part)]; };
+      add_rates(in, group, run.items[i], bar.eta, value(0), value(1), in_bar);
+      for (int k = 0; k < group.parameters; ++k)
+        in_bar.of(Quantity::rest)[group.first_value + static_cast<std::size_t>(run.items[i]) * group.parameters + k] +=
+            value(2 + k);
     }
-  };
-  for_each_member([&]<class K>(const Placed<K, T>& e, const T* J, const Group&, const Member& m) {
-    T x_bar[K::dofs];
-    gather_free(s, e, bar.x, x_bar);
-    adjoint_right_side<K, T>(e, J, bar.lambda + e.first_row, x_bar, y + m.first_row);
-  });
-  factor.solve(block.structure, y);
-  for (const int node : block.nodes) std::fill_n(block_wide.u + s.scene.first_dof[node], 3, T(0.0));
-  for_each_member([&]<class K>(const Placed<K, T>& e, const T* J, const Group& group, const Member& m) {
-    T u[K::dofs]{}, back[K::dofs]{};
-    transpose_times<K>(J, &record.dl[e.first_row], u);
-    transpose_times<K>(J, y + m.first_row, back);
-    for (int d = 0; d < K::dofs; ++d) back[d] = -back[d];
-    for (int d = 0; d < K::dofs; ++d)
-      if (s.scene.role[e.nodes[d / 3]] == Role::free) block_wide.u[s.scene.first_dof[e.nodes[d / 3]] + d % 3] += u[d];
-    add_cotangent(s, e, first_coordinate<K>(group, m.item), back, bar);
-  });
-  for (const int node : block.nodes) {
-    const int dof = s.scene.first_dof[node];
-    std::copy_n(bar.x + dof, 3, block_wide.z + dof);
-    bar.w[node] += dot(Vec3<T>(block_wide.u + dof), Vec3<T>(block_wide.z + dof));
+    bar.values[r].clear();
   }
-  for_each_member([&]<class K>(const Placed<K, T>& e, const T*, const Group& group, const Member& m) {
-    T z[K::dofs], u[K::dofs], x_bar[K::dofs]{};
-    gather_free(s, e, block_wide.z, z);
-    gather_free(s, e, block_wide.u, u);
-    ElementCotangent<K, T> own;
-    pull_back<false, K, T>(e, Kept<K, T>(e.x), &record.lambda[e.first_row], e.references(s, group), &record.dl[e.first_row],
-                 y + m.first_row, z, u, x_bar, own);
-    add_element(s, group, m.item, own, bar);
-    add_cotangent(s, e, first_coordinate<K>(group, m.item), x_bar, bar);
-  });
+  bar.eta = 0.0;
+}
+
+// Takes the cotangents of the corrected coordinates (dofs) and of the multipliers (rows of the scene; null where nothing reads them).
+template <class T>
+void begin_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const T* x_bar, const T* lambda_bar,
+                     const Inputs<T>& in_bar, BlockCotangents<T>& bar) {
+  if (bar.eta != s.eta) finish_block(s.scene, block, s.inputs, in_bar, bar);
+  bar.eta = s.eta;
+  bar.x.clear();
+  bar.C_r.clear();
+  for (int row = 0; row < block.size(); ++row)
+    bar.lambda[row] = lambda_bar ? lambda_bar[block.multipliers[row]] : T(0.0);
+  for (int p = 0; p < block.movable; ++p)
+    std::copy_n(x_bar + s.scene.first_dof[block.particles[p]], 3, bar.x.data() + sheetbend_blocks::row * p);
+}
+
+template <class T>
+void project_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const sheetbend_packs::KernelTable& table,
+                       BlockState<T>& state, int iteration, BlockCotangents<T>& bar) {
+  const auto runs = runs_of(s, block, state, &bar.values);
+  auto arrays = arrays_of(block, runs, state, iteration);
+  arrays.x_bar = bar.x.numbers();
+  arrays.z = bar.z.numbers();
+  arrays.y = bar.y.numbers();
+  arrays.lambda_bar = bar.lambda.numbers();
+  arrays.C_r_bar = bar.C_r.numbers();
+  const auto& reverse = reverse_kernels<T>(table);
+  reverse.right_side(arrays);
+  if (block.structure.banded())
+    forward_kernels<T>(table).solve(arrays, arrays.y);
+  else
+    state.at(iteration).factor.solve(block.structure, bar.y.data());
+  reverse.spread(arrays);
+  reverse.pull_back(arrays);
+}
+
+// Writes the cotangents of the predicted coordinates of movable nodes and adds those of inverse masses (nodes). Those of fixed nodes stay
+// behind, since several blocks may share a node: add_fixed() is called for one block after the other.
+template <class T>
+void end_block_vjp(const SubstepState<T>& s, const DirectBlock& block, T* x_bar, T* w_bar, BlockCotangents<T>& bar) {
+  for (int p = 0; p < block.movable; ++p) {
+    const T* own = bar.x.data() + sheetbend_blocks::row * p;
+    std::copy_n(own, 3, x_bar + s.scene.first_dof[block.particles[p]]);
+    w_bar[block.particles[p]] += own[3];
+  }
+}
+
+// Adds what stands in rows to the coordinates (dofs) of the particles from `begin` to `end`.
+template <class T>
+void add_particles(const Scene& scene, const DirectBlock& block, std::size_t begin, std::size_t end, Numbers<T>& rows,
+                   T* x_bar) {
+  for (std::size_t p = begin; p < end; ++p)
+    Vec3<T>(rows.data() + sheetbend_blocks::row * p).add_to(x_bar + scene.first_dof[block.particles[p]]);
+}
+
+// The reverse of refer_block(): adds to the cotangents of the states at n and n-1, for movable nodes.
+template <class T>
+void refer_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const sheetbend_packs::KernelTable& table,
+                     double before, BlockState<T>& state, T* x_bar, T* x_before_bar, BlockCotangents<T>& bar) {
+  if (!block.damped) return;
+  bar.x_now.clear();
+  bar.x_before.clear();
+  const auto runs = runs_of(s, block, state, &bar.values);
+  auto references = references_of(runs, before, state);
+  references.C_r_bar = bar.C_r.numbers();
+  references.x_bar = bar.x_now.numbers();
+  references.x_before_bar = bar.x_before.numbers();
+  reverse_kernels<T>(table).refer(references);
+  add_particles(s.scene, block, 0, block.movable, bar.x_now, x_bar);
+  add_particles(s.scene, block, 0, block.movable, bar.x_before, x_before_bar);
+}
+
+// Adds the cotangents of fixed nodes: of their coordinates during the substep, and at n and n-1.
+template <class T>
+void add_fixed(const Scene& scene, const DirectBlock& block, BlockCotangents<T>& bar, T* q_bar, T* x_bar,
+               T* x_before_bar) {
+  add_particles(scene, block, block.movable, block.particles.size(), bar.x, q_bar);
+  if (!block.damped) return;
+  add_particles(scene, block, block.movable, block.particles.size(), bar.x_now, x_bar);
+  add_particles(scene, block, block.movable, block.particles.size(), bar.x_before, x_before_bar);
 }
 
 }  // namespace sheetbend

@@ -35,6 +35,8 @@ class StateReverse {
 
   void finish(const Inputs<const T>& in, const Inputs<T>& in_bar) {
     if constexpr (in_packs<T>) sheetbend::finish(scene_, plan_.packs, in, in_bar, scratch_.packs);
+    for (std::size_t b = 0; b < plan_.blocks.size(); ++b)
+      finish_block(scene_, plan_.blocks[b], in, in_bar, scratch_.blocks[b]);
   }
 
  private:

@@ -4,25 +4,29 @@
 #include "adjoint/packs/packed_reverse.h"
 #include "adjoint/predict_vjp.h"
 #include "adjoint/project_block_vjp.h"
+#include "adjoint/project_vjp.h"
 
 namespace sheetbend {
 
 template <class T>
 struct ReverseScratch {
-  std::vector<T> x, fixed, lambda, w, C_r, z, u;  // but for C_r of what does not go through the kernels
+  std::vector<T> x, fixed, lambda, w, C_r;
   std::vector<Vec3<T>> gravity;
-  PackCotangents<std::conditional_t<in_packs<T>, T, double>> packs;
+  PackCotangents<std::conditional_t<in_packs<T>, T, double>> packs;  // of colors that go through the kernels
+  std::vector<BlockCotangents<T>> blocks;
 
-  ReverseScratch(const Scene& scene, const Plan& plan)
-      : C_r(damped_rows(scene)) {
+  ReverseScratch(const Scene& scene, const Plan& plan) : blocks(plan.blocks.size()) {
+    for (std::size_t b = 0; b < blocks.size(); ++b) blocks[b].resize(scene, plan.blocks[b]);
+    if (!plan.colors.empty()) C_r.resize(damped_rows(scene));
     if (sweeps_packs<T>(plan)) {
       if constexpr (in_packs<T>) packs.resize(plan.packs);
       return;
     }
-    for (auto* buffer : {&x, &z, &u}) buffer->resize(scene.dofs());
+    x.resize(scene.dofs());
+    w.resize(scene.nodes());
+    if (plan.colors.empty()) return;
     fixed.resize(scene.stencil_coordinates);
     lambda.resize(scene.rows);
-    w.resize(scene.nodes());
   }
 
   // Where the cotangents of the coordinates and of the inverse masses are while projections are reversed.
@@ -76,34 +80,47 @@ void damping_references_vjp(const Scene& scene, const Inputs<const T>& in, const
 
 // Reverse of project(): scratch.q_bar() goes from the cotangent of the corrected coordinates to that of the predicted ones.
 template <class T>
-void project_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in, double eta, SubstepRecord<T>& record,
-                 ReverseScratch<T>& scratch, const Inputs<T>& in_bar) {
+void project_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf,
+                 const SubstepStates<T>& s, SubstepRecord<T>& record, ReverseScratch<T>& scratch,
+                 const StateCotangents<T>& bar, const Inputs<T>& in_bar) {
+  const SolverOptions& o = plan.options;
+  const T* w = record.weights.w.data();
+  std::fill(scratch.C_r.begin(), scratch.C_r.end(), T(0.0));
   if constexpr (in_packs<T>)
-    if (sweeps_packs<T>(plan))
-      return reverse_sweeps(scene, plan.packs, pack_kernels(), plan.options.iterations, plan.options.threads,
-                            plan.options.grain, in, record.packs, scratch.C_r.data(), in_bar, scratch.packs);
+    if (sweeps_packs<T>(plan)) {
+      reverse_sweeps(scene, plan.packs, pack_kernels(), o.iterations, o.threads, o.grain, in, record.packs,
+                     scratch.C_r.data(), in_bar, scratch.packs);
+      return damping_references_vjp(scene, in, bdf, s, scratch.C_r.data(), bar, in_bar);
+    }
   for (auto* buffer : {&scratch.fixed, &scratch.lambda, &scratch.w}) std::fill(buffer->begin(), buffer->end(), T(0.0));
-  const SubstepState<T> state{scene, in, eta, nullptr, record.weights.w.data(), record.C_r.data(), record.lambda.data()};
+  const SubstepState<T> state{scene, in, bdf.eta, nullptr, w, record.C_r.data(), record.lambda.data()};
+  parallel_for(static_cast<int>(plan.blocks.size()), o.threads, 1, [&](int begin, int end) {
+    for (int b = begin; b < end; ++b) {
+      BlockCotangents<T>& own = scratch.blocks[b];
+      begin_block_vjp<T>(state, plan.blocks[b], scratch.x.data(), nullptr, in_bar, own);
+      for (int iteration = o.iterations - 1; iteration >= 0; --iteration)
+        project_block_vjp(state, plan.blocks[b], pack_kernels(), record.blocks[b], iteration, own);
+      end_block_vjp(state, plan.blocks[b], scratch.x.data(), scratch.w.data(), own);
+      refer_block_vjp(state, plan.blocks[b], pack_kernels(), bdf.before, record.blocks[b], bar.x, bar.x_before, own);
+    }
+  });
+  for (std::size_t b = 0; b < plan.blocks.size(); ++b)
+    add_fixed(scene, plan.blocks[b], scratch.blocks[b], scratch.x.data(), bar.x, bar.x_before);
+  if (plan.colors.empty()) return;
   const SubstepCotangent<T> cotangent{scratch.x.data(), scratch.fixed.data(), scratch.lambda.data(),
                                       scratch.w.data(), scratch.C_r.data(),   in_bar};
-  for (int iteration = plan.options.iterations - 1; iteration >= 0; --iteration) {
-    const IterationRecord<T>& kept = record.iterations[iteration];
+  for (int iteration = o.iterations - 1; iteration >= 0; --iteration)
     for (auto color = plan.colors.rbegin(); color != plan.colors.rend(); ++color)
-      project_color_vjp(state, plan.options, *color, kept, cotangent);
-    parallel_for(static_cast<int>(plan.blocks.size()), plan.options.threads, 1, [&](int begin, int end) {
-      for (int b = begin; b < end; ++b)
-        project_block_vjp(state, plan.blocks[b], kept, kept.factors[b], record.rows.data(),
-                          {scratch.z.data(), scratch.u.data()}, cotangent);
-    });
-  }
+      project_color_vjp(state, o, *color, record.iterations[iteration], cotangent);
   for (const Group& group : scene.groups)
     for (int i = 0; i < group.count; ++i)
       for (int k = 0; k < group.arity; ++k) {
         const int node = group.nodes(i)[k];
         if (scene.role[node] == Role::free) continue;
         const std::size_t from = group.first_coordinate + (static_cast<std::size_t>(i) * group.arity + k) * 3;
-        for (int d = 0; d < 3; ++d) scratch.x[scene.first_dof[node] + d] += scratch.fixed[from + d];
+        Vec3<T>(&scratch.fixed[from]).add_to(&scratch.x[scene.first_dof[node]]);
       }
+  damping_references_vjp(scene, in, bdf, s, scratch.C_r.data(), bar, in_bar);
 }
 
 // Given the cotangents of x_{n+1} and v_{n+1}, adds to those of the states before and of the inputs. The record is the substep's own, recomputed.
@@ -113,9 +130,7 @@ void substep_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in
                  ReverseScratch<T>& scratch, const StateCotangents<T>& bar, const Inputs<T>& in_bar) {
   const int threads = plan.options.threads;
   read_off_vjp(scene, bdf, x_next_bar, v_next_bar, threads, scratch.q_bar(plan), bar);
-  std::fill(scratch.C_r.begin(), scratch.C_r.end(), T(0.0));
-  project_vjp(scene, plan, in, bdf.eta, record, scratch, in_bar);
-  damping_references_vjp(scene, in, bdf, s, scratch.C_r.data(), bar, in_bar);
+  project_vjp(scene, plan, in, bdf, s, record, scratch, bar, in_bar);
   predict_vjp(scene, in, bdf, t_next, s, record.weights, scratch.q_bar(plan), scratch.w_bar(plan), threads,
               scratch.gravity, bar, in_bar);
 }

@@ -6,6 +6,8 @@
 #define SHEETBEND_JOIN_(a, b) a##b
 #define SHEETBEND_JOIN(a, b) SHEETBEND_JOIN_(a, b)
 
+extern "C" const sheetbend_blocks::Table SHEETBEND_JOIN(sheetbend_blocks_, SHEETBEND_VARIANT);
+
 namespace {
 
 using namespace sheetbend_packs;
@@ -16,7 +18,8 @@ constexpr KernelTable table(const char* name, std::index_sequence<I...>) {
           {{&sheetbend::project_packs<std::tuple_element_t<I, sheetbend::Registry>, across_color>...},
            {&sheetbend::project_packs<std::tuple_element_t<I, sheetbend::Registry>, across_scenes>...}},
           {{&sheetbend::project_packs_vjp<std::tuple_element_t<I, sheetbend::Registry>, across_color>...},
-           {&sheetbend::project_packs_vjp<std::tuple_element_t<I, sheetbend::Registry>, across_scenes>...}}};
+           {&sheetbend::project_packs_vjp<std::tuple_element_t<I, sheetbend::Registry>, across_scenes>...}},
+          &SHEETBEND_JOIN(sheetbend_blocks_, SHEETBEND_VARIANT)};
 }
 
 constexpr KernelTable kernels =

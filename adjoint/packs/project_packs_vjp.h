@@ -12,11 +12,11 @@ inline __attribute__((always_inline)) void project_range_vjp(const sheetbend_pac
   using Gathered = GatheredStencil<K, layout>;
   const auto gather = [&](long n) __attribute__((always_inline)) { return Gathered(r.rows_bar, r.nodes, n, true); };
   const auto reverse = [&](long n, const Gathered& now) __attribute__((always_inline)) {
-    constexpr int kept = Kept<K, Wide>::size, rows = K::rows;
-    Element<K, Wide> e;
+    constexpr int kept = Kept<K, Register>::size, rows = K::rows;
+    Element<K, Register> e;
     load_values(r.values, damped, n, e);
     const Strip record(r.record, n, record_size<K>), sums(r.lambda_bar, n, rows);
-    Wide numbers[kept], lambda[rows], dl[rows], lambda_bar[rows], C_r[rows], x_bar[K::dofs], w_bar[K::arity];
+    Register numbers[kept], lambda[rows], dl[rows], lambda_bar[rows], C_r[rows], x_bar[K::dofs], w_bar[K::arity];
     unrolled<kept>([&](int i) { numbers[i] = record[i]; });
     for (int j = 0; j < rows; ++j) {
       lambda[j] = record[kept + j];
@@ -25,8 +25,8 @@ inline __attribute__((always_inline)) void project_range_vjp(const sheetbend_pac
       if (damped) C_r[j] = Strip(r.C_r, n, rows)[j];
     }
     unrolled<K::dofs>([&](int d) { x_bar[d] = now.x[d]; });
-    ElementCotangent<K, Wide> own;
-    correction_vjp(e, Kept<K, Wide>::kept(numbers), lambda, damped ? C_r : nullptr, dl, lambda_bar, x_bar, w_bar, own);
+    ElementCotangent<K, Register> own;
+    correction_vjp(e, Kept<K, Register>::kept(numbers), lambda, damped ? C_r : nullptr, dl, lambda_bar, x_bar, w_bar, own);
     unrolled<K::dofs>([&](int d) { x_bar[d] = now.x[d] + x_bar[d]; });
     unrolled<K::arity>([&](int k) { w_bar[k] = now.w[k] + w_bar[k]; });
     const Particles<layout> particles(r.nodes, n, K::arity);

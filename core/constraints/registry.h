@@ -1,7 +1,6 @@
 // Every constraint that the program knows, one line each. Kinds are numbered in this order.
 #pragma once
 
-#include <algorithm>
 #include <stdexcept>
 #include <string>
 #include <tuple>
@@ -22,9 +21,6 @@ using Registry = std::tuple<  //
     Attachment>;
 
 inline constexpr int kind_count = std::tuple_size_v<Registry>;
-inline constexpr int max_rows = []<class... K>(std::tuple<K...>*) {
-  return std::max({K::rows...});
-}(static_cast<Registry*>(nullptr));
 
 // Calls f with an object of the constraint type that `kind` numbers.
 template <int I = 0, class F>

@@ -2,6 +2,8 @@
 // and chosen at run time. This namespace is the only one that the compiled variants share; see kernel_table.cpp.
 #pragma once
 
+#include "core/blocks/kernels.h"
+
 namespace sheetbend_packs {
 
 inline constexpr int lanes = 8;
@@ -49,6 +51,7 @@ struct KernelTable {
   const char* name;
   void (*project[layouts][max_kinds])(const Forward&, int begin, int end);
   void (*project_vjp[layouts][max_kinds])(const Reverse&, int begin, int end);
+  const sheetbend_blocks::Table* blocks;
 };
 
 }  // namespace sheetbend_packs

@@ -14,7 +14,7 @@ namespace sheetbend {
 using sheetbend_packs::Layout;
 
 template <class K>
-inline constexpr int record_size = sheetbend_packs::record_size(Kept<K, Wide>::size, K::rows);
+inline constexpr int record_size = sheetbend_packs::record_size(Kept<K, Register>::size, K::rows);
 
 template <class K>
 constexpr int value_count(bool damped) {
@@ -23,13 +23,13 @@ constexpr int value_count(bool damped) {
 
 // The numbers of place n in the order that kernels.h gives: the constraint's own parameters, and the rest.
 template <class K>
-void load_parameters(const double* values, bool damped, long n, Wide* p) {
+void load_parameters(const double* values, bool damped, long n, Register* p) {
   const Strip from(values, n, value_count<K>(damped));
   for (int k = 0; k < parameter_count<K>; ++k) p[k] = from[(damped ? 3 : 1) + k];
 }
 
 template <class K>
-void load_values(const double* values, bool damped, long n, Element<K, Wide>& e) {
+void load_values(const double* values, bool damped, long n, Element<K, Register>& e) {
   const Strip from(values, n, value_count<K>(damped));
   int next = 0;
   e.rates.a = from[next++];
@@ -62,7 +62,7 @@ inline __attribute__((always_inline)) void overlapped(long begin, long end, Firs
 
 template <class K, Layout layout>
 struct GatheredStencil {
-  Wide x[K::dofs], w[K::arity];
+  Register x[K::dofs], w[K::arity];
   GatheredStencil(const double* rows, const int* nodes, long n, bool with_w) {
     const Particles<layout> particles(nodes, n, K::arity);
     unrolled<K::arity>([&](int k) { particles.load(rows, k, x + 3 * k, with_w ? w + k : nullptr); });
@@ -71,7 +71,7 @@ struct GatheredStencil {
 
 template <class K>
 struct LoadedParameters {
-  Wide p[parameter_count<K> > 0 ? parameter_count<K> : 1];
+  Register p[parameter_count<K> > 0 ? parameter_count<K> : 1];
   LoadedParameters(const double* values, bool damped, long n) { load_parameters<K>(values, damped, n, p); }
 };
 
@@ -79,26 +79,26 @@ template <class K, Layout layout, class Damped>
 inline __attribute__((always_inline)) void project_range(const sheetbend_packs::Forward& f, Damped damped, long begin,
                                                          long end) {
   struct Evaluated : GatheredStencil<K, layout> {
-    Linearization<K, Wide> value;
-    Evaluated(const double* rows, const int* nodes, long n, const Wide* p)
+    Linearization<K, Register> value;
+    Evaluated(const double* rows, const int* nodes, long n, const Register* p)
         : GatheredStencil<K, layout>(rows, nodes, n, false), value(this->x, p) {}
   };
   const auto evaluate = [&](long n) __attribute__((always_inline)) {
     return Evaluated(f.rows, f.nodes, n, LoadedParameters<K>(f.values, damped, n).p);
   };
   const auto correct = [&](long n, const Evaluated& at) __attribute__((always_inline)) {
-    Element<K, Wide> e;
+    Element<K, Register> e;
     load_values(f.values, damped, n, e);
     const Strip multipliers(f.lambda, n, K::rows);
-    Wide lambda[K::rows], C_r[K::rows];
+    Register lambda[K::rows], C_r[K::rows];
     for (int j = 0; j < K::rows; ++j) lambda[j] = multipliers[j];
     if (damped)
       for (int j = 0; j < K::rows; ++j) C_r[j] = Strip(f.C_r, n, K::rows)[j];
-    Correction<K, Wide> correction(e, at.value, lambda, damped ? C_r : nullptr);
+    Correction<K, Register> correction(e, at.value, lambda, damped ? C_r : nullptr);
     if (f.record) {
       const Strip to(f.record, n, record_size<K>);
-      constexpr int kept = Kept<K, Wide>::size;
-      Wide numbers[kept];
+      constexpr int kept = Kept<K, Register>::size;
+      Register numbers[kept];
       at.value.keep(at.x, numbers);
       unrolled<kept>([&](int i) { to.set(i, numbers[i]); });
       for (int j = 0; j < K::rows; ++j) {
@@ -108,7 +108,7 @@ inline __attribute__((always_inline)) void project_range(const sheetbend_packs::
     }
     for (int j = 0; j < K::rows; ++j) multipliers.set(j, lambda[j] + correction.dl[j]);
     const Particles<layout> particles(f.nodes, n, K::arity);
-    Wide moved[K::dofs];
+    Register moved[K::dofs];
     unrolled<K::dofs>([&](int d) { moved[d] = at.x[d] + e.w[d / 3] * correction.push[d]; });
     unrolled<K::arity>([&](int k) { particles.store(f.rows, k, moved + 3 * k, nullptr); });
   };

@@ -1,7 +1,10 @@
 #include "core/solver/plan.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
+#include <set>
 #include <stdexcept>
 #include <string>
 
@@ -10,59 +13,117 @@
 namespace sheetbend {
 namespace {
 
-// Numbers the members' rows and lists every pair of members that shares a movable node.
-struct Couplings {
-  std::vector<Coupling> list;
-  std::vector<std::pair<int, int>> entries;
-  int rows = 0;
-};
+constexpr int lanes = sheetbend_blocks::lanes;
 
-Couplings couple(const Scene& scene, std::vector<Member>& members) {
-  Couplings c;
-  std::map<int, std::vector<std::pair<int, int>>> users;  // node -> (member, slot)
-  for (int m = 0; m < static_cast<int>(members.size()); ++m) {
-    const Group& group = scene.groups[members[m].group];
-    members[m].first_row = c.rows;
-    c.rows += group.rows;
-    const auto nodes = group.nodes(members[m].item);
-    for (int slot = 0; slot < group.arity; ++slot)
-      if (scene.role[nodes[slot]] == Role::free) users[nodes[slot]].push_back({m, slot});
-  }
-  for (const auto& [node, list] : users)
-    for (const auto& [row, row_slot] : list)
-      for (const auto& [column, column_slot] : list) {
-        if (column > row) continue;
-        c.list.push_back({row, column, node, row_slot, column_slot, 0});
-        const int r = scene.groups[members[row].group].rows, k = scene.groups[members[column].group].rows;
-        for (int i = 0; i < r; ++i)
-          for (int j = 0; j < k; ++j)
-            if (members[row].first_row + i >= members[column].first_row + j)
-              c.entries.emplace_back(members[row].first_row + i, members[column].first_row + j);
+// A movable node and the rows that it takes part in, ascending.
+using Users = std::vector<std::pair<int, std::vector<int>>>;
+
+// Numbers the members' rows and lists those of every movable node; nodes in the order in which elimination meets them.
+Users number_rows(const Scene& scene, std::vector<Member>& members) {
+  Users users;
+  std::map<int, int> place;
+  int rows = 0;
+  for (Member& m : members) {
+    const Group& group = scene.groups[m.group];
+    m.first_row = rows;
+    rows += group.rows;
+    for (const int node : group.nodes(m.item))
+      if (scene.role[node] == Role::free) {
+        const auto [at, is_new] = place.emplace(node, static_cast<int>(users.size()));
+        if (is_new) users.push_back({node, {}});
+        for (int row = m.first_row; row < rows; ++row) users[at->second].second.push_back(row);
       }
-  return c;
+  }
+  return users;
+}
+
+// Every pair of rows that share a movable node.
+FactorStructure structure_of(const Scene& scene, const std::vector<Member>& members, const Users& users) {
+  std::vector<std::pair<int, int>> entries;
+  for (const auto& [node, rows] : users)
+    for (const int row : rows)
+      for (const int column : rows)
+        if (column <= row) entries.emplace_back(row, column);
+  return {members.back().first_row + scene.groups[members.back().group].rows, entries};
+}
+
+// A particle of the block, with the rows that it takes part in. Windows of a band have no gaps: rows between that do not touch the particle
+// have a gradient of zero.
+int add_particle(DirectBlock& block, int node, const std::vector<int>& rows) {
+  block.particles.push_back(node);
+  if (block.structure.banded())
+    for (int row = rows.front(); row <= rows.back(); ++row) block.window_rows.push_back(row);
+  else
+    block.window_rows.insert(block.window_rows.end(), rows.begin(), rows.end());
+  block.window.push_back(static_cast<int>(block.window_rows.size()));
+  return static_cast<int>(block.particles.size()) - 1;
+}
+
+// Where `row` stands among the particle's gradient rows.
+int gradient_row(const DirectBlock& block, int particle, int row) {
+  const auto begin = block.window_rows.begin() + block.window[particle];
+  return static_cast<int>(std::lower_bound(begin, block.window_rows.begin() + block.window[particle + 1], row) -
+                          block.window_rows.begin());
+}
+
+MemberRun make_run(const Scene& scene, int g, const std::map<int, int>& particle_of, DirectBlock& block) {
+  const Group& group = scene.groups[g];
+  MemberRun run{g, 0, {}, {}, {}, {}};
+  std::vector<Member> own;
+  for (const Member& m : block.members)
+    if (m.group == g) own.push_back(m);
+  run.count = static_cast<int>(own.size());
+  const int width = (run.count + lanes - 1) / lanes * lanes;
+  run.nodes.resize(static_cast<std::size_t>(width) * group.arity);
+  run.gradients.resize(run.nodes.size());
+  for (int i = 0; i < width; ++i) {
+    const Member& m = own[std::min(i, run.count - 1)];
+    run.items.push_back(m.item);
+    run.first_row.push_back(m.first_row);
+    for (int k = 0; k < group.arity; ++k) {
+      const long at = lane_at(i, group.arity, k);
+      if (i >= run.count) {
+        run.nodes[at] = run.nodes[lane_at(run.count - 1, group.arity, k)];
+        run.gradients[at] = run.gradients[lane_at(run.count - 1, group.arity, k)];
+        continue;
+      }
+      const int node = group.nodes(m.item)[k];
+      std::vector<int> rows(group.rows);
+      std::iota(rows.begin(), rows.end(), m.first_row);
+      const int particle = scene.role[node] == Role::free ? particle_of.at(node) : add_particle(block, node, rows);
+      run.nodes[at] = sheetbend_blocks::row * particle;
+      run.gradients[at] = sheetbend_blocks::row * gradient_row(block, particle, m.first_row);
+    }
+  }
+  return run;
 }
 
 DirectBlock make_block(const Scene& scene, std::vector<Member> members) {
-  Couplings couplings = couple(scene, members);
-  FactorStructure structure(couplings.rows, couplings.entries);
+  Users users = number_rows(scene, members);
+  FactorStructure structure = structure_of(scene, members, users);
   if (!structure.banded()) {
     order_for_low_fill(scene, members);
-    couplings = couple(scene, members);
-    structure = FactorStructure(couplings.rows, couplings.entries);
+    users = number_rows(scene, members);
+    structure = structure_of(scene, members, users);
   }
-  DirectBlock block{std::move(members), {}, 0, std::move(couplings.list), {}, std::move(structure)};
-  for (Coupling& c : block.couplings) {
-    const Member &row = block.members[c.row_member], &column = block.members[c.column_member];
-    c.first_position = static_cast<int>(block.position.size());
-    for (int i = 0; i < scene.groups[row.group].rows; ++i)
-      for (int j = 0; j < scene.groups[column.group].rows; ++j) {
-        const int r = row.first_row + i, k = column.first_row + j;
-        block.position.push_back(r >= k ? static_cast<int>(block.structure.position(r, k)) : -1);
-      }
+  DirectBlock block{std::move(members), {}, {}, {0}, {}, {}, {}, 0, false, std::move(structure)};
+  std::map<int, int> particle_of;
+  for (const auto& [node, rows] : users) {
+    particle_of[node] = add_particle(block, node, rows);
+    if (!block.structure.banded())
+      for (const int row : rows)
+        for (const int column : rows)
+          if (column <= row) block.positions.push_back(block.structure.position(row, column));
   }
-  std::vector<char> seen(scene.nodes(), 0);
-  for (const Coupling& c : block.couplings)
-    if (!seen[c.node]) seen[c.node] = 1, block.nodes.push_back(c.node);
+  block.movable = static_cast<int>(block.particles.size());
+  std::set<int> groups;
+  for (const Member& m : block.members) {
+    const Group& group = scene.groups[m.group];
+    groups.insert(m.group);
+    block.damped |= group.damped;
+    for (int j = 0; j < group.rows; ++j) block.multipliers.push_back(group.first_row + m.item * group.rows + j);
+  }
+  for (const int g : groups) block.runs.push_back(make_run(scene, g, particle_of, block));
   return block;
 }
 
@@ -84,12 +145,7 @@ Plan make_plan(const Scene& scene, const SolverOptions& options) {
     plan.colors = color_constraints(scene);
     plan.packs = pack_colors(scene, plan.colors);
   } else
-    for (auto& members : connected_chains(scene)) {
-      const int first_row =
-          plan.blocks.empty() ? 0 : plan.blocks.back().first_row + plan.blocks.back().structure.size();
-      plan.blocks.push_back(make_block(scene, std::move(members)));
-      plan.blocks.back().first_row = first_row;
-    }
+    for (auto& members : connected_chains(scene)) plan.blocks.push_back(make_block(scene, std::move(members)));
   return plan;
 }
 

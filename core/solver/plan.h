@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "core/blocks/kernels.h"
 #include "core/packs/packed_colors.h"
 #include "core/scene/scene.h"
 #include "core/solver/options.h"
@@ -17,19 +18,29 @@ struct Member {
   int first_row;  // in the block's matrix
 };
 
-// The coupling of two constraints through one shared node: A[i, j] += w J_i[node] J_j[node]^T.
-struct Coupling {
-  int row_member, column_member, node, row_slot, column_slot;
-  int first_position;  // into DirectBlock::position: rows_i x rows_j entries, row-major (upper ones of a diagonal pair are -1)
+// A block's members of one group, in elimination order; lanes past the end repeat the last one.
+struct MemberRun {
+  int group, count;
+  std::vector<int> items;      // (packs, 8)
+  std::vector<int> nodes;      // (packs, arity, 8) as in sheetbend_blocks::Run
+  std::vector<int> gradients;  // (packs, arity, 8)
+  std::vector<int> first_row;  // (packs, 8)
 };
 
 struct DirectBlock {
   std::vector<Member> members;  // in elimination order
-  std::vector<int> nodes;       // movable nodes it touches
-  int first_row = 0;            // blocks' rows one after the other
-  std::vector<Coupling> couplings;
-  std::vector<int> position;
+  std::vector<MemberRun> runs;  // the same by group
+  std::vector<int>
+      particles;            // the nodes behind the block's particles: the movable ones, then one per use of a fixed one
+  std::vector<int> window;  // (particles + 1), and the rows that each takes part in, as in sheetbend_blocks::Block
+  std::vector<int> window_rows;
+  std::vector<int> multipliers;        // per row: where it stands in the scene
+  std::vector<std::size_t> positions;  // of the pairs of rows of each movable particle, where there is no band
+  int movable = 0;
+  bool damped = false;  // whether any of its groups is
   FactorStructure structure;
+
+  int size() const { return structure.size(); }
 };
 
 struct Plan {

@@ -8,19 +8,15 @@
 
 namespace sheetbend {
 
-// What the reverse needs of one iteration: coordinates and multipliers before each projection, the correction, and for direct blocks the
-// gradients and the factor.
+// What the reverse needs of one iteration over the colors: coordinates and multipliers before each projection, and the correction.
 template <class T>
 struct IterationRecord {
-  std::vector<T> x, lambda, dl, J;
-  std::vector<Factor<T>> factors;
+  std::vector<T> x, lambda, dl;
 
-  void resize(const Scene& scene, const Plan& plan) {
+  void resize(const Scene& scene) {
     x.resize(scene.stencil_coordinates);
     lambda.resize(scene.rows);
     dl.resize(scene.rows);
-    if (!plan.blocks.empty()) J.resize(scene.gradient_entries);
-    factors.resize(plan.blocks.size());
   }
 };
 

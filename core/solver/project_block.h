@@ -1,88 +1,250 @@
-// The block projection of a direct block, forward: its matrix is filled from all members' gradients, factored and solved.
+// The block projection of a direct block, forward. Its numbers stand in the block's own order (particles, rows in elimination order) for a
+// whole substep; the kernels of core/blocks do the work, here they get their arrays.
 #pragma once
 
-#include "core/solver/project.h"
+#include "core/blocks/block_forward.h"
+#include "core/solver/placed.h"
+#include "core/solver/plan.h"
 
 namespace sheetbend {
 
-// All constraints' J of a direct block stand in one array, constraint by constraint.
-template <class K>
-std::size_t first_gradient(const Group& group, int item) {
-  return group.first_gradient + static_cast<std::size_t>(item) * K::rows * K::dofs;
+template <class T>
+inline constexpr bool has_compiled_kernels = std::is_same_v<T, double> || std::is_same_v<T, Pack>;
+
+// The set for T: of this machine's instruction set for numbers and lanes, otherwise compiled where it is used.
+template <class T>
+const sheetbend_blocks::Forward& forward_kernels(const sheetbend_packs::KernelTable& kernels) {
+  if constexpr (has_compiled_kernels<T>)
+    return (std::is_same_v<T, Pack> ? kernels.blocks->many : kernels.blocks->one).forward;
+  else
+    return ForwardKernels<T>::all;
 }
 
-// Calls f with n as a constant, 1 <= n <= Max.
-template <int Max, class F>
-void with_size(int n, F&& f) {
-  if constexpr (Max > 1)
-    if (n < Max) return with_size<Max - 1>(n, f);
-  f.template operator()<Max>();
+// Numbers as the kernels see them, aligned for packs.
+template <class T>
+class Numbers {
+ public:
+  void assign(std::size_t count) {
+    const std::size_t width = sizeof(Wide<T>) / sizeof(T);
+    wide_.assign((count + width - 1) / width, Wide<T>(0.0));
+  }
+  void clear() { std::fill(wide_.begin(), wide_.end(), Wide<T>(0.0)); }
+  T* data() { return reinterpret_cast<T*>(wide_.data()); }
+  double* numbers() { return reinterpret_cast<double*>(wide_.data()); }
+  T& operator[](std::size_t i) { return data()[i]; }
+
+ private:
+  std::vector<Wide<T>> wide_;
+};
+
+// Where number `part` of `parts` of a run's member stands: in a lane of a pack of members, or with its member's others.
+template <class T>
+std::size_t member_number(int member, int parts, int part) {
+  return members_in_lanes<T> ? lane_at(member, parts, part) : static_cast<std::size_t>(member) * parts + part;
 }
 
-// values[position] += w a b^T on one node, for rows x columns scalar constraints (sizes known, so that the loops unroll).
-template <int Rows, int Columns, class T>
-void add_coupling(const T& w, const T* a, int a_stride, const T* b, int b_stride, const int* position, T* values) {
-  for (int i = 0; i < Rows; ++i) {
-    const T x = w * a[i * a_stride], y = w * a[i * a_stride + 1], z = w * a[i * a_stride + 2];
-    for (int k = 0; k < Columns; ++k) {
-      const T* bk = b + k * b_stride;
-      if (const int at = position[i * Columns + k]; at >= 0) values[at] += x * bk[0] + y * bk[1] + z * bk[2];
+template <class T>
+struct BlockState {
+  struct Iteration {
+    Numbers<T> gradients, dl, u;
+    Factor<T> factor;
+  };
+  std::vector<Iteration> iterations;
+  std::vector<Numbers<T>> x, lambda;  // before each iteration and after the last; one of each where nothing is kept
+  std::vector<Numbers<T>> values;     // per run
+  Numbers<T> C_r, diagonal;
+  Numbers<T> x_now, x_before;  // the states that damping refers to
+  double eta = 0.0;            // of `values` and `diagonal`; 0 where they are not filled yet
+
+  void resize(const Scene& scene, const DirectBlock& block, int kept_iterations);
+  Numbers<T>& at(std::vector<Numbers<T>>& states, int iteration) { return states[states.size() == 1 ? 0 : iteration]; }
+  Iteration& at(int iteration) { return iterations[iterations.size() == 1 ? 0 : iteration]; }
+};
+
+template <class T>
+void BlockState<T>::resize(const Scene& scene, const DirectBlock& block, int kept_iterations) {
+  const std::size_t particles = block.particles.size() * sheetbend_blocks::row;
+  const std::size_t rows = Factor<T>::right_side(block.structure);
+  eta = 0.0;
+  iterations.resize(std::max(1, kept_iterations));
+  for (Iteration& i : iterations) {
+    i.gradients.assign(block.window_rows.size() * sheetbend_blocks::row);
+    i.dl.assign(rows);
+    i.u.assign(particles);
+    i.factor.reset(block.structure);
+  }
+  x.resize(kept_iterations + 1);
+  lambda.resize(kept_iterations + 1);
+  for (auto& a : x) a.assign(particles);
+  for (auto& a : lambda) a.assign(block.size());
+  C_r.assign(block.size());
+  diagonal.assign(block.size());
+  if (block.damped)
+    for (auto* a : {&x_now, &x_before}) a->assign(particles);
+  values.resize(block.runs.size());
+  for (std::size_t r = 0; r < values.size(); ++r) {
+    const Group& group = scene.groups[block.runs[r].group];
+    values[r].assign(block.runs[r].items.size() * sheetbend_blocks::value_count(group.damped, group.parameters));
+  }
+}
+
+// What does not change while eta does not: coefficients and the constraints' own parameters.
+template <class T>
+void fill_values(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state) {
+  for (std::size_t r = 0; r < block.runs.size(); ++r) {
+    const MemberRun& run = block.runs[r];
+    const Group& group = s.scene.groups[run.group];
+    const int count = sheetbend_blocks::value_count(group.damped, group.parameters);
+    for (int i = 0; i < static_cast<int>(run.items.size()); ++i) {
+      const int item = run.items[i];
+      const auto set = [&](int part, const T& a) { state.values[r][member_number<T>(i, count, part)] = a; };
+      const Rates<T> rates(s.inputs.of(Quantity::compliance)[group.first + item],
+                           group.damped ? s.inputs.of(Quantity::damping)[group.first + item] : T(0.0), s.eta);
+      set(0, rates.a);
+      if (group.damped) {
+        set(1, rates.g);
+        set(2, rates.scale);
+      }
+      const T* p = s.inputs.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(item) * group.parameters;
+      for (int k = 0; k < group.parameters; ++k) set(count - group.parameters + k, p[k]);
+      for (int j = 0; j < group.rows; ++j) state.diagonal[run.first_row[i] + j] = rates.a * rates.scale;
     }
   }
+  state.eta = s.eta;
 }
 
-// Fills the block's matrix from the gradients of all its members.
+// Particles' coordinates (dofs) to their rows.
 template <class T>
-void assemble(const SubstepState<T>& s, const DirectBlock& block, const T* J, Factor<T>& factor) {
-  const auto gradient = [&](const Member& m, int slot, int& stride) {
-    const Group& group = s.scene.groups[m.group];
-    stride = 3 * group.arity;
-    return J + group.first_gradient + static_cast<std::size_t>(m.item) * group.rows * stride + 3 * slot;
-  };
-  for (const Coupling& c : block.couplings) {
-    int row_stride, column_stride;
-    const Member &row = block.members[c.row_member], &column = block.members[c.column_member];
-    const T *a = gradient(row, c.row_slot, row_stride), *b = gradient(column, c.column_slot, column_stride);
-    with_size<max_rows>(s.scene.groups[row.group].rows, [&]<int R>() {
-      with_size<max_rows>(s.scene.groups[column.group].rows, [&]<int C>() {
-        add_coupling<R, C>(s.w[c.node], a, row_stride, b, column_stride, &block.position[c.first_position],
-                           factor.values.data());
-      });
-    });
+void load_coordinates(const Scene& scene, const DirectBlock& block, const T* x, Numbers<T>& rows) {
+  for (std::size_t p = 0; p < block.particles.size(); ++p)
+    std::copy_n(x + scene.first_dof[block.particles[p]], 3, rows.data() + sheetbend_blocks::row * p);
+}
+
+// Takes coordinates and inverse masses from the substep's state, and multipliers and damping references where it has them.
+template <class T>
+void begin_block(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state) {
+  if (state.eta != s.eta) fill_values(s, block, state);
+  load_coordinates(s.scene, block, s.q, state.x[0]);
+  for (std::size_t p = 0; p < block.particles.size(); ++p)
+    state.x[0][sheetbend_blocks::row * p + 3] = s.w[block.particles[p]];
+  for (int row = 0; row < block.size(); ++row)
+    state.lambda[0][row] = s.lambda ? s.lambda[block.multipliers[row]] : T(0.0);
+  if (s.C_r)
+    for (int row = 0; row < block.size(); ++row) state.C_r[row] = s.C_r[block.multipliers[row]];
+}
+
+// The runs of a block; the reverse gives cotangents for their values.
+template <class T>
+std::vector<sheetbend_blocks::Run> runs_of(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state,
+                                           std::vector<Numbers<T>>* values_bar = nullptr) {
+  std::vector<sheetbend_blocks::Run> runs;
+  for (std::size_t r = 0; r < block.runs.size(); ++r) {
+    const MemberRun& run = block.runs[r];
+    const Group& group = s.scene.groups[run.group];
+    runs.push_back({group.kind, run.count, group.damped, run.nodes.data(), run.gradients.data(), run.first_row.data(),
+                    state.values[r].numbers(), values_bar ? (*values_bar)[r].numbers() : nullptr});
   }
+  return runs;
 }
 
 template <class T>
-void project_block(const SubstepState<T>& s, const DirectBlock& block, T* rows, IterationRecord<T>& record,
-                   Factor<T>& factor) {
-  T* solution = rows + block.first_row;
-  factor.reset(block.structure);
-  for (const Member& m : block.members) {
-    const Group& group = s.scene.groups[m.group];
-    with_kind(group.kind, [&]<class K>(K) {
-      const Placed<K, T> e(s, group, m.item);
-      T C[K::rows];
-      K::evaluate(e.x, e.p, C, &record.J[first_gradient<K>(group, m.item)]);
-      for (int j = 0; j < K::rows; ++j) {
-        solution[m.first_row + j] = -(e.residual(C, s.lambda + e.first_row, e.references(s, group), j) * e.rates.scale);
-        factor.values[block.structure.position(m.first_row + j, m.first_row + j)] += e.rates.a * e.rates.scale;
-      }
-      std::copy_n(e.x, K::dofs, &record.x[first_coordinate<K>(group, m.item)]);
-    });
+sheetbend_blocks::References references_of(const std::vector<sheetbend_blocks::Run>& runs, double before,
+                                           BlockState<T>& state) {
+  sheetbend_blocks::References r{};
+  r.runs = runs.data();
+  r.run_count = static_cast<int>(runs.size());
+  r.before = before;
+  r.x = state.x_now.numbers();
+  r.x_before = state.x_before.numbers();
+  r.C_r = state.C_r.numbers();
+  return r;
+}
+
+// The arrays of one iteration; those of the reverse are left open.
+template <class T>
+sheetbend_blocks::Block arrays_of(const DirectBlock& block, const std::vector<sheetbend_blocks::Run>& runs,
+                                  BlockState<T>& state, int iteration) {
+  auto& own = state.at(iteration);
+  sheetbend_blocks::Block b{};
+  b.runs = runs.data();
+  b.run_count = static_cast<int>(runs.size());
+  b.movable = block.movable;
+  b.particles = static_cast<int>(block.particles.size());
+  b.size = block.size();
+  b.band = block.structure.stored_band();
+  b.window = block.window.data();
+  b.rows = block.window_rows.data();
+  b.x = state.at(state.x, iteration).numbers();
+  b.x_next = state.at(state.x, iteration + 1).numbers();
+  b.lambda = state.at(state.lambda, iteration).numbers();
+  b.lambda_next = state.at(state.lambda, iteration + 1).numbers();
+  b.C_r = state.C_r.numbers();
+  b.diagonal = state.diagonal.numbers();
+  b.gradients = own.gradients.numbers();
+  b.matrix = reinterpret_cast<double*>(own.factor.values.data());
+  b.inverse = reinterpret_cast<double*>(own.factor.inverse.data());
+  b.dl = own.dl.numbers();
+  b.u = own.u.numbers();
+  return b;
+}
+
+// Fills and factors the matrix of a block with branches or loops.
+template <class T>
+void factor_sparse(const DirectBlock& block, BlockState<T>& state, int iteration) {
+  auto& own = state.at(iteration);
+  own.factor.reset(block.structure);
+  for (int row = 0; row < block.size(); ++row)
+    own.factor.values[block.structure.position(row, row)] = state.diagonal[row];
+  const T *G = own.gradients.data(), *x = state.at(state.x, iteration).data();
+  auto position = block.positions.begin();
+  for (int p = 0; p < block.movable; ++p)
+    for (int i = block.window[p]; i < block.window[p + 1]; ++i) {
+      const Vec3<T> wG = x[sheetbend_blocks::row * p + 3] * Vec3<T>(G + sheetbend_blocks::row * i);
+      for (int k = block.window[p]; k <= i; ++k)
+        own.factor.values[*position++] += dot(wG, Vec3<T>(G + sheetbend_blocks::row * k));
+    }
+  own.factor.factorize(block.structure);
+}
+
+// The damping references from the states (dofs) at n and n-1; `before` is that of Bdf.
+template <class T>
+void refer_block(const SubstepState<T>& s, const DirectBlock& block, const sheetbend_packs::KernelTable& table,
+                 double before, const T* x, const T* x_before, BlockState<T>& state) {
+  if (!block.damped) return;
+  load_coordinates(s.scene, block, x, state.x_now);
+  load_coordinates(s.scene, block, x_before, state.x_before);
+  const auto runs = runs_of(s, block, state);
+  forward_kernels<T>(table).refer(references_of(runs, before, state));
+}
+
+template <class T>
+void project_block(const SubstepState<T>& s, const DirectBlock& block, const sheetbend_packs::KernelTable& table,
+                   BlockState<T>& state, int iteration) {
+  const auto& kernels = forward_kernels<T>(table);
+  const auto runs = runs_of(s, block, state);
+  const auto arrays = arrays_of(block, runs, state, iteration);
+  kernels.evaluate(arrays);
+  if (block.structure.banded()) {
+    kernels.factor(arrays);
+    kernels.solve(arrays, arrays.dl);
+  } else {
+    factor_sparse(block, state, iteration);
+    state.at(iteration).factor.solve(block.structure, state.at(iteration).dl.data());
   }
-  assemble(s, block, record.J.data(), factor);
-  factor.factorize(block.structure);
-  factor.solve(block.structure, solution);
-  for (const Member& m : block.members) {
-    const Group& group = s.scene.groups[m.group];
-    with_kind(group.kind, [&]<class K>(K) {
-      const Placed<K, T> e(s, group, m.item);
-      T push[K::dofs]{};
-      transpose_times<K>(&record.J[first_gradient<K>(group, m.item)], &solution[m.first_row], push);
-      correct_multipliers(s, e, &solution[m.first_row], record);
-      apply(s, e, push);
-    });
-  }
+  kernels.push(arrays);
+}
+
+// Writes the movable particles' coordinates.
+template <class T>
+void end_block(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state) {
+  for (int p = 0; p < block.movable; ++p)
+    std::copy_n(state.x.back().data() + sheetbend_blocks::row * p, 3, s.q + s.scene.first_dof[block.particles[p]]);
+}
+
+// Writes the multipliers in the scene's order.
+template <class T>
+void unpack_multipliers(const DirectBlock& block, BlockState<T>& state, T* lambda) {
+  for (int row = 0; row < block.size(); ++row) lambda[block.multipliers[row]] = state.lambda.back()[row];
 }
 
 }  // namespace sheetbend

@@ -83,11 +83,11 @@ class Rollout {
 
   // The last substep's multipliers (rows); zero before the first.
   const T* multipliers() {
+    record_.lambda.resize(scene_.rows);
     if constexpr (in_packs<T>)
-      if (sweeps_packs<T>(plan_)) {
-        record_.lambda.resize(scene_.rows);
-        unpack_multipliers(scene_, plan_.packs, record_.packs, record_.lambda.data());
-      }
+      if (!plan_.colors.empty()) unpack_multipliers(scene_, plan_.packs, record_.packs, record_.lambda.data());
+    for (std::size_t b = 0; b < plan_.blocks.size(); ++b)
+      unpack_multipliers(plan_.blocks[b], record_.blocks[b], record_.lambda.data());
     return record_.lambda.data();
   }
 

@@ -5,6 +5,7 @@
 #include <atomic>
 
 #include "core/solver/predict.h"
+#include "core/solver/project.h"
 #include "core/solver/project_block.h"
 
 namespace sheetbend {
@@ -13,22 +14,25 @@ template <class T>
 struct SubstepRecord {
   std::vector<IterationRecord<T>> iterations;
   Weights<T> weights;
-  std::vector<T> C_r;           // damping references
-  std::vector<T> lambda, rows;  // multipliers; right sides and solutions of direct blocks
-  PackState<std::conditional_t<in_packs<T>, T, double>> packs;  // all of that where colors go through the kernels
+  std::vector<T> C_r, lambda;  // damping references, multipliers (those of packs and blocks stay there)
+  PackState<std::conditional_t<in_packs<T>, T, double>> packs;  // of colors that go through the kernels
+  std::vector<BlockState<T>> blocks;
 
   void resize(const Scene& scene, const Plan& plan, bool keep_iterations) {
     weights.w.resize(scene.nodes());
     if (scene.has_drag) weights.kept.resize(scene.nodes());
+    const int kept = keep_iterations ? plan.options.iterations : 0;
+    blocks.resize(plan.blocks.size());
+    for (std::size_t b = 0; b < blocks.size(); ++b) blocks[b].resize(scene, plan.blocks[b], kept);
+    if (plan.colors.empty()) return;
     C_r.resize(damped_rows(scene));
-    if (sweeps_packs<T>(plan)) {
-      if constexpr (in_packs<T>) packs.resize(plan.packs, keep_iterations ? plan.options.iterations : 0);
-      return;
+    if constexpr (in_packs<T>) {
+      packs.resize(plan.packs, kept);
+    } else {
+      iterations.resize(std::max(1, kept));
+      for (auto& i : iterations) i.resize(scene);
+      lambda.resize(scene.rows);
     }
-    iterations.resize(keep_iterations ? plan.options.iterations : 1);
-    for (auto& i : iterations) i.resize(scene, plan);
-    lambda.resize(scene.rows);
-    rows.resize(scene.rows);
   }
 
   // Where the coordinates are while they are corrected: in the kernels' rows, or in q.
@@ -63,26 +67,34 @@ void damping_references(const Scene& scene, const Inputs<const T>& in, const Bdf
   }
 }
 
-// All iterations.
+// All iterations, with the damping references that they need.
 template <class T>
-void project(const Scene& scene, const Plan& plan, const Inputs<const T>& in, double eta, T* q,
-             SubstepRecord<T>& record) {
+void project(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf, const SubstepStates<T>& s,
+             T* q, SubstepRecord<T>& record) {
   const SolverOptions& o = plan.options;
-  if constexpr (in_packs<T>)
-    if (sweeps_packs<T>(plan)) {
-      begin_sweeps(scene, plan.packs, in, eta, record.weights.w.data(), record.C_r.data(), record.packs);
+  const T* w = record.weights.w.data();
+  parallel_for(static_cast<int>(plan.blocks.size()), o.threads, 1, [&](int begin, int end) {
+    const SubstepState<T> state{scene, in, bdf.eta, q, w, nullptr, nullptr};
+    for (int b = begin; b < end; ++b) {
+      begin_block(state, plan.blocks[b], record.blocks[b]);
+      refer_block(state, plan.blocks[b], pack_kernels(), bdf.before, s.x, s.x_before, record.blocks[b]);
       for (int iteration = 0; iteration < o.iterations; ++iteration)
-        sweep(plan.packs, pack_kernels(), o.threads, o.grain, iteration, record.packs);
-      return;
+        project_block(state, plan.blocks[b], pack_kernels(), record.blocks[b], iteration);
+      end_block(state, plan.blocks[b], record.blocks[b]);
     }
-  std::fill(record.lambda.begin(), record.lambda.end(), T(0.0));
-  const SubstepState<T> state{scene, in, eta, q, record.weights.w.data(), record.C_r.data(), record.lambda.data()};
-  for (int iteration = 0; iteration < o.iterations; ++iteration) {
-    IterationRecord<T>& kept = record.iterations[record.iterations.size() == 1 ? 0 : iteration];
-    parallel_for(static_cast<int>(plan.blocks.size()), o.threads, 1, [&](int begin, int end) {
-      for (int b = begin; b < end; ++b) project_block(state, plan.blocks[b], record.rows.data(), kept, kept.factors[b]);
-    });
-    for (const Color& color : plan.colors) project_color(state, o, color, kept);
+  });
+  if (plan.colors.empty()) return;
+  damping_references(scene, in, bdf, s, record.C_r.data());
+  if constexpr (in_packs<T>) {
+    begin_sweeps(scene, plan.packs, in, bdf.eta, w, record.C_r.data(), record.packs);
+    for (int iteration = 0; iteration < o.iterations; ++iteration)
+      sweep(plan.packs, pack_kernels(), o.threads, o.grain, iteration, record.packs);
+  } else {
+    std::fill(record.lambda.begin(), record.lambda.end(), T(0.0));
+    const SubstepState<T> state{scene, in, bdf.eta, q, w, record.C_r.data(), record.lambda.data()};
+    for (int iteration = 0; iteration < o.iterations; ++iteration)
+      for (const Color& color : plan.colors)
+        project_color(state, o, color, record.iterations[record.iterations.size() == 1 ? 0 : iteration]);
   }
 }
 
@@ -93,8 +105,7 @@ void correct(const Scene& scene, const Plan& plan, const Inputs<const T>& in, co
              const SubstepStates<T>& s, T* q, SubstepRecord<T>& record) {
   weigh(scene, in, bdf, s, record.weights);
   predict(scene, in, bdf, t_next, s, record.weights, plan.options.threads, record.coordinates(plan, q));
-  damping_references(scene, in, bdf, s, record.C_r.data());
-  project(scene, plan, in, bdf.eta, q, record);
+  project(scene, plan, in, bdf, s, q, record);
 }
 
 // v = (q - history(x))/eta, and q to x_next. Says whether all of q is finite.

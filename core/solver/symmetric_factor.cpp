@@ -12,7 +12,7 @@ FactorStructure::FactorStructure(int n, const std::vector<std::pair<int, int>>& 
     nonzeros += row != column;
   }
   // A band pays while it is not much emptier than the matrix.
-  banded_ = band_ < Factor<double>::max_band && static_cast<std::size_t>(n) * band_ <= 4 * nonzeros + 64;
+  banded_ = band_ <= max_band && static_cast<std::size_t>(n) * band_ <= 4 * nonzeros + 64;
   if (!banded_) build_sparse(entries);
 }
 
@@ -48,8 +48,16 @@ void FactorStructure::build_sparse(const std::vector<std::pair<int, int>>& entri
   for (int j = 0; j < n_; ++j) column_start_.push_back(column_start_.back() + count[j]);
 }
 
+std::size_t FactorStructure::values() const {
+  const std::size_t band = stored_band();
+  return banded_ ? (n_ + band) * (band + 1) + band_padding : row_start_.back();
+}
+
 std::size_t FactorStructure::position(int row, int column) const {
-  if (banded_) return static_cast<std::size_t>(row) * (band_ + 1) + band_ - row + column;
+  if (banded_) {
+    const std::size_t band = stored_band();
+    return (band + column) * (band + 1) + row - column;
+  }
   const auto begin = row_column_.begin() + row_start_[row], end = row_column_.begin() + row_start_[row + 1];
   const auto found = std::lower_bound(begin, end, column);
   if (found == end || *found != column) throw std::logic_error("entry outside the matrix pattern");

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/scalar/scalar.h"
+#include "core/blocks/band.h"
 
 namespace sheetbend {
 
@@ -18,9 +18,10 @@ class FactorStructure {
   int size() const { return n_; }
   bool banded() const { return banded_; }
   int half_bandwidth() const { return band_; }
-  std::size_t values() const { return banded_ ? static_cast<std::size_t>(n_) * (band_ + 1) : row_start_.back(); }
+  int stored_band() const { return sheetbend::stored_band(band_); }
+  std::size_t values() const;
   std::size_t position(int row, int column) const;  // row >= column
-  std::size_t fill() const { return banded_ ? values() : column_start_.back(); }
+  std::size_t fill() const { return banded_ ? static_cast<std::size_t>(n_) * (band_ + 1) : column_start_.back(); }
 
  private:
   template <class T>
@@ -37,54 +38,30 @@ class FactorStructure {
 template <class T>
 class Factor {
  public:
-  std::vector<T> values;  // A on entry, by FactorStructure::position
+  std::vector<T> values;   // A on entry, by FactorStructure::position
+  std::vector<T> inverse;  // of the pivots, after as many zeros as the stored band is wide
+
+  // A right side of a band is as long as the matrix and the stored band, with zeros at the end.
+  static std::size_t right_side(const FactorStructure& s) { return s.banded_ ? s.n_ + s.stored_band() : s.n_; }
 
   void reset(const FactorStructure& s) {
     values.assign(s.values(), T(0.0));
-    inverse_.resize(s.n_);
+    inverse.assign(right_side(s), T(0.0));
   }
 
-  void factorize(const FactorStructure& s) { s.banded_ ? factorize_banded(s) : factorize_sparse(s); }
+  void factorize(const FactorStructure& s) {
+    if (!s.banded_) return factorize_sparse(s);
+    with_band(s.stored_band(),
+              [&]<int Band>() { factorize_band<Band>(s.n_, s.stored_band(), values.data(), inverse.data()); });
+  }
 
-  void solve(const FactorStructure& s, T* b) const { s.banded_ ? solve_banded(s, b) : solve_sparse(s, b); }
+  void solve(const FactorStructure& s, T* b) const {
+    if (!s.banded_) return solve_sparse(s, b);
+    with_band(s.stored_band(),
+              [&]<int Band>() { solve_band<Band>(s.n_, s.stored_band(), values.data(), inverse.data(), b); });
+  }
 
  private:
-  static T inverse_pivot(const T& d) {
-    const auto movable = d > T(0.0);
-    return select(movable, T(1.0) / select(movable, d, T(1.0)), T(0.0));
-  }
-
-  // Right-looking by rows of the trailing band: the inner loop runs over contiguous values.
-  void factorize_banded(const FactorStructure& s) {
-    const int n = s.n_, band = s.band_;
-    T scaled[max_band];
-    for (int j = 0; j < n; ++j) {
-      const T inverse = inverse_pivot(at(s, j, j));
-      inverse_[j] = inverse;
-      const int last = j + band < n ? j + band : n - 1;
-      for (int i = j + 1; i <= last; ++i) scaled[i - j] = at(s, i, j);
-      for (int i = j + 1; i <= last; ++i) {
-        const T l = scaled[i - j] * inverse;
-        T* row = &values[static_cast<std::size_t>(i) * (band + 1) + band - i];
-        for (int k = j + 1; k <= i; ++k) row[k] -= l * scaled[k - j];
-        row[j] = l;
-      }
-    }
-  }
-
-  void solve_banded(const FactorStructure& s, T* b) const {
-    const int n = s.n_, band = s.band_;
-    for (int i = 0; i < n; ++i) {
-      const T* row = &values[static_cast<std::size_t>(i) * (band + 1) + band - i];
-      for (int k = i > band ? i - band : 0; k < i; ++k) b[i] -= row[k] * b[k];
-    }
-    for (int i = 0; i < n; ++i) b[i] = b[i] * inverse_[i];
-    for (int i = n - 1; i >= 0; --i) {
-      const T* row = &values[static_cast<std::size_t>(i) * (band + 1) + band - i];
-      for (int k = i > band ? i - band : 0; k < i; ++k) b[k] -= row[k] * b[i];
-    }
-  }
-
   void factorize_sparse(const FactorStructure& s) {
     lower_.resize(s.column_start_.back());
     lower_row_.resize(s.column_start_.back());
@@ -100,33 +77,25 @@ class Factor {
         work_[j] = T(0.0);
         const int begin = s.column_start_[j], end = begin + used_[j];
         for (int q = begin; q < end; ++q) work_[lower_row_[q]] -= lower_[q] * y;
-        const T l = y * inverse_[j];
+        const T l = y * inverse[j];
         pivot -= l * y;
         lower_[end] = l;
         lower_row_[end] = i;
         ++used_[j];
       }
-      inverse_[i] = inverse_pivot(pivot);
+      inverse[i] = inverse_pivot(pivot);
     }
   }
 
   void solve_sparse(const FactorStructure& s, T* b) const {
     for (int j = 0; j < s.n_; ++j)
       for (int q = s.column_start_[j]; q < s.column_start_[j + 1]; ++q) b[lower_row_[q]] -= lower_[q] * b[j];
-    for (int j = 0; j < s.n_; ++j) b[j] = b[j] * inverse_[j];
+    for (int j = 0; j < s.n_; ++j) b[j] = b[j] * inverse[j];
     for (int j = s.n_ - 1; j >= 0; --j)
       for (int q = s.column_start_[j]; q < s.column_start_[j + 1]; ++q) b[j] -= lower_[q] * b[lower_row_[q]];
   }
 
-  T& at(const FactorStructure& s, int i, int j) {
-    return values[static_cast<std::size_t>(i) * (s.band_ + 1) + s.band_ - i + j];
-  }
-
- public:
-  static constexpr int max_band = 64;
-
- private:
-  std::vector<T> inverse_, lower_, work_;
+  std::vector<T> lower_, work_;
   std::vector<int> lower_row_, used_;
 };
 

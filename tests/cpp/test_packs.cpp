@@ -67,7 +67,7 @@ struct Packs : ::testing::TestWithParam<bool> {
     const SubstepState<double> state{scene, in, eta, s.q.data(), w.data(), C_r.data(), s.lambda.data()};
     std::vector<IterationRecord<double>> records(plan.options.iterations);
     for (auto& record : records) {
-      record.resize(scene, plan);
+      record.resize(scene);
       for (const Color& color : plan.colors) project_color(state, plan.options, color, record);
     }
     s.reverse.resize(scene.dofs() + scene.nodes() + scene.rows + scene.layout.total());

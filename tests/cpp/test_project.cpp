@@ -250,6 +250,59 @@ TEST_P(CoupledBlocks, DerivativesMatchComplexStep) {
   record_error("vjp", worst);
 }
 
+TEST_P(CoupledBlocks, HaveTheSameBitsOnEveryInstructionSet) {
+  const Sample sample = random_scene(24, {.net = GetParam()});
+  Projection p(sample.scene, Partition::direct, eta);
+  Random random(24);
+  const auto theta = p.random_theta(sample.inputs, random);
+  const auto out_bar = random.vector(p.scene.dofs() + p.scene.rows);
+  const auto forward = p.forward(theta), reverse = p.reverse(theta, out_bar);
+  for (const auto* kernels : available_kernels()) {
+    p.kernels = kernels;
+    EXPECT_TRUE(same_bits(p.forward(theta), forward)) << kernels->name;
+    EXPECT_TRUE(same_bits(p.reverse(theta, out_bar), reverse)) << kernels->name;
+  }
+}
+
+TEST_P(CoupledBlocks, DampingReferencesHaveTheSameBitsOnEveryInstructionSet) {
+  const Sample sample = random_scene(26, {.net = GetParam()});
+  const Projection p(sample.scene, Partition::direct, eta);
+  Random random(26);
+  const Projection::Run<double> run(p, p.random_theta(sample.inputs, random));
+  std::vector<double> x = run.theta, x_before = run.theta;
+  for (double& a : x_before) a += random(-0.005, 0.005);
+  const auto references = [&](const DirectBlock& block, const sheetbend_packs::KernelTable& kernels) {
+    BlockState<double> state;
+    state.resize(p.scene, block, 0);
+    begin_block(run.state, block, state);
+    refer_block(run.state, block, kernels, -1.0 / 3.0, x.data(), x_before.data(), state);
+    return std::vector<double>(state.C_r.data(), state.C_r.data() + block.size());
+  };
+  for (const DirectBlock& block : p.plan.blocks)
+    for (const auto* kernels : available_kernels())
+      EXPECT_TRUE(same_bits(references(block, *kernels), references(block, pack_kernels()))) << kernels->name;
+}
+
+// Eight states in the lanes against one state at a time.
+TEST_P(CoupledBlocks, HaveTheSameBitsInEveryLane) {
+  const Sample sample = random_scene(25, {.net = GetParam()});
+  Projection p(sample.scene, Partition::direct, eta);
+  Random random(25);
+  std::vector<std::vector<double>> theta;
+  for (int lane = 0; lane < Pack::lanes; ++lane) theta.push_back(p.random_theta(sample.inputs, random));
+  std::vector<Pack> packed(theta[0].size());
+  for (std::size_t i = 0; i < packed.size(); ++i) packed[i] = per_lane([&](int lane) { return theta[lane][i]; });
+  for (const auto* kernels : available_kernels()) {
+    p.kernels = kernels;
+    const auto found = p.forward(packed);
+    for (int lane = 0; lane < Pack::lanes; ++lane) {
+      std::vector<double> own;
+      for (const Pack& a : found) own.push_back(a[lane]);
+      EXPECT_TRUE(same_bits(own, p.forward(theta[lane]))) << kernels->name << ", lane " << lane;
+    }
+  }
+}
+
 TEST_P(CoupledBlocks, OneSweepByColorMatchesComplexStep) {
   const Sample sample = random_scene(30, {.net = GetParam()});
   record_error("vjp", climb(Projection(sample.scene, Partition::gauss_seidel, eta), sample.inputs, 30));

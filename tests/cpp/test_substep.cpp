@@ -42,7 +42,10 @@ std::vector<double> reverse(const OneSubstep& one, const std::vector<double>& th
   substep_vjp(one.scene, one.plan, run.in, run.bdf, one.t_next, run.states, run.record, out_bar.data(),
               out_bar.data() + dofs, scratch, {&bar[0], &bar[dofs], &bar[2 * dofs], &bar[3 * dofs]},
               {one.scene.layout, &bar[4 * dofs]});
-  finish(one.scene, one.plan.packs, run.in, {one.scene.layout, &bar[4 * dofs]}, scratch.packs);
+  const Inputs<double> in_bar{one.scene.layout, &bar[4 * dofs]};
+  finish(one.scene, one.plan.packs, run.in, in_bar, scratch.packs);
+  for (std::size_t b = 0; b < one.plan.blocks.size(); ++b)
+    finish_block(one.scene, one.plan.blocks[b], run.in, in_bar, scratch.blocks[b]);
   return bar;
 }
 

@@ -4,6 +4,8 @@
 #pragma once
 
 #include "adjoint/project_block_vjp.h"
+#include "adjoint/project_vjp.h"
+#include "core/solver/project.h"
 #include "tests/cpp/support/random_scene.h"
 
 namespace sheetbend::testing {
@@ -12,6 +14,7 @@ struct Projection {
   Scene scene;
   Plan plan;
   double eta;
+  const sheetbend_packs::KernelTable* kernels = &pack_kernels();
 
   Projection(Scene s, Partition partition, double eta_)
       : scene(std::move(s)), plan(make_plan(scene, {.h = eta_, .partition = partition})), eta(eta_) {}
@@ -54,12 +57,14 @@ struct Projection {
   struct Run {
     std::vector<T> theta, out, w;
     IterationRecord<T> record;
+    std::vector<BlockState<T>> blocks;
     SubstepState<T> state;
 
     Run(const Projection& p, const std::vector<T>& theta_)
         : theta(theta_),
           out(p.scene.dofs() + p.scene.rows),
           w(p.scene.nodes()),
+          blocks(p.plan.blocks.size()),
           state{p.scene,
                 {p.scene.layout, &theta[p.inputs_at()]},
                 p.eta,
@@ -71,11 +76,15 @@ struct Projection {
       for (int n = 0; n < p.scene.nodes(); ++n) w[n] = p.scene.role[n] == Role::free ? theta[at[1] + n] : T(0.0);
       std::copy_n(theta.begin(), p.scene.dofs(), out.begin());
       std::copy_n(theta.begin() + static_cast<std::ptrdiff_t>(at[3]), p.scene.rows, out.begin() + p.scene.dofs());
-      record.resize(p.scene, p.plan);
-      std::vector<T> rows(p.scene.rows);
+      record.resize(p.scene);
       for (const Color& color : p.plan.colors) project_color(state, p.plan.options, color, record);
-      for (std::size_t b = 0; b < p.plan.blocks.size(); ++b)
-        project_block(state, p.plan.blocks[b], rows.data(), record, record.factors[b]);
+      for (std::size_t b = 0; b < p.plan.blocks.size(); ++b) {
+        blocks[b].resize(p.scene, p.plan.blocks[b], 1);
+        begin_block(state, p.plan.blocks[b], blocks[b]);
+        project_block(state, p.plan.blocks[b], *p.kernels, blocks[b], 0);
+        end_block(state, p.plan.blocks[b], blocks[b]);
+        unpack_multipliers(p.plan.blocks[b], blocks[b], state.lambda);
+      }
     }
   };
 
@@ -86,12 +95,22 @@ struct Projection {
 
   std::vector<double> reverse(const std::vector<double>& theta, const std::vector<double>& out_bar) const {
     return reverse_with(theta, out_bar, [&](Run<double>& run, const SubstepCotangent<double>& bar) {
-      std::vector<double> rows(scene.rows), z(scene.dofs()), u(scene.dofs());
       for (auto color = plan.colors.rbegin(); color != plan.colors.rend(); ++color)
         project_color_vjp(run.state, plan.options, *color, run.record, bar);
-      for (std::size_t b = 0; b < plan.blocks.size(); ++b)
-        project_block_vjp(run.state, plan.blocks[b], run.record, run.record.factors[b], rows.data(),
-                          {z.data(), u.data()}, bar);
+      for (std::size_t b = 0; b < plan.blocks.size(); ++b) {
+        const DirectBlock& block = plan.blocks[b];
+        BlockCotangents<double> own;
+        own.resize(scene, block);
+        begin_block_vjp(run.state, block, bar.x, bar.lambda, bar.inputs, own);
+        project_block_vjp(run.state, block, *kernels, run.blocks[b], 0, own);
+        end_block_vjp(run.state, block, bar.x, bar.w, own);
+        for (int row = 0; row < block.size(); ++row) {
+          bar.lambda[block.multipliers[row]] = own.lambda[row];
+          bar.C_r[block.multipliers[row]] = own.C_r[row];
+        }
+        add_particles(scene, block, block.movable, block.particles.size(), own.x, bar.x);
+        finish_block(scene, block, run.state.inputs, bar.inputs, own);
+      }
     });
   }
 

@@ -1,0 +1,130 @@
+// The reverse kernels of a direct block over a scalar T. The mathematics is element_vjp.h's.
+#pragma once
+
+#include "adjoint/element/element_vjp.h"
+#include "core/blocks/block_forward.h"
+
+namespace sheetbend {
+
+template <class K, class T>
+void pull_back_run(const sheetbend_blocks::Block& b, const sheetbend_blocks::Run& r) {
+  using W = Wide<T>;
+  for (int n = 0; n < elements<T>(r); ++n) {
+    const int* rows = indices_of<T>(r.first_row, 1, n);
+    const int* nodes = indices_of<T>(r.nodes, K::arity, n);
+    const auto e = load_element<K, T>(b, r, nodes, n);
+    W z[K::dofs], u[K::dofs], unused, x_bar[K::dofs]{};
+    for (int k = 0; k < K::arity; ++k) {
+      load_particle(numbers_of<T>(b.z), nodes + k * Pack::lanes, z + 3 * k, unused);
+      load_particle(numbers_of<T>(b.u), nodes + k * Pack::lanes, u + 3 * k, unused);
+    }
+    W lambda[K::rows], C_r[K::rows], dl[K::rows], y[K::rows];
+    for (int j = 0; j < K::rows; ++j) {
+      lambda[j] = gather(numbers_of<T>(b.lambda), rows, j);
+      dl[j] = gather(numbers_of<T>(b.dl), rows, j);
+      y[j] = gather(numbers_of<T>(b.y), rows, j);
+      if (r.damped) C_r[j] = gather(numbers_of<T>(b.C_r), rows, j);
+    }
+    ElementCotangent<K, W> own;
+    pull_back(e, Kept<K, W>(e.x), lambda, r.damped ? C_r : nullptr, dl, y, z, u, x_bar, own);
+
+    add_to_particles<K::arity>(numbers_of<T>(b.x_bar), nodes, r.count - n * Pack::lanes, x_bar);
+    const auto add_row = [&](double* to, int j, const W& by) {
+      scatter(numbers_of<T>(to), rows, j, gather(numbers_of<T>(to), rows, j) + by);
+    };
+    for (int j = 0; j < K::rows; ++j) {
+      add_row(b.lambda_bar, j, own.lambda[j]);
+      if (r.damped) add_row(b.C_r_bar, j, own.C_r[j]);
+    }
+    W* values_bar = numbers_of<W>(r.values_bar) + static_cast<long>(n) * (2 + parameter_count<K>);
+    values_bar[0] += own.a;
+    if (r.damped) values_bar[1] += own.g;
+    for (int k = 0; k < parameter_count<K>; ++k) values_bar[2 + k] += own.p[k];
+  }
+}
+
+// One evaluation's share: x_bar += scale J^T C_bar, p_bar += scale C_bar . dC/dp.
+template <class K, class T>
+void pull_back_reference(const sheetbend_blocks::Run& r, int n, const double* particles, const Wide<T>* C_bar,
+                         double scale, double* x_bar) {
+  constexpr int P = parameter_count<K>;
+  using W = Wide<T>;
+  using D = std::conditional_t<P == 0, W, Dual<W, P>>;
+  const int* nodes = indices_of<T>(r.nodes, K::arity, n);
+  W at[K::dofs], unused, by[K::dofs]{};
+  D x[K::dofs], p[P + 1], C[K::rows], J[K::rows * K::dofs];
+  for (int k = 0; k < K::arity; ++k)
+    load_particle(numbers_of<T>(particles), nodes + k * Pack::lanes, at + 3 * k, unused);
+  for (int d = 0; d < K::dofs; ++d) x[d] = D(at[d]);
+  for (int k = 0; k < P; ++k) p[k] = D(parameters_of<K, T>(r, n)[k]);
+  if constexpr (P > 0)
+    for (int k = 0; k < P; ++k) p[k].d[k] = W(1.0);
+  K::evaluate(x, p, C, J);
+  W* values_bar = numbers_of<W>(r.values_bar) + static_cast<long>(n) * (2 + P);
+  for (int j = 0; j < K::rows; ++j) {
+    const W bar = W(scale) * C_bar[j];
+    for (int d = 0; d < K::dofs; ++d) by[d] += bar * primal<W>(J[j * K::dofs + d]);
+    if constexpr (P > 0)
+      for (int k = 0; k < P; ++k) values_bar[2 + k] += bar * C[j].d[k];
+  }
+  add_to_particles<K::arity>(numbers_of<T>(x_bar), nodes, r.count - n * Pack::lanes, by);
+}
+
+template <class K, class T>
+void refer_run_vjp(const sheetbend_blocks::References& b, const sheetbend_blocks::Run& r) {
+  for (int n = 0; n < elements<T>(r); ++n) {
+    Wide<T> C_bar[K::rows];
+    for (int j = 0; j < K::rows; ++j) C_bar[j] = gather(numbers_of<T>(b.C_r_bar), indices_of<T>(r.first_row, 1, n), j);
+    pull_back_reference<K, T>(r, n, b.x, C_bar, 1.0 - b.before, b.x_bar);
+    if (b.before != 0.0) pull_back_reference<K, T>(r, n, b.x_before, C_bar, b.before, b.x_before_bar);
+  }
+}
+
+template <class T>
+struct ReverseKernels {
+  using Block = sheetbend_blocks::Block;
+
+  static void right_side(const Block& b) {
+    T* y = numbers_of<T>(b.y);
+    for (int j = 0; j < b.size; ++j) y[j] = numbers_of<T>(b.lambda_bar)[j];
+    for (int p = 0; p < b.movable; ++p) {
+      const long at = sheetbend_blocks::row * static_cast<long>(p);
+      const Vec3<T> dx = numbers_of<T>(b.x)[at + 3] * Vec3<T>(numbers_of<T>(b.x_bar) + at);
+      for (int k = b.window[p]; k < b.window[p + 1]; ++k)
+        y[b.rows[k]] += dot(Vec3<T>(numbers_of<T>(b.gradients) + sheetbend_blocks::row * static_cast<long>(k)), dx);
+    }
+  }
+
+  static void spread(const Block& b) {
+    for (int p = 0; p < b.particles; ++p) {
+      const long at = sheetbend_blocks::row * static_cast<long>(p);
+      T* x_bar = numbers_of<T>(b.x_bar) + at;
+      const Vec3<T> z = Vec3<T>(x_bar) - transpose_times_at(b, p, numbers_of<T>(b.y));
+      z.store(x_bar);
+      if (p >= b.movable) continue;
+      z.store(numbers_of<T>(b.z) + at);
+      x_bar[3] += dot(Vec3<T>(numbers_of<T>(b.u) + at), z);
+    }
+  }
+
+  static void pull_back(const Block& b) {
+    for (int r = 0; r < b.run_count; ++r) pull_back_of[b.runs[r].kind](b, b.runs[r]);
+  }
+
+  static constexpr auto pull_back_of = []<class... K>(std::tuple<K...>*) {
+    return std::array{&pull_back_run<K, T>...};
+  }(static_cast<Registry*>(nullptr));
+
+  static void refer(const sheetbend_blocks::References& b) {
+    for (int r = 0; r < b.run_count; ++r)
+      if (b.runs[r].damped) refer_of[b.runs[r].kind](b, b.runs[r]);
+  }
+
+  static constexpr auto refer_of = []<class... K>(std::tuple<K...>*) {
+    return std::array{&refer_run_vjp<K, T>...};
+  }(static_cast<Registry*>(nullptr));
+
+  static constexpr sheetbend_blocks::Reverse all{&right_side, &spread, &pull_back, &refer};
+};
+
+}  // namespace sheetbend

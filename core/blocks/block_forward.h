@@ -1,0 +1,186 @@
+// The forward kernels of a direct block over a scalar T.
+#pragma once
+
+#include <array>
+#include <tuple>
+
+#include "core/blocks/band.h"
+#include "core/blocks/wide.h"
+#include "core/constraints/registry.h"
+
+namespace sheetbend {
+
+template <class K, class T>
+void evaluate_run(const sheetbend_blocks::Block& b, const sheetbend_blocks::Run& r) {
+  for (int n = 0; n < elements<T>(r); ++n) {
+    const int* rows = indices_of<T>(r.first_row, 1, n);
+    const int* gradients = indices_of<T>(r.gradients, K::arity, n);
+    const auto e = load_element<K, T>(b, r, indices_of<T>(r.nodes, K::arity, n), n);
+    const Evaluation<K, Wide<T>> value(e.x, e.p);
+    Wide<T> lambda[K::rows], C_r[K::rows];
+    for (int j = 0; j < K::rows; ++j) {
+      lambda[j] = gather(numbers_of<T>(b.lambda), rows, j);
+      if (r.damped) C_r[j] = gather(numbers_of<T>(b.C_r), rows, j);
+    }
+    for (int j = 0; j < K::rows; ++j) {
+      scatter(numbers_of<T>(b.dl), rows, j,
+              -(e.residual(value.C, lambda, r.damped ? C_r : nullptr, j) * e.rates.scale));
+      for (int k = 0; k < K::arity; ++k)
+        store_gradient(numbers_of<T>(b.gradients), gradients + k * Pack::lanes, j, value.J + j * K::dofs + 3 * k);
+    }
+  }
+}
+
+template <class K, class T>
+void refer_run(const sheetbend_blocks::References& b, const sheetbend_blocks::Run& r) {
+  using W = Wide<T>;
+  for (int n = 0; n < elements<T>(r); ++n) {
+    const int* rows = indices_of<T>(r.first_row, 1, n);
+    const int* nodes = indices_of<T>(r.nodes, K::arity, n);
+    const auto evaluate = [&](const double* particles) {
+      W x[K::dofs], unused;
+      for (int k = 0; k < K::arity; ++k)
+        load_particle(numbers_of<T>(particles), nodes + k * Pack::lanes, x + 3 * k, unused);
+      return Evaluation<K, W>(x, parameters_of<K, T>(r, n));
+    };
+    const auto now = evaluate(b.x);
+    W C_r[K::rows];
+    for (int j = 0; j < K::rows; ++j) C_r[j] = now.C[j];
+    if (b.before != 0.0) {
+      const auto before = evaluate(b.x_before);
+      for (int j = 0; j < K::rows; ++j) C_r[j] -= W(b.before) * difference<K>(now.C[j], before.C[j]);
+    }
+    for (int j = 0; j < K::rows; ++j) scatter(numbers_of<T>(b.C_r), rows, j, C_r[j]);
+  }
+}
+
+// A += w G G^T of one particle's `count` gradient rows G, which follow one another from `column` on.
+template <class T>
+void add_window(const T* G, int count, const T& w, int band, T* column) {
+  for (int k = 0; k < count; ++k, column += band + 1) {
+    const T *Gk = G + 4 * k, wx = w * Gk[0], wy = w * Gk[1], wz = w * Gk[2];
+    for (int i = 0; i < count - k; ++i) {
+      const T* Gi = Gk + 4 * i;
+      column[i] += wx * Gi[0] + wy * Gi[1] + wz * Gi[2];
+    }
+  }
+}
+
+#ifdef __AVX__
+inline constexpr bool has_fours = true;
+#else
+inline constexpr bool has_fours = false;
+#endif
+
+// The same for plain numbers, four entries of a column at a time. What stands above the diagonal there, and below the window, adds a zero.
+template <int Band>
+void add_window_by_fours(const double* G, int count, double w, double* column) {
+  typedef double Four __attribute__((vector_size(32), aligned(8), may_alias));
+  constexpr int fours = Band / 4 + 1;
+  Row x[fours], y[fours], z[fours];
+  for (int c = 0; c < fours; ++c) {
+    Row rows[4];
+    for (int i = 0; i < 4; ++i) rows[i] = 4 * c + i < count ? row_at(G, 16 * c + 4 * i) : Row{};
+    const Row xz01 = __builtin_shufflevector(rows[0], rows[1], 0, 4, 2, 6);
+    const Row xz23 = __builtin_shufflevector(rows[2], rows[3], 0, 4, 2, 6);
+    const Row yw01 = __builtin_shufflevector(rows[0], rows[1], 1, 5, 3, 7);
+    const Row yw23 = __builtin_shufflevector(rows[2], rows[3], 1, 5, 3, 7);
+    x[c] = __builtin_shufflevector(xz01, xz23, 0, 1, 4, 5);
+    y[c] = __builtin_shufflevector(yw01, yw23, 0, 1, 4, 5);
+    z[c] = __builtin_shufflevector(xz01, xz23, 2, 3, 6, 7);
+  }
+#pragma GCC unroll 17
+  for (int k = 0; k <= Band; ++k, column += Band + 1) {
+    if (k >= count) return;
+    const double wx = w * G[4 * k], wy = w * G[4 * k + 1], wz = w * G[4 * k + 2];
+#pragma GCC unroll 5
+    for (int c = k / 4; c < fours; ++c) {
+      Row by = wx * x[c] + wy * y[c] + wz * z[c];
+      if (c == k / 4)
+        for (int i = 0; i < k % 4; ++i) by[i] = 0.0;
+      Four& to = *reinterpret_cast<Four*>(column + 4 * c - k);
+      to += by;
+    }
+  }
+}
+
+// J^T b of one particle.
+template <class T>
+Vec3<T> transpose_times_at(const sheetbend_blocks::Block& block, int particle, const T* b) {
+  Vec3<T> sum;
+  for (int k = block.window[particle]; k < block.window[particle + 1]; ++k)
+    sum = sum + b[block.rows[k]] * Vec3<T>(numbers_of<T>(block.gradients) + sheetbend_blocks::row * k);
+  return sum;
+}
+
+template <class T>
+struct ForwardKernels {
+  using Block = sheetbend_blocks::Block;
+
+  static void evaluate(const Block& b) {
+    for (int r = 0; r < b.run_count; ++r) evaluate_of[b.runs[r].kind](b, b.runs[r]);
+  }
+
+  static void factor(const Block& b) {
+    T *A = numbers_of<T>(b.matrix), *inverse = numbers_of<T>(b.inverse);
+    const T *diagonal = numbers_of<T>(b.diagonal), *x = numbers_of<T>(b.x), *G = numbers_of<T>(b.gradients);
+    with_band(b.band, [&]<int Band>() {
+      const int band = b.band;
+      T* columns = A + band * (band + 1);
+      for (int j = 0; j < b.size; ++j) {
+        T* column = columns + static_cast<long>(j) * (band + 1);
+        column[0] = diagonal[j];
+        for (int i = 1; i <= band; ++i) column[i] = T(0.0);
+      }
+      for (int p = 0; p < b.movable; ++p) {
+        const int begin = b.window[p];
+        const int count = b.window[p + 1] - begin;
+        const T *rows = G + sheetbend_blocks::row * static_cast<long>(begin), w = x[sheetbend_blocks::row * p + 3];
+        T* to = columns + static_cast<long>(b.rows[begin]) * (band + 1);
+        if constexpr (members_in_lanes<T> && has_fours && Band > 0)
+          add_window_by_fours<Band>(rows, count, w, to);
+        else
+          add_window(rows, count, w, band, to);
+      }
+      factorize_band<Band>(b.size, band, A, inverse);
+    });
+  }
+
+  static void solve(const Block& b, double* right_side) {
+    with_band(b.band, [&]<int Band>() {
+      solve_band<Band>(b.size, b.band, numbers_of<T>(b.matrix), numbers_of<T>(b.inverse), numbers_of<T>(right_side));
+    });
+  }
+
+  static void push(const Block& b) {
+    const T* dl = numbers_of<T>(b.dl);
+    for (int p = 0; p < b.particles; ++p) {
+      const long at = sheetbend_blocks::row * static_cast<long>(p);
+      const T* x = numbers_of<T>(b.x) + at;
+      T *u = numbers_of<T>(b.u) + at, *x_next = numbers_of<T>(b.x_next) + at;
+      const T w = x[3];
+      const Vec3<T> push = p < b.movable ? transpose_times_at(b, p, dl) : Vec3<T>();
+      push.store(u);
+      (Vec3<T>(x) + w * push).store(x_next);
+      x_next[3] = w;
+    }
+    for (int j = 0; j < b.size; ++j) numbers_of<T>(b.lambda_next)[j] = numbers_of<T>(b.lambda)[j] + dl[j];
+  }
+
+  static void refer(const sheetbend_blocks::References& b) {
+    for (int r = 0; r < b.run_count; ++r)
+      if (b.runs[r].damped) refer_of[b.runs[r].kind](b, b.runs[r]);
+  }
+
+  static constexpr auto evaluate_of = []<class... K>(std::tuple<K...>*) {
+    return std::array{&evaluate_run<K, T>...};
+  }(static_cast<Registry*>(nullptr));
+
+  static constexpr auto refer_of = []<class... K>(std::tuple<K...>*) {
+    return std::array{&refer_run<K, T>...};
+  }(static_cast<Registry*>(nullptr));
+
+  static constexpr sheetbend_blocks::Forward all{&evaluate, &factor, &solve, &push, &refer};
+};
+
+}  // namespace sheetbend
