@@ -10,7 +10,7 @@
 namespace sheetbend::bench {
 namespace {
 
-constexpr int constraints = 1024, steps = 2, sweeps = 32;
+constexpr int constraints = 1024, steps = 16, sweeps = 8;
 
 template <class K, bool with_gradient>
 void run(benchmark::State& state, bool damped) {

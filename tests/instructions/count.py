@@ -28,19 +28,27 @@ Counts = dict[str, dict[str, float]]  # instruction set -> what -> instructions 
 
 
 def count(program: str, isa: str) -> dict[str, float]:
-    """By the difference of two runs with different numbers of sweeps."""
-    found: dict[str, list[tuple[int, int]]] = {}
+    """What grows with both substeps and sweeps, per projection: set-up and the rest of a substep cancel."""
+    found: dict[str, dict[tuple[int, int, int], int]] = {}
     with tempfile.TemporaryDirectory() as folder:
         command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={folder}/out", program]
         subprocess.run(command, check=True, capture_output=True, env=os.environ | {"SHEETBEND_ISA": isa})
         for dump in Path(folder).glob("out.*"):
             text = dump.read_text()
-            label = re.search(r"^desc: Trigger: Client Request: (.+) (\d+)$", text, re.M)
+            label = re.search(r"^desc: Trigger: Client Request: (.+) (\d+) (\d+) (\d+)$", text, re.M)
             total = re.search(r"^(?:totals|summary): (\d+)", text, re.M)
             assert label and total, f"cannot read what callgrind wrote: {text[:300]}"
-            found.setdefault(label[1], []).append((int(label[2]), int(total[1])))
-    pairs = {name: sorted(runs) for name, runs in found.items()}
-    return {name: round((b[1] - a[1]) / (b[0] - a[0]), 2) for name, (a, b) in sorted(pairs.items())}
+            found.setdefault(label[1], {})[int(label[2]), int(label[3]), int(label[4])] = int(total[1])
+    return {name: round(per_projection(totals), 2) for name, totals in sorted(found.items())}
+
+
+def per_projection(totals: dict[tuple[int, int, int], int]) -> float:
+    """From instructions by (constraints, substeps, sweeps), of two numbers of substeps times two of sweeps."""
+    (constraints,) = {sizes[0] for sizes in totals}
+    few, many = sorted({sizes[1] for sizes in totals})
+    low, high = sorted({sizes[2] for sizes in totals})
+    more = {steps: totals[constraints, steps, high] - totals[constraints, steps, low] for steps in (few, many)}
+    return (more[many] - more[few]) / (constraints * (many - few) * (high - low))
 
 
 def compare(found: Counts, recorded: Counts) -> list[str]:

@@ -36,6 +36,11 @@ def test_what_is_missing_on_one_side_fails(count: ModuleType) -> None:
     assert count.compare({"v2": {}}, {"v2": {"distance": 1.0}}) == ["v2 distance"]
 
 
+def test_only_what_grows_with_substeps_and_sweeps_counts(count: ModuleType) -> None:
+    totals = {(8, s, k): 1000 + 70 * s + 30 * k + 12 * 8 * s * k for s in (1, 3) for k in (1, 4)}
+    assert count.per_projection(totals) == 12
+
+
 def test_without_valgrind_it_says_so(
     count: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,0 +1,73 @@
+"""What the peers' scripts share: the problem that sheetbend wrote, timing, and one line of JSON.
+
+Run a script as: PYTHON with_TOOL.py PROBLEM.npz REPEATS
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import resource
+import sys
+import time
+from collections.abc import Callable
+from types import SimpleNamespace
+
+import numpy as np
+
+BUDGET = 60.0  # s after which no further repeat starts, as in sheetbend bench
+
+
+def load() -> tuple[SimpleNamespace, int]:
+    """The arrays of the problem (sheetbend.bench.problem.Problem.export tells what they are), and the repeats."""
+    with np.load(sys.argv[1]) as saved:
+        p = SimpleNamespace(**{name: saved[name] for name in saved.files})
+    for name in ("frames", "substeps", "iterations"):
+        setattr(p, name, int(getattr(p, name)))
+    p.h = float(p.h)
+    p.color_ranges = list(zip(p.first_of_color[:-1].tolist(), p.first_of_color[1:].tolist(), strict=True))
+    return p, int(sys.argv[2])
+
+
+def times(work: Callable[[], object], repeats: int) -> tuple[float, list[float], object]:
+    """Seconds of the first call (with its compilation), seconds of the others, the last result."""
+    begin = time.perf_counter()
+    result = work()
+    first = time.perf_counter() - begin
+    seconds: list[float] = []
+    gc.collect()
+    while len(seconds) < repeats and sum(seconds) < BUDGET:
+        begin = time.perf_counter()
+        result = work()
+        seconds.append(time.perf_counter() - begin)
+    return first, seconds, result
+
+
+def run(tool: str, version: str, forward: Callable, gradient: Callable | None = None) -> None:
+    """Times forward() -> losses (scenes,) and gradient() -> (losses, by parameters (scenes, 3), by start (scenes,
+    particles, 3)), and prints them."""
+    p, repeats = load()
+    before = peak_mb()
+    first, seconds, losses = times(forward, repeats)
+    told = {
+        "tool": tool,
+        "version": version,
+        "forward_first_s": first,
+        "forward_s": seconds,
+        "losses": np.asarray(losses, dtype=float).tolist(),
+    }
+    if gradient is not None:
+        first, seconds, (losses, by_parameters, by_start) = times(gradient, repeats)
+        along = np.tensordot(np.asarray(by_start, dtype=float), p.direction, axes=2)
+        told |= {
+            "gradient_first_s": first,
+            "gradient_s": seconds,
+            "numbers": np.column_stack([np.asarray(by_parameters, dtype=float), along]).tolist(),
+        }
+    told["peak_mb"] = peak_mb() - before
+    print(json.dumps(told), flush=True)
+
+
+def peak_mb() -> float:
+    """Peak memory of this process, MB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
