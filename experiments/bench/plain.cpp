@@ -9,6 +9,7 @@
 #include <complex>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <map>
 #include <string>
 #include <vector>
@@ -155,14 +156,19 @@ void print_times(const Workload& w, int repeats) {
   const auto sweep = links(w);
   const auto wanted = target(w, sweep);
   double value = 0.0;
-  std::printf("{\"forward_s\": [");
+  std::string seconds, processor;
   for (int run = 0; run <= repeats; ++run) {
     const auto begin = std::chrono::steady_clock::now();
+    const std::clock_t busy = std::clock();
     value = loss<double>(w, sweep, {w.stretch, w.bend, w.mass}, start(w), wanted);
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
-    if (run > 0) std::printf("%s%.9g", run > 1 ? ", " : "", took.count());
+    if (run == 0) continue;
+    const char* comma = run > 1 ? ", " : "";
+    seconds += comma + std::to_string(took.count());
+    processor += comma + std::to_string(static_cast<double>(std::clock() - busy) / CLOCKS_PER_SEC);
   }
-  std::printf("], \"loss\": %.17g}\n", value);
+  std::printf("{\"forward_s\": [%s], \"forward_cpu_s\": [%s], \"losses\": [%.17g]}\n", seconds.c_str(),
+              processor.c_str(), value);
 }
 
 }  // namespace

@@ -29,18 +29,21 @@ def load() -> tuple[SimpleNamespace, int]:
     return p, int(sys.argv[2])
 
 
-def times(work: Callable[[], object], repeats: int) -> tuple[float, list[float], object]:
-    """Seconds of the first call (with its compilation), seconds of the others, the last result."""
+def times(name: str, work: Callable[[], object], repeats: int) -> tuple[dict[str, object], object]:
+    """Seconds of the first call (with its compilation) and of the others, by the wall's clock and on the processor; the
+    last result."""
     begin = time.perf_counter()
     result = work()
     first = time.perf_counter() - begin
     seconds: list[float] = []
+    processor: list[float] = []
     gc.collect()
     while len(seconds) < repeats and sum(seconds) < BUDGET:
-        begin = time.perf_counter()
+        begin, busy = time.perf_counter(), time.process_time()
         result = work()
         seconds.append(time.perf_counter() - begin)
-    return first, seconds, result
+        processor.append(time.process_time() - busy)
+    return {f"{name}_first_s": first, f"{name}_s": seconds, f"{name}_cpu_s": processor}, result
 
 
 def run(tool: str, version: str, forward: Callable, gradient: Callable | None = None) -> None:
@@ -48,22 +51,13 @@ def run(tool: str, version: str, forward: Callable, gradient: Callable | None = 
     particles, 3)), and prints them."""
     p, repeats = load()
     before = peak_mb()
-    first, seconds, losses = times(forward, repeats)
-    told = {
-        "tool": tool,
-        "version": version,
-        "forward_first_s": first,
-        "forward_s": seconds,
-        "losses": np.asarray(losses, dtype=float).tolist(),
-    }
+    seconds, losses = times("forward", forward, repeats)
+    told = {"tool": tool, "version": version, **seconds, "losses": np.asarray(losses, dtype=float).tolist()}
     if gradient is not None:
-        first, seconds, (losses, by_parameters, by_start) = times(gradient, repeats)
+        seconds, (_, by_parameters, by_start) = times("gradient", gradient, repeats)
         along = np.tensordot(np.asarray(by_start, dtype=float), p.direction, axes=2)
-        told |= {
-            "gradient_first_s": first,
-            "gradient_s": seconds,
-            "numbers": np.column_stack([np.asarray(by_parameters, dtype=float), along]).tolist(),
-        }
+        numbers = np.column_stack([np.asarray(by_parameters, dtype=float), along])
+        told |= {**seconds, "numbers": numbers.tolist()}
     told["peak_mb"] = peak_mb() - before
     print(json.dumps(told), flush=True)
 

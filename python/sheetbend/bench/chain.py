@@ -89,13 +89,10 @@ def measure_chain(threads: int = 1, repeats: int = 5, work: int = WORK) -> dict[
         "workload": "chain",
         "particles": longest["segments"] + 1,
         "projections": longest["segments"] * longest["substeps"],
+        **longest,
         "threads": threads,
         "lanes": LANES,
         "isa": isa(),
-        "forward_ns": longest["forward_ns"],
-        "gradient_ns": longest["gradient_ns"],
-        "forward_ns_min": longest["forward_ns_min"],
-        "gradient_ns_min": longest["gradient_ns_min"],
         "repeats": repeats,
         "rows": rows,
         "batch": _batch(threads, repeats, max(2, BATCH_SUBSTEPS * work // WORK)),
@@ -122,10 +119,8 @@ def _row(length: Length, threads: int, repeats: int) -> dict[str, float]:
     return {
         "segments": length.segments,
         "substeps": length.substeps,
-        "forward_ns": forward.ns(length.work),
-        "gradient_ns": gradient.ns(length.work),
-        "forward_ns_min": forward.ns_min(length.work),
-        "gradient_ns_min": gradient.ns_min(length.work),
+        **forward.figures("forward", length.work),
+        **gradient.figures("gradient", length.work),
     }
 
 
@@ -142,8 +137,8 @@ def _batch(threads: int, repeats: int, substeps: int) -> dict[str, float]:
     ):
         batched, _ = timed(together, repeats)
         singly, _ = timed(partial(ropes.singly, alone), repeats)
-        found[f"{name}_ns"], found[f"{name}_ns_singly"] = batched.ns(work), singly.ns(work)
-        found[f"{name}_speedup"] = found[f"{name}_ns_singly"] / found[f"{name}_ns"]
+        found |= batched.figures(name, work) | singly.figures(f"{name}_singly", work)
+        found[f"{name}_speedup"] = found[f"{name}_singly_ns"] / found[f"{name}_ns"]
     return found
 
 

@@ -71,10 +71,8 @@ def climb(w: Workload, threads: int, repeats: int) -> dict[str, Any]:
         "iterations": w.iterations,
         "colors": problem.colors,
         "projections": problem.projections,
-        "forward_ns": forward.ns(problem.projections),
-        "gradient_ns": gradient.ns(problem.projections),
-        "forward_ns_min": forward.ns_min(problem.projections),
-        "gradient_ns_min": gradient.ns_min(problem.projections),
+        **forward.figures("forward", problem.projections),
+        **gradient.figures("gradient", problem.projections),
         "repeats": len(gradient.seconds),
         "peak_mb": peak,
     }

@@ -90,9 +90,11 @@ def _print_workload(console: Console, data: Mapping[str, Any]) -> None:
         soft_wrap=True,
     )
     console.print(f"  {_conditions(data)}, {data['repeats']} runs")
-    console.print("  ns per projection   median   fastest")
+    console.print("  ns per projection   median   fastest   on the processor")
     for name in ("forward", "gradient"):
-        console.print(f"  {name:17s} {data[f'{name}_ns']:8.2f}  {data[f'{name}_ns_min']:8.2f}")
+        console.print(
+            f"  {name:17s} {data[f'{name}_ns']:8.2f}  {data[f'{name}_ns_min']:8.2f}  {data[f'{name}_cpu_ns']:8.2f}"
+        )
 
 
 def _print_chain(console: Console, data: Mapping[str, Any]) -> None:
@@ -107,7 +109,7 @@ def _print_chain(console: Console, data: Mapping[str, Any]) -> None:
     for name in ("forward", "gradient"):
         console.print(
             f"  {b['ropes']} ropes of {b['segments']} segments, {name}: {b[f'{name}_ns']:.0f} in one batch, "
-            f"{b[f'{name}_ns_singly']:.0f} one at a time, {b[f'{name}_speedup']:.1f} times the throughput",
+            f"{b[f'{name}_singly_ns']:.0f} one at a time, {b[f'{name}_speedup']:.1f} times the throughput",
             soft_wrap=True,
         )
 
