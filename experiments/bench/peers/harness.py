@@ -22,7 +22,7 @@ def load() -> tuple[SimpleNamespace, int]:
     """The arrays of the problem (sheetbend.bench.problem.Problem.export tells what they are), and the repeats."""
     with np.load(sys.argv[1]) as saved:
         p = SimpleNamespace(**{name: saved[name] for name in saved.files})
-    for name in ("frames", "substeps", "iterations"):
+    for name in ("columns", "frames", "substeps", "iterations"):
         setattr(p, name, int(getattr(p, name)))
     p.h = float(p.h)
     p.color_ranges = list(zip(p.first_of_color[:-1].tolist(), p.first_of_color[1:].tolist(), strict=True))

@@ -79,7 +79,7 @@ class Problem:
         links (count, 2) in sweep order, first_of_color (colors + 1,), rest (count,), bend (count,) 0 or 1,
         start (particles, 3), inverse_mass_factor (particles,), which divided by M is the inverse mass, gravity (3,),
         target (frames, particles, 3), parameters (scenes, 3), direction (particles, 3), and frames, substeps,
-        iterations, h.
+        iterations, h. Particles stand row by row, columns to a row.
         """
         w, found = self.workload, colors(self.workload)
         factor = np.full(w.particles, float(w.particles))
@@ -96,6 +96,7 @@ class Problem:
             target=self.target,
             parameters=w.parameters,
             direction=direction(w),
+            columns=w.columns,
             frames=w.frames,
             substeps=w.substeps,
             iterations=w.iterations,
