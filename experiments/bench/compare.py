@@ -1,6 +1,6 @@
 """Measures sheetbend and its peers on the same workloads in one run, and writes JSON with the machine's description.
 
-Run: python experiments/bench/compare.py FOLDER [--workloads W1 W2] [--tools sheetbend jax] [--output FILE]
+Run: python experiments/bench/compare.py FOLDER [--workloads W1 W2] [--tools sheetbend jax] [--keep]
 
 FOLDER holds the peers' environments (setup_peers.sh makes them) and keeps their compiled kernels. Everything runs on
 one core, tool after tool within each workload; then sheetbend alone on every core, on chains and on the ladder. A tool
@@ -42,17 +42,35 @@ def main() -> None:
     parser.add_argument("--workloads", nargs="+", default=list(WORKLOADS))
     parser.add_argument("--tools", nargs="+", default=list(TOOLS), choices=TOOLS)
     parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--output", type=Path)
+    parser.add_argument("--output", type=Path, help="results/MACHINE.json by default")
+    parser.add_argument(
+        "--keep", action="store_true", help="keep what the output file has and this run does not measure"
+    )
     given = parser.parse_args()
-    told = {"taken": time.strftime("%Y-%m-%d %H:%M"), "repeats": given.repeats, "machine": described()}
+    told = {"repeats": given.repeats, "machine": described()}
+    path = given.output or HERE / "results" / f"{slug(told['machine'])}.json"
     told["results"] = compare(given.folder.resolve(), given.workloads, given.tools, given.repeats)
     if "sheetbend" in given.tools:
         cores = sorted(os.sched_getaffinity(0))
         told["threads"] = [ours(name, given.repeats, cores) for name in given.workloads if len(cores) > 1]
         told["chain"], told["ladder"] = (ours(name, given.repeats, cores[:1]) for name in ("chain", "ladder"))
-    path = given.output or HERE / "results" / f"{slug(told['machine'])}.json"
+    if given.keep and path.exists():
+        told = merged(json.loads(path.read_text()), told)
     path.write_text(json.dumps(told, indent=1) + "\n")
     print(f"written to {path}")
+
+
+def merged(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+    """The new measurements, and of the old ones those that were not taken again."""
+    found = {**old, **new}
+    for part, keys in (("results", ("workload", "tool")), ("threads", ("workload",))):
+        rows = {tuple(row[key] for key in keys): row for row in [*old.get(part, []), *new.get(part, [])]}
+        found[part] = sorted(rows.values(), key=lambda row: (list(WORKLOADS).index(row["workload"]), _place(row)))
+    return found
+
+
+def _place(row: Mapping[str, Any]) -> int:
+    return TOOLS.index(row.get("tool", "sheetbend"))
 
 
 def compare(folder: Path, names: Sequence[str], tools: Sequence[str], repeats: int) -> list[dict[str, Any]]:
@@ -64,26 +82,35 @@ def compare(folder: Path, names: Sequence[str], tools: Sequence[str], repeats: i
             problem = Path(scratch) / f"{name}.npz"
             Problem(workload(name)).export(problem)
             for tool in tools:
-                row = _row(tool, name, problem, folder, repeats, core)
-                if row is not None:
-                    rows.append({"workload": name, "tool": tool, **row})
+                try:
+                    row = _row(tool, name, problem, folder, repeats, core)
+                except NotMeasured as why:
+                    print(f"{name:4s} {tool:10s} left out: {why}", flush=True)
+                else:
+                    rows.append({"workload": name, "tool": tool, "taken": time.strftime("%Y-%m-%d %H:%M"), **row})
                     print(_line(rows[-1]), flush=True)
     return rows
 
 
-def _row(tool: str, name: str, problem: Path, folder: Path, repeats: int, core: Sequence[int]) -> dict[str, Any] | None:
+class NotMeasured(Exception):
+    """A tool is not there, does not take the workload, or failed."""
+
+
+def _row(tool: str, name: str, problem: Path, folder: Path, repeats: int, core: Sequence[int]) -> dict[str, Any]:
     if tool == "sheetbend":
         found = ours(name, repeats, core)
         kept = [key for key in found if key.endswith(("_ns", "_ns_min"))] + ["gradient_error", "peak_mb", "isa"]
         return {"version": found["sheetbend"], **{key: found[key] for key in kept}}
     if tool == "plain C++":
-        if plain.compiler() is None or workload(name).scenes > 1:
-            return _skip(tool, name, "there is no compiler" if plain.compiler() is None else "it takes one scene")
+        if plain.compiler() is None:
+            raise NotMeasured("there is no compiler")
+        if workload(name).scenes > 1:
+            raise NotMeasured("it takes one scene")
         program = plain.build(folder / "plain", "-march=native")
         return _figures(name, _run([str(program), name, str(repeats)], core), {"version": compiler()})
     python = folder / tool / "bin" / "python"
     if not python.exists():
-        return _skip(tool, name, f"there is no {python}; setup_peers.sh {folder} {tool} makes it")
+        raise NotMeasured(f"there is no {python}; setup_peers.sh makes it")
     script = HERE / "peers" / f"with_{tool}.py"
     found = _run([str(python), str(script), str(problem), str(repeats)], core, WARP_CACHE=str(folder / "warp_cache"))
     return _figures(name, found, {"version": found["version"], "peak_mb": found["peak_mb"]})
@@ -116,22 +143,21 @@ def ours(name: str, repeats: int, cores: Sequence[int]) -> dict[str, Any]:
 
 def _run(command: Sequence[str], cores: Sequence[int], **environment: str) -> dict[str, Any]:
     """The last line of what a command prints, as JSON."""
-    done = subprocess.run(
-        command,
-        check=False,
-        capture_output=True,
-        text=True,
-        timeout=LIMIT,
-        env={**os.environ, **environment},
-        preexec_fn=lambda: os.sched_setaffinity(0, cores),
-    )
+    try:
+        done = subprocess.run(
+            command,
+            check=False,
+            capture_output=True,
+            text=True,
+            timeout=LIMIT,
+            env={**os.environ, **environment},
+            preexec_fn=lambda: os.sched_setaffinity(0, cores),
+        )
+    except subprocess.TimeoutExpired as error:
+        raise NotMeasured(f"it took more than {LIMIT} s") from error
     if done.returncode:
-        raise SystemExit(f"{' '.join(command)} failed with {done.returncode}:\n{done.stderr}")
+        raise NotMeasured(f"it failed with {done.returncode}: {done.stderr[-2000:]}")
     return json.loads(done.stdout.splitlines()[-1])
-
-
-def _skip(tool: str, name: str, why: str) -> None:
-    print(f"{name:4s} {tool:10s} skipped: {why}", flush=True)
 
 
 def _line(row: Mapping[str, Any]) -> str:

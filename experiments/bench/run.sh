@@ -8,6 +8,7 @@ here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 python=${PYTHON:-python3}
 "$here/setup_peers.sh" "$folder"
 "$python" "$here/compare.py" "$folder" "$@"
+# what compare.py has just written
 newest=$(ls -t "$here"/results/*.json | head -n 1)
 "$python" "$here/table.py" "$newest"
 echo "tables of docs/benchmarks.md written from $newest"

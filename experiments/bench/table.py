@@ -6,7 +6,6 @@ Run: python experiments/bench/table.py experiments/bench/results/MACHINE.json
 from __future__ import annotations
 
 import json
-import re
 import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -20,20 +19,24 @@ Data = Mapping[str, Any]
 
 def main(path: Path) -> None:
     data = json.loads(path.read_text())
-    parts = {"machine": machine(data, path.name), "workloads": workloads(data), "quality": quality(data)}
+    page = DOCS / "benchmarks.md"
+    page.write_text(filled(page.read_text(), data, path.name))
+    if "ladder" in data:
+        draw_ladder(data["ladder"], DOCS / "benchmark_ladder.png")
+
+
+def filled(text: str, data: Data, name: str) -> str:
+    """The page with its tables replaced by those of the data, which stand in the results file of this name."""
+    parts = {"machine": machine(data, name), "workloads": workloads(data), "quality": quality(data)}
     if "ladder" in data:
         parts |= {"threads": threads(data), "chain": chain(data["chain"]), "ladder": ladder(data["ladder"])}
-        draw_ladder(data["ladder"], DOCS / "benchmark_ladder.png")
-    page = DOCS / "benchmarks.md"
-    text = page.read_text()
-    for name, lines in parts.items():
-        pattern = rf"(<!-- {name} -->\n).*?(<!-- end of {name} -->)"
-        if not re.search(pattern, text, re.S):
-            raise SystemExit(f"{page.name}: has no place for {name}. Fix: put '<!-- {name} -->' and its end into it.")
-        text = re.sub(
-            pattern, lambda found, lines=lines: found[1] + "\n".join(lines) + "\n" + found[2], text, flags=re.S
-        )
-    page.write_text(text)
+    for part, lines in parts.items():
+        before, mark, rest = text.partition(f"<!-- {part} -->\n")
+        _, end, after = rest.partition(f"<!-- end of {part} -->")
+        if not (mark and end):
+            raise SystemExit(f"the page has no place for {part}. Fix: put '<!-- {part} -->' and its end into it.")
+        text = before + mark + "\n".join(lines) + "\n" + end + after
+    return text
 
 
 def machine(data: Data, name: str) -> list[str]:
@@ -41,7 +44,7 @@ def machine(data: Data, name: str) -> list[str]:
     caches = ", ".join(f"{level} {size / 2**20:.3g} MiB" for level, size in m["caches"].items())
     return [
         f"{m['processor']} (family {m['family']}, model {m['model']}), {m['cores']} cores, {caches}, "
-        f"{m['memory_gb']:.0f} GB, {m['isa']}; {m['compiler']}; Python {m['python']}. Taken {data['taken']}, "
+        f"{m['memory_gb']:.0f} GB, {m['isa']}; {m['compiler']}; Python {m['python']}. Taken {_span(data)}, "
         f"[`{name}`](../experiments/bench/results/{name})."
     ]
 
@@ -101,6 +104,11 @@ def ladder(data: Data) -> list[str]:
         figures = f"{row['forward_cpu_ns']:.3g}", f"{row['gradient_cpu_ns']:.3g}"
         lines.append(_line(f"{row['particles']:,}", *figures, f"{row['substeps']:,}", f"{row['peak_mb']:,.0f}"))
     return [*lines, "", "![Cost per projection over the number of particles](benchmark_ladder.png)"]
+
+
+def _span(data: Data) -> str:
+    times = sorted(row["taken"] for row in data["results"])
+    return times[0] if times[0] == times[-1] else f"{times[0]} to {times[-1]}"
 
 
 def _lead(data: Data, name: str) -> str:

@@ -29,6 +29,19 @@ def load() -> tuple[SimpleNamespace, int]:
     return p, int(sys.argv[2])
 
 
+def slots(p: SimpleNamespace) -> tuple[np.ndarray, np.ndarray]:
+    """For tools whose reverse sees only what is not overwritten: each projection of a substep writes two new slots
+    after the particles' own. Where it reads its particles (projections, 2), where each particle ends (particles,)."""
+    n, m = len(p.start), len(p.rest)
+    now, read = np.arange(n), np.empty((m * p.iterations, 2), dtype=int)
+    for sweep in range(p.iterations):
+        for a, b in p.color_ranges:  # within a color no particle comes twice
+            ids = np.arange(a, b) + sweep * m
+            read[ids] = now[p.links[a:b]]
+            now[p.links[a:b]] = n + 2 * ids[:, None] + [0, 1]
+    return read, now
+
+
 def times(name: str, work: Callable[[], object], repeats: int) -> tuple[dict[str, object], object]:
     """Seconds of the first call (with its compilation) and of the others, by the wall's clock and on the processor; the
     last result."""

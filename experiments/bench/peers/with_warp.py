@@ -19,17 +19,6 @@ scenes, n, m = len(p.parameters), len(p.start), len(p.rest)
 projections, steps = m * p.iterations, p.frames * p.substeps
 
 
-def slots() -> tuple[np.ndarray, np.ndarray]:
-    """Where each projection of a substep reads its particles (projections, 2), and where each particle ends (n,)."""
-    now, read = np.arange(n), np.empty((projections, 2), dtype=np.int32)
-    for sweep in range(p.iterations):
-        for a, b in p.color_ranges:  # within a color no particle comes twice
-            ids = np.arange(a, b) + sweep * m
-            read[ids] = now[p.links[a:b]]
-            now[p.links[a:b]] = n + 2 * ids[:, None] + [0, 1]
-    return read, now.astype(np.int32)
-
-
 @wp.struct
 class Mesh:
     links: wp.array2d(dtype=wp.int32)
@@ -134,12 +123,12 @@ def compare(
 
 
 mesh, no_mesh = Mesh(), Mesh()
-read, last = slots()
+read, last = harness.slots(p)
 mesh.links = wp.array(p.links.astype(np.int32), dtype=wp.int32)
 mesh.bend = wp.array(p.bend.astype(np.int32), dtype=wp.int32)
 mesh.rest = wp.array(p.rest, dtype=wp.float64)
 mesh.factor = wp.array(p.inverse_mass_factor, dtype=wp.float64)
-mesh.read, mesh.last = wp.array(read, dtype=wp.int32), wp.array(last, dtype=wp.int32)
+mesh.read, mesh.last = wp.array(read.astype(np.int32), dtype=wp.int32), wp.array(last.astype(np.int32), dtype=wp.int32)
 mesh.n, mesh.m, mesh.projections = n, m, projections
 mesh.h, mesh.fall = wp.float64(p.h), wp.vec3d(*(p.h * p.gravity))
 target = wp.array(p.target, dtype=wp.vec3d)
