@@ -4,6 +4,7 @@ No time is asserted anywhere."""
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from sheetbend.bench.reference import largest_error, reference, shipped
 from sheetbend.bench.timing import in_fresh_process, peak_mb, timed
 from sheetbend.bench.workloads import colors, direction, pinned, projections, start
 from sheetbend.cli.app import app
+from sheetbend.errors import SheetbendError
 from typer.testing import CliRunner, Result
 
 KEYS = {
@@ -170,6 +172,10 @@ class TestMeasuring:
     def test_peak_memory_is_that_of_the_call(self) -> None:
         megabytes = in_fresh_process(_peak_of_an_array)
         assert megabytes == pytest.approx(80.0, abs=4.0)
+
+    def test_a_process_that_dies_is_told(self) -> None:
+        with pytest.raises(SheetbendError, match="ended from outside"):
+            in_fresh_process(os._exit, 1)
 
     def test_machine(self) -> None:
         found = machine()

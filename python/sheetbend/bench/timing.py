@@ -6,12 +6,15 @@ import gc
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
 import numpy as np
+
+from ..errors import SheetbendError
 
 BUDGET = 60.0  # s after which no further repeat starts
 
@@ -52,9 +55,18 @@ def timed(work: Callable[[], T], repeats: int) -> tuple[Times, T]:
 
 
 def in_fresh_process(work: Callable[P, T], *arguments: P.args, **named: P.kwargs) -> T:
-    """The result of a function of a module, called in a new process: nothing measured before is in its memory."""
-    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        return pool.submit(work, *arguments, **named).result()
+    """The result of a function of a module, called in a new process: nothing measured before is in its memory.
+
+    Raises:
+        SheetbendError: the process was ended from outside, as happens where memory runs out.
+    """
+    try:
+        with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+            return pool.submit(work, *arguments, **named).result()
+    except BrokenProcessPool as error:
+        raise SheetbendError(
+            "the measuring process was ended from outside. Fix: free memory"
+        ) from error
 
 
 def peak_mb(work: Callable[[], object]) -> float:
