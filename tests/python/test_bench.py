@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sheetbend as sb
 from sheetbend.bench import WORKLOADS, measure, workload
 from sheetbend.bench import ladder as ladder_module
 from sheetbend.bench.chain import gradient_error, measure_chain
@@ -91,6 +92,14 @@ class TestDefinitions:
     def test_the_solver_keeps_the_colors(self) -> None:
         for name, count in (("W1", 4), ("W2", 12)):
             assert Problem(workload(name).shortened(1)).colors == count
+
+    def test_the_solver_finds_about_as_few_colors_itself(self) -> None:
+        w, scene = workload("W2"), sb.Scene("own")
+        scene.add_particles(start(w), 1e-3)
+        for bend in (False, True):
+            links = np.concatenate([c.particles for c in colors(w) if c.bend == bend])
+            scene.add_constraints("distance", links[np.argsort(links[:, 0], kind="stable")], name=f"bend{bend}")
+        assert sb.Solver(method="gauss_seidel").core(scene.compiled).colors == 13
 
     def test_shape_and_pins(self) -> None:
         x = start(workload("W2"))

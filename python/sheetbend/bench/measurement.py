@@ -27,6 +27,7 @@ def measure(w: Workload, threads: int = 1, repeats: int = 5) -> dict[str, Any]:
         "scenes": w.scenes,
         "particles": w.scenes * w.particles,
         "colors": problem.colors,
+        "coloring": "the workload's",
         "projections": problem.projections,
         "threads": threads,
         "lanes": LANES,
