@@ -64,9 +64,7 @@ def in_fresh_process(work: Callable[P, T], *arguments: P.args, **named: P.kwargs
         with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
             return pool.submit(work, *arguments, **named).result()
     except BrokenProcessPool as error:
-        raise SheetbendError(
-            "the measuring process was ended from outside. Fix: free memory"
-        ) from error
+        raise SheetbendError("the measuring process was ended from outside. Fix: free memory") from error
 
 
 def peak_mb(work: Callable[[], object]) -> float:
