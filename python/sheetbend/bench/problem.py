@@ -124,8 +124,7 @@ class Problem:
         w = self.workload
         inputs = self._inputs[scene]
         residual = self._residual(self._simulate(inputs[None]))[0]
-        directions = self._at(np.zeros((4, 3)))
-        directions[:] = 0.0
+        directions = np.zeros((4, len(inputs)))
         compliance, mass = self._part(directions, "compliance"), self._part(directions, "mass")
         compliance[0, ~self._bend], compliance[1, self._bend] = 1.0, 1.0
         mass[2] = 1.0 / w.particles
