@@ -14,6 +14,7 @@ from typing import Any
 from sheetbend.bench.figure import draw_ladder
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
+QUIET = 1.1  # clock over processor time, below which a machine counts as quiet
 Data = Mapping[str, Any]
 
 
@@ -41,11 +42,15 @@ def filled(text: str, data: Data, name: str) -> str:
 
 def machine(data: Data, name: str) -> list[str]:
     m = data["machine"]
-    caches = ", ".join(f"{level} {size / 2**20:.3g} MiB" for level, size in m["caches"].items())
+    caches = ", ".join(f"{level} {size // 1024:,} KiB" for level, size in m["caches"].items())
+    busy = max(row["forward_ns"] / row["forward_cpu_ns"] for row in data["results"])
+    quiet = (
+        "" if busy < QUIET else f" Other work ran too: the clock showed up to {busy:.1f} times the processor's time."
+    )
     return [
         f"{m['processor']} (family {m['family']}, model {m['model']}), {m['cores']} cores, {caches}, "
         f"{m['memory_gb']:.0f} GB, {m['isa']}; {m['compiler']}; Python {m['python']}. Taken {_span(data)}, "
-        f"[`{name}`](../experiments/bench/results/{name})."
+        f"[`{name}`](../experiments/bench/results/{name}).{quiet}"
     ]
 
 
@@ -65,7 +70,7 @@ def quality(data: Data) -> list[str]:
     for row in data["results"]:
         if "gradient_error" not in row:
             continue
-        first = f"{row['forward_first_s']:.1f} / {row['gradient_first_s']:.1f}" if "forward_first_s" in row else "none"
+        first = f"{row['forward_first_s']:.1f} / {row['gradient_first_s']:.1f}" if "forward_first_s" in row else ""
         name = f"{row['workload']} {row['tool']}"
         lines.append(_line(name, f"{row['gradient_error']:.0e}", f"{row['peak_mb']:,.0f}", first))
     return lines
@@ -108,7 +113,7 @@ def ladder(data: Data) -> list[str]:
 
 def _span(data: Data) -> str:
     times = sorted(row["taken"] for row in data["results"])
-    return times[0] if times[0] == times[-1] else f"{times[0]} to {times[-1]}"
+    return " to ".join(dict.fromkeys((times[0], times[-1])))
 
 
 def _lead(data: Data, name: str) -> str:

@@ -16,20 +16,21 @@ BYTES_PER_CONSTRAINT = 32  # two particles' places, compliance, rest length, mul
 def draw_ladder(data: Mapping[str, Any], path: Path) -> None:
     """Write the figure of `measure_ladder`'s data; the format follows from the name.
 
-    A cache counts as full where it could just hold what a forward sweep touches: the particles' rows and, per
-    constraint, its particles, values and multiplier.
+    With one thread the times are those on the processor. A cache counts as full where it could just hold what a forward
+    sweep touches: the particles' rows and, per constraint, its particles, values and multiplier.
     """
     rows, caches = data["rows"], data["machine"]["caches"]
+    clock = "cpu_ns" if data["threads"] == 1 else "ns"
     sizes = [row["particles"] for row in rows]
     figure = new_figure(7.2, 3.6, f"cloths on {data['machine']['processor']}, threads: {data['threads']}")
     panel = figure.subplots()
     clean(panel)
     panel.set_xscale("log")
     for name, color in (("gradient", ACCENT), ("forward", INK)):
-        costs = [row[f"{name}_ns"] for row in rows]
+        costs = [row[f"{name}_{clock}"] for row in rows]
         panel.plot(sizes, costs, "o-", color=color, markersize=4, linewidth=1.4)
         panel.annotate(f"{costs[-1]:.3g}", (sizes[-1], costs[-1]), (6, 0), textcoords="offset points", color=color)
-    panel.set_ylim(bottom=0)
+    panel.set_ylim(0, 1.15 * max(row[f"gradient_{clock}"] for row in rows))
     for name, size in caches.items():
         full = size / sweep_bytes(rows[-1])
         if sizes[0] < full < sizes[-1]:
