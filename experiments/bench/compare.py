@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 import plain
+import table
 from sheetbend.bench import WORKLOADS, workload
 from sheetbend.bench.machine import machine
 from sheetbend.bench.problem import Problem
@@ -46,6 +47,9 @@ def main() -> None:
     parser.add_argument(
         "--keep", action="store_true", help="keep what the output file has and this run does not measure"
     )
+    parser.add_argument(
+        "--page", action="store_true", help="write the tables of docs/benchmarks.md from the output file"
+    )
     given = parser.parse_args()
     told = {"repeats": given.repeats, "machine": described()}
     path = given.output or HERE / "results" / f"{slug(told['machine'])}.json"
@@ -58,6 +62,8 @@ def main() -> None:
         told = merged(json.loads(path.read_text()), told)
     path.write_text(json.dumps(told, indent=1) + "\n")
     print(f"written to {path}")
+    if given.page:
+        table.main(path)
 
 
 def merged(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:

@@ -5,10 +5,5 @@ set -euo pipefail
 folder=${1:?usage: run.sh FOLDER [options]}
 shift
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-python=${PYTHON:-python3}
 "$here/setup_peers.sh" "$folder"
-"$python" "$here/compare.py" "$folder" "$@"
-# what compare.py has just written
-newest=$(ls -t "$here"/results/*.json | head -n 1)
-"$python" "$here/table.py" "$newest"
-echo "tables of docs/benchmarks.md written from $newest"
+"${PYTHON:-python3}" "$here/compare.py" "$folder" --page "$@"
