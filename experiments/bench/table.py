@@ -126,8 +126,12 @@ def _lead(data: Data, name: str) -> str:
 
 
 def _pair(row: Data) -> str:
-    gradient = f"{row['gradient_cpu_ns']:.3g}" if "gradient_cpu_ns" in row else "none"
-    return f"{row['forward_cpu_ns']:.3g} / {gradient}"
+    gradient = _ns(row["gradient_cpu_ns"]) if "gradient_cpu_ns" in row else "none"
+    return f"{_ns(row['forward_cpu_ns'])} / {gradient}"
+
+
+def _ns(value: float) -> str:
+    return f"{value:.3g}" if value < 1000 else f"{value:,.0f}"
 
 
 def _head(*cells: str) -> list[str]:
