@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .drawing import ACCENT, GRAY, INK, PALE, WARM, clean, key, new_figure
 from .errors import InputError
-from .optional import require
 from .result import Estimate
 from .timeseries import Array
 
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-INK, GRAY, PALE, ACCENT, WARM = "#22262b", "#8a9099", "#eef0f2", "#0b6e8c", "#c8553d"
-"""One palette: measured is gray, simulated is the accent, what needs attention is warm."""
 
 _MOST_PANELS = 6
 _AXES = "xyz"
@@ -59,17 +57,17 @@ def plot_trajectories(
     names = list(markers) or [f"m{index}" for index in range(measured.shape[1])]
     shown = np.unique(np.linspace(0, measured.shape[1] - 1, min(_MOST_PANELS, measured.shape[1])).astype(int))
     axis = _liveliest(measured) if axis is None else axis
-    figure = _figure(7.2, 1.1 + 1.15 * len(shown), title)
+    figure = new_figure(7.2, 1.1 + 1.15 * len(shown), title)
     panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
     for panel, marker in zip(panels, shown, strict=True):
-        _clean(panel)
+        clean(panel)
         panel.plot(times, 1e3 * measured[:, marker, axis], ".", color=GRAY, markersize=3.6, markeredgewidth=0)
         panel.plot(times, 1e3 * simulated[:, marker, axis], color=ACCENT, linewidth=1.3)
         panel.margins(x=0)
         panel.text(1.01, 0.5, names[marker], transform=panel.transAxes, va="center", color=INK)
         _shade(panel, held_out)
     _name_shade(panels[0], held_out)
-    _key(panels[0], [("measured", GRAY), ("simulated", ACCENT)])
+    key(panels[0], [("measured", GRAY), ("simulated", ACCENT)])
     panels[-1].set_xlabel("time [s]")
     figure.supylabel(f"{_AXES[axis]} [mm]", color=INK, fontsize=9)
     return figure
@@ -91,9 +89,9 @@ def plot_motions(motions: Sequence[Motion], *, title: str = "") -> Figure:
     """One coordinate of each of several recordings, measured (dots) against simulated (line), one panel each."""
     if not motions:
         raise InputError("motions", "are empty", 0, "give at least one")
-    figure = _figure(7.2, 0.6 + 1.75 * len(motions), title or " ")
+    figure = new_figure(7.2, 0.6 + 1.75 * len(motions), title or " ")
     for panel, motion in zip(figure.subplots(len(motions), 1, squeeze=False)[:, 0], motions, strict=True):
-        _clean(panel)
+        clean(panel)
         panel.plot(motion.times, 1e3 * motion.measured, ".", color=GRAY, markersize=4, markeredgewidth=0)
         panel.plot(motion.times, 1e3 * motion.simulated, color=ACCENT, linewidth=1.3)
         panel.margins(x=0)
@@ -102,7 +100,7 @@ def plot_motions(motions: Sequence[Motion], *, title: str = "") -> Figure:
         _shade(panel, motion.held_out)
     panel.set_xlabel("time [s]")
     shaded = [("shaded: held out", INK)] if any(motion.held_out for motion in motions) else []
-    _key(figure, [("measured", GRAY), ("simulated", ACCENT), *shaded])
+    key(figure, [("measured", GRAY), ("simulated", ACCENT), *shaded])
     return figure
 
 
@@ -133,13 +131,13 @@ def plot_shapes(
     width, height = np.ptp(_finite(np.vstack([*measured, *simulated])[:, plane]), axis=0)
     cell = 7.6 / columns
     ratio = min(max(height / max(width, 1e-9), 0.2), 1.5)
-    figure = _figure(7.6, 0.75 + rows * ((cell - 0.35) * ratio + 0.3), title or " ")
+    figure = new_figure(7.6, 0.75 + rows * ((cell - 0.35) * ratio + 0.3), title or " ")
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for panel in panels[len(measured) :]:
         panel.set_visible(False)
     labels = list(names) or [f"shape {index}" for index in range(len(measured))]
     for panel, points, line, label in zip(panels, measured, simulated, labels, strict=False):
-        _clean(panel)
+        clean(panel)
         panel.plot(*(1e3 * points[:, plane]).T, "o", color=GRAY, markersize=3.2, markeredgewidth=0)
         panel.plot(*(1e3 * line[:, plane]).T, color=ACCENT, linewidth=1.4)
         panel.set_title(label, fontsize=9, color=INK, loc="left", pad=4)
@@ -152,7 +150,7 @@ def plot_shapes(
         if index + columns >= len(measured):
             panel.set_xlabel(f"{_AXES[plane[0]]} [mm]")
             panel.tick_params(labelbottom=True)
-    _key(figure, [("measured", GRAY), ("simulated", ACCENT)])
+    key(figure, [("measured", GRAY), ("simulated", ACCENT)])
     return figure
 
 
@@ -178,9 +176,9 @@ def plot_residuals(
     mean = np.sqrt(squares.sum(1) / np.maximum(seen.sum(1), 1))
     mean[~seen.any(1)] = np.nan
     worst = int(np.argmax(squares.sum(0) / np.maximum(seen.sum(0), 1)))
-    figure = _figure(7.2, 3.0, title)
+    figure = new_figure(7.2, 3.0, title)
     panel = figure.subplots()
-    _clean(panel)
+    clean(panel)
     panel.plot(times, gap, color=GRAY, linewidth=0.5, alpha=0.5)
     panel.plot(times, gap[:, worst], color=WARM, linewidth=0.9)
     panel.plot(times, mean, color=ACCENT, linewidth=1.8)
@@ -190,7 +188,7 @@ def plot_residuals(
     panel.margins(x=0)
     panel.set_xlabel("time [s]")
     panel.set_ylabel("distance [mm]")
-    _key(panel, [("each marker", GRAY), (f"worst marker: {names[worst]}", WARM), ("all markers, rms", ACCENT)])
+    key(panel, [("each marker", GRAY), (f"worst marker: {names[worst]}", WARM), ("all markers, rms", ACCENT)])
     return figure
 
 
@@ -214,7 +212,7 @@ def plot_estimates(
     for estimate in estimates:
         groups.setdefault(estimate.unit, []).append(estimate)
     sizes = [len(group) for group in groups.values()]
-    figure = _figure(7.2, 0.55 + 0.3 * sum(sizes) + 0.55 * len(groups), title or " ")
+    figure = new_figure(7.2, 0.55 + 0.3 * sum(sizes) + 0.55 * len(groups), title or " ")
     panels = figure.subplots(len(groups), 1, squeeze=False, height_ratios=[size + 0.6 for size in sizes])[:, 0]
     for panel, (unit, group) in zip(panels, groups.items(), strict=True):
         _estimates_panel(panel, group, published)
@@ -222,14 +220,14 @@ def plot_estimates(
     entries = [("value and 95 % interval", ACCENT)]
     if any(estimate.name in published for estimate in estimates):
         entries.append(("published", WARM))
-    _key(figure, entries)
+    key(figure, entries)
     return figure
 
 
 def _estimates_panel(
     panel: Axes, group: Sequence[Estimate], published: Mapping[str, float | tuple[float, float]]
 ) -> None:
-    _clean(panel)
+    clean(panel)
     panel.spines["left"].set_visible(False)
     ends = [end for e in group for end in (e.lower, e.upper, e.value) if end is not None]
     ends += [end for e in group if e.name in published for end in np.atleast_1d(published[e.name])]
@@ -265,25 +263,6 @@ def _padded(low: float, high: float) -> tuple[float, float]:
     return low - room, high + room
 
 
-def _figure(width: float, height: float, title: str) -> Figure:
-    figure: Figure = require("matplotlib.figure", "plot").Figure(figsize=(width, height), layout="constrained")
-    require("matplotlib.backends.backend_agg", "plot").FigureCanvasAgg(figure)
-    if title:
-        figure.suptitle(title, fontsize=11, color=INK, x=0.01, ha="left", weight="bold")
-    return figure
-
-
-def _clean(panel: Axes) -> None:
-    for side in ("top", "right"):
-        panel.spines[side].set_visible(False)
-    for side in ("left", "bottom"):
-        panel.spines[side].set_color(GRAY)
-        panel.spines[side].set_linewidth(0.7)
-    panel.tick_params(colors=INK, labelsize=8, width=0.7, color=GRAY)
-    panel.xaxis.label.set(color=INK, size=9)
-    panel.yaxis.label.set(color=INK, size=9)
-
-
 def _shade(panel: Axes, span: tuple[float, float] | None) -> None:
     if span is not None:
         panel.axvspan(*span, color=PALE, zorder=0, linewidth=0)
@@ -294,19 +273,6 @@ def _name_shade(panel: Axes, span: tuple[float, float] | None) -> None:
         place = ("data", "axes fraction")
         style: dict[str, Any] = {"va": "bottom", "fontsize": 8, "color": GRAY}
         panel.annotate("held out", (span[0], 1), (0, 3), xycoords=place, textcoords="offset points", **style)
-
-
-def _key(parent: Axes | Figure, entries: Sequence[tuple[str, str]]) -> None:
-    """Words in the color of what they name, above a panel or at the top of a figure, flush right."""
-    boxes = require("matplotlib.offsetbox", "plot")
-    words = [boxes.TextArea(word, textprops={"color": color, "fontsize": 9}) for word, color in entries]
-    row = boxes.HPacker(children=words, pad=0, sep=14)
-    inside = hasattr(parent, "transAxes")
-    coordinates, corner = ("axes fraction", (1, 0)) if inside else ("figure fraction", (1, 1))
-    offset = {"xybox": (0, 4 if inside else -4), "boxcoords": "offset points"}
-    parent.add_artist(
-        boxes.AnnotationBbox(row, (1, 1), box_alignment=corner, xycoords=coordinates, frameon=False, pad=0, **offset)
-    )
 
 
 def _liveliest(measured: Array) -> int:

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from .bench import bench
 from .check import check
 from .fit import fit
 from .info import info
@@ -38,5 +39,5 @@ def options(
     """Simulate ropes and beams, and find their physical parameters from recordings, with error bars."""
 
 
-for command in (simulate, fit, check, info):
+for command in (simulate, fit, check, info, bench):
     app.command()(command)

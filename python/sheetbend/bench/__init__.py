@@ -1,0 +1,6 @@
+"""Benchmarks: workloads that other simulators can be given too, and what they cost here (`sheetbend bench`)."""
+
+from .measurement import measure
+from .workloads import WORKLOADS, Workload, workload
+
+__all__ = ["WORKLOADS", "Workload", "measure", "workload"]

@@ -1,0 +1,128 @@
+"""sheetbend bench: what the benchmark workloads cost on this machine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from ..bench import WORKLOADS, measure, workload
+from ..bench.chain import measure_chain
+from ..bench.ladder import measure_ladder
+from ..errors import InputError
+from .outcome import Code, Outcome, run
+
+NAMES = (*WORKLOADS, "chain", "ladder")
+
+
+def bench(
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="WORKLOAD",
+            help="W1 a rope, W1s the same in small steps, W2 a cloth, W5 256 ropes, chain the direct solver, ladder "
+            "cloths of 441 to 1,000,000 particles.",
+            show_default=False,
+        ),
+    ],
+    threads: Annotated[int, typer.Option(help="Threads of the solver.")] = 1,
+    repeats: Annotated[int, typer.Option(help="Runs after the warm-up; the median counts.")] = 5,
+    frames: Annotated[
+        int | None, typer.Option(help="Only the first frames of W1, W1s, W2 or W5.", show_default=False)
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Draw the ladder into this file (png, svg, pdf).", show_default=False)
+    ] = None,
+    json: Annotated[
+        bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
+    ] = False,
+) -> None:
+    """Measure a benchmark workload: ns per projection forward and with the gradient, its error, peak memory; exit 5
+    where the gradient is off."""
+    run(lambda console: _bench(console, name, threads, repeats, frames, figure), json)
+
+
+def _bench(console: Console, name: str, threads: int, repeats: int, frames: int | None, figure: Path | None) -> Outcome:
+    _check(name, threads, repeats, frames, figure)
+    if name == "chain":
+        data = measure_chain(threads, repeats)
+        _print_chain(console, data)
+    elif name == "ladder":
+        data = measure_ladder(threads, repeats, progress=lambda row: _print_rung(console, row))
+        if figure is not None:
+            from ..bench.figure import draw_ladder
+
+            draw_ladder(data, figure)
+            console.print(f"written to {figure}")
+    else:
+        w = workload(name)
+        data = measure(w if frames is None else w.shortened(frames), threads, repeats)
+        _print_workload(console, data)
+    passed = data["gradient_error"] <= data["gradient_error_bound"]
+    console.print(
+        f"  gradient error {data['gradient_error']:.1e} against complex step, at most "
+        f"{data['gradient_error_bound']:.0e}{'' if passed else '  <- fails'}; peak memory {data['peak_mb']:,.0f} MB",
+        soft_wrap=True,
+    )
+    return Outcome(data, Code.DONE if passed else Code.CHECK_FAILED)
+
+
+def _check(name: str, threads: int, repeats: int, frames: int | None, figure: Path | None) -> None:
+    if name not in NAMES:
+        raise InputError("WORKLOAD", "is unknown", name, f"use one of: {', '.join(NAMES)}")
+    for option, value in (("--threads", threads), ("--repeats", repeats)):
+        if value < 1:
+            raise InputError(option, "must be a positive whole number", value, "give at least 1")
+    if frames is not None and name not in WORKLOADS:
+        raise InputError("--frames", f"does not apply to {name}", frames, f"use it with {', '.join(WORKLOADS)}")
+    if figure is not None and name != "ladder":
+        raise InputError("--figure", f"does not apply to {name}", str(figure), "use it with ladder")
+
+
+def _print_workload(console: Console, data: Mapping[str, Any]) -> None:
+    scenes = "one scene" if data["scenes"] == 1 else f"{data['scenes']} scenes"
+    console.print(
+        f"[bold]{data['workload']}[/]  {scenes}, {data['particles']:,} particles, {data['colors']} colors in the "
+        f"workload's own order, {data['projections']:,} projections",
+        soft_wrap=True,
+    )
+    console.print(f"  {_conditions(data)}, {data['repeats']} runs")
+    console.print("  ns per projection   median   fastest   on the processor")
+    for name in ("forward", "gradient"):
+        console.print(
+            f"  {name:17s} {data[f'{name}_ns']:8.2f}  {data[f'{name}_ns_min']:8.2f}  {data[f'{name}_cpu_ns']:8.2f}"
+        )
+
+
+def _print_chain(console: Console, data: Mapping[str, Any]) -> None:
+    console.print(f"[bold]chain[/]  ropes on the direct solver; {_conditions(data)}")
+    console.print("  segments  substeps   forward  gradient  ratio   (ns per segment and substep)")
+    for row in data["rows"]:
+        console.print(
+            f"  {row['segments']:8,}  {row['substeps']:8,}  {row['forward_ns']:8.0f}  {row['gradient_ns']:8.0f}"
+            f"  {row['gradient_ns'] / row['forward_ns']:5.2f}"
+        )
+    b = data["batch"]
+    for name in ("forward", "gradient"):
+        console.print(
+            f"  {b['ropes']} ropes of {b['segments']} segments, {name}: {b[f'{name}_ns']:.0f} in one batch, "
+            f"{b[f'{name}_singly_ns']:.0f} one at a time, {b[f'{name}_speedup']:.1f} times the throughput",
+            soft_wrap=True,
+        )
+
+
+def _print_rung(console: Console, row: Mapping[str, Any]) -> None:
+    console.print(
+        f"  {row['particles']:9,} particles, {row['colors']} colors, {row['substeps']:,} substeps: "
+        f"{row['forward_ns']:6.2f} ns per projection forward, {row['gradient_ns']:6.2f} with the gradient, "
+        f"{row['peak_mb']:,.0f} MB",
+        soft_wrap=True,
+    )
+
+
+def _conditions(data: Mapping[str, Any]) -> str:
+    threads = "1 thread" if data["threads"] == 1 else f"{data['threads']} threads"
+    return f"{threads}, {data['lanes']} lanes, {data['isa']}, {data['machine']['processor']}"
