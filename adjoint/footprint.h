@@ -44,9 +44,10 @@ std::size_t block_bytes(const Scene& scene, const DirectBlock& block, int kept_i
   const std::size_t particles = of(sheetbend_blocks::row * block.particles.size());
   std::size_t factor = sizeof(Factor<T>) + sizeof(T) * (s.values() + rows);
   if (!s.banded()) factor += (sizeof(T) + sizeof(int)) * (s.fill() + s.size());
-  std::size_t bytes = sizeof(BlockState<T>) + 2 * of(s.size()) + (block.damped ? 2 * particles : 0) +
-                      iterations * (of(sheetbend_blocks::row * block.window_rows.size()) + of(rows) + particles + factor) +
-                      (kept_iterations + 1) * (particles + of(s.size()));
+  std::size_t bytes =
+      sizeof(BlockState<T>) + 2 * of(s.size()) + (block.damped ? 2 * particles : 0) +
+      iterations * (of(sheetbend_blocks::row * block.window_rows.size()) + of(rows) + particles + factor) +
+      (kept_iterations + 1) * (particles + of(s.size()));
   for (const MemberRun& run : block.runs) {
     const Group& group = scene.groups[run.group];
     bytes += of(run.items.size() * sheetbend_blocks::value_count(group.damped, group.parameters));
@@ -61,8 +62,7 @@ std::size_t block_cotangent_bytes(const Scene& scene, const DirectBlock& block) 
   const std::size_t particles = of(sheetbend_blocks::row * block.particles.size());
   std::size_t bytes = sizeof(BlockCotangents<T>) + (block.damped ? 4 : 2) * particles +
                       of(Factor<T>::right_side(block.structure)) + 2 * of(block.size());
-  for (const MemberRun& run : block.runs)
-    bytes += of(run.items.size() * (2 + scene.groups[run.group].parameters));
+  for (const MemberRun& run : block.runs) bytes += of(run.items.size() * (2 + scene.groups[run.group].parameters));
   return bytes;
 }
 

@@ -104,8 +104,7 @@ void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, 
     const int dof = scene.first_dof[n];
     const T m = in.of(Quantity::mass)[n];
     const Vec3<T> v_star_bar = eta * Vec3<T>(q_bar.of(n));
-    const Vec3<T> free_velocity =
-        history(bdf, Exactly<T>{}, s.v + dof, s.v_before + dof) + eta * gravity;
+    const Vec3<T> free_velocity = history(bdf, Exactly<T>{}, s.v + dof, s.v_before + dof) + eta * gravity;
     const T along_velocity = dot(free_velocity, v_star_bar);
     mass_bar[n] += w[n] * (T(1.0) - weights.kept[n]) * along_velocity;
     T momentum_bar = m * along_velocity;

@@ -22,11 +22,8 @@ constexpr KernelTable table(const char* name, std::index_sequence<I...>) {
           &SHEETBEND_JOIN(sheetbend_blocks_, SHEETBEND_VARIANT)};
 }
 
-constexpr KernelTable kernels =
-    table(SHEETBEND_VARIANT_NAME, std::make_index_sequence<sheetbend::kind_count>{});
+constexpr KernelTable kernels = table(SHEETBEND_VARIANT_NAME, std::make_index_sequence<sheetbend::kind_count>{});
 
 }  // namespace
 
-extern "C" const KernelTable* SHEETBEND_JOIN(sheetbend_kernels_, SHEETBEND_VARIANT)() {
-  return &kernels;
-}
+extern "C" const KernelTable* SHEETBEND_JOIN(sheetbend_kernels_, SHEETBEND_VARIANT)() { return &kernels; }

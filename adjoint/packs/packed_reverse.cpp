@@ -51,8 +51,8 @@ void PackCotangents<T>::resize(const PackPlan& plan) {
 
 template <class T>
 void reverse_sweeps(const Scene& scene, const PackPlan& plan, const sheetbend_packs::KernelTable& kernels,
-                    int iterations, int threads, int grain, const Inputs<const T>& in, PackState<T>& state,
-                    T* C_r_bar, const Inputs<T>& in_bar, PackCotangents<T>& bar) {
+                    int iterations, int threads, int grain, const Inputs<const T>& in, PackState<T>& state, T* C_r_bar,
+                    const Inputs<T>& in_bar, PackCotangents<T>& bar) {
   if (bar.eta != state.eta) finish(scene, plan, in, in_bar, bar);
   bar.eta = state.eta;
   begin(plan, bar);

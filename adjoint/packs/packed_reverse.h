@@ -22,8 +22,8 @@ struct PackCotangents {
 // before, with those of the inverse masses in the fourth place; C_r_bar (rows of the scene) is added to.
 template <class T>
 void reverse_sweeps(const Scene& scene, const PackPlan& plan, const sheetbend_packs::KernelTable& kernels,
-                    int iterations, int threads, int grain, const Inputs<const T>& in, PackState<T>& state,
-                    T* C_r_bar, const Inputs<T>& in_bar, PackCotangents<T>& bar);
+                    int iterations, int threads, int grain, const Inputs<const T>& in, PackState<T>& state, T* C_r_bar,
+                    const Inputs<T>& in_bar, PackCotangents<T>& bar);
 
 // Adds the gathered cotangents of the constraints' values to those of the inputs, and forgets them.
 template <class T>

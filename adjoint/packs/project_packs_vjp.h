@@ -26,7 +26,8 @@ inline __attribute__((always_inline)) void project_range_vjp(const sheetbend_pac
     }
     unrolled<K::dofs>([&](int d) { x_bar[d] = now.x[d]; });
     ElementCotangent<K, Register> own;
-    correction_vjp(e, Kept<K, Register>::kept(numbers), lambda, damped ? C_r : nullptr, dl, lambda_bar, x_bar, w_bar, own);
+    correction_vjp(e, Kept<K, Register>::kept(numbers), lambda, damped ? C_r : nullptr, dl, lambda_bar, x_bar, w_bar,
+                   own);
     unrolled<K::dofs>([&](int d) { x_bar[d] = now.x[d] + x_bar[d]; });
     unrolled<K::arity>([&](int k) { w_bar[k] = now.w[k] + w_bar[k]; });
     const Particles<layout> particles(r.nodes, n, K::arity);

@@ -48,8 +48,7 @@ struct Distance : OnPoints<2> {
     }
 
    private:
-    Geometry(const Vec3<T>& n_, const T& inverse_)
-        : n(n_), inverse(inverse_), length(inverse_or_zero(inverse_)) {}
+    Geometry(const Vec3<T>& n_, const T& inverse_) : n(n_), inverse(inverse_), length(inverse_or_zero(inverse_)) {}
   };
 
   template <class T>

@@ -2,7 +2,9 @@
 // and chosen at run time. This namespace is the only one that the compiled variants share; see kernel_table.cpp.
 #pragma once
 
-#include "core/blocks/kernels.h"
+namespace sheetbend_blocks {
+struct Table;  // kernels of direct blocks, see core/blocks/kernels.h
+}
 
 namespace sheetbend_packs {
 
@@ -25,14 +27,15 @@ constexpr int record_size(int kept, int rows) { return kept + 2 * rows; }
 
 // One color. Lanes come last everywhere: (packs, ..., 8).
 struct Forward {
-  int count;  // constraints; across a color the rest of the last pack repeats the last one
+  int count;         // constraints; across a color the rest of the last pack repeats the last one
   const int* nodes;  // where the particles' rows begin
   double* rows;
-  const double* values;  // (packs, value_count, 8): a, where damped g and 1/(1+g), the constraint's own parameters, the inverse of a matrix
-                         // that does not depend on x, the particles' effective inverse masses
-  double* lambda;        // (packs, rows of the constraint, 8)
-  const double* C_r;     // likewise; null where nothing is damped
-  double* record;        // (packs, record_size, 8): what the reverse keeps of x, lambda and dl; null where nothing is kept
+  const double*
+      values;  // (packs, value_count, 8): a, where damped g and 1/(1+g), the constraint's own parameters, the inverse of a matrix
+               // that does not depend on x, the particles' effective inverse masses
+  double* lambda;     // (packs, rows of the constraint, 8)
+  const double* C_r;  // likewise; null where nothing is damped
+  double* record;     // (packs, record_size, 8): what the reverse keeps of x, lambda and dl; null where nothing is kept
 };
 
 struct Reverse {

@@ -27,7 +27,9 @@ class Strip {
  public:
   Strip(T* base, long n, int count) : data_(base + pack_of(n) * count * sheetbend_packs::lanes + lane_of(n)) {}
   Register operator[](int i) const { return *reinterpret_cast<const Register*>(data_ + i * sheetbend_packs::lanes); }
-  void set(int i, const Register& value) const { *reinterpret_cast<Register*>(data_ + i * sheetbend_packs::lanes) = value; }
+  void set(int i, const Register& value) const {
+    *reinterpret_cast<Register*>(data_ + i * sheetbend_packs::lanes) = value;
+  }
   void add(int i, const Register& value) const { set(i, (*this)[i] + value); }
 
  private:
@@ -59,7 +61,8 @@ inline void load_rows(const double* rows, const int* nodes, Register& x, Registe
   w.v[0] = __builtin_shufflevector(yw01, yw23, 2, 3, 10, 11, 6, 7, 14, 15);
 }
 
-inline void store_rows(double* rows, const int* nodes, const Register& x, const Register& y, const Register& z, const Register& w) {
+inline void store_rows(double* rows, const int* nodes, const Register& x, const Register& y, const Register& z,
+                       const Register& w) {
   const auto xy02 = __builtin_shufflevector(x.v[0], y.v[0], 0, 8, 2, 10, 4, 12, 6, 14);
   const auto xy13 = __builtin_shufflevector(x.v[0], y.v[0], 1, 9, 3, 11, 5, 13, 7, 15);
   const auto zw02 = __builtin_shufflevector(z.v[0], w.v[0], 0, 8, 2, 10, 4, 12, 6, 14);
@@ -96,7 +99,8 @@ inline void load_rows(const double* rows, const int* nodes, Register& x, Registe
   x.v[0] = a, y.v[0] = b, z.v[0] = c, w.v[0] = d;
 }
 
-inline void store_rows(double* rows, const int* nodes, const Register& x, const Register& y, const Register& z, const Register& w) {
+inline void store_rows(double* rows, const int* nodes, const Register& x, const Register& y, const Register& z,
+                       const Register& w) {
   Row a = x.v[0], b = y.v[0], c = z.v[0], d = w.v[0];
   transpose(a, b, c, d);
   row_at(rows, nodes[0]) = a;
@@ -121,7 +125,8 @@ inline void load_rows(const double* rows, const int* nodes, Register& x, Registe
   w.v[0] = __builtin_shufflevector(zw0, zw1, 1, 3);
 }
 
-inline void store_rows(double* rows, const int* nodes, const Register& x, const Register& y, const Register& z, const Register& w) {
+inline void store_rows(double* rows, const int* nodes, const Register& x, const Register& y, const Register& z,
+                       const Register& w) {
   pair_at(rows, nodes[0]) = __builtin_shufflevector(x.v[0], y.v[0], 0, 2);
   pair_at(rows, nodes[1]) = __builtin_shufflevector(x.v[0], y.v[0], 1, 3);
   pair_at(rows, nodes[0] + 2) = __builtin_shufflevector(z.v[0], w.v[0], 0, 2);

@@ -91,7 +91,8 @@ Lanes<N> sqrt(const Lanes<N>& a) {
   using Vector = typename Lanes<N>::Vector;
   return Lanes<N>::map(a, a, [](const Vector& x, const Vector&) {
 #if defined(__AVX512F__)
-    if constexpr (sizeof(Vector) == 64) return Vector(__builtin_ia32_sqrtpd512_mask(x, x, 255, 4));  // 4: as rounded now
+    if constexpr (sizeof(Vector) == 64)
+      return Vector(__builtin_ia32_sqrtpd512_mask(x, x, 255, 4));  // 4: as rounded now
 #endif
 #if defined(__AVX__)
     if constexpr (sizeof(Vector) == 32) return Vector(__builtin_ia32_sqrtpd256(x));

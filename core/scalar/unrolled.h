@@ -9,9 +9,8 @@ namespace sheetbend {
 // f(0), ..., f(N - 1).
 template <int N, class F>
 inline __attribute__((always_inline)) void unrolled(F&& f) {
-  [&]<int... i>(std::integer_sequence<int, i...>) __attribute__((always_inline)) {
-    (f(i), ...);
-  }(std::make_integer_sequence<int, N>{});
+  [&]<int... i>(std::integer_sequence<int, i...>)
+      __attribute__((always_inline)) { (f(i), ...); }(std::make_integer_sequence<int, N>{});
 }
 
 }  // namespace sheetbend

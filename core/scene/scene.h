@@ -37,9 +37,9 @@ struct Scene {
   std::vector<int> first_dof, dim;  // per node
   std::vector<Role> role;           // per node
   std::vector<int> pinned;
-  std::vector<int> driven;          // nodes whose motion is given, in the order of Quantity::boundary
-  std::vector<int> driven_slot;     // per node: place in `driven`, or -1
-  std::vector<int> loaded;          // nodes that time-dependent forces act on
+  std::vector<int> driven;       // nodes whose motion is given, in the order of Quantity::boundary
+  std::vector<int> driven_slot;  // per node: place in `driven`, or -1
+  std::vector<int> loaded;       // nodes that time-dependent forces act on
   std::vector<int> loaded_slot;
   bool has_drag = false;
   Knots boundary, force;

@@ -106,8 +106,8 @@ std::vector<double> reverse_of_one(const Projection& p, const std::vector<double
     double x_bar[K::dofs];
     ElementCotangent<K, double> own;
     std::copy_n(bar.x, K::dofs, x_bar);
-    correction_vjp(e, Kept<K, double>(e.x), run.record.lambda.data(), e.references(run.state, group), run.record.dl.data(), bar.lambda, x_bar,
-                   bar.w, own);
+    correction_vjp(e, Kept<K, double>(e.x), run.record.lambda.data(), e.references(run.state, group),
+                   run.record.dl.data(), bar.lambda, x_bar, bar.w, own);
     add_element(run.state, group, 0, own, bar);
     add_cotangent(run.state, e, 0, x_bar, bar);
   });
