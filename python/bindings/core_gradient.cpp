@@ -80,13 +80,13 @@ py::tuple vjp_dot(const Solver& s, const Array& inputs, const Array& inputs_dot,
   return py::make_tuple(values, derivatives);
 }
 
-// Gradients (B, total) of a batch, eight scenes at a time.
-py::array_t<double> vjp_batch(const Solver& s, const Array& inputs, const Steps& steps, const Array& x_bar, double t0,
-                              const Memory& memory) {
+// Records and reverses a batch, eight scenes at a time. seed(first, x) makes cotangents of the states (F, dofs) of the scenes from `first` on.
+template <class Seed>
+py::array_t<double> reverse_batch(const Solver& s, const Array& inputs, const Steps& steps, double t0,
+                                  const Memory& memory, Seed&& seed) {
   const std::size_t total = s.scene->layout.total(), size = steps.size() * s.scene->dofs();
   const std::size_t count = static_cast<std::size_t>(inputs.size()) / total;
   check(s, inputs, count, steps);
-  expect_size(x_bar, count * size, "x_bar");
   const TapePlan plan = plan_of<Pack>(s, steps, count, memory);
   auto out = empty({count, total});
   double* inputs_bar = out.mutable_data();
@@ -99,12 +99,45 @@ py::array_t<double> vjp_batch(const Solver& s, const Array& inputs, const Steps&
       const auto in = to_lanes(inputs.data(), count, first, total);
       std::vector<Pack> x(size), bar(total);
       auto tape = record_rollout(*s.scene, s.plan, in.data(), t0, steps, x.data(), plan.states, &interrupt);
-      x = to_lanes(x_bar.data(), count, first, size);
+      seed(count, first, x);
       reverse_rollout(*s.scene, s.plan, in.data(), t0, tape, steps, x.data(), bar.data(), &interrupt);
       from_lanes(bar, inputs_bar, count, first);
     }
   });
   return out;
+}
+
+// Gradients (B, total) of a batch from cotangents of its states.
+py::array_t<double> vjp_batch(const Solver& s, const Array& inputs, const Steps& steps, const Array& x_bar, double t0,
+                              const Memory& memory) {
+  const std::size_t size = steps.size() * s.scene->dofs();
+  expect_size(x_bar, static_cast<std::size_t>(inputs.size()) / s.scene->layout.total() * size, "x_bar");
+  return reverse_batch(s, inputs, steps, t0, memory, [&](std::size_t count, std::size_t first, std::vector<Pack>& x) {
+    x = to_lanes(x_bar.data(), count, first, size);
+  });
+}
+
+// Half the sum of squared distances to targets (B, F, dofs), or (F, dofs) for all, and its gradient, in one pass over the batch: (B), (B, total).
+py::tuple misfit_batch(const Solver& s, const Array& inputs, const Steps& steps, const Array& targets, double t0,
+                       const Memory& memory) {
+  const std::size_t size = steps.size() * s.scene->dofs();
+  const std::size_t batch = static_cast<std::size_t>(inputs.size()) / s.scene->layout.total();
+  const bool shared = static_cast<std::size_t>(targets.size()) == size;
+  if (!shared) expect_size(targets, batch * size, "targets");
+  auto misfits = empty({batch});
+  double* misfit = misfits.mutable_data();
+  auto gradient =
+      reverse_batch(s, inputs, steps, t0, memory, [&](std::size_t count, std::size_t first, std::vector<Pack>& x) {
+        const auto wanted = to_lanes(targets.data(), shared ? 1 : count, shared ? 0 : first, size);
+        Pack sum(0.0);
+        for (std::size_t i = 0; i < size; ++i) {
+          x[i] -= wanted[i];
+          sum += x[i] * x[i];
+        }
+        for (std::size_t k = 0; k < Pack::lanes && first + k < count; ++k)
+          misfit[first + k] = 0.5 * sum[static_cast<int>(k)];
+      });
+  return py::make_tuple(misfits, gradient);
 }
 
 }  // namespace
@@ -133,6 +166,8 @@ void bind_gradient(py::module_& m, py::class_<Solver>& solver) {
       .def("vjp_dot", &vjp_dot, py::arg("inputs"), py::arg("inputs_dot"), py::arg("steps"), py::arg("x_bar"),
            py::arg("x_bar_dot"), py::arg("t0"), py::arg("memory") = py::none())
       .def("vjp_batch", &vjp_batch, py::arg("inputs"), py::arg("steps"), py::arg("x_bar"), py::arg("t0"),
+           py::arg("memory") = py::none())
+      .def("misfit_batch", &misfit_batch, py::arg("inputs"), py::arg("steps"), py::arg("targets"), py::arg("t0"),
            py::arg("memory") = py::none());
 }
 

@@ -112,6 +112,9 @@ class Solver:
     def vjp_batch(
         self, inputs: ArrayLike, steps: Sequence[int], x_bar: ArrayLike, t0: float, memory: int | None = None
     ) -> Array: ...  # (batch, inputs)
+    def misfit_batch(  # targets (batch, frames, dofs) or (frames, dofs)
+        self, inputs: ArrayLike, steps: Sequence[int], targets: ArrayLike, t0: float, memory: int | None = None
+    ) -> tuple[Array, Array]: ...  # (batch,), (batch, inputs)
     @property
     def blocks(self) -> list[tuple[int, int, bool]]: ...  # rows, half bandwidth, banded
     @property

@@ -108,16 +108,15 @@ class Problem:
         return _loss(self._residual(self._simulate(self._inputs)))
 
     def gradient(self) -> Gradient:
-        """Loss and gradient per scene. A batch is simulated twice, since its residuals are made outside the core."""
+        """Loss and gradient per scene."""
         w, steps = self.workload, self.workload.steps
         if w.scenes == 1:
             states, tape = self._solver.record(self._inputs[0], steps, 0.0)
             residual = self._residual(states[None])
             bar = self._solver.vjp(self._inputs[0], tape, steps, residual[0], 0.0)[None]
-        else:
-            residual = self._residual(self._simulate(self._inputs))
-            bar = self._solver.vjp_batch(self._inputs, steps, residual, 0.0)
-        return Gradient(_loss(residual), *self._by_parameter(bar))
+            return Gradient(_loss(residual), *self._by_parameter(bar))
+        misfit, bar = self._solver.misfit_batch(self._inputs, steps, self._target, 0.0)
+        return Gradient(misfit, *self._by_parameter(bar))
 
     def complex_step(self, scene: int) -> Array:
         """The four numbers of one scene by complex step: (4,); an independent path, several times slower."""
