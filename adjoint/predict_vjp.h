@@ -36,10 +36,12 @@ void pull_back_knots(const KnotWeights& k, const Vec3<T>& bar, T* values_bar, in
 template <class T>
 void read_off_vjp(const Scene& scene, const Bdf& bdf, const T* x_next_bar, const T* v_next_bar, int threads,
                   const Coordinates<T>& q_bar, const StateCotangents<T>& bar) {
-  parallel_for(scene.nodes(), threads, points_per_thread, [&](int begin, int end) {
-    for_each_point<T>(begin, end, [&](int n, auto how) {
-      const int dof = scene.first_dof[n];
-      const auto back = scaled(T(1.0 / bdf.eta), how.load(v_next_bar + dof));
+  const T rate(1.0 / bdf.eta);
+  const int* first_dof = scene.first_dof.data();
+  parallel_for(scene.nodes(), threads, points_per_thread, [=](int begin, int end) {
+    for_each_point<T>(begin, end, [=](int n, auto how) {
+      const int dof = first_dof[n];
+      const auto back = scaled(rate, how.load(v_next_bar + dof));
       how.store(q_bar.of(n), how.load(x_next_bar + dof) + back);
       pull_back_history(bdf, how, -back, bar.x + dof, bar.x_before + dof);
     });
@@ -57,24 +59,30 @@ void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, 
   const std::vector<T>& w = weights.w;
   T* mass_bar = in_bar.of(Quantity::mass);
   // q = history(x) + eta v*, v* = m w (history(v) + eta g) + w eta f. The sum for g goes by chunks of one size, whoever works on them.
-  const int chunks = (scene.nodes() + points_per_thread - 1) / points_per_thread;
+  constexpr int points_per_sum = 1024;
+  const int chunks = (scene.nodes() + points_per_sum - 1) / points_per_sum;
   gravity_bars.resize(chunks);
-  parallel_for(chunks, threads, 1, [&](int first, int last) {
+  const T* kept = scene.has_drag ? weights.kept.data() : nullptr;
+  const int *first_dof = scene.first_dof.data(), nodes = scene.nodes();
+  const Role* role = scene.role.data();
+  const T* inverse_mass = w.data();
+  Vec3<T>* sums = gravity_bars.data();
+  parallel_for(chunks, threads, 1, [=](int first, int last) {
     for (int chunk = first; chunk < last; ++chunk) {
       PointSum<T> sum;
-      const int begin = chunk * points_per_thread, end = std::min(begin + points_per_thread, scene.nodes());
-      for_each_point<T>(begin, end, [&](int n, auto how) {
-        if (scene.role[n] != Role::free) return;
-        const int dof = scene.first_dof[n];
+      const int begin = chunk * points_per_sum, end = std::min(begin + points_per_sum, nodes);
+      for_each_point<T>(begin, end, [=, &sum](int n, auto how) {
+        if (role[n] != Role::free) return;
+        const int dof = first_dof[n];
         const auto x_bar = how.load(q_bar.of(n));
         auto v_bar = scaled(eta, x_bar);
-        if (scene.has_drag) v_bar = scaled(weights.kept[n], v_bar);
+        if (kept) v_bar = scaled(kept[n], v_bar);
         pull_back_history(bdf, how, x_bar, bar.x + dof, bar.x_before + dof);
         pull_back_history(bdf, how, v_bar, bar.v + dof, bar.v_before + dof);
         sum.add(scaled(eta, v_bar));
-        mass_bar[n] -= w[n] * w[n] * w_bar.of(n);
+        mass_bar[n] -= inverse_mass[n] * inverse_mass[n] * w_bar.of(n);
       });
-      gravity_bars[chunk] = sum.total();
+      sums[chunk] = sum.total();
     }
   });
   for (const Vec3<T>& sum : gravity_bars) sum.add_to(in_bar.of(Quantity::gravity));

@@ -46,10 +46,11 @@ class StateReverse {
     return record;
   }
 
-  static void shift(std::vector<T>& next, std::vector<T>& now, std::vector<T>& before) {
+  void shift(std::vector<T>& next, std::vector<T>& now, std::vector<T>& before) const {
     std::swap(next, now);
     std::swap(now, before);
-    std::fill(before.begin(), before.end(), T(0.0));
+    parallel_for(static_cast<int>(before.size()), plan_.options.threads, 3 * points_per_thread,
+                 [&](int begin, int end) { std::fill(before.begin() + begin, before.begin() + end, T(0.0)); });
   }
 
   const Scene& scene_;

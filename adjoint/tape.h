@@ -36,7 +36,7 @@ class Tape {
       slot_[step] = spare_.back();
       spare_.pop_back();
     }
-    std::copy_n(x, scene_.dofs(), at(step));
+    for_each_dof([&, to = at(step)](int begin, int end) { std::copy(x + begin, x + end, to + begin); });
   }
   bool holds(int first, int last) const {
     return std::all_of(slot_.begin() + first, slot_.begin() + last + 1, [](int slot) { return slot >= 0; });
@@ -52,15 +52,25 @@ class Tape {
   // The velocity that the forward program had at `step`; v0 is the initial one.
   void velocity(int step, const T* v0, T* v) const {
     if (step <= 0) {
-      std::copy_n(v0, scene_.dofs(), v);
+      for_each_dof([&](int begin, int end) { std::copy(v0 + begin, v0 + end, v + begin); });
       return;
     }
     const Bdf bdf = Bdf::at(plan_.options, step - 1);
     const T *next = x(step), *now = x(step - 1), *before = bdf.before == 0.0 ? now : x(step - 2);
-    for (int i = 0; i < scene_.dofs(); ++i) v[i] = (next[i] - history(bdf, now[i], before[i])) * T(1.0 / bdf.eta);
+    const T rate(1.0 / bdf.eta), weight_now(bdf.now), weight_before(bdf.before);
+    for_each_dof([=](int begin, int end) {
+      if (bdf.before == 0.0)
+        for (int i = begin; i < end; ++i) v[i] = (next[i] - now[i]) * rate;
+      else
+        for (int i = begin; i < end; ++i) v[i] = (next[i] - (weight_now * now[i] + weight_before * before[i])) * rate;
+    });
   }
 
  private:
+  template <class F>
+  void for_each_dof(F&& f) const {
+    parallel_for(scene_.dofs(), plan_.options.threads, 3 * points_per_thread, f);
+  }
   std::size_t offset(int step) const { return static_cast<std::size_t>(slot_[step]) * scene_.dofs(); }
   T* at(int step) { return x_.data() + offset(step); }
 

@@ -10,13 +10,12 @@ namespace {
 void clear(std::vector<Pack>& v) { std::fill(v.begin(), v.end(), Pack(0.0)); }
 
 template <class T>
-void begin(const PackPlan& plan, PackCotangents<T>& bar) {
-  for (int n = 0; n < plan.nodes; ++n) bar.rows.at(n)[3] = T(0.0);
+void begin(const PackPlan& plan, int threads, PackCotangents<T>& bar) {
+  parallel_for(plan.nodes, threads, points_per_thread, [&](int begin, int end) {
+    for (int n = begin; n < end; ++n) bar.rows.at(n)[3] = T(0.0);
+  });
   std::fill(bar.rows.at(plan.nodes), bar.rows.at(plan.rows()), T(0.0));
-  for (auto& color : bar.colors) {
-    clear(color.lambda);
-    clear(color.C_r);
-  }
+  for (auto& color : bar.colors) clear(color.C_r);
 }
 
 template <class T>
@@ -55,13 +54,14 @@ void reverse_sweeps(const Scene& scene, const PackPlan& plan, const sheetbend_pa
                     const Inputs<T>& in_bar, PackCotangents<T>& bar) {
   if (bar.eta != state.eta) finish(scene, plan, in, in_bar, bar);
   bar.eta = state.eta;
-  begin(plan, bar);
+  begin(plan, threads, bar);
   for (int iteration = iterations - 1; iteration >= 0; --iteration)
     for (int c = static_cast<int>(plan.colors.size()) - 1; c >= 0; --c) {
       const PackedColor& color = plan.colors[c];
       typename PackState<T>::ColorState& primal = state.colors[c];
       typename PackCotangents<T>::ColorCotangents& own = bar.colors[c];
       const sheetbend_packs::Reverse reverse{color.count,
+                                             iteration == iterations - 1,
                                              color.nodes.data(),
                                              numbers(primal.values),
                                              color.damped ? numbers(primal.C_r) : nullptr,

@@ -21,7 +21,7 @@ inline __attribute__((always_inline)) void project_range_vjp(const sheetbend_pac
     for (int j = 0; j < rows; ++j) {
       lambda[j] = record[kept + j];
       dl[j] = record[kept + rows + j];
-      lambda_bar[j] = sums[j];
+      lambda_bar[j] = r.fresh ? Register(0.0) : sums[j];
       if (damped) C_r[j] = Strip(r.C_r, n, rows)[j];
     }
     unrolled<K::dofs>([&](int d) { x_bar[d] = now.x[d]; });

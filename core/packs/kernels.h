@@ -28,6 +28,7 @@ constexpr int record_size(int kept, int rows) { return kept + 2 * rows; }
 // One color. Lanes come last everywhere: (packs, ..., 8).
 struct Forward {
   int count;         // constraints; across a color the rest of the last pack repeats the last one
+  bool fresh;        // lambda counts as zero, whatever it holds: who works on it clears it
   const int* nodes;  // where the particles' rows begin
   double* rows;
   const double*
@@ -40,6 +41,7 @@ struct Forward {
 
 struct Reverse {
   int count;
+  bool fresh;  // so does lambda_bar
   const int* nodes;
   const double* values;
   const double* C_r;

@@ -114,7 +114,6 @@ void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const T
     typename PackState<T>::ColorState& own = state.colors[c];
     if (fresh) fill_values(scene, color, in, eta, own.values);
     if (fresh || scene.has_drag) fill_weights(scene, color, w, own.values);
-    std::fill(own.lambda.begin(), own.lambda.end(), Pack(0.0));
     if (color.damped)
       for_each_entry<T>(color, [&](int i, int item) {
         for (int j = 0; j < color.rows; ++j)
@@ -133,6 +132,7 @@ void sweep(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, in
     const PackedColor& color = plan.colors[c];
     typename PackState<T>::ColorState& own = state.colors[c];
     const sheetbend_packs::Forward forward{color.count,
+                                           iteration == 0,
                                            color.nodes.data(),
                                            state.rows.data(),
                                            numbers(own.values),

@@ -108,12 +108,12 @@ struct PackState {
 };
 
 // Fills values for eta (nothing to do when they are there and no drag changes w: one state serves one vector of inputs), weights from w
-// (nodes), references from C_r (rows of the scene), the rows of uses of fixed nodes from the nodes' own; clears the multipliers.
+// (nodes), references from C_r (rows of the scene), the rows of uses of fixed nodes from the nodes' own.
 template <class T>
 void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const T>& in, double eta, const T* w,
                   const T* C_r, PackState<T>& state);
 
-// One pass over all colors; keeps what the reverse needs where `state` has records.
+// One pass over all colors; the first (0) starts from no multipliers. Keeps what the reverse needs where `state` has records.
 template <class T>
 void sweep(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, int threads, int grain, int iteration,
            PackState<T>& state);

@@ -91,7 +91,7 @@ inline __attribute__((always_inline)) void project_range(const sheetbend_packs::
     load_values(f.values, damped, n, e);
     const Strip multipliers(f.lambda, n, K::rows);
     Register lambda[K::rows], C_r[K::rows];
-    for (int j = 0; j < K::rows; ++j) lambda[j] = multipliers[j];
+    for (int j = 0; j < K::rows; ++j) lambda[j] = f.fresh ? Register(0.0) : multipliers[j];
     if (damped)
       for (int j = 0; j < K::rows; ++j) C_r[j] = Strip(f.C_r, n, K::rows)[j];
     Correction<K, Register> correction(e, at.value, lambda, damped ? C_r : nullptr);

@@ -58,7 +58,7 @@ struct PointSum<double> {
 
 // Calls f(n, how) for the points [begin, end), `how` being the way to load and store them; the last one is touched exactly.
 template <class T, class F>
-void for_each_point(int begin, int end, F&& f) {
+inline __attribute__((always_inline)) void for_each_point(int begin, int end, F f) {
   if constexpr (std::is_same_v<T, double>) {
     for (int n = begin; n < end - 1; ++n) f(n, InFours{});
     if (begin < end) f(end - 1, Exactly<T>{});

@@ -10,9 +10,6 @@
 
 namespace sheetbend {
 
-// Particles per thread below which loops over them are not split.
-inline constexpr int points_per_thread = 4096;
-
 // The states that a substep reads.
 template <class T>
 struct SubstepStates {
@@ -84,6 +81,8 @@ void weigh(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, const 
   }
 }
 
+// Loops over particles capture by value: a store may go anywhere, so what a reference leads to would be loaded again for each.
+//
 // x* = history(x) + eta v*, v* = m w (history(v) + eta gravity) + w eta f, w = 1/(m + eta c). Driven nodes go where their boundary is.
 template <class T>
 void predict(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, double t_next, const SubstepStates<T>& s,
@@ -91,11 +90,13 @@ void predict(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, doub
   const T eta(bdf.eta);
   const T gravity[4] = {eta * in.of(Quantity::gravity)[0], eta * in.of(Quantity::gravity)[1],
                         eta * in.of(Quantity::gravity)[2], T(0.0)};
-  parallel_for(scene.nodes(), threads, points_per_thread, [&](int begin, int end) {
-    for_each_point<T>(begin, end, [&](int n, auto how) {
-      const int dof = scene.first_dof[n];
+  const T* kept = scene.has_drag ? weights.kept.data() : nullptr;
+  const int* first_dof = scene.first_dof.data();
+  parallel_for(scene.nodes(), threads, points_per_thread, [=](int begin, int end) {
+    for_each_point<T>(begin, end, [=](int n, auto how) {
+      const int dof = first_dof[n];
       auto v = history(bdf, how, s.v + dof, s.v_before + dof) + how.load(gravity);
-      if (scene.has_drag) v = scaled(weights.kept[n], v);
+      if (kept) v = scaled(kept[n], v);
       how.store(q.of(n), history(bdf, how, s.x + dof, s.x_before + dof) + scaled(eta, v));
     });
   });

@@ -113,13 +113,15 @@ template <class T>
 bool read_off(const Scene& scene, const Bdf& bdf, const SubstepStates<T>& s, int threads, const Coordinates<T>& q,
               T* x_next, T* v) {
   std::atomic<bool> finite = true;
-  parallel_for(scene.nodes(), threads, points_per_thread, [&](int begin, int end) {
+  const T rate(1.0 / bdf.eta);
+  const int* first_dof = scene.first_dof.data();
+  parallel_for(scene.nodes(), threads, points_per_thread, [=, &finite](int begin, int end) {
     PointSum<T> difference;  // q - q, which only what is finite has as zero
-    for_each_point<T>(begin, end, [&](int n, auto how) {
-      const int dof = scene.first_dof[n];
+    for_each_point<T>(begin, end, [=, &difference](int n, auto how) {
+      const int dof = first_dof[n];
       const auto now = how.load(q.of(n));
       how.store(x_next + dof, now);
-      how.store(v + dof, scaled(T(1.0 / bdf.eta), now - history(bdf, how, s.x + dof, s.x_before + dof)));
+      how.store(v + dof, scaled(rate, now - history(bdf, how, s.x + dof, s.x_before + dof)));
       difference.add(now - now);
     });
     const Vec3<T> d = difference.total();

@@ -8,6 +8,10 @@
 
 namespace sheetbend {
 
+// Particles per thread below which loops over them are not split. Such loops are split as the colors are: a loop on one thread would pull every
+// particle's numbers out of the other threads' caches.
+inline constexpr int points_per_thread = 256;
+
 // False where the caller has to do the work itself.
 bool run_in_pool(int count, int chunks, const std::function<void(int, int)>& body);
 

@@ -166,5 +166,5 @@ class Problem:
 
 
 def _loss(residual: Array) -> Array:
-    """(scenes,), without a copy of the residuals."""
-    return 0.5 * np.array([np.vdot(r, r) for r in residual])
+    """(scenes,), without a copy of the residuals, and without threads of a linear algebra library that would spin beside ours."""
+    return 0.5 * np.einsum("ij,ij->i", residual.reshape(len(residual), -1), residual.reshape(len(residual), -1))
