@@ -45,24 +45,24 @@ struct alignas(8 * N) Lanes {
 
   // f on every piece of one or two packs.
   template <class F>
-  static Lanes map(const Lanes& a, const Lanes& b, F&& f) {
+  [[gnu::always_inline]] static inline Lanes map(const Lanes& a, const Lanes& b, F&& f) {
     Lanes r;
     for (int i = 0; i < pieces; ++i) r.v[i] = f(a.v[i], b.v[i]);
     return r;
   }
-  friend Lanes operator-(const Lanes& a) {
+  [[gnu::always_inline]] friend inline Lanes operator-(const Lanes& a) {
     return map(a, a, [](const Vector& x, const Vector&) { return -x; });
   }
-  friend Lanes operator+(const Lanes& a, const Lanes& b) {
+  [[gnu::always_inline]] friend inline Lanes operator+(const Lanes& a, const Lanes& b) {
     return map(a, b, [](const Vector& x, const Vector& y) { return x + y; });
   }
-  friend Lanes operator-(const Lanes& a, const Lanes& b) {
+  [[gnu::always_inline]] friend inline Lanes operator-(const Lanes& a, const Lanes& b) {
     return map(a, b, [](const Vector& x, const Vector& y) { return x - y; });
   }
-  friend Lanes operator*(const Lanes& a, const Lanes& b) {
+  [[gnu::always_inline]] friend inline Lanes operator*(const Lanes& a, const Lanes& b) {
     return map(a, b, [](const Vector& x, const Vector& y) { return x * y; });
   }
-  friend Lanes operator/(const Lanes& a, const Lanes& b) {
+  [[gnu::always_inline]] friend inline Lanes operator/(const Lanes& a, const Lanes& b) {
     return map(a, b, [](const Vector& x, const Vector& y) { return x / y; });
   }
   friend Mask operator>(const Lanes& a, const Lanes& b) {

@@ -16,19 +16,19 @@ struct Vec3 {
 };
 
 template <class T>
-Vec3<T> operator+(const Vec3<T>& a, const Vec3<T>& b) {
+[[gnu::always_inline]] inline Vec3<T> operator+(const Vec3<T>& a, const Vec3<T>& b) {
   return {a.x + b.x, a.y + b.y, a.z + b.z};
 }
 template <class T>
-Vec3<T> operator-(const Vec3<T>& a, const Vec3<T>& b) {
+[[gnu::always_inline]] inline Vec3<T> operator-(const Vec3<T>& a, const Vec3<T>& b) {
   return {a.x - b.x, a.y - b.y, a.z - b.z};
 }
 template <class T>
-Vec3<T> operator-(const Vec3<T>& a) {
+[[gnu::always_inline]] inline Vec3<T> operator-(const Vec3<T>& a) {
   return {-a.x, -a.y, -a.z};
 }
 template <class T>
-Vec3<T> operator*(const T& s, const Vec3<T>& a) {
+[[gnu::always_inline]] inline Vec3<T> operator*(const T& s, const Vec3<T>& a) {
   return {s * a.x, s * a.y, s * a.z};
 }
 template <class T>
