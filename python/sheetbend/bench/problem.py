@@ -166,5 +166,6 @@ class Problem:
 
 
 def _loss(residual: Array) -> Array:
-    """(scenes,), without a copy of the residuals, and without threads of a linear algebra library that would spin beside ours."""
-    return 0.5 * np.einsum("ij,ij->i", residual.reshape(len(residual), -1), residual.reshape(len(residual), -1))
+    """(scenes,), without a copy of the residuals. A dot product would wake BLAS threads, which spin beside ours."""
+    flat = residual.reshape(len(residual), -1)
+    return 0.5 * np.einsum("ij,ij->i", flat, flat)
