@@ -95,15 +95,15 @@ void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, 
                       static_cast<int>(scene.driven.size()), static_cast<int>(i));
   }
   // What a force and drag add: d(m w)/dm = w^2 eta c, dw/dm = -w^2.
+  const KnotWeights force = scene.loaded.empty() ? KnotWeights{} : scene.force.at(t_next);
   const auto force_impulse = [&](int n) {
-    return eta * at_knots(scene.force.at(t_next), in.of(Quantity::force), static_cast<int>(scene.loaded.size()),
-                          scene.loaded_slot[n]);
+    return eta * at_knots(force, in.of(Quantity::force), static_cast<int>(scene.loaded.size()), scene.loaded_slot[n]);
   };
   for (const int n : scene.loaded) {
     if (scene.role[n] != Role::free) continue;
     const Vec3<T> v_star_bar = eta * Vec3<T>(q_bar.of(n));
-    pull_back_knots(scene.force.at(t_next), (eta * w[n]) * v_star_bar, in_bar.of(Quantity::force),
-                    static_cast<int>(scene.loaded.size()), scene.loaded_slot[n]);
+    pull_back_knots(force, (eta * w[n]) * v_star_bar, in_bar.of(Quantity::force), static_cast<int>(scene.loaded.size()),
+                    scene.loaded_slot[n]);
     mass_bar[n] -= w[n] * w[n] * dot(force_impulse(n), v_star_bar);
   }
   if (!scene.has_drag) return;

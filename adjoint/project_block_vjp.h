@@ -46,10 +46,7 @@ void finish_block(const Scene& scene, const DirectBlock& block, const Inputs<con
     const int count = 2 + group.parameters;
     for (int i = 0; i < run.count; ++i) {
       const auto value = [&](int part) { return bar.values[r][member_number<T>(i, count, part)]; };
-      add_rates(in, group, run.items[i], bar.eta, value(0), value(1), in_bar);
-      for (int k = 0; k < group.parameters; ++k)
-        in_bar.of(Quantity::rest)[group.first_value + static_cast<std::size_t>(run.items[i]) * group.parameters + k] +=
-            value(2 + k);
+      add_values(in, group, run.items[i], bar.eta, value, in_bar);
     }
     bar.values[r].clear();
   }

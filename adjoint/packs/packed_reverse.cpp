@@ -85,11 +85,7 @@ void finish(const Scene& scene, const PackPlan& plan, const Inputs<const T>& in,
     const int parts = 2 + color.parameters;
     for (int i = 0; i < color.count; ++i) {
       const auto value_bar = [&](int part) { return entry<T>(bar.colors[c].values, i, parts, part); };
-      const int item = color.items[i];
-      add_rates(in, group, item, bar.eta, value_bar(0), value_bar(1), in_bar);
-      for (int k = 0; k < color.parameters; ++k)
-        in_bar.of(Quantity::rest)[group.first_value + static_cast<std::size_t>(item) * color.parameters + k] +=
-            value_bar(2 + k);
+      add_values(in, group, color.items[i], bar.eta, value_bar, in_bar);
     }
     clear(bar.colors[c].values);
   }

@@ -23,10 +23,13 @@ constexpr int value_count(bool damped) {
 
 // The numbers of place n in the order that kernels.h gives: the constraint's own parameters, and the rest.
 template <class K>
-void load_parameters(const double* values, bool damped, long n, Register* p) {
-  const Strip from(values, n, value_count<K>(damped));
-  for (int k = 0; k < parameter_count<K>; ++k) p[k] = from[(damped ? 3 : 1) + k];
-}
+struct LoadedParameters {
+  Register p[parameter_count<K> > 0 ? parameter_count<K> : 1];
+  LoadedParameters(const double* values, bool damped, long n) {
+    const Strip from(values, n, value_count<K>(damped));
+    for (int k = 0; k < parameter_count<K>; ++k) p[k] = from[(damped ? 3 : 1) + k];
+  }
+};
 
 template <class K>
 void load_values(const double* values, bool damped, long n, Element<K, Register>& e) {
@@ -67,12 +70,6 @@ struct GatheredStencil {
     const Particles<layout> particles(nodes, n, K::arity);
     unrolled<K::arity>([&](int k) { particles.load(rows, k, x + 3 * k, with_w ? w + k : nullptr); });
   }
-};
-
-template <class K>
-struct LoadedParameters {
-  Register p[parameter_count<K> > 0 ? parameter_count<K> : 1];
-  LoadedParameters(const double* values, bool damped, long n) { load_parameters<K>(values, damped, n, p); }
 };
 
 template <class K, Layout layout, class Damped>

@@ -5,8 +5,6 @@
 #include "adjoint/rollout.h"
 #include "adjoint/tape_plan.h"
 #include "core/scalar/dual.h"
-#include "core/threads/pool.h"
-#include "python/bindings/interrupt.h"
 #include "python/bindings/solver.h"
 
 namespace sheetbend::bindings {
@@ -90,19 +88,12 @@ py::array_t<double> reverse_batch(const Solver& s, const Array& inputs, const St
   const TapePlan plan = plan_of<Pack>(s, steps, count, memory);
   auto out = empty({count, total});
   double* inputs_bar = out.mutable_data();
-  Release release;
-  SignalInterrupt interrupt;
-  const int packs = static_cast<int>((count + Pack::lanes - 1) / Pack::lanes);
-  parallel_for(packs, s.plan.options.threads, 1, [&](int begin, int end) {
-    for (int p = begin; p < end; ++p) {
-      const std::size_t first = static_cast<std::size_t>(p) * Pack::lanes;
-      const auto in = to_lanes(inputs.data(), count, first, total);
-      std::vector<Pack> x(size), bar(total);
-      auto tape = record_rollout(*s.scene, s.plan, in.data(), t0, steps, x.data(), plan.states, &interrupt);
-      seed(count, first, x);
-      reverse_rollout(*s.scene, s.plan, in.data(), t0, tape, steps, x.data(), bar.data(), &interrupt);
-      from_lanes(bar, inputs_bar, count, first);
-    }
+  for_each_pack(s, inputs.data(), count, [&](std::size_t first, const std::vector<Pack>& in, Interrupt* interrupt) {
+    std::vector<Pack> x(size), bar(total);
+    auto tape = record_rollout(*s.scene, s.plan, in.data(), t0, steps, x.data(), plan.states, interrupt);
+    seed(count, first, x);
+    reverse_rollout(*s.scene, s.plan, in.data(), t0, tape, steps, x.data(), bar.data(), interrupt);
+    from_lanes(bar, inputs_bar, count, first);
   });
   return out;
 }

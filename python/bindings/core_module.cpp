@@ -32,6 +32,7 @@ PYBIND11_MODULE(_core, m) {
       "Compiled core of sheetbend. Use the package's Python functions; this module's shapes are flat and unchecked "
       "beyond sizes.";
   m.def("constraint_kinds", &constraint_kinds);
+  m.def("instruction_set", [] { return pack_kernels().name; });
   static py::exception<Diverged> diverged(m, "Diverged", PyExc_RuntimeError);
   static py::exception<NoEquilibrium> no_equilibrium(m, "NoEquilibrium", PyExc_RuntimeError);
   static py::exception<BudgetTooSmall> too_small(m, "BudgetTooSmall", PyExc_ValueError);

@@ -2,9 +2,6 @@
 #include "adjoint/rollout.h"
 #include "core/scalar/complex.h"
 #include "core/scalar/dual.h"
-#include "core/scalar/pack.h"
-#include "core/threads/pool.h"
-#include "python/bindings/interrupt.h"
 #include "python/bindings/solver.h"
 
 namespace sheetbend::bindings {
@@ -121,17 +118,10 @@ py::array_t<double> simulate_batch(const Solver& s, const Array& inputs, const S
   check(s, inputs, count, steps);
   auto out = empty({count, frames, dofs});
   double* x = out.mutable_data();
-  Release release;
-  SignalInterrupt interrupt;
-  const int packs = static_cast<int>((count + Pack::lanes - 1) / Pack::lanes);
-  parallel_for(packs, s.plan.options.threads, 1, [&](int begin, int end) {
-    for (int p = begin; p < end; ++p) {
-      const std::size_t first = static_cast<std::size_t>(p) * Pack::lanes;
-      const auto in = to_lanes(inputs.data(), count, first, total);
-      std::vector<Pack> lanes(frames * dofs);
-      rollout_states(*s.scene, s.plan, in.data(), t0, steps, lanes.data(), &interrupt);
-      from_lanes(lanes, x, count, first);
-    }
+  for_each_pack(s, inputs.data(), count, [&](std::size_t first, const std::vector<Pack>& in, Interrupt* interrupt) {
+    std::vector<Pack> lanes(frames * dofs);
+    rollout_states(*s.scene, s.plan, in.data(), t0, steps, lanes.data(), interrupt);
+    from_lanes(lanes, x, count, first);
   });
   return out;
 }

@@ -6,7 +6,9 @@
 
 #include "core/scalar/pack.h"
 #include "core/solver/plan.h"
+#include "core/threads/pool.h"
 #include "python/bindings/core_module.h"
+#include "python/bindings/interrupt.h"
 
 namespace sheetbend::bindings {
 
@@ -33,5 +35,19 @@ void bind_gradient(py::module_& m, py::class_<Solver>& solver);
 // Packs of eight scenes; lanes past the end repeat the last scene.
 std::vector<Pack> to_lanes(const double* data, std::size_t batch, std::size_t first, std::size_t size);
 void from_lanes(const std::vector<Pack>& lanes, double* data, std::size_t batch, std::size_t first);
+
+// Calls f(first, inputs, interrupt) for every eight scenes of a batch, packs over threads and without the interpreter's lock.
+template <class F>
+void for_each_pack(const Solver& s, const double* inputs, std::size_t batch, F&& f) {
+  Release release;
+  SignalInterrupt interrupt;
+  const int packs = static_cast<int>((batch + Pack::lanes - 1) / Pack::lanes);
+  parallel_for(packs, s.plan.options.threads, 1, [&](int begin, int end) {
+    for (int p = begin; p < end; ++p) {
+      const std::size_t first = static_cast<std::size_t>(p) * Pack::lanes;
+      f(first, to_lanes(inputs, batch, first, s.scene->layout.total()), &interrupt);
+    }
+  });
+}
 
 }  // namespace sheetbend::bindings

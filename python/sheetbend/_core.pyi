@@ -24,6 +24,7 @@ class BudgetTooSmall(ValueError):
     needed: int  # bytes
 
 def constraint_kinds() -> dict[str, dict[str, Any]]: ...
+def instruction_set() -> str: ...
 
 class Scene:
     def __init__(

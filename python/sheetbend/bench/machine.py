@@ -7,6 +7,8 @@ import platform
 from pathlib import Path
 from typing import Any
 
+from .. import _core
+
 LEVELS = {
     "x86-64-v4": {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"},
     "x86-64-v3": {"avx2", "bmi1", "bmi2", "fma"},
@@ -33,7 +35,7 @@ def machine() -> dict[str, Any]:
 
 def isa() -> str:
     """The instruction set of the kernels: what SHEETBEND_ISA names, or the widest that the processor has."""
-    return os.environ.get("SHEETBEND_ISA") or widest_isa()
+    return _core.instruction_set()
 
 
 def widest_isa() -> str:
