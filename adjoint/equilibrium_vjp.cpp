@@ -73,7 +73,7 @@ void EquilibriumDerivative::vjp(const double* x_bar, const double* lambda_bar, d
     } else if (scene_.role[n] == Role::driven) {
       pull_back_knots(boundary, held, bar.of(Quantity::boundary), static_cast<int>(scene_.driven.size()),
                       scene_.driven_slot[n]);
-    } else {
+    } else if (scene_.inertial[n]) {
       bar.of(Quantity::mass)[n] -= dot(un, gravity);
       (-in.of(Quantity::mass)[n] * un).add_to(bar.of(Quantity::gravity));
       if (scene_.loaded_slot[n] >= 0)

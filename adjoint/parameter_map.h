@@ -10,7 +10,7 @@
 
 namespace sheetbend {
 
-enum class Factor1d : int { identity, inverse, square, sine, cosine };
+enum class Factor1d : int { identity, inverse, square, sine, cosine, root, inverse_root };
 
 template <class T>
 T evaluate(Factor1d f, const T& x) {
@@ -20,6 +20,8 @@ T evaluate(Factor1d f, const T& x) {
     case Factor1d::square: return x * x;
     case Factor1d::sine: return sin(x);
     case Factor1d::cosine: return cos(x);
+    case Factor1d::root: return sqrt(x);
+    case Factor1d::inverse_root: return T(1.0) / sqrt(x);
   }
   throw std::logic_error("unknown factor of a parameter map");
 }
@@ -32,6 +34,8 @@ T slope(Factor1d f, const T& x) {
     case Factor1d::square: return T(2.0) * x;
     case Factor1d::sine: return cos(x);
     case Factor1d::cosine: return -sin(x);
+    case Factor1d::root: return T(0.5) / sqrt(x);
+    case Factor1d::inverse_root: return -(T(0.5) / (x * sqrt(x)));
   }
   throw std::logic_error("unknown factor of a parameter map");
 }

@@ -64,7 +64,7 @@ void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, 
   gravity_bars.resize(chunks);
   const T* kept = scene.has_drag ? weights.kept.data() : nullptr;
   const int *first_dof = scene.first_dof.data(), nodes = scene.nodes();
-  const Role* role = scene.role.data();
+  const char* inertial = scene.inertial.data();
   const T* inverse_mass = w.data();
   Vec3<T>* sums = gravity_bars.data();
   parallel_for(chunks, threads, 1, [=](int first, int last) {
@@ -72,7 +72,7 @@ void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, 
       PointSum<T> sum;
       const int begin = chunk * points_per_sum, end = std::min(begin + points_per_sum, nodes);
       for_each_point<T>(begin, end, [=, &sum](int n, auto how) {
-        if (role[n] != Role::free) return;
+        if (!inertial[n]) return;
         const int dof = first_dof[n];
         const auto x_bar = how.load(q_bar.of(n));
         auto v_bar = scaled(eta, x_bar);
@@ -87,6 +87,11 @@ void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, 
   });
   for (const Vec3<T>& sum : gravity_bars) sum.add_to(in_bar.of(Quantity::gravity));
 
+  for (const Director& d : scene.directors) {
+    if (scene.role[d.node] != Role::free) continue;
+    Vec3<T>(q_bar.of(d.node)).add_to(bar.x + scene.first_dof[d.node]);
+    mass_bar[d.node] -= w[d.node] * w[d.node] * eta * eta * w_bar.of(d.node);
+  }
   for (const int n : scene.pinned) Vec3<T>(q_bar.of(n)).add_to(bar.x + scene.first_dof[n]);
   if (!scene.driven.empty()) {
     const KnotWeights boundary = scene.boundary.at(t_next);
@@ -100,7 +105,7 @@ void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, 
     return eta * at_knots(force, in.of(Quantity::force), static_cast<int>(scene.loaded.size()), scene.loaded_slot[n]);
   };
   for (const int n : scene.loaded) {
-    if (scene.role[n] != Role::free) continue;
+    if (!scene.inertial[n]) continue;
     const Vec3<T> v_star_bar = eta * Vec3<T>(q_bar.of(n));
     pull_back_knots(force, (eta * w[n]) * v_star_bar, in_bar.of(Quantity::force), static_cast<int>(scene.loaded.size()),
                     scene.loaded_slot[n]);
@@ -108,7 +113,7 @@ void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, 
   }
   if (!scene.has_drag) return;
   for (int n = 0; n < scene.nodes(); ++n) {
-    if (scene.role[n] != Role::free) continue;
+    if (!scene.inertial[n]) continue;
     const int dof = scene.first_dof[n];
     const T m = in.of(Quantity::mass)[n];
     const Vec3<T> v_star_bar = eta * Vec3<T>(q_bar.of(n));

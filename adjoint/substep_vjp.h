@@ -48,22 +48,23 @@ void damping_references_vjp(const Scene& scene, const Inputs<const T>& in, const
                             const T* C_r_bar, const StateCotangents<T>& bar, const Inputs<T>& in_bar) {
   const auto pull_back = [&]<class K>(K, const Group& group, int item, const T* at, const T* C_bar, const T& scale,
                                       T* x_bar) {
-    constexpr int P = parameter_count<K>;
+    constexpr int P = parameter_count<K>, inside = P - K::offsets;
     const int* nodes = group.stencil.data() + static_cast<std::size_t>(item) * K::arity;
     const std::size_t value = group.first_value + static_cast<std::size_t>(item) * P;
-    using D = std::conditional_t<P == 0, T, Dual<T, P>>;
+    using D = std::conditional_t<inside == 0, T, Dual<T, inside>>;
     D x[K::dofs], p[P + 1], C[K::rows], J[K::rows * K::dofs];
     for (int d = 0; d < K::dofs; ++d) x[d] = D(at[scene.first_dof[nodes[d / 3]] + d % 3]);
     for (int k = 0; k < P; ++k) p[k] = D(in.of(Quantity::rest)[value + k]);
-    if constexpr (P > 0)
-      for (int k = 0; k < P; ++k) p[k].d[k] = T(1.0);
+    if constexpr (inside > 0)
+      for (int k = 0; k < inside; ++k) p[k].d[k] = T(1.0);
     K::evaluate(x, p, C, J);
     for (int j = 0; j < K::rows; ++j) {
       const T bar_j = scale * C_bar[j];
       for (int d = 0; d < K::dofs; ++d)
         x_bar[scene.first_dof[nodes[d / 3]] + d % 3] += bar_j * primal<T>(J[j * K::dofs + d]);
-      if constexpr (P > 0)
-        for (int k = 0; k < P; ++k) in_bar.of(Quantity::rest)[value + k] += bar_j * C[j].d[k];
+      if constexpr (inside > 0)
+        for (int k = 0; k < inside; ++k) in_bar.of(Quantity::rest)[value + k] += bar_j * C[j].d[k];
+      if (j < K::offsets) in_bar.of(Quantity::rest)[value + inside + j] -= bar_j;
     }
   };
   for (const Group& group : scene.groups) {
@@ -123,12 +124,15 @@ void project_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in
   damping_references_vjp(scene, in, bdf, s, scratch.C_r.data(), bar, in_bar);
 }
 
-// Given the cotangents of x_{n+1} and v_{n+1}, adds to those of the states before and of the inputs. The record is the substep's own, recomputed.
+// Given the cotangents of x_{n+1} and v_{n+1}, adds to those of the states before and of the inputs. The record and q are
+// the substep's own, recomputed by correct(). x_next_bar is used up.
 template <class T>
 void substep_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf, double t_next,
-                 const SubstepStates<T>& s, SubstepRecord<T>& record, const T* x_next_bar, const T* v_next_bar,
+                 const SubstepStates<T>& s, SubstepRecord<T>& record, T* q, T* x_next_bar, const T* v_next_bar,
                  ReverseScratch<T>& scratch, const StateCotangents<T>& bar, const Inputs<T>& in_bar) {
   const int threads = plan.options.threads;
+  const Coordinates<T> corrected = record.coordinates(plan, q);
+  retract_directors_vjp(scene, [&](int node) { return corrected.of(node); }, x_next_bar);
   read_off_vjp(scene, bdf, x_next_bar, v_next_bar, threads, scratch.q_bar(plan), bar);
   project_vjp(scene, plan, in, bdf, s, record, scratch, bar, in_bar);
   predict_vjp(scene, in, bdf, t_next, s, record.weights, scratch.q_bar(plan), scratch.w_bar(plan), threads,

@@ -7,7 +7,7 @@
 //   p_bar = sum_j -y_j dC_j/dp + v_j . dJ_j/dp
 //
 // Only "solve with A" differs between solvers. Hess(C_j) v_j and the parameter derivatives are one evaluation of the constraint on dual
-// numbers with rows + parameters directions. ../DERIVATION.md derives it. Where the numbers are stored is not known here.
+// numbers with a direction per row and per parameter that is not just subtracted. ../DERIVATION.md derives it. Where the numbers are stored is not known here.
 #pragma once
 
 #include "core/element/element.h"
@@ -61,16 +61,15 @@ void pull_back(const Element<K, T>& e, const Kept<K, T>& at, const T* lambda, co
     pull_back_rates(e, lambda, C_r, dl, y, 0, C[0], J_dx, bar);
     for (int k = 0; k < P; ++k) bar.p[k] += y[k];  // C = f(x) - p
   } else {
-    using D = Dual<T, K::rows + P>;
+    constexpr int inside = P - K::offsets;  // parameters that the gradient may depend on
+    using D = Dual<T, K::rows + inside>;
     D x[K::dofs], p[P > 0 ? P : 1], C[K::rows], J[K::rows * K::dofs];
     for (int d = 0; d < K::dofs; ++d) {
       x[d].v = at.x[d];
       for (int j = 0; j < K::rows; ++j) x[d].d[j] = v(j, d);
     }
-    for (int k = 0; k < P; ++k) {
-      p[k].v = e.p[k];
-      p[k].d[K::rows + k] = T(1.0);
-    }
+    for (int k = 0; k < P; ++k) p[k].v = e.p[k];
+    for (int k = 0; k < inside; ++k) p[k].d[K::rows + k] = T(1.0);
     K::evaluate(x, p, C, J);
     for (int j = 0; j < K::rows; ++j) {
       T J_dx(0.0);
@@ -78,11 +77,12 @@ void pull_back(const Element<K, T>& e, const Kept<K, T>& at, const T* lambda, co
         for (int d = 0; d < K::dofs; ++d) J_dx += J[j * K::dofs + d].v * e.w[d / 3] * u[d];
       pull_back_rates(e, lambda, C_r, dl, y, j, C[j].v, J_dx, bar);
       for (int d = 0; d < K::dofs; ++d) x_bar[d] += J[j * K::dofs + d].d[j];
-      for (int k = 0; k < P; ++k) {
+      for (int k = 0; k < inside; ++k) {
         T p_bar = -(y[j] * C[j].d[K::rows + k]);
         for (int d = 0; d < K::dofs; ++d) p_bar += x[d].d[j] * J[j * K::dofs + d].d[K::rows + k];
         bar.p[k] += p_bar;
       }
+      if (j < K::offsets) bar.p[inside + j] += y[j];
     }
   }
 }

@@ -9,11 +9,13 @@
 //   };
 //
 // x holds the stencil's coordinates one node after the other (dofs of them), J is row-major (rows x dofs) and fully written.
+// `directors = d` says that the last d of the stencil are directors (directions of a rod's edges), not points.
 // `periodic = true` says that C is an angle: differences of it (rate damping) are taken the short way round.
 //
 // Two shortcuts make hot constraints cheaper; a constraint without them works the same, and tests compare the two routes:
 //   `unit_gradients = true` (one row): |dC/dx_k| = 1 on every particle k whatever x is. Then J W J^T = sum w, and its derivative,
 //     2 Hess(C) W J^T, is zero.
+//   `offsets = m`: the last m parameters are subtracted from the first m rows, so the reverse knows their derivatives.
 //   template <class T> struct Geometry: what the reverse can use in place of x and dual numbers, where the parameters are
 //     subtracted, C = f(x) - p. It has `size` numbers, Geometry(x), keep(to), kept(from), values(p, C), gradient(J) and
 //     add_hessian_times(v, out) for one row. See distance.h.
@@ -30,6 +32,8 @@ template <int Arity>
 struct OnPoints {
   static constexpr int arity = Arity;
   static constexpr int dofs = 3 * Arity;
+  static constexpr int directors = 0;
+  static constexpr int offsets = 0;
   static constexpr bool periodic = false;
   static constexpr bool unit_gradients = false;
 };

@@ -25,15 +25,21 @@ struct CurvatureBinormal {
   // Writes the gradients of the three components (whose values are c) by the three points, row by row.
   void gradients(const T* c, T* J) const {
     const T zero(0.0), one(1.0);
-    gradient({one, zero, zero}, c[0], J);
-    gradient({zero, one, zero}, c[1], J + 9);
-    gradient({zero, zero, one}, c[2], J + 18);
+    row({one, zero, zero}, c[0], J);
+    row({zero, one, zero}, c[1], J + 9);
+    row({zero, zero, one}, c[2], J + 18);
+  }
+
+  // The gradient of u . kb, of value c, by the two edges.
+  void gradient(const Vec3<T>& u, const T& c, Vec3<T>& by_e1, Vec3<T>& by_e2) const {
+    by_e1 = inverse * (T(2.0) * cross(e2, u) - c * d1);
+    by_e2 = inverse * (T(2.0) * cross(u, e1) - c * d2);
   }
 
  private:
-  void gradient(const Vec3<T>& u, const T& c, T* J) const {
-    const Vec3<T> g1 = inverse * (T(2.0) * cross(e2, u) - c * d1);
-    const Vec3<T> g2 = inverse * (T(2.0) * cross(u, e1) - c * d2);
+  void row(const Vec3<T>& u, const T& c, T* J) const {
+    Vec3<T> g1, g2;
+    gradient(u, c, g1, g2);
     (-g1).store(J);
     (g1 - g2).store(J + 3);
     g2.store(J + 6);

@@ -9,7 +9,9 @@
 #include "core/constraints/bend.h"
 #include "core/constraints/distance.h"
 #include "core/constraints/hinge.h"
+#include "core/constraints/material_curvature.h"
 #include "core/constraints/planar_bend.h"
+#include "core/constraints/twist.h"
 
 namespace sheetbend {
 
@@ -18,7 +20,9 @@ using Registry = std::tuple<  //
     Bend,                     //
     PlanarBend,               //
     Hinge,                    //
-    Attachment>;
+    Attachment,               //
+    MaterialCurvature,        //
+    Twist>;
 
 inline constexpr int kind_count = std::tuple_size_v<Registry>;
 

@@ -30,7 +30,10 @@ bool finite(const std::vector<double>& v) {
 // Diagonal of the box around all particles.
 double scene_size(const Scene& scene, const double* x) {
   Vec3<double> low(x), high(x);
+  std::vector<char> is_point(scene.nodes(), true);
+  for (const Director& d : scene.directors) is_point[d.node] = false;
   for (int n = 0; n < scene.nodes(); ++n) {
+    if (!is_point[n]) continue;
     const Vec3<double> p(x + scene.first_dof[n]);
     low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
@@ -38,13 +41,13 @@ double scene_size(const Scene& scene, const double* x) {
   return norm(high - low);
 }
 
-// Mean distance between neighbors of a stencil.
+// Mean distance between neighboring points of a stencil.
 double mean_edge(const Scene& scene, const double* x) {
   double sum = 0.0;
   int count = 0;
   for (const Group& group : scene.groups)
     for (int i = 0; i < group.count; ++i)
-      for (int k = 1; k < group.arity; ++k, ++count)
+      for (int k = 1; k < group.points; ++k, ++count)
         sum += norm(Vec3<double>(x + scene.first_dof[group.nodes(i)[k]]) -
                     Vec3<double>(x + scene.first_dof[group.nodes(i)[k - 1]]));
   return count == 0 ? 0.0 : sum / count;
@@ -194,7 +197,7 @@ bool EquilibriumSolver::step(State& s, double mu, const double* alpha) {
     s.evaluate(x, lambda);
     dx = s.r_x;
     dl = s.r_l;
-    for (int i = 0; i < scene_.dofs(); ++i) dx[i] = -(dx[i] - mu * (x[i] - s.x[i]));
+    for (int i = 0; i < scene_.dofs(); ++i) dx[i] = -(dx[i] - mu * kkt_.metric(i) * (x[i] - s.x[i]));
     for (const Group& group : scene_.groups)
       for (int i = 0; i < group.count; ++i) {
         const int c = group.first + i, row = group.first_row + i * group.rows;

@@ -66,6 +66,14 @@ Kkt::Kkt(const Scene& scene) : scene_(scene), unknown_(scene.dofs(), -1) {
   };
   for_each_pair(unknown_, [&](int a, int b) { position_.push_back(a >= 0 && a <= b ? position(a, b) : -1); });
   for (int i = 0; i < unknowns; ++i) diagonal_.push_back(position(i, i));
+  for (const Director& d : scene.directors)
+    for (int e = 0; e < 9; ++e) {
+      const int a = unknown_[scene.first_dof[d.node] + e / 3], b = unknown_[scene.first_dof[d.node] + e % 3];
+      director_position_.push_back(a >= 0 && a <= b ? position(a, b) : -1);
+    }
+  metric_.assign(scene.dofs(), 1.0);
+  idle_.resize(scene.directors.size());
+  idle_stiffness_.resize(scene.directors.size());
   std::size_t next = 0;
   for (const Group& group : scene.groups) {
     first_hessian_.push_back(next);
@@ -102,6 +110,16 @@ void Kkt::assemble(const double* inputs, const double* x, const double* lambda, 
       }
     for (int e = 0; e < K::rows * K::dofs; ++e) *J++ = Jd[e].v;
   });
+  for (std::size_t i = 0; i < scene_.directors.size(); ++i) {
+    const Director& d = scene_.directors[i];
+    const auto at = [&](int node) { return x + scene_.first_dof[node]; };
+    const Retraction<double> frame(d, at);
+    double t[3], m[3];
+    frame.t.store(t);
+    frame.unit.store(m);
+    for (int e = 0; e < 9; ++e) idle_[i][e] = t[e / 3] * t[e % 3] + m[e / 3] * m[e % 3];
+    std::fill_n(metric_.begin() + scene_.first_dof[d.node], 3, 1.0 / (frame.inverse_length * frame.inverse_length));
+  }
 }
 
 bool Kkt::factorize(double mu, const double* compliance) {
@@ -113,7 +131,8 @@ bool Kkt::factorize(double mu, const double* compliance) {
     if (position_[e] >= 0) values[position_[e]] -= H_[e];
   geometric_ = std::max(force_stiffness_, mu);
   for (const int d : diagonal_) geometric_ = std::max(geometric_, std::abs(values[d]));
-  for (const int d : diagonal_) values[d] += mu;
+  for (int i = 0; i < scene_.dofs(); ++i)
+    if (unknown_[i] >= 0) values[diagonal_[unknown_[i]]] += mu * metric_[i];
 
   const int* position = position_.data();
   const double* J = J_.data();
@@ -133,6 +152,13 @@ bool Kkt::factorize(double mu, const double* compliance) {
       }
     J += K::rows * K::dofs;
   });
+  for (std::size_t i = 0; i < idle_.size(); ++i) {
+    const int* at = &director_position_[9 * i];
+    if (at[0] < 0) continue;
+    idle_stiffness_[i] = std::max(values[at[0]] + values[at[4]] + values[at[8]], 1e-3 * geometric_);
+    for (int e = 0; e < 9; ++e)
+      if (at[e] >= 0) values[at[e]] += idle_stiffness_[i] * idle_[i][e];
+  }
   largest_diagonal_ = 0.0;
   for (const int d : diagonal_) largest_diagonal_ = std::max(largest_diagonal_, std::abs(values[d]));
   factor_.factorize(K_);
@@ -180,7 +206,12 @@ void Kkt::subtract_product(const std::vector<double>& x, const std::vector<doubl
                            std::vector<double>& r_l) const {
   const double *H = H_.data(), *J = J_.data();
   for (int i = 0; i < scene_.dofs(); ++i)
-    if (unknown_[i] >= 0) r_x[i] += mu_ * x[i];
+    if (unknown_[i] >= 0) r_x[i] += mu_ * metric_[i] * x[i];
+  for (std::size_t i = 0; i < idle_.size(); ++i) {
+    const int dof = scene_.first_dof[scene_.directors[i].node];
+    if (unknown_[dof] < 0) continue;
+    for (int e = 0; e < 9; ++e) r_x[dof + e / 3] += idle_stiffness_[i] * idle_[i][e] * x[dof + e % 3];
+  }
   for_each_constraint(scene_, [&]<class K>(K, const Group& group, int item) {
     const auto nodes = group.nodes(item);
     const int row = group.first_row + item * K::rows;

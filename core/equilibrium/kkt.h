@@ -5,12 +5,16 @@
 // condensed with a small compliance of their own, and the solution is refined against A itself, which also removes the rounding
 // of stiff rows (the augmented Lagrangian step for saddle point systems: Benzi, Golub & Liesen 2005).
 //
+// Directors may grow and lean along their edge without changing any constraint. K gets a stiffness of its own in these two directions, in
+// which nothing pushes, so that it is regular.
+//
 // Negative pivots of K count the unstable modes (Sylvester's law of inertia); in the limit of rigid rows K has one positive
 // eigenvalue per row and those of the energy's Hessian on the rows' tangent space (Gould 1985).
 #pragma once
 
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
+#include <array>
 #include <vector>
 
 #include "core/scene/scene.h"
@@ -30,6 +34,8 @@ class Kkt {
   bool factorize(double mu, const double* compliance);
   int negative_modes() const { return negative_; }
   double largest_diagonal() const { return largest_diagonal_; }
+  // What mu is multiplied by at a coordinate: 1, of a director the square of its edge's length.
+  double metric(int dof) const { return metric_[dof]; }
 
   // Solves A (x, lambda) = (x, lambda) in place; entries of fixed nodes come out zero. Refines until corrections are below `accuracy`
   // relative to the solution or stop shrinking; false if that leaves more than 1e-6.
@@ -49,6 +55,10 @@ class Kkt {
   std::vector<int> position_;               // into K's values, -1 where fixed or below the diagonal
   std::vector<int> diagonal_;               // likewise, per unknown
   std::vector<double> H_, J_, alpha_, softened_;
+  std::vector<double> metric_;                     // per dof
+  std::vector<int> director_position_;             // into K's values, 9 per director, -1 as in position_
+  std::vector<std::array<double, 9>> idle_;        // per director: projection onto the directions that nothing depends on
+  std::vector<double> idle_stiffness_;             // per director
   double mu_ = 0.0, force_stiffness_ = 0.0, geometric_ = 0.0, largest_diagonal_ = 0.0;
   int negative_ = 0;
   Eigen::SparseMatrix<double> K_;

@@ -55,7 +55,7 @@ void external_force(const Scene& scene, const Inputs<const T>& in, double t0, T*
   const KnotWeights knots = scene.loaded.empty() ? KnotWeights{} : scene.force.at(t0);
   std::fill_n(f, scene.dofs(), T(0.0));
   for (int n = 0; n < scene.nodes(); ++n) {
-    if (scene.role[n] != Role::free) continue;
+    if (!scene.inertial[n]) continue;
     (in.of(Quantity::mass)[n] * gravity).store(f + scene.first_dof[n]);
     if (scene.loaded_slot[n] >= 0)
       at_knots(knots, in.of(Quantity::force), static_cast<int>(scene.loaded.size()), scene.loaded_slot[n])

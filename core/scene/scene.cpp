@@ -43,7 +43,9 @@ Group build_group(const GroupSpec& spec, const Scene& scene) {
   g.stencil = spec.stencil;
   g.first = scene.constraints;
   g.first_row = scene.rows;
-  with_kind(g.kind, [&]<class K>(K) { g.arity = K::arity, g.rows = K::rows, g.parameters = parameter_count<K>; });
+  with_kind(g.kind, [&]<class K>(K) {
+    g.arity = K::arity, g.points = K::arity - K::directors, g.rows = K::rows, g.parameters = parameter_count<K>;
+  });
   if (g.stencil.size() % g.arity != 0)
     refuse(spec.name + ": " + std::to_string(g.stencil.size()) + " indices. Fix: a " + spec.kind + " takes " +
            std::to_string(g.arity) + " each");
@@ -91,6 +93,19 @@ Scene build_scene(const SceneSpec& spec) {
   check_nodes("loaded", spec.loaded, s.nodes());
   for (const int n : spec.pinned) s.role[n] = Role::pinned;
   for (const int n : spec.driven) s.role[n] = Role::driven;
+  for (const Director& d : spec.directors) check_nodes("directors", {d.node, d.tail, d.head}, s.nodes());
+  s.directors = spec.directors;
+  s.inertial.resize(s.nodes());
+  for (int n = 0; n < s.nodes(); ++n) s.inertial[n] = s.role[n] == Role::free;
+  for (const Director& d : s.directors) {
+    if (d.tail == d.head || d.node == d.tail || d.node == d.head || !s.inertial[d.node] == (s.role[d.node] == Role::free))
+      refuse("directors: node " + std::to_string(d.node) + " with edge " + std::to_string(d.tail) + ", " +
+             std::to_string(d.head) + ". Fix: give each director a node of its own and two distinct ends");
+    s.inertial[d.node] = false;
+  }
+  for (const int n : spec.loaded)
+    if (!s.inertial[n] && s.role[n] == Role::free)
+      refuse("loaded: node " + std::to_string(n) + " is a director. Fix: let forces act on particles");
   s.driven = spec.driven;
   for (int n = 0; n < s.nodes(); ++n)
     if (s.role[n] == Role::pinned) s.pinned.push_back(n);

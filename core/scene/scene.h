@@ -14,6 +14,11 @@ namespace sheetbend {
 
 enum class Role : int { free, pinned, driven };
 
+// A node that gives the frame of the edge from `tail` to `head` its direction. It has no inertia: it turns until no twist drives it.
+struct Director {
+  int node, tail, head;
+};
+
 // A named set of constraints of one kind.
 struct Group {
   std::string name;
@@ -22,6 +27,7 @@ struct Group {
   bool damped = false;       // whether its rate damping is evaluated at all
   std::vector<int> stencil;  // (count, arity) nodes
   int rows = 0, arity = 0, parameters = 0;
+  int points = 0;                    // of a stencil; directors follow them
   int first_row = 0;                 // of the scene's multipliers
   std::size_t first_value = 0;       // into Quantity::rest
   std::size_t first_coordinate = 0;  // into arrays of all stencils' coordinates
@@ -36,6 +42,8 @@ struct Scene {
   Fields fields;
   std::vector<int> first_dof, dim;  // per node
   std::vector<Role> role;           // per node
+  std::vector<Director> directors;
+  std::vector<char> inertial;  // per node: whether it moves by its mass, that is free and no director
   std::vector<int> pinned;
   std::vector<int> driven;       // nodes whose motion is given, in the order of Quantity::boundary
   std::vector<int> driven_slot;  // per node: place in `driven`, or -1
@@ -60,7 +68,8 @@ struct GroupSpec {
 };
 
 struct SceneSpec {
-  int particles = 0;
+  int particles = 0;  // nodes, directors among them
+  std::vector<Director> directors;
   std::vector<int> pinned, driven, loaded;
   bool has_drag = false;
   Knots boundary, force;

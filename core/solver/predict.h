@@ -24,11 +24,12 @@ struct Coordinates {
   T* of(int node) const { return data + static_cast<long>(stride) * node; }
 };
 
-// The effective inverse masses w = 1/(m + eta c), 0 for what cannot move, and with drag the share m w of its momentum that a particle keeps.
+// The effective inverse masses: w = 1/(m + eta c), of a director 1/(m eta^2), 0 for what cannot move; and with drag the share m w of its
+// momentum that a particle keeps.
 template <class T>
 struct Weights {
   std::vector<T> w, kept;
-  bool ready = false;  // without drag they are found once
+  double eta = 0.0;  // without drag they are found once per eta
 };
 
 template <class T>
@@ -61,13 +62,17 @@ Vec3<T> extrapolated_velocity(const Bdf& bdf, const SubstepStates<T>& s, int dof
 template <class T>
 void weigh(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, const SubstepStates<T>& s,
            Weights<T>& weights) {
-  if (weights.ready && !scene.has_drag) return;
-  weights.ready = true;
+  if (weights.eta == bdf.eta && !scene.has_drag) return;
+  weights.eta = bdf.eta;
   const T* mass = in.of(Quantity::mass);
   const T eta(bdf.eta);
   for (int n = 0; n < scene.nodes(); ++n) {
     if (scene.role[n] != Role::free) {
       weights.w[n] = T(0.0);
+      continue;
+    }
+    if (!scene.inertial[n]) {
+      weights.w[n] = T(1.0) / (mass[n] * eta * eta);
       continue;
     }
     T effective = mass[n];
@@ -83,7 +88,8 @@ void weigh(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, const 
 
 // Loops over particles capture by value: a store may go anywhere, so what a reference leads to would be loaded again for each.
 //
-// x* = history(x) + eta v*, v* = m w (history(v) + eta gravity) + w eta f, w = 1/(m + eta c). Driven nodes go where their boundary is.
+// x* = history(x) + eta v*, v* = m w (history(v) + eta gravity) + w eta f, w = 1/(m + eta c). Directors stay, driven nodes go where their
+// boundary is.
 template <class T>
 void predict(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, double t_next, const SubstepStates<T>& s,
              const Weights<T>& weights, int threads, const Coordinates<T>& q) {
@@ -109,6 +115,7 @@ void predict(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, doub
       (eta * (weights.w[n] * (eta * f))).add_to(q.of(n));
     }
   }
+  for (const Director& d : scene.directors) Vec3<T>(s.x + scene.first_dof[d.node]).store(q.of(d.node));
   for (const int n : scene.pinned) Vec3<T>(s.x + scene.first_dof[n]).store(q.of(n));
   if (scene.driven.empty()) return;
   const KnotWeights boundary = scene.boundary.at(t_next);

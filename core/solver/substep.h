@@ -7,6 +7,7 @@
 #include "core/solver/predict.h"
 #include "core/solver/project.h"
 #include "core/solver/project_block.h"
+#include "core/solver/retract.h"
 
 namespace sheetbend {
 
@@ -135,7 +136,9 @@ template <class T>
 bool substep(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf, double t_next,
              const SubstepStates<T>& s, T* x_next, T* v, SubstepRecord<T>& record) {
   correct(scene, plan, in, bdf, t_next, s, x_next, record);
-  return read_off(scene, bdf, s, plan.options.threads, record.coordinates(plan, x_next), x_next, v);
+  const bool finite = read_off(scene, bdf, s, plan.options.threads, record.coordinates(plan, x_next), x_next, v);
+  retract_directors(scene, x_next);
+  return finite;
 }
 
 }  // namespace sheetbend

@@ -11,10 +11,12 @@ from .errors import ConfigError, DivergenceError, InputError, RecordingError, Sc
 from .experiment import Experiment
 from .fit import Fit, fit
 from .gradients import GradientReport, check_gradients
+from .grip import Grip
 from .markers import Place, along_rope, between, on_particle, on_rope
 from .parameters import Parameter, Parameters
 from .recording import Recording
 from .result import FitResult
+from .rod import Rod, add_rod, rod
 from .rollout import Gradient, Rollout, rollout
 from .rope import Rope, add_rope, rope
 from .scene import KINDS, Scene
@@ -34,6 +36,7 @@ __all__ = [
     "FitResult",
     "Gradient",
     "GradientReport",
+    "Grip",
     "InputError",
     "Parameter",
     "Parameters",
@@ -41,6 +44,7 @@ __all__ = [
     "Recording",
     "RecordingError",
     "Refinement",
+    "Rod",
     "Rollout",
     "Rope",
     "Scene",
@@ -49,6 +53,7 @@ __all__ = [
     "Solver",
     "TapePlan",
     "Trajectory",
+    "add_rod",
     "add_rope",
     "along_rope",
     "between",
@@ -59,6 +64,7 @@ __all__ = [
     "no_physics",
     "on_particle",
     "on_rope",
+    "rod",
     "rollout",
     "rope",
     "simulate",

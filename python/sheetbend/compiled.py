@@ -29,6 +29,7 @@ class CompiledScene:
         try:
             self.core = _core.Scene(
                 particles=scene.particle_count,
+                directors=[(d, *edge) for d, edge in scene.directors.items()],
                 pinned=sorted(scene.pinned),
                 driven=list(scene.driven),
                 boundary_times=[] if not scene.driven else list(scene.boundary_times),
@@ -49,7 +50,7 @@ class CompiledScene:
         self.names = tuple(scene.quantities)
         self.theta = np.array([q.value for q in scene.quantities.values()], dtype=float)
         self._base = self._pack(scene)
-        self._terms = list(scene.terms)
+        self._terms = [*scene.terms, *scene.motion_terms()]
         self._map = _core.ParameterMap(self.map())
 
     def _pack(self, scene: Scene) -> np.ndarray:

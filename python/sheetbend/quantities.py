@@ -16,7 +16,7 @@ import numpy as np
 
 from .errors import SceneError
 
-FUNCTIONS = {"identity": 0, "inverse": 1, "square": 2, "sin": 3, "cos": 4}
+FUNCTIONS = {"identity": 0, "inverse": 1, "square": 2, "sin": 3, "cos": 4, "sqrt": 5, "inverse_sqrt": 6}
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .checks import finite, indices, points
+from .chain import (
+    TimeConstant,
+    add_drag,
+    add_links,
+    add_masses,
+    first_value,
+    straight_or_given,
+    time_constants,
+    unit_vector,
+    voronoi_shares,
+)
+from .checks import indices
 from .errors import SceneError
 from .quantities import Term, product
 from .scene import Array, Scene
@@ -107,7 +118,7 @@ def add_rope(
     Raises:
         SceneError: wrong or missing values; the message names the field.
     """
-    shape, length = _shape(name, length, segments, start, direction, points)
+    shape, length = straight_or_given(name, length, segments, start, direction, points)
     for field, value in (
         ("density", density),
         ("EA", EA),
@@ -121,7 +132,7 @@ def add_rope(
         raise SceneError(f"{name}.stretch_damping", "needs a finite EA", EA, "give EA, or leave it out")
     if bend_damping is not None and EI is None:
         raise SceneError(f"{name}.bend_damping", "needs EI", EI, "give EI, or leave it out")
-    normal = None if plane is None else _unit(f"{name}.plane", plane)
+    normal = None if plane is None else unit_vector(f"{name}.plane", plane)
     if normal is None and (clamp_angles or len(set_modes)):
         raise SceneError(
             f"{name}.plane", "is missing", None, "give the unit normal that the clamp angles or the set turn about"
@@ -136,137 +147,19 @@ def add_rope(
     arc = link * np.arange(segments + 1)
     scene.add_quantity(f"{name}_length", length, "m")
     scene.add_quantity(f"{name}_density", density, "kg/m")
-    taus = _time_constants(scene, name, loss_factor, loss_frequency, EA, EI, stretch_damping, bend_damping)
-    _masses(scene, name, nodes, segments)
-    _stretch(scene, name, nodes, link, EA, taus[0])
+    taus = time_constants(scene, name, loss_factor, loss_frequency, EA, EI, stretch_damping, bend_damping)
+    add_masses(scene, name, nodes, segments)
+    add_links(scene, name, nodes, link, EA, taus[0])
     ghosts = [
         _clamp(scene, name, end, clamp, nodes, shape, link, normal if clamp_angles else None)
         for end, clamp in (("start", clamp_start), ("end", clamp_end))
     ]
     if EI is not None:
         _bending(scene, name, nodes, ghosts, arc, EI, taus[1], normal, set_modes)
-    _drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
+    add_drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
     built = Rope(name, nodes, arc, *ghosts)
     scene.ropes[name] = built
     return built
-
-
-def resample(polyline: ArrayLike, segments: int) -> Array:
-    """(segments + 1, 3) points at equal arc lengths along a polyline (k, 3)."""
-    line = points("points", polyline)
-    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    if len(line) < 2 or steps.sum() <= 0:
-        raise SceneError("points", "have no length", line.shape, "give at least two distinct points")
-    s = np.concatenate([[0.0], np.cumsum(steps)])
-    wanted = np.linspace(0.0, s[-1], segments + 1)
-    return np.stack([np.interp(wanted, s, line[:, k]) for k in range(3)], axis=1)
-
-
-def _shape(
-    name: str, length: float | None, segments: int, start: ArrayLike, direction: ArrayLike, given: ArrayLike | None
-) -> tuple[Array, float]:
-    if not isinstance(segments, int | np.integer) or segments < 1:
-        raise SceneError(f"{name}.segments", "must be a positive whole number", segments, "give at least 1")
-    if length is not None and not (np.isfinite(length) and length > 0):
-        raise SceneError(f"{name}.length", "must be positive", length, "give m")
-    if given is not None:
-        shape = resample(given, segments)
-        line = points("points", given)
-        return shape, float(length if length is not None else np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
-    if length is None:
-        raise SceneError(f"{name}.length", "is missing", None, "give the length in m, or initial points")
-    along = _unit(f"{name}.direction", direction)
-    origin = finite(f"{name}.start", start, (3,), SceneError)
-    return origin + np.linspace(0.0, length, segments + 1)[:, None] * along, float(length)
-
-
-def _unit(field: str, vector: ArrayLike) -> Array:
-    v = finite(field, vector, (3,), SceneError)
-    size = np.linalg.norm(v)
-    if size == 0:
-        raise SceneError(field, "has no length", v.tolist(), "give a direction")
-    return v / size
-
-
-def _voronoi(segments: int) -> Array:
-    """Voronoi lengths of the nodes over the rope's length."""
-    share = np.full(segments + 1, 1.0 / segments)
-    share[[0, -1]] /= 2.0
-    return share
-
-
-def _masses(scene: Scene, name: str, nodes: Array, segments: int) -> None:
-    factors = {f"{name}_density": "identity", f"{name}_length": "identity"}
-    scene.add_terms([product("mass", n, share, factors) for n, share in zip(nodes, _voronoi(segments), strict=True)])
-
-
-TimeConstant = tuple[float, dict[str, str]]
-"""A constant and the functions of quantities that it multiplies."""
-
-
-def _time_constants(
-    scene: Scene,
-    name: str,
-    factor: float | None,
-    frequency: float | None,
-    EA: float | None,
-    EI: float | None,
-    stretch: float | None,
-    bend: float | None,
-) -> tuple[TimeConstant | None, TimeConstant | None]:
-    """Kelvin-Voigt time constants of stretching and bending, as terms; adds their quantities."""
-
-    def own(kind: str, value: float | None) -> TimeConstant | None:
-        return None if value is None else (1.0, {scene.add_quantity(f"{name}_{kind}_damping", value, "s"): "identity"})
-
-    if factor is None and frequency is None:
-        return own("stretch", stretch), own("bend", bend)
-    if factor is None or not factor > 0:
-        raise SceneError(f"{name}.loss_factor", "must be positive", factor, "give it together with loss_frequency")
-    if frequency is None or not frequency > 0:
-        raise SceneError(
-            f"{name}.loss_frequency", "must be positive", frequency, "give the frequency of the motion in Hz"
-        )
-    if stretch is not None or bend is not None:
-        fix = "leave out stretch_damping and bend_damping, or it"
-        raise SceneError(f"{name}.loss_factor", "stands beside a time constant", factor, fix)
-    if EA is None and EI is None:
-        raise SceneError(f"{name}.loss_factor", "needs EA or EI", factor, "give a stiffness, or leave it out")
-    eta = scene.add_quantity(f"{name}_loss_factor", factor, "")
-    tau = (0.5 / np.pi, {eta: "identity", scene.add_quantity(f"{name}_loss_frequency", frequency, "Hz"): "inverse"})
-    return (None if EA is None else tau), (None if EI is None else tau)
-
-
-def _stretch(
-    scene: Scene, name: str, nodes: Array, link: float, EA: float | None, damping: TimeConstant | None
-) -> None:
-    segments = len(nodes) - 1
-    group = f"{name}_stretch"
-    pairs = np.stack([nodes[:-1], nodes[1:]], axis=1)
-    scene.add_constraints(
-        "distance",
-        pairs,
-        name=group,
-        rest=link,
-        compliance=np.zeros(segments),
-        damping=None if damping is None else np.zeros(segments),
-    )
-    _, first, _ = scene.group(group)
-    offset = _first_value(scene, group)
-    scene.groups[-1].rest[:] = 0.0
-    length = f"{name}_length"
-    terms = [product("rest", offset + i, 1.0 / segments, {length: "identity"}) for i in range(segments)]
-    if EA is not None:
-        scene.add_quantity(f"{name}_EA", EA, "N")
-        terms += [
-            product("compliance", first + i, 1.0 / segments, {length: "identity", f"{name}_EA": "inverse"})
-            for i in range(segments)
-        ]
-    if damping is not None:
-        scale, tau = damping
-        factors = {**tau, f"{name}_EA": "identity", length: "inverse"}
-        terms += [product("damping", first + i, scale * segments, factors) for i in range(segments)]
-    scene.add_terms(terms)
 
 
 def _clamp(
@@ -282,7 +175,7 @@ def _clamp(
     """Pin an end and hold its direction of travel by a ghost particle behind the start or beyond the end."""
     if clamp is None:
         return None
-    along = _unit(f"{name}.clamp_{end}", clamp)
+    along = unit_vector(f"{name}.clamp_{end}", clamp)
     node, place, sign = (nodes[0], shape[0], -1.0) if end == "start" else (nodes[-1], shape[-1], 1.0)
     reach = sign * GHOST * link
     ghost = int(scene.add_particles([place + reach * along], 1.0)[0])
@@ -313,7 +206,7 @@ def _bending(
     """Joints at the inner nodes and at clamped ends; alpha = Voronoi length / EI. A clamped end counts the rope's own
     half link."""
     chain = [*([] if ghosts[0] is None else [ghosts[0]]), *nodes, *([] if ghosts[1] is None else [ghosts[1]])]
-    share = _voronoi(len(nodes) - 1)
+    share = voronoi_shares(len(nodes) - 1)
     at = list(range(1, len(nodes) - 1))
     at = ([0] if ghosts[0] is not None else []) + at + ([len(nodes) - 1] if ghosts[1] is not None else [])
     if not at:
@@ -340,7 +233,7 @@ def _bending(
         scale, tau = damping
         factors = {**tau, stiffness: "identity", length: "inverse"}
         terms += [product("damping", first + i, scale / share[node], factors) for i, node in enumerate(at)]
-    offset = _first_value(scene, group)
+    offset = first_value(scene, group)
     for k in set_modes:
         mode = scene.add_quantity(f"{name}_set_{k}", 0.0, "1/m", positive=False, scale=1.0 / arc[-1])
         terms += [
@@ -353,25 +246,3 @@ def _bending(
             for i, node in enumerate(at)
         ]
     scene.add_terms(terms)
-
-
-def _drag(scene: Scene, name: str, nodes: Array, segments: int, linear: float | None, quadratic: float | None) -> None:
-    for kind, value, unit in (("linear", linear, "N s/m^2"), ("quadratic", quadratic, "N s^2/m^3")):
-        if value is None:
-            continue
-        scene.has_drag = True
-        quantity = scene.add_quantity(f"{name}_drag_{kind}", value, unit, positive=value > 0)
-        factors = {quantity: "identity", f"{name}_length": "identity"}
-        scene.add_terms(
-            [product(f"drag_{kind}", n, share, factors) for n, share in zip(nodes, _voronoi(segments), strict=True)]
-        )
-
-
-def _first_value(scene: Scene, group: str) -> int:
-    """Where a group's own parameters start in the input array "rest"."""
-    start = 0
-    for g in scene.groups:
-        if g.name == group:
-            return start
-        start += g.rest.size
-    raise KeyError(group)

@@ -20,6 +20,7 @@ from .quantities import Quantity, Term, product
 Array = np.ndarray
 KINDS: Mapping[str, Mapping[str, Any]] = _core.constraint_kinds()
 NEEDS_COMPLIANCE = ("bend", "planar_bend")
+JOINTS = ("material_curvature", "twist")
 # A damping-only element keeps the product of compliance and damping while the compliance grows: what is left of its
 # stiffness.
 VISCOUS_COMPLIANCE = 1e12
@@ -53,6 +54,7 @@ class Scene:
         self.groups: list[Group] = []
         self.pinned: set[int] = set()
         self.driven: list[int] = []
+        self.directors: dict[int, tuple[int, int]] = {}
         self.boundary_times: Array = np.zeros(0)
         self.boundary_interpolation = "cubic"
         self.loaded: list[int] = []
@@ -62,6 +64,7 @@ class Scene:
         self._positions, self._velocities, self._mass = Column(3), Column(3), Column()
         self._drag: dict[str, Array] = {}
         self._boundary: list[Array] = []
+        self._motion: list[tuple[int, Array, dict[str, str]]] = []
         self._forces: list[Array] = []
         self._gravity = finite("gravity", gravity, (3,), SceneError)
         self._frozen = False
@@ -92,6 +95,31 @@ class Scene:
         self._velocities.extend(v)
         self._mass.extend(m)
         return np.arange(first, first + len(x))
+
+    def add_directors(self, edges: ArrayLike, directions: ArrayLike) -> Array:
+        """Give edges material frames and return the indices of their directors, which count as particles.
+
+        A director is a vector across its edge, the frame's first axis; it turns about the edge without inertia.
+
+        Args:
+            edges: (n, 2) particles that each edge leads from and to.
+            directions: (n, 3) initial directions, of any length and not along their edges.
+
+        Raises:
+            SceneError: shapes, NaN, or a direction along its edge.
+        """
+        self._building()
+        ends = index_array("edges", edges, self.particle_count).reshape(-1, 2)
+        q = finite("directions", directions, (len(ends), 3), SceneError)
+        x = self.positions
+        along = x[ends[:, 1]] - x[ends[:, 0]]
+        across = np.linalg.norm(np.cross(along, q), axis=1)
+        if (across <= 1e-9 * np.linalg.norm(along, axis=1) * np.linalg.norm(q, axis=1)).any():
+            bad = int(np.argmin(across))
+            raise SceneError("directions", f"lie along edge {bad}", q[bad].tolist(), "give a vector across the edge")
+        nodes = self.add_particles(q, 0.0)
+        self.directors |= {int(n): (int(a), int(b)) for n, (a, b) in zip(nodes, ends, strict=True)}
+        return nodes
 
     def pin(self, particles: ArrayLike) -> None:
         """Hold particles where they start."""
@@ -131,6 +159,31 @@ class Scene:
         self.boundary_times, self.boundary_interpolation = t, interpolation
         self.driven += which
         self._boundary += [x[:, k] for k in range(len(which))]
+
+    def add_motion_term(self, particle: int, coefficients: ArrayLike, factors: Mapping[str, str]) -> None:
+        """Add to a driven particle's motion (knots, 3) coefficients times a product of functions of quantities.
+
+        Raises:
+            SceneError: the particle is not driven, shapes, NaN, or unknown quantities.
+        """
+        self._building()
+        if particle not in self.driven:
+            raise SceneError("particle", "is not driven", particle, "drive it first")
+        shape = (len(self.boundary_times), 3)
+        values = finite("coefficients", coefficients, shape, SceneError)
+        missing = [q for q in factors if q not in self.quantities]
+        if missing:
+            raise SceneError("factors", "use unknown quantities", missing, "declare them with add_quantity")
+        self._motion.append((self.driven.index(particle), values, dict(factors)))
+
+    def motion_terms(self) -> list[Term]:
+        """The terms of all driven motions; their places are known once every driven particle is."""
+        knots, width = len(self.boundary_times), 3 * len(self.driven)
+        places = width * np.arange(knots)[:, None] + np.arange(3)
+        return [
+            Term("boundary", (places + 3 * slot).ravel(), values.ravel(), tuple(factors.items()))
+            for slot, values, factors in self._motion
+        ]
 
     def add_force(self, particles: ArrayLike, forces: ArrayLike, times: ArrayLike = (0.0,)) -> None:
         """Let forces act on particles: (knots, k, 3) N at `times` (knots,), linear between and constant outside the
@@ -180,16 +233,17 @@ class Scene:
         constraint (their gradients are in the input arrays).
 
         Args:
-            kind: "distance", "bend", "planar_bend", "hinge" or "attachment" (sheetbend.KINDS).
+            kind: "distance", "bend", "planar_bend", "hinge", "attachment", "material_curvature" or "twist"
+                (sheetbend.KINDS).
             particles: (count, arity) indices.
             name: of the group; the kind by default.
             compliance: 0 = rigid; distance, attachment m/N; bend, planar_bend 1/(N m) (Voronoi length / EI); hinge
-                rad/(N m).
+                rad/(N m); material_curvature 1/(N m), twist rad/(N m) (Voronoi length / EI or GJ).
             damping: beta of the Rayleigh dissipation (Macklin et al. 2016, eq. 26): force per rate of C.
             viscosity: the element resists the rate of C only: distance N s/m, hinge N m s/rad; excludes compliance and
                 damping.
             rest: (count,) rest length m (the initial length by default), planar rest (natural curvature times Voronoi
-                length), angle rad.
+                length), angle rad; of material_curvature (count, 2), of twist (count,) rad.
             normal: unit plane normal, (3,) or (count, 3), of planar kinds.
 
         Raises:
@@ -408,6 +462,12 @@ class Scene:
                     "move the particles apart or give rest",
                 )
             values[:, 0] = length
+        elif kind in JOINTS:
+            offsets = parameters.index("rest_1") if "rest_1" in parameters else 0
+            values[:, :offsets] = 1.0
+            shape = (count, len(parameters) - offsets)
+            if rest is not None:
+                values[:, offsets:] = finite(f"{name}.rest", np.reshape(rest, (count, -1)), shape, SceneError)
         elif parameters:
             if normal is None:
                 raise SceneError(
@@ -460,4 +520,6 @@ UNITS: Mapping[str, Mapping[str, str]] = {
     "bend": {"compliance": "1/(N m)", "damping": "N m s"},
     "planar_bend": {"compliance": "1/(N m)", "damping": "N m s"},
     "hinge": {"compliance": "rad/(N m)", "damping": "N m s/rad"},
+    "material_curvature": {"compliance": "1/(N m)", "damping": "N m s"},
+    "twist": {"compliance": "rad/(N m)", "damping": "N m s/rad"},
 }

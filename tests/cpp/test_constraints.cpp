@@ -117,6 +117,7 @@ TYPED_TEST(Constraint, RowOfCasesFits) {
   for (const std::size_t size : {c.p.size(), c.parameter_degree.size(), c.parameter_sign.size()})
     EXPECT_EQ(size, static_cast<std::size_t>(parameter_count<K>));
   EXPECT_EQ(c.relabeling.size(), std::size_t{K::arity});
+  EXPECT_EQ(c.sign.size(), std::size_t{K::rows});
   EXPECT_GT(c.compliance, 0.0);
   EXPECT_GT(c.damping, 0.0);
   EXPECT_TRUE(c.under_rotation == UnderRotation::stays || K::rows == 3);
@@ -186,14 +187,15 @@ TYPED_TEST(Constraint, ParameterDerivativesMatchComplexStep) {
 TYPED_TEST(Constraint, TranslationChangesNothing) {
   using K = TypeParam;
   const Stencil s = jittered<K>(2);
+  constexpr int points = K::arity - K::directors;
   std::vector<double> moved = s.x;
-  for (int d = 0; d < K::dofs; ++d) moved[d] += d % 3 == 0 ? 0.5 : d % 3 == 1 ? -0.25 : 0.125;
+  for (int d = 0; d < 3 * points; ++d) moved[d] += d % 3 == 0 ? 0.5 : d % 3 == 1 ? -0.25 : 0.125;
   const auto before = evaluate<K>(s.x, s.p), after = evaluate<K>(moved, s.p);
   EXPECT_LE(relative_error(after, before), 1e-13);
   for (int j = 0; j < K::rows; ++j)
     for (int d = 0; d < 3; ++d) {
       double sum = 0.0;
-      for (int k = 0; k < K::arity; ++k) sum += before[K::rows + j * K::dofs + 3 * k + d];
+      for (int k = 0; k < points; ++k) sum += before[K::rows + j * K::dofs + 3 * k + d];
       EXPECT_LE(std::abs(sum), 1e-14 * largest(std::span(before).subspan(K::rows))) << "row " << j;
     }
 }
@@ -257,10 +259,10 @@ TYPED_TEST(Constraint, RelabelingGivesTheSameConstraint) {
   const auto before = evaluate<K>(s.x, s.p), after = evaluate<K>(x, p);
   std::vector<double> expected(before.size());
   for (int j = 0; j < K::rows; ++j) {
-    expected[j] = row.sign * before[j];
+    expected[j] = row.sign[j] * before[j];
     for (int d = 0; d < K::dofs; ++d)
       expected[K::rows + j * K::dofs + d] =
-          row.sign * before[K::rows + j * K::dofs + 3 * row.relabeling[d / 3] + d % 3];
+          row.sign[j] * before[K::rows + j * K::dofs + 3 * row.relabeling[d / 3] + d % 3];
   }
   EXPECT_LE(relative_error(after, expected), 1e-14);
 }

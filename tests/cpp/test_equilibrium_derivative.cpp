@@ -20,12 +20,14 @@ AtRest at_rest(Scene scene, std::vector<double> inputs) {
   return {std::move(scene), std::move(inputs), std::move(rest)};
 }
 
-// A hanging rope with every kind of constraint and every quantity that acts at rest; its last particle is tied to a driven one.
+// A hanging rope with every kind of constraint and every quantity that acts at rest; its last particle is tied to a driven one, and every edge
+// has a director, of which the first is pinned.
 AtRest every_kind() {
   const int n = 10;
   SceneSpec spec;
-  spec.particles = n + 2;
-  spec.pinned = {0};
+  spec.particles = n + 2 + n;
+  spec.pinned = {0, n + 2};
+  for (int k = 0; k < n; ++k) spec.directors.push_back({n + 2 + k, k, k + 1});
   spec.driven = {n + 1};
   spec.loaded = {4, 7};
   spec.boundary.times = {0.0, 0.011, 0.02, 0.05};
@@ -35,8 +37,11 @@ AtRest every_kind() {
     if constexpr (std::same_as<K, Attachment>)
       group.stencil = {n, n + 1};
     else
-      for (int k = 0; k + K::arity <= n + 1; ++k)
-        for (int i = 0; i < K::arity; ++i) group.stencil.push_back(k + i);
+      for (int k = 0; k + K::arity - K::directors <= n + 1; ++k)
+        for (int i = 0; i < K::arity; ++i) {
+          const int points = K::arity - K::directors;
+          group.stencil.push_back(i < points ? k + i : n + 2 + k + i - points);
+        }
     spec.groups.push_back(group);
   });
   AtRest s{build_scene(spec), {}, {}};
@@ -54,6 +59,8 @@ AtRest every_kind() {
     const double t = std::min(k, n) / static_cast<double>(n);
     Vec3<double>(0.6 * t, random(-0.01, 0.01), -1.5 * t * (1.0 - t)).store(in.of(Quantity::position) + 3 * k);
   }
+  for (int k = 0; k < n; ++k)
+    Vec3<double>(random(-0.1, 0.1), 0.8, random(-0.1, 0.1)).store(in.of(Quantity::position) + 3 * (n + 2 + k));
   for (std::size_t knot = 0; knot < 4; ++knot)
     Vec3<double>(0.6 + random(-0.01, 0.01), random(-0.01, 0.01), random(-0.01, 0.01))
         .store(in.of(Quantity::boundary) + 3 * knot);
@@ -61,6 +68,7 @@ AtRest every_kind() {
     for (int i = 0; i < group.count; ++i) {
       double* p = in.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(i) * group.parameters;
       if (group.parameters == 1) *p = random(0.09, 0.11);
+      if (group.parameters == 3) Vec3<double>(1.2, random(-0.2, 0.2), random(-0.2, 0.2)).store(p);
       if (group.parameters == 4) {
         Vec3<double>(0.1, 0.99, -0.1).store(p);
         p[3] = random(-0.2, 0.2);

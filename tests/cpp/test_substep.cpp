@@ -37,10 +37,11 @@ std::vector<double> reverse(const OneSubstep& one, const std::vector<double>& th
                             const std::vector<double>& out_bar) {
   SubstepRun<double> run(one, theta);
   const int dofs = one.scene.dofs();
-  std::vector<double> bar(theta.size());
+  std::vector<double> bar(theta.size()), next_bar = out_bar, q(dofs);
   ReverseScratch<double> scratch(one.scene, one.plan);
-  substep_vjp(one.scene, one.plan, run.in, run.bdf, one.t_next, run.states, run.record, out_bar.data(),
-              out_bar.data() + dofs, scratch, {&bar[0], &bar[dofs], &bar[2 * dofs], &bar[3 * dofs]},
+  correct(one.scene, one.plan, run.in, run.bdf, one.t_next, run.states, q.data(), run.record);
+  substep_vjp(one.scene, one.plan, run.in, run.bdf, one.t_next, run.states, run.record, q.data(), next_bar.data(),
+              next_bar.data() + dofs, scratch, {&bar[0], &bar[dofs], &bar[2 * dofs], &bar[3 * dofs]},
               {one.scene.layout, &bar[4 * dofs]});
   const Inputs<double> in_bar{one.scene.layout, &bar[4 * dofs]};
   finish(one.scene, one.plan.packs, run.in, in_bar, scratch.packs);

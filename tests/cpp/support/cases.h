@@ -25,8 +25,8 @@ struct Case {
   int normal = -1;  // first of the three parameters that are a direction; then C only has to be symmetric about it
   int degree;       // C(s x) = s^degree C(x) when each parameter is scaled by s^its degree
   std::vector<int> parameter_degree;
-  std::vector<int> relabeling;  // of the stencil, under which C becomes sign C ...
-  int sign;
+  std::vector<int> relabeling;  // of the stencil, under which C becomes sign C, row by row, ...
+  std::vector<int> sign;
   std::vector<int> parameter_sign;  // ... when the parameters take these signs
   bool curved = true;               // whether C has second derivatives
 };
@@ -47,7 +47,7 @@ inline Case case_of<Distance>() {
           .degree = 1,
           .parameter_degree = {1},
           .relabeling = {1, 0},
-          .sign = 1,
+          .sign = {1},
           .parameter_sign = {1}};
 }
 
@@ -61,7 +61,7 @@ inline Case case_of<Bend>() {
           .degree = 0,
           .parameter_degree = {},
           .relabeling = {2, 1, 0},
-          .sign = -1,
+          .sign = {-1, -1, -1},
           .parameter_sign = {}};
 }
 
@@ -76,7 +76,7 @@ inline Case case_of<PlanarBend>() {
           .degree = 0,
           .parameter_degree = {0, 0, 0, 0},
           .relabeling = {2, 1, 0},
-          .sign = -1,
+          .sign = {-1, -1, -1},
           .parameter_sign = {1, 1, 1, -1}};
 }
 
@@ -91,7 +91,7 @@ inline Case case_of<Hinge>() {
           .degree = 0,
           .parameter_degree = {0, 0, 0, 0},
           .relabeling = {2, 1, 0},
-          .sign = -1,
+          .sign = {-1},
           .parameter_sign = {1, 1, 1, -1}};
 }
 
@@ -105,9 +105,41 @@ inline Case case_of<Attachment>() {
           .degree = 1,
           .parameter_degree = {},
           .relabeling = {1, 0},
-          .sign = -1,
+          .sign = {-1, -1, -1},
           .parameter_sign = {},
           .curved = false};
+}
+
+// A bent and twisted joint; the directors are neither unit vectors nor across their edges.
+inline const std::vector<double> joint_sample{0,     0,    0,   0.1,  0.02, 0.01, 0.18, 0.08,
+                                              -0.03, 0.05, 0.3, -0.9, 0.5,  0.4,  -0.6};
+
+template <>
+inline Case case_of<MaterialCurvature>() {
+  return {.x = joint_sample,
+          .p = {1.3, 0.2, -0.1},
+          .compliance = 2.0,
+          .damping = 5e-4,
+          .under_rotation = UnderRotation::stays,
+          .degree = 0,
+          .parameter_degree = {0, 0, 0},
+          .relabeling = {2, 1, 0, 4, 3},
+          .sign = {1, -1},
+          .parameter_sign = {1, 1, -1}};
+}
+
+template <>
+inline Case case_of<Twist>() {
+  return {.x = joint_sample,
+          .p = {0.15},
+          .compliance = 4.0,
+          .damping = 5e-4,
+          .under_rotation = UnderRotation::stays,
+          .degree = 0,
+          .parameter_degree = {0},
+          .relabeling = {2, 1, 0, 4, 3},
+          .sign = {1},
+          .parameter_sign = {1}};
 }
 
 // The Registry as GoogleTest's list of types, and the names its reports use.

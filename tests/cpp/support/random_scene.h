@@ -1,7 +1,7 @@
 // Random scenes that hold every registered constraint and every differentiable quantity. Each rope strings
 // together one sample stencil of every kind, jittered, and braces. Ropes start at one driven particle, so
 // that constraints of one color, and direct blocks, share it; or, as a net, at one free particle and with
-// ties between them: one block with branches and loops.
+// ties between them: one block with branches and loops. Joints bring the directors of their edges.
 #pragma once
 
 #include "core/scene/scene.h"
@@ -62,16 +62,20 @@ struct SceneBuilder {
   template <class K>
   int add_stencil(int tail, bool damped) {
     const Case sample = case_of<K>();
+    constexpr int points = K::arity - K::directors;
     std::vector<int> nodes{tail};
     for (int k = 1; k < K::arity; ++k) {
       double at[3];
-      for (int d = 0; d < 3; ++d) at[d] = x[3 * tail + d] + sample.x[3 * k + d] - sample.x[d] + random(-0.005, 0.005);
+      for (int d = 0; d < 3; ++d)
+        at[d] = (k < points ? x[3 * tail + d] : 0.0) + sample.x[3 * k + d] - sample.x[d] + random(-0.005, 0.005);
       nodes.push_back(add_particle(at[0], at[1], at[2]));
     }
+    for (int k = 0; k < K::directors; ++k)
+      spec.directors.push_back({nodes[points + k], nodes[k], nodes[k + 1]});
     std::vector<double> p = sample.p;
     for (double& v : p) v += random(-0.02, 0.02);
     add_constraint<K>(damped, nodes, p);
-    return nodes.back();
+    return nodes[points - 1];
   }
 
   void add_brace(int a, int b) {
@@ -84,7 +88,11 @@ struct SceneBuilder {
     int tail = 0;
     for_each_kind([&]<class K>(K) { tail = add_stencil<K>(tail, damped); });
     std::vector<int> rope{0};
-    for (int n = first; n < static_cast<int>(x.size()) / 3; ++n) rope.push_back(n);
+    const auto is_director = [&](int n) {
+      return std::any_of(spec.directors.begin(), spec.directors.end(), [&](const Director& d) { return d.node == n; });
+    };
+    for (int n = first; n < static_cast<int>(x.size()) / 3; ++n)
+      if (!is_director(n)) rope.push_back(n);
     for (std::size_t k = 1; k < rope.size(); ++k) add_brace(rope[k - 1], rope[k]);
     return rope;
   }

@@ -1,0 +1,52 @@
+// Directors at the end of a substep: made perpendicular to their edges again and of length one,  q -> across/|across|,
+// across = q - (q.t) t. The constraints see the direction across the edge alone, so this moves nothing; it keeps the coordinates well scaled
+// and carries a frame along as its edge turns. And the reverse.
+#pragma once
+
+#include "core/scalar/vec3.h"
+#include "core/scene/scene.h"
+
+namespace sheetbend {
+
+template <class T>
+struct Retraction {
+  Vec3<T> q, t, unit;
+  T along, inverse, inverse_length;
+
+  // x(node) gives where a node's coordinates are.
+  template <class At>
+  Retraction(const Director& d, At&& x) : q(x(d.node)) {
+    const Vec3<T> edge = Vec3<T>(x(d.head)) - Vec3<T>(x(d.tail));
+    inverse_length = T(1.0) / norm(edge);
+    t = inverse_length * edge;
+    along = dot(q, t);
+    const Vec3<T> across = q - along * t;
+    inverse = T(1.0) / norm(across);
+    unit = inverse * across;
+  }
+};
+
+template <class T>
+void retract_directors(const Scene& scene, T* x) {
+  const auto at = [&](int node) { return x + scene.first_dof[node]; };
+  for (const Director& d : scene.directors) Retraction<T>(d, at).unit.store(at(d.node));
+}
+
+// q(node) gives the coordinates before. x_bar (dofs) goes in as the cotangent of those after, and comes out as theirs.
+template <class T, class At>
+void retract_directors_vjp(const Scene& scene, At&& q, T* x_bar) {
+  for (const Director& d : scene.directors) {
+    const Retraction<T> r(d, q);
+    T* director_bar = x_bar + scene.first_dof[d.node];
+    const Vec3<T> unit_bar(director_bar);
+    const Vec3<T> across_bar = r.inverse * (unit_bar - dot(unit_bar, r.unit) * r.unit);
+    const T along_bar = -dot(across_bar, r.t);
+    (across_bar + along_bar * r.t).store(director_bar);
+    const Vec3<T> t_bar = along_bar * r.q - r.along * across_bar;
+    const Vec3<T> edge_bar = r.inverse_length * (t_bar - dot(t_bar, r.t) * r.t);
+    edge_bar.add_to(x_bar + scene.first_dof[d.head]);
+    (-edge_bar).add_to(x_bar + scene.first_dof[d.tail]);
+  }
+}
+
+}  // namespace sheetbend

@@ -1,0 +1,150 @@
+"""Grips: how a rod's end is held and moved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .checks import finite
+from .errors import SceneError
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Grip:
+    """The pose of a gripped end over time: it holds the rod's place, direction and roll.
+
+    Attributes:
+        times: (knots,) s; none for a grip that stays.
+        position: (knots, 3) m, where the rod enters the grip; (1, 3) for a grip that stays.
+        direction: the same shape, unit vectors, the rod's direction of travel there (from its start to its end).
+        director: the same shape, unit vectors across direction, the first axis of the material frame.
+    """
+
+    times: Array
+    position: Array
+    direction: Array
+    director: Array
+
+    @classmethod
+    def fixed(cls, position: ArrayLike, direction: ArrayLike, director: ArrayLike | None = None) -> Grip:
+        """A grip that stays: (3,) m, and directions (3,) of any length; any director across by default."""
+        x, d = finite("position", position, (3,), SceneError), _units("direction", direction, (1, 3))
+        q = any_across(d[0]) if director is None else finite("director", director, (3,), SceneError)
+        return cls(np.zeros(0), x[None], d, _across(d, q[None]))
+
+    @classmethod
+    def from_poses(
+        cls,
+        times: ArrayLike,
+        positions: ArrayLike,
+        quaternions: ArrayLike,
+        direction: ArrayLike = (1.0, 0.0, 0.0),
+        director: ArrayLike = (0.0, 0.0, 1.0),
+    ) -> Grip:
+        """Recorded poses, roll included.
+
+        Args:
+            times: (knots,) s.
+            positions: (knots, 3) m.
+            quaternions: (knots, 4), (x, y, z, w), from the gripper's own axes to the world's.
+            direction: the rod's direction of travel in the gripper's axes.
+            director: the frame's first axis in the gripper's axes.
+
+        Raises:
+            SceneError: shapes, NaN, quaternions of no length, a director along the direction.
+        """
+        t = finite("times", times, None, SceneError).ravel()
+        x = finite("positions", positions, (len(t), 3), SceneError)
+        q = _units("quaternions", quaternions, (len(t), 4))
+        d = _units("direction", direction, (3,))
+        along = _rotated(q, d)
+        return cls(t, x, along, _across(along, _rotated(q, finite("director", director, (3,), SceneError))))
+
+    @classmethod
+    def from_markers(
+        cls,
+        times: ArrayLike,
+        first: ArrayLike,
+        second: ArrayLike,
+        *,
+        end: bool = False,
+        nominal: ArrayLike | None = None,
+        director: ArrayLike | None = None,
+    ) -> Grip:
+        """Two markers on the gripped piece, in the order in which the rod passes them; roll is not recorded.
+
+        The director is carried by the shortest rotation of a nominal direction onto the recorded one, so that
+        material frames agree between recordings that share the nominal direction.
+
+        Args:
+            times: (knots,) s.
+            first, second: (knots, 3) m.
+            end: False, at the rod's start: it becomes free at `second`. True, at its end: it is free up to `first`.
+            nominal: (3,) the mean recorded direction by default; give one for recordings that are compared.
+            director: (3,) the frame's first axis at the nominal direction; any across it by default.
+
+        Raises:
+            SceneError: shapes, NaN, markers that coincide, a recorded direction opposite to the nominal one.
+        """
+        t = finite("times", times, None, SceneError).ravel()
+        a, b = (finite(field, x, (len(t), 3), SceneError) for field, x in (("first", first), ("second", second)))
+        along = _units("first, second", b - a, (len(t), 3))
+        from_ = _units("nominal", along.mean(axis=0) if nominal is None else nominal, (3,))
+        q = any_across(from_) if director is None else finite("director", director, (3,), SceneError)
+        return cls(t, a if end else b, along, carried(_across(from_, q), from_, along))
+
+    @property
+    def stays(self) -> bool:
+        return len(self.times) == 0
+
+
+def carried(vector: Array, nominal: Array, directions: Array) -> Array:
+    """(knots, 3): `vector` (3,) turned by the shortest rotations of the unit vector `nominal` onto unit `directions`.
+
+    Raises:
+        SceneError: a direction opposite to the nominal one, to which no rotation is the shortest.
+    """
+    cosine = directions @ nominal
+    if (cosine < -1.0 + 1e-9).any():
+        bad = int(np.argmin(cosine))
+        fix = "give a nominal direction that the grip stays away from by less than half a turn"
+        raise SceneError("nominal", f"is opposite to the grip's direction at knot {bad}", nominal.tolist(), fix)
+    both = nominal + directions
+    share = (both @ vector) / (1.0 + cosine)
+    return np.asarray(vector - share[:, None] * both + 2.0 * (nominal @ vector) * directions)
+
+
+def any_across(direction: Array) -> Array:
+    """A unit vector across a direction, from the coordinate axis that is farthest from it."""
+    axis = np.eye(3)[int(np.argmin(np.abs(direction)))]
+    return _across(direction / np.linalg.norm(direction), axis)
+
+
+def _across(along: Array, vector: Array) -> Array:
+    """The unit part of vectors (..., 3) across unit vectors `along`."""
+    across = vector - np.sum(vector * along, axis=-1, keepdims=True) * along
+    size = np.linalg.norm(across, axis=-1, keepdims=True)
+    if (size < 1e-9 * np.linalg.norm(vector, axis=-1, keepdims=True)).any():
+        raise SceneError("director", "lies along the direction", np.shape(vector), "give a vector across it")
+    return np.asarray(across / size)
+
+
+def _units(field: str, vectors: ArrayLike, shape: tuple[int, ...]) -> Array:
+    v = finite(field, np.reshape(np.asarray(vectors, dtype=float), shape), shape, SceneError)
+    size = np.linalg.norm(v, axis=-1, keepdims=True)
+    if (size == 0).any():
+        raise SceneError(
+            field, "have no length", int(np.argmin(size)), "give directions (markers that do not coincide)"
+        )
+    return np.asarray(v / size)
+
+
+def _rotated(quaternions: Array, vector: Array) -> Array:
+    """(knots, 3): vector (3,) turned by unit quaternions (x, y, z, w)."""
+    xyz, w = quaternions[:, :3], quaternions[:, 3:]
+    twice = 2.0 * np.cross(xyz, vector)
+    return np.asarray(vector + w * twice + np.cross(xyz, twice))

@@ -1,0 +1,329 @@
+"""Rods: ropes that store twist. Every edge has a material frame, so that bending can differ by direction, a rest shape
+turns with the rod, and what a grip rolls the rod feels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .chain import add_drag, add_links, add_masses, first_value, resample, voronoi_shares
+from .checks import finite
+from .errors import SceneError
+from .grip import Grip, any_across, carried
+from .quantities import Term, product
+from .rope import GHOST, Rope
+from .scene import Array, Scene
+
+HOLD = (
+    1e-4  # torque per angle that holds a director where it was, over GJ/length: keeps twist well posed, moves nothing
+)
+
+
+@dataclass(frozen=True)
+class Rod(Rope):
+    """A rope with material frames: `directors` are those of its edges, with the grips' own first and last."""
+
+    directors: Array
+
+
+def rod(
+    length: float,
+    segments: int = 40,
+    *,
+    density: float,
+    EI: float,
+    GJ: float,
+    name: str = "rod",
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+    **options: object,
+) -> Scene:
+    """A scene with one rod; see `add_rod` for the options."""
+    scene = Scene(name, gravity)
+    add_rod(scene, name, length=length, segments=segments, density=density, EI=EI, GJ=GJ, **options)  # type: ignore[arg-type]
+    return scene
+
+
+def add_rod(
+    scene: Scene,
+    name: str = "rod",
+    *,
+    length: float,
+    segments: int = 40,
+    density: float,
+    EI: float,
+    GJ: float,
+    EA: float | None = None,
+    EI2: float | None = None,
+    points: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
+    start: Grip | None = None,
+    end: Grip | None = None,
+    director: ArrayLike | None = None,
+    turns: int = 0,
+    tilts: bool = False,
+    roll: bool = False,
+    stretch_damping: float | None = None,
+    bend_damping: float | None = None,
+    twist_damping: float | None = None,
+    drag_linear: float | None = None,
+    drag_quadratic: float | None = None,
+    curvature_modes: Sequence[int] = (),
+    twist_modes: Sequence[int] = (),
+) -> Rod:
+    """Add a discrete elastic rod of `segments` equal links to a scene (Bergou et al. 2008, 2010).
+
+    Quantities: `<name>_length` m, `<name>_density` kg/m, `_EI` and `_GJ` N m^2, and where given `_EA` N, `_EI2` N m^2,
+    `_stretch_damping`, `_bend_damping` and `_twist_damping` s, `_drag_linear` N s/m^2, `_drag_quadratic` N s^2/m^3,
+    `_start_tilt_1`, `_start_tilt_2`, `_end_tilt_1`, `_end_tilt_2`, `_roll` rad, `_curvature_1_<k>`,
+    `_curvature_2_<k>` and `_twist_<k>` 1/m.
+
+    Args:
+        length: m, between the grips.
+        density: kg/m; nodes carry it by their Voronoi length.
+        EI, GJ: bending and torsional stiffness N m^2. For a section with two stiffnesses EI acts on the curvature about
+            the frame's second axis, and EI2 about the first.
+        EA: axial stiffness N; None = inextensible.
+        points: (k, 3) m, the initial shape, resampled to equal links and fitted to the length; straight from the start
+            grip otherwise.
+        velocity: (k, 3) m/s at `points`; at rest by default.
+        start, end: how the ends are held; None = free.
+        director: (3,) the first frame axis at a start without a grip; any by default.
+        turns: whole turns by which the end's frame is ahead at the start, beside the part of a turn that grips give.
+        tilts: add the four tilts: small angles by which the rod leaves a grip askew, about the frame's axes.
+        roll: add the roll of the end grip about the rod: the twist built in when the rod was gripped.
+        stretch_damping, bend_damping, twist_damping: Kelvin-Voigt time constants s.
+        drag_linear, drag_quadratic: air drag per length, isotropic.
+        curvature_modes: k of rest-curvature modes cos(k pi s / length), about both frame axes; each starts at zero.
+        twist_modes: the same of the rest twist per length.
+
+    Returns:
+        Rod, also kept as `scene.ropes[name]`.
+
+    Raises:
+        SceneError: wrong or missing values; the message names the field.
+    """
+    positive = {"length": length, "density": density, "EI": EI, "GJ": GJ, "EA": EA, "EI2": EI2}
+    positive |= {"stretch_damping": stretch_damping, "bend_damping": bend_damping, "twist_damping": twist_damping}
+    for field, value in positive.items():
+        if value is not None and not (np.isfinite(value) and value > 0):
+            raise SceneError(f"{name}.{field}", "must be positive", value, "give a positive number, or leave it out")
+    if not isinstance(segments, int | np.integer) or segments < 2:
+        raise SceneError(f"{name}.segments", "must be a whole number from 2 on", segments, "give at least 2")
+    if stretch_damping is not None and EA is None:
+        raise SceneError(f"{name}.stretch_damping", "needs a finite EA", EA, "give EA, or leave it out")
+    if tilts and start is None and end is None:
+        raise SceneError(f"{name}.tilts", "need a grip", tilts, "give start or end")
+    if roll and end is None:
+        raise SceneError(f"{name}.roll", "needs a grip at the end", roll, "give end")
+
+    shape, speeds = _initial(name, length, segments, points, velocity, start, end)
+    nodes = scene.add_particles(shape, 0.0, speeds)
+    arc = length / segments * np.arange(segments + 1)
+    scene.add_quantity(f"{name}_length", length, "m")
+    scene.add_quantity(f"{name}_density", density, "kg/m")
+    add_masses(scene, name, nodes, segments)
+    stretch = None
+    if stretch_damping is not None:
+        stretch = (1.0, {scene.add_quantity(f"{name}_stretch_damping", stretch_damping, "s"): "identity"})
+    add_links(scene, name, nodes, length / segments, EA, stretch)
+    ghosts = [
+        None
+        if grip is None
+        else int(scene.add_particles(at + side * GHOST * length / segments * grip.direction[:1], 1.0)[0])
+        for grip, at, side in ((start, shape[0], -1.0), (end, shape[-1], 1.0))
+    ]
+    chain = np.array([*(g for g in ghosts[:1] if g is not None), *nodes, *(g for g in ghosts[1:] if g is not None)])
+    first = start.director[0] if start is not None else director
+    last = None if end is None else end.director[0]
+    directors = scene.add_directors(
+        np.stack([chain[:-1], chain[1:]], axis=1), _frames(scene.positions[chain], first, last, turns)
+    )
+    scene.add_quantity(f"{name}_GJ", GJ, "N m^2")
+    hold = {f"{name}_GJ": "identity", f"{name}_length": "inverse"}
+    scene.add_terms([product("mass", d, HOLD, hold) for d in directors])
+    reach = GHOST * length / segments
+    for label, grip, ghost, node, held, side in (
+        ("start", start, ghosts[0], nodes[0], directors[0], -1.0),
+        ("end", end, ghosts[1], nodes[-1], directors[-1], 1.0),
+    ):
+        if grip is not None and ghost is not None:
+            _hold(scene, f"{name}_{label}" if tilts else None, grip, int(node), ghost, int(held), side * reach)
+            if roll and label == "end":
+                _roll(scene, f"{name}_roll", grip, int(held))
+    joints = np.flatnonzero(np.isin(chain[1:-1], nodes)) + 1
+    stencils = np.stack(
+        [chain[joints - 1], chain[joints], chain[joints + 1], directors[joints - 1], directors[joints]], 1
+    )
+    place = chain[joints] - nodes[0]
+    stiffness = [scene.add_quantity(f"{name}_EI", EI, "N m^2")]
+    if EI2 is not None:
+        stiffness.append(scene.add_quantity(f"{name}_EI2", EI2, "N m^2"))
+    _joints(scene, name, "bend", "material_curvature", stencils, place, segments, bend_damping)
+    _joints(scene, name, "twist", "twist", stencils, place, segments, twist_damping)
+    _rest(scene, name, place, segments, stiffness, curvature_modes, twist_modes)
+    add_drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
+    built = Rod(name, nodes, arc, *ghosts, directors=directors)
+    scene.ropes[name] = built
+    return built
+
+
+def fitted_to_length(shape: Array, link: float, held: Sequence[int]) -> Array:
+    """The nearest chain (nodes, 3) whose links have the given length, with some nodes held.
+
+    A start that is longer than the rod would be pulled together in its first substep, a kick.
+
+    Raises:
+        SceneError: the held nodes are farther apart than the chain reaches.
+    """
+    x = shape.copy()
+    free = np.setdiff1d(np.arange(len(x)), held)
+    for _ in range(50):
+        edges = np.diff(x, axis=0)
+        lengths = np.linalg.norm(edges, axis=1)
+        if np.abs(lengths - link).max() < 1e-12 * link:
+            return x
+        J = np.zeros((len(edges), len(x), 3))
+        units = edges / lengths[:, None]
+        J[np.arange(len(edges)), np.arange(len(edges))] = -units
+        J[np.arange(len(edges)), np.arange(1, len(x))] = units
+        step = np.linalg.lstsq(J[:, free].reshape(len(edges), -1), link - lengths, rcond=1e-9)[0]
+        x[free] += step.reshape(-1, 3)
+    reach, apart = link * (len(x) - 1), float(np.linalg.norm(shape[-1] - shape[0]))
+    fix = f"give a length above {apart:g} m, or check the grips' places"
+    raise SceneError("length", "does not reach between the held ends", reach, fix)
+
+
+def _initial(
+    name: str,
+    length: float,
+    segments: int,
+    points: ArrayLike | None,
+    velocity: ArrayLike | None,
+    start: Grip | None,
+    end: Grip | None,
+) -> tuple[Array, Array | None]:
+    """Initial places and velocities of the nodes."""
+    held = [*([0] if start is not None else []), *([segments] if end is not None else [])]
+    if points is None:
+        if velocity is not None:
+            raise SceneError(f"{name}.velocity", "needs points", None, "give the points that have these velocities")
+        origin = np.zeros(3) if start is None else start.position[0]
+        along = np.array([1.0, 0.0, 0.0]) if start is None else start.direction[0]
+        line = np.stack([origin, origin + length * along])
+        if end is not None:
+            line[1] = end.position[0]
+    else:
+        line = finite(f"{name}.points", points, None, SceneError).reshape(-1, 3)
+    shape = resample(line, segments)
+    for k, grip in ((0, start), (segments, end)):
+        if grip is not None:
+            shape[k] = grip.position[0]
+    shape = fitted_to_length(shape, length / segments, held)
+    if velocity is None:
+        return shape, None
+    v = finite(f"{name}.velocity", velocity, line.shape, SceneError)
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    wanted = np.linspace(0.0, s[-1], segments + 1)
+    return shape, np.stack([np.interp(wanted, s, v[:, k]) for k in range(3)], axis=1)
+
+
+def _frames(chain: Array, first: ArrayLike | None, last: ArrayLike | None, turns: int) -> Array:
+    """Directors of a chain's edges: carried along it from the first, with the twist to the last spread evenly."""
+    edges = np.diff(chain, axis=0)
+    tangents = edges / np.linalg.norm(edges, axis=1, keepdims=True)
+    q = [any_across(tangents[0]) if first is None else np.asarray(first, dtype=float)]
+    for before, after in zip(tangents[:-1], tangents[1:], strict=True):
+        q.append(carried(q[-1] - (q[-1] @ before) * before, before, after[None])[0])
+    frames = np.array([v / np.linalg.norm(v) for v in q])
+    across = np.cross(tangents, frames)
+    missing = 2.0 * np.pi * turns
+    if last is not None:
+        missing += float(np.arctan2(np.asarray(last) @ across[-1], np.asarray(last) @ frames[-1]))
+    angle = np.linspace(0.0, missing, len(edges))[:, None]
+    return np.asarray(np.cos(angle) * frames + np.sin(angle) * across)
+
+
+def _hold(scene: Scene, tilts: str | None, grip: Grip, node: int, ghost: int, director: int, reach: float) -> None:
+    """Give an end its pose; a tilt moves the ghost, by which the direction is held."""
+    second = np.cross(grip.direction, grip.director)
+    if grip.stays:
+        scene.pin([node, ghost, director])
+    else:
+        motion = np.stack([grip.position, grip.position + reach * grip.direction, grip.director], axis=1)
+        scene.drive([node, ghost, director], grip.times, motion)
+    if tilts is None:
+        return
+    for k, axis in ((1, grip.director), (2, second)):
+        tilt = scene.add_quantity(f"{tilts}_tilt_{k}", 0.0, "rad", positive=False, scale=0.1)
+        _add_motion(scene, grip, ghost, reach * axis, {tilt: "identity"})
+
+
+def _roll(scene: Scene, name: str, grip: Grip, director: int) -> None:
+    """Turn the end's director by a quantity: cos and sin of it instead of the given director."""
+    quantity = scene.add_quantity(name, 0.0, "rad", positive=False, scale=0.3)
+    for axis, function in ((grip.director, "cos"), (np.cross(grip.direction, grip.director), "sin")):
+        _add_motion(scene, grip, director, axis, {quantity: function})
+    _add_motion(scene, grip, director, -grip.director, {})
+
+
+def _add_motion(scene: Scene, grip: Grip, node: int, by: Array, factors: dict[str, str]) -> None:
+    if not grip.stays:
+        scene.add_motion_term(node, by, factors)
+    else:
+        scene.add_terms([product("position", 3 * node + k, by[0, k], factors) for k in range(3)])
+
+
+def _joints(
+    scene: Scene, name: str, label: str, kind: str, stencils: Array, place: Array, segments: int, damping: float | None
+) -> None:
+    """A group of joints with alpha = Voronoi length / stiffness; a gripped end counts the rod's own half link."""
+    group, length, share = f"{name}_{label}", f"{name}_length", voronoi_shares(segments)[place]
+    stiffness = f"{name}_EI" if label == "bend" else f"{name}_GJ"
+    zero = np.zeros(len(stencils))
+    scene.add_constraints(kind, stencils, name=group, compliance=zero, damping=None if damping is None else zero)
+    first = scene.group(group)[1] + np.arange(len(stencils))
+    terms = [Term("compliance", first, share, ((length, "identity"), (stiffness, "inverse")))]
+    if damping is not None:
+        tau = scene.add_quantity(f"{group}_damping", damping, "s")
+        terms.append(
+            Term("damping", first, 1.0 / share, ((tau, "identity"), (stiffness, "identity"), (length, "inverse")))
+        )
+    scene.add_terms(terms)
+
+
+def _rest(
+    scene: Scene,
+    name: str,
+    place: Array,
+    segments: int,
+    stiffness: list[str],
+    curvature_modes: Sequence[int],
+    twist_modes: Sequence[int],
+) -> None:
+    """Rest curvature and twist in modes cos(k pi s/length); the ratio of a section with two stiffnesses."""
+    share, s = voronoi_shares(segments)[place], place / segments
+    length = f"{name}_length"
+    bend, twist = first_value(scene, f"{name}_bend"), first_value(scene, f"{name}_twist")
+    joints = np.arange(len(place))
+    ratio: tuple[tuple[str, str], ...] = ()
+    if len(stiffness) == 2:
+        ratio = ((stiffness[1], "sqrt"), (stiffness[0], "inverse_sqrt"))
+        scene.group(f"{name}_bend")[0].rest[:, 0] = 0.0
+        scene.add_terms([Term("rest", bend + 3 * joints, 1.0, ratio)])
+    targets = [
+        ("curvature_1", curvature_modes, bend + 3 * joints + 1, ()),
+        ("curvature_2", curvature_modes, bend + 3 * joints + 2, ratio),
+        ("twist", twist_modes, twist + joints, ()),
+    ]
+    for label, modes, index, factors in targets:
+        for k in modes:
+            if k != int(k) or k < 0:
+                raise SceneError(
+                    f"{name}.{label}", "has modes that are no whole numbers from 0 on", k, "give such as (0, 1)"
+                )
+            mode = scene.add_quantity(f"{name}_{label}_{k}", 0.0, "1/m", positive=False, scale=1.0)
+            weights = share * np.cos(k * np.pi * s)
+            scene.add_terms([Term("rest", index, weights, ((mode, "identity"), (length, "identity"), *factors))])
