@@ -46,6 +46,11 @@ std::vector<int> cuthill_mckee(const std::vector<std::vector<int>>& neighbors, i
   return order;
 }
 
+struct Keyed {
+  double place;
+  Member member;
+};
+
 }  // namespace
 
 std::vector<Color> color_constraints(const Scene& scene) {
@@ -87,22 +92,28 @@ std::vector<std::vector<Member>> connected_chains(const Scene& scene) {
     }
     ++components;
   }
-  struct Keyed {
-    int low, high;
-    Member member;
-  };
-  std::vector<std::vector<Keyed>> keyed(components);
-  for_each_constraint(scene, [&](int g, int i, std::span<const int> nodes) {
-    int low = scene.nodes(), high = -1, home = -1;
-    for (const int n : nodes)
-      if (movable(scene, n)) low = std::min(low, rank[n]), high = std::max(high, rank[n]), home = component[n];
-    keyed[home].push_back({low, high, {g, i, 0}});
-  });
+  // Constraints go by the mean place of their nodes, nodes by that of their constraints, from the ranks on: so links and joints of a rope
+  // alternate also at its ends, where whole ranks would widen the band.
+  std::vector<double> place(rank.begin(), rank.end());
+  std::vector<std::vector<Keyed>> keyed;
+  for (int round = 0; round < 4; ++round) {
+    keyed.assign(components, {});
+    std::vector<double> sum(scene.nodes(), 0.0), uses(scene.nodes(), 0.0);
+    for_each_constraint(scene, [&](int g, int i, std::span<const int> nodes) {
+      double total = 0.0, count = 0.0;
+      int home = -1;
+      for (const int n : nodes)
+        if (movable(scene, n)) total += place[n], ++count, home = component[n];
+      keyed[home].push_back({total / count, {g, i, 0}});
+      for (const int n : nodes) sum[n] += total / count, ++uses[n];
+    });
+    for (int n = 0; n < scene.nodes(); ++n)
+      if (uses[n] > 0.0) place[n] = sum[n] / uses[n];
+  }
   std::vector<std::vector<Member>> chains;
   for (auto& list : keyed) {
     if (list.empty()) continue;
-    std::stable_sort(list.begin(), list.end(),
-                     [](const Keyed& a, const Keyed& b) { return a.low != b.low ? a.low < b.low : a.high < b.high; });
+    std::stable_sort(list.begin(), list.end(), [](const Keyed& a, const Keyed& b) { return a.place < b.place; });
     chains.emplace_back();
     for (const Keyed& k : list) chains.back().push_back(k.member);
   }

@@ -4,7 +4,7 @@ turns with the rod, and what a grip rolls the rod feels."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,7 +26,7 @@ HOLD = (
 class Rod(Rope):
     """A rope with material frames: `directors` are those of its edges, with the grips' own first and last."""
 
-    directors: Array
+    directors: Array = field(default_factory=lambda: np.zeros(0, dtype=int))
 
 
 def rod(
