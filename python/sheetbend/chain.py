@@ -102,7 +102,7 @@ def add_links(
     scene: Scene, name: str, nodes: Array, link: float, EA: float | None, damping: TimeConstant | None
 ) -> None:
     segments = len(nodes) - 1
-    group = f"{name}add_links"
+    group = f"{name}_stretch"
     pairs = np.stack([nodes[:-1], nodes[1:]], axis=1)
     scene.add_constraints(
         "distance",
