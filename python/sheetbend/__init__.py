@@ -11,6 +11,7 @@ from .errors import ConfigError, DivergenceError, InputError, RecordingError, Sc
 from .experiment import Experiment
 from .fit import Fit, fit
 from .gradients import GradientReport, check_gradients
+from .io.folder import recordings
 from .markers import Place, along_rope, between, on_particle, on_rope
 from .parameters import Parameter, Parameters
 from .recording import Recording
@@ -18,6 +19,7 @@ from .result import FitResult
 from .rollout import Gradient, Rollout, rollout
 from .rope import Rope, add_rope, rope
 from .scene import KINDS, Scene
+from .scores import Score, Scores, coordinate_error, scores
 from .simulate import Trajectory, simulate
 from .solver import Solver
 from .tape import TapePlan, tape_plan
@@ -45,6 +47,8 @@ __all__ = [
     "Rope",
     "Scene",
     "SceneError",
+    "Score",
+    "Scores",
     "SheetbendError",
     "Solver",
     "TapePlan",
@@ -53,14 +57,17 @@ __all__ = [
     "along_rope",
     "between",
     "check_gradients",
+    "coordinate_error",
     "equilibria",
     "equilibrium",
     "fit",
     "no_physics",
     "on_particle",
     "on_rope",
+    "recordings",
     "rollout",
     "rope",
+    "scores",
     "simulate",
     "tape_plan",
 ]
