@@ -12,6 +12,7 @@ from .experiment import Experiment
 from .fit import Fit, fit
 from .gradients import GradientReport, check_gradients
 from .grip import Grip
+from .io.folder import recordings
 from .markers import Place, along_rope, between, on_particle, on_rope
 from .parameters import Parameter, Parameters
 from .recording import Recording
@@ -20,6 +21,7 @@ from .rod import Rod, add_rod, rod
 from .rollout import Gradient, Rollout, rollout
 from .rope import Rope, add_rope, rope
 from .scene import KINDS, Scene
+from .scores import Score, Scores, coordinate_error, scores
 from .simulate import Trajectory, simulate
 from .solver import Solver
 from .tape import TapePlan, tape_plan
@@ -49,6 +51,8 @@ __all__ = [
     "Rope",
     "Scene",
     "SceneError",
+    "Score",
+    "Scores",
     "SheetbendError",
     "Solver",
     "TapePlan",
@@ -58,15 +62,18 @@ __all__ = [
     "along_rope",
     "between",
     "check_gradients",
+    "coordinate_error",
     "equilibria",
     "equilibrium",
     "fit",
     "no_physics",
     "on_particle",
     "on_rope",
+    "recordings",
     "rod",
     "rollout",
     "rope",
+    "scores",
     "simulate",
     "tape_plan",
 ]

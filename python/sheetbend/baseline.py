@@ -4,7 +4,8 @@ hold   every free marker stays where it is first seen in the piece to predict.
 rest   every free marker stays at its mean position in the data that were fitted.
 blend  on a rope held at both ends, every free marker follows the ends: from where it is first seen it moves
        by (1 - s) times the motion of the first end plus s times that of the last, s being its share of the
-       arc length. This is exact when both ends move alike and the rope is carried along.
+       arc length. This is exact when both ends move alike and the rope is carried along. Where a grip drives
+       several markers, the end is the one next to the free ones.
 
 hold and blend are given where each free marker is first seen in the piece; blend also the recorded ends
 throughout, as a simulation is. Errors are distances in space, m, over free markers.
@@ -86,37 +87,50 @@ def rest_baseline(
 def blend_baseline(recording: Recording) -> Array:
     """Each free marker follows the two ends of a rope, weighted by arc length.
 
-    With f the frame in which marker i is first seen, s its share of the arc length, a and b the two ends:
+    With f the frame in which marker i is first seen, a and b the innermost clamped markers at the two ends, and s
+    the marker's share of the arc length from a to b:
 
         x_i(t) = x_i(f) + (1 - s) (a(t) - a(f)) + s (b(t) - b(f))
 
     The arc length sums the distances between neighbors, each the median over the frames that show both.
 
     Args:
-        recording: markers in order along the rope, of which exactly the first and the last are clamped.
+        recording: markers in order along the rope, one or more of them clamped at each end and none between.
 
     Returns:
-        (frames, markers, 3) m; NaN for a marker that is never seen. The ends are as recorded, gaps filled.
+        (frames, markers, 3) m; NaN for a marker that is never seen. Clamped markers are as recorded, gaps filled.
 
     Raises:
-        RecordingError: not exactly the first and last marker are clamped, there is no marker between, an end
-            has a gap that `Recording.filled` refuses, or two neighbors are never seen together.
+        RecordingError: other markers are clamped, there is no free marker between, a clamped one has a gap
+            that `Recording.filled` refuses, or two neighbors are never seen together.
     """
-    if not _is_gripped_rope(recording):
+    if not is_gripped_rope(recording):
         raise RecordingError(
             "clamped",
-            "must be exactly the first and the last marker, with others between",
+            "must be the first and the last marker, or several in a row from there, with others between",
             recording.clamped,
             "select the markers in their order along the rope, or use hold_baseline",
         )
-    ends = recording.filled().positions[:, [0, -1]]
-    first = np.argmax(recording.mask, axis=0)
-    s = _arc_length_share(recording)[:, None]
-    weighted = (1 - s) * ends[:, None, 0] + s * ends[:, None, 1]
-    moved = weighted - weighted[first, np.arange(len(recording.markers))]
-    prediction = _first_seen(recording) + moved
-    prediction[:, [0, -1]] = ends
+    driven = recording.filled().positions
+    free = np.array(recording.free)
+    a, b = free[0] - 1, free[-1] + 1
+    s = _arc_length_share(recording.select(range(a, b + 1)))[1:-1, None]
+    weighted = (1 - s) * driven[:, None, a] + s * driven[:, None, b]
+    first = np.argmax(recording.mask, axis=0)[free]
+    prediction = driven.copy()
+    prediction[:, free] = _first_seen(recording)[free] + weighted - weighted[first, np.arange(len(free))]
     return prediction
+
+
+def is_gripped_rope(recording: Recording) -> bool:
+    """Whether the clamped markers are one or more in a row at each end, with free ones between: what blend needs."""
+    free = recording.free
+    return (
+        bool(free)
+        and free[0] > 0
+        and free == tuple(range(free[0], free[-1] + 1))
+        and free[-1] + 1 < len(recording.markers)
+    )
 
 
 def rms_about(recording: Recording, reference: ArrayLike, scored: NDArray[np.bool_] | None = None) -> float:
@@ -159,7 +173,7 @@ def no_physics(fitted: Recording | Sequence[Recording], held_out: Recording) -> 
 
     Taking the smallest favors the baseline, so a simulation that beats it beats them all. `rest` applies
     when the fitted data show every free marker that the piece shows; `hold` when the piece has two frames
-    or more; `blend` when it is also a rope clamped at its first and last marker.
+    or more; `blend` when it is also a rope clamped at both ends.
 
     Args:
         fitted: what the fit saw, one recording or several with the markers of `held_out`.
@@ -178,7 +192,7 @@ def no_physics(fitted: Recording | Sequence[Recording], held_out: Recording) -> 
     if len(held_out.times) > 1:
         scored[np.argmax(held_out.mask, axis=0), np.arange(len(held_out.markers))] = False
         candidates["hold"] = hold_baseline(held_out)
-        if _is_gripped_rope(held_out):
+        if is_gripped_rope(held_out):
             candidates["blend"] = blend_baseline(held_out)
     if not candidates:
         fix = "give fitted recordings that show every marker, or a held-out piece of several frames"
@@ -192,11 +206,6 @@ def _check_same_markers(one: Recording, other: Recording) -> None:
     if one.markers != other.markers:
         fix = f"select the same markers in both: {', '.join(one.markers)}"
         raise RecordingError("markers", f"of {other.name} differ from those of {one.name}", other.markers, fix)
-
-
-def _is_gripped_rope(recording: Recording) -> bool:
-    last = len(recording.markers) - 1
-    return last >= 2 and set(recording.clamped) == {0, last}
 
 
 def _free_and_seen(recording: Recording) -> NDArray[np.bool_]:

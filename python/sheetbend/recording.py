@@ -82,7 +82,7 @@ class Recording:
         and metadata (`sheetbend.io.sidecar`).
 
         Args:
-            path: an .npz or .csv file.
+            path: an .npz, .csv or .pkl file.
             units: length unit of the file, "m", "cm" or "mm"; None takes the JSON's, and meters without one.
 
         Raises:

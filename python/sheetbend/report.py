@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from .optional import require
 from .result import Estimate, FitResult, Given, RecordingFit
+from .tables import Section, plain_section, rich_section
 from .wording import figures, short
 
 if TYPE_CHECKING:
@@ -20,24 +20,6 @@ CORRELATIONS_SHOWN = 15
 """Number of correlations that the report lists at most; fit.json has them all."""
 
 _SAME_MINIMUM = 0.01  # starts that end within 1 % of the best cost found the same minimum
-_COLORS = {
-    "identified": "green",
-    "weak": "yellow",
-    "one-sided": "yellow",
-    "at a bound": "red",
-    "at its floor": "red",
-    "not identifiable": "red",
-}
-
-
-@dataclass(frozen=True)
-class Section:
-    """A titled part of the report: a table, then notes (label, sentence)."""
-
-    title: str
-    headers: tuple[str, ...] = ()
-    rows: tuple[tuple[str, ...], ...] = ()
-    notes: tuple[tuple[str, str], ...] = ()
 
 
 def sections(result: FitResult) -> list[Section]:
@@ -71,11 +53,7 @@ def plain(result: FitResult, width: int = 100) -> str:
     if result.message:
         lines += textwrap.wrap(result.message, width, initial_indent="  ", subsequent_indent="  ")
     for section in sections(result):
-        lines += ["", section.title, "-" * len(section.title)]
-        lines += _table(section)
-        if section.rows and section.notes:
-            lines.append("")
-        lines += _notes(section.notes, width)
+        lines += ["", *plain_section(section, width)]
     return "\n".join(lines) + "\n"
 
 
@@ -87,18 +65,12 @@ def rich_report(result: FitResult) -> Group:
     """
     console = require("rich.console", "cli")
     text = require("rich.text", "cli").Text
-    padding = require("rich.padding", "cli").Padding
     good = result.converged and not result.interrupted
     parts: list[object] = [text(f"Fit {headline(result)}", style="bold green" if good else "bold red")]
     if result.message:
         parts.append(text(result.message, style="dim"))
     for section in sections(result):
-        parts.append(text(f"\n{section.title}", style="bold"))
-        if section.rows:
-            parts.append(padding(_rich_table(section), (0, 0, 0, 2)))
-        for label, sentence in section.notes:
-            line = text.assemble((f"{label}: " if label else "", "cyan"), sentence)
-            parts.append(padding(line, (0, 0, 0, 2)))
+        parts += ["", *rich_section(section)]
     group: Group = console.Group(*parts)
     return group
 
@@ -234,50 +206,3 @@ def _course(result: FitResult) -> Section:
         words = f"{same} of {len(result.starts)} ended within 1 % of the best cost; the worst at {worst:.4g}"
         notes.append(("starts", words))
     return Section("Course", notes=tuple(notes))
-
-
-def _table(section: Section) -> list[str]:
-    if not section.rows:
-        return []
-    left = _flush_left(section)
-    lines = (section.headers, *section.rows)
-    widths = [max(len(line[column]) for line in lines) for column in range(len(section.headers))]
-    aligned = [
-        "  ".join(
-            cell.ljust(size) if flush else cell.rjust(size)
-            for cell, size, flush in zip(line, widths, left, strict=True)
-        )
-        for line in lines
-    ]
-    return [f"  {line}".rstrip() for line in aligned]
-
-
-def _flush_left(section: Section) -> list[bool]:
-    words = {"parameter", "with", "recording", "unit", "verdict"}
-    return [header in words for header in section.headers]
-
-
-def _notes(notes: Iterable[tuple[str, str]], width: int) -> list[str]:
-    lines: list[str] = []
-    for label, sentence in notes:
-        text = f"{label}: {sentence}" if label else sentence
-        lines += textwrap.wrap(
-            text,
-            width,
-            initial_indent="  ",
-            subsequent_indent="    ",
-            break_on_hyphens=False,
-            break_long_words=False,
-        )
-    return lines
-
-
-def _rich_table(section: Section) -> object:
-    box = require("rich.box", "cli")
-    table = require("rich.table", "cli").Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, header_style="dim")
-    text = require("rich.text", "cli").Text
-    for header, flush in zip(section.headers, _flush_left(section), strict=True):
-        table.add_column(header, justify="left" if flush else "right", no_wrap=header != "verdict")
-    for row in section.rows:
-        table.add_row(*(text(cell, style=_COLORS.get(cell, "")) for cell in row))
-    return table

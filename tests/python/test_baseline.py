@@ -93,7 +93,36 @@ def test_blend_starts_where_a_marker_is_first_seen() -> None:
     assert np.abs(blend_baseline(gapped)[5:7, 2] - recording.positions[5:7, 2]).max() < 1e-15
 
 
-@pytest.mark.parametrize("clamped", [[], [0], [0, 1], [0, 2, 4]])
+@pytest.mark.parametrize("clamped", [[0, 1, 5, 6], [6, 1, 0, 5], [0, 5, 6], [0, 1, 2, 6]])
+def test_blend_takes_several_driven_markers_at_an_end(clamped: list[int]) -> None:
+    """Grips that move alike and do not turn carry the rope; driven markers are as recorded whatever the grips do."""
+    share = np.array([0.0, 0.05, 0.3, 0.5, 0.6, 0.95, 1.0])
+    carried = Recording(rope(*ends(), share).positions, T, clamped=clamped)
+    assert np.abs(blend_baseline(carried) - carried.positions).max() < 1e-15
+    x = np.random.default_rng(3).normal(size=(len(T), 7, 3))
+    wild = Recording(x, T, clamped=clamped)
+    assert np.array_equal(blend_baseline(wild)[:, sorted(clamped)], x[:, sorted(clamped)])
+    assert no_physics(wild.piece(0, 0.5), wild.piece(0.5)).errors.keys() == {"rest", "hold", "blend"}
+
+
+def test_blend_follows_the_driven_markers_next_to_the_free_ones() -> None:
+    """By hand: markers at 0, 1, 2, 4, 5, 6 m; those at 1 and 5 m move by 3 and -1 m, the outer ones elsewhere."""
+    x = np.zeros((2, 6, 3))
+    x[:, :, 0] = [0, 1, 2, 4, 5, 6]
+    x[1, [0, 1, 4, 5], 2] = [70, 3, -1, 90]
+    predicted = blend_baseline(Recording(x[[0, 0, 0, 1]], np.arange(4.0), clamped=[0, 1, 4, 5]))
+    assert predicted[3, :, 2].tolist() == [70, 3, 0.75 * 3 - 0.25, 0.25 * 3 - 0.75, -1, 90]
+    assert np.array_equal(predicted[:, :, 0], x[[0, 0, 0, 1], :, 0])
+
+
+def test_blend_with_two_driven_markers_is_that_of_the_rope_between_them() -> None:
+    x = np.random.default_rng(5).normal(size=(len(T), 8, 3))
+    whole = blend_baseline(Recording(x, T, clamped=[0, 1, 6, 7]))
+    between = blend_baseline(Recording(x[:, 1:-1], T, clamped=[0, 5]))
+    assert np.array_equal(whole[:, 1:-1], between)
+
+
+@pytest.mark.parametrize("clamped", [[], [0], [0, 1], [0, 2, 4], [1, 4], [0, 3], [0, 1, 2, 3, 4]])
 def test_blend_refuses_other_boundaries(clamped: list[int]) -> None:
     recording = rope(*ends(), UNEVEN)
     with pytest.raises(RecordingError, match="first and the last"):

@@ -279,6 +279,25 @@ def test_a_format_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert np.array_equal(Recording.load(path, units="mm").positions, X * 1e-3)
 
 
+@pytest.mark.parametrize("suffix", [".npz", ".csv"])
+@pytest.mark.parametrize("clamped", [[0, 1, 4, 5], ["m0", "m1", "m4", "m5"]])
+def test_driven_markers_of_a_rope_come_from_the_json_of_either_format(
+    tmp_path: Path, suffix: str, clamped: list[object]
+) -> None:
+    """(frames, markers, 3) with the indices of the markers that the two grips drive."""
+    path = tmp_path / f"rope{suffix}"
+    x = np.random.default_rng(1).normal(size=(3, 6, 3))
+    Recording(x, [0.0, 0.01, 0.02]).save(path)
+    assert Recording.load(path).clamped == ()
+    path.with_suffix(".json").write_text(json.dumps({"clamped": clamped}))
+    recording = Recording.load(path)
+    assert recording.clamped == (0, 1, 4, 5) and recording.free == (2, 3)
+    assert np.array_equal(recording.positions, x)
+    path.with_suffix(".json").write_text('{"clamped": [0, 1, -2, -1]}')
+    with pytest.raises(RecordingError, match=r"clamped: is out of range for 6 markers \(got -2\).*0 to 5"):
+        Recording.load(path)
+
+
 # ---- the JSON beside ------------------------------------------------------------------------------------
 
 

@@ -84,7 +84,7 @@ class Marker(Section):
 class RecordingSection(Section):
     """A recording. A list: [[recording]]; each gets a scene object of its own from the shared description."""
 
-    file: str = key(..., "NPZ or CSV, relative to the configuration")
+    file: str = key(..., "NPZ, CSV or PKL, relative to the configuration")
     name: Name | None = key(None, "the file's when left out")
     units: Literal["m", "cm", "mm"] | None = key(None, "length unit of the file; its JSON's when left out")
     ropes: list[Name] | None = key(None, "names of the ropes that it shows; all when left out", min_length=1)

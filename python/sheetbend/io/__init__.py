@@ -2,7 +2,8 @@
 
 A reader takes the numbers as they stand in the file; length units, names and whatever else the JSON beside
 the file tells (`sidecar`) are applied here, the same for every format. To add a format, write its module
-and add its line to `FORMATS`.
+and add its line to `FORMATS`. A format whose files do not say times or driven markers names those in `ASSUMED`:
+("times",), ("clamped",) or both; its reader assumes them, and the JSON may replace them.
 """
 
 from __future__ import annotations
@@ -13,11 +14,13 @@ from types import ModuleType
 from ..errors import RecordingError
 from ..recording import Recording
 from ..recording_checks import check_seen
-from . import csv, npz, sidecar
+from . import csv, deform, npz, sidecar
 
 FORMATS: dict[str, ModuleType] = {
     ".npz": npz,
     ".csv": csv,
+    ".pkl": deform,
+    ".pickle": deform,
 }
 
 
@@ -29,7 +32,7 @@ def read(path: Path, units: str | None = None) -> Recording:
         raise RecordingError("path", "is no file", str(path), fix)
     if path.stat().st_size == 0:
         raise RecordingError(str(path), "is empty", "0 bytes", "export the recording again")
-    return sidecar.apply(file_format.read(path), path, units)
+    return sidecar.apply(file_format.read(path), path, units, _assumed(file_format))
 
 
 def write(recording: Recording, path: Path) -> None:
@@ -39,7 +42,7 @@ def write(recording: Recording, path: Path) -> None:
         fix = "make the folder first"
         raise RecordingError("path", "lies in a folder that does not exist", str(path), fix)
     check_seen(recording.positions, recording.markers)  # a piece may lack a marker; a file may not
-    sidecar.write(recording, path)
+    sidecar.write(recording, path, _assumed(file_format))
     file_format.write(recording, path)
 
 
@@ -50,3 +53,8 @@ def _format(path: Path) -> ModuleType:
         known = " or ".join(FORMATS)
         fix = f"use a file that ends in {known}"
         raise RecordingError("path", "has a suffix that no reader knows", str(path), fix) from None
+
+
+def _assumed(file_format: ModuleType) -> tuple[str, ...]:
+    assumed: tuple[str, ...] = getattr(file_format, "ASSUMED", ())
+    return assumed

@@ -5,6 +5,7 @@
     markers   list of names, for files that have none
     clamped   list of names or indices of driven markers, for files that do not say
     gravity   [x, y, z] in m/s^2
+    rate      frames per second, Hz, for files that hold no times (the first frame is at 0 s); elsewhere metadata
 
 All else is metadata, kept as it stands and in its own units: known values, license, attribution. Text under
 `markers` or `clamped` is a remark, kept as `markers_note` and `clamped_note`; units that say more than the
@@ -17,21 +18,26 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..errors import RecordingError
 from ..recording import Recording
 from ..recording_checks import checked_markers, default_markers, marker_indices
+from ..timeseries import Array
 
 METERS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 _RESERVED = ("units", "name", "markers", "clamped", "gravity", "arrays")
+_SAME_FRAME = 1e-6  # frame intervals
 
 
-def apply(recording: Recording, path: Path, units: str | None) -> Recording:
+def apply(recording: Recording, path: Path, units: str | None, assumed: tuple[str, ...] = ()) -> Recording:
     """The recording as read from `path`, in meters, with what the JSON beside it adds.
 
     Args:
         recording: as the reader gave it, lengths in the unit of the file.
         path: the file that was read.
         units: length unit of the file; None takes the JSON's.
+        assumed: what the file does not say and the reader assumed ("times", "clamped"): the JSON replaces it.
 
     Raises:
         RecordingError: the JSON is malformed, disagrees with the file, or the unit is unknown.
@@ -41,24 +47,26 @@ def apply(recording: Recording, path: Path, units: str | None) -> Recording:
     markers = _markers(recording, beside)
     return Recording(
         positions=recording.positions * scale,
-        times=recording.times,
+        times=_times(recording, beside) if "times" in assumed else recording.times,
         markers=markers,
-        clamped=_clamped(recording, beside, markers),
+        clamped=_clamped(recording, beside, markers, "clamped" in assumed),
         name=beside.get("name", path.stem),
         gravity=beside.get("gravity"),
-        metadata=_metadata(beside),
+        metadata=_metadata(beside, _reserved(assumed)),
     )
 
 
-def write(recording: Recording, path: Path) -> None:
-    """Write the JSON beside `path`.
+def write(recording: Recording, path: Path, assumed: tuple[str, ...] = ()) -> None:
+    """Write the JSON beside `path`; `assumed` as in `apply`.
 
     Raises:
-        RecordingError: the metadata use a reserved key or hold what JSON cannot.
+        RecordingError: the metadata use a reserved key or hold what JSON cannot, or the file holds no times and those
+            of the recording do not run evenly from 0 s.
     """
-    taken = [key for key in _RESERVED if key in recording.metadata]
+    reserved = _reserved(assumed)
+    taken = [key for key in reserved if key in recording.metadata]
     if taken:
-        fix = f"rename it; {', '.join(_RESERVED)} are written from the recording itself"
+        fix = f"rename it; {', '.join(reserved)} are written from the recording itself"
         raise RecordingError("metadata", "uses a reserved key", taken, fix)
     content = {
         "name": recording.name,
@@ -66,6 +74,7 @@ def write(recording: Recording, path: Path) -> None:
         "markers": recording.markers,
         "clamped": [recording.markers[i] for i in recording.clamped],
         **({} if recording.gravity is None else {"gravity": recording.gravity.tolist()}),
+        **({"rate": _rate(recording)} if "times" in assumed else {}),
         **recording.metadata,
     }
     try:
@@ -74,6 +83,10 @@ def write(recording: Recording, path: Path) -> None:
         fix = "keep plain numbers, text, lists and dicts in metadata"
         raise RecordingError("metadata", "cannot be written as JSON", str(error), fix) from error
     path.with_suffix(".json").write_text(text + "\n", encoding="utf-8")
+
+
+def _reserved(assumed: tuple[str, ...]) -> tuple[str, ...]:
+    return (*_RESERVED, "rate") if "times" in assumed else _RESERVED
 
 
 def _read(path: Path) -> dict[str, Any]:
@@ -99,6 +112,26 @@ def _meters(units: Any) -> float:
     return METERS[length]
 
 
+def _times(recording: Recording, beside: dict[str, Any]) -> Array:
+    if "rate" not in beside:
+        return recording.times
+    rate = beside["rate"]
+    if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0 < rate < np.inf:
+        raise RecordingError("rate", "must be a positive number", rate, "give the frames per second in Hz")
+    return np.arange(len(recording.times)) / rate
+
+
+def _rate(recording: Recording) -> float:
+    """Frames per second, Hz; 1 for a single frame."""
+    times, last = recording.times, float(recording.times[-1])
+    rate = float(f"{(len(times) - 1) / last:.12g}") if len(times) > 1 and last > 0 else 1.0
+    if not np.abs(times - np.arange(len(times)) / rate).max() <= _SAME_FRAME / rate:
+        span = (float(times[0]), float(times[-1]))
+        fix = "use shifted and resample first, or save as NPZ or CSV, which hold times"
+        raise RecordingError("times", "must run evenly from 0 s in a file that holds none", span, fix)
+    return rate
+
+
 def _markers(recording: Recording, beside: dict[str, Any]) -> tuple[str, ...]:
     named = beside.get("markers", [])
     if isinstance(named, str) or not named:
@@ -111,19 +144,19 @@ def _markers(recording: Recording, beside: dict[str, Any]) -> tuple[str, ...]:
     return names
 
 
-def _clamped(recording: Recording, beside: dict[str, Any], markers: tuple[str, ...]) -> tuple[int, ...]:
-    said = beside.get("clamped", [])
-    if isinstance(said, str) or not said:
+def _clamped(recording: Recording, beside: dict[str, Any], markers: tuple[str, ...], assumed: bool) -> tuple[int, ...]:
+    said = beside.get("clamped")
+    if said is None or isinstance(said, str) or (said == [] and not assumed):
         return recording.clamped
     named = marker_indices("clamped", said, markers)
-    if recording.clamped and set(named) != set(recording.clamped):
+    if not assumed and recording.clamped and set(named) != set(recording.clamped):
         fix = f"use the file's, {list(recording.clamped)}, or leave them out"
         raise RecordingError("clamped", "in the JSON differs from the file's", said, fix)
-    return recording.clamped or named
+    return named if assumed else recording.clamped or named
 
 
-def _metadata(beside: dict[str, Any]) -> dict[str, Any]:
-    kept = {key: value for key, value in beside.items() if key not in _RESERVED}
+def _metadata(beside: dict[str, Any], reserved: tuple[str, ...]) -> dict[str, Any]:
+    kept = {key: value for key, value in beside.items() if key not in reserved}
     for key in ("markers", "clamped"):
         if isinstance(beside.get(key), str):
             kept[f"{key}_note"] = beside[key]
