@@ -37,7 +37,7 @@ inline Complex cos(const Complex& a) { return {std::cos(a.re) * std::cosh(a.im),
 inline Complex log(const Complex& a) { return {std::log(std::hypot(a.re, a.im)), std::atan2(a.im, a.re)}; }
 // The analytic continuation along the real branch, to first order in the imaginary parts (which is all a complex step sees).
 inline Complex atan2(const Complex& y, const Complex& x) {
-  return {std::atan2(y.re, x.re), (x.re * y.im - y.re * x.im) / (x.re * x.re + y.re * y.re)};
+  return {atan2(y.re, x.re), (x.re * y.im - y.re * x.im) / (x.re * x.re + y.re * y.re)};
 }
 inline Complex nearest(const Complex& a) { return {std::nearbyint(a.re), 0.0}; }
 inline Complex select(bool mask, const Complex& a, const Complex& b) { return mask ? a : b; }

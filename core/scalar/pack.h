@@ -1,6 +1,6 @@
 // Lanes<N>: N doubles that go through a kernel together. A Pack of eight holds one scene (or window, or start) per lane, or eight constraints;
 // the kernels work on as many lanes as one register has. Arithmetic, square roots and divisions are IEEE, so each lane has the bits that the
-// scalar code would give. Transcendentals call the scalar function per lane.
+// scalar code would give; atan2 is made of them. Kernels need no other transcendental function, so lanes offer none.
 #pragma once
 
 #include <algorithm>
@@ -76,6 +76,13 @@ struct alignas(8 * N) Lanes {
     for (int i = 0; i < pieces; ++i) r.v[i] = m.bits[i] ? a.v[i] : b.v[i];
     return r;
   }
+  friend Lanes magnitude(const Lanes& a) { return with_sign(a, Lanes(0.0)); }
+  friend Lanes with_sign(const Lanes& size, const Lanes& sign) {
+    return map(size, sign, [](const Vector& x, const Vector& y) {
+      const Vector minus_zero = -Vector{};
+      return Vector((Bits(x) & ~Bits(minus_zero)) | (Bits(y) & Bits(minus_zero)));
+    });
+  }
 };
 
 using Pack = Lanes<8>;
@@ -106,20 +113,8 @@ Lanes<N> sqrt(const Lanes<N>& a) {
   });
 }
 template <int N>
-Lanes<N> sin(const Lanes<N>& a) {
-  return per_lane<N>([&](int i) { return std::sin(a[i]); });
-}
-template <int N>
-Lanes<N> cos(const Lanes<N>& a) {
-  return per_lane<N>([&](int i) { return std::cos(a[i]); });
-}
-template <int N>
-Lanes<N> log(const Lanes<N>& a) {
-  return per_lane<N>([&](int i) { return std::log(a[i]); });
-}
-template <int N>
 Lanes<N> atan2(const Lanes<N>& y, const Lanes<N>& x) {
-  return per_lane<N>([&](int i) { return std::atan2(y[i], x[i]); });
+  return angle_of(y, x);
 }
 template <int N>
 Lanes<N> nearest(const Lanes<N>& a) {

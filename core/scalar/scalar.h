@@ -5,15 +5,16 @@
 #include <cmath>
 #include <concepts>
 
+#include "core/scalar/elementary.h"
+
 namespace sheetbend {
 
 inline double sqrt(double a) { return __builtin_sqrt(a); }
-inline double atan2(double y, double x) { return std::atan2(y, x); }
+inline double atan2(double y, double x) { return angle_of(y, x); }
 inline double sin(double a) { return std::sin(a); }
 inline double cos(double a) { return std::cos(a); }
 inline double log(double a) { return std::log(a); }
 inline double nearest(double a) { return std::nearbyint(a); }
-inline double select(bool mask, double a, double b) { return mask ? a : b; }
 inline bool all_finite(double a) { return std::isfinite(a); }
 // The plain number that branches may look at.
 inline double value_of(double a) { return a; }

@@ -8,8 +8,33 @@ namespace {
 
 constexpr double eta = 1.0 / 300.0;
 
-struct Packs : ::testing::TestWithParam<bool> {
-  Sample sample = random_scene(60, {.net = GetParam()});
+// Hinges that share no particle, with angles all the way round.
+Sample hinges_around_a_turn() {
+  constexpr int count = 67;
+  SceneSpec spec;
+  spec.particles = 3 * count;
+  spec.groups = {{"hinges", Hinge::name, true, {}}};
+  for (int n = 0; n < spec.particles; ++n) spec.groups[0].stencil.push_back(n);
+  Sample out{build_scene(spec), {}};
+  out.inputs.resize(out.scene.layout.total());
+  const Inputs<double> in{out.scene.layout, out.inputs.data()};
+  for (int i = 0; i < count; ++i) {
+    const double angle = 2.0 * M_PI * i / (count - 1) - M_PI;
+    const double x[] = {0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.1 + 0.1 * std::cos(angle), 0.1 * std::sin(angle), 0.0};
+    const double rest[] = {0.0, 0.0, 1.0, 0.9 * angle};
+    std::copy_n(x, 9, in.of(Quantity::position) + 9 * i);
+    std::copy_n(rest, 4, in.of(Quantity::rest) + 4 * i);
+    in.of(Quantity::compliance)[i] = 1.0;
+    in.of(Quantity::damping)[i] = 5e-4;
+  }
+  return out;
+}
+
+enum class Scenes { ropes, net, turn };
+
+struct Packs : ::testing::TestWithParam<Scenes> {
+  Sample sample =
+      GetParam() == Scenes::turn ? hinges_around_a_turn() : random_scene(60, {.net = GetParam() == Scenes::net});
   const Scene& scene = sample.scene;
   Plan plan = make_plan(scene, {.h = eta, .partition = Partition::gauss_seidel, .iterations = 3});
   Inputs<const double> in{scene.layout, sample.inputs.data()};
@@ -84,7 +109,9 @@ struct Packs : ::testing::TestWithParam<bool> {
     return s;
   }
 };
-INSTANTIATE_TEST_SUITE_P(, Packs, ::testing::Bool(), [](const auto& info) { return info.param ? "Net" : "Ropes"; });
+constexpr const char* scene_names[] = {"Ropes", "Net", "Turn"};
+INSTANTIATE_TEST_SUITE_P(, Packs, ::testing::Values(Scenes::ropes, Scenes::net, Scenes::turn),
+                         [](const auto& info) { return scene_names[static_cast<int>(info.param)]; });
 
 TEST_P(Packs, ForwardHasTheBitsOfOneAtATime) {
   const Singly expected = singly();
