@@ -5,12 +5,14 @@
 #include "adjoint/predict_vjp.h"
 #include "adjoint/project_block_vjp.h"
 #include "adjoint/project_vjp.h"
+#include "adjoint/yield_vjp.h"
 
 namespace sheetbend {
 
 template <class T>
 struct ReverseScratch {
   std::vector<T> x, fixed, lambda, w, C_r;
+  std::vector<T> carried;  // the state before what yields has yielded
   std::vector<Vec3<T>> gravity;
   PackCotangents<std::conditional_t<in_packs<T>, T, double>> packs;  // of colors that go through the kernels
   std::vector<BlockCotangents<T>> blocks;
@@ -18,6 +20,7 @@ struct ReverseScratch {
   ReverseScratch(const Scene& scene, const Plan& plan) : blocks(plan.blocks.size()) {
     for (std::size_t b = 0; b < blocks.size(); ++b) blocks[b].resize(scene, plan.blocks[b]);
     if (!plan.colors.empty()) C_r.resize(damped_rows(scene));
+    if (scene.yields) carried.resize(scene.dofs());
     if (sweeps_packs<T>(plan)) {
       if constexpr (in_packs<T>) packs.resize(plan.packs);
       return;
@@ -132,6 +135,10 @@ void substep_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in
                  ReverseScratch<T>& scratch, const StateCotangents<T>& bar, const Inputs<T>& in_bar) {
   const int threads = plan.options.threads;
   const Coordinates<T> corrected = record.coordinates(plan, q);
+  if (scene.yields) {
+    read_carried(scene, corrected, scratch.carried.data());
+    yield_vjp(scene, in, scratch.carried.data(), x_next_bar, in_bar);
+  }
   retract_directors_vjp(scene, [&](int node) { return corrected.of(node); }, x_next_bar);
   read_off_vjp(scene, bdf, x_next_bar, v_next_bar, threads, scratch.q_bar(plan), bar);
   project_vjp(scene, plan, in, bdf, s, record, scratch, bar, in_bar);

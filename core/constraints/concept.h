@@ -9,7 +9,7 @@
 //   };
 //
 // x holds the stencil's coordinates one node after the other (dofs of them), J is row-major (rows x dofs) and fully written.
-// `directors = d` says that the last d of the stencil are directors (directions of a rod's edges), not points.
+// `points` of the stencil are points; those after them are directors (of a rod's edges) or internal variables (see yield.h).
 // `periodic = true` says that C is an angle: differences of it (rate damping) are taken the short way round.
 //
 // Two shortcuts make hot constraints cheaper; a constraint without them works the same, and tests compare the two routes:
@@ -32,7 +32,7 @@ template <int Arity>
 struct OnPoints {
   static constexpr int arity = Arity;
   static constexpr int dofs = 3 * Arity;
-  static constexpr int directors = 0;
+  static constexpr int points = Arity;
   static constexpr int offsets = 0;
   static constexpr bool periodic = false;
   static constexpr bool unit_gradients = false;

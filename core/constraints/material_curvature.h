@@ -18,14 +18,15 @@ struct MaterialCurvature : OnJoint {
   template <class T>
   static void evaluate(const T* x, const T* p, T* C, T* J) {
     const Joint<T> joint(x);
-    const MaterialFrame<T> &first = joint.first, &second = joint.second;
+    const MaterialFrame<T>&first = joint.first, &second = joint.second;
     const T one(1.0), half(0.5);
     const T inverse = one / (one + joint.cosine);  // cos^2(twist/2) = (1 + cos)/2
     const T to_mean = sqrt(half * inverse);
     const Vec3<T> m1 = to_mean * (first.m1 + second.m1), m2 = to_mean * (first.m2 + second.m2);
     const T k1 = dot(m2, joint.curvature.kb), k2 = -dot(m1, joint.curvature.kb);
     const T half_tangent = half * joint.sine * inverse;  // of half the twist
-    const Vec3<T> transport1 = half_tangent * joint.transport(first), transport2 = half_tangent * joint.transport(second);
+    const Vec3<T> transport1 = half_tangent * joint.transport(first),
+                  transport2 = half_tangent * joint.transport(second);
 
     // d(kappa) = m . d(kb), the turn of the frame half way, and its stretch by d(twist) as far as that is not turn
     const auto row = [&](const Vec3<T>& m, const T& k, const T& turned, const T& scale, T* to) {

@@ -13,7 +13,7 @@ namespace sheetbend {
 
 // The stencil of a joint: three points and the directors of the edges between them.
 struct OnJoint : OnPoints<5> {
-  static constexpr int directors = 2;
+  static constexpr int points = 3;
 };
 
 template <class T>
@@ -41,7 +41,8 @@ struct Joint {
   MaterialFrame<T> first, second;
   T cosine, sine;  // of the twist
 
-  explicit Joint(const T* x) : curvature(x), first(curvature.e1, Vec3<T>(x + 9)), second(curvature.e2, Vec3<T>(x + 12)) {
+  explicit Joint(const T* x)
+      : curvature(x), first(curvature.e1, Vec3<T>(x + 9)), second(curvature.e2, Vec3<T>(x + 12)) {
     const T share = dot(second.m1, first.t) / (T(1.0) + dot(first.t, second.t));
     cosine = dot(first.m1, second.m1) - dot(first.m1, second.t) * share;
     sine = dot(first.m2, second.m1) - dot(first.m2, second.t) * share;

@@ -12,6 +12,7 @@
 #include "core/constraints/material_curvature.h"
 #include "core/constraints/planar_bend.h"
 #include "core/constraints/twist.h"
+#include "core/constraints/yielding_curvature.h"
 
 namespace sheetbend {
 
@@ -22,7 +23,8 @@ using Registry = std::tuple<  //
     Hinge,                    //
     Attachment,               //
     MaterialCurvature,        //
-    Twist>;
+    Twist,                    //
+    YieldingCurvature>;
 
 inline constexpr int kind_count = std::tuple_size_v<Registry>;
 

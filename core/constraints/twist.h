@@ -18,8 +18,9 @@ struct Twist : OnJoint {
   static void evaluate(const T* x, const T* p, T* C, T* J) {
     const Joint<T> joint(x);
     C[0] = difference<Twist>(atan2(joint.sine, joint.cosine), p[0]);
-    joint.store(joint.transport(joint.first) - joint.first.by_edge, joint.transport(joint.second) + joint.second.by_edge,
-                -joint.first.by_director, joint.second.by_director, J);
+    joint.store(joint.transport(joint.first) - joint.first.by_edge,
+                joint.transport(joint.second) + joint.second.by_edge, -joint.first.by_director,
+                joint.second.by_director, J);
   }
 };
 

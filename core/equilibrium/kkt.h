@@ -55,10 +55,10 @@ class Kkt {
   std::vector<int> position_;               // into K's values, -1 where fixed or below the diagonal
   std::vector<int> diagonal_;               // likewise, per unknown
   std::vector<double> H_, J_, alpha_, softened_;
-  std::vector<double> metric_;                     // per dof
-  std::vector<int> director_position_;             // into K's values, 9 per director, -1 as in position_
-  std::vector<std::array<double, 9>> idle_;        // per director: projection onto the directions that nothing depends on
-  std::vector<double> idle_stiffness_;             // per director
+  std::vector<double> metric_;               // per dof
+  std::vector<int> director_position_;       // into K's values, 9 per director, -1 as in position_
+  std::vector<std::array<double, 9>> idle_;  // per director: projection onto the directions that nothing depends on
+  std::vector<double> idle_stiffness_;       // per director
   double mu_ = 0.0, force_stiffness_ = 0.0, geometric_ = 0.0, largest_diagonal_ = 0.0;
   int negative_ = 0;
   Eigen::SparseMatrix<double> K_;

@@ -44,7 +44,7 @@ Group build_group(const GroupSpec& spec, const Scene& scene) {
   g.first = scene.constraints;
   g.first_row = scene.rows;
   with_kind(g.kind, [&]<class K>(K) {
-    g.arity = K::arity, g.points = K::arity - K::directors, g.rows = K::rows, g.parameters = parameter_count<K>;
+    g.arity = K::arity, g.points = K::points, g.rows = K::rows, g.parameters = parameter_count<K>;
   });
   if (g.stencil.size() % g.arity != 0)
     refuse(spec.name + ": " + std::to_string(g.stencil.size()) + " indices. Fix: a " + spec.kind + " takes " +
@@ -98,7 +98,8 @@ Scene build_scene(const SceneSpec& spec) {
   s.inertial.resize(s.nodes());
   for (int n = 0; n < s.nodes(); ++n) s.inertial[n] = s.role[n] == Role::free;
   for (const Director& d : s.directors) {
-    if (d.tail == d.head || d.node == d.tail || d.node == d.head || !s.inertial[d.node] == (s.role[d.node] == Role::free))
+    if (d.tail == d.head || d.node == d.tail || d.node == d.head ||
+        !s.inertial[d.node] == (s.role[d.node] == Role::free))
       refuse("directors: node " + std::to_string(d.node) + " with edge " + std::to_string(d.tail) + ", " +
              std::to_string(d.head) + ". Fix: give each director a node of its own and two distinct ends");
     s.inertial[d.node] = false;
@@ -126,6 +127,7 @@ Scene build_scene(const SceneSpec& spec) {
     built.first_coordinate = s.stencil_coordinates;
     built.first_gradient = s.gradient_entries;
     s.constraints += built.count;
+    with_kind(built.kind, [&]<class K>(K) { s.yields |= Yields<K>; });
     s.rows += built.count * built.rows;
     values += static_cast<std::size_t>(built.count) * built.parameters;
     s.stencil_coordinates += static_cast<std::size_t>(built.count) * 3 * built.arity;

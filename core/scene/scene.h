@@ -43,6 +43,7 @@ struct Scene {
   std::vector<int> first_dof, dim;  // per node
   std::vector<Role> role;           // per node
   std::vector<Director> directors;
+  bool yields = false;         // whether any constraint does
   std::vector<char> inertial;  // per node: whether it moves by its mass, that is free and no director
   std::vector<int> pinned;
   std::vector<int> driven;       // nodes whose motion is given, in the order of Quantity::boundary

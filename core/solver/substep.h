@@ -8,6 +8,7 @@
 #include "core/solver/project.h"
 #include "core/solver/project_block.h"
 #include "core/solver/retract.h"
+#include "core/solver/yield.h"
 
 namespace sheetbend {
 
@@ -138,6 +139,7 @@ bool substep(const Scene& scene, const Plan& plan, const Inputs<const T>& in, co
   correct(scene, plan, in, bdf, t_next, s, x_next, record);
   const bool finite = read_off(scene, bdf, s, plan.options.threads, record.coordinates(plan, x_next), x_next, v);
   retract_directors(scene, x_next);
+  yield(scene, in, x_next);
   return finite;
 }
 

@@ -15,7 +15,7 @@ py::dict constraint_kinds() {
   for_each_kind([&]<class K>(K) {
     py::dict kind;
     kind["arity"] = K::arity;
-    kind["directors"] = K::directors;
+    kind["points"] = K::points;
     kind["rows"] = K::rows;
     kind["parameters"] = std::vector<std::string>(K::parameters.begin(), K::parameters.end());
     kind["periodic"] = K::periodic;

@@ -37,17 +37,17 @@ std::shared_ptr<const Scene> make_scene(int particles, const std::vector<std::ar
 
 void bind_scene(py::module_& m) {
   py::class_<Scene, std::shared_ptr<Scene>>(m, "Scene")
-      .def(py::init([](int particles, const std::vector<std::array<int, 3>>& directors, std::vector<int> pinned, std::vector<int> driven,
-                       std::vector<double> boundary_times, const std::string& boundary_interpolation,
-                       std::vector<int> loaded, std::vector<double> force_times, bool has_drag,
-                       const std::vector<py::dict>& groups) {
+      .def(py::init([](int particles, const std::vector<std::array<int, 3>>& directors, std::vector<int> pinned,
+                       std::vector<int> driven, std::vector<double> boundary_times,
+                       const std::string& boundary_interpolation, std::vector<int> loaded,
+                       std::vector<double> force_times, bool has_drag, const std::vector<py::dict>& groups) {
              return std::const_pointer_cast<Scene>(
                  make_scene(particles, directors, std::move(pinned), std::move(driven), std::move(boundary_times),
                             boundary_interpolation, std::move(loaded), std::move(force_times), has_drag, groups));
            }),
-           py::kw_only(), py::arg("particles"), py::arg("directors"), py::arg("pinned"), py::arg("driven"), py::arg("boundary_times"),
-           py::arg("boundary_interpolation"), py::arg("loaded"), py::arg("force_times"), py::arg("has_drag"),
-           py::arg("groups"))
+           py::kw_only(), py::arg("particles"), py::arg("directors"), py::arg("pinned"), py::arg("driven"),
+           py::arg("boundary_times"), py::arg("boundary_interpolation"), py::arg("loaded"), py::arg("force_times"),
+           py::arg("has_drag"), py::arg("groups"))
       .def_property_readonly("layout",
                              [](const Scene& s) {
                                py::dict layout;

@@ -5,15 +5,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .chain import add_drag, add_links, add_masses, first_value, resample, voronoi_shares
+from .chain import add_drag, add_links, add_masses, resample
 from .checks import finite
 from .errors import SceneError
 from .grip import Grip, any_across, carried
-from .quantities import Term, product
+from .quantities import product
+from .rod_joints import Joints
 from .rope import GHOST, Rope
 from .scene import Array, Scene
 
@@ -70,15 +72,18 @@ def add_rod(
     twist_damping: float | None = None,
     drag_linear: float | None = None,
     drag_quadratic: float | None = None,
+    yield_curvature: float | None = None,
+    yield_share: float | None = None,
     curvature_modes: Sequence[int] = (),
     twist_modes: Sequence[int] = (),
+    softness_modes: Sequence[int] = (),
 ) -> Rod:
     """Add a discrete elastic rod of `segments` equal links to a scene (Bergou et al. 2008, 2010).
 
     Quantities: `<name>_length` m, `<name>_density` kg/m, `_EI` and `_GJ` N m^2, and where given `_EA` N, `_EI2` N m^2,
     `_stretch_damping`, `_bend_damping` and `_twist_damping` s, `_drag_linear` N s/m^2, `_drag_quadratic` N s^2/m^3,
     `_start_tilt_1`, `_start_tilt_2`, `_end_tilt_1`, `_end_tilt_2`, `_roll` rad, `_curvature_1_<k>`,
-    `_curvature_2_<k>` and `_twist_<k>` 1/m.
+    `_curvature_2_<k>` and `_twist_<k>` 1/m, `_yield_curvature` 1/m, `_yield_share`, `_softness_<k>`.
 
     Args:
         length: m, between the grips.
@@ -96,8 +101,13 @@ def add_rod(
         roll: add the roll of the end grip about the rod: the twist built in when the rod was gripped.
         stretch_damping, bend_damping, twist_damping: Kelvin-Voigt time constants s.
         drag_linear, drag_quadratic: air drag per length, isotropic.
+        yield_curvature: 1/m, the elastic curvature beyond which internal friction slides (in the frame's two axes; with
+            EI2 the second one counts by sqrt(EI2/EI)); None = elastic. The set starts at zero.
+        yield_share: the part of the bending stiffness that slides, between 0 and 1: beyond yield (1 - share) EI is
+            left. Small motion shows EI.
         curvature_modes: k of rest-curvature modes cos(k pi s / length), about both frame axes; each starts at zero.
         twist_modes: the same of the rest twist per length.
+        softness_modes: the same of the bending compliance, relative to length/EI: a rod that is stiffer in places.
 
     Returns:
         Rod, also kept as `scene.ropes[name]`.
@@ -106,14 +116,20 @@ def add_rod(
         SceneError: wrong or missing values; the message names the field.
     """
     positive = {"length": length, "density": density, "EI": EI, "GJ": GJ, "EA": EA, "EI2": EI2}
+    positive |= {"yield_curvature": yield_curvature}
     positive |= {"stretch_damping": stretch_damping, "bend_damping": bend_damping, "twist_damping": twist_damping}
-    for field, value in positive.items():
+    for label, value in positive.items():
         if value is not None and not (np.isfinite(value) and value > 0):
-            raise SceneError(f"{name}.{field}", "must be positive", value, "give a positive number, or leave it out")
+            raise SceneError(f"{name}.{label}", "must be positive", value, "give a positive number, or leave it out")
     if not isinstance(segments, int | np.integer) or segments < 2:
         raise SceneError(f"{name}.segments", "must be a whole number from 2 on", segments, "give at least 2")
     if stretch_damping is not None and EA is None:
         raise SceneError(f"{name}.stretch_damping", "needs a finite EA", EA, "give EA, or leave it out")
+    if (yield_curvature is None) != (yield_share is None):
+        fix = "give yield_curvature and yield_share, or neither"
+        raise SceneError(f"{name}.yield_share", "and yield_curvature belong together", yield_share, fix)
+    if yield_share is not None and not 0 < yield_share < 1:
+        raise SceneError(f"{name}.yield_share", "must lie between 0 and 1", yield_share, "give a part of EI")
     if tilts and start is None and end is None:
         raise SceneError(f"{name}.tilts", "need a grip", tilts, "give start or end")
     if roll and end is None:
@@ -153,17 +169,13 @@ def add_rod(
             _hold(scene, f"{name}_{label}" if tilts else None, grip, int(node), ghost, int(held), side * reach)
             if roll and label == "end":
                 _roll(scene, f"{name}_roll", grip, int(held))
-    joints = np.flatnonzero(np.isin(chain[1:-1], nodes)) + 1
-    stencils = np.stack(
-        [chain[joints - 1], chain[joints], chain[joints + 1], directors[joints - 1], directors[joints]], 1
-    )
-    place = chain[joints] - nodes[0]
-    stiffness = [scene.add_quantity(f"{name}_EI", EI, "N m^2")]
-    if EI2 is not None:
-        stiffness.append(scene.add_quantity(f"{name}_EI2", EI2, "N m^2"))
-    _joints(scene, name, "bend", "material_curvature", stencils, place, segments, bend_damping)
-    _joints(scene, name, "twist", "twist", stencils, place, segments, twist_damping)
-    _rest(scene, name, place, segments, stiffness, curvature_modes, twist_modes)
+    at = np.flatnonzero(np.isin(chain[1:-1], nodes)) + 1
+    stencils = np.stack([chain[at - 1], chain[at], chain[at + 1], directors[at - 1], directors[at]], axis=1)
+    joints = Joints(scene, name, stencils, chain[at] - nodes[0], segments)
+    joints.bend(EI, EI2, bend_damping, yield_curvature, yield_share)
+    joints.twist(twist_damping)
+    joints.rest(curvature_modes, twist_modes)
+    joints.soften(softness_modes)
     add_drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
     built = Rod(name, nodes, arc, *ghosts, directors=directors)
     scene.ropes[name] = built
@@ -235,7 +247,7 @@ def _frames(chain: Array, first: ArrayLike | None, last: ArrayLike | None, turns
     edges = np.diff(chain, axis=0)
     tangents = edges / np.linalg.norm(edges, axis=1, keepdims=True)
     q = [any_across(tangents[0]) if first is None else np.asarray(first, dtype=float)]
-    for before, after in zip(tangents[:-1], tangents[1:], strict=True):
+    for before, after in pairwise(tangents):
         q.append(carried(q[-1] - (q[-1] @ before) * before, before, after[None])[0])
     frames = np.array([v / np.linalg.norm(v) for v in q])
     across = np.cross(tangents, frames)
@@ -274,56 +286,3 @@ def _add_motion(scene: Scene, grip: Grip, node: int, by: Array, factors: dict[st
         scene.add_motion_term(node, by, factors)
     else:
         scene.add_terms([product("position", 3 * node + k, by[0, k], factors) for k in range(3)])
-
-
-def _joints(
-    scene: Scene, name: str, label: str, kind: str, stencils: Array, place: Array, segments: int, damping: float | None
-) -> None:
-    """A group of joints with alpha = Voronoi length / stiffness; a gripped end counts the rod's own half link."""
-    group, length, share = f"{name}_{label}", f"{name}_length", voronoi_shares(segments)[place]
-    stiffness = f"{name}_EI" if label == "bend" else f"{name}_GJ"
-    zero = np.zeros(len(stencils))
-    scene.add_constraints(kind, stencils, name=group, compliance=zero, damping=None if damping is None else zero)
-    first = scene.group(group)[1] + np.arange(len(stencils))
-    terms = [Term("compliance", first, share, ((length, "identity"), (stiffness, "inverse")))]
-    if damping is not None:
-        tau = scene.add_quantity(f"{group}_damping", damping, "s")
-        terms.append(
-            Term("damping", first, 1.0 / share, ((tau, "identity"), (stiffness, "identity"), (length, "inverse")))
-        )
-    scene.add_terms(terms)
-
-
-def _rest(
-    scene: Scene,
-    name: str,
-    place: Array,
-    segments: int,
-    stiffness: list[str],
-    curvature_modes: Sequence[int],
-    twist_modes: Sequence[int],
-) -> None:
-    """Rest curvature and twist in modes cos(k pi s/length); the ratio of a section with two stiffnesses."""
-    share, s = voronoi_shares(segments)[place], place / segments
-    length = f"{name}_length"
-    bend, twist = first_value(scene, f"{name}_bend"), first_value(scene, f"{name}_twist")
-    joints = np.arange(len(place))
-    ratio: tuple[tuple[str, str], ...] = ()
-    if len(stiffness) == 2:
-        ratio = ((stiffness[1], "sqrt"), (stiffness[0], "inverse_sqrt"))
-        scene.group(f"{name}_bend")[0].rest[:, 0] = 0.0
-        scene.add_terms([Term("rest", bend + 3 * joints, 1.0, ratio)])
-    targets = [
-        ("curvature_1", curvature_modes, bend + 3 * joints + 1, ()),
-        ("curvature_2", curvature_modes, bend + 3 * joints + 2, ratio),
-        ("twist", twist_modes, twist + joints, ()),
-    ]
-    for label, modes, index, factors in targets:
-        for k in modes:
-            if k != int(k) or k < 0:
-                raise SceneError(
-                    f"{name}.{label}", "has modes that are no whole numbers from 0 on", k, "give such as (0, 1)"
-                )
-            mode = scene.add_quantity(f"{name}_{label}_{k}", 0.0, "1/m", positive=False, scale=1.0)
-            weights = share * np.cos(k * np.pi * s)
-            scene.add_terms([Term("rest", index, weights, ((mode, "identity"), (length, "identity"), *factors))])

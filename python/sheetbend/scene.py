@@ -20,7 +20,7 @@ from .quantities import Quantity, Term, product
 Array = np.ndarray
 KINDS: Mapping[str, Mapping[str, Any]] = _core.constraint_kinds()
 NEEDS_COMPLIANCE = ("bend", "planar_bend")
-JOINTS = ("material_curvature", "twist")
+JOINTS = ("material_curvature", "yielding_curvature", "twist")
 # A damping-only element keeps the product of compliance and damping while the compliance grows: what is left of its
 # stiffness.
 VISCOUS_COMPLIANCE = 1e12
@@ -233,7 +233,8 @@ class Scene:
         constraint (their gradients are in the input arrays).
 
         Args:
-            kind: "distance", "bend", "planar_bend", "hinge", "attachment", "material_curvature" or "twist"
+            kind: "distance", "bend", "planar_bend", "hinge", "attachment", "material_curvature",
+                "yielding_curvature" or "twist"
                 (sheetbend.KINDS).
             particles: (count, arity) indices.
             name: of the group; the kind by default.
@@ -521,5 +522,6 @@ UNITS: Mapping[str, Mapping[str, str]] = {
     "planar_bend": {"compliance": "1/(N m)", "damping": "N m s"},
     "hinge": {"compliance": "rad/(N m)", "damping": "N m s/rad"},
     "material_curvature": {"compliance": "1/(N m)", "damping": "N m s"},
+    "yielding_curvature": {"compliance": "1/(N m)", "damping": "N m s"},
     "twist": {"compliance": "rad/(N m)", "damping": "N m s/rad"},
 }

@@ -21,12 +21,13 @@ AtRest at_rest(Scene scene, std::vector<double> inputs) {
 }
 
 // A hanging rope with every kind of constraint and every quantity that acts at rest; its last particle is tied to a driven one, and every edge
-// has a director, of which the first is pinned.
+// has a director, of which the first is pinned; sets are pinned, since nothing yields at rest.
 AtRest every_kind() {
   const int n = 10;
   SceneSpec spec;
-  spec.particles = n + 2 + n;
+  spec.particles = n + 2 + 2 * n;
   spec.pinned = {0, n + 2};
+  for (int k = 0; k < n; ++k) spec.pinned.push_back(2 * n + 2 + k);
   for (int k = 0; k < n; ++k) spec.directors.push_back({n + 2 + k, k, k + 1});
   spec.driven = {n + 1};
   spec.loaded = {4, 7};
@@ -37,10 +38,10 @@ AtRest every_kind() {
     if constexpr (std::same_as<K, Attachment>)
       group.stencil = {n, n + 1};
     else
-      for (int k = 0; k + K::arity - K::directors <= n + 1; ++k)
+      for (int k = 0; k + K::points <= n + 1; ++k)
         for (int i = 0; i < K::arity; ++i) {
-          const int points = K::arity - K::directors;
-          group.stencil.push_back(i < points ? k + i : n + 2 + k + i - points);
+          const int past = i - K::points;  // two directors, then a set
+          group.stencil.push_back(past < 0 ? k + i : past < 2 ? n + 2 + k + past : 2 * n + 2 + k);
         }
     spec.groups.push_back(group);
   });
@@ -61,6 +62,8 @@ AtRest every_kind() {
   }
   for (int k = 0; k < n; ++k)
     Vec3<double>(random(-0.1, 0.1), 0.8, random(-0.1, 0.1)).store(in.of(Quantity::position) + 3 * (n + 2 + k));
+  for (int k = 0; k < n; ++k)
+    Vec3<double>(random(-0.1, 0.1), random(-0.1, 0.1), 0.0).store(in.of(Quantity::position) + 3 * (2 * n + 2 + k));
   for (std::size_t knot = 0; knot < 4; ++knot)
     Vec3<double>(0.6 + random(-0.01, 0.01), random(-0.01, 0.01), random(-0.01, 0.01))
         .store(in.of(Quantity::boundary) + 3 * knot);
@@ -69,6 +72,10 @@ AtRest every_kind() {
       double* p = in.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(i) * group.parameters;
       if (group.parameters == 1) *p = random(0.09, 0.11);
       if (group.parameters == 3) Vec3<double>(1.2, random(-0.2, 0.2), random(-0.2, 0.2)).store(p);
+      if (group.parameters == 5) {
+        const double values[] = {1.2, 0.4, 0.1, 0.1, -0.1};
+        std::copy_n(values, 5, p);
+      }
       if (group.parameters == 4) {
         Vec3<double>(0.1, 0.99, -0.1).store(p);
         p[3] = random(-0.2, 0.2);

@@ -129,6 +129,22 @@ inline Case case_of<MaterialCurvature>() {
 }
 
 template <>
+inline Case case_of<YieldingCurvature>() {
+  std::vector<double> x = joint_sample;
+  x.insert(x.end(), {0.1, -0.2, 0.05});
+  return {.x = x,
+          .p = {1.3, 0.4, 0.25, 0.2, -0.1},
+          .compliance = 2.0,
+          .damping = 5e-4,
+          .under_rotation = UnderRotation::stays,
+          .degree = 0,
+          .parameter_degree = {0, 0, 0, 0, 0},
+          .relabeling = {2, 1, 0, 4, 3, 5},
+          .sign = {1, -1},
+          .parameter_sign = {1, 1, 1, 1, -1}};
+}
+
+template <>
 inline Case case_of<Twist>() {
   return {.x = joint_sample,
           .p = {0.15},

@@ -1,7 +1,7 @@
 // Random scenes that hold every registered constraint and every differentiable quantity. Each rope strings
 // together one sample stencil of every kind, jittered, and braces. Ropes start at one driven particle, so
 // that constraints of one color, and direct blocks, share it; or, as a net, at one free particle and with
-// ties between them: one block with branches and loops. Joints bring the directors of their edges.
+// ties between them: one block with branches and loops. Joints bring the directors of their edges, and the set of those that yield.
 #pragma once
 
 #include "core/scene/scene.h"
@@ -33,6 +33,7 @@ struct SceneBuilder {
     std::vector<double> p, compliance, damping;
   };
   std::vector<Values> groups{};
+  std::vector<int> sets{};
 
   explicit SceneBuilder(unsigned seed) : random(seed) {}
 
@@ -62,7 +63,7 @@ struct SceneBuilder {
   template <class K>
   int add_stencil(int tail, bool damped) {
     const Case sample = case_of<K>();
-    constexpr int points = K::arity - K::directors;
+    constexpr int points = K::points, directors = std::min(2, K::arity - points);
     std::vector<int> nodes{tail};
     for (int k = 1; k < K::arity; ++k) {
       double at[3];
@@ -70,11 +71,11 @@ struct SceneBuilder {
         at[d] = (k < points ? x[3 * tail + d] : 0.0) + sample.x[3 * k + d] - sample.x[d] + random(-0.005, 0.005);
       nodes.push_back(add_particle(at[0], at[1], at[2]));
     }
-    for (int k = 0; k < K::directors; ++k)
-      spec.directors.push_back({nodes[points + k], nodes[k], nodes[k + 1]});
+    for (int k = 0; k < directors; ++k) spec.directors.push_back({nodes[points + k], nodes[k], nodes[k + 1]});
     std::vector<double> p = sample.p;
     for (double& v : p) v += random(-0.02, 0.02);
     add_constraint<K>(damped, nodes, p);
+    for (int k = points + directors; k < K::arity; ++k) sets.push_back(nodes[k]);
     return nodes[points - 1];
   }
 
@@ -88,11 +89,13 @@ struct SceneBuilder {
     int tail = 0;
     for_each_kind([&]<class K>(K) { tail = add_stencil<K>(tail, damped); });
     std::vector<int> rope{0};
-    const auto is_director = [&](int n) {
-      return std::any_of(spec.directors.begin(), spec.directors.end(), [&](const Director& d) { return d.node == n; });
+    const auto is_point = [&](int n) {
+      return std::none_of(spec.directors.begin(), spec.directors.end(),
+                          [&](const Director& d) { return d.node == n; }) &&
+             std::find(sets.begin(), sets.end(), n) == sets.end();
     };
     for (int n = first; n < static_cast<int>(x.size()) / 3; ++n)
-      if (!is_director(n)) rope.push_back(n);
+      if (is_point(n)) rope.push_back(n);
     for (std::size_t k = 1; k < rope.size(); ++k) add_brace(rope[k - 1], rope[k]);
     return rope;
   }
@@ -135,7 +138,8 @@ inline Sample random_scene(unsigned seed, const SceneShape& shape = {}) {
       for (std::size_t k = 1; k + 2 < ropes[r].size(); k += 2) b.add_brace(ropes[r - 1][k], ropes[r][k + 2]);
   b.spec.particles = static_cast<int>(b.x.size()) / 3;
   b.spec.driven = {shape.net ? ropes[2].back() : 0, ropes[1][ropes[1].size() / 2]};
-  b.spec.pinned = {ropes[0].back()};
+  b.spec.pinned = b.sets;
+  b.spec.pinned.push_back(ropes[0].back());
   b.spec.loaded = {ropes[0][1], ropes[2][3]};
   b.spec.has_drag = true;
   b.spec.boundary = {{0.0, 0.011, 0.02, 0.05}, Interpolation::cubic};

@@ -1,0 +1,55 @@
+// The reverse of yield() on the state that it found:  with b = set'_bar,
+//   e_bar = f b + (y/|e|^3) (e.b) e,   y_bar = -(e.b)/|e|,   set_bar = b - e_bar,   x_bar = J^T e_bar.
+// The parameters' share is one evaluation of the constraint on duals with a direction for each that is not just subtracted.
+#pragma once
+
+#include "core/scalar/dual.h"
+#include "core/solver/predict.h"
+#include "core/solver/retract.h"
+#include "core/solver/yield.h"
+
+namespace sheetbend {
+
+// The state that yield() saw, from the corrected coordinates.
+template <class T>
+void read_carried(const Scene& scene, const Coordinates<T>& corrected, T* state) {
+  for (int n = 0; n < scene.nodes(); ++n) Vec3<T>(corrected.of(n)).store(state + scene.first_dof[n]);
+  retract_directors(scene, state);
+}
+
+// x_bar (dofs) goes in as the cotangent of the state after, and comes out as that of the state before. No two constraints share a set.
+template <class T>
+void yield_vjp(const Scene& scene, const Inputs<const T>& in, const T* state, T* x_bar, const Inputs<T>& in_bar) {
+  for_each_yielding(scene, [&]<class K>(K, const Group& group, int item, std::size_t value) {
+    constexpr int P = parameter_count<K>, inside = P - K::offsets;
+    const T* p = in.of(Quantity::rest) + value;
+    T* p_bar = in_bar.of(Quantity::rest) + value;
+    const Yield<K, T> at(scene, group, item, p, state);
+    const auto nodes = group.nodes(item);
+    T* set_bar = x_bar + scene.first_dof[nodes[K::arity - 1]];
+    T along(0.0), e_bar[K::rows];
+    for (int j = 0; j < K::rows; ++j) along += at.e[j] * set_bar[j];
+    along *= at.inverse_length;
+    p_bar[K::yield_parameter] -= along;
+    for (int j = 0; j < K::rows; ++j)
+      e_bar[j] = at.f * set_bar[j] + at.y_over_length * at.inverse_length * along * at.e[j];
+
+    // e = C - (1 - share) set, where C holds -share set: by the set -1, by the share 0
+    using D = Dual<T, inside>;
+    D x[K::dofs], duals[P], C[K::rows], J[K::rows * K::dofs];
+    for (int d = 0; d < K::dofs; ++d) x[d].v = at.x[d];
+    for (int k = 0; k < P; ++k) duals[k].v = p[k];
+    for (int k = 0; k < inside; ++k) duals[k].d[k] = T(1.0);
+    K::evaluate(x, duals, C, J);
+    for (int j = 0; j < K::rows; ++j) {
+      for (int d = 0; d < K::dofs - 3; ++d)
+        x_bar[scene.first_dof[nodes[d / 3]] + d % 3] += e_bar[j] * at.J[j * K::dofs + d];
+      set_bar[j] -= e_bar[j];
+      for (int k = 0; k < inside; ++k)
+        if (k != K::share_parameter) p_bar[k] += e_bar[j] * C[j].d[k];
+      p_bar[inside + j] -= e_bar[j];
+    }
+  });
+}
+
+}  // namespace sheetbend

@@ -1,0 +1,140 @@
+"""The model of a rope held by two grips: what is known of it, what is assumed, and how it is discretized."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..experiment import Experiment, Window
+from ..markers import Place, on_rope
+from ..recording import Recording
+from ..rod import Rod, add_rod
+from ..scene import Scene
+from ..solver import Solver
+from .motion import Array, GrippedMotion
+
+NAME = "rope"
+GRAVITY = (0.0, 0.0, -9.81)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RopeModel:
+    """A rod between two grips.
+
+    Attributes:
+        density: kg/m, weighed: motion alone tells stiffness over density only.
+        nominal: directions (3,) of the start and the end grip from which their frames are carried; recordings that share
+            them share their material frames.
+        values: starting values of quantities, as options of `add_rod` (EI, GJ, bend_damping, ...); None = without it.
+        tilts, roll: nuisances of the grips, see `add_rod`.
+        curvature_modes, softness_modes: see `add_rod`.
+        segments: links between the grips.
+        substeps: per frame.
+        iterations: Newton iterations per substep.
+        smoothing: s, over which the recorded grips and starts are smoothed.
+        sigma: m, expected error of a marker, against which priors count.
+    """
+
+    density: float
+    nominal: tuple[Array, Array]
+    values: Mapping[str, float | None]
+    tilts: bool = False
+    roll: bool = True
+    curvature_modes: Sequence[int] = ()
+    softness_modes: Sequence[int] = ()
+    segments: int = 12
+    substeps: int = 2
+    iterations: int = 1
+    smoothing: float = 0.08
+    sigma: float = 5e-3
+    gravity: tuple[float, float, float] = field(default=GRAVITY)
+
+    def with_values(self, **values: float | None) -> RopeModel:
+        """The same with other starting values."""
+        return replace(self, values={**self.values, **values})
+
+    def at(self, fitted: Mapping[str, float]) -> RopeModel:
+        """The same starting from fitted quantities `rope_<option>`; those that no option holds stay at their start."""
+        known = {key.removeprefix(f"{NAME}_"): value for key, value in fitted.items()}
+        return replace(self, values={k: known.get(k, v) for k, v in self.values.items()})
+
+    def scene(self, motion: GrippedMotion, first: int, last: int) -> Scene:
+        """The rope as it is in frame `first`, with the grips' motion until frame `last`."""
+        scene = Scene(NAME, motion.recording.gravity if motion.recording.gravity is not None else self.gravity)
+        frames = slice(first, last + 1)
+        points, velocity = motion.start(first)
+        options: dict[str, Any] = {k: v for k, v in self.values.items() if v is not None}
+        length = options.pop("length", motion.length)
+        add_rod(
+            scene,
+            NAME,
+            length=length,
+            segments=self.segments,
+            density=self.density,
+            points=points,
+            velocity=velocity,
+            start=motion.grip(False, frames, self.nominal[0]),
+            end=motion.grip(True, frames, self.nominal[1]),
+            tilts=self.tilts,
+            roll=self.roll,
+            curvature_modes=self.curvature_modes,
+            softness_modes=self.softness_modes,
+            **options,
+        )
+        return scene
+
+    def experiment(self, motion: GrippedMotion, window: Window | None = None) -> Experiment:
+        """A window of a recording (all of it by default), predicted open loop from its first frame."""
+        times = motion.recording.times
+        start, stop = (times[0], times[-1]) if window is None else window
+        inside = np.flatnonzero((times >= start - 1e-9) & (times <= stop + 1e-9))
+        if len(inside) < 3:
+            fix = f"give at least three frames between {times[0]:g} and {times[-1]:g} s"
+            raise InputError("window", f"of {motion.recording.name} holds too few frames", window, fix)
+        first, last = int(inside[0]), int(inside[-1])
+        scene = self.scene(motion, first, last)
+        h = float(np.median(np.diff(times))) / self.substeps
+        return Experiment(
+            scene=scene,
+            recording=motion.recording,
+            name=f"{motion.recording.name} from {times[first]:.2f} s",
+            markers=self.places(motion, scene),
+            fit=(float(times[min(first + 1, last)]), float(times[last])),
+            start_time=float(times[first]),
+            solver=Solver(h=h, iterations=self.iterations),
+            sigma=self.sigma,
+        )
+
+    @staticmethod
+    def places(motion: GrippedMotion, scene: Scene) -> list[Place | None]:
+        """The free markers on the rope, None for the gripped ones."""
+        rod: Rod = scene.ropes[NAME]
+        return [
+            on_rope(rod, float(motion.fractions[k]) * rod.length) if k in motion.free else None
+            for k in range(len(motion.recording.markers))
+        ]
+
+
+def nominal_directions(motions: Sequence[GrippedMotion]) -> tuple[Array, Array]:
+    """The mean directions of the two grips over all recordings."""
+    means = []
+    for end in (False, True):
+        mean = np.concatenate([m.directions(end) for m in motions]).mean(axis=0)
+        means.append(np.asarray(mean / np.linalg.norm(mean)))
+    return means[0], means[1]
+
+
+def shared_gravity(recordings: Sequence[Recording]) -> tuple[float, ...] | None:
+    """The gravity that the recordings tell, or None where they tell none.
+
+    Raises:
+        InputError: they differ.
+    """
+    told = {tuple(float(g) for g in r.gravity) for r in recordings if r.gravity is not None}
+    if len(told) > 1:
+        raise InputError("gravity", "differs between recordings", sorted(told), "correct the JSON beside them")
+    return told.pop() if told else None

@@ -1,0 +1,372 @@
+"""Fitting a rope held by two grips, step by step: from a straight rod with twist to what the recordings support.
+
+Long open-loop predictions have a rugged cost, short ones a smooth one; stiff and damped is the safe side of a start.
+So a fit begins with a few short windows and several stiffnesses, goes on to longer windows, and then adds one thing
+after another to the model: tilts of the grips, a rest curvature, yield, a stiffness that varies. A step stays only if
+it predicts recordings better that it was not fitted to.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..errors import InputError, SheetbendError
+from ..experiment import Experiment
+from ..fit import Fit, fit
+from ..optimizers import minimize
+from ..parameters import Parameter
+from ..problem import FitProblem
+from ..recording import Recording
+from ..scores import coordinate_error
+from .model import NAME, RopeModel, nominal_directions, shared_gravity
+from .motion import Array, GrippedMotion
+
+BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first
+LINKS_PER_BENDING_LENGTH = 3.0  # below this EI reads too high and GJ too low
+SETTLED = 0.05  # relative change of EI at which links are short enough
+BETTER = 0.99  # error of a step that stays, over that without it
+TOLERANCE = 1e-4  # relative, of the cost, while searching
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One step of the recipe.
+
+    Attributes:
+        name: for reports.
+        options: what it adds to the model, fields of `RopeModel`.
+        values: what it adds to the model's starting values.
+        parameters: what it adds to the fit.
+    """
+
+    name: str
+    options: Mapping[str, object] = field(default_factory=dict)
+    values: Mapping[str, float] = field(default_factory=dict)
+    parameters: tuple[Parameter, ...] = ()
+
+
+def _log(name: str, initial: float, unit: str, sd: float | None = None) -> Parameter:
+    prior = None if sd is None else (initial, sd)
+    return Parameter(name=f"{NAME}_{name}", initial=initial, log=True, unit=unit, prior=prior)
+
+
+def _plain(name: str, unit: str, sd: float, scale: float) -> Parameter:
+    return Parameter(name=f"{NAME}_{name}", initial=0.0, unit=unit, prior=(0.0, sd), scale=scale)
+
+
+MODES = (0, 1, 2, 3)
+TWIST = Rung(
+    "straight, with twist",
+    parameters=(
+        _log("EI", 1e-3, "N m^2"),
+        _log("GJ", 1e-3, "N m^2", sd=3.0),
+        _log("bend_damping", 0.02, "s", sd=2.0),
+        Parameter(name=f"{NAME}_twist_damping", tied_to=f"{NAME}_bend_damping", unit="s"),
+        _log("drag_linear", 0.01, "N s/m^2", sd=3.0),
+        _log("length", 1.0, "m", sd=0.02),
+        _plain("roll", "rad", 1.0, 0.3),
+    ),
+)
+TILTS = Rung(
+    "tilts of the grips",
+    options={"tilts": True},
+    parameters=tuple(_plain(f"{end}_tilt_{k}", "rad", 0.1, 0.1) for end in ("start", "end") for k in (1, 2)),
+)
+REST = Rung(
+    "rest curvature",
+    options={"curvature_modes": MODES},
+    parameters=tuple(_plain(f"curvature_{axis}_{k}", "1/m", 1.0, 1.0) for k in MODES for axis in (1, 2)),
+)
+YIELD = Rung(
+    "yield",
+    values={"yield_curvature": 1.0, "yield_share": 0.3},
+    parameters=(
+        _log("yield_curvature", 1.0, "1/m", sd=1.0),
+        Parameter(name=f"{NAME}_yield_share", initial=0.3, lower=0.01, upper=0.95, prior=(0.3, 0.3)),
+    ),
+)
+VARYING = Rung(
+    "stiffness along the rope",
+    options={"softness_modes": (1, 2)},
+    parameters=tuple(_plain(f"softness_{k}", "", 0.2, 0.3) for k in (1, 2)),
+)
+LADDER = (TWIST, TILTS, REST, YIELD, VARYING)
+
+
+@dataclass(frozen=True)
+class Step:
+    """How a rung did: errors (mean absolute coordinate error of whole recordings, m) on the recordings that it was
+    fitted to and on the others, whether it stayed, and its time."""
+
+    name: str
+    fitted: float
+    others: float
+    stays: bool
+    seconds: float
+
+
+@dataclass(frozen=True)
+class RopeFit:
+    """A fitted rope.
+
+    Attributes:
+        model: with the fitted values; `predict` simulates it.
+        values: fitted quantities.
+        steps: what was tried, in order.
+        fit: the last fit with intervals and verdicts.
+        warnings: what a reader must know before using the numbers.
+    """
+
+    model: RopeModel
+    values: Mapping[str, float]
+    steps: tuple[Step, ...]
+    fit: Fit
+    warnings: tuple[str, ...]
+
+    def predict(self, recording: Recording) -> Array:
+        """(frames, markers, 3) m: open loop from the first frame, gripped markers as recorded."""
+        return predict(self.model, GrippedMotion.of(recording, self.model.smoothing), self.values)
+
+
+def predict(model: RopeModel, motion: GrippedMotion, values: Mapping[str, float]) -> Array:
+    """The whole recording, open loop from its first frame; NaN where the motion diverges."""
+    e = model.experiment(motion)
+    out = motion.recording.filled().positions.copy()
+    free = list(motion.free)
+    problem = _problem([replace(e, fit=None)], (), values)
+    try:
+        out[:, free] = problem.simulate(np.zeros(0))[0]
+    except SheetbendError:
+        out[:, free] = np.nan
+    return out
+
+
+def fit_rope(
+    recordings: Sequence[Recording],
+    *,
+    density: float,
+    ladder: Sequence[Rung] = LADDER,
+    validate: float = 0.25,
+    bending_lengths: Sequence[float] = BENDING_LENGTHS,
+    windows: Sequence[tuple[float, float]] = ((0.5, 8.0), (1.5, 15.0), (5.0, 60.0)),
+    segments: int = 12,
+    max_segments: int = 48,
+    substeps: int = 2,
+    smoothing: float = 0.08,
+    sigma: float = 5e-3,
+    threads: int = 1,
+    say: Say = lambda text: None,
+) -> RopeFit:
+    """Fit a rope's parameters to recordings between two grips.
+
+    Args:
+        recordings: with two or more clamped markers at each end.
+        density: kg/m, weighed.
+        ladder: the rungs, in order; the first one always stays.
+        validate: share of the recordings that decide whether a rung stays, and that no rung is fitted to; the last fit
+            sees all.
+        bending_lengths: m, of the starts.
+        windows: (length, total) in s: each fit sees windows of this length, of about this total.
+        segments, max_segments: links at the start, and at most; they are doubled until EI moves by less than 5 %.
+        substeps: per frame.
+        smoothing: s, of the recorded grips and starts.
+        sigma: m, expected error of a marker.
+        threads: the result does not depend on it.
+        say: called with a line on each step.
+
+    Raises:
+        InputError, RecordingError: anything inconsistent, named, before work starts.
+    """
+    if not (np.isfinite(density) and density > 0):
+        raise InputError("density", "must be positive", density, "weigh the rope and give kg/m")
+    if not recordings:
+        raise InputError("recordings", "are empty", 0, "give at least one")
+    if not 0 <= validate < 1:
+        raise InputError("validate", "must be a share below 1", validate, "give such as 0.25")
+    shared_gravity(recordings)
+    motions = [GrippedMotion.of(r, smoothing) for r in recordings]
+    model = RopeModel(
+        density=density,
+        nominal=nominal_directions(motions),
+        values={},
+        segments=segments,
+        substeps=substeps,
+        smoothing=smoothing,
+        sigma=sigma,
+    )
+    search = _Search(motions, validate, windows, threads, say)
+    return search.run(model, ladder, bending_lengths, max_segments)
+
+
+class _Search:
+    def __init__(
+        self,
+        motions: Sequence[GrippedMotion],
+        validate: float,
+        windows: Sequence[tuple[float, float]],
+        threads: int,
+        say: Say,
+    ) -> None:
+        count = len(motions)
+        others = set(np.linspace(0, count - 1, round(validate * count), dtype=int).tolist()) if count > 1 else set()
+        self.all = list(motions)
+        self.fitted = [m for i, m in enumerate(motions) if i not in others]
+        self.others = [m for i, m in enumerate(motions) if i in others]
+        self.windows, self.threads, self.say = windows, threads, say
+
+    def run(
+        self, model: RopeModel, ladder: Sequence[Rung], bending_lengths: Sequence[float], max_segments: int
+    ) -> RopeFit:
+        parameters: tuple[Parameter, ...] = ladder[0].parameters
+        model, values = self._first(model, ladder[0], bending_lengths)
+        model, values = self._refined(model, parameters, values, max_segments)
+        steps = [self._step(ladder[0].name, model, values, None, time.perf_counter())]
+        for rung in ladder[1:]:
+            began = time.perf_counter()
+            larger = replace(model, **dict(rung.options), values={**model.values, **rung.values})  # type: ignore[arg-type]
+            wanted = (*parameters, *rung.parameters)
+            found = self._minimum(larger, wanted, values, self.windows[-1])
+            step = self._step(rung.name, larger, found, steps, began)
+            steps.append(step)
+            if step.stays:
+                model, parameters, values = larger.at(found), wanted, found
+        last = self._conclude(model, parameters, values)
+        values = {name: last.values[name] for name in last.values}
+        return RopeFit(model.at(values), values, tuple(steps), last, tuple(_warnings(model, values)))
+
+    def _first(
+        self, model: RopeModel, rung: Rung, bending_lengths: Sequence[float]
+    ) -> tuple[RopeModel, dict[str, float]]:
+        """The best of several stiffnesses on short windows, then on longer ones."""
+        ends = []
+        for length in bending_lengths:
+            EI = model.density * 9.81 * length**3
+            start = {"EI": EI, "GJ": 0.7 * EI, "bend_damping": 0.03, "twist_damping": 0.03, "drag_linear": 0.02}
+            start["length"] = float(np.mean([m.length for m in self.all]))
+            candidate = model.with_values(**start)
+            values = self._minimum(candidate, rung.parameters, {}, self.windows[0], iterations=12)
+            cost = self._cost(candidate, values, self.windows[min(1, len(self.windows) - 1)])
+            self.say(f"start at a bending length of {length:g} m: EI {values[f'{NAME}_EI']:.3g}, cost {cost:.4g}")
+            ends.append((cost, candidate.at(values), values))
+        _, model, values = min(ends, key=lambda end: end[0])
+        for window in self.windows[1:]:
+            values = self._minimum(model, rung.parameters, values, window)
+            model = model.at(values)
+        return model, values
+
+    def _refined(
+        self, model: RopeModel, parameters: tuple[Parameter, ...], values: dict[str, float], max_segments: int
+    ) -> tuple[RopeModel, dict[str, float]]:
+        """Doubles the links until EI moves by less than 5 %."""
+        while 2 * model.segments <= max_segments:
+            finer = replace(model, segments=2 * model.segments)
+            found = self._minimum(finer, parameters, values, self.windows[min(1, len(self.windows) - 1)])
+            before = self._minimum(model, parameters, values, self.windows[min(1, len(self.windows) - 1)])
+            moved = abs(found[f"{NAME}_EI"] / before[f"{NAME}_EI"] - 1.0)
+            self.say(f"{model.segments} to {finer.segments} links move EI by {100 * moved:.2g} %")
+            if moved < SETTLED:
+                break
+            values = self._minimum(finer, parameters, found, self.windows[-1])
+            model = finer.at(values)
+        return model, values
+
+    def _minimum(
+        self,
+        model: RopeModel,
+        parameters: Sequence[Parameter],
+        values: Mapping[str, float],
+        window: tuple[float, float],
+        iterations: int = 30,
+    ) -> dict[str, float]:
+        problem = _problem(_experiments(model, self.fitted, window), parameters, values, self.threads)
+        u = problem.parameters.initial()
+        end, _ = minimize(problem, u, max_iterations=iterations, tolerance=TOLERANCE)
+        if end.interrupted:
+            raise KeyboardInterrupt
+        return problem.parameters.to_physical(end.u)
+
+    def _cost(self, model: RopeModel, values: Mapping[str, float], window: tuple[float, float]) -> float:
+        problem = _problem(_experiments(model, self.fitted, window), (), values, self.threads)
+        ok, r, _ = problem.evaluate(np.zeros(0), jacobian=False)
+        return 0.5 * float(r @ r) if ok else np.inf
+
+    def _step(
+        self, name: str, model: RopeModel, values: Mapping[str, float], before: Sequence[Step] | None, began: float
+    ) -> Step:
+        judges = self.others or self.fitted
+        fitted, others = (self._error(model, values, part) for part in (self.fitted, judges))
+        best = None if before is None else min(s.others for s in before if s.stays)
+        stays = best is None or others < BETTER * best
+        self.say(f"{name}: {1e3 * fitted:.3g} mm, {1e3 * others:.3g} mm on others{'' if stays else ', does not stay'}")
+        return Step(name, fitted, others, stays, time.perf_counter() - began)
+
+    def _error(self, model: RopeModel, values: Mapping[str, float], motions: Sequence[GrippedMotion]) -> float:
+        errors = []
+        for m in motions:
+            predicted = predict(model, m, values)
+            errors.append(coordinate_error(m.recording, predicted) if np.isfinite(predicted).all() else np.inf)
+        return float(np.mean(errors))
+
+    def _conclude(self, model: RopeModel, parameters: Sequence[Parameter], values: Mapping[str, float]) -> Fit:
+        experiments = _experiments(model, self.all, self.windows[-1])
+        return fit(experiments, parameters=_starting(parameters, values), threads=self.threads, max_iterations=30)
+
+
+def _experiments(model: RopeModel, motions: Sequence[GrippedMotion], window: tuple[float, float]) -> list[Experiment]:
+    """Windows of one length, spread over all recordings, of about the total time."""
+    length, total = window
+    whole = [float(m.recording.times[-1] - m.recording.times[0]) for m in motions]
+    places = [
+        (m, float(m.recording.times[0]) + k * length)
+        for m, duration in zip(motions, whole, strict=True)
+        for k in range(max(1, int(duration / length + 1e-9)))
+    ]
+    count = max(1, min(len(places), round(total / length)))
+    chosen = [places[i] for i in np.unique(np.linspace(0, len(places) - 1, count).astype(int))]
+    return [model.experiment(m, (start, start + length)) for m, start in chosen]
+
+
+def _starting(parameters: Sequence[Parameter], values: Mapping[str, float]) -> list[Parameter]:
+    return [
+        replace(p, initial=float(np.clip(values[p.name], p.lower, p.upper)))
+        if p.tied_to is None and p.name in values
+        else p
+        for p in parameters
+    ]
+
+
+def _problem(
+    experiments: Sequence[Experiment],
+    parameters: Sequence[Parameter],
+    values: Mapping[str, float],
+    threads: int = 1,
+) -> FitProblem:
+    """Free parameters start at `values`; other quantities keep them."""
+    from ..parameters import Parameters
+
+    free = {p.name for p in parameters}
+    known = experiments[0].scene.quantities
+    start = {name: q.value for name, q in known.items()} | dict(values)
+    held = [
+        Parameter(name=name, initial=start[name], fixed=True) for name in known if name in values and name not in free
+    ]
+    return FitProblem(experiments, Parameters([*_starting(parameters, start), *held]), threads=threads)
+
+
+def _warnings(model: RopeModel, values: Mapping[str, float]) -> list[str]:
+    """Links that are long beside the bending length."""
+    EI, length = values[f"{NAME}_EI"], values[f"{NAME}_length"]
+    bending = (EI / (model.density * 9.81)) ** (1 / 3)
+    links = bending / (length / model.segments)
+    if links >= LINKS_PER_BENDING_LENGTH:
+        return []
+    return [
+        f"a bending length ({1e3 * bending:.3g} mm) holds only {links:.2g} links: EI may read up to two times too high "
+        "and GJ too low; raise max_segments"
+    ]

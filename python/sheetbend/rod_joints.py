@@ -1,0 +1,125 @@
+"""The joints of a rod: bending with or without yield, twist, and what they are at rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .chain import first_value, voronoi_shares
+from .errors import SceneError
+from .quantities import Term
+from .scene import Array, Scene
+
+Factors = tuple[tuple[str, str], ...]
+
+
+class Joints:
+    """Adds a rod's joints to a scene, group by group; alpha = Voronoi length / stiffness.
+
+    Args:
+        stencils: (joints, 5) three points and two directors.
+        place: (joints,) node numbers along the rod; a gripped end is a joint that counts the rod's own half link.
+    """
+
+    def __init__(self, scene: Scene, name: str, stencils: Array, place: Array, segments: int) -> None:
+        self._scene, self._name, self._stencils = scene, name, stencils
+        self._share, self._s = voronoi_shares(segments)[place], place / segments
+        self._length = f"{name}_length"
+        self._ratio: Factors = ()
+        self._rest_of_bend = 0
+
+    def bend(
+        self,
+        EI: float,
+        EI2: float | None,
+        damping: float | None,
+        yield_curvature: float | None,
+        yield_share: float | None,
+    ) -> None:
+        """Material curvatures; with a set per joint where they yield."""
+        scene, name = self._scene, self._name
+        scene.add_quantity(f"{name}_EI", EI, "N m^2")
+        stencils, kind = self._stencils, "material_curvature"
+        if yield_curvature is not None:
+            sets = scene.add_particles(np.zeros((len(stencils), 3)), 1.0)
+            scene.pin(sets)
+            stencils, kind = np.column_stack([stencils, sets]), "yielding_curvature"
+        self._group("bend", kind, f"{name}_EI", stencils, damping)
+        start, width = first_value(scene, f"{name}_bend"), 3 if yield_curvature is None else 5
+        first = start + width * np.arange(len(stencils))
+        self._rest_of_bend = width - 2
+        rest = scene.group(f"{name}_bend")[0].rest
+        if EI2 is not None:
+            scene.add_quantity(f"{name}_EI2", EI2, "N m^2")
+            self._ratio = ((f"{name}_EI2", "sqrt"), (f"{name}_EI", "inverse_sqrt"))
+            rest[:, 0] = 0.0
+            scene.add_terms([Term("rest", first, 1.0, self._ratio)])
+        if yield_curvature is not None and yield_share is not None:
+            scene.add_quantity(f"{name}_yield_share", yield_share, "")
+            scene.add_quantity(f"{name}_yield_curvature", yield_curvature, "1/m")
+            rest[:, 1:3] = 0.0
+            scene.add_terms(
+                [
+                    Term("rest", first + 1, 1.0, ((f"{name}_yield_share", "identity"),)),
+                    Term(
+                        "rest",
+                        first + 2,
+                        self._share,
+                        ((f"{name}_yield_curvature", "identity"), (self._length, "identity")),
+                    ),
+                ]
+            )
+
+    def twist(self, damping: float | None) -> None:
+        """Twist between neighboring edges; the quantity GJ is there already."""
+        self._group("twist", "twist", f"{self._name}_GJ", self._stencils, damping)
+
+    def rest(self, curvature_modes: Sequence[int], twist_modes: Sequence[int]) -> None:
+        """Rest curvature and twist in modes cos(k pi s/length)."""
+        bend, twist = (first_value(self._scene, f"{self._name}_{label}") for label in ("bend", "twist"))
+        joints = np.arange(len(self._stencils))
+        curvature = bend + (self._rest_of_bend + 2) * joints + self._rest_of_bend
+        targets: list[tuple[str, Sequence[int], Array, Factors]] = [
+            ("curvature_1", curvature_modes, curvature, ()),
+            ("curvature_2", curvature_modes, curvature + 1, self._ratio),
+            ("twist", twist_modes, twist + joints, ()),
+        ]
+        for label, modes, index, factors in targets:
+            for mode, weights in self._modes(label, modes, "1/m"):
+                own: Factors = ((mode, "identity"), (self._length, "identity"), *factors)
+                self._scene.add_terms([Term("rest", index, self._share * weights, own)])
+
+    def soften(self, modes: Sequence[int]) -> None:
+        """Compliance length/EI (1 + sum of modes), each mode starting at zero."""
+        first = self._scene.group(f"{self._name}_bend")[1] + np.arange(len(self._stencils))
+        for mode, weights in self._modes("softness", modes, ""):
+            factors: Factors = ((mode, "identity"), (self._length, "identity"), (f"{self._name}_EI", "inverse"))
+            self._scene.add_terms([Term("compliance", first, self._share * weights, factors)])
+
+    def _group(self, label: str, kind: str, stiffness: str, stencils: Array, damping: float | None) -> None:
+        scene, group, zero = self._scene, f"{self._name}_{label}", np.zeros(len(stencils))
+        scene.add_constraints(kind, stencils, name=group, compliance=zero, damping=None if damping is None else zero)
+        first = scene.group(group)[1] + np.arange(len(stencils))
+        scene.add_terms([Term("compliance", first, self._share, ((self._length, "identity"), (stiffness, "inverse")))])
+        if damping is not None:
+            tau = scene.add_quantity(f"{group}_damping", damping, "s")
+            factors: Factors = ((tau, "identity"), (stiffness, "identity"), (self._length, "inverse"))
+            scene.add_terms([Term("damping", first, 1.0 / self._share, factors)])
+
+    def _modes(self, label: str, modes: Sequence[int], unit: str) -> list[tuple[str, Array]]:
+        """A new quantity per mode, and its weights at the joints."""
+        made = []
+        for k in modes:
+            if k != int(k) or k < 0:
+                fix = "give such as (0, 1)"
+                raise SceneError(f"{self._name}.{label}", "has modes that are no whole numbers from 0 on", k, fix)
+            name = f"{self._name}_{label}_{k}"
+            scale = 1.0 if unit else 0.3
+            made.append(
+                (
+                    self._scene.add_quantity(name, 0.0, unit, positive=False, scale=scale),
+                    np.cos(k * np.pi * self._s),
+                )
+            )
+        return made
