@@ -102,6 +102,7 @@ std::size_t reverse_bytes(const Scene& scene, const Plan& plan) {
   const std::size_t states = 7 + (plan.options.integrator == Integrator::bdf1 ? 1 : 2);
   std::size_t bytes = sizeof(T) * states * dofs + substep_bytes<T>(scene, plan, true);
   for (const DirectBlock& block : plan.blocks) bytes += block_cotangent_bytes<T>(scene, block);
+  if (scene.yields) bytes += sizeof(T) * dofs;
   if (!sweeps_packs<T>(plan)) bytes += sizeof(T) * (dofs + nodes);
   if (plan.colors.empty()) return bytes;
   bytes += sizeof(T) * damped_rows(scene);

@@ -11,6 +11,10 @@ namespace {
 constexpr int repetitions = 20;
 using Dual1 = Dual<double, 1>;
 
+// Coordinates in space: an internal variable, the last of a stencil that yields, is none.
+template <class K>
+constexpr int spatial = Yields<K> ? K::dofs - 3 : K::dofs;
+
 struct Stencil {
   std::vector<double> x, p;
 };
@@ -175,6 +179,8 @@ TYPED_TEST(Constraint, ParameterDerivativesMatchComplexStep) {
     for (int k = 0; k < parameter_count<K>; ++k) {
       const auto e = unit(z.size(), K::dofs + k);
       const auto found = dual_along<K>(z, e), oracle = complex_step_along(evaluate_joined<K, Complex>, z, e);
+      if constexpr (Yields<K>)
+        if (k == K::yield_parameter) continue;  // acts in yield() alone
       EXPECT_GT(largest(std::span(oracle).first(K::rows)), 0.0) << K::parameters[k];
       EXPECT_LE(relative_error(std::span(found).first(K::rows), std::span(oracle).first(K::rows)), 1e-13)
           << K::parameters[k];
@@ -215,13 +221,15 @@ TYPED_TEST(Constraint, RotationTurnsOrKeepsC) {
       const auto normal = rotated(R, axis);
       std::copy(normal.begin(), normal.end(), p.begin() + row.normal);
     }
-    const auto before = evaluate<K>(s.x, s.p), after = evaluate<K>(rotated(R, s.x), p);
+    std::vector<double> x = rotated(R, s.x);
+    std::copy(s.x.begin() + spatial<K>, s.x.end(), x.begin() + spatial<K>);
+    const auto before = evaluate<K>(s.x, s.p), after = evaluate<K>(x, p);
     const std::vector<double> C(before.begin(), before.begin() + K::rows);
     EXPECT_LE(relative_error(std::span(after).first(K::rows), turns ? rotated(R, C) : C), 1e-13);
 
     for (int j = 0; j < K::rows; ++j) {
       Vec3<double> torque;
-      for (int k = 0; k < K::arity; ++k)
+      for (int k = 0; 3 * k < spatial<K>; ++k)
         torque = torque + cross(Vec3<double>(&s.x[3 * k]), Vec3<double>(&before[K::rows + j * K::dofs + 3 * k]));
       if constexpr (K::rows == 3)
         if (turns) torque = torque - cross(Vec3<double>(C.data()), Vec3<double>(unit(3, j).data()));
@@ -237,11 +245,12 @@ TYPED_TEST(Constraint, ScalesWithTheUnitOfLength) {
   for (const double scale : {1e-3, 7.0, 1e3}) {
     const Stencil s = jittered<K>(4);
     std::vector<double> x = s.x, p = s.p;
-    for (double& v : x) v *= scale;
+    for (int d = 0; d < spatial<K>; ++d) x[d] *= scale;
     for (std::size_t k = 0; k < p.size(); ++k) p[k] *= std::pow(scale, row.parameter_degree[k]);
     std::vector<double> expected = evaluate<K>(s.x, s.p);
     for (int i = 0; i < static_cast<int>(expected.size()); ++i)
-      expected[i] *= std::pow(scale, i < K::rows ? row.degree : row.degree - 1);
+      expected[i] *=
+          std::pow(scale, i < K::rows || (i - K::rows) % K::dofs >= spatial<K> ? row.degree : row.degree - 1);
     const auto found = evaluate<K>(x, p);
     EXPECT_LE(relative_error(std::span(found).first(K::rows), std::span(expected).first(K::rows)), 1e-13);
     EXPECT_LE(relative_error(std::span(found).subspan(K::rows), std::span(expected).subspan(K::rows)), 1e-13);
@@ -253,7 +262,9 @@ TYPED_TEST(Constraint, RelabelingGivesTheSameConstraint) {
   const Case row = case_of<K>();
   const Stencil s = jittered<K>(5);
   std::vector<double> x(s.x.size()), p = s.p;
-  for (int d = 0; d < K::dofs; ++d) x[d] = s.x[3 * row.relabeling[d / 3] + d % 3];
+  // An internal variable belongs to C, so it takes C's signs.
+  const auto sign = [&](int d) { return d >= spatial<K> && d - spatial<K> < K::rows ? row.sign[d - spatial<K>] : 1; };
+  for (int d = 0; d < K::dofs; ++d) x[d] = sign(d) * s.x[3 * row.relabeling[d / 3] + d % 3];
   for (std::size_t k = 0; k < p.size(); ++k) p[k] *= row.parameter_sign[k];
   const auto before = evaluate<K>(s.x, s.p), after = evaluate<K>(x, p);
   std::vector<double> expected(before.size());
@@ -261,7 +272,7 @@ TYPED_TEST(Constraint, RelabelingGivesTheSameConstraint) {
     expected[j] = row.sign[j] * before[j];
     for (int d = 0; d < K::dofs; ++d)
       expected[K::rows + j * K::dofs + d] =
-          row.sign[j] * before[K::rows + j * K::dofs + 3 * row.relabeling[d / 3] + d % 3];
+          sign(d) * row.sign[j] * before[K::rows + j * K::dofs + 3 * row.relabeling[d / 3] + d % 3];
   }
   EXPECT_LE(relative_error(after, expected), 1e-14);
 }

@@ -139,9 +139,9 @@ def predict(model: RopeModel, motion: GrippedMotion, values: Mapping[str, float]
     e = model.experiment(motion)
     out = motion.recording.filled().positions.copy()
     free = list(motion.free)
-    problem = _problem([replace(e, fit=None)], (), values)
+    problem = _problem([replace(e, fit=None)], (TWIST.parameters[0],), values)
     try:
-        out[:, free] = problem.simulate(np.zeros(0))[0]
+        out[:, free] = problem.simulate(problem.parameters.initial())[0]
     except SheetbendError:
         out[:, free] = np.nan
     return out
@@ -292,8 +292,8 @@ class _Search:
         return problem.parameters.to_physical(end.u)
 
     def _cost(self, model: RopeModel, values: Mapping[str, float], window: tuple[float, float]) -> float:
-        problem = _problem(_experiments(model, self.fitted, window), (), values, self.threads)
-        ok, r, _ = problem.evaluate(np.zeros(0), jacobian=False)
+        problem = _problem(_experiments(model, self.fitted, window), (TWIST.parameters[0],), values, self.threads)
+        ok, r, _ = problem.evaluate(problem.parameters.initial(), jacobian=False)
         return 0.5 * float(r @ r) if ok else np.inf
 
     def _step(
