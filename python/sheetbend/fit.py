@@ -68,6 +68,7 @@ def fit(
     starts: Sequence[Mapping[str, float]] = (),
     refine: Refinement | None = None,
     leave_one_out: bool = False,
+    profiles: bool = True,
     max_iterations: int = 200,
     threads: int = 1,
     progress: Observer | None = None,
@@ -83,6 +84,8 @@ def fit(
         refine: also refit on a finer discretization, and count what that moves as a part of the intervals (see
             `discretization`).
         leave_one_out: also predict every recording that holds nothing out by a fit to the others.
+        profiles: refit the others along the worst parameters for their intervals; without, intervals are the linear
+            ones, which cost nothing beside the fit.
         max_iterations: per start.
         threads: over experiments and Jacobian columns; the result does not depend on it.
         progress: called after every iteration.
@@ -123,7 +126,7 @@ def fit(
             if refine is None or refitter is None
             else refined_estimates(refine, experiments, wanted, problem, best.u, refitter, threads)
         )
-        return _judge(problem, best.u, refined, refitter), *predicted_values(
+        return _judge(problem, best.u, refined, refitter if profiles else None), *predicted_values(
             experiments, wanted, values, refitter, threads
         )
 

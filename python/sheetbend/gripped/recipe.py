@@ -315,7 +315,8 @@ class _Search:
 
     def _conclude(self, model: RopeModel, parameters: Sequence[Parameter], values: Mapping[str, float]) -> Fit:
         experiments = _experiments(model, self.all, self.windows[-1])
-        return fit(experiments, parameters=_starting(parameters, values), threads=self.threads, max_iterations=30)
+        wanted = _starting(parameters, values)
+        return fit(experiments, parameters=wanted, threads=self.threads, profiles=False, max_iterations=30)
 
 
 def _experiments(model: RopeModel, motions: Sequence[GrippedMotion], window: tuple[float, float]) -> list[Experiment]:
