@@ -60,14 +60,15 @@ void factorize_band(int n, int any_band, T* A, T* inverse) {
   }
 }
 
-template <int Band, class T>
-void solve_band(int n, int any_band, const T* A, const T* inverse, T* b) {
+// A right side may be of another scalar than the matrix: eight of them in lanes.
+template <int Band, class T, class U>
+void solve_band(int n, int any_band, const T* A, const T* inverse, U* b) {
   const int band = Band > 0 ? Band : any_band;
   A += band * (band + 1);
   inverse += band;
   for (int j = 0; j < n; ++j) {
     const T* column = A + static_cast<long>(j) * (band + 1);
-    const T t = b[j] * inverse[j];
+    const U t = b[j] * inverse[j];
 #pragma GCC unroll 16
     for (int i = 1; i <= band; ++i) b[j + i] -= column[i] * t;
     b[j] = t;
@@ -75,7 +76,7 @@ void solve_band(int n, int any_band, const T* A, const T* inverse, T* b) {
   for (int j = n - 1; j >= 0; --j) {
     const T* column = A + static_cast<long>(j) * (band + 1);
     // The entry that was found last comes last: it is what the others wait for.
-    T even(0.0), odd(0.0);
+    U even(0.0), odd(0.0);
 #pragma GCC unroll 16
     for (int i = band; i > 1; --i) (i % 2 ? odd : even) += column[i] * b[j + i];
     b[j] -= inverse[j] * ((even + odd) + column[1] * b[j + 1]);

@@ -79,14 +79,38 @@ struct Reverse {
   void (*refer)(const References&);
 };
 
+// The same arrays' derivatives along eight directions; directions come last: (..., 8). Values are those of packs of members: (packs, count, 8, 8).
+struct Tangents {
+  const double* const* values;  // per run
+  const double *x, *lambda, *C_r;
+  double *x_next, *lambda_next;
+  double* dl;  // (size and band)
+  double* u;   // (particles, 4) those of W J^T dl for a dl that stands still
+};
+
+struct ReferenceTangents {
+  const double* const* values;
+  const double *x, *x_before;
+  double* C_r;
+};
+
+// Beside those of one scene: right_side() after solve() there, solve() for eight right sides, push() before the one there.
+struct TangentKernels {
+  void (*right_side)(const Block&, const Tangents&);
+  void (*solve)(const Block&, double* b);  // (size and band, 8)
+  void (*push)(const Block&, const Tangents&);
+  void (*refer)(const References&, const ReferenceTangents&);
+};
+
 struct Kernels {
   Forward forward;
   Reverse reverse;
 };
 
 struct Table {
-  Kernels one;   // of one scene
-  Kernels many;  // of eight
+  Kernels one;              // of one scene
+  Kernels many;             // of eight
+  TangentKernels tangents;  // of one scene along eight directions
 };
 
 }  // namespace sheetbend_blocks

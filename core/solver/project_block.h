@@ -3,6 +3,8 @@
 #pragma once
 
 #include "core/blocks/block_forward.h"
+#include "core/solver/block_tangents.h"
+#include "core/solver/numbers.h"
 #include "core/solver/placed.h"
 #include "core/solver/plan.h"
 
@@ -20,34 +22,18 @@ const sheetbend_blocks::Forward& forward_kernels(const sheetbend_packs::KernelTa
     return ForwardKernels<T>::all;
 }
 
-// Numbers as the kernels see them, aligned for packs.
-template <class T>
-class Numbers {
- public:
-  void assign(std::size_t count) {
-    const std::size_t width = sizeof(Wide<T>) / sizeof(T);
-    wide_.assign((count + width - 1) / width, Wide<T>(0.0));
-  }
-  void clear() { std::fill(wide_.begin(), wide_.end(), Wide<T>(0.0)); }
-  T* data() { return reinterpret_cast<T*>(wide_.data()); }
-  double* numbers() { return reinterpret_cast<double*>(wide_.data()); }
-  T& operator[](std::size_t i) { return data()[i]; }
-
- private:
-  std::vector<Wide<T>> wide_;
-};
-
 // Where number `part` of `parts` of a run's member stands: in a lane of a pack of members, or with its member's others.
 template <class T>
 std::size_t member_number(int member, int parts, int part) {
-  return members_in_lanes<T> ? lane_at(member, parts, part) : static_cast<std::size_t>(member) * parts + part;
+  return members_in_lanes<Plain<T>> ? lane_at(member, parts, part) : static_cast<std::size_t>(member) * parts + part;
 }
 
 template <class T>
 struct BlockState {
   struct Iteration {
-    Numbers<T> gradients, dl, u;
-    Factor<T> factor;
+    Numbers<Plain<T>> gradients;
+    Numbers<T> dl, u;
+    Factor<Plain<T>> factor;
   };
   std::vector<Iteration> iterations;
   std::vector<Numbers<T>> x, lambda;  // before each iteration and after the last; one of each where nothing is kept
@@ -64,7 +50,7 @@ struct BlockState {
 template <class T>
 void BlockState<T>::resize(const Scene& scene, const DirectBlock& block, int kept_iterations) {
   const std::size_t particles = block.particles.size() * sheetbend_blocks::row;
-  const std::size_t rows = Factor<T>::right_side(block.structure);
+  const std::size_t rows = Factor<Plain<T>>::right_side(block.structure);
   eta = 0.0;
   iterations.resize(std::max(1, kept_iterations));
   for (Iteration& i : iterations) {
@@ -117,7 +103,7 @@ void fill_values(const SubstepState<T>& s, const DirectBlock& block, BlockState<
 template <class T>
 void load_coordinates(const Scene& scene, const DirectBlock& block, const T* x, Numbers<T>& rows) {
   for (std::size_t p = 0; p < block.particles.size(); ++p)
-    std::copy_n(x + scene.first_dof[block.particles[p]], 3, rows.data() + sheetbend_blocks::row * p);
+    for (int d = 0; d < 3; ++d) rows[sheetbend_blocks::row * p + d] = x[scene.first_dof[block.particles[p]] + d];
 }
 
 // Takes coordinates and inverse masses from the substep's state, and multipliers and damping references where it has them.
@@ -194,14 +180,14 @@ void factor_sparse(const DirectBlock& block, BlockState<T>& state, int iteration
   auto& own = state.at(iteration);
   own.factor.reset(block.structure);
   for (int row = 0; row < block.size(); ++row)
-    own.factor.values[block.structure.position(row, row)] = state.diagonal[row];
-  const T *G = own.gradients.data(), *x = state.at(state.x, iteration).data();
+    own.factor.values[block.structure.position(row, row)] = state.diagonal.data()[row];
+  const Plain<T>*G = own.gradients.data(), *x = state.at(state.x, iteration).data();
   auto position = block.positions.begin();
   for (int p = 0; p < block.movable; ++p)
     for (int i = block.window[p]; i < block.window[p + 1]; ++i) {
-      const Vec3<T> wG = x[sheetbend_blocks::row * p + 3] * Vec3<T>(G + sheetbend_blocks::row * i);
+      const Vec3<Plain<T>> wG = x[sheetbend_blocks::row * p + 3] * Vec3<Plain<T>>(G + sheetbend_blocks::row * i);
       for (int k = block.window[p]; k <= i; ++k)
-        own.factor.values[*position++] += dot(wG, Vec3<T>(G + sheetbend_blocks::row * k));
+        own.factor.values[*position++] += dot(wG, Vec3<Plain<T>>(G + sheetbend_blocks::row * k));
     }
   own.factor.factorize(block.structure);
 }
@@ -214,13 +200,15 @@ void refer_block(const SubstepState<T>& s, const DirectBlock& block, const sheet
   load_coordinates(s.scene, block, x, state.x_now);
   load_coordinates(s.scene, block, x_before, state.x_before);
   const auto runs = runs_of(s, block, state);
-  forward_kernels<T>(table).refer(references_of(runs, before, state));
+  const auto references = references_of(runs, before, state);
+  forward_kernels<Plain<T>>(table).refer(references);
+  if constexpr (carries_tangents<T>) refer_tangents(references, table.blocks->tangents, state);
 }
 
 template <class T>
 void project_block(const SubstepState<T>& s, const DirectBlock& block, const sheetbend_packs::KernelTable& table,
                    BlockState<T>& state, int iteration) {
-  const auto& kernels = forward_kernels<T>(table);
+  const auto& kernels = forward_kernels<Plain<T>>(table);
   const auto runs = runs_of(s, block, state);
   const auto arrays = arrays_of(block, runs, state, iteration);
   kernels.evaluate(arrays);
@@ -231,6 +219,7 @@ void project_block(const SubstepState<T>& s, const DirectBlock& block, const she
     factor_sparse(block, state, iteration);
     state.at(iteration).factor.solve(block.structure, state.at(iteration).dl.data());
   }
+  if constexpr (carries_tangents<T>) project_tangents(block, table.blocks->tangents, arrays, state, iteration);
   kernels.push(arrays);
 }
 
@@ -238,7 +227,8 @@ void project_block(const SubstepState<T>& s, const DirectBlock& block, const she
 template <class T>
 void end_block(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state) {
   for (int p = 0; p < block.movable; ++p)
-    std::copy_n(state.x.back().data() + sheetbend_blocks::row * p, 3, s.q + s.scene.first_dof[block.particles[p]]);
+    for (int d = 0; d < 3; ++d)
+      s.q[s.scene.first_dof[block.particles[p]] + d] = state.x.back()[sheetbend_blocks::row * p + d];
 }
 
 // Writes the multipliers in the scene's order.

@@ -55,7 +55,8 @@ class Factor {
               [&]<int Band>() { factorize_band<Band>(s.n_, s.stored_band(), values.data(), inverse.data()); });
   }
 
-  void solve(const FactorStructure& s, T* b) const {
+  template <class U>
+  void solve(const FactorStructure& s, U* b) const {
     if (!s.banded_) return solve_sparse(s, b);
     with_band(s.stored_band(),
               [&]<int Band>() { solve_band<Band>(s.n_, s.stored_band(), values.data(), inverse.data(), b); });
@@ -87,7 +88,8 @@ class Factor {
     }
   }
 
-  void solve_sparse(const FactorStructure& s, T* b) const {
+  template <class U>
+  void solve_sparse(const FactorStructure& s, U* b) const {
     for (int j = 0; j < s.n_; ++j)
       for (int q = s.column_start_[j]; q < s.column_start_[j + 1]; ++q) b[lower_row_[q]] -= lower_[q] * b[j];
     for (int j = 0; j < s.n_; ++j) b[j] = b[j] * inverse[j];

@@ -303,6 +303,46 @@ TEST_P(CoupledBlocks, HaveTheSameBitsInEveryLane) {
   }
 }
 
+// Eight directions, and the first four of them, beside the values; every output along every direction.
+TEST_P(CoupledBlocks, TangentsMatchComplexStepOnEveryInstructionSet) {
+  const Sample sample = random_scene(27, {.net = GetParam()});
+  Projection p(sample.scene, Partition::direct, eta);
+  Random random(27);
+  const auto theta = p.random_theta(sample.inputs, random);
+  std::vector<std::vector<double>> along;
+  for (int k = 0; k < 8; ++k) along.push_back(random.vector(theta.size()));
+  for (auto& v : along)
+    for (std::size_t i = 0; i < v.size(); ++i) v[i] *= std::abs(theta[i]);
+  std::vector<Dual<double, 8>> eight(theta.begin(), theta.end());
+  std::vector<Dual<double, 4>> four(theta.begin(), theta.end());
+  for (std::size_t i = 0; i < theta.size(); ++i) {
+    for (int k = 0; k < 8; ++k) eight[i].d[k] = along[k][i];
+    std::copy_n(eight[i].d, 4, four[i].d);
+  }
+  const auto direction = [](const auto& found, int k) {
+    std::vector<double> out;
+    for (const auto& a : found) out.push_back(k < 0 ? a.v : a.d[k]);
+    return out;
+  };
+  const auto values = p.forward(theta);
+  const auto expected = p.forward(eight);
+  double worst = 0.0;
+  for (int k = 0; k < 8; ++k)
+    worst = std::max(worst,
+                     relative_error(direction(expected, k),
+                                    complex_step_along([&](const auto& z) { return p.forward(z); }, theta, along[k])));
+  EXPECT_LE(worst, 1e-13);
+  record_error("tangents", worst);
+  for (const auto* kernels : available_kernels()) {
+    p.kernels = kernels;
+    const auto found = p.forward(eight);
+    EXPECT_TRUE(same_bits(direction(found, -1), values)) << kernels->name;
+    for (int k = 0; k < 8; ++k) EXPECT_TRUE(same_bits(direction(found, k), direction(expected, k))) << kernels->name;
+    const auto fewer = p.forward(four);
+    for (int k = -1; k < 4; ++k) EXPECT_TRUE(same_bits(direction(fewer, k), direction(found, k))) << kernels->name;
+  }
+}
+
 TEST_P(CoupledBlocks, OneSweepByColorMatchesComplexStep) {
   const Sample sample = random_scene(30, {.net = GetParam()});
   record_error("vjp", climb(Projection(sample.scene, Partition::gauss_seidel, eta), sample.inputs, 30));

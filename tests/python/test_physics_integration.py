@@ -200,7 +200,7 @@ def test_pendulum_period(order, h, error):
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_pendulum_period_derivatives(order):
-    """dT/dL = T/(2L), dT/dg = -T/(2g), and no trace of the mass."""
+    """dT/dL = T/(2L), dT/dg = -T/(2g), and no trace of the mass beyond the rounding of a position of 1 m."""
     amplitude, h = math.radians(30), 1 / 1200
     scene, times, s = pendulum(amplitude), steps(h, 2160), solver(h, order)
     motion = sb.simulate(scene, times, s).positions[:, 1, X]
@@ -213,7 +213,7 @@ def test_pendulum_period_derivatives(order):
     whole = {"rest": [1.0], "position": [0, 0, 0, math.sin(amplitude), 0, -math.cos(amplitude)]}
     assert by(whole) == approx(exact / 2.0, rel=tolerance)
     assert by({"gravity": [0.0, 0.0, -1.0]}) == approx(-exact / (2.0 * G), rel=tolerance)
-    assert np.all(tangents(scene, times, s, {"mass": [0.0, 1.0]}) == 0.0)
+    assert np.max(np.abs(tangents(scene, times, s, {"mass": [0.0, 1.0]}))) <= 1e-16
 
 
 def test_pendulum_derivatives_of_the_discrete_program():

@@ -1,0 +1,182 @@
+// Tangents of the block projection: derivatives of what the kernels of plain numbers compute, along eight directions at once. With J' for the
+// derivative of J along the directions, z = W J^T dl and everything else that stands still, A dl = s gives
+//   A dl' = s' - (a/(1+g))' dl - J' z - J z',  z' = W' J^T dl + W J'^T dl,
+// so the matrix is factored once, in plain numbers, and J' lives no longer than its member is looked at.
+#pragma once
+
+#include "core/blocks/block_forward.h"
+#include "core/scalar/dual.h"
+
+namespace sheetbend {
+
+// A value in every lane of a register and one direction in each.
+using Tangent = Dual<Register, 1>;
+
+// Register `lane`/register_lanes of the directions that belong to number `i`.
+inline Register& directions_at(double* directions, long i, int lane) {
+  return *reinterpret_cast<Register*>(directions + Pack::lanes * i + lane);
+}
+inline const Register& directions_at(const double* directions, long i, int lane) {
+  return *reinterpret_cast<const Register*>(directions + Pack::lanes * i + lane);
+}
+inline Tangent tangent_at(const double* values, const double* directions, long i, int lane) {
+  Tangent a{Register(values[i])};
+  a.d[0] = directions_at(directions, i, lane);
+  return a;
+}
+
+// One member's values, from packs of eight members.
+template <class K>
+struct MemberValues {
+  const sheetbend_blocks::Run& run;
+  const double* directions;
+  int n, lane;
+  Tangent operator[](int part) const {
+    const long count = sheetbend_blocks::value_count(run.damped, parameter_count<K>);
+    return tangent_at(run.values, directions, (n / Pack::lanes * count + part) * Pack::lanes + n % Pack::lanes, lane);
+  }
+  void parameters(Tangent* p) const {
+    for (int k = 0; k < parameter_count<K>; ++k) p[k] = (*this)[sheetbend_blocks::value_count(run.damped, 0) + k];
+  }
+};
+
+template <class K>
+void load_tangents(const double* rows, const double* directions, const int* nodes, int lane, Tangent* x) {
+  for (int d = 0; d < K::dofs; ++d)
+    x[d] = tangent_at(rows, directions, static_cast<long>(nodes[d / 3 * Pack::lanes]) + d % 3, lane);
+}
+
+// One member's share of the right side without J z', and of J'^T dl.
+template <class K>
+void tangents_of_member(const sheetbend_blocks::Block& b, const sheetbend_blocks::Tangents& t, int r, int n, int lane) {
+  const sheetbend_blocks::Run& run = b.runs[r];
+  const int* nodes = indices_of<Tangent>(run.nodes, K::arity, n);
+  const int row = *indices_of<Tangent>(run.first_row, 1, n);
+  const MemberValues<K> values{run, t.values[r], n, lane};
+  Element<K, Tangent> e;
+  load_tangents<K>(b.x, t.x, nodes, lane, e.x);
+  e.rates.a = values[0];
+  if (run.damped) {
+    e.rates.g = values[1];
+    e.rates.scale = values[2];
+  }
+  values.parameters(e.p);
+  const Evaluation<K, Tangent> value(e.x, e.p);
+  Register push[K::dofs];
+  for (int d = 0; d < K::dofs; ++d) push[d] = Register(0.0);
+  for (int j = 0; j < K::rows; ++j) {
+    Tangent lambda[K::rows], C_r[K::rows];
+    lambda[j] = tangent_at(b.lambda, t.lambda, row + j, lane);
+    if (run.damped) C_r[j] = tangent_at(b.C_r, t.C_r, row + j, lane);
+    const Register dl(b.dl[row + j]);
+    Register sum = -(e.residual(value.C, lambda, run.damped ? C_r : nullptr, j) * e.rates.scale).d[0] -
+                   (e.rates.a * e.rates.scale).d[0] * dl;
+    for (int d = 0; d < K::dofs; ++d) {
+      const double* particle = b.x + nodes[d / 3 * Pack::lanes];
+      const double z = particle[3] * b.u[nodes[d / 3 * Pack::lanes] + d % 3];
+      sum -= value.J[j * K::dofs + d].d[0] * Register(z);
+      push[d] += value.J[j * K::dofs + d].d[0] * dl;
+    }
+    directions_at(t.dl, row + j, lane) = sum;
+  }
+  for (int d = 0; d < K::dofs; ++d)
+    directions_at(t.u, static_cast<long>(nodes[d / 3 * Pack::lanes]) + d % 3, lane) += push[d];
+}
+
+template <class K>
+void tangents_of_run(const sheetbend_blocks::Block& b, const sheetbend_blocks::Tangents& t, int r) {
+  for (int n = 0; n < b.runs[r].count; ++n)
+    for (int lane = 0; lane < Pack::lanes; lane += register_lanes) tangents_of_member<K>(b, t, r, n, lane);
+}
+
+template <class K>
+void refer_tangents_of_run(const sheetbend_blocks::References& b, const sheetbend_blocks::ReferenceTangents& t, int r) {
+  const sheetbend_blocks::Run& run = b.runs[r];
+  for (int n = 0; n < run.count; ++n)
+    for (int lane = 0; lane < Pack::lanes; lane += register_lanes) {
+      const int* nodes = indices_of<Tangent>(run.nodes, K::arity, n);
+      const int row = *indices_of<Tangent>(run.first_row, 1, n);
+      Tangent p[parameter_count<K> > 0 ? parameter_count<K> : 1];
+      MemberValues<K>{run, t.values[r], n, lane}.parameters(p);
+      const auto evaluate = [&](const double* rows, const double* directions) {
+        Tangent x[K::dofs];
+        load_tangents<K>(rows, directions, nodes, lane, x);
+        return Evaluation<K, Tangent>(x, p);
+      };
+      const auto now = evaluate(b.x, t.x);
+      Tangent C_r[K::rows];
+      for (int j = 0; j < K::rows; ++j) C_r[j] = now.C[j];
+      if (b.before != 0.0) {
+        const auto before = evaluate(b.x_before, t.x_before);
+        for (int j = 0; j < K::rows; ++j) C_r[j] -= Tangent(b.before) * difference<K>(now.C[j], before.C[j]);
+      }
+      for (int j = 0; j < K::rows; ++j) directions_at(t.C_r, row + j, lane) = C_r[j].d[0];
+    }
+}
+
+struct TangentKernels {
+  using Block = sheetbend_blocks::Block;
+  using Tangents = sheetbend_blocks::Tangents;
+
+  // Reads x, lambda and dl before push() writes over them, and leaves z' in u.
+  static void right_side(const Block& b, const Tangents& t) {
+    Pack *u = numbers_of<Pack>(t.u), *right = numbers_of<Pack>(t.dl);
+    const Pack* x = numbers_of<Pack>(static_cast<const double*>(t.x));
+    for (int p = 0; p < b.particles; ++p) {
+      const long at = sheetbend_blocks::row * static_cast<long>(p);
+      (p < b.movable ? transpose_times_at<double>(b, p, b.dl) : Vec3<double>()).store(b.u + at);
+      for (int d = 0; d < 3; ++d) u[at + d] = Pack(0.0);
+    }
+    for (int r = 0; r < b.run_count; ++r) of_kind[b.runs[r].kind](b, t, r);
+    for (int p = 0; p < b.movable; ++p) {
+      const long at = sheetbend_blocks::row * static_cast<long>(p);
+      for (int d = 0; d < 3; ++d) u[at + d] = x[at + 3] * Pack(b.u[at + d]) + Pack(b.x[at + 3]) * u[at + d];
+      for (int k = b.window[p]; k < b.window[p + 1]; ++k) {
+        const double* G = b.gradients + sheetbend_blocks::row * static_cast<long>(k);
+        right[b.rows[k]] -= Pack(G[0]) * u[at] + Pack(G[1]) * u[at + 1] + Pack(G[2]) * u[at + 2];
+      }
+    }
+  }
+
+  static void solve(const Block& b, double* right_side) {
+    with_band(b.band,
+              [&]<int Band>() { solve_band<Band>(b.size, b.band, b.matrix, b.inverse, numbers_of<Pack>(right_side)); });
+  }
+
+  static void push(const Block& b, const Tangents& t) {
+    const Pack *dl = numbers_of<Pack>(t.dl), *u = numbers_of<Pack>(t.u);
+    const Pack *x = numbers_of<Pack>(t.x), *lambda = numbers_of<Pack>(t.lambda);
+    Pack *x_next = numbers_of<Pack>(t.x_next), *lambda_next = numbers_of<Pack>(t.lambda_next);
+    for (int p = 0; p < b.particles; ++p) {
+      const long at = sheetbend_blocks::row * static_cast<long>(p);
+      for (int d = 0; d < 3; ++d) {
+        Pack sum(0.0);
+        if (p < b.movable) {
+          for (int k = b.window[p]; k < b.window[p + 1]; ++k)
+            sum += Pack(b.gradients[sheetbend_blocks::row * static_cast<long>(k) + d]) * dl[b.rows[k]];
+          sum = u[at + d] + Pack(b.x[at + 3]) * sum;
+        }
+        x_next[at + d] = x[at + d] + sum;
+      }
+      x_next[at + 3] = x[at + 3];
+    }
+    for (int j = 0; j < b.size; ++j) lambda_next[j] = lambda[j] + dl[j];
+  }
+
+  static void refer(const sheetbend_blocks::References& b, const sheetbend_blocks::ReferenceTangents& t) {
+    for (int r = 0; r < b.run_count; ++r)
+      if (b.runs[r].damped) refer_of[b.runs[r].kind](b, t, r);
+  }
+
+  static constexpr auto of_kind = []<class... K>(std::tuple<K...>*) {
+    return std::array{&tangents_of_run<K>...};
+  }(static_cast<Registry*>(nullptr));
+
+  static constexpr auto refer_of = []<class... K>(std::tuple<K...>*) {
+    return std::array{&refer_tangents_of_run<K>...};
+  }(static_cast<Registry*>(nullptr));
+
+  static constexpr sheetbend_blocks::TangentKernels all{&right_side, &solve, &push, &refer};
+};
+
+}  // namespace sheetbend

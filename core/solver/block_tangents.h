@@ -1,0 +1,49 @@
+// The directions of a direct block's numbers, handed to the kernels of core/blocks/block_tangents.h. State is a BlockState of duals.
+#pragma once
+
+#include "core/blocks/kernels.h"
+#include "core/solver/numbers.h"
+#include "core/solver/plan.h"
+
+namespace sheetbend {
+
+// Per run, where the directions of its values stand.
+template <class State>
+std::vector<const double*> value_directions(State& state) {
+  std::vector<const double*> at;
+  for (auto& values : state.values) at.push_back(values.directions());
+  return at;
+}
+
+template <class State>
+void refer_tangents(const sheetbend_blocks::References& references, const sheetbend_blocks::TangentKernels& kernels,
+                    State& state) {
+  const auto values = value_directions(state);
+  kernels.refer(references,
+                {values.data(), state.x_now.directions(), state.x_before.directions(), state.C_r.directions()});
+}
+
+// The directions' share of one iteration: after the values are solved for, before they are pushed.
+template <class State>
+void project_tangents(const DirectBlock& block, const sheetbend_blocks::TangentKernels& kernels,
+                      const sheetbend_blocks::Block& arrays, State& state, int iteration) {
+  const auto values = value_directions(state);
+  auto& own = state.at(iteration);
+  sheetbend_blocks::Tangents t{};
+  t.values = values.data();
+  t.x = state.at(state.x, iteration).directions();
+  t.x_next = state.at(state.x, iteration + 1).directions();
+  t.lambda = state.at(state.lambda, iteration).directions();
+  t.lambda_next = state.at(state.lambda, iteration + 1).directions();
+  t.C_r = state.C_r.directions();
+  t.dl = own.dl.directions();
+  t.u = own.u.directions();
+  kernels.right_side(arrays, t);
+  if (block.structure.banded())
+    kernels.solve(arrays, t.dl);
+  else
+    own.factor.solve(block.structure, numbers_of<Pack>(t.dl));
+  kernels.push(arrays, t);
+}
+
+}  // namespace sheetbend

@@ -1,0 +1,37 @@
+// Rollouts with eight directions: the values have the bits of a rollout without them, the directions are those of the complex step.
+#include "core/scalar/dual.h"
+#include "tests/cpp/support/programs.h"
+
+namespace sheetbend::testing {
+namespace {
+
+struct Tangents : ::testing::TestWithParam<Solver> {};
+INSTANTIATE_TEST_SUITE_P(, Tangents, all_solvers, solver_name);
+
+TEST_P(Tangents, FollowTheRollout) {
+  using D = Dual<double, 8>;
+  const Sample sample = random_scene(80, {.net = GetParam().net});
+  const Program p{sample.scene, make_plan(sample.scene, GetParam().options(2)), 12, 0.004};
+  Random random(80);
+  std::vector<D> inputs(sample.inputs.begin(), sample.inputs.end());
+  for (D& a : inputs)
+    for (double& d : a.d) d = random(-1.0, 1.0) * std::abs(a.v);
+  const std::vector<D> found = states(p, inputs);
+  const auto part = [](const std::vector<D>& all, int k) {
+    std::vector<double> out;
+    for (const D& a : all) out.push_back(k < 0 ? a.v : a.d[k]);
+    return out;
+  };
+  EXPECT_TRUE(same_bits(part(found, -1), states(p, sample.inputs)));
+  double worst = 0.0;
+  for (int k = 0; k < 8; ++k) {
+    const auto oracle =
+        complex_step_along([&](const std::vector<Complex>& z) { return states(p, z); }, sample.inputs, part(inputs, k));
+    worst = std::max(worst, relative_error(part(found, k), oracle));
+  }
+  EXPECT_LE(worst, 1e-12);
+  record_error("tangents", worst);
+}
+
+}  // namespace
+}  // namespace sheetbend::testing
