@@ -53,7 +53,7 @@ class Experiment:
     scene: Scene
     recording: Recording
     name: str = ""
-    markers: Mapping[str, Place] | Sequence[Place] | None = None
+    markers: Mapping[str, Place] | Sequence[Place | None] | None = None
     fit: Window | None = None
     held_out: Window | None = None
     solver: Solver = field(default_factory=Solver)

@@ -89,7 +89,7 @@ def along_rope(rope: Rope, count: int, interpolation: str = "cubic") -> tuple[Pl
 
 
 def places_for(
-    scene: Scene, markers: Mapping[str, Place] | Sequence[Place] | None, names: Sequence[str]
+    scene: Scene, markers: Mapping[str, Place] | Sequence[Place | None] | None, names: Sequence[str]
 ) -> tuple[Place | None, ...]:
     """One place per marker of a recording, None for markers that are not compared.
 
@@ -109,7 +109,7 @@ def places_for(
 
 
 def _places_for(
-    scene: Scene, markers: Mapping[str, Place] | Sequence[Place] | None, names: Sequence[str]
+    scene: Scene, markers: Mapping[str, Place] | Sequence[Place | None] | None, names: Sequence[str]
 ) -> tuple[Place | None, ...]:
     if markers is None:
         if len(scene.ropes) != 1:

@@ -177,7 +177,7 @@ def add_rod(
     joints.rest(curvature_modes, twist_modes)
     joints.soften(softness_modes)
     add_drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
-    built = Rod(name, nodes, arc, *ghosts, directors=directors)
+    built = Rod(name, nodes, arc, ghosts[0], ghosts[1], directors)
     scene.ropes[name] = built
     return built
 
