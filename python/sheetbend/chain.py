@@ -137,7 +137,7 @@ def add_drag(
         if value is None:
             continue
         if not (is_number(value) and value >= 0):
-            raise SceneError(f"{name}.drag_{kind}", "must be zero or more", value, f"give a number in {unit}")
+            raise SceneError(f"{name}_drag_{kind}", "must be zero or more", value, f"give a number in {unit}")
         scene.has_drag = True
         quantity = scene.add_quantity(f"{name}_drag_{kind}", value, unit, positive=value > 0)
         factors = {quantity: "identity", f"{name}_length": "identity"}

@@ -187,3 +187,20 @@ def test_gradients_of_everything(integrator):
     assert report.dot_product < 1e-11
     for name in everything().quantities:
         assert rows[name].gradient > 0, name
+
+
+def test_torch_has_the_same_functions_of_quantities():
+    """EI2 enters by square roots, roll by sine and cosine."""
+    torch = pytest.importorskip("torch")
+    from sheetbend.torch import simulate
+
+    scene, times, solver = everything(), np.array([0.0, 0.05]), sb.Solver(h=1 / 400)
+    given = SET | {"rod_EI2": 5e-4}
+    values = {name: torch.tensor(value, dtype=torch.float64, requires_grad=True) for name, value in given.items()}
+    positions = simulate(scene, times, solver, values=values)
+    rolled_out = sb.rollout(scene, times, solver, given)
+    assert positions.detach().numpy() == approx(rolled_out.positions, abs=1e-12)
+    positions.square().sum().backward()
+    slopes = rolled_out.gradient(2 * rolled_out.positions).quantities
+    for name, value in values.items():
+        assert float(value.grad) == approx(slopes[name], rel=1e-8), name

@@ -19,6 +19,8 @@ _TORCH: Mapping[str, Callable[[Tensor], Tensor]] = {
     "square": torch.square,
     "sin": torch.sin,
     "cos": torch.cos,
+    "sqrt": torch.sqrt,
+    "inverse_sqrt": torch.rsqrt,
 }
 
 
