@@ -7,7 +7,7 @@ namespace sheetbend {
 EquilibriumDerivative::EquilibriumDerivative(const Scene& scene, const double* inputs, const Equilibrium& at)
     : scene_(scene), inputs_(inputs, inputs + scene.layout.total()), at_(at), kkt_(scene) {
   if (!at.converged) throw NoEquilibrium(at.message);
-  kkt_.assemble(inputs, at_.x.data(), at_.lambda.data(), 0.0);
+  kkt_.assemble(inputs, at_.x.data(), at_.lambda.data(), at_.force_stiffness);
   if (!kkt_.factorize(0.0, inputs_.data() + scene.layout.of(Quantity::compliance)))
     throw NoEquilibrium(
         "equilibrium: the Newton matrix is singular, so the shape has no derivative (a fold, or a part that moves "

@@ -89,7 +89,9 @@ void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, 
 
   for (const Director& d : scene.directors) {
     if (scene.role[d.node] != Role::free) continue;
-    Vec3<T>(q_bar.of(d.node)).add_to(bar.x + scene.first_dof[d.node]);
+    const Vec3<T> x_bar(q_bar.of(d.node));
+    (T(bdf.extrapolate_now) * x_bar).add_to(bar.x + scene.first_dof[d.node]);
+    (T(bdf.extrapolate_before) * x_bar).add_to(bar.x_before + scene.first_dof[d.node]);
     mass_bar[d.node] -= w[d.node] * w[d.node] * eta * eta * w_bar.of(d.node);
   }
   for (const int n : scene.pinned) Vec3<T>(q_bar.of(n)).add_to(bar.x + scene.first_dof[n]);

@@ -213,6 +213,7 @@ bool EquilibriumSolver::step(State& s, double mu, const double* alpha) {
     if (negligible || (k > 0 && size < 0.02 * first)) {
       std::swap(s.x, x);
       std::swap(s.lambda, lambda);
+      retract_directors(scene_, s.x.data());
       s.last_step = mu == 0.0 ? first : std::numeric_limits<double>::infinity();
       return true;
     }
@@ -290,6 +291,7 @@ Equilibrium EquilibriumSolver::solve(const double* inputs, const double* start_x
     s.measure();
   }
   result.residual = s.residual;
+  result.force_stiffness = s.force_stiffness();
   result.energy = s.energy();
   if (!result.converged) result.message = not_converged(result, options.tolerance);
   result.x = std::move(s.x);

@@ -35,7 +35,8 @@ struct Equilibrium {
   int unstable_modes = -1;  // negative eigenvalues of the energy's Hessian (on the tangent space of rigid constraints)
   bool converged = false;
   double t0 = 0.0;
-  std::string message;  // why not converged and what to do; empty otherwise
+  double force_stiffness = 0.0;  // scale of stiffness where the multipliers give none  [N/m]
+  std::string message;           // why not converged and what to do; empty otherwise
 };
 
 class EquilibriumSolver {

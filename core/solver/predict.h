@@ -88,8 +88,8 @@ void weigh(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, const 
 
 // Loops over particles capture by value: a store may go anywhere, so what a reference leads to would be loaded again for each.
 //
-// x* = history(x) + eta v*, v* = m w (history(v) + eta gravity) + w eta f, w = 1/(m + eta c). Directors stay, driven nodes go where their
-// boundary is.
+// x* = history(x) + eta v*, v* = m w (history(v) + eta gravity) + w eta f, w = 1/(m + eta c). Directors go on as
+// they turned, driven nodes go where their boundary is.
 template <class T>
 void predict(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, double t_next, const SubstepStates<T>& s,
              const Weights<T>& weights, int threads, const Coordinates<T>& q) {
@@ -115,7 +115,11 @@ void predict(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, doub
       (eta * (weights.w[n] * (eta * f))).add_to(q.of(n));
     }
   }
-  for (const Director& d : scene.directors) Vec3<T>(s.x + scene.first_dof[d.node]).store(q.of(d.node));
+  for (const Director& d : scene.directors) {
+    const int dof = scene.first_dof[d.node];
+    (T(bdf.extrapolate_now) * Vec3<T>(s.x + dof) + T(bdf.extrapolate_before) * Vec3<T>(s.x_before + dof))
+        .store(q.of(d.node));
+  }
   for (const int n : scene.pinned) Vec3<T>(s.x + scene.first_dof[n]).store(q.of(n));
   if (scene.driven.empty()) return;
   const KnotWeights boundary = scene.boundary.at(t_next);

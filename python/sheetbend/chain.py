@@ -136,6 +136,8 @@ def add_drag(
     for kind, value, unit in (("linear", linear, "N s/m^2"), ("quadratic", quadratic, "N s^2/m^3")):
         if value is None:
             continue
+        if not (is_number(value) and value >= 0):
+            raise SceneError(f"{name}_drag_{kind}", "must be zero or more", value, f"give a number in {unit}")
         scene.has_drag = True
         quantity = scene.add_quantity(f"{name}_drag_{kind}", value, unit, positive=value > 0)
         factors = {quantity: "identity", f"{name}_length": "identity"}
@@ -145,6 +147,11 @@ def add_drag(
                 for n, share in zip(nodes, voronoi_shares(segments), strict=True)
             ]
         )
+
+
+def is_number(value: object) -> bool:
+    """Whether a value is a finite real number."""
+    return isinstance(value, int | float | np.integer | np.floating) and bool(np.isfinite(value))
 
 
 def first_value(scene: Scene, group: str) -> int:

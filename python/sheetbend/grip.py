@@ -55,9 +55,10 @@ class Grip:
             director: the frame's first axis in the gripper's axes.
 
         Raises:
-            SceneError: shapes, NaN, quaternions of no length, a director along the direction.
+            SceneError: shapes, NaN, times that do not increase, quaternions of no length, a director along the
+                direction.
         """
-        t = finite("times", times, None, SceneError).ravel()
+        t = _knots(times)
         x = finite("positions", positions, (len(t), 3), SceneError)
         q = _units("quaternions", quaternions, (len(t), 4))
         d = _units("direction", direction, (3,))
@@ -88,11 +89,12 @@ class Grip:
             director: (3,) the frame's first axis at the nominal direction; any across it by default.
 
         Raises:
-            SceneError: shapes, NaN, markers that coincide, a recorded direction opposite to the nominal one.
+            SceneError: shapes, NaN, times that do not increase, markers that coincide, a recorded direction opposite to
+                the nominal one.
         """
-        t = finite("times", times, None, SceneError).ravel()
+        t = _knots(times)
         a, b = (finite(field, x, (len(t), 3), SceneError) for field, x in (("first", first), ("second", second)))
-        along = _units("first, second", b - a, (len(t), 3))
+        along = _units("first, second", b - a, (len(t), 3), "give two markers that never coincide")
         from_ = _units("nominal", along.mean(axis=0) if nominal is None else nominal, (3,))
         q = any_across(from_) if director is None else finite("director", director, (3,), SceneError)
         return cls(t, a if end else b, along, carried(_across(from_, q), from_, along))
@@ -128,18 +130,31 @@ def _across(along: Array, vector: Array) -> Array:
     """The unit part of vectors (..., 3) across unit vectors `along`."""
     across = vector - np.sum(vector * along, axis=-1, keepdims=True) * along
     size = np.linalg.norm(across, axis=-1, keepdims=True)
-    if (size < 1e-9 * np.linalg.norm(vector, axis=-1, keepdims=True)).any():
-        raise SceneError("director", "lies along the direction", np.shape(vector), "give a vector across it")
+    if (size <= 1e-9 * np.linalg.norm(vector, axis=-1, keepdims=True)).any():
+        raise SceneError(
+            "director", "has no part across the direction", np.ravel(vector)[:3].tolist(), "give a vector across it"
+        )
     return np.asarray(across / size)
 
 
-def _units(field: str, vectors: ArrayLike, shape: tuple[int, ...]) -> Array:
-    v = finite(field, np.reshape(np.asarray(vectors, dtype=float), shape), shape, SceneError)
+def _knots(times: ArrayLike) -> Array:
+    t = finite("times", times, None, SceneError).ravel()
+    if len(t) == 0 or (np.diff(t) <= 0).any():
+        raise SceneError("times", "must increase", t[:5].tolist(), "sort the knots and drop repeated ones")
+    return t
+
+
+def _units(
+    field: str, vectors: ArrayLike, shape: tuple[int, ...], fix: str = "give a vector that has a length"
+) -> Array:
+    given = finite(field, vectors, None, SceneError)
+    if given.shape not in (shape, shape[-1:]):
+        wanted = shape[-1:] if shape[0] == 1 else shape
+        raise SceneError(field, "has the wrong shape", given.shape, f"give {wanted}")
+    v = np.reshape(given, shape)
     size = np.linalg.norm(v, axis=-1, keepdims=True)
     if (size == 0).any():
-        raise SceneError(
-            field, "have no length", int(np.argmin(size)), "give directions (markers that do not coincide)"
-        )
+        raise SceneError(field, "has no length", v[np.argmin(size)].tolist() if v.ndim > 1 else v.tolist(), fix)
     return np.asarray(v / size)
 
 

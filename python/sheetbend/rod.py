@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .chain import add_drag, add_links, add_masses, resample
+from .chain import add_drag, add_links, add_masses, is_number, resample
 from .checks import finite
 from .errors import SceneError
 from .grip import Grip, any_across, carried
@@ -115,12 +115,16 @@ def add_rod(
     Raises:
         SceneError: wrong or missing values; the message names the field.
     """
-    positive = {"length": length, "density": density, "EI": EI, "GJ": GJ, "EA": EA, "EI2": EI2}
-    positive |= {"yield_curvature": yield_curvature}
-    positive |= {"stretch_damping": stretch_damping, "bend_damping": bend_damping, "twist_damping": twist_damping}
-    for label, value in positive.items():
-        if value is not None and not (np.isfinite(value) and value > 0):
-            raise SceneError(f"{name}.{label}", "must be positive", value, "give a positive number, or leave it out")
+    required = {"length": length, "density": density, "EI": EI, "GJ": GJ}
+    optional = {"EA": EA, "EI2": EI2, "stretch_damping": stretch_damping}
+    optional |= {"bend_damping": bend_damping, "twist_damping": twist_damping, "yield_curvature": yield_curvature}
+    for given, value in (required | optional).items():
+        if not (is_number(value) and value > 0) and not (value is None and given in optional):  # type: ignore[operator]
+            fix = "give a positive number" + (", or leave it out" if given in optional else "")
+            raise SceneError(f"{name}.{given}", "must be positive", value, fix)
+    for label, grip in (("start", start), ("end", end)):
+        if grip is not None and not isinstance(grip, Grip):
+            raise SceneError(f"{name}.{label}", "is no grip", grip, "give sb.Grip.fixed, from_poses or from_markers")
     if not isinstance(segments, int | np.integer) or segments < 2:
         raise SceneError(f"{name}.segments", "must be a whole number from 2 on", segments, "give at least 2")
     if stretch_damping is not None and EA is None:
@@ -130,12 +134,14 @@ def add_rod(
         raise SceneError(f"{name}.yield_share", "and yield_curvature belong together", yield_share, fix)
     if yield_share is not None and not 0 < yield_share < 1:
         raise SceneError(f"{name}.yield_share", "must lie between 0 and 1", yield_share, "give a part of EI")
+    if not isinstance(turns, int | np.integer):
+        raise SceneError(f"{name}.turns", "must be a whole number", turns, "give whole turns; grips give the rest")
     if tilts and start is None and end is None:
         raise SceneError(f"{name}.tilts", "need a grip", tilts, "give start or end")
     if roll and end is None:
         raise SceneError(f"{name}.roll", "needs a grip at the end", roll, "give end")
 
-    shape, speeds = _initial(name, length, segments, points, velocity, start, end)
+    shape, speeds = _initial(name, length, segments, points, velocity, start, end, EA is not None)
     nodes = scene.add_particles(shape, 0.0, speeds)
     arc = length / segments * np.arange(segments + 1)
     scene.add_quantity(f"{name}_length", length, "m")
@@ -153,9 +159,11 @@ def add_rod(
     ]
     chain = np.array([*(g for g in ghosts[:1] if g is not None), *nodes, *(g for g in ghosts[1:] if g is not None)])
     first = start.director[0] if start is not None else director
+    if start is None and director is not None:
+        first = finite(f"{name}.director", director, (3,), SceneError)
     last = None if end is None else end.director[0]
     directors = scene.add_directors(
-        np.stack([chain[:-1], chain[1:]], axis=1), _frames(scene.positions[chain], first, last, turns)
+        np.stack([chain[:-1], chain[1:]], axis=1), _frames(name, scene.positions[chain], first, last, turns)
     )
     scene.add_quantity(f"{name}_GJ", GJ, "N m^2")
     hold = {f"{name}_GJ": "identity", f"{name}_length": "inverse"}
@@ -188,7 +196,7 @@ def fitted_to_length(shape: Array, link: float, held: Sequence[int]) -> Array:
     A start that is longer than the rod would be pulled together in its first substep, a kick.
 
     Raises:
-        SceneError: the held nodes are farther apart than the chain reaches.
+        SceneError: the held nodes are farther apart than the chain reaches, or the shape is straight and too short.
     """
     x = shape.copy()
     free = np.setdiff1d(np.arange(len(x)), held)
@@ -204,7 +212,10 @@ def fitted_to_length(shape: Array, link: float, held: Sequence[int]) -> Array:
         step = np.linalg.lstsq(J[:, free].reshape(len(edges), -1), link - lengths, rcond=1e-9)[0]
         x[free] += step.reshape(-1, 3)
     reach, apart = link * (len(x) - 1), float(np.linalg.norm(shape[-1] - shape[0]))
-    fix = f"give a length above {apart:g} m, or check the grips' places"
+    if apart < reach:
+        fix = "give points of a bent shape between the held ends"
+        raise SceneError("points", "cannot be bent to the length", reach, fix)
+    fix = f"give EA or a length above {apart:.9g} m, or check the grips' places"
     raise SceneError("length", "does not reach between the held ends", reach, fix)
 
 
@@ -216,8 +227,9 @@ def _initial(
     velocity: ArrayLike | None,
     start: Grip | None,
     end: Grip | None,
+    stretches: bool,
 ) -> tuple[Array, Array | None]:
-    """Initial places and velocities of the nodes."""
+    """Initial places and velocities of the nodes; what `stretches` may start straight and too long between grips."""
     held = [*([0] if start is not None else []), *([segments] if end is not None else [])]
     if points is None:
         if velocity is not None:
@@ -228,12 +240,17 @@ def _initial(
         if end is not None:
             line[1] = end.position[0]
     else:
-        line = finite(f"{name}.points", points, None, SceneError).reshape(-1, 3)
+        line = finite(f"{name}.points", points, None, SceneError)
+        if line.ndim != 2 or line.shape[1] != 3:
+            raise SceneError(f"{name}.points", "has the wrong shape", line.shape, "give (k, 3) in m")
     shape = resample(line, segments)
     for k, grip in ((0, start), (segments, end)):
         if grip is not None:
             shape[k] = grip.position[0]
-    shape = fitted_to_length(shape, length / segments, held)
+    if stretches and len(held) == 2 and np.linalg.norm(shape[-1] - shape[0]) > length:
+        shape = np.linspace(shape[0], shape[-1], segments + 1)
+    else:
+        shape = fitted_to_length(shape, length / segments, held)
     if velocity is None:
         return shape, None
     v = finite(f"{name}.velocity", velocity, line.shape, SceneError)
@@ -242,10 +259,23 @@ def _initial(
     return shape, np.stack([np.interp(wanted, s, v[:, k]) for k in range(3)], axis=1)
 
 
-def _frames(chain: Array, first: ArrayLike | None, last: ArrayLike | None, turns: int) -> Array:
-    """Directors of a chain's edges: carried along it from the first, with the twist to the last spread evenly."""
+def _frames(name: str, chain: Array, first: ArrayLike | None, last: ArrayLike | None, turns: int) -> Array:
+    """Directors of a chain's edges: carried along it from the first, with the twist to the last spread evenly.
+
+    Raises:
+        SceneError: a director along its edge, a chain that folds back, or half a turn of twist in a joint.
+    """
     edges = np.diff(chain, axis=0)
     tangents = edges / np.linalg.norm(edges, axis=1, keepdims=True)
+    folded = (tangents[1:] * tangents[:-1]).sum(axis=1) < -1.0 + 1e-9
+    if folded.any():
+        where = chain[1 + int(np.argmax(folded))].tolist()
+        raise SceneError(f"{name}.points", "fold back on themselves", where, "give a shape without a cusp")
+    if first is not None and np.linalg.norm(np.cross(tangents[0], np.asarray(first))) <= 1e-9 * np.linalg.norm(
+        np.asarray(first)
+    ):
+        given = np.asarray(first).tolist()
+        raise SceneError(f"{name}.director", "has no part across the rod", given, "give a vector across its start")
     q = [any_across(tangents[0]) if first is None else np.asarray(first, dtype=float)]
     for before, after in pairwise(tangents):
         q.append(carried(q[-1] - (q[-1] @ before) * before, before, after[None])[0])
@@ -254,6 +284,9 @@ def _frames(chain: Array, first: ArrayLike | None, last: ArrayLike | None, turns
     missing = 2.0 * np.pi * turns
     if last is not None:
         missing += float(np.arctan2(np.asarray(last) @ across[-1], np.asarray(last) @ frames[-1]))
+    if abs(missing) >= np.pi * (len(edges) - 1):
+        most = "a joint holds less than half a turn: give more segments or fewer turns"
+        raise SceneError(f"{name}.turns", "are more than the joints hold", turns, most)
     angle = np.linspace(0.0, missing, len(edges))[:, None]
     return np.asarray(np.cos(angle) * frames + np.sin(angle) * across)
 

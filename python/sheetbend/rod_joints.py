@@ -110,10 +110,7 @@ class Joints:
     def _modes(self, label: str, modes: Sequence[int], unit: str) -> list[tuple[str, Array]]:
         """A new quantity per mode, and its weights at the joints."""
         made = []
-        for k in modes:
-            if k != int(k) or k < 0:
-                fix = "give such as (0, 1)"
-                raise SceneError(f"{self._name}.{label}", "has modes that are no whole numbers from 0 on", k, fix)
+        for k in _checked(f"{self._name}.{label.removesuffix('_1').removesuffix('_2')}_modes", modes):
             name = f"{self._name}_{label}_{k}"
             scale = 1.0 if unit else 0.3
             made.append(
@@ -123,3 +120,12 @@ class Joints:
                 )
             )
         return made
+
+
+def _checked(field: str, modes: Sequence[int]) -> tuple[int, ...]:
+    """The modes: whole numbers from 0 on, each once."""
+    given = list(modes) if np.iterable(modes) else [None]
+    bad = [k for k in given if not isinstance(k, int | np.integer) or k < 0]
+    if bad or len(set(given)) < len(given):
+        raise SceneError(field, "must be whole numbers from 0 on, each once", modes, "give such as (0, 1)")
+    return tuple(int(k) for k in modes)

@@ -9,7 +9,6 @@ import sheetbend as sb
 from oracles import bending, integration, modes
 from oracles.calculus import derivative
 from pytest import approx
-from scipy.linalg import eigh
 from scipy.optimize import brentq
 from support import observed_orders, pick, slope_along, static_sensitivity, step_factor, steps, tangents, twice
 
@@ -151,26 +150,11 @@ def test_roll_up(links, ratio):
 # --- O-16a: vibration
 
 
-def bending_mode(segments: int, mode: int) -> tuple[float, np.ndarray]:
-    """Frequency and shape (segments,) of the linearized chain: curvature angles at the clamp and the inner nodes."""
-    link = LENGTH / segments
-    slope = (np.eye(segments) - np.eye(segments, k=-1)) / link  # of link j by the heights of nodes 1 ... n
-    turn = slope.copy()
-    turn[1:] -= slope[:-1]
-    voronoi = np.full(segments, link)
-    voronoi[0] = link / 2
-    mass = np.full(segments, DENSITY * link)
-    mass[-1] /= 2
-    squared, shapes = eigh(turn.T @ (EI / voronoi[:, None] * turn), np.diag(mass))
-    shape = shapes[:, mode]
-    return math.sqrt(squared[mode]), shape / np.abs(shape).max()
-
-
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("mode", [0, 1])
 def test_cantilever_vibration(order, mode):
     segments = 20 * (mode + 1)
-    omega, shape = bending_mode(segments, mode)
+    omega, shape = modes.cantilever_chain_mode(segments, mode, LENGTH, DENSITY, EI)
     continuous = modes.cantilever_frequencies(LENGTH, DENSITY, EI, 2)[mode]
     assert omega == approx(continuous, rel=5e-3)
 

@@ -27,8 +27,8 @@ class RopeModel:
 
     Attributes:
         density: kg/m, weighed: motion alone tells stiffness over density only.
-        nominal: directions (3,) of the start and the end grip from which their frames are carried; recordings that share
-            them share their material frames.
+        nominal: directions (3,) of the start and the end grip from which their frames are carried; recordings that
+            share them share their material frames.
         values: starting values of quantities, as options of `add_rod` (EI, GJ, bend_damping, ...); None = without it.
         tilts, roll: nuisances of the grips, see `add_rod`.
         curvature_modes, softness_modes: see `add_rod`.

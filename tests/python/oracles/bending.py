@@ -117,7 +117,7 @@ def bend_chain(
         for j in range(links - 1, -1, -1):
             angles[j + 1] = angle
             moment += link * math.cos(angle) * below[j + 1]
-            angle -= _turning_angle(moment * voronoi[j] / bending_stiffness)
+            angle -= turning_angle(moment * voronoi[j] / bending_stiffness)
         angles[0] = angle
         return angles
 
@@ -127,7 +127,10 @@ def bend_chain(
     return np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
 
 
-def _turning_angle(moment: float) -> float:
-    """Return phi with 2 tan(phi/2)/cos^2(phi/2) = moment: t = tan(phi/2) solves t^3 + t = moment/2."""
+def turning_angle(moment: float) -> float:
+    """O-21: angle of a joint under a `moment` over EI/l_v: the inverse of `bend_moment`.
+
+    t = tan(phi/2) solves t^3 + t = moment/2.
+    """
     scale = 2.0 / math.sqrt(3.0)
     return 2.0 * math.atan(scale * math.sinh(math.asinh(0.75 * moment * math.sqrt(3.0)) / 3.0))

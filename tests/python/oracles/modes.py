@@ -70,3 +70,24 @@ def cantilever_frequencies(length: float, density: float, bending_stiffness: flo
     # cos b = -1/cosh b has exactly one root in each interval ((k - 1) pi, k pi).
     b = [brentq(characteristic, (k - 1) * math.pi, k * math.pi, xtol=1e-15, rtol=1e-15) for k in range(1, count + 1)]
     return np.square(b) * math.sqrt(bending_stiffness / density) / length**2
+
+
+def cantilever_chain_mode(
+    links: int, mode: int, length: float, density: float, bending_stiffness: float
+) -> tuple[float, NDArray[np.float64]]:
+    """O-16a: frequency and shape (n,) of mode 0, 1, ... of n rigid links, by the heights of nodes 1 ... n, largest 1.
+
+    The clamp is a direction, so that its joint has half a Voronoi length; the last node has half a mass. Exact for the
+    linearized chain. Derivatives: omega/(2 EI), -omega/(2 mu).
+    """
+    link = length / links
+    slope = (np.eye(links) - np.eye(links, k=-1)) / link  # of link j
+    turn = slope.copy()
+    turn[1:] -= slope[:-1]
+    voronoi = np.full(links, link)
+    voronoi[0] /= 2.0
+    mass = np.full(links, density * link)
+    mass[-1] /= 2.0
+    squared, shapes = eigh(turn.T @ (bending_stiffness / voronoi[:, None] * turn), np.diag(mass))
+    shape = shapes[:, mode]
+    return math.sqrt(squared[mode]), shape / np.abs(shape).max()

@@ -1,0 +1,206 @@
+"""Grips of rods: poses, markers, tilts and roll do what they say, and their derivatives are right."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from pytest import approx
+from scipy.spatial.transform import Rotation
+from sheetbend.grip import carried
+
+TIMES = np.linspace(0.0, 0.4, 21)
+TURNS = Rotation.from_rotvec(np.stack([0.8 * np.sin(5 * TIMES), 0.5 * TIMES, 1.1 * np.cos(3 * TIMES)], axis=1))
+PLACES = 0.05 * np.stack([np.sin(6 * TIMES), np.cos(4 * TIMES), TIMES], axis=1)
+
+
+def units(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+# --- poses
+
+
+def test_poses_turn_the_grippers_axes():
+    along, across = np.array([0.3, 0.5, -1.0]), np.array([1.0, 1.0, 0.2])
+    grip = sb.Grip.from_poses(TIMES, PLACES, 3.0 * TURNS.as_quat(), along, across)  # of any length
+    assert grip.position == approx(PLACES)
+    assert grip.direction == approx(TURNS.apply(units(along)), abs=1e-14)
+    unit = units(along)
+    assert grip.director == approx(TURNS.apply(units(across - (across @ unit) * unit)), abs=1e-14)
+    assert not grip.stays
+
+
+def test_poses_of_either_sign_are_the_same():
+    signs = np.where(np.arange(len(TIMES)) % 2 == 0, 1.0, -1.0)[:, None]
+    plain, flipped = (sb.Grip.from_poses(TIMES, PLACES, s * TURNS.as_quat()) for s in (1.0, signs))
+    assert flipped.direction == approx(plain.direction, abs=1e-15)
+    assert flipped.director == approx(plain.director, abs=1e-15)
+
+
+def test_a_fixed_grip_makes_its_director_unit_and_across():
+    grip = sb.Grip.fixed((1, 2, 3), (0, 0, 5), (3, 0, 4))
+    assert grip.stays
+    assert grip.direction == approx(np.array([[0, 0, 1.0]]))
+    assert grip.director == approx(np.array([[1.0, 0, 0]]))
+
+
+# --- markers
+
+
+def test_markers_carry_the_director_by_the_shortest_rotation():
+    """Against the rotation vector: about nominal x direction, by the angle between them."""
+    nominal, director = units(np.array([1.0, 0.2, -0.3])), np.array([0.0, 1.0, 1.0])
+    along = TURNS.apply([1.0, 0.1, 0.0])
+    first, second = PLACES, PLACES + 0.03 * along
+    grip = sb.Grip.from_markers(TIMES, first, second, nominal=nominal, director=director)
+    axis = np.cross(nominal, units(along))
+    angle = np.arctan2(np.linalg.norm(axis, axis=1), units(along) @ nominal)
+    across = units(director - (director @ nominal) * nominal)
+    expected = Rotation.from_rotvec(angle[:, None] * units(axis)).apply(across)
+    assert grip.director == approx(expected, abs=1e-12)
+    assert grip.direction == approx(units(along), abs=1e-14)
+    assert grip.position == approx(second)
+    assert np.abs((grip.director * grip.direction).sum(axis=1)).max() < 1e-12
+
+
+def test_a_grip_at_the_end_is_where_the_rod_enters_it():
+    first, second = PLACES, PLACES + 0.03 * TURNS.apply([1.0, 0, 0])
+    grip = sb.Grip.from_markers(TIMES, first, second, end=True)
+    assert grip.position == approx(first)
+    assert grip.direction == approx(units(second - first))
+
+
+def test_recordings_that_share_the_nominal_direction_agree():
+    """Where two recordings have the same direction they have the same frame; by their own means they have not."""
+    along = TURNS.apply([1.0, 0.1, 0.0])
+    parts = (slice(0, 12), slice(8, 21))
+
+    def frames(part: slice, **options) -> np.ndarray:
+        return sb.Grip.from_markers(TIMES[part], PLACES[part], PLACES[part] + along[part], **options).director
+
+    shared = [frames(part, nominal=(1, 0, 0), director=(0, 0, 1)) for part in parts]
+    assert shared[0][8:] == approx(shared[1][:4], abs=1e-14)
+    own = [frames(part, director=(0, 0, 1)) for part in parts]
+    assert np.abs(own[0][8:] - own[1][:4]).max() > 1e-3
+
+
+def test_carried_vectors_keep_their_length_and_angle():
+    nominal, directions = np.array([0.0, 0.0, 1.0]), units(np.random.default_rng(0).standard_normal((50, 3)))
+    vector = np.array([0.3, -0.4, 0.5])
+    turned = carried(vector, nominal, directions)
+    assert np.linalg.norm(turned, axis=1) == approx(np.linalg.norm(vector), rel=1e-12)
+    assert (turned * directions).sum(axis=1) == approx(vector @ nominal, rel=1e-12)
+    assert carried(vector, nominal, nominal[None])[0] == approx(vector)
+
+
+# --- tilts and roll
+
+
+def held(**options) -> sb.Scene:
+    """A stiff rod without weight between nothing but its start's grip, straight."""
+    grip = sb.Grip.fixed((0, 0, 0), (1, 0, 0), (0, 1, 0))
+    given = {"density": 0.05, "EI": 1e-3, "GJ": 1e-3, "start": grip, "tilts": True, "gravity": (0, 0, 0)}
+    return sb.rod(0.5, 6, **(given | options))
+
+
+@pytest.mark.parametrize(("tilt", "towards"), [(1, (0, 1, 0)), (2, (0, 0, 1))])
+def test_a_tilt_turns_the_rod_towards_its_axis(tilt, towards):
+    angle, scene = 0.1, held()
+    rest = sb.equilibrium(scene, values={f"rod_start_tilt_{tilt}": angle})
+    tip = rest.positions[scene.ropes["rod"].particles[-1]]
+    assert tip == approx(0.5 * units(np.array([1.0, 0, 0]) + angle * np.array(towards)), abs=1e-9)
+
+
+def test_tilts_and_roll_at_an_end_that_moves():
+    """Ghost and director of a driven end, from the motion that the compiled scene gets."""
+    end = sb.Grip.from_poses(TIMES, np.add(PLACES, (0.3, 0, 0)), TURNS.as_quat())
+    start = sb.Grip.fixed((0, 0, 0), (1, 0, 0), (0, 0, 1))
+    points = [[0, 0, 0], [0.1, 0.1, 0], PLACES[0] + (0.3, 0, 0)]
+    options = {"density": 0.05, "EI": 1e-3, "GJ": 1e-3, "points": points, "tilts": True, "roll": True}
+    scene = sb.rod(0.5, 6, start=start, end=end, **options)
+    rod = scene.ropes["rod"]
+    values = {"rod_end_tilt_1": 0.2, "rod_end_tilt_2": -0.1, "rod_roll": 0.7}
+    motion = sb.simulate(scene, TIMES, sb.Solver(h=0.02), values).positions[1:]
+    leave = motion[:, rod.end_ghost] - motion[:, rod.particles[-1]]
+    second = np.cross(end.direction, end.director)
+    expected = end.direction + 0.2 * end.director - 0.1 * second
+    assert units(leave) == approx(units(expected)[1:], abs=1e-9)
+    rolled = np.cos(0.7) * end.director + np.sin(0.7) * second
+    across = rolled - (rolled * units(expected)).sum(axis=1, keepdims=True) * units(expected)
+    assert motion[:, rod.directors[-1]] == approx(units(across)[1:], abs=1e-9)
+
+
+def everything() -> sb.Scene:
+    """A rod between two moving grips with all that a rod can have."""
+    start = sb.Grip.from_poses(TIMES, PLACES, TURNS.as_quat())
+    first = np.add(PLACES, (0.3, 0.1, 0))
+    end = sb.Grip.from_markers(TIMES, first, first + TURNS.apply([0.02, 0.02, 0]), end=True)
+    points = [PLACES[0], PLACES[0] + (0.1, 0.1, -0.15), PLACES[0] + (0.3, 0.1, 0)]
+    return sb.rod(
+        0.5,
+        6,
+        density=0.05,
+        EI=1e-3,
+        EI2=4e-4,
+        GJ=6e-4,
+        EA=200.0,
+        points=points,
+        start=start,
+        end=end,
+        tilts=True,
+        roll=True,
+        stretch_damping=1e-3,
+        bend_damping=0.02,
+        twist_damping=0.03,
+        drag_linear=0.01,
+        drag_quadratic=0.02,
+        curvature_modes=(0, 1),
+        twist_modes=(0, 2),
+    )
+
+
+SET = {
+    "rod_start_tilt_1": 0.1,
+    "rod_start_tilt_2": -0.05,
+    "rod_end_tilt_1": 0.03,
+    "rod_end_tilt_2": 0.08,
+    "rod_roll": 0.6,
+    "rod_curvature_1_0": 2.0,
+    "rod_curvature_2_0": -1.0,
+    "rod_curvature_1_1": 1.5,
+    "rod_curvature_2_1": 0.7,
+    "rod_twist_0": 3.0,
+    "rod_twist_2": -2.0,
+}
+
+
+@pytest.mark.parametrize("integrator", ["bdf1", "bdf2"])
+def test_gradients_of_everything(integrator):
+    solver = sb.Solver(h=1 / 400, integrator=integrator)
+    report = sb.check_gradients(everything(), np.arange(0, 41, 10) / 400, solver, values=SET)
+    rows = {row.name: row for row in report.rows}
+    # The derivative by what holds a director, of which a roll is 1e7 times the torque, is good to rounding times that.
+    held_back = rows.pop("mass")
+    assert held_back.complex_step < 1e-6 and held_back.differences < 1e-4
+    assert all(row.passed for row in rows.values()), str(report)
+    assert report.dot_product < 1e-11
+    for name in everything().quantities:
+        assert rows[name].gradient > 0, name
+
+
+def test_torch_has_the_same_functions_of_quantities():
+    """EI2 enters by square roots, roll by sine and cosine."""
+    torch = pytest.importorskip("torch")
+    from sheetbend.torch import simulate
+
+    scene, times, solver = everything(), np.array([0.0, 0.05]), sb.Solver(h=1 / 400)
+    given = SET | {"rod_EI2": 5e-4}
+    values = {name: torch.tensor(value, dtype=torch.float64, requires_grad=True) for name, value in given.items()}
+    positions = simulate(scene, times, solver, values=values)
+    rolled_out = sb.rollout(scene, times, solver, given)
+    assert positions.detach().numpy() == approx(rolled_out.positions, abs=1e-12)
+    positions.square().sum().backward()
+    slopes = rolled_out.gradient(2 * rolled_out.positions).quantities
+    for name, value in values.items():
+        assert float(value.grad) == approx(slopes[name], rel=1e-8), name

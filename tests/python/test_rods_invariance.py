@@ -1,0 +1,161 @@
+"""What must not change rods: momentum, energy that only falls, the same motion seen from elsewhere, and frames turned
+together."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from pytest import approx
+from scipy.spatial.transform import Rotation
+from support import observed_orders, steps
+
+G = 9.81
+SHAPE = np.array([[0, 0, 0], [0.1, 0.02, 0], [0.2, 0.08, 0.03], [0.28, 0.12, 0.1], [0.3, 0.2, 0.2]])
+SPEED = np.array([[0.5, -0.2, 0.1], [0.1, 0.3, 0.0], [0.0, -0.4, 0.3], [-0.3, 0.1, 0.2], [-0.2, 0.5, -0.5]])
+DIRECTOR = np.array([0.1, 0.3, 0.9])
+
+
+def free(**options) -> sb.Scene:
+    """A bent rod set loose in space."""
+    given = {"density": 0.05, "EI": 1e-3, "GJ": 0.8e-3, "points": SHAPE, "velocity": SPEED, "director": DIRECTOR}
+    return sb.rod(0.45, 12, gravity=(0, 0, 0), **(given | options))
+
+
+def masses(scene: sb.Scene) -> np.ndarray:
+    """(nodes,) of the rod's nodes, which come first."""
+    return scene.compiled.unpack(scene.compiled.inputs())["mass"][: len(scene.ropes["rod"].particles)]
+
+
+def momenta(scene: sb.Scene, motion: sb.Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    """Linear and angular momentum (frames, 3)."""
+    nodes, mass = scene.ropes["rod"].particles, masses(scene)[:, None]
+    x, v = motion.positions[:, nodes], motion.velocities[:, nodes]
+    return (mass * v).sum(axis=1), np.cross(x, mass * v).sum(axis=1)
+
+
+# --- momentum and energy
+
+
+@pytest.mark.parametrize("integrator", ["bdf1", "bdf2"])
+def test_a_free_rod_keeps_its_momentum(integrator):
+    scene = free(bend_damping=0.01, twist_damping=0.01, EI2=2e-3, curvature_modes=(0,), twist_modes=(0,))
+    values = {"rod_curvature_1_0": 3.0, "rod_twist_0": 4.0}
+    motion = sb.simulate(scene, steps(1 / 480, 240), sb.Solver(h=1 / 480, integrator=integrator), values)
+    linear, _ = momenta(scene, motion)
+    assert linear == approx(np.broadcast_to(linear[0], linear.shape), abs=1e-12)
+
+
+@pytest.mark.parametrize("options", [{}, {"bend_damping": 0.01, "twist_damping": 0.01}], ids=["undamped", "damped"])
+def test_angular_momentum_is_lost_to_the_integrator_alone(options):
+    """Material damping sees the change of shape alone, so it has no torque either (unlike a rope's)."""
+    lost = []
+    for h in (1 / 1000, 1 / 2000, 1 / 4000):
+        scene = free(**options)
+        _, angular = momenta(scene, sb.simulate(scene, [0.0, 0.1], sb.Solver(h=h)))
+        lost.append(float(np.linalg.norm(angular[1] - angular[0]) / np.linalg.norm(angular[0])))
+    assert lost[0] < 0.02
+    assert observed_orders(lost).min() > 0.9
+
+
+def test_energy_only_falls():
+    """BDF1, from a bent shape at rest; the elastic energy from the multipliers -C/alpha."""
+    scene = free(EA=50.0, EI2=3e-3, velocity=None)
+    motion = sb.simulate(scene, steps(1 / 480, 480), sb.Solver(h=1 / 480, integrator="bdf1"))
+    nodes = scene.ropes["rod"].particles
+    kinetic = 0.5 * (masses(scene)[:, None] * motion.velocities[:, nodes] ** 2).sum(axis=(1, 2))
+    alpha = scene.compiled.unpack(scene.compiled.inputs())["compliance"]
+    forces = [motion.forces[name] for name in ("rod_stretch", "rod_bend", "rod_twist")]
+    square = np.concatenate([(force**2).sum(axis=2) for force in forces], axis=1)
+    energy = (kinetic + 0.5 * square @ alpha)[1:]
+    assert np.diff(energy).max() < 1e-9 * energy[0]
+    assert energy[-1] < 0.5 * energy[0]
+
+
+def test_damping_brings_a_free_rod_to_rest():
+    options = {"bend_damping": 0.05, "twist_damping": 0.05, "EI2": 3e-3, "velocity": None}
+    scene = free(**options)
+    motion = sb.simulate(scene, steps(1 / 480, 960), sb.Solver(h=1 / 480))
+    kinetic = (masses(scene)[:, None] * motion.velocities[:, :13] ** 2).sum(axis=(1, 2))
+    assert kinetic[-1] < 1e-3 * kinetic.max()
+
+
+# --- the same scene seen from elsewhere
+
+
+def gripped(turn: Rotation, shift: np.ndarray, roll: float = 0.0, **options) -> sb.Scene:
+    """A rod with a moving grip and a load, seen from elsewhere, its frames turned by `roll` about the edges."""
+    times = np.linspace(0.0, 0.5, 51)
+    held = Rotation.from_rotvec(np.sin(4 * times)[:, None] * (0.2, 0.4, -0.3))
+    position = turn.apply(0.05 * np.sin(5 * times)[:, None] * (1, 1, 0)) + shift
+    along = turn.apply(held.apply([1.0, 0, 0]))
+    first, second = (turn.apply(held.apply(axis)) for axis in ((0, 1.0, 0), (0, 0, 1.0)))
+    start = sb.Grip(times, position, along, np.cos(roll) * first + np.sin(roll) * second)
+    points = turn.apply(SHAPE - SHAPE[0]) + position[0]
+    given = {"density": 0.05, "EI": 1e-3, "GJ": 0.8e-3, "points": points, "bend_damping": 0.01, "twist_damping": 0.01}
+    scene = sb.rod(0.45, 12, start=start, gravity=turn.apply([0, 0, -G]), **(given | options))
+    scene.add_force([12], turn.apply([[0.01, 0.02, 0.0]])[None])
+    return scene
+
+
+def test_turned_and_moved_scenes_move_alike():
+    """Nodes and ghosts turn and shift, directors turn; to rounding."""
+    turn, shift, h = Rotation.from_rotvec([0.4, -1.1, 0.7]), np.array([3.0, -2.0, 1.0]), 1 / 480
+    options = {"EI2": 3e-3, "curvature_modes": (0, 1), "twist_modes": (0,)}
+    values = {"rod_curvature_1_0": 3.0, "rod_curvature_2_1": -2.0, "rod_twist_0": 4.0}
+    here, there = (
+        sb.simulate(gripped(*seen, **options), steps(h, 120), sb.Solver(h=h), values)
+        for seen in ((Rotation.identity(), np.zeros(3)), (turn, shift))
+    )
+    directors = gripped(turn, shift).ropes["rod"].directors
+    moved = np.ones((here.positions.shape[1], 1))
+    moved[directors] = 0.0
+    expected = turn.apply(here.positions.reshape(-1, 3)).reshape(here.positions.shape) + moved * shift
+    assert there.positions == approx(expected, abs=1e-9)
+    for name, force in here.forces.items():
+        assert there.forces[name] == approx(force, abs=1e-6), name
+
+
+def test_gradients_do_not_depend_on_the_place():
+    turn, shift, h = Rotation.from_rotvec([0.4, -1.1, 0.7]), np.array([3.0, -2.0, 1.0]), 1 / 480
+    weights = np.random.default_rng(0).standard_normal((1, gripped(turn, shift).particle_count, 3))
+    found = []
+    for seen, bar in (
+        ((Rotation.identity(), np.zeros(3)), weights),
+        ((turn, shift), turn.apply(weights[0])[None]),
+    ):
+        found.append(sb.rollout(gripped(*seen, EI2=3e-3), [0.25], sb.Solver(h=h)).gradient(bar).quantities)
+    for name, value in found[0].items():
+        assert found[1][name] == approx(value, rel=1e-6), name
+
+
+def test_frames_turned_together_change_nothing_for_a_round_section():
+    """At rest to rounding. In motion the first iteration of a substep sees frames of the substep before, by which
+    forces that it finds depend on the frames; that falls with the square of the substep."""
+    here = (Rotation.identity(), np.zeros(3))
+
+    def differ(find, **options) -> float:
+        a, b = (find(gripped(*here, roll, **options)) for roll in (0.0, 0.8))
+        return float(np.abs(a - b)[:13].max())
+
+    def moved(h: float):
+        return lambda scene: sb.simulate(scene, [0.25], sb.Solver(h=h)).positions[0]
+
+    assert differ(lambda scene: sb.equilibrium(scene).positions, points=None) < 1e-9
+    coarse, fine = differ(moved(1 / 480)), differ(moved(1 / 960))
+    assert coarse < 1e-6
+    assert observed_orders([coarse, fine]) == approx(2.0, abs=0.1)
+    assert differ(moved(1 / 480), EI2=3e-3) > 1e-3
+
+
+def test_whole_turns_built_in_change_the_sign_with_the_mirror():
+    """Twist has a hand: seen in a mirror, a rod with so many turns moves as one with as many turns the other way."""
+    grips = [sb.Grip.fixed((x, 0, 0), (1, 0, 0), (0, 0, 1)) for x in (0.0, 0.4)]
+    mirror, sides = np.array([1.0, -1.0, 1.0]), []
+    for sign in (1, -1):
+        points = np.array([[0, 0, 0], [0.1, 0.1 * sign, 0], [0.3, 0.1 * sign, 0], [0.4, 0, 0]])
+        options = {"density": 0.05, "EI": 1e-3, "GJ": 0.8e-3, "points": points, "turns": sign, "bend_damping": 0.02}
+        scene = sb.rod(0.5, 12, start=grips[0], end=grips[1], **options)
+        sides.append(sb.simulate(scene, [0.1, 0.3], sb.Solver(h=1 / 480)).positions[:, :13])
+    assert sides[1] == approx(mirror * sides[0], abs=1e-9)
+    assert np.abs(sides[0][:, :, 2] - sides[0][0, :, 2]).max() > 1e-3
