@@ -27,7 +27,7 @@ DROOP = np.radians(35.0)  # the rope leaves its grips downwards
 NOMINAL = [np.cos(DROOP) * ALONG - side * np.sin(DROOP) * UP for side in (1.0, -1.0)]
 REACH, TURN = 0.3, np.radians(60.0)  # m and rad, how far a grip goes from its nominal pose
 MEAN_APART, APART = 0.65, (0.4, 0.9)  # of the rope's length, between the grips
-PLACE, SWING = 0.12, 0.4  # m and rad, size of one wave of a grip's place and direction
+PLACE, SWING = 0.13, 0.5  # m and rad, size of one wave of a grip's place and direction
 REST, START = 0.1, 1.0  # s, at rest, and how long the motion takes to reach its full pace
 CREEP = ((1 / RATE, 20.0), (H, 1.0))  # substeps and times, s, until the rope is at rest at first
 SETS = ("train", "eval")
@@ -66,7 +66,7 @@ def ropes(seed: int = 7) -> list[Rope]:
         # markers, length, density, bending length, GJ/EI, bend and twist damping, drag, rest curvature, extra roll
         (13, 1.04, 0.045, 0.10, 0.60, 0.030, 0.030, 4e-3, 2.0, 0.0),
         (12, 0.93, 0.060, 0.16, 1.30, 0.020, 0.030, 6e-3, 1.2, 0.0),
-        (12, 0.90, 0.080, 0.23, 0.30, 0.015, 0.020, 4e-3, 0.9, np.radians(8.0)),
+        (12, 0.90, 0.080, 0.23, 0.30, 0.015, 0.020, 4e-3, 0.9, np.radians(15.0)),
         (13, 1.00, 0.070, 0.33, 0.80, 0.010, 0.015, 8e-3, 0.6, 0.0),
         (12, 0.96, 0.110, 0.45, 1.00, 0.008, 0.010, 5e-3, 0.3, 0.0),
     ]
@@ -98,7 +98,7 @@ def _rope(
     for grip in ("start", "end"):
         tilt, angle = np.radians(rng.uniform(2.0, 5.0)), rng.uniform(0.0, 2.0 * np.pi)
         values[f"{grip}_tilt_1"], values[f"{grip}_tilt_2"] = tilt * np.cos(angle), tilt * np.sin(angle)
-    values["roll"] = rng.choice([-1.0, 1.0]) * rng.uniform(0.3, 0.9)
+    values["roll"] = rng.choice([-1.0, 1.0]) * rng.uniform(0.7, 1.3)
     free = markers - 4
     around, off = rng.uniform(0.0, 2.0 * np.pi, free), rng.uniform(1e-3, 2e-3, free)
     slack = np.stack([off * np.cos(around), off * np.sin(around), rng.uniform(-3e-3, 3e-3, free)], axis=1)
@@ -110,10 +110,9 @@ def motion(rope: Rope, rng: np.random.Generator, seconds: float) -> tuple[Grip, 
     times = np.arange(round(seconds * KNOTS) + 1) / KNOTS
     base = MEAN_APART * rope.length * ALONG
     while True:
-        (x0, d0, turn0), (x1, d1, turn1) = (_wander(rng, times, n) for n in NOMINAL)
-        farthest = max(np.linalg.norm(x, axis=1).max() for x in (x0, x1))
+        (x0, d0), (x1, d1) = (_wander(rng, times, nominal) for nominal in NOMINAL)
         apart = np.linalg.norm(x1 + base - x0, axis=1) / rope.length
-        if farthest < REACH and max(turn0, turn1) < TURN and APART[0] < apart.min() and apart.max() < APART[1]:
+        if APART[0] < apart.min() and apart.max() < APART[1]:
             break
     q0, q1 = (carried(any_across(n), n, d) for n, d in zip(NOMINAL, (d0, d1), strict=True))  # as Grip.from_markers
     extra = rope.extra_roll * np.sin(2.0 * np.pi * 0.15 * _pace(times))[:, None]
@@ -121,16 +120,21 @@ def motion(rope: Rope, rng: np.random.Generator, seconds: float) -> tuple[Grip, 
     return Grip(times, x0, d0, q0), Grip(times, x1 + base, d1, q1)
 
 
-def _wander(rng: np.random.Generator, times: Array, nominal: Array) -> tuple[Array, Array, float]:
-    """Places (knots, 3) m off the nominal one, directions (knots, 3), and the largest turn off the nominal one, rad."""
+def _wander(rng: np.random.Generator, times: Array, nominal: Array) -> tuple[Array, Array]:
+    """(knots, 3) m off the nominal place, and (knots, 3) unit directions."""
     frequency, start = rng.uniform(0.1, 0.9, (4, 5)), rng.uniform(0.0, 2.0 * np.pi, (4, 5))
     size = rng.normal(size=(4, 5)) / np.sqrt(2.0)
     waves = (size * np.sin(2.0 * np.pi * frequency * _pace(times)[:, None, None] + start)).sum(axis=1)
-    across = SWING * waves[:, 3:]
-    angle = np.linalg.norm(across, axis=1)
+    across = _within(TURN, SWING * waves[:, 3:])
+    angle = np.linalg.norm(across, axis=1)[:, None]
     plane = np.stack([ACROSS, np.cross(nominal, ACROSS)])
-    directions = np.cos(angle)[:, None] * nominal + np.sinc(angle / np.pi)[:, None] * across @ plane
-    return PLACE * waves[:, :3], directions, float(angle.max())
+    return _within(REACH, PLACE * waves[:, :3]), np.cos(angle) * nominal + np.sinc(angle / np.pi) * across @ plane
+
+
+def _within(limit: float, vectors: Array) -> Array:
+    """Vectors (knots, k) shortened smoothly to less than a limit."""
+    share = np.linalg.norm(vectors, axis=1, keepdims=True) / limit
+    return np.asarray(vectors * np.tanh(share) / np.maximum(share, 1e-12))
 
 
 def _pace(times: Array) -> Array:
