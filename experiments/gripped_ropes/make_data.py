@@ -24,7 +24,7 @@ from true_ropes import GRAVITY, GRIPPED, MODES, Array, Rope, ropes
 SEGMENTS, H = 120, 1 / 1600
 RATE = 100  # Hz, of the frames
 NOISE = 5e-4  # m, standard deviation of each coordinate of each marker
-CREEP = ((1 / RATE, 20.0), (H, 1.0))  # substeps and times, s, until the rope is at rest at first
+CREEP = ((1 / 100, 20.0), (1 / 400, 5.0), (H, 0.5))  # substeps and times, s, until the rope is at rest at first
 SETS = ("train", "eval")
 PHYSICAL = ("density", "EI", "GJ", "bend_damping", "twist_damping", "drag_linear")
 

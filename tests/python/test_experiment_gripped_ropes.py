@@ -12,7 +12,6 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-import sheetbend as sb
 from sheetbend.grip import Grip
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "gripped_ropes"
