@@ -25,6 +25,7 @@ SEGMENTS, H = 120, 1 / 1600
 RATE = 100  # Hz, of the frames
 NOISE = 5e-4  # m, standard deviation of each coordinate of each marker
 CREEP = ((1 / 100, 20.0), (1 / 400, 5.0), (H, 0.5))  # substeps and times, s, until the rope is at rest at first
+SNAP = 60.0  # m/s^2; a motion at which the rope snaps over, so that its path hangs on a hair, is drawn anew
 SETS = ("train", "eval")
 PHYSICAL = ("density", "EI", "GJ", "bend_damping", "twist_damping", "drag_linear")
 
@@ -107,8 +108,12 @@ def gripped_markers(grip: Grip, back: float, ahead: float) -> Array:
 def recording(rope: Rope, part: str, number: int, seed: int, seconds: float) -> Array:
     """(frames, markers, 3) m, with noise."""
     rng = np.random.default_rng([seed, int(rope.name.removeprefix("rope_")), SETS.index(part), number])
-    start, end = motion(rope, rng, seconds)
-    free = free_markers(rope, *simulated(rope, start, end, seconds))
+    while True:
+        start, end = motion(rope, rng, seconds)
+        nodes, directors = simulated(rope, start, end, seconds)
+        if RATE**2 * np.linalg.norm(np.diff(nodes, 2, axis=0), axis=2).max() < SNAP:
+            break
+    free = free_markers(rope, nodes, directors)
     clean = np.concatenate([gripped_markers(start, GRIPPED, 0.0), free, gripped_markers(end, 0.0, GRIPPED)], axis=1)
     return clean + NOISE * rng.standard_normal(clean.shape)
 
