@@ -1,0 +1,81 @@
+"""The true values of the five synthetic ropes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+GRIPPED = 0.03  # m of rope in each grip, between its two markers
+GRAVITY = 9.81  # m/s^2
+MODES = (0, 1, 2)  # of the rest curvature
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Rope:
+    """True values of a rope; `values` are quantities of its rod, in SI units.
+
+    Attributes:
+        length: m, between the outermost markers, the gripped pieces included.
+        extra_roll: rad, by which the end grip slowly rolls beside what `Grip.from_markers` knows: a model error.
+        slack: (free markers, 3) m, where a marker sits off its material point: along the rope's two directors, and
+            along its arc.
+    """
+
+    name: str
+    markers: int
+    length: float
+    values: dict[str, float]
+    extra_roll: float
+    slack: Array
+
+    @property
+    def free_length(self) -> float:
+        return self.length - 2.0 * GRIPPED
+
+
+def ropes(seed: int = 7) -> list[Rope]:
+    """Five ropes, from soft to stiff: the bending length (EI/(density g))^(1/3) goes from 0.1 to 0.45 m."""
+    table = [
+        # markers, length, density, bending length, GJ/EI, bend and twist damping, drag, rest curvature, extra roll
+        (13, 1.04, 0.045, 0.10, 0.60, 0.030, 0.030, 4e-3, 2.0, 0.0),
+        (12, 0.93, 0.060, 0.16, 1.30, 0.020, 0.030, 6e-3, 1.2, 0.0),
+        (12, 0.90, 0.080, 0.23, 0.30, 0.015, 0.020, 4e-3, 0.9, np.radians(15.0)),
+        (13, 1.00, 0.070, 0.33, 0.80, 0.010, 0.015, 8e-3, 0.6, 0.0),
+        (12, 0.96, 0.110, 0.45, 1.00, 0.008, 0.010, 5e-3, 0.3, 0.0),
+    ]
+    return [_rope(number, seed, *row) for number, row in enumerate(table, start=1)]
+
+
+def _rope(
+    number: int,
+    seed: int,
+    markers: int,
+    length: float,
+    density: float,
+    bending_length: float,
+    ratio: float,
+    bend_damping: float,
+    twist_damping: float,
+    drag: float,
+    curvature: float,
+    extra_roll: float,
+) -> Rope:
+    rng = np.random.default_rng([seed, number])
+    EI = density * GRAVITY * bending_length**3
+    values = {"density": density, "EI": EI, "GJ": ratio * EI}
+    values |= {"bend_damping": bend_damping, "twist_damping": twist_damping, "drag_linear": drag}
+    for k, share in zip(MODES, (1.0, 0.7, 0.4), strict=True):
+        angle = rng.uniform(0.0, 2.0 * np.pi)
+        values[f"curvature_1_{k}"] = share * curvature * np.cos(angle)
+        values[f"curvature_2_{k}"] = share * curvature * np.sin(angle)
+    for grip in ("start", "end"):
+        tilt, angle = np.radians(rng.uniform(2.0, 5.0)), rng.uniform(0.0, 2.0 * np.pi)
+        values[f"{grip}_tilt_1"], values[f"{grip}_tilt_2"] = tilt * np.cos(angle), tilt * np.sin(angle)
+    values["roll"] = rng.choice([-1.0, 1.0]) * rng.uniform(0.7, 1.3)
+    free = markers - 4
+    around, off = rng.uniform(0.0, 2.0 * np.pi, free), rng.uniform(1e-3, 2e-3, free)
+    slack = np.stack([off * np.cos(around), off * np.sin(around), rng.uniform(-3e-3, 3e-3, free)], axis=1)
+    return Rope(f"rope_{number}", markers, length, values, extra_roll, slack)

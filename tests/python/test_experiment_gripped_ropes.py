@@ -1,0 +1,119 @@
+"""The look-alike of rope recordings is what its files say, and the simulator gives it back from them alone."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import pickle
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+from sheetbend.grip import Grip
+
+FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "gripped_ropes"
+SECONDS, FRAMES = 1.0, 100
+Array = np.ndarray
+
+
+@pytest.fixture(scope="module")
+def script() -> Iterator[ModuleType]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(FOLDER))
+        yield importlib.import_module("make_data")
+        for name in ("make_data", "grip_motion", "true_ropes"):
+            del sys.modules[name]
+
+
+def made(script: ModuleType, folder: Path, noise: float, seed: int = 7) -> Path:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(script, "NOISE", noise)
+        script.main(folder, train=1, evaluation=1, count=1, seconds=SECONDS, seed=seed)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def noisy(script: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return made(script, tmp_path_factory.mktemp("noisy"), script.NOISE)
+
+
+@pytest.fixture(scope="module")
+def clean(script: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return made(script, tmp_path_factory.mktemp("clean"), 0.0)
+
+
+def positions(folder: Path, part: str) -> Array:
+    """(frames, markers, 3) m."""
+    frames = pickle.loads((folder / "rope_1" / part / "00.pkl").read_bytes())
+    assert isinstance(frames, list) and {(f.shape, str(f.dtype)) for f in frames} == {((3, 13), "float64")}
+    return np.array(frames).transpose(0, 2, 1)
+
+
+def truth(folder: Path) -> dict:
+    return json.loads((folder / "rope_1.json").read_text())
+
+
+def from_files(script: ModuleType, folder: Path, part: str, **changed: float) -> Array:
+    """(frames, free markers, 3) m: the true values, simulated between the recorded grips."""
+    x, told = positions(folder, part), truth(folder)
+    times = np.arange(FRAMES) / told["made_with"]["rate"]
+    nominal = told["nominal_directions"]
+    start = Grip.from_markers(times, x[:, 0], x[:, 1], nominal=nominal["start"])
+    end = Grip.from_markers(times, x[:, -2], x[:, -1], end=True, nominal=nominal["end"])
+    rope = script.ropes(told["made_with"]["seed"])[0]
+    assert rope.values == {k: v for k, v in told["true"].items() if k != "length"}
+    assert rope.slack.tolist() == told["marker_slack"] and rope.free_length == told["true"]["length"]
+    rope.values.update(changed)
+    return script.free_markers(rope, *script.simulated(rope, start, end, SECONDS))
+
+
+def test_the_layout_is_that_of_the_rope_data(noisy: Path) -> None:
+    assert sorted(str(p.relative_to(noisy)) for p in noisy.rglob("*.*")) == [
+        "rope_1.json",
+        "rope_1/eval/00.pkl",
+        "rope_1/train/00.pkl",
+    ]
+    assert len(positions(noisy, "train")) == FRAMES
+    assert truth(noisy)["what"].startswith("SYNTHETIC")
+
+
+def test_the_same_seed_gives_the_same_files_and_another_seed_another_rope(
+    script: ModuleType, noisy: Path, tmp_path: Path
+) -> None:
+    again, other = made(script, tmp_path / "again", script.NOISE), made(script, tmp_path / "other", script.NOISE, 8)
+    for file in ("rope_1.json", "rope_1/eval/00.pkl", "rope_1/train/00.pkl"):
+        assert (again / file).read_bytes() == (noisy / file).read_bytes()
+        assert (other / file).read_bytes() != (noisy / file).read_bytes()
+
+
+def test_the_noise_is_what_the_file_says(noisy: Path, clean: Path) -> None:
+    noise = np.concatenate([positions(noisy, part) - positions(clean, part) for part in ("train", "eval")])
+    assert noise.std() == pytest.approx(truth(noisy)["made_with"]["noise"], rel=4.0 / np.sqrt(2 * noise.size))
+    assert abs(noise.mean()) < 4.0 * noise.std() / np.sqrt(noise.size)
+
+
+def test_the_rope_rests_at_first_and_then_moves(clean: Path) -> None:
+    x = positions(clean, "train")
+    still = round(0.1 * truth(clean)["made_with"]["rate"])
+    assert np.abs(x[: still + 1] - x[0]).max() < 2e-5
+    assert np.abs(x - x[0]).max() > 0.05
+
+
+@pytest.mark.parametrize("part", ["train", "eval"])
+def test_the_true_values_give_the_recording_from_its_files_alone(script: ModuleType, clean: Path, part: str) -> None:
+    error = np.abs(from_files(script, clean, part) - positions(clean, part)[:, 2:-2])
+    assert error.mean() < 1e-5 and error.max() < 1e-4
+
+
+def test_without_twist_the_recording_is_missed(script: ModuleType, clean: Path) -> None:
+    GJ = 1e-3 * truth(clean)["true"]["GJ"]
+    error = np.abs(from_files(script, clean, "train", GJ=GJ) - positions(clean, "train")[:, 2:-2])
+    assert error.mean() > 1e-3
+
+
+def test_with_noise_the_true_values_miss_by_about_the_noise(script: ModuleType, noisy: Path) -> None:
+    error = np.abs(from_files(script, noisy, "train") - positions(noisy, "train")[:, 2:-2])
+    assert 0.6 * script.NOISE < error.mean() < 3.0 * script.NOISE
