@@ -33,6 +33,7 @@ struct Dual {
   friend Dual operator+(Dual a, const Dual& b) { return a += b; }
   friend Dual operator-(Dual a, const Dual& b) { return a -= b; }
   friend Dual operator*(const Dual& a, const Dual& b) { return map(a, b, a.v * b.v, b.v, a.v); }
+  friend Dual operator*(double a, const Dual& b) { return map(b, a * b.v, a); }
   friend Dual operator/(const Dual& a, const Dual& b) {
     const T inverse = T(1.0) / b.v, q = a.v / b.v;
     return map(a, b, q, inverse, -q * inverse);

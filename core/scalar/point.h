@@ -67,10 +67,15 @@ inline __attribute__((always_inline)) void for_each_point(int begin, int end, F 
   }
 }
 
-// s p, for either kind of point.
+// s p, for either kind of point. A plain factor has no derivatives to multiply.
 template <class T>
 Vec3<T> scaled(const T& s, const Vec3<T>& p) {
   return s * p;
+}
+template <class T>
+  requires(!std::is_same_v<T, double>)
+Vec3<T> scaled(double s, const Vec3<T>& p) {
+  return {s * p.x, s * p.y, s * p.z};
 }
 
 }  // namespace sheetbend

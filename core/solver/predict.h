@@ -40,7 +40,7 @@ T history(const Bdf& bdf, const T& now, const T& before) {
 template <class T, class How>
 typename How::Point history(const Bdf& bdf, How, const T* now, const T* before) {
   if (bdf.before == 0.0) return How::load(now);
-  return scaled(T(bdf.now), How::load(now)) + scaled(T(bdf.before), How::load(before));
+  return scaled(bdf.now, How::load(now)) + scaled(bdf.before, How::load(before));
 }
 
 // Value of something given at knots, (knots, slots, 3), for one slot.
@@ -96,6 +96,7 @@ void predict(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, doub
   const T eta(bdf.eta);
   const T gravity[4] = {eta * in.of(Quantity::gravity)[0], eta * in.of(Quantity::gravity)[1],
                         eta * in.of(Quantity::gravity)[2], T(0.0)};
+  const double step = bdf.eta;
   const T* kept = scene.has_drag ? weights.kept.data() : nullptr;
   const int* first_dof = scene.first_dof.data();
   parallel_for(scene.nodes(), threads, points_per_thread, [=](int begin, int end) {
@@ -103,7 +104,7 @@ void predict(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, doub
       const int dof = first_dof[n];
       auto v = history(bdf, how, s.v + dof, s.v_before + dof) + how.load(gravity);
       if (kept) v = scaled(kept[n], v);
-      how.store(q.of(n), history(bdf, how, s.x + dof, s.x_before + dof) + scaled(eta, v));
+      how.store(q.of(n), history(bdf, how, s.x + dof, s.x_before + dof) + scaled(step, v));
     });
   });
   if (!scene.loaded.empty()) {

@@ -115,7 +115,7 @@ template <class T>
 bool read_off(const Scene& scene, const Bdf& bdf, const SubstepStates<T>& s, int threads, const Coordinates<T>& q,
               T* x_next, T* v) {
   std::atomic<bool> finite = true;
-  const T rate(1.0 / bdf.eta);
+  const double rate = 1.0 / bdf.eta;
   const int* first_dof = scene.first_dof.data();
   parallel_for(scene.nodes(), threads, points_per_thread, [=, &finite](int begin, int end) {
     PointSum<T> difference;  // q - q, which only what is finite has as zero

@@ -255,7 +255,7 @@ class _Search:
             self.say(f"start at a bending length of {length:g} m: EI {values[f'{NAME}_EI']:.3g}, cost {cost:.4g}")
             ends.append((cost, candidate.at(values), values))
         _, model, values = min(ends, key=lambda end: end[0])
-        for window in self.windows[1:]:
+        for window in self.windows[1:-1]:
             values = self._minimum(model, rung.parameters, values, window)
             model = model.at(values)
         return model, values
@@ -263,18 +263,18 @@ class _Search:
     def _refined(
         self, model: RopeModel, parameters: tuple[Parameter, ...], values: dict[str, float], max_segments: int
     ) -> tuple[RopeModel, dict[str, float]]:
-        """Doubles the links until EI moves by less than 5 %."""
-        while 2 * model.segments <= max_segments:
+        """Doubles the links until EI moves by less than 5 %, and stays with the finer ones."""
+        window = self.windows[min(1, len(self.windows) - 1)]
+        moved = np.inf
+        before = self._minimum(model, parameters, values, window)
+        while moved >= SETTLED and 2 * model.segments <= max_segments:
             finer = replace(model, segments=2 * model.segments)
-            found = self._minimum(finer, parameters, values, self.windows[min(1, len(self.windows) - 1)])
-            before = self._minimum(model, parameters, values, self.windows[min(1, len(self.windows) - 1)])
+            found = self._minimum(finer, parameters, before, window)
             moved = abs(found[f"{NAME}_EI"] / before[f"{NAME}_EI"] - 1.0)
             self.say(f"{model.segments} to {finer.segments} links move EI by {100 * moved:.2g} %")
-            if moved < SETTLED:
-                break
-            values = self._minimum(finer, parameters, found, self.windows[-1])
-            model = finer.at(values)
-        return model, values
+            model, before = finer.at(found), found
+        values = self._minimum(model, parameters, before, self.windows[-1])
+        return model.at(values), values
 
     def _minimum(
         self,
