@@ -1,6 +1,6 @@
 // Directors at the end of a substep: made perpendicular to their edges again and of length one,  q -> across/|across|,
 // across = q - (q.t) t. The constraints see the direction across the edge alone, so this moves nothing; it keeps the coordinates well scaled
-// and carries a frame along as its edge turns. And the reverse.
+// and carries a frame along as its edge turns. Those that are held stay as given. And the reverse.
 #pragma once
 
 #include "core/scalar/vec3.h"
@@ -29,13 +29,15 @@ struct Retraction {
 template <class T>
 void retract_directors(const Scene& scene, T* x) {
   const auto at = [&](int node) { return x + scene.first_dof[node]; };
-  for (const Director& d : scene.directors) Retraction<T>(d, at).unit.store(at(d.node));
+  for (const Director& d : scene.directors)
+    if (scene.role[d.node] == Role::free) Retraction<T>(d, at).unit.store(at(d.node));
 }
 
 // q(node) gives the coordinates before. x_bar (dofs) goes in as the cotangent of those after, and comes out as theirs.
 template <class T, class At>
 void retract_directors_vjp(const Scene& scene, At&& q, T* x_bar) {
   for (const Director& d : scene.directors) {
+    if (scene.role[d.node] != Role::free) continue;
     const Retraction<T> r(d, q);
     T* director_bar = x_bar + scene.first_dof[d.node];
     const Vec3<T> unit_bar(director_bar);
