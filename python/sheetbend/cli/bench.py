@@ -12,10 +12,11 @@ from rich.console import Console
 from ..bench import WORKLOADS, measure, workload
 from ..bench.chain import measure_chain
 from ..bench.ladder import measure_ladder
+from ..bench.rod import measure_rod
 from ..errors import InputError
 from .outcome import Code, Outcome, run
 
-NAMES = (*WORKLOADS, "chain", "ladder")
+NAMES = (*WORKLOADS, "chain", "rod", "ladder")
 
 
 def bench(
@@ -23,8 +24,8 @@ def bench(
         str,
         typer.Argument(
             metavar="WORKLOAD",
-            help="W1 a rope, W1s the same in small steps, W2 a cloth, W5 256 ropes, chain the direct solver, ladder "
-            "cloths of 441 to 1,000,000 particles.",
+            help="W1 a rope, W1s the same in small steps, W2 a cloth, W5 256 ropes, chain the direct solver, rod a "
+            "rope of 12 markers between grips, ladder cloths of 441 to 1,000,000 particles.",
             show_default=False,
         ),
     ],
@@ -50,6 +51,9 @@ def _bench(console: Console, name: str, threads: int, repeats: int, frames: int 
     if name == "chain":
         data = measure_chain(threads, repeats)
         _print_chain(console, data)
+    elif name == "rod":
+        data = measure_rod(threads, repeats)
+        _print_rod(console, data)
     elif name == "ladder":
         data = measure_ladder(threads, repeats, progress=lambda row: _print_rung(console, row))
         if figure is not None:
@@ -110,6 +114,26 @@ def _print_chain(console: Console, data: Mapping[str, Any]) -> None:
         console.print(
             f"  {b['ropes']} ropes of {b['segments']} segments, {name}: {b[f'{name}_ns']:.0f} in one batch, "
             f"{b[f'{name}_singly_ns']:.0f} one at a time, {b[f'{name}_speedup']:.1f} times the throughput",
+            soft_wrap=True,
+        )
+
+
+def _print_rod(console: Console, data: Mapping[str, Any]) -> None:
+    console.print(f"[bold]rod[/]  12 markers between two grips; {_conditions(data)}")
+    forward = data["forward_ns"]
+    for name, words in (
+        ("forward", "forward, one iteration"),
+        ("two_iterations", "forward, two iterations"),
+        ("gradient", "gradient"),
+        ("jacobian", "Jacobian, 8 columns"),
+    ):
+        each = data[f"{name}_ns"]
+        console.print(f"  {words:24s} {each / 1000:6.2f} us per substep, {each / forward:5.2f} times forward")
+    for name in ("forward", "gradient"):
+        batch, singly = data[f"{name}_batch_ns"], data[f"{name}_singly_ns"]
+        console.print(
+            f"  8 recordings, {name}: {batch / 1000:.2f} us in lanes, {singly / 1000:.2f} one at a time, "
+            f"{singly / batch:.1f} times the throughput",
             soft_wrap=True,
         )
 

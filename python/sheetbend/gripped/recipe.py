@@ -13,7 +13,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..checks import finite
 from ..errors import InputError, SheetbendError
 from ..experiment import Experiment
 from ..fit import Fit, fit
@@ -151,6 +153,7 @@ def fit_rope(
     recordings: Sequence[Recording],
     *,
     density: float,
+    nominal: tuple[ArrayLike, ArrayLike] | None = None,
     ladder: Sequence[Rung] = LADDER,
     validate: float = 0.25,
     bending_lengths: Sequence[float] = BENDING_LENGTHS,
@@ -168,6 +171,8 @@ def fit_rope(
     Args:
         recordings: with two or more clamped markers at each end.
         density: kg/m, weighed.
+        nominal: directions (3,) of the start and the end grip from which their frames are carried; the mean recorded
+            ones by default.
         ladder: the rungs, in order; the first one always stays.
         validate: share of the recordings that decide whether a rung stays, and that no rung is fitted to; the last fit
             sees all.
@@ -193,7 +198,7 @@ def fit_rope(
     motions = [GrippedMotion.of(r, smoothing) for r in recordings]
     model = RopeModel(
         density=density,
-        nominal=nominal_directions(motions),
+        nominal=nominal_directions(motions) if nominal is None else _given_directions(nominal),
         values={},
         segments=segments,
         substeps=substeps,
@@ -202,6 +207,11 @@ def fit_rope(
     )
     search = _Search(motions, validate, windows, threads, say)
     return search.run(model, ladder, bending_lengths, max_segments)
+
+
+def _given_directions(nominal: tuple[ArrayLike, ArrayLike]) -> tuple[Array, Array]:
+    start, end = (finite("nominal", d, (3,), InputError) for d in nominal)
+    return start / np.linalg.norm(start), end / np.linalg.norm(end)
 
 
 class _Search:
