@@ -23,27 +23,30 @@ FAST = 15.0  # m/s
 
 
 def solve(task: Task, seconds: float) -> list[Search]:
-    print(f"{task.name}: {task.size} unknowns, {1e3 * task.cost(np.zeros(task.size))[1]:.0f} mm from the target at first")
+    """By both ways, with a report."""
+    first = task.outcome(np.zeros(task.size))
+    print(f"{task.name}: {task.size} unknowns; without a motion {1e3 * first.error:.0f} mm from the target")
     searches = [descend(task, seconds)]
     gap = gradient_gap(task, 0.5 * searches[0].best)
     print(f"  gradient against central differences, at half the motion found: {gap:.1e} of the largest entry")
     searches += [found for found in [evolve(task, searches[0].seconds[-1])] if found]
     for search in searches:
-        count = search.first_below(task.reached)
-        late = "not reached" if count is None else f"below {1e3 * task.reached:g} mm after {count} rollouts, "
-        late += "" if count is None else f"{search.seconds[count - 1]:.2f} s"
-        print(
-            f"  {search.name}: {1e3 * search.errors[-1]:.2f} mm, cost {search.costs[-1]:.4f} after"
-            f" {len(search.costs)} rollouts, {search.seconds[-1]:.1f} s; {late}"
-        )
+        print(f"  {search.name}, {len(search.outcomes)} rollouts, {search.seconds[-1]:.1f} s: {told(search)}")
     if len(searches) == 1:
         print("  CMA-ES: left out, the package cma is not installed")
     return searches
 
 
+def told(search: Search) -> str:
+    last, count = search.outcomes[-1], search.reached_after()
+    when = "not reached" if count is None else f"reached after {count} rollouts, {search.seconds[count - 1]:.2f} s"
+    effort = float(search.best @ search.best)
+    return f"{1e3 * last.error:.2f} mm, {last.speed:.3g} m/s, effort {effort:.2f}, cost {last.cost:.4f}; {when}"
+
+
 def too_soon() -> None:
     """A rope without bending stiffness passes a hand's sideways motion on as a wave; the tip feels it after 0.6 s."""
-    print("whip, 0.2 s after a hand that moves sideways begins:")
+    print("whip without bending, a hand that moves sideways, 0.2 s:")
     try:
         descend(whip(seconds=0.2, axes="xy", EI=None), 1.0)
     except sb.EmptyGradientError as error:

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
+from motion import Array
 from search import Search
-from sheetbend.drawing import ACCENT, GRAY, INK, WARM, clean, key, new_figure
-from task import Array, Task
+from sheetbend.drawing import ACCENT, INK, WARM, clean, key, new_figure
+from task import Task
 
 SHAPES = 9  # of the rope over time, in one picture
 AWAY = np.array([0.45, 0.25])  # how much of the depth y is drawn along x and z
@@ -51,16 +52,20 @@ def _picture(panel, task: Task, best: Array) -> None:
     panel.plot(*target.T, color=WARM, zorder=5, **style)
     panel.set_aspect("equal", adjustable="datalim")
     panel.set_title(task.name, fontsize=10, color=INK, loc="left")
-    panel.set_xlabel("along (m)")
-    panel.set_ylabel("up (m)")
+    panel.set_xlabel("along, and a part of the depth (m)")
+    panel.set_ylabel("up, and a part of the depth (m)")
     clean(panel)
 
 
 def _errors(panel, task: Task, searches: Sequence[Search]) -> None:
     for search in searches:
-        panel.plot(search.seconds, 1e3 * np.array(search.errors), color=COLORS[search.name], lw=1.6, label=search.name)
-    panel.axhline(1e3 * task.reached, color=GRAY, lw=1.0, ls=":")
-    panel.text(searches[0].seconds[-1], 1.1e3 * task.reached, "reached", color=GRAY, fontsize=8, ha="right")
+        errors = [1e3 * outcome.error for outcome in search.outcomes]
+        panel.plot(search.seconds, errors, color=COLORS[search.name], lw=1.6, label=search.name)
+        count = search.reached_after()
+        if count is not None:
+            place = (search.seconds[count - 1], errors[count - 1])
+            panel.plot(*place, "o", color=INK, ms=5)
+            panel.annotate("reached", place, (8, 4), textcoords="offset points", fontsize=8, color=INK)
     panel.set_yscale("log")
     panel.set_xlabel("wall time (s)")
     panel.set_ylabel("distance to the target (mm)")

@@ -6,8 +6,9 @@ import time
 from dataclasses import dataclass, field
 
 import numpy as np
+from motion import Array
 from scipy.optimize import minimize
-from task import Array, Task
+from task import Outcome, Task
 
 SETTLED = 1e-6  # relative decrease of the cost at which L-BFGS stops
 SPREAD = 0.2  # of CMA-ES at first, in unknowns, of which one of size 1 is a likely motion
@@ -15,31 +16,25 @@ SPREAD = 0.2  # of CMA-ES at first, in unknowns, of which one of size 1 is a lik
 
 @dataclass
 class Search:
-    """What a search tried: after so many seconds, so many rollouts, the best cost so far and the error in m there."""
+    """What a search tried: after each rollout the seconds since its start and the best outcome so far."""
 
     name: str
     best: Array
     seconds: list[float] = field(default_factory=list)
-    costs: list[float] = field(default_factory=list)
-    errors: list[float] = field(default_factory=list)
+    outcomes: list[Outcome] = field(default_factory=list)
     began: float = field(default_factory=time.perf_counter)
 
-    def note(self, unknowns: Array, cost: float, error: float) -> None:
-        if self.costs and not cost < self.costs[-1]:
-            cost, error = self.costs[-1], self.errors[-1]
+    def note(self, unknowns: Array, outcome: Outcome) -> None:
+        if self.outcomes and not outcome.cost < self.outcomes[-1].cost:
+            outcome = self.outcomes[-1]
         else:
             self.best = unknowns.copy()
         self.seconds.append(time.perf_counter() - self.began)
-        self.costs.append(cost)
-        self.errors.append(error)
+        self.outcomes.append(outcome)
 
-    def first_below(self, error: float) -> int | None:
-        """The number of rollouts after which the error is first below a bound."""
-        return next((k + 1 for k, e in enumerate(self.errors) if e < error), None)
-
-
-class _OutOfTime(Exception):
-    pass
+    def reached_after(self) -> int | None:
+        """Rollouts."""
+        return next((k + 1 for k, outcome in enumerate(self.outcomes) if outcome.reached), None)
 
 
 def descend(task: Task, seconds: float, start: Array | None = None, most: int = 1000) -> Search:
@@ -54,17 +49,17 @@ def descend(task: Task, seconds: float, start: Array | None = None, most: int = 
     task.require_gradient(first)
 
     def tried(unknowns: Array) -> tuple[float, Array]:
-        if search.seconds and (search.seconds[-1] > seconds or len(search.seconds) >= most):
-            raise _OutOfTime
-        cost, error, gradient = task.cost_and_gradient(unknowns)
-        search.note(unknowns, cost, error)
-        return cost, gradient
+        outcome, gradient = task.outcome_and_gradient(unknowns)
+        search.note(unknowns, outcome)
+        return outcome.cost, gradient
 
-    try:
-        minimize(tried, first, jac=True, method="L-BFGS-B", options={"maxiter": most, "maxfun": most, "ftol": SETTLED})
-    except _OutOfTime:
-        pass
-    if search.errors[-1] > task.reached:
+    def in_time(_: Array) -> None:
+        if search.seconds[-1] > seconds:
+            raise StopIteration
+
+    options = {"maxiter": most, "maxfun": most, "ftol": SETTLED}
+    minimize(tried, first, jac=True, method="L-BFGS-B", callback=in_time, options=options)
+    if not search.outcomes[-1].reached:
         task.require_gradient(search.best)
     return search
 
@@ -73,7 +68,9 @@ def evolve(task: Task, seconds: float, seed: int = 1) -> Search | None:
     """CMA-ES from no motion, until the time is spent; None where the package cma is not installed."""
     try:
         import cma
-    except ModuleNotFoundError:
+    except ModuleNotFoundError as error:
+        if error.name != "cma":
+            raise
         return None
     options = {"verbose": -9, "seed": seed}
     search = Search("CMA-ES", np.zeros(task.size))
@@ -82,19 +79,27 @@ def evolve(task: Task, seconds: float, seed: int = 1) -> Search | None:
         tried = strategy.ask()
         costs = []
         for unknowns in tried:
-            cost, error = task.cost(unknowns)
-            search.note(unknowns, cost, error)
-            costs.append(cost)
+            outcome = task.outcome(unknowns)
+            search.note(unknowns, outcome)
+            costs.append(outcome.cost)
         strategy.tell(tried, costs)
     return search
 
 
-def gradient_gap(task: Task, unknowns: Array, step: float = 1e-3) -> float:
-    """The largest gap between the gradient and central differences (one Richardson step), over its largest entry."""
+def gradient_gap(task: Task, unknowns: Array, directions: Array | None = None, step: float = 1e-3) -> float:
+    """The largest gap between the gradient and central differences (one Richardson step), over its largest entry.
+
+    Args:
+        directions: (k, unknowns), unit vectors; every unknown by default.
+    """
+    along = np.eye(task.size) if directions is None else directions
+
+    def cost(unknowns: Array) -> float:
+        return task.outcome(unknowns).cost
 
     def central(direction: Array, size: float) -> float:
-        return (task.cost(unknowns + size * direction)[0] - task.cost(unknowns - size * direction)[0]) / (2.0 * size)
+        return (cost(unknowns + size * direction) - cost(unknowns - size * direction)) / (2.0 * size)
 
-    gradient = task.cost_and_gradient(unknowns)[2]
-    rough = [(4.0 * central(d, step / 2.0) - central(d, step)) / 3.0 for d in np.eye(task.size)]
-    return float(np.abs(gradient - rough).max() / np.abs(gradient).max())
+    _, gradient = task.outcome_and_gradient(unknowns)
+    rough = [(4.0 * central(d, step / 2.0) - central(d, step)) / 3.0 for d in along]
+    return float(np.abs(along @ gradient - rough).max() / np.abs(gradient).max())

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import sheetbend as sb
-from task import RATE, Array, Control, Motion, Task
+from motion import RATE, Array, Control, Motion
+from task import Task
 
 MOVING, FRAMES = 1.0, np.array([1.05, 1.1, 1.17, 1.25])  # s, of the motion, and where the rod shall be at rest
 KNOTS = 5  # of each of the grippers' 12 ways to move
@@ -12,7 +13,8 @@ LENGTH, SEGMENTS, APART = 1.0, 30, 0.6  # m, links, m between the grippers at fi
 DROOP = np.radians(45.0)  # the rod leaves its grippers downwards
 NEAR = 0.05  # m, the root mean square distance that costs 1
 PLACE, ANGLE = (0.3, 5.0), (0.5, 8.0)  # m and rad, and their accelerations, of an effort of 1
-EFFORT, REACHED = 1e-4, 5e-3  # cost of an effort of 1; m
+EFFORT = 1e-4  # what an effort of 1 costs
+REACHED, AT_REST = 5e-3, 0.05  # m and m/s
 SOLVER = sb.Solver(h=1 / 400)
 FINAL = {  # m, and tangents of angles: the pose to which another motion took the grippers of the target
     "start_x": 0.05,
@@ -32,7 +34,9 @@ FINAL = {  # m, and tangents of angles: the pose to which another motion took th
 def held_rod() -> Control:
     """A rod at rest between two grippers, each of which moves along and turns about three axes."""
     times = np.arange(round(MOVING * RATE) + 1) / RATE
-    grips = [sb.Grip.fixed((x, 0, 0), (np.cos(DROOP), 0, -s * np.sin(DROOP)), (0, 1, 0)) for x, s in ((0, 1), (APART, -1))]
+    grips = [
+        sb.Grip.fixed((x, 0, 0), (np.cos(DROOP), 0, -s * np.sin(DROOP)), (0, 1, 0)) for x, s in ((0, 1), (APART, -1))
+    ]
     options = {"length": LENGTH, "segments": SEGMENTS, "density": 0.05, "EI": 1e-2, "GJ": 1e-2, "EA": 1e3}
     options |= {"stretch_damping": 1e-3, "bend_damping": 0.03, "twist_damping": 0.03, "drag_linear": 0.03}
     sagging = [[0, 0, 0], [0.1, 0, -0.25], [0.3, 0, -0.37], [0.5, 0, -0.25], [APART, 0, 0]]
@@ -63,13 +67,17 @@ def add_gripper(control: Control, name: str, node: int, ghost: int, director: in
     control.add(f"{name}_roll", "1", *ANGLE, {director: up})
 
 
+def other_motion() -> dict[str, float]:
+    """Knots that take the grippers smoothly to their final poses."""
+    u = np.linspace(0.0, 1.0, KNOTS + 1)[1:]
+    ease = u**2 * (3.0 - 2.0 * u)
+    return {f"{name}_{k + 1}": size * e for name, size in FINAL.items() for k, e in enumerate(ease.tolist())}
+
+
 def target_shape(control: Control) -> Array:
-    """(nodes, 3) m: where the rod is after a motion to the final pose, and 20 s of rest."""
-    ease = np.linspace(0.0, 1.0, KNOTS + 1)[1:]
-    ease = ease**2 * (3.0 - 2.0 * ease)
-    values = {f"{name}_{k + 1}": size * e for name, size in FINAL.items() for k, e in enumerate(ease)}
+    """(nodes, 3) m: where the rod is after the other motion and 20 s of rest."""
     nodes = control.scene.ropes["rod"].particles
-    return sb.simulate(control.scene, [20.0], SOLVER, values).positions[0, nodes]
+    return sb.simulate(control.scene, [20.0], SOLVER, other_motion()).positions[0, nodes]
 
 
 def shape() -> Task:
@@ -86,4 +94,10 @@ def shape() -> Task:
         bar[:, nodes] = 2.0 * gap / NEAR / count
         return float((gap * gap).sum()) / count, bar
 
-    return Task("shape", control, FRAMES, SOLVER, loss, error, target, REACHED, EFFORT)
+    def speed(x: Array) -> float:
+        return float(np.linalg.norm(x[-1, nodes] - x[-2, nodes], axis=-1).max() / (FRAMES[-1] - FRAMES[-2]))
+
+    def reached(error: float, speed: float) -> bool:
+        return error < REACHED and speed < AT_REST
+
+    return Task("shape", control, FRAMES, SOLVER, target, loss, error, speed, reached, EFFORT)

@@ -1,94 +1,23 @@
-"""A task of control: motions made of knots, a loss on where the rope goes, and what the motion costs."""
+"""A task of control: what shall be reached by which motion, and at what cost."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import sheetbend as sb
-from scipy.interpolate import CubicSpline
-from scipy.linalg import block_diag
-
-Array = np.ndarray
-RATE = 100  # Hz, of the boundary knots that carry a motion
+from motion import Array, Control
 
 
-@dataclass(frozen=True)
-class Motion:
-    """How far something is moved over time: a cubic spline through knots, at rest before it starts.
+class Outcome(NamedTuple):
+    """What a motion leads to: the cost that is minimized, the error in m, the speed in m/s, and whether it will do."""
 
-    Attributes:
-        seconds: how long it lasts, from time zero.
-        knots: how many are free; the first is zero and not counted.
-        stops: whether it comes to rest at its end; it then stays there.
-    """
-
-    seconds: float
-    knots: int
-    stops: bool
-
-    @cached_property
-    def spline(self) -> CubicSpline:
-        times = np.linspace(0.0, self.seconds, self.knots + 1)
-        ends = ("clamped", "clamped" if self.stops else "natural")
-        return CubicSpline(times, np.eye(self.knots + 1)[:, 1:], bc_type=ends)
-
-    def places(self, times: Array) -> Array:
-        """(times, knots): what each knot does."""
-        return np.asarray(self.spline(np.minimum(times, self.seconds)))
-
-    def mean_square(self, derivative: int) -> Array:
-        """(knots, knots): the mean square over time of the motion (0) or of its acceleration (2), as a form."""
-        values = self.spline(np.linspace(0.0, self.seconds, 40 * self.knots + 1), derivative)
-        return np.asarray(values.T @ values / len(values))
-
-
-@dataclass
-class Control:
-    """The motions that a scene is moved by, each a channel of knots that are quantities of the scene.
-
-    The unknowns are such that a motion's effort is the sum of their squares: a step of any optimizer is then a smooth
-    motion, and one of size 1 is a likely one.
-
-    Attributes:
-        scales: by quantity, how far it is likely to move, m or rad.
-        blocks: per channel (knots, knots), its knots from its unknowns.
-    """
-
-    scene: sb.Scene
-    motion: Motion
-    scales: dict[str, float] = field(default_factory=dict)
-    blocks: list[Array] = field(default_factory=list)
-
-    def add(self, name: str, unit: str, reach: float, acceleration: float, moved: dict[int, Array]) -> None:
-        """Let knots move driven particles: by each particle's vector (3,) for every unit of the channel.
-
-        Args:
-            reach, acceleration: root mean squares over time that cost an effort of 1 each, in units and per s^2.
-        """
-        places = self.motion.places(self.scene.boundary_times)
-        for k in range(self.motion.knots):
-            knot = self.scene.add_quantity(f"{name}_{k + 1}", 0.0, unit, positive=False, scale=reach)
-            for particle, vector in moved.items():
-                self.scene.add_motion_term(particle, np.outer(places[:, k], vector), {knot: "identity"})
-            self.scales[knot] = reach
-        form = self.motion.mean_square(2) / acceleration**2 + self.motion.mean_square(0) / reach**2
-        self.blocks.append(np.linalg.inv(np.linalg.cholesky(form)).T)
-
-    @cached_property
-    def knots(self) -> Array:
-        """(quantities, unknowns)."""
-        return np.asarray(block_diag(*self.blocks))
-
-    def values(self, unknowns: Array) -> dict[str, float]:
-        """Quantities of the scene from unknowns."""
-        return dict(zip(self.scales, (self.knots @ unknowns).tolist(), strict=True))
-
-    def unknowns(self, values: Mapping[str, float]) -> Array:
-        """The other way."""
-        return np.asarray(np.linalg.solve(self.knots, [values[name] for name in self.scales]))
+    cost: float
+    error: float
+    speed: float
+    reached: bool
 
 
 @dataclass(frozen=True)
@@ -97,10 +26,11 @@ class Task:
 
     Attributes:
         frames: (frames,) s at which the loss looks.
+        target: (3,) or (nodes, 3) m.
         loss: of positions (frames, particles, 3), with its derivative by them.
         error: of the same, in m: how far the rope is from its target.
-        target: (3,) or (nodes, 3) m.
-        reached: m, the error below which the target counts as reached.
+        speed: of the same, in m/s: that of the rope in the last two frames, where it is fastest or where it matters.
+        reached: of an error and a speed.
         effort: what an effort of 1 costs beside the loss.
     """
 
@@ -108,37 +38,38 @@ class Task:
     control: Control
     frames: Array
     solver: sb.Solver
+    target: Array
     loss: Callable[[Array], tuple[float, Array]]
     error: Callable[[Array], float]
-    target: Array
-    reached: float
+    speed: Callable[[Array], float]
+    reached: Callable[[float, float], bool]
     effort: float
 
     @property
     def size(self) -> int:
         return len(self.control.scales)
 
-    def positions(self, unknowns: Array) -> Array:
-        """(frames, particles, 3) m."""
-        return sb.simulate(self.control.scene, self.frames, self.solver, self.control.values(unknowns)).positions
+    def outcome(self, unknowns: Array) -> Outcome:
+        """Of one rollout."""
+        values = self.control.values(unknowns)
+        x = sb.simulate(self.control.scene, self.frames, self.solver, values).positions
+        return self._outcome(unknowns, self.loss(x)[0], x)
 
-    def cost(self, unknowns: Array) -> tuple[float, float]:
-        """What is minimized, and the error in m."""
-        x = self.positions(unknowns)
-        return self.loss(x)[0] + self.effort * float(unknowns @ unknowns), self.error(x)
-
-    def cost_and_gradient(self, unknowns: Array) -> tuple[float, float, Array]:
-        """The same, with the gradient by the unknowns."""
-        value, error, felt = self._rolled_back(unknowns)
+    def outcome_and_gradient(self, unknowns: Array) -> tuple[Outcome, Array]:
+        """The same, with the gradient of the cost by the unknowns."""
+        x, value, felt = self._rolled_back(unknowns)
         by_knot = np.array([felt.quantities[name] for name in self.control.scales])
-        gradient = self.control.knots.T @ by_knot + 2.0 * self.effort * unknowns
-        return value + self.effort * float(unknowns @ unknowns), error, gradient
+        return self._outcome(unknowns, value, x), self.control.knots.T @ by_knot + 2.0 * self.effort * unknowns
 
     def require_gradient(self, unknowns: Array) -> None:
         """Raises EmptyGradientError where the loss does not feel the control; effort is always felt and not counted."""
         self._rolled_back(unknowns)[2].require(self.control.scales)
 
-    def _rolled_back(self, unknowns: Array) -> tuple[float, float, sb.Gradient]:
+    def _outcome(self, unknowns: Array, loss: float, x: Array) -> Outcome:
+        error, speed = self.error(x), self.speed(x)
+        return Outcome(loss + self.effort * float(unknowns @ unknowns), error, speed, self.reached(error, speed))
+
+    def _rolled_back(self, unknowns: Array) -> tuple[Array, float, sb.Gradient]:
         rolled = sb.rollout(self.control.scene, self.frames, self.solver, self.control.values(unknowns))
         value, bar = self.loss(rolled.positions)
-        return value, self.error(rolled.positions), rolled.gradient(bar)
+        return rolled.positions, value, rolled.gradient(bar)

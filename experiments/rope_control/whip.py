@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import sheetbend as sb
-from task import RATE, Array, Control, Motion, Task
+from motion import RATE, Array, Control, Motion
+from task import Task
 
 SECONDS = 0.7
 TARGET = np.array([0.9, 0.4, 0.35])  # m; the hand starts at zero, and the rope hangs down by its length of 1 m
@@ -15,11 +16,11 @@ EFFORT, REACHED = 1e-2, 5e-3  # cost of an effort of 1; m
 SUBSTEP = 1 / 500
 
 
-def whip(speed: float = 0.0, seconds: float = SECONDS, axes: str = "xyz", EI: float | None = 1e-3) -> Task:
+def whip(fast: float = 0.0, seconds: float = SECONDS, axes: str = "xyz", EI: float | None = 1e-3) -> Task:
     """A rope of 1 m that hangs at rest.
 
     Args:
-        speed: m/s that the tip shall have at the target at least.
+        fast: m/s that the tip shall have at the target at least.
         seconds: when it shall be there.
         axes: that the hand moves along.
         EI: N m^2; None = no bending.
@@ -35,23 +36,25 @@ def whip(speed: float = 0.0, seconds: float = SECONDS, axes: str = "xyz", EI: fl
     for axis in axes:
         control.add(f"hand_{axis}", "m", REACH, ACCELERATION, {hand: np.eye(3)["xyz".index(axis)]})
 
-    def loss(x: Array) -> tuple[float, Array]:
-        bar = np.zeros_like(x)
-        gap = (x[1, tip] - TARGET) / NEAR
-        bar[1, tip] = 2.0 * gap / NEAR
-        value = float(gap @ gap)
-        velocity = (x[1, tip] - x[0, tip]) / SUBSTEP
-        fast = float(np.linalg.norm(velocity))
-        missing = max(0.0, speed - fast) / SPEED
-        if missing and fast:
-            pull = -2.0 * missing / SPEED * velocity / fast / SUBSTEP
-            bar[1, tip] += pull
-            bar[0, tip] -= pull
-        return value + missing**2, bar
+    def speed(x: Array) -> float:
+        return float(np.linalg.norm(x[1, tip] - x[0, tip])) / SUBSTEP
 
     def error(x: Array) -> float:
         return float(np.linalg.norm(x[1, tip] - TARGET))
 
-    name = f"whip, tip at {speed:g} m/s or more" if speed else "whip"
-    frames = np.array([seconds - SUBSTEP, seconds])
-    return Task(name, control, frames, sb.Solver(h=SUBSTEP), loss, error, TARGET, REACHED, EFFORT)
+    def loss(x: Array) -> tuple[float, Array]:
+        bar = np.zeros_like(x)
+        bar[1, tip] = 2.0 * (x[1, tip] - TARGET) / NEAR**2
+        missing = max(0.0, fast - speed(x)) / SPEED
+        if missing and speed(x):
+            pull = -2.0 * missing / SPEED * (x[1, tip] - x[0, tip]) / (speed(x) * SUBSTEP**2)
+            bar[1, tip] += pull
+            bar[0, tip] -= pull
+        return (error(x) / NEAR) ** 2 + missing**2, bar
+
+    def reached(error: float, speed: float) -> bool:
+        return error < REACHED and speed > 0.99 * fast
+
+    name = f"whip at {fast:g} m/s" if fast else "whip"
+    frames, solver = np.array([seconds - SUBSTEP, seconds]), sb.Solver(h=SUBSTEP)
+    return Task(name, control, frames, solver, TARGET, loss, error, speed, reached, EFFORT)

@@ -31,7 +31,7 @@ class Gradient:
         recomputed: substeps that the forward program ran again: as planned, or more where the same rollout was
             differentiated before and its tape no longer holds what it held.
         tape: bytes of the tape.
-        rounding: what the loss changes by, at least, when positions are rounded to double precision.
+        rounding: what the loss may change by when positions are rounded in the last bit of the largest of them.
     """
 
     quantities: Mapping[str, float]
@@ -100,7 +100,7 @@ class Rollout:
             self._compiled.unpack(inputs_bar),
             self._tape.recomputed,
             self._tape.bytes,
-            float(np.finfo(float).eps * np.abs(bar * self.positions).sum()),
+            float(np.finfo(float).eps * np.abs(self.positions).max() * np.abs(bar).sum()),
         )
 
 
