@@ -7,7 +7,15 @@ to recordings, with intervals and words for what the data cannot tell.
 from .baseline import no_physics
 from .discretization import Refinement
 from .equilibrium import Equilibrium, equilibria, equilibrium
-from .errors import ConfigError, DivergenceError, InputError, RecordingError, SceneError, SheetbendError
+from .errors import (
+    ConfigError,
+    DivergenceError,
+    EmptyGradientError,
+    InputError,
+    RecordingError,
+    SceneError,
+    SheetbendError,
+)
 from .experiment import Experiment
 from .fit import Fit, fit
 from .gradients import GradientReport, check_gradients
@@ -32,6 +40,7 @@ __all__ = [
     "KINDS",
     "ConfigError",
     "DivergenceError",
+    "EmptyGradientError",
     "Equilibrium",
     "Experiment",
     "Fit",

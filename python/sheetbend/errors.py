@@ -68,3 +68,33 @@ class DivergenceError(SheetbendError, RuntimeError):
             f"(t = {self.time:.6g} s), in {self.where}. Fix: use a smaller substep or more iterations, and "
             "check masses, forces and boundary motion near that time."
         )
+
+
+class EmptyGradientError(SheetbendError, RuntimeError):
+    """A loss feels nothing of the quantities that it is to be improved by; no step along its gradient means anything.
+
+    Args:
+        names: the quantities.
+        change: the largest change of the loss when one of them moves by its scale, to the first order.
+        rounding: what the loss changes by when its positions are rounded; zero when it feels no position.
+    """
+
+    def __init__(self, names: tuple[str, ...], change: float, rounding: float) -> None:
+        super().__init__(names, change, rounding)
+        self.names = names
+        self.change = change
+        self.rounding = rounding
+
+    def __str__(self) -> str:
+        names = ", ".join(self.names[:3]) + (f" and {len(self.names) - 3} more" if len(self.names) > 3 else "")
+        if self.rounding == 0.0:
+            return (
+                "the gradient is empty: the loss has no derivative by any position here, so it cannot feel "
+                f"{names}. Fix: start where it has one, such as where a hinge is violated, or check its weights."
+            )
+        return (
+            f"the gradient is empty: moving {names} by its scale changes the loss by {self.change:.1e} at most, and "
+            f"rounding alone by {self.rounding:.1e}. What the loss looks at does not feel them: motion after the last "
+            "frame, a slack or soft rope through which it has not arrived, or a symmetric start. "
+            "Fix: let the loss look later, or start elsewhere."
+        )

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from . import _core
 from .checks import finite
-from .errors import InputError
+from .errors import EmptyGradientError, InputError
 from .scene import Scene
 from .simulate import divergence, substeps
 from .solver import Solver
@@ -31,12 +31,32 @@ class Gradient:
         recomputed: substeps that the forward program ran again: as planned, or more where the same rollout was
             differentiated before and its tape no longer holds what it held.
         tape: bytes of the tape.
+        rounding: what the loss may change by when positions are rounded in the last bit of the largest of them.
     """
 
     quantities: Mapping[str, float]
     inputs: Mapping[str, Array]
     recomputed: int
     tape: int
+    rounding: float
+
+    def require(self, scales: Mapping[str, float]) -> None:
+        """Refuse a gradient that is empty for some named quantities: one that no optimizer can go along.
+
+        Args:
+            scales: by name, in the quantity's unit, how far it is likely to move.
+
+        Raises:
+            InputError: a name that is no quantity of the scene.
+            EmptyGradientError: to the first order none of these moves changes the loss by more than `rounding`.
+        """
+        unknown = [name for name in scales if name not in self.quantities]
+        if unknown:
+            fix = f"name some of: {', '.join(self.quantities)}"
+            raise InputError("scales", "name no quantity of the scene", unknown[0], fix)
+        change = max((abs(self.quantities[name] * scale) for name, scale in scales.items()), default=0.0)
+        if not change > self.rounding:
+            raise EmptyGradientError(tuple(scales), change, self.rounding)
 
 
 class Rollout:
@@ -80,6 +100,7 @@ class Rollout:
             self._compiled.unpack(inputs_bar),
             self._tape.recomputed,
             self._tape.bytes,
+            float(np.finfo(float).eps * np.abs(self.positions).max() * np.abs(bar).sum()),
         )
 
 
