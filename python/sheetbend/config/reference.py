@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
-from . import scene_schema, schema
+from . import gripped_schema, scene_schema, schema
 from .section import AXES, NAME, REFERENCE, Section
 
 HEADERS: dict[str, type[Section]] = {
@@ -33,6 +33,8 @@ HEADERS: dict[str, type[Section]] = {
     "[parameters.NAME]": schema.ParameterSection,
     "[fit]": schema.FitSection,
     "[output]": schema.OutputSection,
+    "[[gripped_rope]]": gripped_schema.GrippedRopeSection,
+    "[fit] beside [[gripped_rope]]": gripped_schema.GrippedFitSection,
 }
 START, END = "<!-- tables: start -->", "<!-- tables: end -->"
 
