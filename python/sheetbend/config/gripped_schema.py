@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import inspect
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, field_validator
 
+from ..gripped import fit_rope
 from .schema import ExperimentSection, OutputSection
 from .section import Finite, Name, Pair, Section, Vector, key
 
 RungName = Literal["twist", "tilts", "rest", "yield", "varying"]
 RUNGS: tuple[RungName, ...] = ("twist", "tilts", "rest", "yield", "varying")
+RECIPE = {name: option.default for name, option in inspect.signature(fit_rope).parameters.items()}
+
+
+def _default(option: str) -> Any:
+    """That of `fit_rope`, tuples as lists."""
+    value = RECIPE[option]
+    if isinstance(value, tuple):
+        return [list(part) if isinstance(part, tuple) else part for part in value]
+    return value
 
 
 def _span(pair: list[float]) -> list[float]:
@@ -32,31 +43,36 @@ class GrippedRopeSection(Section):
     eval: str | None = key(None, "folder of recordings that are only predicted, from their first frame")
     pattern: str = key("*", 'which files of these folders, such as "*.pkl"', min_length=1)
     units: Literal["m", "cm", "mm"] | None = key(None, "length unit of the files; their JSONs' when left out")
-    gravity: Vector = key([0.0, 0.0, -9.81], "in the axes of the recordings, where their JSONs do not tell", "m/s^2")
+    gravity: Vector = key(_default("gravity"), "in the axes of the recordings, where their JSONs do not tell", "m/s^2")
     rungs: list[RungName] = key(
         list(RUNGS),
         "what the model gets, one after another: straight with twist, tilts of the grips, rest curvature, yield, a "
-        "stiffness that varies along the rope; a rung stays only if recordings agree that it was not fitted to",
+        "stiffness that varies along the rope; a rung stays only if it predicts recordings better that it was not fitted to",
         min_length=1,
     )
     validate_share: Finite = key(
-        0.25, "share of the recordings in `train` that decide whether a rung stays; the last fit sees all", ge=0, lt=1
+        _default("validate"),
+        "share of the recordings in `train` that decide whether a rung stays; the last fit sees all",
+        ge=0,
+        lt=1,
     )
     windows: list[Span] = key(
-        [[0.5, 8.0], [1.5, 15.0], [5.0, 60.0]],
+        _default("windows"),
         "[length, total] of the pieces that a fit sees, each predicted open loop: short ones first, whose cost is "
         "smooth",
         "s",
         min_length=1,
     )
     bending_lengths: list[Positive] = key(
-        [0.45, 0.25, 0.12], "of the starts, (EI/(density g))^(1/3); the best one wins", "m", min_length=1
+        _default("bending_lengths"), "of the starts, (EI/(density g))^(1/3); the best one wins", "m", min_length=1
     )
-    segments: int = key(12, "links at the start", ge=4)
-    max_segments: int = key(48, "links are doubled, up to these, until EI moves by less than 5 %", ge=4)
-    substeps: int = key(2, "per frame", ge=1)
-    smoothing: Finite = key(0.08, "over which recorded grips and starts are smoothed", "s", ge=0)
-    sigma: Finite = key(5e-3, "expected error of a marker, against which priors count", "m", gt=0)
+    segments: int = key(_default("segments"), "links at the start", ge=4)
+    max_segments: int = key(
+        _default("max_segments"), "links are doubled, up to these, until EI moves by less than 5 %", ge=4
+    )
+    substeps: int = key(_default("substeps"), "per frame", ge=1)
+    smoothing: Finite = key(_default("smoothing"), "over which recorded grips and starts are smoothed", "s", ge=0)
+    sigma: Finite = key(_default("sigma"), "expected error of a marker, against which priors count", "m", gt=0)
 
     @field_validator("rungs")
     @classmethod

@@ -33,15 +33,22 @@ HEADERS: dict[str, type[Section]] = {
     "[parameters.NAME]": schema.ParameterSection,
     "[fit]": schema.FitSection,
     "[output]": schema.OutputSection,
+}
+ROPE_HEADERS: dict[str, type[Section]] = {
+    "[experiment]": schema.ExperimentSection,
     "[[gripped_rope]]": gripped_schema.GrippedRopeSection,
-    "[fit] beside [[gripped_rope]]": gripped_schema.GrippedFitSection,
+    "[fit]": gripped_schema.GrippedFitSection,
+    "[output]": schema.OutputSection,
 }
 START, END = "<!-- tables: start -->", "<!-- tables: end -->"
 
 
 def tables() -> str:
     """Markdown: a heading, what the section is, and a table of its keys, for every section."""
-    return "\n".join(_section(header, model) for header, model in HEADERS.items())
+    with_scene = [_section(header, model) for header, model in HEADERS.items()]
+    ropes = [_section(header, model) for header, model in ROPE_HEADERS.items() if HEADERS.get(header) is not model]
+    about = "`[experiment]` and `[output]` are as above. The others:"
+    return "\n".join([*with_scene, f"## All keys of ropes between grips\n\n{about}\n", *ropes])
 
 
 def renewed(text: str) -> str:

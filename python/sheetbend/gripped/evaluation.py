@@ -9,6 +9,7 @@ import numpy as np
 
 from ..recording import Recording
 from ..scores import Scores, scores
+from .model import NAME
 from .motion import Array
 from .recipe import RopeFit
 
@@ -21,7 +22,7 @@ class Evaluation:
         recordings: those predicted to their end.
         predicted: of each (frames, markers, 3) m.
         scores: their errors beside the no-physics blend; None where nothing was predicted to its end.
-        diverged: names of the recordings whose prediction was not finite.
+        diverged: names of the recordings whose prediction was not finite, or went farther off than the rope is long.
     """
 
     recordings: tuple[Recording, ...]
@@ -32,8 +33,14 @@ class Evaluation:
 
 def evaluate(found: RopeFit, recordings: Sequence[Recording]) -> Evaluation:
     """Predict each recording open loop from its first frame, and score it (`sheetbend.scores`)."""
-    pairs = [(recording, found.predict(recording)) for recording in recordings]
-    whole = [(recording, x) for recording, x in pairs if np.isfinite(x[recording.mask]).all()]
-    kept, predicted = tuple(r for r, _ in whole), tuple(x for _, x in whole)
-    diverged = tuple(r.name for r, x in pairs if not np.isfinite(x[r.mask]).all())
-    return Evaluation(kept, predicted, scores(kept, predicted) if kept else None, diverged)
+    reach = found.values[f"{NAME}_length"]
+    kept, predicted, diverged = [], [], []
+    for recording in recordings:
+        x = found.predict(recording)
+        off = np.abs(x - recording.positions)[recording.mask]
+        if (off <= reach).all():  # false where it is not a number
+            kept.append(recording)
+            predicted.append(x)
+        else:
+            diverged.append(recording.name)
+    return Evaluation(tuple(kept), tuple(predicted), scores(kept, predicted) if kept else None, tuple(diverged))
