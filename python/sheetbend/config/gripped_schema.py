@@ -47,7 +47,8 @@ class GrippedRopeSection(Section):
     rungs: list[RungName] = key(
         list(RUNGS),
         "what the model gets, one after another: straight with twist, tilts of the grips, rest curvature, yield, a "
-        "stiffness that varies along the rope; a rung stays only if it predicts recordings better that it was not fitted to",
+        "stiffness that varies along the rope; a rung stays only if it predicts recordings better that it was not "
+        "fitted to",
         min_length=1,
     )
     validate_share: Finite = key(
