@@ -52,7 +52,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(FOLDER))
         script = importlib.import_module("make_data")
-        patch.setattr(script, "CREEP", ((1 / 100, 10.0),))  # at rest to a tenth of the noise, in a fifth of the time
+        patch.setattr(script, "CREEP", ((1 / 100, 10.0),))  # not quite at rest, which a fit does not need
         script.main(folder, train=3, evaluation=1, count=1, seconds=2.0, seed=7)
         for name in ("make_data", "grip_motion", "true_ropes"):
             del sys.modules[name]

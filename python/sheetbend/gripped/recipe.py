@@ -232,10 +232,12 @@ class _Search:
     ) -> RopeFit:
         parameters: tuple[Parameter, ...] = ladder[0].parameters
         began, interrupted = time.perf_counter(), False
-        model, values = self._first(model, ladder[0], bending_lengths)
-        model, values = self._refined(model, parameters, values, max_segments)
-        steps = [self._step(ladder[0].name, model, values, None, began)]
+        steps: list[Step] = []
         try:
+            model, values = self._first(model, ladder[0], bending_lengths)
+            model, values = self._refined(model, parameters, values, max_segments)
+            steps.append(self._step(ladder[0].name, model, values, steps, began))
+            self._tell(steps[-1])  # once it counts: who is told of a step may stop there
             for rung in ladder[1:]:
                 began = time.perf_counter()
                 larger = replace(model, **dict(rung.options), values={**model.values, **rung.values})  # type: ignore[arg-type]
@@ -245,7 +247,10 @@ class _Search:
                 steps.append(step)
                 if step.stays:
                     model, parameters, values = larger.at(found), wanted, found
+                self._tell(step)
         except KeyboardInterrupt:
+            if not steps:
+                raise
             interrupted = True
             self.say(f"interrupted: going back to {next(s.name for s in reversed(steps) if s.stays)}")
         last = self._conclude(model, parameters, values, interrupted)
@@ -309,14 +314,16 @@ class _Search:
         return 0.5 * float(r @ r) if ok else np.inf
 
     def _step(
-        self, name: str, model: RopeModel, values: Mapping[str, float], before: Sequence[Step] | None, began: float
+        self, name: str, model: RopeModel, values: Mapping[str, float], before: Sequence[Step], began: float
     ) -> Step:
         judges = self.others or self.fitted
         fitted, others = (self._error(model, values, part) for part in (self.fitted, judges))
-        best = None if before is None else min(s.others for s in before if s.stays)
-        stays = best is None or others < BETTER * best
-        self.say(f"{name}: {1e3 * fitted:.3g} mm, {1e3 * others:.3g} mm on others{'' if stays else ', does not stay'}")
+        stays = not before or others < BETTER * min(s.others for s in before if s.stays)
         return Step(name, fitted, others, stays, time.perf_counter() - began)
+
+    def _tell(self, step: Step) -> None:
+        errors = f"{1e3 * step.fitted:.3g} mm, {1e3 * step.others:.3g} mm on others"
+        self.say(f"{step.name}: {errors}{'' if step.stays else ', does not stay'}")
 
     def _error(self, model: RopeModel, values: Mapping[str, float], motions: Sequence[GrippedMotion]) -> float:
         errors = []
