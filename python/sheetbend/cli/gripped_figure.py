@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from .. import plotting
+from ..baseline import blend_baseline
 from ..gripped.evaluation import Evaluation
 from ..gripped.report import RopeReport
 from ..wording import short
 
 
 def write_figure(report: RopeReport, drawn: Evaluation, form: str, folder: Path) -> list[str]:
-    """Measured against predicted over time; gives the file's name."""
+    """Measured against predicted over time, and the no-physics blend; gives the file's name."""
     if form == "none" or drawn.scores is None:
         return []
     rows = drawn.scores.rows
@@ -26,6 +27,7 @@ def write_figure(report: RopeReport, drawn: Evaluation, form: str, folder: Path)
         drawn.predicted[worst][:, free],
         recording.times,
         markers=[recording.markers[k] for k in free],
+        baseline=None if row.blend is None else blend_baseline(recording)[:, free],
         title=title,
     )
     plotting.save(figure, folder / f"predicted.{form}")

@@ -49,7 +49,7 @@ class RopeReport:
 
     def plain(self, width: int = 100) -> str:
         """As plain text."""
-        lines = [f"Rope {self.name}", "", report.plain(self.result, width)]
+        lines = [f"{self.name}, a rope between two grips", "", report.plain(self.result, width)]
         for section in self._sections():
             lines += [*plain_section(section, width), ""]
         if self.unseen is not None and self.unseen.scores is not None:

@@ -27,8 +27,14 @@ def _losses(v: Values) -> str:
     return "both take energy out of the same motion, and their sum is known better than either"
 
 
+def _shape(v: Values) -> str:
+    return "rolling the grip turns the rest shape: how the rope lies between the grips is known better than either"
+
+
 PAIRS: tuple[tuple[str, str, str, Callable[[Values], str]], ...] = (
     ("GJ", "roll", "GJ against the roll of the end grip (built-in twist)", _twist),
+    ("roll", "curvature_1_0", "the roll of the end grip against the rest curvature about axis 1", _shape),
+    ("roll", "curvature_2_0", "the roll of the end grip against the rest curvature about axis 2", _shape),
     ("yield_curvature", "yield_share", "yield curvature against the share that yields", _yield),
     ("bend_damping", "drag_linear", "internal damping against drag", _losses),
 )
