@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 import sheetbend as sb
+from sheetbend.cli import gripped
 from sheetbend.cli.app import app
-from sheetbend.config import GrippedConfig, parse, parse_any
-from sheetbend.gripped import trades
+from sheetbend.config import GrippedConfig, gripped_schema, parse, parse_any
+from sheetbend.gripped import LADDER, trades
 from sheetbend.gripped.recipe import REST, TILTS, TWIST, VARYING, YIELD
 from sheetbend.result import Correlation, Estimate, FitResult
 from typer.testing import CliRunner, Result
@@ -148,6 +149,26 @@ class TestFit:
         assert FitResult.load(Path("out/ropes/rope_1/fit.json")).interrupted
 
 
+    def test_ropes_that_are_done_stay_when_a_later_one_is_interrupted(
+        self, config: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        edited(config, ('["twist", "tilts"]', '["twist"]'), ("[[0.5, 1.5], [1.0, 4.0]]", "[[0.5, 1.5]]"))
+        second = ROPE[ROPE.index("[[gripped_rope]]") :].replace('"rope_1"', '"rope_2"')
+        config.write_text(config.read_text() + second)
+        fits = iter([gripped.fit_rope])
+
+        def interrupted(*arguments: Any, **options: Any) -> Any:
+            for fit_rope in fits:
+                return fit_rope(*arguments, **options)
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr(gripped, "fit_rope", interrupted)
+        result = run("fit", config, "--json")
+        found = last_line(result)
+        assert found["exit_code"] == 4 and set(found["ropes"]) == {"rope_1"} and found["not_fitted"] == ["rope_2"]
+        assert "not fitted are rope_2" in result.stderr and "rope_1" in Path("out/ropes/report.txt").read_text()
+
+
 class TestOtherCommands:
     def test_info_shows_what_the_folders_hold(self, config: Path) -> None:
         rope = last_line(run("info", config, "--json"))["config"]["ropes"]["rope_1"]
@@ -271,8 +292,5 @@ class TestTrades:
 
 
 def test_the_rungs_of_the_configuration_are_those_of_the_recipe() -> None:
-    from sheetbend.cli.gripped import RUNGS
-    from sheetbend.config.gripped_schema import RUNGS as NAMES
-    from sheetbend.gripped import LADDER
-
-    assert tuple(RUNGS) == NAMES and tuple(RUNGS.values()) == (TWIST, TILTS, REST, YIELD, VARYING) == tuple(LADDER)
+    assert tuple(gripped.RUNGS) == gripped_schema.RUNGS
+    assert tuple(gripped.RUNGS.values()) == (TWIST, TILTS, REST, YIELD, VARYING) == tuple(LADDER)

@@ -73,12 +73,12 @@ def fit_ropes(
         console.print(f"\n[bold]{rope.section.name}[/]  {len(rope.train)} recordings to fit, {len(rope.unseen)} unseen")
         try:
             found = _fit(console, config, rope, [RUNGS[name] for name in rope.section.rungs])
+            report, stopped = _judged(console, config, rope, found)
         except KeyboardInterrupt:
             if not reports:
                 raise
             stopped = True
             break
-        report, stopped = _judged(console, config, rope, found)
         reports.append(report)
         show(console, report.rich, report.plain)
         files += _write(report, config, rope, folder)
