@@ -39,6 +39,7 @@ def plot_trajectories(
     *,
     markers: Sequence[str] = (),
     axis: int | None = None,
+    baseline: Array | None = None,
     held_out: tuple[float, float] | None = None,
     title: str = "",
 ) -> Figure:
@@ -50,6 +51,7 @@ def plot_trajectories(
         times: (frames,) s.
         markers: their names; of more than six, six spread evenly are drawn.
         axis: 0, 1 or 2; the one that moves most when left out.
+        baseline: (frames, markers, 3) m, a prediction without physics, drawn thin beside.
         held_out: (first, last) s of the part that the fit did not see; it is shaded.
         title: above the figure.
     """
@@ -62,12 +64,15 @@ def plot_trajectories(
     for panel, marker in zip(panels, shown, strict=True):
         clean(panel)
         panel.plot(times, 1e3 * measured[:, marker, axis], ".", color=GRAY, markersize=3.6, markeredgewidth=0)
+        if baseline is not None:
+            panel.plot(times, 1e3 * baseline[:, marker, axis], color=WARM, linewidth=0.9)
         panel.plot(times, 1e3 * simulated[:, marker, axis], color=ACCENT, linewidth=1.3)
         panel.margins(x=0)
         panel.text(1.01, 0.5, names[marker], transform=panel.transAxes, va="center", color=INK)
         _shade(panel, held_out)
     _name_shade(panels[0], held_out)
-    key(panels[0], [("measured", GRAY), ("simulated", ACCENT)])
+    without = [("without physics", WARM)] if baseline is not None else []
+    key(panels[0], [("measured", GRAY), ("simulated", ACCENT), *without])
     panels[-1].set_xlabel("time [s]")
     figure.supylabel(f"{_AXES[axis]} [mm]", color=INK, fontsize=9)
     return figure

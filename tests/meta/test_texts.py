@@ -89,6 +89,9 @@ def test_configurations_in_the_texts_load(block: str, tmp_path: Path) -> None:
     if "[experiment]" not in block:
         tomllib.loads(block)
         return
+    if "[[gripped_rope]]" in block:
+        assert config.parse_any(tmp_path / "text.toml").gripped_rope
+        return
     motion = sb.simulate(sb.rope(1.0, 10, density=0.05, EI=1e-3), [k / 20 for k in range(21)])
     sb.Recording(positions=motion.positions, times=motion.times).save(tmp_path / "swing.npz")
     study = config.load(tmp_path / "text.toml")

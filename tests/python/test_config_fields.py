@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 import sheetbend as sb
 import tomli_w
-from sheetbend.config import parse
-from sheetbend.config.reference import HEADERS
+from sheetbend.config import parse_any
+from sheetbend.config.reference import HEADERS, ROPE_HEADERS
 from sheetbend.config.section import Finite
 
 WHOLE: dict[str, Any] = {
@@ -40,8 +40,27 @@ WHOLE: dict[str, Any] = {
 }
 """One table of every section, with what it must have; a configuration that parses."""
 
-SECTIONS = [(path.strip("[]"), model) for header, model in HEADERS.items() for path in header.split(", ")]
-FIELDS = [pytest.param(path, name, id=f"{path}.{name}") for path, model in SECTIONS for name in model.model_fields]
+ROPES: dict[str, Any] = {
+    "experiment": {"name": "all"},
+    "gripped_rope": [{"name": "a", "density": 0.05, "train": "there"}],
+    "fit": {},
+    "output": {},
+}
+"""The same of ropes between grips."""
+
+KINDS = {"scene": (WHOLE, HEADERS), "ropes": (ROPES, ROPE_HEADERS)}
+SECTIONS = [
+    ((kind, path.strip("[]")), model)
+    for kind, (_, headers) in KINDS.items()
+    for header, model in headers.items()
+    for path in header.split(", ")
+]
+FIELDS = [
+    pytest.param(place, name, id=f"{place[0]}-{place[1]}.{name}")
+    for place, model in SECTIONS
+    for name in model.model_fields
+]
+Place = tuple[str, str]  # kind of configuration, and path of a section
 
 
 def section(config: dict[str, Any], path: str) -> tuple[dict[str, Any], str]:
@@ -55,9 +74,10 @@ def section(config: dict[str, Any], path: str) -> tuple[dict[str, Any], str]:
     return here, told
 
 
-def refused(folder: Path, path: str, name: str, *value: Any) -> sb.ConfigError:
+def refused(folder: Path, place: Place, name: str, *value: Any) -> sb.ConfigError:
     """The error about a key that is set to a value, or left out."""
-    config = copy.deepcopy(WHOLE)
+    kind, path = place
+    config = copy.deepcopy(KINDS[kind][0])
     table, told = section(config, path)
     table.pop(name, None)
     if value:
@@ -65,15 +85,15 @@ def refused(folder: Path, path: str, name: str, *value: Any) -> sb.ConfigError:
     file = folder / "all.toml"
     file.write_text(tomli_w.dumps(config))
     with pytest.raises(sb.ConfigError) as caught:
-        parse(file)
+        parse_any(file)
     error = caught.value
-    assert re.match(re.escape(f"{told}.{name}") + r"(\[|\.|$)", error.field), (path, name, value, str(error))
+    assert re.match(re.escape(f"{told}.{name}") + r"(\[|\.|$)", error.field), (place, name, value, str(error))
     assert error.problem and len(error.fix) > 3 and "Fix: " in str(error)
     return error
 
 
-def model_of(path: str) -> Any:
-    return dict(SECTIONS)[path]
+def model_of(place: Place) -> Any:
+    return dict(SECTIONS)[place]
 
 
 def branches(annotation: Any) -> list[Any]:
@@ -94,46 +114,47 @@ def is_vector(annotation: Any) -> bool:
     return [str(branch) for branch in branches(annotation)] == [str(list[Finite])]
 
 
-def limits(path: str, name: str) -> dict[str, float]:
+def limits(place: Place, name: str) -> dict[str, float]:
     """gt and ge of a key that is one number."""
-    field = model_of(path).model_fields[name]
+    field = model_of(place).model_fields[name]
     return {bound: getattr(part, bound) for part in field.metadata for bound in ("gt", "ge") if hasattr(part, bound)}
 
 
-def test_the_whole_configuration_parses(tmp_path: Path) -> None:
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_whole_configuration_parses(tmp_path: Path, kind: str) -> None:
     file = tmp_path / "all.toml"
-    file.write_text(tomli_w.dumps(WHOLE))
-    parse(file)
+    file.write_text(tomli_w.dumps(KINDS[kind][0]))
+    parse_any(file)
 
 
-@pytest.mark.parametrize(("path", "name"), FIELDS)
-def test_a_value_of_another_type(tmp_path: Path, path: str, name: str) -> None:
-    annotation = model_of(path).model_fields[name].annotation
-    refused(tmp_path, path, name, 1.5 if typing.get_origin(annotation) is dict else {"not": ["at", "all"]})
+@pytest.mark.parametrize(("place", "name"), FIELDS)
+def test_a_value_of_another_type(tmp_path: Path, place: Place, name: str) -> None:
+    annotation = model_of(place).model_fields[name].annotation
+    refused(tmp_path, place, name, 1.5 if typing.get_origin(annotation) is dict else {"not": ["at", "all"]})
     if is_number(annotation):
-        refused(tmp_path, path, name, "1.0")
-        refused(tmp_path, path, name, True)
+        refused(tmp_path, place, name, "1.0")
+        refused(tmp_path, place, name, True)
 
 
-@pytest.mark.parametrize(("path", "name"), FIELDS)
-def test_missing_out_of_range_and_not_finite(tmp_path: Path, path: str, name: str) -> None:
-    field = model_of(path).model_fields[name]
+@pytest.mark.parametrize(("place", "name"), FIELDS)
+def test_missing_out_of_range_and_not_finite(tmp_path: Path, place: Place, name: str) -> None:
+    field = model_of(place).model_fields[name]
     if field.is_required():
-        error = refused(tmp_path, path, name)
+        error = refused(tmp_path, place, name)
         assert error.problem == "is missing"
-    for bound, limit in limits(path, name).items():
+    for bound, limit in limits(place, name).items():
         beyond = int(limit) - (bound == "ge")
-        error = refused(tmp_path, path, name, beyond)
+        error = refused(tmp_path, place, name, beyond)
         assert f"{limit:g}" in error.fix
     if is_number(field.annotation):
         for value in (math.nan, math.inf, -math.inf):
-            refused(tmp_path, path, name, value)
+            refused(tmp_path, place, name, value)
     if is_vector(field.annotation) and name not in ("times", "factors"):  # which may have any length
         for vector in ([], [0.0], [0.0] * 4, [0.0, math.nan], [0.0, 0.0, math.inf]):
-            refused(tmp_path, path, name, vector)
+            refused(tmp_path, place, name, vector)
 
 
-@pytest.mark.parametrize(("path", "name"), FIELDS)
-def test_a_misspelled_key_is_guessed(tmp_path: Path, path: str, name: str) -> None:
-    error = refused(tmp_path, path, f"{name}x", 1.0)
+@pytest.mark.parametrize(("place", "name"), FIELDS)
+def test_a_misspelled_key_is_guessed(tmp_path: Path, place: Place, name: str) -> None:
+    error = refused(tmp_path, place, f"{name}x", 1.0)
     assert error.problem == "is no known key" and name in error.fix

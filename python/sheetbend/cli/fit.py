@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from ..config import Config, Study, build, parse
+from ..config import Config, GrippedConfig, Study, build, parse_any
 from ..config.values import with_values, write
 from ..errors import ConfigError
 from ..fit import Fit
@@ -17,10 +17,10 @@ from ..problem import FitProblem, as_parameters
 from ..report import plain, rich_report
 from ..result import FitResult
 from .figures import write_figures
+from .gripped import fit_ropes, load_ropes
 from .outcome import Code, Outcome, run
 from .progress import Iterations
-
-REPORT_WIDTH = 100
+from .screen import show
 
 
 def fit(
@@ -46,27 +46,38 @@ def fit(
 
 
 def _fit(console: Console, path: Path, output: Path | None, resume: Path | None, strict: bool) -> Outcome:
-    study = _study(path, resume)
-    config = study.config
-    folder = output if output is not None else Path("out") / config.experiment.name
-    if folder.exists() and not folder.is_dir():
-        raise ConfigError("--output", "is a file", str(folder), "give a folder")
-    folder.mkdir(parents=True, exist_ok=True)
-    console.print(f"[bold]{config.experiment.name}[/]  {config.experiment.about}")
+    config = parse_any(path)
+    if isinstance(config, GrippedConfig):
+        if resume is not None:
+            fix = "leave it out: the recipe finds its own starts"
+            raise ConfigError("--resume", "is not for ropes between grips", str(resume), fix)
+        ropes = load_ropes(config, path.parent)
+        return fit_ropes(console, config, ropes, _folder(console, config, output), strict)
+    study = _study(config, path.parent, resume)
+    config, folder = study.config, _folder(console, config, output)
     fitted = [e for e in study.experiments if e.predict is None]
     problem = FitProblem(fitted, as_parameters(study.parameters, study.experiments))
     _check_starts(config, problem)
     with Iterations(console, problem.parameters) as progress:
         found = run_fit(study.experiments, parameters=study.parameters, progress=progress, **study.options)
-    _report(console, found.result)
+    show(console, lambda: rich_report(found.result), lambda: plain(found.result))
     files = _write(found, study, folder)
     console.print(f"\nwritten to {folder}: {', '.join(files)}", soft_wrap=True)
     data = found.result.to_dict() | {"name": config.experiment.name, "output": str(folder), "files": files}
     return Outcome(data, _code(found.result, strict or config.fit.strict))
 
 
-def _study(path: Path, resume: Path | None) -> Study:
-    config = parse(path)
+def _folder(console: Console, config: Config | GrippedConfig, output: Path | None) -> Path:
+    """Where results go, made; and the experiment's name on the screen."""
+    folder = output if output is not None else Path("out") / config.experiment.name
+    if folder.exists() and not folder.is_dir():
+        raise ConfigError("--output", "is a file", str(folder), "give a folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    console.print(f"[bold]{config.experiment.name}[/]  {config.experiment.about}")
+    return folder
+
+
+def _study(config: Config, source: Path, resume: Path | None) -> Study:
     if not config.recording:
         raise ConfigError(
             "recording", "is missing", None, "add a [[recording]] with its file, or use `sheetbend simulate`"
@@ -89,7 +100,7 @@ def _study(path: Path, resume: Path | None) -> Study:
         if not resume.is_file():
             raise ConfigError("--resume", "is no file", str(resume), "give the fit.json of an earlier fit")
         config = with_values(config, FitResult.load(resume).values)
-    return build(config, path.parent)
+    return build(config, source)
 
 
 def _check_starts(config: Config, problem: FitProblem) -> None:
@@ -102,16 +113,6 @@ def _check_starts(config: Config, problem: FitProblem) -> None:
                     name,
                     f"use some of: {', '.join(problem.parameters.free)}",
                 )
-
-
-def _report(console: Console, result: FitResult) -> None:
-    """In color in a terminal; where that is narrow its lines wrap, but no column is lost."""
-    if console.is_terminal:
-        Console(stderr=console.stderr, highlight=False, width=max(console.width, REPORT_WIDTH)).print(
-            rich_report(result)
-        )
-    else:
-        console.print("\n" + plain(result), markup=False, soft_wrap=True, end="")
 
 
 def _write(found: Fit, study: Study, folder: Path) -> list[str]:

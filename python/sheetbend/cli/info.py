@@ -7,15 +7,18 @@ import platform
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 from rich.console import Console
 from rich.table import Table
 
 from .. import __version__
-from ..config import build, parse, scene_alone
+from ..config import GrippedConfig, build, parse_any, scene_alone
 from ..experiment import Experiment
+from ..gripped import GrippedMotion
 from ..optimizers import has_ceres
 from ..scene import KINDS, Scene
+from .gripped import RopeData, load_ropes
 from .outcome import Outcome, run
 
 PACKAGES = ("numpy", "scipy", "torch", "matplotlib", "pydantic", "rich", "typer")
@@ -60,7 +63,9 @@ def _packages() -> dict[str, str | None]:
 
 
 def _config(console: Console, path: Path) -> dict[str, Any]:
-    config = parse(path)
+    config = parse_any(path)
+    if isinstance(config, GrippedConfig):
+        return _ropes(console, config, load_ropes(config, path.parent))
     study = build(config, path.parent)
     console.print(f"\n[bold]{config.experiment.name}[/]  {config.experiment.about}")
     scenes = [_recorded(e) for e in study.experiments] or [_counts(scene_alone(config)[0])]
@@ -77,6 +82,30 @@ def _config(console: Console, path: Path) -> dict[str, Any]:
         "quantities": {n: q.value for n, q in first.quantities.items()},
         "parameters": list(study.parameters),
     }
+
+
+def _ropes(console: Console, config: GrippedConfig, ropes: list[RopeData]) -> dict[str, Any]:
+    """Ropes between grips: what was recorded, and what is to be fitted."""
+    console.print(f"\n[bold]{config.experiment.name}[/]  {config.experiment.about}")
+    told: dict[str, dict[str, Any]] = {}
+    for rope in ropes:
+        motions = [GrippedMotion.of(r, rope.section.smoothing) for r in rope.train]
+        told[rope.section.name] = {
+            "train": len(rope.train),
+            "eval": len(rope.unseen),
+            "seconds": float(sum(r.times[-1] - r.times[0] for r in rope.train)),
+            "free markers": len(motions[0].free),
+            "length": float(np.mean([m.length for m in motions])),
+            "density": rope.section.density,
+            "rungs": rope.section.rungs,
+        }
+    table = Table("rope", "train", "eval", "to fit", "free markers", "length", "density", "rungs", box=None)
+    for name, row in told.items():
+        units = {"seconds": "s", "length": "m", "density": "kg/m"}
+        cells = [f"{_text(value)} {units.get(key, '')}".rstrip() for key, value in row.items() if key != "rungs"]
+        table.add_row(name, *cells, ", ".join(row["rungs"]))
+    console.print(table)
+    return {"name": config.experiment.name, "ropes": told}
 
 
 def _recorded(e: Experiment) -> dict[str, Any]:

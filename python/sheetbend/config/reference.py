@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
-from . import scene_schema, schema
+from . import gripped_schema, scene_schema, schema
 from .section import AXES, NAME, REFERENCE, Section
 
 HEADERS: dict[str, type[Section]] = {
@@ -34,12 +34,21 @@ HEADERS: dict[str, type[Section]] = {
     "[fit]": schema.FitSection,
     "[output]": schema.OutputSection,
 }
+ROPE_HEADERS: dict[str, type[Section]] = {
+    "[experiment]": schema.ExperimentSection,
+    "[[gripped_rope]]": gripped_schema.GrippedRopeSection,
+    "[fit]": gripped_schema.GrippedFitSection,
+    "[output]": schema.OutputSection,
+}
 START, END = "<!-- tables: start -->", "<!-- tables: end -->"
 
 
 def tables() -> str:
     """Markdown: a heading, what the section is, and a table of its keys, for every section."""
-    return "\n".join(_section(header, model) for header, model in HEADERS.items())
+    with_scene = [_section(header, model) for header, model in HEADERS.items()]
+    ropes = [_section(header, model) for header, model in ROPE_HEADERS.items() if HEADERS.get(header) is not model]
+    about = "`[experiment]` and `[output]` are as above. The others:"
+    return "\n".join([*with_scene, f"## All keys of ropes between grips\n\n{about}\n", *ropes])
 
 
 def renewed(text: str) -> str:

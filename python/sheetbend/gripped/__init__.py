@@ -1,7 +1,24 @@
 """Ropes held by two grips: from recordings to stiffness, twist, damping, rest shape and yield."""
 
+from .evaluation import Evaluation, evaluate
 from .model import RopeModel
 from .motion import GrippedMotion
 from .recipe import LADDER, RopeFit, Rung, Step, fit_rope
+from .report import RopeReport
+from .trades import trades
+from .without_twist import WITHOUT_TWIST
 
-__all__ = ["LADDER", "GrippedMotion", "RopeFit", "RopeModel", "Rung", "Step", "fit_rope"]
+__all__ = [
+    "LADDER",
+    "WITHOUT_TWIST",
+    "Evaluation",
+    "GrippedMotion",
+    "RopeFit",
+    "RopeModel",
+    "RopeReport",
+    "Rung",
+    "Step",
+    "evaluate",
+    "fit_rope",
+    "trades",
+]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .. import timeseries
 from ..errors import RecordingError
 from ..grip import Grip
 from ..optional import require
@@ -13,6 +14,7 @@ from ..recording import Recording
 
 Array = np.ndarray
 POLYLINE = 200  # points of the initial curve, which links are laid along
+BRIDGED = 0.1  # s, of a free marker's gap: there the C1 cubic stands in for what was not seen, in starts alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +45,7 @@ class GrippedMotion:
             RecordingError: the rope is not gripped by two markers at each end, or a gap is too long to fill.
         """
         inner = _inner(recording)
-        filled = recording.filled()
-        x, v = smoothed(filled.times, filled.positions, smoothing)
+        x, v = smoothed(recording.times, _bridged(recording), smoothing)
         free = x[:, inner[0] : inner[1] + 1]
         chords = np.linalg.norm(np.diff(x, axis=1), axis=2).mean(axis=0)
         s = np.concatenate([[0.0], np.cumsum(chords)])
@@ -94,6 +95,20 @@ def smoothed(times: Array, positions: Array, width: float) -> tuple[Array, Array
     golay = require("scipy.signal", "fit").savgol_filter
     values = golay(positions, frames, 2, axis=0, mode="interp")
     return values, golay(positions, frames, 2, deriv=1, delta=step, axis=0, mode="interp")
+
+
+def _bridged(recording: Recording) -> Array:
+    """(frames, markers, 3) m without gaps; those of gripped markers must be shorter (`Recording.filled`)."""
+    filled, times = recording.filled(), recording.times
+    gap = max(timeseries.default_max_gap(times), BRIDGED)
+    positions = timeseries.interpolate(times, filled.positions, times, "cubic", gap)
+    lost = np.argwhere(np.isnan(positions[:, :, 0]))
+    if len(lost):
+        frame, marker = lost[0]
+        label, problem = f"marker {recording.markers[marker]!r} of {recording.name}", f"is lost for over {gap:.3g} s"
+        fix = "cut a piece without the gap, or leave the marker out with `select`"
+        raise RecordingError(label, f"{problem}, or at an end", f"not seen at {times[frame]:.6g} s", fix)
+    return positions
 
 
 def _curve(points: Array, s: Array) -> Array:

@@ -24,7 +24,7 @@ from ..parameters import Parameter
 from ..problem import FitProblem
 from ..recording import Recording
 from ..scores import coordinate_error
-from .model import NAME, RopeModel, nominal_directions, shared_gravity
+from .model import GRAVITY, NAME, RopeModel, nominal_directions, shared_gravity
 from .motion import Array, GrippedMotion
 
 BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first
@@ -163,6 +163,7 @@ def fit_rope(
     substeps: int = 2,
     smoothing: float = 0.08,
     sigma: float = 5e-3,
+    gravity: tuple[float, float, float] = GRAVITY,
     threads: int = 1,
     say: Say = lambda text: None,
 ) -> RopeFit:
@@ -182,11 +183,16 @@ def fit_rope(
         substeps: per frame.
         smoothing: s, of the recorded grips and starts.
         sigma: m, expected error of a marker.
+        gravity: m/s^2, where the recordings do not tell.
         threads: the result does not depend on it.
         say: called with a line on each step.
 
+    Returns:
+        RopeFit. After Ctrl-C the one of the last finished rung, its fit marked `interrupted`.
+
     Raises:
         InputError, RecordingError: anything inconsistent, named, before work starts.
+        KeyboardInterrupt: before the first rung was finished.
     """
     if not (np.isfinite(density) and density > 0):
         raise InputError("density", "must be positive", density, "weigh the rope and give kg/m")
@@ -204,6 +210,7 @@ def fit_rope(
         substeps=substeps,
         smoothing=smoothing,
         sigma=sigma,
+        gravity=gravity,
     )
     search = _Search(motions, validate, windows, threads, say)
     return search.run(model, ladder, bending_lengths, max_segments)
@@ -234,19 +241,29 @@ class _Search:
         self, model: RopeModel, ladder: Sequence[Rung], bending_lengths: Sequence[float], max_segments: int
     ) -> RopeFit:
         parameters: tuple[Parameter, ...] = ladder[0].parameters
-        model, values = self._first(model, ladder[0], bending_lengths)
-        model, values = self._refined(model, parameters, values, max_segments)
-        steps = [self._step(ladder[0].name, model, values, None, time.perf_counter())]
-        for rung in ladder[1:]:
-            began = time.perf_counter()
-            larger = replace(model, **dict(rung.options), values={**model.values, **rung.values})  # type: ignore[arg-type]
-            wanted = (*parameters, *rung.parameters)
-            found = self._minimum(larger, wanted, values, self.windows[-1])
-            step = self._step(rung.name, larger, found, steps, began)
-            steps.append(step)
-            if step.stays:
-                model, parameters, values = larger.at(found), wanted, found
-        last = self._conclude(model, parameters, values)
+        began, interrupted = time.perf_counter(), False
+        steps: list[Step] = []
+        try:
+            model, values = self._first(model, ladder[0], bending_lengths)
+            model, values = self._refined(model, parameters, values, max_segments)
+            steps.append(self._step(ladder[0].name, model, values, steps, began))
+            self._tell(steps[-1])  # once it counts: who is told of a step may stop there
+            for rung in ladder[1:]:
+                began = time.perf_counter()
+                larger = replace(model, **dict(rung.options), values={**model.values, **rung.values})  # type: ignore[arg-type]
+                wanted = (*parameters, *rung.parameters)
+                found = self._minimum(larger, wanted, values, self.windows[-1])
+                step = self._step(rung.name, larger, found, steps, began)
+                steps.append(step)
+                if step.stays:
+                    model, parameters, values = larger.at(found), wanted, found
+                self._tell(step)
+        except KeyboardInterrupt:
+            if not steps:
+                raise
+            interrupted = True
+            self.say(f"interrupted: going back to {next(s.name for s in reversed(steps) if s.stays)}")
+        last = self._conclude(model, parameters, values, interrupted)
         values = {name: last.values[name] for name in last.values}
         return RopeFit(model.at(values), values, tuple(steps), last, tuple(_warnings(model, values)))
 
@@ -307,14 +324,16 @@ class _Search:
         return 0.5 * float(r @ r) if ok else np.inf
 
     def _step(
-        self, name: str, model: RopeModel, values: Mapping[str, float], before: Sequence[Step] | None, began: float
+        self, name: str, model: RopeModel, values: Mapping[str, float], before: Sequence[Step], began: float
     ) -> Step:
         judges = self.others or self.fitted
         fitted, others = (self._error(model, values, part) for part in (self.fitted, judges))
-        best = None if before is None else min(s.others for s in before if s.stays)
-        stays = best is None or others < BETTER * best
-        self.say(f"{name}: {1e3 * fitted:.3g} mm, {1e3 * others:.3g} mm on others{'' if stays else ', does not stay'}")
+        stays = not before or others < BETTER * min(s.others for s in before if s.stays)
         return Step(name, fitted, others, stays, time.perf_counter() - began)
+
+    def _tell(self, step: Step) -> None:
+        errors = f"{1e3 * step.fitted:.3g} mm, {1e3 * step.others:.3g} mm on others"
+        self.say(f"{step.name}: {errors}{'' if step.stays else ', does not stay'}")
 
     def _error(self, model: RopeModel, values: Mapping[str, float], motions: Sequence[GrippedMotion]) -> float:
         errors = []
@@ -323,10 +342,18 @@ class _Search:
             errors.append(coordinate_error(m.recording, predicted) if np.isfinite(predicted).all() else np.inf)
         return float(np.mean(errors))
 
-    def _conclude(self, model: RopeModel, parameters: Sequence[Parameter], values: Mapping[str, float]) -> Fit:
+    def _conclude(
+        self, model: RopeModel, parameters: Sequence[Parameter], values: Mapping[str, float], interrupted: bool
+    ) -> Fit:
+        """The fit to all recordings; after Ctrl-C one iteration of it, which the intervals need."""
         experiments = _experiments(model, self.all, self.windows[-1])
         wanted = _starting(parameters, values)
-        return fit(experiments, parameters=wanted, threads=self.threads, profiles=False, max_iterations=30)
+        count = 1 if interrupted else 30
+        last = fit(experiments, parameters=wanted, threads=self.threads, profiles=False, max_iterations=count)
+        if not interrupted:
+            return last
+        warning = "interrupted: later rungs were not tried, and the last fit did not get to its end"
+        return replace(last, result=replace(last.result, interrupted=True, converged=False, warnings=(warning,)))
 
 
 def _experiments(model: RopeModel, motions: Sequence[GrippedMotion], window: tuple[float, float]) -> list[Experiment]:

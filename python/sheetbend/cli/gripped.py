@@ -1,0 +1,157 @@
+"""sheetbend fit of ropes between two grips: the recipe, rope by rope."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from rich.console import Console
+
+from ..config import GrippedConfig, GrippedRopeSection
+from ..errors import ConfigError, RecordingError
+from ..gripped import WITHOUT_TWIST, GrippedMotion, RopeFit, RopeReport, Rung, evaluate, fit_rope
+from ..gripped.recipe import REST, TILTS, TWIST, VARYING, YIELD
+from ..gripped.report import overview
+from ..io.folder import recordings
+from ..recording import Recording
+from ..tables import plain_section
+from .gripped_figure import write_figure
+from .outcome import Code, Outcome
+from .screen import show
+
+RUNGS: dict[str, Rung] = {"twist": TWIST, "tilts": TILTS, "rest": REST, "yield": YIELD, "varying": VARYING}
+
+
+@dataclass(frozen=True)
+class RopeData:
+    """A rope's section with its recordings."""
+
+    section: GrippedRopeSection
+    train: Sequence[Recording]
+    unseen: Sequence[Recording]
+
+
+def load_ropes(config: GrippedConfig, folder: Path) -> list[RopeData]:
+    """All recordings, checked.
+
+    Raises:
+        ConfigError: a folder or a recording in it cannot be used; it names the key.
+    """
+    ropes = []
+    for i, section in enumerate(config.gripped_rope):
+        train = _load(section, f"gripped_rope[{i}].train", folder / section.train)
+        unseen = [] if section.eval is None else _load(section, f"gripped_rope[{i}].eval", folder / section.eval)
+        ropes.append(RopeData(section, train, unseen))
+    return ropes
+
+
+def _load(section: GrippedRopeSection, key: str, folder: Path) -> list[Recording]:
+    try:
+        found = recordings(folder, section.pattern, section.units)
+        for recording in found:
+            GrippedMotion.of(recording, section.smoothing)
+    except RecordingError as error:
+        where = "" if error.field in ("folder", str(folder)) else f"{error.field} "
+        raise ConfigError(key, f"{where}{error.problem}", error.got, error.fix) from error
+    return found
+
+
+def fit_ropes(
+    console: Console, config: GrippedConfig, ropes: Sequence[RopeData], folder: Path, strict: bool
+) -> Outcome:
+    """Fit every rope, report each as soon as it is done, and write it to a folder of its own.
+
+    After Ctrl-C what is whole is reported: the ropes that are done, and of the present one the last finished rung.
+    """
+    reports: list[RopeReport] = []
+    files: list[str] = []
+    stopped = False
+    for rope in ropes:
+        console.print(f"\n[bold]{rope.section.name}[/]  {len(rope.train)} recordings to fit, {len(rope.unseen)} unseen")
+        try:
+            found = _fit(console, config, rope, [RUNGS[name] for name in rope.section.rungs])
+            report, stopped = _judged(console, config, rope, found)
+        except KeyboardInterrupt:
+            if not reports:
+                raise
+            stopped = True
+            break
+        reports.append(report)
+        show(console, report.rich, report.plain)
+        files += _write(report, config, rope, folder)
+        if stopped:
+            break
+    summary = plain_section(overview(reports))
+    (folder / "report.txt").write_text("\n".join(summary) + "\n", encoding="utf-8")
+    console.print("\n" + "\n".join(summary), markup=False, soft_wrap=True)
+    console.print(f"\nwritten to {folder}: report.txt, {', '.join(files)}", soft_wrap=True)
+    missing = [rope.section.name for rope in ropes[len(reports) :]]
+    if missing:
+        console.print(f"interrupted: not fitted are {', '.join(missing)}")
+    data = {
+        "name": config.experiment.name,
+        "output": str(folder),
+        "files": ["report.txt", *files],
+        "ropes": {r.name: r.to_dict() for r in reports},
+        "not_fitted": missing,
+    }
+    return Outcome(data, Code.NOT_CONVERGED if stopped else _code(reports, strict or config.fit.strict))
+
+
+def _fit(console: Console, config: GrippedConfig, rope: RopeData, ladder: Sequence[Rung]) -> RopeFit:
+    began = time.perf_counter()
+    s = rope.section
+    return fit_rope(
+        rope.train,
+        density=s.density,
+        ladder=ladder,
+        validate=s.validate_share,
+        bending_lengths=s.bending_lengths,
+        windows=[(length, total) for length, total in s.windows],
+        segments=s.segments,
+        max_segments=s.max_segments,
+        substeps=s.substeps,
+        smoothing=s.smoothing,
+        sigma=s.sigma,
+        gravity=(s.gravity[0], s.gravity[1], s.gravity[2]),
+        threads=config.fit.threads,
+        say=lambda text: console.print(f"  {time.perf_counter() - began:6.1f} s  {text}", markup=False, soft_wrap=True),
+    )
+
+
+def _judged(console: Console, config: GrippedConfig, rope: RopeData, found: RopeFit) -> tuple[RopeReport, bool]:
+    """What the rope predicts, and whether Ctrl-C ended the work."""
+    report = RopeReport(rope.section.name, found, evaluate(found, rope.unseen) if rope.unseen else None)
+    if found.fit.result.interrupted:
+        return report, True
+    if not config.fit.without_twist or not rope.unseen:
+        return report, False
+    console.print("  for comparison without twist:")
+    try:
+        bare = _fit(console, config, rope, [WITHOUT_TWIST])
+    except KeyboardInterrupt:
+        return report, True
+    return replace(report, without_twist=evaluate(bare, rope.unseen)), bare.fit.result.interrupted
+
+
+def _write(report: RopeReport, config: GrippedConfig, rope: RopeData, folder: Path) -> list[str]:
+    """Everything that a rope leaves behind; names relative to the folder."""
+    own = folder / report.name
+    own.mkdir(parents=True, exist_ok=True)
+    text = json.dumps(report.to_dict(), indent=2, allow_nan=False) + "\n"
+    (own / "fit.json").write_text(text, encoding="utf-8")
+    (own / "report.txt").write_text(report.plain(), encoding="utf-8")
+    drawn = report.unseen or evaluate(report.found, rope.train)
+    names = ["fit.json", "report.txt", *write_figure(report, drawn, config.output.figures, own)]
+    return [f"{report.name}/{name}" for name in names]
+
+
+def _code(reports: Sequence[RopeReport], strict: bool) -> Code:
+    results = [report.result for report in reports]
+    if not all(result.converged for result in results):
+        return Code.NOT_CONVERGED
+    unknown = [[e.verdict == "not identifiable" for e in result.estimates] for result in results]
+    return Code.NOT_IDENTIFIABLE if any(any(u) if strict else all(u) for u in unknown) else Code.DONE

@@ -1,0 +1,112 @@
+"""The configuration of a fit of ropes held by two grips: every key with its default, unit and meaning."""
+
+from __future__ import annotations
+
+import inspect
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, field_validator
+
+from ..gripped import fit_rope
+from .schema import ExperimentSection, OutputSection
+from .section import Finite, Name, Pair, Section, Vector, key
+
+RungName = Literal["twist", "tilts", "rest", "yield", "varying"]
+RUNGS: tuple[RungName, ...] = ("twist", "tilts", "rest", "yield", "varying")
+RECIPE = {name: option.default for name, option in inspect.signature(fit_rope).parameters.items()}
+
+
+def _default(option: str) -> Any:
+    """That of `fit_rope`, tuples as lists."""
+    value = RECIPE[option]
+    if isinstance(value, tuple):
+        return [list(part) if isinstance(part, tuple) else part for part in value]
+    return value
+
+
+def _span(pair: list[float]) -> list[float]:
+    if not 0 < pair[0] <= pair[1]:
+        raise ValueError("must be [length, total] with 0 < length <= total|give such as [0.5, 8.0]")
+    return pair
+
+
+Positive = Annotated[Finite, Field(gt=0)]
+Span = Annotated[Pair, AfterValidator(_span)]
+
+
+class GrippedRopeSection(Section):
+    """[[gripped_rope]]: a rope between two grips, and how it is fitted. A list."""
+
+    name: Name = key(..., "names the rope in results, and their folder")
+    density: Finite = key(..., "mass per length, weighed: motion tells stiffness over density only", "kg/m", gt=0)
+    train: str = key(..., "folder of the recordings to fit, relative to the configuration")
+    eval: str | None = key(None, "folder of recordings that are only predicted, from their first frame")
+    pattern: str = key("*", 'which files of these folders, such as "*.pkl"', min_length=1)
+    units: Literal["m", "cm", "mm"] | None = key(None, "length unit of the files; their JSONs' when left out")
+    gravity: Vector = key(_default("gravity"), "in the axes of the recordings, where their JSONs do not tell", "m/s^2")
+    rungs: list[RungName] = key(
+        list(RUNGS),
+        "what the model gets, one after another: straight with twist, tilts of the grips, rest curvature, yield, a "
+        "stiffness that varies along the rope; a rung stays only if it predicts recordings better that it was not "
+        "fitted to",
+        min_length=1,
+    )
+    validate_share: Finite = key(
+        _default("validate"),
+        "share of the recordings in `train` that decide whether a rung stays; the last fit sees all",
+        ge=0,
+        lt=1,
+    )
+    windows: list[Span] = key(
+        _default("windows"),
+        "[length, total] of the pieces that a fit sees, each predicted open loop: short ones first, whose cost is "
+        "smooth",
+        "s",
+        min_length=1,
+    )
+    bending_lengths: list[Positive] = key(
+        _default("bending_lengths"), "of the starts, (EI/(density g))^(1/3); the best one wins", "m", min_length=1
+    )
+    segments: int = key(_default("segments"), "links at the start", ge=4)
+    max_segments: int = key(
+        _default("max_segments"), "links are doubled, up to these, until EI moves by less than 5 %", ge=4
+    )
+    substeps: int = key(_default("substeps"), "per frame", ge=1)
+    smoothing: Finite = key(_default("smoothing"), "over which recorded grips and starts are smoothed", "s", ge=0)
+    sigma: Finite = key(_default("sigma"), "expected error of a marker, against which priors count", "m", gt=0)
+
+    @field_validator("rungs")
+    @classmethod
+    def _in_order(cls, rungs: list[RungName]) -> list[RungName]:
+        if rungs != [rung for rung in RUNGS if rung in rungs] or rungs[0] != "twist":
+            order = ", ".join(f'"{rung}"' for rung in RUNGS)
+            raise ValueError(f'must be in order, each once, "twist" first|leave out some of {order}')
+        return rungs
+
+
+class GrippedFitSection(Section):
+    """[fit]: how the fits run, beside [[gripped_rope]]."""
+
+    threads: int = key(1, "over windows and derivatives; results do not depend on it", ge=1)
+    without_twist: bool = key(
+        False, "also fit a straight rope whose torsional stiffness is negligible, to show what twist explains"
+    )
+    strict: bool = key(False, "exit 3 when any parameter is not identifiable, not only when all are")
+
+
+class GrippedConfig(Section):
+    """A whole file with [[gripped_rope]]."""
+
+    experiment: ExperimentSection = key(..., "what this is")
+    gripped_rope: list[GrippedRopeSection] = key(..., "the ropes", min_length=1)
+    fit: GrippedFitSection = key(GrippedFitSection(), "how the fits run")
+    output: OutputSection = key(OutputSection(), "what is written")
+
+    @field_validator("gripped_rope")
+    @classmethod
+    def _named_once(cls, ropes: list[GrippedRopeSection]) -> list[GrippedRopeSection]:
+        names = [rope.name for rope in ropes]
+        twice = [name for i, name in enumerate(names) if name in names[:i]]
+        if twice:
+            raise ValueError(f"has two ropes of the name {twice[0]!r}|give each rope a name of its own")
+        return ropes

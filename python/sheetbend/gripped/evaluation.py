@@ -1,0 +1,46 @@
+"""A fitted rope on recordings that it was not fitted to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..recording import Recording
+from ..scores import Scores, scores
+from .model import NAME
+from .motion import Array
+from .recipe import RopeFit
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Predictions beside what was measured.
+
+    Attributes:
+        recordings: those predicted to their end.
+        predicted: of each (frames, markers, 3) m.
+        scores: their errors beside the no-physics blend; None where nothing was predicted to its end.
+        diverged: names of the recordings whose prediction was not finite, or went farther off than the rope is long.
+    """
+
+    recordings: tuple[Recording, ...]
+    predicted: tuple[Array, ...]
+    scores: Scores | None
+    diverged: tuple[str, ...]
+
+
+def evaluate(found: RopeFit, recordings: Sequence[Recording]) -> Evaluation:
+    """Predict each recording open loop from its first frame, and score it (`sheetbend.scores`)."""
+    reach = found.values[f"{NAME}_length"]
+    kept, predicted, diverged = [], [], []
+    for recording in recordings:
+        x = found.predict(recording)
+        off = np.abs(x - recording.positions)[recording.mask]
+        if (off <= reach).all():  # false where it is not a number
+            kept.append(recording)
+            predicted.append(x)
+        else:
+            diverged.append(recording.name)
+    return Evaluation(tuple(kept), tuple(predicted), scores(kept, predicted) if kept else None, tuple(diverged))

@@ -1,0 +1,130 @@
+"""The report of a rope's fit: estimates, the steps of the recipe, what trades against what, and unseen recordings."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from .. import report
+from ..optional import require
+from ..result import FitResult
+from ..tables import Section, plain_section, rich_section
+from ..wording import short
+from .evaluation import Evaluation
+from .model import NAME
+from .recipe import RopeFit
+from .trades import trades
+
+if TYPE_CHECKING:
+    from rich.console import Group
+
+
+@dataclass(frozen=True)
+class RopeReport:
+    """A fitted rope with its name and what it predicts.
+
+    Attributes:
+        name: of the rope.
+        found: from `fit_rope`.
+        unseen: predictions of other recordings, or None.
+        without_twist: those of a fit with `WITHOUT_TWIST`, or None.
+    """
+
+    name: str
+    found: RopeFit
+    unseen: Evaluation | None = None
+    without_twist: Evaluation | None = None
+
+    @property
+    def result(self) -> FitResult:
+        """The last fit, with the warnings of the recipe."""
+        result = self.found.fit.result
+        more = tuple(
+            f"the prediction of {name}{where} diverges: it is left out of the errors"
+            for part, where in ((self.unseen, ""), (self.without_twist, " without twist"))
+            for name in (part.diverged if part is not None else ())
+        )
+        return replace(result, warnings=(*result.warnings, *self.found.warnings, *more))
+
+    def plain(self, width: int = 100) -> str:
+        """As plain text."""
+        lines = [f"{self.name}, a rope between two grips", "", report.plain(self.result, width)]
+        for section in self._sections():
+            lines += [*plain_section(section, width), ""]
+        if self.unseen is not None and self.unseen.scores is not None:
+            lines.append(self.unseen.scores.report(width))
+        return "\n".join(lines)
+
+    def rich(self) -> Group:
+        """For rich terminals.
+
+        Raises:
+            MissingExtraError: rich is not installed.
+        """
+        parts: list[object] = [report.rich_report(self.result)]
+        for section in self._sections():
+            parts += ["", *rich_section(section)]
+        if self.unseen is not None and self.unseen.scores is not None:
+            parts += ["", self.unseen.scores.rich_report()]
+        group: Group = require("rich.console", "cli").Group(*parts)
+        return group
+
+    def to_dict(self) -> dict[str, Any]:
+        """Strict JSON values; what `FitResult.load` reads, and beside it the steps, the trades and the errors in m."""
+        steps = [{k: _finite(v) for k, v in asdict(step).items()} for step in self.found.steps]
+        return self.result.to_dict() | {
+            "rope": self.name,
+            "values": dict(self.found.values),
+            "segments": self.found.model.segments,
+            "steps": steps,
+            "trades": [f"{what}: {words}" for what, words in trades(self.result)],
+            **errors(self.unseen, self.without_twist),
+        }
+
+    def _sections(self) -> list[Section]:
+        rows = [
+            (s.name, _mm(s.fitted), _mm(s.others), "mm", "yes" if s.stays else "no", f"{s.seconds:.1f}")
+            for s in self.found.steps
+        ]
+        meaning = "mean absolute coordinate error of whole recordings, predicted from their first frame"
+        notes = (("fitted, others", f"{meaning}: those that the step was fitted to, and those that it was not"),)
+        headers = ("step", "fitted", "others", "unit", "stays", "seconds")
+        return [
+            Section("Steps", headers, tuple(rows), notes),
+            Section("What trades against what", notes=trades(self.result)),
+        ]
+
+
+def errors(unseen: Evaluation | None, without_twist: Evaluation | None) -> dict[str, Any]:
+    """Mean errors in m over unseen recordings, None where there are none, and those of each."""
+    found = None if unseen is None else unseen.scores
+    bare = None if without_twist is None else without_twist.scores
+    rows = {row.recording: {"error": row.error, "blend": row.blend} for row in (found.rows if found else ())}
+    return {
+        "error": None if found is None else found.error,
+        "blend": None if found is None else found.blend,
+        "without_twist": None if bare is None else bare.error,
+        "unseen": rows,
+    }
+
+
+def overview(reports: list[RopeReport]) -> Section:
+    """One line per rope: errors on unseen recordings, and the stiffness."""
+    rows = []
+    for r in reports:
+        told, values = errors(r.unseen, r.without_twist), r.found.values
+        EI, GJ = values[f"{NAME}_EI"], values[f"{NAME}_GJ"]
+        numbers = (_mm(told[key]) for key in ("blend", "without_twist", "error"))
+        rows.append((r.name, *numbers, "mm", short(EI), short(GJ / EI)))
+    headers = ("rope", "blend", "without twist", "fitted", "unit", "EI [N m^2]", "GJ/EI")
+    note = "mean absolute coordinate error of recordings that were not fitted; blend: no physics"
+    return Section("Ropes", headers, tuple(rows), (("errors", note),))
+
+
+def _mm(error: float | None) -> str:
+    return "" if error is None else short(1e3 * error) if math.isfinite(error) else "diverges"
+
+
+def _finite(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,194 @@
+"""Recordings of gripped ropes become smooth grips, starts and windows; what is no such recording is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from sheetbend.gripped import GrippedMotion, RopeModel
+from sheetbend.gripped.model import nominal_directions, shared_gravity
+from sheetbend.gripped.motion import smoothed
+from sheetbend.gripped.recipe import predict
+
+TIMES = np.arange(101) / 100.0
+LENGTH, SPAN, GRIP = 0.9, 0.6, 0.03  # m between the grips: arc, chord; and in each grip
+Array = np.ndarray
+
+
+def arch(s: Array) -> Array:
+    """(k, 3) m: a hanging circular arc of `LENGTH` over `SPAN`, at shares s of its length; straight on in the grips."""
+    angle = 2.6  # of the arc, roughly: sin(angle/2)/(angle/2) = SPAN/LENGTH
+    for _ in range(50):
+        half = angle / 2
+        angle -= (np.sin(half) / half - SPAN / LENGTH) / ((np.cos(half) * half - np.sin(half)) / half**2 / 2)
+    radius, inside = LENGTH / angle, np.clip(s, 0.0, 1.0)
+    turn = angle * (inside - 0.5)
+    line = np.stack([SPAN / 2 + radius * np.sin(turn), 0 * s, radius * (np.cos(angle / 2) - np.cos(turn))], axis=-1)
+    return line + LENGTH * (s - inside)[:, None] * np.stack([np.cos(turn), 0 * s, np.sin(turn)], axis=-1)
+
+
+def carried_about(markers: int = 12, **fields: object) -> sb.Recording:
+    """A rope that keeps its shape and is moved by its grips on a smooth path, as the data sets have it."""
+    inner = np.linspace(0.0, 1.0, markers - 2)
+    shares = np.concatenate([[-GRIP / LENGTH], inner, [1.0 + GRIP / LENGTH]])
+    path = 0.1 * np.stack([np.sin(4 * TIMES), np.cos(3 * TIMES) - 1.0, np.sin(5 * TIMES)], axis=1)
+    positions = arch(shares) + path[:, None]
+    clamped = (0, 1, markers - 2, markers - 1)
+    return sb.Recording(**{"positions": positions, "times": TIMES, "clamped": clamped, "name": "arch", **fields})
+
+
+def model_of(motion: GrippedMotion, **fields: object) -> RopeModel:
+    values = {"EI": 0.02, "GJ": 0.02, "bend_damping": 0.03, "twist_damping": 0.03, "drag_linear": 0.02}
+    given = {"density": 0.06, "nominal": nominal_directions([motion]), "values": values, **fields}
+    return RopeModel(**given)
+
+
+def pull(e: sb.Experiment) -> Array:
+    """(3,) m/s^2: gravity of an experiment's scene."""
+    return e.scene.base_arrays()["gravity"]
+
+
+class TestSmoothing:
+    def test_a_parabola_stays_what_it_is_and_gives_its_slope(self) -> None:
+        x = np.stack([1.0 - 2.0 * TIMES + 3.0 * TIMES**2, 0.5 * TIMES**2], axis=1)
+        values, slopes = smoothed(TIMES, x, 0.08)
+        np.testing.assert_allclose(values, x, atol=1e-12)
+        np.testing.assert_allclose(slopes, np.stack([-2.0 + 6.0 * TIMES, TIMES], axis=1), atol=1e-10)
+
+    def test_noise_shrinks_as_least_squares_has_it(self) -> None:
+        # The middle weight of a parabola through 2 m + 1 points: (9 m^2 + 9 m - 3) / ((2 m + 1)(4 m^2 + 4 m - 3)).
+        noise = np.random.default_rng(3).standard_normal((2001, 40))
+        values, _ = smoothed(np.arange(2001) / 100.0, noise, 0.08)
+        m = 4
+        variance = (9 * m**2 + 9 * m - 3) / ((2 * m + 1) * (4 * m**2 + 4 * m - 3))
+        assert values[10:-10].var() == pytest.approx(variance, rel=0.02)
+
+    def test_a_slow_wave_keeps_its_height_and_speed(self) -> None:
+        wave, speed = np.sin(2 * np.pi * TIMES), 2 * np.pi * np.cos(2 * np.pi * TIMES)
+        values, slopes = smoothed(TIMES, wave, 0.08)
+        # A parabola's third order term is lost, one-sided at the ends: (2 pi)^3/6 (0.04 s)^3 and twice that.
+        np.testing.assert_allclose(values, wave, atol=(2 * np.pi * 0.04) ** 3 / 6)
+        np.testing.assert_allclose(values[4:-4], wave[4:-4], atol=2e-5)
+        np.testing.assert_allclose(slopes[4:-4], speed[4:-4], atol=0.05)
+
+    @pytest.mark.parametrize("width", [0.0, 0.02])
+    def test_too_narrow_a_width_leaves_positions_as_they_are(self, width: float) -> None:
+        x = np.random.default_rng(0).standard_normal((101, 2))
+        values, slopes = smoothed(TIMES, x, width)
+        np.testing.assert_array_equal(values, x)
+        np.testing.assert_allclose(slopes[1:-1], (x[2:] - x[:-2]) / 0.02, rtol=1e-9)
+
+
+class TestMotion:
+    def test_arc_lengths_and_length_of_a_known_shape(self) -> None:
+        motion = GrippedMotion.of(carried_about(), 0.08)
+        assert motion.inner == (1, 10) and list(motion.free) == list(range(2, 10))
+        np.testing.assert_allclose(motion.fractions[1:11], np.linspace(0.0, 1.0, 10), atol=1e-12)
+        assert motion.fractions[0] < 0.0 and motion.fractions[11] > 1.0
+        assert motion.length == pytest.approx(LENGTH, rel=2e-3)
+        assert motion.length > np.linalg.norm(np.diff(arch(np.linspace(0, 1, 10)), axis=0), axis=1).sum()
+
+    def test_positions_and_velocities_follow_the_path(self) -> None:
+        motion = GrippedMotion.of(carried_about(), 0.08)
+        speed = 0.1 * np.stack([4 * np.cos(4 * TIMES), -3 * np.sin(3 * TIMES), 5 * np.cos(5 * TIMES)], axis=1)
+        np.testing.assert_allclose(motion.positions, carried_about().positions, atol=2e-4)
+        np.testing.assert_allclose(motion.velocities[5:-5], np.tile(speed[5:-5, None], (1, 12, 1)), atol=0.01)
+        points, velocity = motion.start(40)
+        assert points[0] == pytest.approx(motion.positions[40, 1]) and points[-1] == pytest.approx(
+            motion.positions[40, 10]
+        )
+        np.testing.assert_allclose(velocity, np.tile(speed[40], (len(velocity), 1)), atol=0.01)
+
+    def test_grips_point_along_the_rope(self) -> None:
+        motion = GrippedMotion.of(carried_about(), 0.08)
+        start, end = motion.directions(False), motion.directions(True)
+        np.testing.assert_allclose(start, np.tile((arch(np.array([0.0])) - arch(np.array([-0.1])))[0], (101, 1)) / 0.09)
+        np.testing.assert_allclose(end, start * [1.0, 1.0, -1.0], atol=1e-9)
+
+    @pytest.mark.parametrize(("marker", "frames"), [(0, 2), (5, 9)], ids=["gripped", "free"])
+    def test_short_gaps_are_closed(self, marker: int, frames: int) -> None:
+        positions = carried_about().positions.copy()
+        positions[50 : 50 + frames, marker] = np.nan
+        filled = GrippedMotion.of(carried_about(positions=positions), 0.08)
+        np.testing.assert_allclose(filled.positions, GrippedMotion.of(carried_about(), 0.08).positions, atol=1e-4)
+
+    @pytest.mark.parametrize("frames", [slice(50, 61), slice(0, 1), slice(100, 101)], ids=["inside", "first", "last"])
+    def test_a_free_marker_that_is_lost_for_long_is_refused(self, frames: slice) -> None:
+        positions = carried_about().positions.copy()
+        positions[frames, 5] = np.nan
+        with pytest.raises(sb.RecordingError, match=r"marker 'm5' of arch: is lost for over 0\.1 s, or at an end"):
+            GrippedMotion.of(carried_about(positions=positions), 0.08)
+
+    @pytest.mark.parametrize(
+        "clamped",
+        [(), (0, 1), (10, 11), (0, 11), (0, 1, 11), (0, 1, 5, 10, 11), tuple(range(12))],
+        ids=["none", "start only", "end only", "one each", "one at the end", "one between", "all"],
+    )
+    def test_what_is_not_held_by_two_grips_is_refused(self, clamped: tuple[int, ...]) -> None:
+        with pytest.raises(sb.RecordingError, match="two or more in a row at each end") as caught:
+            GrippedMotion.of(carried_about(clamped=clamped), 0.08)
+        assert caught.value.field == "clamped" and "arch" in caught.value.problem
+
+    def test_a_grip_that_is_lost_for_long_is_refused(self) -> None:
+        positions = carried_about().positions.copy()
+        positions[20:60, 0] = np.nan
+        with pytest.raises(sb.RecordingError, match="is lost from"):
+            GrippedMotion.of(carried_about(positions=positions), 0.08)
+
+
+class TestModel:
+    def test_a_window_starts_at_its_first_frame_and_sees_the_others(self) -> None:
+        motion = GrippedMotion.of(carried_about(), 0.08)
+        e = model_of(motion, substeps=4).experiment(motion, (0.3, 0.5))
+        assert e.start_time == pytest.approx(0.3) and e.fit == pytest.approx((0.31, 0.5))
+        assert e.solver.h == pytest.approx(1 / 400) and "0.30" in e.name
+        assert [e.places[k] is None for k in range(12)] == [k in (0, 1, 10, 11) for k in range(12)]
+        rod = e.scene.ropes["rope"]
+        assert rod.length == pytest.approx(motion.length)
+        np.testing.assert_allclose(e.scene.positions[rod.particles[0]], motion.positions[30, 1], atol=1e-9)
+
+    def test_all_of_a_recording_by_default(self) -> None:
+        motion = GrippedMotion.of(carried_about(), 0.08)
+        e = model_of(motion).experiment(motion)
+        assert e.start_time == 0.0 and e.fit == pytest.approx((0.01, 1.0))
+
+    @pytest.mark.parametrize("window", [(0.3, 0.31), (2.0, 3.0)])
+    def test_a_window_without_frames_is_refused(self, window: tuple[float, float]) -> None:
+        motion = GrippedMotion.of(carried_about(), 0.08)
+        with pytest.raises(sb.InputError, match="three frames between 0 and 1 s"):
+            model_of(motion).experiment(motion, window)
+
+    def test_gravity_is_the_recordings_or_the_models(self) -> None:
+        along_y = (0.0, -9.81, 0.0)
+        motion = GrippedMotion.of(carried_about(), 0.08)
+        assert pull(model_of(motion, gravity=along_y).experiment(motion)) == pytest.approx(along_y)
+        told = GrippedMotion.of(carried_about(gravity=(0.0, 0.0, -9.8)), 0.08)
+        assert pull(model_of(told, gravity=along_y).experiment(told)) == pytest.approx((0.0, 0.0, -9.8))
+
+    def test_recordings_must_share_their_gravity(self) -> None:
+        one, other = carried_about(gravity=(0.0, 0.0, -9.81)), carried_about(gravity=(0.0, -9.81, 0.0))
+        assert shared_gravity([carried_about()]) is None
+        assert shared_gravity([one, carried_about()]) == pytest.approx((0.0, 0.0, -9.81))
+        with pytest.raises(sb.InputError, match="gravity: differs"):
+            shared_gravity([one, other])
+
+    def test_a_prediction_keeps_driven_markers_and_starts_where_the_rope_is(self) -> None:
+        recording = carried_about()
+        motion = GrippedMotion.of(recording, 0.08)
+        model = model_of(motion)
+        x = predict(model, motion, {})
+        assert x.shape == recording.positions.shape and np.isfinite(x).all()
+        held = list(recording.clamped)
+        np.testing.assert_array_equal(x[:, held], recording.positions[:, held])
+        np.testing.assert_allclose(x[0], recording.positions[0], atol=2e-3)
+        stiffer = predict(model.with_values(EI=2.0, GJ=2.0), motion, {})
+        assert np.abs(x - recording.positions).max() > 3e-3  # it does not keep its shape
+        assert np.abs(x - stiffer).max() > 3e-3
+
+    def test_gaps_of_free_markers_are_predicted_through(self) -> None:
+        positions = carried_about().positions.copy()
+        positions[30:38, 5] = np.nan
+        whole = GrippedMotion.of(carried_about(), 0.08)
+        lost = GrippedMotion.of(carried_about(positions=positions), 0.08)
+        expected = predict(model_of(whole), whole, {})
+        np.testing.assert_allclose(predict(model_of(whole), lost, {}), expected, atol=1e-4)
