@@ -26,7 +26,11 @@ void EquilibriumDerivative::vjp(const double* x_bar, const double* lambda_bar, d
   const Inputs<const double> in{scene_.layout, inputs_.data()};
   const Inputs<double> bar{scene_.layout, inputs_bar};
   std::vector<double> u(scene_.dofs(), 0.0), v(scene_.rows, 0.0), fixed(scene_.dofs(), 0.0);
-  if (x_bar) u.assign(x_bar, x_bar + scene_.dofs()), fixed = u;
+  if (x_bar) {
+    u.assign(x_bar, x_bar + scene_.dofs());
+    retract_directors_vjp<double>(scene_, [&](int node) { return &at_.x[scene_.first_dof[node]]; }, u.data());
+    fixed = u;
+  }
   if (lambda_bar) v.assign(lambda_bar, lambda_bar + scene_.rows);
   solve(u, v);
 

@@ -55,6 +55,7 @@ class EquilibriumDerivative {
       for (std::size_t i = 0; i < r_x.size(); ++i) Tangents<T>::part(at_x[i], k) += x_dot[i];
       for (std::size_t i = 0; i < r_l.size(); ++i) Tangents<T>::part(at_lambda[i], k) = lambda_dot[i];
     }
+    retract_directors(scene_, at_x.data());
     std::copy(at_x.begin(), at_x.end(), x);
     if (lambda) std::copy(at_lambda.begin(), at_lambda.end(), lambda);
   }

@@ -85,6 +85,7 @@ struct EquilibriumSolver::State {
     x.assign(from, from + scene.dofs());
     start_lambda ? lambda.assign(start_lambda, start_lambda + scene.rows) : lambda.assign(scene.rows, 0.0);
     place_fixed(scene, in, o.t0, x.data());
+    retract_directors(scene, x.data());
     size = scene_size(scene, x.data());
     edge = mean_edge(scene, x.data());
     external_force(scene, in, o.t0, r_x.data());

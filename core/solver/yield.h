@@ -6,6 +6,7 @@
 #pragma once
 
 #include "core/constraints/registry.h"
+#include "core/scalar/dual.h"
 #include "core/scene/scene.h"
 
 namespace sheetbend {
@@ -51,6 +52,41 @@ void yield(const Scene& scene, const Inputs<const T>& in, T* state) {
     const Yield<K, T> at(scene, group, item, in.of(Quantity::rest) + value, state);
     T* set = state + scene.first_dof[group.nodes(item)[K::arity - 1]];
     for (int j = 0; j < K::rows; ++j) set[j] += at.f * at.e[j];
+  });
+}
+
+// Along N directions: values and gradients come from one evaluation on duals by the parameters inside C, the directions follow from them.
+template <int N>
+void yield(const Scene& scene, const Inputs<const Dual<double, N>>& in, Dual<double, N>* state) {
+  if (!scene.yields) return;
+  for_each_yielding(scene, [&]<class K>(K, const Group& group, int item, std::size_t value) {
+    constexpr int P = parameter_count<K>, inside = P - K::offsets, set = K::dofs - 3;
+    using D = Dual<double, inside>;
+    const Dual<double, N>* p = in.of(Quantity::rest) + value;
+    const auto nodes = group.nodes(item);
+    const auto at = [&](int d) -> Dual<double, N>& { return state[scene.first_dof[nodes[d / 3]] + d % 3]; };
+    D x[K::dofs], own[P], C[K::rows], J[K::rows * K::dofs];
+    for (int d = 0; d < K::dofs; ++d) x[d].v = at(d).v;
+    for (int k = 0; k < P; ++k) own[k].v = p[k].v;
+    for (int k = 0; k < inside; ++k) own[k].d[k] = 1.0;
+    K::evaluate(x, own, C, J);
+    Dual<double, N> e[K::rows], length2;
+    for (int j = 0; j < K::rows; ++j) {
+      e[j].v = C[j].v;
+      for (int i = 0; i < N; ++i) {
+        double sum = -p[inside + j].d[i];
+        for (int k = 0; k < inside; ++k) sum += C[j].d[k] * p[k].d[i];
+        for (int d = 0; d < K::dofs; ++d) sum += J[j * K::dofs + d].v * at(d).d[i];
+        e[j].d[i] = sum;
+      }
+      e[j] -= (Dual<double, N>(1.0) - p[K::share_parameter]) * at(set + j);
+      length2 += e[j] * e[j];
+    }
+    const Dual<double, N> y = p[K::yield_parameter];
+    if (!(length2.v > y.v * y.v)) return;
+    // in the order of Yield, so that the values have its bits
+    const Dual<double, N> f = Dual<double, N>(1.0) - y * (Dual<double, N>(1.0) / sqrt(length2));
+    for (int j = 0; j < K::rows; ++j) at(set + j) += f * e[j];
   });
 }
 
