@@ -18,6 +18,7 @@ from sheetbend.bench.ladder import measure_ladder, rung
 from sheetbend.bench.machine import LEVELS, machine
 from sheetbend.bench.problem import Problem
 from sheetbend.bench.reference import largest_error, reference, shipped
+from sheetbend.bench.rod import measure_rod
 from sheetbend.bench.timing import in_fresh_process, peak_mb, timed
 from sheetbend.bench.workloads import colors, direction, pinned, projections, start
 from sheetbend.cli.app import app
@@ -241,6 +242,13 @@ class TestCommand:
 
 
 class TestChainAndLadder:
+    def test_rod(self) -> None:
+        found = measure_rod(repeats=1, substeps=20)
+        assert found["gradient_error"] <= found["gradient_error_bound"]
+        ways = ("forward", "two_iterations", "gradient", "jacobian", "forward_batch", "gradient_singly")
+        assert all(found[f"{name}_ns"] > 0 for name in ways)
+        assert found["gradient_ns"] > found["forward_ns_min"]
+
     def test_chain(self) -> None:
         found = {**measure_chain(repeats=1, work=600), "exit_code": 0}
         expect_figures(found)
