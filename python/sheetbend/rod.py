@@ -163,7 +163,7 @@ def add_rod(
     own = np.arange(int(shared[0] is not None), segments + int(shared[1] is None and not ring))
     nodes = np.full(segments + 1, -1)
     nodes[own] = scene.add_particles(shape[own], 0.0, None if speeds is None else speeds[own])
-    nodes[[0, -1]] = [nodes[k] if at is None else at for k, at in zip((0, -1), shared, strict=True)]
+    nodes[[0, -1]] = [nodes[k] if node is None else node for k, node in zip((0, -1), shared, strict=True)]
     if ring:
         nodes[-1] = nodes[0]
     arc = length / segments * np.arange(segments + 1)
@@ -186,10 +186,10 @@ def add_rod(
     first, last = (None if grip is None else grip.director[0] for grip in grips)
     if first is None and director is not None:
         first = finite(f"{name}.director", director, (3,), SceneError)
-    for k, (way, at, direction) in enumerate(zip(ways, shared, along, strict=True)):
-        if way is not None and at is not None and direction is not None:
-            director = way.junction.carried(direction)
-            first, last = (director, last) if k == 0 else (first, director)
+    if ways[0] is not None and shared[0] is not None and along[0] is not None:
+        first = ways[0].junction.carried(along[0])
+    if ways[1] is not None and shared[1] is not None and along[1] is not None:
+        last = ways[1].junction.carried(along[1])
     if ring and last is None and along[0] is not None and along[1] is not None:
         first = any_across(along[0]) if first is None else first
         last = carried(first - (first @ along[0]) * along[0], along[0], along[1][None])[0]
