@@ -26,6 +26,7 @@ from .parameters import Parameter, Parameters
 from .recording import Recording
 from .result import FitResult
 from .rod import Rod, add_rod, rod
+from .rod_junction import Junction
 from .rollout import Gradient, Rollout, rollout
 from .rope import Rope, add_rope, rope
 from .scene import KINDS, Scene
@@ -49,6 +50,7 @@ __all__ = [
     "GradientReport",
     "Grip",
     "InputError",
+    "Junction",
     "Parameter",
     "Parameters",
     "Place",

@@ -16,6 +16,7 @@ from .errors import SceneError
 from .grip import Grip, any_across, carried
 from .quantities import product
 from .rod_joints import Joints
+from .rod_junction import STUB, STUB_MASS, Facing, Junction
 from .rope import GHOST, Rope
 from .scene import Array, Scene
 
@@ -61,8 +62,8 @@ def add_rod(
     EI2: float | None = None,
     points: ArrayLike | None = None,
     velocity: ArrayLike | None = None,
-    start: Grip | None = None,
-    end: Grip | None = None,
+    start: Grip | Junction | Facing | None = None,
+    end: Grip | Junction | Facing | None = None,
     director: ArrayLike | None = None,
     turns: int = 0,
     tilts: bool = False,
@@ -92,9 +93,10 @@ def add_rod(
             the frame's second axis, and EI2 about the first.
         EA: axial stiffness N; None = inextensible.
         points: (k, 3) m, the initial shape, resampled to equal links and fitted to the length; straight from the start
-            grip otherwise.
+            otherwise.
         velocity: (k, 3) m/s at `points`; at rest by default.
-        start, end: how the ends are held; None = free.
+        start, end: how the ends are held; None = free. A `Junction` holds the ends of several rods, or both of one, to
+            each other.
         director: (3,) the first frame axis at a start without a grip; any by default.
         turns: whole turns by which the end's frame is ahead at the start, beside the part of a turn that grips give.
         tilts: add the four tilts: small angles by which the rod leaves a grip askew, about the frame's axes.
@@ -123,8 +125,9 @@ def add_rod(
             fix = "give a positive number" + (", or leave it out" if given in optional else "")
             raise SceneError(f"{name}.{given}", "must be positive", value, fix)
     for label, grip in (("start", start), ("end", end)):
-        if grip is not None and not isinstance(grip, Grip):
-            raise SceneError(f"{name}.{label}", "is no grip", grip, "give sb.Grip.fixed, from_poses or from_markers")
+        if grip is not None and not isinstance(grip, Grip | Junction | Facing):
+            fix = "give sb.Grip.fixed, from_poses or from_markers, or a junction"
+            raise SceneError(f"{name}.{label}", "is no grip", grip, fix)
     if not isinstance(segments, int | np.integer) or segments < 2:
         raise SceneError(f"{name}.segments", "must be a whole number from 2 on", segments, "give at least 2")
     if stretch_damping is not None and EA is None:
@@ -136,13 +139,33 @@ def add_rod(
         raise SceneError(f"{name}.yield_share", "must lie between 0 and 1", yield_share, "give a part of EI")
     if not isinstance(turns, int | np.integer):
         raise SceneError(f"{name}.turns", "must be a whole number", turns, "give whole turns; grips give the rest")
-    if tilts and start is None and end is None:
+    grips = [grip if isinstance(grip, Grip) else None for grip in (start, end)]
+    ways = [
+        Facing(way) if isinstance(way, Junction) else way if isinstance(way, Facing) else None for way in (start, end)
+    ]
+    if tilts and grips == [None, None]:
         raise SceneError(f"{name}.tilts", "need a grip", tilts, "give start or end")
-    if roll and end is None:
+    if roll and grips[1] is None:
         raise SceneError(f"{name}.roll", "needs a grip at the end", roll, "give end")
 
-    shape, speeds = _initial(name, length, segments, points, velocity, start, end, EA is not None)
-    nodes = scene.add_particles(shape, 0.0, speeds)
+    shared = [
+        None if way is None else way.junction.node_in(scene, f"{name}.{label}")
+        for label, way in zip(("start", "end"), ways, strict=True)
+    ]
+    ring = ways[0] is not None and ways[1] is not None and ways[0].junction is ways[1].junction
+    if ring and (
+        points is None or np.linalg.norm(np.subtract(*np.asarray(points, dtype=float)[[0, -1]])) > 1e-9 * length
+    ):
+        raise SceneError(f"{name}.points", "do not return to their first place", points, "give the points of a loop")
+    shape, speeds = _initial(
+        name, length, segments, points, velocity, _places(scene, grips, ways, shared), EA is not None
+    )
+    own = np.arange(int(shared[0] is not None), segments + int(shared[1] is None and not ring))
+    nodes = np.full(segments + 1, -1)
+    nodes[own] = scene.add_particles(shape[own], 0.0, None if speeds is None else speeds[own])
+    nodes[[0, -1]] = [nodes[k] if node is None else node for k, node in zip((0, -1), shared, strict=True)]
+    if ring:
+        nodes[-1] = nodes[0]
     arc = length / segments * np.arange(segments + 1)
     scene.add_quantity(f"{name}_length", length, "m")
     scene.add_quantity(f"{name}_density", density, "kg/m")
@@ -151,35 +174,44 @@ def add_rod(
     if stretch_damping is not None:
         stretch = (1.0, {scene.add_quantity(f"{name}_stretch_damping", stretch_damping, "s"): "identity"})
     add_links(scene, name, nodes, length / segments, EA, stretch)
+    stubs = [
+        side * (GHOST if way is None else STUB) * length / segments for side, way in zip((-1, 1), ways, strict=True)
+    ]
+    along = [_along(*held) for held in zip(grips, ways, (shape[1] - shape[0], shape[-1] - shape[-2]), strict=True)]
     ghosts = [
-        None
-        if grip is None
-        else int(scene.add_particles(at + side * GHOST * length / segments * grip.direction[:1], 1.0)[0])
-        for grip, at, side in ((start, shape[0], -1.0), (end, shape[-1], 1.0))
+        None if way is None else int(scene.add_particles([at + stub * way], STUB_MASS * density * length / segments)[0])
+        for way, at, stub in zip(along, (shape[0], shape[-1]), stubs, strict=True)
     ]
     chain = np.array([*(g for g in ghosts[:1] if g is not None), *nodes, *(g for g in ghosts[1:] if g is not None)])
-    first = start.director[0] if start is not None else director
-    if start is None and director is not None:
+    first, last = (None if grip is None else grip.director[0] for grip in grips)
+    if first is None and director is not None:
         first = finite(f"{name}.director", director, (3,), SceneError)
-    last = None if end is None else end.director[0]
+    if ways[0] is not None and shared[0] is not None and along[0] is not None:
+        first = ways[0].junction.carried(along[0])
+    if ways[1] is not None and shared[1] is not None and along[1] is not None:
+        last = ways[1].junction.carried(along[1])
+    if ring and last is None and along[0] is not None and along[1] is not None:
+        first = any_across(along[0]) if first is None else first
+        last = carried(first - (first @ along[0]) * along[0], along[0], along[1][None])[0]
     directors = scene.add_directors(
         np.stack([chain[:-1], chain[1:]], axis=1), _frames(name, scene.positions[chain], first, last, turns)
     )
     scene.add_quantity(f"{name}_GJ", GJ, "N m^2")
     hold = {f"{name}_GJ": "identity", f"{name}_length": "inverse"}
     scene.add_terms([product("mass", d, HOLD, hold) for d in directors])
-    reach = GHOST * length / segments
-    for label, grip, ghost, node, held, side in (
-        ("start", start, ghosts[0], nodes[0], directors[0], -1.0),
-        ("end", end, ghosts[1], nodes[-1], directors[-1], 1.0),
+    for label, grip, way, ghost, node, held, stub in (
+        ("start", grips[0], ways[0], ghosts[0], nodes[0], directors[0], stubs[0]),
+        ("end", grips[1], ways[1], ghosts[1], nodes[-1], directors[-1], stubs[1]),
     ):
+        if way is not None and ghost is not None:
+            way.junction.join(scene, f"{name}_{label}", int(node), ghost, int(held), stub > 0)
         if grip is not None and ghost is not None:
-            _hold(scene, f"{name}_{label}" if tilts else None, grip, int(node), ghost, int(held), side * reach)
+            _hold(scene, f"{name}_{label}" if tilts else None, grip, int(node), ghost, int(held), stub)
             if roll and label == "end":
                 _roll(scene, f"{name}_roll", grip, int(held))
-    at = np.flatnonzero(np.isin(chain[1:-1], nodes)) + 1
+    at = np.arange(1, len(chain) - 1)
     stencils = np.stack([chain[at - 1], chain[at], chain[at + 1], directors[at - 1], directors[at]], axis=1)
-    joints = Joints(scene, name, stencils, chain[at] - nodes[0], segments)
+    joints = Joints(scene, name, stencils, at - int(ghosts[0] is not None), segments)
     joints.bend(EI, EI2, bend_damping, yield_curvature, yield_share)
     joints.twist(twist_damping)
     joints.rest(curvature_modes, twist_modes)
@@ -219,34 +251,59 @@ def fitted_to_length(shape: Array, link: float, held: Sequence[int]) -> Array:
     raise SceneError("length", "does not reach between the held ends", reach, fix)
 
 
+def _places(
+    scene: Scene, grips: Sequence[Grip | None], ways: Sequence[Facing | None], shared: Sequence[int | None]
+) -> list[tuple[Array, Array] | None]:
+    """Place and direction (3,) of each end that a grip or a junction's earlier rods hold."""
+    found: list[tuple[Array, Array] | None] = []
+    for grip, way, node in zip(grips, ways, shared, strict=True):
+        if grip is not None:
+            found.append((grip.position[0], grip.direction[0]))
+        elif way is not None and node is not None:
+            along = way.junction.direction if way.direction is None else way.direction
+            found.append((scene.positions[node], along))
+        else:
+            found.append(None)
+    return found
+
+
+def _along(grip: Grip | None, way: Facing | None, link: Array) -> Array | None:
+    """The direction (3,) in which a held end goes on: the grip's, the junction's, or that of the end's link (3,)."""
+    if grip is not None:
+        return np.asarray(grip.direction[0])
+    if way is None:
+        return None
+    return np.asarray(link / np.linalg.norm(link)) if way.direction is None else way.direction
+
+
 def _initial(
     name: str,
     length: float,
     segments: int,
     points: ArrayLike | None,
     velocity: ArrayLike | None,
-    start: Grip | None,
-    end: Grip | None,
+    ends: Sequence[tuple[Array, Array] | None],
     stretches: bool,
 ) -> tuple[Array, Array | None]:
-    """Initial places and velocities of the nodes; what `stretches` may start straight and too long between grips."""
+    """Initial places and velocities of the nodes between two ends, whose place and direction is given where they are
+    held; what `stretches` may start straight and too long between them."""
+    start, end = ends
     held = [*([0] if start is not None else []), *([segments] if end is not None else [])]
     if points is None:
         if velocity is not None:
             raise SceneError(f"{name}.velocity", "needs points", None, "give the points that have these velocities")
-        origin = np.zeros(3) if start is None else start.position[0]
-        along = np.array([1.0, 0.0, 0.0]) if start is None else start.direction[0]
+        origin, along = (np.zeros(3), np.array([1.0, 0.0, 0.0])) if start is None else start
         line = np.stack([origin, origin + length * along])
         if end is not None:
-            line[1] = end.position[0]
+            line[1] = end[0]
     else:
         line = finite(f"{name}.points", points, None, SceneError)
         if line.ndim != 2 or line.shape[1] != 3:
             raise SceneError(f"{name}.points", "has the wrong shape", line.shape, "give (k, 3) in m")
     shape = resample(line, segments)
-    for k, grip in ((0, start), (segments, end)):
-        if grip is not None:
-            shape[k] = grip.position[0]
+    for k, given in ((0, start), (segments, end)):
+        if given is not None:
+            shape[k] = given[0]
     if stretches and len(held) == 2 and np.linalg.norm(shape[-1] - shape[0]) > length:
         shape = np.linspace(shape[0], shape[-1], segments + 1)
     else:
