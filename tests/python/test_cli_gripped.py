@@ -148,7 +148,6 @@ class TestFit:
         assert "rope_yield_share" not in rope["parameters"] and "interrupted" in rest
         assert FitResult.load(Path("out/ropes/rope_1/fit.json")).interrupted
 
-
     def test_ropes_that_are_done_stay_when_a_later_one_is_interrupted(
         self, config: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
