@@ -130,8 +130,10 @@ def _judged(console: Console, config: GrippedConfig, rope: RopeData, found: Rope
     if not config.fit.without_twist or not rope.unseen:
         return report, False
     console.print("  for comparison without twist:")
+    kept = {step.name for step in found.steps if step.stays}
+    ladder = [RUNGS[name] for name in rope.section.rungs[1:]]
     try:
-        bare = _fit(console, config, rope, [WITHOUT_TWIST])
+        bare = _fit(console, config, rope, [WITHOUT_TWIST, *(rung for rung in ladder if rung.name in kept)])
     except KeyboardInterrupt:
         return report, True
     except SheetbendError as error:  # a comparison that cannot be made costs no result
