@@ -11,7 +11,7 @@ from pathlib import Path
 from rich.console import Console
 
 from ..config import GrippedConfig, GrippedRopeSection
-from ..errors import ConfigError, RecordingError
+from ..errors import ConfigError, RecordingError, SheetbendError
 from ..gripped import WITHOUT_TWIST, GrippedMotion, RopeFit, RopeReport, Rung, evaluate, fit_rope
 from ..gripped.recipe import REST, TILTS, TWIST, VARYING, YIELD
 from ..gripped.report import overview
@@ -130,10 +130,15 @@ def _judged(console: Console, config: GrippedConfig, rope: RopeData, found: Rope
     if not config.fit.without_twist or not rope.unseen:
         return report, False
     console.print("  for comparison without twist:")
+    kept = {step.name for step in found.steps if step.stays}
+    ladder = [RUNGS[name] for name in rope.section.rungs[1:]]
     try:
-        bare = _fit(console, config, rope, [WITHOUT_TWIST])
+        bare = _fit(console, config, rope, [WITHOUT_TWIST, *(rung for rung in ladder if rung.name in kept)])
     except KeyboardInterrupt:
         return report, True
+    except SheetbendError as error:  # a comparison that cannot be made costs no result
+        console.print(f"  no comparison without twist: {error}", markup=False, soft_wrap=True)
+        return report, False
     return replace(report, without_twist=evaluate(bare, rope.unseen)), bare.fit.result.interrupted
 
 

@@ -89,7 +89,7 @@ class GrippedFitSection(Section):
 
     threads: int = key(1, "over windows and derivatives; results do not depend on it", ge=1)
     without_twist: bool = key(
-        False, "also fit a straight rope whose torsional stiffness is negligible, to show what twist explains"
+        False, "also fit, with the same rungs, a rope of negligible torsional stiffness, to show what twist explains"
     )
     strict: bool = key(False, "exit 3 when any parameter is not identifiable, not only when all are")
 
