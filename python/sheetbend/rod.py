@@ -5,24 +5,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .chain import add_drag, add_links, add_masses, is_number, resample
+from .chain import add_drag, add_links, add_masses, is_number
 from .checks import finite
 from .errors import SceneError
 from .grip import Grip, any_across, carried
 from .quantities import product
+from .rod_end import End
 from .rod_joints import Joints
-from .rod_junction import STUB, STUB_MASS, Facing, Junction
-from .rope import GHOST, Rope
+from .rod_junction import STUB_MASS, Facing, Junction
+from .rod_shape import initial_frames, initial_shape
+from .rope import Rope
 from .scene import Array, Scene
 
-HOLD = (
-    1e-4  # torque per angle that holds a director where it was, over GJ/length: keeps twist well posed, moves nothing
-)
+# Torque per angle that holds a director where it was going, over GJ/length: keeps twist well posed and moves nothing.
+HOLD = 1e-4
 
 
 @dataclass(frozen=True)
@@ -117,98 +117,73 @@ def add_rod(
     Raises:
         SceneError: wrong or missing values; the message names the field.
     """
-    required = {"length": length, "density": density, "EI": EI, "GJ": GJ}
-    optional = {"EA": EA, "EI2": EI2, "stretch_damping": stretch_damping}
-    optional |= {"bend_damping": bend_damping, "twist_damping": twist_damping, "yield_curvature": yield_curvature}
-    for given, value in (required | optional).items():
-        if not (is_number(value) and value > 0) and not (value is None and given in optional):  # type: ignore[operator]
-            fix = "give a positive number" + (", or leave it out" if given in optional else "")
-            raise SceneError(f"{name}.{given}", "must be positive", value, fix)
-    for label, grip in (("start", start), ("end", end)):
-        if grip is not None and not isinstance(grip, Grip | Junction | Facing):
-            fix = "give sb.Grip.fixed, from_poses or from_markers, or a junction"
-            raise SceneError(f"{name}.{label}", "is no grip", grip, fix)
-    if not isinstance(segments, int | np.integer) or segments < 2:
-        raise SceneError(f"{name}.segments", "must be a whole number from 2 on", segments, "give at least 2")
+    _check_values(
+        name,
+        {"length": length, "density": density, "EI": EI, "GJ": GJ},
+        {
+            "EA": EA,
+            "EI2": EI2,
+            "stretch_damping": stretch_damping,
+            "bend_damping": bend_damping,
+            "twist_damping": twist_damping,
+            "yield_curvature": yield_curvature,
+        },
+    )
+    _check_yield(name, yield_curvature, yield_share)
+    for option, value, least in (("segments", segments, 2), ("turns", turns, None)):
+        if not isinstance(value, int | np.integer) or (least is not None and value < least):
+            wanted = "must be a whole number" + ("" if least is None else f" from {least} on")
+            fix = "give whole turns; grips give the rest" if least is None else f"give at least {least}"
+            raise SceneError(f"{name}.{option}", wanted, value, fix)
     if stretch_damping is not None and EA is None:
         raise SceneError(f"{name}.stretch_damping", "needs a finite EA", EA, "give EA, or leave it out")
-    if (yield_curvature is None) != (yield_share is None):
-        fix = "give yield_curvature and yield_share, or neither"
-        raise SceneError(f"{name}.yield_share", "and yield_curvature belong together", yield_share, fix)
-    if yield_share is not None and not 0 < yield_share < 1:
-        raise SceneError(f"{name}.yield_share", "must lie between 0 and 1", yield_share, "give a part of EI")
-    if not isinstance(turns, int | np.integer):
-        raise SceneError(f"{name}.turns", "must be a whole number", turns, "give whole turns; grips give the rest")
-    grips = [grip if isinstance(grip, Grip) else None for grip in (start, end)]
-    ways = [
-        Facing(way) if isinstance(way, Junction) else way if isinstance(way, Facing) else None for way in (start, end)
-    ]
-    if tilts and grips == [None, None]:
+    ends = End(name, "start", -1.0, start), End(name, "end", 1.0, end)
+    if tilts and ends[0].grip is None and ends[1].grip is None:
         raise SceneError(f"{name}.tilts", "need a grip", tilts, "give start or end")
-    if roll and grips[1] is None:
+    if roll and ends[1].grip is None:
         raise SceneError(f"{name}.roll", "needs a grip at the end", roll, "give end")
+    ring = _is_ring(name, ends, points, length)
 
-    shared = [
-        None if way is None else way.junction.node_in(scene, f"{name}.{label}")
-        for label, way in zip(("start", "end"), ways, strict=True)
-    ]
-    ring = ways[0] is not None and ways[1] is not None and ways[0].junction is ways[1].junction
-    if ring and (
-        points is None or np.linalg.norm(np.subtract(*np.asarray(points, dtype=float)[[0, -1]])) > 1e-9 * length
-    ):
-        raise SceneError(f"{name}.points", "do not return to their first place", points, "give the points of a loop")
-    shape, speeds = _initial(
-        name, length, segments, points, velocity, _places(scene, grips, ways, shared), EA is not None
-    )
+    link = length / segments
+    places = [e.place(scene) for e in ends]
+    shared = [e.shared_node(scene) for e in ends]
+    shape, speeds = initial_shape(name, length, segments, points, velocity, places, EA is not None)
     own = np.arange(int(shared[0] is not None), segments + int(shared[1] is None and not ring))
     nodes = np.full(segments + 1, -1)
     nodes[own] = scene.add_particles(shape[own], 0.0, None if speeds is None else speeds[own])
     nodes[[0, -1]] = [nodes[k] if node is None else node for k, node in zip((0, -1), shared, strict=True)]
     if ring:
         nodes[-1] = nodes[0]
-    arc = length / segments * np.arange(segments + 1)
     scene.add_quantity(f"{name}_length", length, "m")
     scene.add_quantity(f"{name}_density", density, "kg/m")
     add_masses(scene, name, nodes, segments)
     stretch = None
     if stretch_damping is not None:
         stretch = (1.0, {scene.add_quantity(f"{name}_stretch_damping", stretch_damping, "s"): "identity"})
-    add_links(scene, name, nodes, length / segments, EA, stretch)
-    stubs = [
-        side * (GHOST if way is None else STUB) * length / segments for side, way in zip((-1, 1), ways, strict=True)
-    ]
-    along = [_along(*held) for held in zip(grips, ways, (shape[1] - shape[0], shape[-1] - shape[-2]), strict=True)]
+    add_links(scene, name, nodes, link, EA, stretch)
+
+    along = [e.along(edge) for e, edge in zip(ends, (shape[1] - shape[0], shape[-1] - shape[-2]), strict=True)]
+    stubs = [e.stub(link) for e in ends]
     ghosts = [
-        None if way is None else int(scene.add_particles([at + stub * way], STUB_MASS * density * length / segments)[0])
+        None if way is None else int(scene.add_particles([at + stub * way], STUB_MASS * density * link)[0])
         for way, at, stub in zip(along, (shape[0], shape[-1]), stubs, strict=True)
     ]
     chain = np.array([*(g for g in ghosts[:1] if g is not None), *nodes, *(g for g in ghosts[1:] if g is not None)])
-    first, last = (None if grip is None else grip.director[0] for grip in grips)
+    first, last = (e.director(scene, way) for e, way in zip(ends, along, strict=True))
     if first is None and director is not None:
         first = finite(f"{name}.director", director, (3,), SceneError)
-    if ways[0] is not None and shared[0] is not None and along[0] is not None:
-        first = ways[0].junction.carried(along[0])
-    if ways[1] is not None and shared[1] is not None and along[1] is not None:
-        last = ways[1].junction.carried(along[1])
     if ring and last is None and along[0] is not None and along[1] is not None:
         first = any_across(along[0]) if first is None else first
         last = carried(first - (first @ along[0]) * along[0], along[0], along[1][None])[0]
-    directors = scene.add_directors(
-        np.stack([chain[:-1], chain[1:]], axis=1), _frames(name, scene.positions[chain], first, last, turns)
-    )
+    edges = np.stack([chain[:-1], chain[1:]], axis=1)
+    directors = scene.add_directors(edges, initial_frames(name, scene.positions[chain], first, last, turns))
     scene.add_quantity(f"{name}_GJ", GJ, "N m^2")
     hold = {f"{name}_GJ": "identity", f"{name}_length": "inverse"}
     scene.add_terms([product("mass", d, HOLD, hold) for d in directors])
-    for label, grip, way, ghost, node, held, stub in (
-        ("start", grips[0], ways[0], ghosts[0], nodes[0], directors[0], stubs[0]),
-        ("end", grips[1], ways[1], ghosts[1], nodes[-1], directors[-1], stubs[1]),
-    ):
-        if way is not None and ghost is not None:
-            way.junction.join(scene, f"{name}_{label}", int(node), ghost, int(held), stub > 0)
-        if grip is not None and ghost is not None:
-            _hold(scene, f"{name}_{label}" if tilts else None, grip, int(node), ghost, int(held), stub)
-            if roll and label == "end":
-                _roll(scene, f"{name}_roll", grip, int(held))
+    for e, k, ghost, stub in zip(ends, (0, -1), ghosts, stubs, strict=True):
+        if ghost is not None:
+            e.hold(scene, int(nodes[k]), ghost, int(directors[k]), stub, tilts, roll and k == -1)
+
     at = np.arange(1, len(chain) - 1)
     stencils = np.stack([chain[at - 1], chain[at], chain[at + 1], directors[at - 1], directors[at]], axis=1)
     joints = Joints(scene, name, stencils, at - int(ghosts[0] is not None), segments)
@@ -217,162 +192,31 @@ def add_rod(
     joints.rest(curvature_modes, twist_modes)
     joints.soften(softness_modes)
     add_drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
-    built = Rod(name, nodes, arc, ghosts[0], ghosts[1], directors)
+    built = Rod(name, nodes, link * np.arange(segments + 1), ghosts[0], ghosts[1], directors)
     scene.ropes[name] = built
     return built
 
 
-def fitted_to_length(shape: Array, link: float, held: Sequence[int]) -> Array:
-    """The nearest chain (nodes, 3) whose links have the given length, with some nodes held.
-
-    A start that is longer than the rod would be pulled together in its first substep, a kick.
-
-    Raises:
-        SceneError: the held nodes are farther apart than the chain reaches, or the shape is straight and too short.
-    """
-    x = shape.copy()
-    free = np.setdiff1d(np.arange(len(x)), held)
-    for _ in range(50):
-        edges = np.diff(x, axis=0)
-        lengths = np.linalg.norm(edges, axis=1)
-        if np.abs(lengths - link).max() < 1e-12 * link:
-            return x
-        J = np.zeros((len(edges), len(x), 3))
-        units = edges / lengths[:, None]
-        J[np.arange(len(edges)), np.arange(len(edges))] = -units
-        J[np.arange(len(edges)), np.arange(1, len(x))] = units
-        step = np.linalg.lstsq(J[:, free].reshape(len(edges), -1), link - lengths, rcond=1e-9)[0]
-        x[free] += step.reshape(-1, 3)
-    reach, apart = link * (len(x) - 1), float(np.linalg.norm(shape[-1] - shape[0]))
-    if apart < reach:
-        fix = "give points of a bent shape between the held ends"
-        raise SceneError("points", "cannot be bent to the length", reach, fix)
-    fix = f"give EA or a length above {apart:.9g} m, or check the grips' places"
-    raise SceneError("length", "does not reach between the held ends", reach, fix)
+def _check_values(name: str, required: dict[str, float], optional: dict[str, float | None]) -> None:
+    for given, value in (required | optional).items():
+        if not (is_number(value) and value > 0) and not (value is None and given in optional):  # type: ignore[operator]
+            fix = "give a positive number" + (", or leave it out" if given in optional else "")
+            raise SceneError(f"{name}.{given}", "must be positive", value, fix)
 
 
-def _places(
-    scene: Scene, grips: Sequence[Grip | None], ways: Sequence[Facing | None], shared: Sequence[int | None]
-) -> list[tuple[Array, Array] | None]:
-    """Place and direction (3,) of each end that a grip or a junction's earlier rods hold."""
-    found: list[tuple[Array, Array] | None] = []
-    for grip, way, node in zip(grips, ways, shared, strict=True):
-        if grip is not None:
-            found.append((grip.position[0], grip.direction[0]))
-        elif way is not None and node is not None:
-            along = way.junction.direction if way.direction is None else way.direction
-            found.append((scene.positions[node], along))
-        else:
-            found.append(None)
-    return found
+def _check_yield(name: str, curvature: float | None, share: float | None) -> None:
+    if (curvature is None) != (share is None):
+        fix = "give yield_curvature and yield_share, or neither"
+        raise SceneError(f"{name}.yield_share", "and yield_curvature belong together", share, fix)
+    if share is not None and not (is_number(share) and 0 < share < 1):
+        raise SceneError(f"{name}.yield_share", "must lie between 0 and 1", share, "give a part of EI")
 
 
-def _along(grip: Grip | None, way: Facing | None, link: Array) -> Array | None:
-    """The direction (3,) in which a held end goes on: the grip's, the junction's, or that of the end's link (3,)."""
-    if grip is not None:
-        return np.asarray(grip.direction[0])
-    if way is None:
-        return None
-    return np.asarray(link / np.linalg.norm(link)) if way.direction is None else way.direction
-
-
-def _initial(
-    name: str,
-    length: float,
-    segments: int,
-    points: ArrayLike | None,
-    velocity: ArrayLike | None,
-    ends: Sequence[tuple[Array, Array] | None],
-    stretches: bool,
-) -> tuple[Array, Array | None]:
-    """Initial places and velocities of the nodes between two ends, whose place and direction is given where they are
-    held; what `stretches` may start straight and too long between them."""
-    start, end = ends
-    held = [*([0] if start is not None else []), *([segments] if end is not None else [])]
-    if points is None:
-        if velocity is not None:
-            raise SceneError(f"{name}.velocity", "needs points", None, "give the points that have these velocities")
-        origin, along = (np.zeros(3), np.array([1.0, 0.0, 0.0])) if start is None else start
-        line = np.stack([origin, origin + length * along])
-        if end is not None:
-            line[1] = end[0]
-    else:
-        line = finite(f"{name}.points", points, None, SceneError)
-        if line.ndim != 2 or line.shape[1] != 3:
-            raise SceneError(f"{name}.points", "has the wrong shape", line.shape, "give (k, 3) in m")
-    shape = resample(line, segments)
-    for k, given in ((0, start), (segments, end)):
-        if given is not None:
-            shape[k] = given[0]
-    if stretches and len(held) == 2 and np.linalg.norm(shape[-1] - shape[0]) > length:
-        shape = np.linspace(shape[0], shape[-1], segments + 1)
-    else:
-        shape = fitted_to_length(shape, length / segments, held)
-    if velocity is None:
-        return shape, None
-    v = finite(f"{name}.velocity", velocity, line.shape, SceneError)
-    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    wanted = np.linspace(0.0, s[-1], segments + 1)
-    return shape, np.stack([np.interp(wanted, s, v[:, k]) for k in range(3)], axis=1)
-
-
-def _frames(name: str, chain: Array, first: ArrayLike | None, last: ArrayLike | None, turns: int) -> Array:
-    """Directors of a chain's edges: carried along it from the first, with the twist to the last spread evenly.
-
-    Raises:
-        SceneError: a director along its edge, a chain that folds back, or half a turn of twist in a joint.
-    """
-    edges = np.diff(chain, axis=0)
-    tangents = edges / np.linalg.norm(edges, axis=1, keepdims=True)
-    folded = (tangents[1:] * tangents[:-1]).sum(axis=1) < -1.0 + 1e-9
-    if folded.any():
-        where = chain[1 + int(np.argmax(folded))].tolist()
-        raise SceneError(f"{name}.points", "fold back on themselves", where, "give a shape without a cusp")
-    if first is not None and np.linalg.norm(np.cross(tangents[0], np.asarray(first))) <= 1e-9 * np.linalg.norm(
-        np.asarray(first)
-    ):
-        given = np.asarray(first).tolist()
-        raise SceneError(f"{name}.director", "has no part across the rod", given, "give a vector across its start")
-    q = [any_across(tangents[0]) if first is None else np.asarray(first, dtype=float)]
-    for before, after in pairwise(tangents):
-        q.append(carried(q[-1] - (q[-1] @ before) * before, before, after[None])[0])
-    frames = np.array([v / np.linalg.norm(v) for v in q])
-    across = np.cross(tangents, frames)
-    missing = 2.0 * np.pi * turns
-    if last is not None:
-        missing += float(np.arctan2(np.asarray(last) @ across[-1], np.asarray(last) @ frames[-1]))
-    if abs(missing) >= np.pi * (len(edges) - 1):
-        most = "a joint holds less than half a turn: give more segments or fewer turns"
-        raise SceneError(f"{name}.turns", "are more than the joints hold", turns, most)
-    angle = np.linspace(0.0, missing, len(edges))[:, None]
-    return np.asarray(np.cos(angle) * frames + np.sin(angle) * across)
-
-
-def _hold(scene: Scene, tilts: str | None, grip: Grip, node: int, ghost: int, director: int, reach: float) -> None:
-    """Give an end its pose; a tilt moves the ghost, by which the direction is held."""
-    second = np.cross(grip.direction, grip.director)
-    if grip.stays:
-        scene.pin([node, ghost, director])
-    else:
-        motion = np.stack([grip.position, grip.position + reach * grip.direction, grip.director], axis=1)
-        scene.drive([node, ghost, director], grip.times, motion)
-    if tilts is None:
-        return
-    for k, axis in ((1, grip.director), (2, second)):
-        tilt = scene.add_quantity(f"{tilts}_tilt_{k}", 0.0, "rad", positive=False, scale=0.1)
-        _add_motion(scene, grip, ghost, reach * axis, {tilt: "identity"})
-
-
-def _roll(scene: Scene, name: str, grip: Grip, director: int) -> None:
-    """Turn the end's director by a quantity: cos and sin of it instead of the given director."""
-    quantity = scene.add_quantity(name, 0.0, "rad", positive=False, scale=0.3)
-    for axis, function in ((grip.director, "cos"), (np.cross(grip.direction, grip.director), "sin")):
-        _add_motion(scene, grip, director, axis, {quantity: function})
-    _add_motion(scene, grip, director, -grip.director, {})
-
-
-def _add_motion(scene: Scene, grip: Grip, node: int, by: Array, factors: dict[str, str]) -> None:
-    if not grip.stays:
-        scene.add_motion_term(node, by, factors)
-    else:
-        scene.add_terms([product("position", 3 * node + k, by[0, k], factors) for k in range(3)])
+def _is_ring(name: str, ends: tuple[End, End], points: ArrayLike | None, length: float) -> bool:
+    """Whether both ends lie in one junction; the shape has to be a loop then."""
+    first, last = (e.way for e in ends)
+    if first is None or last is None or first.junction is not last.junction:
+        return False
+    if points is None or np.linalg.norm(np.subtract(*np.asarray(points, dtype=float)[[0, -1]])) > 1e-9 * length:
+        raise SceneError(f"{name}.points", "do not return to their first place", points, "give the points of a loop")
+    return True

@@ -1,0 +1,95 @@
+"""An end of a rod: free, in a grip, or in a junction with other rods."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .errors import SceneError
+from .grip import Grip
+from .quantities import product
+from .rod_junction import STUB, Facing, Junction
+from .rope import GHOST
+from .scene import Array, Scene
+
+
+class End:
+    """What holds one end of a rod called `name`; `side` is -1 at its start and 1 at its end.
+
+    Raises:
+        SceneError: it is neither a grip nor a junction.
+    """
+
+    def __init__(self, name: str, label: str, side: float, given: Grip | Junction | Facing | None) -> None:
+        if given is not None and not isinstance(given, Grip | Junction | Facing):
+            fix = "give sb.Grip.fixed, from_poses or from_markers, or a junction"
+            raise SceneError(f"{name}.{label}", "is no grip", given, fix)
+        self.name, self.label, self.side = name, label, side
+        self.grip = given if isinstance(given, Grip) else None
+        self.way = Facing(given) if isinstance(given, Junction) else given if isinstance(given, Facing) else None
+
+    @property
+    def held(self) -> bool:
+        return self.grip is not None or self.way is not None
+
+    def shared_node(self, scene: Scene) -> int | None:
+        """The junction's particle; None where this is its first rod, or no junction."""
+        return None if self.way is None else self.way.junction.node_in(scene, f"{self.name}.{self.label}")
+
+    def place(self, scene: Scene) -> tuple[Array, Array] | None:
+        """Place and direction (3,) that a grip or a junction's earlier rods give."""
+        if self.grip is not None:
+            return self.grip.position[0], self.grip.direction[0]
+        node = self.shared_node(scene)
+        if self.way is None or node is None:
+            return None
+        return scene.positions[node], self.way.junction.direction if self.way.direction is None else self.way.direction
+
+    def along(self, link: Array) -> Array | None:
+        """The direction (3,) in which a held end goes on: the grip's, the junction's, or that of its link (3,)."""
+        if self.grip is not None:
+            return np.asarray(self.grip.direction[0])
+        if self.way is None:
+            return None
+        return np.asarray(link / np.linalg.norm(link)) if self.way.direction is None else self.way.direction
+
+    def stub(self, link: float) -> float:
+        """How far, m, along the rod the particle lies that holds the direction; negative before the start."""
+        return self.side * (GHOST if self.way is None else STUB) * link
+
+    def director(self, scene: Scene, along: Array | None) -> Array | None:
+        """The frame axis (3,) that a grip or a junction's earlier rods give."""
+        if self.grip is not None:
+            return np.asarray(self.grip.director[0])
+        if self.way is None or along is None or self.shared_node(scene) is None:
+            return None
+        return self.way.junction.carried(along)
+
+    def hold(self, scene: Scene, node: int, ghost: int, director: int, stub: float, tilts: bool, roll: bool) -> None:
+        """Give the end its pose, or join it to the other rods."""
+        if self.way is not None:
+            self.way.junction.join(scene, f"{self.name}_{self.label}", node, ghost, director, stub > 0)
+        if self.grip is None:
+            return
+        grip = self.grip
+        if grip.stays:
+            scene.pin([node, ghost, director])
+        else:
+            motion = np.stack([grip.position, grip.position + stub * grip.direction, grip.director], axis=1)
+            scene.drive([node, ghost, director], grip.times, motion)
+        second = np.cross(grip.direction, grip.director)
+        if tilts:
+            for k, axis in ((1, grip.director), (2, second)):
+                tilt = scene.add_quantity(f"{self.name}_{self.label}_tilt_{k}", 0.0, "rad", positive=False, scale=0.1)
+                _add_motion(scene, grip, ghost, stub * axis, {tilt: "identity"})
+        if roll:  # cos and sin of it instead of the given director
+            quantity = scene.add_quantity(f"{self.name}_roll", 0.0, "rad", positive=False, scale=0.3)
+            _add_motion(scene, grip, director, grip.director, {quantity: "cos"})
+            _add_motion(scene, grip, director, second, {quantity: "sin"})
+            _add_motion(scene, grip, director, -grip.director, {})
+
+
+def _add_motion(scene: Scene, grip: Grip, node: int, by: Array, factors: dict[str, str]) -> None:
+    if not grip.stays:
+        scene.add_motion_term(node, by, factors)
+    else:
+        scene.add_terms([product("position", 3 * node + k, by[0, k], factors) for k in range(3)])
