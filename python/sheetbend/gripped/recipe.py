@@ -252,8 +252,7 @@ class _Search:
                 began = time.perf_counter()
                 larger = replace(model, **dict(rung.options), values={**model.values, **rung.values})  # type: ignore[arg-type]
                 wanted = (*parameters, *rung.parameters)
-                found = self._minimum(larger, wanted, values, self.windows[-1])
-                step = self._step(rung.name, larger, found, steps, began)
+                found, step = self._tried(rung, larger, wanted, values, steps, began)
                 steps.append(step)
                 if step.stays:
                     model, parameters, values = larger.at(found), wanted, found
@@ -302,6 +301,23 @@ class _Search:
             model, before = finer.at(found), found
         values = self._minimum(model, parameters, before, self.windows[-1])
         return model.at(values), values
+
+    def _tried(
+        self,
+        rung: Rung,
+        model: RopeModel,
+        parameters: tuple[Parameter, ...],
+        values: Mapping[str, float],
+        before: Sequence[Step],
+        began: float,
+    ) -> tuple[dict[str, float], Step]:
+        """A rung fitted to shorter windows, and to long ones where those already let it predict better."""
+        for window in dict.fromkeys((self.windows[min(1, len(self.windows) - 1)], self.windows[-1])):
+            values = found = self._minimum(model, parameters, values, window)
+            step = self._step(rung.name, model, found, before, began)
+            if not step.stays:
+                break
+        return found, step
 
     def _minimum(
         self,
