@@ -52,7 +52,9 @@ def test_experiments_have_one_configuration_each() -> None:
 
 
 def test_copied_recordings_keep_their_licence() -> None:
-    measured = [p for p in (ROOT / "experiments").rglob("*.npz") if "SYNTHETIC" not in p.with_suffix(".json").read_text()]
+    measured = [
+        p for p in (ROOT / "experiments").rglob("*.npz") if "SYNTHETIC" not in p.with_suffix(".json").read_text()
+    ]
     folders = {p.parent for p in measured}
     assert [str(f.relative_to(ROOT)) for f in folders if not (f / "LICENSE.source").exists()] == []
 
