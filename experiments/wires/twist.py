@@ -211,6 +211,13 @@ def turning(wire, EI, ratio):
     }
 
 
+def pushing(wire, EI, ratio):
+    """Rolls [degrees] at which the first photograph's loop, with its set, pushes its end on."""
+    loop = Loop.of(wire, 0, fitted(wire, *MODELS["EI, angles, set"]))
+    path = loop.path(EI, ratio)
+    return [round(float(np.degrees(roll))) for roll, rest in path if rest.forces[f"{wire}_twist"][-1, 0] > 1e-9]
+
+
 def main():
     tables = {}
     for wire in WIRES:
@@ -225,6 +232,9 @@ def main():
             key: 100 * (finer[key] / table["EI alone"][key] - 1.0) for key in ("EI", "GJ_over_EI")
         }
         print(f"  twice the links move, %: {table['moved_percent']}", flush=True)
+        with_set = table["EI, angles, set"]
+        table["pushes_at_deg"] = pushing(wire, with_set["EI"], with_set["GJ_over_EI"])
+        print(f"  with set, pushes on at {table['pushes_at_deg']} degrees", flush=True)
         table["turning"] = turning(wire, table["EI alone"]["EI"], table["EI alone"]["GJ_over_EI"])
         tables[wire] = table
     Path("out/wires").mkdir(parents=True, exist_ok=True)

@@ -118,8 +118,26 @@ def test_branches_converge_with_the_mesh():
     assert observed_orders(apart) == approx(2.0, abs=0.3)
 
 
-def test_gradients_pass_through_a_junction():
-    report = sb.check_gradients(branched(1), [0.02], sb.Solver(h=1 / 400), samples=3)
+def star(branches: int) -> sb.Scene:
+    """A gripped rod with several branches around its axis, each shorter than the one before, and turned."""
+    scene, junction, options = sb.Scene("star"), sb.Junction(), {"density": DENSITY, "EI": EI, "GJ": EI, "segments": 6}
+    sb.add_rod(scene, "trunk", length=0.3, start=GRIP, end=junction, **options)
+    for k in range(branches):
+        around, length = 2 * np.pi * k / branches + 0.4, 0.2 - 0.02 * k
+        way = np.array([0.8, 0.6 * np.cos(around), 0.6 * np.sin(around)])
+        points = [(0.3, 0, 0), (0.3, 0, 0) + length * way]
+        turned = [(0, 0, 0), (0, -np.sin(around), np.cos(around))]
+        sb.add_rod(scene, f"branch{k}", length=length, start=junction, points=points, velocity=turned, **options)
+    return scene
+
+
+@pytest.mark.parametrize(("branches", "is_banded"), [(2, True), (6, False)])
+def test_gradients_pass_through_a_junction(branches, is_banded):
+    """One block, which a band holds while branches are few, and else the sparse factors."""
+    scene, solver = star(branches), sb.Solver(h=1 / 400)
+    blocks = solver.core(scene.compiled).blocks
+    assert [banded for _, _, banded in blocks] == [is_banded]
+    report = sb.check_gradients(scene, [0.02], solver, samples=3)
     assert report.passed, report
 
 
