@@ -32,6 +32,7 @@ LINKS_PER_BENDING_LENGTH = 3.0  # below this EI reads too high and GJ too low
 SETTLED = 0.05  # relative change of EI at which links are short enough
 BETTER = 0.99  # error of a step that stays, over that without it
 TOLERANCE = 1e-4  # relative, of the cost, while searching
+LOOK, SHORT, LONG = 6, 12, 30  # iterations, at most, of a first look at a rung, of a start, and of a fit that counts
 
 Say = Callable[[str], None]
 
@@ -87,10 +88,10 @@ REST = Rung(
 )
 YIELD = Rung(
     "yield",
-    values={"yield_curvature": 1.0, "yield_share": 0.3},
+    values={"yield_curvature": 3.0, "yield_share": 0.2},  # little yields at first
     parameters=(
-        _log("yield_curvature", 1.0, "1/m", sd=1.0),
-        Parameter(name=f"{NAME}_yield_share", initial=0.3, lower=0.01, upper=0.95, prior=(0.3, 0.3)),
+        _log("yield_curvature", 3.0, "1/m", sd=1.0),
+        Parameter(name=f"{NAME}_yield_share", initial=0.2, lower=0.01, upper=0.95, prior=(0.2, 0.3)),
     ),
 )
 VARYING = Rung(
@@ -276,7 +277,7 @@ class _Search:
             start = {"EI": EI, "GJ": 0.7 * EI, "bend_damping": 0.03, "twist_damping": 0.03, "drag_linear": 0.02}
             start["length"] = float(np.mean([m.length for m in self.all]))
             candidate = model.with_values(**start)
-            values = self._minimum(candidate, rung.parameters, {}, self.windows[0], iterations=12)
+            values = self._minimum(candidate, rung.parameters, {}, self.windows[0], SHORT)
             cost = self._cost(candidate, values, self.windows[min(1, len(self.windows) - 1)])
             self.say(f"start at a bending length of {length:g} m: EI {values[f'{NAME}_EI']:.3g}, cost {cost:.4g}")
             ends.append((cost, candidate.at(values), values))
@@ -313,7 +314,8 @@ class _Search:
     ) -> tuple[dict[str, float], Step]:
         """A rung fitted to shorter windows, and to long ones where those already let it predict better."""
         for window in dict.fromkeys((self.windows[min(1, len(self.windows) - 1)], self.windows[-1])):
-            values = found = self._minimum(model, parameters, values, window)
+            iterations = LONG if window == self.windows[-1] else LOOK
+            values = found = self._minimum(model, parameters, values, window, iterations)
             step = self._step(rung.name, model, found, before, began)
             if not step.stays:
                 break
@@ -325,7 +327,7 @@ class _Search:
         parameters: Sequence[Parameter],
         values: Mapping[str, float],
         window: tuple[float, float],
-        iterations: int = 30,
+        iterations: int = LONG,
     ) -> dict[str, float]:
         problem = _problem(_experiments(model, self.fitted, window), parameters, values, self.threads)
         u = problem.parameters.initial()
@@ -364,7 +366,7 @@ class _Search:
         """The fit to all recordings; after Ctrl-C one iteration of it, which the intervals need."""
         experiments = _experiments(model, self.all, self.windows[-1])
         wanted = _starting(parameters, values)
-        count = 1 if interrupted else 30
+        count = 1 if interrupted else LONG
         last = fit(experiments, parameters=wanted, threads=self.threads, profiles=False, max_iterations=count)
         if not interrupted:
             return last
