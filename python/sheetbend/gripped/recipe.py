@@ -46,12 +46,14 @@ class Rung:
         options: what it adds to the model, fields of `RopeModel`.
         values: what it adds to the model's starting values.
         parameters: what it adds to the fit.
+        look_first: whether it is costly, so that a look at shorter windows decides whether it is fitted to long ones.
     """
 
     name: str
     options: Mapping[str, object] = field(default_factory=dict)
     values: Mapping[str, float] = field(default_factory=dict)
     parameters: tuple[Parameter, ...] = ()
+    look_first: bool = False
 
 
 def _log(name: str, initial: float, unit: str, sd: float | None = None) -> Parameter:
@@ -93,6 +95,7 @@ YIELD = Rung(
         _log("yield_curvature", 3.0, "1/m", sd=1.0),
         Parameter(name=f"{NAME}_yield_share", initial=0.2, lower=0.01, upper=0.95, prior=(0.2, 0.3)),
     ),
+    look_first=True,
 )
 VARYING = Rung(
     "stiffness along the rope",
@@ -312,14 +315,15 @@ class _Search:
         before: Sequence[Step],
         began: float,
     ) -> tuple[dict[str, float], Step]:
-        """A rung fitted to shorter windows, and to long ones where those already let it predict better."""
-        for window in dict.fromkeys((self.windows[min(1, len(self.windows) - 1)], self.windows[-1])):
-            iterations = LONG if window == self.windows[-1] else LOOK
-            values = found = self._minimum(model, parameters, values, window, iterations)
-            step = self._step(rung.name, model, found, before, began)
+        """A rung fitted to long windows; a costly one only where a look at shorter ones already predicts better."""
+        if rung.look_first:
+            window = self.windows[min(1, len(self.windows) - 1)]
+            values = self._minimum(model, parameters, values, window, LOOK)
+            step = self._step(rung.name, model, values, before, began)
             if not step.stays:
-                break
-        return found, step
+                return dict(values), step
+        found = self._minimum(model, parameters, values, self.windows[-1])
+        return found, self._step(rung.name, model, found, before, began)
 
     def _minimum(
         self,
