@@ -125,7 +125,7 @@ void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, 
     T momentum_bar = m * along_velocity;
     if (scene.loaded_slot[n] >= 0) momentum_bar += dot(force_impulse(n), v_star_bar);
     const T m_eff_bar = -(w[n] * w[n] * (w_bar.of(n) + momentum_bar));
-    const Vec3<T> v = extrapolated_velocity(bdf, s, dof);
+    const Vec3<T> v = extrapolated(bdf, s.v + dof, s.v_before + dof);
     const T v2 = dot(v, v), speed = sqrt_or_zero(v2);
     in_bar.of(Quantity::drag_linear)[n] += eta * m_eff_bar;
     in_bar.of(Quantity::drag_quadratic)[n] += eta * speed * m_eff_bar;

@@ -7,7 +7,8 @@
 //   p_bar = sum_j -y_j dC_j/dp + v_j . dJ_j/dp
 //
 // Only "solve with A" differs between solvers. Hess(C_j) v_j and the parameter derivatives are one evaluation of the constraint on dual
-// numbers with a direction per row and per parameter that is not just subtracted. ../DERIVATION.md derives it. Where the numbers are stored is not known here.
+// numbers with a direction per row and per parameter that is not just subtracted. ../DERIVATION.md derives it. Where the numbers are
+// stored is not known here.
 #pragma once
 
 #include "core/element/element.h"

@@ -8,6 +8,7 @@
 #pragma once
 
 #include "core/constraints/curvature.h"
+#include "core/scalar/across.h"
 
 namespace sheetbend {
 
@@ -17,21 +18,14 @@ struct OnJoint : OnPoints<5> {
 };
 
 template <class T>
-struct MaterialFrame {
-  T inverse_length;
-  Vec3<T> t, m1, m2;
+struct MaterialFrame : Across<T> {
+  Vec3<T> m2;
   Vec3<T> by_director, by_edge;  // gradient of the frame's angle
 
-  MaterialFrame(const Vec3<T>& edge, const Vec3<T>& q) {
-    inverse_length = T(1.0) / norm(edge);
-    t = inverse_length * edge;
-    const T along = dot(q, t);
-    const Vec3<T> across = q - along * t;
-    const T inverse = T(1.0) / norm(across);
-    m1 = inverse * across;
-    m2 = cross(t, m1);
-    by_director = inverse * m2;
-    by_edge = -(along * inverse_length) * by_director;
+  MaterialFrame(const Vec3<T>& edge, const Vec3<T>& q) : Across<T>(edge, q) {
+    m2 = cross(this->t, this->m1);
+    by_director = this->inverse * m2;
+    by_edge = -(this->along * this->inverse_length) * by_director;
   }
 };
 

@@ -30,10 +30,8 @@ bool finite(const std::vector<double>& v) {
 // Diagonal of the box around all particles.
 double scene_size(const Scene& scene, const double* x) {
   Vec3<double> low(x), high(x);
-  std::vector<char> is_point(scene.nodes(), true);
-  for (const Director& d : scene.directors) is_point[d.node] = false;
   for (int n = 0; n < scene.nodes(); ++n) {
-    if (!is_point[n]) continue;
+    if (scene.is_director[n]) continue;
     const Vec3<double> p(x + scene.first_dof[n]);
     low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};

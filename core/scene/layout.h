@@ -10,8 +10,8 @@ namespace sheetbend {
 enum class Quantity : int {
   position,  // initial state, every field in turn (particles x 3)  [m]
   velocity,  // initial velocity, same shape  [m/s]
-  mass,  // per particle  [kg]; pinned and driven ones do not use it. Of a director: the small torque per angle from where it
-         // was, which keeps a substep well posed  [N m]
+  mass,  // per particle  [kg]; pinned and driven ones do not use it. Of a director: the small torque per angle from its prediction,
+         // which keeps a substep well posed  [N m]
   compliance,      // per constraint, in the scene's order
   damping,         // per constraint: beta of the Rayleigh dissipation (Macklin et al. 2016, eq. 26)
   rest,            // the constraints' own parameters, constraint by constraint

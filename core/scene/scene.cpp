@@ -95,17 +95,16 @@ Scene build_scene(const SceneSpec& spec) {
   for (const int n : spec.driven) s.role[n] = Role::driven;
   for (const Director& d : spec.directors) check_nodes("directors", {d.node, d.tail, d.head}, s.nodes());
   s.directors = spec.directors;
-  s.inertial.resize(s.nodes());
-  for (int n = 0; n < s.nodes(); ++n) s.inertial[n] = s.role[n] == Role::free;
+  s.is_director.assign(s.nodes(), false);
   for (const Director& d : s.directors) {
-    if (d.tail == d.head || d.node == d.tail || d.node == d.head ||
-        !s.inertial[d.node] == (s.role[d.node] == Role::free))
+    if (d.tail == d.head || d.node == d.tail || d.node == d.head || s.is_director[d.node])
       refuse("directors: node " + std::to_string(d.node) + " with edge " + std::to_string(d.tail) + ", " +
              std::to_string(d.head) + ". Fix: give each director a node of its own and two distinct ends");
-    s.inertial[d.node] = false;
+    s.is_director[d.node] = true;
   }
+  for (int n = 0; n < s.nodes(); ++n) s.inertial.push_back(s.role[n] == Role::free && !s.is_director[n]);
   for (const int n : spec.loaded)
-    if (!s.inertial[n] && s.role[n] == Role::free)
+    if (s.is_director[n] && s.role[n] == Role::free)
       refuse("loaded: node " + std::to_string(n) + " is a director. Fix: let forces act on particles");
   s.driven = spec.driven;
   for (int n = 0; n < s.nodes(); ++n)

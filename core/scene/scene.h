@@ -43,8 +43,8 @@ struct Scene {
   std::vector<int> first_dof, dim;  // per node
   std::vector<Role> role;           // per node
   std::vector<Director> directors;
-  bool yields = false;         // whether any constraint does
-  std::vector<char> inertial;  // per node: whether it moves by its mass, that is free and no director
+  bool yields = false;                      // whether any constraint does
+  std::vector<char> is_director, inertial;  // per node; what is free and no director moves by its mass
   std::vector<int> pinned;
   std::vector<int> driven;       // nodes whose motion is given, in the order of Quantity::boundary
   std::vector<int> driven_slot;  // per node: place in `driven`, or -1

@@ -52,10 +52,10 @@ Vec3<T> at_knots(const KnotWeights& k, const T* values, int slots, int slot) {
   return sum;
 }
 
-// The speed that quadratic drag is linearized at.
+// Where what was at n and n-1 goes on to: the velocity that quadratic drag is linearized at, and a director's prediction.
 template <class T>
-Vec3<T> extrapolated_velocity(const Bdf& bdf, const SubstepStates<T>& s, int dof) {
-  return T(bdf.extrapolate_now) * Vec3<T>(s.v + dof) + T(bdf.extrapolate_before) * Vec3<T>(s.v_before + dof);
+Vec3<T> extrapolated(const Bdf& bdf, const T* now, const T* before) {
+  return T(bdf.extrapolate_now) * Vec3<T>(now) + T(bdf.extrapolate_before) * Vec3<T>(before);
 }
 
 // Drag c = c1 + c2 |v| is implicit: it adds eta c to the mass that this substep's projections see, so the reaction of the constraints feels it.
@@ -77,7 +77,7 @@ void weigh(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, const 
     }
     T effective = mass[n];
     if (scene.has_drag) {
-      const Vec3<T> v = extrapolated_velocity(bdf, s, scene.first_dof[n]);
+      const Vec3<T> v = extrapolated(bdf, s.v + scene.first_dof[n], s.v_before + scene.first_dof[n]);
       effective +=
           eta * (in.of(Quantity::drag_linear)[n] + in.of(Quantity::drag_quadratic)[n] * sqrt_or_zero(dot(v, v)));
     }
@@ -118,8 +118,7 @@ void predict(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, doub
   }
   for (const Director& d : scene.directors) {
     const int dof = scene.first_dof[d.node];
-    (T(bdf.extrapolate_now) * Vec3<T>(s.x + dof) + T(bdf.extrapolate_before) * Vec3<T>(s.x_before + dof))
-        .store(q.of(d.node));
+    extrapolated(bdf, s.x + dof, s.x_before + dof).store(q.of(d.node));
   }
   for (const int n : scene.pinned) Vec3<T>(s.x + scene.first_dof[n]).store(q.of(n));
   if (scene.driven.empty()) return;

@@ -8,6 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import sheetbend as sb
 from numpy.typing import ArrayLike
+from oracles import integration
+from scipy.optimize import brentq
 from sheetbend.simulate import substeps
 
 Array = np.ndarray
@@ -118,6 +120,22 @@ def step_factor(series: ArrayLike) -> complex:
     u = np.asarray(series, dtype=float)
     (a, b), *_ = np.linalg.lstsq(np.stack([u[1:-1], -u[:-2]], axis=1), u[2:], rcond=None)
     return complex(a / 2.0, np.sqrt(b - a * a / 4.0))
+
+
+def shown_frequency(h: float, order: int) -> Callable[[Array], float]:
+    """Estimator of the frequency [rad/s] that a series over steps h shows, without the integrator's shift."""
+
+    def estimate(series: Array) -> float:
+        seen = float(np.angle(step_factor(series)))
+        return brentq(
+            lambda omega: integration.numerical_frequency(omega, h, order) * h - seen,
+            0.5 * seen / h,
+            2.0 * seen / h,
+            xtol=1e-15,
+            rtol=1e-15,
+        )
+
+    return estimate
 
 
 def crossings(times: Array, series: Array) -> Array:

@@ -18,7 +18,7 @@ from sheetbend.cli import gripped
 from sheetbend.cli.app import app
 from sheetbend.config import GrippedConfig, gripped_schema, parse, parse_any
 from sheetbend.gripped import LADDER, trades
-from sheetbend.gripped.recipe import REST, TILTS, TWIST, VARYING, YIELD
+from sheetbend.gripped.ladder import REST, TILTS, TWIST, VARYING, YIELD
 from sheetbend.result import Correlation, Estimate, FitResult
 from typer.testing import CliRunner, Result
 

@@ -6,11 +6,10 @@ import math
 import numpy as np
 import pytest
 import sheetbend as sb
-from oracles import bending, integration, modes
+from oracles import bending, modes
 from oracles.calculus import derivative
 from pytest import approx
-from scipy.optimize import brentq
-from support import observed_orders, pick, slope_along, static_sensitivity, step_factor, steps, tangents, twice
+from support import observed_orders, pick, shown_frequency, slope_along, static_sensitivity, steps, tangents, twice
 
 G = 9.81
 X, Y, Z = 0, 1, 2
@@ -170,16 +169,7 @@ def test_cantilever_vibration(order, mode):
     def series(positions):
         return (positions[:, 1 : segments + 1, Z] @ (mass * shape))[25:]
 
-    def estimate(values):
-        seen = float(np.angle(step_factor(values)))
-        return brentq(
-            lambda w: integration.numerical_frequency(w, h, order) * h - seen,
-            0.5 * seen / h,
-            2 * seen / h,
-            xtol=1e-15,
-            rtol=1e-15,
-        )
-
+    estimate = shown_frequency(h, order)
     assert estimate(series(motion)) == approx(omega, rel=1e-5)
     by_stiffness = slope_along(estimate, series(motion), series(tangents(scene, times, s, "rope_EI")))
     assert by_stiffness == approx(omega / (2 * EI), rel=1e-5)

@@ -2,24 +2,22 @@
 adjoint."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 import sheetbend as sb
-from oracles import drag, integration, modes, ropes
+from oracles import drag, modes, ropes
 from oracles.calculus import derivative
 from pytest import approx
 from scipy.linalg import eigh
-from scipy.optimize import brentq
 from support import (
     observed_orders,
     pick,
     place,
     sensitivity,
+    shown_frequency,
     slope_along,
     static_sensitivity,
-    step_factor,
     steps,
     tangents,
     twice,
@@ -235,22 +233,6 @@ def projected_frequency(squared: float, h: float, order: int) -> float:
     """
     eta = h if order == 1 else 2.0 * h / 3.0
     return math.sqrt(squared / (1.0 - eta * eta * squared))
-
-
-def shown_frequency(h: float, order: int) -> Callable[[np.ndarray], float]:
-    """Estimator of the frequency that a series shows, without the integrator's shift."""
-
-    def estimate(series: np.ndarray) -> float:
-        seen = float(np.angle(step_factor(series)))
-        return brentq(
-            lambda omega: integration.numerical_frequency(omega, h, order) * h - seen,
-            0.5 * seen / h,
-            2.0 * seen / h,
-            xtol=1e-15,
-            rtol=1e-15,
-        )
-
-    return estimate
 
 
 @pytest.mark.parametrize("mode", [0, 1, 2])

@@ -8,32 +8,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import sheetbend as sb
-from oracles import integration, modes, rods
+from oracles import modes, rods
 from pytest import approx
-from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
-from support import observed_orders, place, sensitivity, slope_along, step_factor, steps, tangents, twice
+from support import observed_orders, place, sensitivity, shown_frequency, slope_along, steps, tangents, twice
 
 G = 9.81
 LENGTH, DENSITY, EI, GJ = 0.5, 0.05, 1e-3, 0.8e-3
 NO_GRAVITY = (0.0, 0.0, 0.0)
 ALONG, FIRST, SECOND = Rotation.from_rotvec([0.5, -0.9, 1.3]).as_matrix().T
-
-
-def frequency(h: float, order: int):
-    """Estimator of a mode's frequency from its amplitude over steps h, less the integrator's shift."""
-
-    def estimate(values: np.ndarray) -> float:
-        seen = float(np.angle(step_factor(values)))
-        return brentq(
-            lambda w: integration.numerical_frequency(w, h, order) * h - seen,
-            0.5 * seen / h,
-            2 * seen / h,
-            xtol=1e-15,
-            rtol=1e-15,
-        )
-
-    return estimate
 
 
 # --- O-16a: bending
@@ -57,7 +40,7 @@ def test_cantilever_vibration(mode):
     scene = sb.rod(LENGTH, segments, points=np.outer(along, ALONG) + np.outer(heights, across), **options)
     times, s = steps(h, 600), sb.Solver(h=h)
     mass = np.append(np.ones(segments - 1), 0.5)
-    estimate = frequency(h, 2)
+    estimate = shown_frequency(h, 2)
 
     def series(positions):
         return (positions[:, 1 : segments + 1] @ across @ (mass * shape))[25:]
@@ -87,7 +70,7 @@ def test_longitudinal_bar():
     scene = sb.rod(length, segments, points=line, velocity=1e-4 * np.outer(shape, ALONG), start=start, **options)
     times, s = steps(h, 600), sb.Solver(h=h)
     mass = np.append(np.ones(segments), 0.5)
-    estimate = frequency(h, 2)
+    estimate = shown_frequency(h, 2)
 
     def series(positions):
         return (positions[:, : segments + 1] @ ALONG @ (mass * shape))[25:]

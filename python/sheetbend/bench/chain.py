@@ -7,7 +7,6 @@ adjoint.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -19,8 +18,8 @@ from ..rope import rope
 from ..solver import Solver
 from .machine import isa, machine
 from .measurement import LANES
+from .ropes import Ropes
 from .timing import in_fresh_process, peak_mb, timed
-from .workloads import Array
 
 SEGMENTS = (20, 50, 200, 1000, 5000, 20000)
 WORK = 60_000  # segments times substeps of one run
@@ -43,37 +42,10 @@ class Length:
         return self.segments * self.substeps
 
 
-class Ropes:
-    """`count` equal ropes, ready to run."""
-
-    def __init__(self, length: Length, threads: int, count: int = 1) -> None:
-        scene = rope(1.0, length.segments, density=0.05, EA=1e4, EI=1e-3, bend_damping=0.01, pinned=[0])
-        self.inputs = np.tile(scene.compiled.inputs(), (count, 1))
-        self.core = Solver(h=H, threads=threads).core(scene.compiled)
-        self.steps = [length.substeps]
-        self._bar = np.ones((count, 1, scene.compiled.core.dofs))
-
-    def forward(self) -> None:
-        """One rope."""
-        self.core.states(self.inputs[0], self.steps, 0.0)
-
-    def gradient(self) -> Array:
-        """One rope: (inputs,)."""
-        _, tape = self.core.record(self.inputs[0], self.steps, 0.0)
-        return self.core.vjp(self.inputs[0], tape, self.steps, self._bar[0], 0.0)
-
-    def all_forward(self) -> None:
-        """All ropes in one call."""
-        self.core.simulate_batch(self.inputs, self.steps, 0.0)
-
-    def all_gradients(self) -> None:
-        """All ropes in one call."""
-        self.core.vjp_batch(self.inputs, self.steps, self._bar, 0.0)
-
-    def singly(self, work: Callable[[], object]) -> None:
-        """The same work once per rope, one after the other."""
-        for _ in self.inputs:
-            work()
+def chains(length: Length, threads: int, count: int = 1) -> Ropes:
+    """`count` equal ropes."""
+    scene = rope(1.0, length.segments, density=0.05, EA=1e4, EI=1e-3, bend_damping=0.01, pinned=[0]).compiled
+    return Ropes(scene, np.tile(scene.inputs(), (count, 1)), Solver(h=H, threads=threads), length.substeps)
 
 
 def lengths(work: int = WORK) -> list[Length]:
@@ -105,15 +77,12 @@ def measure_chain(threads: int = 1, repeats: int = 5, work: int = WORK) -> dict[
 
 
 def gradient_error() -> float:
-    """Of the adjoint on a short rope, along a fixed random direction of all inputs, relative to complex step."""
-    ropes = Ropes(Length(*CHECKED), 1)
-    direction = np.random.default_rng(5).standard_normal(ropes.inputs.shape[1]) * np.abs(ropes.inputs[0])
-    wanted = ropes.core.complex_step(ropes.inputs[0], direction, ropes.steps, 0.0).sum()
-    return float(abs(np.vdot(ropes.gradient(), direction) / wanted - 1))
+    """Of the adjoint on a short rope, relative to complex step."""
+    return chains(Length(*CHECKED), 1).gradient_error()
 
 
 def _row(length: Length, threads: int, repeats: int) -> dict[str, float]:
-    ropes = Ropes(length, threads)
+    ropes = chains(length, threads)
     forward, _ = timed(ropes.forward, repeats)
     gradient, _ = timed(ropes.gradient, repeats)
     return {
@@ -128,7 +97,7 @@ def _batch(threads: int, repeats: int, substeps: int) -> dict[str, float]:
     """The gradient of a batch is one call that includes its forward run, as it does for one rope."""
     count, segments = BATCH
     length = Length(segments, substeps)
-    ropes = Ropes(length, threads, count)
+    ropes = chains(length, threads, count)
     work = count * length.work
     found: dict[str, float] = {"ropes": count, "segments": segments, "substeps": substeps}
     for name, together, alone in (
@@ -143,4 +112,4 @@ def _batch(threads: int, repeats: int, substeps: int) -> dict[str, float]:
 
 
 def _peak_mb(length: Length, threads: int) -> float:
-    return peak_mb(Ropes(length, threads).gradient)
+    return peak_mb(chains(length, threads).gradient)

@@ -16,11 +16,12 @@ import numpy as np
 from .. import __version__
 from ..grip import Grip, carried
 from ..rod import rod
+from ..scene import Scene
 from ..solver import Solver
 from .machine import isa, machine
 from .measurement import LANES
+from .ropes import Ropes
 from .timing import in_fresh_process, peak_mb, timed
-from .workloads import Array
 
 LINKS = 9
 H = 1 / 200  # s
@@ -31,49 +32,18 @@ CHECKED = 60  # substeps of the run whose gradient is compared with a complex st
 BOUND = 1e-9
 
 
-class Rods:
-    """`count` ropes with different motions, ready to run."""
-
-    def __init__(self, substeps: int, threads: int = 1, count: int = 1, iterations: int = 1) -> None:
-        scenes = [_scene(k, substeps) for k in range(count)]
-        self.inputs = np.stack([s.compiled.inputs() for s in scenes])
-        self.core = Solver(h=H, iterations=iterations, threads=threads).core(scenes[0].compiled)
-        self.steps = [substeps]
-        self._bar = np.ones((count, 1, scenes[0].compiled.core.dofs))
-        directions = np.random.default_rng(1).standard_normal((DIRECTIONS, self.inputs.shape[1]))
-        self._directions = directions * np.abs(self.inputs[0])
-
-    def forward(self) -> None:
-        """One rope."""
-        self.core.states(self.inputs[0], self.steps, 0.0)
-
-    def gradient(self) -> Array:
-        """One rope: (inputs,)."""
-        _, tape = self.core.record(self.inputs[0], self.steps, 0.0)
-        return self.core.vjp(self.inputs[0], tape, self.steps, self._bar[0], 0.0)
-
-    def jacobian(self) -> None:
-        """One rope, along eight directions of its inputs."""
-        self.core.jvp(self.inputs[0], self._directions, self.steps, 0.0)
-
-    def all_forward(self) -> None:
-        """All ropes in one call."""
-        self.core.simulate_batch(self.inputs, self.steps, 0.0)
-
-    def all_gradients(self) -> None:
-        """All ropes in one call."""
-        self.core.vjp_batch(self.inputs, self.steps, self._bar, 0.0)
-
-    def singly(self, work: Callable[[], object]) -> None:
-        """The same work once per rope, one after the other."""
-        for _ in self.inputs:
-            work()
+def rods(substeps: int, threads: int = 1, count: int = 1, iterations: int = 1) -> Ropes:
+    """`count` ropes with different motions."""
+    scenes = [_scene(k, substeps).compiled for k in range(count)]
+    solver = Solver(h=H, iterations=iterations, threads=threads)
+    return Ropes(scenes[0], np.stack([s.inputs() for s in scenes]), solver, substeps)
 
 
 def measure_rod(threads: int = 1, repeats: int = 5, substeps: int = SUBSTEPS) -> dict[str, Any]:
     """ns per substep: forward with one and two iterations, gradient, eight columns of a Jacobian, and eight ropes in
     lanes against one at a time."""
-    one, all_ = Rods(substeps, threads), Rods(substeps, threads, BATCH)
+    one, all_ = rods(substeps, threads), rods(substeps, threads, BATCH)
+    directions = np.random.default_rng(1).standard_normal((DIRECTIONS, one.inputs.shape[1])) * np.abs(one.inputs[0])
     found: dict[str, Any] = {
         "workload": "rod",
         "particles": LINKS + 1,
@@ -86,9 +56,9 @@ def measure_rod(threads: int = 1, repeats: int = 5, substeps: int = SUBSTEPS) ->
     }
     works: dict[str, tuple[Callable[[], object], int]] = {
         "forward": (one.forward, 1),
-        "two_iterations": (Rods(substeps, threads, iterations=2).forward, 1),
+        "two_iterations": (rods(substeps, threads, iterations=2).forward, 1),
         "gradient": (one.gradient, 1),
-        "jacobian": (one.jacobian, 1),
+        "jacobian": (partial(one.jacobian, directions), 1),
         "forward_batch": (all_.all_forward, BATCH),
         "forward_singly": (partial(all_.singly, all_.forward), BATCH),
         "gradient_batch": (all_.all_gradients, BATCH),
@@ -107,14 +77,11 @@ def measure_rod(threads: int = 1, repeats: int = 5, substeps: int = SUBSTEPS) ->
 
 
 def gradient_error() -> float:
-    """Of the adjoint, along a fixed random direction of all inputs, relative to complex step."""
-    rods = Rods(CHECKED)
-    direction = np.random.default_rng(5).standard_normal(rods.inputs.shape[1]) * np.abs(rods.inputs[0])
-    wanted = rods.core.complex_step(rods.inputs[0], direction, rods.steps, 0.0).sum()
-    return float(abs(np.vdot(rods.gradient(), direction) / wanted - 1))
+    """Of the adjoint, relative to complex step."""
+    return rods(CHECKED).gradient_error()
 
 
-def _scene(number: int, substeps: int) -> Any:
+def _scene(number: int, substeps: int) -> Scene:
     """A rope of 0.87 m whose grips move at random, smoothly."""
     rng = np.random.default_rng(number)
     times = np.linspace(0.0, substeps * H, 101)
@@ -147,4 +114,4 @@ def _scene(number: int, substeps: int) -> Any:
 
 
 def _peak_mb(substeps: int, threads: int) -> float:
-    return peak_mb(Rods(substeps, threads).gradient)
+    return peak_mb(rods(substeps, threads).gradient)

@@ -18,7 +18,7 @@ from ..report import plain, rich_report
 from ..result import FitResult
 from .figures import write_figures
 from .gripped import fit_ropes, load_ropes
-from .outcome import Code, Outcome, run
+from .outcome import Outcome, code_of, run
 from .progress import Iterations
 from .screen import show
 
@@ -64,7 +64,7 @@ def _fit(console: Console, path: Path, output: Path | None, resume: Path | None,
     files = _write(found, study, folder)
     console.print(f"\nwritten to {folder}: {', '.join(files)}", soft_wrap=True)
     data = found.result.to_dict() | {"name": config.experiment.name, "output": str(folder), "files": files}
-    return Outcome(data, _code(found.result, strict or config.fit.strict))
+    return Outcome(data, code_of([found.result], strict or config.fit.strict))
 
 
 def _folder(console: Console, config: Config | GrippedConfig, output: Path | None) -> Path:
@@ -121,10 +121,3 @@ def _write(found: Fit, study: Study, folder: Path) -> list[str]:
     (folder / "report.txt").write_text(plain(found.result), encoding="utf-8")
     write(with_values(study.config, found.values), folder / "fitted.toml", study.folder)
     return ["fit.json", "report.txt", "fitted.toml", *write_figures(found, study.config, folder)]
-
-
-def _code(result: FitResult, strict: bool) -> Code:
-    if not result.converged:
-        return Code.NOT_CONVERGED
-    unknown = [e.verdict == "not identifiable" for e in result.estimates]
-    return Code.NOT_IDENTIFIABLE if (any(unknown) if strict else all(unknown)) else Code.DONE

@@ -13,13 +13,13 @@ from rich.console import Console
 from ..config import GrippedConfig, GrippedRopeSection
 from ..errors import ConfigError, RecordingError, SheetbendError
 from ..gripped import WITHOUT_TWIST, GrippedMotion, RopeFit, RopeReport, Rung, evaluate, fit_rope
-from ..gripped.recipe import REST, TILTS, TWIST, VARYING, YIELD
+from ..gripped.ladder import REST, TILTS, TWIST, VARYING, YIELD
 from ..gripped.report import overview
 from ..io.folder import recordings
 from ..recording import Recording
 from ..tables import plain_section
 from .gripped_figure import write_figure
-from .outcome import Code, Outcome
+from .outcome import Code, Outcome, code_of
 from .screen import show
 
 RUNGS: dict[str, Rung] = {"twist": TWIST, "tilts": TILTS, "rest": REST, "yield": YIELD, "varying": VARYING}
@@ -98,7 +98,8 @@ def fit_ropes(
         "ropes": {r.name: r.to_dict() for r in reports},
         "not_fitted": missing,
     }
-    return Outcome(data, Code.NOT_CONVERGED if stopped else _code(reports, strict or config.fit.strict))
+    results = [report.result for report in reports]
+    return Outcome(data, Code.NOT_CONVERGED if stopped else code_of(results, strict or config.fit.strict))
 
 
 def _fit(console: Console, config: GrippedConfig, rope: RopeData, ladder: Sequence[Rung]) -> RopeFit:
@@ -152,11 +153,3 @@ def _write(report: RopeReport, config: GrippedConfig, rope: RopeData, folder: Pa
     drawn = report.unseen or evaluate(report.found, rope.train)
     names = ["fit.json", "report.txt", *write_figure(report, drawn, config.output.figures, own)]
     return [f"{report.name}/{name}" for name in names]
-
-
-def _code(reports: Sequence[RopeReport], strict: bool) -> Code:
-    results = [report.result for report in reports]
-    if not all(result.converged for result in results):
-        return Code.NOT_CONVERGED
-    unknown = [[e.verdict == "not identifiable" for e in result.estimates] for result in results]
-    return Code.NOT_IDENTIFIABLE if any(any(u) if strict else all(u) for u in unknown) else Code.DONE

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any
@@ -15,6 +15,7 @@ from rich.text import Text
 
 from ..errors import InputError, SheetbendError
 from ..optional import MissingExtraError
+from ..result import FitResult
 
 
 class Code(IntEnum):
@@ -54,6 +55,14 @@ def run(command: Callable[[Console], Outcome], as_json: bool) -> None:
     if as_json:
         print(json.dumps(strict({**outcome.data, "exit_code": int(outcome.code)}), allow_nan=False), flush=True)
     raise typer.Exit(int(outcome.code))
+
+
+def code_of(results: Sequence[FitResult], strictly: bool) -> Code:
+    """Of fits: whether all converged, and whether every one (strictly: every parameter) is identifiable."""
+    if not all(result.converged for result in results):
+        return Code.NOT_CONVERGED
+    unknown = [[e.verdict == "not identifiable" for e in result.estimates] for result in results]
+    return Code.NOT_IDENTIFIABLE if any(any(u) if strictly else all(u) for u in unknown) else Code.DONE
 
 
 def strict(value: Any) -> Any:

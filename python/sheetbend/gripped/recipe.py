@@ -10,20 +10,21 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite
+from ..chain import unit_vector
 from ..errors import InputError, SheetbendError
 from ..experiment import Experiment
 from ..fit import Fit, fit
 from ..optimizers import minimize
-from ..parameters import Parameter
+from ..parameters import Parameter, Parameters
 from ..problem import FitProblem
 from ..recording import Recording
 from ..scores import coordinate_error
+from .ladder import LADDER, TWIST, Rung
 from .model import GRAVITY, NAME, RopeModel, nominal_directions, shared_gravity
 from .motion import Array, GrippedMotion
 
@@ -35,74 +36,6 @@ TOLERANCE = 1e-4  # relative, of the cost, while searching
 LOOK, SHORT, LONG = 6, 12, 30  # iterations, at most, of a first look at a rung, of a start, and of a fit that counts
 
 Say = Callable[[str], None]
-
-
-@dataclass(frozen=True)
-class Rung:
-    """One step of the recipe.
-
-    Attributes:
-        name: for reports.
-        options: what it adds to the model, fields of `RopeModel`.
-        values: what it adds to the model's starting values.
-        parameters: what it adds to the fit.
-        look_first: whether it is costly, so that a look at shorter windows decides whether it is fitted to long ones.
-    """
-
-    name: str
-    options: Mapping[str, object] = field(default_factory=dict)
-    values: Mapping[str, float] = field(default_factory=dict)
-    parameters: tuple[Parameter, ...] = ()
-    look_first: bool = False
-
-
-def _log(name: str, initial: float, unit: str, sd: float | None = None) -> Parameter:
-    prior = None if sd is None else (initial, sd)
-    return Parameter(name=f"{NAME}_{name}", initial=initial, log=True, unit=unit, prior=prior)
-
-
-def _plain(name: str, unit: str, sd: float, scale: float) -> Parameter:
-    return Parameter(name=f"{NAME}_{name}", initial=0.0, unit=unit, prior=(0.0, sd), scale=scale)
-
-
-MODES = (0, 1, 2, 3)
-TWIST = Rung(
-    "straight, with twist",
-    parameters=(
-        _log("EI", 1e-3, "N m^2"),
-        _log("GJ", 1e-3, "N m^2", sd=3.0),
-        _log("bend_damping", 0.02, "s", sd=2.0),
-        Parameter(name=f"{NAME}_twist_damping", tied_to=f"{NAME}_bend_damping", unit="s"),
-        _log("drag_linear", 0.01, "N s/m^2", sd=3.0),
-        _log("length", 1.0, "m", sd=0.02),
-        _plain("roll", "rad", 1.0, 0.3),
-    ),
-)
-TILTS = Rung(
-    "tilts of the grips",
-    options={"tilts": True},
-    parameters=tuple(_plain(f"{end}_tilt_{k}", "rad", 0.1, 0.1) for end in ("start", "end") for k in (1, 2)),
-)
-REST = Rung(
-    "rest curvature",
-    options={"curvature_modes": MODES},
-    parameters=tuple(_plain(f"curvature_{axis}_{k}", "1/m", 1.0, 1.0) for k in MODES for axis in (1, 2)),
-)
-YIELD = Rung(
-    "yield",
-    values={"yield_curvature": 3.0, "yield_share": 0.2},  # little yields at first
-    parameters=(
-        _log("yield_curvature", 3.0, "1/m", sd=1.0),
-        Parameter(name=f"{NAME}_yield_share", initial=0.2, lower=0.01, upper=0.95, prior=(0.2, 0.3)),
-    ),
-    look_first=True,
-)
-VARYING = Rung(
-    "stiffness along the rope",
-    options={"softness_modes": (1, 2)},
-    parameters=tuple(_plain(f"softness_{k}", "", 0.2, 0.3) for k in (1, 2)),
-)
-LADDER = (TWIST, TILTS, REST, YIELD, VARYING)
 
 
 @dataclass(frozen=True)
@@ -208,7 +141,9 @@ def fit_rope(
     motions = [GrippedMotion.of(r, smoothing) for r in recordings]
     model = RopeModel(
         density=density,
-        nominal=nominal_directions(motions) if nominal is None else _given_directions(nominal),
+        nominal=nominal_directions(motions)
+        if nominal is None
+        else (unit_vector("nominal", nominal[0]), unit_vector("nominal", nominal[1])),
         values={},
         segments=segments,
         substeps=substeps,
@@ -218,11 +153,6 @@ def fit_rope(
     )
     search = _Search(motions, validate, windows, threads, say)
     return search.run(model, ladder, bending_lengths, max_segments)
-
-
-def _given_directions(nominal: tuple[ArrayLike, ArrayLike]) -> tuple[Array, Array]:
-    start, end = (finite("nominal", d, (3,), InputError) for d in nominal)
-    return start / np.linalg.norm(start), end / np.linalg.norm(end)
 
 
 class _Search:
@@ -240,6 +170,7 @@ class _Search:
         self.fitted = [m for i, m in enumerate(motions) if i not in others]
         self.others = [m for i, m in enumerate(motions) if i in others]
         self.windows, self.threads, self.say = windows, threads, say
+        self.middle, self.longest = windows[min(1, len(windows) - 1)], windows[-1]
 
     def run(
         self, model: RopeModel, ladder: Sequence[Rung], bending_lengths: Sequence[float], max_segments: int
@@ -267,7 +198,7 @@ class _Search:
             interrupted = True
             self.say(f"interrupted: going back to {next(s.name for s in reversed(steps) if s.stays)}")
         last = self._conclude(model, parameters, values, interrupted)
-        values = {name: last.values[name] for name in last.values}
+        values = last.values
         return RopeFit(model.at(values), values, tuple(steps), last, tuple(_warnings(model, values)))
 
     def _first(
@@ -281,7 +212,7 @@ class _Search:
             start["length"] = float(np.mean([m.length for m in self.all]))
             candidate = model.with_values(**start)
             values = self._minimum(candidate, rung.parameters, {}, self.windows[0], SHORT)
-            cost = self._cost(candidate, values, self.windows[min(1, len(self.windows) - 1)])
+            cost = self._cost(candidate, values, self.middle)
             self.say(f"start at a bending length of {length:g} m: EI {values[f'{NAME}_EI']:.3g}, cost {cost:.4g}")
             ends.append((cost, candidate.at(values), values))
         _, model, values = min(ends, key=lambda end: end[0])
@@ -294,16 +225,15 @@ class _Search:
         self, model: RopeModel, parameters: tuple[Parameter, ...], values: dict[str, float], max_segments: int
     ) -> tuple[RopeModel, dict[str, float]]:
         """Doubles the links until EI moves by less than 5 %, and stays with the finer ones."""
-        window = self.windows[min(1, len(self.windows) - 1)]
         moved = np.inf
-        before = self._minimum(model, parameters, values, window)
+        before = self._minimum(model, parameters, values, self.middle)
         while moved >= SETTLED and 2 * model.segments <= max_segments:
             finer = replace(model, segments=2 * model.segments)
-            found = self._minimum(finer, parameters, before, window)
+            found = self._minimum(finer, parameters, before, self.middle)
             moved = abs(found[f"{NAME}_EI"] / before[f"{NAME}_EI"] - 1.0)
             self.say(f"{model.segments} to {finer.segments} links move EI by {100 * moved:.2g} %")
             model, before = finer.at(found), found
-        values = self._minimum(model, parameters, before, self.windows[-1])
+        values = self._minimum(model, parameters, before, self.longest)
         return model.at(values), values
 
     def _tried(
@@ -317,12 +247,11 @@ class _Search:
     ) -> tuple[dict[str, float], Step]:
         """A rung fitted to long windows; a costly one only where a look at shorter ones already predicts better."""
         if rung.look_first:
-            window = self.windows[min(1, len(self.windows) - 1)]
-            values = self._minimum(model, parameters, values, window, LOOK)
+            values = self._minimum(model, parameters, values, self.middle, LOOK)
             step = self._step(rung.name, model, values, before, began)
             if not step.stays:
                 return dict(values), step
-        found = self._minimum(model, parameters, values, self.windows[-1])
+        found = self._minimum(model, parameters, values, self.longest)
         return found, self._step(rung.name, model, found, before, began)
 
     def _minimum(
@@ -348,8 +277,8 @@ class _Search:
     def _step(
         self, name: str, model: RopeModel, values: Mapping[str, float], before: Sequence[Step], began: float
     ) -> Step:
-        judges = self.others or self.fitted
-        fitted, others = (self._error(model, values, part) for part in (self.fitted, judges))
+        fitted = self._error(model, values, self.fitted)
+        others = self._error(model, values, self.others) if self.others else fitted
         stays = not before or others < BETTER * min(s.others for s in before if s.stays)
         return Step(name, fitted, others, stays, time.perf_counter() - began)
 
@@ -368,7 +297,7 @@ class _Search:
         self, model: RopeModel, parameters: Sequence[Parameter], values: Mapping[str, float], interrupted: bool
     ) -> Fit:
         """The fit to all recordings; after Ctrl-C one iteration of it, which the intervals need."""
-        experiments = _experiments(model, self.all, self.windows[-1])
+        experiments = _experiments(model, self.all, self.longest)
         wanted = _starting(parameters, values)
         count = 1 if interrupted else LONG
         last = fit(experiments, parameters=wanted, threads=self.threads, profiles=False, max_iterations=count)
@@ -408,8 +337,6 @@ def _problem(
     threads: int = 1,
 ) -> FitProblem:
     """Free parameters start at `values`; other quantities keep them."""
-    from ..parameters import Parameters
-
     free = {p.name for p in parameters}
     known = experiments[0].scene.quantities
     start = {name: q.value for name, q in known.items()} | dict(values)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ..parameters import Parameter
+from .ladder import TWIST, Rung
 from .model import NAME
-from .recipe import TWIST, Rung
 
 RATIO = 0.01  # GJ/EI that counts as none: thrice as much moves errors by 3 %, a tenth lets motions diverge
 EI, GJ, ROLL = (f"{NAME}_{quantity}" for quantity in ("EI", "GJ", "roll"))
