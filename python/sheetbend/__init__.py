@@ -12,6 +12,7 @@ from .errors import (
     DivergenceError,
     EmptyGradientError,
     InputError,
+    MeshError,
     RecordingError,
     SceneError,
     SheetbendError,
@@ -22,6 +23,19 @@ from .gradients import GradientReport, check_gradients
 from .grip import Grip
 from .io.folder import recordings
 from .markers import Place, along_rope, between, on_particle, on_rope
+from .mesh import (
+    Places,
+    TriangleMesh,
+    disk,
+    equilateral,
+    grid,
+    icosphere,
+    read_mesh,
+    unfold,
+    write_obj,
+    write_obj_sequence,
+    write_ply,
+)
 from .parameters import Parameter, Parameters
 from .recording import Recording
 from .result import FitResult
@@ -51,9 +65,11 @@ __all__ = [
     "Grip",
     "InputError",
     "Junction",
+    "MeshError",
     "Parameter",
     "Parameters",
     "Place",
+    "Places",
     "Recording",
     "RecordingError",
     "Refinement",
@@ -68,18 +84,24 @@ __all__ = [
     "Solver",
     "TapePlan",
     "Trajectory",
+    "TriangleMesh",
     "add_rod",
     "add_rope",
     "along_rope",
     "between",
     "check_gradients",
     "coordinate_error",
+    "disk",
+    "equilateral",
     "equilibria",
     "equilibrium",
     "fit",
+    "grid",
+    "icosphere",
     "no_physics",
     "on_particle",
     "on_rope",
+    "read_mesh",
     "recordings",
     "rod",
     "rollout",
@@ -87,4 +109,8 @@ __all__ = [
     "scores",
     "simulate",
     "tape_plan",
+    "unfold",
+    "write_obj",
+    "write_obj_sequence",
+    "write_ply",
 ]

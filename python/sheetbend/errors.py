@@ -41,6 +41,10 @@ class RecordingError(InputError):
     """A recording, or a file that should hold one, is inconsistent."""
 
 
+class MeshError(InputError):
+    """A mesh, or a file that should hold one, is inconsistent."""
+
+
 class ConfigError(InputError):
     """A configuration has an unknown key, a wrong value or a missing one."""
 

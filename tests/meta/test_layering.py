@@ -72,7 +72,7 @@ def test_core_and_adjoint_know_no_python(library: str) -> None:
 
 def test_optional_packages_are_imported_lazily() -> None:
     """Only the packages that need them (torch, cli, config) import heavy dependencies at their top."""
-    heavy = {"scipy", "torch", "matplotlib", "rich", "typer", "pydantic"}
+    heavy = {"scipy", "torch", "matplotlib", "rich", "typer", "pydantic", "trimesh"}
     offenders = []
     for path in (ROOT / "python/sheetbend").rglob("*.py"):
         part = path.relative_to(ROOT / "python/sheetbend").parts[0]

@@ -1,0 +1,76 @@
+"""What about a mesh can be simulated but is seldom meant."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import topology
+from .topology import Indices
+from .validate import signed_areas
+
+Array = NDArray[np.float64]
+
+_SPLINTER = np.radians(5.0)  # smallest angle below which a triangle is named
+_SMALL = 1e-3  # of the median area
+_WARP_JUMP = np.radians(20.0)  # more than a curved fabric turns from triangle to triangle
+_GATHERED = 1e-3  # relative difference of an edge's length in the material of its two triangles
+
+
+def doubts(vertices: Array, triangles: Indices, corners: Array, twin: Indices) -> tuple[str, ...]:
+    """Sentences on splinters, loose parts, cracks, and material that does not fit along edges."""
+    found = []
+    areas, angle = signed_areas(corners), _smallest_angle(corners)
+    splinters = np.flatnonzero((angle < _SPLINTER) | (areas < _SMALL * np.median(areas)))
+    if splinters.size:
+        worst = splinters[angle[splinters].argmin()]
+        found.append(
+            f"{splinters.size} triangles are splinters, the worst {worst} with {np.degrees(angle[worst]):.2g} degrees "
+            f"and {areas[worst]:.2g} m^2: they make the problem stiff. Remesh them."
+        )
+    parts = np.unique(topology.components(len(vertices), topology.edges(triangles)))
+    if len(parts) > 1:
+        found.append(
+            f"the mesh has {len(parts)} parts that do not hang together (their first vertices: {_few(parts)})."
+        )
+    distinct, index = np.unique(vertices, axis=0, return_inverse=True)
+    if len(distinct) < len(vertices):
+        shared = np.flatnonzero(np.bincount(index.ravel())[index.ravel()] > 1)
+        found.append(
+            f"{shared.size} vertices lie on top of others ({_few(shared)}): the mesh may be cracked there. "
+            "Merge them if so."
+        )
+    return (*found, *_misfit(corners, twin))
+
+
+def _misfit(corners: Array, twin: Indices) -> list[str]:
+    """Sentences on edges whose two triangles disagree on their length or direction in the material."""
+    first, second = topology.hinge_half_edges(twin).T
+    along = (np.roll(corners, -1, axis=1) - corners).reshape(-1, 2)
+    u, v = along[first], -along[second]
+    lengths = np.linalg.norm(u, axis=1), np.linalg.norm(v, axis=1)
+    gathered = np.abs(lengths[0] - lengths[1]) > _GATHERED * np.maximum(*lengths)
+    turn = np.abs(np.arctan2(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], (u * v).sum(axis=1)))
+    found = []
+    if gathered.any():
+        found.append(
+            f"{gathered.sum()} edges have different lengths in the material of their two triangles (gathered seams)."
+        )
+    if (turn > _WARP_JUMP).any():
+        found.append(
+            f"the warp direction jumps across {(turn > _WARP_JUMP).sum()} edges, by up to "
+            f"{np.degrees(turn.max()):.2g} degrees (a seam, or a place where it is perpendicular to the surface)."
+        )
+    return found
+
+
+def _smallest_angle(corners: Array) -> Array:
+    """(m,) rad."""
+    u, v = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    angles = np.arctan2(np.abs(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]), (u * v).sum(-1))
+    smallest: Array = angles.min(axis=1)
+    return smallest
+
+
+def _few(found: NDArray[np.generic]) -> str:
+    return ", ".join(map(str, found[:5].tolist())) + (", ..." if len(found) > 5 else "")

@@ -1,0 +1,141 @@
+"""Meshes from OBJ, PLY and STL files, through trimesh."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..checks import finite
+from ..errors import MeshError
+from ..io.sidecar import METERS
+from ..optional import require
+from .triangle_mesh import TriangleMesh
+from .unfold import unfold
+from .validate import checked_triangles, refuse_broken, signed_areas
+
+Array = NDArray[np.float64]
+
+# How trimesh keeps the order of the file's vertices, and how it splits them where texture coordinates differ.
+_FORMATS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    ".obj": ({"maintain_order": True, "skip_materials": True}, {"skip_materials": True}),
+    ".ply": ({"fix_texture": False}, {"fix_texture": True}),
+    ".stl": ({}, {}),
+}
+_OTHER_SIZE = 2.0  # of lengths between texture and shape: more is no stretch but another unit
+
+
+def read_mesh(
+    path: str | Path,
+    material: str | ArrayLike | None = None,
+    unit: str = "m",
+    texture_size: float | ArrayLike = 1.0,
+    warp: ArrayLike = (1.0, 0.0, 0.0),
+) -> TriangleMesh:
+    """Read a mesh. Its vertices keep the order of the file; in STL, which repeats them, equal ones are merged.
+
+    Args:
+        path: an .obj, .ply or .stl file.
+        material: "texture" takes the file's texture coordinates, "unfold" takes the shape in the file as flat fabric
+            unrolled (`unfold`), an array gives the coordinates, (n, 2) or (m, 3, 2) m. None: "texture" where the file
+            has it, else "unfold".
+        unit: of the file's positions, "m", "cm" or "mm".
+        texture_size: m per unit of texture coordinates, one number or (u, v).
+        warp: (3,) direction of warp for "unfold".
+
+    Warns:
+        UserWarning: for each of the mesh's `doubts`.
+
+    Raises:
+        MeshError: the file is missing or not readable, its texture coordinates are not in meters, or its triangles are
+            no surface.
+        MissingExtraError: trimesh is not installed.
+    """
+    path = Path(path)
+    if unit not in METERS:
+        raise MeshError("unit", "is unknown", unit, f"use one of {', '.join(METERS)}")
+    vertices, triangles, texture = _read(path)
+    vertices, triangles = vertices * METERS[unit], checked_triangles(triangles, len(vertices))
+    if isinstance(material, str) and material not in ("texture", "unfold"):
+        raise MeshError("material", "is unknown", material, "use 'texture', 'unfold' or an array")
+    if material is None:
+        material = "unfold" if texture is None else "texture"
+    if not isinstance(material, str):
+        coordinates = finite("material", material, None, MeshError)
+    elif material == "texture":
+        coordinates = _scaled_texture(path, vertices[triangles], texture, texture_size)
+    else:
+        refuse_broken(triangles, len(vertices))
+        coordinates = unfold(vertices, triangles, warp)
+    mesh = TriangleMesh(vertices, triangles, _per_vertex(coordinates, triangles, len(vertices)))
+    for doubt in mesh.doubts:
+        warnings.warn(f"{path.name}: {doubt}", stacklevel=2)
+    return mesh
+
+
+def _read(path: Path) -> tuple[Array, NDArray[np.int64], Array | None]:
+    """Vertices (n, 3), triangles (m, 3), and texture coordinates (m, 3, 2) where the file has them."""
+    if path.suffix.lower() not in _FORMATS:
+        raise MeshError("path", "has a suffix that no reader knows", str(path), f"use one of {', '.join(_FORMATS)}")
+    if not path.is_file():
+        raise MeshError("path", "is no file", str(path), "check the path; it starts at the working directory")
+    ordered, split = _FORMATS[path.suffix.lower()]
+    whole = _load(path, ordered)
+    vertices, triangles = np.array(whole.vertices, dtype=float), np.array(whole.faces, dtype=np.int64)
+    if path.suffix.lower() == ".stl":
+        return *_merged(vertices, triangles), None
+    textured = _load(path, split)
+    uv = getattr(textured.visual, "uv", None)
+    return vertices, triangles, None if uv is None else np.array(uv, dtype=float)[textured.faces]
+
+
+def _load(path: Path, options: dict[str, Any]) -> Any:
+    trimesh = require("trimesh", "mesh")
+    try:
+        mesh = trimesh.load_mesh(str(path), process=False, **options)
+    except Exception as problem:  # whatever a damaged file makes the library raise
+        raise MeshError(
+            str(path), f"cannot be read ({problem})", type(problem).__name__, "export it again"
+        ) from problem
+    if len(mesh.faces) == 0:
+        raise MeshError(str(path), "has no triangles", f"{len(mesh.vertices)} vertices", "export it with its faces")
+    return mesh
+
+
+def _merged(vertices: Array, triangles: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
+    """One vertex for equal positions, in the order of their first use."""
+    _, first, index = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), dtype=np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return vertices[np.sort(first)], rank[index.ravel()][triangles]
+
+
+def _scaled_texture(path: Path, corners: Array, texture: Array | None, size: float | ArrayLike) -> Array:
+    """Texture coordinates in meters; refused where they make another size of fabric than the shape in the file."""
+    if texture is None:
+        fix = "use material='unfold', or export the file with texture coordinates"
+        raise MeshError(str(path), "has no texture coordinates", "none", fix)
+    scale = finite("texture_size", size, None, MeshError)
+    if scale.shape not in ((), (2,)) or not (scale > 0).all():
+        raise MeshError("texture_size", "must be one or two positive lengths", scale.tolist(), "give m per unit")
+    scaled: Array = texture * scale
+    shape = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+    flat = np.abs(signed_areas(scaled)).sum()
+    ratio = np.sqrt(shape / flat) if flat > 0 else np.inf
+    if not 1 / _OTHER_SIZE < ratio < _OTHER_SIZE:
+        fix = f"give m per unit; {scale.max() * ratio:.6g} makes the areas equal, or use material='unfold'"
+        problem = f"makes {flat:.3g} m^2 of fabric from a shape of {shape:.3g} m^2"
+        raise MeshError("texture_size", problem, scale.tolist(), fix)
+    return scaled
+
+
+def _per_vertex(coordinates: Array, triangles: NDArray[np.int64], count: int) -> Array:
+    """Coordinates per vertex where all corners of each vertex have the same; else as they are."""
+    if coordinates.shape != (len(triangles), 3, 2):
+        return coordinates
+    found = np.zeros((count, 2))
+    found[triangles] = coordinates
+    return found if np.array_equal(found[triangles], coordinates) else coordinates
