@@ -70,6 +70,12 @@ struct Evaluation {
   Evaluation(const T* x, const T* p) { K::evaluate(x, p, C, J); }
 };
 
+// C and J on dual numbers: long, and apart from the kernels, where it would be compiled anew for every use.
+template <class K, class T>
+[[gnu::noinline]] void evaluate_apart(const T* x, const T* p, T* C, T* J) {
+  K::evaluate(x, p, C, J);
+}
+
 // C, and J or the geometry that it comes from.
 template <class K, class T>
 struct Linearization : Evaluation<K, T> {

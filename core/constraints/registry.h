@@ -5,12 +5,18 @@
 #include <string>
 #include <tuple>
 
+#include "core/constraints/area.h"
 #include "core/constraints/attachment.h"
 #include "core/constraints/bend.h"
+#include "core/constraints/dihedral.h"
 #include "core/constraints/distance.h"
+#include "core/constraints/exponential_strain.h"
 #include "core/constraints/hinge.h"
+#include "core/constraints/isometric_bending.h"
 #include "core/constraints/material_curvature.h"
 #include "core/constraints/planar_bend.h"
+#include "core/constraints/spline_strain.h"
+#include "core/constraints/strain.h"
 #include "core/constraints/twist.h"
 #include "core/constraints/yielding_curvature.h"
 
@@ -24,7 +30,13 @@ using Registry = std::tuple<  //
     Attachment,               //
     MaterialCurvature,        //
     Twist,                    //
-    YieldingCurvature>;
+    YieldingCurvature,        //
+    Strain,                   //
+    ExponentialStrain,        //
+    SplineStrain,             //
+    Dihedral,                 //
+    IsometricBending,         //
+    Area>;
 
 inline constexpr int kind_count = std::tuple_size_v<Registry>;
 

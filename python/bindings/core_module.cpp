@@ -60,5 +60,6 @@ PYBIND11_MODULE(_core, m) {
   bind_scene(m);
   bind_rollout(m);
   bind_equilibrium(m);
+  bind_values(m);
   bind_problem(m);
 }

@@ -12,6 +12,7 @@ void bind_map(py::module_& m);
 void bind_scene(py::module_& m);
 void bind_rollout(py::module_& m);
 void bind_equilibrium(py::module_& m);
+void bind_values(py::module_& m);
 void bind_problem(py::module_& m);
 
 }  // namespace sheetbend::bindings

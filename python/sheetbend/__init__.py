@@ -1,10 +1,12 @@
 """sheetbend: a differentiable XPBD simulator for parameter identification.
 
-Ropes (and later cloth) with exact gradients in double precision: simulate, differentiate, and fit physical parameters
+Ropes and cloth with exact gradients in double precision: simulate, differentiate, and fit physical parameters
 to recordings, with intervals and words for what the data cannot tell.
 """
 
+from . import mesh
 from .baseline import no_physics
+from .cloth import Cloth, add_cloth
 from .discretization import Refinement
 from .equilibrium import Equilibrium, equilibria, equilibrium
 from .errors import (
@@ -18,24 +20,13 @@ from .errors import (
     SheetbendError,
 )
 from .experiment import Experiment
+from .fabric import Exponential, Linear, Spline
 from .fit import Fit, fit
 from .gradients import GradientReport, check_gradients
 from .grip import Grip
 from .io.folder import recordings
-from .markers import Place, along_rope, between, on_particle, on_rope
-from .mesh import (
-    Places,
-    TriangleMesh,
-    disk,
-    equilateral,
-    grid,
-    icosphere,
-    read_mesh,
-    unfold,
-    write_obj,
-    write_obj_sequence,
-    write_ply,
-)
+from .markers import Place, along_rope, between, on_cloth, on_particle, on_rope
+from .mesh import TriangleMesh, read_mesh
 from .parameters import Parameter, Parameters
 from .recording import Recording
 from .result import FitResult
@@ -48,16 +39,19 @@ from .scores import Score, Scores, coordinate_error, scores
 from .simulate import Trajectory, simulate
 from .solver import Solver
 from .tape import TapePlan, tape_plan
+from .values import constraint_values, elastic_energy, support_forces
 
 __version__ = "0.1.0"
 
 __all__ = [
     "KINDS",
+    "Cloth",
     "ConfigError",
     "DivergenceError",
     "EmptyGradientError",
     "Equilibrium",
     "Experiment",
+    "Exponential",
     "Fit",
     "FitResult",
     "Gradient",
@@ -65,11 +59,11 @@ __all__ = [
     "Grip",
     "InputError",
     "Junction",
+    "Linear",
     "MeshError",
     "Parameter",
     "Parameters",
     "Place",
-    "Places",
     "Recording",
     "RecordingError",
     "Refinement",
@@ -82,23 +76,25 @@ __all__ = [
     "Scores",
     "SheetbendError",
     "Solver",
+    "Spline",
     "TapePlan",
     "Trajectory",
     "TriangleMesh",
+    "add_cloth",
     "add_rod",
     "add_rope",
     "along_rope",
     "between",
     "check_gradients",
+    "constraint_values",
     "coordinate_error",
-    "disk",
-    "equilateral",
+    "elastic_energy",
     "equilibria",
     "equilibrium",
     "fit",
-    "grid",
-    "icosphere",
+    "mesh",
     "no_physics",
+    "on_cloth",
     "on_particle",
     "on_rope",
     "read_mesh",
@@ -108,9 +104,6 @@ __all__ = [
     "rope",
     "scores",
     "simulate",
+    "support_forces",
     "tape_plan",
-    "unfold",
-    "write_obj",
-    "write_obj_sequence",
-    "write_ply",
 ]

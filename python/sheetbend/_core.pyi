@@ -145,6 +145,9 @@ class EquilibriumSolution:
 def equilibrium(
     scene: Scene, inputs: ArrayLike, start: ArrayLike | None = None, stable: bool = True
 ) -> EquilibriumSolution: ...
+def evaluate_constraints(
+    scene: Scene, inputs: ArrayLike, positions: ArrayLike, multipliers: ArrayLike
+) -> tuple[Array, Array]: ...
 
 class ParameterMap:
     def __init__(self, arg0: Mapping[str, Any], /) -> None: ...

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .checks import finite
+from .cloth import Cloth
 from .errors import SceneError
 from .rope import Rope
 from .scene import Scene
@@ -86,6 +87,19 @@ def on_rope(rope: Rope, arc_length: float, interpolation: str = "cubic") -> Plac
 def along_rope(rope: Rope, count: int, interpolation: str = "cubic") -> tuple[Place, ...]:
     """`count` markers at equal arc lengths from end to end."""
     return tuple(on_rope(rope, s, interpolation) for s in np.linspace(0.0, rope.length, count))
+
+
+def on_cloth(cloth: Cloth, points: ArrayLike) -> tuple[Place, ...]:
+    """Markers at material coordinates of a cloth, (k, 2) m along warp and weft.
+
+    Raises:
+        MeshError: a point lies outside of the cloth.
+    """
+    places = cloth.mesh.at(points)
+    return tuple(
+        Place(tuple(cloth.particles[vertices].tolist()), tuple(weights.tolist()), (0.0, 0.0, 0.0))
+        for vertices, weights in zip(places.vertices, places.weights, strict=True)
+    )
 
 
 def places_for(

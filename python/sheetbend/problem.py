@@ -64,6 +64,8 @@ def as_parameters(
         if "tied_to" not in fields and not fields.get("private"):
             fields.setdefault("initial", q.value)
         defaults: dict[str, Any] = {"unit": q.unit, "log": q.positive, "scale": q.scale}
+        if q.limits is not None and "tied_to" not in fields:
+            defaults |= {"lower": q.limits[0], "upper": q.limits[1]}
         merged = defaults | fields
         if q.positive and not merged["log"]:
             merged.setdefault("lower", 0.0)

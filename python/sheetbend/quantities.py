@@ -29,6 +29,7 @@ class Quantity:
         unit: SI.
         positive: whether only positive values make sense (such are fitted on a log scale by default).
         scale: a natural size in `unit` where zero is a sensible value (angles, offsets), else None.
+        limits: between which values it makes sense, where that is not just positive.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Quantity:
     unit: str
     positive: bool = True
     scale: float | None = None
+    limits: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.value):

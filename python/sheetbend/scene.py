@@ -16,11 +16,11 @@ from .column import Column
 from .compiled import CompiledScene
 from .errors import SceneError
 from .quantities import Quantity, Term, product
+from .rest_values import rest_values
 
 Array = np.ndarray
 KINDS: Mapping[str, Mapping[str, Any]] = _core.constraint_kinds()
 NEEDS_COMPLIANCE = ("bend", "planar_bend")
-JOINTS = ("material_curvature", "yielding_curvature", "twist")
 # A damping-only element keeps the product of compliance and damping while the compliance grows: what is left of its
 # stiffness.
 VISCOUS_COMPLIANCE = 1e12
@@ -61,6 +61,7 @@ class Scene:
         self.force_times: Array = np.zeros(0)
         self.has_drag = False
         self.ropes: dict[str, Any] = {}
+        self.cloths: dict[str, Any] = {}
         self._positions, self._velocities, self._mass = Column(3), Column(3), Column()
         self._drag: dict[str, Array] = {}
         self._boundary: list[Array] = []
@@ -233,18 +234,21 @@ class Scene:
         constraint (their gradients are in the input arrays).
 
         Args:
-            kind: "distance", "bend", "planar_bend", "hinge", "attachment", "material_curvature",
-                "yielding_curvature" or "twist"
-                (sheetbend.KINDS).
+            kind: a name in sheetbend.KINDS: "distance", "attachment"; of ropes "bend", "planar_bend", "hinge"; of rods
+                "material_curvature", "yielding_curvature", "twist"; of cloth "strain", "exponential_strain",
+                "spline_strain", "dihedral", "isometric_bending", "area".
             particles: (count, arity) indices.
             name: of the group; the kind by default.
             compliance: 0 = rigid; distance, attachment m/N; bend, planar_bend 1/(N m) (Voronoi length / EI); hinge
-                rad/(N m); material_curvature 1/(N m), twist rad/(N m) (Voronoi length / EI or GJ).
+                rad/(N m); material_curvature 1/(N m), twist rad/(N m) (Voronoi length / EI or GJ); strains 1/(N m)
+                (1/(area warp stiffness)); dihedral rad/(N m); isometric_bending 1/(N m) (1/B); area m^3/N.
             damping: beta of the Rayleigh dissipation (Macklin et al. 2016, eq. 26): force per rate of C.
             viscosity: the element resists the rate of C only: distance N s/m, hinge N m s/rad; excludes compliance and
                 damping.
             rest: (count,) rest length m (the initial length by default), planar rest (natural curvature times Voronoi
-                length), angle rad; of material_curvature (count, 2), of twist (count,) rad.
+                length), angle rad (zero by default), area m^2 (the initial one); of material_curvature (count, 2), of
+                twist (count,) rad, of attachment (count, 3) m the offset of the first particle from the second; of
+                strains and isometric_bending all parameters of KINDS, (count, parameters).
             normal: unit plane normal, (3,) or (count, 3), of planar kinds.
 
         Raises:
@@ -283,7 +287,7 @@ class Scene:
             raise SceneError(
                 f"{name}.compliance", why, float(alpha.min()), "give a positive compliance, Voronoi length / EI"
             )
-        values = self._rest_values(name, kind, stencil, rest, normal)
+        values = rest_values(name, kind, KINDS[kind]["parameters"], self.positions[stencil], rest, normal)
         first = sum(len(g.particles) for g in self.groups)
         self.groups.append(Group(name, kind, stencil, alpha, beta, damping is not None, values))
         if np.ndim(compliance) == 0 and alpha[0] > 0:
@@ -293,7 +297,13 @@ class Scene:
         return name
 
     def add_quantity(
-        self, name: str, value: float, unit: str, positive: bool = True, scale: float | None = None
+        self,
+        name: str,
+        value: float,
+        unit: str,
+        positive: bool = True,
+        scale: float | None = None,
+        limits: tuple[float, float] | None = None,
     ) -> str:
         """Declare a named quantity; `add_terms` says what it makes.
 
@@ -303,7 +313,7 @@ class Scene:
         self._building()
         if name in self.quantities:
             raise SceneError(name, "is a quantity already", value, "give another name")
-        self.quantities[name] = Quantity(name, float(value), unit, positive, scale)
+        self.quantities[name] = Quantity(name, float(value), unit, positive, scale, limits)
         return name
 
     def add_terms(self, terms: Sequence[Term]) -> None:
@@ -434,56 +444,6 @@ class Scene:
         self.add_terms([Term(array, first + np.arange(len(values)), 1.0, ((quantity, "identity"),))])
         values[:] = 0.0
 
-    def _rest_values(
-        self, name: str, kind: str, stencil: Array, rest: ArrayLike | None, normal: ArrayLike | None
-    ) -> Array:
-        parameters = KINDS[kind]["parameters"]
-        count = len(stencil)
-        values = np.zeros((count, len(parameters)))
-        if rest is not None and not parameters:
-            why = (
-                "has none: a rest curvature in space needs material frames (rods), which are not there yet"
-                if kind == "bend"
-                else "has none"
-            )
-            raise SceneError(
-                f"{name}.rest", why, "rest", "use planar_bend with a plane normal" if kind == "bend" else "leave it out"
-            )
-        if kind == "distance":
-            x = self.positions[stencil]
-            length = (
-                np.linalg.norm(x[:, 1] - x[:, 0], axis=1) if rest is None else per_item(f"{name}.rest", rest, count)
-            )
-            if (length <= 0).any():
-                bad = int(np.argmin(length))
-                raise SceneError(
-                    f"{name}.rest",
-                    f"length of constraint {bad} is not positive",
-                    float(length[bad]),
-                    "move the particles apart or give rest",
-                )
-            values[:, 0] = length
-        elif kind in JOINTS:
-            offsets = parameters.index("rest_1") if "rest_1" in parameters else 0
-            values[:, :offsets] = 1.0
-            shape = (count, len(parameters) - offsets)
-            if rest is not None:
-                values[:, offsets:] = finite(f"{name}.rest", np.reshape(rest, (count, -1)), shape, SceneError)
-        elif parameters:
-            if normal is None:
-                raise SceneError(
-                    f"{name}.normal", "is missing", None, "give the unit normal of the plane, such as (0, 1, 0)"
-                )
-            n = np.broadcast_to(finite(f"{name}.normal", normal, None, SceneError), (count, 3)).copy()
-            size = np.linalg.norm(n, axis=1, keepdims=True)
-            if (size == 0).any():
-                raise SceneError(
-                    f"{name}.normal", "has no length", n[int(np.argmin(size))].tolist(), "give the normal of the plane"
-                )
-            values[:, :3] = n / size
-            values[:, 3] = 0.0 if rest is None else per_item(f"{name}.rest", rest, count)
-        return values
-
     def _validate(self) -> None:
         if self.particle_count == 0:
             raise SceneError(self.name, "has no particles", 0, "add particles or a rope")
@@ -524,4 +484,10 @@ UNITS: Mapping[str, Mapping[str, str]] = {
     "material_curvature": {"compliance": "1/(N m)", "damping": "N m s"},
     "yielding_curvature": {"compliance": "1/(N m)", "damping": "N m s"},
     "twist": {"compliance": "rad/(N m)", "damping": "N m s/rad"},
+    "strain": {"compliance": "1/(N m)", "damping": "N m s"},
+    "exponential_strain": {"compliance": "1/(N m)", "damping": "N m s"},
+    "spline_strain": {"compliance": "1/(N m)", "damping": "N m s"},
+    "dihedral": {"compliance": "rad/(N m)", "damping": "N m s/rad"},
+    "isometric_bending": {"compliance": "1/(N m)", "damping": "N m s"},
+    "area": {"compliance": "m^3/N", "damping": "N s/m^3"},
 }

@@ -265,7 +265,8 @@ TYPED_TEST(Constraint, RelabelingGivesTheSameConstraint) {
   // An internal variable belongs to C, so it takes C's signs.
   const auto sign = [&](int d) { return d >= spatial<K> && d - spatial<K> < K::rows ? row.sign[d - spatial<K>] : 1; };
   for (int d = 0; d < K::dofs; ++d) x[d] = sign(d) * s.x[3 * row.relabeling[d / 3] + d % 3];
-  for (std::size_t k = 0; k < p.size(); ++k) p[k] *= row.parameter_sign[k];
+  for (std::size_t k = 0; k < p.size(); ++k)
+    p[k] = row.parameter_sign[k] * s.p[row.parameter_relabeling.empty() ? k : row.parameter_relabeling[k]];
   const auto before = evaluate<K>(s.x, s.p), after = evaluate<K>(x, p);
   std::vector<double> expected(before.size());
   for (int j = 0; j < K::rows; ++j) {

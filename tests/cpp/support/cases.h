@@ -27,8 +27,9 @@ struct Case {
   std::vector<int> parameter_degree;
   std::vector<int> relabeling;  // of the stencil, under which C becomes sign C, row by row, ...
   std::vector<int> sign;
-  std::vector<int> parameter_sign;  // ... when the parameters take these signs
-  bool curved = true;               // whether C has second derivatives
+  std::vector<int> parameter_sign;             // ... when the parameters take these signs
+  std::vector<int> parameter_relabeling = {};  // and these places; empty: their own
+  bool curved = true;                          // whether C has second derivatives
 };
 
 template <class K>
@@ -98,15 +99,16 @@ inline Case case_of<Hinge>() {
 template <>
 inline Case case_of<Attachment>() {
   return {.x = {0, 0, 0, 0.04, 0.02, -0.03},
-          .p = {},
+          .p = {0.03, -0.01, 0.02},
           .compliance = 3e-4,
           .damping = 3.0,
           .under_rotation = UnderRotation::turns,
+          .normal = 0,
           .degree = 1,
-          .parameter_degree = {},
+          .parameter_degree = {1, 1, 1},
           .relabeling = {1, 0},
           .sign = {-1, -1, -1},
-          .parameter_sign = {},
+          .parameter_sign = {-1, -1, -1},
           .curved = false};
 }
 
@@ -154,6 +156,93 @@ inline Case case_of<Twist>() {
           .degree = 0,
           .parameter_degree = {0},
           .relabeling = {2, 1, 0, 4, 3},
+          .sign = {1},
+          .parameter_sign = {1}};
+}
+
+inline const std::vector<double> triangle_sample{0, 0, 0, 0.055, 0.09, 0.01, -0.048, 0.1, -0.02};
+inline const std::vector<double> hinge_sample{0, 0, 0, 0.09, 0.03, -0.02, 0.01, 0.1, 0.03, 0.06, -0.08, 0.02};
+
+template <>
+inline Case case_of<Strain>() {
+  return {.x = triangle_sample,
+          .p = {10.0, 5.5, -10.0, 5.5, 0.3, 0.8, 0.5},
+          .compliance = 0.2,
+          .damping = 0.02,
+          .under_rotation = UnderRotation::stays,
+          .degree = 0,
+          .parameter_degree = {-1, -1, -1, -1, 0, 0, 0},
+          .relabeling = {0, 2, 1},
+          .sign = {1, 1, 1},
+          .parameter_sign = {1, 1, 1, 1, 1, 1, 1},
+          .parameter_relabeling = {2, 3, 0, 1, 4, 5, 6}};
+}
+
+template <>
+inline Case case_of<ExponentialStrain>() {
+  return {.x = triangle_sample,
+          .p = {10.0, 5.5, -10.0, 5.5, 0.3, 0.8, 0.5, 3.0, 2.0, 8.0},
+          .compliance = 0.2,
+          .damping = 0.02,
+          .under_rotation = UnderRotation::stays,
+          .degree = 0,
+          .parameter_degree = {-1, -1, -1, -1, 0, 0, 0, 0, 0, 0},
+          .relabeling = {0, 2, 1},
+          .sign = {1, 1, 1},
+          .parameter_sign = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1},
+          .parameter_relabeling = {2, 3, 0, 1, 4, 5, 6, 7, 8, 9}};
+}
+
+template <>
+inline Case case_of<SplineStrain>() {
+  Case row = case_of<Strain>();
+  for (const double spacing : {0.05, 0.04, 0.06}) row.p.insert(row.p.end(), {spacing, 1.5, 2.0, 4.0, 3.0});
+  row.parameter_degree.resize(row.p.size(), 0);
+  row.parameter_sign.resize(row.p.size(), 1);
+  for (int k = 7; k < 22; ++k) row.parameter_relabeling.push_back(k);
+  return row;
+}
+
+template <>
+inline Case case_of<Dihedral>() {
+  return {.x = hinge_sample,
+          .p = {0.1},
+          .compliance = 1.0,
+          .damping = 5e-4,
+          .under_rotation = UnderRotation::stays,
+          .degree = 0,
+          .parameter_degree = {0},
+          .relabeling = {0, 1, 3, 2},
+          .sign = {-1},
+          .parameter_sign = {-1}};
+}
+
+template <>
+inline Case case_of<IsometricBending>() {
+  return {.x = hinge_sample,
+          .p = {1.5, -1.0, -2.0},
+          .compliance = 7e-3,
+          .damping = 0.1,
+          .under_rotation = UnderRotation::turns,
+          .degree = 1,
+          .parameter_degree = {0, 0, 0},
+          .relabeling = {0, 1, 3, 2},
+          .sign = {1, 1, 1},
+          .parameter_sign = {1, 1, 1},
+          .parameter_relabeling = {0, 2, 1},
+          .curved = false};
+}
+
+template <>
+inline Case case_of<Area>() {
+  return {.x = triangle_sample,
+          .p = {0.004},
+          .compliance = 6e-6,
+          .damping = 600.0,
+          .under_rotation = UnderRotation::stays,
+          .degree = 2,
+          .parameter_degree = {2},
+          .relabeling = {0, 2, 1},
           .sign = {1},
           .parameter_sign = {1}};
 }

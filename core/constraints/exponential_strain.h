@@ -1,0 +1,31 @@
+// exponential_strain: a membrane (membrane.h) that stiffens as woven and knitted cloth does, with Fung's law per component (Fung 1967):
+// the energy k (exp(b e^2) - 1)/(2 b) of a strain e has the stiffness k at rest and grows by the factor exp(b e^2) (1 + 2 b e^2).
+// Its exact force comes from f = e sqrt((exp(b e^2) - 1)/(b e^2)), which is smooth at rest.
+//
+// A projection leaves out f f'' against f'^2, as XPBD does with all curvature of C. With t = b e^2 its matrix holds (t exp(t)/(exp(t) - 1))/(1 + 2 t)
+// of the true stiffness, from 1 at rest to 1/2; docs/decisions.md says how far sweeps converge. Newton's method for equilibria takes all of it.
+// Infinite beyond b e^2 = 709.
+#pragma once
+
+#include "core/constraints/membrane.h"
+#include "core/scalar/exponential.h"
+
+namespace sheetbend {
+
+struct ExponentialLaw {
+  static constexpr int coefficients = 1;
+  template <class T>
+  static Stretched<T> apply(const T& strain, const T* b) {
+    const Exponential<T> e(b[0] * strain * strain);
+    const T root = sqrt(e.mean_slope);
+    return {strain * root, e.value / root};
+  }
+};
+
+struct ExponentialStrain : Membrane<ExponentialLaw> {
+  static constexpr const char* name = "exponential_strain";
+  static constexpr std::array<const char*, 10> parameters{
+      "N1_u", "N1_v", "N2_u", "N2_v", "coupling", "weft", "shear", "stiffening_u", "stiffening_v", "stiffening_shear"};
+};
+
+}  // namespace sheetbend

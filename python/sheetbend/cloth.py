@@ -1,0 +1,191 @@
+"""Cloth: triangle meshes with membrane and bending stiffness, given and fitted by numbers of the fabric that do not depend
+on the mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .chain import first_value, is_number
+from .checks import finite, indices
+from .errors import SceneError
+from .fabric import Law, Linear
+from .hinges import Hinges
+from .mesh import TriangleMesh
+from .quantities import Term
+from .scene import Array, Scene
+
+MODELS = ("dihedral", "isometric_bending")
+
+
+@dataclass(frozen=True)
+class Cloth:
+    """A cloth in a scene: its mesh, and the particle of each of its vertices."""
+
+    name: str
+    mesh: TriangleMesh
+    particles: Array
+
+
+def add_cloth(
+    scene: Scene,
+    mesh: TriangleMesh,
+    name: str = "cloth",
+    *,
+    density: float,
+    warp: float,
+    weft: float | None = None,
+    shear: float,
+    poisson: float = 0.0,
+    law: Law | None = None,
+    bending: float | None = None,
+    bending_model: str = "dihedral",
+    curved: bool = False,
+    held: ArrayLike = (),
+    positions: ArrayLike | None = None,
+    membrane_damping: float | None = None,
+    bend_damping: float | None = None,
+    drag_linear: float | None = None,
+    drag_quadratic: float | None = None,
+) -> Cloth:
+    """Add a cloth to a scene.
+
+    Quantities: `<name>_density` kg/m^2, `_warp`, `_weft`, `_shear` N/m, `_poisson`, the law's coefficients (see
+    `sheetbend.fabric`) such as `_warp_stiffening`, and where given `_bending` N m, `_membrane_damping` s, `_bend_damping` s,
+    `_drag_linear` N s/m^3, `_drag_quadratic` N s^2/m^4.
+
+    The membrane's energy per area is Y_warp f(E_uu)^2 + 2 n sqrt(Y_warp Y_weft) f(E_uu) f(E_vv) + Y_weft f(E_vv)^2, over
+    2 (1 - n^2), plus G f(2 E_uv)^2/2, in Green strain (core/constraints/membrane.h).
+
+    Args:
+        mesh: with material coordinates along warp and weft.
+        density: mass per area, kg/m^2.
+        warp, weft: tension stiffness at rest, N/m, of a strip with free sides; weft = warp by default.
+        shear: G, N/m; an isotropic fabric has warp/(2 (1 + poisson)).
+        poisson: n = sqrt(nu_uv nu_vu), between -1 and 1. A strip pulled along the warp narrows by nu_uv = n sqrt(warp/weft)
+            times its strain.
+        law: how tension grows with strain; Linear() by default.
+        bending: rigidity B, N m; None = no bending.
+        bending_model: "dihedral" (angles; any rest shape), or "isometric_bending" (quadratic, flat rest shape, faster).
+        curved: the mesh's vertices are the shape at rest of the bending; flat by default.
+        held: vertices that will be pinned or driven: triangles and hinges among them alone are left out.
+        positions: (vertices, 3) m, the initial shape; the mesh's vertices by default.
+        membrane_damping, bend_damping: Kelvin-Voigt time constants, s.
+        drag_linear, drag_quadratic: air drag per area, isotropic.
+
+    Raises:
+        SceneError: wrong or missing values; a mesh whose diagonals bias bending.
+    """
+    _check(name, density=density, warp=warp, shear=shear)
+    _check(
+        name,
+        optional=True,
+        weft=weft,
+        bending=bending,
+        membrane_damping=membrane_damping,
+        bend_damping=bend_damping,
+        drag_linear=drag_linear,
+        drag_quadratic=drag_quadratic,
+    )
+    if not (is_number(poisson) and -1 < poisson < 1):
+        raise SceneError(f"{name}.poisson", "must lie between -1 and 1", poisson, "give sqrt(nu_uv nu_vu)")
+    if bending_model not in MODELS:
+        raise SceneError(f"{name}.bending_model", "is unknown", bending_model, f"use one of: {', '.join(MODELS)}")
+    if bend_damping is not None and bending is None:
+        raise SceneError(f"{name}.bend_damping", "needs bending", bend_damping, "give bending, or leave it out")
+    shape = (
+        mesh.vertices if positions is None else finite(f"{name}.positions", positions, mesh.vertices.shape, SceneError)
+    )
+    free = np.ones(len(shape), dtype=bool)
+    free[indices(f"{name}.held", np.ravel(held).tolist(), len(shape))] = False
+
+    particles = scene.add_particles(shape, 0.0)
+    _weigh(scene, mesh, name, particles, density, drag_linear, drag_quadratic)
+    _membrane(scene, mesh, name, particles, free, (warp, weft, shear, poisson), law or Linear(), membrane_damping)
+    if bending is not None:
+        Hinges(mesh, free).add(scene, name, particles, bending, bending_model, curved, bend_damping)
+    built = Cloth(name, mesh, particles)
+    scene.cloths[name] = built
+    return built
+
+
+def _weigh(
+    scene: Scene,
+    mesh: TriangleMesh,
+    name: str,
+    particles: Array,
+    density: float,
+    linear: float | None,
+    quadratic: float | None,
+) -> None:
+    """Masses and drag: every vertex has a third of its triangles."""
+    share = np.bincount(mesh.triangles.ravel(), np.repeat(mesh.areas / 3.0, 3), len(mesh.vertices))
+    scene.add_quantity(f"{name}_density", density, "kg/m^2")
+    scene.add_terms([Term("mass", particles, share, ((f"{name}_density", "identity"),))])
+    for kind, value, unit in (("linear", linear, "N s/m^3"), ("quadratic", quadratic, "N s^2/m^4")):
+        if value is not None:
+            scene.has_drag = True
+            quantity = scene.add_quantity(f"{name}_drag_{kind}", value, unit)
+            scene.add_terms([Term(f"drag_{kind}", particles, share, ((quantity, "identity"),))])
+
+
+def _membrane(
+    scene: Scene,
+    mesh: TriangleMesh,
+    name: str,
+    particles: Array,
+    free: Array,
+    stiffness: tuple[float, float | None, float, float],
+    law: Law,
+    damping: float | None,
+) -> None:
+    warp, weft, shear, poisson = stiffness
+    kept = np.flatnonzero(free[mesh.triangles].any(axis=1))
+    corners, areas = mesh.corners[kept], mesh.areas[kept]
+    count = len(kept)
+    coefficients = list(law.coefficients())
+    rest = np.zeros((count, 7 + len(coefficients)))
+    rest[:, :4] = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)).reshape(count, 4)
+    if weft is None:
+        rest[:, 5] = 1.0
+    group = f"{name}_membrane"
+    scene.add_constraints(
+        law.kind,
+        particles[mesh.triangles[kept]],
+        name=group,
+        compliance=np.zeros(count),
+        damping=None if damping is None else np.zeros(count),
+        rest=rest,
+    )
+    _, first, _ = scene.group(group)
+    values, all_of = first_value(scene, group) + rest.shape[1] * np.arange(count), first + np.arange(count)
+    scene.add_quantity(f"{name}_warp", warp, "N/m")
+    terms = [Term("compliance", all_of, 1.0 / areas, ((f"{name}_warp", "inverse"),))]
+    over_warp = (f"{name}_warp", "inverse_sqrt")
+    for place, label, value in ((5, "weft", weft), (6, "shear", shear)):
+        if value is not None:
+            scene.add_quantity(f"{name}_{label}", value, "N/m")
+            terms.append(Term("rest", values + place, 1.0, ((f"{name}_{label}", "sqrt"), over_warp)))
+    scene.add_quantity(f"{name}_poisson", poisson, "", positive=False, scale=0.1, limits=(-1.0, 1.0))
+    terms.append(Term("rest", values + 4, 1.0, ((f"{name}_poisson", "identity"),)))
+    own = scene.groups[-1].rest
+    for place, (label, value, fittable) in enumerate(coefficients, start=7):
+        if fittable:
+            scene.add_quantity(f"{name}_{label}", value, "")
+            terms.append(Term("rest", values + place, 1.0, ((f"{name}_{label}", "identity"),)))
+        else:
+            own[:, place] = value
+    if damping is not None:
+        scene.add_quantity(f"{name}_membrane_damping", damping, "s")
+        factors = ((f"{name}_membrane_damping", "identity"), (f"{name}_warp", "identity"))
+        terms.append(Term("damping", all_of, areas, factors))
+    scene.add_terms(terms)
+
+
+def _check(name: str, optional: bool = False, **values: float | None) -> None:
+    for field, value in values.items():
+        if not (is_number(value) and value > 0) and not (optional and value is None):  # type: ignore[operator]
+            fix = "give a positive number" + (", or leave it out" if optional else "")
+            raise SceneError(f"{name}.{field}", "must be positive", value, fix)

@@ -1,0 +1,63 @@
+"""What a scene's constraints are worth at given positions: strains and angles, elastic energy, and forces on supports."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _core
+from .checks import finite
+from .equilibrium import Equilibrium
+from .errors import SceneError
+from .scene import KINDS, Array, Scene
+from .simulate import forces_by_group
+
+
+def constraint_values(
+    scene: Scene, positions: ArrayLike | None = None, values: Mapping[str, float] | None = None
+) -> dict[str, Array]:
+    """C of every constraint, by group (count, rows), in the units of its kind.
+
+    Args:
+        positions: (particles, 3) m; the scene's initial ones by default.
+        values: quantities to change, by name.
+
+    Raises:
+        SceneError: wrong shapes or names.
+    """
+    x = scene.positions if positions is None else finite("positions", positions, (scene.particle_count, 3), SceneError)
+    compiled = scene.compiled
+    rows = sum(len(g.particles) * KINDS[g.kind]["rows"] for g in scene.groups)
+    inputs = compiled.inputs(compiled.values(values))
+    C, _ = _core.evaluate_constraints(compiled.core, inputs, x.ravel(), np.zeros(rows))
+    return forces_by_group(scene, C)
+
+
+def elastic_energy(
+    scene: Scene, positions: ArrayLike | None = None, values: Mapping[str, float] | None = None
+) -> dict[str, Array]:
+    """C.C/(2 alpha) of every constraint [J], by group (count,); zero where rigid. Arguments as of `constraint_values`."""
+    compiled = scene.compiled
+    offset, size = compiled.layout["compliance"]
+    alpha = compiled.inputs(compiled.values(values))[offset : offset + size]
+    energies, first = {}, 0
+    for name, C in constraint_values(scene, positions, values).items():
+        own = alpha[first : first + len(C)]
+        stored = np.zeros(len(C))
+        np.divide((C**2).sum(axis=1), 2.0 * own, out=stored, where=own > 0)
+        energies[name] = stored
+        first += len(C)
+    return energies
+
+
+def support_forces(rest: Equilibrium) -> Array:
+    """(particles, 3) N, the force of the supports on held particles at rest, zero on free ones."""
+    scene, compiled = rest.scene, rest.scene.compiled
+    multipliers = np.concatenate([rest.forces[g.name].ravel() for g in scene.groups])
+    inputs = compiled.inputs(rest.theta)
+    _, forces = _core.evaluate_constraints(compiled.core, inputs, rest.positions.ravel(), multipliers)
+    forces = -forces.reshape(-1, 3)
+    forces[scene.free] = 0.0
+    return forces
