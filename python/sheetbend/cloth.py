@@ -1,5 +1,5 @@
-"""Cloth: triangle meshes with membrane and bending stiffness, given and fitted by numbers of the fabric that do not depend
-on the mesh."""
+"""Cloth: triangle meshes with membrane and bending stiffness, given and fitted by numbers of the fabric that do not
+depend on the mesh."""
 
 from __future__ import annotations
 
@@ -53,19 +53,19 @@ def add_cloth(
     """Add a cloth to a scene.
 
     Quantities: `<name>_density` kg/m^2, `_warp`, `_weft`, `_shear` N/m, `_poisson`, the law's coefficients (see
-    `sheetbend.fabric`) such as `_warp_stiffening`, and where given `_bending` N m, `_membrane_damping` s, `_bend_damping` s,
-    `_drag_linear` N s/m^3, `_drag_quadratic` N s^2/m^4.
+    `sheetbend.fabric`) such as `_warp_stiffening`, and where given `_bending` N m, `_membrane_damping` s,
+    `_bend_damping` s, `_drag_linear` N s/m^3, `_drag_quadratic` N s^2/m^4.
 
-    The membrane's energy per area is Y_warp f(E_uu)^2 + 2 n sqrt(Y_warp Y_weft) f(E_uu) f(E_vv) + Y_weft f(E_vv)^2, over
-    2 (1 - n^2), plus G f(2 E_uv)^2/2, in Green strain (core/constraints/membrane.h).
+    The membrane's energy per area is Y_warp f(E_uu)^2 + 2 n sqrt(Y_warp Y_weft) f(E_uu) f(E_vv) + Y_weft f(E_vv)^2,
+    over 2 (1 - n^2), plus G f(2 E_uv)^2/2, in Green strain (core/constraints/membrane.h).
 
     Args:
         mesh: with material coordinates along warp and weft.
         density: mass per area, kg/m^2.
         warp, weft: tension stiffness at rest, N/m, of a strip with free sides; weft = warp by default.
         shear: G, N/m; an isotropic fabric has warp/(2 (1 + poisson)).
-        poisson: n = sqrt(nu_uv nu_vu), between -1 and 1. A strip pulled along the warp narrows by nu_uv = n sqrt(warp/weft)
-            times its strain.
+        poisson: n = sqrt(nu_uv nu_vu), between -1 and 1. A strip pulled along the warp narrows by
+            nu_uv = n sqrt(warp/weft) times its strain.
         law: how tension grows with strain; Linear() by default.
         bending: rigidity B, N m; None = no bending.
         bending_model: "dihedral" (angles; any rest shape), or "isometric_bending" (quadratic, flat rest shape, faster).

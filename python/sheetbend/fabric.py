@@ -51,7 +51,7 @@ class Exponential:
 
 @dataclass(frozen=True)
 class Spline:
-    """A tangent stiffness in straight pieces: 1 at rest and in compression, then ratios to it at 1 to 4 spacings of strain.
+    """A tangent stiffness in straight pieces: 1 at rest and in compression, then ratios to it at 1 to 4 spacings.
 
     Positive ratios make the tension rise monotonically; the last one holds beyond.
 

@@ -1,4 +1,4 @@
-"""What a scene's constraints are worth at given positions: strains and angles, elastic energy, and forces on supports."""
+"""What a scene's constraints are worth at given positions: strains and angles, elastic energy, forces on supports."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def constraint_values(
 def elastic_energy(
     scene: Scene, positions: ArrayLike | None = None, values: Mapping[str, float] | None = None
 ) -> dict[str, Array]:
-    """C.C/(2 alpha) of every constraint [J], by group (count,); zero where rigid. Arguments as of `constraint_values`."""
+    """C.C/(2 alpha) of every constraint, J, by group (count,); zero where rigid. Arguments: see `constraint_values`."""
     compiled = scene.compiled
     offset, size = compiled.layout["compliance"]
     alpha = compiled.inputs(compiled.values(values))[offset : offset + size]

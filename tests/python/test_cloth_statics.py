@@ -1,0 +1,219 @@
+"""Cloth at rest against closed forms: strips, patches and cantilevers. Values, and derivatives by tangents and by the
+adjoint."""
+
+import math
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from pytest import approx
+from scipy.integrate import quad
+from scipy.optimize import brentq
+from support import static_sensitivity, twice
+
+WARP, SHEAR = 1000.0, 50.0
+TENSION = 50.0  # N/m
+BENDING = 1e-3  # of a membrane under tension, where it has no part in the answer
+
+
+def pulled(mesh: sb.TriangleMesh, tension: float = TENSION, along: str = "right", **options) -> sb.Scene:
+    """A sheet under uniform dead tension [N/m] on two opposite sides, free to narrow.
+
+    One corner is pinned. The traction balances, so the pin carries nothing; a spring of no account stops the turn about
+    the pull and the turn in the plane.
+    """
+    scene = sb.Scene("strip", gravity=(0, 0, 0))
+    cloth = sb.add_cloth(scene, mesh, density=0.2, bending=BENDING, **options)
+    load = np.zeros((len(mesh.vertices), 3))
+    axis = 0 if along == "right" else 1
+    for side, sign in zip(("left", "right") if axis == 0 else ("bottom", "top"), (-1.0, 1.0), strict=True):
+        ids = mesh.sets[side]
+        x = mesh.vertices[ids]
+        for a, b, length in zip(ids[:-1], ids[1:], np.linalg.norm(np.diff(x, axis=0), axis=1), strict=True):
+            load[[a, b], axis] += sign * tension * length / 2.0
+    loaded = np.flatnonzero(load.any(axis=1))
+    scene.add_force(cloth.particles[loaded], load[None, loaded])
+    corner = mesh.sets["corners"]
+    scene.pin(cloth.particles[[corner[0]]])
+    anchors = scene.add_particles(mesh.vertices[corner[1:]] + [0, 0, 1.0], 1.0)
+    scene.pin(anchors)
+    pairs = np.column_stack([cloth.particles[corner[1:]], anchors])
+    scene.add_constraints("distance", pairs, name="hold", compliance=np.full(3, 1e6))
+    return scene
+
+
+def stretch(rest: sb.Equilibrium) -> tuple[float, float]:
+    """Length and width over those at rest."""
+    cloth = rest.scene.cloths["cloth"]
+    x, mesh = rest.positions[cloth.particles], cloth.mesh
+    corner = mesh.sets["corners"]
+    before = mesh.vertices[corner]
+    after = x[corner]
+    return tuple(float(np.linalg.norm(after[k] - after[0]) / np.linalg.norm(before[k] - before[0])) for k in (1, 3))  # type: ignore[return-value]
+
+
+def strip(**options) -> sb.TriangleMesh:
+    return sb.mesh.grid(0.3, 0.2, 6, 4, **options)
+
+
+# --- O-24: uniaxial strip, free sides
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.3])
+@pytest.mark.parametrize("pattern", ["alternating", "crossed"])
+def test_a_strip_of_st_venant_kirchhoff(poisson, pattern):
+    rest = sb.equilibrium(pulled(strip(pattern=pattern), warp=WARP, shear=SHEAR, poisson=poisson))
+    longer = brentq(lambda s: WARP * s * (s * s - 1.0) / 2.0 - TENSION, 1.0, 2.0, xtol=1e-15)
+    assert longer == approx(1.0466805318, abs=1e-10)
+    narrower = math.sqrt(1.0 - poisson * (longer**2 - 1.0))
+    assert stretch(rest) == approx((longer, narrower), abs=1e-8)
+
+
+def test_derivatives_of_the_strip_by_stiffness_and_poisson():
+    scene = pulled(strip(), warp=WARP, weft=WARP, shear=SHEAR, poisson=0.3)
+    rest = sb.equilibrium(scene)
+    s = stretch(rest)[0]
+    far = np.zeros((scene.particle_count, 3))
+    corner = scene.cloths["cloth"].mesh.sets["corners"]
+    far[corner[1], 0] = 1 / 0.3
+    # with warp and weft apart the strip along the warp depends on the warp alone
+    assert static_sensitivity(rest, "cloth_warp", far) == approx(twice(-4.37326631e-5), rel=1e-7)
+    assert static_sensitivity(rest, "cloth_weft", far) == approx(twice(0.0), abs=1e-11)
+    assert static_sensitivity(rest, "cloth_shear", far) == approx(twice(0.0), abs=1e-11)
+    wide = np.zeros((scene.particle_count, 3))
+    wide[corner[3], 1] = 1 / 0.2
+    narrow = stretch(rest)[1]
+    assert static_sensitivity(rest, "cloth_poisson", wide) == approx(twice(-(s**2 - 1.0) / (2.0 * narrow)), rel=1e-7)
+
+
+def test_an_orthotropic_strip_narrows_by_its_own_poisson_ratio():
+    weft, coupling = 400.0, 0.25
+    rest = sb.equilibrium(pulled(strip(), warp=WARP, weft=weft, shear=SHEAR, poisson=coupling))
+    longer = 1.0466805318
+    narrower = math.sqrt(1.0 - coupling * math.sqrt(WARP / weft) * (longer**2 - 1.0))
+    assert stretch(rest) == approx((longer, narrower), abs=1e-8)
+    across = sb.equilibrium(pulled(strip(), along="top", warp=WARP, weft=weft, shear=SHEAR, poisson=coupling))
+    wider = brentq(lambda s: weft * s * (s * s - 1.0) / 2.0 - TENSION, 1.0, 2.0, xtol=1e-15)
+    shorter = math.sqrt(1.0 - coupling * math.sqrt(weft / WARP) * (wider**2 - 1.0))
+    assert stretch(across) == approx((shorter, wider), abs=1e-8)
+
+
+# --- nonlinear fabrics: the force of a strip is its law's
+
+
+def tangent(ratios: tuple[float, ...], spacing: float, e: float) -> float:
+    return float(np.interp(e, spacing * np.arange(5), [1.0, *ratios]))
+
+
+RATIOS = (2.0, 5.0, 9.0, 12.0)
+LAWS = {
+    "exponential": (
+        sb.Exponential(30.0, 30.0, 5.0),
+        lambda e: WARP * e * math.exp(30.0 * e * e),
+    ),
+    "spline": (
+        sb.Spline((0.06, 0.06, 0.1), RATIOS, RATIOS),
+        lambda e: WARP * quad(lambda s: tangent(RATIOS, 0.06, s), 0.0, e, points=[0.06, 0.12, 0.18, 0.24])[0],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("tension", [20.0, 300.0, 3000.0])
+def test_a_strip_of_a_stiffening_fabric(name, tension):
+    law, stress = LAWS[name]
+    rest = sb.equilibrium(pulled(strip(), tension, warp=WARP, shear=SHEAR, law=law))
+    longer = brentq(lambda s: s * stress((s * s - 1.0) / 2.0) - tension, 1.0, 3.0, xtol=1e-14)
+    assert stretch(rest) == approx((longer, 1.0), abs=1e-8)
+
+
+def test_derivative_by_a_stiffening():
+    b = 30.0
+    scene = pulled(strip(), 300.0, warp=WARP, shear=SHEAR, law=sb.Exponential(b, b, 5.0))
+    rest = sb.equilibrium(scene)
+
+    def length(b):
+        stress = lambda e: WARP * e * math.exp(b * e * e)  # noqa: E731
+        return brentq(lambda s: s * stress((s * s - 1.0) / 2.0) - 300.0, 1.0, 3.0, xtol=1e-15)
+
+    far = np.zeros((scene.particle_count, 3))
+    far[scene.cloths["cloth"].mesh.sets["corners"][1], 0] = 1 / 0.3
+    closed = (length(b + 1e-3) - length(b - 1e-3)) / 2e-3
+    assert static_sensitivity(rest, "cloth_warp_stiffening", far) == approx(twice(closed), rel=1e-6)
+
+
+# --- O-24b: off-axis modulus
+
+
+def test_modulus_at_45_degrees():
+    mesh = strip()
+    c = math.sqrt(0.5)
+    turned = sb.TriangleMesh(mesh.vertices, mesh.triangles, mesh.vertices[:, :2] @ [[c, -c], [c, c]], mesh.sets)
+    tension = 1e-3
+    E, nu, G = 1000.0, 0.3, 50.0
+    scene = pulled(turned, tension, warp=E, weft=E, shear=G, poisson=nu)
+    rest = sb.equilibrium(scene)
+    x = rest.positions[scene.cloths["cloth"].particles]
+    corner = mesh.sets["corners"]
+    modulus = tension / ((x[corner[1], 0] - x[corner[0], 0]) / 0.3 - 1.0)
+    expected = 1.0 / (0.25 * (1 / E + 1 / G - 2 * nu / E + 1 / E))
+    assert expected == approx(186.9159, abs=1e-4)
+    assert modulus == approx(expected, rel=1e-4)
+    far = np.zeros((scene.particle_count, 3))
+    far[corner[1], 0] = 1 / 0.3
+    # d(strain)/dG = -tension/(4 G^2)
+    assert static_sensitivity(rest, "cloth_shear", far) == approx(twice(-tension / (4 * G * G)), rel=1e-3)
+
+
+# --- O-26a: simple shear
+
+
+def test_simple_shear():
+    gamma, n = 0.1, 6
+    mesh = sb.mesh.grid(0.2, 0.2, n, n)
+    edge = np.unique(mesh.borders)
+    sheared = mesh.vertices.copy()
+    sheared[:, 0] += gamma * mesh.vertices[:, 1]
+    scene = sb.Scene("frame", gravity=(0, 0, 0))
+    cloth = sb.add_cloth(
+        scene, mesh, density=0.2, warp=WARP, shear=SHEAR, held=edge, bending=BENDING, positions=sheared
+    )
+    scene.pin(cloth.particles[edge])
+    rest = sb.equilibrium(scene)
+    assert rest.positions == approx(sheared, abs=1e-12)
+    strains = sb.constraint_values(scene, rest.positions)["cloth_membrane"]
+    assert strains[:, 0] == approx(0.0, abs=1e-14)
+    assert strains[:, 1] == approx(gamma**2 / 2, abs=1e-14)
+    assert strains[:, 2] * math.sqrt(WARP / SHEAR) == approx(gamma, abs=1e-14)
+    # the top support's force per width is (S_uv + gamma S_vv, S_vv); nodes by the corners lack the triangles left out
+    inner = sb.support_forces(rest)[cloth.particles[mesh.sets["top"][2:-2]]].sum(axis=0) / (0.2 * (n - 3) / n)
+    S_vv = WARP * gamma**2 / 2
+    assert inner[:2] == approx([SHEAR * gamma + gamma * S_vv, S_vv], rel=1e-10)
+
+
+# --- O-23: a patch bent to a cylinder
+
+
+@pytest.mark.parametrize("model", ["dihedral", "isometric_bending"])
+@pytest.mark.parametrize("degrees", [0, 45, 90, 135])
+def test_a_patch_on_a_cylinder_holds_the_energy_of_its_rigidity(model, degrees):
+    n, size, radius, B = 40, 0.2, 20.0, 1e-4
+    mesh = sb.mesh.grid(size, size, n, n, pattern="alternating")
+    scene = sb.Scene("patch", gravity=(0, 0, 0))
+    cloth = sb.add_cloth(scene, mesh, density=0.2, warp=WARP, shear=SHEAR, bending=B, bending_model=model)
+    scene.pin(cloth.particles[:1])
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    along = mesh.vertices[:, 0] * c + mesh.vertices[:, 1] * s
+    across = -mesh.vertices[:, 0] * s + mesh.vertices[:, 1] * c
+    bent = np.column_stack([radius * np.sin(along / radius), across, radius * (1 - np.cos(along / radius))])
+    energy = sb.elastic_energy(scene, bent)["cloth_bend"].sum()
+    measured = energy / (0.5 * B / radius**2 * size**2)
+    assert measured == approx(mesh.bending_ratio(math.radians(degrees)) / 3.0, rel=1e-5)
+
+
+def test_one_way_diagonals_are_refused():
+    mesh = sb.mesh.grid(0.2, 0.2, 10, 10, pattern="one_way")
+    scene = sb.Scene("patch")
+    with pytest.raises(sb.SceneError, match="times as hard in one direction") as caught:
+        sb.add_cloth(scene, mesh, density=0.2, warp=WARP, shear=SHEAR, bending=1e-4)
+    assert "alternating" in str(caught.value)
