@@ -47,13 +47,13 @@ def nearest(vertices: Array, points: Array) -> Indices:
     return np.concatenate(found)
 
 
-def locate(corners: Array, points: Array) -> tuple[Indices, Array]:
+def locate(corners: Array, triangles: Indices, points: Array) -> tuple[Indices, Array]:
     """Triangle and weights (k,), (k, 3) of points (k, 2) in the plane of `corners` (m, 3, 2).
 
     Raises:
-        MeshError: a point lies outside of every triangle, or inside of several.
+        MeshError: a point lies outside of every triangle, or inside of two that have no vertex in common.
     """
-    triangles, weights = [], []
+    found, weights = [], []
     for part in _parts(points, len(corners)):
         w = _flat_weights(corners, part[:, None])
         least = w.min(axis=-1)
@@ -63,14 +63,15 @@ def locate(corners: Array, points: Array) -> tuple[Indices, Array]:
         if outside.size:
             fix = "give points of the fabric, or use project() for points in space"
             raise MeshError("points", "lie outside of the material", part[outside[0]].tolist(), fix)
-        several = np.flatnonzero((least > _INSIDE).sum(axis=1) > 1)
-        if several.size:
-            fix = "use project() with points in space; material coordinates are local on this mesh"
-            raise MeshError("points", "lie in several triangles of the material", part[several[0]].tolist(), fix)
-        triangles.append(best)
+        for row in np.flatnonzero((least > _INSIDE).sum(axis=1) > 1):
+            others = triangles[least[row] > _INSIDE]
+            if not np.isin(others, triangles[best[row]]).any(axis=1).all():
+                fix = "use project() with points in space; material coordinates are local on this mesh"
+                raise MeshError("points", "lie in several triangles of the material", part[row].tolist(), fix)
+        found.append(best)
         weights.append(w[rows, best])
     kept = np.clip(np.concatenate(weights), 0.0, None)
-    return np.concatenate(triangles), kept / kept.sum(axis=1, keepdims=True)
+    return np.concatenate(found), kept / kept.sum(axis=1, keepdims=True)
 
 
 def closest(corners: Array, points: Array) -> tuple[Indices, Array]:

@@ -151,9 +151,9 @@ class TriangleMesh:
         """Places at (k, 2) material coordinates, m.
 
         Raises:
-            MeshError: a point lies outside of every triangle, or inside of several.
+            MeshError: a point lies outside of every triangle, or inside of two that have no vertex in common.
         """
-        triangles, weights = places.locate(self.corners, validate.rows("points", points, 2))
+        triangles, weights = places.locate(self.corners, self.triangles, validate.rows("points", points, 2))
         return Places(triangles, self.triangles[triangles], weights)
 
     def project(self, points: ArrayLike) -> Places:
