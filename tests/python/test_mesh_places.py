@@ -63,7 +63,7 @@ def closest_distance(mesh: sb.TriangleMesh, point: np.ndarray) -> float:
     return min(np.sqrt(minimize(square, start, args=(c,), **options).fun) for c in mesh.vertices[mesh.triangles])
 
 
-def test_many_points_are_projected_in_parts() -> None:
+def test_many_points_of_a_fine_mesh() -> None:
     mesh = sb.grid(1.0, 1.0, 40, 40)
     points = np.random.default_rng(0).uniform(0.0, 1.0, (300, 3))
     assert mesh.project(points).positions(mesh.vertices) == approx(points * [1, 1, 0], abs=1e-12)

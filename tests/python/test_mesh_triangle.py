@@ -70,6 +70,7 @@ def test_loops_are_in_order_with_the_fabric_on_the_left_also_around_a_hole() -> 
     outer, hole = mesh.boundary
     borders = set(map(tuple, mesh.borders.tolist()))
     for loop in mesh.boundary:
+        assert loop[0] == loop.min()
         assert set(zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)) <= borders
     assert [round(area(mesh, loop), 12) for loop in (outer, hole)] == [1.0, -0.04]
 

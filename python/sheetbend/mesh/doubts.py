@@ -27,7 +27,8 @@ def doubts(vertices: Array, triangles: Indices, corners: Array, twin: Indices) -
         worst = splinters[angle[splinters].argmin()]
         found.append(
             f"{splinters.size} of {len(areas)} triangles are splinters, the worst is {worst} with "
-            f"{np.degrees(angle[worst]):.2g} degrees and {areas[worst]:.2g} m^2: they make the problem stiff. Remesh them."
+            f"{np.degrees(angle[worst]):.2g} degrees and {areas[worst]:.2g} m^2: they make the problem stiff. "
+            "Remesh them."
         )
     parts = np.unique(topology.components(len(vertices), topology.edges(triangles)))
     if len(parts) > 1:

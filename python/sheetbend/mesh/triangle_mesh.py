@@ -158,7 +158,7 @@ class TriangleMesh:
 
     def project(self, points: ArrayLike) -> Places:
         """The places of the mesh that are closest to (k, 3) points in space, m."""
-        triangles, weights = places.closest(self.vertices[self.triangles], validate.rows("points", points, 3))
+        triangles, weights = places.closest(self.vertices, self.triangles, validate.rows("points", points, 3))
         return Places(triangles, self.triangles[triangles], weights)
 
     @cached_property
