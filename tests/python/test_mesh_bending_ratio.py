@@ -90,7 +90,7 @@ def test_it_holds_on_irregular_meshes_and_turns_with_the_warp_axis(seed: int, di
 
 
 def test_bias_is_that_of_the_pattern_and_not_of_the_border() -> None:
-    """A strip three cells wide has as much of it as a wide sheet."""
+    """A strip four cells wide has as much of it as a wide sheet."""
     for pattern, bias in (("one_way", 4.0), ("alternating", 1.5), ("crossed", 1.5)):
         wide = sb.grid(1.0, 1.0, 30, 30, pattern)
         assert wide.diagonal_bias == approx(bias, rel=1e-9)

@@ -102,6 +102,8 @@ def test_sets_boxes_and_nearest_vertices() -> None:
     assert mesh.sets["middle"].tolist() == [7] and "left" in mesh.sets
     assert mesh.within([-np.inf, 0.5, 0], [np.inf, 0.5, 0]).tolist() == mesh.sets["top"].tolist()
     assert mesh.within([2, 2, 2], [3, 3, 3]).size == 0
+    with pytest.raises(sb.MeshError, match="upper: must be three numbers"):
+        mesh.within([0, 0, 0], [1, 1])
     assert mesh.nearest(mesh.vertices + np.array([0.1, -0.1, 0.3])).tolist() == list(range(len(mesh.vertices)))
 
 

@@ -136,7 +136,10 @@ class TriangleMesh:
         Args:
             lower, upper: (3,) m; infinite entries leave a side open.
         """
-        low, high = (np.broadcast_to(np.asarray(bound, dtype=float), (3,)) for bound in (lower, upper))
+        low, high = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
+        for name, bound in (("lower", low), ("upper", high)):
+            if bound.shape != (3,) or np.isnan(bound).any():
+                raise MeshError(name, "must be three numbers", bound.tolist(), "give x, y and z in m, or infinity")
         return np.flatnonzero(((self.vertices >= low) & (self.vertices <= high)).all(axis=1))
 
     def nearest(self, points: ArrayLike) -> Indices:
