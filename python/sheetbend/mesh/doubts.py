@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from . import topology
 from .topology import Indices
+from .unfold import warp_turns
 from .validate import signed_areas
 
 Array = NDArray[np.float64]
@@ -25,8 +26,9 @@ def doubts(vertices: Array, triangles: Indices, corners: Array, twin: Indices) -
     if splinters.size:
         worst = splinters[angle[splinters].argmin()]
         found.append(
-            f"{splinters.size} triangles are splinters, the worst {worst} with {np.degrees(angle[worst]):.2g} degrees "
-            f"and {areas[worst]:.2g} m^2: they make the problem stiff. Remesh them."
+            f"{splinters.size} of {len(areas)} triangles are splinters, the worst is {worst} with "
+            f"{np.degrees(angle[worst]):.2g} degrees and {areas[worst]:.2g} m^2: they make the problem stiff. "
+            "Remesh them."
         )
     parts = np.unique(topology.components(len(vertices), topology.edges(triangles)))
     if len(parts) > 1:
@@ -45,21 +47,19 @@ def doubts(vertices: Array, triangles: Indices, corners: Array, twin: Indices) -
 
 def _misfit(corners: Array, twin: Indices) -> list[str]:
     """Sentences on edges whose two triangles disagree on their length or direction in the material."""
-    first, second = topology.hinge_half_edges(twin).T
-    along = (np.roll(corners, -1, axis=1) - corners).reshape(-1, 2)
-    u, v = along[first], -along[second]
-    lengths = np.linalg.norm(u, axis=1), np.linalg.norm(v, axis=1)
-    gathered = np.abs(lengths[0] - lengths[1]) > _GATHERED * np.maximum(*lengths)
-    turn = np.abs(np.arctan2(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], (u * v).sum(axis=1)))
+    lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).ravel()[topology.hinge_half_edges(twin)]
+    gathered = (np.ptp(lengths, axis=1) > _GATHERED * lengths.max(axis=1)).sum()
+    turns = np.abs(warp_turns(corners, twin))
+    jumps = turns[turns > _WARP_JUMP]
     found = []
-    if gathered.any():
+    if gathered:
         found.append(
-            f"{gathered.sum()} edges have different lengths in the material of their two triangles (gathered seams)."
+            f"{gathered} edges have different lengths in the material of their two triangles (gathered seams)."
         )
-    if (turn > _WARP_JUMP).any():
+    if jumps.size:
         found.append(
-            f"the warp direction jumps across {(turn > _WARP_JUMP).sum()} edges, by up to "
-            f"{np.degrees(turn.max()):.2g} degrees (a seam, or a place where it is perpendicular to the surface)."
+            f"the warp direction jumps across {jumps.size} edges, by up to {np.degrees(jumps.max()):.2g} degrees "
+            "(a seam, or a place where it is perpendicular to the surface)."
         )
     return found
 

@@ -136,7 +136,10 @@ class TriangleMesh:
         Args:
             lower, upper: (3,) m; infinite entries leave a side open.
         """
-        low, high = (np.broadcast_to(np.asarray(bound, dtype=float), (3,)) for bound in (lower, upper))
+        low, high = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
+        for name, bound in (("lower", low), ("upper", high)):
+            if bound.shape != (3,) or np.isnan(bound).any():
+                raise MeshError(name, "must be three numbers", bound.tolist(), "give x, y and z in m, or infinity")
         return np.flatnonzero(((self.vertices >= low) & (self.vertices <= high)).all(axis=1))
 
     def nearest(self, points: ArrayLike) -> Indices:
@@ -151,14 +154,14 @@ class TriangleMesh:
         """Places at (k, 2) material coordinates, m.
 
         Raises:
-            MeshError: a point lies outside of every triangle, or inside of several.
+            MeshError: a point lies outside of every triangle, or inside of two that have no vertex in common.
         """
-        triangles, weights = places.locate(self.corners, validate.rows("points", points, 2))
+        triangles, weights = places.locate(self.corners, self.triangles, validate.rows("points", points, 2))
         return Places(triangles, self.triangles[triangles], weights)
 
     def project(self, points: ArrayLike) -> Places:
         """The places of the mesh that are closest to (k, 3) points in space, m."""
-        triangles, weights = places.closest(self.vertices[self.triangles], validate.rows("points", points, 3))
+        triangles, weights = places.closest(self.vertices, self.triangles, validate.rows("points", points, 3))
         return Places(triangles, self.triangles[triangles], weights)
 
     @cached_property

@@ -13,6 +13,7 @@ from .topology import Indices
 Array = NDArray[np.float64]
 
 _SAME_PLACE = 1e-6  # of the size of the mesh: files hold no more digits
+_JUMP = np.radians(5.0)
 _STEEP = 1e-6  # the part of the warp direction that lies in a triangle, at least, to give it a direction
 _NO_AREA = 1e-12  # of the square of the longest edge: rounding of the coordinates
 
@@ -21,9 +22,10 @@ def unfold(vertices: Array, triangles: Indices, warp: ArrayLike = (1.0, 0.0, 0.0
     """Material coordinates in which every triangle keeps its shape.
 
     Each triangle is laid into the plane beside the neighbor through which it is reached first, starting from the one
-    most parallel to `warp` in every connected part. Where the surface can be unrolled (a plane, a bent sheet) the
-    copies of a vertex coincide, and the coordinates are geodesic. Elsewhere no chart exists: each triangle has its own,
-    with `warp` projected onto it, and its neighbor's direction where that vanishes.
+    most parallel to `warp` in every connected part. Where the surface can be unrolled (a plane, a bent sheet) this is
+    the geodesic chart; vertices that sample a bent sheet leave small gaps in it. Where the warp direction would jump by
+    more than 5 degrees across an edge, no chart exists: each triangle has its own, with `warp` projected onto it, and
+    its neighbor's direction where that vanishes.
 
     Args:
         vertices: (n, 3) m, at rest.
@@ -58,9 +60,19 @@ def unfold(vertices: Array, triangles: Indices, warp: ArrayLike = (1.0, 0.0, 0.0
     extent = np.ptp(placed.reshape(-1, 2), axis=0).max()
     if np.abs(per_vertex[triangles] - placed).max() <= _SAME_PLACE * extent:
         return per_vertex
-    clear = steepness > _STEEP * np.linalg.norm(direction)
-    placed[clear] = _projected(vertices[triangles[clear]], across[clear], normals[clear])
+    if np.abs(warp_turns(placed, twin)).max() > _JUMP:
+        clear = steepness > _STEEP * np.linalg.norm(direction)
+        placed[clear] = _projected(vertices[triangles[clear]], across[clear], normals[clear])
     return placed
+
+
+def warp_turns(corners: Array, twin: Indices) -> Array:
+    """(k,) rad, how far the warp direction turns across every hinge when its triangles are laid side by side."""
+    first, second = topology.hinge_half_edges(twin).T
+    along = (np.roll(corners, -1, axis=1) - corners).reshape(-1, 2)
+    u, v = along[first], -along[second]
+    turns: Array = np.arctan2(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], (u * v).sum(axis=1))
+    return turns
 
 
 def _projected(corners: Array, warp: Array, normals: Array) -> Array:

@@ -1,0 +1,161 @@
+"""Meshes from files and into files."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from pytest import approx
+from sheetbend.optional import MissingExtraError
+
+CUT = """# a square whose two halves are cut apart in the texture
+v 0 0 0
+v 100 0 0
+v 100 100 0
+v 0 100 0
+vt 0 0
+vt 0.1 0
+vt 0.1 0.1
+vt 0.5 0
+vt 0.6 0.1
+vt 0.5 0.1
+f 1/1 2/2 3/3
+f 1/4 3/5 4/6
+"""
+
+
+def bumpy() -> sb.TriangleMesh:
+    flat = sb.grid(0.4, 0.3, 4, 3)
+    x, y, _ = flat.vertices.T
+    return sb.TriangleMesh(np.column_stack([x, y, 0.05 * np.sin(9 * x) * y]), flat.triangles, flat.material)
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".ply"])
+def test_what_is_written_is_read_again(tmp_path: Path, suffix: str) -> None:
+    mesh = bumpy()
+    {".obj": sb.write_obj, ".ply": sb.write_ply}[suffix](tmp_path / f"mesh{suffix}", mesh)
+    again = sb.read_mesh(tmp_path / f"mesh{suffix}")
+    assert np.array_equal(again.triangles, mesh.triangles)
+    assert again.vertices == approx(mesh.vertices, abs=1e-10) and again.material == approx(mesh.material, abs=1e-10)
+
+
+def test_material_per_corner_survives_an_obj(tmp_path: Path) -> None:
+    mesh = sb.icosphere(0.1, 1)
+    sb.write_obj(tmp_path / "ball.obj", mesh)
+    with pytest.warns(UserWarning, match="the warp direction jumps"):
+        again = sb.read_mesh(tmp_path / "ball.obj")
+    assert np.array_equal(again.triangles, mesh.triangles) and again.material == approx(mesh.material, abs=1e-10)
+
+
+def test_a_cut_in_the_texture_is_no_cut_in_the_mesh(tmp_path: Path) -> None:
+    (tmp_path / "cut.obj").write_text(CUT)
+    mesh = sb.read_mesh(tmp_path / "cut.obj", unit="mm")
+    assert mesh.vertices.tolist() == [[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0]]  # in the file's order
+    assert len(mesh.hinges) == 1
+    assert mesh.material[1] == approx(np.array([[0.5, 0.0], [0.6, 0.1], [0.5, 0.1]]))
+
+
+def test_a_ply_with_texture_coordinates_per_face(tmp_path: Path) -> None:
+    header = ["ply", "format ascii 1.0", "element vertex 4", *(f"property float {c}" for c in "xyz"), "element face 2"]
+    header += ["property list uchar int vertex_indices", "property list uchar float texcoord", "end_header"]
+    rows = ["0 0 0", "1 0 0", "1 1 0", "0 1 0", "3 0 1 2 6 0 0 1 0 1 1", "3 0 2 3 6 5 0 6 1 5 1"]
+    (tmp_path / "cut.ply").write_text("\n".join([*header, *rows, ""]))
+    mesh = sb.read_mesh(tmp_path / "cut.ply")
+    assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3]] and mesh.vertices[2].tolist() == [1, 1, 0]
+    assert mesh.material.tolist() == [[[0, 0], [1, 0], [1, 1]], [[5, 0], [6, 1], [5, 1]]]
+
+
+def test_an_stl_is_merged_and_unrolled(tmp_path: Path) -> None:
+    mesh = sb.grid(0.4, 0.3, 4, 3)
+    facets = []
+    for corners in mesh.vertices[mesh.triangles]:
+        lines = "".join(f"vertex {x:.7g} {y:.7g} {z:.7g}\n" for x, y, z in corners)
+        facets.append(f"facet normal 0 0 1\nouter loop\n{lines}endloop\nendfacet\n")
+    (tmp_path / "sheet.stl").write_text("solid sheet\n" + "".join(facets) + "endsolid sheet\n")
+    again = sb.read_mesh(tmp_path / "sheet.stl")
+    assert len(again.vertices) == len(mesh.vertices) and len(again.hinges) == len(mesh.hinges)
+    assert again.material == approx(again.vertices[:, :2], abs=1e-9)
+    assert again.vertices[0].tolist() == mesh.vertices[mesh.triangles[0, 0]].tolist()  # in the order of first use
+
+
+def test_the_caller_chooses_the_material(tmp_path: Path) -> None:
+    (tmp_path / "cut.obj").write_text(CUT)
+    unfolded = sb.read_mesh(tmp_path / "cut.obj", "unfold", unit="cm", warp=(0, 1, 0))
+    assert unfolded.material == approx(np.array([[0, 0], [0, -1], [1, -1], [1, 0]]), abs=1e-12)
+    given = sb.read_mesh(tmp_path / "cut.obj", [[0, 0], [2, 0], [2, 2], [0, 2]], unit="cm")
+    assert given.areas == approx(np.array([2.0, 2.0]))
+    sized = sb.read_mesh(tmp_path / "cut.obj", unit="cm", texture_size=[10.0, 9.0])
+    assert sized.areas == approx(np.array([0.45, 0.45]))
+
+
+def test_texture_coordinates_of_another_size_are_refused_with_the_size_that_fits(tmp_path: Path) -> None:
+    (tmp_path / "cut.obj").write_text(CUT)
+    with pytest.raises(
+        sb.MeshError, match=r"makes 0.01 m\^2 of fabric from a shape of 1 m\^2.*10 makes the areas equal"
+    ):
+        sb.read_mesh(tmp_path / "cut.obj", unit="cm")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "options", "message"),
+    [
+        ("mesh.off", "", {}, "path: has a suffix that no reader knows .*use one of .obj, .ply, .stl"),
+        ("mesh.obj", None, {}, "path: is no file"),
+        ("mesh.obj", "v 0 0 0\nv 1 0 0\n", {}, "has no triangles"),
+        ("mesh.ply", "not a mesh", {}, "cannot be read"),
+        ("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", {}, "cannot be read|vertices that do not exist"),
+        ("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", {"material": "texture"}, "has no texture coordinates"),
+        ("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", {"material": "uv"}, "material: is unknown"),
+        ("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", {"unit": "inch"}, "unit: is unknown .*m, cm, mm"),
+        ("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\n", {}, "belong to no triangle"),
+    ],
+)
+def test_bad_files_are_refused(
+    tmp_path: Path, name: str, content: str | None, options: dict[str, str], message: str
+) -> None:
+    if content is not None:
+        (tmp_path / name).write_text(content)
+    with pytest.raises(sb.MeshError, match=message):
+        sb.read_mesh(tmp_path / name, **options)
+
+
+def test_without_trimesh_the_error_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "cut.obj").write_text(CUT)
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'sheetbend\[mesh\]'"):
+        sb.read_mesh(tmp_path / "cut.obj")
+
+
+def test_a_sequence_has_one_file_per_frame(tmp_path: Path) -> None:
+    mesh = bumpy()
+    frames = mesh.vertices + np.linspace(0, 1, 3)[:, None, None] * [0.0, 0.0, 0.2]
+    files = sb.write_obj_sequence(tmp_path / "drop", mesh, frames)
+    assert [f.name for f in files] == ["frame_00000.obj", "frame_00001.obj", "frame_00002.obj"]
+    assert sb.read_mesh(files[2]).vertices == approx(frames[2], abs=1e-10)
+    sb.write_obj_sequence(tmp_path / "drop", mesh, frames)  # once more over itself
+    with pytest.raises(sb.MeshError, match="folder: holds frames of another sequence"):
+        sb.write_obj_sequence(tmp_path / "drop", mesh, frames[:2])
+    with pytest.raises(sb.MeshError, match="positions: has the wrong shape"):
+        sb.write_obj_sequence(tmp_path / "other", mesh, frames[0])
+
+
+def test_a_ply_carries_fields(tmp_path: Path) -> None:
+    trimesh = pytest.importorskip("trimesh")
+    mesh = bumpy()
+    strain, height = np.linspace(-1, 1, len(mesh.triangles)), mesh.vertices[:, 2] / 3
+    lifted = mesh.vertices + np.array([0, 0, 1])
+    sb.write_ply(tmp_path / "a.ply", mesh, lifted, vertex_fields={"height": height}, face_fields={"strain": strain})
+    raw = trimesh.load_mesh(str(tmp_path / "a.ply"), process=False).metadata["_ply_raw"]
+    assert np.array_equal(raw["vertex"]["data"]["z"].ravel(), lifted[:, 2])  # every bit
+    assert np.array_equal(raw["vertex"]["data"]["height"].ravel(), height)
+    assert np.array_equal(raw["face"]["data"]["strain"].ravel(), strain)
+    for fields, message in (
+        ({"face_fields": {"strain": strain[1:]}}, r"face_fields\['strain'\]: has the wrong shape"),
+        ({"vertex_fields": {"x": height}}, "has a name that cannot stand in the file"),
+        ({"face_fields": {"a b": strain}}, "has a name that cannot stand in the file"),
+    ):
+        with pytest.raises(sb.MeshError, match=message):
+            sb.write_ply(tmp_path / "b.ply", mesh, **fields)
