@@ -15,6 +15,7 @@
 #include "core/constraints/isometric_bending.h"
 #include "core/constraints/material_curvature.h"
 #include "core/constraints/planar_bend.h"
+#include "core/constraints/sheet_curvature.h"
 #include "core/constraints/spline_strain.h"
 #include "core/constraints/strain.h"
 #include "core/constraints/twist.h"
@@ -36,6 +37,7 @@ using Registry = std::tuple<  //
     SplineStrain,             //
     Dihedral,                 //
     IsometricBending,         //
+    SheetCurvature,           //
     Area>;
 
 inline constexpr int kind_count = std::tuple_size_v<Registry>;

@@ -35,10 +35,10 @@ struct OneColor {
     std::fill_n(in.of(Quantity::mass), scene.layout.count(Quantity::mass), 0.02);
     std::fill_n(in.of(Quantity::compliance), scene.layout.count(Quantity::compliance), 1e-2);
     std::fill_n(in.of(Quantity::damping), scene.layout.count(Quantity::damping), damped ? 1e-3 : 0.0);
-    const double parameters[] = {0.36, 0.48, 0.8,
-                                 0.15};  // the first three are a unit vector, for those that need a normal
+    // the first three are a unit vector, for those that need a normal; none is zero or above one
+    const double parameters[] = {0.36, 0.48, 0.8, 0.15};
     for (std::size_t i = 0; i < scene.layout.count(Quantity::rest); ++i)
-      in.of(Quantity::rest)[i] = parameters[i % parameter_count<K>];
+      in.of(Quantity::rest)[i] = parameters[i % parameter_count<K> % 4];
   }
 
   Plan plan(int sweeps) const {

@@ -99,7 +99,8 @@ def add_cloth(
         mesh.vertices if positions is None else finite(f"{name}.positions", positions, mesh.vertices.shape, SceneError)
     )
     free = np.ones(len(shape), dtype=bool)
-    free[indices(f"{name}.held", np.ravel(held).tolist(), len(shape))] = False
+    if np.size(held):
+        free[indices(f"{name}.held", held, len(shape))] = False
 
     particles = scene.add_particles(shape, 0.0)
     _weigh(scene, mesh, name, particles, density, drag_linear, drag_quadratic)

@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "adjoint/equilibrium_vjp.h"
+#include "core/equilibrium/residual.h"
+#include "tests/cpp/support/cases.h"
 #include "tests/cpp/support/compare.h"
 #include "tests/cpp/support/ropes.h"
 
@@ -68,20 +70,21 @@ AtRest every_kind() {
     Vec3<double>(0.6 + random(-0.01, 0.01), random(-0.01, 0.01), random(-0.01, 0.01))
         .store(in.of(Quantity::boundary) + 3 * knot);
   for (const Group& group : s.scene.groups)
-    for (int i = 0; i < group.count; ++i) {
-      double* p = in.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(i) * group.parameters;
-      if (group.parameters == 1) *p = random(0.09, 0.11);
-      if (group.parameters == 3) Vec3<double>(1.2, random(-0.2, 0.2), random(-0.2, 0.2)).store(p);
-      if (group.parameters == 5) {
-        const double values[] = {1.2, 0.4, 0.1, 0.1, -0.1};
-        std::copy_n(values, 5, p);
+    with_kind(group.kind, [&]<class K>(K) {
+      for (int i = 0; i < group.count; ++i) {
+        double* p = in.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(i) * group.parameters;
+        const std::vector<double> sample = case_of<K>().p;
+        for (std::size_t k = 0; k < sample.size(); ++k) p[k] = random(0.95, 1.05) * sample[k];
+        double x[K::dofs], force = 0.0;
+        gather<K>(s.scene, group, i, in.of(Quantity::position), x);
+        const Evaluation<K, double> at(x, p);
+        for (int j = 0; j < K::rows; ++j)
+          for (int d = 0; d < K::dofs; ++d) force = std::max(force, std::abs(at.C[j] * at.J[j * K::dofs + d]));
+        // links hold the rope; the rest pulls less than its weight
+        in.of(Quantity::compliance)[group.first + i] =
+            random(1.0, 2.0) * (group.arity == 2 ? 1e-3 : std::max(force / 0.02, 1e2));
       }
-      if (group.parameters == 4) {
-        Vec3<double>(0.1, 0.99, -0.1).store(p);
-        p[3] = random(-0.2, 0.2);
-      }
-      in.of(Quantity::compliance)[group.first + i] = random(1.0, 2.0) * (group.arity == 2 ? 1e-3 : 1e2);
-    }
+    });
   return at_rest(std::move(s.scene), std::move(s.inputs));
 }
 

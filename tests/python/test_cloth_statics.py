@@ -35,7 +35,7 @@ def pulled(mesh: sb.TriangleMesh, tension: float = TENSION, along: str = "right"
     scene.add_force(cloth.particles[loaded], load[None, loaded])
     corner = mesh.sets["corners"]
     scene.pin(cloth.particles[[corner[0]]])
-    anchors = scene.add_particles(mesh.vertices[corner[1:]] + [0, 0, 1.0], 1.0)
+    anchors = scene.add_particles(mesh.vertices[corner[1:]] + [0, 0, 1e3], 1.0)
     scene.pin(anchors)
     pairs = np.column_stack([cloth.particles[corner[1:]], anchors])
     scene.add_constraints("distance", pairs, name="hold", compliance=np.full(3, 1e6))

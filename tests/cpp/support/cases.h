@@ -99,7 +99,7 @@ inline Case case_of<Hinge>() {
 template <>
 inline Case case_of<Attachment>() {
   return {.x = {0, 0, 0, 0.04, 0.02, -0.03},
-          .p = {0.03, -0.01, 0.02},
+          .p = {0.003, -0.001, 0.002},
           .compliance = 3e-4,
           .damping = 3.0,
           .under_rotation = UnderRotation::turns,
@@ -196,7 +196,9 @@ inline Case case_of<ExponentialStrain>() {
 template <>
 inline Case case_of<SplineStrain>() {
   Case row = case_of<Strain>();
-  for (const double spacing : {0.05, 0.04, 0.06}) row.p.insert(row.p.end(), {spacing, 1.5, 2.0, 4.0, 3.0});
+  row.x = {0, 0, 0, 0.225, 0.45, 0.03, -0.18, 0.36, -0.06};  // beyond the last knot of each component
+  row.p = {3.33, 1.83, -3.33, 1.83, 0.3, 0.8, 0.5};
+  for (const double spacing : {0.06, 0.07, 0.05}) row.p.insert(row.p.end(), {spacing, 1.5, 2.0, 4.0, 3.0});
   row.parameter_degree.resize(row.p.size(), 0);
   row.parameter_sign.resize(row.p.size(), 1);
   for (int k = 7; k < 22; ++k) row.parameter_relabeling.push_back(k);
@@ -231,6 +233,21 @@ inline Case case_of<IsometricBending>() {
           .parameter_sign = {1, 1, 1},
           .parameter_relabeling = {0, 2, 1},
           .curved = false};
+}
+
+template <>
+inline Case case_of<SheetCurvature>() {
+  return {.x = {0, 0, 0, 0.09, 0.03, -0.02, 0.01, 0.1, 0.03, 0.06, -0.08, 0.02, 0.12, 0.11, 0.01, -0.08, 0.06, -0.01},
+          .p = {6.0, 5.0, -2.0, 1.0, 4.0, 7.0, 3.0, -5.0, 2.0, 0.8, 1.2, 0.1, -0.05, 0.08},
+          .compliance = 30.0,
+          .damping = 2e-5,
+          .under_rotation = UnderRotation::stays,
+          .degree = 0,
+          .parameter_degree = std::vector<int>(14, 0),
+          .relabeling = {1, 2, 0, 4, 5, 3},
+          .sign = {1, 1, 1},
+          .parameter_sign = std::vector<int>(14, 1),
+          .parameter_relabeling = {1, 2, 0, 4, 5, 3, 7, 8, 6, 9, 10, 12, 13, 11}};
 }
 
 template <>
