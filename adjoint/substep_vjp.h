@@ -1,8 +1,8 @@
 // The reverse of one substep: velocity read-off, projections in reverse order, damping references, prediction.
 #pragma once
 
+#include "adjoint/air_vjp.h"
 #include "adjoint/packs/packed_reverse.h"
-#include "adjoint/predict_vjp.h"
 #include "adjoint/project_block_vjp.h"
 #include "adjoint/project_vjp.h"
 #include "adjoint/yield_vjp.h"
@@ -142,6 +142,7 @@ void substep_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in
   retract_directors_vjp(scene, [&](int node) { return corrected.of(node); }, x_next_bar);
   read_off_vjp(scene, bdf, x_next_bar, v_next_bar, threads, scratch.q_bar(plan), bar);
   project_vjp(scene, plan, in, bdf, s, record, scratch, bar, in_bar);
+  blow_vjp(scene, in, bdf, t_next, s, record.weights, scratch.q_bar(plan), scratch.w_bar(plan), bar, in_bar);
   predict_vjp(scene, in, bdf, t_next, s, record.weights, scratch.q_bar(plan), scratch.w_bar(plan), threads,
               scratch.gravity, bar, in_bar);
 }

@@ -51,6 +51,17 @@ double mean_edge(const Scene& scene, const double* x) {
   return count == 0 ? 0.0 : sum / count;
 }
 
+// The force of a wind has no potential and no symmetric derivative, which is what the solver works with. At rest, still air exerts none.
+void expect_still_air(const Scene& scene, const Inputs<const double>& in, double t0) {
+  if (scene.air.empty()) return;
+  const Vec3<double> wind = at_knots(scene.wind.at(t0), in.of(Quantity::wind), 1, 0);
+  if (dot(wind, wind) == 0.0) return;
+  std::ostringstream text;
+  text << "wind: a state of rest was asked for at t = " << t0 << " s, where the wind is " << norm(wind)
+       << " m/s. Fix: let it rise from zero after that time, or simulate until the motion has died down";
+  throw std::invalid_argument(text.str());
+}
+
 std::string not_converged(const Equilibrium& e, double tolerance) {
   std::ostringstream text;
   text << "equilibrium: no rest found in " << e.iterations << " iterations, relative residual " << e.residual
@@ -79,6 +90,7 @@ struct EquilibriumSolver::State {
         r_l(scene_.rows),
         softened(scene_.constraints),
         soft(scene_.groups.size(), std::numeric_limits<double>::infinity()) {
+    expect_still_air(scene, in, o.t0);
     const double* from = start_x ? start_x : in.of(Quantity::position);
     x.assign(from, from + scene.dofs());
     start_lambda ? lambda.assign(start_lambda, start_lambda + scene.rows) : lambda.assign(scene.rows, 0.0);

@@ -20,11 +20,14 @@ enum class Quantity : int {
   gravity,         // (3)  [m/s^2]
   drag_linear,     // per particle  [N s/m]
   drag_quadratic,  // per particle  [N s^2/m^2]
+  wind,            // (knots, 3)  [m/s]
+  air_normal,      // per triangle in air: air density * drag coefficient / 2, along its normal  [kg/m^3]
+  air_tangential,  // the same across the normal
 };
-inline constexpr int quantity_count = 11;
+inline constexpr int quantity_count = 14;
 inline constexpr std::array<const char*, quantity_count> quantity_names{
-    "position", "velocity", "mass",    "compliance",  "damping",       "rest",
-    "boundary", "force",    "gravity", "drag_linear", "drag_quadratic"};
+    "position", "velocity", "mass",        "compliance",     "damping", "rest",       "boundary",
+    "force",    "gravity",  "drag_linear", "drag_quadratic", "wind",    "air_normal", "air_tangential"};
 
 struct Layout {
   std::array<std::size_t, quantity_count> size{};

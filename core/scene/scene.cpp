@@ -64,6 +64,16 @@ Group build_group(const GroupSpec& spec, const Scene& scene) {
   return g;
 }
 
+void check_air(const Scene& scene) {
+  for (const auto& [a, b, c] : scene.air) {
+    check_nodes("air", {a, b, c}, scene.nodes());
+    const std::string which = std::to_string(a) + ", " + std::to_string(b) + ", " + std::to_string(c);
+    if (a == b || b == c || c == a) refuse("air: triangle " + which + " has no area. Fix: give distinct particles");
+    if (scene.is_director[a] || scene.is_director[b] || scene.is_director[c])
+      refuse("air: triangle " + which + " holds a director. Fix: let air act on particles");
+  }
+}
+
 }  // namespace
 
 int kind_of(const std::string& name) {
@@ -117,6 +127,10 @@ Scene build_scene(const SceneSpec& spec) {
   s.force = spec.force;
   check_knots("boundary_times", s.boundary, !s.driven.empty());
   check_knots("force_times", s.force, !s.loaded.empty());
+  s.air = spec.air;
+  s.wind = spec.wind;
+  check_air(s);
+  check_knots("wind_times", s.wind, !s.air.empty());
 
   std::size_t values = 0;
   for (const GroupSpec& g : spec.groups) {
@@ -144,7 +158,10 @@ Scene build_scene(const SceneSpec& spec) {
                    s.force.times.size() * s.loaded.size() * 3,
                    3,
                    nodes,
-                   nodes};
+                   nodes,
+                   s.wind.times.size() * 3,
+                   s.air.size(),
+                   s.air.size()};
   s.layout.close();
   return s;
 }

@@ -2,6 +2,7 @@
 // differentiated lives outside, in Inputs laid out by `layout`.
 #pragma once
 
+#include <array>
 #include <span>
 #include <string>
 #include <vector>
@@ -51,7 +52,8 @@ struct Scene {
   std::vector<int> loaded;       // nodes that time-dependent forces act on
   std::vector<int> loaded_slot;
   bool has_drag = false;
-  Knots boundary, force;
+  std::vector<std::array<int, 3>> air;  // nodes of the triangles that air acts on
+  Knots boundary, force, wind;
   std::vector<Group> groups;
   int constraints = 0, rows = 0;
   std::size_t stencil_coordinates = 0, gradient_entries = 0;
@@ -73,7 +75,8 @@ struct SceneSpec {
   std::vector<Director> directors;
   std::vector<int> pinned, driven, loaded;
   bool has_drag = false;
-  Knots boundary, force;
+  std::vector<std::array<int, 3>> air;
+  Knots boundary, force, wind;
   std::vector<GroupSpec> groups;
 };
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <atomic>
 
-#include "core/solver/predict.h"
+#include "core/solver/air.h"
 #include "core/solver/project.h"
 #include "core/solver/project_block.h"
 #include "core/solver/retract.h"
@@ -107,6 +107,7 @@ void correct(const Scene& scene, const Plan& plan, const Inputs<const T>& in, co
              const SubstepStates<T>& s, T* q, SubstepRecord<T>& record) {
   weigh(scene, in, bdf, s, record.weights);
   predict(scene, in, bdf, t_next, s, record.weights, plan.options.threads, record.coordinates(plan, q));
+  blow(scene, in, bdf, t_next, s, record.weights, record.coordinates(plan, q));
   project(scene, plan, in, bdf, s, q, record);
 }
 

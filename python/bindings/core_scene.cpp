@@ -17,6 +17,7 @@ std::shared_ptr<const Scene> make_scene(int particles, const std::vector<std::ar
                                         std::vector<int> pinned, std::vector<int> driven,
                                         std::vector<double> boundary_times, const std::string& boundary_interpolation,
                                         std::vector<int> loaded, std::vector<double> force_times, bool has_drag,
+                                        std::vector<std::array<int, 3>> air, std::vector<double> wind_times,
                                         const std::vector<py::dict>& groups) {
   SceneSpec spec;
   spec.particles = particles;
@@ -27,6 +28,8 @@ std::shared_ptr<const Scene> make_scene(int particles, const std::vector<std::ar
   spec.has_drag = has_drag;
   spec.boundary = {std::move(boundary_times), interpolation_of(boundary_interpolation)};
   spec.force = {std::move(force_times), Interpolation::linear};
+  spec.air = std::move(air);
+  spec.wind = {std::move(wind_times), Interpolation::linear};
   for (const py::dict& g : groups)
     spec.groups.push_back({g["name"].cast<std::string>(), g["kind"].cast<std::string>(), g["damped"].cast<bool>(),
                            whole_numbers(g["stencil"])});
@@ -40,14 +43,16 @@ void bind_scene(py::module_& m) {
       .def(py::init([](int particles, const std::vector<std::array<int, 3>>& directors, std::vector<int> pinned,
                        std::vector<int> driven, std::vector<double> boundary_times,
                        const std::string& boundary_interpolation, std::vector<int> loaded,
-                       std::vector<double> force_times, bool has_drag, const std::vector<py::dict>& groups) {
+                       std::vector<double> force_times, bool has_drag, std::vector<std::array<int, 3>> air,
+                       std::vector<double> wind_times, const std::vector<py::dict>& groups) {
              return std::const_pointer_cast<Scene>(
                  make_scene(particles, directors, std::move(pinned), std::move(driven), std::move(boundary_times),
-                            boundary_interpolation, std::move(loaded), std::move(force_times), has_drag, groups));
+                            boundary_interpolation, std::move(loaded), std::move(force_times), has_drag, std::move(air),
+                            std::move(wind_times), groups));
            }),
            py::kw_only(), py::arg("particles"), py::arg("directors"), py::arg("pinned"), py::arg("driven"),
            py::arg("boundary_times"), py::arg("boundary_interpolation"), py::arg("loaded"), py::arg("force_times"),
-           py::arg("has_drag"), py::arg("groups"))
+           py::arg("has_drag"), py::arg("air"), py::arg("wind_times"), py::arg("groups"))
       .def_property_readonly("layout",
                              [](const Scene& s) {
                                py::dict layout;

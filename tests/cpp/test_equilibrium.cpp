@@ -188,6 +188,31 @@ TEST(Equilibrium, WarmStartTakesFewIterations) {
   EXPECT_LE(next.iterations, 4);
 }
 
+// Wind that rises from zero: until then a scene in air rests as if there were none.
+TEST(Equilibrium, TakesStillAirAndRefusesWind) {
+  SceneSpec spec;
+  spec.particles = 3;
+  spec.pinned = {0};
+  spec.groups = {{"links", "distance", false, {0, 1, 1, 2}}};
+  spec.air = {{0, 1, 2}};
+  spec.wind = {{0.0, 1.0}, Interpolation::linear};
+  const Scene scene = build_scene(spec);
+  std::vector<double> inputs(scene.layout.total(), 0.0);
+  const Inputs<double> in{scene.layout, inputs.data()};
+  for (int k = 0; k < 3; ++k) {
+    in.of(Quantity::position)[3 * k] = k;
+    in.of(Quantity::mass)[k] = 1.0;
+  }
+  in.of(Quantity::rest)[0] = in.of(Quantity::rest)[1] = 1.0;
+  in.of(Quantity::gravity)[2] = -g;
+  in.of(Quantity::wind)[3] = 2.0;
+  in.of(Quantity::air_normal)[0] = 0.7;
+  const Equilibrium hanging = EquilibriumSolver(scene).solve(inputs.data());
+  EXPECT_TRUE(hanging.converged);
+  EXPECT_NEAR(hanging.x[8], -2.0, 1e-9);
+  EXPECT_THROW(EquilibriumSolver(scene).solve(inputs.data(), nullptr, nullptr, {.t0 = 0.5}), std::invalid_argument);
+}
+
 TEST(Equilibrium, SaysSoWhenThereIsNone) {
   SceneSpec spec;
   spec.particles = 3;

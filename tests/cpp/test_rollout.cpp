@@ -46,7 +46,7 @@ TEST(RandomScene, NetIsSparse) {
       std::any_of(plan.blocks.begin(), plan.blocks.end(), [](const DirectBlock& b) { return !b.structure.banded(); }));
 }
 
-// Mass, forces and drag times c, compliance over c (and beta times c, for alpha beta is what damps): the same
+// Mass, forces, drag and the air's coefficients times c, compliance over c (and beta times c, for alpha beta is what damps): the same
 // motion.
 TEST_P(RolloutOf, MassGaugeMovesNothing) {
   const Sample sample = random_scene(52, {.net = GetParam().net});
@@ -63,6 +63,8 @@ TEST_P(RolloutOf, MassGaugeMovesNothing) {
   scale(Quantity::force, c);
   scale(Quantity::drag_linear, c);
   scale(Quantity::drag_quadratic, c);
+  scale(Quantity::air_normal, c);
+  scale(Quantity::air_tangential, c);
   EXPECT_TRUE(same_bits(states(program, sample.inputs), states(program, scaled)));
 }
 

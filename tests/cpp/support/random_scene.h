@@ -123,6 +123,9 @@ struct SceneBuilder {
     for (std::size_t k = 0; k < scene.boundary.times.size(); ++k)
       for (const int node : scene.driven)
         for (int d = 0; d < 3; ++d) *knot++ = x[3 * node + d] + random(-0.01, 0.01);
+    fill(Quantity::wind, -3.0, 3.0);
+    fill(Quantity::air_normal, 0.3, 0.9);
+    fill(Quantity::air_tangential, 0.03, 0.2);
   }
 };
 
@@ -142,8 +145,12 @@ inline Sample random_scene(unsigned seed, const SceneShape& shape = {}) {
   b.spec.pinned.push_back(ropes[0].back());
   b.spec.loaded = {ropes[0][1], ropes[2][3]};
   b.spec.has_drag = true;
+  // Some of these triangles hold a driven, a loaded or a pinned particle.
+  for (const auto& rope : ropes)
+    for (std::size_t k = 0; k + 2 < rope.size(); k += 2) b.spec.air.push_back({rope[k], rope[k + 1], rope[k + 2]});
   b.spec.boundary = {{0.0, 0.011, 0.02, 0.05}, Interpolation::cubic};
   b.spec.force = {{0.0, 0.03}, Interpolation::linear};
+  b.spec.wind = {{0.0, 0.008, 0.02}, Interpolation::linear};
   for (const auto& g : b.groups)
     b.spec.groups.push_back({g.kind + (g.damped ? "_damped" : ""), g.kind, g.damped, g.stencil});
   Sample sample{build_scene(b.spec), {}};

@@ -1,0 +1,70 @@
+// The reverse of the air's forces on triangles.
+#pragma once
+
+#include "adjoint/predict_vjp.h"
+#include "core/solver/air.h"
+
+namespace sheetbend {
+
+// Cotangents of a triangle from that of its force. Where a speed or the area is zero, so is the slope of the force along it.
+template <class T>
+AirTriangle<T> air_force_vjp(const AirTriangle<T>& at, const AirForce<T>& a, const Vec3<T>& f_bar) {
+  AirTriangle<T> bar;
+  const T f_N = dot(f_bar, a.N), f_t = dot(f_bar, a.u_t);
+  bar.normal = a.along_N * f_N;
+  bar.tangential = a.along_u_t * f_t;
+  const T along_N_bar = at.normal * f_N, along_u_t_bar = at.tangential * f_t;
+  const T u_t_size_bar = T(0.5) * a.N_size * along_u_t_bar;
+  const Vec3<T> u_t_bar = (at.tangential * a.along_u_t) * f_bar + (u_t_size_bar * inverse_or_zero(a.u_t_size)) * a.u_t;
+  // u_t = u - p N, p = u_N / N2
+  const T p = a.u_N * a.N2_inverse, p_bar = -dot(u_t_bar, a.N);
+  const T u_N_bar = a.N2_inverse * (a.u_N_size * along_N_bar + p_bar);
+  const T N2_inverse_bar = a.u_N * (T(0.5) * a.u_N_size * along_N_bar + p_bar);
+  const T N_size_bar = T(0.5) * a.u_t_size * along_u_t_bar;
+  // |N| and 1/N2 by N
+  const T along = N_size_bar * inverse_or_zero(a.N_size) - T(2.0) * a.N2_inverse * a.N2_inverse * N2_inverse_bar;
+  const Vec3<T> N_bar = (at.normal * a.along_N) * f_bar - p * u_t_bar + u_N_bar * at.u + along * a.N;
+  bar.u = u_t_bar + u_N_bar * a.N;
+  bar.e1 = cross(at.e2, N_bar);
+  bar.e2 = cross(N_bar, at.e1);
+  return bar;
+}
+
+// Reverse of blow(), given the cotangents of q. What w receives is added to w_bar, from which predict_vjp() finds that of masses and drag: it
+// comes after.
+template <class T>
+void blow_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, double t_next, const SubstepStates<T>& s,
+              const Weights<T>& weights, const Coordinates<T>& q_bar, const Strided<T>& w_bar,
+              const StateCotangents<T>& bar, const Inputs<T>& in_bar) {
+  if (scene.air.empty()) return;
+  const Airflow<T> air(scene, in, bdf, t_next, s);
+  const T eta(bdf.eta), share(bdf.eta / 3.0);
+  const auto extrapolated_vjp = [&](const Vec3<T>& y_bar, T* now_bar, T* before_bar) {
+    (T(bdf.extrapolate_now) * y_bar).add_to(now_bar);
+    if (bdf.extrapolate_before != 0.0) (T(bdf.extrapolate_before) * y_bar).add_to(before_bar);
+  };
+  for (int i = 0; i < static_cast<int>(scene.air.size()); ++i) {
+    const AirTriangle<T> at = air.at(i);
+    const AirForce<T> force(at);
+    const Vec3<T> impulse = share * force.f;
+    Vec3<T> impulse_bar;
+    for (const int n : scene.air[i]) {
+      if (!scene.inertial[n]) continue;
+      const Vec3<T> v_star_bar = eta * Vec3<T>(q_bar.of(n));
+      w_bar.of(n) += dot(impulse, v_star_bar);
+      impulse_bar = impulse_bar + weights.w[n] * v_star_bar;
+    }
+    const AirTriangle<T> own = air_force_vjp(at, force, share * impulse_bar);
+    in_bar.of(Quantity::air_normal)[i] += own.normal;
+    in_bar.of(Quantity::air_tangential)[i] += own.tangential;
+    pull_back_knots(air.knots, own.u, in_bar.of(Quantity::wind), 1, 0);
+    const Vec3<T> v_bar = T(-1.0 / 3.0) * own.u, x_bar[3] = {-(own.e1 + own.e2), own.e1, own.e2};
+    for (int k = 0; k < 3; ++k) {
+      const int dof = scene.first_dof[scene.air[i][k]];
+      extrapolated_vjp(x_bar[k], bar.x + dof, bar.x_before + dof);
+      extrapolated_vjp(v_bar, bar.v + dof, bar.v_before + dof);
+    }
+  }
+}
+
+}  // namespace sheetbend
