@@ -16,8 +16,9 @@ from .hinges import Hinges
 from .mesh import TriangleMesh
 from .quantities import Term
 from .scene import Array, Scene
+from .sheet_bending import SheetCurvature
 
-MODELS = ("dihedral", "isometric_bending")
+MODELS = ("curvature", "dihedral", "isometric_bending")
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,9 @@ def add_cloth(
     poisson: float = 0.0,
     law: Law | None = None,
     bending: float | None = None,
-    bending_model: str = "dihedral",
+    bending_weft: float | None = None,
+    bending_twist: float | None = None,
+    bending_model: str = "curvature",
     curved: bool = False,
     held: ArrayLike = (),
     positions: ArrayLike | None = None,
@@ -53,7 +56,8 @@ def add_cloth(
     """Add a cloth to a scene.
 
     Quantities: `<name>_density` kg/m^2, `_warp`, `_weft`, `_shear` N/m, `_poisson`, the law's coefficients (see
-    `sheetbend.fabric`) such as `_warp_stiffening`, and where given `_bending` N m, `_membrane_damping` s,
+    `sheetbend.fabric`) such as `_warp_stiffening`, and where given `_bending`, `_bending_weft`,
+    `_bending_twist` N m, `_membrane_damping` s,
     `_bend_damping` s, `_drag_linear` N s/m^3, `_drag_quadratic` N s^2/m^4.
 
     The membrane's energy per area is Y_warp f(E_uu)^2 + 2 n sqrt(Y_warp Y_weft) f(E_uu) f(E_vv) + Y_weft f(E_vv)^2,
@@ -67,8 +71,11 @@ def add_cloth(
         poisson: n = sqrt(nu_uv nu_vu), between -1 and 1. A strip pulled along the warp narrows by
             nu_uv = n sqrt(warp/weft) times its strain.
         law: how tension grows with strain; Linear() by default.
-        bending: rigidity B, N m; None = no bending.
-        bending_model: "dihedral" (angles; any rest shape), or "isometric_bending" (quadratic, flat rest shape, faster).
+        bending: rigidity B, N m, along the warp and, where nothing else is given, in all directions; None = no bending.
+        bending_weft, bending_twist: rigidities along the weft and against twist, N m, of the curvature model.
+        bending_model: "curvature" (of triangles: right on meshes whose inner vertices have six neighbors), "dihedral"
+            (angles between triangles: what a mesh makes of B depends on its pattern) or "isometric_bending" (the
+            quadratic form of that, flat at rest).
         curved: the mesh's vertices are the shape at rest of the bending; flat by default.
         held: vertices that will be pinned or driven: triangles and hinges among them alone are left out.
         positions: (vertices, 3) m, the initial shape; the mesh's vertices by default.
@@ -84,6 +91,8 @@ def add_cloth(
         optional=True,
         weft=weft,
         bending=bending,
+        bending_weft=bending_weft,
+        bending_twist=bending_twist,
         membrane_damping=membrane_damping,
         bend_damping=bend_damping,
         drag_linear=drag_linear,
@@ -95,6 +104,10 @@ def add_cloth(
         raise SceneError(f"{name}.bending_model", "is unknown", bending_model, f"use one of: {', '.join(MODELS)}")
     if bend_damping is not None and bending is None:
         raise SceneError(f"{name}.bend_damping", "needs bending", bend_damping, "give bending, or leave it out")
+    for field, value in (("bending_weft", bending_weft), ("bending_twist", bending_twist)):
+        if value is not None and (bending is None or bending_model != "curvature"):
+            fix = "give bending and keep bending_model = 'curvature', or leave it out"
+            raise SceneError(f"{name}.{field}", "belongs to the curvature model", value, fix)
     shape = (
         mesh.vertices if positions is None else finite(f"{name}.positions", positions, mesh.vertices.shape, SceneError)
     )
@@ -106,7 +119,11 @@ def add_cloth(
     _weigh(scene, mesh, name, particles, density, drag_linear, drag_quadratic)
     _membrane(scene, mesh, name, particles, free, (warp, weft, shear, poisson), law or Linear(), membrane_damping)
     if bending is not None:
-        Hinges(mesh, free).add(scene, name, particles, bending, bending_model, curved, bend_damping)
+        if bending_model == "curvature":
+            sheet = SheetCurvature(mesh, free)
+            sheet.add(scene, name, particles, bending, bending_weft, bending_twist, curved, bend_damping)
+        else:
+            Hinges(mesh, free).add(scene, name, particles, bending, bending_model, curved, bend_damping)
     built = Cloth(name, mesh, particles)
     scene.cloths[name] = built
     return built

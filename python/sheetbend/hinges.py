@@ -34,15 +34,6 @@ class Hinges:
         corners: Array = np.take_along_axis(self.mesh.corners[triangles], place[:, :, None], axis=1)
         return corners
 
-    def _angles(self) -> Array:
-        """(count,) rad, of the mesh's shape in space, as core/constraints/dihedral.h has them."""
-        x0, x1, a, b = np.swapaxes(self.mesh.vertices[self.stencils], 0, 1)
-        edge = x1 - x0
-        normal_a, normal_b = np.cross(edge, a - x0), np.cross(b - x0, edge)
-        length = np.linalg.norm(edge, axis=1)
-        angles: Array = np.arctan2(length * (normal_a * (b - x0)).sum(axis=1), (normal_a * normal_b).sum(axis=1))
-        return angles
-
     def _cotangents(self) -> Array:
         """(count, 3) of v1, a and b: the coefficients of quadratic bending (Bergou et al. 2006), over sqrt(area)."""
         at_0, at_1 = [], []
@@ -79,7 +70,9 @@ class Hinges:
             raise SceneError(f"{name}.curved", "is not possible for quadratic bending, flat at rest", True, fix)
         count = len(self.stencils)
         group, scale = f"{name}_bend", (self.length**2 / self.area if dihedral else np.ones(count))
-        rest = (self._angles() if curved else np.zeros(count)) if dihedral else self._cotangents()
+        rest = (
+            (rest_angles(self.mesh, self.stencils) if curved else np.zeros(count)) if dihedral else self._cotangents()
+        )
         scene.add_constraints(
             model,
             particles[self.stencils],
@@ -95,6 +88,16 @@ class Hinges:
             scene.add_quantity(f"{name}_bend_damping", damping, "s")
             factors = ((f"{name}_bend_damping", "identity"), (f"{name}_bending", "identity"))
             scene.add_terms([Term("damping", at, scale, factors)])
+
+
+def rest_angles(mesh: TriangleMesh, stencils: Array) -> Array:
+    """(count,) rad, of the mesh's shape in space at hinges [v0, v1, a, b]; as in core/constraints/hinge_angle.h."""
+    x0, x1, a, b = np.swapaxes(mesh.vertices[stencils], 0, 1)
+    edge = x1 - x0
+    normal_a, normal_b = np.cross(edge, a - x0), np.cross(b - x0, edge)
+    length = np.linalg.norm(edge, axis=1)
+    angles: Array = np.arctan2(length * (normal_a * (b - x0)).sum(axis=1), (normal_a * normal_b).sum(axis=1))
+    return angles
 
 
 def _cotangent(a: Array, b: Array) -> Array:

@@ -236,19 +236,20 @@ class Scene:
         Args:
             kind: a name in sheetbend.KINDS: "distance", "attachment"; of ropes "bend", "planar_bend", "hinge"; of rods
                 "material_curvature", "yielding_curvature", "twist"; of cloth "strain", "exponential_strain",
-                "spline_strain", "dihedral", "isometric_bending", "area".
+                "spline_strain", "sheet_curvature", "dihedral", "isometric_bending", "area".
             particles: (count, arity) indices.
             name: of the group; the kind by default.
             compliance: 0 = rigid; distance, attachment m/N; bend, planar_bend 1/(N m) (Voronoi length / EI); hinge
                 rad/(N m); material_curvature 1/(N m), twist rad/(N m) (Voronoi length / EI or GJ); strains 1/(N m)
-                (1/(area warp stiffness)); dihedral rad/(N m); isometric_bending 1/(N m) (1/B); area m^3/N.
+                (1/(area warp stiffness)); dihedral rad/(N m); isometric_bending 1/(N m) (1/B); sheet_curvature
+                1/(N m^3) (1/(area B)); area m^3/N.
             damping: beta of the Rayleigh dissipation (Macklin et al. 2016, eq. 26): force per rate of C.
             viscosity: the element resists the rate of C only: distance N s/m, hinge N m s/rad; excludes compliance and
                 damping.
             rest: (count,) rest length m (the initial length by default), planar rest (natural curvature times Voronoi
                 length), angle rad (zero by default), area m^2 (the initial one); of material_curvature (count, 2), of
                 twist (count,) rad, of attachment (count, 3) m the offset of the first particle from the second; of
-                strains and isometric_bending all parameters of KINDS, (count, parameters).
+                strains, isometric_bending and sheet_curvature all parameters of KINDS, (count, parameters).
             normal: unit plane normal, (3,) or (count, 3), of planar kinds.
 
         Raises:
@@ -489,5 +490,6 @@ UNITS: Mapping[str, Mapping[str, str]] = {
     "spline_strain": {"compliance": "1/(N m)", "damping": "N m s"},
     "dihedral": {"compliance": "rad/(N m)", "damping": "N m s/rad"},
     "isometric_bending": {"compliance": "1/(N m)", "damping": "N m s"},
+    "sheet_curvature": {"compliance": "1/(N m^3)", "damping": "N m^3 s"},
     "area": {"compliance": "m^3/N", "damping": "N s/m^3"},
 }
