@@ -39,6 +39,8 @@ class Scene:
         loaded: Sequence[int],
         force_times: Sequence[float],
         has_drag: bool,
+        air: Sequence[Sequence[int]],
+        wind_times: Sequence[float],
         groups: Sequence[Mapping[str, Any]],
     ) -> None: ...
     @property

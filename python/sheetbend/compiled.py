@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from .scene import Scene
 
 
+VECTORS = ("position", "velocity", "boundary", "force", "wind")
+
+
 class CompiledScene:
     """Built once by `Scene.compiled`.
 
@@ -37,6 +40,8 @@ class CompiledScene:
                 loaded=list(scene.loaded),
                 force_times=[] if not scene.loaded else list(scene.force_times),
                 has_drag=scene.has_drag,
+                air=scene.air.triangles.tolist(),
+                wind_times=scene.air.times.tolist(),
                 groups=[
                     {"name": g.name, "kind": g.kind, "damped": g.damped, "stencil": g.particles.ravel()}
                     for g in scene.groups
@@ -115,7 +120,7 @@ class CompiledScene:
         shaped: dict[str, np.ndarray] = {}
         for array, (offset, size) in self.layout.items():
             part = flat[offset : offset + size]
-            shaped[array] = part.reshape(-1, 3) if array in ("position", "velocity", "boundary", "force") else part
+            shaped[array] = part.reshape(-1, 3) if array in VECTORS else part
         return shaped
 
 

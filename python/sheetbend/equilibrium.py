@@ -85,6 +85,7 @@ def equilibrium(
 
     Raises:
         SceneError: the start has the wrong shape.
+        ValueError: air blows on triangles at the start; still air leaves a scene at rest as it is.
         NoEquilibriumError: not converged; says how far it came and what to try.
     """
     compiled = scene.compiled

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
+from .air import Air
 from .checks import finite, index_array, indices, per_item, points
 from .column import Column
 from .compiled import CompiledScene
@@ -60,6 +61,7 @@ class Scene:
         self.loaded: list[int] = []
         self.force_times: Array = np.zeros(0)
         self.has_drag = False
+        self.air = Air()
         self.ropes: dict[str, Any] = {}
         self.cloths: dict[str, Any] = {}
         self._positions, self._velocities, self._mass = Column(3), Column(3), Column()
@@ -349,6 +351,38 @@ class Scene:
             self._drag[field] = c
             self.has_drag = True
 
+    def add_air(
+        self,
+        triangles: ArrayLike,
+        normal: ArrayLike,
+        tangential: ArrayLike,
+        wind: ArrayLike | None = None,
+        times: ArrayLike | None = None,
+        name: str = "cloth",
+    ) -> None:
+        """Let air act on triangles: A (k_n |u_n| u_n + k_t |u_t| u_t) on each, a third to every corner, where the wind
+        relative to the triangle, u, parts into u_n along its normal and u_t across it.
+
+        k is air density * drag coefficient / 2 (air: 1.2 kg/m^3). One value for all is the quantity
+        `<name>_air_normal` or `<name>_air_tangential`; a constant wind is the quantities `wind_x`, `wind_y`, `wind_z`.
+        The force is taken at the extrapolated state, so substeps must resolve it: with BDF2 h k |u| must stay below 2/3
+        of the area density. `set_drag` has no such limit, and knows no wind.
+
+        Args:
+            triangles: (count, 3) particles.
+            normal, tangential: k_n, k_t, one for all or (count,), kg/m^3.
+            wind: m/s, one for the whole scene: (3,), or (knots, 3) at `times`; still air, or that of an earlier call,
+                by default.
+            times: (knots,) s, increasing; the wind is linear between and constant outside.
+            name: of the quantities.
+
+        Raises:
+            SceneError: shapes, NaN, negative coefficients, corners that are not distinct, times that do not increase,
+                or another wind than an earlier call's.
+        """
+        self._building()
+        self.air.add(self, triangles, normal, tangential, wind, times, name)
+
     def freeze(self) -> Scene:
         """End the construction: validates the whole scene and returns it. Later additions raise.
 
@@ -417,6 +451,7 @@ class Scene:
             "gravity": self._gravity,
             "drag_linear": self._drag_of("linear"),
             "drag_quadratic": self._drag_of("quadratic"),
+            **self.air.arrays(),
         }
 
     # --- private

@@ -200,7 +200,8 @@ TEST(Equilibrium, TakesStillAirAndRefusesWind) {
   std::vector<double> inputs(scene.layout.total(), 0.0);
   const Inputs<double> in{scene.layout, inputs.data()};
   for (int k = 0; k < 3; ++k) {
-    in.of(Quantity::position)[3 * k] = k;
+    in.of(Quantity::position)[3 * k] = 0.1 * k;
+    in.of(Quantity::position)[3 * k + 2] = -k;
     in.of(Quantity::mass)[k] = 1.0;
   }
   in.of(Quantity::rest)[0] = in.of(Quantity::rest)[1] = 1.0;

@@ -1,0 +1,111 @@
+"""Air that acts on triangles: what a scene knows of it, and how it is added."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .checks import finite, index_array, per_item
+from .errors import SceneError
+from .quantities import Term
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+Array = np.ndarray
+WIND = ("wind_x", "wind_y", "wind_z")
+
+
+class Air:
+    """Triangles in air and the scene's one wind.
+
+    Attributes:
+        triangles: (n, 3) particles.
+        normal, tangential: (n,) kg/m^3, the plain parts of the coefficients.
+        times: (knots,) s, of the wind.
+        wind: (knots, 3) m/s, its plain part.
+    """
+
+    def __init__(self) -> None:
+        self.triangles: Array = np.zeros((0, 3), dtype=np.int64)
+        self.normal, self.tangential = np.zeros(0), np.zeros(0)
+        self.times, self.wind = np.zeros(0), np.zeros((0, 3))
+        self._blowing: tuple[Array, Array] | None = None  # times and wind as given
+
+    def add(
+        self,
+        scene: Scene,
+        triangles: ArrayLike,
+        normal: ArrayLike,
+        tangential: ArrayLike,
+        wind: ArrayLike | None,
+        times: ArrayLike | None,
+        name: str,
+    ) -> None:
+        """See `Scene.add_air`."""
+        corners = _triangles(f"{name}.air.triangles", triangles, scene.particle_count)
+        given = {"normal": normal, "tangential": tangential}
+        values = {kind: _coefficient(f"{name}.air.{kind}", k, len(corners)) for kind, k in given.items()}
+        self._blow(scene, wind, times)
+        first = len(self.triangles)
+        for kind, k in values.items():
+            if np.ndim(given[kind]) == 0:
+                quantity = scene.add_quantity(f"{name}_air_{kind}", float(k[0]), "kg/m^3", positive=bool(k[0] > 0))
+                where = first + np.arange(len(corners))
+                scene.add_terms([Term(f"air_{kind}", where, 1.0, ((quantity, "identity"),))])
+                k[:] = 0.0
+        self.triangles = np.concatenate([self.triangles, corners])
+        self.normal = np.concatenate([self.normal, values["normal"]])
+        self.tangential = np.concatenate([self.tangential, values["tangential"]])
+
+    def arrays(self) -> dict[str, Array]:
+        """The plain parts of the input arrays."""
+        return {"wind": self.wind, "air_normal": self.normal, "air_tangential": self.tangential}
+
+    def _blow(self, scene: Scene, wind: ArrayLike | None, times: ArrayLike | None) -> None:
+        """Set the wind, or check that it is the one that was set."""
+        if wind is None:
+            if times is not None:
+                raise SceneError("wind", "is missing", None, "give it at every one of the times")
+            if self._blowing is not None:
+                return
+            wind = (0.0, 0.0, 0.0)
+        t = np.zeros(1) if times is None else finite("wind.times", times, None, SceneError).ravel()
+        if len(t) == 0 or (np.diff(t) <= 0).any():
+            raise SceneError("wind.times", "must increase", t[:5].tolist(), "sort the knots and drop repeated ones")
+        w = finite("wind", wind, (3,) if times is None else (len(t), 3), SceneError).reshape(-1, 3)
+        if self._blowing is not None:
+            before_t, before_w = self._blowing
+            if not (np.array_equal(t, before_t) and np.array_equal(w, before_w)):
+                fix = "leave it out, the wind of a scene is one"
+                raise SceneError("wind", "differs from the one given before", w[0].tolist(), fix)
+            return
+        self._blowing = (t, w)
+        self.times, self.wind = t, w.copy()
+        if times is not None:
+            return
+        for k, quantity in enumerate(WIND):
+            scene.add_quantity(quantity, float(w[0, k]), "m/s", positive=False, scale=1.0)
+            scene.add_terms([Term("wind", k, 1.0, ((quantity, "identity"),))])
+        self.wind[:] = 0.0
+
+
+def _triangles(field: str, triangles: ArrayLike, particles: int) -> Array:
+    flat = index_array(field, triangles, particles)
+    if np.ndim(triangles) != 2 or np.shape(triangles)[1] != 3:
+        raise SceneError(field, "have the wrong shape", np.shape(triangles), "give (count, 3) particles")
+    corners = flat.reshape(-1, 3)
+    twice = (corners == np.roll(corners, 1, axis=1)).any(axis=1)
+    if twice.any():
+        bad = corners[int(np.argmax(twice))].tolist()
+        raise SceneError(field, "use a particle twice", bad, "give three distinct particles each")
+    return corners
+
+
+def _coefficient(field: str, values: ArrayLike, count: int) -> Array:
+    k = per_item(field, values, count)
+    if (k < 0).any():
+        raise SceneError(field, "must not be negative", float(k.min()), "give air density * drag coefficient / 2")
+    return k
