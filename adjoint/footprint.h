@@ -24,6 +24,12 @@ inline std::size_t plan_bytes(const Plan& plan) {
                size_in_bytes(run.first_row);
     // A sparse pattern: rows and columns of the matrix, and of its factor.
     if (!block.structure.banded()) bytes += 2 * sizeof(int) * (block.structure.values() + block.structure.fill());
+    if (block.condensation) {
+      const Condensation& c = *block.condensation;
+      bytes += size_in_bytes(c.members) + size_in_bytes(c.gradients) + size_in_bytes(c.dofs) + size_in_bytes(c.dof_of) +
+               size_in_bytes(c.entries);
+      if (!c.structure.banded()) bytes += 2 * sizeof(int) * (c.structure.values() + c.structure.fill());
+    }
   }
   return bytes;
 }
@@ -35,19 +41,26 @@ std::size_t numbers_bytes(std::size_t count) {
   return sizeof(Numbers<T>) + (count * sizeof(T) + pack - 1) / pack * pack;
 }
 
+// The values of a matrix and its factor.
+template <class T>
+std::size_t factor_bytes(const FactorStructure& s) {
+  std::size_t bytes = sizeof(T) * (s.values() + Factor<T>::right_side(s));
+  if (!s.banded()) bytes += (sizeof(T) + sizeof(int)) * (s.fill() + s.size());
+  return bytes;
+}
+
 // One direct block's BlockState.
 template <class T>
 std::size_t block_bytes(const Scene& scene, const DirectBlock& block, int kept_iterations) {
-  const FactorStructure& s = block.structure;
-  const std::size_t rows = Factor<T>::right_side(s), iterations = std::max(1, kept_iterations);
+  const std::size_t rows = right_side<T>(block), iterations = std::max(1, kept_iterations);
   const auto of = [](std::size_t count) { return numbers_bytes<T>(count); };
   const std::size_t particles = of(sheetbend_blocks::row * block.particles.size());
-  std::size_t factor = sizeof(Factor<T>) + sizeof(T) * (s.values() + rows);
-  if (!s.banded()) factor += (sizeof(T) + sizeof(int)) * (s.fill() + s.size());
+  std::size_t factor = sizeof(Factor<T>) + sizeof(CondensedFactor<T>) + factor_bytes<T>(block.structure);
+  if (block.condensation) factor += factor_bytes<T>(block.condensation->structure) + sizeof(T) * block.size();
   std::size_t bytes =
-      sizeof(BlockState<T>) + 2 * of(s.size()) + (block.damped ? 2 * particles : 0) +
+      sizeof(BlockState<T>) + 2 * of(block.size()) + (block.damped ? 2 * particles : 0) +
       iterations * (of(sheetbend_blocks::row * block.window_rows.size()) + of(rows) + particles + factor) +
-      (kept_iterations + 1) * (particles + of(s.size()));
+      (kept_iterations + 1) * (particles + of(block.size()));
   for (const MemberRun& run : block.runs) {
     const Group& group = scene.groups[run.group];
     bytes += of(run.items.size() * sheetbend_blocks::value_count(group.damped, group.parameters));
@@ -60,8 +73,8 @@ template <class T>
 std::size_t block_cotangent_bytes(const Scene& scene, const DirectBlock& block) {
   const auto of = [](std::size_t count) { return numbers_bytes<T>(count); };
   const std::size_t particles = of(sheetbend_blocks::row * block.particles.size());
-  std::size_t bytes = sizeof(BlockCotangents<T>) + (block.damped ? 4 : 2) * particles +
-                      of(Factor<T>::right_side(block.structure)) + 2 * of(block.size());
+  std::size_t bytes =
+      sizeof(BlockCotangents<T>) + (block.damped ? 4 : 2) * particles + of(right_side<T>(block)) + 2 * of(block.size());
   for (const MemberRun& run : block.runs) bytes += of(run.items.size() * (2 + scene.groups[run.group].parameters));
   return bytes;
 }

@@ -27,7 +27,7 @@ struct BlockCotangents {
     for (auto* a : {&x, &z}) a->assign(block.particles.size() * sheetbend_blocks::row);
     if (block.damped)
       for (auto* a : {&x_now, &x_before}) a->assign(block.particles.size() * sheetbend_blocks::row);
-    y.assign(Factor<T>::right_side(block.structure));
+    y.assign(right_side<T>(block));
     for (auto* a : {&lambda, &C_r}) a->assign(block.size());
     values.resize(block.runs.size());
     for (std::size_t r = 0; r < values.size(); ++r)
@@ -79,10 +79,10 @@ void project_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const
   arrays.C_r_bar = bar.C_r.numbers();
   const auto& reverse = reverse_kernels<T>(table);
   reverse.right_side(arrays);
-  if (block.structure.banded())
+  if (block.banded())
     forward_kernels<T>(table).solve(arrays, arrays.y);
   else
-    state.at(iteration).factor.solve(block.structure, bar.y.data());
+    solve_sparse(block, state, iteration, bar.y.data());
   reverse.spread(arrays);
   reverse.pull_back(arrays);
 }

@@ -59,7 +59,7 @@ void pull_back_reference(const sheetbend_blocks::Run& r, int n, const double* pa
   for (int k = 0; k < P; ++k) p[k] = D(parameters_of<K, T>(r, n)[k]);
   if constexpr (inside > 0)
     for (int k = 0; k < inside; ++k) p[k].d[k] = W(1.0);
-  evaluate_apart<K>(x, p, C, J);
+  evaluate_on_duals<K, inside>(x, p, C, J);
   W* values_bar = numbers_of<W>(r.values_bar) + static_cast<long>(n) * (2 + P);
   for (int j = 0; j < K::rows; ++j) {
     const W bar = W(scale) * C_bar[j];

@@ -71,7 +71,7 @@ void pull_back(const Element<K, T>& e, const Kept<K, T>& at, const T* lambda, co
     }
     for (int k = 0; k < P; ++k) p[k].v = e.p[k];
     for (int k = 0; k < inside; ++k) p[k].d[K::rows + k] = T(1.0);
-    evaluate_apart<K>(x, p, C, J);
+    evaluate_on_duals<K, K::rows + inside>(x, p, C, J);
     for (int j = 0; j < K::rows; ++j) {
       T J_dx(0.0);
       if (C_r)

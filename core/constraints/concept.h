@@ -70,10 +70,19 @@ struct Evaluation {
   Evaluation(const T* x, const T* p) { K::evaluate(x, p, C, J); }
 };
 
-// C and J on dual numbers: long, and apart from the kernels, where it would be compiled anew for every use.
 template <class K, class T>
 [[gnu::noinline]] void evaluate_apart(const T* x, const T* p, T* C, T* J) {
   K::evaluate(x, p, C, J);
+}
+
+// C and J on dual numbers of N directions. With many of them the work is all in memory, and inlining it into every kernel takes
+// compilers minutes; with few it pays.
+template <class K, int N, class T>
+[[gnu::always_inline]] inline void evaluate_on_duals(const T* x, const T* p, T* C, T* J) {
+  if constexpr (N > 7)
+    evaluate_apart<K>(x, p, C, J);
+  else
+    K::evaluate(x, p, C, J);
 }
 
 // C, and J or the geometry that it comes from.

@@ -23,10 +23,10 @@ void refer_tangents(const sheetbend_blocks::References& references, const sheetb
                 {values.data(), state.x_now.directions(), state.x_before.directions(), state.C_r.directions()});
 }
 
-// The directions' share of one iteration: after the values are solved for, before they are pushed.
-template <class State>
+// The directions' share of one iteration: after the values are solved for, before they are pushed. solve_sparse(b) is for blocks that are no band.
+template <class State, class Solve>
 void project_tangents(const DirectBlock& block, const sheetbend_blocks::TangentKernels& kernels,
-                      const sheetbend_blocks::Block& arrays, State& state, int iteration) {
+                      const sheetbend_blocks::Block& arrays, State& state, int iteration, Solve&& solve_sparse) {
   const auto values = value_directions(state);
   auto& own = state.at(iteration);
   sheetbend_blocks::Tangents t{};
@@ -39,10 +39,10 @@ void project_tangents(const DirectBlock& block, const sheetbend_blocks::TangentK
   t.dl = own.dl.directions();
   t.u = own.u.directions();
   kernels.right_side(arrays, t);
-  if (block.structure.banded())
+  if (block.banded())
     kernels.solve(arrays, t.dl);
   else
-    own.factor.solve(block.structure, numbers_of<Pack>(t.dl));
+    solve_sparse(numbers_of<Pack>(t.dl));
   kernels.push(arrays, t);
 }
 

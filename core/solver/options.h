@@ -4,7 +4,8 @@
 namespace sheetbend {
 
 enum class Integrator : int { bdf1, bdf2 };
-enum class Partition : int { gauss_seidel, direct };
+// Blocks of one by color; connected sets by LDL^T of their constraints; or the same sets through their particles (condensed.h).
+enum class Partition : int { gauss_seidel, direct, newton };
 
 struct SolverOptions {
   double h = 1e-3;  // substep [s]

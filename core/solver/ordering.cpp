@@ -125,18 +125,26 @@ void order_for_low_fill(const Scene& scene, std::vector<Member>& members) {
   for (int m = 0; m < static_cast<int>(members.size()); ++m)
     for (const int n : scene.groups[members[m].group].nodes(members[m].item))
       if (movable(scene, n)) users[n].push_back(m);
+  std::vector<std::vector<int>> joined;
+  for (auto& [node, list] : users) joined.push_back(std::move(list));
+  const std::vector<int> place = places_for_low_fill(static_cast<int>(members.size()), joined);
+  std::vector<Member> ordered(members.size());
+  for (std::size_t i = 0; i < members.size(); ++i) ordered[place[i]] = members[i];
+  members = std::move(ordered);
+}
+
+std::vector<int> places_for_low_fill(int nodes, const std::vector<std::vector<int>>& joined) {
   std::vector<Eigen::Triplet<double>> entries;
-  for (const auto& [node, list] : users)
+  for (const auto& list : joined)
     for (const int a : list)
       for (const int b : list) entries.emplace_back(a, b, 1.0);
-  const int n = static_cast<int>(members.size());
-  Eigen::SparseMatrix<double> graph(n, n);
+  Eigen::SparseMatrix<double> graph(nodes, nodes);
   graph.setFromTriplets(entries.begin(), entries.end());
   Eigen::PermutationMatrix<Eigen::Dynamic> permutation;
   Eigen::AMDOrdering<int>()(graph, permutation);
-  std::vector<Member> ordered(members.size());
-  for (int i = 0; i < n; ++i) ordered[i] = members[permutation.indices()(i)];
-  members = std::move(ordered);
+  std::vector<int> place(nodes);
+  for (int i = 0; i < nodes; ++i) place[permutation.indices()(i)] = i;
+  return place;
 }
 
 }  // namespace sheetbend

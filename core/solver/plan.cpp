@@ -51,7 +51,7 @@ FactorStructure structure_of(const Scene& scene, const std::vector<Member>& memb
 // have a gradient of zero.
 int add_particle(DirectBlock& block, int node, const std::vector<int>& rows) {
   block.particles.push_back(node);
-  if (block.structure.banded())
+  if (block.banded())
     for (int row = rows.front(); row <= rows.back(); ++row) block.window_rows.push_back(row);
   else
     block.window_rows.insert(block.window_rows.end(), rows.begin(), rows.end());
@@ -98,19 +98,60 @@ MemberRun make_run(const Scene& scene, int g, const std::map<int, int>& particle
   return run;
 }
 
-DirectBlock make_block(const Scene& scene, std::vector<Member> members) {
+// Where the constraints' shares stand in the condensed matrix.
+Condensation condense(const Scene& scene, const DirectBlock& block, const std::map<int, int>& particle_of) {
+  Condensation c;
+  std::vector<std::vector<int>> joined;
+  for (const Member& m : block.members) {
+    const Group& group = scene.groups[m.group];
+    c.members.push_back({m.first_row, group.rows, static_cast<int>(c.gradients.size()), 0, 0});
+    joined.emplace_back();
+    for (const int node : group.nodes(m.item)) {
+      if (scene.role[node] != Role::free) continue;
+      const int particle = particle_of.at(node);
+      joined.back().push_back(particle);
+      c.gradients.push_back(sheetbend_blocks::row * gradient_row(block, particle, m.first_row));
+      ++c.members.back().uses;
+    }
+  }
+  for (const int place : places_for_low_fill(block.movable, joined)) c.dof_of.push_back(3 * place);
+  std::vector<std::pair<int, int>> entries;
+  const auto each_pair = [&](auto&& f) {
+    for (std::size_t m = 0; m < joined.size(); ++m)
+      for (const int i : joined[m])
+        for (const int k : joined[m])
+          if (c.dof_of[k] <= c.dof_of[i]) f(m, c.dof_of[i], c.dof_of[k]);
+  };
+  each_pair([&](std::size_t, int row, int column) {
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 3; ++b)
+        if (column + b <= row + a) entries.emplace_back(row + a, column + b);
+  });
+  c.structure = FactorStructure(3 * block.movable, entries);
+  for (const auto& list : joined)
+    for (const int particle : list) c.dofs.push_back(c.dof_of[particle]);
+  std::size_t member = joined.size();
+  each_pair([&](std::size_t m, int row, int column) {
+    if (m != member) c.members[member = m].first_entry = c.entries.size();
+    for (int a = 0; a < 3; ++a) c.entries.push_back(c.structure.position(row + a, column));
+  });
+  return c;
+}
+
+DirectBlock make_block(const Scene& scene, std::vector<Member> members, bool condensed) {
   Users users = number_rows(scene, members);
-  FactorStructure structure = structure_of(scene, members, users);
-  if (!structure.banded()) {
+  FactorStructure structure = condensed ? FactorStructure(0, {}) : structure_of(scene, members, users);
+  if (!condensed && !structure.banded()) {
     order_for_low_fill(scene, members);
     users = number_rows(scene, members);
     structure = structure_of(scene, members, users);
   }
   DirectBlock block{std::move(members), {}, {}, {0}, {}, {}, {}, 0, false, std::move(structure)};
+  if (condensed) block.condensation.emplace();
   std::map<int, int> particle_of;
   for (const auto& [node, rows] : users) {
     particle_of[node] = add_particle(block, node, rows);
-    if (!block.structure.banded())
+    if (!condensed && !block.banded())
       for (const int row : rows)
         for (const int column : rows)
           if (column <= row) block.positions.push_back(block.structure.position(row, column));
@@ -124,6 +165,7 @@ DirectBlock make_block(const Scene& scene, std::vector<Member> members) {
     for (int j = 0; j < group.rows; ++j) block.multipliers.push_back(group.first_row + m.item * group.rows + j);
   }
   for (const int g : groups) block.runs.push_back(make_run(scene, g, particle_of, block));
+  if (condensed) block.condensation = condense(scene, block, particle_of);
   return block;
 }
 
@@ -145,7 +187,8 @@ Plan make_plan(const Scene& scene, const SolverOptions& options) {
     plan.colors = color_constraints(scene);
     plan.packs = pack_colors(scene, plan.colors);
   } else
-    for (auto& members : connected_chains(scene)) plan.blocks.push_back(make_block(scene, std::move(members)));
+    for (auto& members : connected_chains(scene))
+      plan.blocks.push_back(make_block(scene, std::move(members), options.partition == Partition::newton));
   return plan;
 }
 

@@ -2,13 +2,14 @@
 // share no movable particle); a connected set can be one direct block. The plan is found once per scene and shared.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "core/blocks/kernels.h"
 #include "core/packs/packed_colors.h"
 #include "core/scene/scene.h"
+#include "core/solver/condensed.h"
 #include "core/solver/options.h"
-#include "core/solver/symmetric_factor.h"
 
 namespace sheetbend {
 
@@ -37,10 +38,12 @@ struct DirectBlock {
   std::vector<int> multipliers;        // per row: where it stands in the scene
   std::vector<std::size_t> positions;  // of the pairs of rows of each movable particle, where there is no band
   int movable = 0;
-  bool damped = false;  // whether any of its groups is
-  FactorStructure structure;
+  bool damped = false;        // whether any of its groups is
+  FactorStructure structure;  // of its constraints' matrix; empty where it is condensed
+  std::optional<Condensation> condensation = {};
 
-  int size() const { return structure.size(); }
+  int size() const { return static_cast<int>(multipliers.size()); }
+  bool banded() const { return !condensation && structure.banded(); }
 };
 
 struct Plan {

@@ -34,6 +34,7 @@ struct BlockState {
     Numbers<Plain<T>> gradients;
     Numbers<T> dl, u;
     Factor<Plain<T>> factor;
+    CondensedFactor<Plain<T>> condensed;  // in its place, where the block is
   };
   std::vector<Iteration> iterations;
   std::vector<Numbers<T>> x, lambda;  // before each iteration and after the last; one of each where nothing is kept
@@ -47,10 +48,16 @@ struct BlockState {
   Iteration& at(int iteration) { return iterations[iterations.size() == 1 ? 0 : iteration]; }
 };
 
+// Length of a right side: of a band, with zeros at the end.
+template <class T>
+std::size_t right_side(const DirectBlock& block) {
+  return block.condensation ? block.size() : Factor<T>::right_side(block.structure);
+}
+
 template <class T>
 void BlockState<T>::resize(const Scene& scene, const DirectBlock& block, int kept_iterations) {
   const std::size_t particles = block.particles.size() * sheetbend_blocks::row;
-  const std::size_t rows = Factor<Plain<T>>::right_side(block.structure);
+  const std::size_t rows = right_side<Plain<T>>(block);
   eta = 0.0;
   iterations.resize(std::max(1, kept_iterations));
   for (Iteration& i : iterations) {
@@ -192,6 +199,22 @@ void factor_sparse(const DirectBlock& block, BlockState<T>& state, int iteration
   own.factor.factorize(block.structure);
 }
 
+// The numbers that a condensed block is factored and solved from.
+template <class T>
+BlockNumbers<Plain<T>> numbers_of_block(BlockState<T>& state, int iteration) {
+  return {state.at(iteration).gradients.data(), state.at(state.x, iteration).data(), state.diagonal.data()};
+}
+
+// b = A^-1 b for blocks that are no band, factored before.
+template <class T, class U>
+void solve_sparse(const DirectBlock& block, BlockState<T>& state, int iteration, U* b) {
+  auto& own = state.at(iteration);
+  if (block.condensation)
+    own.condensed.solve(*block.condensation, numbers_of_block(state, iteration), b);
+  else
+    own.factor.solve(block.structure, b);
+}
+
 // The damping references from the states (dofs) at n and n-1; `before` is that of Bdf.
 template <class T>
 void refer_block(const SubstepState<T>& s, const DirectBlock& block, const sheetbend_packs::KernelTable& table,
@@ -212,14 +235,19 @@ void project_block(const SubstepState<T>& s, const DirectBlock& block, const she
   const auto runs = runs_of(s, block, state);
   const auto arrays = arrays_of(block, runs, state, iteration);
   kernels.evaluate(arrays);
-  if (block.structure.banded()) {
+  if (block.banded()) {
     kernels.factor(arrays);
     kernels.solve(arrays, arrays.dl);
   } else {
-    factor_sparse(block, state, iteration);
-    state.at(iteration).factor.solve(block.structure, state.at(iteration).dl.data());
+    if (block.condensation)
+      state.at(iteration).condensed.factorize(*block.condensation, numbers_of_block(state, iteration));
+    else
+      factor_sparse(block, state, iteration);
+    solve_sparse(block, state, iteration, state.at(iteration).dl.data());
   }
-  if constexpr (carries_tangents<T>) project_tangents(block, table.blocks->tangents, arrays, state, iteration);
+  if constexpr (carries_tangents<T>)
+    project_tangents(block, table.blocks->tangents, arrays, state, iteration,
+                     [&](Pack* b) { solve_sparse(block, state, iteration, b); });
   kernels.push(arrays);
 }
 

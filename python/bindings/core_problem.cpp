@@ -2,8 +2,8 @@
 #include "adjoint/fit/problem.h"
 
 #include "adjoint/fit/evaluation.h"
-#include "python/bindings/core_module.h"
 #include "python/bindings/interrupt.h"
+#include "python/bindings/solver.h"
 
 namespace sheetbend::bindings {
 namespace {
@@ -49,7 +49,7 @@ Experiment make_experiment(const py::dict& d) {
   SolverOptions o;
   o.h = get<double>(d, "h");
   o.integrator = get<std::string>(d, "integrator") == "bdf1" ? Integrator::bdf1 : Integrator::bdf2;
-  o.partition = get<std::string>(d, "partition") == "direct" ? Partition::direct : Partition::gauss_seidel;
+  o.partition = partition_of(get<std::string>(d, "partition"));
   o.iterations = get<int>(d, "iterations");
   e.plan = make_plan(*e.scene, o);
   e.map = make_map(get<py::dict>(d, "map"));

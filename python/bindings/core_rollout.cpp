@@ -16,10 +16,8 @@ Solver make_solver(std::shared_ptr<Scene> scene, double h, const std::string& in
   o.grain = grain;
   if (integrator != "bdf1" && integrator != "bdf2")
     throw std::invalid_argument("integrator: got '" + integrator + "'. Fix: use 'bdf1' or 'bdf2'");
-  if (partition != "direct" && partition != "gauss_seidel")
-    throw std::invalid_argument("partition: got '" + partition + "'. Fix: use 'direct' or 'gauss_seidel'");
   o.integrator = integrator == "bdf1" ? Integrator::bdf1 : Integrator::bdf2;
-  o.partition = partition == "direct" ? Partition::direct : Partition::gauss_seidel;
+  o.partition = partition_of(partition);
   Plan plan = make_plan(*scene, o);
   return {std::move(scene), std::move(plan)};
 }
@@ -164,8 +162,7 @@ void bind_rollout(py::module_& m) {
                              [](const Solver& s) {
                                std::vector<std::tuple<int, int, bool>> blocks;
                                for (const DirectBlock& b : s.plan.blocks)
-                                 blocks.emplace_back(b.structure.size(), b.structure.half_bandwidth(),
-                                                     b.structure.banded());
+                                 blocks.emplace_back(b.size(), b.structure.half_bandwidth(), b.banded());
                                return blocks;
                              })
       .def_property_readonly("colors", [](const Solver& s) { return s.plan.colors.size(); });

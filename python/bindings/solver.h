@@ -17,6 +17,14 @@ struct Solver {
   Plan plan;
 };
 
+// Throws std::invalid_argument where there is none of that name.
+inline Partition partition_of(const std::string& name) {
+  if (name == "direct") return Partition::direct;
+  if (name == "newton") return Partition::newton;
+  if (name == "gauss_seidel") return Partition::gauss_seidel;
+  throw std::invalid_argument("partition: got '" + name + "'. Fix: use 'direct', 'newton' or 'gauss_seidel'");
+}
+
 using Steps = std::vector<int>;
 using Release = py::gil_scoped_release;
 

@@ -24,7 +24,9 @@ WEAKER = (
 class SheetCurvature:
     """The triangles of a mesh that have three neighbors, as core/constraints/sheet_curvature.h takes them.
 
-    Triangles at a border have the curvature of their neighbors: their area counts there.
+    Triangles at a border have the curvature of their neighbors: their area counts there. Where a triangle borders on
+    one whose vertices are all held, the edge between them is a clamp: the sheet goes on beyond it as its mirror image,
+    so that the angle at the edge counts twice.
 
     Attributes:
         stencils: (count, 6) vertices: the triangle's, then those opposite across its edges v0v1, v1v2, v2v0.
@@ -36,21 +38,22 @@ class SheetCurvature:
     def __init__(self, mesh: TriangleMesh, free: Array) -> None:
         self.mesh = mesh
         hinge = _hinges_of_triangles(mesh)
-        full = (hinge >= 0).all(axis=1)
+        loose = free[mesh.triangles].any(axis=1)
+        full = (hinge >= 0).all(axis=1) & loose
         if not full.any():
             why = "needs triangles with three neighbors"
             raise SceneError("bending", why, mesh, "use a mesh of at least two cells across, or the dihedral model")
-        area = _with_borders(mesh, hinge)[full]
+        area = _with_borders(mesh, hinge, full, loose)[full]
         hinge, corners = hinge[full], mesh.corners[full]
         side = (mesh.hinge_triangles[hinge, 0] != np.flatnonzero(full)[:, None]).astype(
             int
         )  # which side the triangle is
         across = np.take_along_axis(mesh.hinges[hinge], 3 - side[..., None], axis=2)[..., 0]
-        stencils = np.column_stack([mesh.triangles[full], across])
-        kept = free[stencils].any(axis=1)
-        self.stencils, self.area = stencils[kept], area[kept]
-        self.matrix = _curvature_matrix(corners, _unfolded(mesh, hinge, side, corners))[kept]
-        self.angles = rest_angles(mesh, mesh.hinges)[hinge][kept]
+        clamped = ~loose[np.take_along_axis(mesh.hinge_triangles[hinge], 1 - side[..., None], axis=2)[..., 0]]
+        beyond = np.where(clamped[..., None], _mirrored(corners), _unfolded(mesh, hinge, side, corners))
+        self.stencils, self.area = np.column_stack([mesh.triangles[full], across]), area
+        self.matrix = _curvature_matrix(corners, beyond) * np.where(clamped, 2.0, 1.0)[:, None, :]
+        self.angles = rest_angles(mesh, mesh.hinges)[hinge]
 
     def add(
         self,
@@ -113,15 +116,15 @@ def _hinges_of_triangles(mesh: TriangleMesh) -> Array:
     return found
 
 
-def _with_borders(mesh: TriangleMesh, hinge: Array) -> Array:
-    """(m,) m^2, areas after every triangle that lacks a neighbor has given its own to those nearer to complete ones."""
+def _with_borders(mesh: TriangleMesh, hinge: Array, full: Array, loose: Array) -> Array:
+    """(m,) m^2, areas after every loose triangle that is not full has given its own to those nearer to full ones."""
     neighbor = np.where(hinge[..., None] >= 0, mesh.hinge_triangles[hinge], -1)
     own = np.arange(len(hinge))[:, None]
     neighbor = np.where(neighbor[..., 0] == own, neighbor[..., 1], neighbor[..., 0])
-    distance = np.where((hinge >= 0).all(axis=1), 0, -1)
+    distance = np.where(full, 0, np.where(loose, -1, -2))  # held ones have no part
     step = 0
-    while (distance < 0).any():
-        near = ((neighbor >= 0) & (distance[neighbor] == step)).any(axis=1) & (distance < 0)
+    while (distance == -1).any():
+        near = ((neighbor >= 0) & (distance[neighbor] == step)).any(axis=1) & (distance == -1)
         if not near.any():
             raise SceneError("bending", "cannot reach a part of the mesh", mesh, "leave out parts of a triangle or two")
         step += 1
@@ -152,6 +155,17 @@ def _unfolded(mesh: TriangleMesh, hinge: Array, side: Array, corners: Array) -> 
         places[:, k] = (
             corners[:, (k + 1) % 3] + s[:, None] * edge + t[:, None] * np.column_stack([-edge[:, 1], edge[:, 0]])
         )
+    return places
+
+
+def _mirrored(corners: Array) -> Array:
+    """(count, 3, 2) m, the third corner mirrored at each edge."""
+    places = np.empty_like(corners)
+    for k in range(3):
+        start, top = corners[:, k], corners[:, (k + 2) % 3]
+        edge = corners[:, (k + 1) % 3] - start
+        foot = start + (((top - start) * edge).sum(axis=1) / (edge**2).sum(axis=1))[:, None] * edge
+        places[:, k] = 2.0 * foot - top
     return places
 
 

@@ -11,7 +11,7 @@ from .errors import InputError
 from .memory import in_bytes
 
 INTEGRATORS = ("bdf1", "bdf2")
-METHODS = ("direct", "gauss_seidel")
+METHODS = ("direct", "gauss_seidel", "newton")
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Solver:
     @property
     def sweeps(self) -> int:
         """Iterations with the method's default filled in."""
-        return self.iterations if self.iterations is not None else (2 if self.method == "direct" else 10)
+        return self.iterations if self.iterations is not None else (10 if self.method == "gauss_seidel" else 2)
 
     def with_h(self, h: float) -> Solver:
         """The same solver at another substep."""

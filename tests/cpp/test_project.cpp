@@ -83,7 +83,7 @@ TYPED_TEST_SUITE(BlockOfOne, RegistryTypes, KindName);
 TYPED_TEST(BlockOfOne, DerivativesMatchComplexStep) {
   using K = TypeParam;
   double worst = 0.0;
-  for (const Partition partition : {Partition::gauss_seidel, Partition::direct})
+  for (const Partition partition : {Partition::gauss_seidel, Partition::direct, Partition::newton})
     for (const bool damped : {false, true})
       for (int pinned = -1; pinned < K::arity; ++pinned)
         for (unsigned seed = 0; seed < 5; ++seed) {
@@ -223,7 +223,7 @@ void expect_formula(const Projection& p, const std::vector<double>& theta) {
 
 TYPED_TEST(BlockOfOne, FollowsTheFormula) {
   using K = TypeParam;
-  for (const Partition partition : {Partition::gauss_seidel, Partition::direct})
+  for (const Partition partition : {Partition::gauss_seidel, Partition::direct, Partition::newton})
     for (const bool damped : {false, true}) {
       const Sample sample = scene_of_one<K>(2, damped, {0});
       const Projection p(sample.scene, partition, eta);

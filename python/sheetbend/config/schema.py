@@ -27,8 +27,10 @@ class SolverSection(Section):
     )
     h: Finite | None = key(None, "the substep itself, instead of `substeps`", "s", gt=0)
     integrator: Literal["bdf1", "bdf2"] = key("bdf2", "second order, or backward Euler (which damps)")
-    method: Literal["direct", "gauss_seidel"] = key("direct", "each rope one block, or colored sweeps")
-    iterations: int | None = key(None, "Newton iterations of a direct block (2) or sweeps (10)", ge=1)
+    method: Literal["direct", "newton", "gauss_seidel"] = key(
+        "direct", "each rope one block; each cloth one block through its vertices (no rigid parts); or colored sweeps"
+    )
+    iterations: int | None = key(None, "Newton iterations of a block (2) or sweeps (10)", ge=1)
     memory: str | int | None = key(
         None,
         'budget of an adjoint gradient (`check`), such as "2 GB" or a number of bytes: what does not fit is computed '

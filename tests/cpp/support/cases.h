@@ -196,7 +196,7 @@ inline Case case_of<ExponentialStrain>() {
 template <>
 inline Case case_of<SplineStrain>() {
   Case row = case_of<Strain>();
-  row.x = {0, 0, 0, 0.225, 0.45, 0.03, -0.18, 0.36, -0.06};  // beyond the last knot of each component
+  row.x = {0, 0, 0, 0.3, 0.58, 0.04, -0.23, 0.47, -0.08};  // beyond the last knot of each component
   row.p = {3.33, 1.83, -3.33, 1.83, 0.3, 0.8, 0.5};
   for (const double spacing : {0.06, 0.07, 0.05}) row.p.insert(row.p.end(), {spacing, 1.5, 2.0, 4.0, 3.0});
   row.parameter_degree.resize(row.p.size(), 0);
