@@ -14,7 +14,7 @@ from .checks import finite
 from .errors import SceneError
 from .grip import Grip, any_across, carried
 from .quantities import product
-from .rod_end import End
+from .rod_end import End, spread_roll
 from .rod_joints import Joints
 from .rod_junction import STUB_MASS, Facing, Junction
 from .rod_shape import initial_frames, initial_shape
@@ -183,6 +183,9 @@ def add_rod(
     for e, k, ghost, stub in zip(ends, (0, -1), ghosts, stubs, strict=True):
         if ghost is not None:
             e.hold(scene, int(nodes[k]), ghost, int(directors[k]), stub, tilts, roll and k == -1)
+    if roll:
+        shares = np.linspace(0.0 if ends[0].held else 1.0, 1.0, len(directors))
+        spread_roll(scene, f"{name}_roll", directors[:-1], shares[:-1])
 
     at = np.arange(1, len(chain) - 1)
     stencils = np.stack([chain[at - 1], chain[at], chain[at + 1], directors[at - 1], directors[at]], axis=1)
