@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .discretization import Refinement, refined_estimates
+from .discretization import Refinement, refined_estimates, to_the_limit
 from .errors import InputError
 from .experiment import Experiment
 from .floors import solver_floors
@@ -21,7 +21,7 @@ from .parameters import Parameter, Parameters
 from .prediction import Comparison, compare, predicted_values
 from .problem import FitProblem, ParameterLike, as_parameters
 from .recording import Recording
-from .result import Estimate, FitResult, Given, RecordingFit, Start
+from .result import Estimate, FitResult, Given, RecordingFit, Refit, Start
 from .scene import Scene
 
 PROFILE_TOLERANCE = 1e-7  # relative, of the cost: an interval's rise is many times that
@@ -120,24 +120,25 @@ def fit(
     best = ends[0]
     values = problem.parameters.to_physical(best.u)
 
-    def conclude(refitter: str | None) -> tuple[Identifiability, dict[str, float], tuple[Given, ...]]:
-        refined = (
-            {}
+    def conclude(
+        refitter: str | None,
+    ) -> tuple[tuple[Refit, ...], Identifiability, dict[str, float], tuple[Given, ...]]:
+        refits = (
+            ()
             if refine is None or refitter is None
             else refined_estimates(refine, experiments, wanted, problem, best.u, refitter, threads)
         )
-        return _judge(problem, best.u, refined, refitter if profiles else None), *predicted_values(
-            experiments, wanted, values, refitter, threads
-        )
+        judged = _judge(problem, best.u, to_the_limit(refits), refitter if profiles else None)
+        return refits, judged, *predicted_values(experiments, wanted, values, refitter, threads)
 
     left_out: dict[str, Comparison] = {}
     try:
-        judged, all_values, extra = conclude(None if interrupted else name)
+        refits, judged, all_values, extra = conclude(None if interrupted else name)
         if leave_one_out and not interrupted:
             left_out = each_left_out(fitted, wanted, values, name, threads)
     except KeyboardInterrupt:
         interrupted = True
-        judged, all_values, extra = conclude(None)
+        refits, judged, all_values, extra = conclude(None)
     comparisons = compare(experiments, wanted, all_values, threads)
     rows = problem.core.first_rows
     count = {e.name: rows[i + 1] - rows[i] for i, e in enumerate(fitted)}
@@ -166,6 +167,7 @@ def fit(
             )
             for m in ends
         ),
+        refits=refits,
         warnings=_warnings(ends, best, interrupted),
     )
     return Fit(result, tuple(comparisons), wanted)

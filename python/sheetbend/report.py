@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from .optional import require
@@ -26,7 +25,7 @@ def sections(result: FitResult) -> list[Section]:
     """The report as data, empty sections left out."""
     parts = [
         _parameters(result),
-        _interval_parts(result.estimates),
+        _interval_parts(result),
         _recordings(result),
         _held_out_motion(result),
         _unknown(result),
@@ -102,13 +101,15 @@ def _given_row(given: Given) -> tuple[str, ...]:
     return (given.name, short(given.value, 6), "", "", given.unit, given.words)
 
 
-def _interval_parts(estimates: Iterable[Estimate]) -> Section:
-    rows = [
-        (e.name, *figures((e.half_width, e.statistical, e.discretization), e.half_width), e.unit)
-        for e in estimates
-        if e.discretization > 0 and e.half_width is not None
-    ]
-    headers = ("parameter", "+/-", "statistical", "discretization", "unit")
+def _interval_parts(result: FitResult) -> Section:
+    rows = []
+    for e in result.estimates:
+        if e.discretization > 0 and e.half_width is not None:
+            moved = [refit.moved[e.name] for refit in result.refits]
+            numbers = figures((e.half_width, e.statistical, e.discretization, *moved), e.half_width)
+            rows.append((e.name, *numbers, e.unit))
+    moves = [f"{refit.name} moves" for refit in result.refits]
+    headers = ("parameter", "+/-", "statistical", "discretization", *moves, "unit")
     return Section("Where the intervals come from", headers, tuple(rows))
 
 

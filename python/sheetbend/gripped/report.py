@@ -93,7 +93,15 @@ class RopeReport:
         return [
             Section("Steps", headers, tuple(rows), notes),
             Section("What trades against what", notes=trades(self.result)),
+            Section("What the intervals count", notes=counted(self.result)),
         ]
+
+
+def counted(result: FitResult) -> tuple[tuple[str, str], ...]:
+    """(counted or not, sentence) of what makes the intervals."""
+    refined = "".join(f", {made.name}" for made in result.refits)
+    beside = "markers beside the rope or off their place along it, a roll of the grips that nothing shows, the weight"
+    return (("counted", f"residuals that are alike over time{refined}"), ("not counted", beside))
 
 
 def errors(unseen: Evaluation | None, without_twist: Evaluation | None) -> dict[str, Any]:
