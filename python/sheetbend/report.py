@@ -26,6 +26,7 @@ def sections(result: FitResult) -> list[Section]:
     parts = [
         _parameters(result),
         _interval_parts(result),
+        _refits(result),
         _recordings(result),
         _held_out_motion(result),
         _unknown(result),
@@ -103,14 +104,24 @@ def _given_row(given: Given) -> tuple[str, ...]:
 
 def _interval_parts(result: FitResult) -> Section:
     rows = []
+    counted = any(e.systematic > 0 for e in result.estimates)
     for e in result.estimates:
-        if e.discretization > 0 and e.half_width is not None:
-            moved = [refit.moved[e.name] for refit in result.refits]
-            numbers = figures((e.half_width, e.statistical, e.discretization, *moved), e.half_width)
-            rows.append((e.name, *numbers, e.unit))
-    moves = [f"{refit.name} moves" for refit in result.refits]
-    headers = ("parameter", "+/-", "statistical", "discretization", *moves, "unit")
+        if e.discretization + e.systematic > 0 and e.half_width is not None:
+            parts = (e.half_width, e.statistical, e.discretization, *([e.systematic] if counted else []))
+            rows.append((e.name, *figures(parts, e.half_width), e.unit))
+    more = ["systematic"] if counted else []
+    headers = ("parameter", "+/-", "statistical", "discretization", *more, "unit")
     return Section("Where the intervals come from", headers, tuple(rows))
+
+
+def _refits(result: FitResult) -> Section:
+    rows = []
+    for e in result.estimates if result.refits else ():
+        moved = [refit.moved[e.name] for refit in result.refits]
+        if e.half_width is not None:
+            rows.append((e.name, *figures(moved, e.half_width / 10), e.unit))
+    headers = ("parameter", *(refit.name for refit in result.refits), "unit")
+    return Section("What refits on a finer discretization move", headers, tuple(rows))
 
 
 def _recordings(result: FitResult) -> Section:

@@ -28,10 +28,11 @@ class Estimate:
 
     Attributes:
         name, value, unit: physical value in SI units.
-        lower, upper: 95 % interval, statistical and discretization parts together; None where it is open.
+        lower, upper: 95 % interval, all parts together; None where it is open.
         half_width: half of it, None where it is open.
         statistical: half-width from the residuals alone, None where it is open.
         discretization: what refits at half the step and twice the nodes move; 0 when that was not measured.
+        systematic: half-width of what else the interval counts; 0 when nothing.
         verdict: one of `VERDICTS`.
         words: the verdict as a sentence.
     """
@@ -46,6 +47,7 @@ class Estimate:
     discretization: float
     verdict: str
     words: str
+    systematic: float = 0.0
 
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:

@@ -136,7 +136,9 @@ class TestFit:
         table = (folder / "report.txt").read_text()
         assert "rope_1" in table and "without twist" in table
         report = (own / "report.txt").read_text()
-        assert "half the step moves" in report and "finer mesh moves" in report and "not counted" in report
+        assert (
+            "half the step" in report and "finer mesh" in report and "systematic" in report and "not counted" in report
+        )
         assert "rope_GJ" in report and "error/blend" in report and TILTS.name in report
         assert max(len(line) for line in report.splitlines()) <= 100
 

@@ -200,6 +200,6 @@ def test_a_refit_is_part_of_the_saved_result(tmp_path):
     (made,) = found.refits
     for e in found.estimates:
         assert e.discretization == approx(abs(made.to_limit * made.moved[e.name])) and e.discretization > 0
-    assert "half the step moves" in found.report()
+    assert "What refits on a finer discretization move" in found.report()
     earlier = {key: value for key, value in found.to_dict().items() if key != "refits"}
     assert sb.FitResult.from_dict(earlier).refits == ()

@@ -28,6 +28,7 @@ from ..scores import coordinate_error
 from .ladder import LADDER, TWIST, Rung
 from .model import GRAVITY, NAME, RopeModel, nominal_directions, shared_gravity
 from .motion import Array, GrippedMotion, motions_of
+from .offsets import offset_reach
 
 BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first
 LINKS_PER_BENDING_LENGTH = 3.0  # below this EI reads too high and GJ too low
@@ -306,6 +307,7 @@ class _Search:
             _experiments(model, self.all, self.longest),
             parameters=_starting(parameters, values),
             refine=None if interrupted else refine,
+            systematic=offset_reach,
             threads=self.threads,
             profiles=False,
             max_iterations=1 if interrupted else LONG,

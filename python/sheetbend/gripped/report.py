@@ -100,8 +100,9 @@ class RopeReport:
 def counted(result: FitResult) -> tuple[tuple[str, str], ...]:
     """(counted or not, sentence) of what makes the intervals."""
     refined = "".join(f", {made.name}" for made in result.refits)
-    beside = "markers beside the rope or off their place along it, a roll of the grips that nothing shows, the weight"
-    return (("counted", f"residuals that are alike over time{refined}"), ("not counted", beside))
+    seen = "markers beside the rope by as much as the residuals show (systematic)"
+    unseen = "a roll of the grips that nothing shows, noise of the grips, the weight"
+    return (("counted", f"residuals that are alike over time{refined}, {seen}"), ("not counted", unseen))
 
 
 def errors(unseen: Evaluation | None, without_twist: Evaluation | None) -> dict[str, Any]:
