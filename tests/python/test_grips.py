@@ -201,6 +201,8 @@ def everything() -> sb.Scene:
         drag_quadratic=0.02,
         curvature_modes=(0, 1),
         twist_modes=(0, 2),
+        softness_modes=(1,),
+        density_modes=(1, 2),
     )
 
 
@@ -216,6 +218,9 @@ SET = {
     "rod_curvature_2_1": 0.7,
     "rod_twist_0": 3.0,
     "rod_twist_2": -2.0,
+    "rod_softness_1": 0.3,
+    "rod_density_1": -0.4,
+    "rod_density_2": 0.2,
 }
 
 

@@ -45,7 +45,7 @@ def offset_reach(problem: FitProblem, u: Array) -> dict[str, float]:
     # how the minimum moves, and what is left in the residuals, per meter
     zeros = np.zeros((len(prior), G.shape[1]))
     moved = -np.linalg.lstsq(np.vstack([J, prior]), np.vstack([G, zeros]), rcond=None)[0]
-    seen = np.square(G).sum(axis=0)
+    seen = np.maximum(np.square(G).sum(axis=0), np.finfo(float).tiny)
     constant = G.T @ r / seen
     left = G.T @ (G + J @ moved) / seen[:, None]
     size = float(np.linalg.norm(constant) / np.linalg.norm(left))
