@@ -60,7 +60,7 @@ class GrippedRopeSection(Section):
         list(RUNGS),
         "what the model gets, one after another: straight with twist, tilts of the grips, rest curvature, yield, a "
         "stiffness that varies along the rope; a rung stays only if it predicts recordings better that it was not "
-        "fitted to",
+        "fitted to, and no worse those that it was",
         min_length=1,
     )
     validate_share: Finite = key(

@@ -3,7 +3,7 @@
 Long open-loop predictions have a rugged cost, short ones a smooth one; stiff and damped is the safe side of a start.
 So a fit begins with a few short windows and several stiffnesses, goes on to longer windows, and then adds one thing
 after another to the model: tilts of the grips, a rest curvature, yield, a stiffness that varies. A step stays only if
-it predicts recordings better that it was not fitted to.
+it predicts recordings better that it was not fitted to, and no worse those that it was.
 """
 
 from __future__ import annotations
@@ -282,7 +282,9 @@ class _Search:
     ) -> Step:
         fitted = self._error(model, values, self.fitted)
         others = self._error(model, values, self.others) if self.others else fitted
-        stays = not before or others < BETTER * min(s.others for s in before if s.stays)
+        kept = [s for s in before if s.stays]
+        # one that fits worse than the smaller model ended elsewhere than in its minimum: better on others by chance
+        stays = not kept or (others < BETTER * min(s.others for s in kept) and fitted <= min(s.fitted for s in kept))
         return Step(name, fitted, others, stays, time.perf_counter() - began)
 
     def _tell(self, step: Step) -> None:
