@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .discretization import Refinement, refined_estimates
+from .discretization import Refinement, refined_estimates, to_the_limit
 from .errors import InputError
 from .experiment import Experiment
 from .floors import solver_floors
@@ -21,10 +21,11 @@ from .parameters import Parameter, Parameters
 from .prediction import Comparison, compare, predicted_values
 from .problem import FitProblem, ParameterLike, as_parameters
 from .recording import Recording
-from .result import Estimate, FitResult, Given, RecordingFit, Start
+from .result import Estimate, FitResult, Given, RecordingFit, Refit, Start
 from .scene import Scene
 
 PROFILE_TOLERANCE = 1e-7  # relative, of the cost: an interval's rise is many times that
+Systematic = Callable[[FitProblem, np.ndarray], Mapping[str, float]]
 INACCURATE = 0.5  # a start whose cost exceeds the best by this share ended elsewhere
 
 
@@ -67,6 +68,7 @@ def fit(
     optimizer: str = "auto",
     starts: Sequence[Mapping[str, float]] = (),
     refine: Refinement | None = None,
+    systematic: Systematic | None = None,
     leave_one_out: bool = False,
     profiles: bool = True,
     max_iterations: int = 200,
@@ -83,6 +85,8 @@ def fit(
         starts: further starting values by name; the best end wins, all are reported.
         refine: also refit on a finer discretization, and count what that moves as a part of the intervals (see
             `discretization`).
+        systematic: (problem, internal minimum) -> half-widths of what else the intervals are to count, by parameter, in
+            its unit.
         leave_one_out: also predict every recording that holds nothing out by a fit to the others.
         profiles: refit the others along the worst parameters for their intervals; without, intervals are the linear
             ones, which cost nothing beside the fit.
@@ -120,24 +124,26 @@ def fit(
     best = ends[0]
     values = problem.parameters.to_physical(best.u)
 
-    def conclude(refitter: str | None) -> tuple[Identifiability, dict[str, float], tuple[Given, ...]]:
-        refined = (
-            {}
+    def conclude(
+        refitter: str | None,
+    ) -> tuple[tuple[Refit, ...], Identifiability, dict[str, float], tuple[Given, ...]]:
+        refits = (
+            ()
             if refine is None or refitter is None
             else refined_estimates(refine, experiments, wanted, problem, best.u, refitter, threads)
         )
-        return _judge(problem, best.u, refined, refitter if profiles else None), *predicted_values(
-            experiments, wanted, values, refitter, threads
-        )
+        more = {} if systematic is None else systematic(problem, best.u)
+        judged = _judge(problem, best.u, to_the_limit(refits), more, refitter if profiles else None)
+        return refits, judged, *predicted_values(experiments, wanted, values, refitter, threads)
 
     left_out: dict[str, Comparison] = {}
     try:
-        judged, all_values, extra = conclude(None if interrupted else name)
+        refits, judged, all_values, extra = conclude(None if interrupted else name)
         if leave_one_out and not interrupted:
             left_out = each_left_out(fitted, wanted, values, name, threads)
     except KeyboardInterrupt:
         interrupted = True
-        judged, all_values, extra = conclude(None)
+        refits, judged, all_values, extra = conclude(None)
     comparisons = compare(experiments, wanted, all_values, threads)
     rows = problem.core.first_rows
     count = {e.name: rows[i + 1] - rows[i] for i, e in enumerate(fitted)}
@@ -166,6 +172,7 @@ def fit(
             )
             for m in ends
         ),
+        refits=refits,
         warnings=_warnings(ends, best, interrupted),
     )
     return Fit(result, tuple(comparisons), wanted)
@@ -225,7 +232,13 @@ def _minimize_all(
     return sorted(ends, key=lambda m: m.cost), name, interrupted
 
 
-def _judge(problem: FitProblem, u: np.ndarray, refined: Mapping[str, float], refitter: str | None) -> Identifiability:
+def _judge(
+    problem: FitProblem,
+    u: np.ndarray,
+    refined: Mapping[str, float],
+    systematic: Mapping[str, float],
+    refitter: str | None,
+) -> Identifiability:
     """Verdicts and intervals; without a refitter the intervals are the linear ones."""
     _, r, J = problem.evaluate(u)
     rows = problem.core.data_rows
@@ -237,6 +250,7 @@ def _judge(problem: FitProblem, u: np.ndarray, refined: Mapping[str, float], ref
         layout=problem.rows_layout(),
         floors=solver_floors(problem.experiments, problem.parameters),
         discretization=refined,
+        systematic=systematic,
         profile=None if refitter is None or len(problem.parameters.free) == 1 else _profile(problem, u, refitter),
         cost=lambda at: _cost(problem, at),
     )

@@ -62,7 +62,7 @@ class Hinges:
         if self.mesh.one_way_diagonals:
             why = f"bend {self.mesh.diagonal_bias:.1f} times as hard in one direction as in another on this mesh"
             raise SceneError(
-                f"{name}.bending", why, rigidity, "use a grid of alternating diagonals, or an equilateral one"
+                f"{name}.bending", why, rigidity, "use the curvature model, or an equilateral mesh"
             )
         dihedral = model == "dihedral"
         if curved and not dihedral:

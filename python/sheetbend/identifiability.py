@@ -79,6 +79,7 @@ def identify(
     layout: Layout | None = None,
     floors: Mapping[str, Floor] | None = None,
     discretization: Mapping[str, float] | None = None,
+    systematic: Mapping[str, float] | None = None,
     profile: Callable[[str, float], float] | None = None,
     cost: Callable[[Array], float] | None = None,
     rank_tolerance: float = RANK_TOLERANCE,
@@ -93,6 +94,7 @@ def identify(
         layout: where each row comes from; one series by default.
         floors: what the solver makes up, by parameter.
         discretization: what refits at half the step and twice the nodes move, by parameter, in its unit.
+        systematic: half-widths of what else the intervals count, by parameter, in its unit.
         profile: (name, physical value) -> cost (half the sum of squares with priors) with all others
             refitted; it is asked about weak parameters only.
         cost: (internal point) -> cost there, infinite where it has none; where it rises towards both linear
@@ -103,11 +105,11 @@ def identify(
         InputError: shapes disagree, numbers are not finite, or a name is unknown.
         MissingExtraError: scipy is not installed.
     """
-    floors, discretization = floors or {}, discretization or {}
-    _check(parameters, internal, residuals, jacobian, {*floors, *discretization})
+    floors, discretization, systematic = floors or {}, discretization or {}, systematic or {}
+    _check(parameters, internal, residuals, jacobian, {*floors, *discretization, *systematic})
     judge = _Judge(parameters, internal, residuals, jacobian, layout, rank_tolerance, profile, cost)
     estimates = tuple(
-        judge.estimate(column, floors.get(name), float(discretization.get(name, 0.0)))
+        judge.estimate(column, floors.get(name), (discretization.get(name, 0.0), systematic.get(name, 0.0)))
         for column, name in enumerate(parameters.free)
     )
     space = judge.space
@@ -175,17 +177,17 @@ class _Judge:
             self.wide = covariance(residuals, jacobian[:, unique], layout, prior[:, unique])
         self.space = replace(self.space, gauges=tuple(self._measured(gauge) for gauge in self.space.gauges))
 
-    def estimate(self, column: int, floor: Floor | None, discretization: float) -> Estimate:
-        """Value, interval and verdict of the parameter in that column."""
+    def estimate(self, column: int, floor: Floor | None, more: tuple[float, float]) -> Estimate:
+        """Value, interval and verdict of the parameter in that column; `more`: discretization and systematic parts."""
         parameter = self.parameters[self.parameters.free[column]]
         value = parameter.to_physical(self.internal[column])
         if column not in self.space.determined:
-            return _open(parameter, value, discretization, self._undetermined(parameter.name))
+            return _open(parameter, value, more, self._undetermined(parameter.name))
         alone = float(self.alone[column])
         if not parameter.log and parameter.scale is not None and alone > _OPEN * parameter.scale:
             left = quantity(alone, parameter)
             words = f"the data hardly depend on it: they would leave it open to {left} if all others were known"
-            return _open(parameter, value, discretization, words)
+            return _open(parameter, value, more, words)
         columns, spread = (self.columns, self.spread) if column in self.columns else (self.wide_columns, self.wide)
         index = columns.index(column)
         t = float(self.quantile(spread.degrees[index], 0.5 + _LEVEL / 2))
@@ -193,7 +195,7 @@ class _Judge:
         ends = _ends(parameter, self.internal[column], reach)
         if self._limit(column) is not None:
             ends = _clipped(parameter, ends)
-        elif self.profile is not None and not _precise(parameter, value, ends, discretization):
+        elif self.profile is not None and not _precise(parameter, value, ends, sum(more)):
             rise = t**2 * spread.residual_variance * float(spread.inflation[index]) / 2
             if rise > 0 and not self._confirmed(column, reach):
                 step = min(reach, 1.0) if parameter.log else reach
@@ -206,7 +208,7 @@ class _Judge:
                     upper=parameter.upper,
                     log=parameter.log,
                 )
-        return self._judged(column, parameter, value, ends, discretization, floor)
+        return self._judged(column, parameter, value, ends, more, floor)
 
     def _judged(
         self,
@@ -214,13 +216,13 @@ class _Judge:
         parameter: Parameter,
         value: float,
         ends: Ends,
-        discretization: float,
+        more: tuple[float, float],
         floor: Floor | None,
     ) -> Estimate:
         if ends == (None, None):
             words = "the cost stays level on both sides: the data hardly depend on it"
-            return _open(parameter, value, discretization, words)
-        lower, upper = _widened(parameter, value, ends, discretization)
+            return _open(parameter, value, more, words)
+        lower, upper = _widened(parameter, value, ends, sum(more))
         half_width = _half((lower, upper))
         if floor is not None and (value >= floor.value if floor.ceiling else value <= floor.value):
             verdict, words = "at its floor", floor_words(parameter, floor.value, floor.ceiling, floor.reason)
@@ -242,7 +244,8 @@ class _Judge:
             upper=upper,
             half_width=half_width,
             statistical=_half(ends),
-            discretization=discretization,
+            discretization=float(more[0]),
+            systematic=float(more[1]),
             verdict=verdict,
             words=words,
         )
@@ -320,7 +323,7 @@ class _Judge:
         return f"upper bound {quantity(parameter.upper, parameter)}" if self.at_upper[column] else None
 
 
-def _open(parameter: Parameter, value: float, discretization: float, words: str) -> Estimate:
+def _open(parameter: Parameter, value: float, more: tuple[float, float], words: str) -> Estimate:
     return Estimate(
         name=parameter.name,
         value=value,
@@ -329,7 +332,8 @@ def _open(parameter: Parameter, value: float, discretization: float, words: str)
         upper=None,
         half_width=None,
         statistical=None,
-        discretization=discretization,
+        discretization=float(more[0]),
+        systematic=float(more[1]),
         verdict="not identifiable",
         words=words,
     )
@@ -350,7 +354,7 @@ def _clipped(parameter: Parameter, ends: Ends) -> Ends:
 
 
 def _widened(parameter: Parameter, value: float, ends: Ends, more: float) -> Ends:
-    """Both ends moved out by the discretization term; a factor on a log scale keeps them positive."""
+    """Both ends moved out by the other parts; a factor on a log scale keeps them positive."""
     lower, upper = ends
     factor, shift = (1 + more / value, 0.0) if parameter.log else (1.0, more)
     return (

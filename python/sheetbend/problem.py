@@ -92,6 +92,7 @@ class FitProblem:
     ) -> None:
         self.experiments = tuple(experiments)
         self.given, self.threads = parameters, threads
+        self._last: tuple[np.ndarray, tuple[bool, np.ndarray, np.ndarray]] | None = None
         self.recordings = tuple(recordings if recordings is not None else (e.fitted() for e in experiments))
         names = [e.name for e in experiments]
         if len(set(names)) != len(names):
@@ -185,8 +186,12 @@ class FitProblem:
 
     def evaluate(self, u: np.ndarray, jacobian: bool = True) -> tuple[bool, np.ndarray, np.ndarray]:
         """(ok, residuals (rows,), Jacobian (rows, free)); rows of data first, then priors. Not ok where the physics
-        has no answer."""
-        return self.core.evaluate(u, jacobian)
+        has no answer. The last Jacobian is kept: everything that is told of a minimum asks for it."""
+        if not jacobian:
+            return self.core.evaluate(u, False)
+        if self._last is None or not np.array_equal(self._last[0], u):
+            self._last = np.array(u, dtype=float), self.core.evaluate(u, True)
+        return self._last[1]
 
     def simulate(self, u: np.ndarray) -> list[np.ndarray]:
         """Simulated markers (frames, markers, 3) of every experiment."""

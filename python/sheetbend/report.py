@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from .optional import require
@@ -26,7 +25,8 @@ def sections(result: FitResult) -> list[Section]:
     """The report as data, empty sections left out."""
     parts = [
         _parameters(result),
-        _interval_parts(result.estimates),
+        _interval_parts(result),
+        _refits(result),
         _recordings(result),
         _held_out_motion(result),
         _unknown(result),
@@ -102,14 +102,26 @@ def _given_row(given: Given) -> tuple[str, ...]:
     return (given.name, short(given.value, 6), "", "", given.unit, given.words)
 
 
-def _interval_parts(estimates: Iterable[Estimate]) -> Section:
-    rows = [
-        (e.name, *figures((e.half_width, e.statistical, e.discretization), e.half_width), e.unit)
-        for e in estimates
-        if e.discretization > 0 and e.half_width is not None
-    ]
-    headers = ("parameter", "+/-", "statistical", "discretization", "unit")
+def _interval_parts(result: FitResult) -> Section:
+    rows = []
+    counted = any(e.systematic > 0 for e in result.estimates)
+    for e in result.estimates:
+        if e.discretization + e.systematic > 0 and e.half_width is not None:
+            parts = (e.half_width, e.statistical, e.discretization, *([e.systematic] if counted else []))
+            rows.append((e.name, *figures(parts, e.half_width), e.unit))
+    more = ["systematic"] if counted else []
+    headers = ("parameter", "+/-", "statistical", "discretization", *more, "unit")
     return Section("Where the intervals come from", headers, tuple(rows))
+
+
+def _refits(result: FitResult) -> Section:
+    rows = []
+    for e in result.estimates if result.refits else ():
+        moved = [refit.moved[e.name] for refit in result.refits]
+        if e.half_width is not None:
+            rows.append((e.name, *figures(moved, e.half_width / 10), e.unit))
+    headers = ("parameter", *(refit.name for refit in result.refits), "unit")
+    return Section("What refits on a finer discretization move", headers, tuple(rows))
 
 
 def _recordings(result: FitResult) -> Section:

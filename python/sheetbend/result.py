@@ -28,10 +28,11 @@ class Estimate:
 
     Attributes:
         name, value, unit: physical value in SI units.
-        lower, upper: 95 % interval, statistical and discretization parts together; None where it is open.
+        lower, upper: 95 % interval, all parts together; None where it is open.
         half_width: half of it, None where it is open.
         statistical: half-width from the residuals alone, None where it is open.
         discretization: what refits at half the step and twice the nodes move; 0 when that was not measured.
+        systematic: half-width of what else the interval counts; 0 when nothing.
         verdict: one of `VERDICTS`.
         words: the verdict as a sentence.
     """
@@ -46,6 +47,7 @@ class Estimate:
     discretization: float
     verdict: str
     words: str
+    systematic: float = 0.0
 
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:
@@ -107,6 +109,21 @@ class Start:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Refit:
+    """What one finer discretization moves.
+
+    Attributes:
+        name: what was refined.
+        to_limit: factor from what it moves to the limit of ever finer ones.
+        moved: of each fitted parameter, finer minus reported, in its unit.
+    """
+
+    name: str
+    to_limit: float
+    moved: Mapping[str, float]
+
+
+@dataclass(frozen=True, kw_only=True)
 class FitResult:
     """A finished (or interrupted) fit.
 
@@ -122,6 +139,7 @@ class FitResult:
         rows: number of data residuals.
         autocorrelation_time: frames of residual that count as one, 1 when they are independent.
         starts: the ends of all starts, best first.
+        refits: on finer discretizations, of which `Estimate.discretization` is made.
         optimizer, iterations, seconds, converged, interrupted, message: how it went.
         warnings: what a reader must know before using the numbers.
     """
@@ -143,6 +161,7 @@ class FitResult:
     held_out_is: str = ""
     autocorrelation_time: float = 1.0
     starts: tuple[Start, ...] = ()
+    refits: tuple[Refit, ...] = ()
     warnings: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
@@ -192,9 +211,9 @@ class FitResult:
         found = data.get("format") if isinstance(data, Mapping) else data
         if found != FORMAT:
             raise InputError("format", "is not the one that this version reads", found, f"use {FORMAT!r}")
-        data = dict(data)
+        data = {"refits": [], **data}  # which files of earlier versions do not have
         plain = {field.name for field in fields(cls)} & data.keys() - {"baseline"}
-        nested = {"given": Given, "correlations": Correlation, "starts": Start}
+        nested = {"given": Given, "correlations": Correlation, "starts": Start, "refits": Refit}
         values = {name: data[name] for name in plain}
         for name, kind in nested.items():
             values[name] = tuple(kind(**part) for part in data[name])

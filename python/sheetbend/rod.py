@@ -14,8 +14,8 @@ from .checks import finite
 from .errors import SceneError
 from .grip import Grip, any_across, carried
 from .quantities import product
-from .rod_end import End
-from .rod_joints import Joints
+from .rod_end import End, spread_roll
+from .rod_joints import Joints, weigh
 from .rod_junction import STUB_MASS, Facing, Junction
 from .rod_shape import initial_frames, initial_shape
 from .rope import Rope
@@ -78,13 +78,15 @@ def add_rod(
     curvature_modes: Sequence[int] = (),
     twist_modes: Sequence[int] = (),
     softness_modes: Sequence[int] = (),
+    density_modes: Sequence[int] = (),
 ) -> Rod:
     """Add a discrete elastic rod of `segments` equal links to a scene (Bergou et al. 2008, 2010).
 
     Quantities: `<name>_length` m, `<name>_density` kg/m, `_EI` and `_GJ` N m^2, and where given `_EA` N, `_EI2` N m^2,
     `_stretch_damping`, `_bend_damping` and `_twist_damping` s, `_drag_linear` N s/m^2, `_drag_quadratic` N s^2/m^3,
     `_start_tilt_1`, `_start_tilt_2`, `_end_tilt_1`, `_end_tilt_2`, `_roll` rad, `_curvature_1_<k>`,
-    `_curvature_2_<k>` and `_twist_<k>` 1/m, `_yield_curvature` 1/m, `_yield_share`, `_softness_<k>`.
+    `_curvature_2_<k>` and `_twist_<k>` 1/m, `_yield_curvature` 1/m, `_yield_share`, `_softness_<k>`,
+    `_density_<k>`.
 
     Args:
         length: m, between the grips.
@@ -110,6 +112,8 @@ def add_rod(
         curvature_modes: k of rest-curvature modes cos(k pi s / length), about both frame axes; each starts at zero.
         twist_modes: the same of the rest twist per length.
         softness_modes: the same of the bending compliance, relative to length/EI: a rod that is stiffer in places.
+        density_modes: the same of the density, relative to it: a rod that is heavier in places; from k = 1 on they
+            leave its weight as it is.
 
     Returns:
         Rod, also kept as `scene.ropes[name]`.
@@ -157,6 +161,7 @@ def add_rod(
     scene.add_quantity(f"{name}_length", length, "m")
     scene.add_quantity(f"{name}_density", density, "kg/m")
     add_masses(scene, name, nodes, segments)
+    weigh(scene, name, nodes, segments, density_modes)
     stretch = None
     if stretch_damping is not None:
         stretch = (1.0, {scene.add_quantity(f"{name}_stretch_damping", stretch_damping, "s"): "identity"})
@@ -183,6 +188,9 @@ def add_rod(
     for e, k, ghost, stub in zip(ends, (0, -1), ghosts, stubs, strict=True):
         if ghost is not None:
             e.hold(scene, int(nodes[k]), ghost, int(directors[k]), stub, tilts, roll and k == -1)
+    if roll:
+        shares = np.linspace(0.0 if ends[0].held else 1.0, 1.0, len(directors))
+        spread_roll(scene, f"{name}_roll", directors[:-1], shares[:-1])
 
     at = np.arange(1, len(chain) - 1)
     stencils = np.stack([chain[at - 1], chain[at], chain[at + 1], directors[at - 1], directors[at]], axis=1)

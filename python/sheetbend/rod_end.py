@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from .errors import SceneError
 from .grip import Grip
-from .quantities import product
+from .quantities import Term, product
 from .rod_junction import STUB, Facing, Junction
 from .rope import GHOST
 from .scene import Array, Scene
+
+SERIES = 9  # powers of the roll in a start's frames: at half a turn they are off by 0.03 rad
 
 
 class End:
@@ -93,3 +97,24 @@ def _add_motion(scene: Scene, grip: Grip, node: int, by: Array, factors: dict[st
         scene.add_motion_term(node, by, factors)
     else:
         scene.add_terms([product("position", 3 * node + k, by[0, k], factors) for k in range(3)])
+
+
+def spread_roll(scene: Scene, roll: str, directors: Array, shares: Array) -> None:
+    """Turn frames about their edges by shares of a roll, by the series of sine and cosine.
+
+    Without it the first substep would turn them, and the damping of the bent joints would make a kick of that.
+
+    Args:
+        directors: (k,) at their places without roll.
+        shares: (k,) of the quantity `roll`.
+    """
+    edges = np.array([scene.directors[int(d)] for d in directors])
+    x = scene.positions
+    along = x[edges[:, 1]] - x[edges[:, 0]]
+    first, second = x[directors], np.cross(along / np.linalg.norm(along, axis=1, keepdims=True), x[directors])
+    index = (3 * np.asarray(directors)[:, None] + np.arange(3)).ravel()
+    for power in range(1, SERIES + 1):
+        weight = (-1) ** (power // 2) / math.factorial(power) * shares**power
+        axis = second if power % 2 else first
+        factors = ((roll, "identity"),) * (power % 2) + ((roll, "square"),) * (power // 2)
+        scene.add_terms([Term("position", index, (weight[:, None] * axis).ravel(), factors)])

@@ -86,14 +86,14 @@ class Joints:
             ("twist", twist_modes, twist + joints, ()),
         ]
         for label, modes, index, factors in targets:
-            for mode, weights in self._modes(label, modes, "1/m"):
+            for mode, weights in mode_quantities(self._scene, self._name, label, modes, self._s, "1/m"):
                 own: Factors = ((mode, "identity"), (self._length, "identity"), *factors)
                 self._scene.add_terms([Term("rest", index, self._share * weights, own)])
 
     def soften(self, modes: Sequence[int]) -> None:
         """Compliance length/EI (1 + sum of modes), each mode starting at zero."""
         first = self._scene.group(f"{self._name}_bend")[1] + np.arange(len(self._stencils))
-        for mode, weights in self._modes("softness", modes, ""):
+        for mode, weights in mode_quantities(self._scene, self._name, "softness", modes, self._s):
             factors: Factors = ((mode, "identity"), (self._length, "identity"), (f"{self._name}_EI", "inverse"))
             self._scene.add_terms([Term("compliance", first, self._share * weights, factors)])
 
@@ -107,19 +107,29 @@ class Joints:
             factors: Factors = ((tau, "identity"), (stiffness, "identity"), (self._length, "inverse"))
             scene.add_terms([Term("damping", first, 1.0 / self._share, factors)])
 
-    def _modes(self, label: str, modes: Sequence[int], unit: str) -> list[tuple[str, Array]]:
-        """A new quantity per mode, and its weights at the joints."""
-        made = []
-        for k in _checked(f"{self._name}.{label.removesuffix('_1').removesuffix('_2')}_modes", modes):
-            name = f"{self._name}_{label}_{k}"
-            scale = 1.0 if unit else 0.3
-            made.append(
-                (
-                    self._scene.add_quantity(name, 0.0, unit, positive=False, scale=scale),
-                    np.cos(k * np.pi * self._s),
-                )
-            )
-        return made
+
+def weigh(scene: Scene, name: str, nodes: Array, segments: int, modes: Sequence[int]) -> None:
+    """Density (1 + sum of modes), each mode starting at zero; the whole weight stays."""
+    share, s = voronoi_shares(segments), np.arange(segments + 1) / segments
+    for mode, weights in mode_quantities(scene, name, "density", modes, s):
+        factors: Factors = ((mode, "identity"), (f"{name}_density", "identity"), (f"{name}_length", "identity"))
+        for part in (slice(None, -1), slice(-1, None)):  # a ring's last node is its first
+            scene.add_terms([Term("mass", nodes[part], (share * weights)[part], factors)])
+
+
+def mode_quantities(
+    scene: Scene, name: str, label: str, modes: Sequence[int], s: Array, unit: str = ""
+) -> list[tuple[str, Array]]:
+    """A new quantity `<name>_<label>_<k>` per mode k, and its weights cos(k pi s) at shares s of the rod's length."""
+    field = f"{name}.{label.removesuffix('_1').removesuffix('_2')}_modes"
+    scale = 1.0 if unit else 0.3
+    return [
+        (
+            scene.add_quantity(f"{name}_{label}_{k}", 0.0, unit, positive=False, scale=scale),
+            np.cos(k * np.pi * s),
+        )
+        for k in _checked(field, modes)
+    ]
 
 
 def _checked(field: str, modes: Sequence[int]) -> tuple[int, ...]:

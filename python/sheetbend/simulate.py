@@ -23,7 +23,7 @@ class Trajectory:
     Attributes:
         times: (frames,) s.
         positions: (frames, particles, 3) m.
-        velocities: (frames, particles, 3) m/s.
+        velocities: (frames, particles, 3) m/s; zero for directors, which are directions.
         forces: per group the constraints' multipliers (frames, count, rows) in units of force (distance: minus the
             tension in N; bend and hinge: minus the moment in N m), zero at the initial frame.
     """
@@ -64,10 +64,12 @@ def simulate(
     with divergence(scene):
         out = solver.core(compiled).simulate(inputs, steps, 0.0)
     frames = len(steps)
+    velocities = out["velocities"].reshape(frames, -1, 3)
+    velocities[:, list(scene.directors)] = 0.0
     return Trajectory(
         np.array(steps) * solver.h,
         out["positions"].reshape(frames, -1, 3),
-        out["velocities"].reshape(frames, -1, 3),
+        velocities,
         forces_by_group(scene, out["multipliers"]),
     )
 

@@ -17,7 +17,7 @@ import sheetbend as sb
 from sheetbend.cli import gripped
 from sheetbend.cli.app import app
 from sheetbend.config import GrippedConfig, gripped_schema, parse, parse_any
-from sheetbend.gripped import LADDER, trades
+from sheetbend.gripped import LADDER, GrippedMotion, trades
 from sheetbend.gripped.ladder import REST, TILTS, TWIST, VARYING, YIELD
 from sheetbend.result import Correlation, Estimate, FitResult
 from typer.testing import CliRunner, Result
@@ -105,11 +105,26 @@ class TestFit:
         assert 0.8 < rope["values"]["rope_EI"] / true["EI"] < 2.0
         assert rope["parameters"]["rope_EI"]["interval"][0] < rope["values"]["rope_EI"]
         assert any("raise max_segments" in warning for warning in rope["warnings"])
+        self.refined(rope)
         assert [step["name"] for step in rope["steps"]] == [TWIST.name, TILTS.name]
         assert all(step["seconds"] > 0 and step["fitted"] > 0 for step in rope["steps"])
         self.written(Path("out") / "ropes", rope)
-        for words in ("start at a bending length", "What trades against what", "EA: not fitted", "without twist"):
+        for words in (
+            "start at a bending length",
+            "What trades against what",
+            "EA: not fitted",
+            "would move EI by",
+            "without twist",
+        ):
             assert words in result.stderr
+
+    def refined(self, rope: dict[str, Any]) -> None:
+        """Both halves of an interval are told, and what each refinement moves."""
+        EI = rope["parameters"]["rope_EI"]
+        moved = [made["to_limit"] * made["moved"]["rope_EI"] for made in rope["refits"]]
+        assert [made["name"] for made in rope["refits"]] == ["half the step", "finer mesh"]
+        assert EI["discretization"] == pytest.approx(np.hypot(*moved)) and EI["discretization"] > 0
+        assert EI["half_width"] > EI["statistical"] > 0
 
     def written(self, folder: Path, rope: dict[str, Any]) -> None:
         assert {p.name for p in folder.iterdir()} == {"report.txt", "rope_1"}
@@ -121,8 +136,36 @@ class TestFit:
         table = (folder / "report.txt").read_text()
         assert "rope_1" in table and "without twist" in table
         report = (own / "report.txt").read_text()
+        assert (
+            "half the step" in report and "finer mesh" in report and "systematic" in report and "not counted" in report
+        )
         assert "rope_GJ" in report and "error/blend" in report and TILTS.name in report
         assert max(len(line) for line in report.splitlines()) <= 100
+
+    def test_recordings_are_smoothed_once(self, config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        edited(config, ('["twist", "tilts"]', '["twist"]'), ("[[0.5, 1.5], [1.0, 4.0]]", "[[0.5, 0.5]]"))
+        smoothed = []
+        of = GrippedMotion.of
+
+        def counted(recording: sb.Recording, smoothing: float) -> GrippedMotion:
+            smoothed.append(recording.name)
+            return of(recording, smoothing)
+
+        monkeypatch.setattr(GrippedMotion, "of", counted)
+        assert run("fit", config).exit_code == 0
+        assert sorted(smoothed) == ["00", "00", "01", "02"]
+
+    def test_the_nominal_directions_are_the_fits(self, config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        edited(config, ('"rope_1/eval"', '"rope_1/eval"\nnominal = [[2, 0, -2], [1, 0, 1]]'))
+        given = []
+
+        def noted(*arguments: Any, **options: Any) -> Any:
+            given.append(options["nominal"])
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr(gripped, "fit_rope", noted)
+        run("fit", config, "--json")
+        assert given == [([2, 0, -2], [1, 0, 1])]
 
     def test_without_eval_there_is_nothing_to_score(self, config: Path) -> None:
         edited(config, ('eval = "rope_1/eval"\n', ""), ('["twist", "tilts"]', '["twist"]'))
@@ -202,6 +245,9 @@ BAD = [
     ('["twist", "tilts"]', '["twist", "friction"]', "gripped_rope[0].rungs[1]", "'varying'"),
     ("[fit]\n", "[scene]\n[fit]\n", "scene", "gripped_rope"),
     ("without_twist = false", "starts = []", "fit.starts", "threads"),
+    ("density = 0.045", "density = 0.045\nnominal = [[1, 0, -1]]", "gripped_rope[0].nominal", "[start, end]"),
+    ("density = 0.045", "density = 0.045\nnominal = [[1, 0, -1], [0, 0, 0]]", "gripped_rope[0].nominal", "a length"),
+    ("density = 0.045", "density = 0.045\nnominal = [[1, 0], [1, 0, 1]]", "gripped_rope[0].nominal[0]", "at least 3"),
     ('"rope_1/train"', '"rope_1/nowhere"', "gripped_rope[0].train", "folder that holds the files"),
     ('"rope_1/eval"', '"rope_1"', "gripped_rope[0].eval", "pattern"),
     ('"rope_1/eval"', '"rope_1/eval"\npattern = "*.csv"', "gripped_rope[0].train", "*.csv"),
@@ -228,6 +274,18 @@ def test_recordings_without_grips_are_refused(config: Path, tmp_path: Path) -> N
     sb.Recording(positions=x, times=np.arange(20) / 100, name="loose").save(tmp_path / "free" / "loose.npz")
     error = last_line(run("fit", edited(config, ('"rope_1/train"', '"free"')), "--json"))["error"]
     assert error["field"] == "gripped_rope[0].train" and "loose" in error["problem"] and "clamped" in error["fix"]
+
+
+def test_a_nominal_direction_opposite_to_a_recorded_one_is_refused(config: Path, tmp_path: Path) -> None:
+    (tmp_path / "straight").mkdir()
+    t = np.arange(20) / 100
+    x = np.arange(8)[:, None] * (0.1, 0.0, 0.0) + 0 * t[:, None, None]
+    recording = sb.Recording(positions=x, times=t, name="line", clamped=(0, 1, 6, 7))
+    recording.save(tmp_path / "straight" / "line.npz")
+    changes = ('"rope_1/train"', '"straight"\nnominal = [[1, 0, 0], [-1, 0, 0]]')
+    error = last_line(run("fit", edited(config, changes), "--json"))["error"]
+    assert error["field"] == "gripped_rope[0].nominal" and "opposite" in error["problem"] and "line" in error["problem"]
+    assert "half a turn" in error["fix"]
 
 
 def test_the_file_decides_which_kind_it_is(config: Path) -> None:

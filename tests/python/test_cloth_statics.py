@@ -179,7 +179,7 @@ def test_simple_shear():
         scene, mesh, density=0.2, warp=WARP, shear=SHEAR, held=edge, bending=BENDING, positions=sheared
     )
     scene.pin(cloth.particles[edge])
-    rest = sb.equilibrium(scene)
+    rest = sb.equilibrium(scene, stable=False)  # a sheared sheet buckles
     assert rest.positions == approx(sheared, abs=1e-12)
     strains = sb.constraint_values(scene, rest.positions)["cloth_membrane"]
     assert strains[:, 0] == approx(0.0, abs=1e-14)

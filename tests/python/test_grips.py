@@ -130,6 +130,51 @@ def test_tilts_and_roll_at_an_end_that_moves():
     assert motion[:, rod.directors[-1]] == approx(rolled[1:], abs=1e-9)
 
 
+def hanging(moves: bool, **options) -> sb.Scene:
+    """A rod that hangs between two grips that stay, as fixed ones or as driven ones that do not move."""
+    still = np.zeros((2, 1))
+    grips = [
+        sb.Grip([0.0, 1.0], still + place, still + way, still + np.array([0, 1.0, 0]))
+        if moves
+        else sb.Grip.fixed(place, way, (0, 1, 0))
+        for place, way in (((0, 0, 0), (1.0, 0, 0)), ((0.3, 0, 0), (1.0, 0, 0)))
+    ]
+    points = [[0, 0, 0], [0.1, 0, -0.15], [0.2, 0, -0.15], [0.3, 0, 0]]
+    given = {"density": 0.05, "EI": 1e-3, "GJ": 1e-3, "points": points, "roll": True} | options
+    return sb.rod(0.5, 10, start=grips[0], end=grips[1], **given)
+
+
+@pytest.mark.parametrize("moves", [False, True])
+@pytest.mark.parametrize("roll", [-1.3, 0.4, 2.5])
+def test_a_roll_twists_every_joint_alike_at_the_start(roll, moves):
+    """Against the rotation of each director about its edge."""
+    scene = hanging(moves)
+    rod = scene.ropes["rod"]
+    plain, rolled = (sb.simulate(scene, [0.0], values={"rod_roll": r}).positions[0] for r in (0.0, roll))
+    chain = np.array([rod.start_ghost, *rod.particles, rod.end_ghost])
+    tangents = units(np.diff(plain[chain], axis=0))
+    shares = np.linspace(0.0, roll, len(tangents))[:, None]
+    expected = Rotation.from_rotvec(shares * tangents).apply(plain[rod.directors])
+    # the series' next terms, at most roll^10/10! and roll^11/11!
+    assert rolled[rod.directors] == approx(expected, abs=max(1e-13, 1.1 * abs(roll) ** 10 / 3628800))
+
+
+@pytest.mark.parametrize("moves", [False, True])
+def test_a_roll_does_not_kick_the_rod_through_its_damping(moves):
+    """What it adds to the speed is what its twist does to a rod whose bending is not damped."""
+
+    def added(**damping: float) -> float:
+        scene = hanging(moves, **damping)
+        nodes = scene.ropes["rod"].particles
+        unrolled, rolled = (
+            sb.simulate(scene, [5e-3], sb.Solver(h=1e-3, iterations=5), {"rod_roll": roll}).velocities[0, nodes]
+            for roll in (0.0, 1.2)
+        )
+        return float(np.abs(rolled - unrolled).max())
+
+    assert added(bend_damping=0.05) == approx(added(), rel=0.1)
+
+
 def everything() -> sb.Scene:
     """A rod between two moving grips with all that a rod can have."""
     start = sb.Grip.from_poses(TIMES, PLACES, TURNS.as_quat())
@@ -156,6 +201,8 @@ def everything() -> sb.Scene:
         drag_quadratic=0.02,
         curvature_modes=(0, 1),
         twist_modes=(0, 2),
+        softness_modes=(1,),
+        density_modes=(1, 2),
     )
 
 
@@ -171,6 +218,9 @@ SET = {
     "rod_curvature_2_1": 0.7,
     "rod_twist_0": 3.0,
     "rod_twist_2": -2.0,
+    "rod_softness_1": 0.3,
+    "rod_density_1": -0.4,
+    "rod_density_2": 0.2,
 }
 
 

@@ -172,3 +172,34 @@ def test_ctrl_c_at_a_further_start_keeps_the_first(monkeypatch):
     found = sb.fit([swinging()], parameters=WANTED, starts=[{"rope_EI": 1e-2}, {"rope_EI": 1e-3}])
     assert len(starts) == 2 and len(found.result.starts) == 1
     assert found.result.interrupted and found.values == whole.values
+
+
+def test_one_step_with_the_fits_jacobian_moves_what_a_refit_moves():
+    at_half = swinging(noise=1e-6, solver=sb.Solver(h=1 / 800))
+    by_refit, by_step = (
+        sb.fit(
+            [swinging(noise=1e-6, solver=sb.Solver(h=1 / 200))],
+            parameters=WANTED,
+            refine=Refinement(finer=lambda: [at_half], linear=linear),
+            profiles=False,
+        )
+        for linear in (False, True)
+    )
+    assert by_step.values == by_refit.values
+    assert [made.name for made in by_step.result.refits] == ["half the step", "finer mesh"]
+    for full, step in zip(by_refit.result.refits, by_step.result.refits, strict=True):
+        for name, moved in full.moved.items():
+            assert 0.02 < moved / by_refit.values[name] < 0.05
+            assert step.moved[name] == approx(moved, rel=0.05)  # what is left out is of second order
+
+
+def test_a_refit_is_part_of_the_saved_result(tmp_path):
+    found = sb.fit([swinging()], parameters=WANTED, refine=Refinement(linear=True), profiles=False).result
+    found.save(tmp_path / "fit.json")
+    assert sb.FitResult.load(tmp_path / "fit.json") == found
+    (made,) = found.refits
+    for e in found.estimates:
+        assert e.discretization == approx(abs(made.to_limit * made.moved[e.name])) and e.discretization > 0
+    assert "What refits on a finer discretization move" in found.report()
+    earlier = {key: value for key, value in found.to_dict().items() if key != "refits"}
+    assert sb.FitResult.from_dict(earlier).refits == ()

@@ -34,6 +34,14 @@ def momenta(scene: sb.Scene, motion: sb.Trajectory) -> tuple[np.ndarray, np.ndar
     return (mass * v).sum(axis=1), np.cross(x, mass * v).sum(axis=1)
 
 
+def test_directors_have_no_velocity():
+    scene = free(twist_damping=0.01)
+    motion = sb.simulate(scene, steps(1 / 480, 5), sb.Solver(h=1 / 480))
+    rod = scene.ropes["rod"]
+    assert np.abs(np.diff(motion.positions[:, rod.directors], axis=0)).max() > 1e-4
+    assert not motion.velocities[:, rod.directors].any() and motion.velocities[:, rod.particles].any()
+
+
 # --- momentum and energy
 
 

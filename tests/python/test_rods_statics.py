@@ -47,6 +47,36 @@ def chain(segments: int, weights: np.ndarray, stiffness: float = EI) -> np.ndarr
     return bending.bend_chain(segments, LENGTH, stiffness, LENGTH / (2 * segments), weights)
 
 
+# --- what varies along the rod
+
+UNEVEN = {"rod_density_1": -0.5, "rod_density_2": 0.3}
+
+
+def test_a_rod_that_is_heavier_in_places_sags_under_the_weight_of_each_piece():
+    """The chain's closed form, loaded by the integral of the density over every node's Voronoi cell."""
+    segments, weight = 80, 2.0
+    ends = LENGTH * np.clip((np.arange(segments + 2) - 0.5) / segments, 0.0, 1.0)
+    mass = DENSITY * ends
+    for name, share in UNEVEN.items():
+        k = int(name[-1]) * np.pi / LENGTH
+        mass = mass + DENSITY * share * np.sin(k * ends) / k
+    closed = chain(segments, weight * np.diff(mass))
+    scene = clamped(segments, weight=weight, density_modes=(1, 2))
+    sag = nodes(sb.equilibrium(scene, values=UNEVEN))
+    even = nodes(sb.equilibrium(scene))
+    expected = np.stack([closed[:, 0], -closed[:, 1], 0 * closed[:, 0]], axis=1)
+    assert sag == approx(expected, abs=1e-5 * LENGTH)
+    assert np.abs(even - expected).max() > 0.02 * LENGTH
+
+
+def test_modes_of_the_density_leave_the_weight():
+    scene = clamped(12, density_modes=(1, 2, 5))
+    values = UNEVEN | {"rod_density_5": 0.1}
+    inputs = scene.compiled.unpack(scene.compiled.inputs(scene.compiled.values(values)))
+    mass = inputs["mass"][scene.ropes["rod"].particles]
+    assert mass.sum() == approx(DENSITY * LENGTH) and np.ptp(mass[1:-1]) > 0.5 * mass.mean()
+
+
 # --- O-15: tip load
 
 

@@ -10,13 +10,14 @@ from pathlib import Path
 
 from rich.console import Console
 
+from ..chain import unit_vector
 from ..config import GrippedConfig, GrippedRopeSection
-from ..errors import ConfigError, RecordingError, SheetbendError
+from ..errors import ConfigError, RecordingError, SceneError, SheetbendError
 from ..gripped import WITHOUT_TWIST, GrippedMotion, RopeFit, RopeReport, Rung, evaluate, fit_rope
 from ..gripped.ladder import REST, TILTS, TWIST, VARYING, YIELD
+from ..gripped.motion import motions_of
 from ..gripped.report import overview
 from ..io.folder import recordings
-from ..recording import Recording
 from ..tables import plain_section
 from .gripped_figure import write_figure
 from .outcome import Code, Outcome, code_of
@@ -27,11 +28,11 @@ RUNGS: dict[str, Rung] = {"twist": TWIST, "tilts": TILTS, "rest": REST, "yield":
 
 @dataclass(frozen=True)
 class RopeData:
-    """A rope's section with its recordings."""
+    """A rope's section with its recordings, smoothed."""
 
     section: GrippedRopeSection
-    train: Sequence[Recording]
-    unseen: Sequence[Recording]
+    train: Sequence[GrippedMotion]
+    unseen: Sequence[GrippedMotion]
 
 
 def load_ropes(config: GrippedConfig, folder: Path) -> list[RopeData]:
@@ -48,15 +49,25 @@ def load_ropes(config: GrippedConfig, folder: Path) -> list[RopeData]:
     return ropes
 
 
-def _load(section: GrippedRopeSection, key: str, folder: Path) -> list[Recording]:
+def _load(section: GrippedRopeSection, key: str, folder: Path) -> list[GrippedMotion]:
     try:
         found = recordings(folder, section.pattern, section.units)
-        for recording in found:
-            GrippedMotion.of(recording, section.smoothing)
+        motions = motions_of(found, section.smoothing)
     except RecordingError as error:
         where = "" if error.field in ("folder", str(folder)) else f"{error.field} "
         raise ConfigError(key, f"{where}{error.problem}", error.got, error.fix) from error
-    return found
+    if section.nominal is not None:
+        _check_nominal(section.nominal, f"{key.rpartition('.')[0]}.nominal", motions)
+    return motions
+
+
+def _check_nominal(nominal: Sequence[Sequence[float]], key: str, motions: Sequence[GrippedMotion]) -> None:
+    for motion in motions:
+        for end, direction in zip((False, True), nominal, strict=True):
+            try:
+                motion.grip(end, slice(None), unit_vector("nominal", direction))
+            except SceneError as error:
+                raise ConfigError(key, f"{error.problem} of {motion.recording.name}", error.got, error.fix) from error
 
 
 def fit_ropes(
@@ -108,6 +119,7 @@ def _fit(console: Console, config: GrippedConfig, rope: RopeData, ladder: Sequen
     return fit_rope(
         rope.train,
         density=s.density,
+        nominal=None if s.nominal is None else (s.nominal[0], s.nominal[1]),
         ladder=ladder,
         validate=s.validate_share,
         bending_lengths=s.bending_lengths,

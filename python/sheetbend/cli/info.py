@@ -15,7 +15,6 @@ from rich.table import Table
 from .. import __version__
 from ..config import GrippedConfig, build, parse_any, scene_alone
 from ..experiment import Experiment
-from ..gripped import GrippedMotion
 from ..optimizers import has_ceres
 from ..scene import KINDS, Scene
 from .gripped import RopeData, load_ropes
@@ -89,11 +88,11 @@ def _ropes(console: Console, config: GrippedConfig, ropes: list[RopeData]) -> di
     console.print(f"\n[bold]{config.experiment.name}[/]  {config.experiment.about}")
     told: dict[str, dict[str, Any]] = {}
     for rope in ropes:
-        motions = [GrippedMotion.of(r, rope.section.smoothing) for r in rope.train]
+        motions = rope.train
         told[rope.section.name] = {
             "train": len(rope.train),
             "eval": len(rope.unseen),
-            "seconds": float(sum(r.times[-1] - r.times[0] for r in rope.train)),
+            "seconds": float(sum(m.recording.times[-1] - m.recording.times[0] for m in motions)),
             "free markers": len(motions[0].free),
             "length": float(np.mean([m.length for m in motions])),
             "density": rope.section.density,

@@ -30,8 +30,15 @@ def _span(pair: list[float]) -> list[float]:
     return pair
 
 
+def _directions(pair: list[list[float]]) -> list[list[float]]:
+    if len(pair) != 2 or not all(any(direction) for direction in pair):
+        raise ValueError("must be two directions that have a length|give [start, end] such as [[1, 0, -1], [1, 0, 1]]")
+    return pair
+
+
 Positive = Annotated[Finite, Field(gt=0)]
 Span = Annotated[Pair, AfterValidator(_span)]
+Directions = Annotated[list[Vector], AfterValidator(_directions)]
 
 
 class GrippedRopeSection(Section):
@@ -44,11 +51,16 @@ class GrippedRopeSection(Section):
     pattern: str = key("*", 'which files of these folders, such as "*.pkl"', min_length=1)
     units: Literal["m", "cm", "mm"] | None = key(None, "length unit of the files; their JSONs' when left out")
     gravity: Vector = key(_default("gravity"), "in the axes of the recordings, where their JSONs do not tell", "m/s^2")
+    nominal: Directions | None = key(
+        None,
+        "[start, end], directions from which the frames of the grips are carried by the shortest rotation, the same "
+        "for all recordings; the mean recorded ones when left out",
+    )
     rungs: list[RungName] = key(
         list(RUNGS),
         "what the model gets, one after another: straight with twist, tilts of the grips, rest curvature, yield, a "
         "stiffness that varies along the rope; a rung stays only if it predicts recordings better that it was not "
-        "fitted to",
+        "fitted to, and no worse those that it was",
         min_length=1,
     )
     validate_share: Finite = key(

@@ -10,7 +10,7 @@ import numpy as np
 from ..recording import Recording
 from ..scores import Scores, scores
 from .model import NAME
-from .motion import Array
+from .motion import Array, GrippedMotion, motions_of
 from .recipe import RopeFit
 
 
@@ -31,12 +31,12 @@ class Evaluation:
     diverged: tuple[str, ...]
 
 
-def evaluate(found: RopeFit, recordings: Sequence[Recording]) -> Evaluation:
+def evaluate(found: RopeFit, recordings: Sequence[Recording | GrippedMotion]) -> Evaluation:
     """Predict each recording open loop from its first frame, and score it (`sheetbend.scores`)."""
     reach = found.values[f"{NAME}_length"]
     kept, predicted, diverged = [], [], []
-    for recording in recordings:
-        x = found.predict(recording)
+    for motion in motions_of(recordings, found.model.smoothing):
+        recording, x = motion.recording, found.predict(motion)
         off = np.abs(x - recording.positions)[recording.mask]
         if (off <= reach).all():  # false where it is not a number
             kept.append(recording)

@@ -31,7 +31,7 @@ class RopeModel:
             share them share their material frames.
         values: starting values of quantities, as options of `add_rod` (EI, GJ, bend_damping, ...); None = without it.
         tilts, roll: nuisances of the grips, see `add_rod`.
-        curvature_modes, softness_modes: see `add_rod`.
+        curvature_modes, softness_modes, density_modes: see `add_rod`.
         segments: links between the grips.
         substeps: per frame.
         iterations: Newton iterations per substep.
@@ -46,6 +46,7 @@ class RopeModel:
     roll: bool = True
     curvature_modes: Sequence[int] = ()
     softness_modes: Sequence[int] = ()
+    density_modes: Sequence[int] = ()
     segments: int = 12
     substeps: int = 2
     iterations: int = 1
@@ -83,6 +84,7 @@ class RopeModel:
             roll=self.roll,
             curvature_modes=self.curvature_modes,
             softness_modes=self.softness_modes,
+            density_modes=self.density_modes,
             **options,
         )
         return scene

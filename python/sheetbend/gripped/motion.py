@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,6 +79,11 @@ class GrippedMotion:
         part = slice(self.inner[0], self.inner[1] + 1)
         s = self.fractions[part]
         return _curve(self.positions[frame, part], s), _curve(self.velocities[frame, part], s)
+
+
+def motions_of(recordings: Sequence[Recording | GrippedMotion], smoothing: float) -> list[GrippedMotion]:
+    """Motions of recordings, smoothed over so many s; those that are motions already stay as they are."""
+    return [r if isinstance(r, GrippedMotion) else GrippedMotion.of(r, smoothing) for r in recordings]
 
 
 def smoothed(times: Array, positions: Array, width: float) -> tuple[Array, Array]:

@@ -3,7 +3,7 @@
 Long open-loop predictions have a rugged cost, short ones a smooth one; stiff and damped is the safe side of a start.
 So a fit begins with a few short windows and several stiffnesses, goes on to longer windows, and then adds one thing
 after another to the model: tilts of the grips, a rest curvature, yield, a stiffness that varies. A step stays only if
-it predicts recordings better that it was not fitted to.
+it predicts recordings better that it was not fitted to, and no worse those that it was.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..chain import unit_vector
+from ..discretization import Refinement
 from ..errors import InputError, SheetbendError
 from ..experiment import Experiment
 from ..fit import Fit, fit
@@ -26,7 +27,8 @@ from ..recording import Recording
 from ..scores import coordinate_error
 from .ladder import LADDER, TWIST, Rung
 from .model import GRAVITY, NAME, RopeModel, nominal_directions, shared_gravity
-from .motion import Array, GrippedMotion
+from .motion import Array, GrippedMotion, motions_of
+from .offsets import offset_reach
 
 BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first
 LINKS_PER_BENDING_LENGTH = 3.0  # below this EI reads too high and GJ too low
@@ -68,9 +70,10 @@ class RopeFit:
     fit: Fit
     warnings: tuple[str, ...]
 
-    def predict(self, recording: Recording) -> Array:
+    def predict(self, recording: Recording | GrippedMotion) -> Array:
         """(frames, markers, 3) m: open loop from the first frame, gripped markers as recorded."""
-        return predict(self.model, GrippedMotion.of(recording, self.model.smoothing), self.values)
+        (motion,) = motions_of([recording], self.model.smoothing)
+        return predict(self.model, motion, self.values)
 
 
 def predict(model: RopeModel, motion: GrippedMotion, values: Mapping[str, float]) -> Array:
@@ -87,7 +90,7 @@ def predict(model: RopeModel, motion: GrippedMotion, values: Mapping[str, float]
 
 
 def fit_rope(
-    recordings: Sequence[Recording],
+    recordings: Sequence[Recording | GrippedMotion],
     *,
     density: float,
     nominal: tuple[ArrayLike, ArrayLike] | None = None,
@@ -107,7 +110,7 @@ def fit_rope(
     """Fit a rope's parameters to recordings between two grips.
 
     Args:
-        recordings: with two or more clamped markers at each end.
+        recordings: with two or more clamped markers at each end; or their motions, smoothed already.
         density: kg/m, weighed.
         nominal: directions (3,) of the start and the end grip from which their frames are carried; the mean recorded
             ones by default.
@@ -137,8 +140,8 @@ def fit_rope(
         raise InputError("recordings", "are empty", 0, "give at least one")
     if not 0 <= validate < 1:
         raise InputError("validate", "must be a share below 1", validate, "give such as 0.25")
-    shared_gravity(recordings)
-    motions = [GrippedMotion.of(r, smoothing) for r in recordings]
+    motions = motions_of(recordings, smoothing)
+    shared_gravity([m.recording for m in motions])
     model = RopeModel(
         density=density,
         nominal=nominal_directions(motions)
@@ -279,7 +282,9 @@ class _Search:
     ) -> Step:
         fitted = self._error(model, values, self.fitted)
         others = self._error(model, values, self.others) if self.others else fitted
-        stays = not before or others < BETTER * min(s.others for s in before if s.stays)
+        kept = [s for s in before if s.stays]
+        # one that fits worse than the smaller model ended elsewhere than in its minimum: better on others by chance
+        stays = not kept or (others < BETTER * min(s.others for s in kept) and fitted <= min(s.fitted for s in kept))
         return Step(name, fitted, others, stays, time.perf_counter() - began)
 
     def _tell(self, step: Step) -> None:
@@ -296,11 +301,22 @@ class _Search:
     def _conclude(
         self, model: RopeModel, parameters: Sequence[Parameter], values: Mapping[str, float], interrupted: bool
     ) -> Fit:
-        """The fit to all recordings; after Ctrl-C one iteration of it, which the intervals need."""
-        experiments = _experiments(model, self.all, self.longest)
-        wanted = _starting(parameters, values)
-        count = 1 if interrupted else LONG
-        last = fit(experiments, parameters=wanted, threads=self.threads, profiles=False, max_iterations=count)
+        """The fit to all recordings, and what half the step and twice the links would move; after Ctrl-C one iteration
+        of it, which the intervals need."""
+        finer = replace(model, segments=2 * model.segments)
+        refine = Refinement(finer=lambda: _experiments(finer, self.all, self.longest), linear=True)
+        last = fit(
+            _experiments(model, self.all, self.longest),
+            parameters=_starting(parameters, values),
+            refine=None if interrupted else refine,
+            systematic=offset_reach,
+            threads=self.threads,
+            profiles=False,
+            max_iterations=1 if interrupted else LONG,
+        )
+        for refit in last.result.refits:
+            moved = refit.moved[f"{NAME}_EI"] / last.values[f"{NAME}_EI"]
+            self.say(f"{refit.name} would move EI by {100 * moved:+.2g} %")
         if not interrupted:
             return last
         warning = "interrupted: later rungs were not tried, and the last fit did not get to its end"

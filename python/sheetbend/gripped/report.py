@@ -93,7 +93,16 @@ class RopeReport:
         return [
             Section("Steps", headers, tuple(rows), notes),
             Section("What trades against what", notes=trades(self.result)),
+            Section("What the intervals count", notes=counted(self.result)),
         ]
+
+
+def counted(result: FitResult) -> tuple[tuple[str, str], ...]:
+    """(counted or not, sentence) of what makes the intervals."""
+    refined = "".join(f", {made.name}" for made in result.refits)
+    seen = "markers beside the rope by as much as the residuals show (systematic)"
+    unseen = "a roll of the grips that nothing shows, noise of the grips, the weight"
+    return (("counted", f"residuals that are alike over time{refined}, {seen}"), ("not counted", unseen))
 
 
 def errors(unseen: Evaluation | None, without_twist: Evaluation | None) -> dict[str, Any]:
