@@ -21,9 +21,10 @@ class Solver:
     Attributes:
         h: substep, s. Constant within a rollout.
         integrator: "bdf2" (second order, the default) or "bdf1" (backward Euler: damps like zeta = omega h/2).
-        method: "direct" (each rope one block, the default) or "gauss_seidel" (colored; unconverged sweeps add about
-            0.9 h^2/(m sweeps) of compliance per link).
-        iterations: Newton iterations of a direct block (2 by default) or sweeps (10 by default).
+        method: "direct" (each connected part one block, solved by its constraints: for ropes; the default), "newton" (the
+            same blocks, solved by their particles: for cloth; every compliance must be positive) or "gauss_seidel"
+            (colored; unconverged sweeps add about 0.9 h^2/(m sweeps) of compliance per link).
+        iterations: Newton iterations of a block (2 by default) or sweeps (10 by default).
         threads: of one rollout; results do not depend on it.
         grain: constraints per thread below which a color is not split.
         memory: budget of a gradient through a rollout, such as "2 GB" or a number of bytes: what does not fit on the
@@ -70,7 +71,16 @@ class Solver:
         return replace(self, h=h)
 
     def core(self, scene: CompiledScene) -> _core.Solver:
-        """The compiled solver for a scene."""
+        """The compiled solver for a scene.
+
+        Raises:
+            InputError: method "newton" with rigid constraints.
+        """
+        if self.method == "newton":
+            offset, size = scene.layout["compliance"]
+            if size and not (scene.inputs()[offset : offset + size] > 0).all():
+                fix = "use 'direct', or give every constraint a compliance"
+                raise InputError("solver.method", "cannot hold rigid constraints", self.method, fix)
         return _core.Solver(
             scene=scene.core,
             h=self.h,
