@@ -21,9 +21,9 @@ class Solver:
     Attributes:
         h: substep, s. Constant within a rollout.
         integrator: "bdf2" (second order, the default) or "bdf1" (backward Euler: damps like zeta = omega h/2).
-        method: "direct" (each connected part one block, solved by its constraints: for ropes; the default), "newton" (the
-            same blocks, solved by their particles: for cloth; every compliance must be positive) or "gauss_seidel"
-            (colored; unconverged sweeps add about 0.9 h^2/(m sweeps) of compliance per link).
+        method: "direct" (each connected part one block, solved by its constraints: for ropes; the default), "newton"
+            (the same blocks, solved by their particles: for cloth; every compliance must be positive) or
+            "gauss_seidel" (colored; unconverged sweeps add about 0.9 h^2/(m sweeps) of compliance per link).
         iterations: Newton iterations of a block (2 by default) or sweeps (10 by default).
         threads: of one rollout; results do not depend on it.
         grain: constraints per thread below which a color is not split.
