@@ -28,7 +28,7 @@ inline std::size_t plan_bytes(const Plan& plan) {
       const Condensation& c = *block.condensation;
       bytes += size_in_bytes(c.members) + size_in_bytes(c.gradients) + size_in_bytes(c.dofs) + size_in_bytes(c.dof_of) +
                size_in_bytes(c.entries);
-      if (!c.structure.banded()) bytes += 2 * sizeof(int) * (c.structure.values() + c.structure.fill());
+      bytes += 2 * sizeof(int) * (c.structure.values() + c.structure.fill());
     }
   }
   return bytes;
@@ -61,6 +61,7 @@ std::size_t block_bytes(const Scene& scene, const DirectBlock& block, int kept_i
       sizeof(BlockState<T>) + 2 * of(block.size()) + (block.damped ? 2 * particles : 0) +
       iterations * (of(sheetbend_blocks::row * block.window_rows.size()) + of(rows) + particles + factor) +
       (kept_iterations + 1) * (particles + of(block.size()));
+  if (block.condensation) bytes += sizeof(T) * (3 * block.size() + block.condensation->structure.size());  // of solves
   for (const MemberRun& run : block.runs) {
     const Group& group = scene.groups[run.group];
     bytes += of(run.items.size() * sheetbend_blocks::value_count(group.damped, group.parameters));

@@ -19,7 +19,7 @@ struct Condensation {
     int first_use, uses;      // into `gradients` and `dofs`
     std::size_t first_entry;  // into `entries`
   };
-  FactorStructure structure{0, {}};
+  FactorStructure structure{0, {}, false};
   std::vector<Member> members;
   std::vector<int> gradients;        // per use: where the particle's gradients of the member's rows stand
   std::vector<int> dofs;             // per use: first dof in H

@@ -127,7 +127,7 @@ Condensation condense(const Scene& scene, const DirectBlock& block, const std::m
       for (int b = 0; b < 3; ++b)
         if (column + b <= row + a) entries.emplace_back(row + a, column + b);
   });
-  c.structure = FactorStructure(3 * block.movable, entries);
+  c.structure = FactorStructure(3 * block.movable, entries, false);
   for (const auto& list : joined)
     for (const int particle : list) c.dofs.push_back(c.dof_of[particle]);
   std::size_t member = joined.size();

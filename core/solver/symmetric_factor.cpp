@@ -5,14 +5,14 @@
 
 namespace sheetbend {
 
-FactorStructure::FactorStructure(int n, const std::vector<std::pair<int, int>>& entries) : n_(n) {
+FactorStructure::FactorStructure(int n, const std::vector<std::pair<int, int>>& entries, bool may_be_banded) : n_(n) {
   std::size_t nonzeros = 0;
   for (const auto& [row, column] : entries) {
     band_ = std::max(band_, row - column);
     nonzeros += row != column;
   }
   // A band pays while it is not much emptier than the matrix.
-  banded_ = band_ <= max_band && static_cast<std::size_t>(n) * band_ <= 4 * nonzeros + 64;
+  banded_ = may_be_banded && band_ <= max_band && static_cast<std::size_t>(n) * band_ <= 4 * nonzeros + 64;
   if (!banded_) build_sparse(entries);
 }
 

@@ -13,7 +13,7 @@ namespace sheetbend {
 class FactorStructure {
  public:
   // entries: (row, column) pairs of the lower triangle in elimination order, duplicates allowed; the diagonal is always there.
-  FactorStructure(int n, const std::vector<std::pair<int, int>>& entries);
+  FactorStructure(int n, const std::vector<std::pair<int, int>>& entries, bool may_be_banded = true);
 
   int size() const { return n_; }
   bool banded() const { return banded_; }

@@ -20,6 +20,7 @@ COMPLEX_STEP_BOUND = 1e-8
 DOT_PRODUCT_BOUND = 1e-9
 DIFFERENCES_BOUND = 1e-4
 STEP_FACTORS = (1e4, 1e2, 1.0, 1e-2)
+POSITIVE = ("mass", "compliance", "damping", "drag_linear", "drag_quadratic", "air_normal", "air_tangential")
 
 
 @dataclass(frozen=True)
@@ -128,7 +129,10 @@ def check_gradients(
         weights = rng.standard_normal((len(steps), compiled.core.dofs))
         adjoint = core.vjp(inputs, tape, steps, weights, 0.0)
         probe = _Probe(core, inputs, steps, weights)
-        rows = [_quantity_row(compiled, probe, theta, adjoint, name) for name in compiled.names]
+        rows = [
+            _quantity_row(compiled, probe, theta, adjoint, name, scene.quantities[name].positive)
+            for name in compiled.names
+        ]
         rows += [_array_row(compiled, probe, adjoint, name, samples, rng) for name in _present(compiled)]
         dot = _dot_product(core, inputs, steps, weights, adjoint, rng)
     return GradientReport(scene.name, steps[-1], tuple(rows), dot)
@@ -171,15 +175,20 @@ class _Probe:
 
 
 def _quantity_row(
-    compiled: CompiledScene, probe: _Probe, theta: np.ndarray, adjoint: np.ndarray, name: str
+    compiled: CompiledScene, probe: _Probe, theta: np.ndarray, adjoint: np.ndarray, name: str, positive: bool
 ) -> GradientRow:
     direction = np.zeros(len(theta))
     direction[compiled.names.index(name)] = 1.0
     gradient = float(compiled.theta_bar(theta, adjoint) @ direction)
     along = compiled.inputs_dot(theta, direction)
-    step = 1e-4 * max(abs(float(theta @ direction)), 1e-2)
+    step = 1e-4 * _size(float(theta @ direction), 1e-2, positive)
     exact, rough = probe.complex_step(along), probe.differences(along, step)
     return _row(name, 1, np.array([gradient]), np.array([exact]), np.array([rough]))
+
+
+def _size(value: float, least: float, positive: bool) -> float:
+    """What a step is judged against: a positive number's own size, however small."""
+    return value if positive and value > 0 else max(abs(value), least)
 
 
 def _array_row(
@@ -194,7 +203,8 @@ def _array_row(
         direction = np.zeros(len(adjoint))
         direction[offset + i] = 1.0
         exact.append(probe.complex_step(direction))
-        rough.append(probe.differences(direction, 1e-4 * max(abs(float(probe.inputs[offset + i])), 1e-3)))
+        size_of = _size(float(probe.inputs[offset + i]), 1e-3, name in POSITIVE)
+        rough.append(probe.differences(direction, 1e-4 * size_of))
     return _row(name, size, part[tested], np.array(exact), np.array(rough))
 
 

@@ -61,9 +61,7 @@ class Hinges:
         """
         if self.mesh.one_way_diagonals:
             why = f"bend {self.mesh.diagonal_bias:.1f} times as hard in one direction as in another on this mesh"
-            raise SceneError(
-                f"{name}.bending", why, rigidity, "use the curvature model, or an equilateral mesh"
-            )
+            raise SceneError(f"{name}.bending", why, rigidity, "use the curvature model, or an equilateral mesh")
         dihedral = model == "dihedral"
         if curved and not dihedral:
             fix = "use the dihedral model"

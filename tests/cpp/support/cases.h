@@ -198,7 +198,7 @@ inline Case case_of<SplineStrain>() {
   Case row = case_of<Strain>();
   row.x = {0, 0, 0, 0.3, 0.58, 0.04, -0.23, 0.47, -0.08};  // beyond the last knot of each component
   row.p = {3.33, 1.83, -3.33, 1.83, 0.3, 0.8, 0.5};
-  for (const double spacing : {0.06, 0.07, 0.05}) row.p.insert(row.p.end(), {spacing, 1.5, 2.0, 4.0, 3.0});
+  for (const double spacing : {0.24, 0.27, 0.18}) row.p.insert(row.p.end(), {spacing, 1.5, 2.0, 4.0, 3.0});
   row.parameter_degree.resize(row.p.size(), 0);
   row.parameter_sign.resize(row.p.size(), 1);
   for (int k = 7; k < 22; ++k) row.parameter_relabeling.push_back(k);
