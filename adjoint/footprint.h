@@ -56,12 +56,13 @@ std::size_t block_bytes(const Scene& scene, const DirectBlock& block, int kept_i
   const auto of = [](std::size_t count) { return numbers_bytes<T>(count); };
   const std::size_t particles = of(sheetbend_blocks::row * block.particles.size());
   std::size_t factor = sizeof(Factor<T>) + sizeof(CondensedFactor<T>) + factor_bytes<T>(block.structure);
-  if (block.condensation) factor += factor_bytes<T>(block.condensation->structure) + sizeof(T) * block.size();
+  if (block.condensation)
+    factor += factor_bytes<T>(block.condensation->structure) +
+              sizeof(T) * (4 * block.size() + block.condensation->structure.size());  // and what solves need
   std::size_t bytes =
       sizeof(BlockState<T>) + 2 * of(block.size()) + (block.damped ? 2 * particles : 0) +
       iterations * (of(sheetbend_blocks::row * block.window_rows.size()) + of(rows) + particles + factor) +
       (kept_iterations + 1) * (particles + of(block.size()));
-  if (block.condensation) bytes += sizeof(T) * (3 * block.size() + block.condensation->structure.size());  // of solves
   for (const MemberRun& run : block.runs) {
     const Group& group = scene.groups[run.group];
     bytes += of(run.items.size() * sheetbend_blocks::value_count(group.damped, group.parameters));

@@ -68,31 +68,29 @@ class CondensedFactor {
   // b = A^-1 b, with the numbers that were factored.
   template <class U>
   void solve(const Condensation& plan, const BlockNumbers<T>& block, U* b) const {
-    thread_local std::vector<U> y, rest, z;  // no allocation once they have grown
     const std::size_t rows = stiffness_.size();
-    y.assign(b, b + rows);
-    rest.resize(rows);
-    z.resize(plan.structure.size());
-    solve_once(plan, block, y.data(), z.data());
+    std::vector<U>& work = scratch<U>();
+    work.resize(3 * rows + plan.structure.size());
+    U *y = work.data(), *rest = y + rows, *scaled = rest + rows, *z = scaled + rows;
+    std::copy_n(b, rows, y);
+    solve_once(plan, block, y, scaled, z);
     // rest = b - A y
-    transpose_times(plan, block, y.data(), z.data());
+    transpose_times(plan, block, y, z);
     for (std::size_t p = 0; p < plan.dof_of.size(); ++p)
       for (int d = plan.dof_of[p]; d < plan.dof_of[p] + 3; ++d) z[d] = block.x[4 * p + 3] * z[d];
     for (std::size_t i = 0; i < rows; ++i) rest[i] = b[i] - block.diagonal[i] * y[i];
-    subtract_times(plan, block, z.data(), rest.data());
-    solve_once(plan, block, rest.data(), z.data());
+    subtract_times(plan, block, z, rest);
+    solve_once(plan, block, rest, scaled, z);
     for (std::size_t i = 0; i < rows; ++i) b[i] = y[i] + rest[i];
   }
 
  private:
   // y = D^-1 (y - J H^-1 J^T D^-1 y)
   template <class U>
-  void solve_once(const Condensation& plan, const BlockNumbers<T>& block, U* y, U* z) const {
+  void solve_once(const Condensation& plan, const BlockNumbers<T>& block, U* y, U* scaled, U* z) const {
     const int rows = static_cast<int>(stiffness_.size());
-    thread_local std::vector<U> scaled;
-    scaled.resize(rows);
     for (int i = 0; i < rows; ++i) scaled[i] = stiffness_[i] * y[i];
-    transpose_times(plan, block, scaled.data(), z);
+    transpose_times(plan, block, scaled, z);
     factor_.solve(plan.structure, z);
     subtract_times(plan, block, z, y);
     for (int i = 0; i < rows; ++i) y[i] = stiffness_[i] * y[i];
@@ -119,8 +117,20 @@ class CondensedFactor {
             b[m.first_row + row] -= block.gradients[plan.gradients[i] + 4 * row + a] * z[plan.dofs[i] + a];
   }
 
+  // No allocation once it has grown.
+  template <class U>
+  std::vector<U>& scratch() const {
+    if constexpr (std::is_same_v<T, U>) {
+      return scratch_;
+    } else {
+      thread_local std::vector<U> own;
+      return own;
+    }
+  }
+
   Factor<T> factor_;
   std::vector<T> stiffness_;  // D^-1
+  mutable std::vector<T> scratch_;
 };
 
 }  // namespace sheetbend

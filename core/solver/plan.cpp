@@ -135,6 +135,9 @@ Condensation condense(const Scene& scene, const DirectBlock& block, const std::m
     if (m != member) c.members[member = m].first_entry = c.entries.size();
     for (int a = 0; a < 3; ++a) c.entries.push_back(c.structure.position(row + a, column));
   });
+  for (auto* list : {&c.gradients, &c.dofs, &c.dof_of}) list->shrink_to_fit();
+  c.members.shrink_to_fit();
+  c.entries.shrink_to_fit();
   return c;
 }
 
