@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,22 +17,24 @@ BEYOND = {"x": 23.5, "y": 14.2}  # % of the force beyond 60 % of the range, of t
 EXPERIMENTS = Path(__file__).resolve().parents[2] / "experiments"
 
 
-def scripts_of(folder: str, *modules: str) -> Iterator[SimpleNamespace]:
+def scripts_of(folder: str, *names: str) -> SimpleNamespace:
+    """Both folders have a study, so none stays among the imported modules."""
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(EXPERIMENTS / folder))
-        yield SimpleNamespace(**{name: importlib.import_module(name) for name in modules})
-        for name in modules:
+        scripts = SimpleNamespace(**{name: importlib.import_module(name) for name in names})
+        for name in names:
             del sys.modules[name]
+    return scripts
 
 
 @pytest.fixture(scope="module")
-def pulled() -> Iterator[SimpleNamespace]:
-    yield from scripts_of("knit_uniaxial", "knits", "study")
+def pulled() -> SimpleNamespace:
+    return scripts_of("knit_uniaxial", "knits", "study")
 
 
 @pytest.fixture(scope="module")
-def stretched() -> Iterator[SimpleNamespace]:
-    yield from scripts_of("knit_dic", "dic", "study")
+def stretched() -> SimpleNamespace:
+    return scripts_of("knit_dic", "dic", "study")
 
 
 @pytest.fixture(scope="module")
