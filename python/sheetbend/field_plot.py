@@ -50,7 +50,9 @@ def plot_fields(mesh: TriangleMesh, fields: Sequence[Field], *, title: str = "")
     """
     if not fields:
         raise InputError("fields", "are empty", 0, "give at least one")
-    figure = new_figure(3.5 * len(fields) + 0.3, 3.9, title or " ")
+    figure = new_figure(3.3 * len(fields) + 0.4, 3.9, title or " ")
+    figure.get_layout_engine().set(w_pad=0.12, wspace=0.03)
+    first_flat = next((i for i, field in enumerate(fields, start=1) if field.positions is None), 0)
     for index, field in enumerate(fields, start=1):
         count = len(mesh.triangles) if field.places is None else len(field.places)
         values = np.asarray(field.values, dtype=float)
@@ -64,6 +66,9 @@ def plot_fields(mesh: TriangleMesh, fields: Sequence[Field], *, title: str = "")
             drawn = _at_places(panel, mesh, field.places, values)
         else:
             drawn = _flat(panel, mesh, values)
+        if field.positions is None and index != first_flat:
+            panel.set_ylabel("")
+            panel.tick_params(labelleft=False)
         bar = figure.colorbar(drawn, ax=panel, orientation="horizontal", shrink=0.8, pad=0.03, aspect=28)
         bar.set_label(field.label, color=INK, fontsize=9)
         bar.ax.tick_params(colors=INK, labelsize=8)
@@ -127,8 +132,9 @@ def _box(panel: Any, points: Array) -> None:
         getattr(panel, f"{name}axis").set_pane_color((1, 1, 1, 0))
         getattr(panel, f"{name}axis").line.set_color(GRAY)
         getattr(panel, f"set_{name}label")(f"{name} [m]", color=INK, fontsize=8, labelpad=-4)
-    panel.set_box_aspect(size)
-    panel.locator_params(nbins=4)
+    panel.set_box_aspect(size, zoom=0.9)
+    for axis, name in enumerate("xyz"):
+        panel.locator_params(axis=name, nbins=2 + round(3 * size[axis] / size.max()))
     panel.grid(visible=False)
     panel.view_init(elev=18, azim=-58)
 
