@@ -51,7 +51,7 @@ def plot_fields(mesh: TriangleMesh, fields: Sequence[Field], *, title: str = "")
     if not fields:
         raise InputError("fields", "are empty", 0, "give at least one")
     figure = new_figure(3.3 * len(fields) + 0.4, 3.9, title or " ")
-    figure.get_layout_engine().set(w_pad=0.12, wspace=0.03)
+    figure.set_layout_engine("constrained", w_pad=0.12, wspace=0.03)
     first_flat = next((i for i, field in enumerate(fields, start=1) if field.positions is None), 0)
     for index, field in enumerate(fields, start=1):
         count = len(mesh.triangles) if field.places is None else len(field.places)
@@ -91,7 +91,8 @@ def _at_places(panel: Axes, mesh: TriangleMesh, places: Places, values: Array) -
     panel.add_collection(collections.PolyCollection(mesh.corners, facecolor="none", edgecolor=PALE, linewidth=0.6))
     at = np.einsum("kc,kcx->kx", places.weights, mesh.corners[places.triangles])
     colors = {k: v for k, v in _colors(values).items() if k in ("cmap", "norm")}
-    drawn = panel.scatter(*at.T, c=_masked(values), s=42, edgecolors=GRAY, linewidths=0.4, zorder=3, **colors)
+    x, y = at.T
+    drawn = panel.scatter(x, y, s=42, c=_masked(values), edgecolors=GRAY, linewidths=0.4, zorder=3, **colors)
     _frame(panel, mesh)
     return drawn
 
@@ -106,6 +107,7 @@ def _frame(panel: Axes, mesh: TriangleMesh) -> None:
 
 
 def _in_space(panel: Any, mesh: TriangleMesh, field: Field, values: Array) -> Any:
+    assert field.positions is not None  # what sent it here
     art = require("mpl_toolkits.mplot3d.art3d", "plot")
     x = finite("positions", field.positions, mesh.vertices.shape, InputError)
     drawn = panel.add_collection3d(
@@ -147,12 +149,11 @@ def _colors(values: Array, line: float = 0.0) -> dict[str, Any]:
     both = seen.size > 0 and seen.min() < -1e-3 * size and seen.max() > 1e-3 * size
     if both:
         palette, low, high = [WARM, PALE, ACCENT], -size, size
-    elif seen.size and seen.max() <= 1e-3 * size:
+    elif seen.min(initial=0.0) < -1e-3 * size:
         palette, low, high = [WARM, PALE], -size, 0.0
     else:
         palette, low, high = [PALE, ACCENT, _DARK], 0.0, size
-    shades = colors.LinearSegmentedColormap.from_list("field", palette)
-    shades.set_bad("white")
+    shades = colors.LinearSegmentedColormap.from_list("field", palette).with_extremes(bad="white")
     edges: dict[str, Any] = {"edgecolor": GRAY, "linewidth": line} if line else {"edgecolor": "face", "linewidth": 0.2}
     return {"cmap": shades, "norm": colors.Normalize(low, high), **edges}
 

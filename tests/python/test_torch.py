@@ -602,7 +602,7 @@ def sheet() -> sb.Scene:
 
 
 class TestCloth:
-    """A sheet of 9 vertices with membrane and bending, damping and drag: its quantities by both modes and in batches."""
+    """A sheet of 9 vertices with membrane, bending, damping and drag: quantities by both modes, and in batches."""
 
     NAMES = ("cloth_density", "cloth_warp", "cloth_weft", "cloth_shear", "cloth_poisson", "cloth_bending")
 

@@ -142,7 +142,8 @@ def _law(section: schema.ClothLaw | None) -> Law | None:
     if section.kind == "exponential":
         return Exponential(**given)
     assert section.spacing is not None  # the schema's check
-    return Spline(tuple(section.spacing), **{c: tuple(ratios) for c, ratios in given.items()})
+    u, v, shear = section.spacing
+    return Spline((u, v, shear), **{c: tuple(ratios) for c, ratios in given.items()})
 
 
 def _drive(
