@@ -312,6 +312,12 @@ BAD = [
         "scene.drive.particles",
         "either pin or drive",
     ),
+    (
+        TABLE,
+        f'[[scene.cloth.grip]]\nset = "right"\nmarkers = ["a", "b"]\n{TABLE}\nstatic = true',
+        "scene.cloth[0].grip[0]",
+        "[[scene.drive]]",
+    ),
     (TABLE, f'[scene.cloth.law]\nkind = "exponential"\nwarp = 1.0\n{TABLE}', "scene.cloth[0].law", "one number each"),
     (TABLE, f'[scene.cloth.law]\nkind = "spline"\nwarp = [1.0]\n{TABLE}', "scene.cloth[0].law", "four ratios"),
     (

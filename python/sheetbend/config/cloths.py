@@ -152,6 +152,9 @@ def _drive(
     """Let vertices follow the line through a grip's markers."""
     line = _seen(f"{path}.markers", grip.markers, moment)
     assert moment is not None  # `_seen` needed it
+    if moment.static:
+        fix = "use [[scene.drive]], which puts particles on their markers"
+        raise ConfigError(path, "has no motion to follow in a recording at rest", grip.set, fix)
     placed = cloth.mesh.vertices[vertices]
     weights = np.array([_along(line, point) for point in placed])
     with located(path):
