@@ -133,10 +133,10 @@ def _box(panel: Any, points: Array) -> None:
         getattr(panel, f"{name}axis").set_tick_params(labelsize=7, colors=INK, pad=-1)
         getattr(panel, f"{name}axis").set_pane_color((1, 1, 1, 0))
         getattr(panel, f"{name}axis").line.set_color(GRAY)
-        getattr(panel, f"set_{name}label")(f"{name} [m]", color=INK, fontsize=8, labelpad=-4)
+        getattr(panel, f"set_{name}label")(f"{name} [m]", color=INK, fontsize=8, labelpad=0)
     panel.set_box_aspect(size, zoom=0.9)
     for axis, name in enumerate("xyz"):
-        panel.locator_params(axis=name, nbins=2 + round(3 * size[axis] / size.max()))
+        panel.locator_params(axis=name, nbins=1 + round(3 * size[axis] / size.max()))
     panel.grid(visible=False)
     panel.view_init(elev=18, azim=-58)
 
