@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from .checks import finite
 from .cloth import Cloth
 from .errors import SceneError
+from .mesh import Places
 from .rope import Rope
 from .scene import Scene
 
@@ -95,7 +96,11 @@ def on_cloth(cloth: Cloth, points: ArrayLike) -> tuple[Place, ...]:
     Raises:
         MeshError: a point lies outside of the cloth.
     """
-    places = cloth.mesh.at(points)
+    return on_mesh(cloth, cloth.mesh.at(points))
+
+
+def on_mesh(cloth: Cloth, places: Places) -> tuple[Place, ...]:
+    """Markers at places of a cloth's mesh, such as `cloth.mesh.project` finds for points in space."""
     return tuple(
         Place(tuple(cloth.particles[vertices].tolist()), tuple(weights.tolist()), (0.0, 0.0, 0.0))
         for vertices, weights in zip(places.vertices, places.weights, strict=True)

@@ -23,6 +23,17 @@ WHOLE: dict[str, Any] = {
     "solver": {},
     "scene": {
         "rope": [{"density": 0.05}],
+        "cloth": [
+            {
+                "density": 0.1,
+                "warp": 100.0,
+                "shear": 10.0,
+                "mesh": {"kind": "grid", "width": 0.3, "height": 0.3, "nx": 3, "ny": 3},
+                "law": {"kind": "exponential", "warp": 10.0, "weft": 10.0, "shear": 5.0},
+                "set": [{"name": "clips", "points": [[0, 0, 0]]}],
+                "grip": [{"set": "left", "markers": ["m0"]}],
+            }
+        ],
         "particles": [{"name": "a", "positions": [[0, 0, 0]]}],
         "pendulum": [{"length": 1.0}],
         "arm": [{"mass": 1.0, "first_moment": 0.1, "inertia": 0.1, "length": 0.5}],

@@ -588,3 +588,48 @@ def backward():
 def test_torch_and_ceres_share_a_process(order: str) -> None:
     done = run(f"{FIT}\n{order}\nprint('both')")
     assert done.stdout.strip() == "both", done.stderr
+
+
+@pytest.fixture(scope="module")
+def sheet() -> sb.Scene:
+    mesh = sb.mesh.grid(0.2, 0.2, 2, 2, "one_way")
+    scene = sb.Scene("sheet")
+    fabric = {"warp": 20.0, "weft": 12.0, "shear": 5.0, "poisson": 0.3, "bending": 1e-3}
+    damped = {"membrane_damping": 0.01, "drag_linear": 0.2}
+    cloth = sb.add_cloth(scene, mesh, density=0.2, held=mesh.sets["corners"][2:], **fabric, **damped)
+    scene.pin(cloth.particles[mesh.sets["corners"][2:]])
+    return scene
+
+
+class TestCloth:
+    """A sheet of 9 vertices with membrane, bending, damping and drag: quantities by both modes, and in batches."""
+
+    NAMES = ("cloth_density", "cloth_warp", "cloth_weft", "cloth_shear", "cloth_poisson", "cloth_bending")
+
+    def test_quantities(self, sheet: sb.Scene) -> None:
+        start = torch.tensor([sheet.quantities[name].value for name in self.NAMES], dtype=torch.float64)
+        weights = torch.linspace(-1.0, 1.0, 3 * sheet.particle_count * len(TIMES), dtype=torch.float64)
+
+        def response(scaled: Tensor) -> Tensor:
+            values = dict(zip(self.NAMES, scaled * start, strict=True))
+            return st.simulate(sheet, TIMES, SOLVER, values).reshape(-1) @ weights
+
+        one = torch.ones(len(self.NAMES), dtype=torch.float64)
+        assert gradcheck(response, one.clone().requires_grad_(), eps=1e-5, atol=1e-8, rtol=0.0)
+        assert gradgradcheck(response, one.clone().requires_grad_(), eps=1e-4, atol=1e-7, rtol=0.0)
+        np.testing.assert_allclose(jacrev(response)(one), jacfwd(response)(one), rtol=0, atol=1e-12)
+
+    def test_module_with_a_batch(self, sheet: sb.Scene) -> None:
+        module = st.SceneModule(sheet, TIMES, SOLVER, learn=["cloth_warp", "cloth_poisson"])
+        shear = torch.tensor([4.0, 5.0, 6.0], dtype=torch.float64)
+        together = module(cloth_shear=shear)
+        assert together.shape == (3, len(TIMES), sheet.particle_count, 3)
+        assert all(torch.equal(together[k], module(cloth_shear=shear[k])) for k in range(3))
+        (together[:, -1, :, 2] ** 2).sum().backward()
+        parts = []
+        for k in range(3):
+            alone = st.SceneModule(sheet, TIMES, SOLVER, learn=["cloth_warp", "cloth_poisson"])
+            (alone(cloth_shear=shear[k])[-1, :, 2] ** 2).sum().backward()
+            parts.append([p.grad for p in alone.parameters()])
+        for p, *each in zip(module.parameters(), *parts, strict=True):
+            torch.testing.assert_close(p.grad, sum(each), rtol=1e-12, atol=0.0)

@@ -54,7 +54,7 @@ def _check(console: Console, path: Path) -> Outcome:
 
 def _reports(study: Study) -> Iterator[tuple[str, GradientReport | JacobianReport]]:
     if not study.experiments:
-        scene, solver = scene_alone(study.config)
+        scene, solver = scene_alone(study.config, study.folder)
         yield scene.name, check_gradients(scene, solver.h * SUBSTEPS * np.arange(FRAMES + 1), solver)
     for e in study.experiments:
         if not e.static:

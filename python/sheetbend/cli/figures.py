@@ -13,6 +13,7 @@ from ..config import Config
 from ..equilibrium import equilibrium
 from ..fit import Fit
 from ..prediction import Comparison
+from .cloth_figures import cloth_figures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,16 +25,18 @@ def write_figures(found: Fit, config: Config, folder: Path) -> list[str]:
     if form == "none":
         return []
     figures: dict[str, Figure] = {}
-    static = [c for c in found.comparisons if c.experiment.static]
+    static = [c for c in found.comparisons if c.experiment.static and not c.experiment.scene.cloths]
     if static:
         figures["shapes"] = _shapes(found, static)
     moving = [c for c in found.comparisons if not c.experiment.static]
     if len(moving) > 1:
         figures["motions"] = plotting.plot_motions([_liveliest(c) for c in moving], title=config.experiment.name)
     for c in moving:
-        name = re.sub(r"[^A-Za-z0-9_.-]", "_", c.experiment.name)
+        name = _file_name(c)
         figures[f"{name}_markers"] = _trajectories(c)
         figures[f"{name}_residuals"] = _residuals(c)
+    for c in found.comparisons:
+        figures |= {f"{_file_name(c)}_{name}": figure for name, figure in cloth_figures(found, c).items()}
     published = _published(found, config)
     figures["estimates"] = plotting.plot_estimates(
         found.result.estimates, published=published, title=config.experiment.name
@@ -41,6 +44,10 @@ def write_figures(found: Fit, config: Config, folder: Path) -> list[str]:
     for name, figure in figures.items():
         plotting.save(figure, folder / f"{name}.{form}")
     return [f"{name}.{form}" for name in figures]
+
+
+def _file_name(c: Comparison) -> str:
+    return re.sub(r"[^A-Za-z0-9_.-]", "_", c.experiment.name)
 
 
 def _shapes(found: Fit, comparisons: list[Comparison]) -> Figure:

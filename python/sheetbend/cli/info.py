@@ -67,8 +67,8 @@ def _config(console: Console, path: Path) -> dict[str, Any]:
         return _ropes(console, config, load_ropes(config, path.parent))
     study = build(config, path.parent)
     console.print(f"\n[bold]{config.experiment.name}[/]  {config.experiment.about}")
-    scenes = [_recorded(e) for e in study.experiments] or [_counts(scene_alone(config)[0])]
-    first = study.experiments[0].scene if study.experiments else scene_alone(config)[0]
+    scenes = [_recorded(e) for e in study.experiments] or [_counts(scene_alone(config, path.parent)[0])]
+    first = study.experiments[0].scene if study.experiments else scene_alone(config, path.parent)[0]
     for scene in scenes:
         console.print("  " + ", ".join(f"{name} {_text(value)}" for name, value in scene.items()), soft_wrap=True)
     table = Table("quantity", "value", "unit", "parameter", box=None, pad_edge=False, padding=(0, 2, 0, 0))

@@ -18,6 +18,7 @@ from ..scene import Scene
 from ..simulate import Trajectory
 from ..simulate import simulate as run_simulation
 from ..solver import Solver
+from .meshes import MeshFormat, write_meshes
 from .outcome import Outcome, run
 
 FRAME = 0.01  # s between frames where no recording tells
@@ -45,16 +46,29 @@ def simulate(
         float | None, typer.Option(help="s; to the recording's end when left out.", show_default=False)
     ] = None,
     recording: Annotated[str | None, typer.Option(help="Only the scene of this recording.", show_default=False)] = None,
+    mesh: Annotated[
+        MeshFormat | None,
+        typer.Option(
+            help="Also write every cloth: a folder of OBJ files, one per frame, or a PLY of the last frame with "
+            "strains and energy per triangle.",
+            show_default=False,
+        ),
+    ] = None,
     json: Annotated[
         bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
     ] = False,
 ) -> None:
     """Simulate a scene and write its trajectory as NPZ: times, positions, velocities and the constraints' forces."""
-    run(lambda console: _simulate(console, config, output, duration, recording), json)
+    run(lambda console: _simulate(console, config, output, duration, recording, mesh), json)
 
 
 def _simulate(
-    console: Console, path: Path, output: Path | None, duration: float | None, recording: str | None
+    console: Console,
+    path: Path,
+    output: Path | None,
+    duration: float | None,
+    recording: str | None,
+    mesh: MeshFormat | None,
 ) -> Outcome:
     if duration is not None and not (np.isfinite(duration) and duration > 0):
         raise ConfigError("--duration", "must be positive", duration, "give s")
@@ -62,9 +76,11 @@ def _simulate(
     name = study.config.experiment.name
     folder = output if output is not None else Path("out") / name
     tasks = _tasks(study, duration, recording)
+    if mesh is not None and not any(task.scene.cloths for task in tasks):
+        raise ConfigError("--mesh", "needs a cloth, and the scene has none", mesh.value, "leave it out")
     folder.mkdir(parents=True, exist_ok=True)
     console.print(f"[bold]{name}[/]  {study.config.experiment.about}")
-    return Outcome({"name": name, "simulated": {task.name: _run(console, task, folder) for task in tasks}})
+    return Outcome({"name": name, "simulated": {task.name: _run(console, task, folder, mesh) for task in tasks}})
 
 
 def _tasks(study: Study, duration: float | None, recording: str | None) -> list[Task]:
@@ -74,7 +90,7 @@ def _tasks(study: Study, duration: float | None, recording: str | None) -> list[
         raise ConfigError("--recording", "is not in the configuration", recording, f"name one of: {known}")
     if experiments:
         return [_task(e, duration) for e in experiments]
-    scene, solver = scene_alone(study.config)
+    scene, solver = scene_alone(study.config, study.folder)
     frame = round(max(FRAME / solver.h, 1.0)) * solver.h
     return [
         Task(study.config.experiment.name, scene, solver, np.arange(0.0, (duration or DURATION) + frame / 2, frame))
@@ -91,12 +107,13 @@ def _task(e: Experiment, duration: float | None) -> Task:
     return Task(e.name, e.scene, e.solver, np.arange(0.0, length + frame / 2, frame), at_rest=e.start == "equilibrium")
 
 
-def _run(console: Console, task: Task, folder: Path) -> dict[str, Any]:
+def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None) -> dict[str, Any]:
     motion = _motion(task)
     path = folder / f"{task.name}.npz"
     arrays: dict[str, Any] = {f"force_{group}": values for group, values in motion.forces.items()}
     np.savez_compressed(path, times=motion.times, positions=motion.positions, velocities=motion.velocities, **arrays)
     moved = np.linalg.norm(motion.positions - motion.positions[0], axis=2)
+    written = {} if mesh is None else {"meshes": write_meshes(task.name, task.scene, motion, folder, mesh)}
     summary = {
         "npz": str(path),
         "frames": len(motion.times),
@@ -106,6 +123,7 @@ def _run(console: Console, task: Task, folder: Path) -> dict[str, Any]:
         "largest_displacement": float(moved.max()),
         "largest_speed": float(np.linalg.norm(motion.velocities, axis=2).max()),
         "largest_force": {group: float(np.abs(values).max()) for group, values in motion.forces.items()},
+        **written,
     }
     told = (
         "at rest"
@@ -117,7 +135,8 @@ def _run(console: Console, task: Task, folder: Path) -> dict[str, Any]:
         if task.static
         else f", moved up to {summary['largest_displacement']:.4g} m at up to {summary['largest_speed']:.4g} m/s"
     )
-    console.print(f"  {task.name}: {summary['particles']} particles, {told}{reach}; {path}", soft_wrap=True)
+    files = ", ".join([str(path), *written.get("meshes", [])])
+    console.print(f"  {task.name}: {summary['particles']} particles, {told}{reach}; {files}", soft_wrap=True)
     return summary
 
 

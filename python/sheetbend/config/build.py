@@ -10,19 +10,22 @@ from typing import Any
 
 import numpy as np
 
+from ..cloth import Cloth
 from ..discretization import Refinement
 from ..errors import ConfigError, RecordingError
 from ..experiment import Experiment
-from ..markers import Place, between, on_particle, on_rope
+from ..markers import Place, between, on_cloth, on_particle, on_rope
 from ..problem import as_parameters
 from ..recording import Recording
 from ..recording_checks import marker_indices
 from ..scene import Scene
 from ..solver import Solver
 from . import schema
+from .cloth_markers import places_on_cloths
 from .errors import located
+from .moment import Moment
 from .scene_schema import SceneSection
-from .scenes import Moment, Particles, build_scene
+from .scenes import Particles, build_scene
 
 SUBSTEPS = 10
 OPTIONAL = ("particles", "constraints", "point_mass", "force")
@@ -61,7 +64,7 @@ def build(config: schema.Config, folder: Path, finer: int = 1) -> Study:
 
     Args:
         folder: files are relative to it.
-        finer: multiplies the segments of every rope.
+        finer: multiplies the segments of every rope and the cells of every cloth.
 
     Raises:
         ConfigError: anything that cannot be built, with the path of its key.
@@ -82,9 +85,9 @@ def build(config: schema.Config, folder: Path, finer: int = 1) -> Study:
     return Study(config, folder, experiments, parameters)
 
 
-def scene_alone(config: schema.Config) -> tuple[Scene, Solver]:
-    """The scene of a configuration without recordings, and its solver."""
-    scene, _ = build_scene(config.experiment.name, config.scene, None, {})
+def scene_alone(config: schema.Config, folder: Path = Path()) -> tuple[Scene, Solver]:
+    """The scene of a configuration without recordings, and its solver; files of meshes are relative to `folder`."""
+    scene, _ = build_scene(config.experiment.name, config.scene, None, {}, folder=folder)
     _start_values(scene, config, {}, "")
     return scene, solver_for(config.solver, None)
 
@@ -116,13 +119,14 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
     numbers = [_number(f"{where}[{k}].marker", m.marker, recording) for k, m in enumerate(markers)]
     described = _without(config.scene, section.leave_out, path)
     scene, particles = build_scene(
-        recording.name, described, moment, _along(ropes, markers, numbers, recording), finer, ropes
+        recording.name, described, moment, _along(ropes, markers, numbers, recording), finer, ropes, folder
     )
     _start_values(scene, config, section.values, path)
     places = {
         recording.markers[n]: _place(f"{where}[{k}]", m, scene, particles)
         for k, (m, n) in enumerate(zip(markers, numbers, strict=True))
     }
+    places = places_on_cloths(config.scene.cloth, scene, recording) | places
     plain = section.model_dump(
         include={
             "static",
@@ -235,6 +239,9 @@ def _place(path: str, marker: schema.Marker, scene: Scene, particles: Particles)
     elif marker.between is not None:
         first, second = (particles.find(f"{path}.between", r) for r in marker.between)
         place = between(first, second, marker.fraction)
+    elif marker.material is not None:
+        with located(path):
+            (place,) = on_cloth(_cloth(path, marker.cloth, scene), [marker.material])
     else:
         name = marker.rope or (next(iter(scene.ropes)) if len(scene.ropes) == 1 else "")
         if name not in scene.ropes:
@@ -250,6 +257,15 @@ def _place(path: str, marker: schema.Marker, scene: Scene, particles: Particles)
     with located(path):
         framed = place.with_offset(marker.offset or (0.0, 0.0, 0.0), marker.normal)
     return framed if marker.offset else replace(framed, offset=None)
+
+
+def _cloth(path: str, name: str | None, scene: Scene) -> Cloth:
+    wanted = name or (next(iter(scene.cloths)) if len(scene.cloths) == 1 else "")
+    if wanted not in scene.cloths:
+        fix = f"name one of: {', '.join(scene.cloths) or 'none'}"
+        raise ConfigError(f"{path}.cloth", "is no cloth of the scene", name, fix)
+    found: Cloth = scene.cloths[wanted]
+    return found
 
 
 def _on_arm(path: str, marker: schema.Marker, particles: Particles) -> Place:

@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
-from . import gripped_schema, scene_schema, schema
+from . import cloth_schema, gripped_schema, scene_schema, schema
 from .section import AXES, NAME, REFERENCE, Section
 
 HEADERS: dict[str, type[Section]] = {
@@ -20,6 +20,11 @@ HEADERS: dict[str, type[Section]] = {
     "[solver]": schema.SolverSection,
     "[scene]": scene_schema.SceneSection,
     "[[scene.rope]]": scene_schema.Rope,
+    "[[scene.cloth]]": cloth_schema.Cloth,
+    "[scene.cloth.mesh]": cloth_schema.ClothMesh,
+    "[scene.cloth.law]": cloth_schema.ClothLaw,
+    "[[scene.cloth.set]]": cloth_schema.VertexSet,
+    "[[scene.cloth.grip]]": cloth_schema.Grip,
     "[[scene.particles]]": scene_schema.Particles,
     "[[scene.pendulum]]": scene_schema.Pendulum,
     "[[scene.arm]]": scene_schema.Arm,
@@ -104,6 +109,8 @@ def _type(annotation: Any, metadata: list[Any]) -> str:
         return "list of tables" if _is_section(parts[0]) else f"list of {_type(parts[0], [])}"
     if origin is dict:
         return "tables by name" if _is_section(parts[1]) else f"{_type(parts[1], [])} by name"
+    if _is_section(annotation):
+        return "table"
     if annotation is str:
         pattern = _pattern(metadata)
         return {NAME: "name", REFERENCE: "particle", AXES: "axes"}.get(pattern, "text")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
+from .cloth_schema import Cloth
 from .section import Finite, Name, Reference, Section, Vector, key
 
 
@@ -146,6 +147,7 @@ class SceneSection(Section):
     gravity: Vector | None = key(None, "the recording's own when left out, else [0, 0, -9.81]", "m/s^2")
     pin: list[Reference] = key([], "particles that are held where they start")
     rope: list[Rope] = key([], "ropes")
+    cloth: list[Cloth] = key([], "cloths")
     particles: list[Particles] = key([], "single particles")
     pendulum: list[Pendulum] = key([], "simple pendulums")
     arm: list[Arm] = key([], "rigid arms")

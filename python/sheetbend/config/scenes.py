@@ -3,43 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
 from ..arm import Arm, add_arm, add_pendulum
+from ..cloth import Cloth
 from ..errors import ConfigError
+from ..mesh import TriangleMesh
 from ..quantities import product
-from ..recording import Recording
 from ..rope import Rope, add_rope
 from ..scene import Scene
-from ..timeseries import mean_position
 from . import scene_schema as schema
+from .cloths import build_cloth
 from .errors import located
+from .moment import Moment
 
 EARTH = (0.0, 0.0, -9.81)  # m/s^2
-
-
-@dataclass(frozen=True)
-class Moment:
-    """What a scene takes from its recording: the frames from the scene's start on, and the shape there."""
-
-    recording: Recording
-    t0: float
-    static: bool
-
-    @property
-    def shape(self) -> np.ndarray:
-        """(markers, 3) m at the start: the first frame of a motion, the mean of an equilibrium; NaN where not seen."""
-        x = self.recording.positions
-        return mean_position(x) if self.static else x[0]
 
 
 @dataclass
 class Particles:
     """Particle references of a configuration ("NAME:INDEX", "NAME:LABEL") and what they mean in a scene.
 
-    Node numbers of ropes count on the configured mesh; `finer` tells how many links one configured link has become.
+    Numbers of nodes and vertices count on the configured mesh: `finer` tells how many links one configured link of a
+    rope has become, and a vertex of a cloth is the one nearest to where it was.
     """
 
     finer: int = 1
@@ -52,7 +41,7 @@ class Particles:
         """The name, unless it is taken."""
         if name in self.named:
             raise ConfigError(
-                f"{path}.name", "is taken", name, "give every rope, arm and set of particles a name of its own"
+                f"{path}.name", "is taken", name, "give every rope, cloth, arm and set of particles a name of its own"
             )
         return name
 
@@ -63,6 +52,15 @@ class Particles:
         self.add(rope.name, rope.particles.tolist())
         self.labels[rope.name] = {"start": int(rope.particles[0]), "end": int(rope.particles[-1])}
         self.ropes.add(rope.name)
+
+    def add_cloth(self, cloth: Cloth, configured: TriangleMesh) -> None:
+        self.add(cloth.name, cloth.particles[cloth.mesh.nearest(configured.vertices)].tolist())
+        self.labels[cloth.name] = {
+            label: int(cloth.particles[vertex])
+            for name, vertices in cloth.mesh.sets.items()
+            for k, vertex in enumerate(vertices)
+            for label in ([name, f"{name}:0"] if len(vertices) == 1 else [f"{name}:{k}"])
+        }
 
     def add_arm(self, arm: Arm) -> None:
         self.add(arm.name, arm.particles)
@@ -83,7 +81,7 @@ class Particles:
         if name not in self.named:
             raise ConfigError(
                 path,
-                "names no rope and no set of particles",
+                "names no rope, cloth or set of particles",
                 reference,
                 f"use one of: {', '.join(self.named) or 'none yet'}",
             )
@@ -100,7 +98,7 @@ class Particles:
         if index in labels:
             return labels[index]
         if not index.removeprefix("-").isdecimal():
-            words = "".join(f", '{name}:{label}'" for label in labels)
+            words = "".join(f", '{name}:{label}'" for label in labels if ":" not in label or label.endswith(":0"))
             raise ConfigError(
                 path, "has no whole number behind the colon", reference, f"write such as '{name}:0'{words}"
             )
@@ -128,14 +126,16 @@ def build_scene(
     placed: Mapping[str, list[int]],
     finer: int = 1,
     ropes: Sequence[str] | None = None,
+    folder: Path = Path(),
 ) -> tuple[Scene, Particles]:
     """A scene and the meaning of its particle references.
 
     Args:
         moment: the recording's part; None without a recording.
         placed: per rope the markers on it, in order along it, for `points = "recording"`.
-        finer: multiplies the segments of every rope.
+        finer: multiplies the segments of every rope and the cells of every cloth.
         ropes: names of the ropes to build; None = all.
+        folder: files of meshes are relative to it.
 
     Raises:
         ConfigError: anything inconsistent, with the path of the table.
@@ -147,6 +147,10 @@ def build_scene(
         if ropes is not None and rope.name not in ropes:
             continue
         _add_rope(scene, particles, f"scene.rope[{i}]", rope, moment, placed.get(rope.name, []), finer)
+    for i, cloth in enumerate(section.cloth):
+        path = f"scene.cloth[{i}]"
+        particles.free_name(path, cloth.name)
+        particles.add_cloth(*build_cloth(scene, path, cloth, moment, folder, finer))
     for i, some in enumerate(section.particles):
         path = f"scene.particles[{i}]"
         particles.free_name(path, some.name)
@@ -279,10 +283,5 @@ def _add_drive(scene: Scene, particles: Particles, path: str, drive: schema.Driv
     if len(drive.markers) != len(which):
         raise ConfigError(f"{path}.markers", "do not match the particles", len(drive.markers), f"give {len(which)}")
     with located(path):
-        followed = moment.recording.select(drive.markers)
-        if moment.static:
-            times, positions = np.zeros(1), replace(moment, recording=followed).shape[None]
-        else:
-            followed = replace(followed, clamped=tuple(range(len(which)))).filled()
-            times, positions = followed.times - moment.t0, followed.positions
+        times, positions = moment.followed(drive.markers)
         scene.drive(which, times, positions + np.array(drive.offset), drive.interpolation)

@@ -55,7 +55,7 @@ class SolverSection(Section):
 
 
 class Marker(Section):
-    """Where a marker sits: on a rope by arc length, on a particle, on an arm, or between two particles.
+    """Where a marker sits: on a rope by arc length, on a cloth, on a particle, on an arm, or between two particles.
 
     A list: [[marker]], shared, or [[recording.marker]].
     """
@@ -63,6 +63,8 @@ class Marker(Section):
     marker: str | int = key(..., "name or number in the recording")
     rope: Name | None = key(None, "a rope, with `arc_length`; the only rope when left out")
     arc_length: Finite | None = key(None, "material coordinate along the rope", "m")
+    cloth: Name | None = key(None, "a cloth instead, with `material`; the only cloth when left out")
+    material: Pair | None = key(None, "material coordinates on the cloth, along warp and weft", "m")
     particle: Reference | None = key(None, "a particle instead")
     arm: Name | None = key(None, "an arm or pendulum instead, with `radius`")
     radius: Finite | None = key(None, "distance from the arm's pivot", "m")
@@ -73,11 +75,10 @@ class Marker(Section):
 
     @model_validator(mode="after")
     def _one_place(self) -> Self:
-        places = [n for n in ("arc_length", "particle", "arm", "between") if getattr(self, n) is not None]
+        kinds = ("arc_length", "material", "particle", "arm", "between")
+        places = [n for n in kinds if getattr(self, n) is not None]
         if len(places) != 1:
-            raise ValueError(
-                f"names {' and '.join(places) or 'no place'}|give one of arc_length, particle, arm, between"
-            )
+            raise ValueError(f"names {' and '.join(places) or 'no place'}|give one of {', '.join(kinds)}")
         if (self.arm is None) != (self.radius is None):
             raise ValueError("has only one of arm and radius|give both")
         return self
@@ -159,7 +160,8 @@ class FitSection(Section):
     )
     double_segments: bool = key(
         False,
-        "refit with twice the segments in every rope; what moves, carried on to the limit, counts in the intervals",
+        "refit with twice the segments in every rope and twice the cells in every cloth; what moves, carried on to the "
+        "limit, counts in the intervals",
     )
     leave_one_out: bool = key(False, "also predict every recording that holds nothing out by a fit to the others")
     strict: bool = key(False, "exit 3 when any requested parameter is not identifiable, not only when all are")

@@ -14,7 +14,8 @@ NAME, REFERENCE, AXES = r"^[A-Za-z][A-Za-z0-9_.-]*$", r"^[^:\s]+(:\S+)?$", "^[xy
 Name = Annotated[str, Field(pattern=NAME)]
 Reference = Annotated[str, Field(pattern=REFERENCE)]
 """A particle: "NAME:INDEX" (negative ones count from the end), "NAME:start" and "NAME:end" of a rope, "NAME:pivot" and
-"NAME:end" of an arm or pendulum, "NAME" of a single particle."""
+"NAME:end" of an arm or pendulum, "NAME:SET:INDEX" of a cloth (its mesh's corners are "NAME:corners:0" to
+"NAME:corners:3"), "NAME" of a single particle."""
 
 
 def _ascending(pair: list[float]) -> list[float]:

@@ -39,14 +39,15 @@ def write(config: Config, path: Path, folder: Path) -> None:
     """Write a configuration as TOML with the keys that were set.
 
     Args:
-        folder: what the recordings' files are relative to now; they are written relative to the new file.
+        folder: what files are relative to now; they are written relative to the new file.
 
     Raises:
         MissingExtraError: tomli-w is not installed.
     """
     content: dict[str, Any] = config.model_dump(exclude_unset=True, exclude_none=True)
-    for recording in content.get("recording", []):
-        recording["file"] = Path(os.path.relpath(folder / recording["file"], path.parent)).as_posix()
+    meshes = [cloth["mesh"] for cloth in content["scene"].get("cloth", [])]
+    for table in [*content.get("recording", []), *(mesh for mesh in meshes if "file" in mesh)]:
+        table["file"] = Path(os.path.relpath(folder / table["file"], path.parent)).as_posix()
     path.write_text(require("tomli_w", "cli").dumps(content), encoding="utf-8")
 
 

@@ -1,0 +1,91 @@
+"""The figure that `sheetbend fit` writes of every cloth of a recording."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..cloth import Cloth
+from ..equilibrium import equilibrium
+from ..field_plot import Field, plot_fields
+from ..fit import Fit
+from ..mesh import Places
+from ..prediction import Comparison
+from ..simulate import simulate
+from ..strain import strain_fields
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def cloth_figures(found: Fit, c: Comparison) -> dict[str, Figure]:
+    """By name of the cloth: its shape with the measured markers, its strains, and the residual of each marker.
+
+    A motion is shown where the markers are farthest from their start, in the fitted part.
+    """
+    e = c.experiment
+    if not e.scene.cloths:
+        return {}
+    values = {
+        q: found.values.get(f"{q}[{e.name}]", found.values.get(q, quantity.value))
+        for q, quantity in e.scene.quantities.items()
+    }
+    frame, positions = _state(c, values)
+    when = "at rest" if e.static else f"at {c.recording.times[frame]:.3g} s"
+    rms = _residuals(c)
+    figures = {}
+    for cloth in e.scene.cloths.values():
+        mine, places = _markers(c, cloth)
+        strain = strain_fields(e.scene, cloth, positions, values)
+        where = positions[cloth.particles]
+        fields = [
+            Field(
+                "strain along the warp [%]",
+                1e2 * strain["strain_warp"],
+                where,
+                measured=c.recording.positions[frame, mine],
+            ),
+            Field("strain along the weft [%]", 1e2 * strain["strain_weft"]),
+            Field("shear [%]", 1e2 * strain["strain_shear"]),
+        ]
+        if mine:
+            fields.append(Field("residual of each marker, rms [mm]", rms[mine], places=places))
+        figures[cloth.name] = plot_fields(cloth.mesh, fields, title=f"{e.name}: {cloth.name} {when}")
+    return figures
+
+
+def _state(c: Comparison, values: dict[str, float]) -> tuple[int, np.ndarray]:
+    """A frame of the comparison, and all particles (n, 3) there."""
+    e = c.experiment
+    if e.static:
+        return 0, equilibrium(e.scene, values=values).positions
+    x = np.where(c.held_out[:, None, None], np.nan, c.recording.positions)
+    first = x[np.isfinite(x).any(axis=(1, 2)).argmax()]
+    moved = np.nansum((x - first) ** 2, axis=(1, 2)) / np.maximum(np.isfinite(x).sum(axis=(1, 2)), 1)
+    frame = int(moved.argmax())
+    time = round((c.recording.times[frame] - e.t0) / e.solver.h) * e.solver.h
+    start = equilibrium(e.scene, values=values).positions if e.start == "equilibrium" else None
+    return frame, simulate(e.scene, [0.0, max(time, 0.0)], e.solver, values, start).positions[-1]
+
+
+def _residuals(c: Comparison) -> np.ndarray:
+    """(markers,) mm, root mean square distance over the fitted frames; NaN for markers that are not seen there."""
+    squares = ((c.simulated - c.recording.positions) ** 2).sum(axis=2)
+    seen = np.isfinite(squares) & ~c.held_out[:, None]
+    count = seen.sum(axis=0)
+    mean = np.where(seen, squares, 0.0).sum(axis=0) / np.maximum(count, 1)
+    return np.where(count > 0, 1e3 * np.sqrt(mean), np.nan)
+
+
+def _markers(c: Comparison, cloth: Cloth) -> tuple[list[int], Places]:
+    """The compared markers that sit on a cloth, and where."""
+    own = {tuple(corners): k for k, corners in enumerate(cloth.particles[cloth.mesh.triangles].tolist())}
+    mine, triangles, weights = [], [], []
+    for k, place in enumerate(c.experiment.compared_places):
+        if place.particles in own:
+            mine.append(k)
+            triangles.append(own[place.particles])
+            weights.append(place.weights)
+    at = np.array(triangles, dtype=int)
+    return mine, Places(at, cloth.mesh.triangles[at], np.array(weights).reshape(-1, 3))

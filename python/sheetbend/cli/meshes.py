@@ -1,0 +1,33 @@
+"""The cloths of a simulated scene as files for other programs."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+
+from ..mesh import write_obj_sequence, write_ply
+from ..scene import Scene
+from ..simulate import Trajectory
+from ..strain import strain_fields
+
+
+class MeshFormat(StrEnum):
+    """What `sheetbend simulate --mesh` writes."""
+
+    OBJ = "obj"
+    PLY = "ply"
+
+
+def write_meshes(name: str, scene: Scene, motion: Trajectory, folder: Path, form: MeshFormat) -> list[str]:
+    """Every cloth of a scene, all frames as OBJ or the last as PLY; gives the paths."""
+    written = []
+    for cloth in scene.cloths.values():
+        path = folder / f"{name}_{cloth.name}"
+        if form is MeshFormat.OBJ:
+            write_obj_sequence(path, cloth.mesh, motion.positions[:, cloth.particles])
+        else:
+            path = path.with_name(f"{path.name}.ply")
+            fields = strain_fields(scene, cloth, motion.positions[-1])
+            write_ply(path, cloth.mesh, motion.positions[-1, cloth.particles], face_fields=fields)
+        written.append(str(path))
+    return written

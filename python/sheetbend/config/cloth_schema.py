@@ -1,0 +1,141 @@
+"""The sections of a configuration that describe cloth: [[scene.cloth]] and its tables."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import model_validator
+
+from .section import Finite, Name, Pair, Section, Vector, key
+
+MESH_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "grid": (("width", "height", "nx", "ny"), ("pattern",)),
+    "equilateral": (("width", "height", "nx"), ()),
+    "disk": (("radius", "rings"), ("support",)),
+    "file": (("file",), ("unit", "material", "texture_size", "warp")),
+}
+"""Of every kind of mesh, what it must have and what it may have."""
+
+
+class ClothMesh(Section):
+    """[scene.cloth.mesh]: a mesh by numbers (`sheetbend.mesh`), flat in its x-y plane with the warp along x, or from a
+    file (`sb.read_mesh`)."""
+
+    kind: Literal["grid", "equilateral", "disk", "file"] = key(..., "which of them")
+    width: Finite | None = key(None, "of a grid or equilateral triangles, along x", "m", gt=0)
+    height: Finite | None = key(None, "of a grid or equilateral triangles, along y", "m", gt=0)
+    nx: int | None = key(None, "cells of a grid along x, or sides of equilateral triangles", ge=1)
+    ny: int | None = key(None, "cells of a grid along y", ge=1)
+    pattern: Literal["alternating", "crossed", "one_way"] | None = key(
+        None, '`grid` only, diagonals; "one_way" when left out: its inner vertices have six neighbors'
+    )
+    radius: Finite | None = key(None, "of a disk around the origin", "m", gt=0)
+    rings: int | None = key(None, "of a disk", ge=1)
+    support: Finite | None = key(None, "radius of a circle of the disk whose vertices are the set `support`", "m", gt=0)
+    file: str | None = key(None, "OBJ, PLY or STL, relative to the configuration")
+    unit: Literal["m", "cm", "mm"] | None = key(None, "length unit of the file; m when left out")
+    material: Literal["texture", "unfold"] | None = key(
+        None, "where the file's material coordinates come from; its texture when left out and there is one"
+    )
+    texture_size: Finite | None = key(None, "of one unit of texture coordinates; 1 when left out", "m", gt=0)
+    warp: Vector | None = key(None, "direction of the warp in the file, for `unfold`; x when left out")
+
+    @model_validator(mode="after")
+    def _keys_of_kind(self) -> Self:
+        needed, optional = MESH_KEYS[self.kind]
+        given = {name for name in type(self).model_fields if name != "kind" and getattr(self, name) is not None}
+        missing, foreign = sorted(set(needed) - given), sorted(given - {*needed, *optional})
+        if missing:
+            raise ValueError(f"of kind '{self.kind}' lacks {', '.join(missing)}|give {', '.join(needed)}")
+        if foreign:
+            fix = f"leave out what is not of: {', '.join((*needed, *optional))}"
+            raise ValueError(f"of kind '{self.kind}' has no {', '.join(foreign)}|{fix}")
+        return self
+
+
+class ClothLaw(Section):
+    """[scene.cloth.law]: how tension grows with strain, `sb.Exponential` or `sb.Spline`; linear when left out."""
+
+    kind: Literal["exponential", "spline"] = key(..., "which of them")
+    warp: Finite | list[Finite] | None = key(
+        None, "stiffening b of an exponential, or ratios of a spline at 1 to 4 spacings (1 when left out)"
+    )
+    weft: Finite | list[Finite] | None = key(None, "the same along the weft")
+    shear: Finite | list[Finite] | None = key(None, "the same in shear")
+    spacing: Vector | None = key(None, "of a spline, in strain of warp, weft and shear")
+
+    @model_validator(mode="after")
+    def _keys_of_kind(self) -> Self:
+        given = {name: getattr(self, name) for name in ("warp", "weft", "shear") if getattr(self, name) is not None}
+        if self.kind == "exponential":
+            if len(given) < 3 or not all(isinstance(v, float) for v in given.values()):
+                raise ValueError("is exponential|give warp, weft and shear, one number each")
+            if self.spacing is not None:
+                raise ValueError("is exponential and has spacing|leave it out, or use a spline")
+        elif self.spacing is None or not all(isinstance(v, list) and len(v) == 4 for v in given.values()):
+            raise ValueError("is a spline|give spacing, and four ratios for each of warp, weft and shear that is given")
+        return self
+
+
+class VertexSet(Section):
+    """Vertices of a cloth by name, beside those that its mesh has (see `sheetbend.mesh`). A list: [[scene.cloth.set]];
+    give a box, points or markers."""
+
+    name: Name = key(..., "what `pinned`, grips and references call them")
+    lower: Vector | None = key(None, "corner of a box in space, where the cloth is placed; open when left out", "m")
+    upper: Vector | None = key(None, "its other corner; open when left out", "m")
+    points: list[Vector] | None = key(None, "the vertices nearest to these points in space", "m", min_length=1)
+    markers: list[str | int] | None = key(
+        None, "the vertices nearest to these markers where they are at the scene's start", min_length=1
+    )
+
+    @model_validator(mode="after")
+    def _one_way_to_choose(self) -> Self:
+        box = self.lower is not None or self.upper is not None
+        if box + (self.points is not None) + (self.markers is not None) != 1:
+            raise ValueError("does not say which vertices|give one of: a box (lower, upper), points, markers")
+        return self
+
+
+class Grip(Section):
+    """Vertices of a cloth that are moved with markers. A list: [[scene.cloth.grip]]; every vertex moves as the line
+    through the markers does where it is nearest to it, from where it is placed."""
+
+    set: Name = key(..., "a set of vertices")
+    markers: list[str | int] = key(..., "one marker, or several in order along the line", min_length=1)
+    interpolation: Literal["cubic", "linear"] = key("cubic", "of the motion between frames")
+
+
+class Cloth(Section):
+    """A cloth, `sb.add_cloth`. A list: [[scene.cloth]]."""
+
+    name: Name = key("cloth", "prefix of its quantities: <name>_warp and so on")
+    mesh: ClothMesh = key(..., "[scene.cloth.mesh]")
+    density: Finite = key(..., "mass per area", "kg/m^2", gt=0)
+    warp: Finite = key(..., "tension stiffness along the warp, of a strip with free sides", "N/m", gt=0)
+    weft: Finite | None = key(None, "along the weft; that of the warp when left out", "N/m", gt=0)
+    shear: Finite = key(..., "shear stiffness", "N/m", gt=0)
+    poisson: Finite = key(0.0, "sqrt(nu_uv nu_vu), between -1 and 1", gt=-1, lt=1)
+    law: ClothLaw | None = key(None, "[scene.cloth.law]")
+    bending: Finite | None = key(None, "rigidity along the warp; no bending when left out", "N m", gt=0)
+    bending_weft: Finite | None = key(None, "rigidity along the weft; `bending` when left out", "N m", gt=0)
+    bending_twist: Finite | None = key(None, "rigidity against twist; `bending` when left out", "N m", gt=0)
+    bending_model: Literal["curvature", "dihedral", "isometric_bending"] = key("curvature", "see `sb.add_cloth`")
+    curved: bool = key(False, "the mesh's own shape is that of bending at rest; flat otherwise")
+    membrane_damping: Finite | None = key(None, "Kelvin-Voigt time constant of the membrane", "s", gt=0)
+    bend_damping: Finite | None = key(None, "Kelvin-Voigt time constant of bending", "s", gt=0)
+    drag_linear: Finite | None = key(None, "linear air drag per area", "N s/m^3", gt=0)
+    drag_quadratic: Finite | None = key(None, "quadratic air drag per area", "N s^2/m^4", gt=0)
+    origin: Vector = key([0.0, 0.0, 0.0], "where the mesh's origin is placed", "m")
+    x_axis: Vector = key([1.0, 0.0, 0.0], "where the mesh's x axis points")
+    y_axis: Vector = key([0.0, 1.0, 0.0], "where its y axis points, perpendicular to `x_axis`")
+    set: list[VertexSet] = key([], "further sets of vertices")
+    pinned: list[Name] = key([], "sets that are held where they are placed")
+    grip: list[Grip] = key([], "sets that are moved with markers")
+    markers: dict[str, Pair] = key({}, "material coordinates (along warp and weft) of markers, by name", "m")
+    nearest_at: Finite | None = key(
+        None,
+        "time of a recording at which the cloth lies as placed: markers without another place sit where they are "
+        "nearest to it then",
+        "s",
+    )

@@ -1,0 +1,180 @@
+"""Cloths of a scene, built from their description: mesh, placement, sets of vertices, and what holds or moves them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import mesh as meshes
+from ..cloth import Cloth, add_cloth
+from ..errors import ConfigError
+from ..fabric import COMPONENTS, Exponential, Law, Spline
+from ..mesh import TriangleMesh
+from ..mesh.subdivide import subdivided
+from ..scene import Scene
+from . import cloth_schema as schema
+from .errors import located
+from .moment import Moment
+
+_SQUARE = 1e-6  # of the product of their lengths: how far two axes may be from perpendicular
+
+
+def build_cloth(
+    scene: Scene, path: str, section: schema.Cloth, moment: Moment | None, folder: Path, finer: int
+) -> tuple[Cloth, TriangleMesh]:
+    """Add a cloth with its pinned and driven vertices to a scene.
+
+    Args:
+        folder: files are relative to it.
+        finer: multiplies the cells, rings or sides of its mesh; a mesh from a file is split.
+
+    Returns:
+        The cloth, and its mesh as configured, whose vertex numbers references use.
+
+    Raises:
+        ConfigError: anything inconsistent, with the path of the key.
+    """
+    coarse = _placed(path, section, moment, folder, 1)
+    mesh = coarse if finer == 1 else _placed(path, section, moment, folder, finer)
+    pinned = [_members(f"{path}.pinned", mesh, name) for name in section.pinned]
+    gripped = [_members(f"{path}.grip[{i}].set", mesh, grip.set) for i, grip in enumerate(section.grip)]
+    left_out = {"name", "mesh", "law", "origin", "x_axis", "y_axis", "set", "pinned", "grip", "markers", "nearest_at"}
+    fields = section.model_dump(exclude=left_out, exclude_none=True)
+    with located(path, section.name):
+        held = np.unique(np.concatenate([np.zeros(0, dtype=int), *pinned, *gripped]))
+        cloth = add_cloth(scene, mesh, section.name, law=_law(section.law), held=held, **fields)
+        for vertices in pinned:
+            scene.pin(cloth.particles[vertices])
+    for i, (grip, vertices) in enumerate(zip(section.grip, gripped, strict=True)):
+        _drive(scene, f"{path}.grip[{i}]", grip, moment, cloth, vertices)
+    return cloth, coarse
+
+
+def _placed(path: str, section: schema.Cloth, moment: Moment | None, folder: Path, finer: int) -> TriangleMesh:
+    """The mesh where the cloth starts, with all its sets."""
+    with located(f"{path}.mesh"):
+        mesh = _mesh(f"{path}.mesh", section.mesh, folder, finer)
+    mesh = replace(mesh, vertices=np.array(section.origin) + mesh.vertices @ _axes(path, section))
+    for i, chosen in enumerate(section.set):
+        mesh = _with_set(f"{path}.set[{i}]", mesh, chosen, moment)
+    return mesh
+
+
+def _mesh(path: str, section: schema.ClothMesh, folder: Path, finer: int) -> TriangleMesh:
+    given: dict[str, Any] = section.model_dump(exclude={"kind"}, exclude_none=True)
+    if section.kind == "file":
+        file = folder / given.pop("file")
+        if not file.is_file():
+            fix = "give a file relative to the configuration's folder"
+            raise ConfigError(f"{path}.file", "does not exist", str(file), fix)
+        mesh = meshes.read_mesh(file, **given)
+        for _ in range(finer.bit_length() - 1):
+            mesh = subdivided(mesh)
+        return mesh
+    for count in ("nx", "ny", "rings"):
+        if count in given:
+            given[count] *= finer
+    if section.kind == "equilateral":
+        return meshes.equilateral(given["width"], given["height"], given["nx"])
+    return meshes.disk(**given) if section.kind == "disk" else meshes.grid(**{"pattern": "one_way", **given})
+
+
+def _axes(path: str, section: schema.Cloth) -> np.ndarray:
+    """(3, 3) unit rows: where x, y and z of the mesh point."""
+    x, y = np.array(section.x_axis), np.array(section.y_axis)
+    sizes = np.linalg.norm(x), np.linalg.norm(y)
+    for key, size in zip(("x_axis", "y_axis"), sizes, strict=True):
+        if not size > 0:
+            raise ConfigError(f"{path}.{key}", "has no length", getattr(section, key), "give a direction")
+    if abs(x @ y) > _SQUARE * sizes[0] * sizes[1]:
+        raise ConfigError(f"{path}.y_axis", "is not perpendicular to x_axis", section.y_axis, "turn one of them")
+    x, y = x / sizes[0], y / sizes[1]
+    return np.stack([x, y, np.cross(x, y)])
+
+
+def _with_set(path: str, mesh: TriangleMesh, chosen: schema.VertexSet, moment: Moment | None) -> TriangleMesh:
+    if chosen.name in mesh.sets:
+        fix = f"choose a name beside: {', '.join(mesh.sets)}"
+        raise ConfigError(f"{path}.name", "is a set of the mesh already", chosen.name, fix)
+    if chosen.markers is not None:
+        vertices = mesh.nearest(_seen(f"{path}.markers", chosen.markers, moment))
+    elif chosen.points is not None:
+        vertices = mesh.nearest(chosen.points)
+    else:
+        lower = [-np.inf] * 3 if chosen.lower is None else chosen.lower
+        vertices = mesh.within(lower, [np.inf] * 3 if chosen.upper is None else chosen.upper)
+    if not len(vertices):
+        box = [mesh.vertices.min(axis=0).tolist(), mesh.vertices.max(axis=0).tolist()]
+        raise ConfigError(path, "holds no vertex", chosen.name, f"choose within the cloth's own box, {box}")
+    if len(np.unique(vertices)) < len(vertices):
+        fix = "leave out all but one of them, or use a finer mesh"
+        raise ConfigError(path, "has one vertex nearest to several", chosen.name, fix)
+    with located(path):
+        return mesh.with_set(chosen.name, vertices)
+
+
+def _seen(path: str, markers: list[str | int], moment: Moment | None) -> np.ndarray:
+    """(k, 3) m, where markers are at the start."""
+    if moment is None:
+        raise ConfigError(path, "need a recording", markers, "add a [[recording]], or give points")
+    with located(path):
+        shape = replace(moment, recording=moment.recording.select(markers)).shape
+    lost = [m for m, x in zip(markers, shape, strict=True) if np.isnan(x).any()]
+    if lost:
+        raise ConfigError(path, "are not seen at the scene's start", lost, "start where they are, or give points")
+    return shape
+
+
+def _members(path: str, mesh: TriangleMesh, name: str) -> np.ndarray:
+    if name not in mesh.sets:
+        fix = f"use one of: {', '.join(mesh.sets) or 'none'}, or add a [[scene.cloth.set]]"
+        raise ConfigError(path, "names no set of vertices", name, fix)
+    return mesh.sets[name]
+
+
+def _law(section: schema.ClothLaw | None) -> Law | None:
+    if section is None:
+        return None
+    given: dict[str, Any] = {c: getattr(section, c) for c in COMPONENTS if getattr(section, c) is not None}
+    if section.kind == "exponential":
+        return Exponential(**given)
+    assert section.spacing is not None  # the schema's check
+    u, v, shear = section.spacing
+    return Spline((u, v, shear), **{c: tuple(ratios) for c, ratios in given.items()})
+
+
+def _drive(
+    scene: Scene, path: str, grip: schema.Grip, moment: Moment | None, cloth: Cloth, vertices: np.ndarray
+) -> None:
+    """Let vertices follow the line through a grip's markers."""
+    line = _seen(f"{path}.markers", grip.markers, moment)
+    assert moment is not None  # `_seen` needed it
+    if moment.static:
+        fix = "use [[scene.drive]], which puts particles on their markers"
+        raise ConfigError(path, "has no motion to follow in a recording at rest", grip.set, fix)
+    placed = cloth.mesh.vertices[vertices]
+    weights = np.array([_along(line, point) for point in placed])
+    with located(path):
+        times, motion = moment.followed(grip.markers)
+        moved = np.einsum("vm,tmx->tvx", weights, motion)
+        scene.drive(cloth.particles[vertices], times, moved + placed - weights @ line, grip.interpolation)
+
+
+def _along(line: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """(markers,) weights of the place of a line through markers (markers, 3) that is nearest to a point; the line goes
+    on beyond its ends."""
+    weights = np.zeros(len(line))
+    if len(line) == 1:
+        weights[0] = 1.0
+        return weights
+    step = np.diff(line, axis=0)
+    share = np.einsum("kx,kx->k", point - line[:-1], step) / np.maximum((step**2).sum(axis=1), np.finfo(float).tiny)
+    low, high = np.zeros(len(step)), np.ones(len(step))
+    low[0], high[-1] = -np.inf, np.inf
+    share = np.clip(share, low, high)
+    k = int(((line[:-1] + share[:, None] * step - point) ** 2).sum(axis=1).argmin())
+    weights[k : k + 2] = 1.0 - share[k], share[k]
+    return weights
