@@ -20,7 +20,7 @@ from .errors import (
     SheetbendError,
 )
 from .experiment import Experiment
-from .fabric import Exponential, Linear, Spline
+from .fabric import Exponential, Fabric, Linear, Spline
 from .fit import Fit, fit
 from .gradients import GradientReport, check_gradients
 from .grip import Grip
@@ -52,6 +52,7 @@ __all__ = [
     "Equilibrium",
     "Experiment",
     "Exponential",
+    "Fabric",
     "Fit",
     "FitResult",
     "Gradient",

@@ -55,6 +55,12 @@ class Equilibrium:
         Raises:
             SceneError: wrong shapes.
         """
+        return self.by_name(self.input_gradient(positions_bar, forces_bar))
+
+    def input_gradient(
+        self, positions_bar: ArrayLike | None = None, forces_bar: Mapping[str, ArrayLike] | None = None
+    ) -> np.ndarray:
+        """The same by the flat inputs (`CompiledScene.inputs`), places and rest geometry among them."""
         x_bar = (
             None
             if positions_bar is None
@@ -67,9 +73,12 @@ class Equilibrium:
                 self.scene.group(name)
                 parts[name] = finite(f"forces_bar.{name}", bar, parts[name].shape, SceneError)
             lambda_bar = np.concatenate([part.ravel() for part in parts.values()])
+        return self.solution.vjp(x_bar, lambda_bar)
+
+    def by_name(self, inputs_bar: np.ndarray) -> dict[str, float]:
+        """A gradient by the named quantities from one by the flat inputs."""
         compiled = self.scene.compiled
-        bar = compiled.theta_bar(self.theta, self.solution.vjp(x_bar, lambda_bar))
-        return dict(zip(compiled.names, bar.tolist(), strict=True))
+        return dict(zip(compiled.names, compiled.theta_bar(self.theta, inputs_bar).tolist(), strict=True))
 
 
 def equilibrium(

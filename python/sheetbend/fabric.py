@@ -1,9 +1,11 @@
-"""How a fabric's tension grows with strain: linear, exponential, or a curve of its own, per strain component."""
+"""A fabric's numbers, and how its tension grows with strain: linear, exponential, or a curve of its own, per strain
+component."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 from .checks import finite
 from .errors import SceneError
@@ -81,3 +83,30 @@ class Spline:
 
 
 Law = Linear | Exponential | Spline
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fabric:
+    """The numbers of a fabric, which hold for any piece of it. `add_cloth` tells what each means and checks them.
+
+    Attributes:
+        density: kg/m^2.
+        warp, weft, shear: tension and shear stiffness, N/m; weft = warp where left out.
+        poisson: sqrt(nu_uv nu_vu).
+        law: how tension grows with strain.
+        bending, bending_weft, bending_twist: rigidities, N m; those left out are `bending`.
+    """
+
+    density: float
+    warp: float
+    weft: float | None = None
+    shear: float
+    poisson: float = 0.0
+    law: Law = Linear()
+    bending: float
+    bending_weft: float | None = None
+    bending_twist: float | None = None
+
+    def options(self) -> dict[str, Any]:
+        """What `add_cloth` takes: `add_cloth(scene, mesh, **fabric.options())`."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}

@@ -1,4 +1,5 @@
-"""What a scene's constraints are worth at given positions: strains and angles, elastic energy, forces on supports."""
+"""What a scene's constraints are worth at given positions: strains and angles, elastic energy and its gradient, forces
+on supports."""
 
 from __future__ import annotations
 
@@ -50,6 +51,20 @@ def elastic_energy(
         energies[name] = stored
         first += len(C)
     return energies
+
+
+def elastic_energy_gradient(rest: Equilibrium) -> dict[str, float]:
+    """Derivative of the whole elastic energy at rest, alpha lambda.lambda/2 over all constraints, by every named
+    quantity, J per unit."""
+    scene, compiled = rest.scene, rest.scene.compiled
+    offset, size = compiled.layout["compliance"]
+    alpha = compiled.inputs(rest.theta)[offset : offset + size]
+    counts = np.cumsum([0, *(len(g.particles) for g in scene.groups)])
+    own = {g.name: alpha[a:b] for g, a, b in zip(scene.groups, counts[:-1], counts[1:], strict=True)}
+    bar = rest.input_gradient(None, {name: own[name][:, None] * rest.forces[name] for name in own})
+    explicit = [(rest.forces[name] ** 2).sum(axis=1) / 2.0 for name in own]
+    bar[offset : offset + size] += np.concatenate(explicit)
+    return rest.by_name(bar)
 
 
 def support_forces(rest: Equilibrium) -> Array:

@@ -4,6 +4,7 @@ what a motion shows."""
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import sheetbend as sb
@@ -161,3 +162,11 @@ def observed_orders(errors: Sequence[float]) -> Array:
     """log2 of the ratios of errors at h, h/2, h/4, ..."""
     e = np.abs(np.asarray(errors, dtype=float))
     return np.log2(e[:-1] / e[1:])
+
+
+def by_fabric(read: Callable[[sb.Fabric], float], fabric: sb.Fabric, field: str, share: float = 1e-4) -> float:
+    """Central difference of a laboratory's number by one of the fabric's."""
+    value = getattr(fabric, field)
+    step = share * (value or 1.0)
+    high, low = (read(replace(fabric, **{field: value + sign * step})) for sign in (1.0, -1.0))
+    return (high - low) / (2.0 * step)

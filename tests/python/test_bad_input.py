@@ -356,7 +356,7 @@ def test_rigid_bending_is_refused_with_its_reason(kind, compliance):
 
 
 def test_a_rest_curvature_in_space_is_refused_with_its_reason():
-    with pytest.raises(sb.SceneError, match=r"material frames \(rods\).*planar_bend"):
+    with pytest.raises(sb.SceneError, match=r"planar_bend.*rod for a curve in space"):
         three().add_constraints("bend", [[0, 1, 2]], compliance=1.0, rest=0.1)
 
 

@@ -46,7 +46,7 @@ def hinge_ratio(mesh: sb.TriangleMesh, direction: float, radius: float = 20.0) -
     ],
 )
 def test_oracle_23(pattern: str, n: int, expected: ArrayLike) -> None:
-    mesh = sb.grid(1.0, 1.0, n, n, pattern)
+    mesh = sb.mesh.grid(1.0, 1.0, n, n, pattern)
     assert mesh.bending_ratio(DEGREES) == approx(np.array(expected), abs=1e-6)
 
 
@@ -54,23 +54,23 @@ def test_oracle_23(pattern: str, n: int, expected: ArrayLike) -> None:
     ("pattern", "limit"), [("one_way", [3, 9, 3, 3]), ("alternating", [3, 4.5, 3, 4.5]), ("crossed", [4.5, 3, 4.5, 3])]
 )
 def test_refined_patterns_approach_their_limits_with_the_border(pattern: str, limit: ArrayLike) -> None:
-    coarse, fine = (sb.grid(1.0, 1.0, n, n, pattern).bending_ratio(DEGREES) - limit for n in (20, 40))
+    coarse, fine = (sb.mesh.grid(1.0, 1.0, n, n, pattern).bending_ratio(DEGREES) - limit for n in (20, 40))
     assert fine == approx(coarse / 2, abs=1e-9)
 
 
 def test_equilateral_triangles_bend_alike_in_all_directions() -> None:
     rows = 46
-    mesh = sb.equilateral(1.0, rows * np.sqrt(3) / 2 / 40, 40)  # no row is stretched
+    mesh = sb.mesh.equilateral(1.0, rows * np.sqrt(3) / 2 / 40, 40)  # no row is stretched
     around = mesh.bending_ratio(np.radians(np.arange(0, 180, 5)))
     assert np.abs(around - 2.94).max() < 0.07  # borders, and the half triangles along two of them
-    inner = [sb.equilateral(1.0, n * np.sqrt(3) / 2 / n, n).diagonal_bias for n in (10, 20, 40)]
+    inner = [sb.mesh.equilateral(1.0, n * np.sqrt(3) / 2 / n, n).diagonal_bias for n in (10, 20, 40)]
     assert inner[0] - 1 > 1.8 * (inner[1] - 1) > 3 * (inner[2] - 1) and inner[2] < 1.01
 
 
 @pytest.mark.parametrize("pattern", ["one_way", "alternating", "crossed"])
 @pytest.mark.parametrize("direction", [0.0, 0.3, 0.785, 2.0])
 def test_the_dihedral_angles_of_a_bent_mesh_say_the_same(pattern: str, direction: float) -> None:
-    mesh = sb.grid(1.0, 0.7, 15, 9, pattern)
+    mesh = sb.mesh.grid(1.0, 0.7, 15, 9, pattern)
     assert hinge_ratio(mesh, direction, radius=200.0) == approx(float(mesh.bending_ratio(direction)), rel=1e-5)
 
 
@@ -78,7 +78,7 @@ def test_the_dihedral_angles_of_a_bent_mesh_say_the_same(pattern: str, direction
 @given(seed=st.integers(0, 10**6), direction=st.floats(0, np.pi), turn=st.floats(-np.pi, np.pi))
 def test_it_holds_on_irregular_meshes_and_turns_with_the_warp_axis(seed: int, direction: float, turn: float) -> None:
     random = np.random.default_rng(seed)
-    regular = sb.grid(1.0, 1.0, 6, 6)
+    regular = sb.mesh.grid(1.0, 1.0, 6, 6)
     moved = regular.material + random.uniform(-0.04, 0.04, regular.material.shape)
     mesh = sb.TriangleMesh(regular.vertices, regular.triangles, moved)
     assert hinge_ratio(mesh, direction, radius=500.0) == approx(float(mesh.bending_ratio(direction)), rel=1e-4)
@@ -92,16 +92,16 @@ def test_it_holds_on_irregular_meshes_and_turns_with_the_warp_axis(seed: int, di
 def test_bias_is_that_of_the_pattern_and_not_of_the_border() -> None:
     """A strip four cells wide has as much of it as a wide sheet."""
     for pattern, bias in (("one_way", 4.0), ("alternating", 1.5), ("crossed", 1.5)):
-        wide = sb.grid(1.0, 1.0, 30, 30, pattern)
+        wide = sb.mesh.grid(1.0, 1.0, 30, 30, pattern)
         assert wide.diagonal_bias == approx(bias, rel=1e-9)
         assert wide.one_way_diagonals is (pattern == "one_way")
-        assert sb.grid(0.06, 1.0, 4, 64, pattern).one_way_diagonals is (pattern == "one_way")
-    assert np.isnan(sb.grid(1.0, 0.1, 10, 1).diagonal_bias) and not sb.grid(1.0, 0.1, 10, 1).one_way_diagonals
+        assert sb.mesh.grid(0.06, 1.0, 4, 64, pattern).one_way_diagonals is (pattern == "one_way")
+    assert np.isnan(sb.mesh.grid(1.0, 0.1, 10, 1).diagonal_bias) and not sb.mesh.grid(1.0, 0.1, 10, 1).one_way_diagonals
 
 
 @pytest.mark.parametrize(("rings", "support"), [(10, None), (20, None), (40, None), (10, 0.09), (20, 0.085)])
 def test_a_disk_has_no_preferred_direction(rings: int, support: float | None) -> None:
-    mesh = sb.disk(0.15, rings, support)
+    mesh = sb.mesh.disk(0.15, rings, support)
     around = mesh.bending_ratio(np.linspace(0, np.pi, 30))
     assert np.ptp(around) < 1e-9
     assert around[0] == approx(3.0, rel=0.04 if support is None else 0.05)

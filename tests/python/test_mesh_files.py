@@ -28,7 +28,7 @@ f 1/4 3/5 4/6
 
 
 def bumpy() -> sb.TriangleMesh:
-    flat = sb.grid(0.4, 0.3, 4, 3)
+    flat = sb.mesh.grid(0.4, 0.3, 4, 3)
     x, y, _ = flat.vertices.T
     return sb.TriangleMesh(np.column_stack([x, y, 0.05 * np.sin(9 * x) * y]), flat.triangles, flat.material)
 
@@ -36,15 +36,15 @@ def bumpy() -> sb.TriangleMesh:
 @pytest.mark.parametrize("suffix", [".obj", ".ply"])
 def test_what_is_written_is_read_again(tmp_path: Path, suffix: str) -> None:
     mesh = bumpy()
-    {".obj": sb.write_obj, ".ply": sb.write_ply}[suffix](tmp_path / f"mesh{suffix}", mesh)
+    {".obj": sb.mesh.write_obj, ".ply": sb.mesh.write_ply}[suffix](tmp_path / f"mesh{suffix}", mesh)
     again = sb.read_mesh(tmp_path / f"mesh{suffix}")
     assert np.array_equal(again.triangles, mesh.triangles)
     assert again.vertices == approx(mesh.vertices, abs=1e-10) and again.material == approx(mesh.material, abs=1e-10)
 
 
 def test_material_per_corner_survives_an_obj(tmp_path: Path) -> None:
-    mesh = sb.icosphere(0.1, 1)
-    sb.write_obj(tmp_path / "ball.obj", mesh)
+    mesh = sb.mesh.icosphere(0.1, 1)
+    sb.mesh.write_obj(tmp_path / "ball.obj", mesh)
     with pytest.warns(UserWarning, match="the warp direction jumps"):
         again = sb.read_mesh(tmp_path / "ball.obj")
     assert np.array_equal(again.triangles, mesh.triangles) and again.material == approx(mesh.material, abs=1e-10)
@@ -69,7 +69,7 @@ def test_a_ply_with_texture_coordinates_per_face(tmp_path: Path) -> None:
 
 
 def test_an_stl_is_merged_and_unrolled(tmp_path: Path) -> None:
-    mesh = sb.grid(0.4, 0.3, 4, 3)
+    mesh = sb.mesh.grid(0.4, 0.3, 4, 3)
     facets = []
     for corners in mesh.vertices[mesh.triangles]:
         lines = "".join(f"vertex {x:.7g} {y:.7g} {z:.7g}\n" for x, y, z in corners)
@@ -132,14 +132,14 @@ def test_without_trimesh_the_error_names_the_extra(tmp_path: Path, monkeypatch: 
 def test_a_sequence_has_one_file_per_frame(tmp_path: Path) -> None:
     mesh = bumpy()
     frames = mesh.vertices + np.linspace(0, 1, 3)[:, None, None] * [0.0, 0.0, 0.2]
-    files = sb.write_obj_sequence(tmp_path / "drop", mesh, frames)
+    files = sb.mesh.write_obj_sequence(tmp_path / "drop", mesh, frames)
     assert [f.name for f in files] == ["frame_00000.obj", "frame_00001.obj", "frame_00002.obj"]
     assert sb.read_mesh(files[2]).vertices == approx(frames[2], abs=1e-10)
-    sb.write_obj_sequence(tmp_path / "drop", mesh, frames)  # once more over itself
+    sb.mesh.write_obj_sequence(tmp_path / "drop", mesh, frames)  # once more over itself
     with pytest.raises(sb.MeshError, match="folder: holds frames of another sequence"):
-        sb.write_obj_sequence(tmp_path / "drop", mesh, frames[:2])
+        sb.mesh.write_obj_sequence(tmp_path / "drop", mesh, frames[:2])
     with pytest.raises(sb.MeshError, match="positions: has the wrong shape"):
-        sb.write_obj_sequence(tmp_path / "other", mesh, frames[0])
+        sb.mesh.write_obj_sequence(tmp_path / "other", mesh, frames[0])
 
 
 def test_a_ply_carries_fields(tmp_path: Path) -> None:
@@ -147,7 +147,9 @@ def test_a_ply_carries_fields(tmp_path: Path) -> None:
     mesh = bumpy()
     strain, height = np.linspace(-1, 1, len(mesh.triangles)), mesh.vertices[:, 2] / 3
     lifted = mesh.vertices + np.array([0, 0, 1])
-    sb.write_ply(tmp_path / "a.ply", mesh, lifted, vertex_fields={"height": height}, face_fields={"strain": strain})
+    sb.mesh.write_ply(
+        tmp_path / "a.ply", mesh, lifted, vertex_fields={"height": height}, face_fields={"strain": strain}
+    )
     raw = trimesh.load_mesh(str(tmp_path / "a.ply"), process=False).metadata["_ply_raw"]
     assert np.array_equal(raw["vertex"]["data"]["z"].ravel(), lifted[:, 2])  # every bit
     assert np.array_equal(raw["vertex"]["data"]["height"].ravel(), height)
@@ -158,4 +160,4 @@ def test_a_ply_carries_fields(tmp_path: Path) -> None:
         ({"face_fields": {"a b": strain}}, "has a name that cannot stand in the file"),
     ):
         with pytest.raises(sb.MeshError, match=message):
-            sb.write_ply(tmp_path / "b.ply", mesh, **fields)
+            sb.mesh.write_ply(tmp_path / "b.ply", mesh, **fields)

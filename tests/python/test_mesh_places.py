@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 
 
 def test_a_place_moves_with_the_fabric() -> None:
-    mesh = sb.grid(1.0, 0.5, 7, 5)
+    mesh = sb.mesh.grid(1.0, 0.5, 7, 5)
     points = np.array([[0.0, 0.0], [1.0, 0.5], [0.3, 0.2], [0.5, 0.1], [0.777, 0.4999]])
     places = mesh.at(points)
     assert places.positions(mesh.vertices)[:, :2] == approx(points, abs=1e-12)
@@ -29,7 +29,7 @@ def test_a_place_moves_with_the_fabric() -> None:
 @given(seed=st.integers(0, 10**6))
 def test_material_coordinates_are_found_again(seed: int) -> None:
     random = np.random.default_rng(seed)
-    regular = sb.grid(1.0, 1.0, 8, 8)
+    regular = sb.mesh.grid(1.0, 1.0, 8, 8)
     inner = regular.material + random.uniform(-0.03, 0.03, regular.material.shape)
     mesh = sb.TriangleMesh(regular.vertices, regular.triangles, inner)
     triangles = random.integers(len(mesh.triangles), size=50)
@@ -44,7 +44,7 @@ def test_material_coordinates_are_found_again(seed: int) -> None:
 def test_projection_finds_the_closest_point(seed: int) -> None:
     """Against a constrained minimization on every triangle, for points above, beside and on the mesh."""
     random = np.random.default_rng(seed)
-    mesh = sb.icosphere(1.0, 0)
+    mesh = sb.mesh.icosphere(1.0, 0)
     points = random.normal(size=(3, 3)) * random.choice([0.3, 1.0, 3.0])
     found = mesh.project(points)
     distance = np.linalg.norm(found.positions(mesh.vertices) - points, axis=1)
@@ -64,17 +64,17 @@ def closest_distance(mesh: sb.TriangleMesh, point: np.ndarray) -> float:
 
 
 def test_many_points_of_a_fine_mesh() -> None:
-    mesh = sb.grid(1.0, 1.0, 40, 40)
+    mesh = sb.mesh.grid(1.0, 1.0, 40, 40)
     points = np.random.default_rng(0).uniform(0.0, 1.0, (300, 3))
     assert mesh.project(points).positions(mesh.vertices) == approx(points * [1, 1, 0], abs=1e-12)
     assert mesh.at(points[:, :2]).positions(mesh.vertices) == approx(points * [1, 1, 0], abs=1e-12)
 
 
 def test_points_off_the_fabric_or_on_two_charts_are_refused() -> None:
-    mesh = sb.grid(1.0, 1.0, 3, 3)
+    mesh = sb.mesh.grid(1.0, 1.0, 3, 3)
     with pytest.raises(sb.MeshError, match=r"points: lie outside of the material \(got \[1.001, 0.5\]\)"):
         mesh.at([[0.5, 0.5], [1.001, 0.5]])
-    sphere = sb.icosphere(1.0, 1)
+    sphere = sb.mesh.icosphere(1.0, 1)
     with pytest.raises(sb.MeshError, match="lie in several triangles of the material"):
         sphere.at(sphere.corners.mean(axis=1))
     with pytest.raises(sb.MeshError, match="points: have the wrong shape"):

@@ -15,11 +15,11 @@ from pytest import approx
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 HALVES = np.array([[0, 1, 2], [0, 2, 3]])
 MESHES = {
-    "alternating": lambda: sb.grid(1.0, 0.5, 5, 3),
-    "crossed": lambda: sb.grid(1.0, 0.5, 2, 3, "crossed"),
-    "equilateral": lambda: sb.equilateral(1.0, 1.0, 4),
-    "disk": lambda: sb.disk(0.2, 4),
-    "sphere": lambda: sb.icosphere(0.1, 2),
+    "alternating": lambda: sb.mesh.grid(1.0, 0.5, 5, 3),
+    "crossed": lambda: sb.mesh.grid(1.0, 0.5, 2, 3, "crossed"),
+    "equilateral": lambda: sb.mesh.equilateral(1.0, 1.0, 4),
+    "disk": lambda: sb.mesh.disk(0.2, 4),
+    "sphere": lambda: sb.mesh.icosphere(0.1, 2),
 }
 
 
@@ -63,7 +63,7 @@ def test_loops_and_euler_number(name: str, loops: int, euler: int) -> None:
 
 
 def test_loops_are_in_order_with_the_fabric_on_the_left_also_around_a_hole() -> None:
-    whole = sb.grid(1.0, 1.0, 5, 5)
+    whole = sb.mesh.grid(1.0, 1.0, 5, 5)
     centers = whole.vertices[whole.triangles].mean(axis=1)
     kept = whole.triangles[(np.abs(centers[:, :2] - 0.5) > 0.1).any(axis=1)]
     mesh = sb.TriangleMesh(whole.vertices, kept, whole.material)
@@ -98,7 +98,7 @@ def test_the_mesh_cannot_be_changed_and_keeps_no_hold_of_what_it_was_made_from()
 
 
 def test_sets_boxes_and_nearest_vertices() -> None:
-    mesh = sb.grid(1.0, 0.5, 4, 2).with_set("middle", [7])
+    mesh = sb.mesh.grid(1.0, 0.5, 4, 2).with_set("middle", [7])
     assert mesh.sets["middle"].tolist() == [7] and "left" in mesh.sets
     assert mesh.within([-np.inf, 0.5, 0], [np.inf, 0.5, 0]).tolist() == mesh.sets["top"].tolist()
     assert mesh.within([2, 2, 2], [3, 3, 3]).size == 0
@@ -110,13 +110,13 @@ def test_sets_boxes_and_nearest_vertices() -> None:
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 10**6), count=st.integers(1, 30))
 def test_nearest_agrees_with_all_distances(seed: int, count: int) -> None:
-    mesh, points = sb.disk(0.2, 5), np.random.default_rng(seed).uniform(-0.3, 0.3, (count, 3))
+    mesh, points = sb.mesh.disk(0.2, 5), np.random.default_rng(seed).uniform(-0.3, 0.3, (count, 3))
     distance = np.linalg.norm(mesh.vertices[None] - points[:, None], axis=2)
     assert distance[np.arange(count), mesh.nearest(points)] == approx(distance.min(axis=1))
 
 
 def test_a_mesh_survives_a_pickle() -> None:
-    mesh = sb.grid(1.0, 1.0, 2, 2)
+    mesh = sb.mesh.grid(1.0, 1.0, 2, 2)
     again = pickle.loads(pickle.dumps(mesh))
     assert np.array_equal(again.material, mesh.material) and again.sets.keys() == mesh.sets.keys()
 
@@ -160,7 +160,7 @@ def test_broken_meshes_are_refused_by_name(case: str) -> None:
 
 def test_two_triangles_on_every_edge_may_still_pinch_a_vertex() -> None:
     """Two closed surfaces that touch in one vertex have no border to give them away."""
-    ball = sb.icosphere(1.0, 0)
+    ball = sb.mesh.icosphere(1.0, 0)
     top = int(ball.vertices[:, 2].argmax())
     renamed = np.where(ball.triangles == top, top, ball.triangles + len(ball.vertices))
     triangles = np.vstack([ball.triangles, renamed])
