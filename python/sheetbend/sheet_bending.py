@@ -24,9 +24,8 @@ WEAKER = (
 class SheetCurvature:
     """The triangles of a mesh that have three neighbors, as core/constraints/sheet_curvature.h takes them.
 
-    Triangles at a border have the curvature of their neighbors: their area counts there. Where a triangle borders on
-    one whose vertices are all held, the edge between them is a clamp: the sheet goes on beyond it as its mirror image,
-    so that the angle at the edge counts twice.
+    Triangles at a border have the curvature of their neighbors: their area counts there. A clamp acts in the middle
+    between the last row of held vertices and the one before it.
 
     Attributes:
         stencils: (count, 6) vertices: the triangle's, then those opposite across its edges v0v1, v1v2, v2v0.
@@ -38,22 +37,21 @@ class SheetCurvature:
     def __init__(self, mesh: TriangleMesh, free: Array) -> None:
         self.mesh = mesh
         hinge = _hinges_of_triangles(mesh)
-        loose = free[mesh.triangles].any(axis=1)
-        full = (hinge >= 0).all(axis=1) & loose
+        full = (hinge >= 0).all(axis=1)
         if not full.any():
             why = "needs triangles with three neighbors"
             raise SceneError("bending", why, mesh, "use a mesh of at least two cells across, or the dihedral model")
-        area = _with_borders(mesh, hinge, full, loose)[full]
+        area = _with_borders(mesh, hinge)[full]
         hinge, corners = hinge[full], mesh.corners[full]
         side = (mesh.hinge_triangles[hinge, 0] != np.flatnonzero(full)[:, None]).astype(
             int
         )  # which side the triangle is
         across = np.take_along_axis(mesh.hinges[hinge], 3 - side[..., None], axis=2)[..., 0]
-        clamped = ~loose[np.take_along_axis(mesh.hinge_triangles[hinge], 1 - side[..., None], axis=2)[..., 0]]
-        beyond = np.where(clamped[..., None], _mirrored(corners), _unfolded(mesh, hinge, side, corners))
-        self.stencils, self.area = np.column_stack([mesh.triangles[full], across]), area
-        self.matrix = _curvature_matrix(corners, beyond) * np.where(clamped, 2.0, 1.0)[:, None, :]
-        self.angles = rest_angles(mesh, mesh.hinges)[hinge]
+        stencils = np.column_stack([mesh.triangles[full], across])
+        kept = free[stencils].any(axis=1)
+        self.stencils, self.area = stencils[kept], area[kept]
+        self.matrix = _curvature_matrix(corners, _unfolded(mesh, hinge, side, corners))[kept]
+        self.angles = rest_angles(mesh, mesh.hinges)[hinge][kept]
 
     def add(
         self,
@@ -116,15 +114,15 @@ def _hinges_of_triangles(mesh: TriangleMesh) -> Array:
     return found
 
 
-def _with_borders(mesh: TriangleMesh, hinge: Array, full: Array, loose: Array) -> Array:
-    """(m,) m^2, areas after every loose triangle that is not full has given its own to those nearer to full ones."""
+def _with_borders(mesh: TriangleMesh, hinge: Array) -> Array:
+    """(m,) m^2, areas after every triangle that lacks a neighbor has given its own to those nearer to complete ones."""
     neighbor = np.where(hinge[..., None] >= 0, mesh.hinge_triangles[hinge], -1)
     own = np.arange(len(hinge))[:, None]
     neighbor = np.where(neighbor[..., 0] == own, neighbor[..., 1], neighbor[..., 0])
-    distance = np.where(full, 0, np.where(loose, -1, -2))  # held ones have no part
+    distance = np.where((hinge >= 0).all(axis=1), 0, -1)
     step = 0
-    while (distance == -1).any():
-        near = ((neighbor >= 0) & (distance[neighbor] == step)).any(axis=1) & (distance == -1)
+    while (distance < 0).any():
+        near = ((neighbor >= 0) & (distance[neighbor] == step)).any(axis=1) & (distance < 0)
         if not near.any():
             raise SceneError("bending", "cannot reach a part of the mesh", mesh, "leave out parts of a triangle or two")
         step += 1
@@ -155,17 +153,6 @@ def _unfolded(mesh: TriangleMesh, hinge: Array, side: Array, corners: Array) -> 
         places[:, k] = (
             corners[:, (k + 1) % 3] + s[:, None] * edge + t[:, None] * np.column_stack([-edge[:, 1], edge[:, 0]])
         )
-    return places
-
-
-def _mirrored(corners: Array) -> Array:
-    """(count, 3, 2) m, the third corner mirrored at each edge."""
-    places = np.empty_like(corners)
-    for k in range(3):
-        start, top = corners[:, k], corners[:, (k + 2) % 3]
-        edge = corners[:, (k + 1) % 3] - start
-        foot = start + (((top - start) * edge).sum(axis=1) / (edge**2).sum(axis=1))[:, None] * edge
-        places[:, k] = 2.0 * foot - top
     return places
 
 

@@ -104,11 +104,14 @@ def test_a_curved_sheet_rests_in_its_shape():
 
 
 def cantilever(gamma: float, rows: int, pattern: str, width: float = 0.5, **options) -> tuple[sb.Scene, np.ndarray]:
-    """Strip of length 1 on `rows` rows of triangles, and the weights that pick its mean drop."""
-    cell = 1.0 / rows
+    """Strip of length 1 on `rows` rows of triangles, and the weights that pick its mean drop.
+
+    A clamp acts in the middle between its two rows.
+    """
+    cell = 1.0 / (rows + 0.5)
     across = max(2, round(width / cell))
-    mesh = sb.mesh.grid(1.0 + cell, width, rows + 1, across, pattern=pattern)
-    held = mesh.within((-1, -1, -1), (1.001 * cell, width + 1, 1))
+    mesh = sb.mesh.grid((rows + 2) * cell, width, rows + 2, across, pattern=pattern)
+    held = mesh.within((-1, -1, -1), (2.001 * cell, width + 1, 1))
     density = 0.2
     rigidity = density * G / gamma
     scene = sb.Scene("cantilever", gravity=(0, 0, -G))
@@ -126,9 +129,9 @@ def test_heavy_strip(gamma):
     scene, drop = cantilever(gamma, 20, "one_way")
     rest = sb.equilibrium(scene)
     closed = bending.heavy_elastica(gamma)
-    assert (rest.positions * drop).sum() == approx(closed.drop, abs=5e-3)
+    assert (rest.positions * drop).sum() == approx(closed.drop, abs=1e-3)
     slope = derivative(lambda g: bending.heavy_elastica(g).drop, gamma)
     by_bending = static_sensitivity(rest, "cloth_bending", drop)
     rigidity = scene.quantities["cloth_bending"].value
     assert by_bending[0] == approx(by_bending[1], rel=1e-8)
-    assert by_bending[0] == approx(-gamma / rigidity * slope, rel=0.03)
+    assert by_bending[0] == approx(-gamma / rigidity * slope, rel=0.01)
