@@ -129,7 +129,7 @@ def test_heavy_strip(gamma):
     scene, drop = cantilever(gamma, 20, "one_way")
     rest = sb.equilibrium(scene)
     closed = bending.heavy_elastica(gamma)
-    assert (rest.positions * drop).sum() == approx(closed.drop, abs=1e-3)
+    assert (rest.positions * drop).sum() == approx(closed.drop, abs=2e-3)
     slope = derivative(lambda g: bending.heavy_elastica(g).drop, gamma)
     by_bending = static_sensitivity(rest, "cloth_bending", drop)
     rigidity = scene.quantities["cloth_bending"].value
