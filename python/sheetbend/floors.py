@@ -17,7 +17,7 @@ def solver_floors(experiments: Sequence[Experiment], parameters: Parameters) -> 
     BDF1 damps a mode of frequency omega like zeta = omega h / 2, a Kelvin-Voigt time constant tau like omega tau / 2:
     the floor is tau = h, that of a loss factor omega h.
     Gauss-Seidel leaves about 0.9 h^2 / (m sweeps) of compliance in a link of node mass m: EA above length / that is
-    not seen.
+    not seen, and no membrane stiffness above its inverse.
     """
     floors: dict[str, Floor] = {}
     for name in parameters.free:
@@ -32,14 +32,23 @@ def solver_floors(experiments: Sequence[Experiment], parameters: Parameters) -> 
                 frequency = e.scene.quantities[quantity.replace("_loss_factor", "_loss_frequency")].value
                 words = f"BDF1 with a substep of {h:g} s damps as much by itself; use bdf2"
                 floors[name] = Floor(2.0 * math.pi * frequency * h, words)
+            sheet = next((c for c in e.scene.cloths.values() if quantity in membrane_names(c.name)), None)
+            if sheet is not None and e.solver.method == "gauss_seidel":
+                mass = e.scene.quantities[f"{sheet.name}_density"].value * sheet.mesh.areas.sum() / len(sheet.particles)
+                floors[name] = _hidden(mass * sweeps / (0.9 * h * h), sweeps, h, "newton")
             rope = next((r for r in e.scene.ropes.values() if quantity == f"{r.name}_EA"), None)
             if rope is not None and e.solver.method == "gauss_seidel":
                 link = rope.arc_length[1] - rope.arc_length[0]
                 mass = e.scene.quantities[f"{rope.name}_density"].value * link
-                limit = link * mass * sweeps / (0.9 * h * h)
-                floors[name] = Floor(
-                    limit,
-                    f"{sweeps} Gauss-Seidel sweeps at {h:g} s hide any larger stiffness; use method = 'direct'",
-                    ceiling=True,
-                )
+                floors[name] = _hidden(link * mass * sweeps / (0.9 * h * h), sweeps, h, "direct")
     return floors
+
+
+def membrane_names(cloth: str) -> tuple[str, str, str]:
+    """The quantities of a cloth's membrane, N/m."""
+    return f"{cloth}_warp", f"{cloth}_weft", f"{cloth}_shear"
+
+
+def _hidden(limit: float, sweeps: int, h: float, method: str) -> Floor:
+    words = f"{sweeps} Gauss-Seidel sweeps at {h:g} s hide any larger stiffness; use method = '{method}'"
+    return Floor(limit, words, ceiling=True)
