@@ -7,14 +7,24 @@ namespace sheetbend {
 Equilibrium EquilibriumAnchor::solve(const Scene& scene, const double* inputs, const EquilibriumOptions& options,
                                      Interrupt* interrupt) {
   EquilibriumSolver solver(scene);
+  // Inputs that an optimizer tries may make a start infinite: no answer, as any other start that leads nowhere.
+  const auto from = [&](const double* x, const double* lambda) {
+    try {
+      return solver.solve(inputs, x, lambda, options, interrupt);
+    } catch (const std::invalid_argument& error) {
+      Equilibrium none;
+      none.message = error.what();
+      return none;
+    }
+  };
   std::unique_lock lock(setting_);
   const bool known = set_;
   lock.unlock();
   if (known) {  // never written again
-    Equilibrium near = solver.solve(inputs, x_.data(), lambda_.data(), options, interrupt);
+    Equilibrium near = from(x_.data(), lambda_.data());
     if (near.converged) return near;
   }
-  Equilibrium e = solver.solve(inputs, nullptr, nullptr, options, interrupt);
+  Equilibrium e = from(nullptr, nullptr);
   if (!e.converged) throw NoEquilibrium(e.message);
   lock.lock();
   if (!set_) {

@@ -9,6 +9,7 @@ import sheetbend as sb
 from pytest import approx
 from scipy.integrate import quad
 from scipy.optimize import brentq
+from sheetbend.problem import FitProblem, as_parameters
 from support import static_sensitivity, twice
 
 WARP, SHEAR = 1000.0, 50.0
@@ -189,3 +190,20 @@ def test_simple_shear():
     inner = sb.support_forces(rest)[cloth.particles[mesh.sets["top"][2:-2]]].sum(axis=0) / (0.2 * (n - 3) / n)
     S_vv = WARP * gamma**2 / 2
     assert inner[:2] == approx([SHEAR * gamma + gamma * S_vv, S_vv], rel=1e-10)
+
+
+def test_a_trial_value_that_makes_the_start_infinite_has_no_answer():
+    mesh = strip()
+    positions = mesh.vertices * [1.5, 1.0, 1.0]
+    options = {"warp": WARP, "shear": SHEAR, "law": sb.Exponential(2.0, 2.0, 2.0), "bending_model": "dihedral"}
+    scene = sb.Scene("strip", gravity=(0, 0, 0))
+    ends = np.concatenate([mesh.sets["left"], mesh.sets["right"]])
+    cloth = sb.add_cloth(scene, mesh, density=0.2, bending=BENDING, held=ends, positions=positions, **options)
+    scene.pin(cloth.particles[ends])
+    recording = sb.Recording(np.zeros((1, 1, 3)), np.zeros(1), ("m",))
+    markers = {"m": sb.on_cloth(cloth, [[0.15, 0.1]])[0]}
+    experiment = sb.Experiment(scene=scene, recording=recording, markers=markers, static=True)
+    problem = FitProblem([experiment], as_parameters(["cloth_warp_stiffening"], [experiment]))
+    assert problem.evaluate(np.log([2.0]))[0]
+    assert not problem.evaluate(np.log([1e5]))[0]  # exp(b e^2) overflows
+    assert "not finite" in problem.core.failure
