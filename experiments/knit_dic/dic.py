@@ -57,6 +57,7 @@ def experiment(still, law, cells=CELLS):
         poisson=0.3,
         law=law,
         bending=FLAT,
+        bending_model="dihedral",
         held=held,
         positions=(1 - share) * ends[0] + share * ends[1],
     )

@@ -125,6 +125,7 @@ class Sheet:
             poisson=0.3,
             law=law,
             bending=FLAT,
+            bending_model="dihedral",
             held=np.concatenate(ends),
             positions=start,
         )
