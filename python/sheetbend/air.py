@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .checks import finite, index_array, per_item
+from .checks import check_increasing, finite, index_array, per_item
 from .errors import SceneError
 from .quantities import Term
 
@@ -73,8 +73,7 @@ class Air:
                 return
             wind = (0.0, 0.0, 0.0)
         t = np.zeros(1) if times is None else finite("wind.times", times, None, SceneError).ravel()
-        if len(t) == 0 or (np.diff(t) <= 0).any():
-            raise SceneError("wind.times", "must increase", t[:5].tolist(), "sort the knots and drop repeated ones")
+        check_increasing("wind.times", t)
         w = finite("wind", wind, (3,) if times is None else (len(t), 3), SceneError).reshape(-1, 3)
         if self._blowing is not None:
             before_t, before_w = self._blowing

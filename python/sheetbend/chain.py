@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .checks import finite, points
+from .checks import finite, is_number, points
 from .errors import SceneError
 from .quantities import product
 from .scene import Array, Scene
@@ -147,11 +147,6 @@ def add_drag(
                 for n, share in zip(nodes, voronoi_shares(segments), strict=True)
             ]
         )
-
-
-def is_number(value: object) -> bool:
-    """Whether a value is a finite real number."""
-    return isinstance(value, int | float | np.integer | np.floating) and bool(np.isfinite(value))
 
 
 def first_value(scene: Scene, group: str) -> int:

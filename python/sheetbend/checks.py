@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -25,6 +27,25 @@ def finite(field: str, values: ArrayLike, shape: tuple[int, ...] | None, error: 
             "give finite numbers",
         )
     return array
+
+
+def check_increasing(field: str, times: np.ndarray) -> None:
+    """Knot times (knots,): at least one, and each later than the one before."""
+    if len(times) == 0 or (np.diff(times) <= 0).any():
+        raise SceneError(field, "must increase", times[:5].tolist(), "sort the knots and drop repeated ones")
+
+
+def is_number(value: object) -> bool:
+    """Whether a value is a finite real number."""
+    return isinstance(value, int | float | np.integer | np.floating) and bool(np.isfinite(value))
+
+
+def check_positive(name: str, required: Mapping[str, float], optional: Mapping[str, float | None]) -> None:
+    """Numbers of a rod or a cloth, by argument; None leaves an optional one out."""
+    for field, value in ({**required, **optional}).items():
+        if not (is_number(value) and value > 0) and not (value is None and field in optional):  # type: ignore[operator]
+            fix = "give a positive number" + (", or leave it out" if field in optional else "")
+            raise SceneError(f"{name}.{field}", "must be positive", value, fix)
 
 
 def points(field: str, values: ArrayLike) -> np.ndarray:

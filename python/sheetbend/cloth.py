@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .chain import first_value, is_number
-from .checks import finite, indices
+from .checks import check_positive, finite, indices, is_number
+from .elastic_group import add_elastic_group
 from .errors import SceneError
 from .fabric import Law, Linear
 from .hinges import Hinges
@@ -86,19 +86,17 @@ def add_cloth(
     Raises:
         SceneError: wrong or missing values; a mesh whose diagonals bias bending.
     """
-    _check(name, density=density, warp=warp, shear=shear)
-    _check(
-        name,
-        optional=True,
-        weft=weft,
-        bending=bending,
-        bending_weft=bending_weft,
-        bending_twist=bending_twist,
-        membrane_damping=membrane_damping,
-        bend_damping=bend_damping,
-        drag_linear=drag_linear,
-        drag_quadratic=drag_quadratic,
-    )
+    optional = {
+        "weft": weft,
+        "bending": bending,
+        "bending_weft": bending_weft,
+        "bending_twist": bending_twist,
+        "membrane_damping": membrane_damping,
+        "bend_damping": bend_damping,
+        "drag_linear": drag_linear,
+        "drag_quadratic": drag_quadratic,
+    }
+    check_positive(name, {"density": density, "warp": warp, "shear": shear}, optional)
     if not (is_number(poisson) and -1 < poisson < 1):
         raise SceneError(f"{name}.poisson", "must lie between -1 and 1", poisson, "give sqrt(nu_uv nu_vu)")
     if bending_model not in MODELS:
@@ -169,19 +167,17 @@ def _membrane(
     rest[:, :4] = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)).reshape(count, 4)
     if weft is None:
         rest[:, 5] = 1.0
-    group = f"{name}_membrane"
-    scene.add_constraints(
+    values = add_elastic_group(
+        scene,
         law.kind,
         particles[mesh.triangles[kept]],
-        name=group,
-        compliance=np.zeros(count),
-        damping=None if damping is None else np.zeros(count),
+        name=f"{name}_membrane",
         rest=rest,
+        scale=areas,
+        stiffness=(f"{name}_warp", warp, "N/m"),
+        damping=(f"{name}_membrane_damping", damping),
     )
-    _, first, _ = scene.group(group)
-    values, all_of = first_value(scene, group) + rest.shape[1] * np.arange(count), first + np.arange(count)
-    scene.add_quantity(f"{name}_warp", warp, "N/m")
-    terms = [Term("compliance", all_of, 1.0 / areas, ((f"{name}_warp", "inverse"),))]
+    terms = []
     over_warp = (f"{name}_warp", "inverse_sqrt")
     for place, label, value in ((5, "weft", weft), (6, "shear", shear)):
         if value is not None:
@@ -196,15 +192,4 @@ def _membrane(
             terms.append(Term("rest", values + place, 1.0, ((f"{name}_{label}", "identity"),)))
         else:
             own[:, place] = value
-    if damping is not None:
-        scene.add_quantity(f"{name}_membrane_damping", damping, "s")
-        factors = ((f"{name}_membrane_damping", "identity"), (f"{name}_warp", "identity"))
-        terms.append(Term("damping", all_of, areas, factors))
     scene.add_terms(terms)
-
-
-def _check(name: str, optional: bool = False, **values: float | None) -> None:
-    for field, value in values.items():
-        if not (is_number(value) and value > 0) and not (optional and value is None):  # type: ignore[operator]
-            fix = "give a positive number" + (", or leave it out" if optional else "")
-            raise SceneError(f"{name}.{field}", "must be positive", value, fix)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from .elastic_group import add_elastic_group
 from .errors import SceneError
 from .mesh import TriangleMesh
-from .quantities import Term
 from .scene import Array, Scene
 
 
@@ -67,25 +67,21 @@ class Hinges:
             fix = "use the dihedral model"
             raise SceneError(f"{name}.curved", "is not possible for quadratic bending, flat at rest", True, fix)
         count = len(self.stencils)
-        group, scale = f"{name}_bend", (self.length**2 / self.area if dihedral else np.ones(count))
-        rest = (
-            (rest_angles(self.mesh, self.stencils) if curved else np.zeros(count)) if dihedral else self._cotangents()
-        )
-        scene.add_constraints(
+        if dihedral:
+            scale = self.length**2 / self.area
+            rest = rest_angles(self.mesh, self.stencils) if curved else np.zeros(count)
+        else:
+            scale, rest = np.ones(count), self._cotangents()
+        add_elastic_group(
+            scene,
             model,
             particles[self.stencils],
-            name=group,
-            compliance=np.zeros(count),
-            damping=None if damping is None else np.zeros(count),
+            name=f"{name}_bend",
             rest=rest,
+            scale=scale,
+            stiffness=(f"{name}_bending", rigidity, "N m"),
+            damping=(f"{name}_bend_damping", damping),
         )
-        at = scene.group(group)[1] + np.arange(count)
-        scene.add_quantity(f"{name}_bending", rigidity, "N m")
-        scene.add_terms([Term("compliance", at, 1.0 / scale, ((f"{name}_bending", "inverse"),))])
-        if damping is not None:
-            scene.add_quantity(f"{name}_bend_damping", damping, "s")
-            factors = ((f"{name}_bend_damping", "identity"), (f"{name}_bending", "identity"))
-            scene.add_terms([Term("damping", at, scale, factors)])
 
 
 def rest_angles(mesh: TriangleMesh, stencils: Array) -> Array:

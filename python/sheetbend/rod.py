@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .chain import add_drag, add_links, add_masses, is_number
-from .checks import finite
+from .chain import add_drag, add_links, add_masses
+from .checks import check_positive, finite, is_number
 from .errors import SceneError
 from .grip import Grip, any_across, carried
 from .quantities import product
@@ -121,7 +121,7 @@ def add_rod(
     Raises:
         SceneError: wrong or missing values; the message names the field.
     """
-    _check_values(
+    check_positive(
         name,
         {"length": length, "density": density, "EI": EI, "GJ": GJ},
         {
@@ -203,13 +203,6 @@ def add_rod(
     built = Rod(name, nodes, link * np.arange(segments + 1), ghosts[0], ghosts[1], directors)
     scene.ropes[name] = built
     return built
-
-
-def _check_values(name: str, required: dict[str, float], optional: dict[str, float | None]) -> None:
-    for given, value in (required | optional).items():
-        if not (is_number(value) and value > 0) and not (value is None and given in optional):  # type: ignore[operator]
-            fix = "give a positive number" + (", or leave it out" if given in optional else "")
-            raise SceneError(f"{name}.{given}", "must be positive", value, fix)
 
 
 def _check_yield(name: str, curvature: float | None, share: float | None) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from . import _core
 from .air import Air
-from .checks import finite, index_array, indices, per_item, points
+from .checks import check_increasing, finite, index_array, indices, per_item, points
 from .column import Column
 from .compiled import CompiledScene
 from .errors import SceneError
@@ -144,8 +144,7 @@ class Scene:
         self._building()
         which = indices("drive", particles, self.particle_count)
         t = finite("drive.times", times, None, SceneError).ravel()
-        if len(t) == 0 or (np.diff(t) <= 0).any():
-            raise SceneError("drive.times", "must increase", t[:5].tolist(), "sort the knots and drop repeated ones")
+        check_increasing("drive.times", t)
         x = finite("drive.positions", positions, (len(t), len(which), 3), SceneError)
         if interpolation not in ("cubic", "linear"):
             raise SceneError("drive.interpolation", "is unknown", interpolation, "use 'cubic' or 'linear'")
@@ -201,10 +200,7 @@ class Scene:
         f = finite(
             "add_force.forces", np.broadcast_to(forces, (len(t), len(which), 3)), (len(t), len(which), 3), SceneError
         )
-        if len(t) == 0 or (np.diff(t) <= 0).any():
-            raise SceneError(
-                "add_force.times", "must increase", t[:5].tolist(), "sort the knots and drop repeated ones"
-            )
+        check_increasing("add_force.times", t)
         if self.loaded and (t.shape != self.force_times.shape or (t != self.force_times).any()):
             raise SceneError(
                 "add_force.times", "differ from those of forces added before", len(t), "use one set of knots"

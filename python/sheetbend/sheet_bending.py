@@ -7,7 +7,7 @@ import warnings
 
 import numpy as np
 
-from .chain import first_value
+from .elastic_group import add_elastic_group
 from .errors import SceneError
 from .hinges import rest_angles
 from .mesh import TriangleMesh
@@ -75,32 +75,25 @@ class SheetCurvature:
         rest[:, 9:11] = (1.0, np.sqrt(2.0))
         if curved:
             rest[:, 11:] = self.angles
-        group, bending = f"{name}_bend", f"{name}_bending"
+        bending = f"{name}_bending"
         ratios = [(9, weft, f"{bending}_weft", 1.0), (10, twist, f"{bending}_twist", np.sqrt(2.0))]
         for place, value, _, _ in ratios:
             if value is not None:
                 rest[:, place] = 0.0
-        scene.add_constraints(
+        values = add_elastic_group(
+            scene,
             "sheet_curvature",
             particles[self.stencils],
-            name=group,
-            compliance=np.zeros(count),
-            damping=None if damping is None else np.zeros(count),
+            name=f"{name}_bend",
             rest=rest,
+            scale=self.area,
+            stiffness=(bending, rigidity, "N m"),
+            damping=(f"{name}_bend_damping", damping),
         )
-        at = scene.group(group)[1] + np.arange(count)
-        values = first_value(scene, group) + 14 * np.arange(count)
-        scene.add_quantity(bending, rigidity, "N m")
-        terms = [Term("compliance", at, 1.0 / self.area, ((bending, "inverse"),))]
         for place, value, label, factor in ratios:
             if value is not None:
                 scene.add_quantity(label, value, "N m")
-                terms.append(Term("rest", values + place, factor, ((label, "sqrt"), (bending, "inverse_sqrt"))))
-        if damping is not None:
-            scene.add_quantity(f"{name}_bend_damping", damping, "s")
-            factors = ((f"{name}_bend_damping", "identity"), (bending, "identity"))
-            terms.append(Term("damping", at, self.area, factors))
-        scene.add_terms(terms)
+                scene.add_terms([Term("rest", values + place, factor, ((label, "sqrt"), (bending, "inverse_sqrt")))])
 
 
 def _hinges_of_triangles(mesh: TriangleMesh) -> Array:
