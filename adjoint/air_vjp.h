@@ -13,6 +13,7 @@ AirTriangle<T> air_force_vjp(const AirTriangle<T>& at, const AirForce<T>& a, con
   const T f_N = dot(f_bar, a.N), f_t = dot(f_bar, a.u_t);
   bar.normal = a.along_N * f_N;
   bar.tangential = a.along_u_t * f_t;
+  bar.pressure = T(0.5) * f_N;
   const T along_N_bar = at.normal * f_N, along_u_t_bar = at.tangential * f_t;
   const T u_t_size_bar = T(0.5) * a.N_size * along_u_t_bar;
   const Vec3<T> u_t_bar = (at.tangential * a.along_u_t) * f_bar + (u_t_size_bar * inverse_or_zero(a.u_t_size)) * a.u_t;
@@ -23,7 +24,8 @@ AirTriangle<T> air_force_vjp(const AirTriangle<T>& at, const AirForce<T>& a, con
   const T N_size_bar = T(0.5) * a.u_t_size * along_u_t_bar;
   // |N| and 1/N2 by N
   const T along = N_size_bar * inverse_or_zero(a.N_size) - T(2.0) * a.N2_inverse * a.N2_inverse * N2_inverse_bar;
-  const Vec3<T> N_bar = (at.normal * a.along_N) * f_bar - p * u_t_bar + u_N_bar * at.u + along * a.N;
+  const Vec3<T> N_bar =
+      (at.normal * a.along_N + T(0.5) * at.pressure) * f_bar - p * u_t_bar + u_N_bar * at.u + along * a.N;
   bar.u = u_t_bar + u_N_bar * a.N;
   bar.e1 = cross(at.e2, N_bar);
   bar.e2 = cross(N_bar, at.e1);
@@ -57,6 +59,7 @@ void blow_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, dou
     const AirTriangle<T> own = air_force_vjp(at, force, share * impulse_bar);
     in_bar.of(Quantity::air_normal)[i] += own.normal;
     in_bar.of(Quantity::air_tangential)[i] += own.tangential;
+    in_bar.of(Quantity::pressure)[i] += own.pressure;
     pull_back_knots(air.knots, own.u, in_bar.of(Quantity::wind), 1, 0);
     const Vec3<T> v_bar = T(-1.0 / 3.0) * own.u, x_bar[3] = {-(own.e1 + own.e2), own.e1, own.e2};
     for (int k = 0; k < 3; ++k) {

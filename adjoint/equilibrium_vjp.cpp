@@ -35,36 +35,20 @@ void EquilibriumDerivative::vjp(const double* x_bar, const double* lambda_bar, d
   solve(u, v);
 
   for_each_constraint(scene_, [&]<class K>(K, const Group& group, int item) {
-    constexpr int P = parameter_count<K>;
-    using D = Dual<double, P + 1>;
-    double local[K::dofs], ul[K::dofs];
-    gather<K>(scene_, group, item, at_.x.data(), local);
-    gather<K>(scene_, group, item, u.data(), ul);
-    D x[K::dofs], p[P + 1], C[K::rows], J[K::rows * K::dofs];
-    for (int d = 0; d < K::dofs; ++d) {
-      x[d].v = local[d];
-      x[d].d[P] = ul[d];
-    }
-    for (int k = 0; k < P; ++k) {
-      p[k].v = rest_parameters<K>(in, group, item)[k];
-      p[k].d[k] = 1.0;
-    }
-    K::evaluate(x, p, C, J);
-    double *rest_bar = bar.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(item) * P,
-           &alpha_bar = bar.of(Quantity::compliance)[group.first + item];
+    const int first_row = group.first_row + item * K::rows;
+    double x[K::dofs], u_here[K::dofs], along[K::rows * K::dofs], by[K::dofs]{};
+    gather<K>(scene_, group, item, at_.x.data(), x);
+    gather<K>(scene_, group, item, u.data(), u_here);
+    for (int j = 0; j < K::rows; ++j)
+      for (int d = 0; d < K::dofs; ++d) along[j * K::dofs + d] = -at_.lambda[first_row + j] * u_here[d];
+    const double* p = rest_parameters<K>(in, group, item);
+    gradients_vjp<K>(x, p, &v[first_row], along, by, bar.of(Quantity::rest) + (p - in.of(Quantity::rest)));
+    const Evaluation<K, double> value(x, p);
     for (int j = 0; j < K::rows; ++j) {
-      const int row = group.first_row + item * K::rows + j;
-      const double l = at_.lambda[row], vj = v[row];
-      alpha_bar -= vj * l;
-      for (int k = 0; k < P; ++k) {
-        double sum = vj * C[j].d[k];
-        for (int d = 0; d < K::dofs; ++d) sum += l * ul[d] * J[j * K::dofs + d].d[k];
-        rest_bar[k] -= sum;
-      }
-      for (int d = 0; d < K::dofs; ++d)
-        fixed[scene_.first_dof[group.nodes(item)[d / 3]] + d % 3] -=
-            l * J[j * K::dofs + d].d[P] + vj * J[j * K::dofs + d].v;
+      bar.of(Quantity::compliance)[group.first + item] -= v[first_row + j] * at_.lambda[first_row + j];
+      for (int d = 0; d < K::dofs; ++d) by[d] -= v[first_row + j] * value.J[j * K::dofs + d];
     }
+    for (int d = 0; d < K::dofs; ++d) fixed[scene_.first_dof[group.nodes(item)[d / 3]] + d % 3] += by[d];
   });
 
   const Vec3<double> gravity(in.of(Quantity::gravity));

@@ -23,12 +23,12 @@ inline std::size_t plan_bytes(const Plan& plan) {
       bytes += size_in_bytes(run.items) + size_in_bytes(run.nodes) + size_in_bytes(run.gradients) +
                size_in_bytes(run.first_row);
     // A sparse pattern: rows and columns of the matrix, and of its factor.
-    if (!block.structure.banded()) bytes += 2 * sizeof(int) * (block.structure.values() + block.structure.fill());
+    bytes += block.structure.bytes();
     if (block.condensation) {
       const Condensation& c = *block.condensation;
       bytes += size_in_bytes(c.members) + size_in_bytes(c.gradients) + size_in_bytes(c.dofs) + size_in_bytes(c.dof_of) +
                size_in_bytes(c.entries);
-      bytes += 2 * sizeof(int) * (c.structure.values() + c.structure.fill());
+      bytes += c.structure.bytes();
     }
   }
   return bytes;
@@ -45,7 +45,7 @@ std::size_t numbers_bytes(std::size_t count) {
 template <class T>
 std::size_t factor_bytes(const FactorStructure& s) {
   std::size_t bytes = sizeof(T) * (s.values() + Factor<T>::right_side(s));
-  if (!s.banded()) bytes += (sizeof(T) + sizeof(int)) * (s.fill() + s.size());
+  if (!s.banded()) bytes += sizeof(T) * s.work() + sizeof(int) * s.size();
   return bytes;
 }
 

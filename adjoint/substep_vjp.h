@@ -51,24 +51,13 @@ void damping_references_vjp(const Scene& scene, const Inputs<const T>& in, const
                             const T* C_r_bar, const StateCotangents<T>& bar, const Inputs<T>& in_bar) {
   const auto pull_back = [&]<class K>(K, const Group& group, int item, const T* at, const T* C_bar, const T& scale,
                                       T* x_bar) {
-    constexpr int P = parameter_count<K>, inside = P - K::offsets;
     const int* nodes = group.stencil.data() + static_cast<std::size_t>(item) * K::arity;
-    const std::size_t value = group.first_value + static_cast<std::size_t>(item) * P;
-    using D = std::conditional_t<inside == 0, T, Dual<T, inside>>;
-    D x[K::dofs], p[P + 1], C[K::rows], J[K::rows * K::dofs];
-    for (int d = 0; d < K::dofs; ++d) x[d] = D(at[scene.first_dof[nodes[d / 3]] + d % 3]);
-    for (int k = 0; k < P; ++k) p[k] = D(in.of(Quantity::rest)[value + k]);
-    if constexpr (inside > 0)
-      for (int k = 0; k < inside; ++k) p[k].d[k] = T(1.0);
-    K::evaluate(x, p, C, J);
-    for (int j = 0; j < K::rows; ++j) {
-      const T bar_j = scale * C_bar[j];
-      for (int d = 0; d < K::dofs; ++d)
-        x_bar[scene.first_dof[nodes[d / 3]] + d % 3] += bar_j * primal<T>(J[j * K::dofs + d]);
-      if constexpr (inside > 0)
-        for (int k = 0; k < inside; ++k) in_bar.of(Quantity::rest)[value + k] += bar_j * C[j].d[k];
-      if (j < K::offsets) in_bar.of(Quantity::rest)[value + inside + j] -= bar_j;
-    }
+    const std::size_t value = group.first_value + static_cast<std::size_t>(item) * parameter_count<K>;
+    T x[K::dofs], scaled[K::rows], by[K::dofs]{};
+    for (int d = 0; d < K::dofs; ++d) x[d] = at[scene.first_dof[nodes[d / 3]] + d % 3];
+    for (int j = 0; j < K::rows; ++j) scaled[j] = scale * C_bar[j];
+    values_vjp<K>(x, in.of(Quantity::rest) + value, scaled, by, in_bar.of(Quantity::rest) + value);
+    for (int d = 0; d < K::dofs; ++d) x_bar[scene.first_dof[nodes[d / 3]] + d % 3] += by[d];
   };
   for (const Group& group : scene.groups) {
     if (!group.damped) continue;

@@ -1,9 +1,8 @@
 // The reverse of yield() on the state that it found:  with b = set'_bar,
 //   e_bar = f b + (y/|e|^3) (e.b) e,   y_bar = -(e.b)/|e|,   set_bar = b - e_bar,   x_bar = J^T e_bar.
-// The parameters' share is one evaluation of the constraint on duals with a direction for each that is not just subtracted.
 #pragma once
 
-#include "core/scalar/dual.h"
+#include "adjoint/element/constraint_vjp.h"
 #include "core/solver/predict.h"
 #include "core/solver/retract.h"
 #include "core/solver/yield.h"
@@ -21,7 +20,6 @@ void read_carried(const Scene& scene, const Coordinates<T>& corrected, T* state)
 template <class T>
 void yield_vjp(const Scene& scene, const Inputs<const T>& in, const T* state, T* x_bar, const Inputs<T>& in_bar) {
   for_each_yielding(scene, [&]<class K>(K, const Group& group, int item, std::size_t value) {
-    constexpr int P = parameter_count<K>, inside = P - K::offsets;
     const T* p = in.of(Quantity::rest) + value;
     T* p_bar = in_bar.of(Quantity::rest) + value;
     const Yield<K, T> at(scene, group, item, p, state);
@@ -35,20 +33,12 @@ void yield_vjp(const Scene& scene, const Inputs<const T>& in, const T* state, T*
       e_bar[j] = at.f * set_bar[j] + at.y_over_length * at.inverse_length * along * at.e[j];
 
     // e = C - (1 - share) set, where C holds -share set: by the set -1, by the share 0
-    using D = Dual<T, inside>;
-    D x[K::dofs], duals[P], C[K::rows], J[K::rows * K::dofs];
-    for (int d = 0; d < K::dofs; ++d) x[d].v = at.x[d];
-    for (int k = 0; k < P; ++k) duals[k].v = p[k];
-    for (int k = 0; k < inside; ++k) duals[k].d[k] = T(1.0);
-    K::evaluate(x, duals, C, J);
-    for (int j = 0; j < K::rows; ++j) {
-      for (int d = 0; d < K::dofs - 3; ++d)
-        x_bar[scene.first_dof[nodes[d / 3]] + d % 3] += e_bar[j] * at.J[j * K::dofs + d];
-      set_bar[j] -= e_bar[j];
-      for (int k = 0; k < inside; ++k)
-        if (k != K::share_parameter) p_bar[k] += e_bar[j] * C[j].d[k];
-      p_bar[inside + j] -= e_bar[j];
-    }
+    T by_x[K::dofs]{}, by_p[parameter_count<K>]{};
+    values_vjp<K>(at.x, p, e_bar, by_x, by_p);
+    for (int d = 0; d < K::dofs - 3; ++d) x_bar[scene.first_dof[nodes[d / 3]] + d % 3] += by_x[d];
+    for (int j = 0; j < K::rows; ++j) set_bar[j] -= e_bar[j];
+    for (int k = 0; k < parameter_count<K>; ++k)
+      if (k != K::share_parameter) p_bar[k] += by_p[k];
   });
 }
 

@@ -47,27 +47,14 @@ void pull_back_run(const sheetbend_blocks::Block& b, const sheetbend_blocks::Run
 template <class K, class T>
 void pull_back_reference(const sheetbend_blocks::Run& r, int n, const double* particles, const Wide<T>* C_bar,
                          double scale, double* x_bar) {
-  constexpr int P = parameter_count<K>, inside = P - K::offsets;
   using W = Wide<T>;
-  using D = std::conditional_t<inside == 0, W, Dual<W, inside>>;
   const int* nodes = indices_of<T>(r.nodes, K::arity, n);
-  W at[K::dofs], unused, by[K::dofs]{};
-  D x[K::dofs], p[P + 1], C[K::rows], J[K::rows * K::dofs];
+  W x[K::dofs], unused, scaled[K::rows], by[K::dofs]{};
   for (int k = 0; k < K::arity; ++k)
-    load_particle(numbers_of<T>(particles), nodes + k * Pack::lanes, at + 3 * k, unused);
-  for (int d = 0; d < K::dofs; ++d) x[d] = D(at[d]);
-  for (int k = 0; k < P; ++k) p[k] = D(parameters_of<K, T>(r, n)[k]);
-  if constexpr (inside > 0)
-    for (int k = 0; k < inside; ++k) p[k].d[k] = W(1.0);
-  evaluate_on_duals<K, inside>(x, p, C, J);
-  W* values_bar = numbers_of<W>(r.values_bar) + static_cast<long>(n) * (2 + P);
-  for (int j = 0; j < K::rows; ++j) {
-    const W bar = W(scale) * C_bar[j];
-    for (int d = 0; d < K::dofs; ++d) by[d] += bar * primal<W>(J[j * K::dofs + d]);
-    if constexpr (inside > 0)
-      for (int k = 0; k < inside; ++k) values_bar[2 + k] += bar * C[j].d[k];
-    if (j < K::offsets) values_bar[2 + inside + j] -= bar;
-  }
+    load_particle(numbers_of<T>(particles), nodes + k * Pack::lanes, x + 3 * k, unused);
+  for (int j = 0; j < K::rows; ++j) scaled[j] = W(scale) * C_bar[j];
+  W* values_bar = numbers_of<W>(r.values_bar) + static_cast<long>(n) * (2 + parameter_count<K>);
+  values_vjp<K>(x, parameters_of<K, T>(r, n), scaled, by, values_bar + 2);
   add_to_particles<K::arity>(numbers_of<T>(x_bar), nodes, r.count - n * Pack::lanes, by);
 }
 

@@ -7,12 +7,12 @@
 //   p_bar = sum_j -y_j dC_j/dp + v_j . dJ_j/dp
 //
 // Only "solve with A" differs between solvers. Hess(C_j) v_j and the parameter derivatives are one evaluation of the constraint on dual
-// numbers with a direction per row and per parameter that is not just subtracted. ../DERIVATION.md derives it. Where the numbers are
+// numbers with a direction per row and per parameter that is not just subtracted, or the constraint's own reverse (constraint_vjp.h). ../DERIVATION.md derives it. Where the numbers are
 // stored is not known here.
 #pragma once
 
+#include "adjoint/element/constraint_vjp.h"
 #include "core/element/element.h"
-#include "core/scalar/dual.h"
 
 namespace sheetbend {
 
@@ -37,12 +37,11 @@ void pull_back_rates(const Element<K, T>& e, const T* lambda, const T* C_r, cons
 }
 
 // Everything after the solve; z and u = J^T dl are the block's, on the element's stencil. Adds Hess(C_j) v_j to x_bar. The second derivatives
-// are the constraint's own geometry's, otherwise one evaluation on dual numbers. `alone`: a block of one with unit gradients. There
+// are the constraint's own geometry's, otherwise those of constraint_vjp.h. `alone`: a block of one with unit gradients. There
 // Hess(C) W J^T = 0, so that of v = W (dl z - y u) the first part is enough.
 template <bool alone = false, class K, class T>
 void pull_back(const Element<K, T>& e, const Kept<K, T>& at, const T* lambda, const T* C_r, const T* dl, const T* y,
                const T* z, const T* u, T* x_bar, ElementCotangent<K, T>& bar) {
-  constexpr int P = parameter_count<K>;
   const auto v = [&](int j, int d) {
     if constexpr (alone)
       return dl[j] * (e.w[d / 3] * z[d]);
@@ -60,31 +59,20 @@ void pull_back(const Element<K, T>& e, const Kept<K, T>& at, const T* lambda, co
       for (int d = 0; d < K::dofs; ++d) J_dx += J[d] * e.w[d / 3] * u[d];
     }
     pull_back_rates(e, lambda, C_r, dl, y, 0, C[0], J_dx, bar);
-    for (int k = 0; k < P; ++k) bar.p[k] += y[k];  // C = f(x) - p
+    for (int k = 0; k < parameter_count<K>; ++k) bar.p[k] += y[k];  // C = f(x) - p
   } else {
-    constexpr int inside = P - K::offsets;  // parameters that the gradient may depend on
-    using D = Dual<T, K::rows + inside>;
-    D x[K::dofs], p[P > 0 ? P : 1], C[K::rows], J[K::rows * K::dofs];
-    for (int d = 0; d < K::dofs; ++d) {
-      x[d].v = at.x[d];
-      for (int j = 0; j < K::rows; ++j) x[d].d[j] = v(j, d);
+    T along[K::rows * K::dofs];
+    for (int j = 0; j < K::rows; ++j)
+      for (int d = 0; d < K::dofs; ++d) along[j * K::dofs + d] = v(j, d);
+    gradients_vjp<K>(at.x, e.p, y, along, x_bar, bar.p);
+    T C[K::rows]{}, J_dx[K::rows]{};
+    if (C_r) {
+      T J[K::rows * K::dofs];
+      K::evaluate(at.x, e.p, C, J);
+      for (int j = 0; j < K::rows; ++j)
+        for (int d = 0; d < K::dofs; ++d) J_dx[j] += J[j * K::dofs + d] * e.w[d / 3] * u[d];
     }
-    for (int k = 0; k < P; ++k) p[k].v = e.p[k];
-    for (int k = 0; k < inside; ++k) p[k].d[K::rows + k] = T(1.0);
-    evaluate_on_duals<K, K::rows + inside>(x, p, C, J);
-    for (int j = 0; j < K::rows; ++j) {
-      T J_dx(0.0);
-      if (C_r)
-        for (int d = 0; d < K::dofs; ++d) J_dx += J[j * K::dofs + d].v * e.w[d / 3] * u[d];
-      pull_back_rates(e, lambda, C_r, dl, y, j, C[j].v, J_dx, bar);
-      for (int d = 0; d < K::dofs; ++d) x_bar[d] += J[j * K::dofs + d].d[j];
-      for (int k = 0; k < inside; ++k) {
-        T p_bar = -(y[j] * C[j].d[K::rows + k]);
-        for (int d = 0; d < K::dofs; ++d) p_bar += x[d].d[j] * J[j * K::dofs + d].d[K::rows + k];
-        bar.p[k] += p_bar;
-      }
-      if (j < K::offsets) bar.p[inside + j] += y[j];
-    }
+    for (int j = 0; j < K::rows; ++j) pull_back_rates(e, lambda, C_r, dl, y, j, C[j], J_dx[j], bar);
   }
 }
 
@@ -97,12 +85,29 @@ void adjoint_right_side(const Element<K, T>& e, const T* J, const T* lambda_bar,
   }
 }
 
+// y = A^-1 y. Where a unilateral constraint has let go, dl = -lambda: A and s have no part in it, so y is 0, and lambda_bar - lambda'_bar, returned,
+// is what takes the right side away.
+template <class K, class T>
+T solve_unless_let_go(const Element<K, T>& e, const T* J, const T* lambda, const T* dl, T* y) {
+  const T right = y[0], zero(0.0);
+  e.solve(J, y);
+  const auto holds = lambda[0] + dl[0] > zero;
+  y[0] = select(holds, y[0], zero);
+  return select(holds, zero, -right);
+}
+
 // The reverse of Correction: a constraint by itself. x_bar (dofs) goes in as x'_bar, zero where nothing can move, and comes out as what is to be
 // added to it; w_bar (arity) and bar are written.
 template <class K, class T>
 void correction_vjp(const Element<K, T>& e, const Kept<K, T>& at, const T* lambda, const T* C_r, const T* dl,
                     const T* lambda_bar, T* x_bar, T* w_bar, ElementCotangent<K, T>& bar) {
   T J[K::rows * K::dofs], y[K::rows], z[K::dofs], u[K::dofs], back[K::dofs];
+  const auto solve = [&] {
+    if constexpr (K::unilateral)
+      bar.lambda[0] = solve_unless_let_go(e, J, lambda, dl, y);
+    else
+      e.solve(J, y);
+  };
   if constexpr (HasGeometry<K>) {
     at.gradient(J);
   } else {
@@ -117,14 +122,14 @@ void correction_vjp(const Element<K, T>& e, const Kept<K, T>& at, const T* lambd
       along[k] = dot(Vec3<T>(J + 3 * k), Vec3<T>(x_bar + 3 * k));
       y[0] += e.w[k] * along[k];
     });
-    e.solve(J, y);
+    solve();
     unrolled<K::arity>([&](int k) { w_bar[k] = dl[0] * (along[k] - y[0]); });
     transpose_times<K>(J, dl, u);
     transpose_times<K>(J, y, back);
     unrolled<K::dofs>([&](int d) { z[d] = x_bar[d]; });
   } else {
     adjoint_right_side(e, J, lambda_bar, x_bar, y);
-    e.solve(J, y);
+    solve();
     transpose_times<K>(J, dl, u);
     transpose_times<K>(J, y, back);
     for (int d = 0; d < K::dofs; ++d) z[d] = x_bar[d] - back[d];

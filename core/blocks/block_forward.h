@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "core/blocks/band.h"
+#include "core/blocks/supernodes.h"
 #include "core/blocks/wide.h"
 #include "core/constraints/registry.h"
 
@@ -172,6 +173,11 @@ struct ForwardKernels {
       if (b.runs[r].damped) refer_of[b.runs[r].kind](b, b.runs[r]);
   }
 
+  static void factor_supernodes(const sheetbend_blocks::Supernodes& s, double* panels, double* inverse, double* work,
+                                int* place) {
+    SupernodalFactor<T>{s, numbers_of<T>(panels), numbers_of<T>(inverse), numbers_of<T>(work), place}.factorize();
+  }
+
   static constexpr auto evaluate_of = []<class... K>(std::tuple<K...>*) {
     return std::array{&evaluate_run<K, T>...};
   }(static_cast<Registry*>(nullptr));
@@ -180,7 +186,7 @@ struct ForwardKernels {
     return std::array{&refer_run<K, T>...};
   }(static_cast<Registry*>(nullptr));
 
-  static constexpr sheetbend_blocks::Forward all{&evaluate, &factor, &solve, &push, &refer};
+  static constexpr sheetbend_blocks::Forward all{&evaluate, &factor, &solve, &push, &refer, &factor_supernodes};
 };
 
 }  // namespace sheetbend

@@ -22,6 +22,20 @@ struct Run {
 // Numbers per pack or member in `values`.
 constexpr int value_count(bool damped, int parameters) { return (damped ? 3 : 1) + parameters; }
 
+// A sparse factor by supernodes, see supernodes.h.
+struct Update {
+  int source, begin, end;  // an earlier supernode, and which of its rows are columns of this one
+};
+struct Supernodes {
+  int count, widest, longest;   // most columns of one, most numbers of a column
+  const int* first;             // (count + 1): columns
+  const int *row_start, *rows;  // those below its columns, ascending
+  const int* length;            // (count): of a column in memory
+  const long* panel;            // (count): where its numbers begin
+  const int* update_start;      // (count + 1)
+  const Update* updates;
+};
+
 // One iteration of a block. Particles: the movable ones first, then one per use of a fixed one. Rows are those of the matrix. A particle's
 // gradient rows stand together: all rows that it takes part in, `rows` says which; in a band they follow one another without a gap.
 struct Block {
@@ -70,6 +84,8 @@ struct Forward {
   void (*solve)(const Block&, double* b);  // b is as long as the block and its band
   void (*push)(const Block&);              // u, x_next and lambda_next from dl
   void (*refer)(const References&);
+  // L over A in `panels`; `work` has 4 (widest + longest) numbers, `place` as many as the matrix has columns.
+  void (*factor_supernodes)(const Supernodes&, double* panels, double* inverse, double* work, int* place);
 };
 
 struct Reverse {

@@ -10,15 +10,19 @@
 //
 // x holds the stencil's coordinates one node after the other (dofs of them), J is row-major (rows x dofs) and fully written.
 // `points` of the stencil are points; those after them are directors (of a rod's edges) or internal variables (see yield.h).
+// `unilateral = true` (one row): C >= 0, a constraint that pushes and never pulls. Its multiplier stays lambda >= 0.
 // `periodic = true` says that C is an angle: differences of it (rate damping) are taken the short way round.
 //
-// Two shortcuts make hot constraints cheaper; a constraint without them works the same, and tests compare the two routes:
+// Shortcuts make hot constraints cheaper; a constraint without them works the same, and tests compare the two routes:
 //   `unit_gradients = true` (one row): |dC/dx_k| = 1 on every particle k whatever x is. Then J W J^T = sum w, and its derivative,
 //     2 Hess(C) W J^T, is zero.
 //   `offsets = m`: the last m parameters are subtracted from the first m rows, so the reverse knows their derivatives.
 //   template <class T> struct Geometry: what the reverse can use in place of x and dual numbers, where the parameters are
 //     subtracted, C = f(x) - p. It has `size` numbers, Geometry(x), keep(to), kept(from), values(p, C), gradient(J) and
 //     add_hessian_times(v, out) for one row. See distance.h.
+//   template <class T> static void reverse(x, p, y, v, x_bar, p_bar): of sum_j (v_j . J_j - y_j C_j), where y (rows) and v (rows x dofs)
+//     do not vary, the derivatives by J's x, Hess(C_j) v_j, and by p, added to x_bar and p_bar: what dual numbers
+//     otherwise find with a direction for each row and parameter. See membrane.h.
 #pragma once
 
 #include <algorithm>
@@ -35,6 +39,7 @@ struct OnPoints {
   static constexpr int points = Arity;
   static constexpr int offsets = 0;
   static constexpr bool periodic = false;
+  static constexpr bool unilateral = false;
   static constexpr bool unit_gradients = false;
 };
 
@@ -43,6 +48,9 @@ inline constexpr int parameter_count = static_cast<int>(K::parameters.size());
 
 template <class K>
 concept HasGeometry = requires { K::template Geometry<double>::size; };
+
+template <class K>
+concept HasReverse = requires(const double* in, double* out) { K::reverse(in, in, in, in, out, out); };
 
 // What a projection leaves for its reverse: the constraint's own geometry, otherwise the coordinates (where they are).
 template <class K, class T>

@@ -23,6 +23,16 @@ struct IsometricBending : OnPoints<4> {
     for (int i = 0; i < rows; ++i)
       for (int d = 0; d < dofs; ++d) J[i * dofs + d] = d % 3 == i ? c[d / 3] : T(0.0);
   }
+
+  // C is bilinear in x and p, and J does not know x.
+  template <class T>
+  static void reverse(const T* x, const T*, const T* y, const T* v, T*, T* p_bar) {
+    for (int k = 1; k < arity; ++k)
+      for (int j = 0; j < rows; ++j) {
+        const T* along = v + j * dofs + j;
+        p_bar[k - 1] += along[3 * k] - along[0] - y[j] * (x[3 * k + j] - x[j]);
+      }
+  }
 };
 
 }  // namespace sheetbend

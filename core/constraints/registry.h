@@ -18,6 +18,7 @@
 #include "core/constraints/sheet_curvature.h"
 #include "core/constraints/spline_strain.h"
 #include "core/constraints/strain.h"
+#include "core/constraints/tether.h"
 #include "core/constraints/twist.h"
 #include "core/constraints/yielding_curvature.h"
 
@@ -38,7 +39,8 @@ using Registry = std::tuple<  //
     Dihedral,                 //
     IsometricBending,         //
     SheetCurvature,           //
-    Area>;
+    Area,                     //
+    Tether>;
 
 inline constexpr int kind_count = std::tuple_size_v<Registry>;
 

@@ -9,6 +9,7 @@
 #pragma once
 
 #include "core/constraints/hinge_angle.h"
+#include "core/scalar/dual.h"
 
 namespace sheetbend {
 
@@ -36,6 +37,45 @@ struct SheetCurvature : OnPoints<6> {
         (factor * angle.by_a).add_to(J + j * dofs + 3 * top);
         (factor * angle.by_b).add_to(J + j * dofs + 3 * (3 + k));
       }
+    }
+  }
+
+  // Of v_j . J_j - y_j C_j, summed over rows, angle by angle: a direction reaches an angle with its row's factor.
+  template <class T>
+  static void reverse(const T* x, const T* p, const T* y, const T* v, T* x_bar, T* p_bar) {
+    const T scale[rows] = {T(1.0), p[9], p[10]};
+    for (int k = 0; k < 3; ++k) {
+      const int nodes[4] = {k, (k + 1) % 3, (k + 2) % 3, 3 + k};
+      T factor[rows], Y(0.0);
+      for (int j = 0; j < rows; ++j) {
+        factor[j] = scale[j] * p[3 * j + k];
+        Y += factor[j] * y[j];
+      }
+      Dual<T> at[12], by[12];
+      for (int i = 0; i < 12; ++i) {
+        const int d = 3 * nodes[i / 3] + i % 3;
+        at[i].v = x[d];
+        at[i].d[0] = factor[0] * v[d] + factor[1] * v[dofs + d] + factor[2] * v[2 * dofs + d];
+      }
+      using Vec = Vec3<Dual<T>>;
+      const HingeAngle<Dual<T>> angle(Vec(at), Vec(at + 3), Vec(at + 6), Vec(at + 9));
+      angle.by_x0.store(by);
+      angle.by_x1.store(by + 3);
+      angle.by_a.store(by + 6);
+      angle.by_b.store(by + 9);
+      T along[rows]{};
+      for (int i = 0; i < 12; ++i) {
+        const int d = 3 * nodes[i / 3] + i % 3;
+        x_bar[d] += by[i].d[0];
+        for (int j = 0; j < rows; ++j) along[j] += by[i].v * v[j * dofs + d];
+      }
+      const T turned = angle.value.v - p[11 + k];
+      for (int j = 0; j < rows; ++j) {
+        const T factor_bar = along[j] - y[j] * turned;
+        p_bar[3 * j + k] += scale[j] * factor_bar;
+        if (j > 0) p_bar[8 + j] += p[3 * j + k] * factor_bar;
+      }
+      p_bar[11 + k] += Y;
     }
   }
 };

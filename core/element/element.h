@@ -71,7 +71,8 @@ void transpose_times(const T* J, const T* y, T* out) {
   });
 }
 
-// The projection of one constraint by itself: dl, and the push J^T dl that its particles get times their inverse masses.
+// The projection of one constraint by itself: dl, and the push J^T dl that its particles get times their inverse masses. A unilateral one lets go
+// where its multiplier would change sign: then dl = -lambda.
 template <class K, class T>
 struct Correction {
   T dl[K::rows], push[K::dofs];
@@ -81,6 +82,7 @@ struct Correction {
     const T* J = value.gradient(scratch);
     for (int j = 0; j < K::rows; ++j) dl[j] = -(e.residual(value.C, lambda, C_r, j) * e.rates.scale);
     e.solve(J, dl);
+    if constexpr (K::unilateral) dl[0] = select(lambda[0] + dl[0] > T(0.0), dl[0], -lambda[0]);
     transpose_times<K>(J, dl, push);
   }
 };

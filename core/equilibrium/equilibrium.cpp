@@ -51,15 +51,28 @@ double mean_edge(const Scene& scene, const double* x) {
   return count == 0 ? 0.0 : sum / count;
 }
 
-// The force of a wind has no potential and no symmetric derivative, which is what the solver works with. At rest, still air exerts none.
+// The forces of wind and pressure follow the triangles and have no symmetric derivative, which is what the solver works with. At rest, still
+// air exerts none.
 void expect_still_air(const Scene& scene, const Inputs<const double>& in, double t0) {
   if (scene.air.empty()) return;
+  const double* pressure = in.of(Quantity::pressure);
+  if (std::any_of(pressure, pressure + scene.air.size(), [](double p) { return p != 0.0; }))
+    throw std::invalid_argument(
+        "pressure: a state of rest was asked for, but triangles are under pressure. Fix: simulate with drag until the "
+        "motion has died down");
   const Vec3<double> wind = at_knots(scene.wind.at(t0), in.of(Quantity::wind), 1, 0);
   if (dot(wind, wind) == 0.0) return;
   std::ostringstream text;
   text << "wind: a state of rest was asked for at t = " << t0 << " s, where the wind is " << norm(wind)
        << " m/s. Fix: let it rise from zero after that time, or simulate until the motion has died down";
   throw std::invalid_argument(text.str());
+}
+
+// Which of them push would have to be found too.
+void expect_no_unilateral(const Scene& scene) {
+  for (const Group& group : scene.groups)
+    if (group.unilateral)
+      throw std::invalid_argument("equilibrium: group " + group.name + " may go slack. Fix: leave it out");
 }
 
 std::string not_converged(const Equilibrium& e, double tolerance) {
@@ -91,6 +104,7 @@ struct EquilibriumSolver::State {
         softened(scene_.constraints),
         soft(scene_.groups.size(), std::numeric_limits<double>::infinity()) {
     expect_still_air(scene, in, o.t0);
+    expect_no_unilateral(scene);
     const double* from = start_x ? start_x : in.of(Quantity::position);
     x.assign(from, from + scene.dofs());
     start_lambda ? lambda.assign(start_lambda, start_lambda + scene.rows) : lambda.assign(scene.rows, 0.0);

@@ -23,11 +23,12 @@ enum class Quantity : int {
   wind,            // (knots, 3)  [m/s]
   air_normal,      // per triangle in air: air density * drag coefficient / 2, along its normal  [kg/m^3]
   air_tangential,  // the same across the normal
+  pressure,        // per triangle in air, along (x1 - x0) x (x2 - x0)  [Pa]
 };
-inline constexpr int quantity_count = 14;
+inline constexpr int quantity_count = 15;
 inline constexpr std::array<const char*, quantity_count> quantity_names{
-    "position", "velocity", "mass",        "compliance",     "damping", "rest",       "boundary",
-    "force",    "gravity",  "drag_linear", "drag_quadratic", "wind",    "air_normal", "air_tangential"};
+    "position", "velocity",    "mass",           "compliance", "damping",    "rest",           "boundary", "force",
+    "gravity",  "drag_linear", "drag_quadratic", "wind",       "air_normal", "air_tangential", "pressure"};
 
 struct Layout {
   std::array<std::size_t, quantity_count> size{};

@@ -45,6 +45,7 @@ Group build_group(const GroupSpec& spec, const Scene& scene) {
   g.first_row = scene.rows;
   with_kind(g.kind, [&]<class K>(K) {
     g.arity = K::arity, g.points = K::points, g.rows = K::rows, g.parameters = parameter_count<K>;
+    g.unilateral = K::unilateral;
   });
   if (g.stencil.size() % g.arity != 0)
     refuse(spec.name + ": " + std::to_string(g.stencil.size()) + " indices. Fix: a " + spec.kind + " takes " +
@@ -160,6 +161,7 @@ Scene build_scene(const SceneSpec& spec) {
                    nodes,
                    nodes,
                    s.wind.times.size() * 3,
+                   s.air.size(),
                    s.air.size(),
                    s.air.size()};
   s.layout.close();

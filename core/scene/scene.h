@@ -29,6 +29,7 @@ struct Group {
   std::vector<int> stencil;  // (count, arity) nodes
   int rows = 0, arity = 0, parameters = 0;
   int points = 0;                    // of a stencil; directors follow them
+  bool unilateral = false;           // C >= 0
   int first_row = 0;                 // of the scene's multipliers
   std::size_t first_value = 0;       // into Quantity::rest
   std::size_t first_coordinate = 0;  // into arrays of all stencils' coordinates

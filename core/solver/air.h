@@ -1,8 +1,8 @@
 // Air on triangles. What blows at one, u = wind - its own velocity, parts into u_n along the unit normal and u_t across it; with area A
 //
-//   f = A (k_n |u_n| u_n + k_t |u_t| u_t),   k = air density * drag coefficient / 2  [kg/m^3],
+//   f = A (k_n |u_n| u_n + k_t |u_t| u_t + p n),   k = air density * drag coefficient / 2  [kg/m^3],
 //
-// a third to each vertex. Which side the normal points to does not matter.
+// a third to each vertex. Which side the normal n points to matters to the pressure p alone: it pushes along (x1 - x0) x (x2 - x0).
 #pragma once
 
 #include "core/solver/predict.h"
@@ -13,6 +13,7 @@ template <class T>
 struct AirTriangle {
   Vec3<T> e1, e2, u;     // edges, what blows
   T normal, tangential;  // k_n, k_t
+  T pressure;
 };
 
 // With N = e1 x e2, |N| = 2 A, the force is a sum over N and u_t in which no speed is divided by.
@@ -33,7 +34,7 @@ struct AirForce {
     u_t_size = sqrt_or_zero(dot(u_t, u_t));
     along_N = T(0.5) * u_N_size * u_N * N2_inverse;
     along_u_t = T(0.5) * N_size * u_t_size;
-    f = (at.normal * along_N) * N + (at.tangential * along_u_t) * u_t;
+    f = (at.normal * along_N + T(0.5) * at.pressure) * N + (at.tangential * along_u_t) * u_t;
   }
 };
 
@@ -63,8 +64,12 @@ struct Airflow {
       x[k] = extrapolated(bdf, s.x + dof, s.x_before + dof);
       v[k] = extrapolated(bdf, s.v + dof, s.v_before + dof);
     }
-    return {x[1] - x[0], x[2] - x[0], wind - T(1.0 / 3.0) * (v[0] + v[1] + v[2]), in.of(Quantity::air_normal)[triangle],
-            in.of(Quantity::air_tangential)[triangle]};
+    return {x[1] - x[0],
+            x[2] - x[0],
+            wind - T(1.0 / 3.0) * (v[0] + v[1] + v[2]),
+            in.of(Quantity::air_normal)[triangle],
+            in.of(Quantity::air_tangential)[triangle],
+            in.of(Quantity::pressure)[triangle]};
   }
 };
 

@@ -24,7 +24,7 @@ struct Condensation {
   std::vector<int> gradients;        // per use: where the particle's gradients of the member's rows stand
   std::vector<int> dofs;             // per use: first dof in H
   std::vector<int> dof_of;           // per movable particle: the same
-  std::vector<std::size_t> entries;  // per pair of uses with dofs descending, three: where its rows stand in H
+  std::vector<std::size_t> entries;  // per pair of uses with dofs descending, three: where its columns stand in H
 };
 
 // A block's numbers at one iteration.
@@ -37,7 +37,8 @@ struct BlockNumbers {
 template <class T>
 class CondensedFactor {
  public:
-  void factorize(const Condensation& plan, const BlockNumbers<T>& block) {
+  void factorize(const Condensation& plan, const BlockNumbers<T>& block,
+                 typename Factor<T>::FactorSupernodes compiled) {
     factor_.reset(plan.structure);
     for (std::size_t p = 0; p < plan.dof_of.size(); ++p) {
       const T mass = T(1.0) / block.x[4 * p + 3];
@@ -47,22 +48,24 @@ class CondensedFactor {
     for (const Condensation::Member& m : plan.members) {
       for (int row = m.first_row; row < m.first_row + m.rows; ++row) stiffness_[row] = T(1.0) / block.diagonal[row];
       const std::size_t* entry = &plan.entries[m.first_entry];
-      for (int i = 0; i < m.uses; ++i)
+      for (int i = 0; i < m.uses; ++i) {
+        const T* Gi = block.gradients + plan.gradients[m.first_use + i];
+        scaled_.clear();
+        for (int row = 0; row < m.rows; ++row)
+          for (int a = 0; a < 3; ++a) scaled_.push_back(stiffness_[m.first_row + row] * Gi[4 * row + a]);
         for (int k = 0; k < m.uses; ++k) {
-          const int di = plan.dofs[m.first_use + i], dk = plan.dofs[m.first_use + k];
-          if (dk > di) continue;
-          const T *Gi = block.gradients + plan.gradients[m.first_use + i],
-                  *Gk = block.gradients + plan.gradients[m.first_use + k];
-          for (int a = 0; a < 3; ++a, ++entry)
-            for (int b = 0; b < (i == k ? a + 1 : 3); ++b) {
-              T sum(0.0);
-              for (int row = 0; row < m.rows; ++row)
-                sum += Gi[4 * row + a] * stiffness_[m.first_row + row] * Gk[4 * row + b];
-              factor_.values[*entry + b] += sum;
-            }
+          if (plan.dofs[m.first_use + k] > plan.dofs[m.first_use + i]) continue;
+          const T* Gk = block.gradients + plan.gradients[m.first_use + k];
+          T sum[9]{};
+          for (int row = 0; row < m.rows; ++row)
+            for (int a = 0; a < 3; ++a)
+              for (int b = 0; b < 3; ++b) sum[3 * a + b] += scaled_[3 * row + a] * Gk[4 * row + b];
+          for (int b = 0; b < 3; ++b, ++entry)
+            for (int a = i == k ? b : 0; a < 3; ++a) factor_.values[*entry + a] += sum[3 * a + b];
         }
+      }
     }
-    factor_.factorize(plan.structure);
+    factor_.factorize(plan.structure, compiled);
   }
 
   // b = A^-1 b, with the numbers that were factored.
@@ -130,6 +133,7 @@ class CondensedFactor {
 
   Factor<T> factor_;
   std::vector<T> stiffness_;  // D^-1
+  std::vector<T> scaled_;
   mutable std::vector<T> scratch_;
 };
 

@@ -133,7 +133,10 @@ Condensation condense(const Scene& scene, const DirectBlock& block, const std::m
   std::size_t member = joined.size();
   each_pair([&](std::size_t m, int row, int column) {
     if (m != member) c.members[member = m].first_entry = c.entries.size();
-    for (int a = 0; a < 3; ++a) c.entries.push_back(c.structure.position(row + a, column));
+    for (int b = 0; b < 3; ++b) {
+      const int above = row == column ? b : 0;  // where the lower triangle begins
+      c.entries.push_back(c.structure.position(row + above, column + b) - above);
+    }
   });
   for (auto* list : {&c.gradients, &c.dofs, &c.dof_of}) list->shrink_to_fit();
   c.members.shrink_to_fit();
@@ -181,10 +184,19 @@ void check(const SolverOptions& o) {
     throw std::invalid_argument("threads: got " + std::to_string(o.threads) + ". Fix: give at least 1");
 }
 
+// Which of them push is not known before a block is solved.
+void expect_no_unilateral(const Scene& scene) {
+  for (const Group& group : scene.groups)
+    if (group.unilateral)
+      throw std::invalid_argument("solver.method: group " + group.name +
+                                  " may go slack, which only sweeps allow. Fix: use gauss_seidel, or leave it out");
+}
+
 }  // namespace
 
 Plan make_plan(const Scene& scene, const SolverOptions& options) {
   check(options);
+  if (options.partition != Partition::gauss_seidel) expect_no_unilateral(scene);
   Plan plan{options, {}, {}, {}};
   if (options.partition == Partition::gauss_seidel) {
     plan.colors = color_constraints(scene);

@@ -183,7 +183,8 @@ sheetbend_blocks::Block arrays_of(const DirectBlock& block, const std::vector<sh
 
 // Fills and factors the matrix of a block with branches or loops.
 template <class T>
-void factor_sparse(const DirectBlock& block, BlockState<T>& state, int iteration) {
+void factor_sparse(const DirectBlock& block, const sheetbend_blocks::Forward& kernels, BlockState<T>& state,
+                   int iteration) {
   auto& own = state.at(iteration);
   own.factor.reset(block.structure);
   for (int row = 0; row < block.size(); ++row)
@@ -196,7 +197,7 @@ void factor_sparse(const DirectBlock& block, BlockState<T>& state, int iteration
       for (int k = block.window[p]; k <= i; ++k)
         own.factor.values[*position++] += dot(wG, Vec3<Plain<T>>(G + sheetbend_blocks::row * k));
     }
-  own.factor.factorize(block.structure);
+  own.factor.factorize(block.structure, kernels.factor_supernodes);
 }
 
 // The numbers that a condensed block is factored and solved from.
@@ -240,9 +241,10 @@ void project_block(const SubstepState<T>& s, const DirectBlock& block, const she
     kernels.solve(arrays, arrays.dl);
   } else {
     if (block.condensation)
-      state.at(iteration).condensed.factorize(*block.condensation, numbers_of_block(state, iteration));
+      state.at(iteration).condensed.factorize(*block.condensation, numbers_of_block(state, iteration),
+                                              kernels.factor_supernodes);
     else
-      factor_sparse(block, state, iteration);
+      factor_sparse(block, kernels, state, iteration);
     solve_sparse(block, state, iteration, state.at(iteration).dl.data());
   }
   if constexpr (carries_tangents<T>)

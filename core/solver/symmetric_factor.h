@@ -1,11 +1,12 @@
 // LDL^T of the matrix of a direct block, over any scalar and without pivoting. The structure is found once; banded for chains
-// (O(n) with a small constant), sparse for branches and loops (Davis 2005, up-looking, after an ordering that keeps fill low).
+// (O(n) with a small constant), by supernodes for the rest (core/blocks/supernodes.h, after an ordering that keeps fill low).
 #pragma once
 
+#include <type_traits>
 #include <utility>
 #include <vector>
 
-#include "core/blocks/band.h"
+#include "core/blocks/supernodes.h"
 
 namespace sheetbend {
 
@@ -21,18 +22,26 @@ class FactorStructure {
   int stored_band() const { return sheetbend::stored_band(band_); }
   std::size_t values() const;
   std::size_t position(int row, int column) const;  // row >= column
-  std::size_t fill() const { return banded_ ? static_cast<std::size_t>(n_) * (band_ + 1) : column_start_.back(); }
+  std::size_t fill() const { return banded_ ? static_cast<std::size_t>(n_) * (band_ + 1) : fill_; }
+  std::size_t bytes() const;  // of the pattern itself
+
+  sheetbend_blocks::Supernodes supernodes() const;
+  std::size_t work() const { return banded_ ? 0 : 4 * static_cast<std::size_t>(widest_ + longest_); }
+  std::size_t longest() const { return longest_; }
 
  private:
-  template <class T>
-  friend class Factor;
   void build_sparse(const std::vector<std::pair<int, int>>& entries);
+  void join_columns(const std::vector<int>& parent, const std::vector<int>& count);
+  void find_updates();
 
   int n_ = 0, band_ = 0;
   bool banded_ = true;
-  std::vector<int> row_start_, row_column_;   // lower triangle of A by rows (sparse only), diagonal last in its row
-  std::vector<int> pattern_start_, pattern_;  // columns of each row of L, in an order in which they can be eliminated
-  std::vector<int> column_start_;             // L by columns
+  std::size_t fill_ = 0;  // entries of L below its diagonal
+  // As in sheetbend_blocks::Supernodes; node_ of every column.
+  int widest_ = 0, longest_ = 0;
+  std::vector<int> first_{0}, row_start_{0}, rows_, length_, update_start_{0}, node_;
+  std::vector<long> panel_{0};
+  std::vector<sheetbend_blocks::Update> updates_;
 };
 
 template <class T>
@@ -42,63 +51,51 @@ class Factor {
   std::vector<T> inverse;  // of the pivots, after as many zeros as the stored band is wide
 
   // A right side of a band is as long as the matrix and the stored band, with zeros at the end.
-  static std::size_t right_side(const FactorStructure& s) { return s.banded_ ? s.n_ + s.stored_band() : s.n_; }
+  static std::size_t right_side(const FactorStructure& s) { return s.banded() ? s.size() + s.stored_band() : s.size(); }
 
   void reset(const FactorStructure& s) {
     values.assign(s.values(), T(0.0));
     inverse.assign(right_side(s), T(0.0));
+    if (s.banded()) return;
+    work_.resize(s.work());
+    place_.resize(s.size());
   }
 
-  void factorize(const FactorStructure& s) {
-    if (!s.banded_) return factorize_sparse(s);
-    with_band(s.stored_band(),
-              [&]<int Band>() { factorize_band<Band>(s.n_, s.stored_band(), values.data(), inverse.data()); });
+  // `compiled` for this machine's instruction set where it is given, otherwise here.
+  using FactorSupernodes = decltype(sheetbend_blocks::Forward::factor_supernodes);
+  void factorize(const FactorStructure& s, FactorSupernodes compiled = nullptr) {
+    if (s.banded())
+      return with_band(s.stored_band(), [&]<int Band>() {
+        factorize_band<Band>(s.size(), s.stored_band(), values.data(), inverse.data());
+      });
+    const auto supernodes = s.supernodes();
+    if (compiled)
+      compiled(supernodes, reinterpret_cast<double*>(values.data()), reinterpret_cast<double*>(inverse.data()),
+               reinterpret_cast<double*>(work_.data()), place_.data());
+    else
+      SupernodalFactor<T>{supernodes, values.data(), inverse.data(), work_.data(), place_.data()}.factorize();
   }
 
   template <class U>
   void solve(const FactorStructure& s, U* b) const {
-    if (!s.banded_) return solve_sparse(s, b);
-    with_band(s.stored_band(),
-              [&]<int Band>() { solve_band<Band>(s.n_, s.stored_band(), values.data(), inverse.data(), b); });
+    if (s.banded())
+      return with_band(s.stored_band(), [&]<int Band>() {
+        solve_band<Band>(s.size(), s.stored_band(), values.data(), inverse.data(), b);
+      });
+    U* gathered;
+    if constexpr (std::is_same_v<T, U>) {
+      gathered = work_.data();
+    } else {
+      thread_local std::vector<U> own;
+      if (own.size() < s.longest()) own.resize(s.longest());
+      gathered = own.data();
+    }
+    solve_supernodes(s.supernodes(), values.data(), inverse.data(), b, gathered);
   }
 
  private:
-  void factorize_sparse(const FactorStructure& s) {
-    lower_.resize(s.column_start_.back());
-    lower_row_.resize(s.column_start_.back());
-    used_.assign(s.n_, 0);
-    work_.assign(s.n_, T(0.0));
-    for (int i = 0; i < s.n_; ++i) {
-      for (int p = s.row_start_[i]; p < s.row_start_[i + 1]; ++p) work_[s.row_column_[p]] = values[p];
-      T pivot = work_[i];
-      work_[i] = T(0.0);
-      for (int p = s.pattern_start_[i]; p < s.pattern_start_[i + 1]; ++p) {
-        const int j = s.pattern_[p];
-        const T y = work_[j];
-        work_[j] = T(0.0);
-        const int begin = s.column_start_[j], end = begin + used_[j];
-        for (int q = begin; q < end; ++q) work_[lower_row_[q]] -= lower_[q] * y;
-        const T l = y * inverse[j];
-        pivot -= l * y;
-        lower_[end] = l;
-        lower_row_[end] = i;
-        ++used_[j];
-      }
-      inverse[i] = inverse_pivot(pivot);
-    }
-  }
-
-  template <class U>
-  void solve_sparse(const FactorStructure& s, U* b) const {
-    for (int j = 0; j < s.n_; ++j)
-      for (int q = s.column_start_[j]; q < s.column_start_[j + 1]; ++q) b[lower_row_[q]] -= lower_[q] * b[j];
-    for (int j = 0; j < s.n_; ++j) b[j] = b[j] * inverse[j];
-    for (int j = s.n_ - 1; j >= 0; --j)
-      for (int q = s.column_start_[j]; q < s.column_start_[j + 1]; ++q) b[j] -= lower_[q] * b[lower_row_[q]];
-  }
-
-  std::vector<T> lower_, work_;
-  std::vector<int> lower_row_, used_;
+  mutable std::vector<T> work_;
+  std::vector<int> place_;
 };
 
 }  // namespace sheetbend

@@ -3,8 +3,8 @@
 Run: python experiments/bench/compare.py FOLDER [--workloads W1 W2] [--tools sheetbend jax] [--keep]
 
 FOLDER holds the peers' environments (setup_peers.sh makes them) and keeps their compiled kernels. Everything runs on
-one core, tool after tool within each workload; then sheetbend alone on every core, on chains and on the ladder. A tool
-that is not there is left out with a word.
+one core, tool after tool within each workload; then sheetbend alone on every core, on chains, on sheets and on the
+ladder. A tool that is not there is left out with a word.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def main() -> None:
     if "sheetbend" in given.tools:
         cores = sorted(os.sched_getaffinity(0))
         told["threads"] = [ours(name, given.repeats, cores) for name in given.workloads if len(cores) > 1]
-        told["chain"], told["ladder"] = (ours(name, given.repeats, cores[:1]) for name in ("chain", "ladder"))
+        told |= {name: ours(name, given.repeats, cores[:1]) for name in ("chain", "cloth", "ladder")}
     if given.keep and path.exists():
         told = merged(json.loads(path.read_text()), told)
     path.write_text(json.dumps(told, indent=1) + "\n")

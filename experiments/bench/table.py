@@ -31,6 +31,7 @@ def filled(text: str, data: Data, name: str) -> str:
     parts = {"machine": machine(data, name), "workloads": workloads(data), "quality": quality(data)}
     if "ladder" in data:
         parts |= {"threads": threads(data), "chain": chain(data["chain"]), "ladder": ladder(data["ladder"])}
+        parts["cloth"] = cloth(data["cloth"])
     for part, lines in parts.items():
         before, mark, rest = text.partition(f"<!-- {part} -->\n")
         _, end, after = rest.partition(f"<!-- end of {part} -->")
@@ -101,6 +102,30 @@ def chain(data: Data) -> list[str]:
         f"{b['gradient_cpu_ns']:.0f} ns with the gradient, {gains['forward']:.1f} and {gains['gradient']:.1f} times "
         "the throughput of one rope at a time.",
     ]
+
+
+def cloth(data: Data) -> list[str]:
+    lines = _head("vertices", "constraints", "ns per projection", "ms per substep", "peak memory of the gradient, MB")
+    for row in data["rows"]:
+        lines.append(_line(f"{row['particles']:,}", f"{row['constraints']:,}", *_costs(row), f"{row['peak_mb']:,.0f}"))
+    swatch = data["swatch"]
+    for name, label in (("curvature", "sheet_curvature"), ("newton", "sheet_curvature, Newton, 2 iterations")):
+        row = swatch[name]
+        costs = _costs(row) if name == "curvature" else ("", _costs(row)[1])
+        lines.append(_line(f"{row['particles']:,}, {label}", f"{row['constraints']:,}", *costs, ""))
+    b = swatch["batch"]
+    return [
+        *lines,
+        "",
+        f"Forward / gradient. {b['sheets']} swatches as one batch take {b['forward_cpu_ns']:.3g} / "
+        f"{b['gradient_cpu_ns']:.3g} ns per projection, {b['forward_speedup']:.1f} and {b['gradient_speedup']:.1f} "
+        "times the throughput of one at a time.",
+    ]
+
+
+def _costs(row: Data) -> tuple[str, str]:
+    each = f"{row['forward_cpu_ns']:.3g} / {row['gradient_cpu_ns']:.3g}"
+    return each, f"{row['forward_step_ms']:.3g} / {row['gradient_step_ms']:.3g}"
 
 
 def ladder(data: Data) -> list[str]:

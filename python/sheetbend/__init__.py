@@ -25,6 +25,7 @@ from .fit import Fit, fit
 from .gradients import GradientReport, check_gradients
 from .grip import Grip
 from .io.folder import recordings
+from .kinds import KINDS
 from .markers import Place, along_rope, between, on_cloth, on_particle, on_rope
 from .mesh import TriangleMesh, read_mesh
 from .parameters import Parameter, Parameters
@@ -34,11 +35,12 @@ from .rod import Rod, add_rod, rod
 from .rod_junction import Junction
 from .rollout import Gradient, Rollout, rollout
 from .rope import Rope, add_rope, rope
-from .scene import KINDS, Scene
+from .scene import Scene
 from .scores import Score, Scores, coordinate_error, scores
 from .simulate import Trajectory, simulate
 from .solver import Solver
 from .tape import TapePlan, tape_plan
+from .tethers import add_tethers
 from .values import constraint_values, elastic_energy, support_forces
 
 __version__ = "0.1.0"
@@ -84,6 +86,7 @@ __all__ = [
     "add_cloth",
     "add_rod",
     "add_rope",
+    "add_tethers",
     "along_rope",
     "between",
     "check_gradients",

@@ -1,4 +1,4 @@
-"""Air that acts on triangles: what a scene knows of it, and how it is added."""
+"""Air and pressure on triangles: what a scene knows of them, and how they are added."""
 
 from __future__ import annotations
 
@@ -19,18 +19,19 @@ WIND = ("wind_x", "wind_y", "wind_z")
 
 
 class Air:
-    """Triangles in air and the scene's one wind.
+    """Triangles in air or under pressure, and the scene's one wind.
 
     Attributes:
         triangles: (n, 3) particles.
         normal, tangential: (n,) kg/m^3, the plain parts of the coefficients.
+        pressure: (n,) Pa, the plain part.
         times: (knots,) s, of the wind.
         wind: (knots, 3) m/s, its plain part.
     """
 
     def __init__(self) -> None:
         self.triangles: Array = np.zeros((0, 3), dtype=np.int64)
-        self.normal, self.tangential = np.zeros(0), np.zeros(0)
+        self.normal, self.tangential, self.pressure = np.zeros(0), np.zeros(0), np.zeros(0)
         self.times, self.wind = np.zeros(0), np.zeros((0, 3))
         self._blowing: tuple[Array, Array] | None = None  # times and wind as given
 
@@ -49,20 +50,38 @@ class Air:
         given = {"normal": normal, "tangential": tangential}
         values = {kind: _coefficient(f"{name}.air.{kind}", k, len(corners)) for kind, k in given.items()}
         self._blow(scene, wind, times)
-        first = len(self.triangles)
         for kind, k in values.items():
             if np.ndim(given[kind]) == 0:
                 quantity = scene.add_quantity(f"{name}_air_{kind}", float(k[0]), "kg/m^3", positive=bool(k[0] > 0))
-                where = first + np.arange(len(corners))
-                scene.add_terms([Term(f"air_{kind}", where, 1.0, ((quantity, "identity"),))])
-                k[:] = 0.0
-        self.triangles = np.concatenate([self.triangles, corners])
-        self.normal = np.concatenate([self.normal, values["normal"]])
-        self.tangential = np.concatenate([self.tangential, values["tangential"]])
+                self._name(scene, f"air_{kind}", k, quantity)
+        self._append(corners, values)
+
+    def press(self, scene: Scene, triangles: ArrayLike, pressure: ArrayLike, name: str) -> None:
+        """See `Scene.add_pressure`."""
+        corners = _triangles(f"{name}.pressure.triangles", triangles, scene.particle_count)
+        p = per_item(f"{name}.pressure", pressure, len(corners))
+        if np.ndim(pressure) == 0:
+            quantity = scene.add_quantity(f"{name}_pressure", float(p[0]), "Pa", positive=bool(p[0] > 0))
+            self._name(scene, "pressure", p, quantity)
+        if not len(self.times):
+            self.times, self.wind = np.zeros(1), np.zeros((1, 3))
+        self._append(corners, {"pressure": p})
 
     def arrays(self) -> dict[str, Array]:
         """The plain parts of the input arrays."""
-        return {"wind": self.wind, "air_normal": self.normal, "air_tangential": self.tangential}
+        coefficients = {"air_normal": self.normal, "air_tangential": self.tangential}
+        return {"wind": self.wind, **coefficients, "pressure": self.pressure}
+
+    def _name(self, scene: Scene, array: str, values: Array, quantity: str) -> None:
+        """Let a quantity stand for the values of triangles that are about to be appended."""
+        where = len(self.triangles) + np.arange(len(values))
+        scene.add_terms([Term(array, where, 1.0, ((quantity, "identity"),))])
+        values[:] = 0.0
+
+    def _append(self, corners: Array, values: dict[str, Array]) -> None:
+        self.triangles = np.concatenate([self.triangles, corners])
+        for kind in ("normal", "tangential", "pressure"):
+            setattr(self, kind, np.concatenate([getattr(self, kind), values.get(kind, np.zeros(len(corners)))]))
 
     def _blow(self, scene: Scene, wind: ArrayLike | None, times: ArrayLike | None) -> None:
         """Set the wind, or check that it is the one that was set."""

@@ -33,7 +33,7 @@ def rest_values(
     if rest is not None and not parameters:
         curved = "has none: use planar_bend with a plane normal, or a rod for a curve in space"
         raise SceneError(f"{name}.rest", curved if kind == "bend" else "has none", "rest", "leave it out")
-    if kind == "distance":
+    if kind in ("distance", "tether"):
         return _positive(name, "length", np.linalg.norm(x[:, 1] - x[:, 0], axis=1), rest)
     if kind == "area":
         return _positive(name, "area", np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1) / 2, rest)

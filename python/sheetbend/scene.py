@@ -10,21 +10,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import _core
 from .air import Air
 from .checks import check_increasing, finite, index_array, indices, per_item, points
 from .column import Column
 from .compiled import CompiledScene
 from .errors import SceneError
+from .kinds import KINDS, NEEDS_COMPLIANCE, UNITS, VISCOUS_COMPLIANCE
 from .quantities import Quantity, Term, product
 from .rest_values import rest_values
+from .scene_checks import validate
 
 Array = np.ndarray
-KINDS: Mapping[str, Mapping[str, Any]] = _core.constraint_kinds()
-NEEDS_COMPLIANCE = ("bend", "planar_bend")
-# A damping-only element keeps the product of compliance and damping while the compliance grows: what is left of its
-# stiffness.
-VISCOUS_COMPLIANCE = 1e12
 
 
 @dataclass(frozen=True)
@@ -234,20 +230,21 @@ class Scene:
         Args:
             kind: a name in sheetbend.KINDS: "distance", "attachment"; of ropes "bend", "planar_bend", "hinge"; of rods
                 "material_curvature", "yielding_curvature", "twist"; of cloth "strain", "exponential_strain",
-                "spline_strain", "sheet_curvature", "dihedral", "isometric_bending", "area".
+                "spline_strain", "sheet_curvature", "dihedral", "isometric_bending", "area", "tether".
             particles: (count, arity) indices.
             name: of the group; the kind by default.
-            compliance: 0 = rigid; distance, attachment m/N; bend, planar_bend 1/(N m) (Voronoi length / EI); hinge
-                rad/(N m); material_curvature 1/(N m), twist rad/(N m) (Voronoi length / EI or GJ); strains 1/(N m)
-                (1/(area warp stiffness)); dihedral rad/(N m); isometric_bending 1/(N m) (1/B); sheet_curvature
-                1/(N m^3) (1/(area B)); area m^3/N.
+            compliance: 0 = rigid; distance, attachment, tether m/N; bend, planar_bend 1/(N m) (Voronoi length / EI);
+                hinge rad/(N m); material_curvature 1/(N m), twist rad/(N m) (Voronoi length / EI or GJ); strains
+                1/(N m) (1/(area warp stiffness)); dihedral rad/(N m); isometric_bending 1/(N m) (1/B);
+                sheet_curvature 1/(N m^3) (1/(area B)); area m^3/N.
             damping: beta of the Rayleigh dissipation (Macklin et al. 2016, eq. 26): force per rate of C.
             viscosity: the element resists the rate of C only: distance N s/m, hinge N m s/rad; excludes compliance and
                 damping.
-            rest: (count,) rest length m (the initial length by default), planar rest (natural curvature times Voronoi
-                length), angle rad (zero by default), area m^2 (the initial one); of material_curvature (count, 2), of
-                twist (count,) rad, of attachment (count, 3) m the offset of the first particle from the second; of
-                strains, isometric_bending and sheet_curvature all parameters of KINDS, (count, parameters).
+            rest: (count,) rest length m, of a tether its greatest length (the initial length by default), planar rest
+                (natural curvature times Voronoi length), angle rad (zero by default), area m^2 (the initial one); of
+                material_curvature (count, 2), of twist (count,) rad, of attachment (count, 3) m the offset of the first
+                particle from the second; of strains, isometric_bending and sheet_curvature all parameters of KINDS,
+                (count, parameters).
             normal: unit plane normal, (3,) or (count, 3), of planar kinds.
 
         Raises:
@@ -379,6 +376,25 @@ class Scene:
         self._building()
         self.air.add(self, triangles, normal, tangential, wind, times, name)
 
+    def add_pressure(self, triangles: ArrayLike, pressure: ArrayLike, name: str = "cloth") -> None:
+        """Let a pressure push triangles along their normals, (x1 - x0) x (x2 - x0): pressure * area on each, a third to
+        every corner.
+
+        One value for all is the quantity `<name>_pressure`. The force is taken at the extrapolated state, so substeps
+        must resolve it: h^2 p/(area density * edge) must stay well below 1 (a balloon is calm at 0.02, not at 0.35).
+        `equilibrium` refuses it, since it follows the triangles.
+
+        Args:
+            triangles: (count, 3) particles; those of a closed surface, counterclockwise from outside, are blown up.
+            pressure: Pa, one for all or (count,), inside above outside.
+            name: of the quantity.
+
+        Raises:
+            SceneError: shapes, NaN, or corners that are not distinct.
+        """
+        self._building()
+        self.air.press(self, triangles, pressure, name)
+
     def freeze(self) -> Scene:
         """End the construction: validates the whole scene and returns it. Later additions raise.
 
@@ -387,7 +403,7 @@ class Scene:
                 boundary holds.
         """
         if not self._frozen:
-            self._validate()
+            validate(self)
             self._frozen = True
         return self
 
@@ -475,52 +491,3 @@ class Scene:
         self.add_quantity(quantity, float(values[0]), unit, positive=float(values[0]) > 0.0)
         self.add_terms([Term(array, first + np.arange(len(values)), 1.0, ((quantity, "identity"),))])
         values[:] = 0.0
-
-    def _validate(self) -> None:
-        if self.particle_count == 0:
-            raise SceneError(self.name, "has no particles", 0, "add particles or a rope")
-        free = self.free
-        if len(free) == 0:
-            raise SceneError(
-                self.name,
-                "has nothing that can move: every particle is pinned or driven",
-                self.particle_count,
-                "release at least one",
-            )
-        heavy = self._mass.values > 0
-        for t in self.terms:
-            if t.array == "mass":
-                heavy[t.index] = True
-        light = free[~heavy[free]]
-        if light.size:
-            raise SceneError("mass", "is zero for free particles", light[:5].tolist(), "give them a mass, or pin them")
-        if self.groups:
-            used = np.zeros(self.particle_count, dtype=bool)
-            for g in self.groups:
-                used[g.particles] = True
-            loose = free[~used[free]]
-            if loose.size:
-                fix = "constrain them, pin them or leave them out"
-                raise SceneError("particles", "are connected to nothing", loose[:5].tolist(), fix)
-        held = self.pinned & set(self.driven)
-        if held:
-            raise SceneError("drive.particles", "are pinned too", sorted(held), "either pin or drive a particle")
-
-
-UNITS: Mapping[str, Mapping[str, str]] = {
-    "distance": {"compliance": "m/N", "damping": "N s/m"},
-    "attachment": {"compliance": "m/N", "damping": "N s/m"},
-    "bend": {"compliance": "1/(N m)", "damping": "N m s"},
-    "planar_bend": {"compliance": "1/(N m)", "damping": "N m s"},
-    "hinge": {"compliance": "rad/(N m)", "damping": "N m s/rad"},
-    "material_curvature": {"compliance": "1/(N m)", "damping": "N m s"},
-    "yielding_curvature": {"compliance": "1/(N m)", "damping": "N m s"},
-    "twist": {"compliance": "rad/(N m)", "damping": "N m s/rad"},
-    "strain": {"compliance": "1/(N m)", "damping": "N m s"},
-    "exponential_strain": {"compliance": "1/(N m)", "damping": "N m s"},
-    "spline_strain": {"compliance": "1/(N m)", "damping": "N m s"},
-    "dihedral": {"compliance": "rad/(N m)", "damping": "N m s/rad"},
-    "isometric_bending": {"compliance": "1/(N m)", "damping": "N m s"},
-    "sheet_curvature": {"compliance": "1/(N m^3)", "damping": "N m^3 s"},
-    "area": {"compliance": "m^3/N", "damping": "N s/m^3"},
-}

@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 from . import _core
 from .checks import finite
 from .errors import DivergenceError, InputError
-from .scene import KINDS, Scene
+from .kinds import KINDS
+from .scene import Scene
 from .solver import Solver
 
 

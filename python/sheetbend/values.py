@@ -12,7 +12,8 @@ from . import _core
 from .checks import finite
 from .equilibrium import Equilibrium
 from .errors import SceneError
-from .scene import KINDS, Array, Scene
+from .kinds import KINDS
+from .scene import Array, Scene
 from .simulate import forces_by_group
 
 

@@ -35,7 +35,7 @@ std::vector<double> recomputed(const Program& p, const Tape<double>& tape, const
 }
 
 TEST_P(Bits, AreEqualWithAndWithoutTape) {
-  const Sample sample = random_scene(70, {.net = GetParam().net});
+  const Sample sample = random_scene(70, GetParam().shape());
   const Program p = program(sample.scene);
   const auto recorded = record(p, sample.inputs);
   EXPECT_TRUE(same_bits(recorded.states, states(p, sample.inputs)));
@@ -43,14 +43,14 @@ TEST_P(Bits, AreEqualWithAndWithoutTape) {
 }
 
 TEST_P(Bits, AreEqualRunAfterRun) {
-  const Sample sample = random_scene(71, {.net = GetParam().net}), again = random_scene(71, {.net = GetParam().net});
+  const Sample sample = random_scene(71, GetParam().shape()), again = random_scene(71, GetParam().shape());
   EXPECT_TRUE(same_bits(sample.inputs, again.inputs));
   const auto first = gradient(program(sample.scene), sample.inputs);
   EXPECT_TRUE(same_bits(first, gradient(program(again.scene), again.inputs)));
 }
 
 TEST_P(Bits, AreEqualForEveryNumberOfThreads) {
-  const Sample sample = random_scene(72, {.net = GetParam().net});
+  const Sample sample = random_scene(72, GetParam().shape());
   const Program one = program(sample.scene);
   const auto forward = states(one, sample.inputs);
   const auto reverse = gradient(one, sample.inputs);
@@ -65,7 +65,7 @@ TEST_P(Bits, AreEqualForEveryNumberOfThreads) {
 
 // Eight scenes of one topology in the lanes against eight scalar runs.
 TEST_P(Bits, AreEqualInEveryLane) {
-  const Sample sample = random_scene(73, {.net = GetParam().net});
+  const Sample sample = random_scene(73, GetParam().shape());
   const Program p = program(sample.scene);
   Random random(73);
   std::vector<std::vector<double>> inputs(Pack::lanes, sample.inputs);

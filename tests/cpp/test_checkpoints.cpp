@@ -116,7 +116,7 @@ struct Checkpoints : ::testing::TestWithParam<Solver> {
 INSTANTIATE_TEST_SUITE_P(, Checkpoints, all_solvers, solver_name);
 
 TEST_P(Checkpoints, GiveTheBitsOfTheWholeTape) {
-  const Sample sample = random_scene(75, {.net = GetParam().net});
+  const Sample sample = random_scene(75, GetParam().shape());
   const Program p = program(sample.scene);
   const auto whole = gradient(p, sample.inputs);
   const int window = Tape<double>::window(p.plan);
@@ -132,7 +132,7 @@ TEST_P(Checkpoints, GiveTheBitsOfTheWholeTape) {
 }
 
 TEST_P(Checkpoints, GiveTheBitsOfTheWholeTapeInLanes) {
-  const Sample sample = random_scene(76, {.net = GetParam().net});
+  const Sample sample = random_scene(76, GetParam().shape());
   const Program p = program(sample.scene);
   Random random(76);
   std::vector<Pack> packed(sample.inputs.size());

@@ -214,6 +214,26 @@ TEST(Equilibrium, TakesStillAirAndRefusesWind) {
   EXPECT_THROW(EquilibriumSolver(scene).solve(inputs.data(), nullptr, nullptr, {.t0 = 0.5}), std::invalid_argument);
 }
 
+TEST(Equilibrium, RefusesWhatMayGoSlackAndPressure) {
+  SceneSpec spec;
+  spec.particles = 3;
+  spec.pinned = {0};
+  spec.groups = {{"links", "distance", false, {0, 1, 1, 2}}};
+  spec.air = {{0, 1, 2}};
+  spec.wind.times = {0.0};
+  const Scene blown = build_scene(spec);
+  std::vector<double> inputs(blown.layout.total(), 1.0);
+  std::fill_n(&inputs[blown.layout.of(Quantity::wind)], 3, 0.0);
+  EXPECT_THROW(EquilibriumSolver(blown).solve(inputs.data()), std::invalid_argument);
+  spec.groups.push_back({"reach", "tether", false, {0, 2}});
+  spec.air.clear();
+  spec.wind.times.clear();
+  const Scene tied = build_scene(spec);
+  inputs.assign(tied.layout.total(), 1.0);
+  EXPECT_THROW(EquilibriumSolver(tied).solve(inputs.data()), std::invalid_argument);
+  EXPECT_THROW(make_plan(tied, {.partition = Partition::direct}), std::invalid_argument);
+}
+
 TEST(Equilibrium, SaysSoWhenThereIsNone) {
   SceneSpec spec;
   spec.particles = 3;

@@ -68,7 +68,7 @@ void expect_footprint(const Scene& scene, const Plan& plan, const std::vector<T>
 }
 
 TEST_P(Footprint, IsWhatIsAllocated) {
-  const Sample sample = random_scene(77, {.ropes = 60, .net = GetParam().net});
+  const Sample sample = random_scene(77, GetParam().shape(60));
   const Plan plan = make_plan(sample.scene, GetParam().options(3));
   expect_footprint<double>(sample.scene, plan, sample.inputs);
   expect_footprint<Pack>(sample.scene, plan, {sample.inputs.begin(), sample.inputs.end()});
@@ -76,7 +76,7 @@ TEST_P(Footprint, IsWhatIsAllocated) {
 }
 
 TEST_P(Footprint, KeepsToTheBudget) {
-  const Sample sample = random_scene(78, {.net = GetParam().net});
+  const Sample sample = random_scene(78, GetParam().shape());
   const Plan plan = make_plan(sample.scene, GetParam().options(2));
   const TapePlan whole = plan_tape<double>(sample.scene, plan, 500, 3, 1, no_budget);
   EXPECT_EQ(whole.states, 500);

@@ -33,8 +33,8 @@ Sample hinges_around_a_turn() {
 enum class Scenes { ropes, net, turn };
 
 struct Packs : ::testing::TestWithParam<Scenes> {
-  Sample sample =
-      GetParam() == Scenes::turn ? hinges_around_a_turn() : random_scene(60, {.net = GetParam() == Scenes::net});
+  Sample sample = GetParam() == Scenes::turn ? hinges_around_a_turn()
+                                             : random_scene(60, {.net = GetParam() == Scenes::net, .unilateral = true});
   const Scene& scene = sample.scene;
   Plan plan = make_plan(scene, {.h = eta, .partition = Partition::gauss_seidel, .iterations = 3});
   Inputs<const double> in{scene.layout, sample.inputs.data()};

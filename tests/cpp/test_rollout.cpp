@@ -11,7 +11,7 @@ INSTANTIATE_TEST_SUITE_P(, RolloutOf, all_solvers, solver_name);
 
 TEST_P(RolloutOf, GradientMatchesComplexStep) {
   for (const unsigned seed : {50u, 51u}) {
-    const Sample sample = random_scene(seed, {.net = GetParam().net});
+    const Sample sample = random_scene(seed, GetParam().shape());
     const Program program{sample.scene, make_plan(sample.scene, GetParam().options(2)), 10, 0.004};
     const auto oracle =
         complex_step_gradient([&](const std::vector<Complex>& z) { return loss(program, z); }, sample.inputs);
@@ -49,7 +49,7 @@ TEST(RandomScene, NetIsSparse) {
 // Mass, forces, drag and the air's coefficients times c, compliance over c (and beta times c, for alpha beta is what damps): the same
 // motion.
 TEST_P(RolloutOf, MassGaugeMovesNothing) {
-  const Sample sample = random_scene(52, {.net = GetParam().net});
+  const Sample sample = random_scene(52, GetParam().shape());
   const Program program{sample.scene, make_plan(sample.scene, GetParam().options(2)), 10};
   std::vector<double> scaled = sample.inputs;
   const Layout& layout = sample.scene.layout;
@@ -65,6 +65,7 @@ TEST_P(RolloutOf, MassGaugeMovesNothing) {
   scale(Quantity::drag_quadratic, c);
   scale(Quantity::air_normal, c);
   scale(Quantity::air_tangential, c);
+  scale(Quantity::pressure, c);
   EXPECT_TRUE(same_bits(states(program, sample.inputs), states(program, scaled)));
 }
 

@@ -12,7 +12,7 @@ struct ForwardOverReverse : ::testing::TestWithParam<Solver> {};
 INSTANTIATE_TEST_SUITE_P(, ForwardOverReverse, all_solvers, solver_name);
 
 TEST_P(ForwardOverReverse, MatchesComplexStepOfTheGradient) {
-  const Sample sample = random_scene(60, {.net = GetParam().net});
+  const Sample sample = random_scene(60, GetParam().shape());
   const Layout& layout = sample.scene.layout;
   const Program program{sample.scene, make_plan(sample.scene, GetParam().options(2)), 8, 0.004};
   Random random(60);
@@ -33,7 +33,7 @@ TEST_P(ForwardOverReverse, MatchesComplexStepOfTheGradient) {
 }
 
 TEST_P(ForwardOverReverse, HessianIsSymmetric) {
-  const Sample sample = random_scene(61, {.net = GetParam().net});
+  const Sample sample = random_scene(61, GetParam().shape());
   const Program program{sample.scene, make_plan(sample.scene, GetParam().options(2)), 8};
   Random random(61);
   const auto product = [&](const std::vector<double>& v) {

@@ -65,7 +65,7 @@ struct Substep : ::testing::TestWithParam<Solver> {};
 INSTANTIATE_TEST_SUITE_P(, Substep, all_solvers, solver_name);
 
 TEST_P(Substep, ReverseMatchesComplexStep) {
-  const Sample sample = random_scene(40, {.net = GetParam().net});
+  const Sample sample = random_scene(40, GetParam().shape());
   const Scene& scene = sample.scene;
   for (const int number : {0, 1}) {
     SCOPED_TRACE(number == 0 ? "the first substep" : "a later substep");

@@ -14,6 +14,7 @@ import sheetbend as sb
 from sheetbend.bench import WORKLOADS, measure, workload
 from sheetbend.bench import ladder as ladder_module
 from sheetbend.bench.chain import gradient_error, measure_chain
+from sheetbend.bench.cloth import measure_cloth
 from sheetbend.bench.ladder import measure_ladder, rung
 from sheetbend.bench.machine import LEVELS, machine
 from sheetbend.bench.problem import Problem
@@ -233,7 +234,7 @@ class TestCommand:
         assert result.exit_code == 2 and last_line(result)["error"]["field"] == field
 
     def test_unknown_workloads_are_answered_with_the_known(self) -> None:
-        assert "W1, W1s, W2, W5, chain, rod, ladder" in last_line(run("cloth", "--json"))["error"]["fix"]
+        assert "W1, W1s, W2, W5, chain, rod, cloth, ladder" in last_line(run("sheet", "--json"))["error"]["fix"]
 
     def test_a_wrong_gradient_exits_5(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr("sheetbend.bench.measurement.largest_error", lambda problem, found: 1e-3)
@@ -254,6 +255,13 @@ class TestChainAndLadder:
         expect_figures(found)
         assert [row["segments"] for row in found["rows"]] == [20, 50, 200, 1000, 5000, 20000]
         assert found["batch"]["ropes"] == 64 and found["batch"]["gradient_speedup"] > 0
+
+    def test_cloth(self) -> None:
+        found = {**measure_cloth(repeats=1, cells=(4, 6)), "exit_code": 0}
+        expect_figures(found)
+        assert [row["particles"] for row in found["rows"]] == [25, 49]
+        assert all(row["gradient_step_ms"] > row["forward_step_ms"] > 0 for row in found["rows"])
+        assert found["swatch"]["batch"]["sheets"] == 8 and found["swatch"]["newton"]["iterations"] == 2
 
     def test_ladder(self, tmp_path: Path) -> None:
         pytest.importorskip("matplotlib")

@@ -11,12 +11,13 @@ from rich.console import Console
 
 from ..bench import WORKLOADS, measure, workload
 from ..bench.chain import measure_chain
+from ..bench.cloth import measure_cloth
 from ..bench.ladder import measure_ladder
 from ..bench.rod import measure_rod
 from ..errors import InputError
 from .outcome import Code, Outcome, run
 
-NAMES = (*WORKLOADS, "chain", "rod", "ladder")
+NAMES = (*WORKLOADS, "chain", "rod", "cloth", "ladder")
 
 
 def bench(
@@ -25,7 +26,8 @@ def bench(
         typer.Argument(
             metavar="WORKLOAD",
             help="W1 a rope, W1s the same in small steps, W2 a cloth, W5 256 ropes, chain the direct solver, rod a "
-            "rope of 12 markers between grips, ladder cloths of 441 to 1,000,000 particles.",
+            "rope of 12 markers between grips, cloth sheets with strain and bending, ladder cloths of 441 to 1,000,000 "
+            "particles.",
             show_default=False,
         ),
     ],
@@ -54,6 +56,9 @@ def _bench(console: Console, name: str, threads: int, repeats: int, frames: int 
     elif name == "rod":
         data = measure_rod(threads, repeats)
         _print_rod(console, data)
+    elif name == "cloth":
+        data = measure_cloth(threads, repeats, progress=lambda row: _print_sheet(console, row))
+        _print_swatches(console, data)
     elif name == "ladder":
         data = measure_ladder(threads, repeats, progress=lambda row: _print_rung(console, row))
         if figure is not None:
@@ -134,6 +139,28 @@ def _print_rod(console: Console, data: Mapping[str, Any]) -> None:
         console.print(
             f"  8 recordings, {name}: {batch / 1000:.2f} us in lanes, {singly / 1000:.2f} one at a time, "
             f"{singly / batch:.1f} times the throughput",
+            soft_wrap=True,
+        )
+
+
+def _print_sheet(console: Console, row: Mapping[str, Any], label: str = "strain and hinges") -> None:
+    console.print(
+        f"  {row['particles']:7,} vertices, {label}: {row['forward_step_ms']:8.2f} ms per substep forward, "
+        f"{row['gradient_step_ms']:8.2f} with the gradient; {row['forward_cpu_ns']:.1f} and "
+        f"{row['gradient_cpu_ns']:.1f} ns per projection",
+        soft_wrap=True,
+    )
+
+
+def _print_swatches(console: Console, data: Mapping[str, Any]) -> None:
+    swatch = data["swatch"]
+    _print_sheet(console, swatch["curvature"], "strain and sheet_curvature")
+    _print_sheet(console, swatch["newton"], "the same by Newton, 2 iterations")
+    b = swatch["batch"]
+    for name in ("forward", "gradient"):
+        console.print(
+            f"  {b['sheets']} swatches, {name}: {b[f'{name}_cpu_ns']:.1f} ns per projection in one batch, "
+            f"{b[f'{name}_singly_cpu_ns']:.1f} one at a time, {b[f'{name}_speedup']:.1f} times the throughput",
             soft_wrap=True,
         )
 

@@ -15,8 +15,9 @@ from rich.table import Table
 from .. import __version__
 from ..config import GrippedConfig, build, parse_any, scene_alone
 from ..experiment import Experiment
+from ..kinds import KINDS
 from ..optimizers import has_ceres
-from ..scene import KINDS, Scene
+from ..scene import Scene
 from .gripped import RopeData, load_ropes
 from .outcome import Outcome, run
 

@@ -21,8 +21,8 @@ def grid(width: float, height: float, nx: int, ny: int, pattern: str = "alternat
         width: along x, m.
         height: along y, m.
         pattern: "alternating" turns the diagonal from cell to cell, "crossed" has both diagonals and a vertex in the
-            middle of each cell (after all others). "one_way" has the same diagonal everywhere and bends three times as
-            hard along it as across it: a fitted bending rigidity means little on it.
+            middle of each cell (after all others), "one_way" has the same diagonal everywhere: the one for bending by
+            the curvature model; hinges bend three times as hard along the diagonals as across them.
 
     Raises:
         MeshError: a size that is not positive, or an unknown pattern.

@@ -61,7 +61,8 @@ def simulate(
         inputs: input arrays to replace, by name: tensors (*batch, ...), whatever quantities made them up. "position",
             "velocity" (particles, 3), "mass" (particles,), "compliance", "damping" (constraints,), "rest" (all rest
             parameters,), "boundary" (knots, driven, 3), "force" (knots, loaded, 3), "gravity" (3,), "drag_linear",
-            "drag_quadratic" (particles,), "wind" (knots, 3), "air_normal", "air_tangential" (triangles in air,).
+            "drag_quadratic" (particles,), "wind" (knots, 3), "air_normal", "air_tangential",
+            "pressure" (triangles in air,).
             Constraints and rest parameters come group after group, as added.
 
     Returns:

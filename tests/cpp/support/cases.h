@@ -53,6 +53,20 @@ inline Case case_of<Distance>() {
 }
 
 template <>
+inline Case case_of<Tether>() {
+  return {.x = {0, 0, 0, 0.09, 0.03, -0.02},
+          .p = {0.08},
+          .compliance = 3e-4,
+          .damping = 3.0,
+          .under_rotation = UnderRotation::stays,
+          .degree = 1,
+          .parameter_degree = {1},
+          .relabeling = {1, 0},
+          .sign = {1},
+          .parameter_sign = {1}};
+}
+
+template <>
 inline Case case_of<Bend>() {
   return {.x = {0, 0, 0, 0.1, 0.02, 0.01, 0.18, 0.08, -0.03},
           .p = {},

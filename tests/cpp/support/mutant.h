@@ -11,6 +11,7 @@ struct WithoutShortcuts : K {
   static constexpr bool unit_gradients = false;
   template <class T>
   struct Geometry;  // hides the constraint's own
+  static void reverse() = delete;
 };
 
 template <class K>

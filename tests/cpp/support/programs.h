@@ -77,6 +77,9 @@ struct Solver {
   Integrator integrator;
   Partition partition;
   bool net;  // one block with branches and loops, instead of ropes
+  SceneShape shape(int ropes = 5) const {
+    return {.ropes = ropes, .net = net, .unilateral = partition == Partition::gauss_seidel};
+  }
   SolverOptions options(int iterations) const {
     return {.h = 4e-3, .integrator = integrator, .partition = partition, .iterations = iterations};
   }

@@ -18,6 +18,7 @@ struct Sample {
 struct SceneShape {
   int ropes = 5;  // the first two are damped; five of them make a net sparse
   bool net = false;
+  bool unilateral = false;  // also those kinds, which direct blocks do not hold
 };
 
 namespace detail {
@@ -84,10 +85,12 @@ struct SceneBuilder {
     add_constraint<Distance>(false, {a, b}, {l * random(0.97, 1.03)});
   }
 
-  std::vector<int> add_rope(bool damped) {
+  std::vector<int> add_rope(bool damped, bool unilateral) {
     const int first = static_cast<int>(x.size()) / 3;
     int tail = 0;
-    for_each_kind([&]<class K>(K) { tail = add_stencil<K>(tail, damped); });
+    for_each_kind([&]<class K>(K) {
+      if (!K::unilateral || unilateral) tail = add_stencil<K>(tail, damped);
+    });
     std::vector<int> rope{0};
     const auto is_point = [&](int n) {
       return std::none_of(spec.directors.begin(), spec.directors.end(),
@@ -126,6 +129,7 @@ struct SceneBuilder {
     fill(Quantity::wind, -3.0, 3.0);
     fill(Quantity::air_normal, 0.3, 0.9);
     fill(Quantity::air_tangential, 0.03, 0.2);
+    fill(Quantity::pressure, -0.2, 0.2);
   }
 };
 
@@ -135,7 +139,7 @@ inline Sample random_scene(unsigned seed, const SceneShape& shape = {}) {
   detail::SceneBuilder b(seed);
   b.add_particle(0.0, 0.0, 0.0);
   std::vector<std::vector<int>> ropes;
-  for (int r = 0; r < shape.ropes; ++r) ropes.push_back(b.add_rope(r < 2));
+  for (int r = 0; r < shape.ropes; ++r) ropes.push_back(b.add_rope(r < 2, shape.unilateral));
   if (shape.net)
     for (std::size_t r = 1; r < ropes.size(); ++r)
       for (std::size_t k = 1; k + 2 < ropes[r].size(); k += 2) b.add_brace(ropes[r - 1][k], ropes[r][k + 2]);

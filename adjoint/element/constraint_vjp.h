@@ -1,0 +1,68 @@
+// What the reverse asks of a constraint at (x, p): with its own reverse where it has one (concept.h), otherwise by one evaluation on dual numbers.
+#pragma once
+
+#include "core/constraints/concept.h"
+#include "core/scalar/dual.h"
+
+namespace sheetbend {
+
+// Parameters that the gradient may depend on; those after them are just subtracted.
+template <class K>
+inline constexpr int inside_count = parameter_count<K> - K::offsets;
+
+// x_bar += J^T C_bar, p_bar += C_bar . dC/dp.
+template <class K, class T>
+void values_vjp(const T* x, const T* p, const T* C_bar, T* x_bar, T* p_bar) {
+  constexpr int inside = HasReverse<K> ? 0 : inside_count<K>;
+  using D = std::conditional_t<inside == 0, T, Dual<T, inside>>;
+  D at[K::dofs], with[parameter_count<K> + 1], C[K::rows], J[K::rows * K::dofs];
+  for (int d = 0; d < K::dofs; ++d) at[d] = D(x[d]);
+  for (int k = 0; k < parameter_count<K>; ++k) with[k] = D(p[k]);
+  if constexpr (inside > 0)
+    for (int k = 0; k < inside; ++k) with[k].d[k] = T(1.0);
+  evaluate_on_duals<K, inside>(at, with, C, J);
+  for (int j = 0; j < K::rows; ++j) {
+    for (int d = 0; d < K::dofs; ++d) x_bar[d] += C_bar[j] * primal<T>(J[j * K::dofs + d]);
+    if constexpr (inside > 0)
+      for (int k = 0; k < inside; ++k) p_bar[k] += C_bar[j] * C[j].d[k];
+    if constexpr (!HasReverse<K>)
+      if (j < K::offsets) p_bar[inside + j] -= C_bar[j];
+  }
+  if constexpr (HasReverse<K>) {
+    T y[K::rows], still[K::rows * K::dofs], unused[K::dofs];
+    for (int j = 0; j < K::rows; ++j) y[j] = -C_bar[j];
+    for (T& v : still) v = T(0.0);
+    for (T& v : unused) v = T(0.0);
+    K::reverse(x, p, y, still, unused, p_bar);
+  }
+}
+
+// Of sum_j (v_j . J_j - y_j C_j) with y_j and v_j (rows x dofs) held: x_bar += Hess(C_j) v_j, p_bar += v_j . dJ_j/dp - y_j dC_j/dp.
+template <class K, class T>
+void gradients_vjp(const T* x, const T* p, const T* y, const T* v, T* x_bar, T* p_bar) {
+  if constexpr (HasReverse<K>) {
+    K::reverse(x, p, y, v, x_bar, p_bar);
+  } else {
+    constexpr int inside = inside_count<K>;
+    using D = Dual<T, K::rows + inside>;
+    D at[K::dofs], with[parameter_count<K> + 1], C[K::rows], J[K::rows * K::dofs];
+    for (int d = 0; d < K::dofs; ++d) {
+      at[d].v = x[d];
+      for (int j = 0; j < K::rows; ++j) at[d].d[j] = v[j * K::dofs + d];
+    }
+    for (int k = 0; k < parameter_count<K>; ++k) with[k].v = p[k];
+    for (int k = 0; k < inside; ++k) with[k].d[K::rows + k] = T(1.0);
+    evaluate_on_duals<K, K::rows + inside>(at, with, C, J);
+    for (int j = 0; j < K::rows; ++j) {
+      for (int d = 0; d < K::dofs; ++d) x_bar[d] += J[j * K::dofs + d].d[j];
+      for (int k = 0; k < inside; ++k) {
+        T sum = -(y[j] * C[j].d[K::rows + k]);
+        for (int d = 0; d < K::dofs; ++d) sum += v[j * K::dofs + d] * J[j * K::dofs + d].d[K::rows + k];
+        p_bar[k] += sum;
+      }
+      if (j < K::offsets) p_bar[inside + j] += y[j];
+    }
+  }
+}
+
+}  // namespace sheetbend

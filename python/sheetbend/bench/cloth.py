@@ -1,0 +1,150 @@
+"""A sheet of triangles with strain and bending: a swatch of 441 vertices, the same in larger, eight swatches in lanes,
+and a substep of global Newton.
+
+A square meter of 0.2 kg/m^2, held at two corners, falls under gravity for substeps of 1/60 s, backward Euler with 20
+Gauss-Seidel sweeps over orthotropic strain (three rows per triangle) and hinges. The loss is the sum of the last
+coordinates. A unit of work is one constraint in one sweep; `step_ms` is a whole substep.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..cloth import add_cloth
+from ..mesh import grid
+from ..scene import Scene
+from ..solver import Solver
+from .machine import isa, machine
+from .measurement import LANES
+from .ropes import Ropes
+from .timing import in_fresh_process, peak_mb, timed
+
+CELLS = (20, 89, 101, 120, 256)  # along a side: 441 to 66,049 vertices
+VERTEX_SUBSTEPS = 20_000
+MIN_SUBSTEPS = 2
+SWEEPS = 20
+H = 1 / 60  # s
+BATCH = 8  # swatches in lanes
+CHECKED = (8, 4)  # cells along a side, and substeps of the sheet whose gradient is compared with a complex step
+BOUND = 1e-9
+SOLVER = Solver(h=H, integrator="bdf1", method="gauss_seidel", iterations=SWEEPS)
+
+
+def sheets(
+    cells: int, substeps: int, solver: Solver = SOLVER, count: int = 1, bending_model: str = "dihedral"
+) -> tuple[Ropes, int]:
+    """`count` sheets whose stiffness differs, and the number of constraints of one."""
+    scenes = [_scene(cells, bending_model, 200.0 * 1.1**k) for k in range(count)]
+    inputs = np.stack([s.compiled.inputs() for s in scenes])
+    constraints = sum(len(g.particles) for g in scenes[0].groups)
+    return Ropes(scenes[0].compiled, inputs, solver, substeps), constraints
+
+
+def measure_cloth(
+    threads: int = 1,
+    repeats: int = 5,
+    cells: tuple[int, ...] = CELLS,
+    progress: Callable[[dict[str, Any]], None] = lambda row: None,
+) -> dict[str, Any]:
+    """One row per size, swatches with the default bending, by Newton and in lanes; `progress` gets each row."""
+    rows: list[dict[str, Any]] = []
+    for n in cells:
+        rows.append(in_fresh_process(_climb, n, threads, repeats))
+        progress(rows[-1])
+    return {
+        "workload": "cloth",
+        **rows[0],
+        "threads": threads,
+        "lanes": LANES,
+        "isa": isa(),
+        "repeats": repeats,
+        "rows": rows,
+        "swatch": {
+            "curvature": _row(cells[0], _substeps(cells[0]), _solver(threads), repeats, "curvature"),
+            "newton": _row(cells[0], 5, Solver(h=H, method="newton", threads=threads), repeats, "curvature"),
+            "batch": _batch(cells[0], _substeps(cells[0]), threads, repeats),
+        },
+        "gradient_error": gradient_error(),
+        "gradient_error_bound": BOUND,
+        "sheetbend": __version__,
+        "machine": machine(),
+    }
+
+
+def gradient_error() -> float:
+    """Of the adjoint on a small sheet, relative to complex step."""
+    return sheets(*CHECKED)[0].gradient_error()
+
+
+def _scene(cells: int, bending_model: str, warp: float) -> Scene:
+    mesh = grid(1.0, 1.0, cells, cells, "one_way" if bending_model == "curvature" else "alternating")
+    scene = Scene("sheet")
+    cloth = add_cloth(
+        scene,
+        mesh,
+        density=0.2,
+        warp=warp,
+        weft=0.75 * warp,
+        shear=0.3 * warp,
+        poisson=0.2,
+        bending=1e-4,
+        bending_model=bending_model,
+    )
+    corners = [int(np.argmin(np.abs(mesh.material - corner).sum(axis=1))) for corner in ((0, 0), (1, 0))]
+    scene.pin(cloth.particles[corners])
+    return scene
+
+
+def _substeps(cells: int) -> int:
+    return max(MIN_SUBSTEPS, VERTEX_SUBSTEPS // (cells + 1) ** 2)
+
+
+def _solver(threads: int) -> Solver:
+    return Solver(h=H, integrator="bdf1", method="gauss_seidel", iterations=SWEEPS, threads=threads)
+
+
+def _climb(cells: int, threads: int, repeats: int) -> dict[str, Any]:
+    """One row; for a process of its own."""
+    substeps = _substeps(cells)
+    peak = peak_mb(sheets(cells, substeps, _solver(threads))[0].gradient)
+    return {**_row(cells, substeps, _solver(threads), repeats, "dihedral"), "peak_mb": peak}
+
+
+def _row(cells: int, substeps: int, solver: Solver, repeats: int, bending_model: str) -> dict[str, Any]:
+    sheet, constraints = sheets(cells, substeps, solver, bending_model=bending_model)
+    work = constraints * solver.sweeps * substeps
+    forward, _ = timed(sheet.forward, repeats)
+    gradient, _ = timed(sheet.gradient, repeats)
+    found: dict[str, Any] = {
+        "particles": (cells + 1) ** 2,
+        "constraints": constraints,
+        "substeps": substeps,
+        "iterations": solver.sweeps,
+        "projections": work,
+        **forward.figures("forward", work),
+        **gradient.figures("gradient", work),
+    }
+    for what in ("forward", "gradient"):
+        found[f"{what}_step_ms"] = found[f"{what}_cpu_ns"] * constraints * solver.sweeps / 1e6
+    return found
+
+
+def _batch(cells: int, substeps: int, threads: int, repeats: int) -> dict[str, Any]:
+    """The gradient of a batch is one call that includes its forward run, as it does for one sheet."""
+    swatches, constraints = sheets(cells, substeps, _solver(threads), BATCH)
+    work = BATCH * constraints * SWEEPS * substeps
+    found: dict[str, Any] = {"sheets": BATCH, "substeps": substeps}
+    for name, together, alone in (
+        ("forward", swatches.all_forward, swatches.forward),
+        ("gradient", swatches.all_gradients, swatches.gradient),
+    ):
+        batched, _ = timed(together, repeats)
+        singly, _ = timed(partial(swatches.singly, alone), repeats)
+        found |= batched.figures(name, work) | singly.figures(f"{name}_singly", work)
+        found[f"{name}_speedup"] = found[f"{name}_singly_cpu_ns"] / found[f"{name}_cpu_ns"]
+    return found
