@@ -28,7 +28,7 @@ from .scene_schema import SceneSection
 from .scenes import Particles, build_scene
 
 SUBSTEPS = 10
-OPTIONAL = ("particles", "constraints", "point_mass", "force")
+OPTIONAL = ("cloth", "particles", "constraints", "point_mass", "force")
 """Lists of the scene that a recording can leave out by name."""
 
 
