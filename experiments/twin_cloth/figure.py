@@ -31,7 +31,8 @@ def draw(panel, e, positions, frame, title):
         shade = 0.55 + 0.45 * np.abs(normal @ LIGHT) / np.linalg.norm(normal, axis=1)
         faces = np.clip(shade[:, None] * np.array(to_rgb(color)), 0.0, 1.0)
         panel.add_collection3d(Poly3DCollection(corners, facecolors=faces, edgecolors=(1, 1, 1, 0.4), linewidths=0.3))
-        panel.text(*(x[:, :2].max(axis=0) + [0.02, 0.0]), x[:, 2].max(), label, fontsize=8)
+        corner = x.max(axis=0)
+        panel.text(corner[0] + 0.02, corner[1], corner[2], label, fontsize=8)
     seen = e.recording.positions[frame, list(e.compared)]
     panel.scatter(*seen.T, s=4, c="black", depthshade=False)
     low, high = positions.min(axis=0), positions.max(axis=0)
