@@ -16,7 +16,7 @@ LABELS = {
     "weft_cut": ("along the weft", "#c98f5a"),
     "bias_cut": ("on the bias", "#7aa874"),
     "flap": ("flap over a rod", "#a77ab5"),
-    "square": ("square over a rod", "#b5707a"),
+    "square": ("", "#b5707a"),
 }
 LIGHT = np.array([0.3, -0.5, 0.8])
 
@@ -31,15 +31,15 @@ def draw(panel, e, positions, frame, title):
         shade = 0.55 + 0.45 * np.abs(normal @ LIGHT) / np.linalg.norm(normal, axis=1)
         faces = np.clip(shade[:, None] * np.array(to_rgb(color)), 0.0, 1.0)
         panel.add_collection3d(Poly3DCollection(corners, facecolors=faces, edgecolors=(1, 1, 1, 0.4), linewidths=0.3))
-        corner = x.max(axis=0)
-        panel.text(corner[0] + 0.02, corner[1], corner[2], label, fontsize=8)
+        panel.text(x[:, 0].max() + 0.03, x[:, 1].mean(), x[x[:, 0].argmax(), 2], label, fontsize=9, zorder=3)
     seen = e.recording.positions[frame, list(e.compared)]
-    panel.scatter(*seen.T, s=4, c="black", depthshade=False)
+    panel.scatter(*seen.T, s=5, c="black", depthshade=False, zorder=2)
     low, high = positions.min(axis=0), positions.max(axis=0)
     panel.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     panel.set_title(title, fontsize=10)
-    panel.set_box_aspect(high - low)
-    panel.view_init(24, -65)
+    panel.set_box_aspect(high - low, zoom=1.08)
+    panel.computed_zorder = False
+    panel.view_init(28, -60)
     panel.set_axis_off()
 
 
@@ -49,11 +49,10 @@ def main():
     rest = sb.equilibrium(swinging.scene).positions
     motion = sb.simulate(swinging.scene, swinging.recording.times, swinging.solver, start=rest)
     frame = 78
-    figure = plt.figure(figsize=(10, 4.4), layout="constrained")
-    left, right = (figure.add_subplot(1, 2, k, projection="3d") for k in (1, 2))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(12, 5), width_ratios=[2, 1], subplot_kw={"projection": "3d"})
     draw(left, swinging, motion.positions[frame], frame, f"swinging, after {swinging.recording.times[frame]:.1f} s")
-    draw(right, draped, sb.equilibrium(draped.scene).positions, 0, "draped")
-    figure.savefig(FILE.parent / "pieces.png", dpi=110)
+    draw(right, draped, sb.equilibrium(draped.scene).positions, 0, "draped, square over a rod")
+    figure.savefig(FILE.parent / "pieces.png", dpi=110, bbox_inches="tight")
 
 
 if __name__ == "__main__":

@@ -144,15 +144,15 @@ def recorded(built: sb.Scene, pieces: dict[str, Piece], what: str, states: Array
     )
 
 
-def swinging(frames: int = round(SECONDS * RATE) + 1) -> sb.Recording:
-    """The first frames of the motion, from rest."""
+def swinging(frames: int | None = None, pieces: dict[str, Piece] = SWINGING) -> sb.Recording:
+    """The motion from rest, or its first frames; what some pieces do does not depend on the others."""
     times = np.arange(round(SECONDS * RATE) + 1) / RATE
-    built = scene("swinging", SWINGING, times)
+    built = scene("swinging", pieces, times)
     rest = sb.equilibrium(built).positions
     seen = times[:frames]
     states = sb.simulate(built, seen, sb.Solver(h=H, method="newton"), start=rest).positions
-    what = "three hammocks between two moving bars, and a flap over a moving rod"
-    return recorded(built, SWINGING, what, states, seen)
+    what = "hammocks between two moving bars, and a flap over a moving rod"
+    return recorded(built, pieces, what, states, seen)
 
 
 def draped() -> sb.Recording:
