@@ -73,6 +73,10 @@ def test_the_fit_has_the_same_pieces_on_coarser_meshes_and_longer_steps() -> Non
             mesh = pieces[name].mesh(1)
             np.testing.assert_allclose(cloth.mesh.vertices, mesh.vertices, atol=1e-12)
             np.testing.assert_allclose(cloth.mesh.material, mesh.material, atol=1e-12)
+            seen = mesh.at(pieces[name].markers()).positions(mesh.vertices)
+            placed = [p for p, m in zip(e.places, e.recording.markers, strict=True) if p and m.startswith(f"{name}_")]
+            there = [np.array(p.weights) @ e.scene.positions[list(p.particles)] for p in placed]
+            np.testing.assert_allclose(there, seen, atol=1e-6)
         assert e.static or e.solver.h == pytest.approx(4 * SCRIPT["H"])
     assert SCRIPT["FINER"] == 4
 
