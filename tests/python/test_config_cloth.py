@@ -218,6 +218,33 @@ def test_a_mesh_from_a_file_is_split_and_keeps_its_path(folder: Path) -> None:
     assert again.scene.quantities["cloth_shear"].value == 12.0
 
 
+def test_a_piece_cut_on_the_bias(folder: Path) -> None:
+    bias = ("ny = 2", "ny = 2\nwarp = [1, 1, 0]")
+    (e,) = load(changed(folder, bias, (MARKERS, "markers = { a = [0.1, 0.0] }"))).experiments
+    mesh = e.scene.cloths["cloth"].mesh
+    along, across = mesh.material.T
+    assert mesh.vertices[:, 0] == pytest.approx((along - across) / np.sqrt(2.0))
+    assert mesh.vertices[:, 2] == pytest.approx(1.0 + (along + across) / np.sqrt(2.0))
+    (a,) = e.compared_places
+    assert np.array(a.weights) @ e.scene.positions[list(a.particles)] == pytest.approx([0.0707107, 0, 1.0707107])
+
+
+def test_a_recording_leaves_a_cloth_out(folder: Path) -> None:
+    text = CLOTH.replace(MARKERS, "markers = { a = [0.2, 0.0] }")
+    piece = text[text.index("[[scene.cloth]]") : text.index("[[recording]]")]
+    second = piece.replace("density", 'name = "other"\ndensity').replace("{ a =", "{ b =")
+    recordings = (
+        '[[recording]]\nfile = "sheet.npz"\nleave_out = ["other"]\n'
+        '[[recording]]\nfile = "sheet.npz"\nname = "second"\nleave_out = ["cloth"]\n'
+    )
+    tied = '[parameters]\ncloth_shear = { initial = 12.0 }\nother_shear = { tied_to = "cloth_shear" }\n'
+    (folder / "my.toml").write_text(text[: text.index("[[recording]]")] + second + recordings + tied)
+    first, other = load(folder / "my.toml").experiments
+    assert [list(e.scene.cloths) for e in (first, other)] == [["cloth"], ["other"]]
+    assert [e.recording.markers[i] for e in (first, other) for i in e.compared] == ["a", "b"]
+    assert other.scene.quantities["other_shear"].value == 12.0
+
+
 def test_without_a_recording(folder: Path) -> None:
     text = CLOTH[: CLOTH.index("[[recording]]")].replace("markers = {", "#")
     (folder / "my.toml").write_text(text)
@@ -272,6 +299,7 @@ BAD = [
     ("y_axis = [0, 0, 2]", "y_axis = [1, 0, 2]", "scene.cloth[0].y_axis", "turn one of them"),
     ("y_axis = [0, 0, 2]", "y_axis = [0, 0, 0]", "scene.cloth[0].y_axis", "give a direction"),
     ('pinned = ["left"]', 'pinned = ["lift"]', "scene.cloth[0].pinned", "left"),
+    ("ny = 2", "ny = 2\nwarp = [0, 0, 1]", "scene.cloth[0].mesh.warp", "[1, 1, 0]"),
     (MARKERS, "markers = { z = [0, 0] }", "scene.cloth[0].markers.z", "a, b, c"),
     (MARKERS, "markers = { a = [0.3, 0.0] }", "scene.cloth[0].markers.a.points", "give points of the fabric"),
     (MARKERS, "nearest_at = 9.0", "scene.cloth[0].nearest_at", "0 to 0.2"),

@@ -28,7 +28,7 @@ from .scene_schema import SceneSection
 from .scenes import Particles, build_scene
 
 SUBSTEPS = 10
-OPTIONAL = ("particles", "constraints", "point_mass", "force")
+OPTIONAL = ("cloth", "particles", "constraints", "point_mass", "force")
 """Lists of the scene that a recording can leave out by name."""
 
 
@@ -345,8 +345,12 @@ def _start_values(scene: Scene, config: schema.Config, values: Mapping[str, floa
             scene.quantities[name] = replace(scene.quantities[name], value=float(value))
     for name in config.parameters:
         root, factor = _root(config, name)
-        if root != name and root in scene.quantities and name in scene.quantities:
-            scene.quantities[name] = replace(scene.quantities[name], value=factor * scene.quantities[root].value)
+        if root == name or name not in scene.quantities:
+            continue
+        here, shared = scene.quantities.get(root), config.parameters.get(root)
+        start = here.value if here is not None else None if shared is None else shared.initial
+        if start is not None:
+            scene.quantities[name] = replace(scene.quantities[name], value=factor * start)
 
 
 def _root(config: schema.Config, name: str) -> tuple[str, float]:

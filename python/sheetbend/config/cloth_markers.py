@@ -26,6 +26,8 @@ def places_on_cloths(sections: Sequence[schema.Cloth], scene: Scene, recording: 
     given: dict[str, Place] = {}
     nearest: dict[str, tuple[float, Place]] = {}
     for i, section in enumerate(sections):
+        if section.name not in scene.cloths:  # left out of this recording
+            continue
         path, cloth = f"scene.cloth[{i}]", scene.cloths[section.name]
         for name, at in section.markers.items():
             if name not in recording.markers:

@@ -9,9 +9,9 @@ from pydantic import model_validator
 from .section import Finite, Name, Pair, Section, Vector, key
 
 MESH_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "grid": (("width", "height", "nx", "ny"), ("pattern",)),
-    "equilateral": (("width", "height", "nx"), ()),
-    "disk": (("radius", "rings"), ("support",)),
+    "grid": (("width", "height", "nx", "ny"), ("pattern", "warp")),
+    "equilateral": (("width", "height", "nx"), ("warp",)),
+    "disk": (("radius", "rings"), ("support", "warp")),
     "file": (("file",), ("unit", "material", "texture_size", "warp")),
 }
 """Of every kind of mesh, what it must have and what it may have."""
@@ -38,7 +38,7 @@ class ClothMesh(Section):
         None, "where the file's material coordinates come from; its texture when left out and there is one"
     )
     texture_size: Finite | None = key(None, "of one unit of texture coordinates; 1 when left out", "m", gt=0)
-    warp: Vector | None = key(None, "direction of the warp in the file, for `unfold`; x when left out")
+    warp: Vector | None = key(None, "direction of the warp in the mesh; x when left out; of a file with `unfold` only")
 
     @model_validator(mode="after")
     def _keys_of_kind(self) -> Self:

@@ -77,9 +77,21 @@ def _mesh(path: str, section: schema.ClothMesh, folder: Path, finer: int) -> Tri
     for count in ("nx", "ny", "rings"):
         if count in given:
             given[count] *= finer
+    warp = given.pop("warp", [1.0, 0.0, 0.0])
     if section.kind == "equilateral":
-        return meshes.equilateral(given["width"], given["height"], given["nx"])
-    return meshes.disk(**given) if section.kind == "disk" else meshes.grid(**{"pattern": "one_way", **given})
+        mesh = meshes.equilateral(given["width"], given["height"], given["nx"])
+    else:
+        mesh = meshes.disk(**given) if section.kind == "disk" else meshes.grid(**{"pattern": "one_way", **given})
+    return replace(mesh, material=mesh.material @ _along_warp(f"{path}.warp", warp))
+
+
+def _along_warp(path: str, warp: list[float]) -> np.ndarray:
+    """(2, 2) that turns x and y of a flat mesh to coordinates along warp and weft."""
+    x, y = warp[:2]
+    size = np.hypot(x, y)
+    if warp[2] != 0.0 or not size > 0:
+        raise ConfigError(path, "is no direction in the mesh's plane", warp, "give such as [1, 1, 0]")
+    return np.array([[x, -y], [y, x]]) / size
 
 
 def _axes(path: str, section: schema.Cloth) -> np.ndarray:
