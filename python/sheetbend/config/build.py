@@ -26,6 +26,7 @@ from .errors import located
 from .moment import Moment
 from .scene_schema import SceneSection
 from .scenes import Particles, build_scene
+from .winds import check_still
 
 SUBSTEPS = 10
 OPTIONAL = ("particles", "constraints", "point_mass", "force")
@@ -112,6 +113,8 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
         moment = Moment(
             recording.piece(*(section.fit if section.static and section.fit else (t0, None))), t0, section.static
         )
+    if section.static or section.start == "equilibrium":
+        check_still(f"{path}.static" if section.static else f"{path}.start", config.scene)
     ropes = _shown(config, section, path)
     shared = not section.marker
     markers = config.marker if shared else section.marker
