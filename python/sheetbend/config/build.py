@@ -49,10 +49,12 @@ class Study:
         refine = None
         if fit.halve_step or fit.double_segments:
             finer = (lambda: build(self.config, self.folder, finer=2).experiments) if fit.double_segments else None
-            refine = Refinement(halve_step=fit.halve_step, finer=finer)
+            refine = Refinement(halve_step=fit.halve_step, finer=finer, linear=fit.linear_refits)
         return {
             "optimizer": fit.optimizer,
             "starts": fit.starts,
+            "windows": fit.windows,
+            "tolerance": fit.tolerance,
             "refine": refine,
             "leave_one_out": fit.leave_one_out,
             "max_iterations": fit.max_iterations,
