@@ -174,6 +174,9 @@ class FitSection(Section):
         False,
         "instead of each of these refits one Gauss-Newton step with the Jacobian of the fit: a simulation each",
     )
+    profiles: bool = key(
+        True, "refit the others along weak parameters for their intervals; false: linear intervals, which cost nothing"
+    )
     leave_one_out: bool = key(False, "also predict every recording that holds nothing out by a fit to the others")
     strict: bool = key(False, "exit 3 when any requested parameter is not identifiable, not only when all are")
 
