@@ -23,6 +23,7 @@ Array = np.ndarray
 SUFFIX = ".gif"
 MOST_FRAMES, RATE = 75, 25.0  # drawn at most; and per second at most
 _DPI = 80
+_WITH_EDGES = 1000  # triangles: plain edges of more would hide colors and markers
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,9 @@ def _picture(motion: Motion, shown: Array, title: str) -> tuple[Figure, Any]:
     sheets = []
     if strains:
         every = np.concatenate([values for own in strains.values() for values in own.values()])
-        colors = field_colors(np.append(np.minimum(every, np.quantile(every, 0.995)), 0.0), line=0.2)
+        sparse = sum(len(c.mesh.triangles) for c in cloths) <= _WITH_EDGES
+        shades = np.append(np.minimum(every, np.quantile(every, 0.995)), 0.0)
+        colors = field_colors(shades, line=0.2 if sparse else 0.05)
         for cloth in cloths:
             drawn = panel.add_collection3d(
                 art.Poly3DCollection(motion.positions[0, cloth.particles][cloth.mesh.triangles], **colors)
@@ -109,12 +112,12 @@ def _picture(motion: Motion, shown: Array, title: str) -> tuple[Figure, Any]:
         bar.ax.tick_params(colors=INK, labelsize=8)
         bar.outline.set_visible(False)
     ropes = [(r.particles, panel.plot([], [], [], color=ACCENT, linewidth=1.8)[0]) for r in motion.scene.ropes.values()]
-    dots = panel.plot([], [], [], "o", color=WARM, markersize=2.6, markeredgewidth=0, zorder=10)[0]
+    dots = panel.plot([], [], [], "o", color=WARM, markersize=3.2, markeredgewidth=0, zorder=10)[0]
     off = panel.add_collection3d(art.Line3DCollection(np.zeros((1, 2, 3)), colors=INK, linewidth=1.2, zorder=9))
     reach = [motion.positions[shown].reshape(-1, 3)]
     if motion.measured is not None:
         reach.append(_seen(motion.measured[shown].reshape(-1, 3)))
-        key(figure, [("measured markers", WARM), ("to their place", INK)])
+        key(figure, [("measured markers", WARM), ("to where they should be", INK)])
     box_in_space(panel, np.vstack(reach))
     clock = figure.text(0.02, 0.02, "", color=INK, fontsize=10)
 
