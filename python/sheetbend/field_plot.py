@@ -81,7 +81,9 @@ def plot_fields(mesh: TriangleMesh, fields: Sequence[Field], *, title: str = "")
 
 def _flat(panel: Axes, mesh: TriangleMesh, values: Array) -> Any:
     collections = require("matplotlib.collections", "plot")
-    drawn = panel.add_collection(collections.PolyCollection(mesh.corners, array=_masked(values), **_colors(values)))
+    drawn = panel.add_collection(
+        collections.PolyCollection(mesh.corners, array=_masked(values), **field_colors(values))
+    )
     _frame(panel, mesh)
     return drawn
 
@@ -90,7 +92,7 @@ def _at_places(panel: Axes, mesh: TriangleMesh, places: Places, values: Array) -
     collections = require("matplotlib.collections", "plot")
     panel.add_collection(collections.PolyCollection(mesh.corners, facecolor="none", edgecolor=PALE, linewidth=0.6))
     at = np.einsum("kc,kcx->kx", places.weights, mesh.corners[places.triangles])
-    colors = {k: v for k, v in _colors(values).items() if k in ("cmap", "norm")}
+    colors = {k: v for k, v in field_colors(values).items() if k in ("cmap", "norm")}
     x, y = at.T
     drawn = panel.scatter(x, y, s=42, c=_masked(values), edgecolors=GRAY, linewidths=0.4, zorder=3, **colors)
     _frame(panel, mesh)
@@ -111,18 +113,18 @@ def _in_space(panel: Any, mesh: TriangleMesh, field: Field, values: Array) -> An
     art = require("mpl_toolkits.mplot3d.art3d", "plot")
     x = finite("positions", field.positions, mesh.vertices.shape, InputError)
     drawn = panel.add_collection3d(
-        art.Poly3DCollection(x[mesh.triangles], array=_masked(values), **_colors(values, line=0.25))
+        art.Poly3DCollection(x[mesh.triangles], array=_masked(values), **field_colors(values, line=0.25))
     )
     shown = [x]
     if field.measured is not None:
         seen = np.asarray(field.measured)[np.isfinite(field.measured).all(axis=1)]
         panel.plot(*seen.T, "o", color=WARM, markersize=2.6, markeredgewidth=0, zorder=10)
         shown.append(seen)
-    _box(panel, np.vstack(shown))
+    box_in_space(panel, np.vstack(shown))
     return drawn
 
 
-def _box(panel: Any, points: Array) -> None:
+def box_in_space(panel: Any, points: Array) -> None:
     """Axes that hold the points, all to one scale; a thin direction keeps a fifth of the widest."""
     low, high = points.min(axis=0), points.max(axis=0)
     size = np.maximum(high - low, 0.2 * (high - low).max())
@@ -141,7 +143,7 @@ def _box(panel: Any, points: Array) -> None:
     panel.view_init(elev=18, azim=-58)
 
 
-def _colors(values: Array, line: float = 0.0) -> dict[str, Any]:
+def field_colors(values: Array, line: float = 0.0) -> dict[str, Any]:
     """Colors of a field; both ends alike far from zero where it has both signs."""
     colors = require("matplotlib.colors", "plot")
     seen = values[np.isfinite(values)]

@@ -16,13 +16,14 @@ from .experiment import Experiment
 from .floors import solver_floors
 from .identifiability import Identifiability, identify
 from .leave_one_out import MEANING, companions, each_left_out
-from .optimizers import Minimum, Observer, minimize, refit
+from .optimizers import Minimum, Observer, refit
 from .parameters import Parameter, Parameters
 from .prediction import Comparison, compare, predicted_values
 from .problem import FitProblem, ParameterLike, as_parameters
 from .recording import Recording
 from .result import Estimate, FitResult, Given, RecordingFit, Refit, Start
 from .scene import Scene
+from .search import Search
 
 PROFILE_TOLERANCE = 1e-7  # relative, of the cost: an interval's rise is many times that
 Systematic = Callable[[FitProblem, np.ndarray], Mapping[str, float]]
@@ -51,6 +52,13 @@ class Fit:
         """All parameters' values by (expanded) name."""
         return self.result.values
 
+    def values_of(self, experiment: Experiment) -> dict[str, float]:
+        """Every quantity of an experiment's scene: as fitted, the private ones its own; else as the scene has it."""
+        return {
+            name: self.values.get(f"{name}[{experiment.name}]", self.values.get(name, quantity.value))
+            for name, quantity in experiment.scene.quantities.items()
+        }
+
     def report(self) -> str:
         """The report as plain text."""
         return self.result.report()
@@ -67,6 +75,8 @@ def fit(
     *,
     optimizer: str = "auto",
     starts: Sequence[Mapping[str, float]] = (),
+    windows: Sequence[float] = (),
+    tolerance: float = 1e-10,
     refine: Refinement | None = None,
     systematic: Systematic | None = None,
     leave_one_out: bool = False,
@@ -83,6 +93,9 @@ def fit(
         parameters: what to fit: names of quantities, `Parameter`s, or a mapping from name to fields of `Parameter`.
         optimizer: "ceres", "scipy", or "auto" (Ceres where it was built).
         starts: further starting values by name; the best end wins, all are reported.
+        windows: s, increasing: so much of every motion from its scene's start on is fitted first, one after another,
+            each from where the one before ended; for a start far off, from which the whole motion diverges or misleads.
+        tolerance: relative change of the cost that counts as none.
         refine: also refit on a finer discretization, and count what that moves as a part of the intervals (see
             `discretization`).
         systematic: (problem, internal minimum) -> half-widths of what else the intervals are to count, by parameter, in
@@ -90,7 +103,7 @@ def fit(
         leave_one_out: also predict every recording that holds nothing out by a fit to the others.
         profiles: refit the others along the worst parameters for their intervals; without, intervals are the linear
             ones, which cost nothing beside the fit.
-        max_iterations: per start.
+        max_iterations: per start and window.
         threads: over experiments and Jacobian columns; the result does not depend on it.
         progress: called after every iteration.
 
@@ -104,9 +117,9 @@ def fit(
     """
     experiments = _experiments(scene, recording, experiment)
     wanted = as_parameters(parameters, experiments)
-    for option, given in (("max_iterations", max_iterations), ("threads", threads)):
-        if given < 1:
-            raise InputError(option, "must be positive", given, "give at least 1")
+    if threads < 1:
+        raise InputError("threads", "must be positive", threads, "give at least 1")
+    search = Search(optimizer, starts, windows, max_iterations, tolerance, progress)
     began = time.perf_counter()
     fitted = [e for e in experiments if e.predict is None]
     if not fitted:
@@ -120,7 +133,7 @@ def fit(
         for e in fitted:
             companions(e, fitted, wanted)
     problem = FitProblem(fitted, wanted, threads=threads)
-    ends, name, interrupted = _minimize_all(problem, optimizer, starts, max_iterations, progress)
+    ends, name, interrupted = search.run(problem)
     best = ends[0]
     values = problem.parameters.to_physical(best.u)
 
@@ -151,6 +164,8 @@ def fit(
         estimates=judged.estimates,
         recordings=tuple(_errors(c, count, left_out) for c in comparisons),
         cost=best.cost,
+        first_cost=best.first,
+        jacobian_seconds=problem.seconds.get(True),
         rows=problem.core.data_rows,
         optimizer=name,
         iterations=best.iterations,
@@ -196,40 +211,6 @@ def _experiments(
     if not experiments:
         raise InputError("experiments", "are empty", 0, "give at least one")
     return experiments
-
-
-def _minimize_all(
-    problem: FitProblem,
-    optimizer: str,
-    starts: Sequence[Mapping[str, float]],
-    max_iterations: int,
-    progress: Observer | None,
-) -> tuple[list[Minimum], str, bool]:
-    """Ends of all starts, best first; the optimizer's name; whether Ctrl-C ended the search."""
-    first = problem.parameters.to_physical(problem.parameters.initial())
-    points = [problem.parameters.initial()]
-    for changes in starts:
-        unknown = set(changes) - set(problem.parameters.free)
-        if unknown:
-            raise InputError(
-                "starts", "name no free parameter", sorted(unknown), f"use: {', '.join(problem.parameters.free)}"
-            )
-        points.append(problem.parameters.to_internal(first | dict(changes)))
-    ends: list[Minimum] = []
-    interrupted, name = False, ""
-    for u in points:
-        try:
-            end, name = minimize(problem, u, optimizer, max_iterations, observe=progress)
-        except KeyboardInterrupt:  # before the first point of this start
-            if not ends:
-                raise
-            interrupted = True
-            break
-        ends.append(end)
-        if end.interrupted:
-            interrupted = True
-            break
-    return sorted(ends, key=lambda m: m.cost), name, interrupted
 
 
 def _judge(

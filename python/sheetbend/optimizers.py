@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,16 +19,18 @@ OPTIMIZERS = ("auto", "ceres", "scipy")
 
 @dataclass(frozen=True)
 class Progress:
-    """One iteration: its number, the cost (half the sum of squares) and the internal point."""
+    """One iteration: its number, the cost (half the sum of squares), the internal point, and the length [s] of the
+    window that is fitted first, if one is."""
 
     iteration: int
     cost: float
     u: np.ndarray
+    window: float | None = None
 
 
 @dataclass(frozen=True)
 class Minimum:
-    """Where an optimizer ended; `interrupted` by Ctrl-C, with its best so far."""
+    """Where an optimizer ended; `interrupted` by Ctrl-C, with its best so far. `first` is the cost where it began."""
 
     u: np.ndarray
     cost: float
@@ -37,6 +39,7 @@ class Minimum:
     converged: bool
     interrupted: bool
     message: str
+    first: float | None = None
 
 
 Observer = Callable[[Progress], None]
@@ -75,9 +78,10 @@ def minimize(
     ok, r, _ = problem.evaluate(u, jacobian=False)
     if not ok:
         raise SheetbendError(f"the fit cannot start: {problem.core.failure or 'a residual is not finite'}")
-    best = _Best(observe, u, 0.5 * float(r @ r))
+    first = 0.5 * float(r @ r)
     run = _ceres if name == "ceres" else _scipy
-    return run(problem, np.array(u, dtype=float), max_iterations, tolerance, best), name
+    end = run(problem, np.array(u, dtype=float), max_iterations, tolerance, _Best(observe, u, first))
+    return replace(end, first=first), name
 
 
 def refit(
@@ -155,6 +159,7 @@ def _scipy(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: f
         nonlocal count
         if last["u"] is None or not np.array_equal(last["u"], at) or (jacobian and last["J"] is None):
             count += 1
+            jacobian |= problem.cheap_jacobian  # most steps are taken, and then it is needed anyway
             ok, r, J = problem.evaluate(at, jacobian)
             # SciPy shortens its step where a residual is not finite.
             last.update(

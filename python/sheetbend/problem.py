@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -16,6 +17,7 @@ from .quantities import Quantity
 from .recording import Recording
 
 ParameterLike = Parameter | Mapping[str, Any] | None
+CHEAP = 3.0  # times the residuals: a Jacobian that costs less is made with them
 
 
 def quantities_of(experiments: Sequence[Experiment]) -> dict[str, Quantity]:
@@ -80,6 +82,7 @@ class FitProblem:
         experiments: in order.
         parameters: with private ones expanded to one per experiment that has them.
         core: the compiled problem.
+        seconds: that the last evaluation from here took, with (True) and without a Jacobian.
     """
 
     def __init__(
@@ -93,6 +96,7 @@ class FitProblem:
         self.experiments = tuple(experiments)
         self.given, self.threads = parameters, threads
         self._last: tuple[np.ndarray, tuple[bool, np.ndarray, np.ndarray]] | None = None
+        self.seconds: dict[bool, float] = {}
         self.recordings = tuple(recordings if recordings is not None else (e.fitted() for e in experiments))
         names = [e.name for e in experiments]
         if len(set(names)) != len(names):
@@ -187,11 +191,20 @@ class FitProblem:
     def evaluate(self, u: np.ndarray, jacobian: bool = True) -> tuple[bool, np.ndarray, np.ndarray]:
         """(ok, residuals (rows,), Jacobian (rows, free)); rows of data first, then priors. Not ok where the physics
         has no answer. The last Jacobian is kept: everything that is told of a minimum asks for it."""
-        if not jacobian:
-            return self.core.evaluate(u, False)
-        if self._last is None or not np.array_equal(self._last[0], u):
-            self._last = np.array(u, dtype=float), self.core.evaluate(u, True)
-        return self._last[1]
+        if jacobian and self._last is not None and np.array_equal(self._last[0], u):
+            return self._last[1]
+        began = time.perf_counter()
+        found = self.core.evaluate(u, jacobian)
+        if found[0]:
+            self.seconds[jacobian] = time.perf_counter() - began
+        if jacobian:
+            self._last = np.array(u, dtype=float), found
+        return found
+
+    @property
+    def cheap_jacobian(self) -> bool:
+        """Whether a Jacobian costs little more than the residuals alone, as where both share the factors of a cloth."""
+        return True in self.seconds and self.seconds[True] < CHEAP * self.seconds.get(False, 0.0)
 
     def simulate(self, u: np.ndarray) -> list[np.ndarray]:
         """Simulated markers (frames, markers, 3) of every experiment."""

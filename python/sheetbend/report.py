@@ -207,6 +207,11 @@ def _correlations(result: FitResult) -> Section:
 
 def _course(result: FitResult) -> Section:
     notes = [("cost", f"{result.cost:.6g} over {result.rows:,} residuals, {len(result.estimates)} free parameters")]
+    if result.first_cost is not None:
+        fell = f", {result.first_cost / result.cost:,.3g} times the end's" if result.cost > 0 else ""
+        notes.append(("at the start", f"{result.first_cost:.6g}{fell}"))
+    if result.jacobian_seconds is not None:
+        notes.append(("a Jacobian took", f"{result.jacobian_seconds:.3g} s"))
     if result.autocorrelation_time > 1.05:
         time = result.autocorrelation_time
         words = f"one in {time:.3g} counts as independent; the intervals allow for it"

@@ -136,6 +136,8 @@ class FitResult:
         baseline: what the no-physics baseline predicts, in words.
         held_out_is: what was held out, in words, where it is not a part of each recording.
         cost: half the sum of squared residuals, priors included.
+        first_cost: that of the best start's first point; None where the motion diverges there.
+        jacobian_seconds: what one Jacobian took at the end; None where none was made from Python.
         rows: number of data residuals.
         autocorrelation_time: frames of residual that count as one, 1 when they are independent.
         starts: the ends of all starts, best first.
@@ -163,6 +165,8 @@ class FitResult:
     starts: tuple[Start, ...] = ()
     refits: tuple[Refit, ...] = ()
     warnings: tuple[str, ...] = ()
+    first_cost: float | None = None
+    jacobian_seconds: float | None = None
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of that name; KeyError names the ones there are."""

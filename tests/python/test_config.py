@@ -322,6 +322,13 @@ class TestValues:
         assert e.scene.quantities["rope_bend_damping"].value == 0.05
         assert tomllib.loads((folder / "deeper" / "fitted.toml").read_text())["recording"][0]["file"] == "../swing.npz"
 
+    def test_short_windows_are_for_the_first_start_only(self, folder: Path) -> None:
+        study = load(written(folder, ROPE + "\n[fit]\nwindows = [0.1, 0.2]\nthreads = 2\n"))
+        assert study.options["windows"] == [0.1, 0.2]
+        write(with_values(study.config, {"rope_EI": 3e-3}), folder / "fitted.toml", folder)
+        again = load(folder / "fitted.toml")
+        assert again.options["windows"] == [] and again.options["threads"] == 2
+
     def test_a_value_on_its_bound_stays_inside(self, folder: Path) -> None:
         new = with_values(parse(written(folder, ROPE)), {"rope_EI": 1.0 + 2e-16 * 8})
         assert new.parameters["rope_EI"].initial == 1.0

@@ -171,6 +171,55 @@ def test_a_grip_of_one_marker_keeps_its_distance(folder: Path) -> None:
     )
 
 
+AIR = "drag_linear = 0.2\nair_normal = 0.7\nair_tangential = 0.02\n"
+WIND = "[scene.wind]\nvelocity = [0.5, 2.0, 0.0]\n\n[[recording]]"
+GUST = "[scene.wind]\nvelocity = [[0.0, 0.0, 0.0], [0.5, 2.0, 0.0]]\ntimes = [0.0, 0.1]\n\n[[recording]]"
+
+
+@pytest.mark.parametrize("wind", [WIND, GUST, "[[recording]]"])
+def test_air_is_that_of_add_air(folder: Path, wind: str) -> None:
+    (e,) = load(changed(folder, ("drag_linear = 0.2\n", AIR), ("[[recording]]", wind))).experiments
+    by_hand, cloth = scene(15.0)
+    given = {WIND: {"wind": [0.5, 2, 0]}, GUST: {"wind": [[0, 0, 0], [0.5, 2, 0]], "times": [0, 0.1]}}.get(wind, {})
+    by_hand.add_air(cloth.particles[cloth.mesh.triangles], 0.7, 0.02, **given)
+    assert {n: q.value for n, q in e.scene.quantities.items()} == {n: q.value for n, q in by_hand.quantities.items()}
+    np.testing.assert_allclose(e.scene.compiled.inputs(), by_hand.compiled.inputs(), rtol=1e-12, atol=1e-12)
+
+
+def test_wind_and_coefficients_start_where_their_parameters_do(folder: Path) -> None:
+    wanted = "[parameters.wind_y]\ninitial = 3.0\n\n[parameters.cloth_air_normal]\ninitial = 0.5\n\n[output]"
+    edits = ("drag_linear = 0.2\n", AIR), ("[[recording]]", WIND), ("[output]", wanted)
+    (e,) = load(changed(folder, *edits)).experiments
+    values = {name: q.value for name, q in e.scene.quantities.items()}
+    assert (values["wind_x"], values["wind_y"], values["cloth_air_normal"]) == (0.5, 3.0, 0.5)
+
+
+def test_a_wind_that_starts_from_zero_has_an_equilibrium(folder: Path) -> None:
+    at_rest = ("sigma = 1e-4", 'sigma = 1e-4\nstart = "equilibrium"')
+    load(changed(folder, ("drag_linear = 0.2\n", AIR), ("[[recording]]", GUST), at_rest))
+    with pytest.raises(sb.ConfigError, match="state of rest") as caught:
+        load(changed(folder, ("drag_linear = 0.2\n", AIR), ("[[recording]]", WIND), at_rest))
+    assert caught.value.field == "recording[0].start"
+
+
+@pytest.mark.parametrize(
+    ("wind", "field", "fix"),
+    [
+        ("velocity = [1, 2]", "scene.wind.velocity", "3"),
+        ("velocity = [[1, 2, 3], [4, 5, 6]]", "scene.wind", "give the time of each"),
+        ("velocity = [1, 2, 3]\ntimes = [0, 1]", "scene.wind", "not one velocity at each of its 2 times"),
+        ("velocity = [[1, 2, 3], [4, 5, 6]]\ntimes = [1, 0]", "scene.wind.times", "must increase"),
+        ("speed = 3.0", "scene.wind.velocity", "add velocity to [scene.wind]"),
+    ],
+)
+def test_winds_that_are_refused(folder: Path, wind: str, field: str, fix: str) -> None:
+    table = f"[scene.wind]\n{wind}\n\n[[recording]]"
+    with pytest.raises(sb.ConfigError) as caught:
+        load(changed(folder, ("drag_linear = 0.2\n", AIR), ("[[recording]]", table)))
+    assert caught.value.field == field
+    assert fix in str(caught.value)
+
+
 @pytest.mark.parametrize(
     ("law", "quantity"),
     [
@@ -346,6 +395,8 @@ BAD = [
         "scene.cloth[0].grip[0]",
         "[[scene.drive]]",
     ),
+    ("drag_linear = 0.2", "air_normal = -0.2", "scene.cloth[0].air_normal", "greater than 0"),
+    (TABLE, f"[scene.wind]\nvelocity = [1, 0, 0]\n{TABLE}", "scene", "give air_normal to a [[scene.cloth]]"),
     (TABLE, f'[scene.cloth.law]\nkind = "exponential"\nwarp = 1.0\n{TABLE}', "scene.cloth[0].law", "one number each"),
     (TABLE, f'[scene.cloth.law]\nkind = "spline"\nwarp = [1.0]\n{TABLE}', "scene.cloth[0].law", "four ratios"),
     (

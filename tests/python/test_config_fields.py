@@ -28,6 +28,7 @@ WHOLE: dict[str, Any] = {
                 "density": 0.1,
                 "warp": 100.0,
                 "shear": 10.0,
+                "air_normal": 0.6,
                 "mesh": {"kind": "grid", "width": 0.3, "height": 0.3, "nx": 3, "ny": 3},
                 "law": {"kind": "exponential", "warp": 10.0, "weft": 10.0, "shear": 5.0},
                 "set": [{"name": "clips", "points": [[0, 0, 0]]}],
@@ -40,6 +41,7 @@ WHOLE: dict[str, Any] = {
         "constraints": [{"kind": "distance", "particles": [["a", "rope:0"]]}],
         "point_mass": [{"name": "p", "particle": "a", "mass": 1.0}],
         "force": [{"particles": ["a"], "force": [0, 0, 1]}],
+        "wind": {"velocity": [1, 0, 0]},
         "drive": [{"particles": ["a"], "markers": ["m0"]}],
         "quantities": {"NAME": {}},
     },
@@ -160,7 +162,7 @@ def test_missing_out_of_range_and_not_finite(tmp_path: Path, place: Place, name:
     if is_number(field.annotation):
         for value in (math.nan, math.inf, -math.inf):
             refused(tmp_path, place, name, value)
-    if is_vector(field.annotation) and name not in ("times", "factors"):  # which may have any length
+    if is_vector(field.annotation) and name not in ("times", "factors", "windows"):  # which may have any length
         for vector in ([], [0.0], [0.0] * 4, [0.0, math.nan], [0.0, 0.0, math.inf]):
             refused(tmp_path, place, name, vector)
 

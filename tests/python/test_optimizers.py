@@ -9,6 +9,7 @@ import signal
 import numpy as np
 import pytest
 import sheetbend as sb
+import sheetbend.search as search
 from pytest import approx
 from sheetbend.discretization import Refinement
 from sheetbend.optimizers import Progress, has_ceres, minimize
@@ -160,7 +161,7 @@ def test_ctrl_c_during_the_refits_keeps_the_converged_values(monkeypatch):
 
 def test_ctrl_c_at_a_further_start_keeps_the_first(monkeypatch):
     whole = sb.fit([swinging()], parameters=WANTED)
-    exact, starts = fitting.minimize, []
+    exact, starts = search.minimize, []
 
     def second_is_interrupted(*arguments: object, **options: object) -> object:
         starts.append(arguments)
@@ -168,10 +169,74 @@ def test_ctrl_c_at_a_further_start_keeps_the_first(monkeypatch):
             raise KeyboardInterrupt
         return exact(*arguments, **options)
 
-    monkeypatch.setattr(fitting, "minimize", second_is_interrupted)
+    monkeypatch.setattr(search, "minimize", second_is_interrupted)
     found = sb.fit([swinging()], parameters=WANTED, starts=[{"rope_EI": 1e-2}, {"rope_EI": 1e-3}])
     assert len(starts) == 2 and len(found.result.starts) == 1
     assert found.result.interrupted and found.values == whole.values
+
+
+def test_short_windows_come_first_and_end_in_the_same_minimum():
+    whole, seen = sb.fit([swinging(), hanging()], parameters=WANTED), []
+    found = sb.fit([swinging(), hanging()], parameters=WANTED, windows=[0.05, 0.15], progress=seen.append)
+    lengths = [progress.window for progress in seen]
+    assert list(dict.fromkeys(lengths)) == [0.05, 0.15, None]
+    firsts = [seen[lengths.index(length)].cost for length in (0.05, 0.15, None)]
+    assert firsts[0] < whole.result.first_cost  # five frames of it
+    assert firsts[2] < 1e-2 * whole.result.first_cost
+    assert found.result.first_cost == whole.result.first_cost
+    for name in WANTED:
+        assert found[name].value == approx(whole[name].value, abs=1e-2 * whole[name].half_width)
+
+
+def test_ctrl_c_in_a_window_keeps_its_best_point(monkeypatch):
+    pressed = []
+
+    def observe(progress: Progress) -> None:
+        if progress.window == 0.05 and progress.iteration == 3 and not pressed:
+            pressed.append(progress)
+            signal.raise_signal(signal.SIGINT)
+
+    found = sb.fit([swinging()], parameters=WANTED, windows=[0.05], optimizer="scipy", progress=observe)
+    problem = problem_of(swinging())
+    _, r, _ = problem.evaluate(problem.parameters.to_internal(found.values), jacobian=False)
+    assert pressed and found.result.interrupted
+    assert found.result.cost == approx(0.5 * r @ r, rel=1e-9)
+
+
+@pytest.mark.parametrize("windows", [[0.1, 0.1], [-0.1], [float("nan")], [0.0]])
+def test_windows_that_do_not_increase_are_refused(windows):
+    with pytest.raises(sb.InputError, match="windows"):
+        sb.fit([swinging()], parameters=WANTED, windows=windows)
+
+
+def test_a_window_without_a_frame_is_refused():
+    with pytest.raises(sb.InputError, match="hold no fitted frame of 'swing0'"):
+        sb.fit([swinging(fit=(0.1, 0.3), start_time=0.0)], parameters=WANTED, windows=[0.05])
+
+
+def test_a_cheap_jacobian_comes_with_the_residuals():
+    problem = problem_of(swinging())
+    u = problem.parameters.initial()
+    assert not problem.cheap_jacobian
+    problem.evaluate(u, jacobian=False)
+    problem.evaluate(u)
+    for ratio, cheap in ((1.5, True), (20.0, False)):
+        problem.seconds = {False: 1.0, True: ratio}
+        assert problem.cheap_jacobian is cheap
+    calls, exact = [], problem.evaluate
+    for ratio in (1e-9, 1e9):  # of the seconds that a Jacobian takes to those of the residuals
+        calls.clear()
+
+        def noted(at, jacobian=True, ratio=ratio):
+            calls.append(jacobian)
+            found = exact(at, jacobian)
+            problem.seconds = {False: 1.0, True: ratio}
+            return found
+
+        problem.evaluate = noted
+        end, _ = minimize(problem, u, "scipy")
+        assert end.converged
+        assert (False in calls[2:]) is (ratio > 1)
 
 
 def test_one_step_with_the_fits_jacobian_moves_what_a_refit_moves():

@@ -27,10 +27,7 @@ def cloth_figures(found: Fit, c: Comparison) -> dict[str, Figure]:
     e = c.experiment
     if not e.scene.cloths:
         return {}
-    values = {
-        q: found.values.get(f"{q}[{e.name}]", found.values.get(q, quantity.value))
-        for q, quantity in e.scene.quantities.items()
-    }
+    values = found.values_of(e)
     frame, positions = _state(c, values)
     when = "at rest" if e.static else f"at {c.recording.times[frame]:.3g} s"
     rms = _residuals(c)

@@ -87,15 +87,11 @@ def _liveliest(c: Comparison) -> plotting.Motion:
 
 def _line(found: Fit, c: Comparison) -> np.ndarray:
     """The rope from end to end; the markers alone where there is not exactly one rope."""
-    scene, name = c.experiment.scene, c.experiment.name
+    scene = c.experiment.scene
     if len(scene.ropes) != 1:
         return c.simulated[0]
     (rope,) = scene.ropes.values()
-    values = {
-        q: found.values.get(f"{q}[{name}]", found.values.get(q, quantity.value))
-        for q, quantity in scene.quantities.items()
-    }
-    return equilibrium(scene, values=values).positions[rope.particles]
+    return equilibrium(scene, values=found.values_of(c.experiment)).positions[rope.particles]
 
 
 def _trajectories(c: Comparison) -> Figure:

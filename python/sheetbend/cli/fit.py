@@ -18,6 +18,7 @@ from ..report import plain, rich_report
 from ..result import FitResult
 from .figures import write_figures
 from .gripped import fit_ropes, load_ropes
+from .movies import OPTION, MoviePath, check_before_fit, write_movies
 from .outcome import Outcome, code_of, run
 from .progress import Iterations
 from .screen import show
@@ -34,6 +35,7 @@ def fit(
     resume: Annotated[
         Path | None, typer.Option(help="Start from the values of an earlier fit.json.", show_default=False)
     ] = None,
+    movie: MoviePath = None,
     strict: Annotated[
         bool, typer.Option("--strict", help="Exit 3 when any parameter is not identifiable, not only when all are.")
     ] = False,
@@ -42,18 +44,24 @@ def fit(
     ] = False,
 ) -> None:
     """Fit parameters to recordings. Ctrl-C stops at the best point so far and still reports."""
-    run(lambda console: _fit(console, config, output, resume, strict), json)
+    run(lambda console: _fit(console, config, output, resume, movie, strict), json)
 
 
-def _fit(console: Console, path: Path, output: Path | None, resume: Path | None, strict: bool) -> Outcome:
+def _fit(
+    console: Console, path: Path, output: Path | None, resume: Path | None, movie: Path | None, strict: bool
+) -> Outcome:
     config = parse_any(path)
     if isinstance(config, GrippedConfig):
         if resume is not None:
             fix = "leave it out: the recipe finds its own starts"
             raise ConfigError("--resume", "is not for ropes between grips", str(resume), fix)
+        if movie is not None:
+            raise ConfigError(OPTION, "is not for ropes between grips", str(movie), "leave it out")
         ropes = load_ropes(config, path.parent)
         return fit_ropes(console, config, ropes, _folder(console, config, output), strict)
     study = _study(config, path.parent, resume)
+    if movie is not None:
+        check_before_fit(movie, study.experiments)
     config, folder = study.config, _folder(console, config, output)
     fitted = [e for e in study.experiments if e.predict is None]
     problem = FitProblem(fitted, as_parameters(study.parameters, study.experiments))
@@ -63,6 +71,10 @@ def _fit(console: Console, path: Path, output: Path | None, resume: Path | None,
     show(console, lambda: rich_report(found.result), lambda: plain(found.result))
     files = _write(found, study, folder)
     console.print(f"\nwritten to {folder}: {', '.join(files)}", soft_wrap=True)
+    if movie is not None:
+        movies = write_movies(found, movie)
+        console.print(f"moving picture: {', '.join(movies)}", soft_wrap=True)
+        files += movies
     data = found.result.to_dict() | {"name": config.experiment.name, "output": str(folder), "files": files}
     return Outcome(data, code_of([found.result], strict or config.fit.strict))
 

@@ -46,6 +46,9 @@ class Iterations:
         parts = [f"{name} {values[name]:.4g} {self.parameters[name].unit}".rstrip() for name in shown]
         more = len(self.parameters.free) - len(shown)
         line = Text.assemble(
-            (f"iteration {progress.iteration:3d}", "bold"), f"  cost {progress.cost:.6g}  ", ("  ".join(parts), "cyan")
+            "" if progress.window is None else (f"first {progress.window:g} s  ", "dim"),
+            (f"iteration {progress.iteration:3d}", "bold"),
+            f"  cost {progress.cost:.6g}  ",
+            ("  ".join(parts), "cyan"),
         )
         return line.append(f"  and {more} more", style="dim") if more else line

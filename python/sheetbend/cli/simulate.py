@@ -14,11 +14,13 @@ from ..config import Study, build, parse, scene_alone
 from ..equilibrium import equilibrium
 from ..errors import ConfigError
 from ..experiment import Experiment
+from ..movie import Motion, check_movie, movie_paths, save_movie
 from ..scene import Scene
 from ..simulate import Trajectory
 from ..simulate import simulate as run_simulation
 from ..solver import Solver
 from .meshes import MeshFormat, write_meshes
+from .movies import OPTION, MoviePath
 from .outcome import Outcome, run
 
 FRAME = 0.01  # s between frames where no recording tells
@@ -54,12 +56,13 @@ def simulate(
             show_default=False,
         ),
     ] = None,
+    movie: MoviePath = None,
     json: Annotated[
         bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
     ] = False,
 ) -> None:
     """Simulate a scene and write its trajectory as NPZ: times, positions, velocities and the constraints' forces."""
-    run(lambda console: _simulate(console, config, output, duration, recording, mesh), json)
+    run(lambda console: _simulate(console, config, output, duration, recording, mesh, movie), json)
 
 
 def _simulate(
@@ -69,6 +72,7 @@ def _simulate(
     duration: float | None,
     recording: str | None,
     mesh: MeshFormat | None,
+    movie: Path | None,
 ) -> Outcome:
     if duration is not None and not (np.isfinite(duration) and duration > 0):
         raise ConfigError("--duration", "must be positive", duration, "give s")
@@ -78,9 +82,14 @@ def _simulate(
     tasks = _tasks(study, duration, recording)
     if mesh is not None and not any(task.scene.cloths for task in tasks):
         raise ConfigError("--mesh", "needs a cloth, and the scene has none", mesh.value, "leave it out")
+    moving = [task for task in tasks if not task.static]
+    if movie is not None:
+        check_movie(OPTION, movie, [task.scene for task in moving])
+    movies = {} if movie is None else movie_paths(movie, [task.name for task in moving])
     folder.mkdir(parents=True, exist_ok=True)
     console.print(f"[bold]{name}[/]  {study.config.experiment.about}")
-    return Outcome({"name": name, "simulated": {task.name: _run(console, task, folder, mesh) for task in tasks}})
+    done = {task.name: _run(console, task, folder, mesh, movies.get(task.name)) for task in tasks}
+    return Outcome({"name": name, "simulated": done})
 
 
 def _tasks(study: Study, duration: float | None, recording: str | None) -> list[Task]:
@@ -107,13 +116,16 @@ def _task(e: Experiment, duration: float | None) -> Task:
     return Task(e.name, e.scene, e.solver, np.arange(0.0, length + frame / 2, frame), at_rest=e.start == "equilibrium")
 
 
-def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None) -> dict[str, Any]:
+def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, movie: Path | None) -> dict[str, Any]:
     motion = _motion(task)
     path = folder / f"{task.name}.npz"
     arrays: dict[str, Any] = {f"force_{group}": values for group, values in motion.forces.items()}
     np.savez_compressed(path, times=motion.times, positions=motion.positions, velocities=motion.velocities, **arrays)
     moved = np.linalg.norm(motion.positions - motion.positions[0], axis=2)
     written = {} if mesh is None else {"meshes": write_meshes(task.name, task.scene, motion, folder, mesh)}
+    if movie is not None:
+        save_movie(Motion(task.scene, motion.times, motion.positions), movie, task.name)
+        written["movie"] = [str(movie)]
     summary = {
         "npz": str(path),
         "frames": len(motion.times),
@@ -135,7 +147,7 @@ def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None) ->
         if task.static
         else f", moved up to {summary['largest_displacement']:.4g} m at up to {summary['largest_speed']:.4g} m/s"
     )
-    files = ", ".join([str(path), *written.get("meshes", [])])
+    files = ", ".join([str(path), *(file for made in written.values() for file in made)])
     console.print(f"  {task.name}: {summary['particles']} particles, {told}{reach}; {files}", soft_wrap=True)
     return summary
 

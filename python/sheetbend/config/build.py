@@ -26,6 +26,7 @@ from .errors import located
 from .moment import Moment
 from .scene_schema import SceneSection
 from .scenes import Particles, build_scene
+from .winds import check_still
 
 SUBSTEPS = 10
 OPTIONAL = ("cloth", "particles", "constraints", "point_mass", "force")
@@ -48,11 +49,14 @@ class Study:
         refine = None
         if fit.halve_step or fit.double_segments:
             finer = (lambda: build(self.config, self.folder, finer=2).experiments) if fit.double_segments else None
-            refine = Refinement(halve_step=fit.halve_step, finer=finer)
+            refine = Refinement(halve_step=fit.halve_step, finer=finer, linear=fit.linear_refits)
         return {
             "optimizer": fit.optimizer,
             "starts": fit.starts,
+            "windows": fit.windows,
+            "tolerance": fit.tolerance,
             "refine": refine,
+            "profiles": fit.profiles,
             "leave_one_out": fit.leave_one_out,
             "max_iterations": fit.max_iterations,
             "threads": fit.threads,
@@ -112,6 +116,8 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
         moment = Moment(
             recording.piece(*(section.fit if section.static and section.fit else (t0, None))), t0, section.static
         )
+    if section.static or section.start == "equilibrium":
+        check_still(f"{path}.static" if section.static else f"{path}.start", config.scene)
     ropes = _shown(config, section, path)
     shared = not section.marker
     markers = config.marker if shared else section.marker

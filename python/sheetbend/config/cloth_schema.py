@@ -126,6 +126,10 @@ class Cloth(Section):
     bend_damping: Finite | None = key(None, "Kelvin-Voigt time constant of bending", "s", gt=0)
     drag_linear: Finite | None = key(None, "linear air drag per area", "N s/m^3", gt=0)
     drag_quadratic: Finite | None = key(None, "quadratic air drag per area", "N s^2/m^4", gt=0)
+    air_normal: Finite | None = key(
+        None, "force of air along the normal of the triangles, air density * drag coefficient / 2", "kg/m^3", gt=0
+    )
+    air_tangential: Finite | None = key(None, "the same across the normal", "kg/m^3", gt=0)
     origin: Vector = key([0.0, 0.0, 0.0], "where the mesh's origin is placed", "m")
     x_axis: Vector = key([1.0, 0.0, 0.0], "where the mesh's x axis points")
     y_axis: Vector = key([0.0, 1.0, 0.0], "where its y axis points, perpendicular to `x_axis`")
@@ -139,3 +143,8 @@ class Cloth(Section):
         "nearest to it then",
         "s",
     )
+
+    @property
+    def in_air(self) -> bool:
+        """Whether air acts on its triangles."""
+        return self.air_normal is not None or self.air_tangential is not None

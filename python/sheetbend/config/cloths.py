@@ -19,6 +19,11 @@ from . import cloth_schema as schema
 from .errors import located
 from .moment import Moment
 
+_ELSEWHERE = {
+    *("name", "mesh", "law", "origin", "x_axis", "y_axis", "set", "pinned", "grip", "markers", "nearest_at"),
+    *("air_normal", "air_tangential"),
+}
+"""Keys of a cloth that are not arguments of `add_cloth`, or not as they stand."""
 _SQUARE = 1e-6  # of the product of their lengths: how far two axes may be from perpendicular
 
 
@@ -41,8 +46,7 @@ def build_cloth(
     mesh = coarse if finer == 1 else _placed(path, section, moment, folder, finer)
     pinned = [_members(f"{path}.pinned", mesh, name) for name in section.pinned]
     gripped = [_members(f"{path}.grip[{i}].set", mesh, grip.set) for i, grip in enumerate(section.grip)]
-    left_out = {"name", "mesh", "law", "origin", "x_axis", "y_axis", "set", "pinned", "grip", "markers", "nearest_at"}
-    fields = section.model_dump(exclude=left_out, exclude_none=True)
+    fields = section.model_dump(exclude=_ELSEWHERE, exclude_none=True)
     with located(path, section.name):
         held = np.unique(np.concatenate([np.zeros(0, dtype=int), *pinned, *gripped]))
         cloth = add_cloth(scene, mesh, section.name, law=_law(section.law), held=held, **fields)

@@ -31,6 +31,7 @@ HEADERS: dict[str, type[Section]] = {
     "[[scene.constraints]]": scene_schema.Constraints,
     "[[scene.point_mass]]": scene_schema.PointMass,
     "[[scene.force]]": scene_schema.Force,
+    "[scene.wind]": scene_schema.Wind,
     "[[scene.drive]]": scene_schema.Drive,
     "[scene.quantities.NAME]": scene_schema.ExtraQuantity,
     "[[recording]]": schema.RecordingSection,

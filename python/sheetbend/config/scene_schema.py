@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, Self
+
+from pydantic import model_validator
 
 from .cloth_schema import Cloth
 from .section import Finite, Name, Reference, Section, Vector, key
@@ -132,6 +134,28 @@ class Drive(Section):
     interpolation: Literal["cubic", "linear"] = key("cubic", "of the motion between frames")
 
 
+class Wind(Section):
+    """[scene.wind]: the wind around the cloths that have `air_normal` or `air_tangential`. A constant one is the
+    quantities wind_x, wind_y and wind_z."""
+
+    velocity: Vector | list[Vector] = key(..., "one, or one at each of the times", "m/s")
+    times: list[Finite] | None = key(
+        None,
+        "knots of a changing wind in the scene's time (0 = its start); linear between, constant outside",
+        "s",
+        min_length=1,
+    )
+
+    @model_validator(mode="after")
+    def _one_each(self) -> Self:
+        several = isinstance(self.velocity[0], list)
+        if self.times is None and several:
+            raise ValueError("has several velocities and no times|give the time of each, or one velocity")
+        if self.times is not None and not (several and len(self.velocity) == len(self.times)):
+            raise ValueError(f"has not one velocity at each of its {len(self.times)} times|give [[x, y, z], ...]")
+        return self
+
+
 class ExtraQuantity(Section):
     """A further named number, for marker offsets and clock shifts. One table each: [scene.quantities.NAME]."""
 
@@ -146,6 +170,7 @@ class SceneSection(Section):
 
     gravity: Vector | None = key(None, "the recording's own when left out, else [0, 0, -9.81]", "m/s^2")
     pin: list[Reference] = key([], "particles that are held where they start")
+    wind: Wind | None = key(None, "[scene.wind]; still air when left out")
     rope: list[Rope] = key([], "ropes")
     cloth: list[Cloth] = key([], "cloths")
     particles: list[Particles] = key([], "single particles")
@@ -156,3 +181,9 @@ class SceneSection(Section):
     force: list[Force] = key([], "forces over time")
     drive: list[Drive] = key([], "motion taken from markers")
     quantities: dict[Name, ExtraQuantity] = key({}, "further named numbers")
+
+    @model_validator(mode="after")
+    def _wind_blows_on_something(self) -> Self:
+        if self.wind is not None and not any(cloth.in_air for cloth in self.cloth):
+            raise ValueError("has a wind that blows on nothing|give air_normal to a [[scene.cloth]]")
+        return self

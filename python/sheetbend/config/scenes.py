@@ -19,6 +19,7 @@ from . import scene_schema as schema
 from .cloths import build_cloth
 from .errors import located
 from .moment import Moment
+from .winds import add_winds
 
 EARTH = (0.0, 0.0, -9.81)  # m/s^2
 
@@ -151,6 +152,7 @@ def build_scene(
         path = f"scene.cloth[{i}]"
         particles.free_name(path, cloth.name)
         particles.add_cloth(*build_cloth(scene, path, cloth, moment, folder, finer))
+    add_winds(scene, section)
     for i, some in enumerate(section.particles):
         path = f"scene.particles[{i}]"
         particles.free_name(path, some.name)

@@ -154,7 +154,14 @@ class FitSection(Section):
 
     optimizer: Literal["auto", "ceres", "scipy"] = key("auto", "Ceres where it was built, else SciPy")
     starts: list[dict[str, Finite]] = key([], "further starting values by name; the best end wins")
-    max_iterations: int = key(200, "per start", ge=1)
+    windows: list[Finite] = key(
+        [],
+        "increasing lengths: so much of every motion from its start on is fitted first, one after another; for a start "
+        "far off",
+        "s",
+    )
+    max_iterations: int = key(200, "per start and window", ge=1)
+    tolerance: Finite = key(1e-10, "relative change of the cost that counts as none", gt=0, lt=1)
     threads: int = key(1, "over recordings and derivatives; results do not depend on it", ge=1)
     halve_step: bool = key(
         False, "refit at half the substep; what moves, carried on to the limit, counts in the intervals"
@@ -163,6 +170,13 @@ class FitSection(Section):
         False,
         "refit with twice the segments in every rope and twice the cells in every cloth; what moves, carried on to the "
         "limit, counts in the intervals",
+    )
+    linear_refits: bool = key(
+        False,
+        "instead of each of these refits one Gauss-Newton step with the Jacobian of the fit: a simulation each",
+    )
+    profiles: bool = key(
+        True, "refit the others along weak parameters for their intervals; false: linear intervals, which cost nothing"
     )
     leave_one_out: bool = key(False, "also predict every recording that holds nothing out by a fit to the others")
     strict: bool = key(False, "exit 3 when any requested parameter is not identifiable, not only when all are")

@@ -1,0 +1,51 @@
+"""The moving pictures that `sheetbend fit` and `sheetbend simulate` write on request."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from ..equilibrium import equilibrium
+from ..experiment import Experiment
+from ..fit import Fit
+from ..movie import Motion, check_movie, movie_paths, save_movie
+from ..prediction import Comparison
+from ..simulate import simulate
+
+OPTION = "--movie"
+MoviePath = Annotated[
+    Path | None,
+    typer.Option(
+        OPTION,
+        help="Also write a moving picture (GIF) of cloths, colored by strain, and ropes; a fit's with the measured "
+        "markers. Several recordings: one file each, FILE_NAME.gif.",
+        show_default=False,
+    ),
+]
+
+
+def check_before_fit(path: Path, experiments: Sequence[Experiment]) -> None:
+    """Raise before the fit starts, see `movie.check_movie`."""
+    check_movie(OPTION, path, [e.scene for e in experiments if not e.static])
+
+
+def write_movies(found: Fit, path: Path) -> list[str]:
+    """One for every recording of a motion; gives the files."""
+    moving = [c for c in found.comparisons if not c.experiment.static]
+    paths = movie_paths(path, [c.experiment.name for c in moving])
+    for c in moving:
+        save_movie(_motion(found, c), paths[c.experiment.name], c.experiment.name)
+    return [str(file) for file in paths.values()]
+
+
+def _motion(found: Fit, c: Comparison) -> Motion:
+    """The fitted motion at the substeps nearest to the recorded frames."""
+    e, values = c.experiment, found.values_of(c.experiment)
+    times = np.rint(np.maximum(c.recording.times - e.t0, 0.0) / e.solver.h) * e.solver.h
+    start = equilibrium(e.scene, values=values).positions if e.start == "equilibrium" else None
+    positions = simulate(e.scene, times, e.solver, values, start).positions
+    return Motion(e.scene, c.recording.times, positions, c.recording.positions, c.simulated)
