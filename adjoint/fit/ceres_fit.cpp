@@ -2,10 +2,15 @@
 
 #include <ceres/ceres.h>
 
+#include <chrono>
 #include <cmath>
+#include <limits>
 
 namespace sheetbend {
 namespace {
+
+// A Jacobian that costs less than this many times the residuals alone is made with them: most steps are taken, and then Ceres asks for it.
+constexpr double cheap = 3.0;
 
 // All experiments are simulated once per point, here, before Ceres asks for residuals.
 class Point : public ceres::EvaluationCallback {
@@ -17,18 +22,24 @@ class Point : public ceres::EvaluationCallback {
         jacobian(static_cast<std::size_t>(evaluation.rows) * u.size()) {}
 
   void PrepareForEvaluation(bool with_jacobian, bool new_point) override {
-    if (!new_point && (!with_jacobian || has_jacobian_)) return;
+    if ((!new_point || u_ == at_) && (!with_jacobian || has_jacobian_)) return;
     if (status == EvaluationStatus::interrupted) return;
-    status =
-        evaluation_.call(evaluation_.problem, u_.data(), residual.data(), with_jacobian ? jacobian.data() : nullptr);
-    has_jacobian_ = with_jacobian;
+    const bool both = with_jacobian || seconds_[1] < cheap * seconds_[0];
+    const auto began = std::chrono::steady_clock::now();
+    status = evaluation_.call(evaluation_.problem, u_.data(), residual.data(), both ? jacobian.data() : nullptr);
+    if (status == EvaluationStatus::ok)
+      seconds_[both] = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+    has_jacobian_ = both;
+    at_ = u_;
     ++evaluations;
   }
 
  private:
   const EvaluationFunction& evaluation_;
   const std::vector<double>& u_;
+  std::vector<double> at_;
   bool has_jacobian_ = false;
+  double seconds_[2]{0.0, std::numeric_limits<double>::infinity()};  // of the last evaluation without, with a Jacobian
 
  public:
   std::vector<double> residual, jacobian;

@@ -192,6 +192,10 @@ def _unknown(result: FitResult) -> Section:
     for estimate in result.estimates:
         if estimate.verdict != "identified" and not any(gauge in estimate.words for gauge in result.gauges):
             notes.append((estimate.name, estimate.words))
+    if any(e.verdict == "at its floor" for e in result.estimates):
+        others = [e.name for e in result.estimates if e.verdict in ("identified", "weak")]
+        if others:
+            notes.append((", ".join(others), "doubtful too: a solver that makes up one number shifts those beside it"))
     return Section("What the data cannot tell", notes=tuple(notes))
 
 

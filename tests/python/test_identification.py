@@ -4,6 +4,7 @@ the substep."""
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import sheetbend as sb
 from pytest import approx
 from scipy.integrate import solve_ivp
 from sheetbend.problem import FitProblem, as_parameters
+from sheetbend.report import plain
 from support import observed_orders
 
 G = 9.81
@@ -186,6 +188,10 @@ def test_gauss_seidel_hides_the_stiffness():
     found = sb.fit(scene, recording, {"rope_EA": {"lower": 1.0, "upper": 1e6}}, markers=markers(at), solver=rough)
     assert found["rope_EA"].verdict == "at its floor"
     assert "sweep" in found["rope_EA"].words
+    beside = replace(found["rope_EA"], name="rope_density", verdict="identified", words="known to 1 %")
+    both = replace(found.result, estimates=(*found.result.estimates, beside))
+    assert "rope_density: doubtful too" in plain(both)
+    assert "doubtful" not in plain(found.result)
 
     soft = sb.rope(1.0, 20, density=0.05, EA=5.0)
     recording = seen(soft, np.arange(31) / 60, sb.Solver(h=1 / 600), at, noise=1e-3)
