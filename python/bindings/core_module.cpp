@@ -9,7 +9,7 @@
 
 namespace sheetbend::bindings {
 
-// The registry as Python sees it: {name: {arity, rows, parameters, periodic}}.
+// The registry as Python sees it: {name: {arity, points, rows, parameters, periodic, unilateral}}.
 py::dict constraint_kinds() {
   py::dict kinds;
   for_each_kind([&]<class K>(K) {
@@ -19,6 +19,7 @@ py::dict constraint_kinds() {
     kind["rows"] = K::rows;
     kind["parameters"] = std::vector<std::string>(K::parameters.begin(), K::parameters.end());
     kind["periodic"] = K::periodic;
+    kind["unilateral"] = K::unilateral;
     kinds[K::name] = kind;
   });
   return kinds;

@@ -3,7 +3,7 @@ on supports."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +13,7 @@ from .checks import finite
 from .equilibrium import Equilibrium
 from .errors import SceneError
 from .kinds import KINDS
-from .scene import Array, Scene
+from .scene import Array, Group, Scene
 from .simulate import forces_by_group
 
 
@@ -40,17 +40,16 @@ def constraint_values(
 def elastic_energy(
     scene: Scene, positions: ArrayLike | None = None, values: Mapping[str, float] | None = None
 ) -> dict[str, Array]:
-    """C.C/(2 alpha) of every constraint, J, by group (count,); zero where rigid. Arguments: see `constraint_values`."""
-    compiled = scene.compiled
-    offset, size = compiled.layout["compliance"]
-    alpha = compiled.inputs(compiled.values(values))[offset : offset + size]
-    energies, first = {}, 0
-    for name, C in constraint_values(scene, positions, values).items():
-        own = alpha[first : first + len(C)]
-        stored = np.zeros(len(C))
-        np.divide((C**2).sum(axis=1), 2.0 * own, out=stored, where=own > 0)
-        energies[name] = stored
-        first += len(C)
+    """C.C/(2 alpha) of every constraint, J, by group (count,); zero where rigid or slack. Arguments: see
+    `constraint_values`."""
+    compiled, energies = scene.compiled, {}
+    C_of = constraint_values(scene, positions, values)
+    for group, alpha in _compliances(scene, compiled.inputs(compiled.values(values))):
+        C = C_of[group.name]
+        if KINDS[group.kind]["unilateral"]:
+            C = np.minimum(C, 0.0)
+        energies[group.name] = stored = np.zeros(len(C))
+        np.divide((C**2).sum(axis=1), 2.0 * alpha, out=stored, where=alpha > 0)
     return energies
 
 
@@ -59,9 +58,7 @@ def elastic_energy_gradient(rest: Equilibrium) -> dict[str, float]:
     quantity, J per unit."""
     scene, compiled = rest.scene, rest.scene.compiled
     offset, size = compiled.layout["compliance"]
-    alpha = compiled.inputs(rest.theta)[offset : offset + size]
-    counts = np.cumsum([0, *(len(g.particles) for g in scene.groups)])
-    own = {g.name: alpha[a:b] for g, a, b in zip(scene.groups, counts[:-1], counts[1:], strict=True)}
+    own = {group.name: alpha for group, alpha in _compliances(scene, compiled.inputs(rest.theta))}
     bar = rest.input_gradient(None, {name: own[name][:, None] * rest.forces[name] for name in own})
     explicit = [(rest.forces[name] ** 2).sum(axis=1) / 2.0 for name in own]
     bar[offset : offset + size] += np.concatenate(explicit)
@@ -77,3 +74,10 @@ def support_forces(rest: Equilibrium) -> Array:
     forces = -forces.reshape(-1, 3)
     forces[scene.free] = 0.0
     return forces
+
+
+def _compliances(scene: Scene, inputs: Array) -> Iterator[tuple[Group, Array]]:
+    """Every group with the compliances of its constraints."""
+    offset, size = scene.compiled.layout["compliance"]
+    ends = np.cumsum([len(g.particles) for g in scene.groups])
+    yield from zip(scene.groups, np.split(inputs[offset : offset + size], ends[:-1]), strict=True)

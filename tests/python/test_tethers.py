@@ -68,6 +68,16 @@ def test_hide_the_stiffness_that_they_replace():
     assert sizes[1] < 0.5 * sizes[0]
 
 
+def test_energy_of_slack_ones_is_zero():
+    scene = sb.Scene("pair")
+    scene.add_particles(np.eye(3), 0.1)
+    scene.pin([0])
+    scene.add_constraints("tether", [[0, 1], [0, 2]], name="reach", rest=[1.0, 2.0], compliance=1e-2)
+    taut, slack = sb.elastic_energy(scene)["reach"]
+    assert taut == approx((np.sqrt(2) - 1.0) ** 2 / 2e-2)
+    assert slack == 0.0
+
+
 def test_reach_is_the_way_along_the_fabric():
     mesh = grid(0.4, 0.3, 4, 3)
     scene = sb.Scene("sheet")
