@@ -41,10 +41,6 @@ void blow_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, dou
   if (scene.air.empty()) return;
   const Airflow<T> air(scene, in, bdf, t_next, s);
   const T eta(bdf.eta), share(bdf.eta / 3.0);
-  const auto extrapolated_vjp = [&](const Vec3<T>& y_bar, T* now_bar, T* before_bar) {
-    (T(bdf.extrapolate_now) * y_bar).add_to(now_bar);
-    if (bdf.extrapolate_before != 0.0) (T(bdf.extrapolate_before) * y_bar).add_to(before_bar);
-  };
   for (int i = 0; i < static_cast<int>(scene.air.size()); ++i) {
     const AirTriangle<T> at = air.at(i);
     const AirForce<T> force(at);
@@ -64,8 +60,8 @@ void blow_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, dou
     const Vec3<T> v_bar = T(-1.0 / 3.0) * own.u, x_bar[3] = {-(own.e1 + own.e2), own.e1, own.e2};
     for (int k = 0; k < 3; ++k) {
       const int dof = scene.first_dof[scene.air[i][k]];
-      extrapolated_vjp(x_bar[k], bar.x + dof, bar.x_before + dof);
-      extrapolated_vjp(v_bar, bar.v + dof, bar.v_before + dof);
+      pull_back_extrapolated(bdf, x_bar[k], bar.x + dof, bar.x_before + dof);
+      pull_back_extrapolated(bdf, v_bar, bar.v + dof, bar.v_before + dof);
     }
   }
 }

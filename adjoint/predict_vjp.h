@@ -26,6 +26,13 @@ void pull_back_history(const Bdf& bdf, How, const typename How::Point& bar, T* n
   How::add(before_bar, scaled(T(bdf.before), bar));
 }
 
+// Reverse of extrapolated().
+template <class T>
+void pull_back_extrapolated(const Bdf& bdf, const Vec3<T>& bar, T* now_bar, T* before_bar) {
+  (T(bdf.extrapolate_now) * bar).add_to(now_bar);
+  if (bdf.extrapolate_before != 0.0) (T(bdf.extrapolate_before) * bar).add_to(before_bar);
+}
+
 template <class T>
 void pull_back_knots(const KnotWeights& k, const Vec3<T>& bar, T* values_bar, int slots, int slot) {
   for (int i = 0; i < k.count; ++i)
@@ -90,8 +97,7 @@ void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, 
   for (const Director& d : scene.directors) {
     if (scene.role[d.node] != Role::free) continue;
     const Vec3<T> x_bar(q_bar.of(d.node));
-    (T(bdf.extrapolate_now) * x_bar).add_to(bar.x + scene.first_dof[d.node]);
-    (T(bdf.extrapolate_before) * x_bar).add_to(bar.x_before + scene.first_dof[d.node]);
+    pull_back_extrapolated(bdf, x_bar, bar.x + scene.first_dof[d.node], bar.x_before + scene.first_dof[d.node]);
     mass_bar[d.node] -= w[d.node] * w[d.node] * eta * eta * w_bar.of(d.node);
   }
   for (const int n : scene.pinned) Vec3<T>(q_bar.of(n)).add_to(bar.x + scene.first_dof[n]);
@@ -130,8 +136,7 @@ void predict_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, 
     in_bar.of(Quantity::drag_linear)[n] += eta * m_eff_bar;
     in_bar.of(Quantity::drag_quadratic)[n] += eta * speed * m_eff_bar;
     const T along = eta * in.of(Quantity::drag_quadratic)[n] * m_eff_bar * inverse_or_zero(speed);
-    (T(bdf.extrapolate_now) * along * v).add_to(bar.v + dof);
-    if (bdf.extrapolate_before != 0.0) (T(bdf.extrapolate_before) * along * v).add_to(bar.v_before + dof);
+    pull_back_extrapolated(bdf, along * v, bar.v + dof, bar.v_before + dof);
   }
 }
 
