@@ -1,7 +1,7 @@
 // What the reverse asks of a constraint at (x, p): with its own reverse where it has one (concept.h), otherwise by one evaluation on dual numbers.
 #pragma once
 
-#include "core/constraints/concept.h"
+#include "core/element/element.h"
 #include "core/scalar/dual.h"
 
 namespace sheetbend {
