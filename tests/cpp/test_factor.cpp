@@ -56,6 +56,18 @@ Entries tangle(int n) {
   return e;
 }
 
+// A grid whose nodes know two rings of neighbors, in an order that fills it in: supernodes as wide as they may be.
+Entries sheet(int n) {
+  const int side = static_cast<int>(std::ceil(std::sqrt(n)));
+  const auto place = [n](int node) { return node * 37 % n; };
+  Entries e;
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < i; ++j)
+      if (std::abs(i / side - j / side) <= 2 && std::abs(i % side - j % side) <= 2)
+        e.emplace_back(std::max(place(i), place(j)), std::min(place(i), place(j)));
+  return e;
+}
+
 Eigen::MatrixXd random_matrix(int n, const Entries& entries, unsigned seed) {
   Random random(seed);
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
@@ -89,7 +101,8 @@ INSTANTIATE_TEST_SUITE_P(, FactorOf,
                          ::testing::Values(Pattern{"Chain", true, chain},
                                            Pattern{"BetweenUnrolledBands", true, band<7>},
                                            Pattern{"WideBand", true, band<20>}, Pattern{"Tree", false, tree},
-                                           Pattern{"Loop", false, loop}, Pattern{"Tangle", false, tangle}),
+                                           Pattern{"Loop", false, loop}, Pattern{"Tangle", false, tangle},
+                                           Pattern{"Sheet", false, sheet}),
                          [](const auto& info) { return info.param.name; });
 
 TEST_P(FactorOf, SolvesAsEigenDoes) {
@@ -171,6 +184,12 @@ TEST(Factor, CanBeUsedAgain) {
   for (const auto& [i, j] : entries) factor.values[s.position(i, j)] = 1.0;
   factor.factorize(s);
   EXPECT_TRUE(same_bits(first, solved(s, factor, std::vector<double>(n, 1.0))));
+}
+
+TEST(Factor, SplitsWideSupernodes) {
+  const FactorStructure s(200, sheet(200));
+  EXPECT_EQ(s.supernodes().widest, 32);
+  EXPECT_LT(s.supernodes().count, 50);
 }
 
 TEST(Factor, RefusesEntriesOutsideItsPattern) {
