@@ -52,8 +52,7 @@ class Air:
         self._blow(scene, wind, times)
         for kind, k in values.items():
             if np.ndim(given[kind]) == 0:
-                quantity = scene.add_quantity(f"{name}_air_{kind}", float(k[0]), "kg/m^3", positive=bool(k[0] > 0))
-                self._name(scene, f"air_{kind}", k, quantity)
+                self._name(scene, name, f"air_{kind}", k, "kg/m^3")
         self._append(corners, values)
 
     def press(self, scene: Scene, triangles: ArrayLike, pressure: ArrayLike, name: str) -> None:
@@ -61,8 +60,7 @@ class Air:
         corners = _triangles(f"{name}.pressure.triangles", triangles, scene.particle_count)
         p = per_item(f"{name}.pressure", pressure, len(corners))
         if np.ndim(pressure) == 0:
-            quantity = scene.add_quantity(f"{name}_pressure", float(p[0]), "Pa", positive=bool(p[0] > 0))
-            self._name(scene, "pressure", p, quantity)
+            self._name(scene, name, "pressure", p, "Pa")
         if not len(self.times):
             self.times, self.wind = np.zeros(1), np.zeros((1, 3))
         self._append(corners, {"pressure": p})
@@ -72,8 +70,10 @@ class Air:
         coefficients = {"air_normal": self.normal, "air_tangential": self.tangential}
         return {"wind": self.wind, **coefficients, "pressure": self.pressure}
 
-    def _name(self, scene: Scene, array: str, values: Array, quantity: str) -> None:
-        """Let a quantity stand for the values of triangles that are about to be appended."""
+    def _name(self, scene: Scene, name: str, array: str, values: Array, unit: str) -> None:
+        """Let a quantity, `<name>_<array>`, stand for the one value of triangles that are about to be appended."""
+        value = float(values[0])
+        quantity = scene.add_quantity(f"{name}_{array}", value, unit, positive=value > 0)
         where = len(self.triangles) + np.arange(len(values))
         scene.add_terms([Term(array, where, 1.0, ((quantity, "identity"),))])
         values[:] = 0.0

@@ -8,7 +8,6 @@ adjoint.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -94,19 +93,11 @@ def _row(length: Length, threads: int, repeats: int) -> dict[str, float]:
 
 
 def _batch(threads: int, repeats: int, substeps: int) -> dict[str, float]:
-    """The gradient of a batch is one call that includes its forward run, as it does for one rope."""
     count, segments = BATCH
     length = Length(segments, substeps)
-    ropes = chains(length, threads, count)
-    work = count * length.work
-    found: dict[str, float] = {"ropes": count, "segments": segments, "substeps": substeps}
-    for name, together, alone in (
-        ("forward", ropes.all_forward, ropes.forward),
-        ("gradient", ropes.all_gradients, ropes.gradient),
-    ):
-        batched, _ = timed(together, repeats)
-        singly, _ = timed(partial(ropes.singly, alone), repeats)
-        found |= batched.figures(name, work) | singly.figures(f"{name}_singly", work)
+    figures = chains(length, threads, count).batch_figures(repeats, count * length.work)
+    found = {"ropes": count, "segments": segments, "substeps": substeps, **figures}
+    for name in ("forward", "gradient"):
         found[f"{name}_speedup"] = found[f"{name}_singly_ns"] / found[f"{name}_ns"]
     return found
 

@@ -9,7 +9,7 @@ coordinates. A unit of work is one constraint in one sweep; `step_ms` is a whole
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -105,7 +105,7 @@ def _substeps(cells: int) -> int:
 
 
 def _solver(threads: int) -> Solver:
-    return Solver(h=H, integrator="bdf1", method="gauss_seidel", iterations=SWEEPS, threads=threads)
+    return replace(SOLVER, threads=threads)
 
 
 def _climb(cells: int, threads: int, repeats: int) -> dict[str, Any]:
@@ -135,16 +135,9 @@ def _row(cells: int, substeps: int, solver: Solver, repeats: int, bending_model:
 
 
 def _batch(cells: int, substeps: int, threads: int, repeats: int) -> dict[str, Any]:
-    """The gradient of a batch is one call that includes its forward run, as it does for one sheet."""
     swatches, constraints = sheets(cells, substeps, _solver(threads), BATCH)
-    work = BATCH * constraints * SWEEPS * substeps
-    found: dict[str, Any] = {"sheets": BATCH, "substeps": substeps}
-    for name, together, alone in (
-        ("forward", swatches.all_forward, swatches.forward),
-        ("gradient", swatches.all_gradients, swatches.gradient),
-    ):
-        batched, _ = timed(together, repeats)
-        singly, _ = timed(partial(swatches.singly, alone), repeats)
-        found |= batched.figures(name, work) | singly.figures(f"{name}_singly", work)
+    figures = swatches.batch_figures(repeats, BATCH * constraints * SWEEPS * substeps)
+    found: dict[str, Any] = {"sheets": BATCH, "substeps": substeps, **figures}
+    for name in ("forward", "gradient"):
         found[f"{name}_speedup"] = found[f"{name}_singly_cpu_ns"] / found[f"{name}_cpu_ns"]
     return found

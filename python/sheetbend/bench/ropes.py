@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from ..compiled import CompiledScene
 from ..solver import Solver
+from .timing import timed
 from .workloads import Array
 
 
@@ -45,6 +47,19 @@ class Ropes:
         """The same work once per rope, one after the other."""
         for _ in self.inputs:
             work()
+
+    def batch_figures(self, repeats: int, work: int) -> dict[str, float]:
+        """Times of all ropes in one call, forward and with the gradient, and of one after the other (`..._singly`),
+        per unit of so much work. The gradient of a batch is one call that includes its forward run."""
+        found: dict[str, float] = {}
+        for name, together, alone in (
+            ("forward", self.all_forward, self.forward),
+            ("gradient", self.all_gradients, self.gradient),
+        ):
+            batched, _ = timed(together, repeats)
+            singly, _ = timed(partial(self.singly, alone), repeats)
+            found |= batched.figures(name, work) | singly.figures(f"{name}_singly", work)
+        return found
 
     def gradient_error(self) -> float:
         """Of the adjoint on one rope, along a fixed random direction of all inputs, relative to complex step."""
