@@ -2,6 +2,7 @@
 // variants are then different functions, and the linker cannot put one in the place of the other.
 #include "adjoint/packs/project_packs_vjp.h"
 #include "core/constraints/registry.h"
+#include "core/packs/project_tangents.h"
 
 #define SHEETBEND_JOIN_(a, b) a##b
 #define SHEETBEND_JOIN(a, b) SHEETBEND_JOIN_(a, b)
@@ -17,6 +18,7 @@ constexpr KernelTable table(const char* name, std::index_sequence<I...>) {
   return {name,
           {{&sheetbend::project_packs<std::tuple_element_t<I, sheetbend::Registry>, across_color>...},
            {&sheetbend::project_packs<std::tuple_element_t<I, sheetbend::Registry>, across_scenes>...}},
+          {&sheetbend::project_tangents<std::tuple_element_t<I, sheetbend::Registry>>...},
           {{&sheetbend::project_packs_vjp<std::tuple_element_t<I, sheetbend::Registry>, across_color>...},
            {&sheetbend::project_packs_vjp<std::tuple_element_t<I, sheetbend::Registry>, across_scenes>...}},
           &SHEETBEND_JOIN(sheetbend_blocks_, SHEETBEND_VARIANT)};

@@ -7,15 +7,13 @@
 namespace sheetbend {
 namespace {
 
-void clear(std::vector<Pack>& v) { std::fill(v.begin(), v.end(), Pack(0.0)); }
-
 template <class T>
 void begin(const PackPlan& plan, int threads, PackCotangents<T>& bar) {
   parallel_for(plan.nodes, threads, points_per_thread, [&](int begin, int end) {
     for (int n = begin; n < end; ++n) bar.rows.at(n)[3] = T(0.0);
   });
   std::fill(bar.rows.at(plan.nodes), bar.rows.at(plan.rows()), T(0.0));
-  for (auto& color : bar.colors) clear(color.C_r);
+  for (auto& color : bar.colors) color.C_r.clear();
 }
 
 template <class T>
@@ -28,7 +26,7 @@ void end(const Scene& scene, const PackPlan& plan, PackCotangents<T>& bar, T* C_
     for (int i = 0; i < color.count; ++i)
       for (int j = 0; j < color.rows; ++j)
         C_r_bar[scene.groups[color.group].first_row + color.items[i] * color.rows + j] +=
-            entry<T>(bar.colors[c].C_r, i, color.rows, j);
+            entry(bar.colors[c].C_r, i, color.rows, j);
   }
 }
 
@@ -41,10 +39,10 @@ void PackCotangents<T>::resize(const PackPlan& plan) {
   colors.resize(plan.colors.size());
   for (std::size_t c = 0; c < colors.size(); ++c) {
     const PackedColor& color = plan.colors[c];
-    const std::size_t packs = color.packs<T>();
-    colors[c].values.assign(packs * (2 + color.parameters), Pack(0.0));
-    colors[c].lambda.assign(packs * color.rows, Pack(0.0));
-    colors[c].C_r.assign(color.damped ? packs * color.rows : 0, Pack(0.0));
+    const std::size_t entries = color.entries<T>();
+    colors[c].values.assign(entries * (2 + color.parameters));
+    colors[c].lambda.assign(entries * color.rows);
+    colors[c].C_r.assign(color.damped ? entries * color.rows : 0);
   }
 }
 
@@ -63,13 +61,13 @@ void reverse_sweeps(const Scene& scene, const PackPlan& plan, const sheetbend_pa
       const sheetbend_packs::Reverse reverse{color.count,
                                              iteration == iterations - 1,
                                              color.nodes.data(),
-                                             numbers(primal.values),
-                                             color.damped ? numbers(primal.C_r) : nullptr,
-                                             numbers(primal.records[iteration]),
-                                             bar.rows.data(),
-                                             numbers(own.values),
-                                             numbers(own.lambda),
-                                             color.damped ? numbers(own.C_r) : nullptr};
+                                             primal.values.numbers(),
+                                             color.damped ? primal.C_r.numbers() : nullptr,
+                                             primal.records[iteration].numbers(),
+                                             bar.rows.numbers(),
+                                             own.values.numbers(),
+                                             own.lambda.numbers(),
+                                             color.damped ? own.C_r.numbers() : nullptr};
       run_kernel(kernels.project_vjp[layout_of<T>][color.kind], reverse, color.packs<T>(), threads, grain);
     }
   end(scene, plan, bar, C_r_bar);
@@ -84,10 +82,10 @@ void finish(const Scene& scene, const PackPlan& plan, const Inputs<const T>& in,
     const Group& group = scene.groups[color.group];
     const int parts = 2 + color.parameters;
     for (int i = 0; i < color.count; ++i) {
-      const auto value_bar = [&](int part) { return entry<T>(bar.colors[c].values, i, parts, part); };
+      const auto value_bar = [&](int part) { return entry(bar.colors[c].values, i, parts, part); };
       add_values(in, group, color.items[i], bar.eta, value_bar, in_bar);
     }
-    clear(bar.colors[c].values);
+    bar.colors[c].values.clear();
   }
   bar.eta = 0.0;
 }

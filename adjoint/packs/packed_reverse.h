@@ -9,7 +9,7 @@ namespace sheetbend {
 template <class T>
 struct PackCotangents {
   struct ColorCotangents {
-    std::vector<Pack> values, lambda, C_r;
+    Numbers<T> values, lambda, C_r;
   };
   Rows<T> rows;
   std::vector<ColorCotangents> colors;

@@ -5,25 +5,9 @@
 #pragma once
 
 #include "core/blocks/block_forward.h"
-#include "core/scalar/dual.h"
+#include "core/packs/tangent.h"
 
 namespace sheetbend {
-
-// A value in every lane of a register and one direction in each.
-using Tangent = Dual<Register, 1>;
-
-// Register `lane`/register_lanes of the directions that belong to number `i`.
-inline Register& directions_at(double* directions, long i, int lane) {
-  return *reinterpret_cast<Register*>(directions + Pack::lanes * i + lane);
-}
-inline const Register& directions_at(const double* directions, long i, int lane) {
-  return *reinterpret_cast<const Register*>(directions + Pack::lanes * i + lane);
-}
-inline Tangent tangent_at(const double* values, const double* directions, long i, int lane) {
-  Tangent a{Register(values[i])};
-  a.d[0] = directions_at(directions, i, lane);
-  return a;
-}
 
 // One member's values, from packs of eight members.
 template <class K>

@@ -52,9 +52,17 @@ struct Reverse {
   double* C_r_bar;
 };
 
+// The same color's projections along directions, eight per number: they read what Forward does before it writes.
+struct Tangents {
+  Forward values_of;
+  int directions;  // how many of the eight count
+  double *rows, *values, *lambda, *C_r;
+};
+
 struct KernelTable {
   const char* name;
   void (*project[layouts][max_kinds])(const Forward&, int begin, int end);
+  void (*project_tangents[max_kinds])(const Tangents&, int begin, int end);
   void (*project_vjp[layouts][max_kinds])(const Reverse&, int begin, int end);
   const sheetbend_blocks::Table* blocks;
 };

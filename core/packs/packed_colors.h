@@ -1,12 +1,13 @@
 // Colors in packs: where each constraint's numbers are, and the arrays that the kernels work on. For one scene (T = double) a pack is eight
-// constraints of a color; for eight scenes in lanes (T = Pack) it is one constraint.
+// constraints of a color; for eight scenes in lanes (T = Pack) it is one constraint. Duals of forward rollouts have the values of one scene, and
+// eight directions beside each.
 #pragma once
 
 #include <algorithm>
 #include <vector>
 
 #include "core/packs/kernels.h"
-#include "core/scalar/pack.h"
+#include "core/scalar/numbers.h"
 #include "core/scalar/vec3.h"
 #include "core/scene/scene.h"
 #include "core/threads/pool.h"
@@ -15,7 +16,7 @@ namespace sheetbend {
 
 // Scalars whose colors go through the kernels; others go one constraint at a time.
 template <class T>
-inline constexpr bool in_packs = std::is_same_v<T, double> || std::is_same_v<T, Pack>;
+inline constexpr bool in_packs = std::is_same_v<T, double> || std::is_same_v<T, Pack> || carries_tangents<T>;
 
 template <class T>
 inline constexpr sheetbend_packs::Layout layout_of =
@@ -27,8 +28,7 @@ struct Color {
   std::vector<int> items;
 };
 
-// A vector of packs as plain numbers, and where entry `part` of `parts` stands in it for a lane.
-inline double* numbers(std::vector<Pack>& v) { return reinterpret_cast<double*>(v.data()); }
+// Where entry `part` of `parts` stands for a lane of packs.
 inline long lane_at(int lane, int parts, int part) {
   return (static_cast<long>(lane / sheetbend_packs::lanes) * parts + part) * sheetbend_packs::lanes +
          lane % sheetbend_packs::lanes;
@@ -36,27 +36,15 @@ inline long lane_at(int lane, int parts, int part) {
 
 // Number `part` of `parts` of the color's constraint `i`.
 template <class T>
-T& entry(std::vector<Pack>& v, int i, int parts, int part) {
-  if constexpr (std::is_same_v<T, Pack>)
-    return v[static_cast<std::size_t>(i) * parts + part];
-  else
-    return numbers(v)[lane_at(i, parts, part)];
+decltype(auto) entry(Numbers<T>& v, int i, int parts, int part) {
+  return v[std::is_same_v<T, Pack> ? static_cast<long>(i) * parts + part : lane_at(i, parts, part)];
 }
 
 // Rows of particles, or their cotangents.
 template <class T>
-class Rows {
- public:
-  void assign(int count) {
-    constexpr int per_pack = sizeof(Pack) / sizeof(T);
-    packs_.assign((static_cast<std::size_t>(count) * sheetbend_packs::row + per_pack - 1) / per_pack, Pack(0.0));
-  }
-  void clear() { std::fill(packs_.begin(), packs_.end(), Pack(0.0)); }
-  T* at(int row) { return reinterpret_cast<T*>(packs_.data()) + sheetbend_packs::row * static_cast<long>(row); }
-  double* data() { return numbers(packs_); }
-
- private:
-  std::vector<Pack> packs_;
+struct Rows : Numbers<T> {
+  void assign(int count) { Numbers<T>::assign(sheetbend_packs::row * static_cast<std::size_t>(count)); }
+  auto* at(int row) { return this->data() + sheetbend_packs::row * static_cast<long>(row); }
 };
 
 // Runs a kernel over a color's packs; below `grain` constraints per thread it uses fewer threads.
@@ -75,6 +63,11 @@ struct PackedColor {
   std::vector<int> items;  // (packs, 8)
   std::vector<int> nodes;  // (packs, arity, 8) places of their rows in PackState
 
+  // How many constraints there are to fill in, those that only fill up a pack included; and how many packs.
+  template <class T>
+  int entries() const {
+    return std::is_same_v<T, Pack> ? count : static_cast<int>(items.size());
+  }
   template <class T>
   int packs() const {
     return std::is_same_v<T, Pack> ? count : static_cast<int>(items.size()) / sheetbend_packs::lanes;
@@ -93,12 +86,12 @@ struct PackPlan {
 
 PackPlan pack_colors(const Scene& scene, const std::vector<Color>& colors);
 
-// The numbers of one substep in the kernels' order. T: double, Pack.
+// The numbers of one substep in the kernels' order. T: double, Pack, Dual<double, 4 or 8>.
 template <class T>
 struct PackState {
   struct ColorState {
-    std::vector<Pack> values, lambda, C_r;
-    std::vector<std::vector<Pack>> records;  // per iteration; empty where nothing is kept
+    Numbers<T> values, lambda, C_r;
+    std::vector<Numbers<Pack>> records;  // per iteration; empty where nothing is kept
   };
   Rows<T> rows;
   std::vector<ColorState> colors;
@@ -108,10 +101,13 @@ struct PackState {
 };
 
 // Fills values for eta (nothing to do when they are there and no drag changes w: one state serves one vector of inputs), weights from w
-// (nodes), references from C_r (rows of the scene), the rows of uses of fixed nodes from the nodes' own.
+// (nodes), references from C_r (rows of the scene), the rows of uses of fixed nodes from the nodes' own. Duals, whose rows hold values and
+// directions apart, have the coordinates q (dofs) put there first, and read back by end_sweeps.
 template <class T>
 void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const T>& in, double eta, const T* w,
-                  const T* C_r, PackState<T>& state);
+                  const T* C_r, PackState<T>& state, const T* q = nullptr);
+template <class T>
+void end_sweeps(const Scene& scene, PackState<T>& state, T* q);
 
 // One pass over all colors; the first (0) starts from no multipliers. Keeps what the reverse needs where `state` has records.
 template <class T>

@@ -31,18 +31,23 @@ struct LoadedParameters {
   }
 };
 
+// `from` gives them one by one.
+template <class K, class From, class T>
+void load_values(From&& from, bool damped, Element<K, T>& e) {
+  int next = 0;
+  e.rates.a = from(next++);
+  if (damped) {
+    e.rates.g = from(next++);
+    e.rates.scale = from(next++);
+  }
+  for (int k = 0; k < parameter_count<K>; ++k) e.p[k] = from(next++);
+  if constexpr (K::unit_gradients) e.inverse = from(next++);
+  for (int k = 0; k < K::arity; ++k) e.w[k] = from(next++);
+}
 template <class K>
 void load_values(const double* values, bool damped, long n, Element<K, Register>& e) {
   const Strip from(values, n, value_count<K>(damped));
-  int next = 0;
-  e.rates.a = from[next++];
-  if (damped) {
-    e.rates.g = from[next++];
-    e.rates.scale = from[next++];
-  }
-  for (int k = 0; k < parameter_count<K>; ++k) e.p[k] = from[next++];
-  if constexpr (K::unit_gradients) e.inverse = from[next++];
-  for (int k = 0; k < K::arity; ++k) e.w[k] = from[next++];
+  load_values<K>([&from](int part) { return from[part]; }, damped, e);
 }
 
 // Runs second(n, first(n)) for every n. With registers to spare, the first of the next place comes before the second of this one: what takes

@@ -8,6 +8,7 @@ namespace sheetbend {
 
 template <class T, int N = 1>
 struct Dual {
+  static constexpr int directions = N;
   T v{};
   T d[N]{};
 

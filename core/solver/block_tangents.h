@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/blocks/kernels.h"
-#include "core/solver/numbers.h"
+#include "core/scalar/numbers.h"
 #include "core/solver/plan.h"
 
 namespace sheetbend {

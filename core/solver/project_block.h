@@ -3,8 +3,8 @@
 #pragma once
 
 #include "core/blocks/block_forward.h"
+#include "core/scalar/numbers.h"
 #include "core/solver/block_tangents.h"
-#include "core/solver/numbers.h"
 #include "core/solver/placed.h"
 #include "core/solver/plan.h"
 

@@ -37,9 +37,9 @@ struct SubstepRecord {
     }
   }
 
-  // Where the coordinates are while they are corrected: in the kernels' rows, or in q.
+  // Where the coordinates are while they are corrected: in the kernels' rows, or (duals) in q.
   Coordinates<T> coordinates(const Plan& plan, T* q) {
-    if constexpr (in_packs<T>)
+    if constexpr (in_packs<T> && !carries_tangents<T>)
       if (sweeps_packs<T>(plan)) return {packs.rows.at(0), sheetbend_packs::row};
     return {q, 3};
   }
@@ -88,9 +88,10 @@ void project(const Scene& scene, const Plan& plan, const Inputs<const T>& in, co
   if (plan.colors.empty()) return;
   damping_references(scene, in, bdf, s, record.C_r.data());
   if constexpr (in_packs<T>) {
-    begin_sweeps(scene, plan.packs, in, bdf.eta, w, record.C_r.data(), record.packs);
+    begin_sweeps(scene, plan.packs, in, bdf.eta, w, record.C_r.data(), record.packs, q);
     for (int iteration = 0; iteration < o.iterations; ++iteration)
       sweep(plan.packs, pack_kernels(), o.threads, o.grain, iteration, record.packs);
+    end_sweeps(scene, record.packs, q);
   } else {
     std::fill(record.lambda.begin(), record.lambda.end(), T(0.0));
     const SubstepState<T> state{scene, in, bdf.eta, q, w, record.C_r.data(), record.lambda.data()};

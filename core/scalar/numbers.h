@@ -1,11 +1,12 @@
-// Arrays of scalars as the kernels of direct blocks see them.
+// Arrays of scalars as kernels see them: aligned for packs, the directions of duals apart from their values.
 #pragma once
 
 #include <algorithm>
+#include <type_traits>
 #include <vector>
 
-#include "core/blocks/wide.h"
 #include "core/scalar/dual.h"
+#include "core/scalar/pack.h"
 
 namespace sheetbend {
 
@@ -20,21 +21,22 @@ inline constexpr bool carries_tangents<Dual<double, N>> = N == 4 || N == 8;
 template <class T>
 using Plain = std::conditional_t<carries_tangents<T>, double, T>;
 
-// Aligned for packs.
 template <class T>
 class Numbers {
  public:
   void assign(std::size_t count) {
-    const std::size_t width = sizeof(Wide<T>) / sizeof(T);
-    wide_.assign((count + width - 1) / width, Wide<T>(0.0));
+    const std::size_t width = sizeof(Aligned) / sizeof(T);
+    wide_.assign((count + width - 1) / width, Aligned(0.0));
   }
-  void clear() { std::fill(wide_.begin(), wide_.end(), Wide<T>(0.0)); }
+  void clear() { std::fill(wide_.begin(), wide_.end(), Aligned(0.0)); }
   T* data() { return reinterpret_cast<T*>(wide_.data()); }
   double* numbers() { return reinterpret_cast<double*>(wide_.data()); }
   T& operator[](std::size_t i) { return data()[i]; }
+  bool empty() const { return wide_.empty(); }
 
  private:
-  std::vector<Wide<T>> wide_;
+  using Aligned = std::conditional_t<std::is_same_v<T, double>, Pack, T>;
+  std::vector<Aligned> wide_;
 };
 
 // Values and directions apart, with room for eight directions.
@@ -65,6 +67,11 @@ class Numbers<Dual<double, N>> {
     values_.assign(count);
     directions_.assign(count);
   }
+  void clear() {
+    values_.clear();
+    directions_.clear();
+  }
+  bool empty() const { return values_.empty(); }
   double* data() { return values_.data(); }
   double* numbers() { return values_.numbers(); }
   double* directions() { return directions_.numbers(); }
