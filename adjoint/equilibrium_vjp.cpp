@@ -51,6 +51,18 @@ void EquilibriumDerivative::vjp(const double* x_bar, const double* lambda_bar, d
     for (int d = 0; d < K::dofs; ++d) fixed[scene_.first_dof[group.nodes(item)[d / 3]] + d % 3] += by[d];
   });
 
+  for_each_pressed(scene_, in, [&](int i, const std::array<int, 3>& nodes, double p) {
+    Vec3<double> pushed;
+    for (const int n : nodes)
+      if (scene_.inertial[n]) pushed = pushed + Vec3<double>(&u[scene_.first_dof[n]]);
+    const auto [a, b, c] = corners_at<double>(scene_, nodes, at_.x.data());
+    bar.of(Quantity::pressure)[i] -= dot(pushed, cross(b - a, c - a)) / 6.0;
+    const Vec3<double> N_bar = -p / 6.0 * pushed, b_bar = cross(c - a, N_bar), c_bar = cross(N_bar, b - a);
+    (-(b_bar + c_bar)).add_to(&fixed[scene_.first_dof[nodes[0]]]);
+    b_bar.add_to(&fixed[scene_.first_dof[nodes[1]]]);
+    c_bar.add_to(&fixed[scene_.first_dof[nodes[2]]]);
+  });
+
   const Vec3<double> gravity(in.of(Quantity::gravity));
   const KnotWeights boundary = scene_.driven.empty() ? KnotWeights{} : scene_.boundary.at(at_.t0);
   const KnotWeights force = scene_.loaded.empty() ? KnotWeights{} : scene_.force.at(at_.t0);

@@ -51,15 +51,14 @@ double mean_edge(const Scene& scene, const double* x) {
   return count == 0 ? 0.0 : sum / count;
 }
 
-// The forces of wind and pressure follow the triangles and have no symmetric derivative, which is what the solver works with. At rest, still
-// air exerts none.
-void expect_still_air(const Scene& scene, const Inputs<const double>& in, double t0) {
+// The solver works with the Hessian of an energy. The forces of wind have none, those of pressure only in some scenes.
+void expect_energy(const Scene& scene, const Inputs<const double>& in, double t0) {
   if (scene.air.empty()) return;
-  const double* pressure = in.of(Quantity::pressure);
-  if (std::any_of(pressure, pressure + scene.air.size(), [](double p) { return p != 0.0; }))
+  if (const int n = without_energy(scene, in); n >= 0)
     throw std::invalid_argument(
-        "pressure: a state of rest was asked for, but triangles are under pressure. Fix: simulate with drag until the "
-        "motion has died down");
+        "pressure: a state of rest was asked for, but at particle " + std::to_string(n) +
+        " the surface under pressure ends or the pressure changes. Fix: close the surface or hold its rim, give one "
+        "pressure, or simulate with drag until the motion has died down");
   const Vec3<double> wind = at_knots(scene.wind.at(t0), in.of(Quantity::wind), 1, 0);
   if (dot(wind, wind) == 0.0) return;
   std::ostringstream text;
@@ -103,7 +102,7 @@ struct EquilibriumSolver::State {
         r_l(scene_.rows),
         softened(scene_.constraints),
         soft(scene_.groups.size(), std::numeric_limits<double>::infinity()) {
-    expect_still_air(scene, in, o.t0);
+    expect_energy(scene, in, o.t0);
     expect_no_unilateral(scene);
     const double* from = start_x ? start_x : in.of(Quantity::position);
     x.assign(from, from + scene.dofs());
@@ -112,7 +111,7 @@ struct EquilibriumSolver::State {
     retract_directors(scene, x.data());
     size = scene_size(scene, x.data());
     edge = mean_edge(scene, x.data());
-    external_force(scene, in, o.t0, r_x.data());
+    external_force(scene, in, o.t0, x.data(), r_x.data());
     weight = largest(r_x);
     for (const double f : r_x) total += std::abs(f);
     evaluate(x, lambda);
@@ -169,7 +168,7 @@ struct EquilibriumSolver::State {
   void measure() {
     evaluate(x, lambda);
     std::vector<double> force(scene.dofs());
-    external_force(scene, in, options.t0, force.data());
+    external_force(scene, in, options.t0, x.data(), force.data());
     for (double& f : force) f = std::abs(f);
     residual = 0.0;
     for_each_constraint(scene, [&]<class K>(K, const Group& group, int item) {
@@ -199,8 +198,8 @@ struct EquilibriumSolver::State {
 
   double energy() const {
     std::vector<double> f(scene.dofs());
-    external_force(scene, in, options.t0, f.data());
-    double sum = 0.0;
+    dead_load(scene, in, options.t0, f.data());
+    double sum = pressure_energy(scene, in, x.data());
     for (int i = 0; i < scene.dofs(); ++i) sum -= f[i] * x[i];
     for_each_constraint(scene, [&]<class K>(K, const Group& group, int item) {
       for (int j = 0; j < K::rows; ++j) {

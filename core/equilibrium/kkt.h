@@ -1,4 +1,5 @@
-// The Newton matrix of static equilibrium,  A = [H - mu, J^T; J, alpha]  with H = sum_j lambda_j Hess(C_j), and the solution of A z = b.
+// The Newton matrix of static equilibrium,  A = [H - mu, J^T; J, alpha]  with H = sum_j lambda_j Hess(C_j) + p Hess(V), and the
+// solution of A z = b.
 //
 // It is condensed onto the free coordinates: K = mu - H + J^T alpha^-1 J is the Hessian of the energy (plus mu), narrow for a
 // chain and positive definite at a stable equilibrium, so LDL^T in a low-fill order suffices. Rigid and nearly rigid rows are
@@ -55,6 +56,8 @@ class Kkt {
   std::vector<int> position_;               // into K's values, -1 where fixed or below the diagonal
   std::vector<int> diagonal_;               // likewise, per unknown
   std::vector<double> H_, J_, alpha_, softened_;
+  std::vector<int> pressure_position_;       // of triangles under pressure, 9 x 9 each, as above
+  std::vector<double> pressure_;             // likewise their p Hess(V)
   std::vector<double> metric_;               // per dof
   std::vector<int> director_position_;       // into K's values, 9 per director, -1 as in position_
   std::vector<std::array<double, 9>> idle_;  // per director: projection onto the directions that nothing depends on

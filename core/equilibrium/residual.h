@@ -1,15 +1,17 @@
 // The equations of static equilibrium, over any scalar. Unknowns are the coordinates x of the free nodes and the multipliers lambda:
 //
-//   r_x = f + J(x)^T lambda = 0        f = m gravity + force, at the time t0
+//   r_x = f + J(x)^T lambda = 0        f = m gravity + force, at the time t0, + pressure(x)
 //   r_l = C(x) + alpha lambda = 0      alpha: compliance; 0 is a rigid constraint
 //
 // J^T lambda is the force of the constraints on the particles, so a stretched link (C = length - rest > 0) has lambda = -tension.
-// For an elastic constraint lambda = -C/alpha, and the pair is the stationarity of the energy -f.x + C.C/(2 alpha).
+// For an elastic constraint lambda = -C/alpha, and the pair is the stationarity of the energy -f.x + C.C/(2 alpha), with -p V for
+// pressure (pressure.h).
 // Pinned nodes stay at Quantity::position, driven ones on their boundary at t0; drag, damping and still air do not act at rest.
 #pragma once
 
 #include <algorithm>
 
+#include "core/equilibrium/pressure.h"
 #include "core/solver/substep.h"
 
 namespace sheetbend {
@@ -48,9 +50,9 @@ void place_fixed(const Scene& scene, const Inputs<const T>& in, double t0, T* x)
   }
 }
 
-// f of the free nodes, zero on the others.
+// What of f does not depend on x, zero on fixed nodes.
 template <class T>
-void external_force(const Scene& scene, const Inputs<const T>& in, double t0, T* f) {
+void dead_load(const Scene& scene, const Inputs<const T>& in, double t0, T* f) {
   const Vec3<T> gravity(in.of(Quantity::gravity));
   const KnotWeights knots = scene.loaded.empty() ? KnotWeights{} : scene.force.at(t0);
   std::fill_n(f, scene.dofs(), T(0.0));
@@ -63,11 +65,18 @@ void external_force(const Scene& scene, const Inputs<const T>& in, double t0, T*
   }
 }
 
+// f of the free nodes, zero on the others.
+template <class T>
+void external_force(const Scene& scene, const Inputs<const T>& in, double t0, const T* x, T* f) {
+  dead_load(scene, in, t0, f);
+  add_pressure_forces(scene, in, x, f);
+}
+
 // r_x (dofs, zero on fixed nodes) and r_l (rows) at x (dofs, with the fixed nodes placed) and lambda (rows).
 template <class T>
 void equilibrium_residual(const Scene& scene, const Inputs<const T>& in, double t0, const T* x, const T* lambda, T* r_x,
                           T* r_l) {
-  external_force(scene, in, t0, r_x);
+  external_force(scene, in, t0, x, r_x);
   for_each_constraint(scene, [&]<class K>(K, const Group& group, int item) {
     T local[K::dofs], push[K::dofs]{};
     gather<K>(scene, group, item, x, local);

@@ -382,7 +382,7 @@ class Scene:
 
         One value for all is the quantity `<name>_pressure`. The force is taken at the extrapolated state, so substeps
         must resolve it: h^2 p/(area density * edge) must stay well below 1 (a balloon is calm at 0.02, not at 0.35).
-        `equilibrium` refuses it, since it follows the triangles.
+        `equilibrium` takes it where it has an energy: a closed surface, or one with a held rim, under one pressure.
 
         Args:
             triangles: (count, 3) particles; those of a closed surface, counterclockwise from outside, are blown up.

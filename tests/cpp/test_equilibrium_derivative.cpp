@@ -102,8 +102,50 @@ AtRest soft_wire() {
   return at_rest(std::move(wire.scene), std::move(wire.inputs));
 }
 
+// A net of 5 x 5 knots whose rim is held (one of it driven), under pressure.
+AtRest bulging_net() {
+  const int n = 5;
+  const auto knot = [](int i, int j) { return n * j + i; };
+  SceneSpec spec;
+  spec.particles = n * n;
+  spec.driven = {knot(2, 0)};
+  spec.boundary.times = {0.0, 0.02};
+  spec.wind.times = {0.0};
+  GroupSpec links{"links", "distance", false, {}};
+  const auto rim = [](int i, int j) { return i == 0 || j == 0 || i == n - 1 || j == n - 1; };
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) {
+      if (rim(i, j) && knot(i, j) != spec.driven[0]) spec.pinned.push_back(knot(i, j));
+      for (const auto& [di, dj] : {std::pair{1, 0}, {0, 1}, {1, 1}})
+        if (i + di < n && j + dj < n && !(rim(i, j) && rim(i + di, j + dj)))
+          links.stencil.insert(links.stencil.end(), {knot(i, j), knot(i + di, j + dj)});
+      if (i + 1 == n || j + 1 == n) continue;
+      spec.air.push_back({knot(i, j), knot(i + 1, j), knot(i + 1, j + 1)});
+      spec.air.push_back({knot(i, j), knot(i + 1, j + 1), knot(i, j + 1)});
+    }
+  spec.groups.push_back(links);
+  AtRest s{build_scene(spec), {}, {}};
+  s.inputs.assign(s.scene.layout.total(), 0.0);
+  const Inputs<double> in{s.scene.layout, s.inputs.data()};
+  Random random(12);
+  for (int k = 0; k < n * n; ++k)
+    Vec3<double>(0.1 * (k % n), 0.1 * (k / n), random(-0.005, 0.005)).store(in.of(Quantity::position) + 3 * k);
+  for (const int at : {0, 3})
+    std::copy_n(in.of(Quantity::position) + 3 * knot(2, 0), 3, in.of(Quantity::boundary) + at);
+  std::fill_n(in.of(Quantity::mass), n * n, 0.01);
+  in.of(Quantity::gravity)[2] = -g;
+  std::fill_n(in.of(Quantity::pressure), spec.air.size(), 40.0);
+  for (int i = 0; i < s.scene.groups[0].count; ++i) {
+    const auto nodes = s.scene.groups[0].nodes(i);
+    const double* x = in.of(Quantity::position);
+    in.of(Quantity::rest)[i] = 0.98 * norm(Vec3<double>(x + 3 * nodes[1]) - Vec3<double>(x + 3 * nodes[0]));
+    in.of(Quantity::compliance)[i] = random(1e-3, 2e-3);
+  }
+  return at_rest(std::move(s.scene), std::move(s.inputs));
+}
+
 struct Derivative : ::testing::TestWithParam<AtRest (*)()> {};
-INSTANTIATE_TEST_SUITE_P(, Derivative, ::testing::Values(&every_kind, &rigid_catenary, &soft_wire));
+INSTANTIATE_TEST_SUITE_P(, Derivative, ::testing::Values(&every_kind, &rigid_catenary, &soft_wire, &bulging_net));
 
 // The residual, in complex arithmetic, stays zero along the tangents.
 TEST_P(Derivative, TangentsKeepTheResidualZero) {

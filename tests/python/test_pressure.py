@@ -7,9 +7,10 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 from sheetbend.mesh import grid, icosphere
-from support import sensitivity, steps
+from support import sensitivity, static_sensitivity, steps, twice
 
 YOUNG, POISSON, RADIUS, STRETCH = 100.0, 0.3, 0.1, 1.2  # N/m, m
+RIM = 3  # a particle in the middle of a side of `bulge`
 PRESSURE = YOUNG * (STRETCH**2 - 1) / ((1 - POISSON) * STRETCH * RADIUS)
 
 
@@ -98,9 +99,84 @@ def test_gradients(method):
         assert shown[name] > 0.0, name
 
 
-def test_no_equilibrium_under_pressure():
-    with pytest.raises(ValueError, match=r"pressure: .*Fix: simulate with drag"):
-        sb.equilibrium(balloon(1))
+def held(scene: sb.Scene, particles: list[int]) -> sb.Scene:
+    """The same, held in place so softly that no shape feels it."""
+    rest = scene.positions[particles]
+    anchors = scene.add_particles(rest, 1.0)
+    scene.pin(anchors)
+    scene.add_constraints("attachment", np.column_stack([particles, anchors]), compliance=1e7, name="hold")
+    return scene
+
+
+def test_balloon_at_rest():
+    """O-35 as an equilibrium, and what only its ratio of pressure to stiffness decides."""
+    scene = held(balloon(2, stretch=1.1), [0, 5, 11])
+    rest = sb.equilibrium(scene)
+    x = rest.positions[:162]
+    radii = np.linalg.norm(x, axis=1)
+    assert radii.mean() == approx(STRETCH * RADIUS, rel=5e-3)
+    weights = np.zeros_like(rest.positions)
+    weights[:162] = x / radii[:, None] / len(radii)
+    by = {}
+    for name in ("cloth_pressure", "cloth_warp", "cloth_shear"):
+        forward, by[name] = static_sensitivity(rest, name, weights)
+        assert forward == approx(by[name], rel=1e-8)
+    by_stiffness = YOUNG * by["cloth_warp"] + YOUNG / (2 * (1 + POISSON)) * by["cloth_shear"]
+    assert by_stiffness == approx(-PRESSURE * by["cloth_pressure"], rel=1e-6)
+    dp_dr = YOUNG * (1 + 1 / STRETCH**2) / ((1 - POISSON) * RADIUS) / RADIUS
+    assert by["cloth_pressure"] == approx(1 / dp_dr, rel=4e-2)
+
+
+def bulge(pressure: float, lift: float = 0.0) -> sb.Scene:
+    """A square sheet whose rim is held, one particle of it lifted."""
+    mesh = grid(0.2, 0.2, 6, 6, pattern="alternating")
+    places = mesh.vertices - mesh.vertices.mean(axis=0)
+    rim = np.flatnonzero((np.abs(places[:, :2]) > 0.0999).any(axis=1))
+    places[RIM, 2] += lift
+    scene = sb.Scene("bulge", gravity=(0, 0, 0))
+    cloth = sb.add_cloth(
+        scene, mesh, density=0.2, warp=YOUNG, shear=40.0, poisson=POISSON, drag_linear=20.0, positions=places
+    )
+    scene.pin(cloth.particles[rim])
+    scene.add_pressure(cloth.particles[mesh.triangles], pressure)
+    return scene
+
+
+def test_a_sheet_with_a_held_rim_bulges():
+    """The equilibrium is where the motion ends, and its derivatives are differences, that by a rim's place included."""
+    scene = bulge(200.0)
+    rest = sb.equilibrium(scene)
+    assert rest.unstable_modes == 0
+    coarse, fine = (
+        sb.simulate(scene, [0.0, 0.3], sb.Solver(h=h, method="newton")).positions[-1] for h in (1 / 2000, 1 / 4000)
+    )
+    assert rest.positions == approx((4 * fine - coarse) / 3, abs=1e-6)  # what iterates leave of their forces is O(h^2)
+    assert rest.positions[:, 2].max() > 0.02
+    weights = np.zeros_like(rest.positions)
+    weights[:, 2] = 1.0 / len(weights)
+
+    def height(pressure: float = 200.0, lift: float = 0.0) -> float:
+        return float(sb.equilibrium(bulge(pressure, lift)).positions[:, 2].mean())
+
+    by_pressure = static_sensitivity(rest, "cloth_pressure", weights)
+    assert by_pressure == approx(twice((height(201.0) - height(199.0)) / 2.0), rel=1e-4)
+    lifted = np.zeros_like(rest.positions)
+    lifted[RIM, 2] = 1.0
+    by_lift = static_sensitivity(rest, {"position": lifted}, weights)
+    assert by_lift == approx(twice((height(lift=1e-4) - height(lift=-1e-4)) / 2e-4), rel=1e-4)
+
+
+def test_no_energy_no_equilibrium():
+    """At a free rim, and where two pressures meet, the forces are no gradient."""
+    loose = sb.Scene("loose", gravity=(0, 0, 0))
+    mesh = grid(0.2, 0.2, 2, 2)
+    sb.add_cloth(loose, mesh, density=0.2, warp=YOUNG, shear=40.0)
+    loose.add_pressure(mesh.triangles, 1.0)
+    uneven = bulge(1.0)
+    uneven.add_pressure(uneven.air.triangles[:30], 1.0, name="half")
+    for scene in (loose, uneven):
+        with pytest.raises(ValueError, match=r"pressure: .*Fix: close the surface"):
+            sb.equilibrium(scene)
 
 
 @pytest.mark.parametrize(
