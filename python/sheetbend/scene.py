@@ -15,6 +15,7 @@ from .checks import check_increasing, finite, index_array, indices, per_item, po
 from .column import Column
 from .compiled import CompiledScene
 from .errors import SceneError
+from .forces import Forces
 from .kinds import KINDS, NEEDS_COMPLIANCE, UNITS, VISCOUS_COMPLIANCE
 from .quantities import Quantity, Term, product
 from .rest_values import rest_values
@@ -54,8 +55,7 @@ class Scene:
         self.directors: dict[int, tuple[int, int]] = {}
         self.boundary_times: Array = np.zeros(0)
         self.boundary_interpolation = "cubic"
-        self.loaded: list[int] = []
-        self.force_times: Array = np.zeros(0)
+        self.forces = Forces()
         self.has_drag = False
         self.air = Air()
         self.ropes: dict[str, Any] = {}
@@ -64,7 +64,6 @@ class Scene:
         self._drag: dict[str, Array] = {}
         self._boundary: list[Array] = []
         self._motion: list[tuple[int, Array, dict[str, str]]] = []
-        self._forces: list[Array] = []
         self._gravity = finite("gravity", gravity, (3,), SceneError)
         self._frozen = False
 
@@ -191,24 +190,7 @@ class Scene:
             SceneError: shapes, NaN, or other knots than an earlier call's.
         """
         self._building()
-        which = indices("add_force.particles", particles, self.particle_count)
-        t = finite("add_force.times", times, None, SceneError).ravel()
-        f = finite(
-            "add_force.forces", np.broadcast_to(forces, (len(t), len(which), 3)), (len(t), len(which), 3), SceneError
-        )
-        check_increasing("add_force.times", t)
-        if self.loaded and (t.shape != self.force_times.shape or (t != self.force_times).any()):
-            raise SceneError(
-                "add_force.times", "differ from those of forces added before", len(t), "use one set of knots"
-            )
-        twice = set(which) & set(self.loaded)
-        if twice:
-            raise SceneError(
-                "add_force.particles", "are loaded already", sorted(twice), "sum the forces and add them once"
-            )
-        self.force_times = t
-        self.loaded += which
-        self._forces += [f[:, k] for k in range(len(which))]
+        self.forces.add(particles, forces, times, self.particle_count)
 
     def add_constraints(
         self,
@@ -459,7 +441,7 @@ class Scene:
             "damping": self._concatenated("damping"),
             "rest": self._concatenated("rest"),
             "boundary": np.stack(self._boundary, axis=1) if self._boundary else np.zeros(0),
-            "force": np.stack(self._forces, axis=1) if self._forces else np.zeros(0),
+            "force": self.forces.values,
             "gravity": self._gravity,
             "drag_linear": self._drag_of("linear"),
             "drag_quadratic": self._drag_of("quadratic"),

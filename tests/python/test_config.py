@@ -305,7 +305,7 @@ class TestBuild:
             "pull_z",
             "delay",
         }
-        assert not bare.scene.loaded
+        assert not bare.scene.forces.particles
         with pytest.raises(sb.ConfigError, match="delay, load, pull"):
             load(written(folder, text.replace('leave_out = ["load"', 'leave_out = ["lord"')))
 

@@ -260,7 +260,7 @@ def _add_forces(scene: Scene, particles: Particles, forces: Sequence[schema.Forc
             raise ConfigError(f"{path}.factors", "do not match the times", len(factors), f"give {len(force.times)}")
         which = [particles.find(f"{path}.particles", r) for r in force.particles]
         plain = np.zeros(3) if force.name else np.array(force.force)
-        first = len(scene.loaded)
+        first = len(scene.forces.particles)
         with located(path):
             scene.add_force(which, np.array(factors)[:, None, None] * plain, force.times)
             if force.name is None:
@@ -274,7 +274,7 @@ def _add_forces(scene: Scene, particles: Particles, forces: Sequence[schema.Forc
                     for w in range(len(which))
                     if f != 0.0
                 ]
-    loaded = len(scene.loaded)
+    loaded = len(scene.forces.particles)
     scene.add_terms([product("force", 3 * (knot * loaded + w) + k, f, {q: "identity"}) for knot, w, k, f, q in terms])
 
 
