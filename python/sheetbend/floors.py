@@ -50,5 +50,5 @@ def membrane_names(cloth: str) -> tuple[str, str, str]:
 
 
 def _hidden(limit: float, sweeps: int, h: float, method: str) -> Floor:
-    words = f"{sweeps} Gauss-Seidel sweeps at {h:g} s hide any larger stiffness; use method = '{method}'"
-    return Floor(limit, words, ceiling=True)
+    fix = f"use method = '{method}' or shorter substeps"
+    return Floor(limit, f"{sweeps} Gauss-Seidel sweeps at {h:g} s hide any larger stiffness; {fix}", ceiling=True)
