@@ -86,11 +86,31 @@ std::size_t row_bytes(const PackPlan& plan) {
   return sizeof(T) * sheetbend_packs::row * static_cast<std::size_t>(plan.rows());
 }
 
+// The VolumeStates.
+template <class T>
+std::size_t volume_bytes(const Scene& scene, int kept_iterations) {
+  const std::size_t iterations = std::max(1, kept_iterations);
+  std::size_t bytes = 0;
+  for (const Volume& volume : scene.volumes)
+    bytes += sizeof(VolumeState<T>) + iterations * sizeof(VolumeRecord<T>) +
+             (iterations + 1) * sizeof(Vec3<T>) * volume.nodes.size();
+  return bytes;
+}
+
+template <class T>
+std::size_t volume_cotangent_bytes(const Scene& scene) {
+  std::size_t bytes = 0;
+  for (const Volume& volume : scene.volumes)
+    bytes += sizeof(VolumeCotangents<T>) + sizeof(Vec3<T>) * volume.nodes.size();
+  return bytes;
+}
+
 template <class T>
 std::size_t substep_bytes(const Scene& scene, const Plan& plan, bool keeps_iterations) {
   const int kept = keeps_iterations ? plan.options.iterations : 0;
   std::size_t bytes = sizeof(T) * (scene.has_drag ? 2 : 1) * static_cast<std::size_t>(scene.nodes());
   for (const DirectBlock& block : plan.blocks) bytes += block_bytes<T>(scene, block, kept);
+  bytes += volume_bytes<T>(scene, kept);
   if (plan.colors.empty()) return bytes;
   bytes += sizeof(T) * damped_rows(scene);
   if constexpr (in_packs<T>) {
@@ -117,6 +137,7 @@ std::size_t reverse_bytes(const Scene& scene, const Plan& plan) {
   const std::size_t states = 7 + (plan.options.integrator == Integrator::bdf1 ? 1 : 2);
   std::size_t bytes = sizeof(T) * states * dofs + substep_bytes<T>(scene, plan, true);
   for (const DirectBlock& block : plan.blocks) bytes += block_cotangent_bytes<T>(scene, block);
+  bytes += volume_cotangent_bytes<T>(scene);
   if (scene.yields) bytes += sizeof(T) * dofs;
   if (!sweeps_packs<T>(plan)) bytes += sizeof(T) * (dofs + nodes);
   if (plan.colors.empty()) return bytes;

@@ -5,6 +5,7 @@
 #include "adjoint/packs/packed_reverse.h"
 #include "adjoint/project_block_vjp.h"
 #include "adjoint/project_vjp.h"
+#include "adjoint/volume_vjp.h"
 #include "adjoint/yield_vjp.h"
 
 namespace sheetbend {
@@ -16,8 +17,10 @@ struct ReverseScratch {
   std::vector<Vec3<T>> gravity;
   PackCotangents<std::conditional_t<in_packs<T>, T, double>> packs;  // of colors that go through the kernels
   std::vector<BlockCotangents<T>> blocks;
+  std::vector<VolumeCotangents<T>> volumes;
 
-  ReverseScratch(const Scene& scene, const Plan& plan) : blocks(plan.blocks.size()) {
+  ReverseScratch(const Scene& scene, const Plan& plan) : blocks(plan.blocks.size()), volumes(scene.volumes.size()) {
+    for (std::size_t v = 0; v < volumes.size(); ++v) volumes[v].v.resize(scene.volumes[v].nodes.size());
     for (std::size_t b = 0; b < blocks.size(); ++b) blocks[b].resize(scene, plan.blocks[b]);
     if (!plan.colors.empty()) C_r.resize(damped_rows(scene));
     if (scene.yields) carried.resize(scene.dofs());
@@ -71,22 +74,12 @@ void damping_references_vjp(const Scene& scene, const Inputs<const T>& in, const
   }
 }
 
-// Reverse of project(): scratch.q_bar() goes from the cotangent of the corrected coordinates to that of the predicted ones.
 template <class T>
-void project_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf,
-                 const SubstepStates<T>& s, SubstepRecord<T>& record, ReverseScratch<T>& scratch,
-                 const StateCotangents<T>& bar, const Inputs<T>& in_bar) {
+void project_blocks_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf,
+                        SubstepRecord<T>& record, ReverseScratch<T>& scratch, const StateCotangents<T>& bar,
+                        const Inputs<T>& in_bar) {
   const SolverOptions& o = plan.options;
-  const T* w = record.weights.w.data();
-  std::fill(scratch.C_r.begin(), scratch.C_r.end(), T(0.0));
-  if constexpr (in_packs<T>)
-    if (sweeps_packs<T>(plan)) {
-      reverse_sweeps(scene, plan.packs, pack_kernels(), o.iterations, o.threads, o.grain, in, record.packs,
-                     scratch.C_r.data(), in_bar, scratch.packs);
-      return damping_references_vjp(scene, in, bdf, s, scratch.C_r.data(), bar, in_bar);
-    }
-  for (auto* buffer : {&scratch.fixed, &scratch.lambda, &scratch.w}) std::fill(buffer->begin(), buffer->end(), T(0.0));
-  const SubstepState<T> state{scene, in, bdf.eta, nullptr, w, record.C_r.data(), record.lambda.data()};
+  const SubstepState<T> state{scene, in, bdf.eta, nullptr, record.weights.w.data(), nullptr, nullptr};
   parallel_for(static_cast<int>(plan.blocks.size()), o.threads, 1, [&](int begin, int end) {
     for (int b = begin; b < end; ++b) {
       BlockCotangents<T>& own = scratch.blocks[b];
@@ -99,20 +92,61 @@ void project_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in
   });
   for (std::size_t b = 0; b < plan.blocks.size(); ++b)
     add_fixed(scene, plan.blocks[b], scratch.blocks[b], scratch.x.data(), bar.x, bar.x_before);
-  if (plan.colors.empty()) return;
-  const SubstepCotangent<T> cotangent{scratch.x.data(), scratch.fixed.data(), scratch.lambda.data(),
-                                      scratch.w.data(), scratch.C_r.data(),   in_bar};
-  for (int iteration = o.iterations - 1; iteration >= 0; --iteration)
+}
+
+// Reverse of project_colors().
+template <class T>
+void project_colors_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in, double eta, int iteration,
+                        bool last, SubstepRecord<T>& record, ReverseScratch<T>& scratch, const Inputs<T>& in_bar) {
+  const SolverOptions& o = plan.options;
+  if constexpr (in_packs<T>) {
+    sweep_vjp(plan.packs, pack_kernels(), o.threads, o.grain, iteration, last, record.packs, scratch.packs);
+  } else {
+    const SubstepState<T> state{
+        scene, in, eta, nullptr, record.weights.w.data(), record.C_r.data(), record.lambda.data()};
+    const SubstepCotangent<T> cotangent{scratch.x.data(), scratch.fixed.data(), scratch.lambda.data(),
+                                        scratch.w.data(), scratch.C_r.data(),   in_bar};
     for (auto color = plan.colors.rbegin(); color != plan.colors.rend(); ++color)
       project_color_vjp(state, o, *color, record.iterations[iteration], cotangent);
-  for (const Group& group : scene.groups)
-    for (int i = 0; i < group.count; ++i)
-      for (int k = 0; k < group.arity; ++k) {
-        const int node = group.nodes(i)[k];
-        if (scene.role[node] == Role::free) continue;
-        const std::size_t from = group.first_coordinate + (static_cast<std::size_t>(i) * group.arity + k) * 3;
-        Vec3<T>(&scratch.fixed[from]).add_to(&scratch.x[scene.first_dof[node]]);
-      }
+  }
+}
+
+// Adds what fixed nodes received, per stencil, to their own.
+template <class T>
+void end_colors_vjp(const Scene& scene, const Plan& plan, ReverseScratch<T>& scratch) {
+  if constexpr (in_packs<T>) {
+    end_sweeps_vjp(scene, plan.packs, scratch.packs, scratch.C_r.data());
+  } else {
+    for (const Group& group : scene.groups)
+      for (int i = 0; i < group.count; ++i)
+        for (int k = 0; k < group.arity; ++k) {
+          const int node = group.nodes(i)[k];
+          if (scene.role[node] == Role::free) continue;
+          const std::size_t from = group.first_coordinate + (static_cast<std::size_t>(i) * group.arity + k) * 3;
+          Vec3<T>(&scratch.fixed[from]).add_to(&scratch.x[scene.first_dof[node]]);
+        }
+  }
+}
+
+// Reverse of project(): scratch.q_bar() goes from the cotangent of the corrected coordinates to that of the predicted ones.
+template <class T>
+void project_vjp(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf,
+                 const SubstepStates<T>& s, SubstepRecord<T>& record, ReverseScratch<T>& scratch,
+                 const StateCotangents<T>& bar, const Inputs<T>& in_bar) {
+  const SolverOptions& o = plan.options;
+  for (auto* buffer : {&scratch.C_r, &scratch.fixed, &scratch.lambda, &scratch.w})
+    std::fill(buffer->begin(), buffer->end(), T(0.0));
+  project_blocks_vjp(scene, plan, in, bdf, record, scratch, bar, in_bar);
+  if constexpr (in_packs<T>)
+    if (!plan.colors.empty()) begin_sweeps_vjp(scene, plan.packs, o.threads, in, record.packs, in_bar, scratch.packs);
+  for (int iteration = o.iterations - 1; iteration >= 0; --iteration) {
+    const bool last = iteration == o.iterations - 1;
+    project_volumes_vjp(scene, in, bdf.eta, record.weights.w.data(), iteration, last, record.volumes,
+                        scratch.q_bar(plan), scratch.w_bar(plan), in_bar, scratch.volumes);
+    project_colors_vjp(scene, plan, in, bdf.eta, iteration, last, record, scratch, in_bar);
+  }
+  if (plan.colors.empty()) return;
+  end_colors_vjp(scene, plan, scratch);
   damping_references_vjp(scene, in, bdf, s, scratch.C_r.data(), bar, in_bar);
 }
 

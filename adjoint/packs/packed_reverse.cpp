@@ -5,32 +5,6 @@
 #include "adjoint/element/rates_vjp.h"
 
 namespace sheetbend {
-namespace {
-
-template <class T>
-void begin(const PackPlan& plan, int threads, PackCotangents<T>& bar) {
-  parallel_for(plan.nodes, threads, points_per_thread, [&](int begin, int end) {
-    for (int n = begin; n < end; ++n) bar.rows.at(n)[3] = T(0.0);
-  });
-  std::fill(bar.rows.at(plan.nodes), bar.rows.at(plan.rows()), T(0.0));
-  for (auto& color : bar.colors) color.C_r.clear();
-}
-
-template <class T>
-void end(const Scene& scene, const PackPlan& plan, PackCotangents<T>& bar, T* C_r_bar) {
-  for (std::size_t g = 0; g < plan.ghosts.size(); ++g)
-    Vec3<T>(bar.rows.at(plan.nodes + static_cast<int>(g))).add_to(bar.rows.at(plan.ghosts[g]));
-  for (std::size_t c = 0; c < plan.colors.size(); ++c) {
-    const PackedColor& color = plan.colors[c];
-    if (!color.damped) continue;
-    for (int i = 0; i < color.count; ++i)
-      for (int j = 0; j < color.rows; ++j)
-        C_r_bar[scene.groups[color.group].first_row + color.items[i] * color.rows + j] +=
-            entry(bar.colors[c].C_r, i, color.rows, j);
-  }
-}
-
-}  // namespace
 
 template <class T>
 void PackCotangents<T>::resize(const PackPlan& plan) {
@@ -47,30 +21,50 @@ void PackCotangents<T>::resize(const PackPlan& plan) {
 }
 
 template <class T>
-void reverse_sweeps(const Scene& scene, const PackPlan& plan, const sheetbend_packs::KernelTable& kernels,
-                    int iterations, int threads, int grain, const Inputs<const T>& in, PackState<T>& state, T* C_r_bar,
-                    const Inputs<T>& in_bar, PackCotangents<T>& bar) {
+void begin_sweeps_vjp(const Scene& scene, const PackPlan& plan, int threads, const Inputs<const T>& in,
+                      const PackState<T>& state, const Inputs<T>& in_bar, PackCotangents<T>& bar) {
   if (bar.eta != state.eta) finish(scene, plan, in, in_bar, bar);
   bar.eta = state.eta;
-  begin(plan, threads, bar);
-  for (int iteration = iterations - 1; iteration >= 0; --iteration)
-    for (int c = static_cast<int>(plan.colors.size()) - 1; c >= 0; --c) {
-      const PackedColor& color = plan.colors[c];
-      typename PackState<T>::ColorState& primal = state.colors[c];
-      typename PackCotangents<T>::ColorCotangents& own = bar.colors[c];
-      const sheetbend_packs::Reverse reverse{color.count,
-                                             iteration == iterations - 1,
-                                             color.nodes.data(),
-                                             primal.values.numbers(),
-                                             color.damped ? primal.C_r.numbers() : nullptr,
-                                             primal.records[iteration].numbers(),
-                                             bar.rows.numbers(),
-                                             own.values.numbers(),
-                                             own.lambda.numbers(),
-                                             color.damped ? own.C_r.numbers() : nullptr};
-      run_kernel(kernels.project_vjp[layout_of<T>][color.kind], reverse, color.packs<T>(), threads, grain);
-    }
-  end(scene, plan, bar, C_r_bar);
+  parallel_for(plan.nodes, threads, points_per_thread, [&](int begin, int end) {
+    for (int n = begin; n < end; ++n) bar.rows.at(n)[3] = T(0.0);
+  });
+  std::fill(bar.rows.at(plan.nodes), bar.rows.at(plan.rows()), T(0.0));
+  for (auto& color : bar.colors) color.C_r.clear();
+}
+
+template <class T>
+void sweep_vjp(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, int threads, int grain, int iteration,
+               bool last, PackState<T>& state, PackCotangents<T>& bar) {
+  for (int c = static_cast<int>(plan.colors.size()) - 1; c >= 0; --c) {
+    const PackedColor& color = plan.colors[c];
+    typename PackState<T>::ColorState& primal = state.colors[c];
+    typename PackCotangents<T>::ColorCotangents& own = bar.colors[c];
+    const sheetbend_packs::Reverse reverse{color.count,
+                                           last,
+                                           color.nodes.data(),
+                                           primal.values.numbers(),
+                                           color.damped ? primal.C_r.numbers() : nullptr,
+                                           primal.records[iteration].numbers(),
+                                           bar.rows.numbers(),
+                                           own.values.numbers(),
+                                           own.lambda.numbers(),
+                                           color.damped ? own.C_r.numbers() : nullptr};
+    run_kernel(kernels.project_vjp[layout_of<T>][color.kind], reverse, color.packs<T>(), threads, grain);
+  }
+}
+
+template <class T>
+void end_sweeps_vjp(const Scene& scene, const PackPlan& plan, PackCotangents<T>& bar, T* C_r_bar) {
+  for (std::size_t g = 0; g < plan.ghosts.size(); ++g)
+    Vec3<T>(bar.rows.at(plan.nodes + static_cast<int>(g))).add_to(bar.rows.at(plan.ghosts[g]));
+  for (std::size_t c = 0; c < plan.colors.size(); ++c) {
+    const PackedColor& color = plan.colors[c];
+    if (!color.damped) continue;
+    for (int i = 0; i < color.count; ++i)
+      for (int j = 0; j < color.rows; ++j)
+        C_r_bar[scene.groups[color.group].first_row + color.items[i] * color.rows + j] +=
+            entry(bar.colors[c].C_r, i, color.rows, j);
+  }
 }
 
 template <class T>
@@ -90,10 +84,13 @@ void finish(const Scene& scene, const PackPlan& plan, const Inputs<const T>& in,
   bar.eta = 0.0;
 }
 
-#define SHEETBEND_INSTANTIATE(T)                                                                                     \
-  template struct PackCotangents<T>;                                                                                 \
-  template void reverse_sweeps<T>(const Scene&, const PackPlan&, const sheetbend_packs::KernelTable&, int, int, int, \
-                                  const Inputs<const T>&, PackState<T>&, T*, const Inputs<T>&, PackCotangents<T>&);  \
+#define SHEETBEND_INSTANTIATE(T)                                                                                       \
+  template struct PackCotangents<T>;                                                                                   \
+  template void begin_sweeps_vjp<T>(const Scene&, const PackPlan&, int, const Inputs<const T>&, const PackState<T>&,   \
+                                    const Inputs<T>&, PackCotangents<T>&);                                             \
+  template void sweep_vjp<T>(const PackPlan&, const sheetbend_packs::KernelTable&, int, int, int, bool, PackState<T>&, \
+                             PackCotangents<T>&);                                                                      \
+  template void end_sweeps_vjp<T>(const Scene&, const PackPlan&, PackCotangents<T>&, T*);                              \
   template void finish<T>(const Scene&, const PackPlan&, const Inputs<const T>&, const Inputs<T>&, PackCotangents<T>&);
 SHEETBEND_INSTANTIATE(double)
 SHEETBEND_INSTANTIATE(Pack)

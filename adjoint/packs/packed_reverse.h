@@ -18,12 +18,20 @@ struct PackCotangents {
   void resize(const PackPlan& plan);
 };
 
-// Reverses all iterations that `state` recorded. The nodes' rows of `bar` hold the cotangents of the coordinates after them, and then of those
-// before, with those of the inverse masses in the fourth place; C_r_bar (rows of the scene) is added to.
+// Before the iterations that `state` recorded are reversed, the last one first. The nodes' rows of `bar` hold the cotangents of the coordinates
+// after them, and then of those before, with those of the inverse masses in the fourth place.
 template <class T>
-void reverse_sweeps(const Scene& scene, const PackPlan& plan, const sheetbend_packs::KernelTable& kernels,
-                    int iterations, int threads, int grain, const Inputs<const T>& in, PackState<T>& state, T* C_r_bar,
-                    const Inputs<T>& in_bar, PackCotangents<T>& bar);
+void begin_sweeps_vjp(const Scene& scene, const PackPlan& plan, int threads, const Inputs<const T>& in,
+                      const PackState<T>& state, const Inputs<T>& in_bar, PackCotangents<T>& bar);
+
+// Reverse of one sweep; of the multipliers after the last nothing arrives.
+template <class T>
+void sweep_vjp(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, int threads, int grain, int iteration,
+               bool last, PackState<T>& state, PackCotangents<T>& bar);
+
+// After them: C_r_bar (rows of the scene) is added to.
+template <class T>
+void end_sweeps_vjp(const Scene& scene, const PackPlan& plan, PackCotangents<T>& bar, T* C_r_bar);
 
 // Adds the gathered cotangents of the constraints' values to those of the inputs, and forgets them.
 template <class T>

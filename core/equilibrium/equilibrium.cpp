@@ -74,6 +74,14 @@ void expect_no_unilateral(const Scene& scene) {
       throw std::invalid_argument("equilibrium: group " + group.name + " may go slack. Fix: leave it out");
 }
 
+// Its row couples all vertices of a surface.
+void expect_no_volume(const Scene& scene) {
+  if (!scene.volumes.empty())
+    throw std::invalid_argument("equilibrium: the volume of " + scene.volumes.front().name +
+                                " is to be kept. Fix: give the pressure instead (add_pressure), which a closed surface "
+                                "may rest under, or simulate with drag until the motion has died down");
+}
+
 std::string not_converged(const Equilibrium& e, double tolerance) {
   std::ostringstream text;
   text << "equilibrium: no rest found in " << e.iterations << " iterations, relative residual " << e.residual
@@ -104,6 +112,7 @@ struct EquilibriumSolver::State {
         soft(scene_.groups.size(), std::numeric_limits<double>::infinity()) {
     expect_energy(scene, in, o.t0);
     expect_no_unilateral(scene);
+    expect_no_volume(scene);
     const double* from = start_x ? start_x : in.of(Quantity::position);
     x.assign(from, from + scene.dofs());
     start_lambda ? lambda.assign(start_lambda, start_lambda + scene.rows) : lambda.assign(scene.rows, 0.0);

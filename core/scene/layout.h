@@ -12,23 +12,26 @@ enum class Quantity : int {
   velocity,  // initial velocity, same shape  [m/s]
   mass,  // per particle  [kg]; pinned and driven ones do not use it. Of a director: the small torque per angle from its prediction,
          // which keeps a substep well posed  [N m]
-  compliance,      // per constraint, in the scene's order
-  damping,         // per constraint: beta of the Rayleigh dissipation (Macklin et al. 2016, eq. 26)
-  rest,            // the constraints' own parameters, constraint by constraint
-  boundary,        // (knots, driven particles, 3) positions  [m]
-  force,           // (knots, loaded particles, 3)  [N]
-  gravity,         // (3)  [m/s^2]
-  drag_linear,     // per particle  [N s/m]
-  drag_quadratic,  // per particle  [N s^2/m^2]
-  wind,            // (knots, 3)  [m/s]
-  air_normal,      // per triangle in air: air density * drag coefficient / 2, along its normal  [kg/m^3]
-  air_tangential,  // the same across the normal
-  pressure,        // per triangle in air, along (x1 - x0) x (x2 - x0)  [Pa]
+  compliance,         // per constraint, in the scene's order
+  damping,            // per constraint: beta of the Rayleigh dissipation (Macklin et al. 2016, eq. 26)
+  rest,               // the constraints' own parameters, constraint by constraint
+  boundary,           // (knots, driven particles, 3) positions  [m]
+  force,              // (knots, loaded particles, 3)  [N]
+  gravity,            // (3)  [m/s^2]
+  drag_linear,        // per particle  [N s/m]
+  drag_quadratic,     // per particle  [N s^2/m^2]
+  wind,               // (knots, 3)  [m/s]
+  air_normal,         // per triangle in air: air density * drag coefficient / 2, along its normal  [kg/m^3]
+  air_tangential,     // the same across the normal
+  pressure,           // per triangle in air, along (x1 - x0) x (x2 - x0)  [Pa]
+  volume,             // per closed surface: the one that it keeps  [m^3]
+  volume_compliance,  // likewise  [m^3/Pa]
 };
-inline constexpr int quantity_count = 15;
+inline constexpr int quantity_count = 17;
 inline constexpr std::array<const char*, quantity_count> quantity_names{
-    "position", "velocity",    "mass",           "compliance", "damping",    "rest",           "boundary", "force",
-    "gravity",  "drag_linear", "drag_quadratic", "wind",       "air_normal", "air_tangential", "pressure"};
+    "position",   "velocity",       "mass",     "compliance",  "damping",          "rest",
+    "boundary",   "force",          "gravity",  "drag_linear", "drag_quadratic",   "wind",
+    "air_normal", "air_tangential", "pressure", "volume",      "volume_compliance"};
 
 struct Layout {
   std::array<std::size_t, quantity_count> size{};

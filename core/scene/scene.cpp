@@ -1,6 +1,7 @@
 #include "core/scene/scene.h"
 
 #include <algorithm>
+#include <set>
 #include <stdexcept>
 
 #include "core/constraints/registry.h"
@@ -65,14 +66,46 @@ Group build_group(const GroupSpec& spec, const Scene& scene) {
   return g;
 }
 
-void check_air(const Scene& scene) {
-  for (const auto& [a, b, c] : scene.air) {
-    check_nodes("air", {a, b, c}, scene.nodes());
+void check_triangles(const std::string& field, const std::vector<std::array<int, 3>>& triangles, const Scene& scene) {
+  for (const auto& [a, b, c] : triangles) {
+    check_nodes(field, {a, b, c}, scene.nodes());
     const std::string which = std::to_string(a) + ", " + std::to_string(b) + ", " + std::to_string(c);
-    if (a == b || b == c || c == a) refuse("air: triangle " + which + " has no area. Fix: give distinct particles");
+    if (a == b || b == c || c == a)
+      refuse(field + ": triangle " + which + " has no area. Fix: give distinct particles");
     if (scene.is_director[a] || scene.is_director[b] || scene.is_director[c])
-      refuse("air: triangle " + which + " holds a director. Fix: let air act on particles");
+      refuse(field + ": triangle " + which + " holds a director. Fix: use particles");
   }
+}
+
+// Every edge is there once in either direction.
+void check_closed(const std::string& field, const std::vector<std::array<int, 3>>& triangles) {
+  std::set<std::pair<int, int>> edges;
+  const auto refuse_edge = [&](int a, int b) {
+    refuse(field + ": edge " + std::to_string(a) + ", " + std::to_string(b) +
+           " is not between two triangles. Fix: close the surface, all triangles counterclockwise from outside");
+  };
+  for (const auto& t : triangles)
+    for (int k = 0; k < 3; ++k)
+      if (!edges.emplace(t[k], t[(k + 1) % 3]).second) refuse_edge(t[k], t[(k + 1) % 3]);
+  for (const auto& [a, b] : edges)
+    if (!edges.contains({b, a})) refuse_edge(a, b);
+}
+
+Volume build_volume(const VolumeSpec& spec, const Scene& scene) {
+  const std::string field = spec.name + ".volume";
+  if (spec.triangles.empty()) refuse(field + ": no triangles. Fix: give those of a closed surface");
+  check_triangles(field, spec.triangles, scene);
+  check_closed(field, spec.triangles);
+  Volume v{spec.name, {}, spec.triangles};
+  for (const auto& t : spec.triangles) v.nodes.insert(v.nodes.end(), t.begin(), t.end());
+  std::sort(v.nodes.begin(), v.nodes.end());
+  v.nodes.erase(std::unique(v.nodes.begin(), v.nodes.end()), v.nodes.end());
+  v.nodes.shrink_to_fit();
+  for (auto& t : v.triangles)
+    for (int& n : t) n = static_cast<int>(std::lower_bound(v.nodes.begin(), v.nodes.end(), n) - v.nodes.begin());
+  if (std::none_of(v.nodes.begin(), v.nodes.end(), [&](int n) { return scene.role[n] == Role::free; }))
+    refuse(field + ": holds only pinned or driven particles. Fix: leave it out, nothing can move");
+  return v;
 }
 
 }  // namespace
@@ -130,7 +163,7 @@ Scene build_scene(const SceneSpec& spec) {
   check_knots("force_times", s.force, !s.loaded.empty());
   s.air = spec.air;
   s.wind = spec.wind;
-  check_air(s);
+  check_triangles("air", s.air, s);
   check_knots("wind_times", s.wind, !s.air.empty());
 
   std::size_t values = 0;
@@ -148,6 +181,8 @@ Scene build_scene(const SceneSpec& spec) {
     s.gradient_entries += static_cast<std::size_t>(built.count) * 3 * built.arity * built.rows;
   }
 
+  for (const VolumeSpec& v : spec.volumes) s.volumes.push_back(build_volume(v, s));
+
   const std::size_t dofs = s.dofs(), nodes = s.nodes(), m = s.constraints;
   s.layout.size = {dofs,
                    dofs,
@@ -163,7 +198,9 @@ Scene build_scene(const SceneSpec& spec) {
                    s.wind.times.size() * 3,
                    s.air.size(),
                    s.air.size(),
-                   s.air.size()};
+                   s.air.size(),
+                   s.volumes.size(),
+                   s.volumes.size()};
   s.layout.close();
   return s;
 }

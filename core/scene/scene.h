@@ -40,6 +40,13 @@ struct Group {
   }
 };
 
+// A closed surface that keeps its volume.
+struct Volume {
+  std::string name;
+  std::vector<int> nodes;                     // each once, ascending
+  std::vector<std::array<int, 3>> triangles;  // places in `nodes`, counterclockwise from outside
+};
+
 struct Scene {
   Fields fields;
   std::vector<int> first_dof, dim;  // per node
@@ -56,12 +63,14 @@ struct Scene {
   std::vector<std::array<int, 3>> air;  // nodes of the triangles that air acts on
   Knots boundary, force, wind;
   std::vector<Group> groups;
+  std::vector<Volume> volumes;
   int constraints = 0, rows = 0;
   std::size_t stencil_coordinates = 0, gradient_entries = 0;
   Layout layout;
 
   int dofs() const { return fields.dofs; }
   int nodes() const { return fields.nodes; }
+  int multipliers() const { return rows + static_cast<int>(volumes.size()); }  // the constraints', then the volumes'
 };
 
 struct GroupSpec {
@@ -69,6 +78,11 @@ struct GroupSpec {
   std::string kind;
   bool damped = false;
   std::vector<int> stencil;
+};
+
+struct VolumeSpec {
+  std::string name;
+  std::vector<std::array<int, 3>> triangles;  // nodes
 };
 
 struct SceneSpec {
@@ -79,6 +93,7 @@ struct SceneSpec {
   std::vector<std::array<int, 3>> air;
   Knots boundary, force, wind;
   std::vector<GroupSpec> groups;
+  std::vector<VolumeSpec> volumes;
 };
 
 // Rows whose damping needs a reference: all of them, or none.

@@ -192,11 +192,21 @@ void expect_no_unilateral(const Scene& scene) {
                                   " may go slack, which only sweeps allow. Fix: use gauss_seidel, or leave it out");
 }
 
+void expect_no_volume(const Scene& scene) {
+  if (!scene.volumes.empty())
+    throw std::invalid_argument("solver.method: the volume of " + scene.volumes.front().name +
+                                " couples all its vertices, which only sweeps take. Fix: use gauss_seidel, or give a "
+                                "pressure instead");
+}
+
 }  // namespace
 
 Plan make_plan(const Scene& scene, const SolverOptions& options) {
   check(options);
-  if (options.partition != Partition::gauss_seidel) expect_no_unilateral(scene);
+  if (options.partition != Partition::gauss_seidel) {
+    expect_no_unilateral(scene);
+    expect_no_volume(scene);
+  }
   Plan plan{options, {}, {}, {}};
   if (options.partition == Partition::gauss_seidel) {
     plan.colors = color_constraints(scene);

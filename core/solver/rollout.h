@@ -81,13 +81,15 @@ class Rollout {
     }
   }
 
-  // The last substep's multipliers (rows); zero before the first.
+  // The last substep's multipliers (scene.multipliers()); zero before the first.
   const T* multipliers() {
-    record_.lambda.resize(scene_.rows);
+    record_.lambda.resize(scene_.multipliers());
     if constexpr (in_packs<T>)
       if (!plan_.colors.empty()) unpack_multipliers(scene_, plan_.packs, record_.packs, record_.lambda.data());
     for (std::size_t b = 0; b < plan_.blocks.size(); ++b)
       unpack_multipliers(plan_.blocks[b], record_.blocks[b], record_.lambda.data());
+    for (std::size_t v = 0; v < record_.volumes.size(); ++v)
+      record_.lambda[scene_.rows + v] = record_.volumes[v].lambda;
     return record_.lambda.data();
   }
 

@@ -8,6 +8,7 @@
 #include "core/solver/project.h"
 #include "core/solver/project_block.h"
 #include "core/solver/retract.h"
+#include "core/solver/volume.h"
 #include "core/solver/yield.h"
 
 namespace sheetbend {
@@ -19,6 +20,7 @@ struct SubstepRecord {
   std::vector<T> C_r, lambda;  // damping references, multipliers (those of packs and blocks stay there)
   PackState<std::conditional_t<in_packs<T>, T, double>> packs;  // of colors that go through the kernels
   std::vector<BlockState<T>> blocks;
+  std::vector<VolumeState<T>> volumes;
 
   void resize(const Scene& scene, const Plan& plan, bool keep_iterations) {
     weights.w.resize(scene.nodes());
@@ -26,6 +28,8 @@ struct SubstepRecord {
     const int kept = keep_iterations ? plan.options.iterations : 0;
     blocks.resize(plan.blocks.size());
     for (std::size_t b = 0; b < blocks.size(); ++b) blocks[b].resize(scene, plan.blocks[b], kept);
+    volumes.resize(scene.volumes.size());
+    for (std::size_t v = 0; v < volumes.size(); ++v) volumes[v].resize(scene.volumes[v], kept);
     if (plan.colors.empty()) return;
     C_r.resize(damped_rows(scene));
     if constexpr (in_packs<T>) {
@@ -42,6 +46,17 @@ struct SubstepRecord {
     if constexpr (in_packs<T> && !carries_tangents<T>)
       if (sweeps_packs<T>(plan)) return {packs.rows.at(0), sheetbend_packs::row};
     return {q, 3};
+  }
+
+  // Calls f(at), at(node, d) being where a coordinate is while colors are swept. The rows of duals hold values and directions apart.
+  template <class F>
+  void with_coordinates(const Plan& plan, T* q, F&& f) {
+    if constexpr (carries_tangents<T>)
+      if (sweeps_packs<T>(plan))
+        return f([&rows = packs.rows](int node, int d) {
+          return rows[sheetbend_packs::row * static_cast<std::size_t>(node) + d];
+        });
+    f([at = coordinates(plan, q)](int node, int d) -> T& { return at.of(node)[d]; });
   }
 };
 
@@ -69,36 +84,60 @@ void damping_references(const Scene& scene, const Inputs<const T>& in, const Bdf
   }
 }
 
-// All iterations, with the damping references that they need.
+// Direct blocks, which share no movable particle: each goes through all its iterations.
 template <class T>
-void project(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf, const SubstepStates<T>& s,
-             T* q, SubstepRecord<T>& record) {
-  const SolverOptions& o = plan.options;
-  const T* w = record.weights.w.data();
-  parallel_for(static_cast<int>(plan.blocks.size()), o.threads, 1, [&](int begin, int end) {
-    const SubstepState<T> state{scene, in, bdf.eta, q, w, nullptr, nullptr};
+void project_blocks(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf,
+                    const SubstepStates<T>& s, T* q, SubstepRecord<T>& record) {
+  parallel_for(static_cast<int>(plan.blocks.size()), plan.options.threads, 1, [&](int begin, int end) {
+    const SubstepState<T> state{scene, in, bdf.eta, q, record.weights.w.data(), nullptr, nullptr};
     for (int b = begin; b < end; ++b) {
       begin_block(state, plan.blocks[b], record.blocks[b]);
       refer_block(state, plan.blocks[b], pack_kernels(), bdf.before, s.x, s.x_before, record.blocks[b]);
-      for (int iteration = 0; iteration < o.iterations; ++iteration)
+      for (int iteration = 0; iteration < plan.options.iterations; ++iteration)
         project_block(state, plan.blocks[b], pack_kernels(), record.blocks[b], iteration);
       end_block(state, plan.blocks[b], record.blocks[b]);
     }
   });
-  if (plan.colors.empty()) return;
+}
+
+template <class T>
+void begin_colors(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf,
+                  const SubstepStates<T>& s, [[maybe_unused]] T* q, SubstepRecord<T>& record) {
   damping_references(scene, in, bdf, s, record.C_r.data());
-  if constexpr (in_packs<T>) {
-    begin_sweeps(scene, plan.packs, in, bdf.eta, w, record.C_r.data(), record.packs, q);
-    for (int iteration = 0; iteration < o.iterations; ++iteration)
-      sweep(plan.packs, pack_kernels(), o.threads, o.grain, iteration, record.packs);
-    end_sweeps(scene, record.packs, q);
-  } else {
+  if constexpr (in_packs<T>)
+    begin_sweeps(scene, plan.packs, in, bdf.eta, record.weights.w.data(), record.C_r.data(), record.packs, q);
+  else
     std::fill(record.lambda.begin(), record.lambda.end(), T(0.0));
-    const SubstepState<T> state{scene, in, bdf.eta, q, w, record.C_r.data(), record.lambda.data()};
-    for (int iteration = 0; iteration < o.iterations; ++iteration)
-      for (const Color& color : plan.colors)
-        project_color(state, o, color, record.iterations[record.iterations.size() == 1 ? 0 : iteration]);
+}
+
+// One pass over all colors.
+template <class T>
+void project_colors(const Scene& scene, const Plan& plan, const Inputs<const T>& in, double eta, int iteration, T* q,
+                    SubstepRecord<T>& record) {
+  const SolverOptions& o = plan.options;
+  if constexpr (in_packs<T>) {
+    sweep(plan.packs, pack_kernels(), o.threads, o.grain, iteration, record.packs);
+  } else {
+    const SubstepState<T> state{scene, in, eta, q, record.weights.w.data(), record.C_r.data(), record.lambda.data()};
+    for (const Color& color : plan.colors)
+      project_color(state, o, color, record.iterations[record.iterations.size() == 1 ? 0 : iteration]);
   }
+}
+
+// Blocks; or iterations over colors and volumes, with the damping references that they need.
+template <class T>
+void project(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf, const SubstepStates<T>& s,
+             T* q, SubstepRecord<T>& record) {
+  project_blocks(scene, plan, in, bdf, s, q, record);
+  if (!plan.colors.empty()) begin_colors(scene, plan, in, bdf, s, q, record);
+  record.with_coordinates(plan, q, [&](auto at) {
+    for (int iteration = 0; iteration < plan.options.iterations; ++iteration) {
+      project_colors(scene, plan, in, bdf.eta, iteration, q, record);
+      project_volumes(scene, in, bdf.eta, record.weights.w.data(), iteration, at, record.volumes);
+    }
+  });
+  if constexpr (in_packs<T>)
+    if (!plan.colors.empty()) end_sweeps(scene, record.packs, q);
 }
 
 // What the reverse repeats of a substep: everything but the velocity. The record holds every iteration when it was sized so, the last one

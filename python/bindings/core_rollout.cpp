@@ -25,7 +25,7 @@ Solver make_solver(std::shared_ptr<Scene> scene, double h, const std::string& in
 // Forward only: positions, velocities and constraint multipliers in force units at the wanted substeps.
 py::dict simulate(const Solver& s, const Array& inputs, const Steps& steps, double t0) {
   check(s, inputs, 1, steps);
-  const std::size_t dofs = s.scene->dofs(), rows = s.scene->rows, frames = steps.size();
+  const std::size_t dofs = s.scene->dofs(), rows = s.scene->multipliers(), frames = steps.size();
   auto positions = empty({frames, dofs}), velocities = empty({frames, dofs}), multipliers = empty({frames, rows});
   double *x = positions.mutable_data(), *v = velocities.mutable_data(), *force = multipliers.mutable_data();
   {

@@ -18,7 +18,7 @@ std::shared_ptr<const Scene> make_scene(int particles, const std::vector<std::ar
                                         std::vector<double> boundary_times, const std::string& boundary_interpolation,
                                         std::vector<int> loaded, std::vector<double> force_times, bool has_drag,
                                         std::vector<std::array<int, 3>> air, std::vector<double> wind_times,
-                                        const std::vector<py::dict>& groups) {
+                                        const std::vector<py::dict>& groups, const std::vector<py::dict>& volumes) {
   SceneSpec spec;
   spec.particles = particles;
   for (const auto& [node, tail, head] : directors) spec.directors.push_back({node, tail, head});
@@ -33,6 +33,8 @@ std::shared_ptr<const Scene> make_scene(int particles, const std::vector<std::ar
   for (const py::dict& g : groups)
     spec.groups.push_back({g["name"].cast<std::string>(), g["kind"].cast<std::string>(), g["damped"].cast<bool>(),
                            whole_numbers(g["stencil"])});
+  for (const py::dict& v : volumes)
+    spec.volumes.push_back({v["name"].cast<std::string>(), v["triangles"].cast<std::vector<std::array<int, 3>>>()});
   return std::make_shared<const Scene>(build_scene(spec));
 }
 
@@ -44,15 +46,16 @@ void bind_scene(py::module_& m) {
                        std::vector<int> driven, std::vector<double> boundary_times,
                        const std::string& boundary_interpolation, std::vector<int> loaded,
                        std::vector<double> force_times, bool has_drag, std::vector<std::array<int, 3>> air,
-                       std::vector<double> wind_times, const std::vector<py::dict>& groups) {
+                       std::vector<double> wind_times, const std::vector<py::dict>& groups,
+                       const std::vector<py::dict>& volumes) {
              return std::const_pointer_cast<Scene>(
                  make_scene(particles, directors, std::move(pinned), std::move(driven), std::move(boundary_times),
                             boundary_interpolation, std::move(loaded), std::move(force_times), has_drag, std::move(air),
-                            std::move(wind_times), groups));
+                            std::move(wind_times), groups, volumes));
            }),
            py::kw_only(), py::arg("particles"), py::arg("directors"), py::arg("pinned"), py::arg("driven"),
            py::arg("boundary_times"), py::arg("boundary_interpolation"), py::arg("loaded"), py::arg("force_times"),
-           py::arg("has_drag"), py::arg("air"), py::arg("wind_times"), py::arg("groups"))
+           py::arg("has_drag"), py::arg("air"), py::arg("wind_times"), py::arg("groups"), py::arg("volumes"))
       .def_property_readonly("layout",
                              [](const Scene& s) {
                                py::dict layout;

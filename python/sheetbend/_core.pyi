@@ -42,6 +42,7 @@ class Scene:
         air: Sequence[Sequence[int]],
         wind_times: Sequence[float],
         groups: Sequence[Mapping[str, Any]],
+        volumes: Sequence[Mapping[str, Any]],
     ) -> None: ...
     @property
     def layout(self) -> dict[str, tuple[int, int]]: ...  # array name -> (offset, size) in the flat inputs

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .checks import check_increasing, finite, index_array, per_item
+from .checks import check_increasing, finite, per_item, triangle_array
 from .errors import SceneError
 from .quantities import Term
 
@@ -46,7 +46,7 @@ class Air:
         name: str,
     ) -> None:
         """See `Scene.add_air`."""
-        corners = _triangles(f"{name}.air.triangles", triangles, scene.particle_count)
+        corners = triangle_array(f"{name}.air.triangles", triangles, scene.particle_count)
         given = {"normal": normal, "tangential": tangential}
         values = {kind: _coefficient(f"{name}.air.{kind}", k, len(corners)) for kind, k in given.items()}
         self._blow(scene, wind, times)
@@ -57,7 +57,7 @@ class Air:
 
     def press(self, scene: Scene, triangles: ArrayLike, pressure: ArrayLike, name: str) -> None:
         """See `Scene.add_pressure`."""
-        corners = _triangles(f"{name}.pressure.triangles", triangles, scene.particle_count)
+        corners = triangle_array(f"{name}.pressure.triangles", triangles, scene.particle_count)
         p = per_item(f"{name}.pressure", pressure, len(corners))
         if np.ndim(pressure) == 0:
             self._name(scene, name, "pressure", p, "Pa")
@@ -108,18 +108,6 @@ class Air:
             scene.add_quantity(quantity, float(w[0, k]), "m/s", positive=False, scale=1.0)
             scene.add_terms([Term("wind", k, 1.0, ((quantity, "identity"),))])
         self.wind[:] = 0.0
-
-
-def _triangles(field: str, triangles: ArrayLike, particles: int) -> Array:
-    flat = index_array(field, triangles, particles)
-    if np.ndim(triangles) != 2 or np.shape(triangles)[1] != 3:
-        raise SceneError(field, "have the wrong shape", np.shape(triangles), "give (count, 3) particles")
-    corners = flat.reshape(-1, 3)
-    twice = (corners == np.roll(corners, 1, axis=1)).any(axis=1)
-    if twice.any():
-        bad = corners[int(np.argmax(twice))].tolist()
-        raise SceneError(field, "use a particle twice", bad, "give three distinct particles each")
-    return corners
 
 
 def _coefficient(field: str, values: ArrayLike, count: int) -> Array:

@@ -79,3 +79,16 @@ def index_array(field: str, values: ArrayLike, count: int) -> np.ndarray:
     if bad.size:
         raise SceneError(field, "name particles that do not exist", bad[:5].tolist(), f"use 0 to {count - 1}")
     return array.ravel().astype(np.int64) % count
+
+
+def triangle_array(field: str, values: ArrayLike, count: int) -> np.ndarray:
+    """Triangles (n, 3) of three distinct particles each."""
+    flat = index_array(field, values, count)
+    if np.ndim(values) != 2 or np.shape(values)[1] != 3:
+        raise SceneError(field, "have the wrong shape", np.shape(values), "give (count, 3) particles")
+    corners = flat.reshape(-1, 3)
+    twice = (corners == np.roll(corners, 1, axis=1)).any(axis=1)
+    if twice.any():
+        bad = corners[int(np.argmax(twice))].tolist()
+        raise SceneError(field, "use a particle twice", bad, "give three distinct particles each")
+    return corners

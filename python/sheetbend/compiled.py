@@ -46,6 +46,10 @@ class CompiledScene:
                     {"name": g.name, "kind": g.kind, "damped": g.damped, "stencil": g.particles.ravel()}
                     for g in scene.groups
                 ],
+                volumes=[
+                    {"name": name, "triangles": triangles.tolist()}
+                    for name, triangles in scene.volumes.triangles.items()
+                ],
             )
         except ValueError as error:
             field, _, rest = str(error).partition(": ")

@@ -20,7 +20,10 @@ COMPLEX_STEP_BOUND = 1e-8
 DOT_PRODUCT_BOUND = 1e-9
 DIFFERENCES_BOUND = 1e-4
 STEP_FACTORS = (1e4, 1e2, 1.0, 1e-2)
-POSITIVE = ("mass", "compliance", "damping", "drag_linear", "drag_quadratic", "air_normal", "air_tangential")
+POSITIVE = (
+    *("mass", "compliance", "damping", "drag_linear", "drag_quadratic", "air_normal", "air_tangential"),
+    *("volume", "volume_compliance"),
+)
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ class Gradient:
         inputs: by input array, in its shape: "position", "velocity" (particles, 3), "mass" (particles,), "compliance",
             "damping" (constraints,), "rest" (all rest parameters,), "boundary", "force" (knots times particles, 3),
             "gravity" (3,), "drag_linear", "drag_quadratic" (particles,), "wind" (knots, 3), "air_normal",
-            "air_tangential", "pressure" (triangles in air,).
+            "air_tangential", "pressure" (triangles in air,), "volume", "volume_compliance" (volumes,).
         recomputed: substeps that the forward program ran again: as planned, or more where the same rollout was
             differentiated before and its tape no longer holds what it held.
         tape: bytes of the tape.

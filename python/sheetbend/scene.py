@@ -20,6 +20,7 @@ from .kinds import KINDS, NEEDS_COMPLIANCE, UNITS, VISCOUS_COMPLIANCE
 from .quantities import Quantity, Term, product
 from .rest_values import rest_values
 from .scene_checks import validate
+from .volume import Volumes
 
 Array = np.ndarray
 
@@ -58,6 +59,7 @@ class Scene:
         self.forces = Forces()
         self.has_drag = False
         self.air = Air()
+        self.volumes = Volumes()
         self.ropes: dict[str, Any] = {}
         self.cloths: dict[str, Any] = {}
         self._positions, self._velocities, self._mass = Column(3), Column(3), Column()
@@ -377,6 +379,28 @@ class Scene:
         self._building()
         self.air.press(self, triangles, pressure, name)
 
+    def add_volume(
+        self, triangles: ArrayLike, *, compliance: float = 0.0, rest: float | None = None, name: str = "cloth"
+    ) -> None:
+        """Let a closed surface keep its volume V, by the energy (V - rest)^2/(2 compliance) (Macklin et al. 2016, 6.5).
+
+        Only method "gauss_seidel" takes it. The pressure that it takes, inside above outside, is in
+        `Trajectory.pressures`, with an error of O(h^2); long substeps are calm, unlike those of `add_pressure`. The
+        numbers are the quantities `<name>_volume` and, unless zero, `<name>_volume_compliance`.
+
+        Args:
+            triangles: (count, 3) particles, counterclockwise as seen from outside; every edge is between two of them.
+            compliance: m^3/Pa; 0 is incompressible, a gas at p Pa that keeps its temperature has V/p.
+            rest: m^3, by default the volume of the particles as they were added; more blows the surface up.
+            name: of the volume and its quantities.
+
+        Raises:
+            SceneError: an edge that is not between two triangles, corners that are not distinct, a surface that is
+                inside out, a rest volume that is not positive, a negative compliance.
+        """
+        self._building()
+        self.volumes.add(self, triangles, compliance, rest, name)
+
     def freeze(self) -> Scene:
         """End the construction: validates the whole scene and returns it. Later additions raise.
 
@@ -446,6 +470,7 @@ class Scene:
             "drag_linear": self._drag_of("linear"),
             "drag_quadratic": self._drag_of("quadratic"),
             **self.air.arrays(),
+            **self.volumes.arrays(),
         }
 
     # --- private

@@ -33,8 +33,8 @@ def validate(scene: Scene) -> None:
         raise SceneError("mass", "is zero for free particles", light[:5].tolist(), "give them a mass, or pin them")
     if scene.groups:
         used = np.zeros(scene.particle_count, dtype=bool)
-        for g in scene.groups:
-            used[g.particles] = True
+        for particles in (*(g.particles for g in scene.groups), *scene.volumes.triangles.values()):
+            used[particles] = True
         loose = free[~used[free]]
         if loose.size:
             fix = "constrain them, pin them or leave them out"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,12 +27,14 @@ class Trajectory:
         velocities: (frames, particles, 3) m/s; zero for directors, which are directions.
         forces: per group the constraints' multipliers (frames, count, rows) in units of force (distance: minus the
             tension in N; bend and hinge: minus the moment in N m), zero at the initial frame.
+        pressures: per volume (frames,) its multiplier, Pa, inside above outside; zero at the initial frame.
     """
 
     times: np.ndarray
     positions: np.ndarray
     velocities: np.ndarray
     forces: Mapping[str, np.ndarray]
+    pressures: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
 def simulate(
@@ -72,6 +74,7 @@ def simulate(
         out["positions"].reshape(frames, -1, 3),
         velocities,
         forces_by_group(scene, out["multipliers"]),
+        dict(zip(scene.volumes.triangles, out["multipliers"].T[compiled.core.rows :], strict=True)),
     )
 
 

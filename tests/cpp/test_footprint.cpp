@@ -5,6 +5,7 @@
 
 #include "adjoint/tape_plan.h"
 #include "core/scalar/dual.h"
+#include "tests/cpp/support/bipyramid.h"
 #include "tests/cpp/support/programs.h"
 
 namespace {
@@ -70,6 +71,15 @@ void expect_footprint(const Scene& scene, const Plan& plan, const std::vector<T>
 TEST_P(Footprint, IsWhatIsAllocated) {
   const Sample sample = random_scene(77, GetParam().shape(60));
   const Plan plan = make_plan(sample.scene, GetParam().options(3));
+  expect_footprint<double>(sample.scene, plan, sample.inputs);
+  expect_footprint<Pack>(sample.scene, plan, {sample.inputs.begin(), sample.inputs.end()});
+  expect_footprint<Dual<double, 1>>(sample.scene, plan, {sample.inputs.begin(), sample.inputs.end()});
+}
+
+// A scene of one closed surface and nothing else.
+TEST(FootprintOfAVolume, IsWhatIsAllocated) {
+  const Sample sample = bipyramid(300);
+  const Plan plan = make_plan(sample.scene, {.h = 4e-3, .partition = Partition::gauss_seidel, .iterations = 3});
   expect_footprint<double>(sample.scene, plan, sample.inputs);
   expect_footprint<Pack>(sample.scene, plan, {sample.inputs.begin(), sample.inputs.end()});
   expect_footprint<Dual<double, 1>>(sample.scene, plan, {sample.inputs.begin(), sample.inputs.end()});

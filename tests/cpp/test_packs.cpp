@@ -74,7 +74,10 @@ struct Packs : ::testing::TestWithParam<Scenes> {
     double *w_bar = &all[scene.dofs()], *C_r_bar = w_bar + scene.nodes();
     const Inputs<double> in_bar{scene.layout, C_r_bar + scene.rows};
     for (int n = 0; n < scene.nodes(); ++n) Vec3<double>(&x_bar[scene.first_dof[n]]).store(bar.rows.at(n));
-    reverse_sweeps(scene, plan.packs, kernels, plan.options.iterations, threads, 1, in, f.state, C_r_bar, in_bar, bar);
+    begin_sweeps_vjp(scene, plan.packs, threads, in, f.state, in_bar, bar);
+    const int last = plan.options.iterations - 1;
+    for (int i = last; i >= 0; --i) sweep_vjp(plan.packs, kernels, threads, 1, i, i == last, f.state, bar);
+    end_sweeps_vjp(scene, plan.packs, bar, C_r_bar);
     for (int n = 0; n < scene.nodes(); ++n) {
       Vec3<double>(bar.rows.at(n)).store(&all[scene.first_dof[n]]);
       w_bar[n] = bar.rows.at(n)[3];

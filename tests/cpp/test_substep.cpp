@@ -93,8 +93,9 @@ TEST_P(Substep, ReverseMatchesComplexStep) {
       const auto of = [&](const std::vector<double>& g) {
         return std::span(g).subspan(4 * dofs + scene.layout.offset[q], scene.layout.size[q]);
       };
-      EXPECT_EQ(largest(of(oracle)) > 0.0,
-                q != static_cast<int>(Quantity::position) && q != static_cast<int>(Quantity::velocity));
+      const bool initial = q == static_cast<int>(Quantity::position) || q == static_cast<int>(Quantity::velocity);
+      const bool missing = scene.volumes.empty() && is_of_volumes(q);
+      EXPECT_EQ(largest(of(oracle)) > 0.0, !initial && !missing) << quantity_names[q];
       const double error = relative_error(of(bar), of(oracle));
       EXPECT_LE(error, 1e-10) << quantity_names[q];
       record_error(quantity_names[q], error);

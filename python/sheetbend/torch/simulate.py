@@ -62,7 +62,7 @@ def simulate(
             "velocity" (particles, 3), "mass" (particles,), "compliance", "damping" (constraints,), "rest" (all rest
             parameters,), "boundary" (knots, driven, 3), "force" (knots, loaded, 3), "gravity" (3,), "drag_linear",
             "drag_quadratic" (particles,), "wind" (knots, 3), "air_normal", "air_tangential",
-            "pressure" (triangles in air,).
+            "pressure" (triangles in air,), "volume", "volume_compliance" (volumes,).
             Constraints and rest parameters come group after group, as added.
 
     Returns:

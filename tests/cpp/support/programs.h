@@ -78,7 +78,8 @@ struct Solver {
   Partition partition;
   bool net;  // one block with branches and loops, instead of ropes
   SceneShape shape(int ropes = 5) const {
-    return {.ropes = ropes, .net = net, .unilateral = partition == Partition::gauss_seidel};
+    const bool sweeps = partition == Partition::gauss_seidel;
+    return {.ropes = ropes, .net = net, .unilateral = sweeps, .volumes = sweeps};
   }
   SolverOptions options(int iterations) const {
     return {.h = 4e-3, .integrator = integrator, .partition = partition, .iterations = iterations};

@@ -1,7 +1,8 @@
 // Random scenes that hold every registered constraint and every differentiable quantity. Each rope strings
 // together one sample stencil of every kind, jittered, and braces. Ropes start at one driven particle, so
 // that constraints of one color, and direct blocks, share it; or, as a net, at one free particle and with
-// ties between them: one block with branches and loops. Joints bring the directors of their edges, and the set of those that yield.
+// ties between them: one block with branches and loops. Joints bring the directors of their edges, and the set of those that yield. A closed surface
+// may hang on each rope, one of them with a driven particle, another with a pinned one.
 #pragma once
 
 #include "core/scene/scene.h"
@@ -19,6 +20,7 @@ struct SceneShape {
   int ropes = 5;  // the first two are damped; five of them make a net sparse
   bool net = false;
   bool unilateral = false;  // also those kinds, which direct blocks do not hold
+  bool volumes = false;     // likewise
 };
 
 namespace detail {
@@ -35,6 +37,7 @@ struct SceneBuilder {
   };
   std::vector<Values> groups{};
   std::vector<int> sets{};
+  std::vector<double> volumes{}, volume_compliances{};
 
   explicit SceneBuilder(unsigned seed) : random(seed) {}
 
@@ -85,6 +88,28 @@ struct SceneBuilder {
     add_constraint<Distance>(false, {a, b}, {l * random(0.97, 1.03)});
   }
 
+  // An octahedron with a corner at place k of a rope, tied to it and to the particle before.
+  void add_volume(const std::vector<int>& rope, std::size_t k) {
+    const int corner = rope[k];
+    constexpr double r = 0.08, inside = 4.0 / 3.0 * r * r * r;
+    std::vector<int> ring;
+    for (const auto& [a, b] : {std::pair{r, 0.0}, {0.0, r}, {-r, 0.0}, {0.0, -r}}) {
+      ring.push_back(add_particle(x[3 * corner] + a + random(-0.005, 0.005), x[3 * corner + 1] + b,
+                                  x[3 * corner + 2] - r + random(-0.005, 0.005)));
+      add_brace(corner, ring.back());
+    }
+    add_brace(rope[k - 1], ring[0]);
+    const int below = add_particle(x[3 * corner], x[3 * corner + 1], x[3 * corner + 2] - 2.0 * r);
+    VolumeSpec volume{"volume", {}};
+    for (int k = 0; k < 4; ++k) {
+      volume.triangles.push_back({corner, ring[k], ring[(k + 1) % 4]});
+      volume.triangles.push_back({below, ring[(k + 1) % 4], ring[k]});
+    }
+    spec.volumes.push_back(volume);
+    volumes.push_back(inside * random(0.95, 1.05));
+    volume_compliances.push_back(5e-8 * random(0.5, 1.5));
+  }
+
   std::vector<int> add_rope(bool damped, bool unilateral) {
     const int first = static_cast<int>(x.size()) / 3;
     int tail = 0;
@@ -130,6 +155,8 @@ struct SceneBuilder {
     fill(Quantity::air_normal, 0.3, 0.9);
     fill(Quantity::air_tangential, 0.03, 0.2);
     fill(Quantity::pressure, -0.2, 0.2);
+    std::copy(volumes.begin(), volumes.end(), in.of(Quantity::volume));
+    std::copy(volume_compliances.begin(), volume_compliances.end(), in.of(Quantity::volume_compliance));
   }
 };
 
@@ -143,6 +170,9 @@ inline Sample random_scene(unsigned seed, const SceneShape& shape = {}) {
   if (shape.net)
     for (std::size_t r = 1; r < ropes.size(); ++r)
       for (std::size_t k = 1; k + 2 < ropes[r].size(); k += 2) b.add_brace(ropes[r - 1][k], ropes[r][k + 2]);
+  if (shape.volumes)
+    for (std::size_t r = 0; r < ropes.size(); ++r)
+      b.add_volume(ropes[r], r == 1 ? ropes[r].size() / 2 : ropes[r].size() - 1);
   b.spec.particles = static_cast<int>(b.x.size()) / 3;
   b.spec.driven = {shape.net ? ropes[2].back() : 0, ropes[1][ropes[1].size() / 2]};
   b.spec.pinned = b.sets;
