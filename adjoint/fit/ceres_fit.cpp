@@ -107,6 +107,8 @@ CeresResult minimize_with_ceres(const EvaluationFunction& evaluation, std::vecto
   o.gradient_tolerance = options.gradient_tolerance;
   o.parameter_tolerance = options.parameter_tolerance;
   o.max_num_consecutive_invalid_steps = 20;
+  // With bounds Ceres also searches along each step; cubic interpolation would ask for a Jacobian at every trial of it.
+  o.line_search_interpolation_type = ceres::QUADRATIC;
   o.logging_type = ceres::SILENT;
   o.update_state_every_iteration = true;
   o.callbacks.push_back(&watch);
