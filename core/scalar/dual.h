@@ -9,8 +9,10 @@ namespace sheetbend {
 template <class T, int N = 1>
 struct Dual {
   static constexpr int directions = N;
-  T v{};
+  // Directions first, so that code on pairs of them and copies of the whole move the same 16 bytes: a load across two stores that are still
+  // under way waits for both, which took more than half the time of a rope's Jacobian.
   T d[N]{};
+  T v{};
 
   Dual() = default;
   Dual(double a) : v(a) {}

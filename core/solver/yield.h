@@ -15,11 +15,16 @@ template <class K, class T>
 struct Yield {
   static constexpr int set = K::dofs - 3;
   T x[K::dofs], C[K::rows], J[K::rows * K::dofs], e[K::rows];
+  decltype(T() > T()) slides;  // per lane
   T f, y_over_length, inverse_length;
 
-  Yield(const Scene& scene, const Group& group, int item, const T* p, const T* state) {
-    const auto nodes = group.nodes(item);
-    for (int d = 0; d < K::dofs; ++d) x[d] = state[scene.first_dof[nodes[d / 3]] + d % 3];
+  Yield(const Scene& scene, const Group& group, int item, const T* p, const T* state)
+      : Yield([&](int d) -> const T& { return state[scene.first_dof[group.nodes(item)[d / 3]] + d % 3]; }, p) {}
+
+  // at(d): coordinate d of the stencil.
+  template <class At>
+  Yield(At&& at, const T* p) {
+    for (int d = 0; d < K::dofs; ++d) x[d] = at(d);
     K::evaluate(x, p, C, J);
     const T one(1.0), y = p[K::yield_parameter];
     T length2(0.0);
@@ -27,7 +32,7 @@ struct Yield {
       e[j] = C[j] - (one - p[K::share_parameter]) * x[set + j];
       length2 += e[j] * e[j];
     }
-    const auto slides = length2 > y * y;
+    slides = length2 > y * y;
     inverse_length = select(slides, one / sqrt(select(slides, length2, one)), T(0.0));
     y_over_length = y * inverse_length;
     f = select(slides, one - y_over_length, T(0.0));
@@ -55,37 +60,41 @@ void yield(const Scene& scene, const Inputs<const T>& in, T* state) {
   });
 }
 
-// Along N directions: values and gradients come from one evaluation on duals by the parameters inside C, the directions follow from them.
+// Along N directions, where it slides: those of coordinates go through the gradient, those of parameters inside C through duals.
 template <int N>
 void yield(const Scene& scene, const Inputs<const Dual<double, N>>& in, Dual<double, N>* state) {
+  using Directed = Dual<double, N>;
   if (!scene.yields) return;
   for_each_yielding(scene, [&]<class K>(K, const Group& group, int item, std::size_t value) {
     constexpr int P = parameter_count<K>, inside = P - K::offsets, set = K::dofs - 3;
-    using D = Dual<double, inside>;
-    const Dual<double, N>* p = in.of(Quantity::rest) + value;
+    const Directed* p = in.of(Quantity::rest) + value;
     const auto nodes = group.nodes(item);
-    const auto at = [&](int d) -> Dual<double, N>& { return state[scene.first_dof[nodes[d / 3]] + d % 3]; };
-    D x[K::dofs], own[P], C[K::rows], J[K::rows * K::dofs];
-    for (int d = 0; d < K::dofs; ++d) x[d].v = at(d).v;
-    for (int k = 0; k < P; ++k) own[k].v = p[k].v;
-    for (int k = 0; k < inside; ++k) own[k].d[k] = 1.0;
-    K::evaluate(x, own, C, J);
-    Dual<double, N> e[K::rows], length2;
+    const auto at = [&](int d) -> Directed& { return state[scene.first_dof[nodes[d / 3]] + d % 3]; };
+    double own[P];
+    for (int k = 0; k < P; ++k) own[k] = p[k].v;
+    const Yield<K, double> values([&](int d) { return at(d).v; }, own);
+    if (!values.slides) return;
+
+    using ByParameter = Dual<double, inside>;
+    ByParameter xd[K::dofs], pd[P], C[K::rows], J[K::rows * K::dofs];
+    for (int d = 0; d < K::dofs; ++d) xd[d].v = values.x[d];
+    for (int k = 0; k < P; ++k) pd[k].v = own[k];
+    for (int k = 0; k < inside; ++k) pd[k].d[k] = 1.0;
+    K::evaluate(xd, pd, C, J);
+    Directed e[K::rows], length2;
     for (int j = 0; j < K::rows; ++j) {
-      e[j].v = C[j].v;
+      e[j].v = values.C[j];
       for (int i = 0; i < N; ++i) {
         double sum = -p[inside + j].d[i];
         for (int k = 0; k < inside; ++k) sum += C[j].d[k] * p[k].d[i];
-        for (int d = 0; d < K::dofs; ++d) sum += J[j * K::dofs + d].v * at(d).d[i];
+        for (int d = 0; d < K::dofs; ++d) sum += values.J[j * K::dofs + d] * at(d).d[i];
         e[j].d[i] = sum;
       }
-      e[j] -= (Dual<double, N>(1.0) - p[K::share_parameter]) * at(set + j);
+      e[j] -= (Directed(1.0) - p[K::share_parameter]) * at(set + j);
       length2 += e[j] * e[j];
     }
-    const Dual<double, N> y = p[K::yield_parameter];
-    if (!(length2.v > y.v * y.v)) return;
     // in the order of Yield, so that the values have its bits
-    const Dual<double, N> f = Dual<double, N>(1.0) - y * (Dual<double, N>(1.0) / sqrt(length2));
+    const Directed f = Directed(1.0) - p[K::yield_parameter] * (Directed(1.0) / sqrt(length2));
     for (int j = 0; j < K::rows; ++j) at(set + j) += f * e[j];
   });
 }
