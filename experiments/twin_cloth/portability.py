@@ -41,10 +41,10 @@ def main() -> int:
 
 
 def swept(config: Config, found: sb.Fit, sweeps: int) -> sb.Fit:
-    """The fit through Gauss-Seidel: one iteration from what was found, whose minimum is near where sweeps suffice."""
+    """The fit through Gauss-Seidel, from what was found."""
     study = build(with_values(config, found.values), FILE.parent)
     experiments = [by_gauss_seidel(e, sweeps) for e in study.experiments]
-    return sb.fit(experiments, parameters=study.parameters, profiles=False, max_iterations=1)
+    return sb.fit(experiments, parameters=study.parameters, profiles=False)
 
 
 def by_gauss_seidel(e: sb.Experiment, sweeps: int) -> sb.Experiment:
