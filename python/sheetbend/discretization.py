@@ -8,7 +8,8 @@ moves is carried on to the limit (Richardson): 4/3 of it for meshes and BDF2, tw
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,13 +66,17 @@ def refined_estimates(
     return tuple(moved)
 
 
-def to_the_limit(refits: Iterable[Refit]) -> dict[str, float]:
-    """By how much each parameter would move up to the limit, in its unit: root sum of squares over the refits."""
+def to_the_limit(refits: Iterable[Refit], parameters: Parameters, values: Mapping[str, float]) -> dict[str, float]:
+    """By how much each parameter would move up to the limit, in its unit: root sum of squares over the refits.
+
+    A logarithmic one moves by a factor, and its size is that of the factor upward: from 1 to 0.4 is 1.5, as to 2.5.
+    """
     total: dict[str, float] = {}
     for made in refits:
         for name, moved in made.moved.items():
-            total[name] = float(np.hypot(total.get(name, 0.0), made.to_limit * moved))
-    return total
+            step = math.log1p(moved / values[name]) if parameters[name].log else moved
+            total[name] = math.hypot(total.get(name, 0.0), made.to_limit * step)
+    return {name: values[name] * math.expm1(size) if parameters[name].log else size for name, size in total.items()}
 
 
 def _one_step(problem: FitProblem, finer: FitProblem, u: np.ndarray) -> np.ndarray:

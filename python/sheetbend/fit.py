@@ -146,7 +146,8 @@ def fit(
             else refined_estimates(refine, experiments, wanted, problem, best.u, refitter, threads)
         )
         more = {} if systematic is None else systematic(problem, best.u)
-        judged = _judge(problem, best.u, to_the_limit(refits), more, refitter if profiles else None)
+        refined = to_the_limit(refits, problem.parameters, values)
+        judged = _judge(problem, best.u, refined, more, refitter if profiles else None)
         return refits, judged, *predicted_values(experiments, wanted, values, refitter, threads)
 
     left_out: dict[str, Comparison] = {}

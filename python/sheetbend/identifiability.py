@@ -354,15 +354,12 @@ def _clipped(parameter: Parameter, ends: Ends) -> Ends:
 
 
 def _widened(parameter: Parameter, value: float, ends: Ends, more: float) -> Ends:
-    """Both ends moved out by the other parts; on a log scale by the factors that lead from the value to as much above
-    and below it, and where that is zero or less there is no lower end."""
+    """Both ends moved out by the other parts; a factor on a log scale keeps them positive."""
     lower, upper = ends
-    if not parameter.log:
-        return None if lower is None else lower - more, None if upper is None else upper + more
-    share = more / value
+    factor, shift = (1 + more / value, 0.0) if parameter.log else (1.0, more)
     return (
-        None if lower is None or share >= 1 else lower * (1 - share),
-        None if upper is None else upper * (1 + share),
+        None if lower is None else lower / factor - shift,
+        None if upper is None else upper * factor + shift,
     )
 
 

@@ -121,9 +121,10 @@ class TestFit:
     def refined(self, rope: dict[str, Any]) -> None:
         """Both halves of an interval are told, and what each refinement moves."""
         EI = rope["parameters"]["rope_EI"]
-        moved = [made["to_limit"] * made["moved"]["rope_EI"] for made in rope["refits"]]
+        value = rope["values"]["rope_EI"]
+        moved = [made["to_limit"] * np.log1p(made["moved"]["rope_EI"] / value) for made in rope["refits"]]
         assert [made["name"] for made in rope["refits"]] == ["half the step", "finer mesh"]
-        assert EI["discretization"] == pytest.approx(np.hypot(*moved)) and EI["discretization"] > 0
+        assert EI["discretization"] == pytest.approx(value * np.expm1(np.hypot(*moved))) and EI["discretization"] > 0
         assert EI["half_width"] > EI["statistical"] > 0
 
     def written(self, folder: Path, rope: dict[str, Any]) -> None:

@@ -282,19 +282,6 @@ def test_discretization_is_added_and_both_are_reported() -> None:
     assert judge(one(1.0), discretization={"p": 0.5}).verdict == "weak"
 
 
-def test_a_log_interval_reaches_where_a_refinement_leads() -> None:
-    """A value that a refinement takes from 1 to 0.4 has an interval down to 0.4, and none downward if it goes to zero."""
-    parameters = Parameters([Parameter(name="p", initial=1.0, log=True)])
-    rng = np.random.default_rng(0)
-    data = (np.zeros(1), 0.01 * rng.standard_normal(400), np.full((400, 1), 5.0))
-    (moved,) = identify(parameters, *data, discretization={"p": 0.6}).estimates
-    assert moved.lower is not None and 0.39 < moved.lower < 0.4
-    assert moved.upper is not None and 1.6 < moved.upper < 1.61
-    (lost,) = identify(parameters, *data, discretization={"p": 1.2}).estimates
-    assert lost.lower is None
-    assert lost.verdict == "one-sided"
-
-
 def test_correlations() -> None:
     rng = np.random.default_rng(4)
     jacobian = rng.standard_normal((3000, 2)) @ np.array([[1.0, 0.8], [0.0, 0.6]])

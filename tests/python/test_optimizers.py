@@ -264,7 +264,8 @@ def test_a_refit_is_part_of_the_saved_result(tmp_path):
     assert sb.FitResult.load(tmp_path / "fit.json") == found
     (made,) = found.refits
     for e in found.estimates:
-        assert e.discretization == approx(abs(made.to_limit * made.moved[e.name])) and e.discretization > 0
+        step = made.to_limit * np.log1p(made.moved[e.name] / e.value)
+        assert e.discretization == approx(e.value * np.expm1(abs(step))) and e.discretization > 0
     assert "What refits on a finer discretization move" in found.report()
     earlier = {key: value for key, value in found.to_dict().items() if key != "refits"}
     assert sb.FitResult.from_dict(earlier).refits == ()
