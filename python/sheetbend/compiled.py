@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _core
-from .errors import SceneError
+from .errors import SceneError, refusal
 from .quantities import FUNCTIONS, Term
 
 if TYPE_CHECKING:
@@ -52,9 +52,7 @@ class CompiledScene:
                 ],
             )
         except ValueError as error:
-            field, _, rest = str(error).partition(": ")
-            problem, _, fix = rest.partition(". Fix: ")
-            raise SceneError(field, problem, scene.name, fix or "see above") from error
+            raise refusal(error, SceneError, scene.name) from error
         self.layout: dict[str, tuple[int, int]] = self.core.layout
         self.names = tuple(scene.quantities)
         self.theta = np.array([q.value for q in scene.quantities.values()], dtype=float)

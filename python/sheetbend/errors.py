@@ -33,6 +33,13 @@ class InputError(SheetbendError, ValueError):
         return f"{self.field}: {self.problem} (got {_short.repr(self.got)}). Fix: {self.fix}."
 
 
+def refusal(error: ValueError, kind: type[InputError], got: object) -> InputError:
+    """What the core refuses ("field: problem. Fix: what to do") as an error of the package."""
+    field, _, rest = str(error).partition(": ")
+    problem, _, fix = rest.partition(". Fix: ")
+    return kind(field, problem, got, fix or "see above")
+
+
 class SceneError(InputError):
     """A scene (particles, constraints, boundary) is inconsistent."""
 

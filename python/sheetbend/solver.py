@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from . import _core
 from .compiled import CompiledScene
-from .errors import InputError
+from .errors import InputError, refusal
 from .memory import in_bytes
 
 INTEGRATORS = ("bdf1", "bdf2")
@@ -74,19 +74,22 @@ class Solver:
         """The compiled solver for a scene.
 
         Raises:
-            InputError: method "newton" with rigid constraints.
+            InputError: the method cannot step the scene, such as "newton" with rigid constraints.
         """
         if self.method == "newton":
             offset, size = scene.layout["compliance"]
             if size and not (scene.inputs()[offset : offset + size] > 0).all():
                 fix = "use 'direct', or give every constraint a compliance"
                 raise InputError("solver.method", "cannot hold rigid constraints", self.method, fix)
-        return _core.Solver(
-            scene=scene.core,
-            h=self.h,
-            integrator=self.integrator,
-            partition=self.method,
-            iterations=self.sweeps,
-            threads=self.threads,
-            grain=self.grain,
-        )
+        try:
+            return _core.Solver(
+                scene=scene.core,
+                h=self.h,
+                integrator=self.integrator,
+                partition=self.method,
+                iterations=self.sweeps,
+                threads=self.threads,
+                grain=self.grain,
+            )
+        except ValueError as error:
+            raise refusal(error, InputError, self.method) from error

@@ -20,7 +20,7 @@ from .simulate import forces_by_group
 def constraint_values(
     scene: Scene, positions: ArrayLike | None = None, values: Mapping[str, float] | None = None
 ) -> dict[str, Array]:
-    """C of every constraint, by group (count, rows), in the units of its kind.
+    """C of every constraint of a group, by group (count, rows), in the units of its kind.
 
     Args:
         positions: (particles, 3) m; the scene's initial ones by default.
@@ -40,8 +40,11 @@ def constraint_values(
 def elastic_energy(
     scene: Scene, positions: ArrayLike | None = None, values: Mapping[str, float] | None = None
 ) -> dict[str, Array]:
-    """C.C/(2 alpha) of every constraint, J, by group (count,); zero where rigid or slack. Arguments: see
-    `constraint_values`."""
+    """C.C/(2 alpha) of every constraint of a group, J, by group (count,); zero where rigid or slack. Arguments: see
+    `constraint_values`.
+
+    Not counted is what is in no group: (V - rest)^2/(2 compliance) of a volume that is kept (`Scene.add_volume`), and
+    -p V of a pressure (`Scene.add_pressure`)."""
     compiled, energies = scene.compiled, {}
     C_of = constraint_values(scene, positions, values)
     for group, alpha in _compliances(scene, compiled.inputs(compiled.values(values))):
@@ -54,8 +57,8 @@ def elastic_energy(
 
 
 def elastic_energy_gradient(rest: Equilibrium) -> dict[str, float]:
-    """Derivative of the whole elastic energy at rest, alpha lambda.lambda/2 over all constraints, by every named
-    quantity, J per unit."""
+    """Derivative of the elastic energy of all groups at rest, alpha lambda.lambda/2, by every named quantity, J per
+    unit; that of a pressure, -p V, is not in it."""
     scene, compiled = rest.scene, rest.scene.compiled
     offset, size = compiled.layout["compliance"]
     own = {group.name: alpha for group, alpha in _compliances(scene, compiled.inputs(rest.theta))}

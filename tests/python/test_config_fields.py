@@ -29,6 +29,7 @@ WHOLE: dict[str, Any] = {
                 "warp": 100.0,
                 "shear": 10.0,
                 "air_normal": 0.6,
+                "volume": {},
                 "mesh": {"kind": "grid", "width": 0.3, "height": 0.3, "nx": 3, "ny": 3},
                 "law": {"kind": "exponential", "warp": 10.0, "weft": 10.0, "shear": 5.0},
                 "set": [{"name": "clips", "points": [[0, 0, 0]]}],

@@ -61,7 +61,8 @@ def simulate(
         bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
     ] = False,
 ) -> None:
-    """Simulate a scene and write its trajectory as NPZ: times, positions, velocities and the constraints' forces."""
+    """Simulate a scene and write its trajectory as NPZ: times, positions, velocities, the constraints' forces, and the
+    pressures of volumes that are kept."""
     run(lambda console: _simulate(console, config, output, duration, recording, mesh, movie), json)
 
 
@@ -120,6 +121,7 @@ def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, mo
     motion = _motion(task)
     path = folder / f"{task.name}.npz"
     arrays: dict[str, Any] = {f"force_{group}": values for group, values in motion.forces.items()}
+    arrays |= {f"pressure_{name}": values for name, values in motion.pressures.items()}
     np.savez_compressed(path, times=motion.times, positions=motion.positions, velocities=motion.velocities, **arrays)
     moved = np.linalg.norm(motion.positions - motion.positions[0], axis=2)
     written = {} if mesh is None else {"meshes": write_meshes(task.name, task.scene, motion, folder, mesh)}

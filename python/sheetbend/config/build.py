@@ -24,9 +24,9 @@ from . import schema
 from .cloth_markers import places_on_cloths
 from .errors import located
 from .moment import Moment
+from .rest import check_rest
 from .scene_schema import SceneSection
 from .scenes import Particles, build_scene
-from .winds import check_still
 
 SUBSTEPS = 10
 OPTIONAL = ("cloth", "particles", "constraints", "point_mass", "force")
@@ -116,8 +116,6 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
         moment = Moment(
             recording.piece(*(section.fit if section.static and section.fit else (t0, None))), t0, section.static
         )
-    if section.static or section.start == "equilibrium":
-        check_still(f"{path}.static" if section.static else f"{path}.start", config.scene)
     ropes = _shown(config, section, path)
     shared = not section.marker
     markers = config.marker if shared else section.marker
@@ -128,6 +126,8 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
         recording.name, described, moment, _along(ropes, markers, numbers, recording), finer, ropes, folder
     )
     _start_values(scene, config, section.values, path)
+    if section.static or section.start == "equilibrium":
+        check_rest(f"{path}.static" if section.static else f"{path}.start", described, scene)
     places = {
         recording.markers[n]: _place(f"{where}[{k}]", m, scene, particles)
         for k, (m, n) in enumerate(zip(markers, numbers, strict=True))
@@ -162,6 +162,8 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
         experiment.observed(experiment.fitted())  # raise here, where the path is known
     with located("scene"):
         assert scene.compiled
+    if not section.static:
+        experiment.solver.core(scene.compiled)  # raise here, before any work starts
     return experiment
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, Self
 
-from pydantic import model_validator
+from pydantic import ValidationInfo, field_validator, model_validator
 
 from .section import Finite, Name, Pair, Section, Vector, key
 
@@ -106,6 +106,16 @@ class Grip(Section):
     interpolation: Literal["cubic", "linear"] = key("cubic", "of the motion between frames")
 
 
+class ClothVolume(Section):
+    """[scene.cloth.volume]: a closed mesh keeps its volume, `Scene.add_volume`, with method "gauss_seidel" only. The
+    table may be empty. Its numbers are the quantities `<name>_volume` and, unless zero, `<name>_volume_compliance`."""
+
+    rest: Finite | None = key(None, "what it keeps; the volume of the mesh as placed when left out", "m^3", gt=0)
+    compliance: Finite = key(
+        0.0, "0 = incompressible; a gas at p Pa that keeps its temperature has V/p", "m^3/Pa", ge=0
+    )
+
+
 class Cloth(Section):
     """A cloth, `sb.add_cloth`. A list: [[scene.cloth]]."""
 
@@ -130,6 +140,13 @@ class Cloth(Section):
         None, "force of air along the normal of the triangles, air density * drag coefficient / 2", "kg/m^3", gt=0
     )
     air_tangential: Finite | None = key(None, "the same across the normal", "kg/m^3", gt=0)
+    volume: ClothVolume | None = key(None, "[scene.cloth.volume], not kept when left out")
+    pressure: Finite | None = key(
+        None,
+        "pushes the triangles along their normals, out of a closed mesh, and where x_axis x y_axis points from a flat "
+        "one; the quantity <name>_pressure",
+        "Pa",
+    )
     origin: Vector = key([0.0, 0.0, 0.0], "where the mesh's origin is placed", "m")
     x_axis: Vector = key([1.0, 0.0, 0.0], "where the mesh's x axis points")
     y_axis: Vector = key([0.0, 1.0, 0.0], "where its y axis points, perpendicular to `x_axis`")
@@ -143,6 +160,14 @@ class Cloth(Section):
         "nearest to it then",
         "s",
     )
+
+    @field_validator("pressure")
+    @classmethod
+    def _beside_no_volume(cls, pressure: float | None, info: ValidationInfo) -> float | None:
+        if pressure is not None and info.data.get("volume") is not None:
+            fix = "leave it out, or leave out scene.cloth.volume, which finds the pressure that it takes"
+            raise ValueError(f"stands beside a volume that is kept, and one takes up the other|{fix}")
+        return pressure
 
     @property
     def in_air(self) -> bool:

@@ -21,7 +21,7 @@ from .moment import Moment
 
 _ELSEWHERE = {
     *("name", "mesh", "law", "origin", "x_axis", "y_axis", "set", "pinned", "grip", "markers", "nearest_at"),
-    *("air_normal", "air_tangential"),
+    *("air_normal", "air_tangential", "pressure", "volume"),
 }
 """Keys of a cloth that are not arguments of `add_cloth`, or not as they stand."""
 _SQUARE = 1e-6  # of the product of their lengths: how far two axes may be from perpendicular
@@ -52,9 +52,19 @@ def build_cloth(
         cloth = add_cloth(scene, mesh, section.name, law=_law(section.law), held=held, **fields)
         for vertices in pinned:
             scene.pin(cloth.particles[vertices])
+        _press(scene, section, cloth)
     for i, (grip, vertices) in enumerate(zip(section.grip, gripped, strict=True)):
         _drive(scene, f"{path}.grip[{i}]", grip, moment, cloth, vertices)
     return cloth, coarse
+
+
+def _press(scene: Scene, section: schema.Cloth, cloth: Cloth) -> None:
+    """Put a cloth under the pressure that is given, or under the one that keeps its volume."""
+    triangles = cloth.particles[cloth.mesh.triangles]
+    if section.pressure is not None:
+        scene.add_pressure(triangles, section.pressure, name=section.name)
+    if section.volume is not None:
+        scene.add_volume(triangles, **section.volume.model_dump(), name=section.name)
 
 
 def _placed(path: str, section: schema.Cloth, moment: Moment | None, folder: Path, finer: int) -> TriangleMesh:

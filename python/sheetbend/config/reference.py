@@ -23,6 +23,7 @@ HEADERS: dict[str, type[Section]] = {
     "[[scene.cloth]]": cloth_schema.Cloth,
     "[scene.cloth.mesh]": cloth_schema.ClothMesh,
     "[scene.cloth.law]": cloth_schema.ClothLaw,
+    "[scene.cloth.volume]": cloth_schema.ClothVolume,
     "[[scene.cloth.set]]": cloth_schema.VertexSet,
     "[[scene.cloth.grip]]": cloth_schema.Grip,
     "[[scene.particles]]": scene_schema.Particles,

@@ -1,0 +1,49 @@
+"""What a state of rest asks of the scene of a configuration."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import ConfigError
+from ..scene import Scene
+from .cloth_schema import Cloth
+from .scene_schema import SceneSection
+
+
+def check_rest(path: str, section: SceneSection, scene: Scene) -> None:
+    """A scene of which the key at `path` wants the equilibrium must have one that `sb.equilibrium` can find.
+
+    Raises:
+        ConfigError: a wind blows at its start, a volume is to be kept, or a pressure ends at a free rim.
+    """
+    _check_still(path, section)
+    for cloth in section.cloth:
+        if cloth.volume is not None:
+            fix = "give the cloth a pressure instead, or simulate with drag until the motion has died down"
+            raise ConfigError(path, "asks for a state of rest, and a cloth keeps its volume", cloth.name, fix)
+        if cloth.pressure is not None:
+            _check_rim(path, cloth, scene)
+
+
+def _check_still(path: str, section: SceneSection) -> None:
+    if section.wind is None:
+        return
+    velocity = section.wind.velocity
+    first = velocity[0] if isinstance(velocity[0], list) else velocity
+    if any(first):
+        fix = "give scene.wind times and let it start at zero, or leave the key out"
+        raise ConfigError(path, "asks for a state of rest, and a wind blows", first, fix)
+
+
+def _check_rim(path: str, section: Cloth, scene: Scene) -> None:
+    """A pressure has an energy on a closed surface and on one whose rim is held."""
+    cloth = scene.cloths[section.name]
+    rim = cloth.particles[np.unique(cloth.mesh.borders)]
+    free = [int(particle) for particle in rim if particle not in scene.pinned and particle not in scene.driven]
+    if free:
+        problem = (
+            f"asks for a state of rest, and the rim of {section.name}, which is under pressure, is free at vertices"
+        )
+        vertices = np.flatnonzero(np.isin(cloth.particles, free)).tolist()
+        fix = "pin or grip all of its rim, or simulate with drag until the motion has died down"
+        raise ConfigError(path, problem, vertices, fix)
