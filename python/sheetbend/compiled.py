@@ -73,19 +73,24 @@ class CompiledScene:
         order = {name: i for i, name in enumerate(self.names if names is None else names)}
         offsets = {array: offset for array, (offset, _) in self.layout.items()} | {"extra": self.core.inputs}
         every = [*self._terms, *terms]
-        entries = [np.size(t.index) for t in every]
-        factors = np.repeat([len(t.factors) for t in every], entries).astype(int)
-        parameter = [[order[name] for name, _ in t.factors] for t in every]
-        function = [[FUNCTIONS[f] for _, f in t.factors] for t in every]
+        entries = np.array([np.size(t.index) for t in every], dtype=int)
+        lengths = np.array([len(t.factors) for t in every], dtype=int)
+        parameter = np.array([order[name] for t in every for name, _ in t.factors], dtype=int)
+        function = np.array([FUNCTIONS[f] for t in every for _, f in t.factors], dtype=int)
+        # Every entry of a term has all of its factors: where they stand in the two lists above.
+        length = np.repeat(lengths, entries)
+        first_factor = np.concatenate([[0], np.cumsum(length)])
+        first = np.repeat(np.cumsum(lengths) - lengths, entries)
+        place = np.repeat(first - first_factor[:-1], length) + np.arange(first_factor[-1])
         return {
             "base": np.concatenate([self._base, np.zeros(extra)]) if extra else self._base,
             "target": _joined([offsets[t.array] + np.ravel(t.index) for t in every]),
             "coefficient": _joined(
                 [np.broadcast_to(t.coefficient, k) for t, k in zip(every, entries, strict=True)]
             ).astype(float),
-            "first_factor": np.concatenate([[0], np.cumsum(factors)]),
-            "parameter": _joined([np.tile(p, k) for p, k in zip(parameter, entries, strict=True)]),
-            "function": _joined([np.tile(f, k) for f, k in zip(function, entries, strict=True)]),
+            "first_factor": first_factor,
+            "parameter": parameter[place],
+            "function": function[place],
         }
 
     def values(self, changes: Mapping[str, float] | None = None) -> np.ndarray:
