@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from .checks import is_number, triangle_array
 from .errors import SceneError
+from .mesh.topology import half_edges
 from .quantities import Term
 
 if TYPE_CHECKING:
@@ -22,12 +23,10 @@ class Volumes:
 
     Attributes:
         triangles: (n, 3) particles, by name, in the order in which they were added.
-        compliance: m^3/Pa, the plain part of each.
     """
 
     def __init__(self) -> None:
         self.triangles: dict[str, Array] = {}
-        self.compliance: list[float] = []
 
     def add(self, scene: Scene, triangles: ArrayLike, compliance: float, rest: float | None, name: str) -> None:
         """See `Scene.add_volume`."""
@@ -74,7 +73,7 @@ def enclosed_volume(triangles: Array, positions: Array) -> float:
 
 def _check_closed(field: str, triangles: Array) -> None:
     """Every edge lies between two triangles, which go along it in opposite directions."""
-    edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    edges = half_edges(triangles)
     size = triangles.max() + 1
     there, back = edges @ [size, 1], edges @ [1, size]
     known, at, times = np.unique(there, return_inverse=True, return_counts=True)

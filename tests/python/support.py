@@ -103,6 +103,16 @@ def static_sensitivity(
     return forward, float(rest.solution.vjp(x_bar.ravel(), lambda_bar) @ tangent)
 
 
+def refitted(
+    scene: sb.Scene, times: ArrayLike, solver: sb.Solver, seen: Sequence[int], start: Mapping[str, float]
+) -> sb.Fit:
+    """A fit to the scene's own motion, of the particles that are seen, from other values."""
+    x = sb.simulate(scene, times, solver).positions[:, seen]
+    recording = sb.Recording(positions=x, times=times, name="twin")
+    parameters = {name: {"initial": value} for name, value in start.items()}
+    return sb.fit(scene, recording, parameters, markers=[sb.on_particle(n) for n in seen], solver=solver)
+
+
 def slope_along(estimate: Callable[[Array], float], series: Array, series_dot: Array) -> float:
     """d(estimate)/d(parameter) of an estimator of a series whose derivative by the parameter is `series_dot`.
 

@@ -14,7 +14,7 @@ from oracles.calculus import derivative
 from pytest import approx
 from scipy.spatial.transform import Rotation
 from sheetbend.mesh import grid
-from support import observed_orders, place, sensitivity, steps, twice
+from support import observed_orders, place, refitted, sensitivity, steps, twice
 
 G = 9.81
 X, Y, Z = 0, 1, 2
@@ -188,11 +188,7 @@ def test_gradients_of_a_constant_wind_and_of_still_air():
 def test_wind_and_drag_of_a_fluttering_sheet_are_recovered():
     values = {"cloth_air_normal": 0.7, "cloth_air_tangential": 0.2, "wind_x": 2.0}
     scene, s = flag(wind=(2.0, 1.0, 0.5), times=None, tangential=0.2), sb.Solver(h=1 / 240)
-    times, seen = np.arange(25) / 60, [0, 4, 12, 15, 19]
-    x = sb.simulate(scene, times, s).positions[:, seen]
-    recording = sb.Recording(positions=x, times=times, name="twin")
-    start = {name: {"initial": 1.3 * value} for name, value in values.items()}
-    found = sb.fit(scene, recording, start, markers=[sb.on_particle(n) for n in seen], solver=s)
+    found = refitted(scene, np.arange(25) / 60, s, [0, 4, 12, 15, 19], {k: 1.3 * v for k, v in values.items()})
     for name, value in values.items():
         assert found[name].value == approx(value, rel=1e-4), name
 

@@ -6,13 +6,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import sheetbend as sb
+from balloons import PRESSURE, RADIUS, SHEAR, STRETCH, YOUNG, skin
 from pytest import approx
 from sheetbend.mesh import icosphere
 from sheetbend.volume import enclosed_volume
-from support import observed_orders, sensitivity, steps
+from support import observed_orders, refitted, sensitivity, steps
 
-YOUNG, POISSON, RADIUS, STRETCH = 100.0, 0.3, 0.1, 1.2  # N/m, m
-PRESSURE = YOUNG * (STRETCH**2 - 1) / ((1 - POISSON) * STRETCH * RADIUS)
 SPHERE = icosphere(RADIUS, 1)
 
 
@@ -88,23 +87,10 @@ def test_momentum():
     assert drifts[-1] < 1e-2
 
 
-def balloon(subdivisions: int, compliance: float = 0.0, start: float = STRETCH) -> sb.Scene:
-    """An isotropic sphere with drag, that nothing holds, inflated to a volume."""
-    scene = sb.Scene("balloon", gravity=(0, 0, 0))
-    mesh = icosphere(RADIUS, subdivisions)
-    shear = YOUNG / (2 * (1 + POISSON))
-    cloth = sb.add_cloth(
-        scene,
-        mesh,
-        density=0.2,
-        warp=YOUNG,
-        shear=shear,
-        poisson=POISSON,
-        drag_linear=40.0,
-        positions=start * mesh.vertices,
-    )
-    rest = STRETCH**3 * enclosed_volume(mesh.triangles, mesh.vertices)
-    scene.add_volume(cloth.particles[mesh.triangles], rest=rest, compliance=compliance)
+def balloon(subdivisions: int, compliance: float = 0.0) -> sb.Scene:
+    """It keeps the volume to which it is stretched."""
+    scene, triangles = skin(subdivisions, STRETCH)
+    scene.add_volume(triangles, compliance=compliance)
     return scene
 
 
@@ -148,10 +134,9 @@ def test_pressure_of_a_balloon_by_its_stiffness():
     for name in ("cloth_warp", "cloth_shear", "cloth_volume"):
         forward, by[name] = sensitivity(scene, times, solver, weights, name)
         assert forward == approx(by[name], rel=1e-8)
-    shear = YOUNG / (2 * (1 + POISSON))
-    by_stiffness = by["cloth_warp"] + by["cloth_shear"] * shear / YOUNG
+    by_stiffness = by["cloth_warp"] + by["cloth_shear"] * SHEAR / YOUNG
     assert by_stiffness == approx(p / YOUNG, rel=5e-3)
-    stiffer, softer = ({"cloth_warp": YOUNG * f, "cloth_shear": shear * f} for f in (1.001, 0.999))
+    stiffer, softer = ({"cloth_warp": YOUNG * f, "cloth_shear": SHEAR * f} for f in (1.001, 0.999))
     difference = blown_up(2, values=stiffer, compliance=compliance) - blown_up(2, values=softer, compliance=compliance)
     assert by_stiffness == approx(difference / (0.002 * YOUNG), rel=1e-3)
     by_volume = by["cloth_volume"] + 1.0 / compliance
@@ -198,11 +183,7 @@ def test_incompressible_gradients():
 def test_the_content_of_a_ball_is_recovered():
     values = {"cloth_volume": 1.05 * volume(SPHERE.vertices), "cloth_volume_compliance": 2e-5}
     scene, solver = attached(), sb.Solver(h=1 / 400, method="gauss_seidel")
-    times, seen = np.arange(13) / 100, [0, 4, 12, 15, 19]
-    x = sb.simulate(scene, times, solver).positions[:, seen]
-    recording = sb.Recording(positions=x, times=times, name="twin")
-    start = {name: {"initial": 1.2 * value} for name, value in values.items()}
-    found = sb.fit(scene, recording, start, markers=[sb.on_particle(n) for n in seen], solver=solver)
+    found = refitted(scene, np.arange(13) / 100, solver, [0, 4, 12, 15, 19], {k: 1.2 * v for k, v in values.items()})
     for name, value in values.items():
         assert found[name].value == approx(value, rel=1e-4), name
 

@@ -1,0 +1,28 @@
+"""The balloon of O-35: a sphere of a St. Venant-Kirchhoff membrane, whose tension carries p = 2 sigma/R."""
+
+from __future__ import annotations
+
+import numpy as np
+import sheetbend as sb
+from sheetbend.mesh import icosphere
+
+YOUNG, POISSON, RADIUS, STRETCH = 100.0, 0.3, 0.1, 1.2  # N/m, m
+SHEAR = YOUNG / (2 * (1 + POISSON))
+PRESSURE = YOUNG * (STRETCH**2 - 1) / ((1 - POISSON) * STRETCH * RADIUS)
+
+
+def skin(subdivisions: int, stretch: float) -> tuple[sb.Scene, np.ndarray]:
+    """Its isotropic skin with drag, that nothing holds, and its triangles (n, 3) of particles."""
+    scene = sb.Scene("balloon", gravity=(0, 0, 0))
+    mesh = icosphere(RADIUS, subdivisions)
+    cloth = sb.add_cloth(
+        scene,
+        mesh,
+        density=0.2,
+        warp=YOUNG,
+        shear=SHEAR,
+        poisson=POISSON,
+        drag_linear=40.0,
+        positions=stretch * mesh.vertices,
+    )
+    return scene, cloth.particles[mesh.triangles]
