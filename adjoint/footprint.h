@@ -145,7 +145,7 @@ std::size_t reverse_bytes(const Scene& scene, const Plan& plan) {
   if constexpr (in_packs<T>) {
     for (const PackedColor& color : plan.packs.colors)
       bytes += sizeof(Pack) * color.packs<T>() * (2 + color.parameters + color.rows * (color.damped ? 2 : 1)) +
-               sizeof(typename PackCotangents<T>::ColorCotangents);
+               sizeof(ColorNumbers<T>);
     return bytes + row_bytes<T>(plan.packs);
   } else {
     return bytes + sizeof(T) * (scene.stencil_coordinates + rows);

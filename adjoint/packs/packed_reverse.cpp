@@ -11,13 +11,7 @@ void PackCotangents<T>::resize(const PackPlan& plan) {
   eta = 0.0;
   rows.assign(plan.rows());
   colors.resize(plan.colors.size());
-  for (std::size_t c = 0; c < colors.size(); ++c) {
-    const PackedColor& color = plan.colors[c];
-    const std::size_t entries = color.entries<T>();
-    colors[c].values.assign(entries * (2 + color.parameters));
-    colors[c].lambda.assign(entries * color.rows);
-    colors[c].C_r.assign(color.damped ? entries * color.rows : 0);
-  }
+  for (std::size_t c = 0; c < colors.size(); ++c) colors[c].resize(plan.colors[c], 2 + plan.colors[c].parameters);
 }
 
 template <class T>
@@ -38,7 +32,7 @@ void sweep_vjp(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels
   for (int c = static_cast<int>(plan.colors.size()) - 1; c >= 0; --c) {
     const PackedColor& color = plan.colors[c];
     typename PackState<T>::ColorState& primal = state.colors[c];
-    typename PackCotangents<T>::ColorCotangents& own = bar.colors[c];
+    ColorNumbers<T>& own = bar.colors[c];
     const sheetbend_packs::Reverse reverse{color.count,
                                            last,
                                            color.nodes.data(),

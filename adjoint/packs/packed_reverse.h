@@ -8,11 +8,8 @@ namespace sheetbend {
 // Cotangents in the kernels' order (T: double, Pack). Those of the constraints' values gather over substeps of one eta; finish() hands them on.
 template <class T>
 struct PackCotangents {
-  struct ColorCotangents {
-    Numbers<T> values, lambda, C_r;
-  };
   Rows<T> rows;
-  std::vector<ColorCotangents> colors;
+  std::vector<ColorNumbers<T>> colors;
   double eta = 0.0;
 
   void resize(const PackPlan& plan);

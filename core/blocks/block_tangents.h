@@ -16,8 +16,8 @@ struct MemberValues {
   const double* directions;
   int n, lane;
   Tangent operator[](int part) const {
-    const long count = sheetbend_blocks::value_count(run.damped, parameter_count<K>);
-    return tangent_at(run.values, directions, (n / Pack::lanes * count + part) * Pack::lanes + n % Pack::lanes, lane);
+    const int count = sheetbend_blocks::value_count(run.damped, parameter_count<K>);
+    return tangent_at(run.values, directions, lane_at(n, count, part), lane);
   }
   void parameters(Tangent* p) const {
     for (int k = 0; k < parameter_count<K>; ++k) p[k] = (*this)[sheetbend_blocks::value_count(run.damped, 0) + k];

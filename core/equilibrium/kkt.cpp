@@ -3,6 +3,7 @@
 #include <Eigen/OrderingMethods>
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "core/equilibrium/residual.h"
@@ -33,26 +34,21 @@ Kkt::Kkt(const Scene& scene) : scene_(scene), unknown_(scene.dofs(), -1) {
 
   // Pairs (row, column) of K that an element touches; the diagonal is always there.
   const auto for_each_pair = [&](const std::vector<int>& number, auto&& f) {
-    for_each_constraint(scene, [&]<class K>(K, const Group& group, int item) {
-      const auto nodes = group.nodes(item);
-      for (int a = 0; a < K::dofs; ++a)
-        for (int b = 0; b < K::dofs; ++b)
+    const auto pairs = [&](std::span<const int> nodes) {
+      const int dofs = 3 * static_cast<int>(nodes.size());
+      for (int a = 0; a < dofs; ++a)
+        for (int b = 0; b < dofs; ++b)
           f(number[scene.first_dof[nodes[a / 3]] + a % 3], number[scene.first_dof[nodes[b / 3]] + b % 3]);
-    });
-  };
-  const auto for_each_pressed_pair = [&](const std::vector<int>& number, auto&& f) {
-    for (const std::array<int, 3>& nodes : scene.air)
-      for (int a = 0; a < 9; ++a)
-        for (int b = 0; b < 9; ++b)
-          f(number[scene.first_dof[nodes[a / 3]] + a % 3], number[scene.first_dof[nodes[b / 3]] + b % 3]);
+    };
+    for (const Group& group : scene.groups)
+      for (int item = 0; item < group.count; ++item) pairs(group.nodes(item));
+    for (const std::array<int, 3>& nodes : scene.air) pairs(nodes);
   };
   std::vector<Eigen::Triplet<double>> entries;
   for (int i = 0; i < unknowns; ++i) entries.emplace_back(i, i, 1.0);
-  const auto enter = [&](int a, int b) {
+  for_each_pair(free_dof, [&](int a, int b) {
     if (a >= 0 && b >= 0) entries.emplace_back(a, b, 1.0);
-  };
-  for_each_pair(free_dof, enter);
-  for_each_pressed_pair(free_dof, enter);
+  });
   Eigen::SparseMatrix<double> graph(unknowns, unknowns);
   graph.setFromTriplets(entries.begin(), entries.end());
   Eigen::PermutationMatrix<Eigen::Dynamic> order;  // order(new) = old
@@ -72,10 +68,7 @@ Kkt::Kkt(const Scene& scene) : scene_(scene), unknown_(scene.dofs(), -1) {
               *end = K_.innerIndexPtr() + K_.outerIndexPtr()[column + 1];
     return static_cast<int>(std::lower_bound(begin, end, row) - K_.innerIndexPtr());
   };
-  const auto above = [&](int a, int b) { return a >= 0 && a <= b ? position(a, b) : -1; };
-  for_each_pair(unknown_, [&](int a, int b) { position_.push_back(above(a, b)); });
-  for_each_pressed_pair(unknown_, [&](int a, int b) { pressure_position_.push_back(above(a, b)); });
-  pressure_.resize(pressure_position_.size());
+  for_each_pair(unknown_, [&](int a, int b) { position_.push_back(a >= 0 && a <= b ? position(a, b) : -1); });
   for (int i = 0; i < unknowns; ++i) diagonal_.push_back(position(i, i));
   for (const Director& d : scene.directors)
     for (int e = 0; e < 9; ++e) {
@@ -85,12 +78,7 @@ Kkt::Kkt(const Scene& scene) : scene_(scene), unknown_(scene.dofs(), -1) {
   metric_.assign(scene.dofs(), 1.0);
   idle_.resize(scene.directors.size());
   idle_stiffness_.resize(scene.directors.size());
-  std::size_t next = 0;
-  for (const Group& group : scene.groups) {
-    first_hessian_.push_back(next);
-    next += static_cast<std::size_t>(group.count) * 9 * group.arity * group.arity;
-  }
-  H_.resize(next);
+  H_.resize(position_.size());
   J_.resize(scene.gradient_entries);
   softened_.resize(scene.constraints);
   factor_.analyzePattern(K_);
@@ -121,8 +109,9 @@ void Kkt::assemble(const double* inputs, const double* x, const double* lambda, 
       }
     for (int e = 0; e < K::rows * K::dofs; ++e) *J++ = Jd[e].v;
   });
-  for_each_pressed(scene_, in, [&](int i, const std::array<int, 3>& nodes, double p) {
-    pressure_hessian(corners_at(scene_, nodes, x), p, &pressure_[81 * static_cast<std::size_t>(i)]);
+  for_each_pressed(scene_, in, [&](int, const std::array<int, 3>& nodes, double p) {
+    pressure_hessian(corners_at(scene_, nodes, x), p, H);
+    H += 81;
   });
   for (std::size_t i = 0; i < scene_.directors.size(); ++i) {
     const Director& d = scene_.directors[i];
@@ -143,8 +132,6 @@ bool Kkt::factorize(double mu, const double* compliance) {
   std::fill_n(values, K_.nonZeros(), 0.0);
   for (std::size_t e = 0; e < H_.size(); ++e)
     if (position_[e] >= 0) values[position_[e]] -= H_[e];
-  for (std::size_t e = 0; e < pressure_.size(); ++e)
-    if (pressure_position_[e] >= 0) values[pressure_position_[e]] -= pressure_[e];
   geometric_ = std::max(force_stiffness_, mu);
   for (const int d : diagonal_) geometric_ = std::max(geometric_, std::abs(values[d]));
   for (int i = 0; i < scene_.dofs(); ++i)
@@ -228,13 +215,6 @@ void Kkt::subtract_product(const std::vector<double>& x, const std::vector<doubl
     if (unknown_[dof] < 0) continue;
     for (int e = 0; e < 9; ++e) r_x[dof + e / 3] += idle_stiffness_[i] * idle_[i][e] * x[dof + e % 3];
   }
-  for (std::size_t i = 0; i < scene_.air.size(); ++i)
-    for (int a = 0; a < 9; ++a) {
-      const int dof = scene_.first_dof[scene_.air[i][a / 3]] + a % 3;
-      if (unknown_[dof] < 0) continue;
-      for (int b = 0; b < 9; ++b)
-        r_x[dof] -= pressure_[81 * i + 9 * a + b] * x[scene_.first_dof[scene_.air[i][b / 3]] + b % 3];
-    }
   for_each_constraint(scene_, [&]<class K>(K, const Group& group, int item) {
     const auto nodes = group.nodes(item);
     const int row = group.first_row + item * K::rows;
@@ -253,6 +233,12 @@ void Kkt::subtract_product(const std::vector<double>& x, const std::vector<doubl
       r_l[row + j] -= sum;
     }
   });
+  for (const std::array<int, 3>& nodes : scene_.air)
+    for (int a = 0; a < 9; ++a, H += 9) {
+      const int dof = scene_.first_dof[nodes[a / 3]] + a % 3;
+      if (unknown_[dof] < 0) continue;
+      for (int b = 0; b < 9; ++b) r_x[dof] -= H[b] * x[scene_.first_dof[nodes[b / 3]] + b % 3];
+    }
 }
 
 bool Kkt::solve(double* x, double* lambda, double accuracy) const {

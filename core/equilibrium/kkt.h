@@ -51,13 +51,11 @@ class Kkt {
                         std::vector<double>& r_l) const;
 
   const Scene& scene_;
-  std::vector<int> unknown_;                // per dof: place in K, or -1
-  std::vector<std::size_t> first_hessian_;  // per group, into H_ and position_: dofs x dofs per constraint
-  std::vector<int> position_;               // into K's values, -1 where fixed or below the diagonal
-  std::vector<int> diagonal_;               // likewise, per unknown
-  std::vector<double> H_, J_, alpha_, softened_;
-  std::vector<int> pressure_position_;       // of triangles under pressure, 9 x 9 each, as above
-  std::vector<double> pressure_;             // likewise their p Hess(V)
+  std::vector<int> unknown_;   // per dof: place in K, or -1
+  std::vector<int> position_;  // of H_'s entries in K's values, -1 where fixed or below the diagonal
+  std::vector<int> diagonal_;  // likewise, per unknown
+  std::vector<double> H_;      // dofs x dofs per constraint, then 9 x 9 per triangle under pressure
+  std::vector<double> J_, alpha_, softened_;
   std::vector<double> metric_;               // per dof
   std::vector<int> director_position_;       // into K's values, 9 per director, -1 as in position_
   std::vector<std::array<double, 9>> idle_;  // per director: projection onto the directions that nothing depends on

@@ -10,6 +10,12 @@ namespace sheetbend {
 using Register = Lanes<register_lanes>;
 inline constexpr int parts_per_pack = sheetbend_packs::lanes / register_lanes;
 
+// Where entry `part` of `parts` of one lane stands in (packs, parts, 8).
+inline long lane_at(int lane, int parts, int part) {
+  return (static_cast<long>(lane / sheetbend_packs::lanes) * parts + part) * sheetbend_packs::lanes +
+         lane % sheetbend_packs::lanes;
+}
+
 // A kernel's place: part n % parts_per_pack of pack n / parts_per_pack.
 inline long pack_of(long n) { return n / parts_per_pack; }
 inline long lane_of(long n) { return n % parts_per_pack * register_lanes; }

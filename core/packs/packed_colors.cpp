@@ -95,10 +95,7 @@ void PackState<T>::resize(const PackPlan& plan, int kept_iterations) {
   colors.resize(plan.colors.size());
   for (std::size_t c = 0; c < colors.size(); ++c) {
     const PackedColor& color = plan.colors[c];
-    const std::size_t entries = color.entries<T>();
-    colors[c].values.assign(entries * color.value_count());
-    colors[c].lambda.assign(entries * color.rows);
-    colors[c].C_r.assign(color.damped ? entries * color.rows : 0);
+    colors[c].resize(color, color.value_count());
     colors[c].records.resize(kept_iterations);
     for (auto& record : colors[c].records)
       record.assign(static_cast<std::size_t>(color.packs<T>()) * color.record_size());

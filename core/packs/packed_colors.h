@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "core/packs/kernels.h"
+#include "core/packs/lanes.h"
 #include "core/scalar/numbers.h"
 #include "core/scalar/vec3.h"
 #include "core/scene/scene.h"
@@ -27,12 +27,6 @@ struct Color {
   int group;
   std::vector<int> items;
 };
-
-// Where entry `part` of `parts` stands for a lane of packs.
-inline long lane_at(int lane, int parts, int part) {
-  return (static_cast<long>(lane / sheetbend_packs::lanes) * parts + part) * sheetbend_packs::lanes +
-         lane % sheetbend_packs::lanes;
-}
 
 // Number `part` of `parts` of the color's constraint `i`.
 template <class T>
@@ -86,11 +80,23 @@ struct PackPlan {
 
 PackPlan pack_colors(const Scene& scene, const std::vector<Color>& colors);
 
+// What stands per constraint of a color, or its cotangents.
+template <class T>
+struct ColorNumbers {
+  Numbers<T> values, lambda, C_r;
+
+  void resize(const PackedColor& color, int value_count) {
+    const std::size_t entries = color.entries<T>();
+    values.assign(entries * value_count);
+    lambda.assign(entries * color.rows);
+    C_r.assign(color.damped ? entries * color.rows : 0);
+  }
+};
+
 // The numbers of one substep in the kernels' order. T: double, Pack, Dual<double, 4 or 8>.
 template <class T>
 struct PackState {
-  struct ColorState {
-    Numbers<T> values, lambda, C_r;
+  struct ColorState : ColorNumbers<T> {
     std::vector<Numbers<Pack>> records;  // per iteration; empty where nothing is kept
   };
   Rows<T> rows;

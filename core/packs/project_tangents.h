@@ -8,13 +8,10 @@
 namespace sheetbend {
 
 template <class K>
-void project_tangent(const sheetbend_packs::Tangents& t, long i, int lane) {
+void project_tangent(const sheetbend_packs::Tangents& t, int i, int lane) {
   const sheetbend_packs::Forward& f = t.values_of;
   const bool damped = f.C_r != nullptr;
-  // Number `part` of `parts` of constraint i.
-  const auto place = [i](int parts, int part) {
-    return (i / Pack::lanes * parts + part) * Pack::lanes + i % Pack::lanes;
-  };
+  const auto place = [i](int parts, int part) { return lane_at(i, parts, part); };
   const int* nodes = f.nodes + place(K::arity, 0);
   const auto coordinate = [nodes](int d) { return static_cast<long>(nodes[d / 3 * Pack::lanes]) + d % 3; };
 
@@ -38,8 +35,8 @@ void project_tangent(const sheetbend_packs::Tangents& t, long i, int lane) {
 
 template <class K>
 void project_tangents(const sheetbend_packs::Tangents& t, int begin, int end) {
-  const long last = std::min(static_cast<long>(end) * Pack::lanes, static_cast<long>(t.values_of.count));
-  for (long i = static_cast<long>(begin) * Pack::lanes; i < last; ++i)
+  const int last = std::min(end * Pack::lanes, t.values_of.count);
+  for (int i = begin * Pack::lanes; i < last; ++i)
     for (int lane = 0; lane < t.directions; lane += register_lanes) project_tangent<K>(t, i, lane);
 }
 
