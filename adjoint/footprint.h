@@ -60,7 +60,7 @@ std::size_t block_bytes(const Scene& scene, const DirectBlock& block, int kept_i
     factor += factor_bytes<T>(block.condensation->structure) +
               sizeof(T) * (4 * block.size() + block.condensation->structure.size());  // and what solves need
   std::size_t bytes =
-      sizeof(BlockState<T>) + 2 * of(block.size()) + (block.damped ? 2 * particles : 0) +
+      sizeof(BlockState<T>) + 2 * of(block.size()) + (block.damped ? 2 * (particles + of(block.size())) : 0) +
       iterations * (of(sheetbend_blocks::row * block.window_rows.size()) + of(rows) + particles + factor) +
       (kept_iterations + 1) * (particles + of(block.size()));
   for (const MemberRun& run : block.runs) {

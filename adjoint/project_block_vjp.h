@@ -111,16 +111,19 @@ template <class T>
 void refer_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const sheetbend_packs::KernelTable& table,
                      double before, BlockState<T>& state, T* x_bar, T* x_before_bar, BlockCotangents<T>& bar) {
   if (!block.damped) return;
-  bar.x_now.clear();
-  bar.x_before.clear();
   const auto runs = runs_of(s, block, state, &bar.values);
-  auto references = references_of(runs, before, state);
-  references.C_r_bar = bar.C_r.numbers();
-  references.x_bar = bar.x_now.numbers();
-  references.x_before_bar = bar.x_before.numbers();
-  reverse_kernels<T>(table).refer(references);
-  add_particles(s.scene, block, 0, block.movable, bar.x_now, x_bar);
-  add_particles(s.scene, block, 0, block.movable, bar.x_before, x_before_bar);
+  const auto pull_back = [&](typename BlockState<T>::Values& values, double scale, Numbers<T>& rows, T* to) {
+    rows.clear();
+    if (scale == 0.0) return;
+    auto arrays = values_at<T>(runs, values);
+    arrays.C_bar = bar.C_r.numbers();
+    arrays.scale = scale;
+    arrays.x_bar = rows.numbers();
+    reverse_kernels<T>(table).values(arrays);
+    add_particles(s.scene, block, 0, block.movable, rows, to);
+  };
+  pull_back(state.now, 1.0 - before, bar.x_now, x_bar);
+  pull_back(state.before, before, bar.x_before, x_before_bar);
 }
 
 // Adds the cotangents of fixed nodes: of their coordinates during the substep, and at n and n-1.

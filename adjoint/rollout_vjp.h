@@ -88,9 +88,9 @@ void rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t
   const auto state = [&](int n) -> SubstepStates<T> {
     const T* v0 = in.of(Quantity::velocity);
     tape.velocity(n, v0, v.data());
-    if (v_before.empty()) return {tape.x(n), tape.x(n), v.data(), v.data()};
+    if (v_before.empty()) return {tape.x(n), tape.x(n), v.data(), v.data(), n};
     tape.velocity(n - 1, v0, v_before.data());
-    return {tape.x(n), tape.x(n - 1), v.data(), v_before.data()};
+    return {tape.x(n), tape.x(n - 1), v.data(), v_before.data(), n};
   };
   std::optional<Rollout<T>> forward;
   if (tape.states() < tape.steps()) forward.emplace(scene, plan, inputs, t0);

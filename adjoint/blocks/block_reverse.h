@@ -43,28 +43,18 @@ void pull_back_run(const sheetbend_blocks::Block& b, const sheetbend_blocks::Run
   }
 }
 
-// One evaluation's share: x_bar += scale J^T C_bar, p_bar += scale C_bar . dC/dp.
+// x_bar += scale J^T C_bar, p_bar += scale C_bar . dC/dp.
 template <class K, class T>
-void pull_back_reference(const sheetbend_blocks::Run& r, int n, const double* particles, const Wide<T>* C_bar,
-                         double scale, double* x_bar) {
+void values_of_run_vjp(const sheetbend_blocks::Values& b, const sheetbend_blocks::Run& r) {
   using W = Wide<T>;
-  const int* nodes = indices_of<T>(r.nodes, K::arity, n);
-  W x[K::dofs], unused, scaled[K::rows], by[K::dofs]{};
-  for (int k = 0; k < K::arity; ++k)
-    load_particle(numbers_of<T>(particles), nodes + k * Pack::lanes, x + 3 * k, unused);
-  for (int j = 0; j < K::rows; ++j) scaled[j] = W(scale) * C_bar[j];
-  W* values_bar = numbers_of<W>(r.values_bar) + static_cast<long>(n) * (2 + parameter_count<K>);
-  values_vjp<K>(x, parameters_of<K, T>(r, n), scaled, by, values_bar + 2);
-  add_to_particles<K::arity>(numbers_of<T>(x_bar), nodes, r.count - n * Pack::lanes, by);
-}
-
-template <class K, class T>
-void refer_run_vjp(const sheetbend_blocks::References& b, const sheetbend_blocks::Run& r) {
   for (int n = 0; n < elements<T>(r); ++n) {
-    Wide<T> C_bar[K::rows];
-    for (int j = 0; j < K::rows; ++j) C_bar[j] = gather(numbers_of<T>(b.C_r_bar), indices_of<T>(r.first_row, 1, n), j);
-    pull_back_reference<K, T>(r, n, b.x, C_bar, 1.0 - b.before, b.x_bar);
-    if (b.before != 0.0) pull_back_reference<K, T>(r, n, b.x_before, C_bar, b.before, b.x_before_bar);
+    const int *nodes = indices_of<T>(r.nodes, K::arity, n), *rows = indices_of<T>(r.first_row, 1, n);
+    W x[K::dofs], unused, scaled[K::rows], by[K::dofs]{};
+    for (int k = 0; k < K::arity; ++k) load_particle(numbers_of<T>(b.x), nodes + k * Pack::lanes, x + 3 * k, unused);
+    for (int j = 0; j < K::rows; ++j) scaled[j] = W(b.scale) * gather(numbers_of<T>(b.C_bar), rows, j);
+    W* values_bar = numbers_of<W>(r.values_bar) + static_cast<long>(n) * (2 + parameter_count<K>);
+    values_vjp<K>(x, parameters_of<K, T>(r, n), scaled, by, values_bar + 2);
+    add_to_particles<K::arity>(numbers_of<T>(b.x_bar), nodes, r.count - n * Pack::lanes, by);
   }
 }
 
@@ -103,16 +93,16 @@ struct ReverseKernels {
     return std::array{&pull_back_run<K, T>...};
   }(static_cast<Registry*>(nullptr));
 
-  static void refer(const sheetbend_blocks::References& b) {
+  static void values(const sheetbend_blocks::Values& b) {
     for (int r = 0; r < b.run_count; ++r)
-      if (b.runs[r].damped) refer_of[b.runs[r].kind](b, b.runs[r]);
+      if (b.runs[r].damped) values_of[b.runs[r].kind](b, b.runs[r]);
   }
 
-  static constexpr auto refer_of = []<class... K>(std::tuple<K...>*) {
-    return std::array{&refer_run_vjp<K, T>...};
+  static constexpr auto values_of = []<class... K>(std::tuple<K...>*) {
+    return std::array{&values_of_run_vjp<K, T>...};
   }(static_cast<Registry*>(nullptr));
 
-  static constexpr sheetbend_blocks::Reverse all{&right_side, &spread, &pull_back, &refer};
+  static constexpr sheetbend_blocks::Reverse all{&right_side, &spread, &pull_back, &values};
 };
 
 }  // namespace sheetbend

@@ -33,25 +33,27 @@ void evaluate_run(const sheetbend_blocks::Block& b, const sheetbend_blocks::Run&
 }
 
 template <class K, class T>
-void refer_run(const sheetbend_blocks::References& b, const sheetbend_blocks::Run& r) {
+void values_of_run(const sheetbend_blocks::Values& b, const sheetbend_blocks::Run& r) {
   using W = Wide<T>;
   for (int n = 0; n < elements<T>(r); ++n) {
-    const int* rows = indices_of<T>(r.first_row, 1, n);
     const int* nodes = indices_of<T>(r.nodes, K::arity, n);
-    const auto evaluate = [&](const double* particles) {
-      W x[K::dofs], unused;
-      for (int k = 0; k < K::arity; ++k)
-        load_particle(numbers_of<T>(particles), nodes + k * Pack::lanes, x + 3 * k, unused);
-      return Evaluation<K, W>(x, parameters_of<K, T>(r, n));
-    };
-    const auto now = evaluate(b.x);
-    W C_r[K::rows];
-    for (int j = 0; j < K::rows; ++j) C_r[j] = now.C[j];
-    if (b.before != 0.0) {
-      const auto before = evaluate(b.x_before);
-      for (int j = 0; j < K::rows; ++j) C_r[j] -= W(b.before) * difference<K>(now.C[j], before.C[j]);
+    W x[K::dofs], unused;
+    for (int k = 0; k < K::arity; ++k) load_particle(numbers_of<T>(b.x), nodes + k * Pack::lanes, x + 3 * k, unused);
+    const Evaluation<K, W> value(x, parameters_of<K, T>(r, n));
+    for (int j = 0; j < K::rows; ++j) scatter(numbers_of<T>(b.C), indices_of<T>(r.first_row, 1, n), j, value.C[j]);
+  }
+}
+
+template <class K, class T>
+void refer_run(const sheetbend_blocks::References& b, const sheetbend_blocks::Run& r) {
+  for (int n = 0; n < elements<T>(r); ++n) {
+    const int* rows = indices_of<T>(r.first_row, 1, n);
+    for (int j = 0; j < K::rows; ++j) {
+      const Wide<T> now = gather(numbers_of<T>(b.C), rows, j);
+      const Wide<T> before = gather(numbers_of<T>(b.C_before), rows, j);
+      scatter(numbers_of<T>(b.C_r), rows, j,
+              b.before == 0.0 ? now : now - Wide<T>(b.before) * difference<K>(now, before));
     }
-    for (int j = 0; j < K::rows; ++j) scatter(numbers_of<T>(b.C_r), rows, j, C_r[j]);
   }
 }
 
@@ -168,6 +170,11 @@ struct ForwardKernels {
     for (int j = 0; j < b.size; ++j) numbers_of<T>(b.lambda_next)[j] = numbers_of<T>(b.lambda)[j] + dl[j];
   }
 
+  static void values(const sheetbend_blocks::Values& b) {
+    for (int r = 0; r < b.run_count; ++r)
+      if (b.runs[r].damped) values_of[b.runs[r].kind](b, b.runs[r]);
+  }
+
   static void refer(const sheetbend_blocks::References& b) {
     for (int r = 0; r < b.run_count; ++r)
       if (b.runs[r].damped) refer_of[b.runs[r].kind](b, b.runs[r]);
@@ -182,11 +189,16 @@ struct ForwardKernels {
     return std::array{&evaluate_run<K, T>...};
   }(static_cast<Registry*>(nullptr));
 
+  static constexpr auto values_of = []<class... K>(std::tuple<K...>*) {
+    return std::array{&values_of_run<K, T>...};
+  }(static_cast<Registry*>(nullptr));
+
   static constexpr auto refer_of = []<class... K>(std::tuple<K...>*) {
     return std::array{&refer_run<K, T>...};
   }(static_cast<Registry*>(nullptr));
 
-  static constexpr sheetbend_blocks::Forward all{&evaluate, &factor, &solve, &push, &refer, &factor_supernodes};
+  static constexpr sheetbend_blocks::Forward all{&evaluate, &factor,           &solve, &push, &values,
+                                                 &refer,    &factor_supernodes};
 };
 
 }  // namespace sheetbend

@@ -74,27 +74,16 @@ void tangents_of_run(const sheetbend_blocks::Block& b, const sheetbend_blocks::T
 }
 
 template <class K>
-void refer_tangents_of_run(const sheetbend_blocks::References& b, const sheetbend_blocks::ReferenceTangents& t, int r) {
+void values_tangents_of_run(const sheetbend_blocks::Values& b, const sheetbend_blocks::ValueTangents& t, int r) {
   const sheetbend_blocks::Run& run = b.runs[r];
   for (int n = 0; n < run.count; ++n)
     for (int lane = 0; lane < Pack::lanes; lane += register_lanes) {
-      const int* nodes = indices_of<Tangent>(run.nodes, K::arity, n);
-      const int row = *indices_of<Tangent>(run.first_row, 1, n);
-      Tangent p[parameter_count<K> > 0 ? parameter_count<K> : 1];
+      Tangent x[K::dofs], p[parameter_count<K> > 0 ? parameter_count<K> : 1];
+      load_tangents<K>(b.x, t.x, indices_of<Tangent>(run.nodes, K::arity, n), lane, x);
       MemberValues<K>{run, t.values[r], n, lane}.parameters(p);
-      const auto evaluate = [&](const double* rows, const double* directions) {
-        Tangent x[K::dofs];
-        load_tangents<K>(rows, directions, nodes, lane, x);
-        return Evaluation<K, Tangent>(x, p);
-      };
-      const auto now = evaluate(b.x, t.x);
-      Tangent C_r[K::rows];
-      for (int j = 0; j < K::rows; ++j) C_r[j] = now.C[j];
-      if (b.before != 0.0) {
-        const auto before = evaluate(b.x_before, t.x_before);
-        for (int j = 0; j < K::rows; ++j) C_r[j] -= Tangent(b.before) * difference<K>(now.C[j], before.C[j]);
-      }
-      for (int j = 0; j < K::rows; ++j) directions_at(t.C_r, row + j, lane) = C_r[j].d[0];
+      const Evaluation<K, Tangent> value(x, p);
+      const int row = *indices_of<Tangent>(run.first_row, 1, n);
+      for (int j = 0; j < K::rows; ++j) directions_at(t.C, row + j, lane) = value.C[j].d[0];
     }
 }
 
@@ -147,20 +136,26 @@ struct TangentKernels {
     for (int j = 0; j < b.size; ++j) lambda_next[j] = lambda[j] + dl[j];
   }
 
-  static void refer(const sheetbend_blocks::References& b, const sheetbend_blocks::ReferenceTangents& t) {
+  static void values(const sheetbend_blocks::Values& b, const sheetbend_blocks::ValueTangents& t) {
     for (int r = 0; r < b.run_count; ++r)
-      if (b.runs[r].damped) refer_of[b.runs[r].kind](b, t, r);
+      if (b.runs[r].damped) values_of[b.runs[r].kind](b, t, r);
+  }
+
+  static void refer(const sheetbend_blocks::References& b, int size, const sheetbend_blocks::ReferenceTangents& t) {
+    const Pack *C = numbers_of<Pack>(t.C), *C_before = numbers_of<Pack>(t.C_before);
+    Pack* C_r = numbers_of<Pack>(t.C_r);
+    for (int j = 0; j < size; ++j) C_r[j] = b.before == 0.0 ? C[j] : C[j] - Pack(b.before) * (C[j] - C_before[j]);
   }
 
   static constexpr auto of_kind = []<class... K>(std::tuple<K...>*) {
     return std::array{&tangents_of_run<K>...};
   }(static_cast<Registry*>(nullptr));
 
-  static constexpr auto refer_of = []<class... K>(std::tuple<K...>*) {
-    return std::array{&refer_tangents_of_run<K>...};
+  static constexpr auto values_of = []<class... K>(std::tuple<K...>*) {
+    return std::array{&values_tangents_of_run<K>...};
   }(static_cast<Registry*>(nullptr));
 
-  static constexpr sheetbend_blocks::TangentKernels all{&right_side, &solve, &push, &refer};
+  static constexpr sheetbend_blocks::TangentKernels all{&right_side, &solve, &push, &values, &refer};
 };
 
 }  // namespace sheetbend

@@ -64,17 +64,26 @@ struct Block {
   double* C_r_bar;
 };
 
-// The damping references of a substep, C_r = (1 - before) C(x) + before C(x_before) with angles on one branch, and their reverse.
+// What the damped constraints are at a state, and the reverse of that.
+struct Values {
+  const Run* runs;
+  int run_count;
+  const double* x;  // (particles, 4), the last number unused
+  double* C;        // (size)
+
+  const double* C_bar;  // (size) times `scale` their cotangents
+  double scale;
+  double* x_bar;  // (particles, 4), added to
+};
+
+// The damping references of a substep, C_r = (1 - before) C + before C_before with angles on one branch.
 struct References {
   const Run* runs;
   int run_count;
-  double before;    // 0 where x alone counts
-  const double* x;  // (particles, 4), the last number unused
-  const double* x_before;
-  double* C_r;  // (size)
-  const double* C_r_bar;
-  double* x_bar;  // (particles, 4), added to
-  double* x_before_bar;
+  double before;    // 0 where C alone counts
+  const double* C;  // (size) at n
+  const double* C_before;
+  double* C_r;
 };
 
 // All of one kind of scalar. `factor` and `solve` are for bands.
@@ -83,6 +92,7 @@ struct Forward {
   void (*factor)(const Block&);            // fills the band and factors it
   void (*solve)(const Block&, double* b);  // b is as long as the block and its band
   void (*push)(const Block&);              // u, x_next and lambda_next from dl
+  void (*values)(const Values&);
   void (*refer)(const References&);
   // L over A in `panels`; `work` has 4 (widest + longest) numbers, `place` as many as the matrix has columns.
   void (*factor_supernodes)(const Supernodes&, double* panels, double* inverse, double* work, int* place);
@@ -92,7 +102,7 @@ struct Reverse {
   void (*right_side)(const Block&);  // y = lambda_bar + J W x_bar
   void (*spread)(const Block&);      // z, and x_bar of what J^T y carries on
   void (*pull_back)(const Block&);   // the constraints' own share
-  void (*refer)(const References&);
+  void (*values)(const Values&);
 };
 
 // The same arrays' derivatives along eight directions; directions come last: (..., 8). Values are those of packs of members: (packs, count, 8, 8).
@@ -104,9 +114,14 @@ struct Tangents {
   double* u;   // (particles, 4) those of W J^T dl for a dl that stands still
 };
 
-struct ReferenceTangents {
+struct ValueTangents {
   const double* const* values;
-  const double *x, *x_before;
+  const double* x;
+  double* C;
+};
+
+struct ReferenceTangents {
+  const double *C, *C_before;
   double* C_r;
 };
 
@@ -115,7 +130,8 @@ struct TangentKernels {
   void (*right_side)(const Block&, const Tangents&);
   void (*solve)(const Block&, double* b);  // (size and band, 8)
   void (*push)(const Block&, const Tangents&);
-  void (*refer)(const References&, const ReferenceTangents&);
+  void (*values)(const Values&, const ValueTangents&);
+  void (*refer)(const References&, int size, const ReferenceTangents&);
 };
 
 struct Kernels {

@@ -15,12 +15,17 @@ std::vector<const double*> value_directions(State& state) {
   return at;
 }
 
+template <class State, class At>
+void values_tangents(const sheetbend_blocks::Values& values, const sheetbend_blocks::TangentKernels& kernels,
+                     State& state, At& at) {
+  const auto own = value_directions(state);
+  kernels.values(values, {own.data(), at.x.directions(), at.C.directions()});
+}
+
 template <class State>
-void refer_tangents(const sheetbend_blocks::References& references, const sheetbend_blocks::TangentKernels& kernels,
-                    State& state) {
-  const auto values = value_directions(state);
-  kernels.refer(references,
-                {values.data(), state.x_now.directions(), state.x_before.directions(), state.C_r.directions()});
+void refer_tangents(const sheetbend_blocks::References& references, int size,
+                    const sheetbend_blocks::TangentKernels& kernels, State& state) {
+  kernels.refer(references, size, {state.now.C.directions(), state.before.C.directions(), state.C_r.directions()});
 }
 
 // The directions' share of one iteration: after the values are solved for, before they are pushed. solve_sparse(b) is for blocks that are no band.

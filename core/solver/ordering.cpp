@@ -74,7 +74,12 @@ std::vector<Color> color_constraints(const Scene& scene) {
       colors[first + c].items.push_back(i);
     }
   }
-  for (Color& color : colors) color.items.shrink_to_fit();
+  // In the order of their particles, which is that of memory: constraints of one color do not see one another, so it changes no result.
+  for (Color& color : colors) {
+    const auto lowest = [&](int i) { return *std::ranges::min_element(scene.groups[color.group].nodes(i)); };
+    std::ranges::stable_sort(color.items, {}, lowest);
+    color.items.shrink_to_fit();
+  }
   return colors;
 }
 

@@ -9,6 +9,7 @@
 namespace sheetbend {
 
 // Greedy coloring of each group in turn, in the scene's order: each constraint takes the first color whose movable nodes it does not touch.
+// A color's constraints then stand in the order of their lowest node.
 std::vector<Color> color_constraints(const Scene& scene);
 
 // Connected sets of constraints (through movable nodes), each in an order that makes a chain a narrow band: nodes are numbered by

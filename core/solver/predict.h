@@ -14,6 +14,7 @@ namespace sheetbend {
 template <class T>
 struct SubstepStates {
   const T *x, *x_before, *v, *v_before;  // at n and n-1 (n-1 unused by BDF1)
+  int step = -1;                         // n, by which a rollout's states are known again; -1 where it has none
 };
 
 // Coordinates while they are corrected: node n's begin at stride n.

@@ -2,11 +2,14 @@
 // whole substep; the kernels of core/blocks do the work, here they get their arrays.
 #pragma once
 
+#include <utility>
+
 #include "core/blocks/block_forward.h"
 #include "core/scalar/numbers.h"
 #include "core/solver/block_tangents.h"
 #include "core/solver/placed.h"
 #include "core/solver/plan.h"
+#include "core/solver/predict.h"
 
 namespace sheetbend {
 
@@ -40,8 +43,13 @@ struct BlockState {
   std::vector<Numbers<T>> x, lambda;  // before each iteration and after the last; one of each where nothing is kept
   std::vector<Numbers<T>> values;     // per run
   Numbers<T> C_r, diagonal;
-  Numbers<T> x_now, x_before;  // the states that damping refers to
-  double eta = 0.0;            // of `values` and `diagonal`; 0 where they are not filled yet
+  // What damped constraints are at a state that damping refers to.
+  struct Values {
+    Numbers<T> x, C;
+    int step = -1;  // of the state, as in SubstepStates
+  };
+  Values now, before;
+  double eta = 0.0;  // of `values` and `diagonal`; 0 where they are not filled yet
 
   void resize(const Scene& scene, const DirectBlock& block, int kept_iterations);
   Numbers<T>& at(std::vector<Numbers<T>>& states, int iteration) { return states[states.size() == 1 ? 0 : iteration]; }
@@ -72,8 +80,12 @@ void BlockState<T>::resize(const Scene& scene, const DirectBlock& block, int kep
   for (auto& a : lambda) a.assign(block.size());
   C_r.assign(block.size());
   diagonal.assign(block.size());
-  if (block.damped)
-    for (auto* a : {&x_now, &x_before}) a->assign(particles);
+  for (Values* v : {&now, &before}) {
+    v->step = -1;
+    if (!block.damped) continue;
+    v->x.assign(particles);
+    v->C.assign(block.size());
+  }
   values.resize(block.runs.size());
   for (std::size_t r = 0; r < values.size(); ++r) {
     const Group& group = scene.groups[block.runs[r].group];
@@ -141,16 +153,14 @@ std::vector<sheetbend_blocks::Run> runs_of(const SubstepState<T>& s, const Direc
 }
 
 template <class T>
-sheetbend_blocks::References references_of(const std::vector<sheetbend_blocks::Run>& runs, double before,
-                                           BlockState<T>& state) {
-  sheetbend_blocks::References r{};
-  r.runs = runs.data();
-  r.run_count = static_cast<int>(runs.size());
-  r.before = before;
-  r.x = state.x_now.numbers();
-  r.x_before = state.x_before.numbers();
-  r.C_r = state.C_r.numbers();
-  return r;
+sheetbend_blocks::Values values_at(const std::vector<sheetbend_blocks::Run>& runs,
+                                   typename BlockState<T>::Values& state) {
+  sheetbend_blocks::Values v{};
+  v.runs = runs.data();
+  v.run_count = static_cast<int>(runs.size());
+  v.x = state.x.numbers();
+  v.C = state.C.numbers();
+  return v;
 }
 
 // The arrays of one iteration; those of the reverse are left open.
@@ -216,17 +226,30 @@ void solve_sparse(const DirectBlock& block, BlockState<T>& state, int iteration,
     own.factor.solve(block.structure, b);
 }
 
-// The damping references from the states (dofs) at n and n-1; `before` is that of Bdf.
+// The damping references; `before` is that of Bdf. One of the two states was looked at in the substep before, or in the one after on the way back.
 template <class T>
 void refer_block(const SubstepState<T>& s, const DirectBlock& block, const sheetbend_packs::KernelTable& table,
-                 double before, const T* x, const T* x_before, BlockState<T>& state) {
+                 double before, const SubstepStates<T>& states, BlockState<T>& state) {
   if (!block.damped) return;
-  load_coordinates(s.scene, block, x, state.x_now);
-  load_coordinates(s.scene, block, x_before, state.x_before);
   const auto runs = runs_of(s, block, state);
-  const auto references = references_of(runs, before, state);
+  const auto find = [&](typename BlockState<T>::Values& values, const T* at, int step) {
+    if (step >= 0 && values.step == step) return;
+    values.step = step;
+    load_coordinates(s.scene, block, at, values.x);
+    forward_kernels<Plain<T>>(table).values(values_at<T>(runs, values));
+    if constexpr (carries_tangents<T>)
+      values_tangents(values_at<T>(runs, values), table.blocks->tangents, state, values);
+  };
+  const int n = states.step;
+  if (n >= 0 && (state.now.step == n - 1 || state.before.step == n)) std::swap(state.now, state.before);
+  find(state.now, states.x, n);
+  if (before != 0.0) find(state.before, states.x_before, n - 1);
+
+  const sheetbend_blocks::References references{
+      runs.data(),           static_cast<int>(runs.size()), before,
+      state.now.C.numbers(), state.before.C.numbers(),      state.C_r.numbers()};
   forward_kernels<Plain<T>>(table).refer(references);
-  if constexpr (carries_tangents<T>) refer_tangents(references, table.blocks->tangents, state);
+  if constexpr (carries_tangents<T>) refer_tangents(references, block.size(), table.blocks->tangents, state);
 }
 
 template <class T>

@@ -48,9 +48,9 @@ class Rollout {
 
   void advance() {
     const Bdf bdf = Bdf::at(plan_.options, step_);
-    const bool finite =
-        substep(scene_, plan_, in_, bdf, time(step_ + 1), {x_.data(), x_before_.data(), v_.data(), v_before_.data()},
-                x_next_.data(), v_next_.data(), record_);
+    const bool finite = substep(scene_, plan_, in_, bdf, time(step_ + 1),
+                                {x_.data(), x_before_.data(), v_.data(), v_before_.data(), step_}, x_next_.data(),
+                                v_next_.data(), record_);
     ++step_;
     std::swap(x_before_, x_);
     std::swap(x_, x_next_);

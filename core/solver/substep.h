@@ -92,7 +92,7 @@ void project_blocks(const Scene& scene, const Plan& plan, const Inputs<const T>&
     const SubstepState<T> state{scene, in, bdf.eta, q, record.weights.w.data(), nullptr, nullptr};
     for (int b = begin; b < end; ++b) {
       begin_block(state, plan.blocks[b], record.blocks[b]);
-      refer_block(state, plan.blocks[b], pack_kernels(), bdf.before, s.x, s.x_before, record.blocks[b]);
+      refer_block(state, plan.blocks[b], pack_kernels(), bdf.before, s, record.blocks[b]);
       for (int iteration = 0; iteration < plan.options.iterations; ++iteration)
         project_block(state, plan.blocks[b], pack_kernels(), record.blocks[b], iteration);
       end_block(state, plan.blocks[b], record.blocks[b]);

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "adjoint/equilibrium_vjp.h"
+#include "core/threads/pool.h"
 #include "python/bindings/core_module.h"
 #include "python/bindings/interrupt.h"
 
@@ -17,17 +18,32 @@ struct Solution {
   Equilibrium at;
 };
 
-Solution solve(std::shared_ptr<Scene> scene, const Array& inputs, const std::optional<Array>& start, bool stable) {
-  expect_size(inputs, scene->layout.total(), "inputs");
+// For inputs (B, total), spread over threads; the ordering of the Newton matrix is found once per thread.
+std::vector<Solution> solve_batch(const std::shared_ptr<Scene>& scene, const Array& inputs,
+                                  const std::optional<Array>& start, bool stable, int threads) {
+  const std::size_t total = scene->layout.total(), count = static_cast<std::size_t>(inputs.size()) / total;
+  expect_size(inputs, count * total, "inputs");
   if (start) expect_size(*start, scene->dofs(), "start");
-  Solution s{std::move(scene), {inputs.data(), inputs.data() + inputs.size()}, {}};
-  py::gil_scoped_release release;
-  SignalInterrupt interrupt;
+  std::vector<Solution> all;
+  for (std::size_t b = 0; b < count; ++b)
+    all.push_back({scene, {inputs.data() + b * total, inputs.data() + (b + 1) * total}, {}});
+  const double* from = start ? start->data() : nullptr;
   EquilibriumOptions options;
   options.stable = stable;
-  s.at =
-      EquilibriumSolver(*s.scene).solve(s.inputs.data(), start ? start->data() : nullptr, nullptr, options, &interrupt);
-  return s;
+  py::gil_scoped_release release;
+  SignalInterrupt interrupt;
+  parallel_for(static_cast<int>(count), threads, 1, [&](int begin, int end) {
+    EquilibriumSolver solver(*scene);
+    for (int b = begin; b < end; ++b)
+      all[b].at = solver.solve(all[b].inputs.data(), from, nullptr, options, &interrupt);
+  });
+  return all;
+}
+
+Solution solve(const std::shared_ptr<Scene>& scene, const Array& inputs, const std::optional<Array>& start,
+               bool stable) {
+  expect_size(inputs, scene->layout.total(), "inputs");
+  return std::move(solve_batch(scene, inputs, start, stable, 1)[0]);
 }
 
 py::array_t<double> vjp(const Solution& s, const std::optional<Array>& x_bar, const std::optional<Array>& lambda_bar) {
@@ -40,6 +56,25 @@ py::array_t<double> vjp(const Solution& s, const std::optional<Array>& x_bar, co
         .vjp(x_bar ? x_bar->data() : nullptr, lambda_bar ? lambda_bar->data() : nullptr, bar.data());
   }
   return to_numpy(bar, {static_cast<py::ssize_t>(bar.size())});
+}
+
+// Gradients (B, total) from cotangents (B, dofs + rows) of coordinates and multipliers.
+py::array_t<double> vjp_batch(const std::vector<const Solution*>& solutions, const Array& bar, int threads) {
+  if (solutions.empty()) throw std::invalid_argument("solutions: empty. Fix: give at least one");
+  const Scene& scene = *solutions[0]->scene;
+  const std::size_t total = scene.layout.total(), size = scene.dofs() + scene.rows;
+  expect_size(bar, solutions.size() * size, "bar");
+  py::array_t<double> out({solutions.size(), total});
+  double* inputs_bar = out.mutable_data();
+  std::fill_n(inputs_bar, out.size(), 0.0);
+  const double* from = bar.data();
+  py::gil_scoped_release release;
+  parallel_for(static_cast<int>(solutions.size()), threads, 1, [&](int begin, int end) {
+    for (int b = begin; b < end; ++b)
+      EquilibriumDerivative(scene, solutions[b]->inputs.data(), solutions[b]->at)
+          .vjp(from + b * size, from + b * size + scene.dofs(), inputs_bar + b * total);
+  });
+  return out;
 }
 
 // (x_dot, lambda_dot) along one direction of the inputs.
@@ -79,6 +114,9 @@ void bind_equilibrium(py::module_& m) {
       .def("jvp", &jvp, py::arg("inputs_dot"));
   m.def("equilibrium", &solve, py::arg("scene"), py::arg("inputs"), py::arg("start") = py::none(),
         py::arg("stable") = true);
+  m.def("equilibria", &solve_batch, py::arg("scene"), py::arg("inputs"), py::arg("start") = py::none(),
+        py::arg("stable") = true, py::arg("threads") = 1);
+  m.def("equilibria_vjp", &vjp_batch, py::arg("solutions"), py::arg("bar"), py::arg("threads") = 1);
 }
 
 }  // namespace sheetbend::bindings

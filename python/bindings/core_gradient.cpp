@@ -78,55 +78,57 @@ py::tuple vjp_dot(const Solver& s, const Array& inputs, const Array& inputs_dot,
   return py::make_tuple(values, derivatives);
 }
 
-// Records and reverses a batch, eight scenes at a time. seed(first, x) makes cotangents of the states (F, dofs) of the scenes from `first` on.
+// Records and reverses a batch, eight scenes at a time. seed(pack, x) makes cotangents of the states x (frames of the pack, dofs).
 template <class Seed>
 py::array_t<double> reverse_batch(const Solver& s, const Array& inputs, const Steps& steps, double t0,
-                                  const Memory& memory, Seed&& seed) {
-  const std::size_t total = s.scene->layout.total(), size = steps.size() * s.scene->dofs();
+                                  const Memory& memory, const Lengths& lengths, Seed&& seed) {
+  const std::size_t total = s.scene->layout.total(), dofs = s.scene->dofs();
   const std::size_t count = static_cast<std::size_t>(inputs.size()) / total;
   check(s, inputs, count, steps);
   const TapePlan plan = plan_of<Pack>(s, steps, count, memory);
   auto out = empty({count, total});
   double* inputs_bar = out.mutable_data();
-  for_each_pack(s, inputs.data(), count, [&](std::size_t first, const std::vector<Pack>& in, Interrupt* interrupt) {
-    std::vector<Pack> x(size), bar(total);
-    auto tape = record_rollout(*s.scene, s.plan, in.data(), t0, steps, x.data(), plan.states, interrupt);
-    seed(count, first, x);
-    reverse_rollout(*s.scene, s.plan, in.data(), t0, tape, steps, x.data(), bar.data(), interrupt);
-    from_lanes(bar, inputs_bar, count, first);
-  });
+  for_each_pack(s, inputs.data(), count, steps, lengths,
+                [&](const PackOfScenes& pack, const std::vector<Pack>& in, const Steps& own, Interrupt* interrupt) {
+                  std::vector<Pack> x(own.size() * dofs), bar(total);
+                  auto tape = record_rollout(*s.scene, s.plan, in.data(), t0, own, x.data(), plan.states, interrupt);
+                  seed(pack, x);
+                  for (int k = 0; k < Pack::lanes; ++k)
+                    for (std::size_t i = pack.length[k] * dofs; i < x.size(); ++i) x[i].set(k, 0.0);
+                  reverse_rollout(*s.scene, s.plan, in.data(), t0, tape, own, x.data(), bar.data(), interrupt);
+                  pack.from_lanes(bar, inputs_bar, total);
+                });
   return out;
 }
 
-// Gradients (B, total) of a batch from cotangents of its states.
+// Gradients (B, total) of a batch from cotangents of its states; those of frames after a scene's last do not count.
 py::array_t<double> vjp_batch(const Solver& s, const Array& inputs, const Steps& steps, const Array& x_bar, double t0,
-                              const Memory& memory) {
+                              const Memory& memory, const Lengths& lengths) {
   const std::size_t size = steps.size() * s.scene->dofs();
   expect_size(x_bar, static_cast<std::size_t>(inputs.size()) / s.scene->layout.total() * size, "x_bar");
-  return reverse_batch(s, inputs, steps, t0, memory, [&](std::size_t count, std::size_t first, std::vector<Pack>& x) {
-    x = to_lanes(x_bar.data(), count, first, size);
+  return reverse_batch(s, inputs, steps, t0, memory, lengths, [&](const PackOfScenes& pack, std::vector<Pack>& x) {
+    x = pack.to_lanes(x_bar.data(), x.size(), size);
   });
 }
 
 // Half the sum of squared distances to targets (B, F, dofs), or (F, dofs) for all, and its gradient, in one pass over the batch: (B), (B, total).
 py::tuple misfit_batch(const Solver& s, const Array& inputs, const Steps& steps, const Array& targets, double t0,
-                       const Memory& memory) {
-  const std::size_t size = steps.size() * s.scene->dofs();
+                       const Memory& memory, const Lengths& lengths) {
+  const std::size_t dofs = s.scene->dofs(), size = steps.size() * dofs;
   const std::size_t batch = static_cast<std::size_t>(inputs.size()) / s.scene->layout.total();
   const bool shared = static_cast<std::size_t>(targets.size()) == size;
   if (!shared) expect_size(targets, batch * size, "targets");
   auto misfits = empty({batch});
   double* misfit = misfits.mutable_data();
   auto gradient =
-      reverse_batch(s, inputs, steps, t0, memory, [&](std::size_t count, std::size_t first, std::vector<Pack>& x) {
-        const auto wanted = to_lanes(targets.data(), shared ? 1 : count, shared ? 0 : first, size);
-        Pack sum(0.0);
-        for (std::size_t i = 0; i < size; ++i) {
-          x[i] -= wanted[i];
-          sum += x[i] * x[i];
+      reverse_batch(s, inputs, steps, t0, memory, lengths, [&](const PackOfScenes& pack, std::vector<Pack>& x) {
+        const auto wanted = pack.to_lanes(targets.data(), x.size(), shared ? 0 : size);
+        for (std::size_t i = 0; i < x.size(); ++i) x[i] -= wanted[i];
+        for (int k = 0; k < pack.count; ++k) {
+          double sum = 0.0;
+          for (std::size_t i = 0; i < pack.length[k] * dofs; ++i) sum += x[i][k] * x[i][k];
+          misfit[pack.scene[k]] = 0.5 * sum;
         }
-        for (std::size_t k = 0; k < Pack::lanes && first + k < count; ++k)
-          misfit[first + k] = 0.5 * sum[static_cast<int>(k)];
       });
   return py::make_tuple(misfits, gradient);
 }
@@ -157,9 +159,9 @@ void bind_gradient(py::module_& m, py::class_<Solver>& solver) {
       .def("vjp_dot", &vjp_dot, py::arg("inputs"), py::arg("inputs_dot"), py::arg("steps"), py::arg("x_bar"),
            py::arg("x_bar_dot"), py::arg("t0"), py::arg("memory") = py::none())
       .def("vjp_batch", &vjp_batch, py::arg("inputs"), py::arg("steps"), py::arg("x_bar"), py::arg("t0"),
-           py::arg("memory") = py::none())
+           py::arg("memory") = py::none(), py::arg("lengths") = Lengths())
       .def("misfit_batch", &misfit_batch, py::arg("inputs"), py::arg("steps"), py::arg("targets"), py::arg("t0"),
-           py::arg("memory") = py::none());
+           py::arg("memory") = py::none(), py::arg("lengths") = Lengths());
 }
 
 }  // namespace sheetbend::bindings

@@ -1,4 +1,8 @@
 // Rollouts from Python: forward, JVP and batches in lanes. Shapes: inputs (total,), states (wanted, dofs); a batch has a leading dimension.
+#include <algorithm>
+#include <functional>
+#include <numeric>
+
 #include "adjoint/rollout.h"
 #include "core/scalar/complex.h"
 #include "core/scalar/dual.h"
@@ -109,18 +113,25 @@ py::array_t<double> complex_step(const Solver& s, const Array& inputs, const Arr
   return out;
 }
 
-// States (B, F, dofs) of a batch.
-py::array_t<double> simulate_batch(const Solver& s, const Array& inputs, const Steps& steps, double t0) {
+// States (B, F, dofs) of a batch; after its own last frame a scene stands still.
+py::array_t<double> simulate_batch(const Solver& s, const Array& inputs, const Steps& steps, double t0,
+                                   const Lengths& lengths) {
   const std::size_t total = s.scene->layout.total(), dofs = s.scene->dofs(), frames = steps.size();
   const std::size_t count = static_cast<std::size_t>(inputs.size()) / total;
   check(s, inputs, count, steps);
   auto out = empty({count, frames, dofs});
   double* x = out.mutable_data();
-  for_each_pack(s, inputs.data(), count, [&](std::size_t first, const std::vector<Pack>& in, Interrupt* interrupt) {
-    std::vector<Pack> lanes(frames * dofs);
-    rollout_states(*s.scene, s.plan, in.data(), t0, steps, lanes.data(), interrupt);
-    from_lanes(lanes, x, count, first);
-  });
+  for_each_pack(s, inputs.data(), count, steps, lengths,
+                [&](const PackOfScenes& pack, const std::vector<Pack>& in, const Steps& own, Interrupt* interrupt) {
+                  std::vector<Pack> lanes(own.size() * dofs);
+                  rollout_states(*s.scene, s.plan, in.data(), t0, own, lanes.data(), interrupt);
+                  pack.from_lanes(lanes, x, frames * dofs);
+                  for (int k = 0; k < pack.count; ++k) {
+                    double* scene = x + pack.scene[k] * frames * dofs;
+                    for (std::size_t f = pack.length[k]; f < frames; ++f)
+                      std::copy_n(scene + (pack.length[k] - 1) * dofs, dofs, scene + f * dofs);
+                  }
+                });
   return out;
 }
 
@@ -134,18 +145,42 @@ void check(const Solver& s, const Array& inputs, std::size_t batch, const Steps&
   if (steps.empty()) throw std::invalid_argument("steps: empty. Fix: ask for at least one");
 }
 
-std::vector<Pack> to_lanes(const double* data, std::size_t batch, std::size_t first, std::size_t size) {
+std::vector<Pack> PackOfScenes::to_lanes(const double* data, std::size_t size, std::size_t stride) const {
   std::vector<Pack> lanes(size);
-  for (int k = 0; k < Pack::lanes; ++k) {
-    const double* from = data + std::min(first + k, batch - 1) * size;
-    for (std::size_t i = 0; i < size; ++i) lanes[i].set(k, from[i]);
-  }
+  for (int k = 0; k < Pack::lanes; ++k)
+    for (std::size_t i = 0; i < size; ++i) lanes[i].set(k, data[scene[k] * stride + i]);
   return lanes;
 }
 
-void from_lanes(const std::vector<Pack>& lanes, double* data, std::size_t batch, std::size_t first) {
-  for (std::size_t k = 0; k < Pack::lanes && first + k < batch; ++k)
-    for (std::size_t i = 0; i < lanes.size(); ++i) data[(first + k) * lanes.size() + i] = lanes[i][static_cast<int>(k)];
+void PackOfScenes::from_lanes(const std::vector<Pack>& lanes, double* data, std::size_t stride) const {
+  for (int k = 0; k < count; ++k)
+    for (std::size_t i = 0; i < lanes.size(); ++i) data[scene[k] * stride + i] = lanes[i][k];
+}
+
+std::vector<PackOfScenes> packs_of(std::size_t batch, const Steps& steps, const Lengths& lengths) {
+  const int frames = static_cast<int>(steps.size());
+  if (!lengths.empty() && lengths.size() != batch)
+    throw std::invalid_argument("lengths: got " + std::to_string(lengths.size()) + ". Fix: give one for each of " +
+                                std::to_string(batch) + " scenes");
+  for (const int length : lengths)
+    if (length < 1 || length > frames)
+      throw std::invalid_argument("lengths: got " + std::to_string(length) + ". Fix: give 1 to " +
+                                  std::to_string(frames) + " frames");
+  const auto length_of = [&](std::size_t scene) { return lengths.empty() ? frames : lengths[scene]; };
+  std::vector<std::size_t> order(batch);
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::stable_sort(order, std::greater<>(), length_of);
+  std::vector<PackOfScenes> packs;
+  for (std::size_t first = 0; first < batch; first += Pack::lanes) {
+    PackOfScenes& pack = packs.emplace_back();
+    pack.count = static_cast<int>(std::min<std::size_t>(Pack::lanes, batch - first));
+    for (int k = 0; k < Pack::lanes; ++k) {
+      pack.scene[k] = order[std::min(first + k, batch - 1)];
+      pack.length[k] = length_of(pack.scene[k]);
+    }
+    pack.frames = pack.length[0];
+  }
+  return packs;
 }
 
 void bind_rollout(py::module_& m) {
@@ -157,7 +192,8 @@ void bind_rollout(py::module_& m) {
       .def("states", &states, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
       .def("jvp", &jvp, py::arg("inputs"), py::arg("inputs_dot"), py::arg("steps"), py::arg("t0"))
       .def("complex_step", &complex_step, py::arg("inputs"), py::arg("direction"), py::arg("steps"), py::arg("t0"))
-      .def("simulate_batch", &simulate_batch, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
+      .def("simulate_batch", &simulate_batch, py::arg("inputs"), py::arg("steps"), py::arg("t0"),
+           py::arg("lengths") = Lengths())
       .def_property_readonly("blocks",
                              [](const Solver& s) {
                                std::vector<std::tuple<int, int, bool>> blocks;

@@ -40,20 +40,36 @@ inline py::array_t<double> zeros(std::vector<std::size_t> shape) {
 
 void bind_gradient(py::module_& m, py::class_<Solver>& solver);
 
-// Packs of eight scenes; lanes past the end repeat the last scene.
-std::vector<Pack> to_lanes(const double* data, std::size_t batch, std::size_t first, std::size_t size);
-void from_lanes(const std::vector<Pack>& lanes, double* data, std::size_t batch, std::size_t first);
+// How many of the frames each scene of a batch has; all of them where it is empty.
+using Lengths = std::vector<int>;
 
-// Calls f(first, inputs, interrupt) for every eight scenes of a batch, packs over threads and without the interpreter's lock.
+// Eight scenes of a batch that go through one rollout; lanes that are left over repeat one of them.
+struct PackOfScenes {
+  std::size_t scene[Pack::lanes];
+  int count;
+  int length[Pack::lanes];  // frames of each
+  int frames;               // of the longest
+
+  // A row of the first `size` of `stride` numbers for each scene.
+  std::vector<Pack> to_lanes(const double* data, std::size_t size, std::size_t stride) const;
+  void from_lanes(const std::vector<Pack>& lanes, double* data, std::size_t stride) const;
+};
+
+// Scenes of like length go together. Throws std::invalid_argument where the lengths do not fit.
+std::vector<PackOfScenes> packs_of(std::size_t batch, const Steps& steps, const Lengths& lengths);
+
+// Calls f(pack, inputs, steps, interrupt) for every eight scenes of a batch, packs over threads and without the interpreter's lock.
 template <class F>
-void for_each_pack(const Solver& s, const double* inputs, std::size_t batch, F&& f) {
+void for_each_pack(const Solver& s, const double* inputs, std::size_t batch, const Steps& steps, const Lengths& lengths,
+                   F&& f) {
+  const std::vector<PackOfScenes> packs = packs_of(batch, steps, lengths);
   Release release;
   SignalInterrupt interrupt;
-  const int packs = static_cast<int>((batch + Pack::lanes - 1) / Pack::lanes);
-  parallel_for(packs, s.plan.options.threads, 1, [&](int begin, int end) {
+  const std::size_t total = s.scene->layout.total();
+  parallel_for(static_cast<int>(packs.size()), s.plan.options.threads, 1, [&](int begin, int end) {
     for (int p = begin; p < end; ++p) {
-      const std::size_t first = static_cast<std::size_t>(p) * Pack::lanes;
-      f(first, to_lanes(inputs, batch, first, s.scene->layout.total()), &interrupt);
+      const Steps own(steps.begin(), steps.begin() + packs[p].frames);
+      f(packs[p], packs[p].to_lanes(inputs, total, total), own, &interrupt);
     }
   });
 }

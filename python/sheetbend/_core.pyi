@@ -113,12 +113,27 @@ class Solver:
     ) -> tuple[Array, Array]: ...
     def jvp(self, inputs: ArrayLike, inputs_dot: ArrayLike, steps: Sequence[int], t0: float) -> tuple[Array, Array]: ...
     def complex_step(self, inputs: ArrayLike, direction: ArrayLike, steps: Sequence[int], t0: float) -> Array: ...
-    def simulate_batch(self, inputs: ArrayLike, steps: Sequence[int], t0: float) -> Array: ...  # (batch, frames, dofs)
+    # lengths: (batch,) frames of each scene, or none where all have every frame
+    def simulate_batch(
+        self, inputs: ArrayLike, steps: Sequence[int], t0: float, lengths: Sequence[int] = ()
+    ) -> Array: ...  # (batch, frames, dofs)
     def vjp_batch(
-        self, inputs: ArrayLike, steps: Sequence[int], x_bar: ArrayLike, t0: float, memory: int | None = None
+        self,
+        inputs: ArrayLike,
+        steps: Sequence[int],
+        x_bar: ArrayLike,
+        t0: float,
+        memory: int | None = None,
+        lengths: Sequence[int] = (),
     ) -> Array: ...  # (batch, inputs)
     def misfit_batch(  # targets (batch, frames, dofs) or (frames, dofs)
-        self, inputs: ArrayLike, steps: Sequence[int], targets: ArrayLike, t0: float, memory: int | None = None
+        self,
+        inputs: ArrayLike,
+        steps: Sequence[int],
+        targets: ArrayLike,
+        t0: float,
+        memory: int | None = None,
+        lengths: Sequence[int] = (),
     ) -> tuple[Array, Array]: ...  # (batch,), (batch, inputs)
     @property
     def blocks(self) -> list[tuple[int, int, bool]]: ...  # rows, half bandwidth, banded
@@ -148,6 +163,12 @@ class EquilibriumSolution:
 def equilibrium(
     scene: Scene, inputs: ArrayLike, start: ArrayLike | None = None, stable: bool = True
 ) -> EquilibriumSolution: ...
+def equilibria(  # inputs (batch, total)
+    scene: Scene, inputs: ArrayLike, start: ArrayLike | None = None, stable: bool = True, threads: int = 1
+) -> list[EquilibriumSolution]: ...
+def equilibria_vjp(  # bar (batch, dofs + rows)
+    solutions: Sequence[EquilibriumSolution], bar: ArrayLike, threads: int = 1
+) -> Array: ...  # (batch, inputs)
 def evaluate_constraints(
     scene: Scene, inputs: ArrayLike, positions: ArrayLike, multipliers: ArrayLike
 ) -> tuple[Array, Array]: ...

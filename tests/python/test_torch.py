@@ -413,6 +413,23 @@ def test_equilibrium_forces_have_their_shapes(hanging: sb.Scene) -> None:
         st.equilibrium(hanging, start=np.zeros((2, 3)))
 
 
+@pytest.mark.parametrize("threads", [1, 2, 3])
+def test_a_batch_of_equilibria_has_the_bits_of_each(hanging: sb.Scene, threads: int) -> None:
+    EI = torch.tensor([2e-2, 5e-3, 1e-2, 2e-2, 4e-2], dtype=double)  # one of them twice
+
+    def both(values: Tensor) -> tuple[Tensor, Tensor]:
+        values = values.clone().requires_grad_()
+        rest = st.equilibrium(hanging, values={"rope_EI": values}, threads=threads)
+        loss = rest.positions.square().sum() + sum(force.sum() for force in rest.forces.values())
+        return rest.positions.detach(), torch.autograd.grad(loss, values)[0]
+
+    x, bar = both(EI)
+    for k, value in enumerate(EI):
+        own, own_bar = both(value)
+        assert torch.equal(x[k], own)
+        assert relative(bar[k], own_bar) < 1e-14
+
+
 # --- the Module
 
 

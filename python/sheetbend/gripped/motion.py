@@ -98,9 +98,14 @@ def smoothed(times: Array, positions: Array, width: float) -> tuple[Array, Array
     frames = min(2 * round(width / step / 2) + 1, len(times) - (1 - len(times) % 2))
     if frames < 5:
         return positions, np.gradient(positions, times, axis=0)
-    golay = require("scipy.signal", "fit").savgol_filter
-    values = golay(positions, frames, 2, axis=0, mode="interp")
-    return values, golay(positions, frames, 2, deriv=1, delta=step, axis=0, mode="interp")
+    half = frames // 2
+    t = step * np.arange(-half, half + 1)
+    fit = np.linalg.pinv(np.vander(t, 3, increasing=True))
+    parabolas = np.lib.stride_tricks.sliding_window_view(positions, frames, axis=0) @ fit.T
+    at = np.clip(np.arange(len(times)), half, len(times) - 1 - half)  # the middle of the frame's parabola
+    offset = (step * (np.arange(len(times)) - at)).reshape(-1, *[1] * (positions.ndim - 1))
+    value, slope, bend = np.moveaxis(parabolas[at - half], -1, 0)
+    return value + offset * (slope + offset * bend), slope + 2.0 * offset * bend
 
 
 def _bridged(recording: Recording) -> Array:

@@ -6,6 +6,7 @@
 from .export import write_obj, write_obj_sequence, write_ply
 from .files import read_mesh
 from .grids import equilateral, grid
+from .locality import renumbered
 from .places import Places
 from .shapes import disk, icosphere
 from .triangle_mesh import TriangleMesh
@@ -19,6 +20,7 @@ __all__ = [
     "grid",
     "icosphere",
     "read_mesh",
+    "renumbered",
     "unfold",
     "write_obj",
     "write_obj_sequence",

@@ -35,10 +35,10 @@ class Equilibrium(NamedTuple):
 
 
 class Equilibria:
-    """Coordinates and multipliers (B, dofs + rows) of the equilibria for inputs (B, total), scene by scene."""
+    """Coordinates and multipliers (B, dofs + rows) of the equilibria for inputs (B, total), spread over threads."""
 
-    def __init__(self, scene: Scene, start: Array | None, stable: bool) -> None:
-        self._scene, self._start, self._stable = scene, start, stable
+    def __init__(self, scene: Scene, start: Array | None, stable: bool, threads: int) -> None:
+        self._scene, self._start, self._stable, self._threads = scene, start, stable, threads
         self._kept: tuple[Array, list[_core.EquilibriumSolution]] | None = None
 
     def value(self, inputs: Array) -> Array:
@@ -46,9 +46,8 @@ class Equilibria:
         return np.stack([np.concatenate([s.positions, s.multipliers]) for s in self._solutions(inputs)])
 
     def vjp(self, inputs: Array, states_bar: Array) -> Array:
-        dofs = self._scene.compiled.core.dofs
-        solutions = self._solutions(inputs)
-        return np.stack([s.vjp(bar[:dofs], bar[dofs:]) for s, bar in zip(solutions, states_bar, strict=True)])
+        out: Array = _core.equilibria_vjp(self._solutions(inputs), states_bar, self._threads)
+        return out
 
     def jvp(self, inputs: Array, inputs_dot: Array) -> Array:
         solutions = self._solutions(inputs)
@@ -66,7 +65,7 @@ class Equilibria:
         expect_finite(self._scene, inputs)
         # jacrev and jacfwd repeat one scene once per row or column.
         rows, scene_of = np.unique(inputs, axis=0, return_inverse=True)
-        distinct = [_core.equilibrium(self._scene.compiled.core, row, self._start, self._stable) for row in rows]
+        distinct = _core.equilibria(self._scene.compiled.core, rows, self._start, self._stable, self._threads)
         for solution in distinct:
             if not solution.converged:
                 raise NoEquilibriumError(f"{self._scene.name}: {solution.message}")
@@ -81,10 +80,12 @@ def equilibrium(
     values: Mapping[str, Tensor | float] | None = None,
     inputs: Mapping[str, Tensor] | None = None,
     stable: bool = True,
+    threads: int = 1,
 ) -> Equilibrium:
     """The equilibrium that a start leads to, differentiable in every tensor given, by the implicit function theorem.
 
-    Once: second derivatives raise NotImplementedError. A batch is solved scene by scene.
+    Once: second derivatives raise NotImplementedError. A batch is one call of the core, which spreads the scenes over
+    threads: each takes its own steps, so they share no vector.
 
     Args:
         scene: is frozen by this.
@@ -92,6 +93,7 @@ def equilibrium(
         values: quantities to change, by name: tensors (*batch,), or plain numbers.
         inputs: input arrays to replace, as in `simulate`.
         stable: leave saddles; False goes to the nearest equilibrium whatever its stability.
+        threads: for a batch; the result does not depend on it.
 
     Raises:
         SceneError: the start has the wrong shape.
@@ -101,6 +103,6 @@ def equilibrium(
     x = None if start is None else finite("start", start, (scene.particle_count, 3), SceneError).ravel()
     flat = InputMap(scene)(values or {}, inputs or {})
     batch, dofs = flat.shape[:-1], scene.compiled.core.dofs
-    states = respond(Equilibria(scene, x, stable), flat.reshape(-1, flat.shape[-1])).reshape(*batch, -1)
+    states = respond(Equilibria(scene, x, stable, threads), flat.reshape(-1, flat.shape[-1])).reshape(*batch, -1)
     forces: Any = forces_by_group(scene, cast(Any, states[..., dofs:]))  # slices and reshapes only, so tensors pass
     return Equilibrium(states[..., :dofs].reshape(*batch, -1, 3), forces)

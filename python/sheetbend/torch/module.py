@@ -50,17 +50,22 @@ class SceneModule(nn.Module):
         stored = dict(self.named_parameters())
         return {name: stored[name].exp() if positive else stored[name] for name, positive in self._positive.items()}
 
-    def forward(self, inputs: Mapping[str, Tensor] | None = None, **overrides: Tensor | float) -> Tensor:
+    def forward(
+        self,
+        inputs: Mapping[str, Tensor] | None = None,
+        lengths: ArrayLike | None = None,
+        **overrides: Tensor | float,
+    ) -> Tensor:
         """Positions (*batch, frames, particles, 3) m.
 
         Args:
-            inputs: input arrays to replace, tensors (*batch, ...), as in `sheetbend.torch.simulate`.
+            inputs, lengths: input arrays to replace, and frames per scene, as in `sheetbend.torch.simulate`.
             overrides: quantities by name, physical values (*batch,), instead of the learned or the scene's ones.
 
         Raises:
             InputError, DivergenceError: as `sheetbend.torch.simulate`.
         """
-        return self._simulation({**self.values(), **overrides}, inputs)
+        return self._simulation({**self.values(), **overrides}, inputs, lengths)
 
     def extra_repr(self) -> str:
         units = {name: q.unit for name, q in self._simulation.scene.quantities.items()}

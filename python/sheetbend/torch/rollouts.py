@@ -27,20 +27,30 @@ class Rollouts:
         steps: wanted substeps, ascending.
         solver: its memory is the budget of a gradient.
         keep_tape: keep the tape of a single rollout for the `vjp` that will follow, which else records it again.
+        lengths: (B,) how many of the steps each scene has; then it stands still, and those frames have no derivatives.
     """
 
-    def __init__(self, scene: Scene, core: Any, steps: Sequence[int], keep_tape: bool, solver: Solver) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        core: Any,
+        steps: Sequence[int],
+        keep_tape: bool,
+        solver: Solver,
+        lengths: Array | None = None,
+    ) -> None:
         self._scene, self._core, self._steps, self._keep_tape = scene, core, list(steps), keep_tape
-        self._solver = solver
+        self._solver, self._lengths = solver, lengths
         self._kept: tuple[Array, Any] | None = None
 
     def value(self, inputs: Array) -> Array:
         """Positions. Raises InputError where inputs are not finite, DivergenceError."""
         expect_finite(self._scene, inputs)
+        lengths = self._lengths_of(inputs)
         out: Array
         with divergence(self._scene):
-            if len(inputs) != 1:
-                out = self._core.simulate_batch(inputs, self._steps, 0.0)
+            if len(inputs) != 1 or lengths:
+                out = self._core.simulate_batch(inputs, self._steps, 0.0, lengths)
                 return out
             if self._keep_tape:
                 out, tape = self._record(inputs)
@@ -51,10 +61,11 @@ class Rollouts:
 
     def vjp(self, inputs: Array, states_bar: Array) -> Array:
         """One call of the core for the whole batch."""
+        lengths = self._lengths_of(inputs)
         out: Array
         with divergence(self._scene), budget(self._solver):
-            if len(inputs) != 1:
-                out = self._core.vjp_batch(inputs, self._steps, states_bar, 0.0, self._solver.budget)
+            if len(inputs) != 1 or lengths:
+                out = self._core.vjp_batch(inputs, self._steps, states_bar, 0.0, self._solver.budget, lengths)
                 return out
             kept = self._kept
             tape = kept[1] if kept is not None and np.array_equal(kept[0], inputs) else self._record(inputs)[1]
@@ -63,24 +74,36 @@ class Rollouts:
 
     def jvp(self, inputs: Array, inputs_dot: Array) -> Array:
         """One call per distinct scene, eight tangents to a rollout: the core has no lanes of scenes for tangents."""
-        out = np.empty((len(inputs), len(self._steps), self._scene.compiled.core.dofs))
-        _, first, scene_of = np.unique(inputs, axis=0, return_index=True, return_inverse=True)
+        out = np.zeros((len(inputs), len(self._steps), self._scene.compiled.core.dofs))
+        frames = np.array(self._lengths_of(inputs) or [len(self._steps)] * len(inputs))
+        distinct = np.column_stack([inputs, frames])
+        _, first, scene_of = np.unique(distinct, axis=0, return_index=True, return_inverse=True)
         scene_of = scene_of.reshape(-1)
         with divergence(self._scene):
             for k, row in enumerate(first):
-                same = scene_of == k
-                out[same] = self._core.jvp(inputs[row], inputs_dot[same], self._steps, 0.0)[1]
+                same, own = np.flatnonzero(scene_of == k), frames[row]
+                out[same, :own] = self._core.jvp(inputs[row], inputs_dot[same], self._steps[:own], 0.0)[1]
         return out
 
     def vjp_dot(self, inputs: Array, inputs_dot: Array, states_bar: Array, states_bar_dot: Array) -> Array:
         """One call per scene of the batch: the core has no lanes for second derivatives."""
         out = np.empty_like(inputs)
+        frames = self._lengths_of(inputs) or [len(self._steps)] * len(inputs)
         with divergence(self._scene), budget(self._solver):
-            for b in range(len(inputs)):
-                out[b] = self._core.vjp_dot(
-                    inputs[b], inputs_dot[b], self._steps, states_bar[b], states_bar_dot[b], 0.0, self._solver.budget
-                )[1]
+            for b, own in enumerate(frames):
+                bars = states_bar[b, :own], states_bar_dot[b, :own]
+                steps, memory = self._steps[:own], self._solver.budget
+                out[b] = self._core.vjp_dot(inputs[b], inputs_dot[b], steps, *bars, 0.0, memory)[1]
         return out
+
+    def _lengths_of(self, inputs: Array) -> list[int]:
+        """Of the batch's scenes; empty where all have every frame."""
+        if self._lengths is None:
+            return []
+        if len(self._lengths) != len(inputs):
+            fix = "give the batch as leading dimensions instead of through torch.func.vmap"
+            raise InputError("lengths", f"are those of {len(self._lengths)} scenes", len(inputs), fix)
+        return [int(n) for n in self._lengths]
 
     def _record(self, inputs: Array) -> tuple[Array, Any]:
         with budget(self._solver):

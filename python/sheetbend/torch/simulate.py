@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
 import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
+from ..errors import InputError
 from ..scene import Scene
 from ..simulate import substeps
 from ..solver import Solver
@@ -26,12 +28,16 @@ class Simulation:
         self._core = self.solver.core(scene.compiled)
 
     def __call__(
-        self, values: Mapping[str, Tensor | float] | None = None, inputs: Mapping[str, Tensor] | None = None
+        self,
+        values: Mapping[str, Tensor | float] | None = None,
+        inputs: Mapping[str, Tensor] | None = None,
+        lengths: ArrayLike | None = None,
     ) -> Tensor:
         flat = self._inputs(values or {}, inputs or {})
         batch = flat.shape[:-1]
         keep_tape = torch.is_grad_enabled() and flat.requires_grad
-        rollouts = Rollouts(self.scene, self._core, self._steps, keep_tape, self.solver)
+        own = None if lengths is None else _checked(lengths, batch, len(self._steps))
+        rollouts = Rollouts(self.scene, self._core, self._steps, keep_tape, self.solver, own)
         states = respond(rollouts, flat.reshape(-1, flat.shape[-1]))
         return states.reshape(*batch, len(self._steps), -1, 3)
 
@@ -42,6 +48,7 @@ def simulate(
     solver: Solver | None = None,
     values: Mapping[str, Tensor | float] | None = None,
     inputs: Mapping[str, Tensor] | None = None,
+    lengths: ArrayLike | None = None,
 ) -> Tensor:
     """Positions of a simulated scene, differentiable in every tensor given.
 
@@ -64,13 +71,27 @@ def simulate(
             "drag_quadratic" (particles,), "wind" (knots, 3), "air_normal", "air_tangential",
             "pressure" (triangles in air,), "volume", "volume_compliance" (volumes,).
             Constraints and rest parameters come group after group, as added.
+        lengths: (*batch,) how many of the frames each scene has, where recordings differ in length; all by default.
+            After its last frame a scene stands still, and what a loss makes of those frames has no gradient. Scenes of
+            like length share a vector, so short ones do not pay for long ones.
 
     Returns:
         (*batch, frames, particles, 3) m, float64.
 
     Raises:
-        InputError: times off the grid; a budget below the least that works; a tensor with an unknown name, of the wrong
-            shape or dtype, on another device, or not finite.
+        InputError: times off the grid; lengths that fit neither batch nor frames; a budget below the least that works;
+            a tensor with an unknown name, of the wrong shape or dtype, on another device, or not finite.
         DivergenceError: a state became infinite; says when and where.
     """
-    return Simulation(scene, times, solver)(values, inputs)
+    return Simulation(scene, times, solver)(values, inputs, lengths)
+
+
+def _checked(lengths: ArrayLike, batch: tuple[int, ...], frames: int) -> np.ndarray:
+    """(scenes,)"""
+    own = np.asarray(lengths)
+    if own.shape != batch or not np.issubdtype(own.dtype, np.integer):
+        fix = f"give {batch}, of the batch; without one cut the times"
+        raise InputError("lengths", "must be whole numbers, one per scene", own.shape, fix)
+    if own.min() < 1 or own.max() > frames:
+        raise InputError("lengths", "do not lie within the frames", [int(own.min()), int(own.max())], f"1 to {frames}")
+    return own.reshape(-1)
