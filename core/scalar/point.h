@@ -41,6 +41,19 @@ struct InFours {
   }
 };
 
+// The numbers that a point of another scalar consists of. Sums and multiples by plain numbers go through them in one loop, without a rule of the
+// scalar and without copies of it.
+template <class T>
+inline constexpr int numbers_per_point = 3 * static_cast<int>(sizeof(T) / sizeof(double));
+template <class T>
+double* numbers_of_point(T* p) {
+  return reinterpret_cast<double*>(p);
+}
+template <class T>
+const double* numbers_of_point(const T* p) {
+  return reinterpret_cast<const double*>(p);
+}
+
 // A sum over points that stays in registers.
 template <class T>
 struct PointSum {

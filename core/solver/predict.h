@@ -44,6 +44,17 @@ typename How::Point history(const Bdf& bdf, How, const T* now, const T* before) 
   return scaled(bdf.now, How::load(now)) + scaled(bdf.before, How::load(before));
 }
 
+// out = history(now, before) + c more, for scalars other than double.
+template <class T>
+void add_to_history(const Bdf& bdf, const T* now, const T* before, double c, const T* more, T* out) {
+  const double *a = numbers_of_point(now), *b = numbers_of_point(before), *m = numbers_of_point(more);
+  double* __restrict to = numbers_of_point(out);
+  if (bdf.before == 0.0)
+    for (int i = 0; i < numbers_per_point<T>; ++i) to[i] = a[i] + c * m[i];
+  else
+    for (int i = 0; i < numbers_per_point<T>; ++i) to[i] = (bdf.now * a[i] + bdf.before * b[i]) + c * m[i];
+}
+
 // Value of something given at knots, (knots, slots, 3), for one slot.
 template <class T>
 Vec3<T> at_knots(const KnotWeights& k, const T* values, int slots, int slot) {
@@ -101,12 +112,23 @@ void predict(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, doub
   const T* kept = scene.has_drag ? weights.kept.data() : nullptr;
   const int* first_dof = scene.first_dof.data();
   parallel_for(scene.nodes(), threads, points_per_thread, [=](int begin, int end) {
-    for_each_point<T>(begin, end, [=](int n, auto how) {
-      const int dof = first_dof[n];
-      auto v = history(bdf, how, s.v + dof, s.v_before + dof) + how.load(gravity);
-      if (kept) v = scaled(kept[n], v);
-      how.store(q.of(n), history(bdf, how, s.x + dof, s.x_before + dof) + scaled(step, v));
-    });
+    if constexpr (std::is_same_v<T, double>) {
+      for_each_point<T>(begin, end, [=](int n, auto how) {
+        const int dof = first_dof[n];
+        auto v = history(bdf, how, s.v + dof, s.v_before + dof) + how.load(gravity);
+        if (kept) v = scaled(kept[n], v);
+        how.store(q.of(n), history(bdf, how, s.x + dof, s.x_before + dof) + scaled(step, v));
+      });
+    } else {
+      for (int n = begin; n < end; ++n) {
+        const int dof = first_dof[n];
+        T v[3];
+        add_to_history(bdf, s.v + dof, s.v_before + dof, 1.0, gravity, v);
+        if (kept)
+          for (T& component : v) component = kept[n] * component;
+        add_to_history(bdf, s.x + dof, s.x_before + dof, step, v, q.of(n));
+      }
+    }
   });
   if (!scene.loaded.empty()) {
     const KnotWeights force = scene.force.at(t_next);

@@ -159,16 +159,35 @@ bool read_off(const Scene& scene, const Bdf& bdf, const SubstepStates<T>& s, int
   const double rate = 1.0 / bdf.eta;
   const int* first_dof = scene.first_dof.data();
   parallel_for(scene.nodes(), threads, points_per_thread, [=, &finite](int begin, int end) {
-    PointSum<T> difference;  // q - q, which only what is finite has as zero
-    for_each_point<T>(begin, end, [=, &difference](int n, auto how) {
-      const int dof = first_dof[n];
-      const auto now = how.load(q.of(n));
-      how.store(x_next + dof, now);
-      how.store(v + dof, scaled(rate, now - history(bdf, how, s.x + dof, s.x_before + dof)));
-      difference.add(now - now);
-    });
-    const Vec3<T> d = difference.total();
-    if (!all_finite(d.x) || !all_finite(d.y) || !all_finite(d.z)) finite = false;
+    // q - q, which only what is finite has as zero
+    if constexpr (std::is_same_v<T, double>) {
+      PointSum<T> difference;
+      for_each_point<T>(begin, end, [=, &difference](int n, auto how) {
+        const int dof = first_dof[n];
+        const auto now = how.load(q.of(n));
+        how.store(x_next + dof, now);
+        how.store(v + dof, scaled(rate, now - history(bdf, how, s.x + dof, s.x_before + dof)));
+        difference.add(now - now);
+      });
+      const Vec3<T> d = difference.total();
+      if (!all_finite(d.x) || !all_finite(d.y) || !all_finite(d.z)) finite = false;
+    } else {
+      double difference[numbers_per_point<T>]{};
+      for (int n = begin; n < end; ++n) {
+        const int dof = first_dof[n];
+        const double *now = numbers_of_point(q.of(n)), *a = numbers_of_point(s.x + dof);
+        const double* b = numbers_of_point(s.x_before + dof);
+        double* __restrict rates = numbers_of_point(v + dof);
+        for (int i = 0; i < numbers_per_point<T>; ++i) {
+          const double past = bdf.before == 0.0 ? a[i] : bdf.now * a[i] + bdf.before * b[i];
+          rates[i] = rate * (now[i] - past);
+          difference[i] += now[i] - now[i];
+        }
+        if (x_next + dof != q.of(n)) std::copy_n(q.of(n), 3, x_next + dof);
+      }
+      for (const double d : difference)
+        if (!(d == 0.0)) finite = false;
+    }
   });
   return finite;
 }

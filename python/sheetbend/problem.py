@@ -208,7 +208,11 @@ class FitProblem:
 
     def simulate(self, u: np.ndarray) -> list[np.ndarray]:
         """Simulated markers (frames, markers, 3) of every experiment."""
-        return [self.core.simulate(i, u).reshape(r.positions.shape) for i, r in enumerate(self.recordings)]
+        return [self.simulate_one(i, u) for i in range(len(self.recordings))]
+
+    def simulate_one(self, experiment: int, u: np.ndarray) -> np.ndarray:
+        """The same of one; threads may call it at the same time."""
+        return self.core.simulate(experiment, u).reshape(self.recordings[experiment].positions.shape)
 
     def rows_layout(self) -> Layout:
         """Where each data row comes from, for the covariance."""

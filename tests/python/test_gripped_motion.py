@@ -176,7 +176,7 @@ class TestModel:
         recording = carried_about()
         motion = GrippedMotion.of(recording, 0.08)
         model = model_of(motion)
-        x = predict(model, motion, {})
+        (x,) = predict(model, [motion], {})
         assert x.shape == recording.positions.shape and np.isfinite(x).all()
         held = list(recording.clamped)
         np.testing.assert_array_equal(x[:, held], recording.positions[:, held])

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -73,20 +74,27 @@ class RopeFit:
     def predict(self, recording: Recording | GrippedMotion) -> Array:
         """(frames, markers, 3) m: open loop from the first frame, gripped markers as recorded."""
         (motion,) = motions_of([recording], self.model.smoothing)
-        return predict(self.model, motion, self.values)
+        return predict(self.model, [motion], self.values)[0]
 
 
-def predict(model: RopeModel, motion: GrippedMotion, values: Mapping[str, float]) -> Array:
-    """The whole recording, open loop from its first frame; NaN where the motion diverges."""
-    e = model.experiment(motion)
-    out = motion.recording.filled().positions.copy()
-    free = list(motion.free)
-    problem = _problem([replace(e, fit=None)], (TWIST.parameters[0],), values)
-    try:
-        out[:, free] = problem.simulate(problem.parameters.initial())[0]
-    except SheetbendError:
-        out[:, free] = np.nan
-    return out
+def predict(
+    model: RopeModel, motions: Sequence[GrippedMotion], values: Mapping[str, float], threads: int = 1
+) -> list[Array]:
+    """Whole recordings, open loop from their first frames; NaN where a motion diverges."""
+    experiments = [replace(model.experiment(m), fit=None) for m in motions]
+    problem = _problem(experiments, (TWIST.parameters[0],), values)
+    u = problem.parameters.initial()
+
+    def one(k: int) -> Array:
+        out, free = motions[k].recording.filled().positions.copy(), list(motions[k].free)
+        try:
+            out[:, free] = problem.simulate_one(k, u)
+        except SheetbendError:
+            out[:, free] = np.nan
+        return out
+
+    with ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(one, range(len(motions))))
 
 
 def fit_rope(
@@ -292,10 +300,11 @@ class _Search:
         self.say(f"{step.name}: {errors}{'' if step.stays else ', does not stay'}")
 
     def _error(self, model: RopeModel, values: Mapping[str, float], motions: Sequence[GrippedMotion]) -> float:
-        errors = []
-        for m in motions:
-            predicted = predict(model, m, values)
-            errors.append(coordinate_error(m.recording, predicted) if np.isfinite(predicted).all() else np.inf)
+        predicted = predict(model, motions, values, self.threads)
+        errors = [
+            coordinate_error(m.recording, x) if np.isfinite(x).all() else np.inf
+            for m, x in zip(motions, predicted, strict=True)
+        ]
         return float(np.mean(errors))
 
     def _conclude(
