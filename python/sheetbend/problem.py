@@ -10,11 +10,13 @@ import numpy as np
 
 from . import _core
 from .covariance import Layout
+from .equilibrium import NoEquilibriumError
 from .errors import InputError
 from .experiment import Experiment
 from .parameters import Parameter, Parameters
 from .quantities import Quantity
 from .recording import Recording
+from .simulate import divergence
 
 ParameterLike = Parameter | Mapping[str, Any] | None
 CHEAP = 3.0  # times the residuals: a Jacobian that costs less is made with them
@@ -211,8 +213,18 @@ class FitProblem:
         return [self.simulate_one(i, u) for i in range(len(self.recordings))]
 
     def simulate_one(self, experiment: int, u: np.ndarray) -> np.ndarray:
-        """The same of one; threads may call it at the same time."""
-        return self.core.simulate(experiment, u).reshape(self.recordings[experiment].positions.shape)
+        """The same of one; threads may call it at the same time.
+
+        Raises:
+            DivergenceError, NoEquilibriumError: the physics has no answer.
+        """
+        scene = self.experiments[experiment].scene
+        try:
+            with divergence(scene):
+                markers = self.core.simulate(experiment, u)
+        except _core.NoEquilibrium as error:
+            raise NoEquilibriumError(f"{scene.name}: {error}") from error
+        return markers.reshape(self.recordings[experiment].positions.shape)
 
     def rows_layout(self) -> Layout:
         """Where each data row comes from, for the covariance."""

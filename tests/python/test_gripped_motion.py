@@ -181,17 +181,23 @@ class TestModel:
         held = list(recording.clamped)
         np.testing.assert_array_equal(x[:, held], recording.positions[:, held])
         np.testing.assert_allclose(x[0], recording.positions[0], atol=2e-3)
-        stiffer = predict(model.with_values(EI=2.0, GJ=2.0), motion, {})
+        (stiffer,) = predict(model.with_values(EI=2.0, GJ=2.0), [motion], {})
         assert np.abs(x - recording.positions).max() > 3e-3  # it does not keep its shape
         assert np.abs(x - stiffer).max() > 3e-3
+
+    def test_a_prediction_that_diverges_is_nan_for_the_free_markers(self) -> None:
+        motion = GrippedMotion.of(carried_about(), 0.08)
+        for x in predict(model_of(motion), [motion], {"rope_length": 1e200}):
+            assert np.isnan(x[:, list(motion.free)]).all()
+            assert np.isfinite(x[:, list(motion.recording.clamped)]).all()
 
     def test_gaps_of_free_markers_are_predicted_through(self) -> None:
         positions = carried_about().positions.copy()
         positions[30:38, 5] = np.nan
         whole = GrippedMotion.of(carried_about(), 0.08)
         lost = GrippedMotion.of(carried_about(positions=positions), 0.08)
-        expected = predict(model_of(whole), whole, {})
-        np.testing.assert_allclose(predict(model_of(whole), lost, {}), expected, atol=1e-4)
+        expected, found = (predict(model_of(whole), [motion], {})[0] for motion in (whole, lost))
+        np.testing.assert_allclose(found, expected, atol=1e-4)
 
 
 @pytest.mark.parametrize(
