@@ -43,7 +43,7 @@ struct Experiment {
   int steps() const;                   // substeps until the last frame
   void check() const;
 
-  // Fills residuals (residual_count) and, when not null, simulated markers (frames, markers, 3). Throws Diverged or NoEquilibrium.
+  // Fills residuals (residual_count) and, when not null, simulated markers (frames, markers, 3). Throws Diverged, Unconverged or NoEquilibrium.
   template <class T>
   void residuals(const T* theta, T* r, T* simulated, Interrupt* interrupt) const;
 };

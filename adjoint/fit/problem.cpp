@@ -113,6 +113,10 @@ bool Problem::evaluate(const double* u, double* residual, double* jacobian, Inte
         std::lock_guard lock(failing);
         ok = false;
         failure_ = experiments_[e].name + ": " + error.what();
+      } catch (const Unconverged& error) {
+        std::lock_guard lock(failing);
+        ok = false;
+        failure_ = experiments_[e].name + ": " + error.what();
       } catch (const NoEquilibrium& error) {
         std::lock_guard lock(failing);
         ok = false;

@@ -4,14 +4,17 @@
 namespace sheetbend {
 
 enum class Integrator : int { bdf1, bdf2 };
-// Blocks of one by color; connected sets by LDL^T of their constraints; or the same sets through their particles (condensed.h).
-enum class Partition : int { gauss_seidel, direct, newton };
+// Blocks of one by color; connected sets by LDL^T of their constraints; or the same sets through their particles (condensed.h), factored or by
+// conjugate gradients.
+enum class Partition : int { gauss_seidel, direct, newton, newton_cg };
 
 struct SolverOptions {
   double h = 1e-3;  // substep [s]
   Integrator integrator = Integrator::bdf2;
   Partition partition = Partition::direct;
   int iterations = 2;
+  double cg_tolerance = 1e-13;  // relative residual at which conjugate gradients stop
+  int cg_iterations = 10000;    // more than these are an error
   int threads = 1;
   int grain = 256;  // blocks per thread below which a color is not split
 };

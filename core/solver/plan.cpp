@@ -99,8 +99,8 @@ MemberRun make_run(const Scene& scene, int g, const std::map<int, int>& particle
 }
 
 // Where the constraints' shares stand in the condensed matrix.
-Condensation condense(const Scene& scene, const DirectBlock& block, const std::map<int, int>& particle_of) {
-  Condensation c;
+CondensedPattern condense(const Scene& scene, const DirectBlock& block, const std::map<int, int>& particle_of) {
+  CondensedPattern c;
   std::vector<std::vector<int>> joined;
   for (const Member& m : block.members) {
     const Group& group = scene.groups[m.group];
@@ -144,7 +144,8 @@ Condensation condense(const Scene& scene, const DirectBlock& block, const std::m
   return c;
 }
 
-DirectBlock make_block(const Scene& scene, std::vector<Member> members, bool condensed) {
+DirectBlock make_block(const Scene& scene, std::vector<Member> members, const SolverOptions& options) {
+  const bool condensed = options.partition != Partition::direct;
   Users users = number_rows(scene, members);
   FactorStructure structure = condensed ? FactorStructure(0, {}) : structure_of(scene, members, users);
   if (!condensed && !structure.banded()) {
@@ -153,7 +154,7 @@ DirectBlock make_block(const Scene& scene, std::vector<Member> members, bool con
     structure = structure_of(scene, members, users);
   }
   DirectBlock block{std::move(members), {}, {}, {0}, {}, {}, {}, 0, false, std::move(structure)};
-  if (condensed) block.condensation.emplace();
+  if (condensed) block.condensation = Stopping{options.cg_tolerance, options.cg_iterations};
   std::map<int, int> particle_of;
   for (const auto& [node, rows] : users) {
     particle_of[node] = add_particle(block, node, rows);
@@ -171,7 +172,7 @@ DirectBlock make_block(const Scene& scene, std::vector<Member> members, bool con
     for (int j = 0; j < group.rows; ++j) block.multipliers.push_back(group.first_row + m.item * group.rows + j);
   }
   for (const int g : groups) block.runs.push_back(make_run(scene, g, particle_of, block));
-  if (condensed) block.condensation = condense(scene, block, particle_of);
+  if (options.partition == Partition::newton) block.condensation = condense(scene, block, particle_of);
   return block;
 }
 
@@ -180,6 +181,11 @@ void check(const SolverOptions& o) {
     throw std::invalid_argument("h: the substep is " + std::to_string(o.h) + " s. Fix: give a positive time");
   if (o.iterations < 1)
     throw std::invalid_argument("iterations: got " + std::to_string(o.iterations) + ". Fix: give at least 1");
+  if (!(o.cg_tolerance > 0.0 && o.cg_tolerance < 1.0))
+    throw std::invalid_argument("cg_tolerance: got " + std::to_string(o.cg_tolerance) +
+                                ". Fix: give a relative residual between 0 and 1");
+  if (o.cg_iterations < 1)
+    throw std::invalid_argument("cg_iterations: got " + std::to_string(o.cg_iterations) + ". Fix: give at least 1");
   if (o.threads < 1)
     throw std::invalid_argument("threads: got " + std::to_string(o.threads) + ". Fix: give at least 1");
 }
@@ -212,8 +218,7 @@ Plan make_plan(const Scene& scene, const SolverOptions& options) {
     plan.colors = color_constraints(scene);
     plan.packs = pack_colors(scene, plan.colors);
   } else
-    for (auto& members : connected_chains(scene))
-      plan.blocks.push_back(make_block(scene, std::move(members), options.partition == Partition::newton));
+    for (auto& members : connected_chains(scene)) plan.blocks.push_back(make_block(scene, std::move(members), options));
   return plan;
 }
 

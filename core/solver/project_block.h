@@ -37,7 +37,7 @@ struct BlockState {
     Numbers<Plain<T>> gradients;
     Numbers<T> dl, u;
     Factor<Plain<T>> factor;
-    CondensedFactor<Plain<T>> condensed;  // in its place, where the block is
+    CondensedSolver<Plain<T>> condensed;  // in its place, where the block is
   };
   std::vector<Iteration> iterations;
   std::vector<Numbers<T>> x, lambda;  // before each iteration and after the last; one of each where nothing is kept
@@ -210,18 +210,24 @@ void factor_sparse(const DirectBlock& block, const sheetbend_blocks::Forward& ke
   own.factor.factorize(block.structure, kernels.factor_supernodes);
 }
 
-// The numbers that a condensed block is factored and solved from.
+// The numbers that a condensed block is prepared and solved from.
 template <class T>
-BlockNumbers<Plain<T>> numbers_of_block(BlockState<T>& state, int iteration) {
-  return {state.at(iteration).gradients.data(), state.at(state.x, iteration).data(), state.diagonal.data()};
+BlockNumbers<Plain<T>> numbers_of_block(const DirectBlock& block, BlockState<T>& state, int iteration) {
+  return {state.at(iteration).gradients.data(),
+          state.at(state.x, iteration).data(),
+          state.diagonal.data(),
+          block.window.data(),
+          block.window_rows.data(),
+          block.movable,
+          block.size()};
 }
 
-// b = A^-1 b for blocks that are no band, factored before.
+// b = A^-1 b for blocks that are no band, factored or prepared before.
 template <class T, class U>
 void solve_sparse(const DirectBlock& block, BlockState<T>& state, int iteration, U* b) {
   auto& own = state.at(iteration);
   if (block.condensation)
-    own.condensed.solve(*block.condensation, numbers_of_block(state, iteration), b);
+    own.condensed.solve(*block.condensation, numbers_of_block(block, state, iteration), b);
   else
     own.factor.solve(block.structure, b);
 }
@@ -264,8 +270,8 @@ void project_block(const SubstepState<T>& s, const DirectBlock& block, const she
     kernels.solve(arrays, arrays.dl);
   } else {
     if (block.condensation)
-      state.at(iteration).condensed.factorize(*block.condensation, numbers_of_block(state, iteration),
-                                              kernels.factor_supernodes);
+      state.at(iteration).condensed.prepare(*block.condensation, numbers_of_block(block, state, iteration),
+                                            kernels.factor_supernodes);
     else
       factor_sparse(block, kernels, state, iteration);
     solve_sparse(block, state, iteration, state.at(iteration).dl.data());

@@ -36,6 +36,7 @@ PYBIND11_MODULE(_core, m) {
   m.def("constraint_kinds", &constraint_kinds);
   m.def("instruction_set", [] { return pack_kernels().name; });
   static py::exception<Diverged> diverged(m, "Diverged", PyExc_RuntimeError);
+  static py::exception<Unconverged> unconverged(m, "Unconverged", PyExc_RuntimeError);
   static py::exception<NoEquilibrium> no_equilibrium(m, "NoEquilibrium", PyExc_RuntimeError);
   static py::exception<BudgetTooSmall> too_small(m, "BudgetTooSmall", PyExc_ValueError);
   py::register_exception_translator([](std::exception_ptr p) {
@@ -51,6 +52,11 @@ PYBIND11_MODULE(_core, m) {
       py::object error = py::handle(too_small)(e.what());
       error.attr("needed") = e.needed;
       PyErr_SetObject(too_small.ptr(), error.ptr());
+    } catch (const Unconverged& e) {
+      py::object error = py::handle(unconverged)(e.what());
+      error.attr("iterations") = e.iterations;
+      error.attr("residual") = e.residual;
+      PyErr_SetObject(unconverged.ptr(), error.ptr());
     } catch (const NoEquilibrium& e) {
       PyErr_SetString(no_equilibrium.ptr(), e.what());
     } catch (const Interrupted&) {

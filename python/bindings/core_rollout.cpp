@@ -12,12 +12,14 @@ namespace sheetbend::bindings {
 namespace {
 
 Solver make_solver(std::shared_ptr<Scene> scene, double h, const std::string& integrator, const std::string& partition,
-                   int iterations, int threads, int grain) {
+                   int iterations, int threads, int grain, double cg_tolerance, int cg_iterations) {
   SolverOptions o;
   o.h = h;
   o.iterations = iterations;
   o.threads = threads;
   o.grain = grain;
+  o.cg_tolerance = cg_tolerance;
+  o.cg_iterations = cg_iterations;
   if (integrator != "bdf1" && integrator != "bdf2")
     throw std::invalid_argument("integrator: got '" + integrator + "'. Fix: use 'bdf1' or 'bdf2'");
   o.integrator = integrator == "bdf1" ? Integrator::bdf1 : Integrator::bdf2;
@@ -187,7 +189,8 @@ void bind_rollout(py::module_& m) {
   py::class_<Solver> solver(m, "Solver");
   solver
       .def(py::init(&make_solver), py::kw_only(), py::arg("scene"), py::arg("h"), py::arg("integrator"),
-           py::arg("partition"), py::arg("iterations"), py::arg("threads"), py::arg("grain"))
+           py::arg("partition"), py::arg("iterations"), py::arg("threads"), py::arg("grain"), py::arg("cg_tolerance"),
+           py::arg("cg_iterations"))
       .def("simulate", &simulate, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
       .def("states", &states, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
       .def("jvp", &jvp, py::arg("inputs"), py::arg("inputs_dot"), py::arg("steps"), py::arg("t0"))

@@ -18,6 +18,7 @@ from .errors import (
     RecordingError,
     SceneError,
     SheetbendError,
+    UnconvergedError,
 )
 from .experiment import Experiment
 from .fabric import Exponential, Fabric, Linear, Spline
@@ -83,6 +84,7 @@ __all__ = [
     "TapePlan",
     "Trajectory",
     "TriangleMesh",
+    "UnconvergedError",
     "add_cloth",
     "add_rod",
     "add_rope",

@@ -16,6 +16,12 @@ class Diverged(RuntimeError):
     time: float
     particle: int
 
+class Unconverged(RuntimeError):
+    """Conjugate gradients ran out of iterations."""
+
+    iterations: int
+    residual: float
+
 class NoEquilibrium(RuntimeError): ...
 
 class BudgetTooSmall(ValueError):
@@ -92,7 +98,17 @@ class TapePlan:
 
 class Solver:
     def __init__(
-        self, *, scene: Scene, h: float, integrator: str, partition: str, iterations: int, threads: int, grain: int
+        self,
+        *,
+        scene: Scene,
+        h: float,
+        integrator: str,
+        partition: str,
+        iterations: int,
+        threads: int,
+        grain: int,
+        cg_tolerance: float,
+        cg_iterations: int,
     ) -> None: ...
     def simulate(self, inputs: ArrayLike, steps: Sequence[int], t0: float) -> dict[str, Array]: ...
     def states(self, inputs: ArrayLike, steps: Sequence[int], t0: float) -> Array: ...  # (frames, dofs)

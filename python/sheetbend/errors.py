@@ -81,6 +81,29 @@ class DivergenceError(SheetbendError, RuntimeError):
         )
 
 
+class UnconvergedError(SheetbendError, RuntimeError):
+    """Conjugate gradients (method "newton_cg") took as many iterations as they may.
+
+    Args:
+        iterations: what they may take.
+        residual: that is left, over the right side.
+        where: what was being computed, in words.
+    """
+
+    def __init__(self, iterations: int, residual: float, where: str) -> None:
+        super().__init__(iterations, residual, where)
+        self.iterations = iterations
+        self.residual = residual
+        self.where = where
+
+    def __str__(self) -> str:
+        return (
+            f"conjugate gradients did not converge: after {self.iterations} iterations the residual is still "
+            f"{self.residual:.1e} of the right side, in {self.where}. Fix: raise solver.cg_iterations, use a smaller "
+            "substep, or method 'newton' where its factor fits in memory."
+        )
+
+
 class EmptyGradientError(SheetbendError, RuntimeError):
     """A loss feels nothing of the quantities that it is to be improved by; no step along its gradient means anything.
 

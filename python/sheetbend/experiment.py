@@ -258,6 +258,8 @@ class Experiment:
             "integrator": self.solver.integrator,
             "partition": self.solver.method,
             "iterations": self.solver.sweeps,
+            "cg_tolerance": self.solver.cg_tolerance,
+            "cg_iterations": self.solver.cg_iterations,
             "map": map_,
             "observed": observed,
             "is_static": self.static,

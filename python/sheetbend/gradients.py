@@ -167,7 +167,7 @@ class _Probe:
         def at(size: float) -> tuple[float, float]:
             try:
                 coarse, fine = self._central(direction, size), self._central(direction, size / 2.0)
-            except _core.Diverged:  # a step as large as a mass
+            except (_core.Diverged, _core.Unconverged):  # a step as large as a mass
                 return np.inf, np.nan
             return abs(fine - coarse) + self.rounding / size, (4.0 * fine - coarse) / 3.0
 

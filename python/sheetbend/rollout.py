@@ -90,11 +90,13 @@ class Rollout:
 
         Raises:
             InputError: wrong shape, NaN.
+            UnconvergedError: as `rollout`.
         """
         bar = np.asarray(positions_bar, dtype=float)
         if bar.shape != self.positions.shape or not np.isfinite(bar).all():
             bar = finite("positions_bar", positions_bar, self.positions.shape, InputError)
-        inputs_bar = self._core.vjp(self._inputs, self._tape, self._steps, bar, 0.0)
+        with divergence(self._scene):
+            inputs_bar = self._core.vjp(self._inputs, self._tape, self._steps, bar, 0.0)
         by_quantity = self._compiled.theta_bar(self._theta, inputs_bar)
         return Gradient(
             dict(zip(self._compiled.names, by_quantity.tolist(), strict=True)),
@@ -119,5 +121,6 @@ def rollout(
     Raises:
         InputError: times off the grid, unknown quantities, a budget below the least that works.
         DivergenceError: a state became infinite; says when and where.
+        UnconvergedError: method "newton_cg" ran out of iterations, here or in a gradient.
     """
     return Rollout(scene, times, solver or Solver(), values)

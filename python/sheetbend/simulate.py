@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from . import _core
 from .checks import finite
-from .errors import DivergenceError, InputError
+from .errors import DivergenceError, InputError, UnconvergedError
 from .kinds import KINDS
 from .scene import Scene
 from .solver import Solver
@@ -56,6 +56,7 @@ def simulate(
     Raises:
         InputError: times off the grid, unknown quantities.
         DivergenceError: a state became infinite; says when and where.
+        UnconvergedError: method "newton_cg" ran out of iterations.
     """
     solver = solver or Solver()
     compiled = scene.compiled
@@ -108,8 +109,10 @@ def forces_by_group(scene: Scene, multipliers: np.ndarray) -> dict[str, np.ndarr
 
 @contextmanager
 def divergence(scene: Scene) -> Iterator[None]:
-    """Turns the core's divergence into the package's error."""
+    """Turns what stops the core's rollouts into the package's errors."""
     try:
         yield
     except _core.Diverged as error:
         raise DivergenceError(error.substep, error.time, error.particle, scene.name) from error
+    except _core.Unconverged as error:
+        raise UnconvergedError(error.iterations, error.residual, scene.name) from error

@@ -11,7 +11,7 @@ from .errors import InputError, refusal
 from .memory import in_bytes
 
 INTEGRATORS = ("bdf1", "bdf2")
-METHODS = ("direct", "gauss_seidel", "newton")
+METHODS = ("direct", "gauss_seidel", "newton", "newton_cg")
 
 
 @dataclass(frozen=True)
@@ -22,11 +22,14 @@ class Solver:
         h: substep, s. Constant within a rollout.
         integrator: "bdf2" (second order, the default) or "bdf1" (backward Euler: damps like zeta = omega h/2).
         method: "direct" (each connected part one block, solved by its constraints: for ropes; the default), "newton"
-            (the same blocks, solved by their particles: for cloth; every compliance must be positive) or
-            "gauss_seidel" (colored; unconverged sweeps add about 0.9 h^2/(m sweeps) of compliance per link).
+            (the same blocks, solved by their particles: for cloth; every compliance must be positive), "newton_cg" (the
+            same by preconditioned conjugate gradients: for cloth whose factors do not fit in memory) or "gauss_seidel"
+            (colored; unconverged sweeps add about 0.9 h^2/(m sweeps) of compliance per link).
         iterations: Newton iterations of a block (2 by default) or sweeps (10 by default).
         threads: of one rollout; results do not depend on it.
         grain: constraints per thread below which a color is not split.
+        cg_tolerance: relative residual at which "newton_cg" stops a solve; gradients are as exact as this.
+        cg_iterations: conjugate gradients per solve of "newton_cg"; more are an error.
         memory: budget of a gradient through a rollout, such as "2 GB" or a number of bytes: what does not fit on the
             tape is computed again, with the same result. None = keep every substep boundary. `tape_plan` tells what a
             budget costs. Tangents (`fit`, forward mode) keep no tape.
@@ -38,6 +41,8 @@ class Solver:
     iterations: int | None = None
     threads: int = 1
     grain: int = 256
+    cg_tolerance: float = 1e-13
+    cg_iterations: int = 10_000
     memory: str | int | None = None
 
     def __post_init__(self) -> None:
@@ -49,10 +54,13 @@ class Solver:
             )
         if self.method not in METHODS:
             raise InputError("solver.method", "is unknown", self.method, f"use one of: {', '.join(METHODS)}")
-        for field in ("iterations", "threads", "grain"):
+        for field in ("iterations", "threads", "grain", "cg_iterations"):
             value = getattr(self, field)
             if value is not None and (not isinstance(value, int) or value < 1):
                 raise InputError(f"solver.{field}", "must be a positive whole number", value, "give at least 1")
+        if not (isinstance(self.cg_tolerance, float) and 0.0 < self.cg_tolerance < 1.0):
+            problem = "must be a relative residual between 0 and 1"
+            raise InputError("solver.cg_tolerance", problem, self.cg_tolerance, "give a small number, such as 1e-13")
         if self.memory is not None:
             in_bytes("solver.memory", self.memory)
 
@@ -76,7 +84,7 @@ class Solver:
         Raises:
             InputError: the method cannot step the scene, such as "newton" with rigid constraints.
         """
-        if self.method == "newton":
+        if self.method in ("newton", "newton_cg"):
             offset, size = scene.layout["compliance"]
             if size and not (scene.inputs()[offset : offset + size] > 0).all():
                 fix = "use 'direct', or give every constraint a compliance"
@@ -90,6 +98,8 @@ class Solver:
                 iterations=self.sweeps,
                 threads=self.threads,
                 grain=self.grain,
+                cg_tolerance=self.cg_tolerance,
+                cg_iterations=self.cg_iterations,
             )
         except ValueError as error:
             raise refusal(error, InputError, self.method) from error

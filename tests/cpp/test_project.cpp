@@ -79,7 +79,7 @@ double climb(const Projection& p, const std::vector<double>& inputs, unsigned se
 template <class K>
 std::vector<Partition> partitions() {
   if (K::unilateral) return {Partition::gauss_seidel};
-  return {Partition::gauss_seidel, Partition::direct, Partition::newton};
+  return {Partition::gauss_seidel, Partition::direct, Partition::newton, Partition::newton_cg};
 }
 
 template <class K>
@@ -285,7 +285,7 @@ TEST_P(CoupledBlocks, DerivativesMatchComplexStep) {
 
 TEST_P(CoupledBlocks, HaveTheSameBitsOnEveryInstructionSet) {
   const Sample sample = random_scene(24, {.net = GetParam()});
-  for (const Partition partition : {Partition::direct, Partition::newton}) {
+  for (const Partition partition : {Partition::direct, Partition::newton, Partition::newton_cg}) {
     Projection p(sample.scene, partition, eta);
     Random random(24);
     const auto theta = p.random_theta(sample.inputs, random);
@@ -321,7 +321,7 @@ TEST_P(CoupledBlocks, DampingReferencesHaveTheSameBitsOnEveryInstructionSet) {
 // Eight states in the lanes against one state at a time.
 TEST_P(CoupledBlocks, HaveTheSameBitsInEveryLane) {
   const Sample sample = random_scene(25, {.net = GetParam()});
-  for (const Partition partition : {Partition::direct, Partition::newton}) {
+  for (const Partition partition : {Partition::direct, Partition::newton, Partition::newton_cg}) {
     Projection p(sample.scene, partition, eta);
     Random random(25);
     std::vector<std::vector<double>> theta;

@@ -115,7 +115,7 @@ TEST(SceneWithVolume, NamesWhatIsWrong) {
 
 TEST(SceneWithVolume, TakesSweepsAlone) {
   const Sample s = bipyramid(4);
-  for (const Partition partition : {Partition::direct, Partition::newton})
+  for (const Partition partition : {Partition::direct, Partition::newton, Partition::newton_cg})
     EXPECT_THROW(make_plan(s.scene, {.partition = partition}), std::invalid_argument);
   EXPECT_THROW(EquilibriumSolver(s.scene).solve(s.inputs.data()), std::invalid_argument);
 }

@@ -203,6 +203,7 @@ def test_what_is_refused(folder: Path, old: str, new: str, field: str, words: st
     ("method", "line", "field", "fix"),
     [
         ("newton", "", "solver.method", "use gauss_seidel"),
+        ("newton_cg", "", "solver.method", "use gauss_seidel"),
         ("direct", "", "solver.method", "use gauss_seidel"),
         ("gauss_seidel", 'start = "equilibrium"', "recording[0].start", "give the cloth a pressure instead"),
         ("newton", "static = true", "recording[0].static", "give the cloth a pressure instead"),

@@ -74,7 +74,7 @@ def test_a_loose_sheet_is_pushed_along_its_normal():
     assert np.ptp(z) < 1e-12
 
 
-@pytest.mark.parametrize("method", ["newton", "gauss_seidel"])
+@pytest.mark.parametrize("method", ["newton", "newton_cg", "gauss_seidel"])
 def test_gradients(method):
     scene = balloon(1)
     scene.add_air(scene.air.triangles[:6], 0.7, 0.1, wind=(3.0, 1.0, 0.0), name="windward")

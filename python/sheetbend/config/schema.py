@@ -27,10 +27,14 @@ class SolverSection(Section):
     )
     h: Finite | None = key(None, "the substep itself, instead of `substeps`", "s", gt=0)
     integrator: Literal["bdf1", "bdf2"] = key("bdf2", "second order, or backward Euler (which damps)")
-    method: Literal["direct", "newton", "gauss_seidel"] = key(
-        "direct", "each rope one block; each cloth one block through its vertices (no rigid parts); or colored sweeps"
+    method: Literal["direct", "newton", "newton_cg", "gauss_seidel"] = key(
+        "direct",
+        "each rope one block; each cloth one block through its vertices (no rigid parts), factored or, where factors do"
+        " not fit in memory, by conjugate gradients; or colored sweeps",
     )
     iterations: int | None = key(None, "Newton iterations of a block (2) or sweeps (10)", ge=1)
+    cg_tolerance: Finite = key(1e-13, "relative residual at which newton_cg stops a solve", gt=0, lt=1)
+    cg_iterations: int = key(10_000, "conjugate gradients per solve of newton_cg; more are an error", ge=1)
     memory: str | int | None = key(
         None,
         'budget of an adjoint gradient (`check`), such as "2 GB" or a number of bytes: what does not fit is computed '

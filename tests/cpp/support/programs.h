@@ -93,7 +93,8 @@ inline const auto all_solvers =
                       Solver{"Bdf1Direct", Integrator::bdf1, Partition::direct, false},
                       Solver{"Bdf2Direct", Integrator::bdf2, Partition::direct, false},
                       Solver{"Bdf2DirectNet", Integrator::bdf2, Partition::direct, true},
-                      Solver{"Bdf2Newton", Integrator::bdf2, Partition::newton, true});
+                      Solver{"Bdf2Newton", Integrator::bdf2, Partition::newton, true},
+                      Solver{"Bdf2NewtonCg", Integrator::bdf2, Partition::newton_cg, true});
 
 inline std::string solver_name(const ::testing::TestParamInfo<Solver>& info) { return info.param.name; }
 
