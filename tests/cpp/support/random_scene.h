@@ -1,8 +1,8 @@
 // Random scenes that hold every registered constraint and every differentiable quantity. Each rope strings
 // together one sample stencil of every kind, jittered, and braces. Ropes start at one driven particle, so
 // that constraints of one color, and direct blocks, share it; or, as a net, at one free particle and with
-// ties between them: one block with branches and loops. Joints bring the directors of their edges, and the set of those that yield. A closed surface
-// may hang on each rope, one of them with a driven particle, another with a pinned one.
+// ties between them: one block with branches and loops. Joints bring the directors of their edges, or two edges with
+// sections that shear, and the set of those that yield. A closed surface may hang on each rope, one of them with a driven particle, another with a pinned one.
 #pragma once
 
 #include "core/scene/scene.h"
@@ -75,12 +75,45 @@ struct SceneBuilder {
         at[d] = (k < points ? x[3 * tail + d] : 0.0) + sample.x[3 * k + d] - sample.x[d] + random(-0.005, 0.005);
       nodes.push_back(add_particle(at[0], at[1], at[2]));
     }
-    for (int k = 0; k < directors; ++k) spec.directors.push_back({nodes[points + k], nodes[k], nodes[k + 1]});
-    std::vector<double> p = sample.p;
-    for (double& v : p) v += random(-0.02, 0.02);
-    add_constraint<K>(damped, nodes, p);
+    for (int k = 0; k < directors; ++k)
+      if constexpr (std::same_as<K, Shear>)
+        spec.directors.push_back({nodes[points + k], nodes[0], nodes[1], nodes[points]});
+      else
+        spec.directors.push_back({nodes[points + k], nodes[k], nodes[k + 1]});
+    add_constraint<K>(damped, nodes, jittered_parameters<K>());
     for (int k = points + directors; k < K::arity; ++k) sets.push_back(nodes[k]);
     return nodes[points - 1];
+  }
+
+  template <class K>
+  std::vector<double> jittered_parameters() {
+    std::vector<double> p = case_of<K>().p;
+    for (double& v : p) v += random(-0.02, 0.02);
+    return p;
+  }
+
+  // Two edges on particle `tail` whose sections hold the sample; returns the last particle.
+  template <class K>
+  int add_sections(int tail, bool damped) {
+    const Case sample = case_of<K>();
+    std::vector<int> points{tail}, nodes;
+    for (const int k : {3, 6}) {
+      double at[3];
+      for (int d = 0; d < 3; ++d) at[d] = x[3 * tail + d] + joint_sample[k + d] + random(-0.005, 0.005);
+      points.push_back(add_particle(at[0], at[1], at[2]));
+    }
+    for (int k = 0; k < K::arity; ++k) {
+      double at[3];
+      for (int d = 0; d < 3; ++d) at[d] = sample.x[3 * k + d] + random(-0.005, 0.005);
+      nodes.push_back(add_particle(at[0], at[1], at[2]));
+      if (k < 4)
+        spec.directors.push_back({nodes[k], points[k % 2], points[k % 2 + 1], nodes[k % 2]});
+      else
+        sets.push_back(nodes[k]);
+    }
+    add_constraint<K>(damped, nodes, jittered_parameters<K>());
+    for (int k = 0; k < 2; ++k) add_constraint<Shear>(damped, {points[k], points[k + 1], nodes[k], nodes[2 + k]}, {});
+    return points.back();
   }
 
   void add_brace(int a, int b) {
@@ -114,7 +147,11 @@ struct SceneBuilder {
     const int first = static_cast<int>(x.size()) / 3;
     int tail = 0;
     for_each_kind([&]<class K>(K) {
-      if (!K::unilateral || unilateral) tail = add_stencil<K>(tail, damped);
+      if (K::unilateral && !unilateral) return;
+      if constexpr (K::points == 0)
+        tail = add_sections<K>(tail, damped);
+      else
+        tail = add_stencil<K>(tail, damped);
     });
     std::vector<int> rope{0};
     const auto is_point = [&](int n) {
