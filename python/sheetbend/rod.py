@@ -21,8 +21,8 @@ from .rod_shape import initial_frames, initial_shape
 from .rope import Rope
 from .scene import Array, Scene
 
-# Torque per angle that holds a director where it was going, over GJ/length: keeps twist well posed and moves nothing. Of a
-# section's normal, over EI/length.
+# Torque per angle that holds a director where it was going, over GJ/length: keeps twist well posed and moves nothing.
+# That of a section's normal is over EI/length.
 HOLD = 1e-4
 
 
@@ -87,12 +87,11 @@ def add_rod(
 ) -> Rod:
     """Add a discrete elastic rod of `segments` equal links to a scene (Bergou et al. 2008, 2010).
 
-    Quantities: `<name>_length` m, `<name>_density` kg/m, `_EI` and `_GJ` N m^2, and where given `_EA` and `_GA` N, `_EI2`
-    N m^2,
-    `_stretch_damping`, `_bend_damping`, `_twist_damping` and `_shear_damping` s, `_drag_linear` N s/m^2, `_drag_quadratic` N s^2/m^3,
-    `_start_tilt_1`, `_start_tilt_2`, `_end_tilt_1`, `_end_tilt_2`, `_roll` rad, `_curvature_1_<k>`,
-    `_curvature_2_<k>` and `_twist_<k>` 1/m, `_yield_curvature` 1/m, `_yield_share`, `_softness_<k>`,
-    `_density_<k>`.
+    Quantities: `<name>_length` m, `<name>_density` kg/m, `_EI` and `_GJ` N m^2, and where given `_EA` and `_GA` N,
+    `_EI2` N m^2, `_stretch_damping`, `_bend_damping`, `_twist_damping` and `_shear_damping` s, `_drag_linear` N s/m^2,
+    `_drag_quadratic` N s^2/m^3, `_start_tilt_1`, `_start_tilt_2`, `_end_tilt_1`, `_end_tilt_2`, `_roll` rad,
+    `_curvature_1_<k>`, `_curvature_2_<k>` and `_twist_<k>` 1/m, `_yield_curvature` 1/m, `_yield_share`,
+    `_softness_<k>`, `_density_<k>`.
 
     Args:
         length: m, between the grips.
@@ -149,14 +148,10 @@ def add_rod(
             wanted = "must be a whole number" + ("" if least is None else f" from {least} on")
             fix = "give whole turns; grips give the rest" if least is None else f"give at least {least}"
             raise SceneError(f"{name}.{option}", wanted, value, fix)
-    for label, damping, stiffness, value in (
-        ("stretch", stretch_damping, "EA", EA),
-        ("shear", shear_damping, "GA", GA),
-    ):
-        if damping is not None and value is None:
-            raise SceneError(
-                f"{name}.{label}_damping", f"needs a finite {stiffness}", value, f"give {stiffness}, or leave it out"
-            )
+    for label, damping, stiffness in (("stretch_damping", stretch_damping, EA), ("shear_damping", shear_damping, GA)):
+        if damping is not None and stiffness is None:
+            of = "EA" if label == "stretch_damping" else "GA"
+            raise SceneError(f"{name}.{label}", f"needs a finite {of}", stiffness, f"give {of}, or leave it out")
     ends = End(name, "start", -1.0, start), End(name, "end", 1.0, end)
     if tilts and ends[0].grip is None and ends[1].grip is None:
         raise SceneError(f"{name}.tilts", "need a grip", tilts, "give start or end")

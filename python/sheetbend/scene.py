@@ -144,9 +144,7 @@ class Scene:
 
     def _with_frames(self, directions: Array, edges: Array, normals: Array) -> Array:
         nodes = self.add_particles(directions, 0.0)
-        self.directors |= {
-            int(n): (int(a), int(b), int(c)) for n, (a, b), c in zip(nodes, edges, normals, strict=True)
-        }
+        self.directors |= {int(n): (int(a), int(b), int(c)) for n, (a, b), c in zip(nodes, edges, normals, strict=True)}
         return nodes
 
     def pin(self, particles: ArrayLike) -> None:

@@ -229,7 +229,7 @@ SET = {
 }
 
 
-SHEARS = {"GA": 0.5, "shear_damping": 0.01}
+SHEARS = {"GA": 0.7, "shear_damping": 0.01}
 YIELDS = {"yield_curvature": 3.0, "yield_share": 0.4}
 
 

@@ -146,10 +146,11 @@ def test_gradients_do_not_depend_on_the_place(shear):
         assert found[1][name] == approx(value, rel=1e-6), name
 
 
-@pytest.mark.parametrize("shear", [{}, SHEAR], ids=["", "shear"])
-def test_frames_turned_together_change_nothing_for_a_round_section(shear):
+@pytest.mark.parametrize(("shear", "most"), [({}, 1e-6), ({"GA": 2.0}, 1.2e-6)], ids=["", "shear"])
+def test_frames_turned_together_change_nothing_for_a_round_section(shear, most):
     """At rest to rounding. In motion the first iteration of a substep sees frames of the substep before, by which
-    forces that it finds depend on the frames; that falls with the square of the substep."""
+    forces that it finds depend on the frames; that falls with the square of the substep, and is a hundredth of what the
+    substep itself is off by."""
     here = (Rotation.identity(), np.zeros(3))
 
     def differ(find, **options) -> float:
@@ -161,7 +162,7 @@ def test_frames_turned_together_change_nothing_for_a_round_section(shear):
 
     assert differ(lambda scene: sb.equilibrium(scene).positions, points=None) < 1e-9
     coarse, fine = differ(moved(1 / 480)), differ(moved(1 / 960))
-    assert coarse < 1e-6
+    assert coarse < most
     assert observed_orders([coarse, fine]) == approx(2.0, abs=0.1)
     assert differ(moved(1 / 480), EI2=3e-3) > 1e-3
 

@@ -55,7 +55,7 @@ def test_timoshenkos_cantilever(slenderness):
 
 
 def test_sections_turn_as_the_moment_says_and_edges_lean_by_the_force():
-    """Slope of the section at s: P (L s - s^2/2)/EI; the edge's is steeper by P/GA everywhere, next to the clamp too."""
+    """Slope of the section at s: P (L s - s^2/2)/EI; the edge's is steeper by P/GA, next to the clamp too."""
     segments, load, GA = 40, 1e-3 * UNIT, 10 * UNIT
     scene = cantilever(segments, load * DOWN, GA=GA)
     x, rod = sb.equilibrium(scene).positions, scene.ropes["rod"]
@@ -90,7 +90,7 @@ def test_a_column_that_shears_falls_at_engessers_load(slenderness):
     euler = rods.euler_load(2 * LENGTH, EI)
     load = rods.engesser_load(euler, GA)
     assert load < 0.9 * euler
-    for share, expected in ((0.99, 0), (1.01, 2)):
+    for share, expected in ((0.998, 0), (1.002, 2)):
         rest = sb.equilibrium(cantilever(40, -share * load * ALONG, GA=GA), stable=False)
         assert rest.unstable_modes == expected
 

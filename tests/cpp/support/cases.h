@@ -175,14 +175,14 @@ inline Case case_of<Twist>() {
 }
 
 // Two sections that are bent, twisted, and turned out of the edges of joint_sample.
-inline const std::vector<double> sections_sample{0.9, 0.3, 0.2, 0.8, 0.7, -0.5, 0.05, 0.3, -0.9, 0.5, 0.4, -0.6};
+inline const std::vector<double> sections_sample{0.1, 0.03, 0.02, 0.08, 0.07, -0.05, 0.05, 0.3, -0.9, 0.5, 0.4, -0.6};
 
 template <>
 inline Case case_of<Shear>() {
-  return {.x = {0, 0, 0, 0.1, 0.02, 0.01, 0.9, 0.4, 0.3, 0.05, 0.3, -0.9},
+  return {.x = {0, 0, 0, 0.1, 0.02, 0.01, 0.09, 0.04, 0.03, 0.05, 0.3, -0.9},
           .p = {},
-          .compliance = 0.3,
-          .damping = 3e-3,
+          .compliance = 2.0,
+          .damping = 5e-4,
           .under_rotation = UnderRotation::stays,
           .degree = 0,
           .parameter_degree = {},
@@ -195,8 +195,8 @@ template <>
 inline Case case_of<SectionCurvature>() {
   return {.x = sections_sample,
           .p = {1.3, 0.2, -0.1},
-          .compliance = 0.3,
-          .damping = 3e-3,
+          .compliance = 2.0,
+          .damping = 5e-4,
           .under_rotation = UnderRotation::stays,
           .degree = 0,
           .parameter_degree = {0, 0, 0},
@@ -211,8 +211,8 @@ inline Case case_of<SectionYieldingCurvature>() {
   x.insert(x.end(), {0.1, -0.2, 0.05});
   return {.x = x,
           .p = {1.3, 0.4, 0.25, 0.2, -0.1},
-          .compliance = 0.3,
-          .damping = 3e-3,
+          .compliance = 2.0,
+          .damping = 5e-4,
           .under_rotation = UnderRotation::stays,
           .degree = 0,
           .parameter_degree = {0, 0, 0, 0, 0},
@@ -225,8 +225,8 @@ template <>
 inline Case case_of<SectionTwist>() {
   return {.x = sections_sample,
           .p = {0.15},
-          .compliance = 0.3,
-          .damping = 3e-3,
+          .compliance = 4.0,
+          .damping = 5e-4,
           .under_rotation = UnderRotation::stays,
           .degree = 0,
           .parameter_degree = {0},

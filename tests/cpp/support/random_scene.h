@@ -36,7 +36,7 @@ struct SceneBuilder {
     std::vector<double> p, compliance, damping;
   };
   std::vector<Values> groups{};
-  std::vector<int> sets{};
+  std::vector<int> sets{}, sections{};  // sections: of the current rope, two normals and two directors
   std::vector<double> volumes{}, volume_compliances{};
 
   explicit SceneBuilder(unsigned seed) : random(seed) {}
@@ -92,28 +92,36 @@ struct SceneBuilder {
     return p;
   }
 
-  // Two edges on particle `tail` whose sections hold the sample; returns the last particle.
-  template <class K>
+  // A particle near (3,) `sample`, counted from particle `tail` if there is one.
+  int add_near(const double* sample, int tail = -1) {
+    double at[3];
+    for (int d = 0; d < 3; ++d) at[d] = (tail < 0 ? 0.0 : x[3 * tail + d]) + sample[d] + random(-0.005, 0.005);
+    return add_particle(at[0], at[1], at[2]);
+  }
+
+  // Two edges on particle `tail` with sections that shear; returns the last particle.
   int add_sections(int tail, bool damped) {
-    const Case sample = case_of<K>();
-    std::vector<int> points{tail}, nodes;
-    for (const int k : {3, 6}) {
-      double at[3];
-      for (int d = 0; d < 3; ++d) at[d] = x[3 * tail + d] + joint_sample[k + d] + random(-0.005, 0.005);
-      points.push_back(add_particle(at[0], at[1], at[2]));
+    const std::vector<int> points{tail, add_near(&joint_sample[3], tail), add_near(&joint_sample[6], tail)};
+    for (int k = 0; k < 4; ++k) {
+      sections.push_back(add_near(&sections_sample[3 * k]));
+      spec.directors.push_back({sections[k], points[k % 2], points[k % 2 + 1], sections[k % 2]});
     }
-    for (int k = 0; k < K::arity; ++k) {
-      double at[3];
-      for (int d = 0; d < 3; ++d) at[d] = sample.x[3 * k + d] + random(-0.005, 0.005);
-      nodes.push_back(add_particle(at[0], at[1], at[2]));
-      if (k < 4)
-        spec.directors.push_back({nodes[k], points[k % 2], points[k % 2 + 1], nodes[k % 2]});
-      else
-        sets.push_back(nodes[k]);
+    for (int k = 0; k < 2; ++k)
+      add_constraint<Shear>(damped, {points[k], points[k + 1], sections[k], sections[2 + k]}, {});
+    return points.back();
+  }
+
+  // A constraint between the rope's two sections, which the first kind adds; returns the last particle.
+  template <class K>
+  int add_between_sections(int tail, bool damped) {
+    if (sections.empty()) tail = add_sections(tail, damped);
+    std::vector<int> nodes = sections;
+    if constexpr (K::arity > 4) {
+      nodes.push_back(add_near(&case_of<K>().x[12]));
+      sets.push_back(nodes.back());
     }
     add_constraint<K>(damped, nodes, jittered_parameters<K>());
-    for (int k = 0; k < 2; ++k) add_constraint<Shear>(damped, {points[k], points[k + 1], nodes[k], nodes[2 + k]}, {});
-    return points.back();
+    return tail;
   }
 
   void add_brace(int a, int b) {
@@ -146,10 +154,11 @@ struct SceneBuilder {
   std::vector<int> add_rope(bool damped, bool unilateral) {
     const int first = static_cast<int>(x.size()) / 3;
     int tail = 0;
+    sections.clear();
     for_each_kind([&]<class K>(K) {
       if (K::unilateral && !unilateral) return;
       if constexpr (K::points == 0)
-        tail = add_sections<K>(tail, damped);
+        tail = add_between_sections<K>(tail, damped);
       else
         tail = add_stencil<K>(tail, damped);
     });
