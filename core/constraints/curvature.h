@@ -14,7 +14,9 @@ struct CurvatureBinormal {
   T inverse;       // 1 / (|e1||e2| + e1.e2)
   Vec3<T> d1, d2;  // gradient of that denominator by e1 and e2
 
-  explicit CurvatureBinormal(const T* x) : e1(Vec3<T>(x + 3) - Vec3<T>(x)), e2(Vec3<T>(x + 6) - Vec3<T>(x + 3)) {
+  explicit CurvatureBinormal(const T* x)
+      : CurvatureBinormal(Vec3<T>(x + 3) - Vec3<T>(x), Vec3<T>(x + 6) - Vec3<T>(x + 3)) {}
+  CurvatureBinormal(const Vec3<T>& first, const Vec3<T>& second) : e1(first), e2(second) {
     const T l1 = norm(e1), l2 = norm(e2);
     inverse = T(1.0) / (l1 * l2 + dot(e1, e2));
     kb = T(2.0) * inverse * cross(e1, e2);

@@ -3,21 +3,22 @@
 // Bergou's kappa is the mean over both frames, which twist shortens by cos(twist/2); the frame half way keeps |kappa| = |kb|, so that
 // bending stiffness does not depend on twist. Compliance alpha = l / EI1 [1/(N m)] with the Voronoi length l, and ratio = sqrt(EI2 / EI1),
 // give the energy (EI1 (kappa1 - rest1)^2 + EI2 (kappa2 - rest2 / ratio)^2) / (2 l). Degenerate as material_frame.h says, and half a turn of twist.
+// section_curvature: the same between the normals of two sections.
 #pragma once
 
 #include "core/constraints/material_frame.h"
 
 namespace sheetbend {
 
-struct MaterialCurvature : OnJoint {
-  static constexpr const char* name = "material_curvature";
+template <class Stencil>
+struct CurvatureInFrames : Stencil {
   static constexpr int rows = 2;
   static constexpr std::array<const char*, 3> parameters{"ratio", "rest_1", "rest_2"};
   static constexpr int offsets = 2;
 
   template <class T>
   static void evaluate(const T* x, const T* p, T* C, T* J) {
-    const Joint<T> joint(x);
+    const Joint<Stencil, T> joint(x);
     const MaterialFrame<T>&first = joint.first, &second = joint.second;
     const T one(1.0), half(0.5);
     const T inverse = one / (one + joint.cosine);  // cos^2(twist/2) = (1 + cos)/2
@@ -33,15 +34,23 @@ struct MaterialCurvature : OnJoint {
       Vec3<T> by_e1, by_e2;
       joint.curvature.gradient(m, k, by_e1, by_e2);
       const T turn = half * turned;
-      joint.store(scale * (by_e1 + turn * first.by_edge + k * transport1),
-                  scale * (by_e2 + turn * second.by_edge + k * transport2), (scale * turn) * first.by_director,
+      joint.store(scale * (by_e1 + turn * first.by_axis + k * transport1),
+                  scale * (by_e2 + turn * second.by_axis + k * transport2), (scale * turn) * first.by_director,
                   (scale * turn) * second.by_director, to);
     };
     C[0] = k1 - p[1];
     C[1] = p[0] * k2 - p[2];
     row(m2, k1, k2, one, J);
-    row(-m1, k2, -k1, p[0], J + dofs);
+    row(-m1, k2, -k1, p[0], J + Stencil::dofs);
   }
+};
+
+struct MaterialCurvature : CurvatureInFrames<OnJoint> {
+  static constexpr const char* name = "material_curvature";
+};
+
+struct SectionCurvature : CurvatureInFrames<OnSections> {
+  static constexpr const char* name = "section_curvature";
 };
 
 }  // namespace sheetbend

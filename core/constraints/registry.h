@@ -15,6 +15,7 @@
 #include "core/constraints/isometric_bending.h"
 #include "core/constraints/material_curvature.h"
 #include "core/constraints/planar_bend.h"
+#include "core/constraints/shear.h"
 #include "core/constraints/sheet_curvature.h"
 #include "core/constraints/spline_strain.h"
 #include "core/constraints/strain.h"
@@ -24,22 +25,26 @@
 
 namespace sheetbend {
 
-using Registry = std::tuple<  //
-    Distance,                 //
-    Bend,                     //
-    PlanarBend,               //
-    Hinge,                    //
-    Attachment,               //
-    MaterialCurvature,        //
-    Twist,                    //
-    YieldingCurvature,        //
-    Strain,                   //
-    ExponentialStrain,        //
-    SplineStrain,             //
-    Dihedral,                 //
-    IsometricBending,         //
-    SheetCurvature,           //
-    Area,                     //
+using Registry = std::tuple<   //
+    Distance,                  //
+    Bend,                      //
+    PlanarBend,                //
+    Hinge,                     //
+    Attachment,                //
+    MaterialCurvature,         //
+    Twist,                     //
+    YieldingCurvature,         //
+    Shear,                     //
+    SectionCurvature,          //
+    SectionTwist,              //
+    SectionYieldingCurvature,  //
+    Strain,                    //
+    ExponentialStrain,         //
+    SplineStrain,              //
+    Dihedral,                  //
+    IsometricBending,          //
+    SheetCurvature,            //
+    Area,                      //
     Tether>;
 
 inline constexpr int kind_count = std::tuple_size_v<Registry>;

@@ -26,7 +26,7 @@ struct EquilibriumOptions {
 };
 
 struct Equilibrium {
-  std::vector<double> x;  // (dofs), fixed nodes included; free directors are unit vectors across their edges
+  std::vector<double> x;  // (dofs), fixed nodes included; free directors are unit vectors across their axes
   std::vector<double>
       lambda;           // (rows), force = J^T lambda: minus the tension for a distance, minus the moment for an angle
   double energy = 0.0;  // of weight and forces (free nodes; zero at the origin) and elastic  [J]

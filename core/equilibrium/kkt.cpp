@@ -116,12 +116,18 @@ void Kkt::assemble(const double* inputs, const double* x, const double* lambda, 
   for (std::size_t i = 0; i < scene_.directors.size(); ++i) {
     const Director& d = scene_.directors[i];
     const auto at = [&](int node) { return x + scene_.first_dof[node]; };
-    const Across<double> frame = across_edge<double>(d, at);
-    double t[3], m[3];
-    frame.t.store(t);
-    frame.m1.store(m);
+    const double inverse_length = 1.0 / norm(Vec3<double>(at(d.head)) - Vec3<double>(at(d.tail)));
+    double t[3]{}, m[3];
+    if (d.is_normal()) {
+      const Vec3<double> n(at(d.node));
+      ((1.0 / norm(n)) * n).store(m);
+    } else {
+      const Across<double> frame = across_axis<double>(d, at);
+      frame.t.store(t);
+      frame.m1.store(m);
+    }
     for (int e = 0; e < 9; ++e) idle_[i][e] = t[e / 3] * t[e % 3] + m[e / 3] * m[e % 3];
-    std::fill_n(metric_.begin() + scene_.first_dof[d.node], 3, 1.0 / (frame.inverse_length * frame.inverse_length));
+    std::fill_n(metric_.begin() + scene_.first_dof[d.node], 3, 1.0 / (inverse_length * inverse_length));
   }
 }
 

@@ -6,7 +6,7 @@
 // condensed with a small compliance of their own, and the solution is refined against A itself, which also removes the rounding
 // of stiff rows (the augmented Lagrangian step for saddle point systems: Benzi, Golub & Liesen 2005).
 //
-// Directors may grow and lean along their edge without changing any constraint. K gets a stiffness of its own in these two directions, in
+// Directors may grow and lean along their axis, normals may grow, without changing any constraint. K gets a stiffness of its own in these directions, in
 // which nothing pushes, so that it is regular.
 //
 // Negative pivots of K count the unstable modes (Sylvester's law of inertia); in the limit of rigid rows K has one positive

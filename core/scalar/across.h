@@ -1,5 +1,5 @@
-// A director q against the direction t of its edge: along = q.t, and m1, the unit vector of its part across the edge, q - along t.
-// Degenerate: an edge without length, a director along its edge.
+// A director q against the direction t of its frame's axis: along = q.t, and m1, the unit vector of its part across, q - along t.
+// Degenerate: an axis without length, a director along it.
 #pragma once
 
 #include "core/scalar/vec3.h"
@@ -9,11 +9,11 @@ namespace sheetbend {
 template <class T>
 struct Across {
   Vec3<T> t, m1;
-  T inverse_length, along, inverse;  // of the edge; of the part across
+  T inverse_length, along, inverse;  // of the axis; of the part across
 
-  Across(const Vec3<T>& edge, const Vec3<T>& q) {
-    inverse_length = T(1.0) / norm(edge);
-    t = inverse_length * edge;
+  Across(const Vec3<T>& axis, const Vec3<T>& q) {
+    inverse_length = T(1.0) / norm(axis);
+    t = inverse_length * axis;
     along = dot(q, t);
     const Vec3<T> across = q - along * t;
     inverse = T(1.0) / norm(across);

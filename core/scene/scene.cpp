@@ -145,6 +145,9 @@ Scene build_scene(const SceneSpec& spec) {
       refuse("directors: node " + std::to_string(d.node) + " with edge " + std::to_string(d.tail) + ", " +
              std::to_string(d.head) + ". Fix: give each director a node of its own and two distinct ends");
     s.is_director[d.node] = true;
+    if (d.normal != -1 && (d.normal < 0 || d.normal >= s.nodes() || !s.is_director[d.normal]))
+      refuse("directors: node " + std::to_string(d.node) + " with normal " + std::to_string(d.normal) +
+             ". Fix: give a normal that stands before, the node itself for a normal, or -1");
   }
   for (int n = 0; n < s.nodes(); ++n) s.inertial.push_back(s.role[n] == Role::free && !s.is_director[n]);
   for (const int n : spec.loaded)

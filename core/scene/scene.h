@@ -16,8 +16,13 @@ namespace sheetbend {
 enum class Role : int { free, pinned, driven };
 
 // A node that gives the frame of the edge from `tail` to `head` its direction. It has no inertia: it turns until no twist drives it.
+// The frame's axis is the edge or, where the section may lean against it, the section's normal: a node of the same sort, which stands before
+// and names itself.
 struct Director {
   int node, tail, head;
+  int normal = -1;
+
+  bool is_normal() const { return normal == node; }
 };
 
 // A named set of constraints of one kind.

@@ -13,7 +13,7 @@ Interpolation interpolation_of(const std::string& name) {
   throw std::invalid_argument("interpolation: got '" + name + "'. Fix: use 'cubic' or 'linear'");
 }
 
-std::shared_ptr<const Scene> make_scene(int particles, const std::vector<std::array<int, 3>>& directors,
+std::shared_ptr<const Scene> make_scene(int particles, const std::vector<std::array<int, 4>>& directors,
                                         std::vector<int> pinned, std::vector<int> driven,
                                         std::vector<double> boundary_times, const std::string& boundary_interpolation,
                                         std::vector<int> loaded, std::vector<double> force_times, bool has_drag,
@@ -21,7 +21,7 @@ std::shared_ptr<const Scene> make_scene(int particles, const std::vector<std::ar
                                         const std::vector<py::dict>& groups, const std::vector<py::dict>& volumes) {
   SceneSpec spec;
   spec.particles = particles;
-  for (const auto& [node, tail, head] : directors) spec.directors.push_back({node, tail, head});
+  for (const auto& [node, tail, head, normal] : directors) spec.directors.push_back({node, tail, head, normal});
   spec.pinned = std::move(pinned);
   spec.driven = std::move(driven);
   spec.loaded = std::move(loaded);
@@ -42,7 +42,7 @@ std::shared_ptr<const Scene> make_scene(int particles, const std::vector<std::ar
 
 void bind_scene(py::module_& m) {
   py::class_<Scene, std::shared_ptr<Scene>>(m, "Scene")
-      .def(py::init([](int particles, const std::vector<std::array<int, 3>>& directors, std::vector<int> pinned,
+      .def(py::init([](int particles, const std::vector<std::array<int, 4>>& directors, std::vector<int> pinned,
                        std::vector<int> driven, std::vector<double> boundary_times,
                        const std::string& boundary_interpolation, std::vector<int> loaded,
                        std::vector<double> force_times, bool has_drag, std::vector<std::array<int, 3>> air,

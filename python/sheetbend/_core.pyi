@@ -37,7 +37,7 @@ class Scene:
         self,
         *,
         particles: int,
-        directors: Sequence[tuple[int, int, int]],
+        directors: Sequence[tuple[int, int, int, int]],
         pinned: Sequence[int],
         driven: Sequence[int],
         boundary_times: Sequence[float],

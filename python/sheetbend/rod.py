@@ -15,21 +15,24 @@ from .errors import SceneError
 from .grip import Grip, any_across, carried
 from .quantities import product
 from .rod_end import End, spread_roll
-from .rod_joints import Joints, weigh
+from .rod_joints import Joints, shear, weigh
 from .rod_junction import STUB_MASS, Facing, Junction
 from .rod_shape import initial_frames, initial_shape
 from .rope import Rope
 from .scene import Array, Scene
 
 # Torque per angle that holds a director where it was going, over GJ/length: keeps twist well posed and moves nothing.
+# That of a section's normal is over EI/length.
 HOLD = 1e-4
 
 
 @dataclass(frozen=True)
 class Rod(Rope):
-    """A rope with material frames: `directors` are those of its edges, with the grips' own first and last."""
+    """A rope with material frames: `directors` are those of its edges, with the grips' own first and last; so are
+    `normals`, those of sections that shear."""
 
     directors: Array = field(default_factory=lambda: np.zeros(0, dtype=int))
+    normals: Array = field(default_factory=lambda: np.zeros(0, dtype=int))
 
 
 def rod(
@@ -59,6 +62,7 @@ def add_rod(
     EI: float,
     GJ: float,
     EA: float | None = None,
+    GA: float | None = None,
     EI2: float | None = None,
     points: ArrayLike | None = None,
     velocity: ArrayLike | None = None,
@@ -71,6 +75,7 @@ def add_rod(
     stretch_damping: float | None = None,
     bend_damping: float | None = None,
     twist_damping: float | None = None,
+    shear_damping: float | None = None,
     drag_linear: float | None = None,
     drag_quadratic: float | None = None,
     yield_curvature: float | None = None,
@@ -82,11 +87,11 @@ def add_rod(
 ) -> Rod:
     """Add a discrete elastic rod of `segments` equal links to a scene (Bergou et al. 2008, 2010).
 
-    Quantities: `<name>_length` m, `<name>_density` kg/m, `_EI` and `_GJ` N m^2, and where given `_EA` N, `_EI2` N m^2,
-    `_stretch_damping`, `_bend_damping` and `_twist_damping` s, `_drag_linear` N s/m^2, `_drag_quadratic` N s^2/m^3,
-    `_start_tilt_1`, `_start_tilt_2`, `_end_tilt_1`, `_end_tilt_2`, `_roll` rad, `_curvature_1_<k>`,
-    `_curvature_2_<k>` and `_twist_<k>` 1/m, `_yield_curvature` 1/m, `_yield_share`, `_softness_<k>`,
-    `_density_<k>`.
+    Quantities: `<name>_length` m, `<name>_density` kg/m, `_EI` and `_GJ` N m^2, and where given `_EA` and `_GA` N,
+    `_EI2` N m^2, `_stretch_damping`, `_bend_damping`, `_twist_damping` and `_shear_damping` s, `_drag_linear` N s/m^2,
+    `_drag_quadratic` N s^2/m^3, `_start_tilt_1`, `_start_tilt_2`, `_end_tilt_1`, `_end_tilt_2`, `_roll` rad,
+    `_curvature_1_<k>`, `_curvature_2_<k>` and `_twist_<k>` 1/m, `_yield_curvature` 1/m, `_yield_share`,
+    `_softness_<k>`, `_density_<k>`.
 
     Args:
         length: m, between the grips.
@@ -94,6 +99,8 @@ def add_rod(
         EI, GJ: bending and torsional stiffness N m^2. For a section with two stiffnesses EI acts on the curvature about
             the frame's second axis, and EI2 about the first.
         EA: axial stiffness N; None = inextensible.
+        GA: shear stiffness N, shear coefficient times G times the section's area (5/6 G A for a rectangle: Timoshenko);
+            None = sections stay across the rod. A grip holds the section, and the link next to it may lean against it.
         points: (k, 3) m, the initial shape, resampled to equal links and fitted to the length; straight from the start
             otherwise.
         velocity: (k, 3) m/s at `points`; at rest by default.
@@ -103,7 +110,7 @@ def add_rod(
         turns: whole turns by which the end's frame is ahead at the start, beside the part of a turn that grips give.
         tilts: add the four tilts: small angles by which the rod leaves a grip askew, about the frame's axes.
         roll: add the roll of the end grip about the rod: the twist built in when the rod was gripped.
-        stretch_damping, bend_damping, twist_damping: Kelvin-Voigt time constants s.
+        stretch_damping, bend_damping, twist_damping, shear_damping: Kelvin-Voigt time constants s.
         drag_linear, drag_quadratic: air drag per length, isotropic.
         yield_curvature: 1/m, the elastic curvature beyond which internal friction slides (in the frame's two axes; with
             EI2 the second one counts by sqrt(EI2/EI)); None = elastic. The set starts at zero.
@@ -126,10 +133,12 @@ def add_rod(
         {"length": length, "density": density, "EI": EI, "GJ": GJ},
         {
             "EA": EA,
+            "GA": GA,
             "EI2": EI2,
             "stretch_damping": stretch_damping,
             "bend_damping": bend_damping,
             "twist_damping": twist_damping,
+            "shear_damping": shear_damping,
             "yield_curvature": yield_curvature,
         },
     )
@@ -139,8 +148,10 @@ def add_rod(
             wanted = "must be a whole number" + ("" if least is None else f" from {least} on")
             fix = "give whole turns; grips give the rest" if least is None else f"give at least {least}"
             raise SceneError(f"{name}.{option}", wanted, value, fix)
-    if stretch_damping is not None and EA is None:
-        raise SceneError(f"{name}.stretch_damping", "needs a finite EA", EA, "give EA, or leave it out")
+    for label, damping, stiffness in (("stretch_damping", stretch_damping, EA), ("shear_damping", shear_damping, GA)):
+        if damping is not None and stiffness is None:
+            of = "EA" if label == "stretch_damping" else "GA"
+            raise SceneError(f"{name}.{label}", f"needs a finite {of}", stiffness, f"give {of}, or leave it out")
     ends = End(name, "start", -1.0, start), End(name, "end", 1.0, end)
     if tilts and ends[0].grip is None and ends[1].grip is None:
         raise SceneError(f"{name}.tilts", "need a grip", tilts, "give start or end")
@@ -181,26 +192,36 @@ def add_rod(
         first = any_across(along[0]) if first is None else first
         last = carried(first - (first @ along[0]) * along[0], along[0], along[1][None])[0]
     edges = np.stack([chain[:-1], chain[1:]], axis=1)
-    directors = scene.add_directors(edges, initial_frames(name, scene.positions[chain], first, last, turns))
+    frames = initial_frames(name, scene.positions[chain], first, last, turns)
+    normals = None if GA is None else scene.add_normals(edges)
+    directors = scene.add_directors(edges, frames, normals)
     scene.add_quantity(f"{name}_GJ", GJ, "N m^2")
     hold = {f"{name}_GJ": "identity", f"{name}_length": "inverse"}
     scene.add_terms([product("mass", d, HOLD, hold) for d in directors])
     for e, k, ghost, stub in zip(ends, (0, -1), ghosts, stubs, strict=True):
         if ghost is not None:
-            e.hold(scene, int(nodes[k]), ghost, int(directors[k]), stub, tilts, roll and k == -1)
+            normal = None if normals is None else int(normals[k])
+            e.hold(scene, int(nodes[k]), ghost, int(directors[k]), normal, stub, tilts, roll and k == -1)
     if roll:
         shares = np.linspace(0.0 if ends[0].held else 1.0, 1.0, len(directors))
         spread_roll(scene, f"{name}_roll", directors[:-1], shares[:-1])
 
     at = np.arange(1, len(chain) - 1)
-    stencils = np.stack([chain[at - 1], chain[at], chain[at + 1], directors[at - 1], directors[at]], axis=1)
-    joints = Joints(scene, name, stencils, at - int(ghosts[0] is not None), segments)
+    axes = [chain[at - 1], chain[at], chain[at + 1]] if normals is None else [normals[at - 1], normals[at]]
+    before = int(ghosts[0] is not None)
+    joints = Joints(scene, name, np.stack([*axes, directors[at - 1], directors[at]], axis=1), at - before, segments)
     joints.bend(EI, EI2, bend_damping, yield_curvature, yield_share)
+    if normals is not None and GA is not None:
+        hold = {f"{name}_EI": "identity", f"{name}_length": "inverse"}
+        scene.add_terms([product("mass", n, HOLD, hold) for n in normals])
+        links = slice(before, before + segments)
+        shear(scene, name, np.column_stack([edges[links], normals[links], directors[links]]), GA, shear_damping)
     joints.twist(twist_damping)
     joints.rest(curvature_modes, twist_modes)
     joints.soften(softness_modes)
     add_drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
-    built = Rod(name, nodes, link * np.arange(segments + 1), ghosts[0], ghosts[1], directors)
+    sections = np.zeros(0, dtype=int) if normals is None else normals
+    built = Rod(name, nodes, link * np.arange(segments + 1), ghosts[0], ghosts[1], directors, sections)
     scene.ropes[name] = built
     return built
 

@@ -68,23 +68,36 @@ class End:
             return None
         return self.way.junction.carried(along)
 
-    def hold(self, scene: Scene, node: int, ghost: int, director: int, stub: float, tilts: bool, roll: bool) -> None:
-        """Give the end its pose, or join it to the other rods."""
+    def hold(
+        self,
+        scene: Scene,
+        node: int,
+        ghost: int,
+        director: int,
+        normal: int | None,
+        stub: float,
+        tilts: bool,
+        roll: bool,
+    ) -> None:
+        """Give the end its pose, or join it to the other rods; the section of its stub stays across that."""
         if self.way is not None:
-            self.way.junction.join(scene, f"{self.name}_{self.label}", node, ghost, director, stub > 0)
+            self.way.junction.join(scene, f"{self.name}_{self.label}", node, ghost, director, normal, stub > 0)
         if self.grip is None:
             return
         grip = self.grip
+        section = [] if normal is None else [normal]
         if grip.stays:
-            scene.pin([node, ghost, director])
+            scene.pin([node, ghost, director, *section])
         else:
-            motion = np.stack([grip.position, grip.position + stub * grip.direction, grip.director], axis=1)
-            scene.drive([node, ghost, director], grip.times, motion)
+            poses = [grip.position, grip.position + stub * grip.direction, grip.director]
+            motion = np.stack(poses + [grip.direction for _ in section], axis=1)
+            scene.drive([node, ghost, director, *section], grip.times, motion)
         second = np.cross(grip.direction, grip.director)
         if tilts:
             for k, axis in ((1, grip.director), (2, second)):
                 tilt = scene.add_quantity(f"{self.name}_{self.label}_tilt_{k}", 0.0, "rad", positive=False, scale=0.1)
-                _add_motion(scene, grip, ghost, stub * axis, {tilt: "identity"})
+                for n, length in ((ghost, stub), *((n, 1.0) for n in section)):
+                    _add_motion(scene, grip, n, length * axis, {tilt: "identity"})
         if roll:  # cos and sin of it instead of the given director
             quantity = scene.add_quantity(f"{self.name}_roll", 0.0, "rad", positive=False, scale=0.3)
             _add_motion(scene, grip, director, grip.director, {quantity: "cos"})
@@ -108,7 +121,7 @@ def spread_roll(scene: Scene, roll: str, directors: Array, shares: Array) -> Non
         directors: (k,) at their places without roll.
         shares: (k,) of the quantity `roll`.
     """
-    edges = np.array([scene.directors[int(d)] for d in directors])
+    edges = np.array([scene.directors[int(d)][:2] for d in directors])
     x = scene.positions
     along = x[edges[:, 1]] - x[edges[:, 0]]
     first, second = x[directors], np.cross(along / np.linalg.norm(along, axis=1, keepdims=True), x[directors])

@@ -18,12 +18,14 @@ class Joints:
     """Adds a rod's joints to a scene, group by group; alpha = Voronoi length / stiffness.
 
     Args:
-        stencils: (joints, 5) three points and two directors.
+        stencils: (joints, 5) three points and two directors; or (joints, 4) two normals and two directors of sections
+            that shear.
         place: (joints,) node numbers along the rod; a gripped end is a joint that counts the rod's own half link.
     """
 
     def __init__(self, scene: Scene, name: str, stencils: Array, place: Array, segments: int) -> None:
         self._scene, self._name, self._stencils = scene, name, stencils
+        self._sections = stencils.shape[1] == 4
         self._share, self._s = voronoi_shares(segments)[place], place / segments
         self._length = f"{name}_length"
         self._ratio: Factors = ()
@@ -40,11 +42,12 @@ class Joints:
         """Material curvatures; with a set per joint where they yield."""
         scene, name = self._scene, self._name
         scene.add_quantity(f"{name}_EI", EI, "N m^2")
-        stencils, kind = self._stencils, "material_curvature"
+        stencils, kind = self._stencils, "section_curvature" if self._sections else "material_curvature"
         if yield_curvature is not None:
             sets = scene.add_particles(np.zeros((len(stencils), 3)), 1.0)
             scene.pin(sets)
-            stencils, kind = np.column_stack([stencils, sets]), "yielding_curvature"
+            kind = "section_yielding_curvature" if self._sections else "yielding_curvature"
+            stencils = np.column_stack([stencils, sets])
         self._group("bend", kind, f"{name}_EI", stencils, damping)
         start, width = first_value(scene, f"{name}_bend"), 3 if yield_curvature is None else 5
         first = start + width * np.arange(len(stencils))
@@ -73,7 +76,8 @@ class Joints:
 
     def twist(self, damping: float | None) -> None:
         """Twist between neighboring edges; the quantity GJ is there already."""
-        self._group("twist", "twist", f"{self._name}_GJ", self._stencils, damping)
+        kind = "section_twist" if self._sections else "twist"
+        self._group("twist", kind, f"{self._name}_GJ", self._stencils, damping)
 
     def rest(self, curvature_modes: Sequence[int], twist_modes: Sequence[int]) -> None:
         """Rest curvature and twist in modes cos(k pi s/length)."""
@@ -106,6 +110,25 @@ class Joints:
             tau = scene.add_quantity(f"{group}_damping", damping, "s")
             factors: Factors = ((tau, "identity"), (stiffness, "identity"), (self._length, "inverse"))
             scene.add_terms([Term("damping", first, 1.0 / self._share, factors)])
+
+
+def shear(scene: Scene, name: str, stencils: Array, GA: float, damping: float | None) -> None:
+    """Let the sections of a rod's links lean against them; alpha = 1 / (GA link).
+
+    Args:
+        stencils: (links, 4) the two ends, the section's normal and its director.
+    """
+    group, segments = f"{name}_shear", len(stencils)
+    scene.add_quantity(f"{name}_GA", GA, "N")
+    zero = np.zeros(segments)
+    scene.add_constraints("shear", stencils, name=group, compliance=zero, damping=None if damping is None else zero)
+    first = scene.group(group)[1] + np.arange(segments)
+    factors: Factors = ((f"{name}_GA", "inverse"), (f"{name}_length", "inverse"))
+    scene.add_terms([Term("compliance", first, float(segments), factors)])
+    if damping is not None:
+        tau = scene.add_quantity(f"{group}_damping", damping, "s")
+        factors = ((tau, "identity"), (f"{name}_GA", "identity"), (f"{name}_length", "identity"))
+        scene.add_terms([Term("damping", first, 1.0 / segments, factors)])
 
 
 def weigh(scene: Scene, name: str, nodes: Array, segments: int, modes: Sequence[int]) -> None:

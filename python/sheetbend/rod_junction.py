@@ -70,11 +70,17 @@ class Junction:
         assert self._scene is not None
         return carried(self._scene.positions[self._director], self.direction, direction[None])[0]
 
-    def join(self, scene: Scene, label: str, node: int, ghost: int, director: int, arrives: bool) -> None:
-        """Take in a rod's short link between `node` and `ghost`; it `arrives` where the rod ends."""
+    def join(
+        self, scene: Scene, label: str, node: int, ghost: int, director: int, normal: int | None, arrives: bool
+    ) -> None:
+        """Take in a rod's short link between `node` and `ghost`, which does not shear; it `arrives` where the rod
+        ends."""
         x = scene.positions
         reach = float(np.linalg.norm(x[ghost] - x[node]))
         scene.add_constraints("distance", [[node, ghost]], name=f"{label}_stub", rest=reach)
+        if normal is not None:
+            edge = [node, ghost] if arrives else [ghost, node]
+            scene.add_constraints("shear", [[*edge, normal, director]], name=f"{label}_section")
         if self._scene is None:
             self._scene, self._node = scene, node
             self._ghost, self._director, self._arrives = ghost, director, arrives

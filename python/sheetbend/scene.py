@@ -53,7 +53,7 @@ class Scene:
         self.groups: list[Group] = []
         self.pinned: set[int] = set()
         self.driven: list[int] = []
-        self.directors: dict[int, tuple[int, int]] = {}
+        self.directors: dict[int, tuple[int, int, int]] = {}  # edge from, to; the section's normal, or -1
         self.boundary_times: Array = np.zeros(0)
         self.boundary_interpolation = "cubic"
         self.forces = Forces()
@@ -96,7 +96,7 @@ class Scene:
         self._mass.extend(m)
         return np.arange(first, first + len(x))
 
-    def add_directors(self, edges: ArrayLike, directions: ArrayLike) -> Array:
+    def add_directors(self, edges: ArrayLike, directions: ArrayLike, normals: ArrayLike | None = None) -> Array:
         """Give edges material frames and return the indices of their directors, which count as particles.
 
         A director is a vector across its edge, the frame's first axis; it turns about the edge without inertia.
@@ -104,6 +104,7 @@ class Scene:
         Args:
             edges: (n, 2) particles that each edge leads from and to.
             directions: (n, 3) initial directions, of any length and not along their edges.
+            normals: (n,) of `add_normals`, for sections that shear: the directors stay across them.
 
         Raises:
             SceneError: shapes, NaN, or a direction along its edge.
@@ -117,8 +118,33 @@ class Scene:
         if (across <= 1e-9 * np.linalg.norm(along, axis=1) * np.linalg.norm(q, axis=1)).any():
             bad = int(np.argmin(across))
             raise SceneError("directions", f"lie along edge {bad}", q[bad].tolist(), "give a vector across the edge")
-        nodes = self.add_particles(q, 0.0)
-        self.directors |= {int(n): (int(a), int(b)) for n, (a, b) in zip(nodes, ends, strict=True)}
+        axes = np.full(len(ends), -1)
+        if normals is not None:
+            axes = np.array(indices("normals", normals, self.particle_count))
+            wrong = [int(n) for n in axes if int(n) not in self.directors]
+            if wrong or len(axes) != len(ends):
+                raise SceneError("normals", "are not one for each edge", wrong, "give those of add_normals")
+        return self._with_frames(q, ends, axes)
+
+    def add_normals(self, edges: ArrayLike) -> Array:
+        """Give edges (n, 2) sections that may lean against them, and return the indices of the sections' normals, which
+        count as particles. They start along the edges, and turn without inertia.
+
+        Raises:
+            SceneError: unknown particles, or an edge without length.
+        """
+        self._building()
+        ends = index_array("edges", edges, self.particle_count).reshape(-1, 2)
+        along = self.positions[ends[:, 1]] - self.positions[ends[:, 0]]
+        length = np.linalg.norm(along, axis=1)
+        if not (length > 0).all():
+            bad = int(np.argmin(length))
+            raise SceneError("edges", f"edge {bad} has no length", ends[bad].tolist(), "move its particles apart")
+        return self._with_frames(along / length[:, None], ends, self.particle_count + np.arange(len(ends)))
+
+    def _with_frames(self, directions: Array, edges: Array, normals: Array) -> Array:
+        nodes = self.add_particles(directions, 0.0)
+        self.directors |= {int(n): (int(a), int(b), int(c)) for n, (a, b), c in zip(nodes, edges, normals, strict=True)}
         return nodes
 
     def pin(self, particles: ArrayLike) -> None:
@@ -213,12 +239,14 @@ class Scene:
 
         Args:
             kind: a name in sheetbend.KINDS: "distance", "attachment"; of ropes "bend", "planar_bend", "hinge"; of rods
-                "material_curvature", "yielding_curvature", "twist"; of cloth "strain", "exponential_strain",
+                "material_curvature", "yielding_curvature", "twist", "shear" and, between sections, "section_curvature",
+                "section_yielding_curvature", "section_twist"; of cloth "strain", "exponential_strain",
                 "spline_strain", "sheet_curvature", "dihedral", "isometric_bending", "area", "tether".
             particles: (count, arity) indices.
             name: of the group; the kind by default.
             compliance: 0 = rigid; distance, attachment, tether m/N; bend, planar_bend 1/(N m) (Voronoi length / EI);
-                hinge rad/(N m); material_curvature 1/(N m), twist rad/(N m) (Voronoi length / EI or GJ); strains
+                hinge rad/(N m); material_curvature 1/(N m), twist rad/(N m) (Voronoi length / EI or GJ), shear
+                1/(N m) (1/(GA length)); strains
                 1/(N m) (1/(area warp stiffness)); dihedral rad/(N m); isometric_bending 1/(N m) (1/B);
                 sheet_curvature 1/(N m^3) (1/(area B)); area m^3/N.
             damping: beta of the Rayleigh dissipation (Macklin et al. 2016, eq. 26): force per rate of C.

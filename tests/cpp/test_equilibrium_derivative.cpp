@@ -23,14 +23,20 @@ AtRest at_rest(Scene scene, std::vector<double> inputs) {
 }
 
 // A hanging rope with every kind of constraint and every quantity that acts at rest; its last particle is tied to a driven one, and every edge
-// has a director, of which the first is pinned; sets are pinned, since nothing yields at rest.
+// has a director, of which the first is pinned; sets are pinned, since nothing yields at rest. Beside these, every edge has a section with a
+// normal and a director; the first ones are pinned.
 AtRest every_kind() {
   const int n = 10;
   SceneSpec spec;
-  spec.particles = n + 2 + 2 * n;
-  spec.pinned = {0, n + 2};
-  for (int k = 0; k < n; ++k) spec.pinned.push_back(2 * n + 2 + k);
-  for (int k = 0; k < n; ++k) spec.directors.push_back({n + 2 + k, k, k + 1});
+  const int directors = n + 2, sets = directors + n, normals = sets + n, leaning = normals + n;
+  spec.particles = leaning + n;
+  spec.pinned = {0, directors, normals, leaning};
+  for (int k = 0; k < n; ++k) spec.pinned.push_back(sets + k);
+  for (int k = 0; k < n; ++k) {
+    spec.directors.push_back({directors + k, k, k + 1});
+    spec.directors.push_back({normals + k, k, k + 1, normals + k});
+    spec.directors.push_back({leaning + k, k, k + 1, normals + k});
+  }
   spec.driven = {n + 1};
   spec.loaded = {4, 7};
   spec.boundary.times = {0.0, 0.011, 0.02, 0.05};
@@ -40,18 +46,24 @@ AtRest every_kind() {
     GroupSpec group{K::name, K::name, false, {}};
     if constexpr (std::same_as<K, Attachment>)
       group.stencil = {n, n + 1};
+    else if constexpr (std::same_as<K, Shear>)
+      for (int k = 0; k < n; ++k) group.stencil.insert(group.stencil.end(), {k, k + 1, normals + k, leaning + k});
+    else if constexpr (K::points == 0)
+      for (int k = 0; k + 2 <= n; ++k)
+        for (int i = 0; i < K::arity; ++i)
+          group.stencil.push_back(i < 2 ? normals + k + i : i < 4 ? leaning + k + i - 2 : sets + k);
     else
       for (int k = 0; k + K::points <= n + 1; ++k)
         for (int i = 0; i < K::arity; ++i) {
           const int past = i - K::points;  // two directors, then a set
-          group.stencil.push_back(past < 0 ? k + i : past < 2 ? n + 2 + k + past : 2 * n + 2 + k);
+          group.stencil.push_back(past < 0 ? k + i : past < 2 ? directors + k + past : sets + k);
         }
     spec.groups.push_back(group);
   });
   AtRest s{build_scene(spec), {}, {}};
   s.inputs.assign(s.scene.layout.total(), 0.0);
   const Inputs<double> in{s.scene.layout, s.inputs.data()};
-  Random random(11);
+  Random random(15);
   const auto fill = [&](Quantity q, double low, double high) {
     for (std::size_t i = 0; i < s.scene.layout.count(q); ++i) in.of(q)[i] = random(low, high);
   };
@@ -63,10 +75,13 @@ AtRest every_kind() {
     const double t = std::min(k, n) / static_cast<double>(n);
     Vec3<double>(0.6 * t, random(-0.01, 0.01), -1.5 * t * (1.0 - t)).store(in.of(Quantity::position) + 3 * k);
   }
-  for (int k = 0; k < n; ++k)
-    Vec3<double>(random(-0.1, 0.1), 0.8, random(-0.1, 0.1)).store(in.of(Quantity::position) + 3 * (n + 2 + k));
-  for (int k = 0; k < n; ++k)
-    Vec3<double>(random(-0.1, 0.1), random(-0.1, 0.1), 0.0).store(in.of(Quantity::position) + 3 * (2 * n + 2 + k));
+  const auto place = [&](int node) { return in.of(Quantity::position) + 3 * node; };
+  for (int k = 0; k < n; ++k) {
+    Vec3<double>(random(-0.1, 0.1), 0.8, random(-0.1, 0.1)).store(place(directors + k));
+    Vec3<double>(random(-0.1, 0.1), random(-0.1, 0.1), 0.0).store(place(sets + k));
+    (Vec3<double>(place(k + 1)) - Vec3<double>(place(k))).store(place(normals + k));
+    Vec3<double>(random(-0.1, 0.1), 0.8, random(-0.1, 0.1)).store(place(leaning + k));
+  }
   for (std::size_t knot = 0; knot < 4; ++knot)
     Vec3<double>(0.6 + random(-0.01, 0.01), random(-0.01, 0.01), random(-0.01, 0.01))
         .store(in.of(Quantity::boundary) + 3 * knot);

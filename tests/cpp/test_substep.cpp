@@ -116,5 +116,39 @@ TEST(SubstepAtRest, ReverseIsFinite) {
   for (const double b : reverse(one, theta, random.vector(2 * dofs))) EXPECT_TRUE(std::isfinite(b));
 }
 
+// Directors across an edge and across a normal, and the normal itself, of which one is held.
+TEST(Retraction, ReverseMatchesComplexStep) {
+  SceneSpec spec;
+  spec.particles = 7;
+  spec.directors = {{2, 0, 1}, {3, 0, 1, 3}, {4, 0, 1, 3}, {5, 1, 0, 5}, {6, 1, 0, 5}};
+  spec.pinned = {5};
+  spec.groups = {{"all", "section_curvature", false, {3, 5, 4, 6}}};
+  const Scene scene = build_scene(spec);
+  Random random(4);
+  const std::vector<double> x = random.vector(scene.dofs()), bar = random.vector(scene.dofs());
+  std::vector<double> found = bar;
+  retract_directors_vjp<double>(scene, [&](int node) { return &x[scene.first_dof[node]]; }, found.data());
+  for (int i = 0; i < scene.dofs(); ++i) {
+    std::vector<Complex> z(x.begin(), x.end());
+    z[i].im = complex_step;
+    retract_directors(scene, z.data());
+    double expected = 0.0;
+    for (int k = 0; k < scene.dofs(); ++k) expected += bar[k] * z[k].im / complex_step;
+    EXPECT_NEAR(found[i], expected, 1e-13);
+  }
+  for (const int free : {2, 3, 4, 6}) {
+    std::vector<double> once = x;
+    retract_directors(scene, once.data());
+    EXPECT_NEAR(norm(Vec3<double>(&once[3 * free])), 1.0, 1e-15);
+  }
+}
+
+TEST(Retraction, RefusesANormalThatComesLater) {
+  SceneSpec spec;
+  spec.particles = 4;
+  spec.directors = {{2, 0, 1, 3}, {3, 0, 1, 3}};
+  EXPECT_THROW(build_scene(spec), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace sheetbend::testing

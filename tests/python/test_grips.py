@@ -97,6 +97,9 @@ def test_carried_vectors_keep_their_length_and_angle():
 # --- tilts and roll
 
 
+SHEAR = pytest.mark.parametrize("shear", [{}, {"GA": 0.5}], ids=["", "shear"])
+
+
 def held(**options) -> sb.Scene:
     """A stiff rod without weight between nothing but its start's grip, straight."""
     grip = sb.Grip.fixed((0, 0, 0), (1, 0, 0), (0, 1, 0))
@@ -104,9 +107,10 @@ def held(**options) -> sb.Scene:
     return sb.rod(0.5, 6, **(given | options))
 
 
+@SHEAR
 @pytest.mark.parametrize(("tilt", "towards"), [(1, (0, 1, 0)), (2, (0, 0, 1))])
-def test_a_tilt_turns_the_rod_towards_its_axis(tilt, towards):
-    angle, scene = 0.1, held()
+def test_a_tilt_turns_the_rod_towards_its_axis(tilt, towards, shear):
+    angle, scene = 0.1, held(**shear)
     rest = sb.equilibrium(scene, values={f"rod_start_tilt_{tilt}": angle})
     tip = rest.positions[scene.ropes["rod"].particles[-1]]
     assert tip == approx(0.5 * units(np.array([1.0, 0, 0]) + angle * np.array(towards)), abs=1e-9)
@@ -175,7 +179,7 @@ def test_a_roll_does_not_kick_the_rod_through_its_damping(moves):
     assert added(bend_damping=0.05) == approx(added(), rel=0.1)
 
 
-def everything() -> sb.Scene:
+def everything(**options: float) -> sb.Scene:
     """A rod between two moving grips with all that a rod can have."""
     start = sb.Grip.from_poses(TIMES, PLACES, TURNS.as_quat())
     first = np.add(PLACES, (0.3, 0.1, 0))
@@ -203,6 +207,7 @@ def everything() -> sb.Scene:
         twist_modes=(0, 2),
         softness_modes=(1,),
         density_modes=(1, 2),
+        **options,
     )
 
 
@@ -224,17 +229,22 @@ SET = {
 }
 
 
+SHEARS = {"GA": 0.7, "shear_damping": 0.01}
+YIELDS = {"yield_curvature": 3.0, "yield_share": 0.4}
+
+
+@pytest.mark.parametrize("options", [{}, SHEARS, SHEARS | YIELDS], ids=["", "shear", "shear and yield"])
 @pytest.mark.parametrize("integrator", ["bdf1", "bdf2"])
-def test_gradients_of_everything(integrator):
+def test_gradients_of_everything(integrator, options):
     solver = sb.Solver(h=1 / 400, integrator=integrator)
-    report = sb.check_gradients(everything(), np.arange(0, 41, 10) / 400, solver, values=SET)
+    report = sb.check_gradients(everything(**options), np.arange(0, 41, 10) / 400, solver, values=SET)
     rows = {row.name: row for row in report.rows}
     # The derivative by what holds a director, of which a roll is 1e7 times the torque, is good to rounding times that.
     held_back = rows.pop("mass")
     assert held_back.complex_step < 1e-6 and held_back.differences < 1e-4
     assert all(row.passed for row in rows.values()), str(report)
     assert report.dot_product < 1e-11
-    for name in everything().quantities:
+    for name in everything(**options).quantities:
         assert rows[name].gradient > 0, name
 
 

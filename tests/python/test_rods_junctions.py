@@ -69,9 +69,9 @@ def test_a_ring_vibrates_as_the_closed_form_says(rods):
 # --- rods in series and branches
 
 
-def hanging(links: int, parts: int, density: float = DENSITY) -> np.ndarray:
+def hanging(links: int, parts: int, density: float = DENSITY, **shear: float) -> np.ndarray:
     """(3,) m: the end of a rod that hangs from a level grip, in one part or two."""
-    scene, junction, options = sb.Scene("hanging"), sb.Junction(), {"density": density, "EI": EI, "GJ": EI}
+    scene, junction, options = sb.Scene("hanging"), sb.Junction(), {"density": density, "EI": EI, "GJ": EI} | shear
     if parts == 1:
         last = sb.add_rod(scene, "a", length=0.6, segments=links, start=GRIP, **options)
     else:
@@ -80,8 +80,9 @@ def hanging(links: int, parts: int, density: float = DENSITY) -> np.ndarray:
     return sb.equilibrium(scene).positions[last.particles[-1]]
 
 
-def test_a_rod_in_two_parts_hangs_as_one():
-    apart = [float(np.linalg.norm(hanging(links, 1) - hanging(links, 2))) for links in (24, 48, 96)]
+@pytest.mark.parametrize("shear", [{}, {"GA": 0.1}], ids=["", "shear"])
+def test_a_rod_in_two_parts_hangs_as_one(shear):
+    apart = [float(np.linalg.norm(hanging(links, 1, **shear) - hanging(links, 2, **shear))) for links in (24, 48, 96)]
     assert apart[0] < 1e-5
     assert apart[-1] < 1e-6
 

@@ -174,6 +174,67 @@ inline Case case_of<Twist>() {
           .parameter_sign = {1}};
 }
 
+// Two sections that are bent, twisted, and turned out of the edges of joint_sample.
+inline const std::vector<double> sections_sample{0.1, 0.03, 0.02, 0.08, 0.07, -0.05, 0.05, 0.3, -0.9, 0.5, 0.4, -0.6};
+
+template <>
+inline Case case_of<Shear>() {
+  return {.x = {0, 0, 0, 0.1, 0.02, 0.01, 0.09, 0.04, 0.03, 0.05, 0.3, -0.9},
+          .p = {},
+          .compliance = 2.0,
+          .damping = 5e-4,
+          .under_rotation = UnderRotation::stays,
+          .degree = 0,
+          .parameter_degree = {},
+          .relabeling = {1, 0, 2, 3},
+          .sign = {-1, -1},
+          .parameter_sign = {}};
+}
+
+template <>
+inline Case case_of<SectionCurvature>() {
+  return {.x = sections_sample,
+          .p = {1.3, 0.2, -0.1},
+          .compliance = 2.0,
+          .damping = 5e-4,
+          .under_rotation = UnderRotation::stays,
+          .degree = 0,
+          .parameter_degree = {0, 0, 0},
+          .relabeling = {1, 0, 3, 2},
+          .sign = {-1, -1},
+          .parameter_sign = {1, -1, -1}};
+}
+
+template <>
+inline Case case_of<SectionYieldingCurvature>() {
+  std::vector<double> x = sections_sample;
+  x.insert(x.end(), {0.1, -0.2, 0.05});
+  return {.x = x,
+          .p = {1.3, 0.4, 0.25, 0.2, -0.1},
+          .compliance = 2.0,
+          .damping = 5e-4,
+          .under_rotation = UnderRotation::stays,
+          .degree = 0,
+          .parameter_degree = {0, 0, 0, 0, 0},
+          .relabeling = {1, 0, 3, 2, 4},
+          .sign = {-1, -1},
+          .parameter_sign = {1, 1, 1, -1, -1}};
+}
+
+template <>
+inline Case case_of<SectionTwist>() {
+  return {.x = sections_sample,
+          .p = {0.15},
+          .compliance = 4.0,
+          .damping = 5e-4,
+          .under_rotation = UnderRotation::stays,
+          .degree = 0,
+          .parameter_degree = {0},
+          .relabeling = {1, 0, 3, 2},
+          .sign = {-1},
+          .parameter_sign = {-1}};
+}
+
 inline const std::vector<double> triangle_sample{0, 0, 0, 0.055, 0.09, 0.01, -0.048, 0.1, -0.02};
 inline const std::vector<double> hinge_sample{0, 0, 0, 0.09, 0.03, -0.02, 0.01, 0.1, 0.03, 0.06, -0.08, 0.02};
 

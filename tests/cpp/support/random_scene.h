@@ -1,8 +1,8 @@
 // Random scenes that hold every registered constraint and every differentiable quantity. Each rope strings
 // together one sample stencil of every kind, jittered, and braces. Ropes start at one driven particle, so
 // that constraints of one color, and direct blocks, share it; or, as a net, at one free particle and with
-// ties between them: one block with branches and loops. Joints bring the directors of their edges, and the set of those that yield. A closed surface
-// may hang on each rope, one of them with a driven particle, another with a pinned one.
+// ties between them: one block with branches and loops. Joints bring the directors of their edges, or two edges with
+// sections that shear, and the set of those that yield. A closed surface may hang on each rope, one of them with a driven particle, another with a pinned one.
 #pragma once
 
 #include "core/scene/scene.h"
@@ -36,7 +36,7 @@ struct SceneBuilder {
     std::vector<double> p, compliance, damping;
   };
   std::vector<Values> groups{};
-  std::vector<int> sets{};
+  std::vector<int> sets{}, sections{};  // sections: of the current rope, two normals and two directors
   std::vector<double> volumes{}, volume_compliances{};
 
   explicit SceneBuilder(unsigned seed) : random(seed) {}
@@ -75,12 +75,53 @@ struct SceneBuilder {
         at[d] = (k < points ? x[3 * tail + d] : 0.0) + sample.x[3 * k + d] - sample.x[d] + random(-0.005, 0.005);
       nodes.push_back(add_particle(at[0], at[1], at[2]));
     }
-    for (int k = 0; k < directors; ++k) spec.directors.push_back({nodes[points + k], nodes[k], nodes[k + 1]});
-    std::vector<double> p = sample.p;
-    for (double& v : p) v += random(-0.02, 0.02);
-    add_constraint<K>(damped, nodes, p);
+    for (int k = 0; k < directors; ++k)
+      if constexpr (std::same_as<K, Shear>)
+        spec.directors.push_back({nodes[points + k], nodes[0], nodes[1], nodes[points]});
+      else
+        spec.directors.push_back({nodes[points + k], nodes[k], nodes[k + 1]});
+    add_constraint<K>(damped, nodes, jittered_parameters<K>());
     for (int k = points + directors; k < K::arity; ++k) sets.push_back(nodes[k]);
     return nodes[points - 1];
+  }
+
+  template <class K>
+  std::vector<double> jittered_parameters() {
+    std::vector<double> p = case_of<K>().p;
+    for (double& v : p) v += random(-0.02, 0.02);
+    return p;
+  }
+
+  // A particle near (3,) `sample`, counted from particle `tail` if there is one.
+  int add_near(const double* sample, int tail = -1) {
+    double at[3];
+    for (int d = 0; d < 3; ++d) at[d] = (tail < 0 ? 0.0 : x[3 * tail + d]) + sample[d] + random(-0.005, 0.005);
+    return add_particle(at[0], at[1], at[2]);
+  }
+
+  // Two edges on particle `tail` with sections that shear; returns the last particle.
+  int add_sections(int tail, bool damped) {
+    const std::vector<int> points{tail, add_near(&joint_sample[3], tail), add_near(&joint_sample[6], tail)};
+    for (int k = 0; k < 4; ++k) {
+      sections.push_back(add_near(&sections_sample[3 * k]));
+      spec.directors.push_back({sections[k], points[k % 2], points[k % 2 + 1], sections[k % 2]});
+    }
+    for (int k = 0; k < 2; ++k)
+      add_constraint<Shear>(damped, {points[k], points[k + 1], sections[k], sections[2 + k]}, {});
+    return points.back();
+  }
+
+  // A constraint between the rope's two sections, which the first kind adds; returns the last particle.
+  template <class K>
+  int add_between_sections(int tail, bool damped) {
+    if (sections.empty()) tail = add_sections(tail, damped);
+    std::vector<int> nodes = sections;
+    if constexpr (K::arity > 4) {
+      nodes.push_back(add_near(&case_of<K>().x[12]));
+      sets.push_back(nodes.back());
+    }
+    add_constraint<K>(damped, nodes, jittered_parameters<K>());
+    return tail;
   }
 
   void add_brace(int a, int b) {
@@ -113,8 +154,13 @@ struct SceneBuilder {
   std::vector<int> add_rope(bool damped, bool unilateral) {
     const int first = static_cast<int>(x.size()) / 3;
     int tail = 0;
+    sections.clear();
     for_each_kind([&]<class K>(K) {
-      if (!K::unilateral || unilateral) tail = add_stencil<K>(tail, damped);
+      if (K::unilateral && !unilateral) return;
+      if constexpr (K::points == 0)
+        tail = add_between_sections<K>(tail, damped);
+      else
+        tail = add_stencil<K>(tail, damped);
     });
     std::vector<int> rope{0};
     const auto is_point = [&](int n) {

@@ -1,6 +1,6 @@
-"""Rods that twist and buckle: closed forms of the continuous rod, isotropic section, no shear.
+"""Rods that twist, shear and buckle: closed forms of the continuous rod, isotropic section.
 
-EI bending and GJ torsional stiffness [N m^2], angles [rad], `density` mu [kg/m].
+EI bending and GJ torsional stiffness [N m^2], GA shear stiffness [N], angles [rad], `density` mu [kg/m].
 """
 
 import math
@@ -29,6 +29,33 @@ def ring_critical_twist(stiffness_ratio: float) -> float:
 def euler_load(length: float, bending_stiffness: float) -> float:
     """O-16b: buckling load [N] of a column with pinned ends: pi^2 EI/L^2; a clamped-free one bears that of 2 L."""
     return bending_stiffness * (math.pi / length) ** 2
+
+
+def sheared_tip(load: float, length: float, bending_stiffness: float, shear_stiffness: float) -> float:
+    """Small deflection [m] of a cantilever under a load on its tip: P L^3/(3 EI) + P L/GA (Timoshenko 1921).
+
+    -EI dw/dEI is the first part, -GA dw/dGA the second.
+    """
+    return load * length**3 / (3.0 * bending_stiffness) + load * length / shear_stiffness
+
+
+def engesser_load(euler: float, shear_stiffness: float) -> float:
+    """Load [N] at which a column that shears falls: Pe/(1 + Pe/GA) (Engesser 1891), Pe without shear.
+
+    It holds where the load's work sees the slope of the axis and shear is its angle against the section: with
+    sections turned by a and edges by a + g, EI a'^2/2 + GA g^2/2 - P (a + g)^2/2 is least for g = P a/(GA - P), which
+    leaves EI a'^2/2 - P/(1 - P/GA) a^2/2.
+    """
+    return euler / (1.0 + euler / shear_stiffness)
+
+
+def sheared_frequency(
+    mode: int, length: float, density: float, bending_stiffness: float, shear_stiffness: float
+) -> float:
+    """Frequency [rad/s] of a beam on two hinges, without rotary inertia: k^2 sqrt(EI/mu)/sqrt(1 + EI k^2/GA) with
+    k = mode pi/L (Timoshenko 1921)."""
+    k = mode * math.pi / length
+    return k**2 * math.sqrt(bending_stiffness / density / (1.0 + bending_stiffness * k**2 / shear_stiffness))
 
 
 def self_buckling_length(weight: float, bending_stiffness: float) -> float:
