@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from . import _core
 from .errors import SceneError, refusal
@@ -58,7 +60,10 @@ class CompiledScene:
         self.theta = np.array([q.value for q in scene.quantities.values()], dtype=float)
         self._base = self._pack(scene)
         self._terms = [*scene.terms, *scene.motion_terms()]
-        self._map = _core.ParameterMap(self.map())
+
+    @cached_property
+    def _map(self) -> _core.ParameterMap:
+        return _core.ParameterMap(self.map())
 
     def _pack(self, scene: Scene) -> np.ndarray:
         base = np.zeros(self.core.inputs)
@@ -82,12 +87,11 @@ class CompiledScene:
         first_factor = np.concatenate([[0], np.cumsum(length)])
         first = np.repeat(np.cumsum(lengths) - lengths, entries)
         place = np.repeat(first - first_factor[:-1], length) + np.arange(first_factor[-1])
+        coefficients = [_spread(t.coefficient, k) for t, k in zip(every, entries, strict=True)]
         return {
             "base": np.concatenate([self._base, np.zeros(extra)]) if extra else self._base,
             "target": _joined([offsets[t.array] + np.ravel(t.index) for t in every]),
-            "coefficient": _joined(
-                [np.broadcast_to(t.coefficient, k) for t, k in zip(every, entries, strict=True)]
-            ).astype(float),
+            "coefficient": _joined(coefficients).astype(float),
             "first_factor": first_factor,
             "parameter": parameter[place],
             "function": function[place],
@@ -129,6 +133,12 @@ class CompiledScene:
             part = flat[offset : offset + size]
             shaped[array] = part.reshape(-1, 3) if array in VECTORS else part
         return shaped
+
+
+def _spread(coefficient: ArrayLike, entries: int) -> np.ndarray:
+    """One coefficient per entry; `broadcast_to` takes most of the time of a map with many small terms."""
+    given = np.ravel(coefficient)
+    return given if len(given) == entries else np.full(entries, *given)
 
 
 def _joined(parts: Sequence[np.ndarray]) -> np.ndarray:

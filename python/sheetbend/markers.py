@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -81,7 +82,7 @@ def on_rope(rope: Rope, arc_length: float, interpolation: str = "cubic") -> Plac
     link = int(np.clip(np.searchsorted(s, arc_length, side="right") - 1, 0, len(s) - 2))
     first = int(np.clip(link - (width // 2 - 1), 0, len(s) - width))
     knots = s[first : first + width]
-    weights, slopes = _lagrange(knots, arc_length)
+    weights, slopes = _lagrange(knots.tolist(), float(arc_length))
     return Place(tuple(int(n) for n in nodes[first : first + width]), tuple(weights), tuple(slopes))
 
 
@@ -152,15 +153,14 @@ def _places_for(
     return tuple(markers)
 
 
-def _lagrange(knots: np.ndarray, x: float) -> tuple[list[float], list[float]]:
+def _lagrange(knots: list[float], x: float) -> tuple[list[float], list[float]]:
     """Lagrange weights at x and their derivatives."""
     weights, slopes = [], []
     for i in range(len(knots)):
         others = [k for j, k in enumerate(knots) if j != i]
-        scale = float(np.prod([knots[i] - k for k in others]))
-        weights.append(float(np.prod([x - k for k in others])) / scale)
+        scale = prod(knots[i] - k for k in others)
+        weights.append(prod(x - k for k in others) / scale)
         slopes.append(
-            sum(float(np.prod([x - k for j, k in enumerate(others) if j != skip])) for skip in range(len(others)))
-            / scale
+            sum(prod(x - k for j, k in enumerate(others) if j != skip) for skip in range(len(others))) / scale
         )
     return weights, slopes
