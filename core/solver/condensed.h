@@ -37,7 +37,7 @@ class CondensedSolver {
     U *y = own.data(), *rest = y + rows, *room = rest + rows;
     std::copy_n(b, rows, y);
     solve_once(plan, block, y, room);
-    if (is_refined(plan)) {
+    for (int k = 0; k < refinements(plan); ++k) {
       subtract_matrix_times(block, y, b, rest, room);
       solve_once(plan, block, rest, room);
       for (int i = 0; i < rows; ++i) y[i] = y[i] + rest[i];
@@ -53,10 +53,10 @@ class CondensedSolver {
   }
 
  private:
-  // A step of iterative refinement against A itself takes back the digits that the difference costs when D is small. Conjugate gradients take it only
-  // where it brings in the first order of the matrix, since they would need twice the time.
-  static bool is_refined(const Condensation& plan) {
-    return std::holds_alternative<CondensedPattern>(plan) || !is_plain<T>;
+  // A step of iterative refinement against A itself takes back the digits that the difference costs when D is small. Conjugate gradients, whose H is
+  // that of the values, need one before it that brings in the first order.
+  static int refinements(const Condensation& plan) {
+    return std::holds_alternative<CondensedPattern>(plan) || is_plain<T> ? 1 : 2;
   }
 
   // y = D^-1 (y - J H^-1 J^T D^-1 y)

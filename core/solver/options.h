@@ -13,7 +13,7 @@ struct SolverOptions {
   Integrator integrator = Integrator::bdf2;
   Partition partition = Partition::direct;
   int iterations = 2;
-  double cg_tolerance = 1e-13;  // relative residual at which conjugate gradients stop
+  double cg_tolerance = 1e-12;  // relative residual at which conjugate gradients stop
   int cg_iterations = 10000;    // more than these are an error
   int threads = 1;
   int grain = 256;  // blocks per thread below which a color is not split

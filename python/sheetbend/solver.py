@@ -28,8 +28,8 @@ class Solver:
         iterations: Newton iterations of a block (2 by default) or sweeps (10 by default).
         threads: of one rollout; results do not depend on it.
         grain: constraints per thread below which a color is not split.
-        cg_tolerance: relative residual at which "newton_cg" stops a solve; gradients are as exact as this.
-        cg_iterations: conjugate gradients per solve of "newton_cg"; more are an error.
+        cg_tolerance: relative residual at which conjugate gradients stop ("newton_cg" runs them twice per solve).
+        cg_iterations: conjugate gradients until there; more are an error.
         memory: budget of a gradient through a rollout, such as "2 GB" or a number of bytes: what does not fit on the
             tape is computed again, with the same result. None = keep every substep boundary. `tape_plan` tells what a
             budget costs. Tangents (`fit`, forward mode) keep no tape.
@@ -41,7 +41,7 @@ class Solver:
     iterations: int | None = None
     threads: int = 1
     grain: int = 256
-    cg_tolerance: float = 1e-13
+    cg_tolerance: float = 1e-12
     cg_iterations: int = 10_000
     memory: str | int | None = None
 
@@ -60,7 +60,7 @@ class Solver:
                 raise InputError(f"solver.{field}", "must be a positive whole number", value, "give at least 1")
         if not (isinstance(self.cg_tolerance, float) and 0.0 < self.cg_tolerance < 1.0):
             problem = "must be a relative residual between 0 and 1"
-            raise InputError("solver.cg_tolerance", problem, self.cg_tolerance, "give a small number, such as 1e-13")
+            raise InputError("solver.cg_tolerance", problem, self.cg_tolerance, "give a small number, such as 1e-12")
         if self.memory is not None:
             in_bytes("solver.memory", self.memory)
 

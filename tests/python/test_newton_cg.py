@@ -81,8 +81,8 @@ def test_scenes_in_lanes_have_the_bits_that_they_have_alone() -> None:
 def test_a_looser_tolerance_ends_elsewhere() -> None:
     scene = cloth()
     exact = sb.simulate(scene, TIMES, FACTORED).positions
-    rough = sb.simulate(scene, TIMES, replace(ITERATED, cg_tolerance=1e-4)).positions
-    assert 1e-9 < np.abs(rough - exact).max() < 1e-3
+    rough = sb.simulate(scene, TIMES, replace(ITERATED, cg_tolerance=1e-3)).positions
+    assert 1e-9 < np.abs(rough - exact).max() < 1e-5
 
 
 def test_running_out_of_iterations_is_told() -> None:
@@ -109,7 +109,7 @@ def test_rigid_constraints_are_refused(method: str) -> None:
     ("given", "said"),
     [
         ({"cg_tolerance": 0.0}, "solver.cg_tolerance: must be a relative residual"),
-        ({"cg_tolerance": 2.0}, "such as 1e-13"),
+        ({"cg_tolerance": 2.0}, "such as 1e-12"),
         ({"cg_tolerance": float("nan")}, "solver.cg_tolerance"),
         ({"cg_iterations": 0}, "solver.cg_iterations: must be a positive whole number"),
     ],
