@@ -121,7 +121,7 @@ class Scene:
         axes = np.full(len(ends), -1)
         if normals is not None:
             axes = np.array(indices("normals", normals, self.particle_count))
-            wrong = [int(n) for n in axes if int(n) not in self.directors]
+            wrong = [int(n) for n in axes if self.directors.get(int(n), (0, 0, -1))[2] != n]
             if wrong or len(axes) != len(ends):
                 raise SceneError("normals", "are not one for each edge", wrong, "give those of add_normals")
         return self._with_frames(q, ends, axes)

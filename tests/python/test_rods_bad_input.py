@@ -32,6 +32,18 @@ def markers(**options: Any) -> sb.Grip:
     return sb.Grip.from_markers(**({"times": TIMES, "first": STILL, "second": AHEAD} | options))
 
 
+def section(normals: Any = None, edges: Any = ((0, 1),)) -> Callable[[], Any]:
+    """A section on an edge; the last particle lies on the first."""
+
+    def run() -> None:
+        scene = sb.Scene()
+        scene.add_particles([[0, 0, 0], [1, 0, 0], [0, 0, 0]], 1.0)
+        own = scene.add_normals(edges)
+        scene.add_directors([[0, 1]], [[0, 1, 0]], own if normals is None else normals)
+
+    return run
+
+
 def later(make: Callable[..., Any], **options: Any) -> Callable[[], Any]:
     return lambda: make(**options)
 
@@ -104,7 +116,15 @@ GRIP = {
     "nominal of the wrong shape": ("nominal", later(markers, nominal=(1, 0))),
     "marker director along": ("director", later(markers, director=(3, 0, 0))),
 }
-CASES = {f"rod: {k}": v for k, v in ROD.items()} | {f"grip: {k}": v for k, v in GRIP.items()}
+SECTION = {
+    "a particle for a normal": ("normals", section(normals=[0])),
+    "two normals for an edge": ("normals", section(edges=[[0, 1], [0, 1]])),
+    "edge without length": ("edges", section(edges=[[0, 2]])),
+    "edge to no particle": ("edges", section(edges=[[0, 7]])),
+}
+CASES = {
+    f"{what}: {k}": v for what, part in {"rod": ROD, "grip": GRIP, "section": SECTION}.items() for k, v in part.items()
+}
 
 
 @pytest.mark.parametrize(("field", "run"), CASES.values(), ids=CASES)

@@ -175,7 +175,7 @@ inline Case case_of<Twist>() {
 }
 
 // Two sections that are bent, twisted, and turned out of the edges of joint_sample.
-inline const std::vector<double> sections_sample{0.1, 0.03, 0.02, 0.08, 0.07, -0.05, 0.05, 0.3, -0.9, 0.5, 0.4, -0.6};
+inline const std::vector<double> sections_sample{0.2, 0.05, 0.03, 0.18, 0.09, -0.05, 0.05, 0.3, -0.9, 0.5, 0.4, -0.6};
 
 template <>
 inline Case case_of<Shear>() {
