@@ -79,7 +79,7 @@ double climb(const Projection& p, const std::vector<double>& inputs, unsigned se
 template <class K>
 std::vector<Partition> partitions() {
   if (K::unilateral) return {Partition::gauss_seidel};
-  return {Partition::gauss_seidel, Partition::direct, Partition::newton, Partition::newton_cg};
+  return {Partition::gauss_seidel, Partition::direct, Partition::newton};
 }
 
 template <class K>
