@@ -16,7 +16,7 @@ struct OneColor {
   Scene scene;
   std::vector<double> inputs;
 
-  // A curved stencil that is no degenerate shape of any kind, moved by its number so that no two are equal.
+  // A curved stencil that is no degenerate shape of any kind, nor has a vector of zero length, moved by its number so that no two are equal.
   template <class K>
   OneColor(K, int constraints_, int steps_, bool damped) : constraints(constraints_), steps(steps_) {
     SceneSpec spec;
@@ -29,7 +29,7 @@ struct OneColor {
     const Inputs<double> in{scene.layout, inputs.data()};
     for (int n = 0; n < spec.particles; ++n) {
       const int k = n % K::arity;
-      const double at[] = {0.1 * k + 1e-3 * (n / K::arity), 0.02 * k * k, -0.015 * k};
+      const double at[] = {0.05 + 0.1 * k + 1e-3 * (n / K::arity), 0.02 * k * k, -0.015 * k};
       std::copy_n(at, 3, in.of(Quantity::position) + 3 * n);
     }
     std::fill_n(in.of(Quantity::mass), scene.layout.count(Quantity::mass), 0.02);
