@@ -16,6 +16,7 @@ from .column import Column
 from .compiled import CompiledScene
 from .errors import SceneError
 from .forces import Forces
+from .frames import Frame, directors_of, normals_of
 from .kinds import KINDS, NEEDS_COMPLIANCE, UNITS, VISCOUS_COMPLIANCE
 from .quantities import Quantity, Term, product
 from .rest_values import rest_values
@@ -53,7 +54,7 @@ class Scene:
         self.groups: list[Group] = []
         self.pinned: set[int] = set()
         self.driven: list[int] = []
-        self.directors: dict[int, tuple[int, int, int]] = {}  # edge from, to; the section's normal, or -1
+        self.directors: dict[int, Frame] = {}  # and the normals of sections
         self.boundary_times: Array = np.zeros(0)
         self.boundary_interpolation = "cubic"
         self.forces = Forces()
@@ -110,21 +111,7 @@ class Scene:
             SceneError: shapes, NaN, or a direction along its edge.
         """
         self._building()
-        ends = index_array("edges", edges, self.particle_count).reshape(-1, 2)
-        q = finite("directions", directions, (len(ends), 3), SceneError)
-        x = self.positions
-        along = x[ends[:, 1]] - x[ends[:, 0]]
-        across = np.linalg.norm(np.cross(along, q), axis=1)
-        if (across <= 1e-9 * np.linalg.norm(along, axis=1) * np.linalg.norm(q, axis=1)).any():
-            bad = int(np.argmin(across))
-            raise SceneError("directions", f"lie along edge {bad}", q[bad].tolist(), "give a vector across the edge")
-        axes = np.full(len(ends), -1)
-        if normals is not None:
-            axes = np.array(indices("normals", normals, self.particle_count))
-            wrong = [int(n) for n in axes if self.directors.get(int(n), (0, 0, -1))[2] != n]
-            if wrong or len(axes) != len(ends):
-                raise SceneError("normals", "are not one for each edge", wrong, "give those of add_normals")
-        return self._with_frames(q, ends, axes)
+        return self._with_frames(*directors_of(edges, directions, normals, self.positions, self.directors))
 
     def add_normals(self, edges: ArrayLike) -> Array:
         """Give edges (n, 2) sections that may lean against them, and return the indices of the sections' normals, which
@@ -134,17 +121,11 @@ class Scene:
             SceneError: unknown particles, or an edge without length.
         """
         self._building()
-        ends = index_array("edges", edges, self.particle_count).reshape(-1, 2)
-        along = self.positions[ends[:, 1]] - self.positions[ends[:, 0]]
-        length = np.linalg.norm(along, axis=1)
-        if not (length > 0).all():
-            bad = int(np.argmin(length))
-            raise SceneError("edges", f"edge {bad} has no length", ends[bad].tolist(), "move its particles apart")
-        return self._with_frames(along / length[:, None], ends, self.particle_count + np.arange(len(ends)))
+        return self._with_frames(*normals_of(edges, self.positions))
 
-    def _with_frames(self, directions: Array, edges: Array, normals: Array) -> Array:
+    def _with_frames(self, directions: Array, frames: list[Frame]) -> Array:
         nodes = self.add_particles(directions, 0.0)
-        self.directors |= {int(n): (int(a), int(b), int(c)) for n, (a, b), c in zip(nodes, edges, normals, strict=True)}
+        self.directors |= dict(zip(nodes.tolist(), frames, strict=True))
         return nodes
 
     def pin(self, particles: ArrayLike) -> None:
