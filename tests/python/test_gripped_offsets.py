@@ -18,7 +18,7 @@ NAMES = ("rope_EI", "rope_start_tilt_1", "rope_start_tilt_2", "rope_end_tilt_1",
 WANTED = [Parameter(name=NAMES[0], initial=0.02, log=True), *(Parameter(name=name, initial=0.0) for name in NAMES[1:])]
 MOTION = GrippedMotion.of(carried_about(), 0.0)
 MODEL = model_of(MOTION, tilts=True, smoothing=0.0)
-CLEAN = predict(MODEL, MOTION, {})
+(CLEAN,) = predict(MODEL, [MOTION], {})
 
 
 def across() -> np.ndarray:
