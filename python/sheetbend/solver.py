@@ -58,8 +58,8 @@ class Solver:
             value = getattr(self, field)
             if value is not None and (not isinstance(value, int) or value < 1):
                 raise InputError(f"solver.{field}", "must be a positive whole number", value, "give at least 1")
-        if not (isinstance(self.cg_tolerance, float) and 0.0 < self.cg_tolerance < 1.0):
-            problem = "must be a relative residual between 0 and 1"
+        if not (isinstance(self.cg_tolerance, float) and 0.0 < self.cg_tolerance <= 1e-3):
+            problem = "must be a relative residual of at most 1e-3"
             raise InputError("solver.cg_tolerance", problem, self.cg_tolerance, "give a small number, such as 1e-12")
         if self.memory is not None:
             in_bytes("solver.memory", self.memory)

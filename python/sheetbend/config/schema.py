@@ -33,7 +33,7 @@ class SolverSection(Section):
         " not fit in memory, by conjugate gradients; or colored sweeps",
     )
     iterations: int | None = key(None, "Newton iterations of a block (2) or sweeps (10)", ge=1)
-    cg_tolerance: Finite = key(1e-12, "relative residual at which conjugate gradients stop", gt=0, lt=1)
+    cg_tolerance: Finite = key(1e-12, "relative residual at which conjugate gradients stop", gt=0, le=1e-3)
     cg_iterations: int = key(10_000, "conjugate gradients until there; more are an error", ge=1)
     memory: str | int | None = key(
         None,
