@@ -36,6 +36,7 @@ LINKS_PER_BENDING_LENGTH = 3.0  # below this EI reads too high and GJ too low
 SETTLED = 0.05  # relative change of EI at which links are short enough
 BETTER = 0.99  # error of a step that stays, over that without it
 TOLERANCE = 1e-4  # relative, of the cost, while searching
+LAST_TOLERANCE = 1e-7  # of the fit that counts: its numbers are then within a few hundredths of their intervals
 LOOK, SHORT, LONG = 6, 12, 30  # iterations, at most, of a first look at a rung, of a start, and of a fit that counts
 
 Say = Callable[[str], None]
@@ -322,6 +323,7 @@ class _Search:
             threads=self.threads,
             profiles=False,
             max_iterations=1 if interrupted else LONG,
+            tolerance=LAST_TOLERANCE,
         )
         for refit in last.result.refits:
             moved = refit.moved[f"{NAME}_EI"] / last.values[f"{NAME}_EI"]
