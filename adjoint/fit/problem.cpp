@@ -98,6 +98,11 @@ bool Problem::evaluate(const double* u, double* residual, double* jacobian, Inte
   parallel_for(static_cast<int>(jobs.size()), threads_, 1, [&](int begin, int end) {
     for (int job = begin; job < end; ++job) {
       const auto [e, first, width] = jobs[job];
+      const auto fail = [&, e = e](const std::exception& error) {
+        std::lock_guard lock(failing);
+        ok = false;
+        failure_ = experiments_[e].name + ": " + error.what();
+      };
       try {
         if (width == 0) {
           std::vector<double> theta(theta_.size());
@@ -110,17 +115,11 @@ bool Problem::evaluate(const double* u, double* residual, double* jacobian, Inte
           evaluate_columns<8>(u, e, first, residual, jacobian, interrupt);
         }
       } catch (const Diverged& error) {
-        std::lock_guard lock(failing);
-        ok = false;
-        failure_ = experiments_[e].name + ": " + error.what();
+        fail(error);
       } catch (const Unconverged& error) {
-        std::lock_guard lock(failing);
-        ok = false;
-        failure_ = experiments_[e].name + ": " + error.what();
+        fail(error);
       } catch (const NoEquilibrium& error) {
-        std::lock_guard lock(failing);
-        ok = false;
-        failure_ = experiments_[e].name + ": " + error.what();
+        fail(error);
       }
     }
   });

@@ -148,10 +148,10 @@ def add_rod(
             wanted = "must be a whole number" + ("" if least is None else f" from {least} on")
             fix = "give whole turns; grips give the rest" if least is None else f"give at least {least}"
             raise SceneError(f"{name}.{option}", wanted, value, fix)
-    for label, damping, stiffness in (("stretch_damping", stretch_damping, EA), ("shear_damping", shear_damping, GA)):
+    for label, damping, of, stiffness in (("stretch", stretch_damping, "EA", EA), ("shear", shear_damping, "GA", GA)):
         if damping is not None and stiffness is None:
-            of = "EA" if label == "stretch_damping" else "GA"
-            raise SceneError(f"{name}.{label}", f"needs a finite {of}", stiffness, f"give {of}, or leave it out")
+            fix = f"give {of}, or leave it out"
+            raise SceneError(f"{name}.{label}_damping", f"needs a finite {of}", stiffness, fix)
     ends = End(name, "start", -1.0, start), End(name, "end", 1.0, end)
     if tilts and ends[0].grip is None and ends[1].grip is None:
         raise SceneError(f"{name}.tilts", "need a grip", tilts, "give start or end")

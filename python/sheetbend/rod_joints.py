@@ -12,6 +12,7 @@ from .quantities import Term
 from .scene import Array, Scene
 
 Factors = tuple[tuple[str, str], ...]
+_INVERSE = {"identity": "inverse", "inverse": "identity"}
 
 
 class Joints:
@@ -102,14 +103,8 @@ class Joints:
             self._scene.add_terms([Term("compliance", first, self._share * weights, factors)])
 
     def _group(self, label: str, kind: str, stiffness: str, stencils: Array, damping: float | None) -> None:
-        scene, group, zero = self._scene, f"{self._name}_{label}", np.zeros(len(stencils))
-        scene.add_constraints(kind, stencils, name=group, compliance=zero, damping=None if damping is None else zero)
-        first = scene.group(group)[1] + np.arange(len(stencils))
-        scene.add_terms([Term("compliance", first, self._share, ((self._length, "identity"), (stiffness, "inverse")))])
-        if damping is not None:
-            tau = scene.add_quantity(f"{group}_damping", damping, "s")
-            factors: Factors = ((tau, "identity"), (stiffness, "identity"), (self._length, "inverse"))
-            scene.add_terms([Term("damping", first, 1.0 / self._share, factors)])
+        compliance = self._share, (self._length, "identity")
+        _add_elastic(self._scene, f"{self._name}_{label}", kind, stencils, compliance, stiffness, damping)
 
 
 def shear(scene: Scene, name: str, stencils: Array, GA: float, damping: float | None) -> None:
@@ -118,17 +113,36 @@ def shear(scene: Scene, name: str, stencils: Array, GA: float, damping: float | 
     Args:
         stencils: (links, 4) the two ends, the section's normal and its director.
     """
-    group, segments = f"{name}_shear", len(stencils)
     scene.add_quantity(f"{name}_GA", GA, "N")
-    zero = np.zeros(segments)
-    scene.add_constraints("shear", stencils, name=group, compliance=zero, damping=None if damping is None else zero)
-    first = scene.group(group)[1] + np.arange(segments)
-    factors: Factors = ((f"{name}_GA", "inverse"), (f"{name}_length", "inverse"))
-    scene.add_terms([Term("compliance", first, float(segments), factors)])
+    compliance = float(len(stencils)), (f"{name}_length", "inverse")
+    _add_elastic(scene, f"{name}_shear", "shear", stencils, compliance, f"{name}_GA", damping)
+
+
+def _add_elastic(
+    scene: Scene,
+    group: str,
+    kind: str,
+    stencils: Array,
+    compliance: tuple[Array | float, tuple[str, str]],
+    stiffness: str,
+    damping: float | None,
+) -> None:
+    """Add constraints of compliance coefficient length^(+-1) / stiffness, damped by a Kelvin-Voigt time constant.
+
+    Args:
+        compliance: the coefficient, and the quantity of the length with its function.
+        stiffness: its quantity.
+        damping: s, of the new quantity `<group>_damping`; None = undamped.
+    """
+    coefficient, (length, power) = compliance
+    zero = np.zeros(len(stencils))
+    scene.add_constraints(kind, stencils, name=group, compliance=zero, damping=None if damping is None else zero)
+    first = scene.group(group)[1] + np.arange(len(stencils))
+    scene.add_terms([Term("compliance", first, coefficient, ((length, power), (stiffness, "inverse")))])
     if damping is not None:
         tau = scene.add_quantity(f"{group}_damping", damping, "s")
-        factors = ((tau, "identity"), (f"{name}_GA", "identity"), (f"{name}_length", "identity"))
-        scene.add_terms([Term("damping", first, 1.0 / segments, factors)])
+        factors: Factors = ((tau, "identity"), (stiffness, "identity"), (length, _INVERSE[power]))
+        scene.add_terms([Term("damping", first, 1.0 / coefficient, factors)])
 
 
 def weigh(scene: Scene, name: str, nodes: Array, segments: int, modes: Sequence[int]) -> None:
