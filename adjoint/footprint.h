@@ -72,6 +72,7 @@ std::size_t block_bytes(const Scene& scene, const DirectBlock& block, int kept_i
   for (const MemberRun& run : block.runs) {
     const Group& group = scene.groups[run.group];
     bytes += of(run.items.size() * sheetbend_blocks::value_count(group.damped, group.parameters));
+    bytes += sizeof(sheetbend_blocks::Run);
   }
   return bytes;
 }

@@ -70,7 +70,7 @@ void begin_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const T
 template <class T>
 void project_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const sheetbend_packs::KernelTable& table,
                        BlockState<T>& state, int iteration, BlockCotangents<T>& bar) {
-  const auto runs = runs_of(s, block, state, &bar.values);
+  const auto& runs = runs_of(s, block, state, &bar.values);
   auto arrays = arrays_of(block, runs, state, iteration);
   arrays.x_bar = bar.x.numbers();
   arrays.z = bar.z.numbers();
@@ -111,7 +111,7 @@ template <class T>
 void refer_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const sheetbend_packs::KernelTable& table,
                      double before, BlockState<T>& state, T* x_bar, T* x_before_bar, BlockCotangents<T>& bar) {
   if (!block.damped) return;
-  const auto runs = runs_of(s, block, state, &bar.values);
+  const auto& runs = runs_of(s, block, state, &bar.values);
   const auto pull_back = [&](typename BlockState<T>::Values& values, double scale, Numbers<T>& rows, T* to) {
     rows.clear();
     if (scale == 0.0) return;

@@ -3,7 +3,7 @@
 //   y = A^-1 (lambda'_bar + J W x'_bar)        s_bar = -y/(1+g)        z = x'_bar - J^T y        dx = W J^T dl
 //   v_j = dl_j W z - y_j dx                    one direction per scalar constraint
 //   x_bar = z + sum_j Hess(C_j) v_j            lambda_bar = lambda'_bar + a s_bar      a_bar = s_bar . lambda'
-//   w_bar_i = (J^T dl)_i . z_i                 g_bar = s_bar . (C - C_r + J dx)        C_r_bar = -g s_bar
+//   w_bar_i = (J^T dl)_i . z_i                 g_bar = -s_bar . (C_r + a lambda')/(1+g) C_r_bar = -g s_bar
 //   p_bar = sum_j -y_j dC_j/dp + v_j . dJ_j/dp
 //
 // Only "solve with A" differs between solvers. Hess(C_j) v_j and the parameter derivatives are one evaluation of the constraint on dual
@@ -24,15 +24,15 @@ struct ElementCotangent {
   T lambda[K::rows]{}, C_r[K::rows]{};
 };
 
-// What does not need second derivatives: C and J dx are the constraint's row j.
+// What does not need second derivatives. C_r is null where nothing is damped; angles have it on the branch next to C.
 template <class K, class T>
-void pull_back_rates(const Element<K, T>& e, const T* lambda, const T* C_r, const T* dl, const T* y, int j, const T& C,
-                     const T& J_dx, ElementCotangent<K, T>& bar) {
-  const T s_bar = -(y[j] * e.rates.scale);
-  bar.a += s_bar * (lambda[j] + dl[j]);
+void pull_back_rates(const Element<K, T>& e, const T* lambda, const T* C_r, const T* dl, const T* y, int j,
+                     ElementCotangent<K, T>& bar) {
+  const T s_bar = -(y[j] * e.rates.scale), lambda_next = lambda[j] + dl[j];
+  bar.a += s_bar * lambda_next;
   bar.lambda[j] += e.rates.a * s_bar;
   if (!C_r) return;
-  bar.g += s_bar * (difference<K>(C, C_r[j]) + J_dx);
+  bar.g -= s_bar * (e.rates.scale * (C_r[j] + e.rates.a * lambda_next));
   bar.C_r[j] -= e.rates.g * s_bar;
 }
 
@@ -48,32 +48,21 @@ void pull_back(const Element<K, T>& e, const Kept<K, T>& at, const T* lambda, co
     else
       return e.w[d / 3] * (dl[j] * z[d] - y[j] * u[d]);
   };
+  T near[K::rows];
   if constexpr (HasGeometry<K>) {
-    T C[1], J_dx(0.0), along[K::dofs];
+    T along[K::dofs];
     unrolled<K::dofs>([&](int d) { along[d] = v(0, d); });
     at.add_hessian_times(along, x_bar);
-    if (C_r) {
-      T J[K::dofs];
-      at.values(e.p, C);
-      at.gradient(J);
-      for (int d = 0; d < K::dofs; ++d) J_dx += J[d] * e.w[d / 3] * u[d];
-    }
-    pull_back_rates(e, lambda, C_r, dl, y, 0, C[0], J_dx, bar);
     for (int k = 0; k < parameter_count<K>; ++k) bar.p[k] += y[k];  // C = f(x) - p
   } else {
     T along[K::rows * K::dofs];
     for (int j = 0; j < K::rows; ++j)
       for (int d = 0; d < K::dofs; ++d) along[j * K::dofs + d] = v(j, d);
     gradients_vjp<K>(at.x, e.p, y, along, x_bar, bar.p);
-    T C[K::rows]{}, J_dx[K::rows]{};
-    if (C_r) {
-      T J[K::rows * K::dofs];
-      K::evaluate(at.x, e.p, C, J);
-      for (int j = 0; j < K::rows; ++j)
-        for (int d = 0; d < K::dofs; ++d) J_dx[j] += J[j * K::dofs + d] * e.w[d / 3] * u[d];
-    }
-    for (int j = 0; j < K::rows; ++j) pull_back_rates(e, lambda, C_r, dl, y, j, C[j], J_dx[j], bar);
+    if constexpr (K::periodic)
+      if (C_r) C_r = on_branch<K>(at.x, e.p, C_r, near);
   }
+  for (int j = 0; j < K::rows; ++j) pull_back_rates(e, lambda, C_r, dl, y, j, bar);
 }
 
 // y = lambda'_bar + J W x'_bar.

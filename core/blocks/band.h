@@ -23,8 +23,8 @@ inline int stored_band(int band) {
 // A row whose pivot is exactly zero (nothing of it can move) gets the solution zero.
 template <class T>
 T inverse_pivot(const T& d) {
-  const auto movable = d > T(0.0);
-  return select(movable, T(1.0) / select(movable, d, T(1.0)), T(0.0));
+  const T inverse = T(1.0) / d;
+  return select(d > T(0.0), inverse, T(0.0));
 }
 
 // Calls f with the band as a constant, or with 0 where it is not among the unrolled ones.
@@ -38,7 +38,8 @@ void with_band(int band, F&& f) {
   }
 }
 
-// Left-looking: a column takes what all columns before it have for it while it stands in registers.
+// Left-looking: a column takes what all columns before it have for it while it stands in registers. Its pivot waits for that of the column
+// before, which therefore comes last, with as little as can be after its division.
 template <int Band, class T>
 void factorize_band(int n, int any_band, T* A, T* inverse) {
   const int band = Band > 0 ? Band : any_band;
@@ -49,12 +50,15 @@ void factorize_band(int n, int any_band, T* A, T* inverse) {
     T sum[(Band > 0 ? Band : max_band) + 1]{};
     for (int i = 0; i <= band; ++i) sum[i] = column[i];
 #pragma GCC unroll 16
-    for (int k = band; k >= 1; --k) {
+    for (int k = band; k >= 2; --k) {
       const T* left = column - static_cast<long>(k) * (band + 1);
       const T l = left[k] * inverse[j - k];
 #pragma GCC unroll 17
       for (int i = k; i <= band; ++i) sum[i - k] -= l * left[i];
     }
+    const T* left = column - (band + 1);
+#pragma GCC unroll 17
+    for (int i = 1; i <= band; ++i) sum[i - 1] -= (left[1] * left[i]) * inverse[j - 1];
     inverse[j] = inverse_pivot(sum[0]);
     for (int i = 0; i <= band; ++i) column[i] = sum[i];
   }

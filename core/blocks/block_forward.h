@@ -4,7 +4,7 @@
 #include <array>
 #include <tuple>
 
-#include "core/blocks/band.h"
+#include "core/blocks/fours.h"
 #include "core/blocks/supernodes.h"
 #include "core/blocks/wide.h"
 #include "core/constraints/registry.h"
@@ -69,44 +69,6 @@ void add_window(const T* G, int count, const T& w, int band, T* column) {
   }
 }
 
-#ifdef __AVX__
-inline constexpr bool has_fours = true;
-#else
-inline constexpr bool has_fours = false;
-#endif
-
-// The same for plain numbers, four entries of a column at a time. What stands above the diagonal there, and below the window, adds a zero.
-template <int Band>
-void add_window_by_fours(const double* G, int count, double w, double* column) {
-  typedef double Four __attribute__((vector_size(32), aligned(8), may_alias));
-  constexpr int fours = Band / 4 + 1;
-  Row x[fours], y[fours], z[fours];
-  for (int c = 0; c < fours; ++c) {
-    Row rows[4];
-    for (int i = 0; i < 4; ++i) rows[i] = 4 * c + i < count ? row_at(G, 16 * c + 4 * i) : Row{};
-    const Row xz01 = __builtin_shufflevector(rows[0], rows[1], 0, 4, 2, 6);
-    const Row xz23 = __builtin_shufflevector(rows[2], rows[3], 0, 4, 2, 6);
-    const Row yw01 = __builtin_shufflevector(rows[0], rows[1], 1, 5, 3, 7);
-    const Row yw23 = __builtin_shufflevector(rows[2], rows[3], 1, 5, 3, 7);
-    x[c] = __builtin_shufflevector(xz01, xz23, 0, 1, 4, 5);
-    y[c] = __builtin_shufflevector(yw01, yw23, 0, 1, 4, 5);
-    z[c] = __builtin_shufflevector(xz01, xz23, 2, 3, 6, 7);
-  }
-#pragma GCC unroll 17
-  for (int k = 0; k <= Band; ++k, column += Band + 1) {
-    if (k >= count) return;
-    const double wx = w * G[4 * k], wy = w * G[4 * k + 1], wz = w * G[4 * k + 2];
-#pragma GCC unroll 5
-    for (int c = k / 4; c < fours; ++c) {
-      Row by = wx * x[c] + wy * y[c] + wz * z[c];
-      if (c == k / 4)
-        for (int i = 0; i < k % 4; ++i) by[i] = 0.0;
-      Four& to = *reinterpret_cast<Four*>(column + 4 * c - k);
-      to += by;
-    }
-  }
-}
-
 // J^T b of one particle.
 template <class T>
 Vec3<T> transpose_times_at(const sheetbend_blocks::Block& block, int particle, const T* b) {
@@ -145,7 +107,10 @@ struct ForwardKernels {
         else
           add_window(rows, count, w, band, to);
       }
-      factorize_band<Band>(b.size, band, A, inverse);
+      if constexpr (members_in_lanes<T> && has_fours && Band >= least_band_in_fours)
+        factorize_band_by_fours<Band>(b.size, A, inverse);
+      else
+        factorize_band<Band>(b.size, band, A, inverse);
     });
   }
 

@@ -17,6 +17,7 @@
 //   `unit_gradients = true` (one row): |dC/dx_k| = 1 on every particle k whatever x is. Then J W J^T = sum w, and its derivative,
 //     2 Hess(C) W J^T, is zero.
 //   `offsets = m`: the last m parameters are subtracted from the first m rows, so the reverse knows their derivatives.
+//   `factors = 1`: the first parameter multiplies all of the last row but what is subtracted, so the reverse knows its derivatives too.
 //   template <class T> struct Geometry: what the reverse can use in place of x and dual numbers, where the parameters are
 //     subtracted, C = f(x) - p. It has `size` numbers, Geometry(x), keep(to), kept(from), values(p, C), gradient(J) and
 //     add_hessian_times(v, out) for one row. See distance.h.
@@ -37,7 +38,7 @@ struct OnPoints {
   static constexpr int arity = Arity;
   static constexpr int dofs = 3 * Arity;
   static constexpr int points = Arity;
-  static constexpr int offsets = 0;
+  static constexpr int offsets = 0, factors = 0;
   static constexpr bool periodic = false;
   static constexpr bool unilateral = false;
   static constexpr bool unit_gradients = false;

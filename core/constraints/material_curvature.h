@@ -14,7 +14,7 @@ template <class Stencil>
 struct CurvatureInFrames : Stencil {
   static constexpr int rows = 2;
   static constexpr std::array<const char*, 3> parameters{"ratio", "rest_1", "rest_2"};
-  static constexpr int offsets = 2;
+  static constexpr int offsets = 2, factors = 1;
 
   template <class T>
   static void evaluate(const T* x, const T* p, T* C, T* J) {

@@ -49,10 +49,7 @@ template <class T>
 void add_to_history(const Bdf& bdf, const T* now, const T* before, double c, const T* more, T* out) {
   const double *a = numbers_of_point(now), *b = numbers_of_point(before), *m = numbers_of_point(more);
   double* __restrict to = numbers_of_point(out);
-  if (bdf.before == 0.0)
-    for (int i = 0; i < numbers_per_point<T>; ++i) to[i] = a[i] + c * m[i];
-  else
-    for (int i = 0; i < numbers_per_point<T>; ++i) to[i] = (bdf.now * a[i] + bdf.before * b[i]) + c * m[i];
+  for (int i = 0; i < numbers_per_point<T>; ++i) to[i] = history(bdf, a[i], b[i]) + c * m[i];
 }
 
 // Value of something given at knots, (knots, slots, 3), for one slot.

@@ -42,6 +42,7 @@ struct BlockState {
   std::vector<Iteration> iterations;
   std::vector<Numbers<T>> x, lambda;  // before each iteration and after the last; one of each where nothing is kept
   std::vector<Numbers<T>> values;     // per run
+  std::vector<sheetbend_blocks::Run> runs;
   Numbers<T> C_r, diagonal;
   // What damped constraints are at a state that damping refers to.
   struct Values {
@@ -86,6 +87,7 @@ void BlockState<T>::resize(const Scene& scene, const DirectBlock& block, int kep
     v->x.assign(particles);
     v->C.assign(block.size());
   }
+  runs.reserve(block.runs.size());
   values.resize(block.runs.size());
   for (std::size_t r = 0; r < values.size(); ++r) {
     const Group& group = scene.groups[block.runs[r].group];
@@ -138,18 +140,19 @@ void begin_block(const SubstepState<T>& s, const DirectBlock& block, BlockState<
     for (int row = 0; row < block.size(); ++row) state.C_r[row] = s.C_r[block.multipliers[row]];
 }
 
-// The runs of a block; the reverse gives cotangents for their values.
+// The runs of a block; the reverse gives cotangents for their values. They stand in the state, so that a substep allocates nothing.
 template <class T>
-std::vector<sheetbend_blocks::Run> runs_of(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state,
-                                           std::vector<Numbers<T>>* values_bar = nullptr) {
-  std::vector<sheetbend_blocks::Run> runs;
+const std::vector<sheetbend_blocks::Run>& runs_of(const SubstepState<T>& s, const DirectBlock& block,
+                                                  BlockState<T>& state, std::vector<Numbers<T>>* values_bar = nullptr) {
+  state.runs.clear();
   for (std::size_t r = 0; r < block.runs.size(); ++r) {
     const MemberRun& run = block.runs[r];
     const Group& group = s.scene.groups[run.group];
-    runs.push_back({group.kind, run.count, group.damped, run.nodes.data(), run.gradients.data(), run.first_row.data(),
-                    state.values[r].numbers(), values_bar ? (*values_bar)[r].numbers() : nullptr});
+    state.runs.push_back({group.kind, run.count, group.damped, run.nodes.data(), run.gradients.data(),
+                          run.first_row.data(), state.values[r].numbers(),
+                          values_bar ? (*values_bar)[r].numbers() : nullptr});
   }
-  return runs;
+  return state.runs;
 }
 
 template <class T>
@@ -237,7 +240,7 @@ template <class T>
 void refer_block(const SubstepState<T>& s, const DirectBlock& block, const sheetbend_packs::KernelTable& table,
                  double before, const SubstepStates<T>& states, BlockState<T>& state) {
   if (!block.damped) return;
-  const auto runs = runs_of(s, block, state);
+  const auto& runs = runs_of(s, block, state);
   const auto find = [&](typename BlockState<T>::Values& values, const T* at, int step) {
     if (step >= 0 && values.step == step) return;
     values.step = step;
@@ -262,7 +265,7 @@ template <class T>
 void project_block(const SubstepState<T>& s, const DirectBlock& block, const sheetbend_packs::KernelTable& table,
                    BlockState<T>& state, int iteration) {
   const auto& kernels = forward_kernels<Plain<T>>(table);
-  const auto runs = runs_of(s, block, state);
+  const auto& runs = runs_of(s, block, state);
   const auto arrays = arrays_of(block, runs, state, iteration);
   kernels.evaluate(arrays);
   if (block.banded()) {

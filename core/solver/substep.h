@@ -179,8 +179,7 @@ bool read_off(const Scene& scene, const Bdf& bdf, const SubstepStates<T>& s, int
         const double* b = numbers_of_point(s.x_before + dof);
         double* __restrict rates = numbers_of_point(v + dof);
         for (int i = 0; i < numbers_per_point<T>; ++i) {
-          const double past = bdf.before == 0.0 ? a[i] : bdf.now * a[i] + bdf.before * b[i];
-          rates[i] = rate * (now[i] - past);
+          rates[i] = rate * (now[i] - history(bdf, a[i], b[i]));
           difference[i] += now[i] - now[i];
         }
         if (x_next + dof != q.of(n)) std::copy_n(q.of(n), 3, x_next + dof);

@@ -4,6 +4,7 @@
 
 #include <Eigen/Dense>
 
+#include "core/blocks/fours.h"
 #include "core/element/small_ldlt.h"
 #include "core/scalar/dual.h"
 #include "core/scalar/pack.h"
@@ -171,6 +172,25 @@ TEST_P(FactorOf, RowsOfZerosGetZero) {
   const Eigen::VectorXd expected = regular.partialPivLu().solve(b);
   for (const int k : {0, 17, n - 1}) EXPECT_EQ(x[k], 0.0) << "row " << k;
   EXPECT_LE(relative_error(x, {expected.data(), static_cast<std::size_t>(n)}), 1e-13);
+}
+
+// Also with rows of zeros, at the ends and inside.
+TEST(Factor, ByFoursHasTheSameBits) {
+  constexpr int band = 10;
+  for (const int n : {1, 9, 11, 60}) {
+    const FactorStructure s(n, testing::band<band>(n));
+    Eigen::MatrixXd A = random_matrix(n, testing::band<band>(n), n);
+    for (const int k : {0, 5, n - 1})
+      if (n > 20) A.row(k).setZero(), A.col(k).setZero();
+    std::vector<double> values((n + band) * (band + 1) + band_padding), inverse(n + band);
+    for (int j = 0; j < n; ++j)
+      for (int i = j; i < std::min(n, j + band + 1); ++i) values[(band + j) * (band + 1) + i - j] = A(i, j);
+    auto fours = values, fours_inverse = inverse;
+    factorize_band<band>(n, band, values.data(), inverse.data());
+    factorize_band_by_fours<band>(n, fours.data(), fours_inverse.data());
+    EXPECT_TRUE(same_bits(fours, values)) << n;
+    EXPECT_TRUE(same_bits(fours_inverse, inverse)) << n;
+  }
 }
 
 TEST(Factor, CanBeUsedAgain) {
