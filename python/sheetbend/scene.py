@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -12,33 +11,19 @@ from numpy.typing import ArrayLike
 
 from .air import Air
 from .boundary import Boundary
-from .checks import finite, index_array, indices, per_item, points
+from .checks import finite, indices, per_item, points
 from .column import Column
 from .compiled import CompiledScene
 from .errors import SceneError
 from .forces import Forces
 from .frames import Frame, directors_of, normals_of
-from .kinds import KINDS, NEEDS_COMPLIANCE, UNITS, VISCOUS_COMPLIANCE
+from .group import Group, make_group
+from .kinds import KINDS, UNITS
 from .quantities import Quantity, Term, product
-from .rest_values import rest_values
 from .scene_checks import validate
 from .volume import Volumes
 
 Array = np.ndarray
-
-
-@dataclass(frozen=True)
-class Group:
-    """A named set of constraints of one kind: particles (count, arity), base compliance and damping (count,), rest
-    (count, parameters)."""
-
-    name: str
-    kind: str
-    particles: Array
-    compliance: Array
-    damping: Array
-    damped: bool
-    rest: Array
 
 
 class Scene:
@@ -213,39 +198,24 @@ class Scene:
         name = name or kind
         if any(g.name == name for g in self.groups):
             raise SceneError("name", "is taken by another group", name, "give each group a name of its own")
-        arity = KINDS[kind]["arity"]
-        flat = index_array(f"{name}.particles", particles, self.particle_count)
-        if np.ndim(particles) != 2 or np.shape(particles)[1] != arity:
-            raise SceneError(
-                f"{name}.particles", "have the wrong shape", np.shape(particles), f"give (count, {arity}) for {kind}"
-            )
-        stencil = flat.reshape(-1, arity)
-        count = len(stencil)
-        if viscosity is not None:
-            if compliance is not None or damping is not None:
-                raise SceneError(
-                    f"{name}.viscosity", "excludes compliance and damping", viscosity, "give one or the other"
-                )
-            compliance, damping, label = np.full(count, VISCOUS_COMPLIANCE), viscosity, "viscosity"
-        else:
-            compliance, label = 0.0 if compliance is None else compliance, "damping"
-        alpha = per_item(f"{name}.compliance", compliance, count)
-        beta = per_item(f"{name}.{label}", 0.0 if damping is None else damping, count)
-        for field, values in (("compliance", alpha), (label, beta)):
-            if (values < 0).any():
-                raise SceneError(f"{name}.{field}", "must not be negative", float(values.min()), "give zero or more")
-        if kind in NEEDS_COMPLIANCE and not (alpha > 0).all():
-            why = "is rigid, and a straight rigid joint has a singular projection (rank 2 of 3)"
-            raise SceneError(
-                f"{name}.compliance", why, float(alpha.min()), "give a positive compliance, Voronoi length / EI"
-            )
-        values = rest_values(name, kind, KINDS[kind]["parameters"], self.positions[stencil], rest, normal)
+        group = make_group(
+            name,
+            kind,
+            particles,
+            self.positions,
+            compliance=compliance,
+            damping=damping,
+            viscosity=viscosity,
+            rest=rest,
+            normal=normal,
+        )
         first = sum(len(g.particles) for g in self.groups)
-        self.groups.append(Group(name, kind, stencil, alpha, beta, damping is not None, values))
-        if np.ndim(compliance) == 0 and alpha[0] > 0:
-            self._scalar(f"{name}_compliance", "compliance", first, alpha, kind)
-        if damping is not None and np.ndim(damping) == 0:
-            self._scalar(f"{name}_{label}", "damping", first, beta, kind)
+        self.groups.append(group)
+        if compliance is not None and np.ndim(compliance) == 0 and group.compliance[0] > 0:
+            self._scalar(f"{name}_compliance", "compliance", first, group.compliance, kind)
+        for label, given in (("damping", damping), ("viscosity", viscosity)):
+            if given is not None and np.ndim(given) == 0:
+                self._scalar(f"{name}_{label}", "damping", first, group.damping, kind)
         return name
 
     def add_quantity(
