@@ -32,16 +32,17 @@ struct TapePlan {
   std::size_t working() const { return inputs + frames + plan + forward + reverse + heap; }
 };
 
-// `scenes` rollouts with `frames` states each, of a scalar T; a vector of scenes is one scalar. `border` counts the arrays that the caller holds
-// in plain numbers: inputs, gradient, states and their cotangents.
+// `scenes` rollouts with `frames` states each, of a scalar T; a vector of scenes is one scalar. What the caller holds of all of them is counted:
+// inputs, gradient, states and their cotangents, with the tangents that T has.
 template <class T>
 TapePlan plan_tape(const Scene& scene, const Plan& plan, int steps, std::size_t frames, std::size_t scenes,
                    std::size_t budget) {
   TapePlan p;
   p.steps = steps;
   const std::size_t dofs = scene.dofs(), total = scene.layout.total();
-  p.inputs = 2 * sizeof(double) * scenes * total;
-  p.frames = 2 * sizeof(double) * scenes * frames * dofs;
+  const std::size_t number = sizeof(T) / lanes_of<T>;
+  p.inputs = 2 * number * scenes * total;
+  p.frames = 2 * number * scenes * frames * dofs;
   if constexpr (!std::is_same_v<T, double>) {
     p.lanes = static_cast<int>(lanes_of<T>);
     const std::size_t packs = (scenes + lanes_of<T> - 1) / lanes_of<T>;

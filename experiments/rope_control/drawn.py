@@ -44,7 +44,7 @@ def _picture(panel, task: Task, best: Array) -> None:
         line = lines[round(share * last)]
         panel.plot(*line.T, color=ACCENT, alpha=0.15 + 0.85 * share**2, lw=1.0 + 0.8 * share)
     for node in rope.particles:
-        if int(node) in control.scene.driven:
+        if int(node) in control.scene.boundary.driven:
             panel.plot(*_seen(motion[:, node]).T, color=INK, lw=1.4)
             panel.plot(*_seen(motion[-1, node]), "o", color=INK, ms=4)
     target = np.atleast_2d(_seen(task.target))

@@ -67,7 +67,7 @@ class Control:
         Args:
             reach, acceleration: root mean squares over time that cost an effort of 1 each, in units and per s^2.
         """
-        places = self.motion.places(self.scene.boundary_times)
+        places = self.motion.places(self.scene.boundary.times)
         for k in range(self.motion.knots):
             knot = self.scene.add_quantity(f"{name}_{k + 1}", 0.0, unit, positive=False, scale=reach)
             for particle, vector in moved.items():

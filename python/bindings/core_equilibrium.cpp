@@ -1,7 +1,10 @@
 // Static equilibrium from Python: the solution and its derivative.
 #include "core/equilibrium/equilibrium.h"
 
+#include <algorithm>
+#include <functional>
 #include <memory>
+#include <numeric>
 #include <optional>
 
 #include "adjoint/equilibrium_vjp.h"
@@ -58,41 +61,63 @@ py::array_t<double> vjp(const Solution& s, const std::optional<Array>& x_bar, co
   return to_numpy(bar, {static_cast<py::ssize_t>(bar.size())});
 }
 
+// Calls f(derivative, b) for every solution of a batch, spread over threads. A solution that stands there again, as under jacrev and jacfwd,
+// serves with its factors at hand.
+template <class F>
+void for_each_derivative(const std::vector<const Solution*>& solutions, int threads, F&& f) {
+  std::vector<std::size_t> order(solutions.size());
+  std::iota(order.begin(), order.end(), 0);
+  const auto at = [&](std::size_t i) { return solutions[order[i]]; };
+  std::ranges::stable_sort(order, std::less<>(), [&](std::size_t b) { return solutions[b]; });
+  py::gil_scoped_release release;
+  SignalInterrupt interrupt;
+  parallel_for(static_cast<int>(order.size()), threads, 1, [&](int begin, int end) {
+    std::optional<EquilibriumDerivative> derivative;
+    for (int i = begin; i < end; ++i) {
+      interrupt.poll();
+      if (i == begin || at(i) != at(i - 1)) derivative.emplace(*at(i)->scene, at(i)->inputs.data(), at(i)->at);
+      f(*derivative, order[i]);
+    }
+  });
+}
+
+// The scene of a batch of solutions.
+const Scene& scene_of(const std::vector<const Solution*>& solutions) {
+  if (solutions.empty()) throw std::invalid_argument("solutions: empty. Fix: give at least one");
+  return *solutions[0]->scene;
+}
+
 // Gradients (B, total) from cotangents (B, dofs + rows) of coordinates and multipliers.
 py::array_t<double> vjp_batch(const std::vector<const Solution*>& solutions, const Array& bar, int threads) {
-  if (solutions.empty()) throw std::invalid_argument("solutions: empty. Fix: give at least one");
-  const Scene& scene = *solutions[0]->scene;
-  const std::size_t total = scene.layout.total(), size = scene.dofs() + scene.rows;
+  const Scene& scene = scene_of(solutions);
+  const std::size_t total = scene.layout.total(), dofs = scene.dofs(), size = dofs + scene.rows;
   expect_size(bar, solutions.size() * size, "bar");
   py::array_t<double> out({solutions.size(), total});
   double* inputs_bar = out.mutable_data();
   std::fill_n(inputs_bar, out.size(), 0.0);
   const double* from = bar.data();
-  py::gil_scoped_release release;
-  parallel_for(static_cast<int>(solutions.size()), threads, 1, [&](int begin, int end) {
-    for (int b = begin; b < end; ++b)
-      EquilibriumDerivative(scene, solutions[b]->inputs.data(), solutions[b]->at)
-          .vjp(from + b * size, from + b * size + scene.dofs(), inputs_bar + b * total);
+  for_each_derivative(solutions, threads, [&](const EquilibriumDerivative& derivative, std::size_t b) {
+    derivative.vjp(from + b * size, from + b * size + dofs, inputs_bar + b * total);
   });
   return out;
 }
 
-// (x_dot, lambda_dot) along one direction of the inputs.
-py::tuple jvp(const Solution& s, const Array& inputs_dot) {
+// Tangents (B, dofs + rows) of coordinates and multipliers, each along a direction (B, total) of its own.
+py::array_t<double> jvp_batch(const std::vector<const Solution*>& solutions, const Array& inputs_dot, int threads) {
   using D = Dual<double, 1>;
-  expect_size(inputs_dot, s.inputs.size(), "inputs_dot");
-  std::vector<D> in(s.inputs.begin(), s.inputs.end()), x(s.scene->dofs()), lambda(s.scene->rows);
-  for (std::size_t i = 0; i < in.size(); ++i) in[i].d[0] = inputs_dot.data()[i];
-  {
-    py::gil_scoped_release release;
-    EquilibriumDerivative(*s.scene, s.inputs.data(), s.at).jvp(in.data(), x.data(), lambda.data());
-  }
-  const auto tangents = [](const std::vector<D>& a) {
-    py::array_t<double> out(static_cast<py::ssize_t>(a.size()));
-    for (std::size_t i = 0; i < a.size(); ++i) out.mutable_data()[i] = a[i].d[0];
-    return out;
-  };
-  return py::make_tuple(tangents(x), tangents(lambda));
+  const Scene& scene = scene_of(solutions);
+  const std::size_t total = scene.layout.total(), dofs = scene.dofs(), size = dofs + scene.rows;
+  expect_size(inputs_dot, solutions.size() * total, "inputs_dot");
+  py::array_t<double> out({solutions.size(), size});
+  double* tangents = out.mutable_data();
+  const double* along = inputs_dot.data();
+  for_each_derivative(solutions, threads, [&](const EquilibriumDerivative& derivative, std::size_t b) {
+    std::vector<D> in(solutions[b]->inputs.begin(), solutions[b]->inputs.end()), states(size);
+    for (std::size_t i = 0; i < total; ++i) in[i].d[0] = along[b * total + i];
+    derivative.jvp(in.data(), states.data(), states.data() + dofs);
+    for (std::size_t i = 0; i < size; ++i) tangents[b * size + i] = states[i].d[0];
+  });
+  return out;
 }
 
 }  // namespace
@@ -110,13 +135,13 @@ void bind_equilibrium(py::module_& m) {
       .def_property_readonly("unstable_modes", [](const Solution& s) { return s.at.unstable_modes; })
       .def_property_readonly("converged", [](const Solution& s) { return s.at.converged; })
       .def_property_readonly("message", [](const Solution& s) { return s.at.message; })
-      .def("vjp", &vjp, py::arg("x_bar") = py::none(), py::arg("lambda_bar") = py::none())
-      .def("jvp", &jvp, py::arg("inputs_dot"));
+      .def("vjp", &vjp, py::arg("x_bar") = py::none(), py::arg("lambda_bar") = py::none());
   m.def("equilibrium", &solve, py::arg("scene"), py::arg("inputs"), py::arg("start") = py::none(),
         py::arg("stable") = true);
   m.def("equilibria", &solve_batch, py::arg("scene"), py::arg("inputs"), py::arg("start") = py::none(),
         py::arg("stable") = true, py::arg("threads") = 1);
   m.def("equilibria_vjp", &vjp_batch, py::arg("solutions"), py::arg("bar"), py::arg("threads") = 1);
+  m.def("equilibria_jvp", &jvp_batch, py::arg("solutions"), py::arg("inputs_dot"), py::arg("threads") = 1);
 }
 
 }  // namespace sheetbend::bindings

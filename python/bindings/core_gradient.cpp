@@ -1,21 +1,10 @@
-// Gradients from Python: tapes and what they will cost, VJPs and second derivatives, single and in lanes. `memory` is a budget in bytes, None
-// without one. Shapes as in core_rollout.cpp.
-#include <optional>
-
+// Gradients from Python: tapes and what they will cost, VJPs, single and in lanes. `memory` is a budget in bytes, None without one. Shapes as in
+// core_rollout.cpp.
 #include "adjoint/rollout.h"
-#include "adjoint/tape_plan.h"
-#include "core/scalar/dual.h"
 #include "python/bindings/solver.h"
 
 namespace sheetbend::bindings {
 namespace {
-
-using Memory = std::optional<std::size_t>;
-
-template <class T>
-TapePlan plan_of(const Solver& s, const Steps& steps, std::size_t scenes, const Memory& memory) {
-  return plan_tape<T>(*s.scene, s.plan, steps.back(), steps.size(), scenes, memory.value_or(no_budget));
-}
 
 TapePlan tape_plan(const Solver& s, const Steps& steps, std::size_t scenes, const Memory& memory) {
   return scenes == 1 ? plan_of<double>(s, steps, 1, memory) : plan_of<Pack>(s, steps, scenes, memory);
@@ -47,35 +36,6 @@ py::array_t<double> vjp(const Solver& s, const Array& inputs, Tape<double>& tape
   SignalInterrupt interrupt;
   reverse_rollout(*s.scene, s.plan, inputs.data(), t0, tape, steps, x_bar.data(), inputs_bar, &interrupt);
   return out;
-}
-
-// Forward over reverse: the VJP and its derivative along (inputs_dot, x_bar_dot).
-py::tuple vjp_dot(const Solver& s, const Array& inputs, const Array& inputs_dot, const Steps& steps, const Array& x_bar,
-                  const Array& x_bar_dot, double t0, const Memory& memory) {
-  using D = Dual<double, 1>;
-  check(s, inputs, 1, steps);
-  const std::size_t total = s.scene->layout.total(), size = steps.size() * s.scene->dofs();
-  expect_size(inputs_dot, total, "inputs_dot");
-  expect_size(x_bar, size, "x_bar");
-  expect_size(x_bar_dot, size, "x_bar_dot");
-  const TapePlan plan = plan_of<D>(s, steps, 1, memory);
-  auto values = empty({total}), derivatives = empty({total});
-  double *value = values.mutable_data(), *derivative = derivatives.mutable_data();
-  {
-    Release release;
-    SignalInterrupt interrupt;
-    const auto duals = [](const Array& v, const Array& d) {
-      std::vector<D> out(v.data(), v.data() + v.size());
-      for (std::size_t i = 0; i < out.size(); ++i) out[i].d[0] = d.data()[i];
-      return out;
-    };
-    const std::vector<D> in = duals(inputs, inputs_dot), seed = duals(x_bar, x_bar_dot);
-    std::vector<D> x(size), bar(total);
-    auto tape = record_rollout(*s.scene, s.plan, in.data(), t0, steps, x.data(), plan.states, &interrupt);
-    reverse_rollout(*s.scene, s.plan, in.data(), t0, tape, steps, seed.data(), bar.data(), &interrupt);
-    for (std::size_t i = 0; i < total; ++i) value[i] = bar[i].v, derivative[i] = bar[i].d[0];
-  }
-  return py::make_tuple(values, derivatives);
 }
 
 // Records and reverses a batch, eight scenes at a time. seed(pack, x) makes cotangents of the states x (frames of the pack, dofs).
@@ -156,8 +116,6 @@ void bind_gradient(py::module_& m, py::class_<Solver>& solver) {
   solver.def("tape_plan", &tape_plan, py::arg("steps"), py::arg("scenes") = 1, py::arg("memory") = py::none())
       .def("record", &record, py::arg("inputs"), py::arg("steps"), py::arg("t0"), py::arg("memory") = py::none())
       .def("vjp", &vjp, py::arg("inputs"), py::arg("tape"), py::arg("steps"), py::arg("x_bar"), py::arg("t0"))
-      .def("vjp_dot", &vjp_dot, py::arg("inputs"), py::arg("inputs_dot"), py::arg("steps"), py::arg("x_bar"),
-           py::arg("x_bar_dot"), py::arg("t0"), py::arg("memory") = py::none())
       .def("vjp_batch", &vjp_batch, py::arg("inputs"), py::arg("steps"), py::arg("x_bar"), py::arg("t0"),
            py::arg("memory") = py::none(), py::arg("lengths") = Lengths())
       .def("misfit_batch", &misfit_batch, py::arg("inputs"), py::arg("steps"), py::arg("targets"), py::arg("t0"),

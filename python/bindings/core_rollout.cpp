@@ -1,11 +1,9 @@
-// Rollouts from Python: forward, JVP and batches in lanes. Shapes: inputs (total,), states (wanted, dofs); a batch has a leading dimension.
+// Rollouts from Python: forward, and batches in lanes. Shapes: inputs (total,), states (wanted, dofs); a batch has a leading dimension.
 #include <algorithm>
 #include <functional>
 #include <numeric>
 
 #include "adjoint/rollout.h"
-#include "core/scalar/complex.h"
-#include "core/scalar/dual.h"
 #include "python/bindings/solver.h"
 
 namespace sheetbend::bindings {
@@ -69,52 +67,6 @@ py::array_t<double> states(const Solver& s, const Array& inputs, const Steps& st
   return out;
 }
 
-py::tuple jvp(const Solver& s, const Array& inputs, const Array& inputs_dot, const Steps& steps, double t0) {
-  using D = Dual<double, 8>;
-  check(s, inputs, 1, steps);
-  const std::size_t total = s.scene->layout.total(), dofs = s.scene->dofs(), size = steps.size() * dofs;
-  const std::size_t columns = static_cast<std::size_t>(inputs_dot.size()) / total;
-  expect_size(inputs_dot, columns * total, "inputs_dot");
-  auto values = empty({steps.size(), dofs}), tangents = empty({columns, steps.size(), dofs});
-  double *x = values.mutable_data(), *x_dot = tangents.mutable_data();
-  {
-    Release release;
-    SignalInterrupt interrupt;
-    std::vector<D> in(total), out(size);
-    for (std::size_t first = 0; first < columns; first += 8) {
-      const std::size_t width = std::min<std::size_t>(8, columns - first);
-      for (std::size_t i = 0; i < total; ++i) {
-        in[i] = D(inputs.data()[i]);
-        for (std::size_t k = 0; k < width; ++k) in[i].d[k] = inputs_dot.data()[(first + k) * total + i];
-      }
-      rollout_states(*s.scene, s.plan, in.data(), t0, steps, out.data(), &interrupt);
-      for (std::size_t i = 0; i < size; ++i) {
-        x[i] = out[i].v;
-        for (std::size_t k = 0; k < width; ++k) x_dot[(first + k) * size + i] = out[i].d[k];
-      }
-    }
-  }
-  return py::make_tuple(values, tangents);
-}
-
-// Derivative of the states along one direction by complex step: an independent path for checks.
-py::array_t<double> complex_step(const Solver& s, const Array& inputs, const Array& direction, const Steps& steps,
-                                 double t0) {
-  check(s, inputs, 1, steps);
-  expect_size(direction, s.scene->layout.total(), "direction");
-  constexpr double step = 1e-40;
-  const std::size_t dofs = s.scene->dofs();
-  auto out = empty({steps.size(), dofs});
-  double* x_dot = out.mutable_data();
-  Release release;
-  SignalInterrupt interrupt;
-  std::vector<Complex> in(inputs.data(), inputs.data() + inputs.size()), x(steps.size() * dofs);
-  for (std::size_t i = 0; i < in.size(); ++i) in[i].im = step * direction.data()[i];
-  rollout_states(*s.scene, s.plan, in.data(), t0, steps, x.data(), &interrupt);
-  for (std::size_t i = 0; i < x.size(); ++i) x_dot[i] = x[i].im / step;
-  return out;
-}
-
 // States (B, F, dofs) of a batch; after its own last frame a scene stands still.
 py::array_t<double> simulate_batch(const Solver& s, const Array& inputs, const Steps& steps, double t0,
                                    const Lengths& lengths) {
@@ -159,26 +111,31 @@ void PackOfScenes::from_lanes(const std::vector<Pack>& lanes, double* data, std:
     for (std::size_t i = 0; i < lanes.size(); ++i) data[scene[k] * stride + i] = lanes[i][k];
 }
 
-std::vector<PackOfScenes> packs_of(std::size_t batch, const Steps& steps, const Lengths& lengths) {
+Lengths frames_of(std::size_t batch, const Steps& steps, const Lengths& lengths) {
   const int frames = static_cast<int>(steps.size());
-  if (!lengths.empty() && lengths.size() != batch)
+  if (lengths.empty()) return Lengths(batch, frames);
+  if (lengths.size() != batch)
     throw std::invalid_argument("lengths: got " + std::to_string(lengths.size()) + ". Fix: give one for each of " +
                                 std::to_string(batch) + " scenes");
   for (const int length : lengths)
     if (length < 1 || length > frames)
       throw std::invalid_argument("lengths: got " + std::to_string(length) + ". Fix: give 1 to " +
                                   std::to_string(frames) + " frames");
-  const auto length_of = [&](std::size_t scene) { return lengths.empty() ? frames : lengths[scene]; };
+  return lengths;
+}
+
+std::vector<PackOfScenes> packs_of(const Lengths& frames) {
+  const std::size_t batch = frames.size();
   std::vector<std::size_t> order(batch);
   std::iota(order.begin(), order.end(), 0);
-  std::ranges::stable_sort(order, std::greater<>(), length_of);
+  std::ranges::stable_sort(order, std::greater<>(), [&](std::size_t scene) { return frames[scene]; });
   std::vector<PackOfScenes> packs;
   for (std::size_t first = 0; first < batch; first += Pack::lanes) {
     PackOfScenes& pack = packs.emplace_back();
     pack.count = static_cast<int>(std::min<std::size_t>(Pack::lanes, batch - first));
     for (int k = 0; k < Pack::lanes; ++k) {
       pack.scene[k] = order[std::min(first + k, batch - 1)];
-      pack.length[k] = length_of(pack.scene[k]);
+      pack.length[k] = frames[pack.scene[k]];
     }
     pack.frames = pack.length[0];
   }
@@ -193,8 +150,6 @@ void bind_rollout(py::module_& m) {
            py::arg("cg_iterations"))
       .def("simulate", &simulate, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
       .def("states", &states, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
-      .def("jvp", &jvp, py::arg("inputs"), py::arg("inputs_dot"), py::arg("steps"), py::arg("t0"))
-      .def("complex_step", &complex_step, py::arg("inputs"), py::arg("direction"), py::arg("steps"), py::arg("t0"))
       .def("simulate_batch", &simulate_batch, py::arg("inputs"), py::arg("steps"), py::arg("t0"),
            py::arg("lengths") = Lengths())
       .def_property_readonly("blocks",
@@ -206,6 +161,7 @@ void bind_rollout(py::module_& m) {
                              })
       .def_property_readonly("colors", [](const Solver& s) { return s.plan.colors.size(); });
   bind_gradient(m, solver);
+  bind_tangents(solver);
 }
 
 }  // namespace sheetbend::bindings

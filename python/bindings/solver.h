@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 
+#include "adjoint/tape_plan.h"
 #include "core/scalar/pack.h"
 #include "core/solver/plan.h"
 #include "core/threads/pool.h"
@@ -41,9 +43,30 @@ inline py::array_t<double> zeros(std::vector<std::size_t> shape) {
 }
 
 void bind_gradient(py::module_& m, py::class_<Solver>& solver);
+void bind_tangents(py::class_<Solver>& solver);
 
-// How many of the frames each scene of a batch has; all of them where it is empty.
+using Memory = std::optional<std::size_t>;
+
+template <class T>
+TapePlan plan_of(const Solver& s, const Steps& steps, std::size_t scenes, const Memory& memory) {
+  return plan_tape<T>(*s.scene, s.plan, steps.back(), steps.size(), scenes, memory.value_or(no_budget));
+}
+
+// How many of the frames each scene of a batch has; from Python all of them where it is empty.
 using Lengths = std::vector<int>;
+
+// One for each scene. Throws std::invalid_argument where the lengths do not fit.
+Lengths frames_of(std::size_t batch, const Steps& steps, const Lengths& lengths);
+
+// Calls f(i, interrupt) for every i < count, over the solver's threads and without the interpreter's lock.
+template <class F>
+void over_threads(const Solver& s, std::size_t count, F&& f) {
+  Release release;
+  SignalInterrupt interrupt;
+  parallel_for(static_cast<int>(count), s.plan.options.threads, 1, [&](int begin, int end) {
+    for (int i = begin; i < end; ++i) f(i, &interrupt);
+  });
+}
 
 // Eight scenes of a batch that go through one rollout; lanes that are left over repeat one of them.
 struct PackOfScenes {
@@ -57,22 +80,18 @@ struct PackOfScenes {
   void from_lanes(const std::vector<Pack>& lanes, double* data, std::size_t stride) const;
 };
 
-// Scenes of like length go together. Throws std::invalid_argument where the lengths do not fit.
-std::vector<PackOfScenes> packs_of(std::size_t batch, const Steps& steps, const Lengths& lengths);
+// Scenes of like length go together.
+std::vector<PackOfScenes> packs_of(const Lengths& frames);
 
-// Calls f(pack, inputs, steps, interrupt) for every eight scenes of a batch, packs over threads and without the interpreter's lock.
+// Calls f(pack, inputs, steps, interrupt) for every eight scenes of a batch.
 template <class F>
 void for_each_pack(const Solver& s, const double* inputs, std::size_t batch, const Steps& steps, const Lengths& lengths,
                    F&& f) {
-  const std::vector<PackOfScenes> packs = packs_of(batch, steps, lengths);
-  Release release;
-  SignalInterrupt interrupt;
+  const std::vector<PackOfScenes> packs = packs_of(frames_of(batch, steps, lengths));
   const std::size_t total = s.scene->layout.total();
-  parallel_for(static_cast<int>(packs.size()), s.plan.options.threads, 1, [&](int begin, int end) {
-    for (int p = begin; p < end; ++p) {
-      const Steps own(steps.begin(), steps.begin() + packs[p].frames);
-      f(packs[p], packs[p].to_lanes(inputs, total, total), own, &interrupt);
-    }
+  over_threads(s, packs.size(), [&](int p, Interrupt* interrupt) {
+    const Steps own(steps.begin(), steps.begin() + packs[p].frames);
+    f(packs[p], packs[p].to_lanes(inputs, total, total), own, interrupt);
   });
 }
 

@@ -117,16 +117,6 @@ class Solver:
         self, inputs: ArrayLike, steps: Sequence[int], t0: float, memory: int | None = None
     ) -> tuple[Array, Tape]: ...  # (frames, dofs)
     def vjp(self, inputs: ArrayLike, tape: Tape, steps: Sequence[int], x_bar: ArrayLike, t0: float) -> Array: ...
-    def vjp_dot(
-        self,
-        inputs: ArrayLike,
-        inputs_dot: ArrayLike,
-        steps: Sequence[int],
-        x_bar: ArrayLike,
-        x_bar_dot: ArrayLike,
-        t0: float,
-        memory: int | None = None,
-    ) -> tuple[Array, Array]: ...
     def jvp(self, inputs: ArrayLike, inputs_dot: ArrayLike, steps: Sequence[int], t0: float) -> tuple[Array, Array]: ...
     def complex_step(self, inputs: ArrayLike, direction: ArrayLike, steps: Sequence[int], t0: float) -> Array: ...
     # lengths: (batch,) frames of each scene, or none where all have every frame
@@ -138,6 +128,20 @@ class Solver:
         inputs: ArrayLike,
         steps: Sequence[int],
         x_bar: ArrayLike,
+        t0: float,
+        memory: int | None = None,
+        lengths: Sequence[int] = (),
+    ) -> Array: ...  # (batch, inputs)
+    def jvp_batch(  # inputs_dot (batch, inputs)
+        self, inputs: ArrayLike, inputs_dot: ArrayLike, steps: Sequence[int], t0: float, lengths: Sequence[int] = ()
+    ) -> Array: ...  # (batch, frames, dofs)
+    def vjp_dot_batch(
+        self,
+        inputs: ArrayLike,
+        inputs_dot: ArrayLike,
+        steps: Sequence[int],
+        x_bar: ArrayLike,
+        x_bar_dot: ArrayLike,
         t0: float,
         memory: int | None = None,
         lengths: Sequence[int] = (),
@@ -174,7 +178,6 @@ class EquilibriumSolution:
     @property
     def message(self) -> str: ...
     def vjp(self, x_bar: ArrayLike | None = None, lambda_bar: ArrayLike | None = None) -> Array: ...
-    def jvp(self, inputs_dot: ArrayLike) -> tuple[Array, Array]: ...
 
 def equilibrium(
     scene: Scene, inputs: ArrayLike, start: ArrayLike | None = None, stable: bool = True
@@ -185,6 +188,9 @@ def equilibria(  # inputs (batch, total)
 def equilibria_vjp(  # bar (batch, dofs + rows)
     solutions: Sequence[EquilibriumSolution], bar: ArrayLike, threads: int = 1
 ) -> Array: ...  # (batch, inputs)
+def equilibria_jvp(  # inputs_dot (batch, inputs)
+    solutions: Sequence[EquilibriumSolution], inputs_dot: ArrayLike, threads: int = 1
+) -> Array: ...  # (batch, dofs + rows)
 def evaluate_constraints(
     scene: Scene, inputs: ArrayLike, positions: ArrayLike, multipliers: ArrayLike
 ) -> tuple[Array, Array]: ...

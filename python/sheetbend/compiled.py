@@ -36,9 +36,9 @@ class CompiledScene:
                 particles=scene.particle_count,
                 directors=[(d, *edge) for d, edge in scene.directors.items()],
                 pinned=sorted(scene.pinned),
-                driven=list(scene.driven),
-                boundary_times=[] if not scene.driven else list(scene.boundary_times),
-                boundary_interpolation=scene.boundary_interpolation,
+                driven=list(scene.boundary.driven),
+                boundary_times=[] if not scene.boundary.driven else list(scene.boundary.times),
+                boundary_interpolation=scene.boundary.interpolation,
                 loaded=list(scene.forces.particles),
                 force_times=scene.forces.times.tolist(),
                 has_drag=scene.has_drag,
@@ -59,7 +59,7 @@ class CompiledScene:
         self.names = tuple(scene.quantities)
         self.theta = np.array([q.value for q in scene.quantities.values()], dtype=float)
         self._base = self._pack(scene)
-        self._terms = [*scene.terms, *scene.motion_terms()]
+        self._terms = [*scene.terms, *scene.boundary.terms()]
 
     @cached_property
     def _map(self) -> _core.ParameterMap:

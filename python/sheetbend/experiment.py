@@ -140,7 +140,7 @@ class Experiment:
     @cached_property
     def compared(self) -> tuple[int, ...]:
         """Indices of the markers that are compared: placed, and not on particles whose motion is given."""
-        held = self.scene.pinned | set(self.scene.driven)
+        held = self.scene.pinned | set(self.scene.boundary.driven)
         chosen = tuple(i for i, p in enumerate(self.places) if p is not None and not self._depends_on(i, p) <= held)
         if not chosen:
             raise RecordingError(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -11,33 +10,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .air import Air
-from .checks import check_increasing, finite, index_array, indices, per_item, points
+from .boundary import Boundary
+from .checks import finite, indices, per_item, points
 from .column import Column
 from .compiled import CompiledScene
 from .errors import SceneError
 from .forces import Forces
 from .frames import Frame, directors_of, normals_of
-from .kinds import KINDS, NEEDS_COMPLIANCE, UNITS, VISCOUS_COMPLIANCE
+from .group import Group, make_group
+from .kinds import KINDS, UNITS
 from .quantities import Quantity, Term, product
-from .rest_values import rest_values
 from .scene_checks import validate
 from .volume import Volumes
 
 Array = np.ndarray
-
-
-@dataclass(frozen=True)
-class Group:
-    """A named set of constraints of one kind: particles (count, arity), base compliance and damping (count,), rest
-    (count, parameters)."""
-
-    name: str
-    kind: str
-    particles: Array
-    compliance: Array
-    damping: Array
-    damped: bool
-    rest: Array
 
 
 class Scene:
@@ -53,10 +39,8 @@ class Scene:
         self.terms: list[Term] = []
         self.groups: list[Group] = []
         self.pinned: set[int] = set()
-        self.driven: list[int] = []
         self.directors: dict[int, Frame] = {}  # and the normals of sections
-        self.boundary_times: Array = np.zeros(0)
-        self.boundary_interpolation = "cubic"
+        self.boundary = Boundary()
         self.forces = Forces()
         self.has_drag = False
         self.air = Air()
@@ -65,8 +49,6 @@ class Scene:
         self.cloths: dict[str, Any] = {}
         self._positions, self._velocities, self._mass = Column(3), Column(3), Column()
         self._drag: dict[str, Array] = {}
-        self._boundary: list[Array] = []
-        self._motion: list[tuple[int, Array, dict[str, str]]] = []
         self._gravity = finite("gravity", gravity, (3,), SceneError)
         self._frozen = False
 
@@ -146,25 +128,7 @@ class Scene:
             SceneError: shapes, NaN, times that do not increase, or other knots than an earlier call's.
         """
         self._building()
-        which = indices("drive", particles, self.particle_count)
-        t = finite("drive.times", times, None, SceneError).ravel()
-        check_increasing("drive.times", t)
-        x = finite("drive.positions", positions, (len(t), len(which), 3), SceneError)
-        if interpolation not in ("cubic", "linear"):
-            raise SceneError("drive.interpolation", "is unknown", interpolation, "use 'cubic' or 'linear'")
-        if self.driven and (t.shape != self.boundary_times.shape or (t != self.boundary_times).any()):
-            raise SceneError(
-                "drive.times",
-                "differ from those of particles driven before",
-                len(t),
-                "resample all motions to one set of knots",
-            )
-        twice = set(which) & set(self.driven)
-        if twice:
-            raise SceneError("drive.particles", "are driven already", sorted(twice), "drive each particle once")
-        self.boundary_times, self.boundary_interpolation = t, interpolation
-        self.driven += which
-        self._boundary += [x[:, k] for k in range(len(which))]
+        self.boundary.drive(particles, times, positions, interpolation, self.particle_count)
 
     def add_motion_term(self, particle: int, coefficients: ArrayLike, factors: Mapping[str, str]) -> None:
         """Add to a driven particle's motion (knots, 3) coefficients times a product of functions of quantities.
@@ -173,23 +137,7 @@ class Scene:
             SceneError: the particle is not driven, shapes, NaN, or unknown quantities.
         """
         self._building()
-        if particle not in self.driven:
-            raise SceneError("particle", "is not driven", particle, "drive it first")
-        shape = (len(self.boundary_times), 3)
-        values = finite("coefficients", coefficients, shape, SceneError)
-        missing = [q for q in factors if q not in self.quantities]
-        if missing:
-            raise SceneError("factors", "use unknown quantities", missing, "declare them with add_quantity")
-        self._motion.append((self.driven.index(particle), values, dict(factors)))
-
-    def motion_terms(self) -> list[Term]:
-        """The terms of all driven motions; their places are known once every driven particle is."""
-        knots, width = len(self.boundary_times), 3 * len(self.driven)
-        places = width * np.arange(knots)[:, None] + np.arange(3)
-        return [
-            Term("boundary", (places + 3 * slot).ravel(), values.ravel(), tuple(factors.items()))
-            for slot, values, factors in self._motion
-        ]
+        self.boundary.add_term(particle, coefficients, factors, self.quantities)
 
     def add_force(self, particles: ArrayLike, forces: ArrayLike, times: ArrayLike = (0.0,)) -> None:
         """Let forces act on particles: (knots, k, 3) N at `times` (knots,), linear between and constant outside the
@@ -250,39 +198,24 @@ class Scene:
         name = name or kind
         if any(g.name == name for g in self.groups):
             raise SceneError("name", "is taken by another group", name, "give each group a name of its own")
-        arity = KINDS[kind]["arity"]
-        flat = index_array(f"{name}.particles", particles, self.particle_count)
-        if np.ndim(particles) != 2 or np.shape(particles)[1] != arity:
-            raise SceneError(
-                f"{name}.particles", "have the wrong shape", np.shape(particles), f"give (count, {arity}) for {kind}"
-            )
-        stencil = flat.reshape(-1, arity)
-        count = len(stencil)
-        if viscosity is not None:
-            if compliance is not None or damping is not None:
-                raise SceneError(
-                    f"{name}.viscosity", "excludes compliance and damping", viscosity, "give one or the other"
-                )
-            compliance, damping, label = np.full(count, VISCOUS_COMPLIANCE), viscosity, "viscosity"
-        else:
-            compliance, label = 0.0 if compliance is None else compliance, "damping"
-        alpha = per_item(f"{name}.compliance", compliance, count)
-        beta = per_item(f"{name}.{label}", 0.0 if damping is None else damping, count)
-        for field, values in (("compliance", alpha), (label, beta)):
-            if (values < 0).any():
-                raise SceneError(f"{name}.{field}", "must not be negative", float(values.min()), "give zero or more")
-        if kind in NEEDS_COMPLIANCE and not (alpha > 0).all():
-            why = "is rigid, and a straight rigid joint has a singular projection (rank 2 of 3)"
-            raise SceneError(
-                f"{name}.compliance", why, float(alpha.min()), "give a positive compliance, Voronoi length / EI"
-            )
-        values = rest_values(name, kind, KINDS[kind]["parameters"], self.positions[stencil], rest, normal)
+        group = make_group(
+            name,
+            kind,
+            particles,
+            self.positions,
+            compliance=compliance,
+            damping=damping,
+            viscosity=viscosity,
+            rest=rest,
+            normal=normal,
+        )
         first = sum(len(g.particles) for g in self.groups)
-        self.groups.append(Group(name, kind, stencil, alpha, beta, damping is not None, values))
-        if np.ndim(compliance) == 0 and alpha[0] > 0:
-            self._scalar(f"{name}_compliance", "compliance", first, alpha, kind)
-        if damping is not None and np.ndim(damping) == 0:
-            self._scalar(f"{name}_{label}", "damping", first, beta, kind)
+        self.groups.append(group)
+        if compliance is not None and np.ndim(compliance) == 0 and group.compliance[0] > 0:
+            self._scalar(f"{name}_compliance", "compliance", first, group.compliance, kind)
+        for label, given in (("damping", damping), ("viscosity", viscosity)):
+            if given is not None and np.ndim(given) == 0:
+                self._scalar(f"{name}_{label}", "damping", first, group.damping, kind)
         return name
 
     def add_quantity(
@@ -441,7 +374,7 @@ class Scene:
     def free(self) -> Array:
         """Indices of the particles that can move."""
         held = np.zeros(self.particle_count, dtype=bool)
-        held[[*self.pinned, *self.driven]] = True
+        held[[*self.pinned, *self.boundary.driven]] = True
         return np.flatnonzero(~held)
 
     def group(self, name: str) -> tuple[Group, int, int]:
@@ -473,7 +406,7 @@ class Scene:
             "compliance": self._concatenated("compliance"),
             "damping": self._concatenated("damping"),
             "rest": self._concatenated("rest"),
-            "boundary": np.stack(self._boundary, axis=1) if self._boundary else np.zeros(0),
+            "boundary": self.boundary.values,
             "force": self.forces.values,
             "gravity": self._gravity,
             "drag_linear": self._drag_of("linear"),

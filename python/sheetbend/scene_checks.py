@@ -39,6 +39,6 @@ def validate(scene: Scene) -> None:
         if loose.size:
             fix = "constrain them, pin them or leave them out"
             raise SceneError("particles", "are connected to nothing", loose[:5].tolist(), fix)
-    held = scene.pinned & set(scene.driven)
+    held = scene.pinned & set(scene.boundary.driven)
     if held:
         raise SceneError("drive.particles", "are pinned too", sorted(held), "either pin or drive a particle")

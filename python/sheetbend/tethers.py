@@ -35,7 +35,7 @@ def add_tethers(
     if not (is_number(stretch) and stretch >= 0):
         raise SceneError(f"{name}.stretch", "must not be negative", stretch, "give a strain such as 0.02")
     count = len(cloth.mesh.vertices)
-    fixed = np.isin(cloth.particles, [*scene.pinned, *scene.driven])
+    fixed = np.isin(cloth.particles, [*scene.pinned, *scene.boundary.driven])
     chosen = np.flatnonzero(fixed) if anchors is None else indices(f"{name}.anchors", anchors, count)
     if not len(chosen):
         raise SceneError(f"{name}.anchors", "are none", 0, "pin or drive vertices first, or give anchors")

@@ -12,8 +12,9 @@ from . import _core
 from .checks import finite
 from .equilibrium import Equilibrium
 from .errors import SceneError
+from .group import Group
 from .kinds import KINDS
-from .scene import Array, Group, Scene
+from .scene import Array, Scene
 from .simulate import forces_by_group
 
 

@@ -104,6 +104,17 @@ TEST_P(Footprint, KeepsToTheBudget) {
   const TapePlan batch = plan_tape<Pack>(sample.scene, plan, 500, 3, 20, no_budget);
   EXPECT_EQ(batch.lanes, 8);
   EXPECT_EQ(batch.at_once, 1);
+  // Second derivatives: one scene per thread at a time, and the caller's arrays with their tangents.
+  SolverOptions threaded = GetParam().options(2);
+  threaded.threads = 2;
+  const Plan two = make_plan(sample.scene, threaded);
+  using D = Dual<double, 1>;
+  const TapePlan one = plan_tape<D>(sample.scene, two, 500, 3, 1, no_budget);
+  const TapePlan many = plan_tape<D>(sample.scene, two, 500, 3, 20, no_budget);
+  EXPECT_EQ(many.at_once, 2);
+  EXPECT_EQ(many.reverse, 2 * one.reverse);
+  EXPECT_EQ(many.tape, 2 * one.tape);
+  EXPECT_EQ(many.frames, (20 + 2) * 2 * sizeof(D) * 3 * sample.scene.dofs());
 }
 
 }  // namespace

@@ -11,6 +11,7 @@ import sheetbend as sb
 from numpy.typing import ArrayLike
 from oracles import integration
 from scipy.optimize import brentq
+from sheetbend import _core
 from sheetbend.simulate import substeps
 
 Array = np.ndarray
@@ -96,8 +97,7 @@ def static_sensitivity(
     x_bar = np.zeros_like(rest.positions) if weights is None else weights
     parts = {name: np.zeros(f.shape) for name, f in rest.forces.items()} | dict(forces or {})
     lambda_bar = np.concatenate([part.ravel() for part in parts.values()])
-    x_dot, lambda_dot = rest.solution.jvp(tangent)
-    forward = float(x_dot @ x_bar.ravel() + lambda_dot @ lambda_bar)
+    forward = float(_core.equilibria_jvp([rest.solution], tangent[None])[0] @ np.append(x_bar, lambda_bar))
     if isinstance(direction, str):
         return forward, rest.gradient(x_bar, parts)[direction]
     return forward, float(rest.solution.vjp(x_bar.ravel(), lambda_bar) @ tangent)

@@ -163,7 +163,7 @@ class TestBuild:
         )
         (e,) = load(written(folder, text)).experiments
         measured = sb.Recording.load(folder / "swing.npz").piece(0.05)
-        np.testing.assert_allclose(e.scene.boundary_times, measured.times - 0.05, atol=1e-12)
+        np.testing.assert_allclose(e.scene.boundary.times, measured.times - 0.05, atol=1e-12)
         boundary = e.scene.base_arrays()["boundary"]
         np.testing.assert_allclose(boundary[:, 0], measured.positions[:, 0] + [0, 0.01, 0], atol=1e-12)
 

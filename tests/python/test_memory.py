@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sheetbend as sb
+from sheetbend import _core
 from sheetbend.memory import in_bytes, in_words, least_in_words
 
 STEPS = 120
@@ -119,6 +120,24 @@ def test_second_derivatives_keep_to_the_budget() -> None:
 
     # Dual numbers take twice the room of plain ones.
     assert torch.equal(curvature(4 * sb.tape_plan(scene, TIMES, solver).least), curvature(None))
+
+
+def test_second_derivatives_of_a_batch_keep_to_the_budget() -> None:
+    scene, steps, rng = net(), [30, STEPS], np.random.default_rng(2)
+    inputs = scene.compiled.inputs() * (1.0 + 1e-3 * rng.standard_normal((5, scene.compiled.core.inputs)))
+    directions = 1e-3 * rng.standard_normal(inputs.shape)
+    bars = rng.standard_normal((2, 5, len(steps), scene.compiled.core.dofs))
+    needed = []
+    for threads in (1, 2):
+        core = replace(SOLVERS[2], threads=threads).core(scene.compiled)
+        with pytest.raises(_core.BudgetTooSmall) as caught:
+            core.vjp_dot_batch(inputs, directions, steps, *bars, 0.0, memory=1)
+        needed.append(caught.value.needed)
+        least = core.vjp_dot_batch(inputs, directions, steps, *bars, 0.0, memory=needed[-1])
+        assert np.array_equal(least, core.vjp_dot_batch(inputs, directions, steps, *bars, 0.0))
+        with pytest.raises(_core.BudgetTooSmall):
+            core.vjp_dot_batch(inputs, directions, steps, *bars, 0.0, memory=needed[-1] - 1)
+    assert needed[0] < needed[1] < 2 * needed[0]  # each thread has a tape; the batch itself is there once
 
 
 def test_check_gradients_keeps_to_the_budget() -> None:

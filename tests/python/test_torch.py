@@ -267,7 +267,7 @@ def test_leading_dimensions_are_a_batch(scene: sb.Scene) -> None:
 
 
 def test_a_batch_is_one_call_of_the_core(scene: sb.Scene) -> None:
-    """Forward and reverse of a batch go through the lanes: no other entry of the core is touched."""
+    """Values and all derivatives of a batch: no other entry of the core is touched."""
     calls: list[str] = []
 
     class Recorder:
@@ -284,6 +284,12 @@ def test_a_batch_is_one_call_of_the_core(scene: sb.Scene) -> None:
     simulation({"rope_EI": us}).square().sum().backward()
     vmap(grad(lambda EI: simulation({"rope_EI": EI}).square().sum()))(us.detach())
     assert calls == ["simulate_batch", "vjp_batch"] * 2
+    calls.clear()
+    jvp(lambda EI: simulation({"rope_EI": EI}), (us.detach(),), (us.detach(),))
+    assert calls == ["simulate_batch", "jvp_batch"]
+    calls.clear()
+    vmap(hessian(lambda EI: simulation({"rope_EI": EI}).square().sum()))(us.detach())
+    assert calls == ["simulate_batch", "jvp_batch", "vjp_batch", "vjp_dot_batch"]
     calls.clear()
     simulation({"rope_EI": us[0]}).square().sum().backward()
     assert calls == ["record", "vjp"]  # the tape is kept for backward
@@ -417,17 +423,22 @@ def test_equilibrium_forces_have_their_shapes(hanging: sb.Scene) -> None:
 def test_a_batch_of_equilibria_has_the_bits_of_each(hanging: sb.Scene, threads: int) -> None:
     EI = torch.tensor([2e-2, 5e-3, 1e-2, 2e-2, 4e-2], dtype=double)  # one of them twice
 
-    def both(values: Tensor) -> tuple[Tensor, Tensor]:
-        values = values.clone().requires_grad_()
-        rest = st.equilibrium(hanging, values={"rope_EI": values}, threads=threads)
-        loss = rest.positions.square().sum() + sum(force.sum() for force in rest.forces.values())
-        return rest.positions.detach(), torch.autograd.grad(loss, values)[0]
+    def rest(values: Tensor) -> tuple[Tensor, Tensor]:
+        found = st.equilibrium(hanging, values={"rope_EI": values}, threads=threads)
+        return found.positions, torch.cat([force.flatten(values.dim()) for force in found.forces.values()], -1)
 
-    x, bar = both(EI)
+    def all_of(values: Tensor) -> tuple[Tensor, ...]:
+        (x, forces), pull = vjp(rest, values)
+        x_dot, forces_dot = jvp(rest, (values,), (values,))[1]
+        return x, forces, *pull((x, torch.ones_like(forces))), x_dot, forces_dot
+
+    together = all_of(EI)
     for k, value in enumerate(EI):
-        own, own_bar = both(value)
-        assert torch.equal(x[k], own)
-        assert relative(bar[k], own_bar) < 1e-14
+        *exact, bar, x_dot, forces_dot = all_of(value)
+        assert all(torch.equal(a[k], b) for a, b in zip(together, exact, strict=False))
+        assert relative(together[2][k], bar) < 1e-14
+        assert torch.equal(together[3][k], x_dot)
+        assert torch.equal(together[4][k], forces_dot)
 
 
 # --- the Module

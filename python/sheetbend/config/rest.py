@@ -39,7 +39,7 @@ def _check_rim(path: str, section: Cloth, scene: Scene) -> None:
     """A pressure has an energy on a closed surface and on one whose rim is held."""
     cloth = scene.cloths[section.name]
     rim = cloth.particles[np.unique(cloth.mesh.borders)]
-    free = [int(particle) for particle in rim if particle not in scene.pinned and particle not in scene.driven]
+    free = [int(particle) for particle in rim if particle not in scene.pinned and particle not in scene.boundary.driven]
     if free:
         problem = (
             f"asks for a state of rest, and the rim of {section.name}, which is under pressure, is free at vertices"

@@ -50,8 +50,8 @@ class Equilibria:
         return out
 
     def jvp(self, inputs: Array, inputs_dot: Array) -> Array:
-        solutions = self._solutions(inputs)
-        return np.stack([np.concatenate(s.jvp(dot)) for s, dot in zip(solutions, inputs_dot, strict=True)])
+        out: Array = _core.equilibria_jvp(self._solutions(inputs), inputs_dot, self._threads)
+        return out
 
     def vjp_dot(self, *_: Array) -> NoReturn:
         raise NotImplementedError(

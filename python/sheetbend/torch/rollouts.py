@@ -73,27 +73,17 @@ class Rollouts:
             return out[None]
 
     def jvp(self, inputs: Array, inputs_dot: Array) -> Array:
-        """One call per distinct scene, eight tangents to a rollout: the core has no lanes of scenes for tangents."""
-        out = np.zeros((len(inputs), len(self._steps), self._scene.compiled.core.dofs))
-        frames = np.array(self._lengths_of(inputs) or [len(self._steps)] * len(inputs))
-        distinct = np.column_stack([inputs, frames])
-        _, first, scene_of = np.unique(distinct, axis=0, return_index=True, return_inverse=True)
-        scene_of = scene_of.reshape(-1)
+        """One call for the whole batch; tangents of one scene share a rollout, eight at a time."""
         with divergence(self._scene):
-            for k, row in enumerate(first):
-                same, own = np.flatnonzero(scene_of == k), frames[row]
-                out[same, :own] = self._core.jvp(inputs[row], inputs_dot[same], self._steps[:own], 0.0)[1]
+            out: Array = self._core.jvp_batch(inputs, inputs_dot, self._steps, 0.0, self._lengths_of(inputs))
         return out
 
     def vjp_dot(self, inputs: Array, inputs_dot: Array, states_bar: Array, states_bar_dot: Array) -> Array:
-        """One call per scene of the batch: the core has no lanes for second derivatives."""
-        out = np.empty_like(inputs)
-        frames = self._lengths_of(inputs) or [len(self._steps)] * len(inputs)
+        """One call for the whole batch, one rollout per scene."""
+        lengths, memory = self._lengths_of(inputs), self._solver.budget
+        bars = states_bar, states_bar_dot
         with divergence(self._scene), budget(self._solver):
-            for b, own in enumerate(frames):
-                bars = states_bar[b, :own], states_bar_dot[b, :own]
-                steps, memory = self._steps[:own], self._solver.budget
-                out[b] = self._core.vjp_dot(inputs[b], inputs_dot[b], steps, *bars, 0.0, memory)[1]
+            out: Array = self._core.vjp_dot_batch(inputs, inputs_dot, self._steps, *bars, 0.0, memory, lengths)
         return out
 
     def _lengths_of(self, inputs: Array) -> list[int]:

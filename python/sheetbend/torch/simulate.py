@@ -56,9 +56,9 @@ def simulate(
     second derivatives by forward over reverse (double backward, torch.func.hessian). Forward over forward and third
     derivatives raise NotImplementedError.
 
-    Leading batch dimensions, and torch.func.vmap, simulate many scenes: forward and reverse are one call of the core,
-    eight scenes to a vector and spread over `solver.threads`. Tangents take one call per distinct scene, second
-    derivatives one per scene.
+    Leading batch dimensions, and torch.func.vmap, simulate many scenes: each derivative too is one call of the core,
+    which spreads them over `solver.threads`. Forward and reverse go eight scenes to a vector, tangents eight of one
+    scene to a rollout, second derivatives one at a time.
 
     Args:
         scene: is frozen by this.

@@ -1,0 +1,76 @@
+"""The motion of driven particles."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .checks import check_increasing, finite, indices
+from .errors import SceneError
+from .quantities import Term
+
+Array = np.ndarray
+
+
+class Boundary:
+    """The boundary motion of a scene, at one set of knots.
+
+    Attributes:
+        driven: particles.
+        times: (knots,) s.
+        interpolation: "cubic" or "linear".
+    """
+
+    def __init__(self) -> None:
+        self.driven: list[int] = []
+        self.times: Array = np.zeros(0)
+        self.interpolation = "cubic"
+        self._values: list[Array] = []
+        self._terms: list[tuple[int, Array, dict[str, str]]] = []
+
+    def drive(
+        self, particles: ArrayLike, times: ArrayLike, positions: ArrayLike, interpolation: str, particle_count: int
+    ) -> None:
+        """See `Scene.drive`."""
+        which = indices("drive", particles, particle_count)
+        t = finite("drive.times", times, None, SceneError).ravel()
+        check_increasing("drive.times", t)
+        x = finite("drive.positions", positions, (len(t), len(which), 3), SceneError)
+        if interpolation not in ("cubic", "linear"):
+            raise SceneError("drive.interpolation", "is unknown", interpolation, "use 'cubic' or 'linear'")
+        if self.driven and (t.shape != self.times.shape or (t != self.times).any()):
+            fix = "resample all motions to one set of knots"
+            raise SceneError("drive.times", "differ from those of particles driven before", len(t), fix)
+        twice = set(which) & set(self.driven)
+        if twice:
+            raise SceneError("drive.particles", "are driven already", sorted(twice), "drive each particle once")
+        self.times, self.interpolation = t, interpolation
+        self.driven += which
+        self._values += [x[:, k] for k in range(len(which))]
+
+    def add_term(
+        self, particle: int, coefficients: ArrayLike, factors: Mapping[str, str], quantities: Collection[str]
+    ) -> None:
+        """See `Scene.add_motion_term`."""
+        if particle not in self.driven:
+            raise SceneError("particle", "is not driven", particle, "drive it first")
+        values = finite("coefficients", coefficients, (len(self.times), 3), SceneError)
+        missing = [q for q in factors if q not in quantities]
+        if missing:
+            raise SceneError("factors", "use unknown quantities", missing, "declare them with add_quantity")
+        self._terms.append((self.driven.index(particle), values, dict(factors)))
+
+    def terms(self) -> list[Term]:
+        """Of all motions; their places are known once every driven particle is."""
+        places = 3 * len(self.driven) * np.arange(len(self.times))[:, None] + np.arange(3)
+        return [
+            Term("boundary", (places + 3 * slot).ravel(), values.ravel(), tuple(factors.items()))
+            for slot, values, factors in self._terms
+        ]
+
+    @property
+    def values(self) -> Array:
+        """(knots, driven, 3) m, the plain part of the motion."""
+        return np.stack(self._values, axis=1) if self._values else np.zeros(0)
