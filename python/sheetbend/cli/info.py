@@ -25,7 +25,10 @@ PACKAGES = ("numpy", "scipy", "torch", "matplotlib", "pydantic", "rich", "typer"
 
 
 def info(
-    config: Annotated[Path | None, typer.Argument(help="A TOML configuration.", show_default=False)] = None,
+    config: Annotated[
+        Path | None,
+        typer.Argument(help="A TOML configuration, see docs/configuration.md.", show_default=False),
+    ] = None,
     json: Annotated[
         bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
     ] = False,
