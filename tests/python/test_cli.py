@@ -353,8 +353,9 @@ class TestBadInput:
 
     def test_resume_from_what_is_no_fit(self, config: Path) -> None:
         assert last_line(run("fit", config, "--json", "--resume", "no.json"))["error"]["field"] == "--resume"
-        Path("bad.json").write_text("{}")
-        assert run("fit", config, "--resume", "bad.json").exit_code == 2
+        for content in (b"{}", b"[]", b"no json", b"\x80\x81"):
+            Path("bad.json").write_bytes(content)
+            assert run("fit", config, "--resume", "bad.json").exit_code == 2
 
     @pytest.mark.parametrize("command", ["fit", "simulate"])
     @pytest.mark.parametrize("folder", ["my.toml", "my.toml/below"])

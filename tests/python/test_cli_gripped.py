@@ -241,7 +241,12 @@ class TestOtherCommands:
         rope = last_line(run("info", config, "--json"))["config"]["ropes"]["rope_1"]
         assert rope["train"] == 3 and rope["eval"] == 1 and rope["free markers"] == 9
         assert rope["length"] == pytest.approx(0.98, rel=0.03) and rope["rungs"] == ["twist", "tilts"]
-        assert "rope_1" in run("info", config).stdout
+        assert rope["doubts"] == [] and "rope_1" in run("info", config).stdout
+
+    def test_info_names_what_is_doubtful(self, config: Path) -> None:
+        edited(config, ("density = 0.045", "density = 0.045\ngravity = [0.0, 9.81, 0.0]"))
+        (doubt,) = last_line(run("info", config, "--json"))["config"]["ropes"]["rope_1"]["doubts"]
+        assert "check `gravity`" in doubt and "is doubtful: the rope sags" in run("info", config).stdout
 
     @pytest.mark.parametrize("command", ["simulate", "check"])
     def test_commands_for_scenes_say_that_there_is_none(self, config: Path, command: str) -> None:
