@@ -157,8 +157,8 @@ class Cloth(Section):
     markers: dict[str, Pair] = key({}, "material coordinates (along warp and weft) of markers, by name", "m")
     nearest_at: Finite | None = key(
         None,
-        "time of a recording at which the cloth lies as placed: markers without another place sit where they are "
-        "nearest to it then",
+        "time of a recording at which the cloth lies as placed: markers without another place, that move no grip, sit "
+        "where they are nearest to it then",
         "s",
     )
 
