@@ -72,7 +72,7 @@ def doubts(motions: Sequence[GrippedMotion], gravity: Sequence[float]) -> tuple[
         gravity: m/s^2, where the recordings do not tell.
     """
     found = []
-    g = np.array(gravity if motions[0].recording.gravity is None else motions[0].recording.gravity)
+    g = np.array(next((m.recording.gravity for m in motions if m.recording.gravity is not None), gravity))
     size = float(np.linalg.norm(g))
     length = float(np.mean([m.length for m in motions]))
     sag = np.mean([m.sag for m in motions], axis=0)
