@@ -58,6 +58,7 @@ class CompiledScene:
         self.layout: dict[str, tuple[int, int]] = self.core.layout
         self.names = tuple(scene.quantities)
         self.theta = np.array([q.value for q in scene.quantities.values()], dtype=float)
+        self._positive = tuple(q.positive for q in scene.quantities.values())
         self._base = self._pack(scene)
         self._terms = [*scene.terms, *scene.boundary.terms()]
 
@@ -98,19 +99,41 @@ class CompiledScene:
         }
 
     def values(self, changes: Mapping[str, float] | None = None) -> np.ndarray:
-        """theta with some quantities changed, shape (quantities,)."""
+        """theta with some quantities changed, shape (quantities,).
+
+        Raises:
+            SceneError: an unknown name, no finite number, or a negative one where it must be positive.
+        """
         theta = self.theta.copy()
         for name, value in (changes or {}).items():
             if name not in self.names:
                 raise SceneError(
                     "values", "name no quantity of the scene", name, f"name one of: {', '.join(self.names)}"
                 )
-            theta[self.names.index(name)] = value
+            k = self.names.index(name)
+            try:
+                theta[k] = value
+            except (TypeError, ValueError):
+                theta[k] = np.nan
+            if not np.isfinite(theta[k]) or (self._positive[k] and theta[k] < 0.0):
+                wanted = "a positive number" if self._positive[k] else "a finite number"
+                raise SceneError(f"values.{name}", f"must be {wanted}", value, "give it in SI units")
         return theta
 
     def inputs(self, theta: np.ndarray | None = None) -> np.ndarray:
-        """Flat inputs, shape (core.inputs,)."""
-        return self._map.inputs(self.theta if theta is None else theta)
+        """Flat inputs, shape (core.inputs,).
+
+        Raises:
+            SceneError: some are not finite, as where a stiffness is zero.
+        """
+        theta = self.theta if theta is None else theta
+        found = self._map.inputs(theta)
+        if not np.isfinite(found).all():
+            got = {n: float(v) for n, v, p in zip(self.names, theta, self._positive, strict=True) if p and not v > 0.0}
+            raise SceneError(
+                "values", "make inputs that are not finite", got or theta.tolist(), "give positive numbers"
+            )
+        return found
 
     def inputs_dot(self, theta: np.ndarray, theta_dot: np.ndarray) -> np.ndarray:
         """Tangent of the inputs along theta_dot."""

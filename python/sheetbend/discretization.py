@@ -20,6 +20,7 @@ from .gauge import RANK_TOLERANCE
 from .optimizers import refit
 from .parameters import Parameters
 from .problem import FitProblem
+from .profile import FARTHEST
 from .result import Refit
 
 _SECOND_ORDER = 4.0 / 3.0
@@ -69,14 +70,19 @@ def refined_estimates(
 def to_the_limit(refits: Iterable[Refit], parameters: Parameters, values: Mapping[str, float]) -> dict[str, float]:
     """By how much each parameter would move up to the limit, in its unit: root sum of squares over the refits.
 
-    A logarithmic one moves by a factor, and its size is that of the factor upward: from 1 to 0.4 is 1.5, as to 2.5.
+    A logarithmic one moves by a factor, and its size is that of the factor upward: from 1 to 0.4 is 1.5, as to 2.5;
+    nothing is told apart from a factor of a million.
     """
     total: dict[str, float] = {}
     for made in refits:
         for name, moved in made.moved.items():
-            step = math.log1p(moved / values[name]) if parameters[name].log else moved
+            log = parameters[name].log
+            step = math.log(max(1.0 + moved / values[name], math.exp(-FARTHEST))) if log else moved
             total[name] = math.hypot(total.get(name, 0.0), made.to_limit * step)
-    return {name: values[name] * math.expm1(size) if parameters[name].log else size for name, size in total.items()}
+    return {
+        name: values[name] * math.expm1(min(size, FARTHEST)) if parameters[name].log else size
+        for name, size in total.items()
+    }
 
 
 def _one_step(problem: FitProblem, finer: FitProblem, u: np.ndarray) -> np.ndarray:

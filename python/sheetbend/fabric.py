@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from typing import Any
 
-from .checks import finite
+from .checks import check_positive, finite
 from .errors import SceneError
 
 COMPONENTS = ("warp", "weft", "shear")
@@ -87,7 +87,7 @@ Law = Linear | Exponential | Spline
 
 @dataclass(frozen=True, kw_only=True)
 class Fabric:
-    """The numbers of a fabric, which hold for any piece of it. `add_cloth` tells what each means and checks them.
+    """The numbers of a fabric, which hold for any piece of it. `add_cloth` tells what each means.
 
     Attributes:
         density: kg/m^2.
@@ -95,6 +95,9 @@ class Fabric:
         poisson: sqrt(nu_uv nu_vu).
         law: how tension grows with strain.
         bending, bending_weft, bending_twist: rigidities, N m; those left out are `bending`.
+
+    Raises:
+        SceneError: a number that must be positive is not.
     """
 
     density: float
@@ -106,6 +109,11 @@ class Fabric:
     bending: float
     bending_weft: float | None = None
     bending_twist: float | None = None
+
+    def __post_init__(self) -> None:
+        given = {field: getattr(self, field) for field in ("density", "warp", "shear", "bending")}
+        left_out = {field: getattr(self, field) for field in ("weft", "bending_weft", "bending_twist")}
+        check_positive("fabric", given, left_out)
 
     def options(self) -> dict[str, Any]:
         """What `add_cloth` takes: `add_cloth(scene, mesh, **fabric.options())`."""

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from . import _core
 from .compiled import CompiledScene
+from .errors import InputError
 from .scene import Scene
 from .simulate import divergence, substeps
 from .solver import Solver
@@ -118,11 +119,15 @@ def check_gradients(
         values: quantities to change, by name.
 
     Raises:
-        InputError, DivergenceError: as `simulate`.
+        InputError, DivergenceError: as `simulate`; times without a substep, or fewer than one sample.
     """
     solver = solver or Solver()
-    compiled = scene.compiled
     steps = substeps(times, solver.h)
+    if steps[-1] == 0:
+        raise InputError("times", "hold no substep to check", times, f"give frames up to {4 * solver.h:g} s or later")
+    if samples < 1:
+        raise InputError("samples", "must be positive", samples, "give at least 1")
+    compiled = scene.compiled
     rng = np.random.default_rng(seed)
     core = solver.core(compiled)
     theta = compiled.values(values)

@@ -30,6 +30,7 @@ IDENTIFIED = 0.2
 
 _LEVEL = 0.95
 _AT_BOUND = 1e-6
+_LARGEST = 700.0  # exponent of a number that a computer can hold
 _OPEN = 30.0  # natural scales: data that leave more of a parameter open, all others known, do not contain it
 _LINEAR = 0.2  # a rise of the cost that differs by less from the linear picture's confirms it
 
@@ -170,7 +171,8 @@ class _Judge:
         self.spread = covariance(residuals, jacobian[:, self.columns], layout, prior[:, self.columns])
         # Half-widths that the data would leave with all other parameters known and without priors.
         size = np.maximum(np.linalg.norm(jacobian, axis=0), np.finfo(float).tiny)
-        self.alone = 2 * math.sqrt(self.spread.residual_variance) / size
+        with np.errstate(over="ignore"):  # infinite where the data do not depend on it
+            self.alone = 2 * math.sqrt(self.spread.residual_variance) / size
         self.wide_columns, self.wide = self.columns, self.spread
         if len(self.columns) < len(unique):
             self.wide_columns = unique
@@ -310,9 +312,12 @@ class _Judge:
             for member, weight in ((column, 1.0), (columns[0], -power)):
                 if member in varied:
                     row[self.columns.index(member)] = weight
-            value = math.exp(self.internal[column] - power * self.internal[columns[0]])
+            exponent = self.internal[column] - power * self.internal[columns[0]]
             degrees = min(self.spread.degrees[self.columns.index(member)] for member in varied)
             reach = float(self.quantile(degrees, 0.5 + _LEVEL / 2)) * math.sqrt(row @ self.spread.matrix @ row)
+            if reach > FARTHEST or abs(exponent) > _LARGEST:
+                return gauge
+            value = math.exp(exponent)
             values.append(" +/- ".join(figures((value, value * math.sinh(reach)), value * math.sinh(reach))))
         return replace(gauge, words=f"{gauge.words}: {', '.join(values)}")
 

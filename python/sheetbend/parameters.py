@@ -124,9 +124,10 @@ class Parameter:
         return math.log(value) if value > 0 else -math.inf
 
     def to_physical(self, internal: float) -> float:
-        """The physical value of an internal coordinate; infinite where an optimizer strays too far."""
-        with np.errstate(over="ignore"):
-            return float(np.exp(internal)) if self.log else float(internal)
+        """The physical value of an internal coordinate; infinite, or the least positive one, where an optimizer strays
+        too far."""
+        with np.errstate(over="ignore", under="ignore"):
+            return max(float(np.exp(internal)), float(np.finfo(float).tiny)) if self.log else float(internal)
 
 
 class Parameters(Mapping[str, Parameter]):

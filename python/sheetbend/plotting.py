@@ -276,8 +276,8 @@ def _shade(panel: Axes, span: tuple[float, float] | None) -> None:
 def _name_shade(panel: Axes, span: tuple[float, float] | None) -> None:
     if span is not None:
         place = ("data", "axes fraction")
-        style: dict[str, Any] = {"va": "bottom", "fontsize": 8, "color": GRAY}
-        panel.annotate("held out", (span[0], 1), (0, 3), xycoords=place, textcoords="offset points", **style)
+        style: dict[str, Any] = {"va": "top", "fontsize": 8, "color": GRAY}  # inside: above stands the key
+        panel.annotate("held out", (span[0], 1), (3, -3), xycoords=place, textcoords="offset points", **style)
 
 
 def _liveliest(measured: Array) -> int:

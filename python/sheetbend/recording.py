@@ -25,6 +25,8 @@ from .recording_checks import (
 )
 from .timeseries import Array, Kind
 
+UNNAMED = "recording"
+"""The name of a recording that was given none; from a file it takes the file's."""
 _SAME_TIME = 1e-9  # s: decimal bounds such as 0.66 must find the frame stored as 0.6600000000000001
 
 
@@ -51,7 +53,7 @@ class Recording:
     times: Array
     markers: tuple[str, ...] = ()
     clamped: tuple[int, ...] = ()
-    name: str = "recording"
+    name: str = UNNAMED
     gravity: Array | None = None
     metadata: Mapping[str, Any] = field(default_factory=dict)
 

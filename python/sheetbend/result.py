@@ -239,7 +239,7 @@ class FitResult:
         """
         try:
             data = json.loads(Path(path).read_text(encoding="utf-8"))
-        except json.JSONDecodeError as error:
+        except ValueError as error:  # no JSON, or no text
             raise InputError(
                 str(path), f"is no JSON ({error})", path, "give a file that FitResult.save wrote"
             ) from error

@@ -353,11 +353,24 @@ class TestBadInput:
 
     def test_resume_from_what_is_no_fit(self, config: Path) -> None:
         assert last_line(run("fit", config, "--json", "--resume", "no.json"))["error"]["field"] == "--resume"
-        Path("bad.json").write_text("{}")
-        assert run("fit", config, "--resume", "bad.json").exit_code == 2
+        for content in (b"{}", b"[]", b"no json", b"\x80\x81"):
+            Path("bad.json").write_bytes(content)
+            assert run("fit", config, "--resume", "bad.json").exit_code == 2
 
-    def test_output_that_is_a_file(self, config: Path) -> None:
-        assert last_line(run("fit", config, "--json", "--output", "my.toml"))["error"]["field"] == "--output"
+    @pytest.mark.parametrize("command", ["fit", "simulate"])
+    @pytest.mark.parametrize("folder", ["my.toml", "my.toml/below"])
+    def test_output_that_takes_no_files(self, config: Path, command: str, folder: str) -> None:
+        error = last_line(run(command, config, "--json", "--output", folder))["error"]
+        assert error["field"] == "--output" and error["got"] == repr(folder)
+
+    @pytest.mark.parametrize("command", ["fit", "simulate"])
+    def test_a_movie_that_cannot_be_written_costs_no_work(self, config: Path, command: str) -> None:
+        error = last_line(run(command, config, "--json", "--movie", "my.toml/swing.gif"))["error"]
+        assert error["field"] == "--movie" and not Path("out").exists()
+
+    @pytest.mark.parametrize("command", ["fit", "simulate"])
+    def test_help_tells_where_results_go(self, command: str) -> None:
+        assert "out/NAME" in run(command, "--help").stdout
 
     def test_unknown_option(self, config: Path) -> None:
         assert run("fit", config, "--fast").exit_code == 2

@@ -113,6 +113,7 @@ class TestFit:
             "start at a bending length",
             "What trades against what",
             "EA: not fitted",
+            "the fit that counts",
             "would move EI by",
             "without twist",
         ):
@@ -214,12 +215,38 @@ class TestFit:
         assert "not fitted are rope_2" in result.stderr and "rope_1" in Path("out/ropes/report.txt").read_text()
 
 
+class TestClamped:
+    @pytest.fixture
+    def plain(self, config: Path) -> Path:
+        """The first recording as a CSV that says nothing of grips."""
+        Path("plain").mkdir()
+        recording = sb.Recording.load("rope_1/train/00.pkl")
+        sb.Recording(recording.positions, recording.times).save("plain/00.csv")
+        Path("plain/00.json").unlink()
+        return edited(config, ('"rope_1/train"', '"plain"'), ('eval = "rope_1/eval"\n', ""))
+
+    def test_the_configuration_may_name_the_gripped_markers(self, plain: Path) -> None:
+        edited(plain, ("density = 0.045", 'density = 0.045\nclamped = ["m0", 1, "m11", 12]'))
+        assert last_line(run("info", plain, "--json"))["config"]["ropes"]["rope_1"]["free markers"] == 9
+
+    @pytest.mark.parametrize("clamped", ["", 'clamped = ["left"]', "clamped = [0, 13]"], ids=["none", "name", "number"])
+    def test_without_them_or_with_others_the_key_is_named(self, plain: Path, clamped: str) -> None:
+        edited(plain, ("density = 0.045", f"density = 0.045\n{clamped}"))
+        error = last_line(run("info", plain, "--json"))["error"]
+        assert error["field"] == "gripped_rope[0].train" and "clamped" in error["problem"]
+
+
 class TestOtherCommands:
     def test_info_shows_what_the_folders_hold(self, config: Path) -> None:
         rope = last_line(run("info", config, "--json"))["config"]["ropes"]["rope_1"]
         assert rope["train"] == 3 and rope["eval"] == 1 and rope["free markers"] == 9
         assert rope["length"] == pytest.approx(0.98, rel=0.03) and rope["rungs"] == ["twist", "tilts"]
-        assert "rope_1" in run("info", config).stdout
+        assert rope["doubts"] == [] and "rope_1" in run("info", config).stdout
+
+    def test_info_names_what_is_doubtful(self, config: Path) -> None:
+        edited(config, ("density = 0.045", "density = 0.045\ngravity = [0.0, 9.81, 0.0]"))
+        (doubt,) = last_line(run("info", config, "--json"))["config"]["ropes"]["rope_1"]["doubts"]
+        assert "check `gravity`" in doubt and "is doubtful: the rope sags" in run("info", config).stdout
 
     @pytest.mark.parametrize("command", ["simulate", "check"])
     def test_commands_for_scenes_say_that_there_is_none(self, config: Path, command: str) -> None:

@@ -101,6 +101,31 @@ class TestBuild:
         np.testing.assert_allclose(e.scene.positions[:7], measured.positions[frame], atol=2e-3)
         assert np.abs(e.scene.positions[:7] - measured.positions[0]).max() > 0.05
 
+    @pytest.mark.parametrize("marker", [0, 6], ids=["first", "last"])
+    def test_points_need_both_ends_at_the_start(self, folder: Path, marker: int) -> None:
+        recording = sb.Recording.load(folder / "swing.npz")
+        positions = recording.positions.copy()
+        positions[:3, marker] = np.nan
+        sb.Recording(positions, recording.times).save(folder / "swing.npz")
+        with pytest.raises(sb.ConfigError, match=r"points: .*not seen at the start.*such as at 0\.03 s") as caught:
+            load(written(folder, ROPE))
+        assert caught.value.got == [f"m{marker}"]
+        assert len(load(changed(folder, "[0.0, 0.2]", "[0.03, 0.2]")).experiments) == 1
+
+    def test_a_marker_between_the_ends_may_be_unseen_at_the_start(self, folder: Path) -> None:
+        recording = sb.Recording.load(folder / "swing.npz")
+        positions = recording.positions.copy()
+        positions[0, 3] = np.nan
+        sb.Recording(positions, recording.times).save(folder / "swing.npz")
+        (experiment,) = load(written(folder, ROPE)).experiments
+        np.testing.assert_allclose(experiment.scene.positions[-1], positions[0, 6])
+
+    @pytest.mark.parametrize("units", ["mm", "cm"])
+    def test_points_of_another_unit_than_the_length_are_refused(self, folder: Path, units: str) -> None:
+        with pytest.raises(sb.ConfigError, match=r"points: are .* m long at the start") as caught:
+            load(changed(folder, "sigma = 1e-4", f'sigma = 1e-4\nunits = "{units}"'))
+        assert caught.value.got == 0.6 and "`units`" in caught.value.fix
+
     def test_points_of_an_equilibrium_are_the_mean_of_its_frames(self, folder: Path) -> None:
         text = ROPE.replace("held_out = [0.2, 0.31]", "static = true")
         (e,) = load(written(folder, text)).experiments

@@ -116,6 +116,18 @@ def test_markers_by_material_coordinates_and_nearest(folder: Path) -> None:
         np.testing.assert_allclose(where, PLACED, atol=1e-9)
 
 
+@pytest.mark.parametrize("bar", ['"c"', "2"], ids=["by name", "by number"])
+def test_a_marker_that_moves_a_grip_is_not_compared(folder: Path, bar: str) -> None:
+    recording = sb.Recording.load(folder / "sheet.npz")
+    positions = recording.positions.copy()
+    positions[:, 2] = [0.001, 0.001, 1.05]  # beside the bar, by the noise of a camera
+    sb.Recording(positions, recording.times, recording.markers).save(folder / "sheet.npz")
+    grip = f'[[scene.cloth.grip]]\nset = "left"\nmarkers = [{bar}]\n\n[[recording]]'
+    nearest = (MARKERS, "nearest_at = 0.0")
+    (e,) = load(changed(folder, ('pinned = ["left"]\n', ""), nearest, ("[[recording]]", grip))).experiments
+    assert e.names == ("a", "b")
+
+
 def test_a_marker_table_goes_before_the_cloths_own(folder: Path) -> None:
     table = '[[recording.marker]]\nmarker = "c"\nmaterial = [0.15, 0.05]\n\n[parameters.cloth_shear]'
     (e,) = load(changed(folder, ("[parameters.cloth_shear]", table))).experiments

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from pytest import approx
 from sheetbend.discretization import to_the_limit
 from sheetbend.identifiability import identify
@@ -19,6 +20,13 @@ def test_moves_are_carried_to_the_limit_and_summed_as_squares():
     sizes = to_the_limit(refits, parameters, {"p": 1.0, "q": 1.0})
     assert sizes["p"] == approx(np.hypot(0.6, 0.8))
     assert sizes["q"] == approx(np.expm1(np.hypot(2 * np.log(1.1), 4 / 3 * np.log(0.8))))
+
+
+@pytest.mark.parametrize("moved", [-2.0, -2.0 + 1e-15, 1e300, np.inf], ids=["to zero", "nearly", "far up", "away"])
+def test_a_refinement_that_leads_anywhere_leaves_a_factor_of_a_million(moved: float):
+    parameters = Parameters([Parameter(name="p", initial=1.0, log=True)])
+    refits = [Refit(name="finer", to_limit=4 / 3, moved={"p": moved})]
+    assert to_the_limit(refits, parameters, {"p": 2.0})["p"] == approx(2e6, rel=1e-5)
 
 
 def test_a_log_interval_reaches_where_a_refinement_leads():

@@ -38,6 +38,12 @@ def test_the_pattern_and_the_units_are_used(tmp_path: Path) -> None:
     assert np.array_equal(sb.recordings(tmp_path, "a*", units="mm")[0].positions, X * 1e-3)
 
 
+def test_recordings_without_a_name_take_that_of_their_file(tmp_path: Path) -> None:
+    for name in ("swing.npz", "fall.csv"):
+        sb.Recording(X, T).save(tmp_path / name)
+    assert [r.name for r in sb.recordings(tmp_path)] == ["fall", "swing"]
+
+
 def test_a_folder_without_recordings_is_refused(tmp_path: Path) -> None:
     with pytest.raises(sb.RecordingError, match=r"folder: is no folder .*nowhere"):
         sb.recordings(tmp_path / "nowhere")

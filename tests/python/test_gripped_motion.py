@@ -8,7 +8,7 @@ import sheetbend as sb
 from sheetbend.gripped import GrippedMotion, RopeModel
 from sheetbend.gripped.model import nominal_directions, shared_gravity
 from sheetbend.gripped.motion import smoothed
-from sheetbend.gripped.recipe import _Search, predict
+from sheetbend.gripped.recipe import _experiments, _Search, predict
 
 TIMES = np.arange(101) / 100.0
 LENGTH, SPAN, GRIP = 0.9, 0.6, 0.03  # m between the grips: arc, chord; and in each grip
@@ -71,6 +71,14 @@ class TestSmoothing:
         np.testing.assert_allclose(values[4:-4], wave[4:-4], atol=2e-5)
         np.testing.assert_allclose(slopes[4:-4], speed[4:-4], atol=0.05)
 
+    def test_jittering_times_and_lost_frames_make_no_error(self) -> None:
+        rng = np.random.default_rng(4)
+        times = (TIMES + rng.uniform(-0.004, 0.004, len(TIMES)))[rng.permutation(len(TIMES))[:80]]
+        times.sort()
+        values, slopes = smoothed(times, 3.0 * times**2 - times, 0.08)
+        np.testing.assert_allclose(values, 3.0 * times**2 - times, atol=1e-12)
+        np.testing.assert_allclose(slopes, 6.0 * times - 1.0, atol=1e-10)
+
     @pytest.mark.parametrize("width", [0.0, 0.02])
     def test_too_narrow_a_width_leaves_positions_as_they_are(self, width: float) -> None:
         x = np.random.default_rng(0).standard_normal((101, 2))
@@ -112,12 +120,51 @@ class TestMotion:
         filled = GrippedMotion.of(carried_about(positions=positions), 0.08)
         np.testing.assert_allclose(filled.positions, GrippedMotion.of(carried_about(), 0.08).positions, atol=1e-4)
 
-    @pytest.mark.parametrize("frames", [slice(50, 61), slice(0, 1), slice(100, 101)], ids=["inside", "first", "last"])
-    def test_a_free_marker_that_is_lost_for_long_is_refused(self, frames: slice) -> None:
+    @pytest.mark.parametrize("frames", [slice(50, 80), slice(0, 1), slice(95, 101)], ids=["inside", "first", "last"])
+    def test_starts_do_without_a_free_marker_that_is_lost_for_long(self, frames: slice) -> None:
         positions = carried_about().positions.copy()
         positions[frames, 5] = np.nan
-        with pytest.raises(sb.RecordingError, match=r"marker 'm5' of arch: is lost for over 0\.1 s, or at an end"):
+        whole, lost = (
+            GrippedMotion.of(carried_about(positions=x), 0.08) for x in (carried_about().positions, positions)
+        )
+        assert lost.length == pytest.approx(whole.length, rel=1e-6)
+        np.testing.assert_allclose(lost.fractions, whole.fractions, atol=1e-9)
+        frame = frames.start
+        assert np.isnan(lost.positions[frame, 5]).all() and lost.shown(frame)
+        for expected, found, off in zip(whole.start(frame), lost.start(frame), (5e-4, 0.02), strict=True):
+            np.testing.assert_allclose(found, expected, atol=off)
+
+    def test_no_window_starts_where_few_markers_are_seen(self) -> None:
+        positions = carried_about().positions.copy()
+        positions[45:56, 2:7] = np.nan
+        motion = GrippedMotion.of(carried_about(positions=positions), 0.08)
+        assert not motion.shown(50)
+        starts = [e.start_time for e in _experiments(model_of(motion), [motion], (0.25, 5.0))]
+        assert starts == pytest.approx([0.0, 0.25, 0.75])
+
+    def test_a_recording_that_starts_with_few_markers_is_refused_with_a_time_to_start_from(self) -> None:
+        positions = carried_about().positions.copy()
+        positions[:6, 2:7] = np.nan
+        with pytest.raises(sb.RecordingError, match=r"less than half seen in the first frames.*from 0\.1 s on"):
             GrippedMotion.of(carried_about(positions=positions), 0.08)
+
+    def test_neighbors_that_are_never_seen_together_are_refused(self) -> None:
+        positions = carried_about().positions.copy()
+        positions[:50, 5], positions[50:, 6] = np.nan, np.nan
+        with pytest.raises(sb.RecordingError, match="never seen together") as caught:
+            GrippedMotion.of(carried_about(positions=positions), 0.08)
+        assert caught.value.got == ["m5", "m6"]
+
+    def test_a_hole_in_the_times_is_refused(self) -> None:
+        kept = np.r_[0:40, 60:101]
+        with pytest.raises(sb.RecordingError, match=r"times: of arch jump by 0\.21 s"):
+            GrippedMotion.of(carried_about(positions=carried_about().positions[kept], times=TIMES[kept]), 0.08)
+
+    @pytest.mark.parametrize("frames", [1, 2])
+    def test_too_few_frames_are_refused(self, frames: int) -> None:
+        short = carried_about(positions=carried_about().positions[:frames], times=TIMES[:frames])
+        with pytest.raises(sb.RecordingError, match="fewer than three frames"):
+            GrippedMotion.of(short, 0.08)
 
     @pytest.mark.parametrize(
         "clamped",
@@ -125,7 +172,7 @@ class TestMotion:
         ids=["none", "start only", "end only", "one each", "one at the end", "one between", "all"],
     )
     def test_what_is_not_held_by_two_grips_is_refused(self, clamped: tuple[int, ...]) -> None:
-        with pytest.raises(sb.RecordingError, match="two or more in a row at each end") as caught:
+        with pytest.raises(sb.RecordingError, match="the last two or more along the rope") as caught:
             GrippedMotion.of(carried_about(clamped=clamped), 0.08)
         assert caught.value.field == "clamped" and "arch" in caught.value.problem
 

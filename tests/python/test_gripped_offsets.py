@@ -54,6 +54,14 @@ def test_it_covers_what_offsets_move() -> None:
     assert (size > 0.35).all() and (size < 0.65).all()
 
 
+def test_frames_need_not_lie_on_substeps() -> None:
+    jitter = 0.002 * np.sin(np.arange(len(MOTION.recording.times)))
+    jitter[[0, -1]] = 0.0
+    seen = MODEL.experiment(GrippedMotion.of(replace(MOTION.recording, times=MOTION.recording.times + jitter), 0.0))
+    problem = FitProblem([seen], Parameters(WANTED))
+    assert min(offset_reach(problem, problem.parameters.initial()).values()) >= 0.0
+
+
 def test_noise_is_not_taken_for_offsets() -> None:
     _, with_offsets = fitted(NOISE, OFFSET, 0)
     _, without = fitted(NOISE, 0.0, 0)

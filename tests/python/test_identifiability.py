@@ -156,6 +156,14 @@ def test_mass_against_compliance_in_a_simulated_oscillator() -> None:
     assert "through its prior" in result.estimates[1].words
 
 
+@pytest.mark.parametrize("far", [800.0, -800.0])
+def test_a_gauge_far_off_keeps_its_words_without_numbers(far: float) -> None:
+    """The product of two on a log scale, where neither is a number that a computer can hold."""
+    two = Parameters([Parameter(name=name, initial=1.0, log=True) for name in ("a", "b")])
+    found = identify(two, np.array([far, far]), 1e-3 * np.arange(5.0), np.ones((5, 2)))
+    assert [gauge.words for gauge in found.gauges] == ["a^+1 * b^-1 stays free: only the product a * b is known"]
+
+
 def test_two_gauges_and_linear_parameters() -> None:
     t = np.linspace(0, 1, 100)
     columns = [np.sin(9 * t), np.sin(9 * t), t, -t, np.cos(4 * t)]

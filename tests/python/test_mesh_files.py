@@ -81,6 +81,20 @@ def test_an_stl_is_merged_and_unrolled(tmp_path: Path) -> None:
     assert again.vertices[0].tolist() == mesh.vertices[mesh.triangles[0, 0]].tolist()  # in the order of first use
 
 
+@pytest.mark.filterwarnings("error")
+def test_vertices_that_an_exporter_split_are_merged_on_request(tmp_path: Path) -> None:
+    """Quads of their own vertices, with normals and without texture coordinates, in centimeters."""
+    cells = [(i, j) for j in range(3) for i in range(3)]
+    vertices = [f"v {10 * (i + a)} {10 * (j + b)} 0" for i, j in cells for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    quads = ["f " + " ".join(f"{4 * k + n}//1" for n in (1, 2, 3, 4)) for k in range(9)]
+    (tmp_path / "split.obj").write_text("\n".join([*vertices, "vn 0 0 1", *quads]))
+    with pytest.raises(UserWarning, match="9 parts"):
+        sb.read_mesh(tmp_path / "split.obj", unit="cm")
+    mesh = sb.read_mesh(tmp_path / "split.obj", unit="cm", merge=True)
+    assert len(mesh.vertices) == 16 and len(mesh.triangles) == 18 and mesh.doubts == ()
+    assert mesh.areas.sum() == approx(0.09)
+
+
 def test_the_caller_chooses_the_material(tmp_path: Path) -> None:
     (tmp_path / "cut.obj").write_text(CUT)
     unfolded = sb.read_mesh(tmp_path / "cut.obj", "unfold", unit="cm", warp=(0, 1, 0))

@@ -94,6 +94,13 @@ def test_internal_vector_round_trip() -> None:
     np.testing.assert_allclose(parameters.initial(), [math.log(1e4), 0.1, math.log(0.3)])
 
 
+def test_logarithms_far_out_stay_positive_and_come_back() -> None:
+    parameters = Parameters([Parameter(name="p", initial=1.0, log=True)])
+    (value,) = parameters.to_physical(np.array([-1e4])).values()
+    assert 0.0 < value < 1e-300
+    assert np.isfinite(parameters.to_internal({"p": value})).all()
+
+
 def test_bounds_are_transformed() -> None:
     lower, upper = mixed().bounds()
     np.testing.assert_allclose(lower, [math.log(1e2), -1.0, -math.inf])

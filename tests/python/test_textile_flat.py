@@ -154,6 +154,15 @@ def test_gradient_of_bias_extension(number, field):
         (lambda: textile.bias_extension(APPAREL, length=0.15), "length"),
         (lambda: textile.bias_extension(APPAREL, extension=0.1), "extension"),
         (lambda: textile.uniaxial(APPAREL, "bias"), "along"),
+        (lambda: textile.uniaxial(APPAREL, load=0.0), "uniaxial.load"),
+        (lambda: textile.uniaxial(APPAREL, load=-1.0), "uniaxial.load"),
+        (lambda: textile.uniaxial(APPAREL, width=float("nan")), "uniaxial.width"),
+        (lambda: textile.shear(APPAREL, tension=0.0), "shear.tension"),
+        (lambda: textile.cantilever(APPAREL, angle=0.0), "cantilever.angle"),
+        (lambda: textile.picture_frame(APPAREL, angle=0.0), "picture_frame.angle"),
+        (lambda: sb.Fabric(density=-0.2, warp=600.0, shear=40.0, bending=3e-5), "fabric.density"),
+        (lambda: sb.Fabric(density=0.2, warp="600", shear=40.0, bending=3e-5), "fabric.warp"),
+        (lambda: sb.Fabric(density=0.2, warp=600.0, shear=40.0, bending=3e-5, bending_weft=0.0), "fabric.bending_weft"),
     ],
 )
 def test_what_cannot_be_tested_is_refused(call, field):

@@ -14,7 +14,7 @@ from .simulate import simulate
 
 app = typer.Typer(
     name="sheetbend",
-    help="Simulate ropes and beams, and find their physical parameters from recordings, with error bars.",
+    help="Simulate ropes, beams and cloth, and find their physical parameters from recordings, with error bars.",
     epilog="Exit codes: 0 done, 2 bad input, 3 not identifiable, 4 did not converge, 5 a check failed.",
     no_args_is_help=True,
     add_completion=False,
@@ -36,7 +36,7 @@ def options(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    """Simulate ropes and beams, and find their physical parameters from recordings, with error bars."""
+    """Simulate ropes, beams and cloth, and find their physical parameters from recordings, with error bars."""
 
 
 for command in (simulate, fit, check, info, bench):

@@ -22,7 +22,9 @@ FITTED_FRAMES = 5
 
 
 def check(
-    config: Annotated[Path, typer.Argument(help="A TOML configuration.", show_default=False)],
+    config: Annotated[
+        Path, typer.Argument(help="A TOML configuration, see docs/configuration.md.", show_default=False)
+    ],
     json: Annotated[
         bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
     ] = False,

@@ -17,19 +17,22 @@ from ..problem import FitProblem, as_parameters
 from ..report import plain, rich_report
 from ..result import FitResult
 from .figures import write_figures
+from .folders import made
 from .gripped import fit_ropes, load_ropes
-from .movies import OPTION, MoviePath, check_before_fit, write_movies
+from .movies import OPTION, MoviePath, check_before, write_movies
 from .outcome import Outcome, code_of, run
 from .progress import Iterations
 from .screen import show
 
 
 def fit(
-    config: Annotated[Path, typer.Argument(help="A TOML configuration.", show_default=False)],
+    config: Annotated[
+        Path, typer.Argument(help="A TOML configuration, see docs/configuration.md.", show_default=False)
+    ],
     output: Annotated[
         Path | None,
         typer.Option(
-            help="Folder for fit.json, figures, report and fitted.toml. [default: out/NAME]", show_default=False
+            help="Folder for fit.json, figures, report and fitted.toml; out/NAME when left out.", show_default=False
         ),
     ] = None,
     resume: Annotated[
@@ -61,7 +64,7 @@ def _fit(
         return fit_ropes(console, config, ropes, _folder(console, config, output), strict)
     study = _study(config, path.parent, resume)
     if movie is not None:
-        check_before_fit(movie, study.experiments)
+        check_before(movie, [e.scene for e in study.experiments if not e.static])
     config, folder = study.config, _folder(console, config, output)
     fitted = [e for e in study.experiments if e.predict is None]
     problem = FitProblem(fitted, as_parameters(study.parameters, study.experiments))
@@ -82,9 +85,7 @@ def _fit(
 def _folder(console: Console, config: Config | GrippedConfig, output: Path | None) -> Path:
     """Where results go, made; and the experiment's name on the screen."""
     folder = output if output is not None else Path("out") / config.experiment.name
-    if folder.exists() and not folder.is_dir():
-        raise ConfigError("--output", "is a file", str(folder), "give a folder")
-    folder.mkdir(parents=True, exist_ok=True)
+    made("--output", folder)
     console.print(f"[bold]{config.experiment.name}[/]  {config.experiment.about}")
     return folder
 

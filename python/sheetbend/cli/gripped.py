@@ -18,6 +18,7 @@ from ..gripped.ladder import REST, TILTS, TWIST, VARYING, YIELD
 from ..gripped.motion import motions_of
 from ..gripped.report import overview
 from ..io.folder import recordings
+from ..recording_checks import marker_indices
 from ..tables import plain_section
 from .gripped_figure import write_figure
 from .outcome import Code, Outcome, code_of
@@ -52,6 +53,8 @@ def load_ropes(config: GrippedConfig, folder: Path) -> list[RopeData]:
 def _load(section: GrippedRopeSection, key: str, folder: Path) -> list[GrippedMotion]:
     try:
         found = recordings(folder, section.pattern, section.units)
+        if section.clamped is not None:
+            found = [replace(r, clamped=marker_indices("clamped", section.clamped, r.markers)) for r in found]
         motions = motions_of(found, section.smoothing)
     except RecordingError as error:
         where = "" if error.field in ("folder", str(folder)) else f"{error.field} "

@@ -15,6 +15,7 @@ from rich.table import Table
 from .. import __version__
 from ..config import GrippedConfig, build, parse_any, scene_alone
 from ..experiment import Experiment
+from ..gripped.plausible import doubts
 from ..kinds import KINDS
 from ..optimizers import has_ceres
 from ..scene import Scene
@@ -25,7 +26,10 @@ PACKAGES = ("numpy", "scipy", "torch", "matplotlib", "pydantic", "rich", "typer"
 
 
 def info(
-    config: Annotated[Path | None, typer.Argument(help="A TOML configuration.", show_default=False)] = None,
+    config: Annotated[
+        Path | None,
+        typer.Argument(help="A TOML configuration, see docs/configuration.md.", show_default=False),
+    ] = None,
     json: Annotated[
         bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
     ] = False,
@@ -42,9 +46,13 @@ def _info(console: Console, path: Path | None) -> Outcome:
         "  optimizers   ",
         "ceres, scipy" if has_ceres() else "scipy (Ceres was not built: install libceres-dev and reinstall)",
     )
-    console.print("  constraints  ", ", ".join(f"{name} ({arity})" for name, arity in data["constraints"].items()))
     console.print(
-        "  packages     ", ", ".join(f"{name} {version or 'missing'}" for name, version in data["packages"].items())
+        "  constraints  ", ", ".join(f"{name} ({arity})" for name, arity in data["constraints"].items()), soft_wrap=True
+    )
+    console.print(
+        "  packages     ",
+        ", ".join(f"{name} {version or 'missing'}" for name, version in data["packages"].items()),
+        soft_wrap=True,
     )
     if path is not None:
         data["config"] = _config(console, path)
@@ -88,6 +96,7 @@ def _ropes(console: Console, config: GrippedConfig, ropes: list[RopeData]) -> di
     """Ropes between grips: what was recorded, and what is to be fitted."""
     console.print(f"\n[bold]{config.experiment.name}[/]  {config.experiment.about}")
     told: dict[str, dict[str, Any]] = {}
+    doubtful = {rope.section.name: doubts(rope.train, rope.section.gravity) for rope in ropes}
     for rope in ropes:
         motions = rope.train
         told[rope.section.name] = {
@@ -105,6 +114,10 @@ def _ropes(console: Console, config: GrippedConfig, ropes: list[RopeData]) -> di
         cells = [f"{_text(value)} {units.get(key, '')}".rstrip() for key, value in row.items() if key != "rungs"]
         table.add_row(name, *cells, ", ".join(row["rungs"]))
     console.print(table)
+    for name, sentences in doubtful.items():
+        told[name]["doubts"] = list(sentences)
+        for sentence in sentences:
+            console.print(f"  {name} is doubtful: {sentence}", markup=False, soft_wrap=True)
     return {"name": config.experiment.name, "ropes": told}
 
 

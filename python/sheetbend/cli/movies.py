@@ -10,11 +10,12 @@ import numpy as np
 import typer
 
 from ..equilibrium import equilibrium
-from ..experiment import Experiment
 from ..fit import Fit
 from ..movie import Motion, check_movie, movie_paths, save_movie
 from ..prediction import Comparison
+from ..scene import Scene
 from ..simulate import simulate
+from .folders import made
 
 OPTION = "--movie"
 MoviePath = Annotated[
@@ -28,9 +29,10 @@ MoviePath = Annotated[
 ]
 
 
-def check_before_fit(path: Path, experiments: Sequence[Experiment]) -> None:
-    """Raise before the fit starts, see `movie.check_movie`."""
-    check_movie(OPTION, path, [e.scene for e in experiments if not e.static])
+def check_before(path: Path, scenes: Sequence[Scene]) -> None:
+    """Raise before any work starts, see `movie.check_movie`; makes the file's folder."""
+    check_movie(OPTION, path, scenes)
+    made(OPTION, path.parent)
 
 
 def write_movies(found: Fit, path: Path) -> list[str]:

@@ -14,13 +14,14 @@ from ..config import Study, build, parse, scene_alone
 from ..equilibrium import equilibrium
 from ..errors import ConfigError
 from ..experiment import Experiment
-from ..movie import Motion, check_movie, movie_paths, save_movie
+from ..movie import Motion, movie_paths, save_movie
 from ..scene import Scene
 from ..simulate import Trajectory
 from ..simulate import simulate as run_simulation
 from ..solver import Solver
+from .folders import made
 from .meshes import MeshFormat, write_meshes
-from .movies import OPTION, MoviePath
+from .movies import MoviePath, check_before
 from .outcome import Outcome, run
 
 FRAME = 0.01  # s between frames where no recording tells
@@ -40,9 +41,15 @@ class Task:
 
 
 def simulate(
-    config: Annotated[Path, typer.Argument(help="A TOML configuration; a fit's fitted.toml too.", show_default=False)],
+    config: Annotated[
+        Path,
+        typer.Argument(
+            help="A TOML configuration, see docs/configuration.md; a fit's fitted.toml too.",
+            show_default=False,
+        ),
+    ],
     output: Annotated[
-        Path | None, typer.Option(help="Folder for the trajectories. [default: out/NAME]", show_default=False)
+        Path | None, typer.Option(help="Folder for the trajectories; out/NAME when left out.", show_default=False)
     ] = None,
     duration: Annotated[
         float | None, typer.Option(help="s; to the recording's end when left out.", show_default=False)
@@ -85,9 +92,9 @@ def _simulate(
         raise ConfigError("--mesh", "needs a cloth, and the scene has none", mesh.value, "leave it out")
     moving = [task for task in tasks if not task.static]
     if movie is not None:
-        check_movie(OPTION, movie, [task.scene for task in moving])
+        check_before(movie, [task.scene for task in moving])
     movies = {} if movie is None else movie_paths(movie, [task.name for task in moving])
-    folder.mkdir(parents=True, exist_ok=True)
+    made("--output", folder)
     console.print(f"[bold]{name}[/]  {study.config.experiment.about}")
     done = {task.name: _run(console, task, folder, mesh, movies.get(task.name)) for task in tasks}
     return Outcome({"name": name, "simulated": done})

@@ -18,13 +18,14 @@ from .errors import located
 def places_on_cloths(sections: Sequence[schema.Cloth], scene: Scene, recording: Recording) -> dict[str, Place]:
     """By marker, what the keys `markers` and `nearest_at` of the scene's cloths say.
 
-    With `nearest_at` of several cloths a marker sits on the nearest one.
+    With `nearest_at` of several cloths a marker sits on the nearest one; those that move a grip sit on none.
 
     Raises:
         ConfigError: an unknown marker, a place outside of the fabric, or no frame at `nearest_at`.
     """
     given: dict[str, Place] = {}
     nearest: dict[str, tuple[float, Place]] = {}
+    moving = {m if isinstance(m, str) else recording.markers[m] for s in sections for g in s.grip for m in g.markers}
     for i, section in enumerate(sections):
         if section.name not in scene.cloths:  # left out of this recording
             continue
@@ -38,7 +39,7 @@ def places_on_cloths(sections: Sequence[schema.Cloth], scene: Scene, recording: 
         if section.nearest_at is not None:
             for name, found in _nearest(f"{path}.nearest_at", section.nearest_at, cloth, recording).items():
                 nearest[name] = min(nearest.get(name, found), found, key=lambda pair: pair[0])
-    return {name: place for name, (_, place) in nearest.items()} | given
+    return {name: place for name, (_, place) in nearest.items() if name not in moving} | given
 
 
 def _nearest(path: str, time: float, cloth: Cloth, recording: Recording) -> dict[str, tuple[float, Place]]:

@@ -12,7 +12,7 @@ MESH_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "grid": (("width", "height", "nx", "ny"), ("pattern", "warp")),
     "equilateral": (("width", "height", "nx"), ("warp",)),
     "disk": (("radius", "rings"), ("support", "warp")),
-    "file": (("file",), ("unit", "material", "texture_size", "warp")),
+    "file": (("file",), ("unit", "material", "texture_size", "warp", "merge")),
 }
 """Of every kind of mesh, what it must have and what it may have."""
 
@@ -39,6 +39,7 @@ class ClothMesh(Section):
     )
     texture_size: Finite | None = key(None, "of one unit of texture coordinates; 1 when left out", "m", gt=0)
     warp: Vector | None = key(None, "direction of the warp in the mesh; x when left out; of a file with `unfold` only")
+    merge: bool | None = key(None, "make one vertex of those of the file at equal positions; no when left out")
 
     @model_validator(mode="after")
     def _keys_of_kind(self) -> Self:
@@ -156,8 +157,8 @@ class Cloth(Section):
     markers: dict[str, Pair] = key({}, "material coordinates (along warp and weft) of markers, by name", "m")
     nearest_at: Finite | None = key(
         None,
-        "time of a recording at which the cloth lies as placed: markers without another place sit where they are "
-        "nearest to it then",
+        "time of a recording at which the cloth lies as placed: markers without another place, that move no grip, sit "
+        "where they are nearest to it then",
         "s",
     )
 

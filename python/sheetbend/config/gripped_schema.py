@@ -50,6 +50,9 @@ class GrippedRopeSection(Section):
     eval: str | None = key(None, "folder of recordings that are only predicted, from their first frame")
     pattern: str = key("*", 'which files of these folders, such as "*.pkl"', min_length=1)
     units: Literal["m", "cm", "mm"] | None = key(None, "length unit of the files; their JSONs' when left out")
+    clamped: list[str | int] | None = key(
+        None, "names or numbers of the gripped markers, two or more at each end; the files' when left out"
+    )
     gravity: Vector = key(_default("gravity"), "in the axes of the recordings, where their JSONs do not tell", "m/s^2")
     nominal: Directions | None = key(
         None,

@@ -22,6 +22,7 @@ from .moment import Moment
 from .winds import add_winds
 
 EARTH = (0.0, 0.0, -9.81)  # m/s^2
+LEAST_SPAN, MOST_SPAN = 0.02, 2.0  # of a rope's length: another unit's, beyond
 
 
 @dataclass
@@ -207,7 +208,7 @@ def _add_rope(
     finer: int,
 ) -> None:
     fields = rope.model_dump(exclude={"name", "pinned", "points", "segments"}, exclude_none=True)
-    points = _measured(f"{path}.points", moment, placed) if rope.points == "recording" else rope.points
+    points = _measured(f"{path}.points", moment, placed, rope.length) if rope.points == "recording" else rope.points
     particles.free_name(path, rope.name)
     with located(path, rope.name):
         particles.add_rope(add_rope(scene, rope.name, points=points, segments=finer * rope.segments, **fields))
@@ -215,7 +216,12 @@ def _add_rope(
         scene.pin(particles.nodes(f"{path}.pinned", rope.name, rope.pinned))
 
 
-def _measured(path: str, moment: Moment | None, placed: list[int]) -> np.ndarray:
+def _measured(path: str, moment: Moment | None, placed: list[int], length: float | None) -> np.ndarray:
+    """The markers on a rope at the start, those between its first and last that are not seen left out.
+
+    Raises:
+        ConfigError: there is no recording, an end is not seen, or the markers cannot be those of a rope so long.
+    """
     if moment is None:
         raise ConfigError(path, "needs a recording", "recording", "add a [[recording]], or give the points")
     shape = moment.shape[placed]
@@ -227,6 +233,15 @@ def _measured(path: str, moment: Moment | None, placed: list[int]) -> np.ndarray
             len(seen),
             "place markers on it, or give the points",
         )
+    ends = [moment.recording.markers[k] for k in (placed[0], placed[-1]) if np.isnan(shape[k, 0])]
+    if ends:
+        at = moment.recording.times[moment.recording.mask[:, [placed[0], placed[-1]]].all(axis=1)]
+        fix = f"start where both are seen, such as at {at[0]:g} s" if len(at) else "give the points"
+        raise ConfigError(path, "needs the first and the last marker on the rope, not seen at the start", ends, fix)
+    span = float(np.linalg.norm(np.diff(seen, axis=0), axis=1).sum())
+    if length is not None and not LEAST_SPAN * length < span < MOST_SPAN * length:
+        fix = "correct the length, or the `units` of the recording"
+        raise ConfigError(path, f"are {span:.3g} m long at the start, and the rope has a length of", length, fix)
     return seen
 
 

@@ -95,7 +95,8 @@ class RopeModel:
         start, stop = (times[0], times[-1]) if window is None else window
         inside = np.flatnonzero((times >= start - 1e-9) & (times <= stop + 1e-9))
         if len(inside) < 3:
-            fix = f"give at least three frames between {times[0]:g} and {times[-1]:g} s"
+            apart = f"{np.median(np.diff(times)):g} s apart"
+            fix = f"give at least three frames between {times[0]:g} and {times[-1]:g} s, {apart}"
             raise InputError("window", f"of {motion.recording.name} holds too few frames", window, fix)
         first, last = int(inside[0]), int(inside[-1])
         scene = self.scene(motion, first, last)

@@ -12,10 +12,12 @@ from ..errors import RecordingError
 from ..grip import Grip
 from ..optional import require
 from ..recording import Recording
+from ..timeseries import mean_position
+from .plausible import check_order
 
 Array = np.ndarray
 POLYLINE = 200  # points of the initial curve, which links are laid along
-BRIDGED = 0.1  # s, of a free marker's gap: there the C1 cubic stands in for what was not seen, in starts alone
+BRIDGED = 0.1  # s, of a gap: there the C1 cubic stands in for what was not seen, of grips and of starts
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,9 +25,10 @@ class GrippedMotion:
     """A recording of a rope whose first and last two markers are gripped, smoothed.
 
     Attributes:
-        recording: as given.
+        recording: as given, short gaps of gripped markers closed.
         inner: numbers of the two inner gripped markers, between which the rope is free.
-        positions, velocities: (frames, markers, 3) m and m/s, of a local parabola in time.
+        positions, velocities: (frames, markers, 3) m and m/s, of a local parabola in time; NaN about long gaps of free
+            markers.
         fractions: (markers,) arc length from the first inner marker over the free length, mean chords; outside 0 to 1
             in the grips.
         length: m, mean arc length of a smooth curve through the free markers.
@@ -43,16 +46,25 @@ class GrippedMotion:
         """Smooth over `smoothing` s (0 = not at all).
 
         Raises:
-            RecordingError: the rope is not gripped by two markers at each end, or a gap is too long to fill.
+            RecordingError: the rope is not gripped by two markers at each end, its markers are not in order, or too
+                much was not seen.
         """
+        if len(recording.times) < 3:
+            problem = f"of {recording.name} are fewer than three frames"
+            raise RecordingError("times", problem, len(recording.times), "leave the recording out, or record a motion")
         inner = _inner(recording)
-        x, v = smoothed(recording.times, _bridged(recording), smoothing)
-        free = x[:, inner[0] : inner[1] + 1]
-        chords = np.linalg.norm(np.diff(x, axis=1), axis=2).mean(axis=0)
+        check_order(recording, inner)
+        recording, positions = _bridged(recording)
+        x, v = smoothed(recording.times, positions, smoothing)
+        part = slice(inner[0], inner[1] + 1)
+        chords = mean_position(np.linalg.norm(np.diff(x, axis=1), axis=2))
+        _check_shown(recording, x, chords, inner)
         s = np.concatenate([[0.0], np.cumsum(chords)])
         fractions = (s - s[inner[0]]) / (s[inner[1]] - s[inner[0]])
-        some = np.linspace(0, len(free) - 1, min(len(free), 20)).astype(int)
-        curves = [_curve(free[f], fractions[inner[0] : inner[1] + 1]) for f in some]
+        seen = np.isfinite(x[:, part, 0]).sum(axis=1)
+        best = np.flatnonzero(seen == seen.max())
+        some = best[np.linspace(0, len(best) - 1, min(len(best), 20)).astype(int)]
+        curves = [_curve(x[f, part], fractions[part]) for f in some]
         length = float(np.mean([np.linalg.norm(np.diff(c, axis=0), axis=1).sum() for c in curves]))
         return cls(recording, inner, x, v, fractions, length)
 
@@ -74,8 +86,21 @@ class GrippedMotion:
         first, second = self.positions[frames, k], self.positions[frames, k + 1]
         return Grip.from_markers(t - t[0], first, second, end=end, nominal=nominal)
 
+    @property
+    def sag(self) -> Array:
+        """(3,) m, by which the free markers are off the line between the grips, on average."""
+        first, last = (self.positions[:, [k]] for k in self.inner)
+        free = list(self.free)
+        share = self.fractions[free, None]
+        return np.nanmean(self.positions[:, free] - (1.0 - share) * first - share * last, axis=(0, 1))
+
+    def shown(self, frame: int) -> bool:
+        """Whether at least half of the free markers are seen about a frame: a motion can start there."""
+        return _shown(self.positions[frame], self.inner)
+
     def start(self, frame: int) -> tuple[Array, Array]:
-        """Points (k, 3) m along a smooth curve through the markers between the grips, and velocities (k, 3) m/s."""
+        """Points (k, 3) m along a smooth curve through the markers between the grips, and velocities (k, 3) m/s;
+        markers that are not seen are left out."""
         part = slice(self.inner[0], self.inner[1] + 1)
         s = self.fractions[part]
         return _curve(self.positions[frame, part], s), _curve(self.velocities[frame, part], s)
@@ -90,7 +115,7 @@ def smoothed(times: Array, positions: Array, width: float) -> tuple[Array, Array
     """Values and slopes of the parabola fitted around each frame (Savitzky & Golay 1964), one-sided at the ends.
 
     Args:
-        times: (frames,) s, evenly spaced.
+        times: (frames,) s, increasing; the intervals need not be equal.
         positions: (frames, ...) finite.
         width: s; fewer than five frames leave the positions as they are, with central differences.
     """
@@ -98,32 +123,54 @@ def smoothed(times: Array, positions: Array, width: float) -> tuple[Array, Array
     frames = min(2 * round(width / step / 2) + 1, len(times) - (1 - len(times) % 2))
     if frames < 5:
         return positions, np.gradient(positions, times, axis=0)
-    half = frames // 2
-    t = step * np.arange(-half, half + 1)
-    fit = np.linalg.pinv(np.vander(t, 3, increasing=True))
-    parabolas = np.lib.stride_tricks.sliding_window_view(positions, frames, axis=0) @ fit.T
-    at = np.clip(np.arange(len(times)), half, len(times) - 1 - half)  # the middle of the frame's parabola
-    offset = (step * (np.arange(len(times)) - at)).reshape(-1, *[1] * (positions.ndim - 1))
-    value, slope, bend = np.moveaxis(parabolas[at - half], -1, 0)
-    return value + offset * (slope + offset * bend), slope + 2.0 * offset * bend
+    first = np.clip(np.arange(len(times)) - frames // 2, 0, len(times) - frames)
+    unit = step * (frames // 2)
+    powers = ((times[first[:, None] + np.arange(frames)] - times[:, None]) / unit)[..., None] ** np.arange(3)
+    fit = np.linalg.pinv(powers)  # (frames, 3, window): value, slope and half the bend from the window's samples
+    value, slope = sum(np.einsum("nc,n...->cn...", fit[:, :2, k], positions[first + k]) for k in range(frames))
+    return value, slope / unit
 
 
-def _bridged(recording: Recording) -> Array:
-    """(frames, markers, 3) m without gaps; those of gripped markers must be shorter (`Recording.filled`)."""
-    filled, times = recording.filled(), recording.times
+def _bridged(recording: Recording) -> tuple[Recording, Array]:
+    """The recording with closed gaps of gripped markers, and (frames, markers, 3) m with those of free ones closed too.
+
+    Raises:
+        RecordingError: a gap of a gripped marker, or of all, is too long.
+    """
+    times = recording.times
     gap = max(timeseries.default_max_gap(times), BRIDGED)
-    positions = timeseries.interpolate(times, filled.positions, times, "cubic", gap)
-    lost = np.argwhere(np.isnan(positions[:, :, 0]))
+    jump = np.flatnonzero(np.diff(times) > gap * (1 + 1e-9))
+    if len(jump):
+        before, after = times[jump[0]], times[jump[0] + 1]
+        problem = f"of {recording.name} jump by {after - before:.3g} s: nothing was recorded there"
+        fix = "save each side as a recording of its own (`Recording.piece`)"
+        raise RecordingError("times", problem, (float(before), float(after)), fix)
+    filled = recording.filled(gap)
+    return filled, timeseries.interpolate(times, filled.positions, times, "cubic", gap)
+
+
+def _check_shown(recording: Recording, positions: Array, chords: Array, inner: tuple[int, int]) -> None:
+    """Raises RecordingError where a free marker is hardly ever seen beside its neighbor, or too few at the start."""
+    lost = np.flatnonzero(np.isnan(chords))
     if len(lost):
-        frame, marker = lost[0]
-        label, problem = f"marker {recording.markers[marker]!r} of {recording.name}", f"is lost for over {gap:.3g} s"
-        fix = "cut a piece without the gap, or leave the marker out with `select`"
-        raise RecordingError(label, f"{problem}, or at an end", f"not seen at {times[frame]:.6g} s", fix)
-    return positions
+        names = [recording.markers[k] for k in (lost[0], lost[0] + 1)]
+        problem = f"of {recording.name} are never seen together for long enough"
+        raise RecordingError("markers", problem, names, "leave one out with `Recording.select`")
+    if not _shown(positions[0], inner):
+        later = [f"{t:g} s" for t, x in zip(recording.times, positions, strict=True) if _shown(x, inner)]
+        fix = f"save the recording from {later[0] if later else 'a later frame'} on (`Recording.piece`)"
+        problem = f"of {recording.name} are less than half seen in the first frames"
+        raise RecordingError("markers", problem, float(recording.times[0]), fix)
+
+
+def _shown(positions: Array, inner: tuple[int, int]) -> bool:
+    return 2 * int(np.isfinite(positions[inner[0] + 1 : inner[1], 0]).sum()) >= inner[1] - inner[0] - 1
 
 
 def _curve(points: Array, s: Array) -> Array:
-    spline = require("scipy.interpolate", "fit").CubicSpline(s, points)
+    """Through those points (k, 3) that are seen."""
+    seen = np.isfinite(points[:, 0])
+    spline = require("scipy.interpolate", "fit").CubicSpline(s[seen], points[seen])
     return np.asarray(spline(np.linspace(s[0], s[-1], POLYLINE)))
 
 
@@ -133,6 +180,6 @@ def _inner(recording: Recording) -> tuple[int, int]:
     last = next((k for k in reversed(range(count)) if k not in held), -1)
     gripped = held == set(range(first)) | set(range(last + 1, count))
     if not gripped or first < 2 or last > count - 3 or last < first:
-        fix = "name the gripped markers in `clamped`: two or more in a row at each end, free ones between"
+        fix = "name the gripped markers in `clamped`, the first two or more and the last two or more along the rope"
         raise RecordingError("clamped", f"of {recording.name} are no two grips", sorted(held), fix)
     return first - 1, last + 1

@@ -30,6 +30,7 @@ from .ladder import LADDER, TWIST, Rung
 from .model import GRAVITY, NAME, RopeModel, nominal_directions, shared_gravity
 from .motion import Array, GrippedMotion, motions_of
 from .offsets import offset_reach
+from .plausible import doubts
 
 BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first
 LINKS_PER_BENDING_LENGTH = 3.0  # below this EI reads too high and GJ too low
@@ -151,6 +152,9 @@ def fit_rope(
         raise InputError("validate", "must be a share below 1", validate, "give such as 0.25")
     motions = motions_of(recordings, smoothing)
     shared_gravity([m.recording for m in motions])
+    doubtful = doubts(motions, gravity)
+    for doubt in doubtful:
+        say(f"doubtful: {doubt}")
     model = RopeModel(
         density=density,
         nominal=nominal_directions(motions)
@@ -164,7 +168,8 @@ def fit_rope(
         gravity=gravity,
     )
     search = _Search(motions, validate, windows, threads, say)
-    return search.run(model, ladder, bending_lengths, max_segments)
+    found = search.run(model, ladder, bending_lengths, max_segments)
+    return replace(found, warnings=(*doubtful, *found.warnings))
 
 
 class _Search:
@@ -313,6 +318,7 @@ class _Search:
     ) -> Fit:
         """The fit to all recordings, and what half the step and twice the links would move; after Ctrl-C one iteration
         of it, which the intervals need."""
+        self.say(f"the fit that counts, to all {len(self.all)} recordings")
         finer = replace(model, segments=2 * model.segments)
         refine = Refinement(finer=lambda: _experiments(finer, self.all, self.longest), linear=True)
         last = fit(
@@ -339,9 +345,10 @@ def _experiments(model: RopeModel, motions: Sequence[GrippedMotion], window: tup
     length, total = window
     whole = [float(m.recording.times[-1] - m.recording.times[0]) for m in motions]
     places = [
-        (m, float(m.recording.times[0]) + k * length)
+        (m, start)
         for m, duration in zip(motions, whole, strict=True)
-        for k in range(max(1, int(duration / length + 1e-9)))
+        for start in (m.recording.times[0] + length * np.arange(max(1, int(duration / length + 1e-9)))).tolist()
+        if m.shown(int(np.searchsorted(m.recording.times, start - 1e-9)))
     ]
     count = max(1, min(len(places), round(total / length)))
     chosen = [places[i] for i in np.unique(np.linspace(0, len(places) - 1, count).astype(int))]

@@ -30,6 +30,7 @@ from ..recording import Recording
 
 _DELIMITERS = (",", ";", "\t")
 _AXES = ("x", "y", "z")
+_COLUMNS = "name the columns of each marker <marker>_x, <marker>_y, <marker>_z"
 
 Row = tuple[int, list[str]]  # line number in the file, from 1, and the cells
 
@@ -102,9 +103,9 @@ def _read_wide(path: Path, header: list[str], header_line: int, rows: list[Row])
     expected = [f"{marker}_{axis}" for marker in markers for axis in _AXES]
     for column, wanted in zip(header[1:], expected, strict=False):
         if column != wanted:
-            _refuse(path, header_line, f"must have the column {wanted!r} there", column)
+            _refuse(path, header_line, f"must have the column {wanted!r} there", column, _COLUMNS)
     if len(header) != 1 + len(expected):
-        _refuse(path, header_line, "must have three columns x, y, z per marker", header[-1])
+        _refuse(path, header_line, "must have three columns x, y, z per marker", header[-1], _COLUMNS)
     table = np.array([[_number(path, line, cell) for cell in cells] for line, cells in rows])
     _check_times(path, rows, table[:, 0])
     return Recording(table[:, 1:].reshape(len(rows), -1, 3), table[:, 0], tuple(markers))
@@ -137,7 +138,8 @@ def _number(path: Path, line: int, cell: str) -> float:
     try:
         number = float(cell.replace("_", "?"))  # Python would read 1_0 as ten
     except ValueError:
-        _refuse(path, line, "holds a cell that is no number (the decimal mark is a point)", cell)
+        fix = "write a point as decimal mark, and an empty cell or nan for a marker not seen"
+        _refuse(path, line, "holds a cell that is no number", cell, fix)
     if np.isinf(number):
         _refuse(path, line, "holds an infinite number; leave the cell empty for a marker not seen", cell)
     return number
@@ -151,5 +153,5 @@ def _check_times(path: Path, rows: list[Row], times: np.ndarray) -> None:
         previous = time
 
 
-def _refuse(path: Path, line: int, problem: str, got: object) -> NoReturn:
-    raise RecordingError(f"{path}, line {line}", problem, got, "correct that line")
+def _refuse(path: Path, line: int, problem: str, got: object, fix: str = "correct that line") -> NoReturn:
+    raise RecordingError(f"{path}, line {line}", problem, got, fix)

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import RecordingError
-from ..recording import Recording
+from ..recording import UNNAMED, Recording
 from ..recording_checks import checked_markers, default_markers, marker_indices
 from ..timeseries import Array
 
@@ -69,7 +69,7 @@ def write(recording: Recording, path: Path, assumed: tuple[str, ...] = ()) -> No
         fix = f"rename it; {', '.join(reserved)} are written from the recording itself"
         raise RecordingError("metadata", "uses a reserved key", taken, fix)
     content = {
-        "name": recording.name,
+        **({} if recording.name == UNNAMED else {"name": recording.name}),
         "units": "m",
         "markers": recording.markers,
         "clamped": [recording.markers[i] for i in recording.clamped],

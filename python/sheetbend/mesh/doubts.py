@@ -43,7 +43,7 @@ def doubts(vertices: Array, triangles: Indices, corners: Array, twin: Indices) -
         shared = np.flatnonzero(np.bincount(index.ravel())[index.ravel()] > 1)
         found.append(
             f"{shared.size} vertices lie on top of others ({_few(shared)}): the mesh may be cracked there. "
-            "Merge them if so."
+            "Merge them if so (`read_mesh(..., merge=True)`)."
         )
     apart = np.abs(edges[:, 1] - edges[:, 0]).mean()
     if len(vertices) > _MANY and apart > _FAR * np.sqrt(len(vertices)):

@@ -34,6 +34,7 @@ def read_mesh(
     unit: str = "m",
     texture_size: float | ArrayLike = 1.0,
     warp: ArrayLike = (1.0, 0.0, 0.0),
+    merge: bool = False,
 ) -> TriangleMesh:
     """Read a mesh. Its vertices keep the order of the file; in STL, which repeats them, equal ones are merged.
 
@@ -45,6 +46,7 @@ def read_mesh(
         unit: of the file's positions, "m", "cm" or "mm".
         texture_size: m per unit of texture coordinates, one number or (u, v).
         warp: (3,) direction of warp for "unfold".
+        merge: make one vertex of those at equal positions, as exporters split them where normals differ.
 
     Warns:
         UserWarning: for each of the mesh's `doubts`.
@@ -58,6 +60,8 @@ def read_mesh(
     if unit not in METERS:
         raise MeshError("unit", "is unknown", unit, f"use one of {', '.join(METERS)}")
     vertices, triangles, texture = _read(path)
+    if merge:
+        vertices, triangles = _merged(vertices, triangles)
     vertices, triangles = vertices * METERS[unit], checked_triangles(triangles, len(vertices))
     if isinstance(material, str) and material not in ("texture", "unfold"):
         raise MeshError("material", "is unknown", material, "use 'texture', 'unfold' or an array")
@@ -95,7 +99,9 @@ def _read(path: Path) -> tuple[Array, NDArray[np.int64], Array | None]:
 def _load(path: Path, options: dict[str, Any]) -> Any:
     trimesh = require("trimesh", "mesh")
     try:
-        mesh = trimesh.load_mesh(str(path), process=False, **options)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # of arithmetic on what a file leaves out
+            mesh = trimesh.load_mesh(str(path), process=False, **options)
     except Exception as problem:  # whatever a damaged file makes the library raise
         raise MeshError(
             str(path), f"cannot be read ({problem})", type(problem).__name__, "export it again"

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks import check_positive
 from ..cloth import add_cloth
 from ..equilibrium import Equilibrium, equilibrium
 from ..fabric import Fabric
@@ -55,8 +56,10 @@ def cantilever(
         cells: along the overhang.
 
     Raises:
+        SceneError: the width or the angle is not positive.
         NoEquilibriumError: the strip comes to no rest.
     """
+    check_positive("cantilever", {"width": width, "angle": angle}, {})
     stiff = fabric.bending_weft if along == "weft" and fabric.bending_weft is not None else fabric.bending
     guess = (_CHORD_GAMMA * stiff / (fabric.density * GRAVITY)) ** (1.0 / 3.0)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks import check_positive
 from ..cloth import Cloth
 from ..equilibrium import Equilibrium
 from ..fabric import Fabric
@@ -46,8 +47,10 @@ def picture_frame(fabric: Fabric, *, angle: float = 20.0, side: float = 0.2, cel
         cells: along a side.
 
     Raises:
+        SceneError: the angle or the side is not positive.
         NoEquilibriumError: the fabric comes to no rest.
     """
+    check_positive("picture_frame", {"angle": angle, "side": side}, {})
     half = math.radians(angle) / 2.0
     scene, cloth = specimen(fabric, grid(side, side, cells, cells))
     a, b = cloth.mesh.vertices[:, :2].T

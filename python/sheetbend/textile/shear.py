@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from ..checks import check_positive
 from ..equilibrium import Equilibrium
 from ..fabric import Fabric
 from ..mesh import grid
@@ -55,8 +56,10 @@ def shear(
         cells: along the gauge.
 
     Raises:
+        SceneError: a size or the tension is not positive.
         NoEquilibriumError: the tension is not reached.
     """
+    check_positive("shear", {"tension": tension, "width": width, "gauge": gauge}, {})
     mesh = grid(width, gauge, max(2, round(cells * width / gauge)), cells)
     scene, cloth = specimen(fabric, turned(mesh, 90.0 - warp_angle(along)))
     x = mesh.vertices

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..checks import check_positive
 from ..equilibrium import Equilibrium
 from ..fabric import Fabric
 from ..mesh import grid
@@ -51,8 +52,10 @@ def uniaxial(
         cells: along the gauge.
 
     Raises:
+        SceneError: a size or the load is not positive.
         NoEquilibriumError: the load is not reached.
     """
+    check_positive("uniaxial", {"load": load, "width": width, "gauge": gauge}, {})
     scene, cloth = specimen(
         fabric, turned(grid(gauge, width, cells, max(2, round(cells * width / gauge))), warp_angle(along))
     )

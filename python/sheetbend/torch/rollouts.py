@@ -109,4 +109,5 @@ def expect_finite(scene: Scene, inputs: Array) -> None:
     row, column = bad[0].tolist()
     array = next(name for name, (offset, size) in scene.compiled.layout.items() if offset <= column < offset + size)
     where = f" in scene {row} of the batch" if len(inputs) > 1 else ""
-    raise InputError(array, f"is not finite{where}", float(inputs[row, column]), "check the values and arrays given")
+    fix = "check the values and arrays given; stiffness and density must be positive, as `SceneModule` keeps them"
+    raise InputError(array, f"is not finite{where}", float(inputs[row, column]), fix)
