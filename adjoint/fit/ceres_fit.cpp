@@ -1,7 +1,11 @@
 #include "adjoint/fit/ceres_fit.h"
 
 #include <ceres/ceres.h>
+#if __has_include(<glog/logging.h>)
+#include <glog/logging.h>
+#endif
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -64,6 +68,18 @@ class Residuals : public ceres::CostFunction {
   const Point& point_;
 };
 
+// Ceres logs failed evaluations whatever its options say; the result tells of them. Its own small stand-in for glog has no such flag.
+class Quiet {
+#ifdef GLOG_EXPORT
+ public:
+  Quiet() { FLAGS_minloglevel = google::GLOG_FATAL; }
+  ~Quiet() { FLAGS_minloglevel = before_; }
+
+ private:
+  const int before_ = FLAGS_minloglevel;
+#endif
+};
+
 class Watch : public ceres::IterationCallback {
  public:
   Watch(const Observe& observe, const Point& point, const std::vector<double>& u)
@@ -113,12 +129,13 @@ CeresResult minimize_with_ceres(const EvaluationFunction& evaluation, std::vecto
   o.update_state_every_iteration = true;
   o.callbacks.push_back(&watch);
   ceres::Solver::Summary summary;
+  [[maybe_unused]] const Quiet quiet;
   ceres::Solve(o, &problem, &summary);
 
   CeresResult result;
   result.u = u;
   result.cost = summary.final_cost;
-  result.iterations = static_cast<int>(summary.iterations.size()) - 1;
+  result.iterations = std::max(0, static_cast<int>(summary.iterations.size()) - 1);
   result.evaluations = point.evaluations;
   result.converged = summary.termination_type == ceres::CONVERGENCE;
   result.stopped = summary.termination_type == ceres::USER_FAILURE || point.status == EvaluationStatus::interrupted;

@@ -49,6 +49,16 @@ def problem_of(*experiments: sb.Experiment) -> FitProblem:
 
 
 @needs_ceres
+def test_ceres_tells_of_failures_in_its_result_alone(capfd):
+    problem = problem_of(swinging())
+    far = np.full(len(problem.parameters.initial()), 900.0)
+    end = importlib.import_module("sheetbend.optimizers")._ceres(problem, far, 5, 1e-10, lambda *_: None)
+    assert not end.converged and end.iterations == 0
+    assert "evaluation failed" in end.message
+    assert capfd.readouterr() == ("", "")
+
+
+@needs_ceres
 @pytest.mark.parametrize("loss", ["squares", "soft_l1", "huber"])
 def test_ceres_and_scipy_give_the_same_answer(loss):
     """As asked for, within a thousandth of the intervals; iterated until the cost is level to rounding, 1e-4 standard
