@@ -90,7 +90,9 @@ void Aggregation::find_coarse(const std::vector<int>& aggregate, int count) {
   for (const int a : aggregate) dof_of.push_back(modes * place[a]);
 
   std::vector<std::pair<int, int>> blocks;  // first dofs of rows and columns
-  const auto block_of = [&](int i, int j) { return std::pair(std::max(dof_of[i], dof_of[j]), std::min(dof_of[i], dof_of[j])); };
+  const auto block_of = [&](int i, int j) {
+    return std::pair(std::max(dof_of[i], dof_of[j]), std::min(dof_of[i], dof_of[j]));
+  };
   for (int i = 0; i < particles; ++i)
     for (int k = start[i]; k < start[i + 1]; ++k) blocks.push_back(block_of(i, column[k]));
   std::ranges::sort(blocks);

@@ -38,8 +38,7 @@ struct BlockMatrix {
       const Vec3<V> own = inverse_times(i, sum);
       own.store(z + 3 * static_cast<long>(i));
       Vec3<V>(V(0.0), V(0.0), V(0.0)).store(rest + 3 * static_cast<long>(i));
-      for (int k = start[i]; k < diagonal; ++k)
-        subtract(transpose_times(k, own), rest, column[k]);
+      for (int k = start[i]; k < diagonal; ++k) subtract(transpose_times(k, own), rest, column[k]);
     }
   }
 

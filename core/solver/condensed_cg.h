@@ -33,8 +33,8 @@ class CondensedCg {
     fill(plan, block, stiffness);
     inverse_.resize(6 * static_cast<std::size_t>(block.movable));
     for (int i = 0; i < block.movable; ++i) invert(diagonal(plan, i), &inverse_[6 * static_cast<std::size_t>(i)]);
-    coarse_.factorize(plan, blocks_.data(), [&](std::size_t i, int d) { return coefficient<double>(block.x[4 * i + d]); },
-                      compiled);
+    coarse_.factorize(
+        plan, blocks_.data(), [&](std::size_t i, int d) { return coefficient<double>(block.x[4 * i + d]); }, compiled);
   }
 
   // z = H^-1 z. `room` has work() numbers.
@@ -100,7 +100,8 @@ class CondensedCg {
   }
 
   BlockMatrix<Plain> matrix(const Aggregation& plan) const {
-    return {plan.start.data(), plan.column.data(), blocks_.data(), inverse_.data(), static_cast<int>(plan.dof_of.size())};
+    return {plan.start.data(), plan.column.data(), blocks_.data(), inverse_.data(),
+            static_cast<int>(plan.dof_of.size())};
   }
 
   std::vector<Plain> blocks_, inverse_;

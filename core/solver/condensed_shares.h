@@ -17,9 +17,7 @@ struct CondensedShares {
   std::vector<int> gradients;  // per use: where the particle's gradients of the member's rows stand
   std::vector<int> dofs;       // per use: first dof in H
 
-  std::size_t bytes() const {
-    return sizeof(Member) * members.size() + sizeof(int) * (gradients.size() + dofs.size());
-  }
+  std::size_t bytes() const { return sizeof(Member) * members.size() + sizeof(int) * (gradients.size() + dofs.size()); }
 
   // f(member, use i, use k) for each pair in H's lower triangle.
   template <class F>

@@ -186,8 +186,7 @@ DirectBlock make_block(const Scene& scene, std::vector<Member> members, const So
   }
   for (const int g : groups) block.runs.push_back(make_run(scene, g, particle_of, block));
   if (options.partition == Partition::newton) block.condensation = factored(scene, block, particle_of);
-  if (options.partition == Partition::newton_cg)
-    block.condensation = iterated(scene, block, particle_of, options);
+  if (options.partition == Partition::newton_cg) block.condensation = iterated(scene, block, particle_of, options);
   return block;
 }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -104,7 +105,7 @@ def company() -> sb.Scene:
     x[14] = scene.positions[corner] + [0.02, 0.0, -0.05]
     own = scene.add_particles(x, mass=1e-3)
     scene.pin(own[[0, 12]])
-    links = [*zip(own[:9], own[1:10], strict=True), (own[10], own[11]), (own[12], own[13]), (corner, own[14])]
+    links = [*pairwise(own[:10]), (own[10], own[11]), (own[12], own[13]), (corner, own[14])]
     at = scene.positions
     rest = [0.98 * np.linalg.norm(at[a] - at[b]) for a, b in links]
     scene.add_constraints("distance", np.array(links), compliance=1e-5, rest=np.array(rest))
