@@ -11,11 +11,6 @@ std::size_t size_in_bytes(const std::vector<V>& v) {
   return sizeof(V) * v.size();
 }
 
-// Of a block whose condensed matrix is factored, otherwise null.
-inline const CondensedPattern* pattern_of(const DirectBlock& block) {
-  return block.condensation ? std::get_if<CondensedPattern>(&*block.condensation) : nullptr;
-}
-
 // Colors or blocks: what was found once about the scene.
 inline std::size_t plan_bytes(const Plan& plan) {
   std::size_t bytes = size_in_bytes(plan.packs.ghosts);
@@ -29,9 +24,7 @@ inline std::size_t plan_bytes(const Plan& plan) {
                size_in_bytes(run.first_row);
     // A sparse pattern: rows and columns of the matrix, and of its factor.
     bytes += block.structure.bytes();
-    if (const CondensedPattern* c = pattern_of(block))
-      bytes += size_in_bytes(c->members) + size_in_bytes(c->gradients) + size_in_bytes(c->dofs) +
-               size_in_bytes(c->dof_of) + size_in_bytes(c->entries) + c->structure.bytes();
+    if (block.condensation) bytes += std::visit([](const auto& c) { return c.bytes(); }, *block.condensation);
   }
   return bytes;
 }
@@ -43,28 +36,14 @@ std::size_t numbers_bytes(std::size_t count) {
   return sizeof(Numbers<T>) + (count * sizeof(T) + pack - 1) / pack * pack;
 }
 
-// The values of a matrix and its factor.
-template <class T>
-std::size_t factor_bytes(const FactorStructure& s) {
-  std::size_t bytes = sizeof(T) * (s.values() + Factor<T>::right_side(s));
-  if (!s.banded()) bytes += sizeof(T) * s.work() + sizeof(int) * s.size();
-  return bytes;
-}
-
 // One direct block's BlockState.
 template <class T>
 std::size_t block_bytes(const Scene& scene, const DirectBlock& block, int kept_iterations) {
   const std::size_t rows = right_side<T>(block), iterations = std::max(1, kept_iterations);
   const auto of = [](std::size_t count) { return numbers_bytes<T>(count); };
   const std::size_t particles = of(sheetbend_blocks::row * block.particles.size());
-  std::size_t factor = sizeof(Factor<T>) + sizeof(CondensedSolver<T>) + factor_bytes<T>(block.structure);
-  if (block.condensation) {
-    factor += sizeof(T) * (block.size() + CondensedSolver<T>::work(*block.condensation, block.movable, block.size()));
-    if (const CondensedPattern* pattern = pattern_of(block))
-      factor += factor_bytes<T>(pattern->structure);
-    else
-      factor += CondensedCg<T>::bytes(block.movable);
-  }
+  std::size_t factor = sizeof(Factor<T>) + sizeof(CondensedSolver<T>) + Factor<T>::bytes(block.structure);
+  if (block.condensation) factor += CondensedSolver<T>::bytes(*block.condensation, block.movable, block.size());
   std::size_t bytes =
       sizeof(BlockState<T>) + 2 * of(block.size()) + (block.damped ? 2 * (particles + of(block.size())) : 0) +
       iterations * (of(sheetbend_blocks::row * block.window_rows.size()) + of(rows) + particles + factor) +

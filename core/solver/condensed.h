@@ -13,8 +13,8 @@
 
 namespace sheetbend {
 
-// What a plan knows about H: its pattern where it is factored, or when conjugate gradients stop.
-using Condensation = std::variant<CondensedPattern, Stopping>;
+// What a plan knows about H: its pattern where it is factored, or what conjugate gradients go by.
+using Condensation = std::variant<CondensedPattern, CondensedIteration>;
 
 template <class T>
 class CondensedSolver {
@@ -25,7 +25,8 @@ class CondensedSolver {
     if (const auto* pattern = std::get_if<CondensedPattern>(&plan))
       factor_.factorize(*pattern, block, stiffness_.data(), compiled);
     else
-      cg_.prepare(block, stiffness_.data());
+      cg_.prepare(std::get<CondensedIteration>(plan).aggregation, block, stiffness_.data(),
+                  is_plain<T> ? compiled : nullptr);
   }
 
   // b = A^-1 b, with the numbers that were prepared.
@@ -47,9 +48,17 @@ class CondensedSolver {
 
   // Numbers that solve() works on.
   static std::size_t work(const Condensation& plan, std::size_t movable, std::size_t rows) {
-    const std::size_t own = 3 * rows + 3 * movable;
-    return own + (std::holds_alternative<CondensedPattern>(plan) ? CondensedFactor<T>::work(movable)
-                                                                 : CondensedCg<T>::work(movable, rows));
+    const auto* iteration = std::get_if<CondensedIteration>(&plan);
+    return 3 * rows + 3 * movable +
+           (iteration ? CondensedCg<T>::work(iteration->aggregation) : CondensedFactor<T>::work(movable));
+  }
+
+  // What it holds once it has solved.
+  static std::size_t bytes(const Condensation& plan, std::size_t movable, std::size_t rows) {
+    const auto* pattern = std::get_if<CondensedPattern>(&plan);
+    return sizeof(T) * (rows + work(plan, movable, rows)) +
+           (pattern ? Factor<T>::bytes(pattern->structure)
+                    : CondensedCg<T>::bytes(std::get<CondensedIteration>(plan).aggregation));
   }
 
  private:
@@ -68,7 +77,7 @@ class CondensedSolver {
     if (const auto* pattern = std::get_if<CondensedPattern>(&plan))
       factor_.solve(*pattern, z, rest);
     else
-      cg_.solve(block, stiffness_.data(), std::get<Stopping>(plan), z, rest);
+      cg_.solve(std::get<CondensedIteration>(plan), z, rest);
     block.subtract_times(z, y);
     for (int i = 0; i < block.size; ++i) y[i] = stiffness_[i] * y[i];
   }

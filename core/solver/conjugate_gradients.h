@@ -38,54 +38,39 @@ double largest_excess(const U& a, const U& b) {
   return largest;
 }
 
-// A dot product, particle by particle.
+// Particle by particle.
 template <class U>
-struct DotProduct {
+U dot_product(const U* a, const U* b, std::size_t size) {
   Vec3<U> sum{U(0.0), U(0.0), U(0.0)};
-  void add(const U* a, const U* b) { sum = sum + Vec3<U>(a[0] * b[0], a[1] * b[1], a[2] * b[2]); }
-  U total() const { return (sum.x + sum.y) + sum.z; }
-};
+  for (std::size_t d = 0; d < size; d += 3) sum = sum + Vec3<U>(a[d] * b[d], a[d + 1] * b[d + 1], a[d + 2] * b[d + 2]);
+  return (sum.x + sum.y) + sum.z;
+}
 
-// b = H^-1 b. H.multiply(p, q) is q = H p, H.precondition(i, z) is z = M^-1 z for the three numbers of particle i. `work` has three times as many
-// numbers as b. Gives the number of iterations.
+// b = H^-1 b. H.multiply(p, q) is q = H p, H.precondition(r, z) is z = M^-1 r. `work` has three times as many numbers as b. Gives the number of
+// iterations.
 template <class U, class Matrix>
 int conjugate_gradients(const Matrix& H, int particles, const Stopping& stop, U* b, U* work) {
   const std::size_t size = 3 * static_cast<std::size_t>(particles);
   const U zero(0.0), one(1.0);
   U *z = work, *p = z + size, *q = p + size, *r = b;
-  DotProduct<U> start;
-  for (int i = 0; i < particles; ++i) {
-    const std::size_t at = 3 * static_cast<std::size_t>(i);
-    for (std::size_t d = at; d < at + 3; ++d) {
-      z[d] = zero;
-      p[d] = r[d];
-    }
-    H.precondition(i, p + at);
-    start.add(r + at, p + at);
-  }
-  U left = start.total();
+  std::fill_n(z, size, zero);
+  H.precondition(r, p);
+  U left = dot_product(r, p, size);
   const U enough = U(stop.tolerance * stop.tolerance) * left;
   int iteration = 0;
   for (double excess; (excess = largest_excess(left, enough)) > 0.0; ++iteration) {
     if (iteration == stop.most) throw Unconverged(stop, stop.tolerance * sqrt(excess));
     H.multiply(p, q);
-    DotProduct<U> curvature, next;
-    for (std::size_t at = 0; at < size; at += 3) curvature.add(p + at, q + at);
     const auto moves = left > enough;
-    const U step = select(moves, left / select(moves, curvature.total(), one), zero);
-    for (int i = 0; i < particles; ++i) {
-      const std::size_t at = 3 * static_cast<std::size_t>(i);
-      for (std::size_t d = at; d < at + 3; ++d) {
-        z[d] += step * p[d];
-        r[d] -= step * q[d];
-        q[d] = r[d];
-      }
-      H.precondition(i, q + at);
-      next.add(r + at, q + at);
+    const U curvature = dot_product(p, q, size), step = select(moves, left / select(moves, curvature, one), zero);
+    for (std::size_t d = 0; d < size; ++d) {
+      z[d] += step * p[d];
+      r[d] -= step * q[d];
     }
-    const U turn = select(moves, next.total() / select(moves, left, one), zero);
+    H.precondition(r, q);
+    const U next = dot_product(r, q, size), turn = select(moves, next / select(moves, left, one), zero);
     for (std::size_t d = 0; d < size; ++d) p[d] = q[d] + turn * p[d];
-    left = select(moves, next.total(), left);
+    left = select(moves, next, left);
   }
   std::copy_n(z, size, b);
   return iteration;

@@ -98,50 +98,63 @@ MemberRun make_run(const Scene& scene, int g, const std::map<int, int>& particle
   return run;
 }
 
-// Where the constraints' shares stand in the condensed matrix.
-CondensedPattern condense(const Scene& scene, const DirectBlock& block, const std::map<int, int>& particle_of) {
-  CondensedPattern c;
-  std::vector<std::vector<int>> joined;
+// The constraints' shares of the condensed matrix, whose particles have these first dofs.
+CondensedShares shares_of(const Scene& scene, const DirectBlock& block, const std::map<int, int>& particle_of,
+                          const std::vector<int>& dof_of) {
+  CondensedShares shares;
   for (const Member& m : block.members) {
     const Group& group = scene.groups[m.group];
-    c.members.push_back({m.first_row, group.rows, static_cast<int>(c.gradients.size()), 0, 0});
-    joined.emplace_back();
+    shares.members.push_back({m.first_row, group.rows, static_cast<int>(shares.dofs.size()), 0});
     for (const int node : group.nodes(m.item)) {
       if (scene.role[node] != Role::free) continue;
       const int particle = particle_of.at(node);
-      joined.back().push_back(particle);
-      c.gradients.push_back(sheetbend_blocks::row * gradient_row(block, particle, m.first_row));
-      ++c.members.back().uses;
+      shares.gradients.push_back(sheetbend_blocks::row * gradient_row(block, particle, m.first_row));
+      shares.dofs.push_back(dof_of[particle]);
+      ++shares.members.back().uses;
     }
   }
+  for (auto* list : {&shares.gradients, &shares.dofs}) list->shrink_to_fit();
+  shares.members.shrink_to_fit();
+  return shares;
+}
+
+// Where they stand in its factor.
+CondensedPattern factored(const Scene& scene, const DirectBlock& block, const std::map<int, int>& particle_of) {
+  CondensedPattern c;
+  std::vector<std::vector<int>> joined;
+  for (const Member& m : block.members) {
+    joined.emplace_back();
+    for (const int node : scene.groups[m.group].nodes(m.item))
+      if (scene.role[node] == Role::free) joined.back().push_back(particle_of.at(node));
+  }
   for (const int place : places_for_low_fill(block.movable, joined)) c.dof_of.push_back(3 * place);
+  c.shares = shares_of(scene, block, particle_of, c.dof_of);
+  const std::vector<int>& dofs = c.shares.dofs;
   std::vector<std::pair<int, int>> entries;
-  const auto each_pair = [&](auto&& f) {
-    for (std::size_t m = 0; m < joined.size(); ++m)
-      for (const int i : joined[m])
-        for (const int k : joined[m])
-          if (c.dof_of[k] <= c.dof_of[i]) f(m, c.dof_of[i], c.dof_of[k]);
-  };
-  each_pair([&](std::size_t, int row, int column) {
+  c.shares.for_each_pair([&](const auto&, int i, int k) {
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b)
-        if (column + b <= row + a) entries.emplace_back(row + a, column + b);
+        if (dofs[k] + b <= dofs[i] + a) entries.emplace_back(dofs[i] + a, dofs[k] + b);
   });
   c.structure = FactorStructure(3 * block.movable, entries, false);
-  for (const auto& list : joined)
-    for (const int particle : list) c.dofs.push_back(c.dof_of[particle]);
-  std::size_t member = joined.size();
-  each_pair([&](std::size_t m, int row, int column) {
-    if (m != member) c.members[member = m].first_entry = c.entries.size();
+  c.shares.for_each_pair([&](const auto&, int i, int k) {
     for (int b = 0; b < 3; ++b) {
-      const int above = row == column ? b : 0;  // where the lower triangle begins
-      c.entries.push_back(c.structure.position(row + above, column + b) - above);
+      const int above = i == k ? b : 0;  // where the lower triangle begins
+      c.entries.push_back(c.structure.position(dofs[i] + above, dofs[k] + b) - above);
     }
   });
-  for (auto* list : {&c.gradients, &c.dofs, &c.dof_of}) list->shrink_to_fit();
-  c.members.shrink_to_fit();
+  c.dof_of.shrink_to_fit();
   c.entries.shrink_to_fit();
   return c;
+}
+
+// The same for conjugate gradients, particles in the block's order.
+CondensedIteration iterated(const Scene& scene, const DirectBlock& block, const std::map<int, int>& particle_of,
+                            const SolverOptions& options) {
+  std::vector<int> dof_of(block.movable);
+  for (int p = 0; p < block.movable; ++p) dof_of[p] = 3 * p;
+  return {{options.cg_tolerance, options.cg_iterations},
+          Aggregation(block.movable, shares_of(scene, block, particle_of, dof_of))};
 }
 
 DirectBlock make_block(const Scene& scene, std::vector<Member> members, const SolverOptions& options) {
@@ -154,7 +167,7 @@ DirectBlock make_block(const Scene& scene, std::vector<Member> members, const So
     structure = structure_of(scene, members, users);
   }
   DirectBlock block{std::move(members), {}, {}, {0}, {}, {}, {}, 0, false, std::move(structure)};
-  if (condensed) block.condensation = Stopping{options.cg_tolerance, options.cg_iterations};
+  if (condensed) block.condensation.emplace();  // to be filled in: it has no band
   std::map<int, int> particle_of;
   for (const auto& [node, rows] : users) {
     particle_of[node] = add_particle(block, node, rows);
@@ -172,7 +185,8 @@ DirectBlock make_block(const Scene& scene, std::vector<Member> members, const So
     for (int j = 0; j < group.rows; ++j) block.multipliers.push_back(group.first_row + m.item * group.rows + j);
   }
   for (const int g : groups) block.runs.push_back(make_run(scene, g, particle_of, block));
-  if (options.partition == Partition::newton) block.condensation = condense(scene, block, particle_of);
+  if (options.partition == Partition::newton) block.condensation = factored(scene, block, particle_of);
+  if (options.partition == Partition::newton_cg) block.condensation = iterated(scene, block, particle_of, options);
   return block;
 }
 

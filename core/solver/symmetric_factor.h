@@ -53,6 +53,11 @@ class Factor {
   // A right side of a band is as long as the matrix and the stored band, with zeros at the end.
   static std::size_t right_side(const FactorStructure& s) { return s.banded() ? s.size() + s.stored_band() : s.size(); }
 
+  static std::size_t bytes(const FactorStructure& s) {
+    const std::size_t own = sizeof(T) * (s.values() + right_side(s));
+    return s.banded() ? own : own + sizeof(T) * s.work() + sizeof(int) * s.size();
+  }
+
   void reset(const FactorStructure& s) {
     values.assign(s.values(), T(0.0));
     inverse.assign(right_side(s), T(0.0));

@@ -25,9 +25,11 @@ struct Springs {
         q[d + 3] += force;
       }
   }
-  void precondition(int i, T* z) const {
-    const T diagonal = T(1.0) + (i > 0 ? spring(i - 1) : T(0.0)) + (i + 1 < particles ? spring(i) : T(0.0));
-    for (int d = 0; d < 3; ++d) z[d] = z[d] / diagonal;
+  void precondition(const T* r, T* z) const {
+    for (int i = 0; i < particles; ++i) {
+      const T diagonal = T(1.0) + (i > 0 ? spring(i - 1) : T(0.0)) + (i + 1 < particles ? spring(i) : T(0.0));
+      for (int d = 3 * i; d < 3 * i + 3; ++d) z[d] = r[d] / diagonal;
+    }
   }
 };
 
@@ -87,7 +89,7 @@ TEST(ConjugateGradients, SayWhenTheyRunOut) {
   }
 }
 
-// A net's rollout is that of the factored matrix; its plan knows no pattern.
+// A net's rollout is that of the factored matrix; its plan knows no pattern of that.
 TEST(NewtonByConjugateGradients, IsNewtonFactored) {
   const Sample sample = random_scene(90, {.net = true});
   const auto run = [&](Partition partition) {
@@ -98,7 +100,7 @@ TEST(NewtonByConjugateGradients, IsNewtonFactored) {
   expect_gradients_agree(sample.scene.layout, gradient(iterated, sample.inputs), gradient(factored, sample.inputs),
                          1e-9);
   for (const DirectBlock& block : iterated.plan.blocks)
-    EXPECT_TRUE(std::holds_alternative<Stopping>(block.condensation.value()));
+    EXPECT_TRUE(std::holds_alternative<CondensedIteration>(block.condensation.value()));
 }
 
 TEST(NewtonByConjugateGradients, LeavesItToTheRolloutToFindWhatIsNoNumber) {

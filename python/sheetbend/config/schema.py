@@ -29,8 +29,8 @@ class SolverSection(Section):
     integrator: Literal["bdf1", "bdf2"] = key("bdf2", "second order, or backward Euler (which damps)")
     method: Literal["direct", "newton", "newton_cg", "gauss_seidel"] = key(
         "direct",
-        "each rope one block; each cloth one block through its vertices (no rigid parts), factored or, where factors do"
-        " not fit in memory, by conjugate gradients; or colored sweeps",
+        "each rope one block; each cloth one block through its vertices (no rigid parts), factored or, for more than"
+        " some 10,000 of them, by conjugate gradients; or colored sweeps",
     )
     iterations: int | None = key(None, "Newton iterations of a block (2) or sweeps (10)", ge=1)
     cg_tolerance: Finite = key(1e-12, "relative residual at which conjugate gradients stop", gt=0, le=1e-3)
