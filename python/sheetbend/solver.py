@@ -23,9 +23,8 @@ class Solver:
         integrator: "bdf2" (second order, the default) or "bdf1" (backward Euler: damps like zeta = omega h/2).
         method: "direct" (each connected part one block, solved by its constraints: for ropes; the default), "newton"
             (the same blocks, solved by their particles: for cloth; every compliance must be positive), "newton_cg" (the
-            same by conjugate gradients on two levels: for cloth of more than some 10,000 vertices, in half the memory)
-            or "gauss_seidel" (colored; unconverged sweeps add about 0.9 h^2/(m sweeps) of compliance per
-            link).
+            same by conjugate gradients on two levels: for cloth of more than some 20,000 vertices, in half the memory)
+            or "gauss_seidel" (colored; unconverged sweeps add about 0.9 h^2/(m sweeps) of compliance per link).
         iterations: Newton iterations of a block (2 by default) or sweeps (10 by default).
         threads: of one rollout; results do not depend on it.
         grain: constraints per thread below which a color is not split.

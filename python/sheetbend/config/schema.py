@@ -30,7 +30,7 @@ class SolverSection(Section):
     method: Literal["direct", "newton", "newton_cg", "gauss_seidel"] = key(
         "direct",
         "each rope one block; each cloth one block through its vertices (no rigid parts), factored or, for more than"
-        " some 10,000 of them, by conjugate gradients; or colored sweeps",
+        " some 20,000 of them, by conjugate gradients; or colored sweeps",
     )
     iterations: int | None = key(None, "Newton iterations of a block (2) or sweeps (10)", ge=1)
     cg_tolerance: Finite = key(1e-12, "relative residual at which conjugate gradients stop", gt=0, le=1e-3)
