@@ -1,0 +1,254 @@
+"""A fabric's numbers from what a laboratory has read, with intervals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..equilibrium import NoEquilibriumError
+from ..errors import InputError
+from ..fabric import Exponential, Fabric, Spline
+from ..gauge import null_space
+from ..identifiability import IDENTIFIED
+from ..optional import require
+from ..parameters import Parameter, Parameters
+from ..result import Estimate
+from ..tables import Section, plain_section
+from ..timeseries import Array
+from ..wording import figures, short, width_words
+from .reading import Reading
+
+_UNITS = {"density": "kg/m^2", "warp": "N/m", "weft": "N/m", "shear": "N/m", "poisson": ""} | dict.fromkeys(
+    ("bending", "bending_weft", "bending_twist"), "N m"
+)
+_NORMAL = 1.959964  # two-sided 95 %
+_BLIND = (
+    2.0 / 30.0
+)  # sigmas that a number moves all readings by, per e-fold or per scale: less, and they do not contain it
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measured:
+    """What a laboratory has read.
+
+    Attributes:
+        name: for reports, such as "bending length, warp".
+        test: the test in the computer, such as `lambda fabric: textile.cantilever(fabric).bending_length`.
+        value: in the laboratory's unit of that reading (mm, %, gf/(cm deg); see `Reading.laboratory_unit`).
+        sigma: standard deviation of `value`, in the same unit: of the mean, where it is one of several specimens.
+    """
+
+    name: str
+    test: Callable[[Fabric], Reading]
+    value: float
+    sigma: float
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.value):
+            raise InputError(f"{self.name}.value", "must be finite", self.value, "give the laboratory's number")
+        if not (math.isfinite(self.sigma) and self.sigma > 0):
+            raise InputError(
+                f"{self.name}.sigma", "must be a positive size", self.sigma, "give the reading's own error"
+            )
+
+
+@dataclass(frozen=True)
+class FabricFit:
+    """Result of `fit_fabric`. Printing it gives the report.
+
+    Attributes:
+        fabric: with the numbers that were found.
+        estimates: value, 95 % interval and verdict of each free number.
+        measured, readings: what was given, and what the tests of `fabric` read.
+        misfit: sum of the squares of (reading - value)/sigma.
+        freedom: readings less numbers that they determine; the misfit should be about as large.
+    """
+
+    fabric: Fabric
+    estimates: tuple[Estimate, ...]
+    measured: tuple[Measured, ...]
+    readings: tuple[Reading, ...]
+    misfit: float
+    freedom: int
+
+    def __str__(self) -> str:
+        found = tuple(
+            (e.name, f"{values[0]} {e.unit}".rstrip(), f"{values[1]} to {values[2]}" if values[1] else "open", e.words)
+            for e in self.estimates
+            for values in [figures((e.value, e.lower, e.upper), e.half_width)]
+        )
+        read = tuple(
+            (
+                m.name,
+                f"{short(m.value, 4)} +/- {short(m.sigma, 2)}",
+                str(r),
+                f"{(r.laboratory - m.value) / m.sigma:+.1f}",
+            )
+            for m, r in zip(self.measured, self.readings, strict=True)
+        )
+        size = f"{self.misfit:.3g} for {self.freedom} more readings than numbers found"
+        if self.freedom == 0:
+            size = "none is left: as many numbers were found as there are readings"
+        note = ("misfit", f"{size}; intervals are widened by its root" if self._widening > 1 else size)
+        return "\n".join(
+            [
+                *plain_section(Section("Fabric", ("number", "value", "95 % interval", "verdict"), found)),
+                "",
+                *plain_section(Section("Readings", ("test", "laboratory", "fabric", "off by, sigma"), read, (note,))),
+            ]
+        )
+
+    @property
+    def _widening(self) -> float:
+        return math.sqrt(max(1.0, self.misfit / self.freedom)) if self.freedom > 0 else 1.0
+
+
+def fit_fabric(measured: Sequence[Measured], start: Fabric, free: Sequence[str]) -> FabricFit:
+    """Find numbers of a fabric whose tests read what the laboratory has read: least squares, weighted by sigma.
+
+    Readings fall into one sum whatever their tests are, so numbers that share a test (shear in a bias extension) are
+    found together, and what the readings do not tell is named. Intervals come from the readings' own sigmas; where the
+    misfit is larger than chance has it they are widened by its root (Birge 1932).
+
+    Args:
+        measured: at least one.
+        start: where to begin, and the numbers that are not free. A number that it leaves out follows the one it
+            follows in `Fabric`.
+        free: numbers to find: of `Fabric` ("warp", "poisson", "bending_weft"), or of its law as fits name them
+            ("warp_stiffening", "shear_ratio_2"). All but `poisson` are found on a log scale.
+
+    Raises:
+        InputError: no readings, no or unknown numbers, or numbers that `start` leaves out.
+        NoEquilibriumError: a test of `start` comes to no rest.
+        MissingExtraError: scipy is not installed.
+    """
+    if not measured:
+        raise InputError("measured", "is empty", len(measured), "give what the laboratory has read")
+    parameters = _parameters(start, free)
+    evaluate = _Evaluation(measured, start, parameters)
+    u = parameters.initial()
+    evaluate(u)
+    solver = require("scipy.optimize", "fit").least_squares
+    end = solver(evaluate.residuals, u, evaluate.jacobian, bounds=parameters.bounds(), xtol=1e-9, ftol=1e-9, gtol=1e-9)
+    readings, r, jacobian = evaluate(end.x)
+    estimates, rank = _estimates(parameters, end.x, r, jacobian)
+    fabric = _with(start, parameters, end.x)
+    return FabricFit(fabric, estimates, tuple(measured), readings, float(r @ r), len(r) - rank)
+
+
+def _parameters(start: Fabric, free: Sequence[str]) -> Parameters:
+    initial = {name: getattr(start, name) for name in _UNITS} | {n: v for n, v, can in start.law.coefficients() if can}
+    unknown = [name for name in free if name not in initial]
+    if unknown or not free:
+        problem = "name no number of the fabric" if unknown else "is empty"
+        raise InputError("free", problem, unknown or list(free), f"use names of: {', '.join(initial)}")
+    left_out = [name for name in free if initial[name] is None]
+    if left_out:
+        raise InputError("free", "name what the start leaves out", left_out, "give the start a value of it")
+    return Parameters(
+        Parameter(name=name, initial=initial[name], unit="", lower=-0.99, upper=0.99, scale=1.0)
+        if name == "poisson"
+        else Parameter(name=name, initial=initial[name], unit=_UNITS.get(name, ""), log=True)
+        for name in free
+    )
+
+
+def _with(start: Fabric, parameters: Parameters, u: Array) -> Fabric:
+    law, changes = start.law, {}
+    for name, internal in zip(parameters.free, u, strict=True):
+        value = parameters[name].to_physical(internal)
+        component, _, coefficient = name.partition("_")
+        if name in _UNITS:
+            changes[name] = value
+        elif isinstance(law, Exponential):
+            law = replace(law, **{component: value})
+        elif isinstance(law, Spline):
+            ratios = list(getattr(law, component))
+            ratios[int(coefficient.removeprefix("ratio_")) - 1] = value
+            law = replace(law, **{component: tuple(ratios)})
+    return replace(start, law=law, **changes)
+
+
+class _Evaluation:
+    """Readings, weighted residuals and their derivatives at a point, the last one kept."""
+
+    def __init__(self, measured: Sequence[Measured], start: Fabric, parameters: Parameters) -> None:
+        self._measured, self._start, self._parameters = measured, start, parameters
+        self._at = np.zeros(0)
+        self._last: tuple[tuple[Reading, ...], Array, Array] = ((), np.zeros(0), np.zeros(0))
+
+    def __call__(self, u: Array) -> tuple[tuple[Reading, ...], Array, Array]:
+        if not np.array_equal(u, self._at):
+            fabric = _with(self._start, self._parameters, u)
+            readings = tuple(m.test(fabric) for m in self._measured)
+            by_name = [self._parameters[name] for name in self._parameters.free]
+            chain = [p.to_physical(x) if p.log else 1.0 for p, x in zip(by_name, u, strict=True)]
+            residuals, jacobian = [], []
+            for m, r in zip(self._measured, readings, strict=True):
+                weight = r.per / m.sigma
+                residuals.append((r.laboratory - m.value) / m.sigma)
+                jacobian.append(
+                    [weight * r.gradient.get(f"cloth_{p.name}", 0.0) * c for p, c in zip(by_name, chain, strict=True)]
+                )
+            self._at, self._last = np.array(u), (readings, np.array(residuals), np.array(jacobian))
+        return self._last
+
+    def residuals(self, u: Array) -> Array:
+        """Infinite where a test has no answer, so that the optimizer takes a shorter step."""
+        try:
+            return self(u)[1]
+        except NoEquilibriumError:
+            return np.full(len(self._measured), np.inf)
+
+    def jacobian(self, u: Array) -> Array:
+        return self(u)[2]
+
+
+def _estimates(parameters: Parameters, u: Array, r: Array, jacobian: Array) -> tuple[tuple[Estimate, ...], int]:
+    """Of each free number, and how many combinations of them the readings determine."""
+    free = [parameters[name] for name in parameters.free]
+    seen = np.linalg.norm(jacobian, axis=0) > _BLIND
+    jacobian = jacobian * seen
+    space = null_space(jacobian, parameters.free, [p.log for p in free])
+    kept = [column for column in range(len(free)) if column not in space.pivots]
+    covariance = np.linalg.inv(jacobian[:, kept].T @ jacobian[:, kept])
+    freedom = len(r) - space.rank
+    widening = max(1.0, float(r @ r) / freedom) if freedom > 0 else 1.0
+    estimates = []
+    for column, p in enumerate(free):
+        reach = math.inf
+        if column in space.determined:
+            index = kept.index(column)
+            reach = _NORMAL * math.sqrt(widening * covariance[index, index])
+        told = [gauge.words for gauge in space.gauges if p.name in gauge.members]
+        estimates.append(_estimate(p, u[column], reach, "; ".join(told)))
+    return tuple(estimates), space.rank
+
+
+def _estimate(p: Parameter, internal: float, reach: float, gauges: str) -> Estimate:
+    """`reach`: half-width in the internal coordinate, infinite where the readings leave the number open."""
+    value = p.to_physical(internal)
+    lower = upper = half = None
+    if math.isinf(reach):
+        verdict, words = "not identifiable", gauges or "moves no reading: fix it, or measure what depends on it"
+    else:
+        lower, upper = p.to_physical(internal - reach), p.to_physical(internal + reach)
+        half = (upper - lower) / 2
+        good = half <= IDENTIFIED * (p.scale or abs(value))
+        verdict = "identified" if good else "weak"
+        words = f"known {'' if good else 'only '}{width_words(p, value, lower, upper)}"
+    return Estimate(
+        name=p.name,
+        value=value,
+        unit=p.unit,
+        lower=lower,
+        upper=upper,
+        half_width=half,
+        statistical=half,
+        discretization=0.0,
+        verdict=verdict,
+        words=words,
+    )
