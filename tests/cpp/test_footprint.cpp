@@ -58,11 +58,12 @@ double peak_of(Run&& run) {
 // hundredth.
 template <class T>
 void expect_footprint(const Scene& scene, const Plan& plan, const std::vector<T>& inputs) {
-  const int kept = Schedule::least(20, Tape<T>::window(plan));
+  constexpr int steps = 6;
+  const int kept = Schedule::least(steps, Tape<T>::window(plan));
   std::vector<T> x(scene.dofs()), inputs_bar(inputs.size());
   const double found = peak_of([&] {
-    auto tape = record_rollout<T>(scene, plan, inputs.data(), 0.0, {20}, x.data(), kept, nullptr);
-    reverse_rollout<T>(scene, plan, inputs.data(), 0.0, tape, {20}, x.data(), inputs_bar.data(), nullptr);
+    auto tape = record_rollout<T>(scene, plan, inputs.data(), 0.0, {steps}, x.data(), kept, nullptr);
+    reverse_rollout<T>(scene, plan, inputs.data(), 0.0, tape, {steps}, x.data(), inputs_bar.data(), nullptr);
   });
   const auto told = static_cast<double>(rollout_bytes<T>(scene, plan) + reverse_bytes<T>(scene, plan) +
                                         kept * sizeof(T) * scene.dofs());
