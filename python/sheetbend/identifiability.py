@@ -184,12 +184,12 @@ class _Judge:
         parameter = self.parameters[self.parameters.free[column]]
         value = parameter.to_physical(self.internal[column])
         if column not in self.space.determined:
-            return _open(parameter, value, more, self._undetermined(parameter.name))
+            return open_estimate(parameter, value, self._undetermined(parameter.name), more)
         alone = float(self.alone[column])
         if not parameter.log and parameter.scale is not None and alone > _OPEN * parameter.scale:
             left = quantity(alone, parameter)
             words = f"the data hardly depend on it: they would leave it open to {left} if all others were known"
-            return _open(parameter, value, more, words)
+            return open_estimate(parameter, value, words, more)
         columns, spread = (self.columns, self.spread) if column in self.columns else (self.wide_columns, self.wide)
         index = columns.index(column)
         t = float(self.quantile(spread.degrees[index], 0.5 + _LEVEL / 2))
@@ -223,7 +223,7 @@ class _Judge:
     ) -> Estimate:
         if ends == (None, None):
             words = "the cost stays level on both sides: the data hardly depend on it"
-            return _open(parameter, value, more, words)
+            return open_estimate(parameter, value, words, more)
         lower, upper = _widened(parameter, value, ends, sum(more))
         half_width = _half((lower, upper))
         if floor is not None and (value >= floor.value if floor.ceiling else value <= floor.value):
@@ -232,10 +232,8 @@ class _Judge:
             verdict, words = "at a bound", f"stopped at its {limit}: widen it, or doubt the model"
         elif lower is None or upper is None:
             verdict, words = "one-sided", side_words(parameter, lower, upper)
-        elif _precise(parameter, value, (lower, upper)):
-            verdict, words = "identified", f"known {width_words(parameter, value, lower, upper)}"
         else:
-            verdict, words = "weak", f"known only {width_words(parameter, value, lower, upper)}"
+            verdict, words = known(parameter, value, lower, upper)
         if column in self.by_prior:
             words += "; through its prior, not through the data"
         return Estimate(
@@ -328,7 +326,15 @@ class _Judge:
         return f"upper bound {quantity(parameter.upper, parameter)}" if self.at_upper[column] else None
 
 
-def _open(parameter: Parameter, value: float, more: tuple[float, float], words: str) -> Estimate:
+def known(parameter: Parameter, value: float, lower: float, upper: float) -> tuple[str, str]:
+    """Verdict and words of a closed interval."""
+    width = width_words(parameter, value, lower, upper)
+    precise = _precise(parameter, value, (lower, upper))
+    return ("identified", f"known {width}") if precise else ("weak", f"known only {width}")
+
+
+def open_estimate(parameter: Parameter, value: float, words: str, more: tuple[float, float] = (0.0, 0.0)) -> Estimate:
+    """Of a parameter that is not determined, in words why; `more`: discretization and systematic parts."""
     return Estimate(
         name=parameter.name,
         value=value,

@@ -12,13 +12,13 @@ from ..equilibrium import NoEquilibriumError
 from ..errors import InputError
 from ..fabric import Exponential, Fabric, Spline
 from ..gauge import null_space
-from ..identifiability import IDENTIFIED
+from ..identifiability import known, open_estimate
 from ..optional import require
 from ..parameters import Parameter, Parameters
 from ..result import Estimate
 from ..tables import Section, plain_section
 from ..timeseries import Array
-from ..wording import figures, short, width_words
+from ..wording import figures, short
 from .reading import Reading
 
 _UNITS = {"density": "kg/m^2", "warp": "N/m", "weft": "N/m", "shear": "N/m", "poisson": ""} | dict.fromkeys(
@@ -92,7 +92,10 @@ class FabricFit:
         size = f"{self.misfit:.3g} for {self.freedom} more readings than numbers found"
         if self.freedom == 0:
             size = "none is left: as many numbers were found as there are readings"
-        note = ("misfit", f"{size}; intervals are widened by its root" if self._widening > 1 else size)
+        note = (
+            "misfit",
+            f"{size}; intervals are widened by its root" if _widening(self.misfit, self.freedom) > 1 else size,
+        )
         return "\n".join(
             [
                 *plain_section(Section("Fabric", ("number", "value", "95 % interval", "verdict"), found)),
@@ -101,9 +104,10 @@ class FabricFit:
             ]
         )
 
-    @property
-    def _widening(self) -> float:
-        return math.sqrt(max(1.0, self.misfit / self.freedom)) if self.freedom > 0 else 1.0
+
+def _widening(misfit: float, freedom: int) -> float:
+    """By what intervals are widened (Birge 1932)."""
+    return math.sqrt(max(1.0, misfit / freedom)) if freedom > 0 else 1.0
 
 
 def fit_fabric(measured: Sequence[Measured], start: Fabric, free: Sequence[str]) -> FabricFit:
@@ -215,14 +219,13 @@ def _estimates(parameters: Parameters, u: Array, r: Array, jacobian: Array) -> t
     space = null_space(jacobian, parameters.free, [p.log for p in free])
     kept = [column for column in range(len(free)) if column not in space.pivots]
     covariance = np.linalg.inv(jacobian[:, kept].T @ jacobian[:, kept])
-    freedom = len(r) - space.rank
-    widening = max(1.0, float(r @ r) / freedom) if freedom > 0 else 1.0
+    widening = _widening(float(r @ r), len(r) - space.rank)
     estimates = []
     for column, p in enumerate(free):
         reach = math.inf
         if column in space.determined:
             index = kept.index(column)
-            reach = _NORMAL * math.sqrt(widening * covariance[index, index])
+            reach = _NORMAL * widening * math.sqrt(covariance[index, index])
         told = [gauge.words for gauge in space.gauges if p.name in gauge.members]
         estimates.append(_estimate(p, u[column], reach, "; ".join(told)))
     return tuple(estimates), space.rank
@@ -231,15 +234,11 @@ def _estimates(parameters: Parameters, u: Array, r: Array, jacobian: Array) -> t
 def _estimate(p: Parameter, internal: float, reach: float, gauges: str) -> Estimate:
     """`reach`: half-width in the internal coordinate, infinite where the readings leave the number open."""
     value = p.to_physical(internal)
-    lower = upper = half = None
     if math.isinf(reach):
-        verdict, words = "not identifiable", gauges or "moves no reading: fix it, or measure what depends on it"
-    else:
-        lower, upper = p.to_physical(internal - reach), p.to_physical(internal + reach)
-        half = (upper - lower) / 2
-        good = half <= IDENTIFIED * (p.scale or abs(value))
-        verdict = "identified" if good else "weak"
-        words = f"known {'' if good else 'only '}{width_words(p, value, lower, upper)}"
+        return open_estimate(p, value, gauges or "moves no reading: fix it, or measure what depends on it")
+    lower, upper = p.to_physical(internal - reach), p.to_physical(internal + reach)
+    half = (upper - lower) / 2
+    verdict, words = known(p, value, lower, upper)
     return Estimate(
         name=p.name,
         value=value,
