@@ -30,6 +30,7 @@ from .timeseries import Array
 
 Integers = NDArray[np.integer[Any]]
 
+NEGLIGIBLE = 1e-10  # share of a parameter's variance
 _MAX_ORDER = 20
 _CORRECTIONS = 2  # the second already changes the intervals by less than 1 %
 
@@ -114,23 +115,28 @@ def covariance(
     size = np.sqrt((jacobian**2).sum(0) + (prior**2).sum(0))
     jacobian, prior = jacobian / size, prior / size
     bread = np.linalg.inv(jacobian.T @ jacobian + prior.T @ prior)
-    absorbed = float(((jacobian @ bread) * jacobian).sum())  # parameters' worth of residual that the fit took away
+    influence = jacobian @ bread  # of a row on the estimate
+    absorbed = float((influence * jacobian).sum())  # parameters' worth of residual that the fit took away
     if rows - absorbed < 0.5:
         raise InputError("residuals", "must outnumber the free parameters", rows, f"give more than {count} rows")
     variance = float(residuals @ residuals) / (rows - absorbed)
-    from_data = variance * (bread @ (jacobian.T @ jacobian) @ bread)
+    from_data = variance * (influence.T @ influence)
+    from_prior = bread @ prior.T @ prior @ bread
     inflation, time = np.ones(count), 1.0
-    if variance > 0 and count:
+    white = np.diag(from_data).copy()
+    told = white > NEGLIGIBLE * (white + np.diag(from_prior))  # else the prior says it all, and the rest is rounding
+    if told.any():
         grid = _Grid(layout, residuals)
         spectral, time = _spectral(grid, jacobian, bread)
-        robust = _newey_west(grid, jacobian @ bread) * rows / (rows - absorbed)
-        white = np.diag(from_data).copy()
-        inflation = np.maximum(np.maximum(np.diag(spectral), robust) / white, 1.0)
-        if np.all(np.diag(spectral) > 1e-6 * white):  # else its correlations mean nothing: one frame only, say
+        robust = _newey_west(grid, influence) * rows / (rows - absorbed)
+        largest = np.maximum(np.diag(spectral), robust)
+        inflation[told] = np.maximum(largest[told] / white[told], 1.0)
+        if np.all(np.diag(spectral)[told] > 1e-6 * white[told]):  # else its correlations mean nothing: one frame, say
             from_data = spectral
-        stretch = np.sqrt(inflation * white / np.diag(from_data))
+        stretch = np.ones(count)
+        stretch[told] = np.sqrt((inflation * white / np.diag(from_data))[told])
         from_data = from_data * np.outer(stretch, stretch)
-    matrix = (from_data + bread @ prior.T @ prior @ bread) / np.outer(size, size)
+    matrix = (from_data + from_prior) / np.outer(size, size)
     return Covariance(matrix, np.maximum(rows / inflation - absorbed, 1.0), inflation, variance, time)
 
 

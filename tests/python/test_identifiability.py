@@ -156,6 +156,22 @@ def test_mass_against_compliance_in_a_simulated_oscillator() -> None:
     assert "through its prior" in result.estimates[1].words
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("seed", range(20))
+def test_what_only_a_prior_tells_has_the_interval_of_the_prior(seed: int) -> None:
+    """Two equal columns and a prior on the first: what the data add to it is rounding, of either sign."""
+    rng = np.random.default_rng(seed)
+    column = 10 ** rng.uniform(-2, 2) * rng.standard_normal(300)
+    parameters = Parameters(
+        [Parameter(name="a", initial=2.0, log=True, prior=(2.0, 0.01)), Parameter(name="b", initial=1.0)]
+    )
+    residuals = np.convolve(rng.standard_normal(309), np.ones(10), "valid")
+    found = identify(parameters, parameters.initial(), residuals, np.column_stack([column, column])).estimates[0]
+    assert found.verdict == "identified"
+    assert found.lower is not None and found.upper is not None
+    np.testing.assert_allclose(np.log([found.lower / 2.0, found.upper / 2.0]), [-0.0196, 0.0196], rtol=2e-2)
+
+
 @pytest.mark.parametrize("far", [800.0, -800.0])
 def test_a_gauge_far_off_keeps_its_words_without_numbers(far: float) -> None:
     """The product of two on a log scale, where neither is a number that a computer can hold."""
