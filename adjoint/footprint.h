@@ -100,12 +100,15 @@ std::size_t substep_bytes(const Scene& scene, const Plan& plan, bool keeps_itera
   if (plan.colors.empty()) return bytes;
   bytes += sizeof(T) * damped_rows(scene);
   if constexpr (in_packs<T>) {
+    const Sections sections = sections_of_record<T>(scene, plan, kept);
+    const std::size_t begun = std::max(1, sections.count());  // the sweeps as they go, and where sections begin
     for (const PackedColor& color : plan.packs.colors) {
-      const std::size_t own = color.value_count() + color.rows * (color.damped ? 2 : 1) + kept * color.record_size();
-      bytes += sizeof(Pack) * color.packs<T>() * own + sizeof(typename PackState<T>::ColorState) +
-               kept * sizeof(std::vector<Pack>);
+      const std::size_t own = color.value_count() + color.rows * (begun + (color.damped ? 1 : 0));
+      bytes += sizeof(Pack) * (color.packs<T>() * own + sections.length * color.record_packs<T>()) +
+               sizeof(typename PackState<T>::ColorState) + sections.length * sizeof(Numbers<Pack>) +
+               (begun - 1) * sizeof(Numbers<T>);
     }
-    return bytes + row_bytes<T>(plan.packs);
+    return bytes + begun * row_bytes<T>(plan.packs) + (begun - 1) * sizeof(Rows<T>);
   } else {
     return bytes + sizeof(T) * (scene.rows + std::max(1, kept) * (scene.stencil_coordinates + 2 * scene.rows));
   }

@@ -29,6 +29,8 @@ void begin_sweeps_vjp(const Scene& scene, const PackPlan& plan, int threads, con
 template <class T>
 void sweep_vjp(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, int threads, int grain, int iteration,
                bool last, PackState<T>& state, PackCotangents<T>& bar) {
+  sweep_again(plan, kernels, threads, grain, iteration, state);
+  const int recorded = iteration - state.sections.begin(state.recorded);
   for (int c = static_cast<int>(plan.colors.size()) - 1; c >= 0; --c) {
     const PackedColor& color = plan.colors[c];
     typename PackState<T>::ColorState& primal = state.colors[c];
@@ -38,7 +40,7 @@ void sweep_vjp(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels
                                            color.nodes.data(),
                                            primal.values.numbers(),
                                            color.damped ? primal.C_r.numbers() : nullptr,
-                                           primal.records[iteration].numbers(),
+                                           primal.records[recorded].numbers(),
                                            bar.rows.numbers(),
                                            own.values.numbers(),
                                            own.lambda.numbers(),

@@ -53,6 +53,18 @@ void fill_weights(const Scene& scene, const PackedColor& color, const T* w, Numb
   });
 }
 
+// Calls f(now, then, count) for the rows and for each color's multipliers, now and where a section begins.
+template <class T, class F>
+void with_beginning(const PackPlan& plan, PackState<T>& state, int section, F&& f) {
+  if constexpr (!carries_tangents<T>) {  // those are never reversed
+    f(state.rows.data(), state.rows_before[section - 1].data(), sheetbend_packs::row * plan.rows());
+    for (std::size_t c = 0; c < plan.colors.size(); ++c) {
+      auto& color = state.colors[c];
+      f(color.lambda.data(), color.lambda_before[section - 1].data(), plan.colors[c].multipliers<T>());
+    }
+  }
+}
+
 }  // namespace
 
 PackPlan pack_colors(const Scene& scene, const std::vector<Color>& colors) {
@@ -89,16 +101,28 @@ PackPlan pack_colors(const Scene& scene, const std::vector<Color>& colors) {
 }
 
 template <class T>
-void PackState<T>::resize(const PackPlan& plan, int kept_iterations) {
+Sections sections_of(const PackPlan& plan, int sweeps, std::size_t whole, std::size_t section) {
+  std::size_t bytes = 0;  // of a sweep's record
+  for (const PackedColor& color : plan.colors) bytes += sizeof(Pack) * color.record_packs<T>();
+  if (sweeps * bytes <= whole) return {sweeps, sweeps};
+  return {sweeps, std::clamp(static_cast<int>(section / bytes), 1, sweeps)};
+}
+
+template <class T>
+void PackState<T>::resize(const PackPlan& plan, const Sections& of) {
   eta = 0.0;
+  sections = of;
   rows.assign(plan.rows());
+  rows_before.resize(std::max(1, sections.count()) - 1);
+  for (auto& before : rows_before) before.assign(plan.rows());
   colors.resize(plan.colors.size());
   for (std::size_t c = 0; c < colors.size(); ++c) {
     const PackedColor& color = plan.colors[c];
     colors[c].resize(color, color.value_count());
-    colors[c].records.resize(kept_iterations);
-    for (auto& record : colors[c].records)
-      record.assign(static_cast<std::size_t>(color.packs<T>()) * color.record_size());
+    colors[c].records.resize(sections.length);
+    for (auto& record : colors[c].records) record.assign(color.record_packs<T>());
+    colors[c].lambda_before.resize(rows_before.size());
+    for (auto& before : colors[c].lambda_before) before.assign(color.multipliers<T>());
   }
 }
 
@@ -118,6 +142,7 @@ void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const T
       });
   }
   state.eta = eta;
+  state.recorded = 0;
   constexpr long row = sheetbend_packs::row;
   if constexpr (carries_tangents<T>)
     for (int n = 0; n < plan.nodes; ++n)
@@ -138,17 +163,23 @@ void end_sweeps([[maybe_unused]] const Scene& scene, [[maybe_unused]] PackState<
 template <class T>
 void sweep(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, int threads, int grain, int iteration,
            PackState<T>& state) {
+  const Sections& sections = state.sections;
+  const int section = sections.of(iteration);
+  const bool keeps = sections.length > 0 && section == state.recorded;
+  if (section > state.recorded && iteration == sections.begin(section))
+    with_beginning(plan, state, section, [](const T* now, T* then, int count) { std::copy_n(now, count, then); });
   for (std::size_t c = 0; c < plan.colors.size(); ++c) {
     const PackedColor& color = plan.colors[c];
     typename PackState<T>::ColorState& own = state.colors[c];
-    const sheetbend_packs::Forward forward{color.count,
-                                           iteration == 0,
-                                           color.nodes.data(),
-                                           state.rows.numbers(),
-                                           own.values.numbers(),
-                                           own.lambda.numbers(),
-                                           color.damped ? own.C_r.numbers() : nullptr,
-                                           own.records.empty() ? nullptr : own.records[iteration].numbers()};
+    const sheetbend_packs::Forward forward{
+        color.count,
+        iteration == 0,
+        color.nodes.data(),
+        state.rows.numbers(),
+        own.values.numbers(),
+        own.lambda.numbers(),
+        color.damped ? own.C_r.numbers() : nullptr,
+        keeps ? own.records[iteration - sections.begin(section)].numbers() : nullptr};
     if constexpr (carries_tangents<T>) {
       const sheetbend_packs::Tangents tangents{forward,
                                                T::directions,
@@ -163,6 +194,16 @@ void sweep(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, in
 }
 
 template <class T>
+void sweep_again(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, int threads, int grain,
+                 int iteration, PackState<T>& state) {
+  const int section = state.sections.of(iteration);
+  if (section == state.recorded) return;
+  state.recorded = section;
+  with_beginning(plan, state, section, [](T* now, const T* then, int count) { std::copy_n(then, count, now); });
+  for (int i = state.sections.begin(section); i <= iteration; ++i) sweep(plan, kernels, threads, grain, i, state);
+}
+
+template <class T>
 void unpack_multipliers(const Scene& scene, const PackPlan& plan, PackState<T>& state, T* lambda) {
   for (std::size_t c = 0; c < plan.colors.size(); ++c) {
     const PackedColor& color = plan.colors[c];
@@ -174,6 +215,7 @@ void unpack_multipliers(const Scene& scene, const PackPlan& plan, PackState<T>& 
 }
 
 #define SHEETBEND_INSTANTIATE(T)                                                                                   \
+  template Sections sections_of<T>(const PackPlan&, int, std::size_t, std::size_t);                                \
   template struct PackState<T>;                                                                                    \
   template void begin_sweeps<T>(const Scene&, const PackPlan&, const Inputs<const T>&, double, const T*, const T*, \
                                 PackState<T>&, const T*);                                                          \
@@ -182,6 +224,9 @@ void unpack_multipliers(const Scene& scene, const PackPlan& plan, PackState<T>& 
   template void unpack_multipliers<T>(const Scene&, const PackPlan&, PackState<T>&, T*);
 SHEETBEND_INSTANTIATE(double)
 SHEETBEND_INSTANTIATE(Pack)
+template void sweep_again<double>(const PackPlan&, const sheetbend_packs::KernelTable&, int, int, int,
+                                  PackState<double>&);
+template void sweep_again<Pack>(const PackPlan&, const sheetbend_packs::KernelTable&, int, int, int, PackState<Pack>&);
 using Dual4 = Dual<double, 4>;
 using Dual8 = Dual<double, 8>;
 SHEETBEND_INSTANTIATE(Dual4)

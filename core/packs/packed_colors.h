@@ -68,6 +68,14 @@ struct PackedColor {
   }
   int value_count() const { return sheetbend_packs::value_count(damped, parameters, unit_gradients, arity); }
   int record_size() const { return sheetbend_packs::record_size(kept, rows); }
+  template <class T>
+  std::size_t record_packs() const {
+    return static_cast<std::size_t>(packs<T>()) * record_size();
+  }
+  template <class T>
+  int multipliers() const {
+    return entries<T>() * rows;
+  }
 };
 
 // Rows: one per node, then one per use of a fixed node (its own, so that constraints of one color never share a row).
@@ -79,6 +87,23 @@ struct PackPlan {
 };
 
 PackPlan pack_colors(const Scene& scene, const std::vector<Color>& colors);
+
+// The reverse of a substep needs a record of every sweep, in reverse order. Where all of them would leave the caches, they are made a section of
+// sweeps at a time: each section is swept again, from where it began, just before it is reversed.
+struct Sections {
+  int sweeps = 0;  // of a substep whose record is kept; 0 = none is
+  int length = 0;  // sweeps in each section; fewer in the first
+
+  int count() const { return length == 0 ? 0 : (sweeps + length - 1) / length; }
+  // The section of a sweep, counted from the last one, and the sweep that it begins with.
+  int of(int sweep) const { return length == 0 ? 0 : (sweeps - 1 - sweep) / length; }
+  int begin(int section) const { return std::max(0, sweeps - (section + 1) * length); }
+};
+
+inline constexpr std::size_t whole_record = 8 << 20, section_record = 2 << 20;  // bytes, measured: docs/decisions.md
+template <class T>
+Sections sections_of(const PackPlan& plan, int sweeps, std::size_t whole = whole_record,
+                     std::size_t section = section_record);
 
 // What stands per constraint of a color, or its cotangents.
 template <class T>
@@ -97,13 +122,17 @@ struct ColorNumbers {
 template <class T>
 struct PackState {
   struct ColorState : ColorNumbers<T> {
-    std::vector<Numbers<Pack>> records;  // per iteration; empty where nothing is kept
+    std::vector<Numbers<Pack>> records;     // per sweep of a section; empty where nothing is kept
+    std::vector<Numbers<T>> lambda_before;  // where sections begin, all but the last
   };
   Rows<T> rows;
+  std::vector<Rows<T>> rows_before;
   std::vector<ColorState> colors;
+  Sections sections;
+  int recorded = 0;  // the section whose sweeps are recorded, counted from the last
   double eta = 0.0;  // of `values`; 0 where they are not filled yet
 
-  void resize(const PackPlan& plan, int kept_iterations);
+  void resize(const PackPlan& plan, const Sections& sections);
 };
 
 // Fills values for eta (nothing to do when they are there and no drag changes w: one state serves one vector of inputs), weights from w
@@ -115,10 +144,15 @@ void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const T
 template <class T>
 void end_sweeps(const Scene& scene, PackState<T>& state, T* q);
 
-// One pass over all colors; the first (0) starts from no multipliers. Keeps what the reverse needs where `state` has records.
+// One pass over all colors; the first (0) starts from no multipliers. Keeps what the reverse of the last section needs, and where the others begin.
 template <class T>
 void sweep(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, int threads, int grain, int iteration,
            PackState<T>& state);
+
+// Sweeps the section of `iteration` again, if its record is not the one at hand; the coordinates of later ones are lost.
+template <class T>
+void sweep_again(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, int threads, int grain,
+                 int iteration, PackState<T>& state);
 
 // Writes the multipliers in the scene's order, (rows).
 template <class T>

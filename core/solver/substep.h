@@ -13,6 +13,12 @@
 
 namespace sheetbend {
 
+// Volumes are projected between sweeps, so their scenes have one section.
+template <class T>
+Sections sections_of_record(const Scene& scene, const Plan& plan, int kept) {
+  return scene.volumes.empty() ? sections_of<T>(plan.packs, kept) : Sections{kept, kept};
+}
+
 template <class T>
 struct SubstepRecord {
   std::vector<IterationRecord<T>> iterations;
@@ -33,7 +39,7 @@ struct SubstepRecord {
     if (plan.colors.empty()) return;
     C_r.resize(damped_rows(scene));
     if constexpr (in_packs<T>) {
-      packs.resize(plan.packs, kept);
+      packs.resize(plan.packs, sections_of_record<T>(scene, plan, kept));
     } else {
       iterations.resize(std::max(1, kept));
       for (auto& i : iterations) i.resize(scene);

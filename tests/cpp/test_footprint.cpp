@@ -80,6 +80,14 @@ TEST_P(Footprint, IsWhatIsAllocated) {
   expect_footprint<Dual<double, 1>>(sample.scene, plan, {sample.inputs.begin(), sample.inputs.end()});
 }
 
+TEST(FootprintOfSections, IsWhatIsAllocated) {
+  const Sample sample = random_scene(77, {.ropes = 60});
+  const Plan plan = make_plan(sample.scene, {.h = 4e-3, .partition = Partition::gauss_seidel, .iterations = 100});
+  ASSERT_GT(sections_of<double>(plan.packs, 100).count(), 1);
+  expect_footprint<double>(sample.scene, plan, sample.inputs);
+  expect_footprint<Pack>(sample.scene, plan, {sample.inputs.begin(), sample.inputs.end()});
+}
+
 // A scene of one closed surface and nothing else.
 TEST(FootprintOfAVolume, IsWhatIsAllocated) {
   const Sample sample = bipyramid(300);

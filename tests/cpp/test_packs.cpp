@@ -53,9 +53,10 @@ struct Packs : ::testing::TestWithParam<Scenes> {
     std::vector<double> q, lambda;
     PackState<double> state;
   };
-  Forward forward(const sheetbend_packs::KernelTable& kernels, int threads) const {
+  // `section`: sweeps whose record is kept at once; 0 = all.
+  Forward forward(const sheetbend_packs::KernelTable& kernels, int threads, int section = 0) const {
     Forward f{q, std::vector<double>(scene.rows), {}};
-    f.state.resize(plan.packs, plan.options.iterations);
+    f.state.resize(plan.packs, {plan.options.iterations, section > 0 ? section : plan.options.iterations});
     for (int n = 0; n < scene.nodes(); ++n) Vec3<double>(&q[scene.first_dof[n]]).store(f.state.rows.at(n));
     begin_sweeps(scene, plan.packs, in, eta, w.data(), C_r.data(), f.state);
     for (int i = 0; i < plan.options.iterations; ++i) sweep(plan.packs, kernels, threads, 1, i, f.state);
@@ -65,8 +66,8 @@ struct Packs : ::testing::TestWithParam<Scenes> {
   }
 
   // Cotangents of coordinates, inverse masses, references and inputs, one after the other.
-  std::vector<double> reverse(const sheetbend_packs::KernelTable& kernels, int threads) const {
-    Forward f = forward(kernels, threads);
+  std::vector<double> reverse(const sheetbend_packs::KernelTable& kernels, int threads, int section = 0) const {
+    Forward f = forward(kernels, threads, section);
     PackCotangents<double> bar;
     bar.resize(plan.packs);
     std::vector<double> all = x_bar;
@@ -135,6 +136,32 @@ TEST_P(Packs, ReverseHasTheSameBitsOnEveryInstructionSet) {
   for (const auto* kernels : available_kernels())
     for (const int threads : {1, 3})
       EXPECT_TRUE(same_bits(reverse(*kernels, threads), expected)) << kernels->name << ", threads " << threads;
+}
+
+TEST_P(Packs, SweptAgainInSectionsHasTheSameBits) {
+  const auto expected = reverse(pack_kernels(), 1);
+  for (const int section : {1, 2})
+    for (const int threads : {1, 3})
+      EXPECT_TRUE(same_bits(reverse(pack_kernels(), threads, section), expected)) << section << ", threads " << threads;
+}
+
+TEST_P(Packs, SectionsKeepToTheirSize) {
+  const auto length = [&](int sweeps, std::size_t whole, std::size_t section) {
+    return sections_of<double>(plan.packs, sweeps, whole, section).length;
+  };
+  std::size_t sweep = 0;
+  for (const PackedColor& color : plan.packs.colors) sweep += sizeof(Pack) * color.record_packs<double>();
+  EXPECT_EQ(length(0, 0, 0), 0);
+  EXPECT_EQ(length(10, 10 * sweep, sweep), 10);
+  EXPECT_EQ(length(10, 10 * sweep - 1, 3 * sweep), 3);
+  EXPECT_EQ(length(10, sweep, sweep - 1), 1);
+  const Sections sections{10, 3};
+  EXPECT_EQ(sections.count(), 4);
+  std::vector<int> of, begin;
+  for (int i = 0; i < 10; ++i) of.push_back(sections.of(i));
+  for (int i = 0; i < 4; ++i) begin.push_back(sections.begin(i));
+  EXPECT_EQ(of, (std::vector<int>{3, 2, 2, 2, 1, 1, 1, 0, 0, 0}));
+  EXPECT_EQ(begin, (std::vector<int>{7, 4, 1, 0}));
 }
 
 TEST_P(Packs, RepeatedLanesCountOnce) {
