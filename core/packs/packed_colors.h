@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/packs/lanes.h"
+#include "core/packs/sections.h"
 #include "core/scalar/numbers.h"
 #include "core/scalar/vec3.h"
 #include "core/scene/scene.h"
@@ -88,19 +89,8 @@ struct PackPlan {
 
 PackPlan pack_colors(const Scene& scene, const std::vector<Color>& colors);
 
-// The reverse of a substep needs a record of every sweep, in reverse order. Where all of them would leave the caches, they are made a section of
-// sweeps at a time: each section is swept again, from where it began, just before it is reversed.
-struct Sections {
-  int sweeps = 0;  // of a substep whose record is kept; 0 = none is
-  int length = 0;  // sweeps in each section; fewer in the first
-
-  int count() const { return length == 0 ? 0 : (sweeps + length - 1) / length; }
-  // The section of a sweep, counted from the last one, and the sweep that it begins with.
-  int of(int sweep) const { return length == 0 ? 0 : (sweeps - 1 - sweep) / length; }
-  int begin(int section) const { return std::max(0, sweeps - (section + 1) * length); }
-};
-
-inline constexpr std::size_t whole_record = 8 << 20, section_record = 2 << 20;  // bytes, measured: docs/decisions.md
+// Bytes: what may be recorded as a whole, and what a section may take otherwise. Measured: docs/decisions.md.
+inline constexpr std::size_t whole_record = 8 << 20, section_record = 2 << 20;
 template <class T>
 Sections sections_of(const PackPlan& plan, int sweeps, std::size_t whole = whole_record,
                      std::size_t section = section_record);
