@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 WIND = ("wind_x", "wind_y", "wind_z")
+STRENGTH = "wind_strength"
+NAMED_KNOTS = 50  # a wind of more has no quantity for each
 
 
 class Air:
@@ -102,12 +104,29 @@ class Air:
             return
         self._blowing = (t, w)
         self.times, self.wind = t, w.copy()
-        if times is not None:
-            return
-        for k, quantity in enumerate(WIND):
-            scene.add_quantity(quantity, float(w[0, k]), "m/s", positive=False, scale=1.0)
-            scene.add_terms([Term("wind", k, 1.0, ((quantity, "identity"),))])
+        if times is None:
+            for place, (quantity, velocity) in enumerate(zip(WIND, w[0], strict=True)):
+                _name_wind(scene, place, quantity, velocity)
+        else:
+            _name_changing_wind(scene, w)
         self.wind[:] = 0.0
+
+
+def _name_wind(scene: Scene, place: int, quantity: str, velocity: float, *factors: tuple[str, str]) -> None:
+    """Let a quantity stand for one number of the wind."""
+    scene.add_quantity(quantity, float(velocity), "m/s", positive=False, scale=1.0)
+    scene.add_terms([Term("wind", place, 1.0, ((quantity, "identity"), *factors))])
+
+
+def _name_changing_wind(scene: Scene, wind: Array) -> None:
+    """One factor for all of it, `wind_strength`, and where the knots are few each of their numbers, `wind_x_0` ..."""
+    strength = (scene.add_quantity(STRENGTH, 1.0, "", positive=True), "identity")
+    if len(wind) > NAMED_KNOTS:
+        scene.add_terms([Term("wind", np.arange(wind.size), wind.ravel(), (strength,))])
+        return
+    for knot, velocities in enumerate(wind):
+        for axis, velocity in enumerate(velocities):
+            _name_wind(scene, 3 * knot + axis, f"{WIND[axis]}_{knot}", velocity, strength)
 
 
 def _coefficient(field: str, values: ArrayLike, count: int) -> Array:

@@ -284,6 +284,8 @@ class Scene:
 
         k is air density * drag coefficient / 2 (air: 1.2 kg/m^3). One value for all is the quantity
         `<name>_air_normal` or `<name>_air_tangential`; a constant wind is the quantities `wind_x`, `wind_y`, `wind_z`.
+        A changing one is multiplied by `wind_strength` and, with at most 50 knots, is `wind_x_0`, `wind_y_0`,
+        `wind_z_0`, `wind_x_1` and so on.
         The force is taken at the extrapolated state, so substeps must resolve it: with BDF2 h k |u| must stay below 2/3
         of the area density. `set_drag` has no such limit, and knows no wind.
 

@@ -193,6 +193,44 @@ def test_wind_and_drag_of_a_fluttering_sheet_are_recovered():
         assert found[name].value == approx(value, rel=1e-4), name
 
 
+def gusts(tail: float = 0.0) -> sb.Scene:
+    """A flag on two corners in a wind of three knots along x; `tail` of calm knots after the motion."""
+    calm = [0.2 + 0.01 * k for k in range(1, 60)] if tail else []
+    wind = [[1.0, 0.5, 0.0], [3.0, 0.5, 0.2], [0.5, 0.0, 0.0], *[[tail, 0.0, 0.0]] * len(calm)]
+    scene = flag(wind=wind, times=[0.0, 0.1, 0.2, *calm])
+    scene.pin([0, 15])
+    return scene
+
+
+def test_a_changing_wind_has_a_strength_and_a_number_per_knot():
+    """Of a product the derivative by the common factor is the sum of the numbers' own, each times its number."""
+    scene, s = gusts(), sb.Solver(h=1 / 200)
+    named = {name: q.value for name, q in scene.quantities.items() if name.startswith("wind_")}
+    assert list(named)[:5] == ["wind_strength", "wind_x_0", "wind_y_0", "wind_z_0", "wind_x_1"]
+    assert named["wind_strength"] == 1.0 and named["wind_x_1"] == 3.0 and len(named) == 10
+    weights = np.random.default_rng(5).standard_normal((1, scene.particle_count, 3))
+    by = {name: sensitivity(scene, [0.15], s, weights, name)[1] for name in named}
+    assert by["wind_x_2"] != 0.0
+    knots = sum(value * by[name] for name, value in named.items() if name != "wind_strength")
+    assert by["wind_strength"] == approx(knots, rel=1e-10)
+
+
+def test_a_wind_of_many_knots_has_its_strength_alone():
+    scene = gusts(tail=1.0)
+    assert [name for name in scene.quantities if name.startswith("wind")] == ["wind_strength"]
+    here, there = (sb.simulate(a, [0.1], sb.Solver(h=1 / 200)).positions for a in (scene, gusts()))
+    np.testing.assert_allclose(here, there, rtol=1e-13)
+
+
+def test_a_fit_finds_gusts():
+    """The wind at three knots, from the motion of five particles."""
+    true = {"wind_x_0": 1.0, "wind_x_1": 3.0, "wind_x_2": 0.5}
+    s = sb.Solver(h=1 / 240)
+    found = refitted(gusts(), np.arange(25) / 120, s, [2, 4, 12, 15, 19], dict.fromkeys(true, 0.2))
+    for name, value in true.items():
+        assert found[name].value == approx(value, rel=1e-6), name
+
+
 # --- rest
 
 

@@ -136,7 +136,8 @@ class Drive(Section):
 
 class Wind(Section):
     """[scene.wind]: the wind around the cloths that have `air_normal` or `air_tangential`. A constant one is the
-    quantities wind_x, wind_y and wind_z."""
+    quantities wind_x, wind_y and wind_z; a changing one is multiplied by wind_strength, and with at most 50 knots it is
+    wind_x_0, wind_y_0, wind_z_0, wind_x_1 and so on."""
 
     velocity: Vector | list[Vector] = key(..., "one, or one at each of the times", "m/s")
     times: list[Finite] | None = key(
