@@ -3,7 +3,9 @@ depend on the mesh."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,11 +25,20 @@ MODELS = ("curvature", "dihedral", "isometric_bending")
 
 @dataclass(frozen=True)
 class Cloth:
-    """A cloth in a scene: its mesh, and the particle of each of its vertices."""
+    """A cloth in a scene.
+
+    Attributes:
+        mesh: as given.
+        particles: of its vertices.
+        fabric: prefix of its fabric's quantities.
+        numbers: of its fabric as given, those left out too.
+    """
 
     name: str
     mesh: TriangleMesh
     particles: Array
+    fabric: str
+    numbers: Mapping[str, Any]
 
 
 def add_cloth(
@@ -35,6 +46,7 @@ def add_cloth(
     mesh: TriangleMesh,
     name: str = "cloth",
     *,
+    fabric: str = "",
     density: float,
     warp: float,
     weft: float | None = None,
@@ -55,7 +67,7 @@ def add_cloth(
 ) -> Cloth:
     """Add a cloth to a scene.
 
-    Quantities: `<name>_density` kg/m^2, `_warp`, `_weft`, `_shear` N/m, `_poisson`, the law's coefficients (see
+    Quantities: `<fabric>_density` kg/m^2, `_warp`, `_weft`, `_shear` N/m, `_poisson`, the law's coefficients (see
     `sheetbend.fabric`) such as `_warp_stiffening`, and where given `_bending`, `_bending_weft`,
     `_bending_twist` N m, `_membrane_damping` s,
     `_bend_damping` s, `_drag_linear` N s/m^3, `_drag_quadratic` N s^2/m^4.
@@ -65,6 +77,7 @@ def add_cloth(
 
     Args:
         mesh: with material coordinates along warp and weft.
+        fabric: prefix of the quantities, `name` by default. Cuts of one fabric share them and have the same values.
         density: mass per area, kg/m^2.
         warp, weft: tension stiffness at rest, N/m, of a strip with free sides; weft = warp by default.
         shear: G, N/m; an isotropic fabric has warp/(2 (1 + poisson)).
@@ -84,8 +97,9 @@ def add_cloth(
         drag_linear, drag_quadratic: air drag per area, isotropic.
 
     Raises:
-        SceneError: wrong or missing values; a mesh whose diagonals bias bending.
+        SceneError: wrong or missing values, or others than those of a cut before; a mesh whose diagonals bias bending.
     """
+    needed = {"density": density, "warp": warp, "shear": shear}
     optional = {
         "weft": weft,
         "bending": bending,
@@ -96,7 +110,10 @@ def add_cloth(
         "drag_linear": drag_linear,
         "drag_quadratic": drag_quadratic,
     }
-    check_positive(name, {"density": density, "warp": warp, "shear": shear}, optional)
+    check_positive(name, needed, optional)
+    fabric = fabric or name
+    numbers = needed | optional | {"poisson": poisson, "law": law or Linear(), "bending_model": bending_model}
+    _check_cut(scene, name, fabric, numbers)
     if not (is_number(poisson) and -1 < poisson < 1):
         raise SceneError(f"{name}.poisson", "must lie between -1 and 1", poisson, "give sqrt(nu_uv nu_vu)")
     if bending_model not in MODELS:
@@ -115,23 +132,36 @@ def add_cloth(
         free[indices(f"{name}.held", held, len(shape))] = False
 
     particles = scene.add_particles(shape, 0.0)
-    _weigh(scene, mesh, name, particles, density, drag_linear, drag_quadratic)
-    _membrane(scene, mesh, name, particles, free, (warp, weft, shear, poisson), law or Linear(), membrane_damping)
+    _weigh(scene, mesh, fabric, particles, density, drag_linear, drag_quadratic)
+    _membrane(
+        scene, mesh, name, fabric, particles, free, (warp, weft, shear, poisson), law or Linear(), membrane_damping
+    )
     if bending is not None:
         if bending_model == "curvature":
             sheet = SheetCurvature(mesh, free)
-            sheet.add(scene, name, particles, bending, bending_weft, bending_twist, curved, bend_damping)
+            sheet.add(scene, name, fabric, particles, bending, bending_weft, bending_twist, curved, bend_damping)
         else:
-            Hinges(mesh, free).add(scene, name, particles, bending, bending_model, curved, bend_damping)
-    built = Cloth(name, mesh, particles)
+            Hinges(mesh, free).add(scene, name, fabric, particles, bending, bending_model, curved, bend_damping)
+    built = Cloth(name, mesh, particles, fabric, numbers)
     scene.cloths[name] = built
     return built
+
+
+def _check_cut(scene: Scene, name: str, fabric: str, numbers: Mapping[str, Any]) -> None:
+    """Cuts of one fabric have the same numbers."""
+    for other in scene.cloths.values():
+        if other.fabric == fabric and other.numbers != numbers:
+            differing = [key for key, value in numbers.items() if other.numbers[key] != value]
+            fix = f"give what {other.name} has, or another fabric"
+            raise SceneError(
+                f"{name}.{differing[0]}", f"is not that of its fabric, {fabric}", numbers[differing[0]], fix
+            )
 
 
 def _weigh(
     scene: Scene,
     mesh: TriangleMesh,
-    name: str,
+    fabric: str,
     particles: Array,
     density: float,
     linear: float | None,
@@ -139,12 +169,12 @@ def _weigh(
 ) -> None:
     """Masses and drag: every vertex has a third of its triangles."""
     share = np.bincount(mesh.triangles.ravel(), np.repeat(mesh.areas / 3.0, 3), len(mesh.vertices))
-    scene.add_quantity(f"{name}_density", density, "kg/m^2")
-    scene.add_terms([Term("mass", particles, share, ((f"{name}_density", "identity"),))])
+    scene.add_quantity(f"{fabric}_density", density, "kg/m^2", shared=True)
+    scene.add_terms([Term("mass", particles, share, ((f"{fabric}_density", "identity"),))])
     for kind, value, unit in (("linear", linear, "N s/m^3"), ("quadratic", quadratic, "N s^2/m^4")):
         if value is not None:
             scene.has_drag = True
-            quantity = scene.add_quantity(f"{name}_drag_{kind}", value, unit)
+            quantity = scene.add_quantity(f"{fabric}_drag_{kind}", value, unit, shared=True)
             scene.add_terms([Term(f"drag_{kind}", particles, share, ((quantity, "identity"),))])
 
 
@@ -152,6 +182,7 @@ def _membrane(
     scene: Scene,
     mesh: TriangleMesh,
     name: str,
+    fabric: str,
     particles: Array,
     free: Array,
     stiffness: tuple[float, float | None, float, float],
@@ -174,22 +205,22 @@ def _membrane(
         name=f"{name}_membrane",
         rest=rest,
         scale=areas,
-        stiffness=(f"{name}_warp", warp, "N/m"),
-        damping=(f"{name}_membrane_damping", damping),
+        stiffness=(f"{fabric}_warp", warp, "N/m"),
+        damping=(f"{fabric}_membrane_damping", damping),
     )
     terms = []
-    over_warp = (f"{name}_warp", "inverse_sqrt")
+    over_warp = (f"{fabric}_warp", "inverse_sqrt")
     for place, label, value in ((5, "weft", weft), (6, "shear", shear)):
         if value is not None:
-            scene.add_quantity(f"{name}_{label}", value, "N/m")
-            terms.append(Term("rest", values + place, 1.0, ((f"{name}_{label}", "sqrt"), over_warp)))
-    scene.add_quantity(f"{name}_poisson", poisson, "", positive=False, scale=0.1, limits=(-1.0, 1.0))
-    terms.append(Term("rest", values + 4, 1.0, ((f"{name}_poisson", "identity"),)))
+            scene.add_quantity(f"{fabric}_{label}", value, "N/m", shared=True)
+            terms.append(Term("rest", values + place, 1.0, ((f"{fabric}_{label}", "sqrt"), over_warp)))
+    scene.add_quantity(f"{fabric}_poisson", poisson, "", positive=False, scale=0.1, limits=(-1.0, 1.0), shared=True)
+    terms.append(Term("rest", values + 4, 1.0, ((f"{fabric}_poisson", "identity"),)))
     own = scene.groups[-1].rest
     for place, (label, value, fittable) in enumerate(coefficients, start=7):
         if fittable:
-            scene.add_quantity(f"{name}_{label}", value, "")
-            terms.append(Term("rest", values + place, 1.0, ((f"{name}_{label}", "identity"),)))
+            scene.add_quantity(f"{fabric}_{label}", value, "", shared=True)
+            terms.append(Term("rest", values + place, 1.0, ((f"{fabric}_{label}", "identity"),)))
         else:
             own[:, place] = value
     scene.add_terms(terms)

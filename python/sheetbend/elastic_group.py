@@ -27,8 +27,8 @@ def add_elastic_group(
         name: of the group.
         rest: (count,) or (count, parameters), see `Scene.add_constraints`.
         scale: (count,) what the stiffness counts in each, such as areas.
-        stiffness: name, value and unit of its quantity.
-        damping: name and value, s, of the time constant's; None = undamped.
+        stiffness: name, value and unit of its quantity, which groups of equal value share.
+        damping: name and value, s, of the time constant's, likewise; None = undamped.
 
     Returns:
         (count,) where each constraint's own parameters start in the input array "rest".
@@ -46,10 +46,10 @@ def add_elastic_group(
     )
     group, first, _ = scene.group(name)
     at = first + np.arange(count)
-    scene.add_quantity(quantity, value, unit)
+    scene.add_quantity(quantity, value, unit, shared=True)
     scene.add_terms([Term("compliance", at, 1.0 / scale, ((quantity, "inverse"),))])
     if constant is not None:
-        scene.add_quantity(label, constant, "s")
+        scene.add_quantity(label, constant, "s", shared=True)
         scene.add_terms([Term("damping", at, scale, ((label, "identity"), (quantity, "identity")))])
     values: Array = first_value(scene, name) + group.rest.shape[1] * np.arange(count)
     return values

@@ -32,9 +32,11 @@ def solver_floors(experiments: Sequence[Experiment], parameters: Parameters) -> 
                 frequency = e.scene.quantities[quantity.replace("_loss_factor", "_loss_frequency")].value
                 words = f"BDF1 with a substep of {h:g} s damps as much by itself; use bdf2"
                 floors[name] = Floor(2.0 * math.pi * frequency * h, words)
-            sheet = next((c for c in e.scene.cloths.values() if quantity in membrane_names(c.name)), None)
+            sheet = next((c for c in e.scene.cloths.values() if quantity in membrane_names(c.fabric)), None)
             if sheet is not None and e.solver.method == "gauss_seidel":
-                mass = e.scene.quantities[f"{sheet.name}_density"].value * sheet.mesh.areas.sum() / len(sheet.particles)
+                mass = (
+                    e.scene.quantities[f"{sheet.fabric}_density"].value * sheet.mesh.areas.sum() / len(sheet.particles)
+                )
                 floors[name] = _hidden(mass * sweeps / (0.9 * h * h), sweeps, h, "newton")
             rope = next((r for r in e.scene.ropes.values() if quantity == f"{r.name}_EA"), None)
             if rope is not None and e.solver.method == "gauss_seidel":
@@ -44,9 +46,9 @@ def solver_floors(experiments: Sequence[Experiment], parameters: Parameters) -> 
     return floors
 
 
-def membrane_names(cloth: str) -> tuple[str, str, str]:
-    """The quantities of a cloth's membrane, N/m."""
-    return f"{cloth}_warp", f"{cloth}_weft", f"{cloth}_shear"
+def membrane_names(fabric: str) -> tuple[str, str, str]:
+    """The quantities of a fabric's membrane, N/m."""
+    return f"{fabric}_warp", f"{fabric}_weft", f"{fabric}_shear"
 
 
 def _hidden(limit: float, sweeps: int, h: float, method: str) -> Floor:

@@ -48,13 +48,14 @@ class Hinges:
         self,
         scene: Scene,
         name: str,
+        fabric: str,
         particles: Array,
         rigidity: float,
         model: str,
         curved: bool,
         damping: float | None,
     ) -> None:
-        """Add them to a scene as the group `<name>_bend`, with the quantity `<name>_bending` (B, N m).
+        """Add them to a scene as the group `<name>_bend`, with the quantity `<fabric>_bending` (B, N m).
 
         Raises:
             SceneError: a mesh with one-way diagonals, or a curved rest shape of quadratic bending.
@@ -79,8 +80,8 @@ class Hinges:
             name=f"{name}_bend",
             rest=rest,
             scale=scale,
-            stiffness=(f"{name}_bending", rigidity, "N m"),
-            damping=(f"{name}_bend_damping", damping),
+            stiffness=(f"{fabric}_bending", rigidity, "N m"),
+            damping=(f"{fabric}_bend_damping", damping),
         )
 
 

@@ -226,17 +226,24 @@ class Scene:
         positive: bool = True,
         scale: float | None = None,
         limits: tuple[float, float] | None = None,
+        shared: bool = False,
     ) -> str:
         """Declare a named quantity; `add_terms` says what it makes.
+
+        Args:
+            shared: it may be there already, with the same value.
 
         Raises:
             SceneError: the name is taken, or the value is not finite (or not positive where it must be).
         """
         self._building()
-        if name in self.quantities:
-            raise SceneError(name, "is a quantity already", value, "give another name")
-        self.quantities[name] = Quantity(name, float(value), unit, positive, scale, limits)
-        return name
+        quantity = Quantity(name, float(value), unit, positive, scale, limits)
+        before = self.quantities.setdefault(name, quantity)
+        if before is quantity or (shared and before == quantity):
+            return name
+        if shared:
+            raise SceneError(name, f"is {before.value:g} already", value, "give what shares it the same value")
+        raise SceneError(name, "is a quantity already", value, "give another name")
 
     def add_terms(self, terms: Sequence[Term]) -> None:
         """Add terms to the inputs (array names and order as in `CompiledScene.layout`)."""

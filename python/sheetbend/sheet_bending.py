@@ -57,6 +57,7 @@ class SheetCurvature:
         self,
         scene: Scene,
         name: str,
+        fabric: str,
         particles: Array,
         rigidity: float,
         weft: float | None,
@@ -64,7 +65,7 @@ class SheetCurvature:
         curved: bool,
         damping: float | None,
     ) -> None:
-        """Add them to a scene as the group `<name>_bend`, with the quantities `<name>_bending`, where given
+        """Add them to a scene as the group `<name>_bend`, with the quantities `<fabric>_bending`, where given
         `_bending_weft`, `_bending_twist`, N m."""
         irregular = _irregular(self.mesh)
         if irregular > IRREGULAR:
@@ -75,7 +76,7 @@ class SheetCurvature:
         rest[:, 9:11] = (1.0, np.sqrt(2.0))
         if curved:
             rest[:, 11:] = self.angles
-        bending = f"{name}_bending"
+        bending = f"{fabric}_bending"
         ratios = [(9, weft, f"{bending}_weft", 1.0), (10, twist, f"{bending}_twist", np.sqrt(2.0))]
         for place, value, _, _ in ratios:
             if value is not None:
@@ -88,11 +89,11 @@ class SheetCurvature:
             rest=rest,
             scale=self.area,
             stiffness=(bending, rigidity, "N m"),
-            damping=(f"{name}_bend_damping", damping),
+            damping=(f"{fabric}_bend_damping", damping),
         )
         for place, value, label, factor in ratios:
             if value is not None:
-                scene.add_quantity(label, value, "N m")
+                scene.add_quantity(label, value, "N m", shared=True)
                 scene.add_terms([Term("rest", values + place, factor, ((label, "sqrt"), (bending, "inverse_sqrt")))])
 
 

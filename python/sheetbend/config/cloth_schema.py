@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 from pydantic import ValidationInfo, field_validator, model_validator
 
@@ -121,6 +121,11 @@ class Cloth(Section):
     """A cloth, `sb.add_cloth`. A list: [[scene.cloth]]."""
 
     name: Name = key("cloth", "prefix of its quantities: <name>_warp and so on")
+    fabric: Name | None = key(
+        None,
+        "name of an earlier cloth that is cut from the same fabric: what the fabric is, from `density` to "
+        "`drag_quadratic` and `law`, is that cloth's, and so are the quantities",
+    )
     mesh: ClothMesh = key(..., "[scene.cloth.mesh]")
     density: Finite = key(..., "mass per area", "kg/m^2", gt=0)
     warp: Finite = key(..., "tension stiffness along the warp, of a strip with free sides", "N/m", gt=0)
@@ -174,3 +179,38 @@ class Cloth(Section):
     def in_air(self) -> bool:
         """Whether air acts on its triangles."""
         return self.air_normal is not None or self.air_tangential is not None
+
+
+FABRIC = (
+    *("density", "warp", "weft", "shear", "poisson", "law", "bending", "bending_weft", "bending_twist"),
+    *("bending_model", "membrane_damping", "bend_damping", "drag_linear", "drag_quadratic"),
+)
+"""Keys of a cloth that tell its fabric."""
+
+
+def with_fabrics(scene: dict[str, Any]) -> dict[str, Any]:
+    """What [scene] has of cloths as read, each with the keys of the fabric that it is cut from.
+
+    Raises:
+        ValueError: a fabric is that of no earlier cloth, or a cut has a number of its own.
+    """
+    cloths = scene.get("cloth")
+    if not isinstance(cloths, list) or not all(isinstance(cloth, dict) for cloth in cloths):
+        return {}  # refused where it stands
+    known: dict[str, dict[str, Any]] = {}
+    complete = []
+    for cloth in cloths:
+        name, fabric = str(cloth.get("name", "cloth")), cloth.get("fabric")
+        if isinstance(fabric, str):
+            if fabric not in known:
+                fix = f"name an earlier [[scene.cloth]]{': ' + ', '.join(known) if known else ''}"
+                raise ValueError(f"has a cloth, {name}, whose fabric is that of no earlier one, {fabric}|{fix}")
+            own = [key for key in FABRIC if key in cloth and cloth[key] != known[fabric].get(key)]
+            if own:
+                fix = f"leave them out, or leave out its fabric: the numbers of {fabric} hold"
+                raise ValueError(f"has a cloth, {name}, with numbers beside its fabric: {', '.join(own)}|{fix}")
+            whole = known[fabric]
+            cloth = {k: whole[k] for k in FABRIC if k in whole} | cloth | {"fabric": whole.get("fabric", fabric)}
+        known[name] = cloth
+        complete.append(cloth)
+    return {"cloth": complete}

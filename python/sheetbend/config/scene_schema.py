@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 from pydantic import model_validator
 
-from .cloth_schema import Cloth
+from .cloth_schema import Cloth, with_fabrics
 from .section import Finite, Name, Reference, Section, Vector, key
 
 
@@ -182,6 +182,11 @@ class SceneSection(Section):
     force: list[Force] = key([], "forces over time")
     drive: list[Drive] = key([], "motion taken from markers")
     quantities: dict[Name, ExtraQuantity] = key({}, "further named numbers")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _cuts_have_their_fabric(cls, given: Any) -> Any:
+        return given if not isinstance(given, dict) else given | with_fabrics(given)
 
     @model_validator(mode="after")
     def _wind_blows_on_something(self) -> Self:
