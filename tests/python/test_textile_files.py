@@ -209,3 +209,24 @@ def test_quantities():
     for text in ("5", "cm", "5 N", "5..2 cm"):
         with pytest.raises(sb.InputError, match="width"):
             quantity("width", text, "length")
+
+
+@pytest.mark.parametrize("pull", ["garter_x", "rib_y", "stockinette_y"])
+def test_a_shipped_knit_comes_back(pull, tmp_path):
+    """Five repeats side by side, of different length, in mm and cN with decimal commas."""
+    data = Path(__file__).resolve().parents[2] / "experiments/knit_uniaxial/data" / f"{pull}.npz"
+    arrays = np.load(data)
+    bottom, top = (arrays["pins"][:, :, k].astype(float) for k in (2, 3))
+    extension, force = np.linalg.norm(top - bottom, axis=2), arrays["force"].astype(float)
+    seen = [np.flatnonzero(~np.isnan(f)) for f in force]
+    columns = [c[k][seen[k]] * per for k in range(5) for c, per in ((extension, 100.0), (force, 100.0))]
+    cells = [[f"{c[row]:.9g}" if row < len(c) else "" for c in columns] for row in range(max(map(len, columns)))]
+    header = ";".join(f"Weg {k} [mm];Kraft {k} [cN]" for k in range(1, 6))
+    path = written(tmp_path, header + "\n" + "\n".join(";".join(row) for row in cells).replace(".", ","))
+    curves = textile.read_curves(path, length=0.1, width=0.1)
+    assert len(curves) == 5
+    for k, curve in enumerate(curves):
+        assert curve.deformation == approx(extension[k][seen[k]], rel=1e-8)
+        assert curve.load == approx(force[k][seen[k]] / 0.1, abs=1e-6)
+        cut = curve.from_pretension(10.0)  # 1 N
+        assert cut.load[0] == approx(10.0) and cut.cycles()[0].lost is None

@@ -13,7 +13,7 @@ from .drape import Drape, DrapeState, drape, drape_scene, drape_state
 from .fabric_fit import FabricFit, Measured, fit_fabric
 from .kes import BendingLoop, ShearLoop, TensileLoop, bending_loop, shear_loop, tensile_loop
 from .picture_frame import PictureFrame, picture_frame
-from .pull import fit_pull, pulled
+from .pull import fit_pull, pulled, strains_under
 from .reading import GRAM_FORCE, Reading
 from .shear import Shear, shear
 from .uniaxial import Uniaxial, uniaxial
@@ -50,6 +50,7 @@ __all__ = [
     "read_curves",
     "shear",
     "shear_loop",
+    "strains_under",
     "tensile_loop",
     "uniaxial",
 ]

@@ -6,9 +6,10 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..fabric import Exponential, Fabric, Linear, Spline
+from ..fabric import Exponential, Fabric, Law, Linear, Spline
 from .curve import Curve, chosen, mean_curve, same_test
 from .fabric_fit import FabricFit, Measured, fit_fabric
 from .flat import warp_angle
@@ -54,8 +55,7 @@ def pulled(
     warp_angle(along)
     _check(curves)
     ways = {c.name: chosen(c, cycle).way(way) for c in curves}
-    lengths = [c.length for c in curves if c.length is not None]
-    length, width = float(np.mean(lengths)) if lengths else _SPECIMEN[0], curves[0].width or _SPECIMEN[1]
+    length, width = _specimen(curves)
     note, found = _left_out(curves, cycle, way), []
     for load in _loads(curves, cycle, way, levels):
         strains = {name: 100.0 * w.deformation_at(load) for name, w in ways.items()}
@@ -106,18 +106,39 @@ def fit_pull(
     pretension = curves[0].pretension
     loads = _loads(curves, cycle, way, levels) - pretension
     strains = np.array([m.value for m in measured]) / 100.0
-    green = (strains + strains**2 / 2.0).tolist()
-    secants = loads / (np.array(green) * (1.0 + strains))
-    # T = k E exp(b E^2) (1 + e) of a strip
+    green = strains + strains**2 / 2.0
+    secants = loads / (green * (1.0 + strains))  # of a free strip: k exp(b green^2)
     b = max(math.log(secants[-1] / secants[0]) / (green[-1] ** 2 - green[0] ** 2), 0.01)
-    laws = {
+    stiffness = float(secants[0])
+    laws: dict[str, Law] = {
         "linear": Linear(),
         "exponential": Exponential(b, b, b),
-        "spline": Spline((green[-1] / 4.0,) * 3),
+        "spline": Spline((float(green[-1]) / 4.0,) * 3),
     }
-    stiffness = float(secants[0])
-    start = Fabric(density=0.1, warp=stiffness, weft=stiffness, shear=stiffness / 2.0, bending=1e-5, law=laws[law])
+    sizes = {"density": 0.1, "bending": 1e-5, "warp": stiffness, "weft": stiffness, "shear": stiffness / 2.0}
+    start = Fabric(**sizes, law=laws[law])
     return fit_fabric(measured, start, [along, *(f"{along}_{name}" for name in LAWS[law])])
+
+
+def strains_under(
+    fabric: Fabric, curves: Sequence[Curve], loads: ArrayLike, along: str = "warp", cells: int = 6
+) -> np.ndarray:
+    """(n,) strains that such specimens of a fabric have under loads (n,) N/m, beyond the curves' pretension as well.
+
+    Raises:
+        InputError: no curves, or curves of another test or of different widths or pretensions.
+        NoEquilibriumError: a specimen comes to no rest.
+    """
+    _check(curves)
+    length, width = _specimen(curves)
+    beyond = np.atleast_1d(np.asarray(loads, dtype=float)) - curves[0].pretension
+    return np.array([_test(along, float(load), width, length, cells)(fabric).value for load in beyond])
+
+
+def _specimen(curves: Sequence[Curve]) -> tuple[float, float]:
+    """Length and width, m."""
+    lengths = [c.length for c in curves if c.length is not None]
+    return float(np.mean(lengths)) if lengths else _SPECIMEN[0], curves[0].width or _SPECIMEN[1]
 
 
 def _check(curves: Sequence[Curve]) -> None:
