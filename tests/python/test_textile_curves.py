@@ -234,6 +234,8 @@ def test_bad_pulls(change, message):
         ({"deformation": np.full(402 - 1, 0.1)}, "never changes"),
         ({"deformation": np.arange(2.0), "load": np.arange(2.0)}, "too few"),
         ({"load": np.full(402 - 1, np.nan)}, "not finite"),
+        ({"load": -tensile().load}, "not positive at the largest strain"),
+        ({"deformation": -tensile().deformation}, "not positive at the largest strain"),
     ],
 )
 def test_bad_curves(change, message):

@@ -81,11 +81,14 @@ BELOW = "Specimen 1\nExt (mm),Load (N)\n{0}\nSpecimen 2\nExt (mm),Load (N)\n{1}"
 PAIRS = "Ext 1 (mm);Load 1 (N);Ext 2 (mm);Load 2 (N)\n"
 
 
-@pytest.mark.parametrize("layout", ["below", "beside", "numbered"])
+@pytest.mark.parametrize("layout", ["below", "one header", "beside", "numbered"])
 def test_repeats(layout, tmp_path):
     short = slice(0, 4)
     if layout == "below":
         text = BELOW.format(rows([MM, FORCE], ","), rows([MM[short], 2 * FORCE[short]], ","))
+    elif layout == "one header":
+        text = "Ext (mm),Load (N)\nSpecimen,1\n" + rows([MM, FORCE], ",")
+        text += "Specimen,2\n" + rows([MM[short], 2 * FORCE[short]], ",")
     elif layout == "beside":
         text = PAIRS + "".join(
             ";".join([f"{MM[k]:g}", f"{FORCE[k]:g}", *([f"{MM[k]:g}", f"{2 * FORCE[k]:g}"] if k < 4 else ["", ""])])
@@ -137,6 +140,8 @@ TABLE = "Time (s),Ext (mm),Load (N)\n"
         ("Ext (mm);Load (N)\n0,0;0,1\n1,0;2,5\n", {"decimal": "."}, "strip.csv", "holds no table"),
         ("Ext (mm);Load (N)\n0;0\n1;--\n2;1\n3;2\n", {}, "line 3, column 2", "is no number"),
         ("Ext (mm);Load (N)\n0;0\n1;\n2;1\n3;2\n", {}, "line 3, column 2", "empty above"),
+        ("Ext (mm);Load (N)\n0;0\nNaN;1\n2;1\n3;2\n", {}, "line 3, column 1", "is no number"),
+        ("Ext (mm);Load (N)\n0;0\n---;---\n2;1\n3;2\n", {}, "line 3, column 1", "is no number"),
         ("Ext (mm);Load (N)\n0;0\n1;1\n2;1\n3;\n", {}, "line 5, column 2", "not as many numbers"),
         ("Ext (mm);Load (N)\n0;0\n1;1;7\n2;1\n3;2\n", {}, "line 3", "must have 2 cells"),
         ("Ext (mm);Strain (%);Load (N)\n0;0;0\n1;1;1\n2;2;2\n", {}, "line 1", "several columns that could be the def"),

@@ -32,8 +32,8 @@ class Curve:
         pretension: N/m, under which the specimen counts as unstretched; `load` still contains it.
 
     Raises:
-        InputError: an unknown test, fewer than three points, arrays of different length, or numbers that are not
-            finite.
+        InputError: an unknown test, fewer than three points, arrays of different length, numbers that are not finite,
+            or a pull that counts as negative.
     """
 
     name: str
@@ -56,6 +56,10 @@ class Curve:
             object.__setattr__(self, field, checked)
         if not np.ptp(self.deformation) > 0.0:
             raise InputError(f"{self.name}.deformation", "never changes", self.deformation[0], "give a test that moves")
+        farthest = float(self.load[self.deformation.argmax()])
+        if self.test == "tension" and farthest <= 0.0:
+            fix = "turn the sign of the column that counts pulling as negative"
+            raise InputError(f"{self.name}.load", "is not positive at the largest strain", farthest, fix)
 
     @property
     def work(self) -> float:

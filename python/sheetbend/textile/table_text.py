@@ -1,7 +1,8 @@
 """Tables in the text files of testing machines: preamble, header, units and numbers, in whatever dialect.
 
 Lines above a table are its preamble; the last of them that has as many cells as the numbers is its header, or the last
-two where the lower one holds units alone. Another preamble below begins another table. Cells are separated by
+two where the lower one holds units alone. Another preamble below begins another table, which has the same header if it
+brings none. Cells are separated by
 semicolons, tabs, commas or blanks; the decimal mark is a point or a comma, the same everywhere in the file.
 """
 
@@ -21,6 +22,7 @@ from .units import unit
 
 _DELIMITERS = (";", "\t", ",", None)  # None: blanks
 _NUMBER = {mark: re.compile(rf"[-+]?(\d+{mark}?\d*|{mark}\d+)([eE][-+]?\d+)?") for mark in (r"\.", ",")}
+_MISSING = ("nan", "inf", "na", "n/a", "null", "none")
 _HINT = "correct that cell, or leave out the line"
 
 Line = tuple[int, list[str]]  # number in the file, from 1, and stripped cells
@@ -121,30 +123,34 @@ def _tables(path: Path, lines: Sequence[Line], mark: str, delimiter: str | None)
     above: list[Line] = []
     rows: list[Line] = []
     for line, cells in lines:
-        if _is_row(cells, mark) or (rows and _starts_with_number(cells)):
+        if _is_row(cells, mark) or (rows and _is_broken_row(cells)):
             rows.append((line, cells))
             continue
         if rows:
-            found.append(_table(path, above, rows, mark, delimiter))
+            found.append(_table(path, above, rows, mark, delimiter, found[-1] if found else None))
             above, rows = [], []
         above.append((line, cells))
     if rows:
-        found.append(_table(path, above, rows, mark, delimiter))
+        found.append(_table(path, above, rows, mark, delimiter, found[-1] if found else None))
     return found
 
 
-def _starts_with_number(cells: Sequence[str]) -> bool:
-    """Of a row that holds something else besides: it is wrong, not the next preamble."""
+def _is_broken_row(cells: Sequence[str]) -> bool:
+    """Whether a line starts as a row of numbers does, or with what stands for a missing one: it is wrong, not the next
+    preamble."""
     first = next((cell for cell in cells if cell), "")
-    return len(cells) > 1 and any(_number(first, mark) is not None for mark in (".", ","))
+    number = any(_number(first, mark) is not None for mark in (".", ","))
+    return len(cells) > 1 and (number or not re.search(r"[^\W\d_]", first) or first.lower() in _MISSING)
 
 
-def _table(path: Path, above: list[Line], rows: list[Line], mark: str, delimiter: str | None) -> TextTable:
+def _table(
+    path: Path, above: list[Line], rows: list[Line], mark: str, delimiter: str | None, before: TextTable | None
+) -> TextTable:
     while all(not cells[-1] for _, cells in rows):  # a delimiter that ends every line
         rows = [(line, cells[:-1]) for line, cells in rows]
         above = [(line, cells[:-1] if not cells[-1] else cells) for line, cells in above]
     width = len(rows[0][1])
-    while above and len(above[-1][1]) == width and _starts_with_number(above[-1][1]):
+    while above and len(above[-1][1]) == width and _is_broken_row(above[-1][1]):
         rows.insert(0, above.pop())  # a first row that is wrong
     header = next((k for k in range(len(above) - 1, -1, -1)[:2] if _is_header(above[k][1], width)), None)
     if header is None:
@@ -155,6 +161,8 @@ def _table(path: Path, above: list[Line], rows: list[Line], mark: str, delimiter
             )
             raise RecordingError(f"{path}, line {rows[0][0]}", problem, ",".join(rows[0][1]), fix)
         header, line, names, units = len(above), rows[0][0], [""] * width, [""] * width
+        if before is not None and len(before.names) == width:
+            names, units = list(before.names), list(before.units)
     else:
         line, names = above[header]
         units = [cell.strip("[]()") for cell in names]
