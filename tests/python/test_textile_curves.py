@@ -217,6 +217,7 @@ def test_what_the_loop_loses_is_told():
         ({"way": "up"}, "way: is unknown"),
         ({"cycle": 1}, "cycle: is none"),
         ({"curves": [tensile(), tensile()]}, "share a name"),
+        ({"curves": [Curve("slack", "tension", [0.0, 0.01, 0.02], [0.0, 0.0, 5.0])]}, "bear nothing"),
         ({"curves": [tensile(), replace(tensile(name="b"), width=0.1)]}, "different widths"),
         ({"curves": [parallelogram("shear", 1.0, 0.1, 0.1)]}, "no pulls"),
     ],

@@ -37,6 +37,9 @@ DIALECTS = {
     "tabs, per width, strain, UTF-16": (
         "KES-FB1\nElongation (%)\tForce (gf/cm)\n" + rows([100 * STRAIN, FORCE / WIDTH / (100 * GF)], "\t")
     ).encode("utf-16"),
+    "units of no letters in a line of their own": (
+        "Dehnung;Kraft\n%;N\n" + rows([100 * STRAIN, FORCE], ";", ",")
+    ).encode(),
     "blanks": ("# strip\ntime_s extension_cm force_kN\n" + rows([TIME, MM / 10, FORCE / 1e3], " ")).encode(),
     "Spanish, semicolons at the ends": (
         "Alargamiento en mm;Carga en N;\n".replace(" en ", " / ") + rows([MM, FORCE], ";", ",").replace("\n", ";\n")

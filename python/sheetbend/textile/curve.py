@@ -12,7 +12,7 @@ from ..checks import finite
 from ..errors import InputError
 from ..timeseries import Array
 
-TESTS = {"tension": ("", "N/m"), "shear": ("rad", "N/m"), "bending": ("1/m", "N")}
+TESTS = ("tension", "shear", "bending")
 _TURN = 0.05  # of the whole range: what a specimen must go back by before it counts as unloading
 _SLACK = 0.05  # of the largest load: below it a specimen counts as unloaded
 _POINTS = 100  # of a skeleton

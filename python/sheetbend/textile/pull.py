@@ -49,8 +49,8 @@ def pulled(
         cells: of `uniaxial`.
 
     Raises:
-        InputError: no curves, curves of another test or of different widths or pretensions, or without that cycle or
-            way.
+        InputError: no curves, curves of another test or of different widths or pretensions, without that cycle or way,
+            or slack where the first load is read off.
     """
     warp_angle(along)
     _check(curves)
@@ -158,7 +158,11 @@ def _loads(curves: Sequence[Curve], cycle: int, way: str, levels: int) -> np.nda
     mean = mean_curve(curves, way, cycle=cycle)
     top = min(float(chosen(c, cycle).way(way).load.max()) for c in curves)
     start, end = mean.deformation[0], mean.deformation[mean.load <= top][-1]
-    return np.interp(start + (end - start) * np.arange(1, levels + 1) / levels, mean.deformation, mean.load)
+    loads = np.interp(start + (end - start) * np.arange(1, levels + 1) / levels, mean.deformation, mean.load)
+    if loads[0] <= curves[0].pretension:
+        fix = "cut the slack off by from_pretension, or take fewer levels"
+        raise InputError("curves", "bear nothing at the first of the levels", f"{loads[0]:.4g} N/m", fix)
+    return loads
 
 
 def _test(along: str, load: float, width: float, length: float, cells: int) -> Callable[[Fabric], Reading]:

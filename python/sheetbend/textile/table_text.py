@@ -2,8 +2,8 @@
 
 Lines above a table are its preamble; the last of them that has as many cells as the numbers is its header, or the last
 two where the lower one holds units alone. Another preamble below begins another table, which has the same header if it
-brings none. Cells are separated by
-semicolons, tabs, commas or blanks; the decimal mark is a point or a comma, the same everywhere in the file.
+brings none. Cells are separated by semicolons, tabs, commas or blanks; the decimal mark is a point or a comma, the same
+everywhere in the file.
 """
 
 from __future__ import annotations
@@ -136,11 +136,20 @@ def _tables(path: Path, lines: Sequence[Line], mark: str, delimiter: str | None)
 
 
 def _is_broken_row(cells: Sequence[str]) -> bool:
-    """Whether a line starts as a row of numbers does, or with what stands for a missing one: it is wrong, not the next
-    preamble."""
-    first = next((cell for cell in cells if cell), "")
-    number = any(_number(first, mark) is not None for mark in (".", ","))
-    return len(cells) > 1 and (number or not re.search(r"[^\W\d_]", first) or first.lower() in _MISSING)
+    """Whether a line between rows starts as they do, or with what stands for a missing number: then it is wrong, and no
+    preamble of a next table."""
+    first = _first(cells)
+    return len(cells) > 1 and (
+        _starts_with_number(cells) or not re.search(r"[^\W\d_]", first) or first.lower() in _MISSING
+    )
+
+
+def _starts_with_number(cells: Sequence[str]) -> bool:
+    return any(_number(_first(cells), mark) is not None for mark in (".", ","))
+
+
+def _first(cells: Sequence[str]) -> str:
+    return next((cell for cell in cells if cell), "")
 
 
 def _table(
@@ -150,16 +159,14 @@ def _table(
         rows = [(line, cells[:-1]) for line, cells in rows]
         above = [(line, cells[:-1] if not cells[-1] else cells) for line, cells in above]
     width = len(rows[0][1])
-    while above and len(above[-1][1]) == width and _is_broken_row(above[-1][1]):
+    while above and len(above[-1][1]) == width and _starts_with_number(above[-1][1]):
         rows.insert(0, above.pop())  # a first row that is wrong
     header = next((k for k in range(len(above) - 1, -1, -1)[:2] if _is_header(above[k][1], width)), None)
     if header is None:
         if above and delimiter == "," and width == 2 * len(above[-1][1]):
-            problem, fix = (
-                "has twice the cells of its header",
-                "export with ';' between columns, or '.' as decimal mark",
-            )
-            raise RecordingError(f"{path}, line {rows[0][0]}", problem, ",".join(rows[0][1]), fix)
+            fix = "export with ';' between columns, or '.' as decimal mark"
+            got = ",".join(rows[0][1])
+            raise RecordingError(f"{path}, line {rows[0][0]}", "has twice the cells of its header", got, fix)
         header, line, names, units = len(above), rows[0][0], [""] * width, [""] * width
         if before is not None and len(before.names) == width:
             names, units = list(before.names), list(before.units)
