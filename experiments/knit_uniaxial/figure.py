@@ -10,7 +10,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from knits import DIRECTIONS, FITTED, KNITS, PRETENSION, read
 
-COLORS = {"linear": "#7fa8d0", "spline": "#3a8f5c", "exponential": "#d95f02"}
+COLORS = {"linear": "#7fa8d0", "spline": "#3a8f5c", "exponential": "#f2b48a", "weighted": "#d95f02"}
+WORDS = {"weighted": "exponential law, weighted"}
 
 
 def main():
@@ -28,7 +29,9 @@ def main():
             for law, color in COLORS.items():
                 strain, force = (np.array(predictions[law]["curve"][k]) for k in ("strain", "force"))
                 seen = strain <= pull.fitted
-                panel.plot(strain[seen], PRETENSION + force[seen], color=color, lw=2, label=f"{law} law")
+                panel.plot(
+                    strain[seen], PRETENSION + force[seen], color=color, lw=2, label=WORDS.get(law, f"{law} law")
+                )
                 panel.plot(strain[~seen], PRETENSION + force[~seen], color=color, lw=2, ls=(0, (2, 1)))
             panel.axvspan(pull.fitted, 1.05 * pull.end, color="#f2f2f2", lw=0, zorder=0)
             panel.set(xlim=(0, 1.05 * pull.end), ylim=(0, 32), title=f"{knit}, along {along}")

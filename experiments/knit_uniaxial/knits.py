@@ -23,6 +23,18 @@ FLAT = 1.0  # N m, bending: it keeps the sheet in its plane and does nothing wit
 
 
 @dataclass(frozen=True)
+class Weights:
+    """What the law, which is not the knit's, may miss by more than repeats differ: smaller loads, by this power of the
+    largest fitted force over theirs, and the distance of the side pins, by a factor."""
+
+    emphasis: float
+    sides: float
+
+
+EVEN = Weights(0.0, 1.0)  # what repeats differ by, and no more
+
+
+@dataclass(frozen=True)
 class Repeat:
     """One pull: strain of the pins top and bottom, force above the pretension (rising), and how far the sides have come
     in, each (n,); length and width between the pins under the pretension."""
@@ -65,7 +77,7 @@ class Pull:
         return np.mean([self.repeats[i].force_at(strains) for i in FITTED], axis=0)
 
 
-def read(knit, along):
+def read(knit, along, share=SHARE):
     arrays = np.load(DATA / f"{knit}_{along}.npz")
     told = json.loads((DATA / f"{knit}_{along}.json").read_text(encoding="utf-8"))
     found = [_repeat(*parts) for parts in zip(arrays["force"].astype(float), arrays["pins"].astype(float), strict=True)]
@@ -76,7 +88,7 @@ def read(knit, along):
         f"{knit}_{along}",
         along,
         repeats,
-        fitted=slack + SHARE * (end - slack),
+        fitted=slack + share * (end - slack),
         end=end,
         length=clamps,
         width=max(told["fabric_width_px"] / told["clamp_px"], *(repeats[i].width for i in FITTED)),
@@ -146,17 +158,19 @@ class Sheet:
         return sb.on_cloth(self.cloth, np.array(points)[:, :2])
 
 
-def experiments(pull, law, cells=CELLS):
+def experiments(pull, law, cells=CELLS, weights=EVEN):
     """Two equilibria per level: one compared along the pull, one across it; a marker per fitted repeat."""
     found = []
     repeats = [pull.repeats[i] for i in FITTED]
-    for load in pull.loads():
+    loads = pull.loads()
+    for load in loads:
+        loose = ((PRETENSION + loads[-1]) / (PRETENSION + load)) ** weights.emphasis
         strains = np.array([r.strain_at(load) for r in repeats])
         narrowing = np.array([r.narrowing_at(s) for r, s in zip(repeats, strains, strict=True)])
         lengths, widths = np.array([r.length for r in repeats]), np.array([r.width for r in repeats])
-        for part, rest, values in (
-            ("length", lengths, lengths * (1 + strains)),
-            ("width", widths, widths * (1 - narrowing)),
+        for part, rest, values, factor in (
+            ("length", lengths, lengths * (1 + strains), loose),
+            ("width", widths, widths * (1 - narrowing), loose * weights.sides),
         ):
             sheet = Sheet(pull, load, law, cells, 1 + float(strains.mean()))
             axis = pull.along if part == "length" else "xy".replace(pull.along, "")
@@ -165,7 +179,7 @@ def experiments(pull, law, cells=CELLS):
             places = sheet.pins(rest, []) if part == "length" else sheet.pins([], rest)
             name = f"{pull.name}_{part}_{load:.2f}N"
             recording = sb.Recording(positions=positions[None], times=np.zeros(1), name=name)
-            sigma = SPREAD * pull.fitted * float(rest.mean()) / 2
+            sigma = float(factor) * SPREAD * pull.fitted * float(rest.mean()) / 2
             found.append(
                 sb.Experiment(
                     scene=sheet.scene, recording=recording, markers=places, static=True, sigma=sigma, axes=axis

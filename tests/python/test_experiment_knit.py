@@ -14,6 +14,7 @@ from pytest import approx
 
 GARTER = {"knit_warp": 5.61, "knit_weft": 2.52, "knit_poisson": 0.332}  # of the README, exponential law
 BEYOND = {"x": 23.5, "y": 14.2}  # % of the force beyond 60 % of the range, of the README
+WEIGHTED = {"x": 16.0, "y": 8.6}  # the same of the fit that is weighted to be carried on
 EXPERIMENTS = Path(__file__).resolve().parents[2] / "experiments"
 
 
@@ -29,7 +30,7 @@ def scripts_of(folder: str, *names: str) -> SimpleNamespace:
 
 @pytest.fixture(scope="module")
 def pulled() -> SimpleNamespace:
-    return scripts_of("knit_uniaxial", "knits", "study")
+    return scripts_of("knit_uniaxial", "knits", "study", "choose_weights")
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +41,11 @@ def stretched() -> SimpleNamespace:
 @pytest.fixture(scope="module")
 def garter(pulled):
     return pulled.study.fitted("garter", "exponential")
+
+
+@pytest.fixture(scope="module")
+def weighted(pulled):
+    return pulled.study.fitted("garter", "weighted", weights=pulled.study.WEIGHTED)
 
 
 @pytest.fixture(scope="module")
@@ -95,6 +101,36 @@ def test_force_on_unseen_repeats(pulled, garter, along):
     assert found["in the range"] < 1.15 * plain["mean curve"]["in the range"]
     assert found["beyond"] == approx(BEYOND[along], abs=2)
     assert found["beyond"] < 0.6 * plain["line"]["beyond"]
+
+
+@pytest.mark.parametrize("along", ["x", "y"])
+def test_weights_chosen_within_the_range_foresee_more(pulled, weighted, along):
+    pulls = [pulled.knits.read("garter", d) for d in pulled.knits.DIRECTIONS]
+    pull = pulls[pulled.knits.DIRECTIONS.index(along)]
+    law = pulled.study.law_of("weighted", pulls)
+    found = pulled.study.prediction(pull, pulled.study.curve(pull, law, weighted.values)[0])
+    mean = pulled.study.prediction(pull, pulled.study.without_physics(pull)["mean curve"])
+    assert found["in the range"] < mean["in the range"] + 0.3
+    assert found["beyond"] == approx(WEIGHTED[along], abs=2)
+
+
+def test_they_were_chosen_within_the_range(pulled):
+    """Garter along x, judged from 40 to 60 %: 4.7 % instead of 9.2."""
+    chosen, even = (
+        pulled.choose_weights.within("garter", weights)[0] for weights in (pulled.study.WEIGHTED, pulled.knits.EVEN)
+    )
+    assert chosen == approx(4.7, abs=0.5) and even == approx(9.2, abs=0.5)
+
+
+def test_weights_loosen_small_loads_and_side_pins(pulled):
+    pull = pulled.knits.read("garter", "x")
+    sigmas = {
+        weights: [e.sigma for e in pulled.knits.experiments(pull, sb.Linear(), weights=weights)]
+        for weights in (pulled.knits.EVEN, pulled.knits.Weights(2.0, 4.0))
+    }
+    even, loose = (np.array(s, dtype=float).reshape(-1, 2) for s in sigmas.values())  # loads, length and width
+    force = pulled.knits.PRETENSION + pull.loads()
+    assert loose / even == approx(np.outer((force[-1] / force) ** 2, [1.0, 4.0]))
 
 
 def test_stiffness_cannot_come_from_shape(stretched):

@@ -11,6 +11,7 @@ from .check import check
 from .fit import fit
 from .info import info
 from .simulate import simulate
+from .textile import textile
 
 app = typer.Typer(
     name="sheetbend",
@@ -39,5 +40,5 @@ def options(
     """Simulate ropes, beams and cloth, and find their physical parameters from recordings, with error bars."""
 
 
-for command in (simulate, fit, check, info, bench):
+for command in (simulate, fit, check, info, textile, bench):
     app.command()(command)

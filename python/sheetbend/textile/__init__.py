@@ -2,37 +2,55 @@
 
 Each takes a `Fabric` and gives what the laboratory would read, in its unit and in SI, with the derivative by every
 number of the fabric, and the state of rest for pictures. Sizes are those of the standards. `fit_fabric` goes the other
-way, from what a laboratory has read to a fabric.
+way, from what a laboratory has read to a fabric; `read_curves` reads what its machines have written.
 """
 
 from .bias_extension import BiasExtension, bias_extension
 from .cantilever import Cantilever, cantilever
+from .curve import Curve, Cycle, MeanCurve, mean_curve
+from .curve_file import read_curves
 from .drape import Drape, DrapeState, drape, drape_scene, drape_state
 from .fabric_fit import FabricFit, Measured, fit_fabric
+from .kes import BendingLoop, ShearLoop, TensileLoop, bending_loop, shear_loop, tensile_loop
 from .picture_frame import PictureFrame, picture_frame
+from .pull import fit_pull, pulled, strains_under
 from .reading import GRAM_FORCE, Reading
 from .shear import Shear, shear
 from .uniaxial import Uniaxial, uniaxial
 
 __all__ = [
     "GRAM_FORCE",
+    "BendingLoop",
     "BiasExtension",
     "Cantilever",
+    "Curve",
+    "Cycle",
     "Drape",
     "DrapeState",
     "FabricFit",
+    "MeanCurve",
     "Measured",
     "PictureFrame",
     "Reading",
     "Shear",
+    "ShearLoop",
+    "TensileLoop",
     "Uniaxial",
+    "bending_loop",
     "bias_extension",
     "cantilever",
     "drape",
     "drape_scene",
     "drape_state",
     "fit_fabric",
+    "fit_pull",
+    "mean_curve",
     "picture_frame",
+    "pulled",
+    "read_curves",
     "shear",
+    "shear_loop",
+    "strains_under",
+    "tensile_loop",
     "uniaxial",
 ]

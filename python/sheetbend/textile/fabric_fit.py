@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -39,12 +39,41 @@ class Measured:
         test: the test in the computer, such as `lambda fabric: textile.cantilever(fabric).bending_length`.
         value: in the laboratory's unit of that reading (mm, %, gf/(cm deg); see `Reading.laboratory_unit`).
         sigma: standard deviation of `value`, in the same unit: of the mean, where it is one of several specimens.
+        specimens: what each specimen read, by its name, in the same unit; the same name in other readings is the same
+            specimen. `of_specimens` makes value and sigma of them.
+        note: what the test in the computer leaves out, for the report.
     """
 
     name: str
     test: Callable[[Fabric], Reading]
     value: float
     sigma: float
+    specimens: Mapping[str, float] = field(default_factory=dict)
+    note: str = ""
+
+    @classmethod
+    def of_specimens(
+        cls,
+        specimens: Mapping[str, float],
+        *,
+        name: str,
+        test: Callable[[Fabric], Reading],
+        error: float = 0.0,
+        note: str = "",
+    ) -> Measured:
+        """Mean of several specimens, and its standard deviation: their scatter over the root of their number, and the
+        machine's own `error`, in the laboratory's unit, which more specimens do not lessen.
+
+        Raises:
+            InputError: fewer than two specimens and no error, or specimens that all read the same and no error.
+        """
+        values = np.array(list(specimens.values()), dtype=float)
+        if not values.size or (values.size == 1 and not error > 0):
+            fix = "give two or more, or one and its error"
+            raise InputError(f"{name}.specimens", "tell no scatter", len(values), fix)
+        scatter = float(values.std(ddof=1)) / math.sqrt(len(values)) if len(values) > 1 else 0.0
+        sigma = math.hypot(scatter, error)
+        return cls(name=name, test=test, value=float(values.mean()), sigma=sigma, specimens=specimens, note=note)
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.value):
@@ -96,11 +125,14 @@ class FabricFit:
             "misfit",
             f"{size}; intervals are widened by its root" if _widening(self.misfit, self.freedom) > 1 else size,
         )
+        left_out = tuple(("left out", told) for told in dict.fromkeys(m.note for m in self.measured) if told)
         return "\n".join(
             [
                 *plain_section(Section("Fabric", ("number", "value", "95 % interval", "verdict"), found)),
                 "",
-                *plain_section(Section("Readings", ("test", "laboratory", "fabric", "off by, sigma"), read, (note,))),
+                *plain_section(
+                    Section("Readings", ("test", "laboratory", "fabric", "off by, sigma"), read, (note, *left_out))
+                ),
             ]
         )
 
@@ -115,7 +147,9 @@ def fit_fabric(measured: Sequence[Measured], start: Fabric, free: Sequence[str])
 
     Readings fall into one sum whatever their tests are, so numbers that share a test (shear in a bias extension) are
     found together, and what the readings do not tell is named. Intervals come from the readings' own sigmas; where the
-    misfit is larger than chance has it they are widened by its root (Birge 1932).
+    misfit is larger than chance has it they are widened by its root (Birge 1932). Errors of one specimen go together:
+    where readings name their specimens, each specimen counts as a whole (errors clustered by specimen; Liang and Zeger
+    1986), with Student's t of their number.
 
     Args:
         measured: at least one.
@@ -138,7 +172,7 @@ def fit_fabric(measured: Sequence[Measured], start: Fabric, free: Sequence[str])
     solver = require("scipy.optimize", "fit").least_squares
     end = solver(evaluate.residuals, u, evaluate.jacobian, bounds=parameters.bounds(), xtol=1e-9, ftol=1e-9, gtol=1e-9)
     readings, r, jacobian = evaluate(end.x)
-    estimates, rank = _estimates(parameters, end.x, r, jacobian)
+    estimates, rank = _estimates(parameters, end.x, r, jacobian, measured)
     fabric = _with(start, parameters, end.x)
     return FabricFit(fabric, estimates, tuple(measured), readings, float(r @ r), len(r) - rank)
 
@@ -211,24 +245,46 @@ class _Evaluation:
         return self(u)[2]
 
 
-def _estimates(parameters: Parameters, u: Array, r: Array, jacobian: Array) -> tuple[tuple[Estimate, ...], int]:
+def _estimates(
+    parameters: Parameters, u: Array, r: Array, jacobian: Array, measured: Sequence[Measured]
+) -> tuple[tuple[Estimate, ...], int]:
     """Of each free number, and how many combinations of them the readings determine."""
     free = [parameters[name] for name in parameters.free]
     seen = np.linalg.norm(jacobian, axis=0) > _BLIND
     jacobian = jacobian * seen
     space = null_space(jacobian, parameters.free, [p.log for p in free])
     kept = [column for column in range(len(free)) if column not in space.pivots]
-    covariance = np.linalg.inv(jacobian[:, kept].T @ jacobian[:, kept])
-    widening = _widening(float(r @ r), len(r) - space.rank)
+    by_errors = np.linalg.pinv(jacobian[:, kept]) @ _errors(measured)
+    factor = _quantile(measured) * _widening(float(r @ r), len(r) - space.rank)
     estimates = []
     for column, p in enumerate(free):
         reach = math.inf
         if column in space.determined:
-            index = kept.index(column)
-            reach = _NORMAL * widening * math.sqrt(covariance[index, index])
+            reach = factor * float(np.linalg.norm(by_errors[kept.index(column)]))
         told = [gauge.words for gauge in space.gauges if p.name in gauge.members]
         estimates.append(_estimate(p, u[column], reach, "; ".join(told)))
     return tuple(estimates), space.rank
+
+
+def _errors(measured: Sequence[Measured]) -> Array:
+    """(readings, sources) sigmas that each source of error moves a reading by: a specimen moves all readings that it is
+    part of, and what sigma has beyond the scatter of the specimens moves its reading alone."""
+    names = list(dict.fromkeys(name for m in measured for name in m.specimens))
+    found = np.zeros((len(measured), len(names) + len(measured)))
+    for row, m in enumerate(measured):
+        count = len(m.specimens)
+        values = np.array(list(m.specimens.values()), dtype=float)
+        if count > 1:
+            parts = (values - values.mean()) / (m.sigma * math.sqrt(count * (count - 1)))
+            found[row, [names.index(name) for name in m.specimens]] = parts
+        found[row, len(names) + row] = math.sqrt(max(0.0, 1.0 - float((found[row] ** 2).sum())))
+    return found
+
+
+def _quantile(measured: Sequence[Measured]) -> float:
+    """Two-sided 95 %: normal, or of Student's t where scatter is that of a few specimens."""
+    counts = [len(m.specimens) for m in measured if len(m.specimens) > 1]
+    return float(require("scipy.special", "fit").stdtrit(min(counts) - 1, 0.975)) if counts else _NORMAL
 
 
 def _estimate(p: Parameter, internal: float, reach: float, gauges: str) -> Estimate:

@@ -14,10 +14,12 @@ from numpy.typing import ArrayLike
 from ..cloth import Cloth, add_cloth
 from ..equilibrium import Equilibrium, equilibrium
 from ..errors import InputError
-from ..fabric import Fabric
+from ..fabric import Exponential, Fabric
 from ..mesh import TriangleMesh
 from ..quantities import Term
 from ..scene import Array, Scene
+
+_HALVINGS = 40
 
 
 def turned(mesh: TriangleMesh, degrees: float) -> TriangleMesh:
@@ -55,6 +57,22 @@ def travel(scene: Scene, anchors: Array, name: str, axis: int) -> None:
     """Let anchors move along an axis by the quantity `name`, m."""
     scene.add_quantity(name, 0.0, "m", positive=False)
     scene.add_terms([Term("position", 3 * anchors + axis, 1.0, ((name, "identity"),))])
+
+
+def strip_strain(fabric: Fabric, along: str, load: float) -> float:
+    """About the strain of a free strip under a load, N/m: where a test that asks for a load may start."""
+    stiffness = fabric.warp if along == "warp" or fabric.weft is None else fabric.weft
+    low, high = 0.0, load / stiffness
+    if not isinstance(fabric.law, Exponential):
+        return 0.5 * high
+    b = fabric.law.warp if along == "warp" else fabric.law.weft
+    for _ in range(_HALVINGS):
+        strain = (low + high) / 2.0
+        green = strain + strain**2 / 2.0
+        # in logarithms, since the exponential may overflow
+        over = math.log(stiffness * green * (1.0 + strain) / load) + b * green**2 > 0.0
+        low, high = (low, strain) if over else (strain, high)
+    return (low + high) / 2.0
 
 
 def flat_rest(scene: Scene, cloth: Cloth, start: ArrayLike, **settings: float) -> Equilibrium:

@@ -9,7 +9,7 @@ from ..checks import check_positive
 from ..equilibrium import Equilibrium
 from ..fabric import Fabric
 from ..mesh import grid
-from .flat import flat_rest, jaw, jaw_force, specimen, travel, turned, warp_angle
+from .flat import flat_rest, jaw, jaw_force, specimen, strip_strain, travel, turned, warp_angle
 from .reading import GRAM_FORCE, Reading, combined
 from .root import root
 
@@ -67,8 +67,7 @@ def shear(
     anchors = jaw(scene, cloth, mesh.sets["top"], "jaw")
     travel(scene, anchors, "jaw_shift", 0)
     travel(scene, anchors, "jaw_travel", 1)
-    weft = fabric.warp if fabric.weft is None else fabric.weft
-    stretch = tension / (fabric.warp if along == "warp" else weft)
+    stretch = strip_strain(fabric, along, tension)
     forces, own = [], ("jaw_shift", "jaw_travel")
     for angle in angles:
         shift = math.tan(math.radians(angle))

@@ -9,7 +9,7 @@ from ..equilibrium import Equilibrium
 from ..fabric import Fabric
 from ..mesh import grid
 from ..values import elastic_energy, elastic_energy_gradient
-from .flat import flat_rest, jaw, jaw_force, specimen, travel, turned, warp_angle
+from .flat import flat_rest, jaw, jaw_force, specimen, strip_strain, travel, turned, warp_angle
 from .reading import GRAM_FORCE, Reading, combined
 from .root import root
 
@@ -68,8 +68,7 @@ def uniaxial(
         force, by = jaw_force(rest, "jaw", 0)
         return force / (load * width) - 1.0, by["jaw_travel"] * gauge / (load * width), (rest, force, by)
 
-    weft = fabric.warp if fabric.weft is None else fabric.weft
-    strain, (rest, force, by) = root(measure, 0.5 * load / (fabric.warp if along == "warp" else weft))
+    strain, (rest, force, by) = root(measure, strip_strain(fabric, along, load))
     own = ("jaw_travel",)
     extension = combined((-1.0 / (by["jaw_travel"] * gauge), by), leave=own)
     area = gauge * width

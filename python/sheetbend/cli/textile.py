@@ -1,0 +1,125 @@
+"""sheetbend textile: curves of a testing machine, their KES numbers, and the law that follows them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+from rich.console import Console
+
+from ..errors import ConfigError, InputError
+from ..textile import Curve, fit_pull, mean_curve, read_curves
+from ..textile.units import quantity
+from .folders import made
+from .outcome import Code, Outcome, run
+from .textile_figure import write_figure
+from .textile_report import report, to_dict, write_mean
+
+Test = Literal["tension", "shear", "bending"]
+Along = Literal["warp", "weft"]
+LawName = Literal["linear", "exponential", "spline", "none"]
+Way = Literal["loading", "unloading", "skeleton"]
+Form = Literal["png", "svg", "pdf", "none"]
+
+
+def textile(
+    files: Annotated[
+        list[Path], typer.Argument(help="Text exports (CSV, TXT), a specimen or several in each.", show_default=False)
+    ],
+    test: Annotated[Test, typer.Option(help="What the machine did.")] = "tension",
+    length: Annotated[
+        str | None,
+        typer.Option(help="Between the jaws: 20cm, or the words before it in the preamble.", show_default=False),
+    ] = None,
+    width: Annotated[
+        str | None, typer.Option(help="Of the specimen: 5cm, or the preamble's words.", show_default=False)
+    ] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option(help="ROLE=NAME or ROLE=NUMBER; deformation, load, time, repeat.", show_default=False),
+    ] = None,
+    unit: Annotated[
+        list[str] | None, typer.Option(help="ROLE=UNIT where the header has none: load=cN.", show_default=False)
+    ] = None,
+    decimal: Annotated[str | None, typer.Option(help="Decimal mark: a point or a comma.", show_default=False)] = None,
+    pretension: Annotated[
+        str | None, typer.Option(help="From where strains count: 2N, or 1cN/cm.", show_default=False)
+    ] = None,
+    along: Annotated[Along, typer.Option(help="Direction of a pull.")] = "warp",
+    law: Annotated[LawName, typer.Option(help="Fitted to a pull.")] = "exponential",
+    way: Annotated[Way, typer.Option(help="Which way of the loop the elastic law follows.")] = "loading",
+    cycle: Annotated[int, typer.Option(help="Which one, from 0; -1 is the last.")] = 0,
+    output: Annotated[
+        Path | None,
+        typer.Option(help="Folder for report, mean and figure; out/NAME when left out.", show_default=False),
+    ] = None,
+    figures: Annotated[Form, typer.Option(help="Format of the figure.")] = "png",
+    json: Annotated[
+        bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
+    ] = False,
+) -> None:
+    """Read a testing machine's curves, print their KES numbers, and fit the law of a pull with intervals."""
+
+    def command(console: Console) -> Outcome:
+        folder = made("--output", output if output is not None else Path("out") / files[0].stem)
+        columns, units = _pairs("--column", column), _pairs("--unit", unit)
+        at, across = _size("--length", length), _size("--width", width)
+        curves = [
+            curve
+            for file in files
+            for curve in read_curves(
+                file, test=test, length=at, width=across, columns=_numbered(columns), units=units, decimal=decimal
+            )
+        ]
+        if pretension is not None:
+            curves = [c.from_pretension(_pretension(pretension, c)) for c in curves]
+        if len({c.name for c in curves}) < len(curves):
+            curves = [replace(c, name=f"{k} {c.name}") for k, c in enumerate(curves, start=1)]
+        fitted = test == "tension" and law != "none"
+        fit = fit_pull(curves, along, law, way=way, cycle=cycle) if fitted else None
+        text = report(curves, fit, cycle)
+        console.print("\n" + text, markup=False, soft_wrap=True, end="")
+        (folder / "report.txt").write_text(text, encoding="utf-8")
+        mean = mean_curve(curves, way, cycle=cycle)
+        write_mean(curves[0].test, mean, folder / "mean.csv")
+        drawn = write_figure(curves, mean, way, fit, along, figures, folder)
+        written = ["report.txt", "mean.csv", *drawn]
+        console.print(f"\nwritten to {folder}: {', '.join(written)}", soft_wrap=True)
+        unknown = fit is not None and all(e.verdict == "not identifiable" for e in fit.estimates)
+        data = {"output": str(folder), "files": written} | to_dict(curves, fit, cycle)
+        return Outcome(data, Code.NOT_IDENTIFIABLE if unknown else Code.DONE)
+
+    run(command, json)
+
+
+def _pairs(option: str, given: Sequence[str] | None) -> dict[str, str]:
+    pairs = {}
+    for text in given or ():
+        role, sign, value = text.partition("=")
+        if not (sign and role and value):
+            raise ConfigError(option, "must be ROLE=VALUE", text, f"write it as {option} load=...")
+        pairs[role] = value
+    return pairs
+
+
+def _numbered(columns: Mapping[str, str]) -> dict[str, str | int]:
+    return {role: int(value) if value.isdigit() else value for role, value in columns.items()}
+
+
+def _size(option: str, given: str | None) -> float | str | None:
+    """m; words that the preamble is to be searched for stay words."""
+    if given is None or not given[:1].isdigit():
+        return given
+    return quantity(option, given, "length")[0]
+
+
+def _pretension(given: str, curve: Curve) -> float:
+    value, dimension = quantity("--pretension", given, "force", "force per width")
+    if dimension == "force per width":
+        return value
+    if curve.width is None:
+        raise InputError("--pretension", "is a force, and the width is not known", given, "give --width, or N/m")
+    return value / curve.width

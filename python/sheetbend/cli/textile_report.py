@@ -1,0 +1,96 @@
+"""What `sheetbend textile` prints and writes of curves: their KES numbers, the fitted fabric, the mean curve."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..tables import Section, plain_section
+from ..textile import Curve, FabricFit, MeanCurve, Reading, bending_loop, shear_loop, tensile_loop
+from ..timeseries import Array
+from ..wording import short
+
+_COLUMNS = {
+    "tension": "strain (mm/mm),force (N/m),scatter (N/m)",
+    "shear": "angle (rad),force (N/m),scatter (N/m)",
+    "bending": "curvature (1/m),moment (N.m/m),scatter (N.m/m)",
+}
+
+
+def kes_numbers(curve: Curve, cycle: int) -> tuple[dict[str, Reading | None], float | None]:
+    """By their names, None where the test does not tell them; and the part of the work that the loop loses."""
+    if curve.test == "tension":
+        t = tensile_loop(curve, cycle)
+        lost = None if t.resilience is None else 1.0 - t.resilience.value
+        return {"EMT": t.extension, "WT": t.energy, "LT": t.linearity, "RT": t.resilience}, lost
+    if curve.test == "shear":
+        s = shear_loop(curve, cycle)
+        return {"G": s.stiffness, "2HG": s.hysteresis, "2HG5": s.hysteresis_far}, s.lost
+    b = bending_loop(curve, cycle)
+    return {"B": b.rigidity, "2HB": b.hysteresis}, b.lost
+
+
+def report(curves: Sequence[Curve], fit: FabricFit | None, cycle: int) -> str:
+    """A row per specimen in the laboratory's units, mean and scatter of several, and the fitted fabric."""
+    found = [kes_numbers(curve, cycle)[0] for curve in curves]
+    units = {name: r for row in reversed(found) for name, r in row.items() if r is not None}
+    names = [name for name in found[0] if name in units]
+    values = {name: np.array([r.value for row in found if (r := row[name]) is not None]) for name in names}
+    rows = [(c.name, *(_cell(row[name]) for name in names)) for c, row in zip(curves, found, strict=True)]
+    if len(curves) > 1:
+        for label, of in (("mean", np.mean), ("scatter", _scatter)):
+            rows.append((label, *(short(float(of(values[name])) * units[name].per, 4) for name in names)))
+    headers = [f"{name} [{units[name].laboratory_unit}]" if units[name].laboratory_unit else name for name in names]
+    means = ", ".join(f"{n} {short(float(values[n].mean()), 4)} {units[n].unit}".rstrip() for n in names)
+    notes = [("in SI units", means)]
+    if fit is None:
+        notes.append(("left out of an elastic fabric", _lost(curves, cycle)))
+    lines = plain_section(Section("Curves", ("specimen", *headers), tuple(rows), tuple(notes)))
+    return "\n".join(lines) + ("\n" if fit is None else f"\n\n{fit}\n")
+
+
+def to_dict(curves: Sequence[Curve], fit: FabricFit | None, cycle: int) -> dict[str, Any]:
+    """The same in SI units."""
+    rows: list[dict[str, Any]] = []
+    for c in curves:
+        told, lost = kes_numbers(c, cycle)
+        values = {name: None if r is None else r.value for name, r in told.items()}
+        rows.append({"name": c.name, "test": c.test, "points": len(c.load), **values, "lost": lost})
+    if fit is None:
+        return {"curves": rows}
+    readings = [
+        {"name": m.name, "measured": m.value, "sigma": m.sigma, "fabric": r.laboratory}
+        for m, r in zip(fit.measured, fit.readings, strict=True)
+    ]
+    estimates = [asdict(e) for e in fit.estimates]
+    misfit = {"misfit": fit.misfit, "freedom": fit.freedom}
+    return {"curves": rows, "estimates": estimates, "readings": readings, **misfit}
+
+
+def write_mean(test: str, mean: MeanCurve, path: Path) -> None:
+    """The mean curve and its scatter as a table that `read_curves` takes."""
+    table = np.column_stack([mean.deformation, mean.load, mean.scatter])
+    np.savetxt(path, table[:, : 3 if mean.count > 1 else 2], "%.9g", ",", header=_header(test, mean), comments="")
+
+
+def _header(test: str, mean: MeanCurve) -> str:
+    return ",".join(_COLUMNS[test].split(",")[: 3 if mean.count > 1 else 2])
+
+
+def _cell(value: Reading | None) -> str:
+    return "-" if value is None else short(value.laboratory, 4)
+
+
+def _scatter(values: Array) -> float:
+    return float(values.std(ddof=1)) if len(values) > 1 else np.nan
+
+
+def _lost(curves: Sequence[Curve], cycle: int) -> str:
+    lost = [part for part in (kes_numbers(c, cycle)[1] for c in curves) if part is not None]
+    if not lost:
+        return "the curves have no way back, so what a loop would lose is not known"
+    return f"the specimens lose {100.0 * float(np.mean(lost)):.0f} % of the work of the way out"

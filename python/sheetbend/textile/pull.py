@@ -1,0 +1,178 @@
+"""From measured pulls to a fabric."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import InputError
+from ..fabric import Exponential, Fabric, Law, Linear, Spline
+from .curve import Curve, chosen, mean_curve, same_test
+from .fabric_fit import FabricFit, Measured, fit_fabric
+from .flat import warp_angle
+from .reading import Reading
+from .uniaxial import uniaxial
+
+LAWS = {"linear": (), "exponential": ("stiffening",), "spline": ("ratio_1", "ratio_2", "ratio_3", "ratio_4")}
+_SPECIMEN = (0.05, 0.2)  # m, length and width of KES-FB1, where curves do not tell theirs
+_LEVELS = 5
+_CLASS = 0.005  # class 0.5 of ISO 7500-1 and ISO 9513
+
+
+def pulled(
+    curves: Sequence[Curve],
+    along: str = "warp",
+    way: str = "loading",
+    *,
+    cycle: int = 0,
+    levels: int = _LEVELS,
+    error: float = _CLASS,
+    cells: int = 6,
+) -> list[Measured]:
+    """What specimens stretch to under some loads, as `fit_fabric` takes it.
+
+    The fabric is elastic and has one curve, so one way of the loop is chosen; what the loop loses is told with the
+    readings. Each load is that of the mean curve at an even share of its strain, and `uniaxial` pulls such a specimen
+    (the curves' width and mean length; those of KES-FB1 where they have none). A pretension counts as none: loads and
+    strains are those beyond it.
+
+    Args:
+        curves: of tension, a specimen each.
+        along: direction of the pull, "warp" or "weft".
+        way: "loading", "unloading" or "skeleton" (their mean), see `Cycle.way`.
+        cycle: which one, from 0; -1 is the last.
+        levels: number of loads.
+        error: of the machine, relative: what a strain may be off by besides the specimens' scatter.
+        cells: of `uniaxial`.
+
+    Raises:
+        InputError: no curves, curves of another test or of different widths or pretensions, without that cycle or way,
+            or slack where the first load is read off.
+    """
+    warp_angle(along)
+    _check(curves)
+    ways = {c.name: chosen(c, cycle).way(way) for c in curves}
+    length, width = _specimen(curves)
+    note, found = _left_out(curves, cycle, way), []
+    for load in _loads(curves, cycle, way, levels):
+        strains = {name: 100.0 * w.deformation_at(load) for name, w in ways.items()}
+        missing = [name for name, strain in strains.items() if math.isnan(strain)]
+        if missing:
+            fix = "cut the curves by from_pretension, or take fewer levels"
+            raise InputError(missing[0], f"does not pass a load of {load:.4g} N/m", ways[missing[0]].load[0], fix)
+        found.append(
+            Measured.of_specimens(
+                strains,
+                name=f"strain at {load:.4g} N/m, {along}",
+                test=_test(along, load - curves[0].pretension, width, length, cells),
+                error=error * float(np.mean(list(strains.values()))),
+                note=note,
+            )
+        )
+    return found
+
+
+def fit_pull(
+    curves: Sequence[Curve],
+    along: str = "warp",
+    law: str = "exponential",
+    *,
+    way: str = "loading",
+    cycle: int = 0,
+    error: float = _CLASS,
+) -> FabricFit:
+    """Stiffness and law of one direction from its pulls alone: `fit_fabric` on the readings of `pulled`, with a start
+    from the mean curve.
+
+    The other numbers of the fabric are stand-ins (poisson 0): a specimen as wide as KES-FB1's, which cannot narrow,
+    reads warp/(1 - poisson^2). To fit both directions and the coupling give `fit_fabric` the readings of all tests.
+
+    Args:
+        curves, along, way, cycle, error: of `pulled`.
+        law: "linear", "exponential" or "spline".
+
+    Raises:
+        InputError: an unknown law, or what `pulled` raises.
+        NoEquilibriumError: the start comes to no rest.
+        MissingExtraError: scipy is not installed.
+    """
+    if law not in LAWS:
+        raise InputError("law", "is unknown", law, f"use one of {', '.join(LAWS)}")
+    levels = max(_LEVELS, 2 * len(LAWS[law]))
+    measured = pulled(curves, along, way, cycle=cycle, levels=levels, error=error)
+    pretension = curves[0].pretension
+    loads = _loads(curves, cycle, way, levels) - pretension
+    strains = np.array([m.value for m in measured]) / 100.0
+    green = strains + strains**2 / 2.0
+    secants = loads / (green * (1.0 + strains))  # of a free strip: k exp(b green^2)
+    b = max(math.log(secants[-1] / secants[0]) / (green[-1] ** 2 - green[0] ** 2), 0.01)
+    stiffness = float(secants[0])
+    laws: dict[str, Law] = {
+        "linear": Linear(),
+        "exponential": Exponential(b, b, b),
+        "spline": Spline((float(green[-1]) / 4.0,) * 3),
+    }
+    sizes = {"density": 0.1, "bending": 1e-5, "warp": stiffness, "weft": stiffness, "shear": stiffness / 2.0}
+    start = Fabric(**sizes, law=laws[law])
+    return fit_fabric(measured, start, [along, *(f"{along}_{name}" for name in LAWS[law])])
+
+
+def strains_under(
+    fabric: Fabric, curves: Sequence[Curve], loads: ArrayLike, along: str = "warp", cells: int = 6
+) -> np.ndarray:
+    """(n,) strains that such specimens of a fabric have under loads (n,) N/m, beyond the curves' pretension as well.
+
+    Raises:
+        InputError: no curves, or curves of another test or of different widths or pretensions.
+        NoEquilibriumError: a specimen comes to no rest.
+    """
+    _check(curves)
+    length, width = _specimen(curves)
+    beyond = np.atleast_1d(np.asarray(loads, dtype=float)) - curves[0].pretension
+    return np.array([_test(along, float(load), width, length, cells)(fabric).value for load in beyond])
+
+
+def _specimen(curves: Sequence[Curve]) -> tuple[float, float]:
+    """Length and width, m."""
+    lengths = [c.length for c in curves if c.length is not None]
+    return float(np.mean(lengths)) if lengths else _SPECIMEN[0], curves[0].width or _SPECIMEN[1]
+
+
+def _check(curves: Sequence[Curve]) -> None:
+    if same_test(curves)[0].test != "tension":
+        raise InputError("curves", "are no pulls", curves[0].test, "give curves of tension")
+    alike = sorted({f"{c.width} m, {c.pretension} N/m" for c in curves})
+    if len(alike) > 1:
+        fix = "fit each kind by itself, or cut them alike"
+        raise InputError("curves", "have different widths or pretensions", alike, fix)
+    if len({c.name for c in curves}) < len(curves):
+        fix = "rename them by dataclasses.replace(curve, name=...)"
+        raise InputError("curves", "share a name", [c.name for c in curves], fix)
+
+
+def _loads(curves: Sequence[Curve], cycle: int, way: str, levels: int) -> np.ndarray:
+    """(levels,) N/m of the mean curve at even shares of its strain, up to the load that all reach."""
+    mean = mean_curve(curves, way, cycle=cycle)
+    top = min(float(chosen(c, cycle).way(way).load.max()) for c in curves)
+    start, end = mean.deformation[0], mean.deformation[mean.load <= top][-1]
+    loads = np.interp(start + (end - start) * np.arange(1, levels + 1) / levels, mean.deformation, mean.load)
+    if loads[0] <= curves[0].pretension:
+        fix = "cut the slack off by from_pretension, or take fewer levels"
+        raise InputError("curves", "bear nothing at the first of the levels", f"{loads[0]:.4g} N/m", fix)
+    return loads
+
+
+def _test(along: str, load: float, width: float, length: float, cells: int) -> Callable[[Fabric], Reading]:
+    return lambda fabric: uniaxial(fabric, along, load=load, width=width, gauge=length, cells=cells).extension
+
+
+def _left_out(curves: Sequence[Curve], cycle: int, way: str) -> str:
+    lost = [part for part in (chosen(c, cycle).lost for c in curves) if part is not None]
+    if not lost:
+        return "the curves have no unloading, so what a loop would lose is not known"
+    follows = {"skeleton": "the mean of loading and unloading"}.get(way, way)
+    percent = 100.0 * float(np.mean(lost))
+    return f"the specimens lose {percent:.0f} % of the work of loading; the fabric is elastic and follows {follows}"

@@ -1,0 +1,87 @@
+"""sheetbend textile: from a machine's file to numbers, a law with intervals, and a figure."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pytest import approx
+from sheetbend import textile
+from sheetbend.cli.app import app
+from typer.testing import CliRunner, Result
+
+STIFFNESS = 400.0  # N/m
+LENGTH, WIDTH = 0.2, 0.05  # m
+
+
+def strip(path: Path, share: float = 1.0) -> str:
+    """A strip of a linear fabric up to 5 % of strain and back, where it gives back less: T = k E (1 + e)."""
+    out = np.linspace(0.0, 0.05, 60)
+    force = STIFFNESS * (out + out**2 / 2) * (1 + out) * WIDTH
+    back, less = out[::-1][1:], (force * (out / 0.05))[::-1][1:]
+    lines = [
+        f"{1e3 * LENGTH * share * e:.6f};{f:.6f}".replace(".", ",")
+        for e, f in zip([*out, *back], [*force, *less], strict=True)
+    ]
+    path.write_text("Width;50;mm\nWeg [mm];Kraft [N]\n" + "\n".join(lines) + "\n", encoding="utf-8")
+    return str(path)
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(app, ["textile", *arguments])
+
+
+def test_a_pull(tmp_path):
+    files = [strip(tmp_path / f"{k}.csv", share) for k, share in enumerate((0.98, 1.0, 1.02))]
+    out = tmp_path / "out"
+    sizes = ["--length", "20 cm", "--width", "Width"]
+    done = run(*files, *sizes, "--law", "linear", "--output", str(out), "--figures", "svg", "--json")
+    assert done.exit_code == 0, done.stderr
+    told = json.loads(done.stdout)
+    (estimate,) = told["estimates"]
+    assert estimate["value"] == approx(STIFFNESS, rel=0.01)
+    assert estimate["lower"] < STIFFNESS < estimate["upper"]
+    assert math.log(estimate["upper"] / estimate["lower"]) / 2 == approx(4.30 * 0.02 / math.sqrt(3), rel=0.2)
+    middle = told["curves"][1]
+    assert middle["EMT"] == approx(0.05) and middle["RT"] + middle["lost"] == approx(1.0)
+    assert {path.name for path in out.iterdir()} == {"report.txt", "mean.csv", "curves.svg"}
+    report = (out / "report.txt").read_text(encoding="utf-8")
+    assert "EMT [%]" in report and "scatter" in report and "95 % interval" in report and "% of the work" in report
+    (mean,) = textile.read_curves(out / "mean.csv")
+    assert mean.load[-1] == approx(STIFFNESS * 0.05, rel=0.2)
+
+
+def test_a_loop_of_shear(tmp_path):
+    angle = np.concatenate([np.linspace(0, 8, 81), np.linspace(8, 0, 81)[1:]])
+    force = np.where(np.arange(161) < 81, 1.0, 0.6) * angle
+    table = "\n".join(f"{a:.4f}\t{f:.4f}" for a, f in zip(angle, force, strict=True))
+    (tmp_path / "shear.txt").write_text(f"{table}\n")
+    told = ["--column", "deformation=1", "--column", "load=2", "--unit", "deformation=deg", "--unit", "load=gf/cm"]
+    done = run(str(tmp_path / "shear.txt"), "--test", "shear", *told, "--output", str(tmp_path / "out"), "--json")
+    assert done.exit_code == 0, done.stderr
+    (row,) = json.loads(done.stdout)["curves"]
+    assert row["G"] == approx(0.980665 * 180 / math.pi, rel=1e-3)
+    assert row["2HG5"] == approx(0.4 * 5 * 0.980665, rel=1e-3)
+    assert row["lost"] == approx(0.4, abs=0.01)
+    assert "lose 40 %" in (tmp_path / "out/report.txt").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("told", "message"),
+    [
+        (["--width", "5cm"], "length: is missing"),
+        (["--length", "20N", "--width", "5cm"], "--length: must be a length"),
+        (["--length", "20cm"], "width: is missing"),
+        (["--length", "20cm", "--width", "5cm", "--pretension", "1 kg/N"], "--pretension: must be"),
+        (["--length", "20cm", "--width", "5cm", "--pretension", "50N"], "never reaches the pretension"),
+        (["--length", "20cm", "--width", "5cm", "--column", "load"], "--column: must be ROLE=VALUE"),
+        (["--length", "20cm", "--width", "5cm", "--cycle", "3"], "cycle: is none of the 1"),
+    ],
+)
+def test_what_is_wrong(told, message, tmp_path):
+    done = run(strip(tmp_path / "a.csv"), *told, "--output", str(tmp_path / "out"))
+    assert done.exit_code == 2
+    assert message in " ".join(done.stderr.split())
