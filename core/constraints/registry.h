@@ -17,6 +17,7 @@
 #include "core/constraints/planar_bend.h"
 #include "core/constraints/shear.h"
 #include "core/constraints/sheet_curvature.h"
+#include "core/constraints/sinh_strain.h"
 #include "core/constraints/spline_strain.h"
 #include "core/constraints/strain.h"
 #include "core/constraints/tether.h"
@@ -40,6 +41,7 @@ using Registry = std::tuple<   //
     SectionYieldingCurvature,  //
     Strain,                    //
     ExponentialStrain,         //
+    SinhStrain,                //
     SplineStrain,              //
     Dihedral,                  //
     IsometricBending,          //

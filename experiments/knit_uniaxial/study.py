@@ -31,8 +31,12 @@ PARAMETERS = {
     "exponential": STIFFNESS | STIFFENING,
     "spline": STIFFNESS | RATIOS,
     "weighted": STIFFNESS | STIFFENING,
+    "sinh": STIFFNESS | STIFFENING,
 }
-WEIGHTED = Weights(2.0, 4.0)  # of the exponential law called weighted; chosen within the range by choose_weights.py
+WEIGHTED = Weights(
+    2.0, 4.0
+)  # of `weighted`, the exponential law, and `sinh`; chosen within the range by choose_weights.py
+CARRIED_ON = ("weighted", "sinh")
 
 
 def law_of(name, pulls):
@@ -40,6 +44,8 @@ def law_of(name, pulls):
         return sb.Linear()
     if name in ("exponential", "weighted"):
         return sb.Exponential(warp=1.0, weft=1.0, shear=1.0)
+    if name == "sinh":
+        return sb.Sinh(warp=1.0, weft=1.0, shear=1.0)
     # Four pieces up to the largest Green strain that is fitted.
     along = [((1 + p.fitted) ** 2 - 1) / 2 for p in pulls]
     return sb.Spline(spacing=(along[0] / 4, along[1] / 4, 0.25))
@@ -136,7 +142,7 @@ def judged(knit):
     }
     for law, parameters in PARAMETERS.items():
         began = time.perf_counter()
-        fit = fitted(knit, law, refine=law == "exponential", weights=WEIGHTED if law == "weighted" else EVEN)
+        fit = fitted(knit, law, refine=law == "exponential", weights=WEIGHTED if law in CARRIED_ON else EVEN)
         table[law] = {
             "parameters": len(parameters),
             "cost": fit.result.cost,

@@ -21,7 +21,7 @@ from .errors import (
     UnconvergedError,
 )
 from .experiment import Experiment
-from .fabric import Exponential, Fabric, Linear, Spline
+from .fabric import Exponential, Fabric, Linear, Sinh, Spline
 from .fit import Fit, fit
 from .gradients import GradientReport, check_gradients
 from .grip import Grip
@@ -79,6 +79,7 @@ __all__ = [
     "Score",
     "Scores",
     "SheetbendError",
+    "Sinh",
     "Solver",
     "Spline",
     "TapePlan",

@@ -1,8 +1,9 @@
-"""A fabric's numbers, and how its tension grows with strain: linear, exponential, or a curve of its own, per strain
-component."""
+"""A fabric's numbers, and how its tension grows with strain: linear, exponential, as a hyperbolic sine, or a curve of
+its own, per strain component."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from typing import Any
@@ -25,10 +26,8 @@ class Linear:
 
 
 @dataclass(frozen=True)
-class Exponential:
-    """Fung's law: of the Green strain e the energy k (exp(b e^2) - 1)/(2 b), of the tangent stiffness k at rest.
-
-    The tangent grows by exp(b e^2) (1 + 2 b e^2), so stiffening shows from about e = 1/sqrt(b) on.
+class Stiffening:
+    """A law with one number b per component.
 
     Attributes:
         warp, weft, shear: b, no unit; of the shear strain 2 E_uv.
@@ -37,7 +36,6 @@ class Exponential:
     warp: float
     weft: float
     shear: float
-    kind = "exponential_strain"
 
     def __post_init__(self) -> None:
         for component in COMPONENTS:
@@ -49,6 +47,35 @@ class Exponential:
     def coefficients(self) -> Iterator[tuple[str, float, bool]]:
         """Name, value and whether it can be fitted, of each coefficient in the constraint's order."""
         return iter((f"{component}_stiffening", float(getattr(self, component)), True) for component in COMPONENTS)
+
+
+class Exponential(Stiffening):
+    """Fung's law: of the Green strain e the energy k (exp(b e^2) - 1)/(2 b), of the tangent stiffness k at rest.
+
+    The tangent grows by exp(b e^2) (1 + 2 b e^2), so stiffening shows from about e = 1/sqrt(b) on.
+    """
+
+    kind = "exponential_strain"
+
+    @staticmethod
+    def log_growth(b: float, strain: float) -> float:
+        """Natural logarithm of the stress over k e."""
+        return b * strain**2
+
+
+class Sinh(Stiffening):
+    """The stress k sinh(b e)/b: exponential in the Green strain e itself, of the tangent stiffness k at rest.
+
+    The tangent grows by cosh(b e), so stiffening shows from about e = 1/b on, and goes on more evenly than Fung's.
+    """
+
+    kind = "sinh_strain"
+
+    @staticmethod
+    def log_growth(b: float, strain: float) -> float:
+        """Natural logarithm of the stress over k e."""
+        t = abs(b * strain)
+        return t + math.log(-math.expm1(-2.0 * t) / (2.0 * t)) if t > 0.0 else 0.0
 
 
 @dataclass(frozen=True)
@@ -82,7 +109,7 @@ class Spline:
                 yield f"{component}_ratio_{k}", float(ratio), True
 
 
-Law = Linear | Exponential | Spline
+Law = Linear | Exponential | Sinh | Spline
 
 
 @dataclass(frozen=True, kw_only=True)

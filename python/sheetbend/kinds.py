@@ -27,6 +27,7 @@ UNITS: Mapping[str, Mapping[str, str]] = {
     "section_twist": {"compliance": "rad/(N m)", "damping": "N m s/rad"},
     "strain": {"compliance": "1/(N m)", "damping": "N m s"},
     "exponential_strain": {"compliance": "1/(N m)", "damping": "N m s"},
+    "sinh_strain": {"compliance": "1/(N m)", "damping": "N m s"},
     "spline_strain": {"compliance": "1/(N m)", "damping": "N m s"},
     "dihedral": {"compliance": "rad/(N m)", "damping": "N m s/rad"},
     "isometric_bending": {"compliance": "1/(N m)", "damping": "N m s"},

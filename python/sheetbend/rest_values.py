@@ -12,7 +12,7 @@ from .errors import SceneError
 
 Array = NDArray[np.float64]
 IN_A_PLANE = ("planar_bend", "hinge")
-AS_GIVEN = ("strain", "exponential_strain", "spline_strain", "isometric_bending", "sheet_curvature")
+AS_GIVEN = ("strain", "exponential_strain", "sinh_strain", "spline_strain", "isometric_bending", "sheet_curvature")
 
 
 def rest_values(

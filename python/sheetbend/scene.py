@@ -170,7 +170,7 @@ class Scene:
             kind: a name in sheetbend.KINDS: "distance", "attachment"; of ropes "bend", "planar_bend", "hinge"; of rods
                 "material_curvature", "yielding_curvature", "twist", "shear" and, between sections, "section_curvature",
                 "section_yielding_curvature", "section_twist"; of cloth "strain", "exponential_strain",
-                "spline_strain", "sheet_curvature", "dihedral", "isometric_bending", "area", "tether".
+                "sinh_strain", "spline_strain", "sheet_curvature", "dihedral", "isometric_bending", "area", "tether".
             particles: (count, arity) indices.
             name: of the group; the kind by default.
             compliance: 0 = rigid; distance, attachment, tether m/N; bend, planar_bend 1/(N m) (Voronoi length / EI);

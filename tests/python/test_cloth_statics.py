@@ -112,6 +112,10 @@ LAWS = {
         sb.Exponential(30.0, 30.0, 5.0),
         lambda e: WARP * e * math.exp(30.0 * e * e),
     ),
+    "sinh": (
+        sb.Sinh(12.0, 12.0, 5.0),
+        lambda e: WARP * math.sinh(12.0 * e) / 12.0,
+    ),
     "spline": (
         sb.Spline((0.06, 0.06, 0.1), RATIOS, RATIOS),
         lambda e: WARP * quad(lambda s: tangent(RATIOS, 0.06, s), 0.0, e, points=[0.06, 0.12, 0.18, 0.24])[0],
@@ -128,13 +132,19 @@ def test_a_strip_of_a_stiffening_fabric(name, tension):
     assert stretch(rest) == approx((longer, 1.0), abs=1e-8)
 
 
-def test_derivative_by_a_stiffening():
-    b = 30.0
-    scene = pulled(strip(), 300.0, warp=WARP, shear=SHEAR, law=sb.Exponential(b, b, 5.0))
+@pytest.mark.parametrize(
+    ("law", "b", "growth"),
+    [
+        (sb.Exponential, 30.0, lambda b, e: math.exp(b * e * e)),
+        (sb.Sinh, 12.0, lambda b, e: math.sinh(b * e) / (b * e)),
+    ],
+)
+def test_derivative_by_a_stiffening(law, b, growth):
+    scene = pulled(strip(), 300.0, warp=WARP, shear=SHEAR, law=law(b, b, 5.0))
     rest = sb.equilibrium(scene)
 
     def length(b):
-        stress = lambda e: WARP * e * math.exp(b * e * e)  # noqa: E731
+        stress = lambda e: WARP * e * growth(b, e)  # noqa: E731
         return brentq(lambda s: s * stress((s * s - 1.0) / 2.0) - 300.0, 1.0, 3.0, xtol=1e-15)
 
     far = np.zeros((scene.particle_count, 3))

@@ -236,6 +236,7 @@ def test_winds_that_are_refused(folder: Path, wind: str, field: str, fix: str) -
     ("law", "quantity"),
     [
         ('kind = "exponential"\nwarp = 20.0\nweft = 10.0\nshear = 5.0', "cloth_weft_stiffening"),
+        ('kind = "sinh"\nwarp = 20.0\nweft = 10.0\nshear = 5.0', "cloth_weft_stiffening"),
         ('kind = "spline"\nspacing = [0.05, 0.05, 0.1]\nweft = [2.0, 10.0, 4.0, 5.0]', "cloth_weft_ratio_2"),
     ],
 )

@@ -20,7 +20,7 @@ from .textile_report import report, to_dict, write_mean
 
 Test = Literal["tension", "shear", "bending"]
 Along = Literal["warp", "weft"]
-LawName = Literal["linear", "exponential", "spline", "none"]
+LawName = Literal["linear", "exponential", "sinh", "spline", "none"]
 Way = Literal["loading", "unloading", "skeleton"]
 Form = Literal["png", "svg", "pdf", "none"]
 

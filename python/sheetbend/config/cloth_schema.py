@@ -55,11 +55,12 @@ class ClothMesh(Section):
 
 
 class ClothLaw(Section):
-    """[scene.cloth.law]: how tension grows with strain, `sb.Exponential` or `sb.Spline`; linear when left out."""
+    """[scene.cloth.law]: how tension grows with strain, `sb.Exponential`, `sb.Sinh` or `sb.Spline`; linear when left
+    out."""
 
-    kind: Literal["exponential", "spline"] = key(..., "which of them")
+    kind: Literal["exponential", "sinh", "spline"] = key(..., "which of them")
     warp: Finite | list[Finite] | None = key(
-        None, "stiffening b of an exponential, or ratios of a spline at 1 to 4 spacings (1 when left out)"
+        None, "stiffening b of an exponential or sinh, or ratios of a spline at 1 to 4 spacings (1 when left out)"
     )
     weft: Finite | list[Finite] | None = key(None, "the same along the weft")
     shear: Finite | list[Finite] | None = key(None, "the same in shear")
@@ -68,11 +69,11 @@ class ClothLaw(Section):
     @model_validator(mode="after")
     def _keys_of_kind(self) -> Self:
         given = {name: getattr(self, name) for name in ("warp", "weft", "shear") if getattr(self, name) is not None}
-        if self.kind == "exponential":
+        if self.kind != "spline":
             if len(given) < 3 or not all(isinstance(v, float) for v in given.values()):
-                raise ValueError("is exponential|give warp, weft and shear, one number each")
+                raise ValueError(f"is of kind {self.kind}|give warp, weft and shear, one number each")
             if self.spacing is not None:
-                raise ValueError("is exponential and has spacing|leave it out, or use a spline")
+                raise ValueError(f"is of kind {self.kind} and has spacing|leave it out, or use a spline")
         elif self.spacing is None or not all(isinstance(v, list) and len(v) == 4 for v in given.values()):
             raise ValueError("is a spline|give spacing, and four ratios for each of warp, weft and shear that is given")
         return self

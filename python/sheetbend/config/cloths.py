@@ -11,7 +11,7 @@ import numpy as np
 from .. import mesh as meshes
 from ..cloth import Cloth, add_cloth
 from ..errors import ConfigError
-from ..fabric import COMPONENTS, Exponential, Law, Spline
+from ..fabric import COMPONENTS, Exponential, Law, Sinh, Spline
 from ..mesh import TriangleMesh
 from ..mesh.subdivide import subdivided
 from ..scene import Scene
@@ -165,8 +165,8 @@ def _law(section: schema.ClothLaw | None) -> Law | None:
     if section is None:
         return None
     given: dict[str, Any] = {c: getattr(section, c) for c in COMPONENTS if getattr(section, c) is not None}
-    if section.kind == "exponential":
-        return Exponential(**given)
+    if section.kind != "spline":
+        return (Exponential if section.kind == "exponential" else Sinh)(**given)
     assert section.spacing is not None  # the schema's check
     u, v, shear = section.spacing
     return Spline((u, v, shear), **{c: tuple(ratios) for c, ratios in given.items()})

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..equilibrium import NoEquilibriumError
 from ..errors import InputError
-from ..fabric import Exponential, Fabric, Spline
+from ..fabric import Fabric, Spline, Stiffening
 from ..gauge import null_space
 from ..identifiability import known, open_estimate
 from ..optional import require
@@ -201,7 +201,7 @@ def _with(start: Fabric, parameters: Parameters, u: Array) -> Fabric:
         component, _, coefficient = name.partition("_")
         if name in _UNITS:
             changes[name] = value
-        elif isinstance(law, Exponential):
+        elif isinstance(law, Stiffening):
             law = replace(law, **{component: value})
         elif isinstance(law, Spline):
             ratios = list(getattr(law, component))

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..cloth import Cloth, add_cloth
 from ..equilibrium import Equilibrium, equilibrium
 from ..errors import InputError
-from ..fabric import Exponential, Fabric
+from ..fabric import Exponential, Fabric, Sinh
 from ..mesh import TriangleMesh
 from ..quantities import Term
 from ..scene import Array, Scene
@@ -63,14 +63,14 @@ def strip_strain(fabric: Fabric, along: str, load: float) -> float:
     """About the strain of a free strip under a load, N/m: where a test that asks for a load may start."""
     stiffness = fabric.warp if along == "warp" or fabric.weft is None else fabric.weft
     low, high = 0.0, load / stiffness
-    if not isinstance(fabric.law, Exponential):
+    if not isinstance(fabric.law, Exponential | Sinh):
         return 0.5 * high
     b = fabric.law.warp if along == "warp" else fabric.law.weft
     for _ in range(_HALVINGS):
         strain = (low + high) / 2.0
         green = strain + strain**2 / 2.0
         # in logarithms, since the exponential may overflow
-        over = math.log(stiffness * green * (1.0 + strain) / load) + b * green**2 > 0.0
+        over = math.log(stiffness * green * (1.0 + strain) / load) + fabric.law.log_growth(b, green) > 0.0
         low, high = (low, strain) if over else (strain, high)
     return (low + high) / 2.0
 

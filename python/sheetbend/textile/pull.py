@@ -9,14 +9,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..fabric import Exponential, Fabric, Law, Linear, Spline
+from ..fabric import Exponential, Fabric, Law, Linear, Sinh, Spline
 from .curve import Curve, chosen, mean_curve, same_test
 from .fabric_fit import FabricFit, Measured, fit_fabric
 from .flat import warp_angle
 from .reading import Reading
 from .uniaxial import uniaxial
 
-LAWS = {"linear": (), "exponential": ("stiffening",), "spline": ("ratio_1", "ratio_2", "ratio_3", "ratio_4")}
+LAWS = {
+    "linear": (),
+    "exponential": ("stiffening",),
+    "sinh": ("stiffening",),
+    "spline": ("ratio_1", "ratio_2", "ratio_3", "ratio_4"),
+}
 _SPECIMEN = (0.05, 0.2)  # m, length and width of KES-FB1, where curves do not tell theirs
 _LEVELS = 5
 _CLASS = 0.005  # class 0.5 of ISO 7500-1 and ISO 9513
@@ -92,7 +97,7 @@ def fit_pull(
 
     Args:
         curves, along, way, cycle, error: of `pulled`.
-        law: "linear", "exponential" or "spline".
+        law: "linear", "exponential", "sinh" or "spline".
 
     Raises:
         InputError: an unknown law, or what `pulled` raises.
@@ -107,12 +112,15 @@ def fit_pull(
     loads = _loads(curves, cycle, way, levels) - pretension
     strains = np.array([m.value for m in measured]) / 100.0
     green = strains + strains**2 / 2.0
-    secants = loads / (green * (1.0 + strains))  # of a free strip: k exp(b green^2)
-    b = max(math.log(secants[-1] / secants[0]) / (green[-1] ** 2 - green[0] ** 2), 0.01)
+    secants = loads / (green * (1.0 + strains))  # of a free strip: k exp(b green^2), or k sinh(b green)/(b green)
+    grown = max(math.log(secants[-1] / secants[0]), 0.0)
+    b = max(grown / (green[-1] ** 2 - green[0] ** 2), 0.01)
+    evenly = max(math.sqrt(6.0 * grown) / green[-1], 0.01)  # where sinh(t)/t is about exp(t^2/6)
     stiffness = float(secants[0])
     laws: dict[str, Law] = {
         "linear": Linear(),
         "exponential": Exponential(b, b, b),
+        "sinh": Sinh(evenly, evenly, evenly),
         "spline": Spline((float(green[-1]) / 4.0,) * 3),
     }
     sizes = {"density": 0.1, "bending": 1e-5, "warp": stiffness, "weft": stiffness, "shear": stiffness / 2.0}

@@ -269,6 +269,11 @@ inline Case case_of<ExponentialStrain>() {
 }
 
 template <>
+inline Case case_of<SinhStrain>() {
+  return case_of<ExponentialStrain>();
+}
+
+template <>
 inline Case case_of<SplineStrain>() {
   Case row = case_of<Strain>();
   row.x = {0, 0, 0, 0.3, 0.58, 0.04, -0.23, 0.47, -0.08};  // beyond the last knot of each component
