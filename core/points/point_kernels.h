@@ -50,20 +50,11 @@ struct PointKernels {
     store(numbers, i + 2, p.z);
   }
 
-  // A multiple by a plain number, which has no derivatives to multiply.
-  template <class A>
-  static A times(double a, const A& b) {
-    return A(a) * b;
-  }
-  template <class A>
-  static Dual<A, 1> times(double a, const Dual<A, 1>& b) {
-    return Dual<A, 1>::map(b, A(a) * b.v, A(a));
-  }
   static S history(const Points& p, const double* now, const double* before, long i) {
-    return p.before == 0.0 ? load(now, i) : times(p.now, load(now, i)) + times(p.before, load(before, i));
+    return p.before == 0.0 ? load(now, i) : p.now * load(now, i) + p.before * load(before, i);
   }
   static S extrapolated(const Points& p, const double* now, const double* before, long i) {
-    return times(p.extrapolate_now, load(now, i)) + times(p.extrapolate_before, load(before, i));
+    return p.extrapolate_now * load(now, i) + p.extrapolate_before * load(before, i);
   }
 
   static void weigh(const Points& p, int begin, int end) {
@@ -72,7 +63,7 @@ struct PointKernels {
       const auto v = [&](int d) { return extrapolated(p, p.v, p.v_before, 3 * n + d); };
       const Vec3<S> velocity(v(0), v(1), v(2));
       const S speed = sqrt_or_zero(dot(velocity, velocity)), mass = load(p.mass, n);
-      const S effective = mass + times(p.eta, load(p.drag_linear, n) + load(p.drag_quadratic, n) * speed);
+      const S effective = mass + p.eta * (load(p.drag_linear, n) + load(p.drag_quadratic, n) * speed);
       const S w = 1.0 / effective;
       store(p.w, n, w);
       store(p.kept, n, mass * w);
@@ -80,8 +71,7 @@ struct PointKernels {
   }
 
   static void predict(const Points& p, int begin, int end) {
-    const S gravity[3] = {times(p.eta, load(p.gravity, 0)), times(p.eta, load(p.gravity, 1)),
-                          times(p.eta, load(p.gravity, 2))};
+    const S gravity[3] = {p.eta * load(p.gravity, 0), p.eta * load(p.gravity, 1), p.eta * load(p.gravity, 2)};
     for (long n = begin; n < end; ++n)
       for (int d = 0; d < 3; ++d) {
         const long i = 3 * n + d;
@@ -91,7 +81,7 @@ struct PointKernels {
         }
         S v = history(p, p.v, p.v_before, i) + gravity[d];
         if (p.kept) v = load(p.kept, n) * v;
-        store(p.q, p.stride * n + d, history(p, p.x, p.x_before, i) + times(p.eta, v));
+        store(p.q, p.stride * n + d, history(p, p.x, p.x_before, i) + p.eta * v);
       }
   }
 
@@ -102,7 +92,7 @@ struct PointKernels {
       for (int d = 0; d < 3; ++d) {
         const long i = 3 * n + d;
         const S now = load(p.q, p.stride * n + d);
-        store(p.v_next, i, times(rate, now - history(p, p.x, p.x_before, i)));
+        store(p.v_next, i, rate * (now - history(p, p.x, p.x_before, i)));
         store(p.x_next, i, now);
         difference += now - now;
       }
@@ -122,7 +112,7 @@ struct PointKernels {
   static void interpolate(const double* values, long between, const double* weight, int knots, double* to) {
     for (int d = 0; d < 3; ++d) {
       S sum(0.0);
-      for (int k = 0; k < knots; ++k) sum += times(weight[k], load(values, between * k + d));
+      for (int k = 0; k < knots; ++k) sum += weight[k] * load(values, between * k + d);
       store(to, d, sum);
     }
   }
