@@ -34,17 +34,19 @@ Projection::Projection(const Experiment& e, int threads)
 }
 
 void Projection::linearize(const CorrectedMotion& motion, Interrupt* interrupt) {
-  A_.resize(static_cast<Eigen::Index>(e_->residual_count()), unknowns());
+  A_.resize(0, 0);  // until all of it is there
+  Eigen::MatrixXd A(static_cast<Eigen::Index>(e_->residual_count()), unknowns());
   parallel_for((unknowns() + 7) / 8, threads_, 1, [&](int begin, int end) {
     for (int group = begin; group < end; ++group) {
       const int first = 8 * group;
-      motion.columns(first, std::min(8, unknowns() - first), &A_(0, first), interrupt);
+      motion.columns(first, std::min(8, unknowns() - first), &A(0, first), interrupt);
     }
   });
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(unknowns(), unknowns());
-  normal.selfadjointView<Eigen::Lower>().rankUpdate(A_.transpose());
+  normal.selfadjointView<Eigen::Lower>().rankUpdate(A.transpose());
   normal.diagonal().array() += weight_;
   normal_.compute(normal);
+  A_ = std::move(A);
 }
 
 std::vector<double> Projection::predicted(const double* u) const {
@@ -85,17 +87,22 @@ void Projection::solve(const double* theta, const double* u, double* residual, I
     try {
       motion.emplace(*e_, theta, trial.data(), interrupt);
     } catch (const Diverged&) {
-      if (turn == 0) throw;
+      if (std::isinf(cost) && trial == b_) throw;
     }
     const double here = motion ? 0.5 * (squared(motion->residuals()) + weight_ * squared(trial)) : cost;
     if (!(here < cost)) {
-      if (turn == 0 || ++halvings > most_halvings) break;  // infinite; or no step is short enough for rounding errors
+      if (std::isinf(cost)) {  // predicted too far
+        if (trial == b_) throw Diverged(e_->steps(), 0, e_->observed.times.back());
+        trial = b_;
+        continue;
+      }
+      if (++halvings > most_halvings) break;  // no step is short enough for rounding errors
       step *= 0.5;
       VectorXd::Map(trial.data(), step.size()) = best + step;
       continue;
     }
     VectorXd next = vector(motion->gradient(interrupt)) + weight_ * vector(trial);
-    if (turn > 0 && step.dot(next - gradient) > 0.0) pairs.emplace_back(step, next - gradient);
+    if (step.size() > 0 && step.dot(next - gradient) > 0.0) pairs.emplace_back(step, next - gradient);
     best = vector(trial);
     gradient = std::move(next);
     cost = here;

@@ -3,12 +3,19 @@ where nothing does."""
 
 from __future__ import annotations
 
+import signal
+from pathlib import Path
+
 import numpy as np
 import pytest
 import sheetbend as sb
 from pytest import approx
+from sheetbend.cli.app import app
+from sheetbend.config import Study, build, parse
 from sheetbend.driven_noise import driven_noises
+from sheetbend.optimizers import Progress
 from sheetbend.problem import FitProblem, as_parameters
+from typer.testing import CliRunner
 
 Array = np.ndarray
 H, NOISE = 1 / 240, 3e-4  # s; m per coordinate
@@ -300,3 +307,67 @@ def test_a_correction_that_is_too_large_is_refused():
     e = sb.Experiment(scene=scene, recording=recording, markers=places, driven_sigma=1e-3)
     with pytest.raises(sb.InputError, match=r"driven_sigma: has 9000 coordinates to correct.*Fix: fit a shorter part"):
         problem_of(e)
+
+
+CONFIG = """
+[experiment]
+name = "shaken"
+
+[solver]
+substeps = 4
+
+[[scene.rope]]
+name = "rope"
+points = [[0, 0, 0], [0, 0, -0.4]]
+segments = 8
+density = 0.05
+EI = 2e-3
+bend_damping = 0.02
+drag_linear = 5e-3
+
+[[scene.drive]]
+particles = ["rope:0"]
+markers = ["hand"]
+
+[[recording]]
+file = "rope.npz"
+sigma = 3e-4
+driven_sigma = {given}
+"""
+
+
+def configured(folder: Path, given: str) -> Study:
+    recording = shaken(16, frames=31).recording
+    recording.save(folder / "rope.npz")
+    markers = "".join(f'\n[[marker]]\nmarker = "m{i}"\nparticle = "rope:{i}"\n' for i in SEEN)
+    (folder / "shaken.toml").write_text(CONFIG.format(given=given) + markers + "\n[parameters.rope_EI]\n")
+    return build(parse(folder / "shaken.toml"), folder)
+
+
+def test_a_configuration_sets_driven_sigma(tmp_path):
+    (e,) = configured(tmp_path, '"estimate"').experiments
+    assert e.driven_noise == approx(NOISE, rel=0.5)
+    study = configured(tmp_path, "3e-4")
+    (mine,) = study.experiments
+    fit = sb.fit(study.experiments, parameters=study.parameters, **study.options)
+    same = sb.fit(shaken(16, frames=31), parameters=["rope_EI"], threads=1)
+    assert mine.driven_noise == 3e-4 and fit["rope_EI"].value == approx(same["rope_EI"].value, rel=1e-6)
+    with pytest.raises(sb.ConfigError, match=r"recording\[0\]\.driven_sigma"):
+        configured(tmp_path, "-1.0")
+
+
+def test_the_check_of_a_configuration_passes_with_driven_sigma(tmp_path):
+    configured(tmp_path, "3e-4")
+    told = CliRunner().invoke(app, ["check", str(tmp_path / "shaken.toml")])
+    assert told.exit_code == 0 and "Jacobian check" in told.output, told.output
+
+
+def test_an_interrupted_fit_keeps_its_best():
+    def stop(progress: Progress) -> None:
+        if progress.iteration == 1:
+            signal.raise_signal(signal.SIGINT)
+
+    e = shaken(17)
+    fit = sb.fit(e, parameters=WANTED, progress=stop)
+    assert fit.result.interrupted and fit["rope_EI"].lower is not None
+    assert fit.corrections[e.name].shape == (41, 1, 3)
