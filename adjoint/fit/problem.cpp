@@ -113,6 +113,8 @@ bool Problem::attempt(int experiment, F&& f) const {
     return fail(error);
   } catch (const NoEquilibrium& error) {
     return fail(error);
+  } catch (const NoCorrection& error) {
+    return fail(error);
   }
 }
 

@@ -10,10 +10,11 @@
 namespace sheetbend {
 namespace {
 
-constexpr double largest = 2e9;       // bytes of A
-constexpr double converged = 1e-13;   // of the cost: what another step would take off it
-constexpr int steps_per_matrix = 15;  // cost less than the matrix does
-constexpr int most_steps = 150, most_halvings = 12;
+constexpr double largest = 2e9;           // bytes of A
+constexpr double converged = 1e-13;       // of the cost: what another step would take off it
+constexpr double within_rounding = 1e-9;  // likewise, where no step that is tried lowers the cost any more
+constexpr int steps_per_matrix = 15;      // cost less than the matrix does
+constexpr int most_steps = 600, most_halvings = 12;
 
 double squared(const std::vector<double>& a) {
   double sum = 0.0;
@@ -65,7 +66,7 @@ void Projection::solve(const double* theta, const double* u, double* residual, I
   std::vector<double> trial = predicted(u);
   VectorXd best, gradient, step;
   std::vector<std::pair<VectorXd, VectorXd>> pairs;  // steps and what they change in the gradient
-  double cost = std::numeric_limits<double>::infinity();
+  double cost = std::numeric_limits<double>::infinity(), decrease = cost;
   int halvings = 0, since = 0;  // steps since A was made, or since this theta began
   const auto newton = [&] {
     VectorXd q = gradient;
@@ -96,8 +97,15 @@ void Projection::solve(const double* theta, const double* u, double* residual, I
         trial = b_;
         continue;
       }
-      if (++halvings > most_halvings) break;  // no step is short enough for rounding errors
-      step *= 0.5;
+      if (++halvings <= most_halvings) {
+        step *= 0.5;
+      } else if (!pairs.empty()) {  // once more without them
+        pairs.clear();
+        step = -newton();
+        halvings = 0;
+      } else {
+        break;
+      }
       VectorXd::Map(trial.data(), step.size()) = best + step;
       continue;
     }
@@ -113,10 +121,12 @@ void Projection::solve(const double* theta, const double* u, double* residual, I
       since = 0;
     }
     step = -newton();
-    if (-0.5 * gradient.dot(step) <= converged * cost) break;
+    decrease = -0.5 * gradient.dot(step);
+    if (decrease <= converged * cost) break;
     halvings = 0;
     VectorXd::Map(trial.data(), step.size()) = best + step;
   }
+  if (!(decrease <= within_rounding * cost)) throw NoCorrection();
   b_.assign(best.data(), best.data() + best.size());
   if (exact_) linearize(CorrectedMotion(*e_, theta, b_.data(), interrupt), interrupt);
   exact_ = false;

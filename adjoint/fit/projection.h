@@ -9,11 +9,19 @@
 #pragma once
 
 #include <Eigen/Cholesky>
+#include <stdexcept>
 #include <vector>
 
 #include "adjoint/corrected_motion.h"
 
 namespace sheetbend {
+
+// No correction was found at which cost and prior balance.
+struct NoCorrection : std::runtime_error {
+  NoCorrection()
+      : std::runtime_error(
+            "the correction of driven markers did not converge. Fix: start nearer, or fit a shorter window first") {}
+};
 
 class Projection {
  public:
@@ -23,8 +31,8 @@ class Projection {
   int unknowns() const { return e_->correction.unknowns(); }
   const std::vector<double>& b() const { return b_; }
 
-  // b(theta), and the residuals there (residual_count); u are the optimizer's parameters that make theta. Throws what the rollout throws; b is then
-  // as it was.
+  // b(theta), and the residuals there (residual_count); u are the optimizer's parameters that make theta. Throws what the rollout throws, and
+  // NoCorrection; b is then as it was.
   void solve(const double* theta, const double* u, double* residual, Interrupt* interrupt);
 
   // Turns J_theta (rows x parameters, row-major) into J_theta + A X and fills X/s (unknowns x parameters), where `solve` ended.
