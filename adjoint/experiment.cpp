@@ -3,53 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "adjoint/observation.h"
 #include "core/scalar/dual.h"
 
 namespace sheetbend {
-namespace {
-
-// The factor on a marker's residuals whose squares then sum to the robust loss rho(s) scale^2, s = squared distance / scale^2.
-// Huber 1964 and its smooth form soft-L1; both are the squares themselves for small residuals.
-template <class T>
-T robust_scale(const Observations& o, const T& distance2) {
-  if (o.loss == Loss::squares) return T(1.0);
-  const T s = distance2 * T(1.0 / (o.loss_scale * o.loss_scale));
-  if (o.loss == Loss::soft_l1) return sqrt(T(2.0) / (T(1.0) + sqrt(T(1.0) + s)));
-  const auto far = s > T(1.0);
-  const T safe = select(far, s, T(1.0));
-  return select(far, sqrt((T(2.0) * sqrt(safe) - T(1.0)) / safe), T(1.0));
-}
-
-template <class T>
-class ResidualWriter {
- public:
-  ResidualWriter(const Experiment& e, const T* offsets, T* r, T* simulated)
-      : o_(e.observed), offsets_(offsets), r_(r), simulated_(simulated) {}
-
-  // The state at the time of one frame.
-  void frame(std::size_t f, const T* x) {
-    const std::size_t count = o_.markers.size();
-    for (std::size_t m = 0; m < count; ++m) {
-      const std::size_t at = f * count + m;
-      const Vec3<T> p = marker_position(o_.markers[m], x, offsets_ + 3 * m);
-      if (simulated_) p.store(simulated_ + 3 * at);
-      const double* seen = &o_.measured[3 * at];
-      if (!r_ || std::isnan(seen[0])) continue;
-      const T place[3] = {p.x, p.y, p.z};
-      T d[3]{};
-      for (const int axis : o_.axes) d[axis] = T(1.0 / o_.sigma[at]) * (place[axis] - T(seen[axis]));
-      const T scale = robust_scale(o_, dot(Vec3<T>(d), Vec3<T>(d)));
-      for (const int axis : o_.axes) *r_++ = scale * d[axis];
-    }
-  }
-
- private:
-  const Observations& o_;
-  const T* offsets_;
-  T *r_, *simulated_;
-};
-
-}  // namespace
 
 std::size_t Experiment::residual_count() const {
   std::size_t seen = 0;
@@ -71,24 +28,25 @@ void Experiment::check() const {
   if (is_static && frames != 1)
     throw std::invalid_argument(name + ": an equilibrium has one frame. Fix: give each shape as a recording");
   if (map.base.size() != inputs()) throw std::invalid_argument(name + ": the parameter map does not fit the scene");
+  if (correction.first.size() != correction.given.size() + 1)
+    throw std::invalid_argument(name + ": the correction does not fit its own numbers");
   if (residual_count() == 0) throw std::invalid_argument(name + ": every marker is missing in every frame");
 }
 
 template <class T>
-void Experiment::residuals(const T* theta, T* r, T* simulated, Interrupt* interrupt) const {
-  std::vector<T> in(inputs());
-  map.apply(theta, in.data());
-  const std::size_t scene_inputs = scene->layout.total();
-  const T* offsets = &in[scene_inputs];
+void Experiment::residuals(const T* theta, const T* b, T* r, T* simulated, Interrupt* interrupt) const {
+  std::vector<T> in = inputs_at(theta, b);
+  const T* offsets = &in[scene->layout.total()];
   const T time_offset = in.back();
-  ResidualWriter<T> writer(*this, offsets, r, simulated);
   if (is_static || start == Start::equilibrium) {
     const std::vector<T> x = equilibrium_coordinates<T>(*scene, in.data(), equilibrium, *anchor, interrupt);
-    if (is_static) return writer.frame(0, x.data());
+    if (is_static) {
+      frame_residuals(observed, 0, x.data(), offsets, r, simulated);
+      return;
+    }
     std::copy(x.begin(), x.end(), in.begin() + static_cast<std::ptrdiff_t>(scene->layout.of(Quantity::position)));
   }
 
-  // A frame lies between substeps `base` and base + 1; it is written as soon as base + 2 is known.
   const int last = steps();
   const std::size_t dofs = scene->dofs();
   std::vector<T> ring(4 * dofs), x(dofs);
@@ -99,25 +57,19 @@ void Experiment::residuals(const T* theta, T* r, T* simulated, Interrupt* interr
       [&](int step, const T* state, const T*) {
         std::copy_n(state, dofs, &ring[(step % 4) * dofs]);
         for (; next_frame < observed.times.size(); ++next_frame) {
-          const T place = (T(observed.times[next_frame] - t0) + time_offset) * T(1.0 / plan.options.h);
-          const int base = std::clamp(static_cast<int>(std::floor(value_of(place) + 1e-9)), 1, last - 2);
-          if (step < base + 2) return;
-          const auto weights = cubic_weights(place - T(base));
-          for (std::size_t i = 0; i < dofs; ++i) {
-            T sum(0.0);
-            for (int k = 0; k < 4; ++k) sum += weights[k] * ring[((base - 1 + k) % 4) * dofs + i];
-            x[i] = sum;
-          }
-          writer.frame(next_frame, x.data());
+          const FramePlace<T> place(*this, next_frame, time_offset, last);
+          if (step < place.base + 2) return;
+          place.interpolate(dofs, [&](int k) { return &ring[((place.base - 1 + k) % 4) * dofs]; }, x.data());
+          r = frame_residuals(observed, next_frame, x.data(), offsets, r, simulated);
         }
       },
       interrupt);
 }
 
-template void Experiment::residuals<double>(const double*, double*, double*, Interrupt*) const;
-template void Experiment::residuals<Dual<double, 4>>(const Dual<double, 4>*, Dual<double, 4>*, Dual<double, 4>*,
-                                                     Interrupt*) const;
-template void Experiment::residuals<Dual<double, 8>>(const Dual<double, 8>*, Dual<double, 8>*, Dual<double, 8>*,
-                                                     Interrupt*) const;
+template void Experiment::residuals<double>(const double*, const double*, double*, double*, Interrupt*) const;
+template void Experiment::residuals<Dual<double, 4>>(const Dual<double, 4>*, const Dual<double, 4>*, Dual<double, 4>*,
+                                                     Dual<double, 4>*, Interrupt*) const;
+template void Experiment::residuals<Dual<double, 8>>(const Dual<double, 8>*, const Dual<double, 8>*, Dual<double, 8>*,
+                                                     Dual<double, 8>*, Interrupt*) const;
 
 }  // namespace sheetbend

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "adjoint/boundary_correction.h"
 #include "adjoint/equilibrium_tangents.h"
 #include "adjoint/markers.h"
 #include "adjoint/parameter_map.h"
@@ -32,6 +33,7 @@ struct Experiment {
   Plan plan;
   ParameterMap map;
   Observations observed;
+  BoundaryCorrection correction;
   bool is_static = false;  // the recording shows an equilibrium
   Start start = Start::given;
   double t0 = 0.0;
@@ -43,9 +45,18 @@ struct Experiment {
   int steps() const;                   // substeps until the last frame
   void check() const;
 
-  // Fills residuals (residual_count) and, when not null, simulated markers (frames, markers, 3). Throws Diverged, Unconverged or NoEquilibrium.
+  // The scene's inputs at parameters theta and a correction b (correction.count()), then the observation's.
   template <class T>
-  void residuals(const T* theta, T* r, T* simulated, Interrupt* interrupt) const;
+  std::vector<T> inputs_at(const T* theta, const T* b) const {
+    std::vector<T> in(inputs());
+    map.apply(theta, in.data());
+    correction.apply(b, in.data());
+    return in;
+  }
+
+  // Fills, when not null, residuals (residual_count) and simulated markers (frames, markers, 3). Throws Diverged, Unconverged or NoEquilibrium.
+  template <class T>
+  void residuals(const T* theta, const T* b, T* r, T* simulated, Interrupt* interrupt) const;
 };
 
 }  // namespace sheetbend

@@ -95,6 +95,7 @@ template <class T>
 std::size_t substep_bytes(const Scene& scene, const Plan& plan, bool keeps_iterations) {
   const int kept = keeps_iterations ? plan.options.iterations : 0;
   std::size_t bytes = sizeof(T) * (scene.has_drag ? 2 : 1) * static_cast<std::size_t>(scene.nodes());
+  if constexpr (!std::is_same_v<T, double>) bytes += sizeof(sheetbend_points::Frame) * scene.directors.size();
   for (const DirectBlock& block : plan.blocks) bytes += block_bytes<T>(scene, block, kept);
   bytes += volume_bytes<T>(scene, kept);
   if (plan.colors.empty()) return bytes;

@@ -1,6 +1,7 @@
 #include "adjoint/fit/problem.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -12,6 +13,8 @@
 
 namespace sheetbend {
 namespace {
+
+std::mutex failing;  // over what is said of failures
 
 inline double exp(double a) { return std::exp(a); }
 template <int N>
@@ -40,6 +43,10 @@ Problem::Problem(std::vector<Experiment> experiments, std::vector<double> theta,
         columns_[i].push_back(k);
   }
   for (const FreeParameter& p : free_) priors_ += p.has_prior;
+  for (const Experiment& e : experiments_) {
+    projections_.push_back(e.correction.unknowns() > 0 ? std::make_unique<Projection>(e, threads_) : nullptr);
+    corrections_ += e.correction.unknowns();
+  }
 }
 
 template <class T>
@@ -52,8 +59,9 @@ void Problem::set_theta(const T* u, T* theta) const {
 }
 
 template <class T>
-std::vector<T> Problem::local_theta(const std::vector<T>& theta, int experiment) const {
-  std::vector<T> local;
+std::vector<T> Problem::local_theta(const T* u, int experiment) const {
+  std::vector<T> theta(theta_.size()), local;
+  set_theta(u, theta.data());
   for (const int slot : slots_[experiment]) local.push_back(theta[slot]);
   return local;
 }
@@ -65,13 +73,13 @@ void Problem::evaluate_columns(const double* u, int experiment, int first, doubl
   using D = Dual<double, N>;
   const std::vector<int>& columns = columns_[experiment];
   const int count = std::min(N, static_cast<int>(columns.size()) - first);
-  std::vector<D> duals(u, u + parameters()), theta(theta_.size());
+  std::vector<D> duals(u, u + parameters());
   for (int k = 0; k < count; ++k) duals[columns[first + k]].d[k] = 1.0;
-  set_theta(duals.data(), theta.data());
   const int rows = first_row_[experiment + 1] - first_row_[experiment];
   std::vector<D> r(rows);
-  experiments_[experiment].residuals(local_theta(theta, experiment).data(), r.data(), static_cast<D*>(nullptr),
-                                     interrupt);
+  const std::vector<D> b(correction(experiment).begin(), correction(experiment).end());
+  experiments_[experiment].residuals(local_theta(duals.data(), experiment).data(), b.data(), r.data(),
+                                     static_cast<D*>(nullptr), interrupt);
   for (int i = 0; i < rows; ++i) {
     const std::size_t row = first_row_[experiment] + i;
     if (first == 0) residual[row] = r[i].v;
@@ -89,38 +97,52 @@ std::vector<Problem::Sweep> Problem::sweeps(bool jacobian) const {
   return list;
 }
 
+template <class F>
+bool Problem::attempt(int experiment, F&& f) const {
+  const auto fail = [&](const std::exception& error) {
+    std::lock_guard lock(failing);
+    failure_ = experiments_[experiment].name + ": " + error.what();
+    return false;
+  };
+  try {
+    f(experiment);
+    return true;
+  } catch (const Diverged& error) {
+    return fail(error);
+  } catch (const Unconverged& error) {
+    return fail(error);
+  } catch (const NoEquilibrium& error) {
+    return fail(error);
+  } catch (const NoCorrection& error) {
+    return fail(error);
+  }
+}
+
 bool Problem::evaluate(const double* u, double* residual, double* jacobian, Interrupt* interrupt) const {
   const int p = parameters();
   if (jacobian) std::fill_n(jacobian, static_cast<std::size_t>(rows()) * p, 0.0);
+  std::atomic<bool> ok = true;
+  for (int e = 0; e < static_cast<int>(experiments_.size()) && ok; ++e)
+    if (projections_[e])
+      ok = attempt(
+          e, [&](int) { projections_[e]->solve(local_theta(u, e).data(), u, residual + first_row_[e], interrupt); });
+  if (!ok) return false;
   const std::vector<Sweep> jobs = sweeps(jacobian != nullptr);
-  std::mutex failing;
-  bool ok = true;
   parallel_for(static_cast<int>(jobs.size()), threads_, 1, [&](int begin, int end) {
     for (int job = begin; job < end; ++job) {
-      const auto [e, first, width] = jobs[job];
-      const auto fail = [&, e = e](const std::exception& error) {
-        std::lock_guard lock(failing);
-        ok = false;
-        failure_ = experiments_[e].name + ": " + error.what();
-      };
-      try {
+      const auto [experiment, first, width] = jobs[job];
+      const bool done = attempt(experiment, [&, first = first, width = width](int e) {
         if (width == 0) {
-          std::vector<double> theta(theta_.size());
-          set_theta(u, theta.data());
-          experiments_[e].residuals(local_theta(theta, e).data(), residual + first_row_[e],
-                                    static_cast<double*>(nullptr), interrupt);
+          if (!projections_[e])
+            experiments_[e].residuals(local_theta(u, e).data(), correction(e).data(), residual + first_row_[e],
+                                      static_cast<double*>(nullptr), interrupt);
         } else if (width == 4) {
           evaluate_columns<4>(u, e, first, residual, jacobian, interrupt);
         } else {
           evaluate_columns<8>(u, e, first, residual, jacobian, interrupt);
         }
-      } catch (const Diverged& error) {
-        fail(error);
-      } catch (const Unconverged& error) {
-        fail(error);
-      } catch (const NoEquilibrium& error) {
-        fail(error);
-      }
+      });
+      if (!done) ok = false;
     }
   });
   int row = data_rows();
@@ -132,15 +154,64 @@ bool Problem::evaluate(const double* u, double* residual, double* jacobian, Inte
         jacobian[static_cast<std::size_t>(row) * p + k] = k == i ? 1.0 / free_[i].prior_sd : 0.0;
     ++row;
   }
+  if (ok) project(u, residual, jacobian);
   return ok && std::all_of(residual, residual + rows(), [](double r) { return std::isfinite(r); });
+}
+
+void Problem::project(const double* u, double* residual, double* jacobian) const {
+  int row = data_rows() + priors_;
+  for (std::size_t e = 0; e < projections_.size(); ++e) {
+    if (!projections_[e]) continue;
+    Projection& own = *projections_[e];
+    const auto at = [&](int r) { return jacobian + static_cast<std::size_t>(r) * parameters(); };
+    if (jacobian) own.project(u, residual + first_row_[e], at(first_row_[e]), at(row), parameters());
+    for (const double b : own.b()) residual[row++] = b / experiments_[e].correction.sigma;
+  }
 }
 
 std::vector<double> Problem::simulate(int experiment, const double* u, Interrupt* interrupt) const {
   const Experiment& e = experiments_.at(experiment);
-  std::vector<double> theta(theta_.size()), markers(e.observed.measured.size());
-  set_theta(u, theta.data());
-  e.residuals(local_theta(theta, experiment).data(), static_cast<double*>(nullptr), markers.data(), interrupt);
+  std::vector<double> markers(e.observed.measured.size());
+  e.residuals(local_theta(u, experiment).data(), correction(experiment).data(), static_cast<double*>(nullptr),
+              markers.data(), interrupt);
   return markers;
+}
+
+std::vector<double> Problem::respond(int experiment, const double* u, const double* changes, int count,
+                                     Interrupt* interrupt) const {
+  using D = Dual<double, 8>;
+  const Experiment& e = experiments_.at(experiment);
+  const std::size_t rows = e.residual_count(), numbers = correction(experiment).size();
+  const std::vector<double> at = local_theta(u, experiment);
+  const std::vector<D> theta(at.begin(), at.end());
+  std::vector<double> moved(count * rows);
+  parallel_for((count + 7) / 8, threads_, 1, [&](int begin, int end) {
+    for (int first = 8 * begin; first < std::min(8 * end, count); first += 8) {
+      std::vector<D> b(correction(experiment).begin(), correction(experiment).end()), r(rows);
+      const int width = std::min(8, count - first);
+      for (int k = 0; k < width; ++k)
+        for (std::size_t i = 0; i < numbers; ++i) b[i].d[k] = changes[(first + k) * numbers + i];
+      e.residuals(theta.data(), b.data(), r.data(), static_cast<D*>(nullptr), interrupt);
+      for (int k = 0; k < width; ++k)
+        for (std::size_t i = 0; i < rows; ++i) moved[(first + k) * rows + i] = r[i].d[k];
+    }
+  });
+  return moved;
+}
+
+const std::vector<double>& Problem::correction(int experiment) const {
+  const auto& own = projections_.at(experiment);
+  return own ? own->b() : experiments_[experiment].correction.given;
+}
+
+double Problem::absorbed(int experiment) const {
+  const auto& own = projections_.at(experiment);
+  return own ? own->absorbed() : 0.0;
+}
+
+void Problem::relinearize() const {
+  for (const auto& own : projections_)
+    if (own) own->relinearize();
 }
 
 std::vector<double> Problem::physical(const double* u) const {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "adjoint/experiment.h"
+#include "adjoint/fit/projection.h"
 
 namespace sheetbend {
 
@@ -27,15 +27,29 @@ class Problem {
 
   int parameters() const { return static_cast<int>(free_.size()); }
   int data_rows() const { return first_row_.back(); }
-  int rows() const { return data_rows() + priors_; }
+  int rows() const { return data_rows() + priors_ + corrections_; }
   const std::vector<int>& first_rows() const { return first_row_; }  // of each experiment, and one past the last
 
-  // residual (rows), jacobian (rows x parameters, row-major) or null. Returns false, with `failure` saying why, where the physics has no
-  // answer (divergence, no equilibrium).
+  // residual (rows), jacobian (rows x parameters, row-major) or null: rows of data, of the parameters' priors, of the corrections' priors.
+  // Corrections of boundaries are solved for at every u, so that all depend on u alone (projection.h). Returns false, with `failure` saying
+  // why, where the physics has no answer (divergence, no equilibrium).
   bool evaluate(const double* u, double* residual, double* jacobian, Interrupt* interrupt) const;
 
-  // Simulated markers (frames, markers, 3) of one experiment.
+  // Simulated markers (frames, markers, 3) of one experiment, its boundary corrected as it was in the last evaluation.
   std::vector<double> simulate(int experiment, const double* u, Interrupt* interrupt) const;
+
+  // What `count` changes of an experiment's correction (count x its numbers) make of its residuals, (count x residuals), to first order.
+  std::vector<double> respond(int experiment, const double* u, const double* changes, int count,
+                              Interrupt* interrupt) const;
+
+  // The correction [m] of an experiment in the last evaluation, or as given where none is estimated.
+  const std::vector<double>& correction(int experiment) const;
+
+  // What the correction of an experiment absorbs of its data's degrees of freedom, as last linearized; 0 where none is estimated.
+  double absorbed(int experiment) const;
+
+  // Lets the next evaluation linearize the corrections where it ends, for intervals.
+  void relinearize() const;
 
   std::vector<double> physical(const double* u) const;  // theta
   const std::string& failure() const { return failure_; }
@@ -43,8 +57,11 @@ class Problem {
  private:
   template <class T>
   void set_theta(const T* u, T* theta) const;
+  // Calls f(experiment); false, with `failure`, where the physics has no answer.
+  template <class F>
+  bool attempt(int experiment, F&& f) const;
   template <class T>
-  std::vector<T> local_theta(const std::vector<T>& theta, int experiment) const;
+  std::vector<T> local_theta(const T* u, int experiment) const;
   template <int N>
   void evaluate_columns(const double* u, int experiment, int first, double* residual, double* jacobian,
                         Interrupt* interrupt) const;
@@ -54,6 +71,7 @@ class Problem {
     int experiment, first, width;
   };
   std::vector<Sweep> sweeps(bool jacobian) const;
+  void project(const double* u, double* residual, double* jacobian) const;
 
   std::vector<Experiment> experiments_;
   std::vector<double> theta_;
@@ -62,7 +80,8 @@ class Problem {
   std::vector<std::vector<int>>
       columns_;  // per experiment: the free parameters that reach it; its other columns are zero
   std::vector<int> first_row_;
-  int priors_ = 0, threads_ = 1;
+  int priors_ = 0, corrections_ = 0, threads_ = 1;
+  std::vector<std::unique_ptr<Projection>> projections_;  // per experiment, null where no correction is estimated
   mutable std::string failure_;
 };
 

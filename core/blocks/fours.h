@@ -19,9 +19,18 @@ inline constexpr int least_band_in_fours = 8;
 
 typedef double Four __attribute__((vector_size(32), aligned(8), may_alias));
 
-// add_window() of block_forward.h: what stands above the diagonal, and below the window, adds a zero.
+// Four entries from number `first` on of a column of fours, which zeros follow.
+template <int first, int fours>
+inline __attribute__((always_inline)) Row four_from(const Row* x) {
+  constexpr int c = first / 4, i = first % 4;
+  return __builtin_shufflevector(x[c], c + 1 < fours ? x[c + 1] : Row{}, i, i + 1, i + 2, i + 3);
+}
+
+// add_window() of block_forward.h: what stands below the window adds a zero. Every column is added to in the same pieces: a load of what several
+// stores still under way have left waits for all of them.
 template <int Band>
-void add_window_by_fours(const double* G, int count, double w, double* column) {
+void add_window_by_fours(const double* G, int count, double w, double* columns) {
+  typedef double Pair __attribute__((vector_size(16), aligned(8), may_alias));
   constexpr int fours = Band / 4 + 1;
   Row x[fours], y[fours], z[fours];
   for (int c = 0; c < fours; ++c) {
@@ -35,19 +44,24 @@ void add_window_by_fours(const double* G, int count, double w, double* column) {
     y[c] = __builtin_shufflevector(yw01, yw23, 0, 1, 4, 5);
     z[c] = __builtin_shufflevector(xz01, xz23, 2, 3, 6, 7);
   }
-#pragma GCC unroll 17
-  for (int k = 0; k <= Band; ++k, column += Band + 1) {
+  unrolled<Band + 1>([&](auto k) __attribute__((always_inline)) {
     if (k >= count) return;
+    double* column = columns + k * (Band + 1);
     const double wx = w * G[4 * k], wy = w * G[4 * k + 1], wz = w * G[4 * k + 2];
-#pragma GCC unroll 5
-    for (int c = k / 4; c < fours; ++c) {
-      Row by = wx * x[c] + wy * y[c] + wz * z[c];
-      if (c == k / 4)
-        for (int i = 0; i < k % 4; ++i) by[i] = 0.0;
-      Four& to = *reinterpret_cast<Four*>(column + 4 * c - k);
-      to += by;
-    }
-  }
+    unrolled<fours>([&](auto c) __attribute__((always_inline)) {
+      constexpr int i = 4 * c, left = Band + 1 - i;
+      if constexpr (k + i <= Band) {
+        const Row by =
+            wx * four_from<k + i, fours>(x) + wy * four_from<k + i, fours>(y) + wz * four_from<k + i, fours>(z);
+        if constexpr (left >= 4) {
+          *reinterpret_cast<Four*>(column + i) += by;
+        } else {
+          if constexpr (left >= 2) *reinterpret_cast<Pair*>(column + i) += __builtin_shufflevector(by, by, 0, 1);
+          if constexpr (left % 2) column[i + left - 1] += by[left - 1];
+        }
+      }
+    });
+  });
 }
 
 // The first `count` of four numbers, and zeros.

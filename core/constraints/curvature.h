@@ -18,10 +18,10 @@ struct CurvatureBinormal {
       : CurvatureBinormal(Vec3<T>(x + 3) - Vec3<T>(x), Vec3<T>(x + 6) - Vec3<T>(x + 3)) {}
   CurvatureBinormal(const Vec3<T>& first, const Vec3<T>& second) : e1(first), e2(second) {
     const T l1 = norm(e1), l2 = norm(e2);
-    inverse = T(1.0) / (l1 * l2 + dot(e1, e2));
-    kb = T(2.0) * inverse * cross(e1, e2);
-    d1 = (l2 / l1) * e1 + e2;
-    d2 = (l1 / l2) * e2 + e1;
+    inverse = 1.0 / (l1 * l2 + dot(e1, e2));
+    kb = 2.0 * inverse * cross(e1, e2);
+    d1 = (l2 * (1.0 / l1)) * e1 + e2;  // frames want these inverses too
+    d2 = (l1 * (1.0 / l2)) * e2 + e1;
   }
 
   // Writes the gradients of the three components (whose values are c) by the three points, row by row.
@@ -34,8 +34,8 @@ struct CurvatureBinormal {
 
   // The gradient of u . kb, of value c, by the two edges.
   void gradient(const Vec3<T>& u, const T& c, Vec3<T>& by_e1, Vec3<T>& by_e2) const {
-    by_e1 = inverse * (T(2.0) * cross(e2, u) - c * d1);
-    by_e2 = inverse * (T(2.0) * cross(u, e1) - c * d2);
+    by_e1 = inverse * (2.0 * cross(e2, u) - c * d1);
+    by_e2 = inverse * (2.0 * cross(u, e1) - c * d2);
   }
 
  private:

@@ -20,27 +20,26 @@ struct CurvatureInFrames : Stencil {
   static void evaluate(const T* x, const T* p, T* C, T* J) {
     const Joint<Stencil, T> joint(x);
     const MaterialFrame<T>&first = joint.first, &second = joint.second;
-    const T one(1.0), half(0.5);
-    const T inverse = one / (one + joint.cosine);  // cos^2(twist/2) = (1 + cos)/2
-    const T to_mean = sqrt(half * inverse);
+    const T inverse = 1.0 / (1.0 + joint.cosine);  // cos^2(twist/2) = (1 + cos)/2
+    const T to_mean = sqrt(0.5 * inverse);
     const Vec3<T> m1 = to_mean * (first.m1 + second.m1), m2 = to_mean * (first.m2 + second.m2);
     const T k1 = dot(m2, joint.curvature.kb), k2 = -dot(m1, joint.curvature.kb);
-    const T half_tangent = half * joint.sine * inverse;  // of half the twist
+    const T half_tangent = 0.5 * joint.sine * inverse;  // of half the twist
     const Vec3<T> transport1 = half_tangent * joint.transport(first),
                   transport2 = half_tangent * joint.transport(second);
 
     // d(kappa) = m . d(kb), the turn of the frame half way, and its stretch by d(twist) as far as that is not turn
-    const auto row = [&](const Vec3<T>& m, const T& k, const T& turned, const T& scale, T* to) {
+    const auto row = [&](const Vec3<T>& m, const T& k, const T& turned, const auto& scale, T* to) {
       Vec3<T> by_e1, by_e2;
       joint.curvature.gradient(m, k, by_e1, by_e2);
-      const T turn = half * turned;
+      const T turn = 0.5 * turned;
       joint.store(scale * (by_e1 + turn * first.by_axis + k * transport1),
                   scale * (by_e2 + turn * second.by_axis + k * transport2), (scale * turn) * first.by_director,
                   (scale * turn) * second.by_director, to);
     };
     C[0] = k1 - p[1];
     C[1] = p[0] * k2 - p[2];
-    row(m2, k1, k2, one, J);
+    row(m2, k1, k2, 1.0, J);
     row(-m1, k2, -k1, p[0], J + Stencil::dofs);
   }
 };

@@ -69,7 +69,7 @@ struct Joint {
       : curvature(Stencil::axis(x, 0), Stencil::axis(x, 1)),
         first(curvature.e1, Vec3<T>(x + Stencil::directors)),
         second(curvature.e2, Vec3<T>(x + Stencil::directors + 3)) {
-    const T share = dot(second.m1, first.t) / (T(1.0) + dot(first.t, second.t));
+    const T share = dot(second.m1, first.t) / (1.0 + dot(first.t, second.t));
     cosine = dot(first.m1, second.m1) - dot(first.m1, second.t) * share;
     sine = dot(first.m2, second.m1) - dot(first.m2, second.t) * share;
   }
@@ -82,7 +82,7 @@ struct Joint {
   }
 
   // kb . (dt1 + dt2)/2, by an axis.
-  Vec3<T> transport(const MaterialFrame<T>& frame) const { return (T(0.5) * frame.inverse_length) * curvature.kb; }
+  Vec3<T> transport(const MaterialFrame<T>& frame) const { return (0.5 * frame.inverse_length) * curvature.kb; }
 };
 
 }  // namespace sheetbend

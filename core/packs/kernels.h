@@ -5,6 +5,9 @@
 namespace sheetbend_blocks {
 struct Table;  // kernels of direct blocks, see core/blocks/kernels.h
 }
+namespace sheetbend_points {
+struct Table;  // of what a substep does point by point, see core/points/kernels.h
+}
 
 namespace sheetbend_packs {
 
@@ -65,6 +68,7 @@ struct KernelTable {
   void (*project_tangents[max_kinds])(const Tangents&, int begin, int end);
   void (*project_vjp[layouts][max_kinds])(const Reverse&, int begin, int end);
   const sheetbend_blocks::Table* blocks;
+  const sheetbend_points::Table* points;
 };
 
 }  // namespace sheetbend_packs

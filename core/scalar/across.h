@@ -12,11 +12,11 @@ struct Across {
   T inverse_length, along, inverse;  // of the axis; of the part across
 
   Across(const Vec3<T>& axis, const Vec3<T>& q) {
-    inverse_length = T(1.0) / norm(axis);
+    inverse_length = 1.0 / norm(axis);
     t = inverse_length * axis;
     along = dot(q, t);
     const Vec3<T> across = q - along * t;
-    inverse = T(1.0) / norm(across);
+    inverse = 1.0 / norm(across);
     m1 = inverse * across;
   }
 };

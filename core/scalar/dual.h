@@ -41,6 +41,12 @@ struct Dual {
     const T inverse = T(1.0) / b.v, q = a.v / b.v;
     return map(a, b, q, inverse, -q * inverse);
   }
+  // Plain numbers have no derivatives to multiply: zero times a number is not known to be zero.
+  friend Dual operator+(double a, Dual b) { return b.v = a + b.v, b; }
+  friend Dual operator/(double a, const Dual& b) {
+    const T inverse = 1.0 / b.v, q = a / b.v;
+    return map(b, q, -q * inverse);
+  }
   friend auto operator>(const Dual& a, const Dual& b) { return a.v > b.v; }
   friend auto operator<(const Dual& a, const Dual& b) { return a.v < b.v; }
 
@@ -72,7 +78,7 @@ const T& primal(const Dual<T, N>& a) {
 template <class T, int N>
 Dual<T, N> sqrt(const Dual<T, N>& a) {
   const T r = sqrt(a.v);
-  return Dual<T, N>::map(a, r, T(0.5) / r);
+  return Dual<T, N>::map(a, r, T(0.5) * (T(1.0) / r));  // mostly 1/r is wanted as well
 }
 template <class T, int N>
 Dual<T, N> sin(const Dual<T, N>& a) {

@@ -41,19 +41,6 @@ struct InFours {
   }
 };
 
-// The numbers that a point of another scalar consists of. Sums and multiples by plain numbers go through them in one loop, without a rule of the
-// scalar and without copies of it.
-template <class T>
-inline constexpr int numbers_per_point = 3 * static_cast<int>(sizeof(T) / sizeof(double));
-template <class T>
-double* numbers_of_point(T* p) {
-  return reinterpret_cast<double*>(p);
-}
-template <class T>
-const double* numbers_of_point(const T* p) {
-  return reinterpret_cast<const double*>(p);
-}
-
 // A sum over points that stays in registers.
 template <class T>
 struct PointSum {
@@ -80,15 +67,10 @@ inline __attribute__((always_inline)) void for_each_point(int begin, int end, F 
   }
 }
 
-// s p, for either kind of point. A plain factor has no derivatives to multiply.
-template <class T>
-Vec3<T> scaled(const T& s, const Vec3<T>& p) {
+// s p, for either kind of point.
+template <class S, class T>
+Vec3<T> scaled(const S& s, const Vec3<T>& p) {
   return s * p;
-}
-template <class T>
-  requires(!std::is_same_v<T, double>)
-Vec3<T> scaled(double s, const Vec3<T>& p) {
-  return {s * p.x, s * p.y, s * p.z};
 }
 
 }  // namespace sheetbend

@@ -32,6 +32,11 @@ template <class T>
   return {s * a.x, s * a.y, s * a.z};
 }
 template <class T>
+  requires(!std::same_as<T, double>)
+[[gnu::always_inline]] inline Vec3<T> operator*(double s, const Vec3<T>& a) {
+  return {s * a.x, s * a.y, s * a.z};
+}
+template <class T>
 T dot(const Vec3<T>& a, const Vec3<T>& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }

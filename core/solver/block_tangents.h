@@ -7,19 +7,10 @@
 
 namespace sheetbend {
 
-// Per run, where the directions of its values stand.
-template <class State>
-std::vector<const double*> value_directions(State& state) {
-  std::vector<const double*> at;
-  for (auto& values : state.values) at.push_back(values.directions());
-  return at;
-}
-
 template <class State, class At>
 void values_tangents(const sheetbend_blocks::Values& values, const sheetbend_blocks::TangentKernels& kernels,
                      State& state, At& at) {
-  const auto own = value_directions(state);
-  kernels.values(values, {own.data(), at.x.directions(), at.C.directions()});
+  kernels.values(values, {state.value_directions.data(), at.x.directions(), at.C.directions()});
 }
 
 template <class State>
@@ -32,10 +23,9 @@ void refer_tangents(const sheetbend_blocks::References& references, int size,
 template <class State, class Solve>
 void project_tangents(const DirectBlock& block, const sheetbend_blocks::TangentKernels& kernels,
                       const sheetbend_blocks::Block& arrays, State& state, int iteration, Solve&& solve_sparse) {
-  const auto values = value_directions(state);
   auto& own = state.at(iteration);
   sheetbend_blocks::Tangents t{};
-  t.values = values.data();
+  t.values = state.value_directions.data();
   t.x = state.at(state.x, iteration).directions();
   t.x_next = state.at(state.x, iteration + 1).directions();
   t.lambda = state.at(state.lambda, iteration).directions();

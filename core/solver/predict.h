@@ -3,6 +3,8 @@
 
 #include <vector>
 
+#include "core/packs/packed_colors.h"
+#include "core/points/point_kernels.h"
 #include "core/scalar/point.h"
 #include "core/scene/scene.h"
 #include "core/solver/options.h"
@@ -33,23 +35,10 @@ struct Weights {
   double eta = 0.0;  // without drag they are found once per eta
 };
 
-template <class T>
-T history(const Bdf& bdf, const T& now, const T& before) {
-  return bdf.before == 0.0 ? now : T(bdf.now) * now + T(bdf.before) * before;
-}
-
 template <class T, class How>
 typename How::Point history(const Bdf& bdf, How, const T* now, const T* before) {
   if (bdf.before == 0.0) return How::load(now);
   return scaled(bdf.now, How::load(now)) + scaled(bdf.before, How::load(before));
-}
-
-// out = history(now, before) + c more, for scalars other than double.
-template <class T>
-void add_to_history(const Bdf& bdf, const T* now, const T* before, double c, const T* more, T* out) {
-  const double *a = numbers_of_point(now), *b = numbers_of_point(before), *m = numbers_of_point(more);
-  double* __restrict to = numbers_of_point(out);
-  for (int i = 0; i < numbers_per_point<T>; ++i) to[i] = history(bdf, a[i], b[i]) + c * m[i];
 }
 
 // Value of something given at knots, (knots, slots, 3), for one slot.
@@ -57,7 +46,7 @@ template <class T>
 Vec3<T> at_knots(const KnotWeights& k, const T* values, int slots, int slot) {
   Vec3<T> sum;
   for (int i = 0; i < k.count; ++i)
-    sum = sum + T(k.weight[i]) * Vec3<T>(values + 3 * ((static_cast<std::size_t>(k.first) + i) * slots + slot));
+    sum = sum + scaled(k.weight[i], Vec3<T>(values + 3 * ((static_cast<std::size_t>(k.first) + i) * slots + slot)));
   return sum;
 }
 
@@ -67,32 +56,60 @@ Vec3<T> extrapolated(const Bdf& bdf, const T* now, const T* before) {
   return T(bdf.extrapolate_now) * Vec3<T>(now) + T(bdf.extrapolate_before) * Vec3<T>(before);
 }
 
+// The kernels for T: of this machine's instruction set for lanes and for duals of forward rollouts, otherwise compiled where they are used.
+template <class T>
+const sheetbend_points::Kernels& point_kernels() {
+  if constexpr (std::is_same_v<T, Pack>)
+    return pack_kernels().points->lanes;
+  else if constexpr (std::is_same_v<T, Dual<double, 4>>)
+    return pack_kernels().points->four_directions;
+  else if constexpr (std::is_same_v<T, Dual<double, 8>>)
+    return pack_kernels().points->eight_directions;
+  else
+    return PointKernels<T>::all;
+}
+
+// What the kernels read, and the weights that they write; where coordinates go is left open.
+template <class T>
+sheetbend_points::Points points_of(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf,
+                                   const SubstepStates<T>& s, Weights<T>& weights) {
+  const auto read = [](const T* from) { return reinterpret_cast<const double*>(from); };
+  const auto write = [](std::vector<T>& to) { return reinterpret_cast<double*>(to.data()); };
+  sheetbend_points::Points p{};
+  p.eta = bdf.eta;
+  p.now = bdf.now;
+  p.before = bdf.before;
+  p.extrapolate_now = bdf.extrapolate_now;
+  p.extrapolate_before = bdf.extrapolate_before;
+  p.inertial = scene.inertial.data();
+  p.director = scene.is_director.data();
+  p.x = read(s.x);
+  p.x_before = read(s.x_before);
+  p.v = read(s.v);
+  p.v_before = read(s.v_before);
+  p.mass = read(in.of(Quantity::mass));
+  p.drag_linear = read(in.of(Quantity::drag_linear));
+  p.drag_quadratic = read(in.of(Quantity::drag_quadratic));
+  p.gravity = read(in.of(Quantity::gravity));
+  p.w = write(weights.w);
+  p.kept = scene.has_drag ? write(weights.kept) : nullptr;
+  return p;
+}
+
 // Drag c = c1 + c2 |v| is implicit: it adds eta c to the mass that this substep's projections see, so the reaction of the constraints feels it.
 template <class T>
 void weigh(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, const SubstepStates<T>& s,
            Weights<T>& weights) {
-  if (weights.eta == bdf.eta && !scene.has_drag) return;
-  weights.eta = bdf.eta;
-  const T* mass = in.of(Quantity::mass);
-  const T eta(bdf.eta);
-  for (int n = 0; n < scene.nodes(); ++n) {
-    if (scene.role[n] != Role::free) {
-      weights.w[n] = T(0.0);
-      continue;
-    }
-    if (!scene.inertial[n]) {
-      weights.w[n] = T(1.0) / (mass[n] * eta * eta);
-      continue;
-    }
-    T effective = mass[n];
-    if (scene.has_drag) {
-      const Vec3<T> v = extrapolated(bdf, s.v + scene.first_dof[n], s.v_before + scene.first_dof[n]);
-      effective +=
-          eta * (in.of(Quantity::drag_linear)[n] + in.of(Quantity::drag_quadratic)[n] * sqrt_or_zero(dot(v, v)));
-    }
-    weights.w[n] = T(1.0) / effective;
-    if (scene.has_drag) weights.kept[n] = mass[n] * weights.w[n];
+  if (weights.eta != bdf.eta) {
+    weights.eta = bdf.eta;
+    const T* mass = in.of(Quantity::mass);
+    const T eta(bdf.eta);
+    for (int n = 0; n < scene.nodes(); ++n)
+      weights.w[n] = scene.inertial[n]             ? T(1.0) / mass[n]
+                     : scene.role[n] == Role::free ? T(1.0) / (mass[n] * eta * eta)
+                                                   : T(0.0);
   }
+  if (scene.has_drag) point_kernels<T>().weigh(points_of(scene, in, bdf, s, weights), 0, scene.nodes());
 }
 
 // Loops over particles capture by value: a store may go anywhere, so what a reference leads to would be loaded again for each.
@@ -101,51 +118,50 @@ void weigh(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, const 
 // they turned, driven nodes go where their boundary is.
 template <class T>
 void predict(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, double t_next, const SubstepStates<T>& s,
-             const Weights<T>& weights, int threads, const Coordinates<T>& q) {
+             Weights<T>& weights, int threads, const Coordinates<T>& q) {
   const T eta(bdf.eta);
-  const T gravity[4] = {eta * in.of(Quantity::gravity)[0], eta * in.of(Quantity::gravity)[1],
-                        eta * in.of(Quantity::gravity)[2], T(0.0)};
-  const double step = bdf.eta;
-  const T* kept = scene.has_drag ? weights.kept.data() : nullptr;
-  const int* first_dof = scene.first_dof.data();
-  parallel_for(scene.nodes(), threads, points_per_thread, [=](int begin, int end) {
-    if constexpr (std::is_same_v<T, double>) {
+  if constexpr (std::is_same_v<T, double>) {
+    const double gravity[4] = {eta * in.of(Quantity::gravity)[0], eta * in.of(Quantity::gravity)[1],
+                               eta * in.of(Quantity::gravity)[2], 0.0};
+    const double* kept = scene.has_drag ? weights.kept.data() : nullptr;
+    const int* first_dof = scene.first_dof.data();
+    parallel_for(scene.nodes(), threads, points_per_thread, [=](int begin, int end) {
       for_each_point<T>(begin, end, [=](int n, auto how) {
         const int dof = first_dof[n];
         auto v = history(bdf, how, s.v + dof, s.v_before + dof) + how.load(gravity);
         if (kept) v = scaled(kept[n], v);
-        how.store(q.of(n), history(bdf, how, s.x + dof, s.x_before + dof) + scaled(step, v));
+        how.store(q.of(n), history(bdf, how, s.x + dof, s.x_before + dof) + scaled(eta, v));
       });
-    } else {
-      for (int n = begin; n < end; ++n) {
-        const int dof = first_dof[n];
-        T v[3];
-        add_to_history(bdf, s.v + dof, s.v_before + dof, 1.0, gravity, v);
-        if (kept)
-          for (T& component : v) component = kept[n] * component;
-        add_to_history(bdf, s.x + dof, s.x_before + dof, step, v, q.of(n));
-      }
+    });
+    for (const Director& d : scene.directors) {
+      const int dof = scene.first_dof[d.node];
+      extrapolated(bdf, s.x + dof, s.x_before + dof).store(q.of(d.node));
     }
-  });
+  } else {
+    auto points = points_of(scene, in, bdf, s, weights);
+    points.q = reinterpret_cast<double*>(q.data);
+    points.stride = q.stride;
+    parallel_for(scene.nodes(), threads, points_per_thread,
+                 [&](int begin, int end) { point_kernels<T>().predict(points, begin, end); });
+  }
   if (!scene.loaded.empty()) {
     const KnotWeights force = scene.force.at(t_next);
     for (std::size_t i = 0; i < scene.loaded.size(); ++i) {
       const int n = scene.loaded[i];
+      if (!scene.inertial[n]) continue;
       const Vec3<T> f =
           at_knots(force, in.of(Quantity::force), static_cast<int>(scene.loaded.size()), static_cast<int>(i));
       (eta * (weights.w[n] * (eta * f))).add_to(q.of(n));
     }
   }
-  for (const Director& d : scene.directors) {
-    const int dof = scene.first_dof[d.node];
-    extrapolated(bdf, s.x + dof, s.x_before + dof).store(q.of(d.node));
-  }
   for (const int n : scene.pinned) Vec3<T>(s.x + scene.first_dof[n]).store(q.of(n));
   if (scene.driven.empty()) return;
   const KnotWeights boundary = scene.boundary.at(t_next);
-  for (std::size_t i = 0; i < scene.driven.size(); ++i)
-    at_knots(boundary, in.of(Quantity::boundary), static_cast<int>(scene.driven.size()), static_cast<int>(i))
-        .store(q.of(scene.driven[i]));
+  const std::size_t slots = scene.driven.size();
+  const T* values = in.of(Quantity::boundary) + 3 * slots * boundary.first;
+  for (std::size_t i = 0; i < slots; ++i)
+    point_kernels<T>().interpolate(reinterpret_cast<const double*>(values + 3 * i), 3 * slots, boundary.weight.data(),
+                                   boundary.count, reinterpret_cast<double*>(q.of(scene.driven[i])));
 }
 
 }  // namespace sheetbend

@@ -42,6 +42,7 @@ struct BlockState {
   std::vector<Iteration> iterations;
   std::vector<Numbers<T>> x, lambda;  // before each iteration and after the last; one of each where nothing is kept
   std::vector<Numbers<T>> values;     // per run
+  std::vector<const double*> value_directions;  // of duals, where those of `values` stand
   std::vector<sheetbend_blocks::Run> runs;
   Numbers<T> C_r, diagonal;
   // What damped constraints are at a state that damping refers to.
@@ -93,6 +94,9 @@ void BlockState<T>::resize(const Scene& scene, const DirectBlock& block, int kep
     const Group& group = scene.groups[block.runs[r].group];
     values[r].assign(block.runs[r].items.size() * sheetbend_blocks::value_count(group.damped, group.parameters));
   }
+  value_directions.clear();
+  if constexpr (carries_tangents<T>)
+    for (Numbers<T>& v : values) value_directions.push_back(v.directions());
 }
 
 // What does not change while eta does not: coefficients and the constraints' own parameters.

@@ -3,6 +3,7 @@
 // coordinates well scaled and carries a frame along as its axis turns. Those that are held stay as given. And the reverse.
 #pragma once
 
+#include "core/points/kernels.h"
 #include "core/scalar/across.h"
 #include "core/scene/scene.h"
 
@@ -23,6 +24,18 @@ void retract_directors(const Scene& scene, T* x) {
     const Vec3<T> q(at(d.node));
     (d.is_normal() ? (T(1.0) / norm(q)) * q : across_axis<T>(d, at).m1).store(at(d.node));
   }
+}
+
+// The same frames for the kernels of core/points.
+inline std::vector<sheetbend_points::Frame> frames_of(const Scene& scene) {
+  std::vector<sheetbend_points::Frame> frames;
+  const auto at = [&](int node) { return scene.first_dof[node]; };
+  for (const Director& d : scene.directors) {
+    if (scene.role[d.node] != Role::free) continue;
+    const bool leans = d.normal >= 0;
+    frames.push_back({at(d.node), leans ? -1 : at(d.tail), at(leans ? d.normal : d.head)});
+  }
+  return frames;
 }
 
 // q(node) gives the coordinates before. x_bar (dofs) goes in as the cotangent of those after, and comes out as theirs. What a director

@@ -27,10 +27,12 @@ struct SubstepRecord {
   PackState<std::conditional_t<in_packs<T>, T, double>> packs;  // of colors that go through the kernels
   std::vector<BlockState<T>> blocks;
   std::vector<VolumeState<T>> volumes;
+  std::vector<sheetbend_points::Frame> frames;  // that the kernels retract
 
   void resize(const Scene& scene, const Plan& plan, bool keep_iterations) {
     weights.w.resize(scene.nodes());
     if (scene.has_drag) weights.kept.resize(scene.nodes());
+    if constexpr (!std::is_same_v<T, double>) frames = frames_of(scene);
     const int kept = keep_iterations ? plan.options.iterations : 0;
     blocks.resize(plan.blocks.size());
     for (std::size_t b = 0; b < blocks.size(); ++b) blocks[b].resize(scene, plan.blocks[b], kept);
@@ -159,14 +161,14 @@ void correct(const Scene& scene, const Plan& plan, const Inputs<const T>& in, co
 
 // v = (q - history(x))/eta, and q to x_next. Says whether all of q is finite.
 template <class T>
-bool read_off(const Scene& scene, const Bdf& bdf, const SubstepStates<T>& s, int threads, const Coordinates<T>& q,
-              T* x_next, T* v) {
+bool read_off(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, const SubstepStates<T>& s,
+              Weights<T>& weights, int threads, const Coordinates<T>& q, T* x_next, T* v) {
   std::atomic<bool> finite = true;
-  const double rate = 1.0 / bdf.eta;
-  const int* first_dof = scene.first_dof.data();
-  parallel_for(scene.nodes(), threads, points_per_thread, [=, &finite](int begin, int end) {
-    // q - q, which only what is finite has as zero
-    if constexpr (std::is_same_v<T, double>) {
+  // q - q, which only what is finite has as zero
+  if constexpr (std::is_same_v<T, double>) {
+    const double rate = 1.0 / bdf.eta;
+    const int* first_dof = scene.first_dof.data();
+    parallel_for(scene.nodes(), threads, points_per_thread, [=, &finite](int begin, int end) {
       PointSum<T> difference;
       for_each_point<T>(begin, end, [=, &difference](int n, auto how) {
         const int dof = first_dof[n];
@@ -177,23 +179,17 @@ bool read_off(const Scene& scene, const Bdf& bdf, const SubstepStates<T>& s, int
       });
       const Vec3<T> d = difference.total();
       if (!all_finite(d.x) || !all_finite(d.y) || !all_finite(d.z)) finite = false;
-    } else {
-      double difference[numbers_per_point<T>]{};
-      for (int n = begin; n < end; ++n) {
-        const int dof = first_dof[n];
-        const double *now = numbers_of_point(q.of(n)), *a = numbers_of_point(s.x + dof);
-        const double* b = numbers_of_point(s.x_before + dof);
-        double* __restrict rates = numbers_of_point(v + dof);
-        for (int i = 0; i < numbers_per_point<T>; ++i) {
-          rates[i] = rate * (now[i] - history(bdf, a[i], b[i]));
-          difference[i] += now[i] - now[i];
-        }
-        if (x_next + dof != q.of(n)) std::copy_n(q.of(n), 3, x_next + dof);
-      }
-      for (const double d : difference)
-        if (!(d == 0.0)) finite = false;
-    }
-  });
+    });
+  } else {
+    auto points = points_of(scene, in, bdf, s, weights);
+    points.q = reinterpret_cast<double*>(q.data);
+    points.stride = q.stride;
+    points.x_next = reinterpret_cast<double*>(x_next);
+    points.v_next = reinterpret_cast<double*>(v);
+    parallel_for(scene.nodes(), threads, points_per_thread, [&](int begin, int end) {
+      if (!point_kernels<T>().read_off(points, begin, end)) finite = false;
+    });
+  }
   return finite;
 }
 
@@ -202,8 +198,13 @@ template <class T>
 bool substep(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf, double t_next,
              const SubstepStates<T>& s, T* x_next, T* v, SubstepRecord<T>& record) {
   correct(scene, plan, in, bdf, t_next, s, x_next, record);
-  const bool finite = read_off(scene, bdf, s, plan.options.threads, record.coordinates(plan, x_next), x_next, v);
-  retract_directors(scene, x_next);
+  const bool finite =
+      read_off(scene, in, bdf, s, record.weights, plan.options.threads, record.coordinates(plan, x_next), x_next, v);
+  if constexpr (std::is_same_v<T, double>)
+    retract_directors(scene, x_next);
+  else
+    point_kernels<T>().retract(record.frames.data(), static_cast<int>(record.frames.size()),
+                               reinterpret_cast<double*>(x_next));
   yield(scene, in, x_next);
   return finite;
 }

@@ -42,6 +42,16 @@ Observations make_observations(const py::dict& d) {
   return o;
 }
 
+BoundaryCorrection make_correction(const py::dict& d) {
+  BoundaryCorrection c;
+  c.sigma = get<double>(d, "sigma");
+  c.given = numbers(d, "given");
+  c.first = whole_numbers(d["first"]);
+  c.target = whole_numbers(d["target"]);
+  c.weight = numbers(d, "weight");
+  return c;
+}
+
 Experiment make_experiment(const py::dict& d) {
   Experiment e;
   e.name = get<std::string>(d, "name");
@@ -56,6 +66,7 @@ Experiment make_experiment(const py::dict& d) {
   e.plan = make_plan(*e.scene, o);
   e.map = make_map(get<py::dict>(d, "map"));
   e.observed = make_observations(get<py::dict>(d, "observed"));
+  if (!d["correction"].is_none()) e.correction = make_correction(get<py::dict>(d, "correction"));
   e.is_static = get<bool>(d, "is_static");
   e.start = get<bool>(d, "starts_at_equilibrium") ? Start::equilibrium : Start::given;
   e.t0 = get<double>(d, "t0");
@@ -127,6 +138,27 @@ void bind_problem(py::module_& m) {
              }
              return to_numpy(markers, {static_cast<py::ssize_t>(markers.size() / 3), 3});
            })
+      .def("respond",
+           [](const Problem& p, int experiment, const Array& u, const Array& changes) {
+             expect_size(u, p.parameters(), "u");
+             const std::size_t numbers = p.correction(experiment).size();
+             const auto count = numbers == 0 ? 0 : static_cast<int>(changes.size() / numbers);
+             expect_size(changes, count * numbers, "changes");
+             std::vector<double> moved;
+             {
+               py::gil_scoped_release release;
+               SignalInterrupt interrupt;
+               moved = p.respond(experiment, u.data(), changes.data(), count, &interrupt);
+             }
+             return to_numpy(moved, {count, static_cast<py::ssize_t>(moved.size()) / std::max(count, 1)});
+           })
+      .def("correction",
+           [](const Problem& p, int experiment) {
+             const std::vector<double>& b = p.correction(experiment);
+             return to_numpy(b, {static_cast<py::ssize_t>(b.size())});
+           })
+      .def("absorbed", &Problem::absorbed)
+      .def("relinearize", &Problem::relinearize)
       // The compiled evaluation, for sheetbend._ceres; the problem must outlive it.
       .def("evaluation", [](const Problem& p) {
         const auto call = [](const void* problem, const double* u, double* residual, double* jacobian) {

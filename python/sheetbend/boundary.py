@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +15,23 @@ from .quantities import Term
 Array = np.ndarray
 
 
+@dataclass(frozen=True, eq=False)
+class Following:
+    """Driven particles that move with recorded markers.
+
+    Attributes:
+        slots: (k,) their places among the driven particles.
+        markers: names.
+        weights: (k, markers).
+        from_placed: they move from where they are placed by what the markers do after the first knot.
+    """
+
+    slots: Array
+    markers: tuple[str, ...]
+    weights: Array
+    from_placed: bool
+
+
 class Boundary:
     """The boundary motion of a scene, at one set of knots.
 
@@ -21,12 +39,14 @@ class Boundary:
         driven: particles.
         times: (knots,) s.
         interpolation: "cubic" or "linear".
+        following: those of the driven particles that move with recorded markers.
     """
 
     def __init__(self) -> None:
         self.driven: list[int] = []
         self.times: Array = np.zeros(0)
         self.interpolation = "cubic"
+        self.following: list[Following] = []
         self._values: list[Array] = []
         self._terms: list[tuple[int, Array, dict[str, str]]] = []
 
@@ -49,6 +69,36 @@ class Boundary:
         self.times, self.interpolation = t, interpolation
         self.driven += which
         self._values += [x[:, k] for k in range(len(which))]
+
+    def follow(
+        self,
+        particles: ArrayLike,
+        times: ArrayLike,
+        motion: ArrayLike,
+        markers: Sequence[str],
+        weights: ArrayLike | None,
+        placed: ArrayLike | None,
+        interpolation: str,
+        particle_count: int,
+    ) -> None:
+        """See `Scene.follow`."""
+        which = indices("follow", particles, particle_count)
+        names = tuple(markers)
+        if not names or len(set(names)) != len(names):
+            raise SceneError("follow.markers", "must be names, each once", names, "name every marker of the motion")
+        knots = np.size(times)
+        x = finite("follow.motion", motion, (knots, len(names), 3), SceneError)
+        if weights is None and len(names) != len(which):
+            fix = "give weights (particles, markers), or one marker for each particle"
+            raise SceneError("follow.markers", "are not one for each particle", len(names), fix)
+        w = np.eye(len(which)) if weights is None else weights
+        w = finite("follow.weights", w, (len(which), len(names)), SceneError)
+        x = np.einsum("pm,kma->kpa", w, x)
+        if placed is not None:
+            x = x - x[0] + finite("follow.placed", placed, (len(which), 3), SceneError)
+        first = len(self.driven)
+        self.drive(which, times, x, interpolation, particle_count)
+        self.following.append(Following(first + np.arange(len(which)), names, w, placed is not None))
 
     def add_term(
         self, particle: int, coefficients: ArrayLike, factors: Mapping[str, str], quantities: Collection[str]

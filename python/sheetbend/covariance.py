@@ -94,6 +94,7 @@ def covariance(
     jacobian: Array,
     layout: Layout | None = None,
     prior_jacobian: Array | None = None,
+    taken: float = 0.0,
 ) -> Covariance:
     """Covariance of a least-squares estimate from its residuals.
 
@@ -101,7 +102,10 @@ def covariance(
         residuals: (rows,) weighted residuals of the data at the minimum.
         jacobian: (rows, p) their derivative; of full column rank together with the prior rows.
         layout: where each row comes from; one series of equally spaced samples by default.
-        prior_jacobian: (priors, p) rows of the priors; their residuals have unit variance by their meaning.
+        prior_jacobian: (priors, p) rows of the priors; their residuals have unit variance by their meaning. So have the
+            rows that unknowns leave which were solved for on the way (X/s of adjoint/fit/projection.h): the estimate's
+            error is B times the jacobian's rows times all errors, theirs included.
+        taken: degrees of freedom of the residuals that such unknowns took away.
 
     Raises:
         InputError: shapes disagree, or there are no more rows than parameters.
@@ -116,7 +120,7 @@ def covariance(
     jacobian, prior = jacobian / size, prior / size
     bread = np.linalg.inv(jacobian.T @ jacobian + prior.T @ prior)
     influence = jacobian @ bread  # of a row on the estimate
-    absorbed = float((influence * jacobian).sum())  # parameters' worth of residual that the fit took away
+    absorbed = taken + float((influence * jacobian).sum())  # parameters' worth of residual that the fit took away
     if rows - absorbed < 0.5:
         raise InputError("residuals", "must outnumber the free parameters", rows, f"give more than {count} rows")
     variance = float(residuals @ residuals) / (rows - absorbed)

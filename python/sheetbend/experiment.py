@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from .checks import is_number
+from .correction import Correction, recorded_noise
 from .errors import InputError, RecordingError
 from .markers import Place, places_for
 from .quantities import Term, product
@@ -41,6 +43,10 @@ class Experiment:
         offsets: per marker name, names of quantities that are added to its offset (tangent, normal, tangent x normal),
             None for none.
         sigma: expected error of a marker, m: scales residuals against priors and between experiments.
+        driven_sigma: noise of the markers that the scene follows (`Scene.follow`), m per coordinate, or "estimate"
+            (from the recording itself): the fit then estimates their true motion along with the parameters, one
+            correction for every frame and axis with this prior, and its intervals allow for it. `sigma` must be as
+            honest, since the two are weighed against each other. None = the recorded motion is taken for the truth.
         axes: coordinates that count, such as "xz".
         radius: distance of the markers from a pivot, m: errors are then reported as angles in rad, rms
             distance/radius; None = in m.
@@ -63,6 +69,7 @@ class Experiment:
     time_offset: str | None = None
     offsets: Mapping[str, tuple[str | None, str | None, str | None]] = field(default_factory=dict)
     sigma: float = 1e-3
+    driven_sigma: float | str | None = None
     axes: str = "xyz"
     radius: float | None = None
     loss: str = "squares"
@@ -78,6 +85,7 @@ class Experiment:
             raise InputError(
                 f"{self.name}.sigma", "must be positive", self.sigma, "give the expected error of a marker in m"
             )
+        self._check_driven_sigma()
         if not self.axes or set(self.axes) - set("xyz") or len(set(self.axes)) != len(self.axes):
             raise InputError(f"{self.name}.axes", "must be some of x, y, z", self.axes, "give such as 'xz'")
         if self.radius is not None and not (math.isfinite(self.radius) and self.radius > 0):
@@ -126,6 +134,42 @@ class Experiment:
                 self.held_out,
                 "hold out whole recordings: predict = 'mean'",
             )
+
+    def _check_driven_sigma(self) -> None:
+        field, given = f"{self.name}.driven_sigma", self.driven_sigma
+        if given is None:
+            return
+        if given != "estimate" and not (is_number(given) and given > 0):  # type: ignore[operator]
+            fix = "give the noise of the driven markers in m, or 'estimate'"
+            raise InputError(field, "must be positive", given, fix)
+        if self.static:
+            fix = "leave it out: the frames of an equilibrium are averaged, and so is their noise"
+            raise InputError(field, "makes no sense for an equilibrium", given, fix)
+        if not self.scene.boundary.following:
+            fix = "let particles follow markers (Scene.follow, [[scene.drive]], [[scene.cloth.grip]]), or leave it out"
+            raise InputError(field, "has no driven marker to correct", given, fix)
+        assert self.driven_noise is not None
+
+    @cached_property
+    def driven_noise(self) -> float | None:
+        """Noise of the markers that the scene follows, m: `driven_sigma`, "estimate" carried out; None without one.
+
+        Raises:
+            InputError: the recording shows too little of the markers that are followed to estimate from.
+        """
+        if self.driven_sigma != "estimate":
+            return None if self.driven_sigma is None else float(self.driven_sigma)
+        found = self.recorded_noise()
+        if not found:
+            fix = "give it in m"
+            raise InputError(f"{self.name}.driven_sigma", "cannot be estimated from the recording", found, fix)
+        return found
+
+    def recorded_noise(self) -> float | None:
+        """Noise that the markers show which the scene follows, m per coordinate; None where there are none, or the
+        recording shows too little of them."""
+        markers = tuple(dict.fromkeys(m for part in self.scene.boundary.following for m in part.markers))
+        return None if self.static else recorded_noise(self.recording.piece(self.t0, None), markers)
 
     @cached_property
     def places(self) -> tuple[Place | None, ...]:
@@ -242,8 +286,17 @@ class Experiment:
                 f"use one of: {', '.join(known)}",
             )
 
-    def core(self, recording: Recording) -> dict[str, Any]:
-        """The experiment on (part of) its recording, for the compiled core."""
+    def correction(self, recording: Recording) -> Correction | None:
+        """Of the markers that the scene follows, as far as (part of) the recording feels it; None without any."""
+        return None if self.static else Correction.of(self.scene, float(recording.times[-1]) - self.t0)
+
+    def core(self, recording: Recording, corrected: np.ndarray | None = None) -> dict[str, Any]:
+        """The experiment on (part of) its recording, for the compiled core.
+
+        Args:
+            corrected: (knots, markers, 3) m, a known correction of the markers that the scene follows; by default the
+                fit finds it where there is a `driven_sigma`, and otherwise it is zero.
+        """
         compiled = self.scene.compiled
         offsets = [place.offset or (0.0, 0.0, 0.0) for place in self.compared_places]
         observed = self.observed(recording)
@@ -251,6 +304,8 @@ class Experiment:
             marker["carries_offset"] = marker["carries_offset"] or self.recording.markers[m] in self.offsets
         map_ = compiled.map(3 * len(offsets) + 1, self.extra_terms())
         map_["base"][compiled.core.inputs : -1] = np.ravel(offsets)
+        correction = self.correction(recording)
+        sigma = 0.0 if corrected is not None else self.driven_noise or 0.0
         return {
             "name": self.name,
             "scene": compiled.core,
@@ -262,6 +317,9 @@ class Experiment:
             "cg_iterations": self.solver.cg_iterations,
             "map": map_,
             "observed": observed,
+            "correction": None
+            if correction is None
+            else correction.core(compiled.layout["boundary"][0], sigma, corrected),
             "is_static": self.static,
             "starts_at_equilibrium": self.start == "equilibrium",
             "t0": 0.0,

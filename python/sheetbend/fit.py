@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from .discretization import Refinement, refined_estimates, to_the_limit
+from .driven_noise import doubts
 from .errors import InputError
 from .experiment import Experiment
 from .floors import solver_floors
-from .identifiability import Identifiability, identify
+from .identifiability import Identifiability, Nuisance, identify
 from .leave_one_out import MEANING, companions, each_left_out
 from .optimizers import Minimum, Observer, refit
 from .parameters import Parameter, Parameters
@@ -38,11 +39,14 @@ class Fit:
         result: see `FitResult`; `result.report()` is the text.
         comparisons: measured against simulated, per experiment.
         parameters: as given, private ones not expanded.
+        corrections: by experiment with a `driven_sigma`, (knots, markers, 3) m, what the fit added to the markers that
+            the scene follows, up to the end of the fitted part.
     """
 
     result: FitResult
     comparisons: tuple[Comparison, ...]
     parameters: Parameters
+    corrections: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Estimate:
         return self.result[name]
@@ -137,9 +141,7 @@ def fit(
     best = ends[0]
     values = problem.parameters.to_physical(best.u)
 
-    def conclude(
-        refitter: str | None,
-    ) -> tuple[tuple[Refit, ...], Identifiability, dict[str, float], tuple[Given, ...]]:
+    def conclude(refitter: str | None) -> _Conclusion:
         refits = (
             ()
             if refine is None or refitter is None
@@ -148,22 +150,25 @@ def fit(
         more = {} if systematic is None else systematic(problem, best.u)
         refined = to_the_limit(refits, problem.parameters, values)
         judged = _judge(problem, best.u, refined, more, refitter if profiles else None)
-        return refits, judged, *predicted_values(experiments, wanted, values, refitter, threads)
+        found = predicted_values(experiments, wanted, values, refitter, threads)
+        doubted = () if refitter is None else doubts(problem, best.u, judged)
+        return _Conclusion(refits, judged, *found, doubted)
 
     left_out: dict[str, Comparison] = {}
     try:
-        refits, judged, all_values, extra = conclude(None if interrupted else name)
+        end = conclude(None if interrupted else name)
         if leave_one_out and not interrupted:
             left_out = each_left_out(fitted, wanted, values, name, threads)
     except KeyboardInterrupt:
         interrupted = True
-        refits, judged, all_values, extra = conclude(None)
-    comparisons = compare(experiments, wanted, all_values, threads)
+        end = conclude(None)
+    judged, corrected = end.judged, problem.corrections(best.u) | end.corrected
+    comparisons = compare(experiments, wanted, end.values, threads, corrected)
     rows = problem.core.first_rows
     count = {e.name: rows[i + 1] - rows[i] for i, e in enumerate(fitted)}
     result = FitResult(
         estimates=judged.estimates,
-        recordings=tuple(_errors(c, count, left_out) for c in comparisons),
+        recordings=tuple(_errors(c, count, left_out, corrected) for c in comparisons),
         cost=best.cost,
         first_cost=best.first,
         jacobian_seconds=problem.seconds.get(True),
@@ -174,7 +179,7 @@ def fit(
         converged=best.converged,
         interrupted=interrupted,
         message=best.message,
-        given=_given(problem.parameters, values) + extra,
+        given=_given(problem.parameters, values) + end.given,
         correlations=judged.correlations,
         gauges=tuple(g.words for g in judged.gauges),
         baseline="; ".join(
@@ -188,10 +193,22 @@ def fit(
             )
             for m in ends
         ),
-        refits=refits,
-        warnings=_warnings(ends, best, interrupted),
+        refits=end.refits,
+        warnings=_warnings(ends, best, interrupted) + end.doubts,
     )
-    return Fit(result, tuple(comparisons), wanted)
+    return Fit(result, tuple(comparisons), wanted, corrected)
+
+
+@dataclass(frozen=True)
+class _Conclusion:
+    """What follows from a minimum."""
+
+    refits: tuple[Refit, ...]
+    judged: Identifiability
+    values: dict[str, float]  # of all experiments
+    given: tuple[Given, ...]
+    corrected: dict[str, np.ndarray]  # of experiments that are only predicted
+    doubts: tuple[str, ...]
 
 
 def _experiments(
@@ -222,8 +239,8 @@ def _judge(
     refitter: str | None,
 ) -> Identifiability:
     """Verdicts and intervals; without a refitter the intervals are the linear ones."""
-    _, r, J = problem.evaluate(u)
-    rows = problem.core.data_rows
+    _, r, J = problem.evaluate_exactly(u)
+    rows, behind = problem.prior_rows
     return identify(
         problem.parameters,
         u,
@@ -235,6 +252,7 @@ def _judge(
         systematic=systematic,
         profile=None if refitter is None or len(problem.parameters.free) == 1 else _profile(problem, u, refitter),
         cost=lambda at: _cost(problem, at),
+        nuisance=Nuisance(J[behind:], sum(map(problem.core.absorbed, range(len(problem.experiments))))),
     )
 
 
@@ -267,12 +285,19 @@ def _profile(problem: FitProblem, u: np.ndarray, refitter: str) -> Callable[[str
     return cost
 
 
-def _errors(c: Comparison, rows: Mapping[str, int], left_out: Mapping[str, Comparison]) -> RecordingFit:
+def _errors(
+    c: Comparison, rows: Mapping[str, int], left_out: Mapping[str, Comparison], corrected: Mapping[str, np.ndarray]
+) -> RecordingFit:
     found = c.errors(rows.get(c.experiment.name, 0))
+    if c.experiment.name in corrected:
+        by = float(np.sqrt(np.mean(corrected[c.experiment.name] ** 2)))
+        found = replace(found, driven_sigma=c.experiment.driven_noise, corrected_by=by)
     if c.experiment.name not in left_out:
         return found
     other = left_out[c.experiment.name].errors(0)
-    return replace(other, rows=found.rows, rms=found.rms)
+    return replace(
+        other, rows=found.rows, rms=found.rms, driven_sigma=found.driven_sigma, corrected_by=found.corrected_by
+    )
 
 
 def _given(parameters: Parameters, values: Mapping[str, float]) -> tuple[Given, ...]:

@@ -51,6 +51,19 @@ class Floor:
 
 
 @dataclass(frozen=True)
+class Nuisance:
+    """What unknowns that are solved for at every point of a fit, such as corrections of driven markers, leave in it.
+
+    Attributes:
+        jacobian: (unknowns, free) derivative of their priors' residuals in internal coordinates.
+        taken: degrees of freedom of the data's residuals that they took.
+    """
+
+    jacobian: Array
+    taken: float
+
+
+@dataclass(frozen=True)
 class Identifiability:
     """What the data tell about the free parameters, in their order.
 
@@ -83,6 +96,7 @@ def identify(
     systematic: Mapping[str, float] | None = None,
     profile: Callable[[str, float], float] | None = None,
     cost: Callable[[Array], float] | None = None,
+    nuisance: Nuisance | None = None,
     rank_tolerance: float = RANK_TOLERANCE,
 ) -> Identifiability:
     """Judge every free parameter of a finished fit.
@@ -100,6 +114,7 @@ def identify(
             refitted; it is asked about weak parameters only.
         cost: (internal point) -> cost there, infinite where it has none; where it rises towards both linear
             ends of a parameter as the linear picture says, no profile is needed.
+        nuisance: what unknowns left that were solved for at every point.
         rank_tolerance: see `gauge.RANK_TOLERANCE`.
 
     Raises:
@@ -108,7 +123,8 @@ def identify(
     """
     floors, discretization, systematic = floors or {}, discretization or {}, systematic or {}
     _check(parameters, internal, residuals, jacobian, {*floors, *discretization, *systematic})
-    judge = _Judge(parameters, internal, residuals, jacobian, layout, rank_tolerance, profile, cost)
+    nuisance = nuisance or Nuisance(np.zeros((0, len(parameters.free))), 0.0)
+    judge = _Judge(parameters, internal, residuals, jacobian, layout, rank_tolerance, profile, cost, nuisance)
     estimates = tuple(
         judge.estimate(column, floors.get(name), (discretization.get(name, 0.0), systematic.get(name, 0.0)))
         for column, name in enumerate(parameters.free)
@@ -152,14 +168,16 @@ class _Judge:
         tolerance: float,
         profile: Callable[[str, float], float] | None,
         cost: Callable[[Array], float] | None,
+        nuisance: Nuisance,
     ) -> None:
         self.parameters, self.internal, self.profile, self.cost = parameters, internal, profile, cost
         self.quantile = require("scipy.special", "fit").stdtrit
         names, log = parameters.free, [parameters[name].log for name in parameters.free]
-        prior = parameters.prior_jacobian()
-        self.rows = np.vstack([jacobian, prior])
+        data = np.vstack([jacobian, nuisance.jacobian])
+        self.rows = np.vstack([data, parameters.prior_jacobian()])
         self.space = null_space(self.rows, names, log, tolerance)
-        seen_by_data = null_space(jacobian, names, log, tolerance).determined
+        seen_by_data = null_space(data, names, log, tolerance).determined
+        prior = self.rows[len(jacobian) :]
         self.by_prior = set(self.space.determined) - set(seen_by_data)
         lower, upper = parameters.bounds()
         near = _AT_BOUND * np.maximum(np.abs(internal), 1e-3)
@@ -168,15 +186,15 @@ class _Judge:
         unique = [column for column in range(len(names)) if column not in self.space.pivots]
         # A parameter at its bound stays there for the others; its own interval lets all of them move.
         self.columns = [column for column in unique if not bounded[column]]
-        self.spread = covariance(residuals, jacobian[:, self.columns], layout, prior[:, self.columns])
+        self.spread = covariance(residuals, jacobian[:, self.columns], layout, prior[:, self.columns], nuisance.taken)
         # Half-widths that the data would leave with all other parameters known and without priors.
-        size = np.maximum(np.linalg.norm(jacobian, axis=0), np.finfo(float).tiny)
+        size = np.maximum(np.linalg.norm(data, axis=0), np.finfo(float).tiny)
         with np.errstate(over="ignore"):  # infinite where the data do not depend on it
             self.alone = 2 * math.sqrt(self.spread.residual_variance) / size
         self.wide_columns, self.wide = self.columns, self.spread
         if len(self.columns) < len(unique):
             self.wide_columns = unique
-            self.wide = covariance(residuals, jacobian[:, unique], layout, prior[:, unique])
+            self.wide = covariance(residuals, jacobian[:, unique], layout, prior[:, unique], nuisance.taken)
         self.space = replace(self.space, gauges=tuple(self._measured(gauge) for gauge in self.space.gauges))
 
     def estimate(self, column: int, floor: Floor | None, more: tuple[float, float]) -> Estimate:

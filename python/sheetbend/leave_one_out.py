@@ -62,5 +62,5 @@ def _left_out(
     problem = FitProblem(others, part, threads=threads)
     end = refit(problem, problem.parameters.to_internal(values), refitter)
     every = [*others, replace(e, predict="mean")]
-    found, _ = predicted_values(every, part, problem.parameters.to_physical(end.u), refitter, threads)
+    found, _, _ = predicted_values(every, part, problem.parameters.to_physical(end.u), refitter, threads)
     return compare(every, part, found, threads)[-1]

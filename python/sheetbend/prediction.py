@@ -94,11 +94,12 @@ def predicted_values(
     values: Mapping[str, float],
     refitter: str | None,
     threads: int,
-) -> tuple[dict[str, float], tuple[Given, ...]]:
+) -> tuple[dict[str, float], tuple[Given, ...], dict[str, np.ndarray]]:
     """All values, with the private parameters of the experiments that are only predicted: fitted to their own windows
-    or the others' mean."""
+    or the others' mean; and the corrections of driven markers (`FitProblem.corrections`) that the former found."""
     complete = dict(values)
     given: list[Given] = []
+    corrected: dict[str, np.ndarray] = {}
     for e in experiments:
         if e.predict is None:
             continue
@@ -117,25 +118,34 @@ def predicted_values(
                 if not p.private and p.tied_to is None
             ]
             problem = FitProblem([e], Parameters([*shared, *private]), threads=threads)
-            complete |= problem.parameters.to_physical(refit(problem, problem.parameters.initial(), refitter).u)
+            end = refit(problem, problem.parameters.initial(), refitter)
+            complete |= problem.parameters.to_physical(end.u)
+            corrected |= problem.corrections(end.u)
         given += [
             Given(name=f"{p.name}[{e.name}]", value=complete[f"{p.name}[{e.name}]"], unit=p.unit, words=words)
             for p in private
         ]
-    return complete, tuple(given)
+    return complete, tuple(given), corrected
 
 
 def compare(
-    experiments: Sequence[Experiment], parameters: Parameters, values: Mapping[str, float], threads: int = 1
+    experiments: Sequence[Experiment],
+    parameters: Parameters,
+    values: Mapping[str, float],
+    threads: int = 1,
+    corrected: Mapping[str, np.ndarray] | None = None,
 ) -> list[Comparison]:
     """Simulate each experiment once over its fitted and held-out parts at the fitted values.
 
     Args:
         parameters: as given to the fit (private ones not expanded).
         values: by expanded name.
+        corrected: by experiment, what the fit added to driven markers (`FitProblem.corrections`). Behind the fitted
+            part they move as recorded: a correction is as white as the noise, so it ends in no larger step than the
+            recorded motion makes from any frame to the next.
     """
     parts = [_whole(e) for e in experiments]
-    problem = FitProblem(experiments, parameters, [part for part, _ in parts], threads)
+    problem = FitProblem(experiments, parameters, [part for part, _ in parts], threads, corrected=corrected or {})
     u = problem.parameters.to_internal(values)
     comparisons = []
     for e, (part, held), simulated in zip(experiments, parts, problem.simulate(u), strict=True):

@@ -11,7 +11,7 @@ import numpy as np
 from . import _core
 from .covariance import Layout
 from .equilibrium import NoEquilibriumError
-from .errors import InputError
+from .errors import InputError, refusal
 from .experiment import Experiment
 from .parameters import Parameter, Parameters
 from .quantities import Quantity
@@ -19,6 +19,7 @@ from .recording import Recording
 from .simulate import divergence
 
 ParameterLike = Parameter | Mapping[str, Any] | None
+NOTHING = np.zeros((0, 1, 3))  # no correction at any knot
 CHEAP = 3.0  # times the residuals: a Jacobian that costs less is made with them
 
 
@@ -94,7 +95,9 @@ class FitProblem:
         recordings: Sequence[Recording] | None = None,
         threads: int = 1,
         expanded: Parameters | None = None,
+        corrected: Mapping[str, np.ndarray] | None = None,
     ) -> None:
+        """With `corrected`, by experiment (knots, markers, 3) m, no experiment estimates a correction of its own."""
         self.experiments = tuple(experiments)
         self.given, self.threads = parameters, threads
         self._last: tuple[np.ndarray, tuple[bool, np.ndarray, np.ndarray]] | None = None
@@ -105,18 +108,26 @@ class FitProblem:
             raise InputError("experiments", "share a name", names, "give each a name of its own")
         self.parameters = self._expanded(parameters) if expanded is None else expanded
         theta, slots, slot_of = self._slots()
-        self.core = _core.Problem(
-            experiments=[e.core(r) for e, r in zip(self.experiments, self.recordings, strict=True)],
-            theta=theta,
-            slots=slots,
-            free=self._free(slot_of),
-            threads=threads,
-        )
+        held = [None if corrected is None else corrected.get(e.name, NOTHING) for e in self.experiments]
+        try:
+            self.core = _core.Problem(
+                experiments=[e.core(r, b) for e, r, b in zip(self.experiments, self.recordings, held, strict=True)],
+                theta=theta,
+                slots=slots,
+                free=self._free(slot_of),
+                threads=threads,
+            )
+        except ValueError as error:
+            raise refusal(error, InputError, [len(r.times) for r in self.recordings]) from error
 
     def holding(self, name: str, value: float) -> FitProblem:
         """The same problem with one (expanded) parameter held at a value."""
         held = self.parameters.replace(name, fixed=True, initial=value, prior=None, lower=-np.inf, upper=np.inf)
         return FitProblem(self.experiments, self.given, self.recordings, self.threads, held)
+
+    def uncorrected(self, recordings: Sequence[Recording]) -> FitProblem:
+        """The same problem on (parts of) the recordings, with the markers that scenes follow taken for the truth."""
+        return FitProblem(self.experiments, self.given, recordings, self.threads, self.parameters, corrected={})
 
     def around(self, name: str) -> FitProblem:
         """The part that one free (expanded) parameter is tied to, through shared parameters; the rest of the minimum
@@ -191,8 +202,9 @@ class FitProblem:
         return lists
 
     def evaluate(self, u: np.ndarray, jacobian: bool = True) -> tuple[bool, np.ndarray, np.ndarray]:
-        """(ok, residuals (rows,), Jacobian (rows, free)); rows of data first, then priors. Not ok where the physics
-        has no answer. The last Jacobian is kept: everything that is told of a minimum asks for it."""
+        """(ok, residuals (rows,), Jacobian (rows, free)); rows of data first, then those of the parameters' priors and
+        of corrections'. Not ok where the physics has no answer. The last Jacobian is kept: everything that is told of
+        a minimum asks for it."""
         if jacobian and self._last is not None and np.array_equal(self._last[0], u):
             return self._last[1]
         began = time.perf_counter()
@@ -201,6 +213,40 @@ class FitProblem:
             self.seconds[jacobian] = time.perf_counter() - began
         if jacobian:
             self._last = np.array(u, dtype=float), found
+        return found
+
+    def evaluate_exactly(self, u: np.ndarray) -> tuple[bool, np.ndarray, np.ndarray]:
+        """`evaluate` with corrections linearized at u itself, as intervals need it; a fit's own steps may use an
+        earlier linearization, which leaves the gradient exact."""
+        if self.estimates_corrections:
+            self.core.relinearize()
+            self._last = None
+        return self.evaluate(u)
+
+    @property
+    def estimates_corrections(self) -> bool:
+        """Whether an experiment corrects the markers that its scene follows."""
+        return self.core.rows > self.prior_rows[1]
+
+    @property
+    def prior_rows(self) -> tuple[int, int]:
+        """First row of the parameters' priors, and one past the last; those of corrections follow."""
+        first = self.core.data_rows
+        return first, first + len(self.parameters.prior_residuals(self.parameters.initial()))
+
+    def corrections(self, u: np.ndarray) -> dict[str, np.ndarray]:
+        """(knots, markers, 3) m by name of experiment, what is added at u to the markers that its scene follows; of
+        those that estimate it."""
+        found: dict[str, np.ndarray] = {}
+        if not self.estimates_corrections:
+            return found
+        rows = self.evaluate(u)[1][self.prior_rows[1] :]
+        for e, r in zip(self.experiments, self.recordings, strict=True):
+            correction = e.correction(r)
+            if correction is not None and e.driven_noise is not None:
+                count = int(np.prod(correction.shape))
+                found[e.name] = e.driven_noise * rows[:count].reshape(correction.shape)
+                rows = rows[count:]
         return found
 
     @property

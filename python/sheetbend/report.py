@@ -139,10 +139,23 @@ def _recordings(result: FitResult) -> Section:
         headers, rows = headers[:3] + headers[-1:], [row[:3] + row[-1:] for row in rows]
     notes = tuple(
         (label, words)
-        for label, words in (("held out", result.held_out_is), ("baseline (no physics)", result.baseline))
+        for label, words in (
+            ("held out", result.held_out_is),
+            ("baseline (no physics)", result.baseline),
+            *((recording.name, _corrected(recording)) for recording in result.recordings),
+        )
         if words
     )
     return Section("Recordings", headers, tuple(rows), notes)
+
+
+def _corrected(recording: RecordingFit) -> str:
+    if recording.corrected_by is None or recording.driven_sigma is None:
+        return ""
+    found, prior = (short(1e3 * size, 2) for size in (recording.corrected_by, recording.driven_sigma))
+    return (
+        f"its driven markers are moved by {found} mm in each coordinate (root mean square); driven_sigma is {prior} mm"
+    )
 
 
 def _recording_row(recording: RecordingFit) -> tuple[str, ...]:

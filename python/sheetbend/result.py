@@ -83,6 +83,8 @@ class RecordingFit:
         held_out: over the part that the fit did not see; None when there is none.
         baseline: over the same part, of a prediction without physics.
         motion: over the same part, of the measured markers about their mean; None for an equilibrium.
+        driven_sigma: prior of the correction of its driven markers, m; None without one.
+        corrected_by: root mean square of one coordinate of that correction, m.
         measured_frequency, simulated_frequency: first frequency there, Hz; None where the part shows fewer than three
             periods.
     """
@@ -96,6 +98,8 @@ class RecordingFit:
     measured_frequency: float | None = None
     simulated_frequency: float | None = None
     unit: str = "m"
+    driven_sigma: float | None = None
+    corrected_by: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -130,6 +130,36 @@ class Scene:
         self._building()
         self.boundary.drive(particles, times, positions, interpolation, self.particle_count)
 
+    def follow(
+        self,
+        particles: ArrayLike,
+        times: ArrayLike,
+        motion: ArrayLike,
+        markers: Sequence[str],
+        weights: ArrayLike | None = None,
+        placed: ArrayLike | None = None,
+        interpolation: str = "cubic",
+    ) -> None:
+        """Give particles the motion of recorded markers, so that a fit can allow for its noise
+        (`Experiment.driven_sigma`).
+
+        Args:
+            particles: (k,) indices.
+            times: (knots,) s, increasing, from the scene's start on; see `drive`.
+            motion: (knots, markers, 3) m, of the markers.
+            markers: their names in the recording.
+            weights: (k, markers), by which a particle moves with each; one marker for each particle by default.
+            placed: (k, 3) m, where the particles are at the first knot: they move from there by what the markers move.
+                By default they are where the weighted markers are.
+            interpolation: "cubic" (C1) or "linear" (kicks at every knot).
+
+        Raises:
+            SceneError: shapes, NaN, times that do not increase or differ from an earlier call's, names that are
+                repeated, particles that are driven already.
+        """
+        self._building()
+        self.boundary.follow(particles, times, motion, markers, weights, placed, interpolation, self.particle_count)
+
     def add_motion_term(self, particle: int, coefficients: ArrayLike, factors: Mapping[str, str]) -> None:
         """Add to a driven particle's motion (knots, 3) coefficients times a product of functions of quantities.
 

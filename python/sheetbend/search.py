@@ -1,7 +1,8 @@
 """How a fit finds its minimum: from every start, through short windows first where they are asked for.
 
 The cost of a long motion is rugged far from its minimum, and where the motion is sensitive its derivative says nothing
-about a large step. Over a short window from the same start it is smooth.
+about a large step. Over a short window from the same start it is smooth. Corrections of driven markers come last: far
+from the minimum they would explain away what the parameters have to.
 """
 
 from __future__ import annotations
@@ -45,12 +46,14 @@ class Search:
             InputError: starts of what is not fitted, or windows that hold no frame.
             SheetbendError: a start has no answer.
         """
-        windows = [(length, _cut(problem, length)) for length in self.windows]
+        first: list[tuple[float | None, FitProblem]] = [(length, _cut(problem, length)) for length in self.windows]
+        if problem.estimates_corrections:
+            first.append((None, problem.uncorrected(problem.recordings)))
         ends: list[Minimum] = []
         interrupted, name = False, ""
         for u in self._points(problem):
             try:
-                end, name = self._end(problem, windows, u)
+                end, name = self._end(problem, first, u)
             except KeyboardInterrupt:  # before the first point of this start
                 if not ends:
                     raise
@@ -75,10 +78,10 @@ class Search:
         return points
 
     def _end(
-        self, problem: FitProblem, windows: Sequence[tuple[float, FitProblem]], u: np.ndarray
+        self, problem: FitProblem, before: Sequence[tuple[float | None, FitProblem]], u: np.ndarray
     ) -> tuple[Minimum, str]:
-        first, iterations = _cost(problem, u) if windows else None, 0
-        for length, part in windows:
+        first, iterations = _cost(before[-1][1] if problem.estimates_corrections else problem, u) if before else None, 0
+        for length, part in before:
             tolerance = max(self.tolerance, WINDOW_TOLERANCE)
             end, name = minimize(part, u, self.optimizer, self.max_iterations, tolerance, self._observer(length))
             u, iterations = end.u, iterations + end.iterations
@@ -88,7 +91,7 @@ class Search:
                     raise KeyboardInterrupt
                 return replace(end, cost=cost, first=first, iterations=iterations), name
         end, name = minimize(problem, u, self.optimizer, self.max_iterations, self.tolerance, self._observer(None))
-        return replace(end, first=first if windows else end.first, iterations=iterations + end.iterations), name
+        return replace(end, first=first if before else end.first, iterations=iterations + end.iterations), name
 
     def _observer(self, window: float | None) -> Observer | None:
         observe = self.progress
@@ -116,4 +119,4 @@ def _cut(problem: FitProblem, length: float) -> FitProblem:
             fix = "make it longer, or leave it out"
             raise InputError("windows", f"hold no fitted frame of '{e.name}'", length, fix)
         pieces.append(recording if e.static else recording.piece(None, last))
-    return FitProblem(problem.experiments, problem.given, pieces, problem.threads)
+    return problem.uncorrected(pieces)

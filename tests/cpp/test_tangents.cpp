@@ -12,7 +12,11 @@ INSTANTIATE_TEST_SUITE_P(Cg, Tangents, ::testing::Values(newton_by_cg), solver_n
 TEST_P(Tangents, FollowTheRollout) {
   using D = Dual<double, 8>;
   const Sample sample = random_scene(85, GetParam().shape());
-  const Program p{sample.scene, make_plan(sample.scene, GetParam().options(2)), 8, 0.004};
+  SolverOptions options = GetParam().options(2);
+  const Program p{sample.scene, make_plan(sample.scene, options), 8, 0.004};
+  // Conjugate gradients over complex numbers leave some 1e-12, factors do not.
+  if (options.partition == Partition::newton_cg) options.partition = Partition::newton;
+  const Program exact{sample.scene, make_plan(sample.scene, options), 8, 0.004};
   Random random(80);
   std::vector<D> inputs(sample.inputs.begin(), sample.inputs.end());
   for (D& a : inputs)
@@ -26,8 +30,8 @@ TEST_P(Tangents, FollowTheRollout) {
   EXPECT_TRUE(same_bits(part(found, -1), states(p, sample.inputs)));
   double worst = 0.0;
   for (int k = 0; k < 8; ++k) {
-    const auto oracle =
-        complex_step_along([&](const std::vector<Complex>& z) { return states(p, z); }, sample.inputs, part(inputs, k));
+    const auto oracle = complex_step_along([&](const std::vector<Complex>& z) { return states(exact, z); },
+                                           sample.inputs, part(inputs, k));
     worst = std::max(worst, relative_error(part(found, k), oracle));
   }
   EXPECT_LE(worst, 1e-12);

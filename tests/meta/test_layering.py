@@ -18,6 +18,7 @@ ALLOWED = {
     "core/element": {"core/scalar", "core/constraints"},
     "core/packs": {"core/scalar", "core/constraints", "core/scene", "core/element", "core/threads"},
     "core/blocks": {"core/scalar", "core/constraints", "core/element", "core/packs"},
+    "core/points": {"core/scalar"},
     "core/solver": {
         "core/scalar",
         "core/constraints",
@@ -25,6 +26,7 @@ ALLOWED = {
         "core/element",
         "core/packs",
         "core/blocks",
+        "core/points",
         "core/threads",
     },
     "core/equilibrium": {"core/scalar", "core/constraints", "core/scene", "core/element", "core/solver"},

@@ -67,10 +67,11 @@ def _reports(study: Study) -> Iterator[tuple[str, GradientReport | JacobianRepor
 
 
 def _jacobian(study: Study, e: Experiment) -> JacobianReport | None:
-    """Of one recording, its first frames; None where nothing free acts on it."""
+    """Of one recording, its first frames, its driven markers taken for the truth: with corrections the Jacobian is no
+    derivative of the residuals, only its gradient is. None where nothing free acts on it."""
     mine = {name: fields for name, fields in study.parameters.items() if name in e.scene.quantities}
     if not any(not fields.get("fixed") and "tied_to" not in fields for fields in mine.values()):
         return None
     part = e.fitted()
     part = part.frames(slice(0, FITTED_FRAMES))
-    return check_jacobian(FitProblem([e], as_parameters(mine, [e]), [part]), e.name)
+    return check_jacobian(FitProblem([e], as_parameters(mine, [e]), [part], corrected={}), e.name)

@@ -140,6 +140,7 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
             "start_time",
             "predict",
             "sigma",
+            "driven_sigma",
             "axes",
             "radius",
             "loss",

@@ -184,9 +184,8 @@ def _drive(
     placed = cloth.mesh.vertices[vertices]
     weights = np.array([_along(line, point) for point in placed])
     with located(path):
-        times, motion = moment.followed(grip.markers)
-        moved = np.einsum("vm,tmx->tvx", weights, motion)
-        scene.drive(cloth.particles[vertices], times, moved + placed - weights @ line, grip.interpolation)
+        times, motion, names = moment.followed(grip.markers)
+        scene.follow(cloth.particles[vertices], times, motion, names, weights, placed, grip.interpolation)
 
 
 def _along(line: np.ndarray, point: np.ndarray) -> np.ndarray:

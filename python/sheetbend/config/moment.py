@@ -25,15 +25,15 @@ class Moment:
         x = self.recording.positions
         return mean_position(x) if self.static else x[0]
 
-    def followed(self, markers: Sequence[str | int]) -> tuple[np.ndarray, np.ndarray]:
+    def followed(self, markers: Sequence[str | int]) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
         """The motion of some markers, gaps closed: times (frames,) s from the scene's start, positions (frames,
-        markers, 3) m; of an equilibrium one frame.
+        markers, 3) m, names; of an equilibrium one frame.
 
         Raises:
             RecordingError: unknown markers, or a gap too long to be closed.
         """
         chosen = self.recording.select(markers)
         if self.static:
-            return np.zeros(1), replace(self, recording=chosen).shape[None]
+            return np.zeros(1), replace(self, recording=chosen).shape[None], chosen.markers
         chosen = replace(chosen, clamped=tuple(range(len(markers)))).filled()
-        return chosen.times - self.t0, chosen.positions
+        return chosen.times - self.t0, chosen.positions, chosen.markers

@@ -300,5 +300,6 @@ def _add_drive(scene: Scene, particles: Particles, path: str, drive: schema.Driv
     if len(drive.markers) != len(which):
         raise ConfigError(f"{path}.markers", "do not match the particles", len(drive.markers), f"give {len(which)}")
     with located(path):
-        times, positions = moment.followed(drive.markers)
-        scene.drive(which, times, positions + np.array(drive.offset), drive.interpolation)
+        times, positions, names = moment.followed(drive.markers)
+        moved = positions + np.array(drive.offset)
+        scene.follow(which, times, moved, names, interpolation=drive.interpolation)

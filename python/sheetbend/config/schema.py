@@ -117,6 +117,13 @@ class RecordingSection(Section):
         'or the others\' mean ("mean")',
     )
     sigma: Finite = key(1e-3, "expected error of a marker", "m", gt=0)
+    driven_sigma: Finite | Literal["estimate"] | None = key(
+        None,
+        'noise of the markers that `scene.drive` and grips follow, in each coordinate, or "estimate" (from the '
+        "recording): their true motion is then estimated too, with this as prior, and intervals allow for it; `sigma` "
+        "must be as honest",
+        "m",
+    )
     axes: str = key("xyz", "coordinates that count", pattern=AXES)
     radius: Finite | None = key(
         None,

@@ -1,0 +1,74 @@
+// What an experiment sees of a rollout: where its frames lie between substeps, and the residuals of one marker in one frame.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "adjoint/experiment.h"
+
+namespace sheetbend {
+
+// The factor on a marker's residuals whose squares then sum to the robust loss rho(s) scale^2, s = squared distance / scale^2.
+// Huber 1964 and its smooth form soft-L1; both are the squares themselves for small residuals.
+template <class T>
+T robust_scale(const Observations& o, const T& distance2) {
+  if (o.loss == Loss::squares) return T(1.0);
+  const T s = distance2 * T(1.0 / (o.loss_scale * o.loss_scale));
+  if (o.loss == Loss::soft_l1) return sqrt(T(2.0) / (T(1.0) + sqrt(T(1.0) + s)));
+  const auto far = s > T(1.0);
+  const T safe = select(far, s, T(1.0));
+  return select(far, sqrt((T(2.0) * sqrt(safe) - T(1.0)) / safe), T(1.0));
+}
+
+inline bool is_seen(const Observations& o, std::size_t at) { return !std::isnan(o.measured[3 * at]); }
+
+// Residuals of a marker that was seen, one per axis, from where it is simulated; at = frame * markers + marker. Returns one past the last.
+template <class T>
+T* marker_residuals(const Observations& o, std::size_t at, const Vec3<T>& p, T* r) {
+  const double* seen = &o.measured[3 * at];
+  const T place[3] = {p.x, p.y, p.z};
+  T d[3]{};
+  for (const int axis : o.axes) d[axis] = T(1.0 / o.sigma[at]) * (place[axis] - T(seen[axis]));
+  const T scale = robust_scale(o, dot(Vec3<T>(d), Vec3<T>(d)));
+  for (const int axis : o.axes) *r++ = scale * d[axis];
+  return r;
+}
+
+// Residuals of one frame (not where r is null), and simulated markers (likewise), from the coordinates x at its time.
+template <class T>
+T* frame_residuals(const Observations& o, std::size_t frame, const T* x, const T* offsets, T* r, T* simulated) {
+  const std::size_t count = o.markers.size();
+  for (std::size_t m = 0; m < count; ++m) {
+    const std::size_t at = frame * count + m;
+    const Vec3<T> p = marker_position(o.markers[m], x, offsets + 3 * m);
+    if (simulated) p.store(simulated + 3 * at);
+    if (r && is_seen(o, at)) r = marker_residuals(o, at, p, r);
+  }
+  return r;
+}
+
+// A frame lies between substeps `base` and base + 1, and is interpolated from base - 1 to base + 2.
+template <class T>
+struct FramePlace {
+  int base;
+  std::array<T, 4> weight;
+
+  FramePlace(const Experiment& e, std::size_t frame, const T& time_offset, int last) {
+    const T place = (T(e.observed.times[frame] - e.t0) + time_offset) * T(1.0 / e.plan.options.h);
+    base = std::clamp(static_cast<int>(std::floor(value_of(place) + 1e-9)), 1, last - 2);
+    weight = cubic_weights(place - T(base));
+  }
+
+  // x (dofs) from state(k), the coordinates at base - 1 + k.
+  template <class State>
+  void interpolate(std::size_t dofs, State&& state, T* x) const {
+    const T* at[4] = {state(0), state(1), state(2), state(3)};
+    for (std::size_t i = 0; i < dofs; ++i) {
+      T sum(0.0);
+      for (int k = 0; k < 4; ++k) sum += weight[k] * at[k][i];
+      x[i] = sum;
+    }
+  }
+};
+
+}  // namespace sheetbend
