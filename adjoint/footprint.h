@@ -43,11 +43,13 @@ std::size_t block_bytes(const Scene& scene, const DirectBlock& block, int kept_i
   const auto of = [](std::size_t count) { return numbers_bytes<T>(count); };
   const std::size_t particles = of(sheetbend_blocks::row * block.particles.size());
   std::size_t factor = sizeof(Factor<T>) + sizeof(CondensedSolver<T>) + Factor<T>::bytes(block.structure);
-  if (block.condensation) factor += CondensedSolver<T>::bytes(*block.condensation, block.movable, block.size());
+  if (block.condensation && !block.implicit)
+    factor += CondensedSolver<T>::bytes(*block.condensation, block.movable, block.size());
   std::size_t bytes =
       sizeof(BlockState<T>) + 2 * of(block.size()) + (block.damped ? 2 * (particles + of(block.size())) : 0) +
       iterations * (of(sheetbend_blocks::row * block.window_rows.size()) + of(rows) + particles + factor) +
       (kept_iterations + 1) * (particles + of(block.size()));
+  if (block.implicit) bytes += scenes_of<T> * ImplicitBlock::bytes(scene, block);
   for (const MemberRun& run : block.runs) {
     const Group& group = scene.groups[run.group];
     bytes += of(run.items.size() * sheetbend_blocks::value_count(group.damped, group.parameters));
@@ -64,6 +66,7 @@ std::size_t block_cotangent_bytes(const Scene& scene, const DirectBlock& block) 
   std::size_t bytes =
       sizeof(BlockCotangents<T>) + (block.damped ? 4 : 2) * particles + of(right_side<T>(block)) + 2 * of(block.size());
   for (const MemberRun& run : block.runs) bytes += of(run.items.size() * (2 + scene.groups[run.group].parameters));
+  if (block.implicit) bytes += 2 * sizeof(T) * 3 * block.movable;  // p and what it gathers
   return bytes;
 }
 
@@ -93,7 +96,7 @@ std::size_t volume_cotangent_bytes(const Scene& scene) {
 
 template <class T>
 std::size_t substep_bytes(const Scene& scene, const Plan& plan, bool keeps_iterations) {
-  const int kept = keeps_iterations ? plan.options.iterations : 0;
+  const int kept = kept_iterations(plan, keeps_iterations);
   std::size_t bytes = sizeof(T) * (scene.has_drag ? 2 : 1) * static_cast<std::size_t>(scene.nodes());
   if constexpr (!std::is_same_v<T, double>) bytes += sizeof(sheetbend_points::Frame) * scene.directors.size();
   for (const DirectBlock& block : plan.blocks) bytes += block_bytes<T>(scene, block, kept);

@@ -26,9 +26,13 @@ class StateReverse {
             const Inputs<T>& in_bar) {
     const Bdf bdf = Bdf::at(plan_.options, n);
     seed(n, x_bar_.data());
-    correct(scene_, plan_, in, bdf, t_next, states, q_.data(), record_);
-    substep_vjp(scene_, plan_, in, bdf, t_next, states, record_, q_.data(), x_next_bar.data(), v_next_bar.data(),
-                scratch_, {x_bar_.data(), x_before_bar_.data(), v_bar_.data(), v_before_bar_.data()}, in_bar);
+    try {
+      correct(scene_, plan_, in, bdf, t_next, states, q_.data(), record_);
+      substep_vjp(scene_, plan_, in, bdf, t_next, states, record_, q_.data(), x_next_bar.data(), v_next_bar.data(),
+                  scratch_, {x_bar_.data(), x_before_bar_.data(), v_bar_.data(), v_before_bar_.data()}, in_bar);
+    } catch (const Unbalanced& e) {
+      throw Unbalanced(e, n + 1, t_next);
+    }
     shift(x_next_bar, x_bar_, x_before_bar_);
     shift(v_next_bar, v_bar_, v_before_bar_);
   }

@@ -3,7 +3,7 @@
 
 #include "adjoint/air_vjp.h"
 #include "adjoint/packs/packed_reverse.h"
-#include "adjoint/project_block_vjp.h"
+#include "adjoint/project_implicit_vjp.h"
 #include "adjoint/project_vjp.h"
 #include "adjoint/volume_vjp.h"
 #include "adjoint/yield_vjp.h"
@@ -84,8 +84,11 @@ void project_blocks_vjp(const Scene& scene, const Plan& plan, const Inputs<const
     for (int b = begin; b < end; ++b) {
       BlockCotangents<T>& own = scratch.blocks[b];
       begin_block_vjp<T>(state, plan.blocks[b], scratch.x.data(), nullptr, in_bar, own);
-      for (int iteration = o.iterations - 1; iteration >= 0; --iteration)
-        project_block_vjp(state, plan.blocks[b], pack_kernels(), record.blocks[b], iteration, own);
+      if (plan.blocks[b].implicit)
+        project_implicit_vjp(state, plan.blocks[b], pack_kernels(), record.blocks[b], own);
+      else
+        for (int iteration = o.iterations - 1; iteration >= 0; --iteration)
+          project_block_vjp(state, plan.blocks[b], pack_kernels(), record.blocks[b], iteration, own);
       end_block_vjp(state, plan.blocks[b], scratch.x.data(), scratch.w.data(), own);
       refer_block_vjp(state, plan.blocks[b], pack_kernels(), bdf.before, record.blocks[b], bar.x, bar.x_before, own);
     }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <string>
 
 #include "core/scalar/pack.h"
 #include "core/scalar/vec3.h"
@@ -16,11 +17,15 @@ struct Stopping {
   int most;          // iterations
 };
 
-// Conjugate gradients took as many iterations as they may.
+// An iteration took as many steps as it may: conjugate gradients, or (derived) Newton's method.
 struct Unconverged : std::runtime_error {
   int iterations;
   double residual;  // over the right side
   Unconverged(const Stopping& stop, double residual_);
+
+ protected:
+  Unconverged(const std::string& words, int iterations_, double residual_)
+      : std::runtime_error(words), iterations(iterations_), residual(residual_) {}
 };
 
 inline double lane_of(double a, int) { return a; }

@@ -5,16 +5,17 @@ namespace sheetbend {
 
 enum class Integrator : int { bdf1, bdf2 };
 // Blocks of one by color; connected sets by LDL^T of their constraints; or the same sets through their particles (condensed.h), factored or by
-// conjugate gradients.
-enum class Partition : int { gauss_seidel, direct, newton, newton_cg };
+// conjugate gradients; or these solved until their forces balance (implicit_block.h).
+enum class Partition : int { gauss_seidel, direct, newton, newton_cg, implicit };
 
 struct SolverOptions {
   double h = 1e-3;  // substep [s]
   Integrator integrator = Integrator::bdf2;
   Partition partition = Partition::direct;
-  int iterations = 2;
-  double cg_tolerance = 1e-12;  // relative residual at which conjugate gradients stop
-  int cg_iterations = 10000;    // more than these are an error
+  int iterations = 2;              // of implicit: more Newton matrices than these are an error
+  double force_tolerance = 1e-10;  // largest force that implicit leaves, of the largest there is
+  double cg_tolerance = 1e-12;     // relative residual at which conjugate gradients stop
+  int cg_iterations = 10000;       // more than these are an error
   int threads = 1;
   int grain = 256;  // blocks per thread below which a color is not split
 };

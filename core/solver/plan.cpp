@@ -166,7 +166,8 @@ DirectBlock make_block(const Scene& scene, std::vector<Member> members, const So
     users = number_rows(scene, members);
     structure = structure_of(scene, members, users);
   }
-  DirectBlock block{std::move(members), {}, {}, {0}, {}, {}, {}, 0, false, std::move(structure)};
+  DirectBlock block{std::move(members), {}, {}, {0}, {}, {}, {}, 0, false, false, std::move(structure)};
+  block.implicit = options.partition == Partition::implicit;
   if (condensed) block.condensation.emplace();  // to be filled in: it has no band
   std::map<int, int> particle_of;
   for (const auto& [node, rows] : users) {
@@ -185,7 +186,8 @@ DirectBlock make_block(const Scene& scene, std::vector<Member> members, const So
     for (int j = 0; j < group.rows; ++j) block.multipliers.push_back(group.first_row + m.item * group.rows + j);
   }
   for (const int g : groups) block.runs.push_back(make_run(scene, g, particle_of, block));
-  if (options.partition == Partition::newton) block.condensation = factored(scene, block, particle_of);
+  if (options.partition == Partition::newton || block.implicit)
+    block.condensation = factored(scene, block, particle_of);
   if (options.partition == Partition::newton_cg) block.condensation = iterated(scene, block, particle_of, options);
   return block;
 }
@@ -200,6 +202,9 @@ void check(const SolverOptions& o) {
                                 ". Fix: give a relative residual between 0 and 1");
   if (o.cg_iterations < 1)
     throw std::invalid_argument("cg_iterations: got " + std::to_string(o.cg_iterations) + ". Fix: give at least 1");
+  if (!(o.force_tolerance > 0.0 && o.force_tolerance < 1.0))
+    throw std::invalid_argument("force_tolerance: got " + std::to_string(o.force_tolerance) +
+                                ". Fix: give a share of the largest force between 0 and 1");
   if (o.threads < 1)
     throw std::invalid_argument("threads: got " + std::to_string(o.threads) + ". Fix: give at least 1");
 }
@@ -219,6 +224,14 @@ void expect_no_volume(const Scene& scene) {
                                 "pressure instead");
 }
 
+// Next to torques the inertia of a director is nothing, and a Newton step turns it as far as it likes.
+void expect_points(const Scene& scene) {
+  for (const Group& group : scene.groups)
+    if (group.points != group.arity)
+      throw std::invalid_argument("solver.method: group " + group.name +
+                                  " has frames of rods, for which implicit substeps are not made. Fix: use direct");
+}
+
 }  // namespace
 
 Plan make_plan(const Scene& scene, const SolverOptions& options) {
@@ -227,6 +240,7 @@ Plan make_plan(const Scene& scene, const SolverOptions& options) {
     expect_no_unilateral(scene);
     expect_no_volume(scene);
   }
+  if (options.partition == Partition::implicit) expect_points(scene);
   Plan plan{options, {}, {}, {}};
   if (options.partition == Partition::gauss_seidel) {
     plan.colors = color_constraints(scene);

@@ -39,6 +39,7 @@ struct DirectBlock {
   std::vector<std::size_t> positions;  // of the pairs of rows of each movable particle, where there is no band
   int movable = 0;
   bool damped = false;        // whether any of its groups is
+  bool implicit = false;      // solved until its forces balance
   FactorStructure structure;  // of its constraints' matrix; empty where it is condensed
   std::optional<Condensation> condensation = {};
 
@@ -52,6 +53,11 @@ struct Plan {
   PackPlan packs;  // the same colors, eight constraints at a time
   std::vector<DirectBlock> blocks;
 };
+
+// Iterations over blocks and colors that a record for the reverse holds; an implicit step is known by where it ends.
+inline int kept_iterations(const Plan& plan, bool keep) {
+  return keep && plan.options.partition != Partition::implicit ? plan.options.iterations : 0;
+}
 
 // Whether this plan's constraints go through the kernels of core/packs.
 template <class T>

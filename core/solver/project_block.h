@@ -7,6 +7,7 @@
 #include "core/blocks/block_forward.h"
 #include "core/scalar/numbers.h"
 #include "core/solver/block_tangents.h"
+#include "core/solver/implicit_block.h"
 #include "core/solver/placed.h"
 #include "core/solver/plan.h"
 #include "core/solver/predict.h"
@@ -31,6 +32,10 @@ std::size_t member_number(int member, int parts, int part) {
   return members_in_lanes<Plain<T>> ? lane_at(member, parts, part) : static_cast<std::size_t>(member) * parts + part;
 }
 
+// Scenes in a number.
+template <class T>
+inline constexpr int scenes_of = std::is_same_v<T, Pack> ? Pack::lanes : 1;
+
 template <class T>
 struct BlockState {
   struct Iteration {
@@ -51,7 +56,8 @@ struct BlockState {
     int step = -1;  // of the state, as in SubstepStates
   };
   Values now, before;
-  double eta = 0.0;  // of `values` and `diagonal`; 0 where they are not filled yet
+  std::vector<ImplicitBlock> implicit;  // one per scene, where substeps are solved until forces balance
+  double eta = 0.0;                     // of `values` and `diagonal`; 0 where they are not filled yet
 
   void resize(const Scene& scene, const DirectBlock& block, int kept_iterations);
   Numbers<T>& at(std::vector<Numbers<T>>& states, int iteration) { return states[states.size() == 1 ? 0 : iteration]; }
@@ -88,6 +94,8 @@ void BlockState<T>::resize(const Scene& scene, const DirectBlock& block, int kep
     v->x.assign(particles);
     v->C.assign(block.size());
   }
+  implicit.resize(block.implicit ? scenes_of<T> : 0);
+  for (ImplicitBlock& scene_ : implicit) scene_.resize(scene, block);
   runs.reserve(block.runs.size());
   values.resize(block.runs.size());
   for (std::size_t r = 0; r < values.size(); ++r) {

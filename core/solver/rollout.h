@@ -48,9 +48,14 @@ class Rollout {
 
   void advance() {
     const Bdf bdf = Bdf::at(plan_.options, step_);
-    const bool finite = substep(scene_, plan_, in_, bdf, time(step_ + 1),
-                                {x_.data(), x_before_.data(), v_.data(), v_before_.data(), step_}, x_next_.data(),
-                                v_next_.data(), record_);
+    bool finite;
+    try {
+      finite = substep(scene_, plan_, in_, bdf, time(step_ + 1),
+                       {x_.data(), x_before_.data(), v_.data(), v_before_.data(), step_}, x_next_.data(),
+                       v_next_.data(), record_);
+    } catch (const Unbalanced& e) {
+      throw Unbalanced(e, step_ + 1, time(step_ + 1));
+    }
     ++step_;
     std::swap(x_before_, x_);
     std::swap(x_, x_next_);
@@ -91,6 +96,14 @@ class Rollout {
     for (std::size_t v = 0; v < record_.volumes.size(); ++v)
       record_.lambda[scene_.rows + v] = record_.volumes[v].lambda;
     return record_.lambda.data();
+  }
+
+  // Of the last substep, per implicit block: the force left at the start and after each Newton step, over the largest one.
+  std::vector<std::vector<double>> balance() const {
+    std::vector<std::vector<double>> all;
+    for (const BlockState<T>& block : record_.blocks)
+      for (const ImplicitBlock& scene : block.implicit) all.push_back(scene.balance());
+    return all;
   }
 
   double time(int step) const { return t0_ + step * plan_.options.h; }

@@ -6,7 +6,7 @@
 
 #include "core/solver/air.h"
 #include "core/solver/project.h"
-#include "core/solver/project_block.h"
+#include "core/solver/project_implicit.h"
 #include "core/solver/retract.h"
 #include "core/solver/volume.h"
 #include "core/solver/yield.h"
@@ -33,7 +33,7 @@ struct SubstepRecord {
     weights.w.resize(scene.nodes());
     if (scene.has_drag) weights.kept.resize(scene.nodes());
     if constexpr (!std::is_same_v<T, double>) frames = frames_of(scene);
-    const int kept = keep_iterations ? plan.options.iterations : 0;
+    const int kept = kept_iterations(plan, keep_iterations);
     blocks.resize(plan.blocks.size());
     for (std::size_t b = 0; b < blocks.size(); ++b) blocks[b].resize(scene, plan.blocks[b], kept);
     volumes.resize(scene.volumes.size());
@@ -92,7 +92,7 @@ void damping_references(const Scene& scene, const Inputs<const T>& in, const Bdf
   }
 }
 
-// Direct blocks, which share no movable particle: each goes through all its iterations.
+// Direct blocks, which share no movable particle: each goes through all its iterations, or to where its forces balance.
 template <class T>
 void project_blocks(const Scene& scene, const Plan& plan, const Inputs<const T>& in, const Bdf& bdf,
                     const SubstepStates<T>& s, T* q, SubstepRecord<T>& record) {
@@ -101,8 +101,11 @@ void project_blocks(const Scene& scene, const Plan& plan, const Inputs<const T>&
     for (int b = begin; b < end; ++b) {
       begin_block(state, plan.blocks[b], record.blocks[b]);
       refer_block(state, plan.blocks[b], pack_kernels(), bdf.before, s, record.blocks[b]);
-      for (int iteration = 0; iteration < plan.options.iterations; ++iteration)
-        project_block(state, plan.blocks[b], pack_kernels(), record.blocks[b], iteration);
+      if (plan.blocks[b].implicit)
+        project_implicit(state, plan.blocks[b], plan.options, s, pack_kernels(), record.blocks[b]);
+      else
+        for (int iteration = 0; iteration < plan.options.iterations; ++iteration)
+          project_block(state, plan.blocks[b], pack_kernels(), record.blocks[b], iteration);
       end_block(state, plan.blocks[b], record.blocks[b]);
     }
   });

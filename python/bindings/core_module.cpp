@@ -37,6 +37,7 @@ PYBIND11_MODULE(_core, m) {
   m.def("instruction_set", [] { return pack_kernels().name; });
   static py::exception<Diverged> diverged(m, "Diverged", PyExc_RuntimeError);
   static py::exception<Unconverged> unconverged(m, "Unconverged", PyExc_RuntimeError);
+  static py::exception<Unbalanced> unbalanced(m, "Unbalanced", unconverged);
   static py::exception<NoEquilibrium> no_equilibrium(m, "NoEquilibrium", PyExc_RuntimeError);
   static py::exception<BudgetTooSmall> too_small(m, "BudgetTooSmall", PyExc_ValueError);
   py::register_exception_translator([](std::exception_ptr p) {
@@ -52,6 +53,16 @@ PYBIND11_MODULE(_core, m) {
       py::object error = py::handle(too_small)(e.what());
       error.attr("needed") = e.needed;
       PyErr_SetObject(too_small.ptr(), error.ptr());
+    } catch (const Unbalanced& e) {
+      py::object error = py::handle(unbalanced)(e.what());
+      error.attr("iterations") = e.iterations;
+      error.attr("residual") = e.residual;
+      error.attr("problem") = e.problem;
+      error.attr("fix") = e.fix;
+      error.attr("substep") = e.substep;
+      error.attr("particle") = e.node;
+      error.attr("time") = e.time;
+      PyErr_SetObject(unbalanced.ptr(), error.ptr());
     } catch (const Unconverged& e) {
       py::object error = py::handle(unconverged)(e.what());
       error.attr("iterations") = e.iterations;

@@ -57,6 +57,23 @@ py::dict simulate(const Solver& s, const Array& inputs, const Steps& steps, doub
   return out;
 }
 
+// The force that is left at the start and after each Newton step, over the largest one: per substep, and per block in it.
+std::vector<std::vector<std::vector<double>>> force_balance(const Solver& s, const Array& inputs, int steps,
+                                                            double t0) {
+  check(s, inputs, 1, {steps});
+  std::vector<std::vector<std::vector<double>>> all;
+  Release release;
+  SignalInterrupt interrupt;
+  Rollout<double> rollout(*s.scene, s.plan, inputs.data(), t0);
+  rollout.run(
+      steps,
+      [&](int step, const double*, const double*) {
+        if (step > 0) all.push_back(rollout.balance());
+      },
+      &interrupt);
+  return all;
+}
+
 py::array_t<double> states(const Solver& s, const Array& inputs, const Steps& steps, double t0) {
   check(s, inputs, 1, steps);
   auto out = empty({steps.size(), static_cast<std::size_t>(s.scene->dofs())});
@@ -150,6 +167,7 @@ void bind_rollout(py::module_& m) {
            py::arg("cg_iterations"))
       .def("simulate", &simulate, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
       .def("states", &states, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
+      .def("force_balance", &force_balance, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
       .def("simulate_batch", &simulate_batch, py::arg("inputs"), py::arg("steps"), py::arg("t0"),
            py::arg("lengths") = Lengths())
       .def_property_readonly("blocks",

@@ -24,9 +24,10 @@ inline Partition partition_of(const std::string& name) {
   if (name == "direct") return Partition::direct;
   if (name == "newton") return Partition::newton;
   if (name == "newton_cg") return Partition::newton_cg;
+  if (name == "implicit") return Partition::implicit;
   if (name == "gauss_seidel") return Partition::gauss_seidel;
   throw std::invalid_argument("partition: got '" + name +
-                              "'. Fix: use 'direct', 'newton', 'newton_cg' or 'gauss_seidel'");
+                              "'. Fix: use 'direct', 'newton', 'newton_cg', 'implicit' or 'gauss_seidel'");
 }
 
 using Steps = std::vector<int>;

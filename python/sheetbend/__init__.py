@@ -5,6 +5,7 @@ to recordings, with intervals and words for what the data cannot tell.
 """
 
 from . import mesh
+from .balance import ForceBalance, force_balance
 from .baseline import no_physics
 from .cloth import Cloth, add_cloth
 from .discretization import Refinement
@@ -18,6 +19,7 @@ from .errors import (
     RecordingError,
     SceneError,
     SheetbendError,
+    UnbalancedError,
     UnconvergedError,
 )
 from .experiment import Experiment
@@ -58,6 +60,7 @@ __all__ = [
     "Fabric",
     "Fit",
     "FitResult",
+    "ForceBalance",
     "Gradient",
     "GradientReport",
     "Grip",
@@ -85,6 +88,7 @@ __all__ = [
     "TapePlan",
     "Trajectory",
     "TriangleMesh",
+    "UnbalancedError",
     "UnconvergedError",
     "add_cloth",
     "add_rod",
@@ -99,6 +103,7 @@ __all__ = [
     "equilibria",
     "equilibrium",
     "fit",
+    "force_balance",
     "mesh",
     "no_physics",
     "on_cloth",

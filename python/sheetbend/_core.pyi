@@ -22,6 +22,15 @@ class Unconverged(RuntimeError):
     iterations: int
     residual: float
 
+class Unbalanced(Unconverged):
+    """The forces of an implicit substep do not balance."""
+
+    problem: str
+    fix: str
+    substep: int
+    particle: int
+    time: float
+
 class NoEquilibrium(RuntimeError): ...
 
 class BudgetTooSmall(ValueError):
@@ -119,6 +128,8 @@ class Solver:
     def vjp(self, inputs: ArrayLike, tape: Tape, steps: Sequence[int], x_bar: ArrayLike, t0: float) -> Array: ...
     def jvp(self, inputs: ArrayLike, inputs_dot: ArrayLike, steps: Sequence[int], t0: float) -> tuple[Array, Array]: ...
     def complex_step(self, inputs: ArrayLike, direction: ArrayLike, steps: Sequence[int], t0: float) -> Array: ...
+    # per substep, per block: the force left at the start and after each Newton step, over the largest one
+    def force_balance(self, inputs: ArrayLike, steps: int, t0: float) -> list[list[list[float]]]: ...
     # lengths: (batch,) frames of each scene, or none where all have every frame
     def simulate_batch(
         self, inputs: ArrayLike, steps: Sequence[int], t0: float, lengths: Sequence[int] = ()

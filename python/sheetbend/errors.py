@@ -104,6 +104,37 @@ class UnconvergedError(SheetbendError, RuntimeError):
         )
 
 
+class UnbalancedError(SheetbendError, RuntimeError):
+    """The forces of a substep (method "implicit") do not balance, or they do at the point of buckling, where they have
+    no derivative.
+
+    Args:
+        problem: what happened, in words.
+        fix: what to do about it.
+        substep: number of the substep.
+        time: at its end, s.
+        particle: where forces balance worst.
+        residual: largest force that is left, over the largest one.
+        where: what was being computed, in words.
+    """
+
+    def __init__(
+        self, problem: str, fix: str, substep: int, time: float, particle: int, residual: float, where: str
+    ) -> None:
+        super().__init__(problem, fix, substep, time, particle, residual, where)
+        self.problem = problem
+        self.fix = fix
+        self.substep = substep
+        self.time = time
+        self.particle = particle
+        self.residual = residual
+        self.where = where
+
+    def __str__(self) -> str:
+        when = f"in substep {self.substep} (t = {self.time:.6g} s) of {self.where}"
+        return f"{self.problem}, {when}. Fix: {self.fix}."
+
+
 class EmptyGradientError(SheetbendError, RuntimeError):
     """A loss feels nothing of the quantities that it is to be improved by; no step along its gradient means anything.
 

@@ -122,5 +122,6 @@ def rollout(
         InputError: times off the grid, unknown quantities, a budget below the least that works.
         DivergenceError: a state became infinite; says when and where.
         UnconvergedError: method "newton_cg" ran out of iterations, here or in a gradient.
+        UnbalancedError: method "implicit" did not bring a substep's forces into balance.
     """
     return Rollout(scene, times, solver or Solver(), values)

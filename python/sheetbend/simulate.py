@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from . import _core
 from .checks import finite
-from .errors import DivergenceError, InputError, UnconvergedError
+from .errors import DivergenceError, InputError, UnbalancedError, UnconvergedError
 from .kinds import KINDS
 from .scene import Scene
 from .solver import Solver
@@ -57,6 +57,7 @@ def simulate(
         InputError: times off the grid, unknown quantities.
         DivergenceError: a state became infinite; says when and where.
         UnconvergedError: method "newton_cg" ran out of iterations.
+        UnbalancedError: method "implicit" did not bring a substep's forces into balance; says when and where.
     """
     solver = solver or Solver()
     compiled = scene.compiled
@@ -114,5 +115,8 @@ def divergence(scene: Scene) -> Iterator[None]:
         yield
     except _core.Diverged as error:
         raise DivergenceError(error.substep, error.time, error.particle, scene.name) from error
+    except _core.Unbalanced as error:
+        when = (error.substep, error.time, error.particle)
+        raise UnbalancedError(error.problem, error.fix, *when, error.residual, scene.name) from error
     except _core.Unconverged as error:
         raise UnconvergedError(error.iterations, error.residual, scene.name) from error

@@ -11,7 +11,8 @@ from .errors import InputError, refusal
 from .memory import in_bytes
 
 INTEGRATORS = ("bdf1", "bdf2")
-METHODS = ("direct", "gauss_seidel", "newton", "newton_cg")
+METHODS = ("direct", "gauss_seidel", "implicit", "newton", "newton_cg")
+ITERATIONS = {"gauss_seidel": 10, "implicit": 100}  # by default; 2 of the others
 
 
 @dataclass(frozen=True)
@@ -23,9 +24,12 @@ class Solver:
         integrator: "bdf2" (second order, the default) or "bdf1" (backward Euler: damps like zeta = omega h/2).
         method: "direct" (each connected part one block, solved by its constraints: for ropes; the default), "newton"
             (the same blocks, solved by their particles: for cloth; every compliance must be positive), "newton_cg" (the
-            same by conjugate gradients on two levels: for cloth of more than some 20,000 vertices, in half the memory)
-            or "gauss_seidel" (colored; unconverged sweeps add about 0.9 h^2/(m sweeps) of compliance per link).
-        iterations: Newton iterations of a block (2 by default) or sweeps (10 by default).
+            same by conjugate gradients on two levels: for cloth of more than some 20,000 vertices, in half the memory),
+            "implicit" (each substep solved until what is left of the forces is below 1e-10 of the largest: for fabrics
+            that stiffen strongly; no rods, no rigid constraints) or "gauss_seidel" (colored; unconverged sweeps add
+            about 0.9 h^2/(m sweeps) of compliance per link).
+        iterations: Newton iterations of a block (2 by default) or sweeps (10 by default); of "implicit" the Newton
+            matrices that a substep may take (100 by default): more are an error.
         threads: of one rollout; results do not depend on it.
         grain: constraints per thread below which a color is not split.
         cg_tolerance: relative residual at which conjugate gradients stop ("newton_cg" runs them twice per solve).
@@ -72,7 +76,7 @@ class Solver:
     @property
     def sweeps(self) -> int:
         """Iterations with the method's default filled in."""
-        return self.iterations if self.iterations is not None else (10 if self.method == "gauss_seidel" else 2)
+        return self.iterations if self.iterations is not None else ITERATIONS.get(self.method, 2)
 
     def with_h(self, h: float) -> Solver:
         """The same solver at another substep."""
@@ -84,7 +88,7 @@ class Solver:
         Raises:
             InputError: the method cannot step the scene, such as "newton" with rigid constraints.
         """
-        if self.method in ("newton", "newton_cg"):
+        if self.method in ("implicit", "newton", "newton_cg"):
             offset, size = scene.layout["compliance"]
             if size and not (scene.inputs()[offset : offset + size] > 0).all():
                 fix = "use 'direct', or give every constraint a compliance"

@@ -16,6 +16,7 @@ struct Bits : ::testing::TestWithParam<Solver> {
   }
 };
 INSTANTIATE_TEST_SUITE_P(, Bits, all_solvers, solver_name);
+INSTANTIATE_TEST_SUITE_P(Implicit, Bits, ::testing::Values(implicit_bdf2), solver_name);
 INSTANTIATE_TEST_SUITE_P(Cg, Bits, ::testing::Values(newton_by_cg), solver_name);
 
 // Each substep again from the tape's states, as the reverse does.

@@ -114,6 +114,7 @@ struct Checkpoints : ::testing::TestWithParam<Solver> {
   Program program(const Scene& scene) const { return {scene, make_plan(scene, GetParam().options(2)), 40, 0.004}; }
 };
 INSTANTIATE_TEST_SUITE_P(, Checkpoints, all_solvers, solver_name);
+INSTANTIATE_TEST_SUITE_P(Implicit, Checkpoints, ::testing::Values(implicit_bdf2), solver_name);
 
 TEST_P(Checkpoints, GiveTheBitsOfTheWholeTape) {
   const Sample sample = random_scene(75, GetParam().shape());

@@ -44,6 +44,7 @@ namespace {
 
 struct Footprint : ::testing::TestWithParam<Solver> {};
 INSTANTIATE_TEST_SUITE_P(, Footprint, all_solvers, solver_name);
+INSTANTIATE_TEST_SUITE_P(Implicit, Footprint, ::testing::Values(implicit_bdf2), solver_name);
 INSTANTIATE_TEST_SUITE_P(Cg, Footprint, ::testing::Values(newton_by_cg), solver_name);
 
 // What `run` has allocated at its highest.

@@ -10,6 +10,7 @@ using Dual1 = Dual<double, 1>;
 
 struct ForwardOverReverse : ::testing::TestWithParam<Solver> {};
 INSTANTIATE_TEST_SUITE_P(, ForwardOverReverse, all_solvers, solver_name);
+INSTANTIATE_TEST_SUITE_P(Implicit, ForwardOverReverse, ::testing::Values(implicit_bdf2), solver_name);
 INSTANTIATE_TEST_SUITE_P(Cg, ForwardOverReverse, ::testing::Values(newton_by_cg), solver_name);
 
 TEST_P(ForwardOverReverse, MatchesComplexStepOfTheGradient) {

@@ -63,6 +63,7 @@ std::vector<double> random_theta(const Sample& sample, Random& random) {
 
 struct Substep : ::testing::TestWithParam<Solver> {};
 INSTANTIATE_TEST_SUITE_P(, Substep, all_solvers, solver_name);
+INSTANTIATE_TEST_SUITE_P(Implicit, Substep, ::testing::Values(implicit_bdf2), solver_name);
 
 TEST_P(Substep, ReverseMatchesComplexStep) {
   const Sample sample = random_scene(40, GetParam().shape());

@@ -7,6 +7,7 @@ namespace {
 
 struct Tangents : ::testing::TestWithParam<Solver> {};
 INSTANTIATE_TEST_SUITE_P(, Tangents, all_solvers, solver_name);
+INSTANTIATE_TEST_SUITE_P(Implicit, Tangents, ::testing::Values(implicit_bdf2), solver_name);
 INSTANTIATE_TEST_SUITE_P(Cg, Tangents, ::testing::Values(newton_by_cg), solver_name);
 
 TEST_P(Tangents, FollowTheRollout) {

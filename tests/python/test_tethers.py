@@ -92,7 +92,7 @@ def test_reach_is_the_way_along_the_fabric():
     assert group.rest[along, 0] == approx(1.5 * straight[along])
 
 
-@pytest.mark.parametrize("method", ["direct", "newton", "newton_cg"])
+@pytest.mark.parametrize("method", ["direct", "implicit", "newton", "newton_cg"])
 def test_direct_blocks_refuse_them(method):
     scene, _ = curtain(compliance=1e-6)
     with pytest.raises(ValueError, match=r"cloth_tethers may go slack.*Fix: use gauss_seidel"):

@@ -220,7 +220,7 @@ def test_two_volumes():
 
 def test_what_cannot_take_a_volume():
     scene = attached()
-    for method in ("direct", "newton", "newton_cg"):
+    for method in ("direct", "implicit", "newton", "newton_cg"):
         with pytest.raises(ValueError, match=r"volume of cloth couples all its vertices.*Fix: use gauss_seidel"):
             sb.simulate(scene, [0.0, 0.1], sb.Solver(h=1 / 240, method=method))
     with pytest.raises(ValueError, match=r"equilibrium: the volume of cloth.*Fix: .*add_pressure"):

@@ -27,12 +27,17 @@ class SolverSection(Section):
     )
     h: Finite | None = key(None, "the substep itself, instead of `substeps`", "s", gt=0)
     integrator: Literal["bdf1", "bdf2"] = key("bdf2", "second order, or backward Euler (which damps)")
-    method: Literal["direct", "newton", "newton_cg", "gauss_seidel"] = key(
+    method: Literal["direct", "newton", "newton_cg", "implicit", "gauss_seidel"] = key(
         "direct",
         "each rope one block; each cloth one block through its vertices (no rigid parts), factored or, for more than"
-        " some 20,000 of them, by conjugate gradients; or colored sweeps",
+        " some 20,000 of them, by conjugate gradients; the same with every substep solved until forces balance, for"
+        " fabrics that stiffen strongly; or colored sweeps",
     )
-    iterations: int | None = key(None, "Newton iterations of a block (2) or sweeps (10)", ge=1)
+    iterations: int | None = key(
+        None,
+        "Newton iterations of a block (2), at most so many matrices of an implicit one (100), or sweeps (10)",
+        ge=1,
+    )
     cg_tolerance: Finite = key(1e-12, "relative residual at which conjugate gradients stop", gt=0, le=1e-3)
     cg_iterations: int = key(10_000, "conjugate gradients until there; more are an error", ge=1)
     memory: str | int | None = key(

@@ -79,10 +79,20 @@ struct Solver {
   bool net;  // one block with branches and loops, instead of ropes
   SceneShape shape(int ropes = 5) const {
     const bool sweeps = partition == Partition::gauss_seidel;
-    return {.ropes = ropes, .net = net, .unilateral = sweeps, .volumes = sweeps};
+    return {.ropes = ropes,
+            .net = net,
+            .unilateral = sweeps,
+            .volumes = sweeps,
+            .directors = partition != Partition::implicit};
   }
   SolverOptions options(int iterations) const {
-    return {.h = 4e-3, .integrator = integrator, .partition = partition, .iterations = iterations};
+    // What is solved to the end takes as many iterations as it needs; in long substeps it would follow angles that no membrane holds
+    // until their triangles collapse.
+    const bool implicit = partition == Partition::implicit;
+    return {.h = implicit ? 2.5e-4 : 4e-3,
+            .integrator = integrator,
+            .partition = partition,
+            .iterations = implicit ? 100 : iterations};
   }
 };
 inline void PrintTo(const Solver& s, std::ostream* out) { *out << s.name; }
@@ -97,6 +107,9 @@ inline const auto all_solvers =
 
 // The same as Newton factored, and slow over complex numbers: for tests that need no gradient by complex step.
 inline const Solver newton_by_cg{"Bdf2NewtonCg", Integrator::bdf2, Partition::newton_cg, true};
+
+// Likewise slow; tests over directions and of one substep hold its derivatives.
+inline const Solver implicit_bdf2{"Bdf2Implicit", Integrator::bdf2, Partition::implicit, true};
 
 inline std::string solver_name(const ::testing::TestParamInfo<Solver>& info) { return info.param.name; }
 

@@ -21,6 +21,7 @@ struct SceneShape {
   bool net = false;
   bool unilateral = false;  // also those kinds, which direct blocks do not hold
   bool volumes = false;     // likewise
+  bool directors = true;    // kinds that have them, which implicit blocks do not hold
 };
 
 namespace detail {
@@ -88,7 +89,11 @@ struct SceneBuilder {
   template <class K>
   std::vector<double> jittered_parameters() {
     std::vector<double> p = case_of<K>().p;
-    for (double& v : p) v += random(-0.02, 0.02);
+    for (double& v : p) {
+      const double by = random(-0.02, 0.02);
+      v += std::same_as<K, Area> ? by * v
+                                 : by;  // an area stays positive: at none the triangle has no shape to go back to
+    }
     return p;
   }
 
@@ -151,12 +156,13 @@ struct SceneBuilder {
     volume_compliances.push_back(5e-8 * random(0.5, 1.5));
   }
 
-  std::vector<int> add_rope(bool damped, bool unilateral) {
+  std::vector<int> add_rope(bool damped, const SceneShape& shape) {
     const int first = static_cast<int>(x.size()) / 3;
     int tail = 0;
     sections.clear();
     for_each_kind([&]<class K>(K) {
-      if (K::unilateral && !unilateral) return;
+      if (K::unilateral && !shape.unilateral) return;
+      if (K::points != K::arity && !shape.directors) return;
       if constexpr (K::points == 0)
         tail = add_between_sections<K>(tail, damped);
       else
@@ -212,7 +218,7 @@ inline Sample random_scene(unsigned seed, const SceneShape& shape = {}) {
   detail::SceneBuilder b(seed);
   b.add_particle(0.0, 0.0, 0.0);
   std::vector<std::vector<int>> ropes;
-  for (int r = 0; r < shape.ropes; ++r) ropes.push_back(b.add_rope(r < 2, shape.unilateral));
+  for (int r = 0; r < shape.ropes; ++r) ropes.push_back(b.add_rope(r < 2, shape));
   if (shape.net)
     for (std::size_t r = 1; r < ropes.size(); ++r)
       for (std::size_t k = 1; k + 2 < ropes[r].size(); k += 2) b.add_brace(ropes[r - 1][k], ropes[r][k + 2]);

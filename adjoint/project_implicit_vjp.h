@@ -1,0 +1,71 @@
+// The reverse of an implicit step (core/solver/project_implicit.h), by the implicit function theorem: K p = x'_bar, then
+//
+//   z = W^-1 p (of the predicted coordinates)     y = D^-1 J p     w_bar_i = (J^T lambda)_i . z_i
+//
+// and everything else as for a projection (element/element_vjp.h) with dl = lambda and v_j = lambda_j W z. Both y and v are linear in p, and what the
+// elements send to the coordinates is what K p leaves of x'_bar: a second pass on that refines p, and brings the first order
+// of scalars that carry one.
+#pragma once
+
+#include "adjoint/project_block_vjp.h"
+#include "core/solver/project_implicit.h"
+
+namespace sheetbend {
+
+// z = K^-1 z of every scene.
+template <class T>
+void solve_implicit(const DirectBlock& block, const BlockState<T>& state, std::vector<T>& z) {
+  if constexpr (std::is_same_v<T, Pack>) {
+    std::vector<double> own(z.size());
+    for (int scene = 0; scene < Pack::lanes; ++scene) {
+      for (std::size_t i = 0; i < z.size(); ++i) own[i] = z[i][scene];
+      state.implicit[scene].solve(block, own.data());
+      for (std::size_t i = 0; i < z.size(); ++i) z[i].set(scene, own[i]);
+    }
+  } else {
+    state.implicit[0].solve(block, z.data());
+  }
+}
+
+template <class T>
+void project_implicit_vjp(const SubstepState<T>& s, const DirectBlock& block, const sheetbend_packs::KernelTable& table,
+                          BlockState<T>& state, BlockCotangents<T>& bar) {
+  constexpr int passes = 2;
+  for (ImplicitBlock& scene : state.implicit) scene.factorize(s.scene, block);
+  auto& own = state.at(0);
+  state.lambda[0].clear();  // all of it is dl
+  own.u.clear();            // J stands in no linearized row
+  const auto& runs = runs_of(s, block, state, &bar.values);
+  auto arrays = arrays_of(block, runs, state, 0);
+  arrays.x_bar = bar.x.numbers();
+  arrays.z = bar.z.numbers();
+  arrays.y = bar.y.numbers();
+  arrays.lambda_bar = bar.lambda.numbers();
+  arrays.C_r_bar = bar.C_r.numbers();
+
+  std::vector<T> p(3 * static_cast<std::size_t>(block.movable)), x_bar(p.size(), T(0.0));
+  for (int pass = 0; pass < passes; ++pass) {
+    for (std::size_t i = 0; i < p.size(); ++i) p[i] = bar.x[sheetbend_blocks::row * (i / 3) + i % 3];
+    solve_implicit(block, state, p);
+    bar.y.clear();
+    numbers_of_block(block, state, 0).subtract_times(p.data(), bar.y.data());
+    for (int j = 0; j < block.size(); ++j) bar.y[j] = -(bar.y[j] / state.diagonal[j]);
+    for (int n = 0; n < static_cast<int>(block.particles.size()); ++n) {
+      const std::size_t at = sheetbend_blocks::row * static_cast<std::size_t>(n);
+      Vec3<T> left = Vec3<T>(&bar.x[at]) - transpose_times_at<T>(arrays, n, bar.y.data());
+      if (n < block.movable) {
+        const T mass = T(1.0) / state.x[0][at + 3];
+        const Vec3<T> z = mass * Vec3<T>(&p[3 * n]);
+        z.store(&bar.z[at]);
+        z.add_to(&x_bar[3 * n]);
+        left = left - z;
+        bar.x[at + 3] += dot(transpose_times_at<T>(arrays, n, own.dl.data()), z);
+      }
+      left.store(&bar.x[at]);
+    }
+    reverse_kernels<T>(table).pull_back(arrays);
+  }
+  for (std::size_t i = 0; i < p.size(); ++i) bar.x[sheetbend_blocks::row * (i / 3) + i % 3] = x_bar[i];
+}
+
+}  // namespace sheetbend
