@@ -137,7 +137,7 @@ bool ImplicitBlock::slow() const {
   return k > 1 && balance_[k - 1] > 0.5 * balance_[k - 2];
 }
 
-// f(member, kind, dofs, run, place in it, numbers before its own) for each constraint, in the block's order.
+// f(member, group, run, place in it, numbers before its own) for each constraint, in the block's order.
 template <class F>
 void ImplicitBlock::for_each_element(const Scene& scene, const DirectBlock& block, F&& f) const {
   std::vector<int> run_of(scene.groups.size(), -1), next(block.runs.size(), 0);

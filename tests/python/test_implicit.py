@@ -87,11 +87,14 @@ def test_incremental_iterations_leave_forces() -> None:
 
 
 def test_the_motion_is_of_second_order() -> None:
-    """Halving the substep leaves a quarter of the error, at b e^2 = 5."""
+    """Halving the substep leaves a quarter of the error where the strip is pulled taut, at b e^2 = 5.
+
+    While it wrinkles on the way, finer substeps follow other wrinkles.
+    """
     scene = strip(5.0, membrane_damping=0.02, bend_damping=0.02)
     ends = [
-        sb.simulate(scene, [0.0, 0.25], sb.Solver(h=1 / rate, method="implicit")).positions[-1]
-        for rate in (480, 960, 1920, 3840)
+        sb.simulate(scene, [0.0, 0.5], sb.Solver(h=1 / rate, method="implicit")).positions[-1]
+        for rate in (120, 240, 480, 960)
     ]
     errors = [np.abs(a - b).max() for a, b in pairwise(ends)]
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.2)
