@@ -10,8 +10,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from knits import DIRECTIONS, FITTED, KNITS, PRETENSION, read
 
-COLORS = {"linear": "#7fa8d0", "spline": "#3a8f5c", "exponential": "#f2b48a", "weighted": "#d95f02"}
-WORDS = {"weighted": "exponential law, weighted"}
+COLORS = {"linear": "#7fa8d0", "spline": "#3a8f5c", "exponential": "#f2b48a", "weighted": "#d95f02", "sinh": "#7b3294"}
+WORDS = {"weighted": "exponential law, weighted", "sinh": "sinh law, weighted"}
 
 
 def main():
