@@ -96,7 +96,7 @@ void FactorStructure::find_updates() {
   const int nodes = static_cast<int>(first_.size()) - 1;
   std::vector<std::vector<sheetbend_blocks::Update>> of(nodes);
   for (int s = 0; s < nodes; ++s) {
-    const int *rows = &rows_[0] + row_start_[s], count = row_start_[s + 1] - row_start_[s];
+    const int *rows = rows_.data() + row_start_[s], count = row_start_[s + 1] - row_start_[s];
     for (int begin = 0, end; begin < count; begin = end) {
       for (end = begin + 1; end < count && node_[rows[end]] == node_[rows[begin]];) ++end;
       of[node_[rows[begin]]].push_back({s, begin, end});
