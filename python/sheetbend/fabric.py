@@ -4,6 +4,7 @@ its own, per strain component."""
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from typing import Any
@@ -26,7 +27,7 @@ class Linear:
 
 
 @dataclass(frozen=True)
-class Stiffening:
+class Stiffening(ABC):
     """A law with one number b per component.
 
     Attributes:
@@ -48,6 +49,11 @@ class Stiffening:
         """Name, value and whether it can be fitted, of each coefficient in the constraint's order."""
         return iter((f"{component}_stiffening", float(getattr(self, component)), True) for component in COMPONENTS)
 
+    @staticmethod
+    @abstractmethod
+    def log_growth(b: float, strain: float) -> float:
+        """Natural logarithm of the stress over k e."""
+
 
 class Exponential(Stiffening):
     """Fung's law: of the Green strain e the energy k (exp(b e^2) - 1)/(2 b), of the tangent stiffness k at rest.
@@ -59,7 +65,6 @@ class Exponential(Stiffening):
 
     @staticmethod
     def log_growth(b: float, strain: float) -> float:
-        """Natural logarithm of the stress over k e."""
         return b * strain**2
 
 
@@ -73,7 +78,6 @@ class Sinh(Stiffening):
 
     @staticmethod
     def log_growth(b: float, strain: float) -> float:
-        """Natural logarithm of the stress over k e."""
         t = abs(b * strain)
         return t + math.log(-math.expm1(-2.0 * t) / (2.0 * t)) if t > 0.0 else 0.0
 

@@ -206,11 +206,11 @@ def with_fabrics(scene: dict[str, Any]) -> dict[str, Any]:
             if fabric not in known:
                 fix = f"name an earlier [[scene.cloth]]{': ' + ', '.join(known) if known else ''}"
                 raise ValueError(f"has a cloth, {name}, whose fabric is that of no earlier one, {fabric}|{fix}")
-            own = [key for key in FABRIC if key in cloth and cloth[key] != known[fabric].get(key)]
+            whole = known[fabric]
+            own = [key for key in FABRIC if key in cloth and cloth[key] != whole.get(key)]
             if own:
                 fix = f"leave them out, or leave out its fabric: the numbers of {fabric} hold"
                 raise ValueError(f"has a cloth, {name}, with numbers beside its fabric: {', '.join(own)}|{fix}")
-            whole = known[fabric]
             cloth = {k: whole[k] for k in FABRIC if k in whole} | cloth | {"fabric": whole.get("fabric", fabric)}
         known[name] = cloth
         complete.append(cloth)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..cloth import Cloth, add_cloth
 from ..equilibrium import Equilibrium, equilibrium
 from ..errors import InputError
-from ..fabric import Exponential, Fabric, Sinh
+from ..fabric import Fabric, Stiffening
 from ..mesh import TriangleMesh
 from ..quantities import Term
 from ..scene import Array, Scene
@@ -63,7 +63,7 @@ def strip_strain(fabric: Fabric, along: str, load: float) -> float:
     """About the strain of a free strip under a load, N/m: where a test that asks for a load may start."""
     stiffness = fabric.warp if along == "warp" or fabric.weft is None else fabric.weft
     low, high = 0.0, load / stiffness
-    if not isinstance(fabric.law, Exponential | Sinh):
+    if not isinstance(fabric.law, Stiffening):
         return 0.5 * high
     b = fabric.law.warp if along == "warp" else fabric.law.weft
     for _ in range(_HALVINGS):

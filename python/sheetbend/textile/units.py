@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from math import pi
 
 from ..errors import InputError
+from ..io.sidecar import METERS
 from .reading import GRAM_FORCE
 
 _INCH, _POUND = 0.0254, 4.4482216152605
 _FORCES = {"N": 1.0, "mN": 1e-3, "cN": 1e-2, "daN": 10.0, "kN": 1e3, "gf": GRAM_FORCE, "kgf": 1e3 * GRAM_FORCE}
 _FORCES |= {"g": GRAM_FORCE, "kg": 1e3 * GRAM_FORCE, "lbf": _POUND}  # g and kg of a force: gram-force
-_LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": _INCH, "inch": _INCH}
+_LENGTHS = METERS | {"um": 1e-6, "in": _INCH, "inch": _INCH}
 _TIMES = {"s": 1.0, "sec": 1.0, "sek": 1.0, "ms": 1e-3, "min": 60.0}
 _ANGLES = {"deg": pi / 180.0, "°": pi / 180.0, "grad": pi / 180.0, "rad": 1.0}
 _RATIOS = {"%": 1e-2, "1": 1.0, "-": 1.0}
