@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 import plain
+import plain_cloth
 import table
 from sheetbend.bench import WORKLOADS, workload
 from sheetbend.bench.machine import machine
@@ -58,6 +59,8 @@ def main() -> None:
         cores = sorted(os.sched_getaffinity(0))
         told["threads"] = [ours(name, given.repeats, cores) for name in given.workloads if len(cores) > 1]
         told |= {name: ours(name, given.repeats, cores[:1]) for name in ("chain", "cloth", "ladder")}
+        if "plain C++" in given.tools and plain.compiler() is not None:
+            told["cloth"]["plain"] = plain_sheet(given.folder.resolve(), given.repeats, cores[:1])
     if given.keep and path.exists():
         told = merged(json.loads(path.read_text()), told)
     path.write_text(json.dumps(told, indent=1) + "\n")
@@ -145,6 +148,16 @@ def ours(name: str, repeats: int, cores: Sequence[int]) -> dict[str, Any]:
     """sheetbend bench on these cores, one thread each."""
     command = [sys.executable, "-m", "sheetbend", "bench", name, "--json"]
     return _run([*command, "--repeats", str(repeats), "--threads", str(len(cores))], cores)
+
+
+def plain_sheet(folder: Path, repeats: int, cores: Sequence[int]) -> dict[str, Any]:
+    """The smallest sheet of `sheetbend bench cloth` as a plain loop, ns per projection."""
+    program = plain.build(folder / "plain", "-march=native", name="plain_cloth")
+    with tempfile.TemporaryDirectory() as scratch:
+        sheet = Path(scratch) / "sheet.txt"
+        projections = plain_cloth.write_swatch(sheet)
+        found = _run([str(program), str(sheet), str(repeats)], cores)
+    return {"forward_cpu_ns": 1e9 * statistics.median(found["forward_cpu_s"]) / projections}
 
 
 def _run(command: Sequence[str], cores: Sequence[int], **environment: str) -> dict[str, Any]:

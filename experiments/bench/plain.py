@@ -1,4 +1,4 @@
-"""The plain C++ loop of plain.cpp: builds it with the machine's compiler and runs it."""
+"""The plain C++ loops of plain.cpp and plain_cloth.cpp: builds them with the machine's compiler and runs them."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-SOURCE = Path(__file__).with_name("plain.cpp")
+HERE = Path(__file__).resolve().parent
 
 
 def compiler() -> str | None:
     return shutil.which("c++")
 
 
-def build(folder: Path, *flags: str) -> Path:
+def build(folder: Path, *flags: str, name: str = "plain") -> Path:
     """The program, compiled into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    program = folder / "plain"
-    subprocess.run(["c++", "-std=c++20", "-O3", *flags, "-o", str(program), str(SOURCE)], check=True)
+    program = folder / name
+    source = HERE / f"{name}.cpp"
+    subprocess.run(["c++", "-std=c++20", "-O3", *flags, "-o", str(program), str(source)], check=True)
     return program
 
 

@@ -97,3 +97,22 @@ def test_the_plain_loop_gives_the_shipped_reference(scripts: None, tmp_path: Pat
     found = plain.run(program, "W1", "--reference", 1e-4, 1e-2, 0.1)
     np.testing.assert_allclose(found["gradient"], shipped("W1")[0], rtol=1e-10)
     assert plain.run(program, "W1s", 1)["losses"][0] == pytest.approx(0.0748491949, rel=1e-8)
+
+
+def test_the_plain_sheet_is_the_package_s(scripts: None, tmp_path: Path) -> None:
+    """Value and gradient of a sheet with strain and hinges, by a program that shares no code with the package."""
+    import plain
+    import plain_cloth
+    from sheetbend.bench import cloth
+
+    if plain.compiler() is None:
+        pytest.skip("there is no C++ compiler")
+    ours, _ = cloth.sheets(*cloth.CHECKED)
+    cells, substeps = cloth.CHECKED
+    direction = np.random.default_rng(7).standard_normal(ours.inputs.shape[1]) * np.abs(ours.inputs[0])
+    plain_cloth.write(tmp_path / "sheet.txt", cloth.sheet(cells), cloth.SOLVER, substeps, direction)
+    program = plain.build(tmp_path, "-ffp-contract=off", name="plain_cloth")
+    states = ours.core.states(ours.inputs[0], [substeps], 0.0)
+    assert plain.run(program, tmp_path / "sheet.txt", 1)["sum"] == pytest.approx(states.sum(), rel=1e-13)
+    derivative = plain.run(program, tmp_path / "sheet.txt", "--derivative")["derivative"]
+    assert np.vdot(ours.gradient(), direction) == pytest.approx(derivative, rel=1e-11)

@@ -39,7 +39,7 @@ def sheets(
     cells: int, substeps: int, solver: Solver = SOLVER, count: int = 1, bending_model: str = "dihedral"
 ) -> tuple[Ropes, int]:
     """`count` sheets whose stiffness differs, and the number of constraints of one."""
-    scenes = [_scene(cells, bending_model, 200.0 * 1.1**k) for k in range(count)]
+    scenes = [sheet(cells, bending_model, 200.0 * 1.1**k) for k in range(count)]
     inputs = np.stack([s.compiled.inputs() for s in scenes])
     constraints = sum(len(g.particles) for g in scenes[0].groups)
     return Ropes(scenes[0].compiled, inputs, solver, substeps), constraints
@@ -65,9 +65,9 @@ def measure_cloth(
         "repeats": repeats,
         "rows": rows,
         "swatch": {
-            "curvature": _row(cells[0], _substeps(cells[0]), _solver(threads), repeats, "curvature"),
+            "curvature": _row(cells[0], substeps_of(cells[0]), _solver(threads), repeats, "curvature"),
             "newton": _row(cells[0], 5, Solver(h=H, method="newton", threads=threads), repeats, "curvature"),
-            "batch": _batch(cells[0], _substeps(cells[0]), threads, repeats),
+            "batch": _batch(cells[0], substeps_of(cells[0]), threads, repeats),
         },
         "gradient_error": gradient_error(),
         "gradient_error_bound": BOUND,
@@ -81,7 +81,8 @@ def gradient_error() -> float:
     return sheets(*CHECKED)[0].gradient_error()
 
 
-def _scene(cells: int, bending_model: str, warp: float) -> Scene:
+def sheet(cells: int, bending_model: str = "dihedral", warp: float = 200.0) -> Scene:
+    """A sheet of so many cells along a side; `warp` in N/m."""
     mesh = grid(1.0, 1.0, cells, cells, "one_way" if bending_model == "curvature" else "alternating")
     scene = Scene("sheet")
     cloth = add_cloth(
@@ -100,7 +101,8 @@ def _scene(cells: int, bending_model: str, warp: float) -> Scene:
     return scene
 
 
-def _substeps(cells: int) -> int:
+def substeps_of(cells: int) -> int:
+    """As many as are measured: fewer of larger sheets."""
     return max(MIN_SUBSTEPS, VERTEX_SUBSTEPS // (cells + 1) ** 2)
 
 
@@ -110,16 +112,16 @@ def _solver(threads: int) -> Solver:
 
 def _climb(cells: int, threads: int, repeats: int) -> dict[str, Any]:
     """One row; for a process of its own."""
-    substeps = _substeps(cells)
+    substeps = substeps_of(cells)
     peak = peak_mb(sheets(cells, substeps, _solver(threads))[0].gradient)
     return {**_row(cells, substeps, _solver(threads), repeats, "dihedral"), "peak_mb": peak}
 
 
 def _row(cells: int, substeps: int, solver: Solver, repeats: int, bending_model: str) -> dict[str, Any]:
-    sheet, constraints = sheets(cells, substeps, solver, bending_model=bending_model)
+    one, constraints = sheets(cells, substeps, solver, bending_model=bending_model)
     work = constraints * solver.sweeps * substeps
-    forward, _ = timed(sheet.forward, repeats)
-    gradient, _ = timed(sheet.gradient, repeats)
+    forward, _ = timed(one.forward, repeats)
+    gradient, _ = timed(one.gradient, repeats)
     found: dict[str, Any] = {
         "particles": (cells + 1) ** 2,
         "constraints": constraints,
