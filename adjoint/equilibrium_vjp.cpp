@@ -36,13 +36,14 @@ void EquilibriumDerivative::vjp(const double* x_bar, const double* lambda_bar, d
 
   for_each_constraint(scene_, [&]<class K>(K, const Group& group, int item) {
     const int first_row = group.first_row + item * K::rows;
-    double x[K::dofs], u_here[K::dofs], along[K::rows * K::dofs], by[K::dofs]{};
+    double x[K::dofs], away[K::dofs], by[K::dofs]{};
+    constexpr double none[K::dofs]{};
     gather<K>(scene_, group, item, at_.x.data(), x);
-    gather<K>(scene_, group, item, u.data(), u_here);
-    for (int j = 0; j < K::rows; ++j)
-      for (int d = 0; d < K::dofs; ++d) along[j * K::dofs + d] = -at_.lambda[first_row + j] * u_here[d];
+    gather<K>(scene_, group, item, u.data(), away);
+    for (double& a : away) a = -a;
     const double* p = rest_parameters<K>(in, group, item);
-    gradients_vjp<K>(x, p, &v[first_row], along, by, bar.of(Quantity::rest) + (p - in.of(Quantity::rest)));
+    gradients_vjp<K>(x, p, &at_.lambda[first_row], &v[first_row], away, none, by,
+                     bar.of(Quantity::rest) + (p - in.of(Quantity::rest)));
     const Evaluation<K, double> value(x, p);
     for (int j = 0; j < K::rows; ++j) {
       bar.of(Quantity::compliance)[group.first + item] -= v[first_row + j] * at_.lambda[first_row + j];

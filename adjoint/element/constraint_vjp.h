@@ -46,26 +46,27 @@ void values_vjp(const T* x, const T* p, const T* C_bar, T* x_bar, T* p_bar) {
   }
   if constexpr (K::factors) p_bar[0] += C_bar[K::rows - 1] * primal<T>(C[K::rows - 1]);
   if constexpr (HasReverse<K>) {
-    T y[K::rows], still[K::rows * K::dofs], unused[K::dofs];
+    T y[K::rows], still[std::max(K::rows, K::dofs)], unused[K::dofs];
     for (int j = 0; j < K::rows; ++j) y[j] = -C_bar[j];
     for (T& v : still) v = T(0.0);
     for (T& v : unused) v = T(0.0);
-    K::reverse(x, p, y, still, unused, p_bar);
+    K::reverse(x, p, still, y, still, still, unused, p_bar);
   }
 }
 
-// Of sum_j (v_j . J_j - y_j C_j) with y_j and v_j (rows x dofs) held: x_bar += Hess(C_j) v_j, p_bar += v_j . dJ_j/dp - y_j dC_j/dp.
+// Of sum_j (v_j . J_j - y_j C_j) with v_j = dl_j a - y_j b held: x_bar += Hess(C_j) v_j, p_bar += v_j . dJ_j/dp - y_j dC_j/dp.
 template <class K, class T>
-void gradients_vjp(const T* x, const T* p, const T* y, const T* v, T* x_bar, T* p_bar) {
+void gradients_vjp(const T* x, const T* p, const T* dl, const T* y, const T* a, const T* b, T* x_bar, T* p_bar) {
   if constexpr (HasReverse<K>) {
-    K::reverse(x, p, y, v, x_bar, p_bar);
+    K::reverse(x, p, dl, y, a, b, x_bar, p_bar);
   } else {
     constexpr int inside = inside_count<K>, last = (K::rows - 1) * K::dofs;
+    const auto v = [&](int j, int d) { return dl[j] * a[d] - y[j] * b[d]; };
     using D = Dual<T, K::rows + inside>;
     D at[K::dofs], with[parameter_count<K> + 1], C[K::rows], J[K::rows * K::dofs];
     for (int d = 0; d < K::dofs; ++d) {
       at[d].v = x[d];
-      for (int j = 0; j < K::rows; ++j) at[d].d[j] = times_factor<K>(p, j, v[j * K::dofs + d]);
+      for (int j = 0; j < K::rows; ++j) at[d].d[j] = times_factor<K>(p, j, v(j, d));
     }
     load_inside<K>(p, with);
     for (int k = 0; k < inside; ++k) with[K::factors + k].d[K::rows + k] = T(1.0);
@@ -81,7 +82,7 @@ void gradients_vjp(const T* x, const T* p, const T* y, const T* v, T* x_bar, T* 
     }
     if constexpr (K::factors) {
       T sum = -(y[K::rows - 1] * C[K::rows - 1].v);
-      for (int d = 0; d < K::dofs; ++d) sum += v[last + d] * J[last + d].v;
+      for (int d = 0; d < K::dofs; ++d) sum += v(K::rows - 1, d) * J[last + d].v;
       p_bar[0] += sum;
     }
   }

@@ -42,42 +42,28 @@ void pull_back_rates(const Element<K, T>& e, const T* lambda, const T* C_r, cons
 template <bool alone = false, class K, class T>
 void pull_back(const Element<K, T>& e, const Kept<K, T>& at, const T* lambda, const T* C_r, const T* dl, const T* y,
                const T* z, const T* u, T* x_bar, ElementCotangent<K, T>& bar) {
-  const auto v = [&](int j, int d) {
-    if constexpr (alone)
-      return dl[j] * (e.w[d / 3] * z[d]);
-    else
-      return e.w[d / 3] * (dl[j] * z[d] - y[j] * u[d]);
-  };
-  T near[K::rows];
+  T a[K::dofs], b[K::dofs], near[K::rows];
+  unrolled<K::dofs>([&](int d) {
+    a[d] = e.w[d / 3] * z[d];
+    b[d] = alone ? T(0.0) : e.w[d / 3] * u[d];
+  });
   if constexpr (HasGeometry<K>) {
     T along[K::dofs];
-    unrolled<K::dofs>([&](int d) { along[d] = v(0, d); });
+    unrolled<K::dofs>([&](int d) { along[d] = alone ? dl[0] * a[d] : dl[0] * a[d] - y[0] * b[d]; });
     at.add_hessian_times(along, x_bar);
     for (int k = 0; k < parameter_count<K>; ++k) bar.p[k] += y[k];  // C = f(x) - p
   } else {
-    T along[K::rows * K::dofs];
-    for (int j = 0; j < K::rows; ++j)
-      for (int d = 0; d < K::dofs; ++d) along[j * K::dofs + d] = v(j, d);
-    gradients_vjp<K>(at.x, e.p, y, along, x_bar, bar.p);
+    gradients_vjp<K>(at.x, e.p, dl, y, a, b, x_bar, bar.p);
     if constexpr (K::periodic)
       if (C_r) C_r = on_branch<K>(at.x, e.p, C_r, near);
   }
   for (int j = 0; j < K::rows; ++j) pull_back_rates(e, lambda, C_r, dl, y, j, bar);
 }
 
-// y = lambda'_bar + J W x'_bar.
-template <class K, class T>
-void adjoint_right_side(const Element<K, T>& e, const T* J, const T* lambda_bar, const T* x_bar, T* y) {
-  for (int j = 0; j < K::rows; ++j) {
-    y[j] = lambda_bar[j];
-    for (int d = 0; d < K::dofs; ++d) y[j] += J[j * K::dofs + d] * (e.w[d / 3] * x_bar[d]);
-  }
-}
-
 // y = A^-1 y. Where a unilateral constraint has let go, dl = -lambda: A and s have no part in it, so y is 0, and lambda_bar - lambda'_bar, returned,
 // is what takes the right side away.
-template <class K, class T>
-T solve_unless_let_go(const Element<K, T>& e, const T* J, const T* lambda, const T* dl, T* y) {
+template <class K, class T, class Gradient>
+T solve_unless_let_go(const Element<K, T>& e, const Gradient& J, const T* lambda, const T* dl, T* y) {
   const T right = y[0], zero(0.0);
   e.solve(J, y);
   const auto holds = lambda[0] + dl[0] > zero;
@@ -90,37 +76,35 @@ T solve_unless_let_go(const Element<K, T>& e, const T* J, const T* lambda, const
 template <class K, class T>
 void correction_vjp(const Element<K, T>& e, const Kept<K, T>& at, const T* lambda, const T* C_r, const T* dl,
                     const T* lambda_bar, T* x_bar, T* w_bar, ElementCotangent<K, T>& bar) {
-  T J[K::rows * K::dofs], y[K::rows], z[K::dofs], u[K::dofs], back[K::dofs];
+  T y[K::rows], z[K::dofs], u[K::dofs], back[K::dofs];
+  const auto J = gradient_of(at, e.p);
   const auto solve = [&] {
     if constexpr (K::unilateral)
       bar.lambda[0] = solve_unless_let_go(e, J, lambda, dl, y);
     else
       e.solve(J, y);
   };
-  if constexpr (HasGeometry<K>) {
-    at.gradient(J);
-  } else {
-    T C[K::rows];
-    K::evaluate(at.x, e.p, C, J);
-  }
   if constexpr (K::unit_gradients) {
     // |J_k| = 1; and since Hess(C) W J^T = 0, z may be x'_bar itself
     T along[K::arity];
     y[0] = lambda_bar[0];
     unrolled<K::arity>([&](int k) {
-      along[k] = dot(Vec3<T>(J + 3 * k), Vec3<T>(x_bar + 3 * k));
+      along[k] = dot(Vec3<T>(J.J + 3 * k), Vec3<T>(x_bar + 3 * k));
       y[0] += e.w[k] * along[k];
     });
     solve();
     unrolled<K::arity>([&](int k) { w_bar[k] = dl[0] * (along[k] - y[0]); });
-    transpose_times<K>(J, dl, u);
-    transpose_times<K>(J, y, back);
+    J.transpose_times(dl, u);
+    J.transpose_times(y, back);
     unrolled<K::dofs>([&](int d) { z[d] = x_bar[d]; });
   } else {
-    adjoint_right_side(e, J, lambda_bar, x_bar, y);
+    T moved[K::dofs];
+    unrolled<K::dofs>([&](int d) { moved[d] = e.w[d / 3] * x_bar[d]; });
+    for (int j = 0; j < K::rows; ++j) y[j] = lambda_bar[j];
+    J.add_times(moved, y);
     solve();
-    transpose_times<K>(J, dl, u);
-    transpose_times<K>(J, y, back);
+    J.transpose_times(dl, u);
+    J.transpose_times(y, back);
     for (int d = 0; d < K::dofs; ++d) z[d] = x_bar[d] - back[d];
     for (int k = 0; k < K::arity; ++k) w_bar[k] = dot(Vec3<T>(u + 3 * k), Vec3<T>(z + 3 * k));
   }

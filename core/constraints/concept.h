@@ -21,9 +21,12 @@
 //   template <class T> struct Geometry: what the reverse can use in place of x and dual numbers, where the parameters are
 //     subtracted, C = f(x) - p. It has `size` numbers, Geometry(x), keep(to), kept(from), values(p, C), gradient(J) and
 //     add_hessian_times(v, out) for one row. See distance.h.
-//   template <class T> static void reverse(x, p, y, v, x_bar, p_bar): of sum_j (v_j . J_j - y_j C_j), where y (rows) and v (rows x dofs)
-//     do not vary, the derivatives by J's x, Hess(C_j) v_j, and by p, added to x_bar and p_bar: what dual numbers
-//     otherwise find with a direction for each row and parameter. See membrane.h.
+//   template <class T> struct Factors: C, and J as a product of few numbers, for constraints of several rows. It has Factors(x, p), C, gradient(J), and
+//     what a projection makes of J without writing it down: matrix(w, A), add_times(v, y) and transpose_times(y, out), as in
+//     core/element/linearization.h. See membrane.h.
+//   template <class T> static void reverse(x, p, dl, y, a, b, x_bar, p_bar): of sum_j (v_j . J_j - y_j C_j) with v_j = dl_j a - y_j b, where dl, y (rows)
+//     and a, b (dofs) do not vary, the derivatives by J's x, Hess(C_j) v_j, and by p, added to x_bar and p_bar: what
+//     dual numbers otherwise find with a direction for each row and parameter. See membrane.h.
 #pragma once
 
 #include <algorithm>
@@ -51,7 +54,10 @@ template <class K>
 concept HasGeometry = requires { K::template Geometry<double>::size; };
 
 template <class K>
-concept HasReverse = requires(const double* in, double* out) { K::reverse(in, in, in, in, out, out); };
+concept HasReverse = requires(const double* in, double* out) { K::reverse(in, in, in, in, in, in, out, out); };
+
+template <class K>
+concept HasFactors = requires(const typename K::template Factors<double>& factors) { factors.C; };
 
 // What a projection leaves for its reverse: the constraint's own geometry, otherwise the coordinates (where they are).
 template <class K, class T>
@@ -93,25 +99,6 @@ template <class K, int N, class T>
   else
     K::evaluate(x, p, C, J);
 }
-
-// C, and J or the geometry that it comes from.
-template <class K, class T>
-struct Linearization : Evaluation<K, T> {
-  using Evaluation<K, T>::Evaluation;
-  void keep(const T* x, T* to) const { std::copy_n(x, K::dofs, to); }
-  const T* gradient(T*) const { return this->J; }
-};
-template <HasGeometry K, class T>
-struct Linearization<K, T> {
-  Kept<K, T> at;
-  T C[K::rows];
-  Linearization(const T* x, const T* p) : at(x) { at.values(p, C); }
-  void keep(const T*, T* to) const { at.keep(to); }
-  const T* gradient(T* scratch) const {
-    at.gradient(scratch);
-    return scratch;
-  }
-};
 
 // a - b, for angles the short way round.
 template <class K, class T>

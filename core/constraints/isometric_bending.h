@@ -14,23 +14,47 @@ struct IsometricBending : OnPoints<4> {
   static constexpr int rows = 3;
   static constexpr std::array<const char*, 3> parameters{"c1", "ca", "cb"};
 
+  // J is c_k times the unit matrix.
+  template <class T>
+  struct Factors {
+    T C[rows], c[arity];
+    Factors(const T* x, const T* p) : c{-(p[0] + p[1] + p[2]), p[0], p[1], p[2]} {
+      Vec3<T> sum;
+      for (int k = 1; k < arity; ++k) sum = sum + c[k] * (Vec3<T>(x + 3 * k) - Vec3<T>(x));
+      sum.store(C);
+    }
+    void gradient(T* J) const {
+      for (int i = 0; i < rows; ++i)
+        for (int d = 0; d < dofs; ++d) J[i * dofs + d] = d % 3 == i ? c[d / 3] : T(0.0);
+    }
+    void matrix(const T* w, T* A) const {
+      T sum = w[0] * (c[0] * c[0]);
+      for (int k = 1; k < arity; ++k) sum += w[k] * (c[k] * c[k]);
+      for (int i = 0; i < rows; ++i)
+        for (int j = 0; j <= i; ++j) A[i * rows + j] = i == j ? sum : T(0.0);
+    }
+    void add_times(const T* v, T* y) const {
+      for (int d = 0; d < dofs; ++d) y[d % 3] += c[d / 3] * v[d];
+    }
+    void transpose_times(const T* y, T* out) const {
+      for (int d = 0; d < dofs; ++d) out[d] = c[d / 3] * y[d % 3];
+    }
+  };
+
   template <class T>
   static void evaluate(const T* x, const T* p, T* C, T* J) {
-    const T c[arity] = {-(p[0] + p[1] + p[2]), p[0], p[1], p[2]};
-    Vec3<T> sum;
-    for (int k = 1; k < arity; ++k) sum = sum + c[k] * (Vec3<T>(x + 3 * k) - Vec3<T>(x));
-    sum.store(C);
-    for (int i = 0; i < rows; ++i)
-      for (int d = 0; d < dofs; ++d) J[i * dofs + d] = d % 3 == i ? c[d / 3] : T(0.0);
+    const Factors<T> at(x, p);
+    std::copy_n(at.C, rows, C);
+    at.gradient(J);
   }
 
   // C is bilinear in x and p, and J does not know x.
   template <class T>
-  static void reverse(const T* x, const T*, const T* y, const T* v, T*, T* p_bar) {
+  static void reverse(const T* x, const T*, const T* dl, const T* y, const T* a, const T* b, T*, T* p_bar) {
     for (int k = 1; k < arity; ++k)
       for (int j = 0; j < rows; ++j) {
-        const T* along = v + j * dofs + j;
-        p_bar[k - 1] += along[3 * k] - along[0] - y[j] * (x[3 * k + j] - x[j]);
+        const int d = 3 * k + j;
+        p_bar[k - 1] += dl[j] * (a[d] - a[j]) - y[j] * (b[d] - b[j] + x[d] - x[j]);
       }
   }
 };

@@ -4,9 +4,8 @@
 // Nothing here knows where the numbers are stored, so one constraint and eight in the lanes of a pack go through the same lines.
 #pragma once
 
-#include "core/constraints/concept.h"
+#include "core/element/linearization.h"
 #include "core/element/small_ldlt.h"
-#include "core/scalar/unrolled.h"
 
 namespace sheetbend {
 
@@ -32,25 +31,15 @@ struct Element {
     return r;
   }
 
-  // A = J W J^T + a/(1+g), lower triangle, row-major.
-  void matrix(const T* J, T* A) const {
-    unrolled<K::rows>([&](int i) {
-      for (int j = 0; j <= i; ++j) {
-        T sum = w[0] * dot(Vec3<T>(J + i * K::dofs), Vec3<T>(J + j * K::dofs));
-        for (int k = 1; k < K::arity; ++k)
-          sum += w[k] * dot(Vec3<T>(J + i * K::dofs + 3 * k), Vec3<T>(J + j * K::dofs + 3 * k));
-        A[i * K::rows + j] = i == j ? sum + rates.a * rates.scale : sum;
-      }
-    });
-  }
-
-  // b = A^-1 b.
-  void solve(const T* J, T* b) const {
+  // b = A^-1 b, A = J W J^T + a/(1+g).
+  template <class Gradient>
+  void solve(const Gradient& J, T* b) const {
     if constexpr (K::unit_gradients) {
       b[0] = b[0] * inverse;
     } else {
       T A[K::rows * K::rows];
-      matrix(J, A);
+      J.matrix(w, A);
+      for (int i = 0; i < K::rows; ++i) A[i * K::rows + i] = A[i * K::rows + i] + rates.a * rates.scale;
       SmallLdlt<K::rows, T>(A).solve(b);
     }
   }
@@ -62,15 +51,6 @@ T inverse_of_unit_matrix(const T& sum_of_w, const Rates<T>& rates) {
   return inverse_or_zero(sum_of_w + rates.a * rates.scale);
 }
 
-// out = J^T y, on the stencil.
-template <class K, class T>
-void transpose_times(const T* J, const T* y, T* out) {
-  unrolled<K::dofs>([&](int d) {
-    out[d] = J[d] * y[0];
-    for (int j = 1; j < K::rows; ++j) out[d] += J[j * K::dofs + d] * y[j];
-  });
-}
-
 // The projection of one constraint by itself: dl, and the push J^T dl that its particles get times their inverse masses. A unilateral one lets go
 // where its multiplier would change sign: then dl = -lambda.
 template <class K, class T>
@@ -78,12 +58,11 @@ struct Correction {
   T dl[K::rows], push[K::dofs];
 
   Correction(const Element<K, T>& e, const Linearization<K, T>& value, const T* lambda, const T* C_r) {
-    T scratch[K::rows * K::dofs];
-    const T* J = value.gradient(scratch);
+    const auto& J = value.gradient();
     for (int j = 0; j < K::rows; ++j) dl[j] = -(e.residual(value.C, lambda, C_r, j) * e.rates.scale);
     e.solve(J, dl);
     if constexpr (K::unilateral) dl[0] = select(lambda[0] + dl[0] > T(0.0), dl[0], -lambda[0]);
-    transpose_times<K>(J, dl, push);
+    J.transpose_times(dl, push);
   }
 };
 

@@ -50,12 +50,15 @@ void load_values(const double* values, bool damped, long n, Element<K, Register>
   load_values<K>([&from](int part) { return from[part]; }, damped, e);
 }
 
+// What the first of two stages may hand on in registers; more would be copied through memory.
+inline constexpr std::size_t most_handed_on = 30 * sizeof(Register);
+
 // Runs second(n, first(n)) for every n. With registers to spare, the first of the next place comes before the second of this one: what takes
 // long in the first (square roots, divisions) then overlaps the loads and stores around it. Places of one color share no particle.
 template <class First, class Second>
 inline __attribute__((always_inline)) void overlapped(long begin, long end, First&& first, Second&& second) {
   if (begin >= end) return;
-  if constexpr (register_lanes == 8) {
+  if constexpr (register_lanes == 8 && sizeof(first(begin)) <= most_handed_on) {
     auto now = first(begin);
     for (long n = begin; n + 1 < end; ++n) {
       auto next = first(n + 1);  // not const: gcc keeps const aggregates in memory
