@@ -248,7 +248,6 @@ class TestChainAndLadder:
         assert found["gradient_error"] <= found["gradient_error_bound"]
         ways = ("forward", "two_iterations", "gradient", "jacobian", "forward_batch", "gradient_singly")
         assert all(found[f"{name}_ns"] > 0 for name in ways)
-        assert found["gradient_ns"] > found["forward_ns_min"]
 
     def test_chain(self) -> None:
         found = {**measure_chain(repeats=1, work=600), "exit_code": 0}
