@@ -8,7 +8,7 @@ EquilibriumDerivative::EquilibriumDerivative(const Scene& scene, const double* i
     : scene_(scene), inputs_(inputs, inputs + scene.layout.total()), at_(at), kkt_(scene) {
   if (!at.converged) throw NoEquilibrium(at.message);
   kkt_.assemble(inputs, at_.x.data(), at_.lambda.data(), at_.force_stiffness);
-  if (!kkt_.factorize(0.0, inputs_.data() + scene.layout.of(Quantity::compliance)))
+  if (!kkt_.factorize(0.0, compliances(scene, {scene.layout, inputs_.data()}).data()))
     throw NoEquilibrium(
         "equilibrium: the Newton matrix is singular, so the shape has no derivative (a fold, or a part that moves "
         "freely). Fix: hold "
@@ -25,13 +25,13 @@ void EquilibriumDerivative::solve(std::vector<double>& x, std::vector<double>& l
 void EquilibriumDerivative::vjp(const double* x_bar, const double* lambda_bar, double* inputs_bar) const {
   const Inputs<const double> in{scene_.layout, inputs_.data()};
   const Inputs<double> bar{scene_.layout, inputs_bar};
-  std::vector<double> u(scene_.dofs(), 0.0), v(scene_.rows, 0.0), fixed(scene_.dofs(), 0.0);
+  std::vector<double> u(scene_.dofs(), 0.0), v(scene_.multipliers(), 0.0), fixed(scene_.dofs(), 0.0);
   if (x_bar) {
     u.assign(x_bar, x_bar + scene_.dofs());
     retract_directors_vjp<double>(scene_, [&](int node) { return &at_.x[scene_.first_dof[node]]; }, u.data());
     fixed = u;
   }
-  if (lambda_bar) v.assign(lambda_bar, lambda_bar + scene_.rows);
+  if (lambda_bar) v.assign(lambda_bar, lambda_bar + scene_.multipliers());
   solve(u, v);
 
   for_each_constraint(scene_, [&]<class K>(K, const Group& group, int item) {
@@ -63,6 +63,33 @@ void EquilibriumDerivative::vjp(const double* x_bar, const double* lambda_bar, d
     b_bar.add_to(&fixed[scene_.first_dof[nodes[1]]]);
     c_bar.add_to(&fixed[scene_.first_dof[nodes[2]]]);
   });
+
+  using D = Dual<double, 1>;
+  std::vector<Vec3<D>> along, gradient;
+  for (int i = 0; i < static_cast<int>(scene_.volumes.size()); ++i) {
+    const Volume& volume = scene_.volumes[i];
+    const double p = at_.lambda[scene_.rows + i], v_here = v[scene_.rows + i];
+    place_volume(
+        volume,
+        [&](int n) {
+          D x[3];
+          for (int d = 0; d < 3; ++d) {
+            x[d].v = at_.x[scene_.first_dof[n] + d];
+            x[d].d[0] = u[scene_.first_dof[n] + d];
+          }
+          return Vec3<D>(x);
+        },
+        along);
+    gradient.resize(along.size());
+    enclosed(volume, along, gradient);
+    bar.of(Quantity::volume)[i] += v_here;
+    bar.of(Quantity::volume_compliance)[i] -= v_here * p;
+    for (std::size_t k = 0; k < gradient.size(); ++k) {
+      const auto by = [&](const D& g) { return -(p * g.d[0] + v_here * g.v); };
+      Vec3<double>(by(gradient[k].x), by(gradient[k].y), by(gradient[k].z))
+          .add_to(&fixed[scene_.first_dof[volume.nodes[k]]]);
+    }
+  }
 
   const Vec3<double> gravity(in.of(Quantity::gravity));
   const KnotWeights boundary = scene_.driven.empty() ? KnotWeights{} : scene_.boundary.at(at_.t0);

@@ -36,10 +36,10 @@ class EquilibriumDerivative {
   // Factors A once. Throws NoEquilibrium where the result did not converge or A is singular (a fold, or a part that moves freely).
   EquilibriumDerivative(const Scene& scene, const double* inputs, const Equilibrium& at);
 
-  // inputs_bar (layout.total()) += gradient, given x_bar (dofs) and lambda_bar (rows); either may be null.
+  // inputs_bar (layout.total()) += gradient, given x_bar (dofs) and lambda_bar (multipliers); either may be null.
   void vjp(const double* x_bar, const double* lambda_bar, double* inputs_bar) const;
 
-  // Coordinates (dofs) and multipliers (rows, may be null) with their first-order parts, from inputs that carry some.
+  // Coordinates (dofs) and multipliers (may be null) with their first-order parts, from inputs that carry some.
   template <class T>
   void jvp(const T* inputs, T* x, T* lambda) const {
     const Inputs<const T> in{scene_.layout, inputs};

@@ -74,14 +74,6 @@ void expect_no_unilateral(const Scene& scene) {
       throw std::invalid_argument("equilibrium: group " + group.name + " may go slack. Fix: leave it out");
 }
 
-// Its row couples all vertices of a surface.
-void expect_no_volume(const Scene& scene) {
-  if (!scene.volumes.empty())
-    throw std::invalid_argument("equilibrium: the volume of " + scene.volumes.front().name +
-                                " is to be kept. Fix: give the pressure instead (add_pressure), which a closed surface "
-                                "may rest under, or simulate with drag until the motion has died down");
-}
-
 std::string not_converged(const Equilibrium& e, double tolerance) {
   std::ostringstream text;
   text << "equilibrium: no rest found in " << e.iterations << " iterations, relative residual " << e.residual
@@ -97,8 +89,9 @@ struct EquilibriumSolver::State {
   const Scene& scene;
   Inputs<const double> in;
   const EquilibriumOptions& options;
-  std::vector<double> x, lambda, r_x, r_l, softened, soft;
+  std::vector<double> x, lambda, r_x, r_l, compliance, softened, soft;
   double size, edge, weight, total = 0.0;  // of the scene, of an edge  [m]; largest and summed external force  [N]
+  std::vector<double> inflation;  // per volume, what changing the start's to its own takes by the first estimate  [J]
   double residual = 0.0, last_step = std::numeric_limits<double>::infinity();
 
   State(const Scene& scene_, const double* inputs, const double* start_x, const double* start_lambda,
@@ -107,15 +100,16 @@ struct EquilibriumSolver::State {
         in{scene_.layout, inputs},
         options(o),
         r_x(scene_.dofs()),
-        r_l(scene_.rows),
-        softened(scene_.constraints),
-        soft(scene_.groups.size(), std::numeric_limits<double>::infinity()) {
+        r_l(scene_.multipliers()),
+        compliance(compliances(scene_, in)),
+        softened(compliance),
+        soft(scene_.groups.size() + scene_.volumes.size(), std::numeric_limits<double>::infinity()) {
     expect_energy(scene, in, o.t0);
     expect_no_unilateral(scene);
-    expect_no_volume(scene);
     const double* from = start_x ? start_x : in.of(Quantity::position);
     x.assign(from, from + scene.dofs());
-    start_lambda ? lambda.assign(start_lambda, start_lambda + scene.rows) : lambda.assign(scene.rows, 0.0);
+    lambda.assign(scene.multipliers(), 0.0);
+    if (start_lambda) std::copy_n(start_lambda, lambda.size(), lambda.data());
     place_fixed(scene, in, o.t0, x.data());
     retract_directors(scene, x.data());
     size = scene_size(scene, x.data());
@@ -130,28 +124,32 @@ struct EquilibriumSolver::State {
           "back");
   }
 
-  // A scale of stiffness that is there before any multiplier: of the loads or, without loads, a part of the softest constraint's.
+  // A scale of stiffness that is there before any multiplier: of the loads or, without loads, a part of the softest constraint's. A kept
+  // volume loads the constraints of its surface; one that only holds the body in place is no measure of them.
   double force_stiffness() const {
     if (weight > 0.0 && edge > 0.0) return weight / edge;
+    std::vector<char> counts(scene.nodes(), scene.volumes.empty());
+    for (const Volume& volume : scene.volumes)
+      for (const int n : volume.nodes) counts[n] = true;
     double softest = std::numeric_limits<double>::infinity();
     for_each_constraint(scene, [&]<class K>(K, const Group& group, int item) {
+      if (!std::ranges::all_of(group.nodes(item), [&](int n) { return counts[n]; })) return;
       double local[K::dofs], J2 = 0.0;
       gather<K>(scene, group, item, x.data(), local);
       for (const double j : Evaluation<K, double>(local, rest_parameters<K>(in, group, item)).J)
         J2 = std::max(J2, j * j);
-      if (const double alpha = compliance()[group.first + item]; alpha > 0.0) softest = std::min(softest, J2 / alpha);
+      if (const double alpha = compliance[group.first + item]; alpha > 0.0) softest = std::min(softest, J2 / alpha);
     });
     return std::isfinite(softest) ? 1e-4 * softest : 0.0;
   }
-  double first_pseudo_stiffness(Kkt& kkt, const double* alpha) const {
-    kkt.factorize(0.0, alpha);
+  double first_pseudo_stiffness(Kkt& kkt) const {
+    kkt.factorize(0.0, compliance.data());
     return std::max(1e-6 * kkt.largest_diagonal(), force_stiffness());
   }
 
-  const double* compliance() const { return in.of(Quantity::compliance); }
-
   // A compliance for each group, always falling, at which its violated constraints hold no more than a part of the energy that
-  // the loads can give: full stiffness would answer a rough start with forces that crumple it.
+  // the loads can give: full stiffness would answer a rough start with forces that crumple it. A volume is a load itself: of the work that
+  // it is estimated to take, it may hold all.
   void soften() {
     const double budget = energy_share * total * size;
     for (std::size_t g = 0; g < scene.groups.size(); ++g) {
@@ -165,8 +163,19 @@ struct EquilibriumSolver::State {
         }
       });
       soft[g] = budget > 0.0 ? std::min(sum / budget, stiffening * soft[g]) : 0.0;
-      for (int c = group.first; c < group.first + group.count; ++c) softened[c] = std::max(compliance()[c], soft[g]);
+      for (int c = group.first; c < group.first + group.count; ++c) softened[c] = std::max(compliance[c], soft[g]);
     }
+    for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
+      double& own = soft[scene.groups.size() + v];
+      const double missing = missing_volume(v);
+      own = inflation[v] > 0.0 ? std::min(0.5 * missing * missing / inflation[v], stiffening * own) : 0.0;
+      softened[scene.constraints + v] = std::max(compliance[scene.constraints + v], own);
+    }
+  }
+
+  double missing_volume(std::size_t v) const {
+    std::vector<Vec3<double>> gradient;
+    return kept_volume(scene, in, static_cast<int>(v), x.data(), gradient);
   }
 
   void evaluate(const std::vector<double>& at_x, const std::vector<double>& at_lambda) {
@@ -194,6 +203,19 @@ struct EquilibriumSolver::State {
         residual = std::max(residual, std::abs(r_l[row]) / (J2 > 0.0 ? std::sqrt(J2) * size : 1.0));
       }
     });
+    std::vector<Vec3<double>> gradient;
+    for (int v = 0; v < static_cast<int>(scene.volumes.size()); ++v) {
+      const int row = scene.rows + v;
+      double g2 = 0.0;
+      kept_volume(scene, in, v, x.data(), gradient);
+      for (std::size_t k = 0; k < gradient.size(); ++k) {
+        const Vec3<double> push = lambda[row] * gradient[k];
+        Vec3<double>(std::abs(push.x), std::abs(push.y), std::abs(push.z))
+            .add_to(&force[scene.first_dof[scene.volumes[v].nodes[k]]]);
+        g2 += dot(gradient[k], gradient[k]);
+      }
+      residual = std::max(residual, std::abs(r_l[row]) / (g2 > 0.0 ? std::sqrt(g2) * size : 1.0));
+    }
     const double scale = largest(force);
     if (scale > 0.0) residual = std::max(residual, largest(r_x) / scale);
   }
@@ -213,9 +235,11 @@ struct EquilibriumSolver::State {
     for_each_constraint(scene, [&]<class K>(K, const Group& group, int item) {
       for (int j = 0; j < K::rows; ++j) {
         const double l = lambda[group.first_row + item * K::rows + j];
-        sum += 0.5 * in.of(Quantity::compliance)[group.first + item] * l * l;
+        sum += 0.5 * compliance[group.first + item] * l * l;
       }
     });
+    for (std::size_t v = 0; v < scene.volumes.size(); ++v)
+      sum += 0.5 * compliance[scene.constraints + v] * lambda[scene.rows + v] * lambda[scene.rows + v];
     return sum;
   }
 };
@@ -234,11 +258,13 @@ bool EquilibriumSolver::step(State& s, double mu, const double* alpha) {
     for (const Group& group : scene_.groups)
       for (int i = 0; i < group.count; ++i) {
         const int c = group.first + i, row = group.first_row + i * group.rows;
-        for (int j = row; j < row + group.rows; ++j) dl[j] = -(dl[j] + (alpha[c] - s.compliance()[c]) * lambda[j]);
+        for (int j = row; j < row + group.rows; ++j) dl[j] = -(dl[j] + (alpha[c] - s.compliance[c]) * lambda[j]);
       }
+    for (int j = scene_.rows, c = scene_.constraints; j < scene_.multipliers(); ++j, ++c)
+      dl[j] = -(dl[j] + (alpha[c] - s.compliance[c]) * lambda[j]);
     if (!finite(dx) || !finite(dl) || !kkt_.solve(dx.data(), dl.data(), 1e-8)) return false;
     for (int i = 0; i < scene_.dofs(); ++i) x[i] += dx[i];
-    for (int i = 0; i < scene_.rows; ++i) lambda[i] += dl[i];
+    for (std::size_t i = 0; i < lambda.size(); ++i) lambda[i] += dl[i];
     const double size = largest(dx);
     if (k == 0) first = size;
     const bool negligible = size <= 1e-14 * s.size;
@@ -258,19 +284,19 @@ bool EquilibriumSolver::step(State& s, double mu, const double* alpha) {
 // The multipliers that would hold the start best: those of one heavily damped step from it, which is not taken.
 void EquilibriumSolver::estimate_multipliers(State& s) {
   kkt_.assemble(s.in.data, s.x.data(), s.lambda.data(), s.force_stiffness());
-  const double mu = s.first_pseudo_stiffness(kkt_, s.compliance());
+  const double mu = s.first_pseudo_stiffness(kkt_);
   std::vector<double> x = s.r_x, lambda = s.r_l;
   for (double& r : x) r = -r;
   for (double& r : lambda) r = -r;
-  if (kkt_.factorize(mu, s.compliance()) && kkt_.solve(x.data(), lambda.data(), 1e-3)) s.lambda = lambda;
+  if (kkt_.factorize(mu, s.compliance.data()) && kkt_.solve(x.data(), lambda.data(), 1e-3)) s.lambda = lambda;
 }
 
 // Moves a little along a direction of negative curvature, found by inverse iteration on the smallest K + mu that is positive definite.
 void EquilibriumSolver::leave_saddle(State& s) {
-  const double* alpha = s.compliance();
+  const double* alpha = s.compliance.data();
   double mu = 1e-9 * kkt_.largest_diagonal();
   for (int k = 0; k < 100 && (!kkt_.factorize(mu, alpha) || kkt_.negative_modes() > 0); ++k) mu *= 2.0;
-  std::vector<double> v(scene_.dofs()), rows(scene_.rows);
+  std::vector<double> v(scene_.dofs()), rows(scene_.multipliers());
   for (int i = 0; i < scene_.dofs(); ++i) v[i] = std::sin(1.0 + 1.7 * i);
   for (int k = 0; k < 8; ++k) {
     std::fill(rows.begin(), rows.end(), 0.0);
@@ -291,13 +317,15 @@ Equilibrium EquilibriumSolver::solve(const double* inputs, const double* start_x
   bool newton = true;
   int departures = 0;
   if (!start_lambda) estimate_multipliers(s);
+  for (std::size_t v = 0; v < scene_.volumes.size(); ++v)
+    s.inflation.push_back(0.5 * std::abs(s.missing_volume(v) * s.lambda[scene_.rows + v]));
   s.measure();
   while (result.iterations < options.max_iterations) {
     if (interrupt) interrupt->poll();
     kkt_.assemble(inputs, s.x.data(), s.lambda.data(), s.force_stiffness());
     ++result.iterations;
     if (s.converged()) {
-      result.unstable_modes = kkt_.factorize(0.0, s.compliance()) ? kkt_.negative_modes() : -1;
+      result.unstable_modes = kkt_.factorize(0.0, s.compliance.data()) ? kkt_.negative_modes() : -1;
       result.converged = true;
       if (!options.stable || result.unstable_modes <= 0 || departures == max_departures) break;
       leave_saddle(s);
@@ -306,7 +334,7 @@ Equilibrium EquilibriumSolver::solve(const double* inputs, const double* start_x
       s.measure();
       continue;
     }
-    bool accepted = newton && step(s, 0.0, s.compliance());
+    bool accepted = newton && step(s, 0.0, s.compliance.data());
     if (!accepted) {
       s.soften();
       if (mu == 0.0) {
@@ -314,7 +342,7 @@ Equilibrium EquilibriumSolver::solve(const double* inputs, const double* start_x
           std::fill(s.lambda.begin(), s.lambda.end(), 0.0);
           kkt_.assemble(inputs, s.x.data(), s.lambda.data(), s.force_stiffness());
         }
-        mu = s.first_pseudo_stiffness(kkt_, s.compliance());
+        mu = s.first_pseudo_stiffness(kkt_);
       }
       for (int tries = 0; tries < 40 && !(accepted = step(s, mu, s.softened.data())); ++tries) mu *= 4.0;
       mu *= 0.1;

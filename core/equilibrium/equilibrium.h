@@ -27,8 +27,9 @@ struct EquilibriumOptions {
 
 struct Equilibrium {
   std::vector<double> x;  // (dofs), fixed nodes included; free directors are unit vectors across their axes
-  std::vector<double>
-      lambda;           // (rows), force = J^T lambda: minus the tension for a distance, minus the moment for an angle
+  // (multipliers), force = J^T lambda: minus the tension for a distance, minus the moment for an angle; then the
+  // pressures in kept volumes
+  std::vector<double> lambda;
   double energy = 0.0;  // of weight and forces (free nodes; zero at the origin) and elastic  [J]
   double residual = std::numeric_limits<double>::infinity();  // largest of |r_x| / force scale and |r_l| / (|J| size)
   int iterations = 0;                                         // evaluations of the Newton matrix
@@ -44,7 +45,7 @@ class EquilibriumSolver {
   // The scene must outlive the solver.
   explicit EquilibriumSolver(const Scene& scene) : scene_(scene), kkt_(scene) {}
 
-  // Starts at start_x (dofs; null: Quantity::position), with the fixed nodes moved to their places; start_lambda (rows) makes a warm start.
+  // Starts at start_x (dofs; null: Quantity::position), with the fixed nodes moved to their places; start_lambda (multipliers) makes a warm start.
   // A result that did not converge says so, with a message. Throws std::invalid_argument where the start is not finite.
   Equilibrium solve(const double* inputs, const double* start_x = nullptr, const double* start_lambda = nullptr,
                     const EquilibriumOptions& options = {}, Interrupt* interrupt = nullptr);

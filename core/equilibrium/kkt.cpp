@@ -20,17 +20,29 @@ double largest(const std::vector<double>& v) {
 
 double ratio(double part, double whole) { return part == 0.0 ? 0.0 : part / whole; }
 
+// Calls f(volume, place in its gradient, dof).
+template <class F>
+void for_each_border(const Scene& scene, F&& f) {
+  for (int v = 0; v < static_cast<int>(scene.volumes.size()); ++v) {
+    const std::vector<int>& nodes = scene.volumes[v].nodes;
+    for (std::size_t i = 0; i < 3 * nodes.size(); ++i) f(v, i, scene.first_dof[nodes[i / 3]] + static_cast<int>(i % 3));
+  }
+}
+
 // How much stiffer than the geometric stiffness a row of K may be; refinement gains about as many digits per pass.
 constexpr double rigid_stiffness = 1e8;
 
 }  // namespace
 
-Kkt::Kkt(const Scene& scene) : scene_(scene), unknown_(scene.dofs(), -1) {
+Kkt::Kkt(const Scene& scene) : scene_(scene), unknown_(scene.dofs(), -1), pressed_(scene.air) {
   std::vector<int> free_dof(scene.dofs(), -1);
-  int unknowns = 0;
   for (int n = 0; n < scene.nodes(); ++n)
     if (scene.role[n] == Role::free)
-      for (int d = 0; d < scene.dim[n]; ++d) free_dof[scene.first_dof[n] + d] = unknowns++;
+      for (int d = 0; d < scene.dim[n]; ++d) free_dof[scene.first_dof[n] + d] = free_++;
+  const int unknowns = free_ + static_cast<int>(scene.volumes.size());
+  for (const Volume& volume : scene.volumes)
+    for (const auto& [a, b, c] : volume.triangles)
+      pressed_.push_back({volume.nodes[a], volume.nodes[b], volume.nodes[c]});
 
   // Pairs (row, column) of K that an element touches; the diagonal is always there.
   const auto for_each_pair = [&](const std::vector<int>& number, auto&& f) {
@@ -42,25 +54,29 @@ Kkt::Kkt(const Scene& scene) : scene_(scene), unknown_(scene.dofs(), -1) {
     };
     for (const Group& group : scene.groups)
       for (int item = 0; item < group.count; ++item) pairs(group.nodes(item));
-    for (const std::array<int, 3>& nodes : scene.air) pairs(nodes);
+    for (const std::array<int, 3>& nodes : pressed_) pairs(nodes);
   };
   std::vector<Eigen::Triplet<double>> entries;
-  for (int i = 0; i < unknowns; ++i) entries.emplace_back(i, i, 1.0);
+  for (int i = 0; i < free_; ++i) entries.emplace_back(i, i, 1.0);
   for_each_pair(free_dof, [&](int a, int b) {
     if (a >= 0 && b >= 0) entries.emplace_back(a, b, 1.0);
   });
-  Eigen::SparseMatrix<double> graph(unknowns, unknowns);
+  Eigen::SparseMatrix<double> graph(free_, free_);
   graph.setFromTriplets(entries.begin(), entries.end());
   Eigen::PermutationMatrix<Eigen::Dynamic> order;  // order(new) = old
   Eigen::AMDOrdering<int>()(graph, order);
-  std::vector<int> place(unknowns);
-  for (int i = 0; i < unknowns; ++i) place[order.indices()(i)] = i;
+  std::vector<int> place(free_);
+  for (int i = 0; i < free_; ++i) place[order.indices()(i)] = i;
   for (int i = 0; i < scene.dofs(); ++i)
     if (free_dof[i] >= 0) unknown_[i] = place[free_dof[i]];
 
   std::vector<Eigen::Triplet<double>> upper;
   for (const auto& e : entries)
     if (place[e.row()] <= place[e.col()]) upper.emplace_back(place[e.row()], place[e.col()], 1.0);
+  for_each_border(scene, [&](int v, std::size_t, int dof) {
+    if (unknown_[dof] >= 0) upper.emplace_back(unknown_[dof], free_ + v, 1.0);
+  });
+  for (int i = free_; i < unknowns; ++i) upper.emplace_back(i, i, 1.0);
   K_.resize(unknowns, unknowns);
   K_.setFromTriplets(upper.begin(), upper.end());
   const auto position = [&](int row, int column) {
@@ -75,6 +91,13 @@ Kkt::Kkt(const Scene& scene) : scene_(scene), unknown_(scene.dofs(), -1) {
       const int a = unknown_[scene.first_dof[d.node] + e / 3], b = unknown_[scene.first_dof[d.node] + e % 3];
       director_position_.push_back(a >= 0 && a <= b ? position(a, b) : -1);
     }
+  for (const Volume& volume : scene.volumes) {
+    border_position_.emplace_back(3 * volume.nodes.size());
+    border_.emplace_back(3 * volume.nodes.size());
+  }
+  for_each_border(scene, [&](int v, std::size_t i, int dof) {
+    border_position_[v][i] = unknown_[dof] >= 0 ? position(unknown_[dof], free_ + v) : -1;
+  });
   metric_.assign(scene.dofs(), 1.0);
   idle_.resize(scene.directors.size());
   idle_stiffness_.resize(scene.directors.size());
@@ -109,10 +132,16 @@ void Kkt::assemble(const double* inputs, const double* x, const double* lambda, 
       }
     for (int e = 0; e < K::rows * K::dofs; ++e) *J++ = Jd[e].v;
   });
-  for_each_pressed(scene_, in, [&](int, const std::array<int, 3>& nodes, double p) {
-    pressure_hessian(corners_at(scene_, nodes, x), p, H);
-    H += 81;
-  });
+  const double* given = in.of(Quantity::pressure);
+  std::vector<double> pressures(given, given + scene_.air.size());
+  std::vector<Vec3<double>> gradient;
+  for (int v = 0; v < static_cast<int>(border_.size()); ++v) {
+    pressures.insert(pressures.end(), scene_.volumes[v].triangles.size(), lambda[scene_.rows + v]);
+    kept_volume(scene_, in, v, x, gradient);
+    for (std::size_t k = 0; k < gradient.size(); ++k) gradient[k].store(&border_[v][3 * k]);
+  }
+  for (std::size_t i = 0; i < pressed_.size(); ++i, H += 81)
+    pressure_hessian(corners_at(scene_, pressed_[i], x), pressures[i], H);
   for (std::size_t i = 0; i < scene_.directors.size(); ++i) {
     const Director& d = scene_.directors[i];
     const auto at = [&](int node) { return x + scene_.first_dof[node]; };
@@ -133,13 +162,13 @@ void Kkt::assemble(const double* inputs, const double* x, const double* lambda, 
 
 bool Kkt::factorize(double mu, const double* compliance) {
   mu_ = mu;
-  alpha_.assign(compliance, compliance + scene_.constraints);
+  alpha_.assign(compliance, compliance + scene_.constraints + scene_.volumes.size());
   double* values = K_.valuePtr();
   std::fill_n(values, K_.nonZeros(), 0.0);
   for (std::size_t e = 0; e < H_.size(); ++e)
     if (position_[e] >= 0) values[position_[e]] -= H_[e];
   geometric_ = std::max(force_stiffness_, mu);
-  for (const int d : diagonal_) geometric_ = std::max(geometric_, std::abs(values[d]));
+  for (int i = 0; i < free_; ++i) geometric_ = std::max(geometric_, std::abs(values[diagonal_[i]]));
   for (int i = 0; i < scene_.dofs(); ++i)
     if (unknown_[i] >= 0) values[diagonal_[unknown_[i]]] += mu * metric_[i];
 
@@ -169,14 +198,18 @@ bool Kkt::factorize(double mu, const double* compliance) {
       if (at[e] >= 0) values[at[e]] += idle_stiffness_[i] * idle_[i][e];
   }
   largest_diagonal_ = 0.0;
-  for (const int d : diagonal_) largest_diagonal_ = std::max(largest_diagonal_, std::abs(values[d]));
+  for (int i = 0; i < free_; ++i) largest_diagonal_ = std::max(largest_diagonal_, std::abs(values[diagonal_[i]]));
+  for_each_border(scene_, [&](int v, std::size_t i, int) {
+    if (border_position_[v][i] >= 0) values[border_position_[v][i]] = -border_[v][i];
+  });
+  for (std::size_t v = 0; v < border_.size(); ++v) values[diagonal_[free_ + v]] = -alpha_[scene_.constraints + v];
   factor_.factorize(K_);
   if (factor_.info() != Eigen::Success || !factor_.vectorD().allFinite()) return false;
-  negative_ = static_cast<int>((factor_.vectorD().array() < 0.0).count());
+  negative_ = static_cast<int>((factor_.vectorD().array() < 0.0).count() - border_.size());
   return true;
 }
 
-// K x = J^T alpha^-1 b_l - b_x,  lambda = alpha^-1 (b_l - J x), with the softened compliances.
+// K x - g p = J^T alpha^-1 b_l - b_x,  lambda = alpha^-1 (b_l - J x), with the softened compliances;  -g.x - alpha p = -b_p.
 void Kkt::condensed_solve(const std::vector<double>& b_x, const std::vector<double>& b_l, std::vector<double>& x,
                           std::vector<double>& lambda) const {
   Eigen::VectorXd b(K_.rows());
@@ -196,7 +229,9 @@ void Kkt::condensed_solve(const std::vector<double>& b_x, const std::vector<doub
     for (int d = 0; d < K::dofs; ++d)
       if (const int u = unknown_[scene_.first_dof[nodes[d / 3]] + d % 3]; u >= 0) b[u] += stiffness * push[d];
   });
+  for (std::size_t v = 0; v < border_.size(); ++v) b[free_ + v] = -b_l[scene_.rows + v];
   const Eigen::VectorXd solution = factor_.solve(b);
+  for (std::size_t v = 0; v < border_.size(); ++v) lambda[scene_.rows + v] = solution[free_ + v];
   for (int i = 0; i < scene_.dofs(); ++i) x[i] = unknown_[i] >= 0 ? solution[unknown_[i]] : 0.0;
   for_each_gradient([&]<class K>(K, const Group& group, int item, const double* J, double stiffness) {
     double local[K::dofs];
@@ -239,30 +274,43 @@ void Kkt::subtract_product(const std::vector<double>& x, const std::vector<doubl
       r_l[row + j] -= sum;
     }
   });
-  for (const std::array<int, 3>& nodes : scene_.air)
+  for (const std::array<int, 3>& nodes : pressed_)
     for (int a = 0; a < 9; ++a, H += 9) {
       const int dof = scene_.first_dof[nodes[a / 3]] + a % 3;
       if (unknown_[dof] < 0) continue;
       for (int b = 0; b < 9; ++b) r_x[dof] -= H[b] * x[scene_.first_dof[nodes[b / 3]] + b % 3];
     }
+  for_each_border(scene_, [&](int v, std::size_t i, int dof) {
+    if (unknown_[dof] >= 0) r_x[dof] -= border_[v][i] * lambda[scene_.rows + v];
+    r_l[scene_.rows + v] -= border_[v][i] * x[dof];
+  });
+  for (std::size_t v = 0; v < border_.size(); ++v)
+    r_l[scene_.rows + v] -= alpha_[scene_.constraints + v] * lambda[scene_.rows + v];
 }
 
 bool Kkt::solve(double* x, double* lambda, double accuracy) const {
-  std::vector<double> r_x(x, x + scene_.dofs()), r_l(lambda, lambda + scene_.rows), dx(r_x.size()), dl(r_l.size());
+  std::vector<double> r_x(x, x + scene_.dofs()), r_l(lambda, lambda + scene_.multipliers()), dx(r_x.size()),
+      dl(r_l.size());
   std::vector<double> z_x(r_x.size(), 0.0), z_l(r_l.size(), 0.0);
   for (int i = 0; i < scene_.dofs(); ++i)
     if (unknown_[i] < 0) r_x[i] = 0.0;
   // Either part of a solution may vanish; corrections to it count relative to what such a right-hand side moves as a rule.
-  const double J = largest(J_);
-  const double move = std::max(ratio(largest(r_x), geometric_), ratio(largest(r_l), J)),
-               push = ratio(geometric_ * move, J);
+  std::vector<double> gradient(r_l.size(), largest(J_));
+  for (std::size_t v = 0; v < border_.size(); ++v) gradient[scene_.rows + v] = largest(border_[v]);
+  double move = ratio(largest(r_x), geometric_);
+  for (std::size_t i = 0; i < r_l.size(); ++i) move = std::max(move, ratio(std::abs(r_l[i]), gradient[i]));
+  const auto push = [&](const std::vector<double>& multipliers) {
+    double force = 0.0;
+    for (std::size_t i = 0; i < gradient.size(); ++i) force = std::max(force, gradient[i] * std::abs(multipliers[i]));
+    return force;
+  };
   double change = 1.0;
   for (int pass = 0; pass < 20; ++pass) {
     condensed_solve(r_x, r_l, dx, dl);
     for (std::size_t i = 0; i < dx.size(); ++i) z_x[i] += dx[i];
     for (std::size_t i = 0; i < dl.size(); ++i) z_l[i] += dl[i];
     const double before = std::exchange(change, std::max(ratio(largest(dx), std::max(largest(z_x), move)),
-                                                         ratio(largest(dl), std::max(largest(z_l), push))));
+                                                         ratio(push(dl), std::max(push(z_l), geometric_ * move))));
     if (!std::isfinite(change)) return false;
     if (change <= accuracy || (pass > 0 && change > 0.5 * before)) break;
     subtract_product(dx, dl, r_x, r_l);

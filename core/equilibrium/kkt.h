@@ -1,15 +1,16 @@
 // The Newton matrix of static equilibrium,  A = [H - mu, J^T; J, alpha]  with H = sum_j lambda_j Hess(C_j) + p Hess(V), and the
-// solution of A z = b.
+// solution of A z = b. Rows are those of the constraints and one per kept volume.
 //
 // It is condensed onto the free coordinates: K = mu - H + J^T alpha^-1 J is the Hessian of the energy (plus mu), narrow for a
 // chain and positive definite at a stable equilibrium, so LDL^T in a low-fill order suffices. Rigid and nearly rigid rows are
 // condensed with a small compliance of their own, and the solution is refined against A itself, which also removes the rounding
-// of stiff rows (the augmented Lagrangian step for saddle point systems: Benzi, Golub & Liesen 2005).
+// of stiff rows (the augmented Lagrangian step for saddle point systems: Benzi, Golub & Liesen 2005). The row of a kept volume touches all its
+// vertices, so it stays beside K, last in the order:  [K, -g; -g^T, -alpha].
 //
 // Directors may grow and lean along their axis, normals may grow, without changing any constraint. K gets a stiffness of its own in these directions, in
 // which nothing pushes, so that it is regular.
 //
-// Negative pivots of K count the unstable modes (Sylvester's law of inertia); in the limit of rigid rows K has one positive
+// Negative pivots, less one per kept volume, count the unstable modes (Sylvester's law of inertia); in the limit of rigid rows K has one positive
 // eigenvalue per row and those of the energy's Hessian on the rows' tangent space (Gould 1985).
 #pragma once
 
@@ -27,11 +28,11 @@ class Kkt {
   // Finds the pattern and the elimination order; the scene must outlive this.
   explicit Kkt(const Scene& scene);
 
-  // Evaluates H and J at x (dofs) and lambda (rows). force_stiffness [N/m], a typical force over a typical length, is the scale
+  // Evaluates H and J at x (dofs) and lambda (multipliers). force_stiffness [N/m], a typical force over a typical length, is the scale
   // of stiffness where the multipliers give none.
   void assemble(const double* inputs, const double* x, const double* lambda, double force_stiffness);
 
-  // Factors K for mu >= 0 [N/m] and the compliance of each constraint. False where K is singular to rounding.
+  // Factors K for mu >= 0 [N/m] and the compliance of each constraint and volume. False where K is singular to rounding.
   bool factorize(double mu, const double* compliance);
   int negative_modes() const { return negative_; }
   double largest_diagonal() const { return largest_diagonal_; }
@@ -51,10 +52,14 @@ class Kkt {
                         std::vector<double>& r_l) const;
 
   const Scene& scene_;
-  std::vector<int> unknown_;   // per dof: place in K, or -1
-  std::vector<int> position_;  // of H_'s entries in K's values, -1 where fixed or below the diagonal
-  std::vector<int> diagonal_;  // likewise, per unknown
-  std::vector<double> H_;      // dofs x dofs per constraint, then 9 x 9 per triangle under pressure
+  int free_ = 0;                             // unknowns that are coordinates; one per volume follows
+  std::vector<int> unknown_;                 // per dof: place in K, or -1
+  std::vector<int> position_;                // of H_'s entries in K's values, -1 where fixed or below the diagonal
+  std::vector<int> diagonal_;                // likewise, per unknown
+  std::vector<std::array<int, 3>> pressed_;  // triangles in air, then those of the volumes
+  std::vector<std::vector<int>> border_position_;  // per volume, of its nodes' coordinates; -1 where fixed
+  std::vector<double> H_;                          // dofs x dofs per constraint, then 9 x 9 per pressed triangle
+  std::vector<std::vector<double>> border_;        // per volume its gradient, at its nodes' coordinates
   std::vector<double> J_, alpha_, softened_;
   std::vector<double> metric_;               // per dof
   std::vector<int> director_position_;       // into K's values, 9 per director, -1 as in position_

@@ -3,6 +3,8 @@
 //   r_x = f + J(x)^T lambda = 0        f = m gravity + force, at the time t0, + pressure(x)
 //   r_l = C(x) + alpha lambda = 0      alpha: compliance; 0 is a rigid constraint
 //
+// Multipliers are those of the constraints, then one per kept volume (C = V - V0), which is the pressure inside.
+//
 // J^T lambda is the force of the constraints on the particles, so a stretched link (C = length - rest > 0) has lambda = -tension.
 // For an elastic constraint lambda = -C/alpha, and the pair is the stationarity of the energy -f.x + C.C/(2 alpha), with -p V for
 // pressure (pressure.h).
@@ -72,7 +74,25 @@ void external_force(const Scene& scene, const Inputs<const T>& in, double t0, co
   add_pressure_forces(scene, in, x, f);
 }
 
-// r_x (dofs, zero on fixed nodes) and r_l (rows) at x (dofs, with the fixed nodes placed) and lambda (rows).
+// Compliances of all constraints, then of the kept volumes.
+inline std::vector<double> compliances(const Scene& scene, const Inputs<const double>& in) {
+  const double *own = in.of(Quantity::compliance), *volumes = in.of(Quantity::volume_compliance);
+  std::vector<double> alpha(own, own + scene.constraints);
+  alpha.insert(alpha.end(), volumes, volumes + scene.volumes.size());
+  return alpha;
+}
+
+// The volume's C, and its gradient by the volume's nodes.
+template <class T>
+T kept_volume(const Scene& scene, const Inputs<const T>& in, int i, const T* x, std::vector<Vec3<T>>& gradient) {
+  const Volume& volume = scene.volumes[i];
+  std::vector<Vec3<T>> at;
+  place_volume(volume, [&](int n) { return Vec3<T>(x + scene.first_dof[n]); }, at);
+  gradient.resize(at.size());
+  return enclosed(volume, at, gradient) - in.of(Quantity::volume)[i];
+}
+
+// r_x (dofs, zero on fixed nodes) and r_l (multipliers) at x (dofs, with the fixed nodes placed) and lambda (multipliers).
 template <class T>
 void equilibrium_residual(const Scene& scene, const Inputs<const T>& in, double t0, const T* x, const T* lambda, T* r_x,
                           T* r_l) {
@@ -89,6 +109,14 @@ void equilibrium_residual(const Scene& scene, const Inputs<const T>& in, double 
     for (int k = 0; k < K::arity; ++k)
       if (scene.role[nodes[k]] == Role::free) Vec3<T>(push + 3 * k).add_to(r_x + scene.first_dof[nodes[k]]);
   });
+  std::vector<Vec3<T>> gradient;
+  for (int i = 0; i < static_cast<int>(scene.volumes.size()); ++i) {
+    const std::vector<int>& nodes = scene.volumes[i].nodes;
+    const T& p = lambda[scene.rows + i];
+    r_l[scene.rows + i] = kept_volume(scene, in, i, x, gradient) + in.of(Quantity::volume_compliance)[i] * p;
+    for (std::size_t k = 0; k < nodes.size(); ++k)
+      if (scene.role[nodes[k]] == Role::free) (p * gradient[k]).add_to(r_x + scene.first_dof[nodes[k]]);
+  }
 }
 
 }  // namespace sheetbend

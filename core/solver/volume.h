@@ -36,6 +36,14 @@ struct VolumeState {
   VolumeRecord<T>& record(int iteration) { return iterations[iterations.size() == 1 ? 0 : iteration]; }
 };
 
+// Coordinates of the volume's nodes from the first one.
+template <class T, class Point>
+void place_volume(const Volume& volume, Point&& point, std::vector<Vec3<T>>& x) {
+  x.resize(volume.nodes.size());
+  const Vec3<T> first = point(volume.nodes[0]);
+  for (std::size_t k = 0; k < x.size(); ++k) x[k] = point(volume.nodes[k]) - first;
+}
+
 // V, and its gradient.
 template <class T>
 T enclosed(const Volume& volume, const std::vector<Vec3<T>>& x, std::vector<Vec3<T>>& gradient) {
@@ -75,9 +83,7 @@ void project_volumes(const Scene& scene, const Inputs<const T>& in, double eta, 
     VolumeState<T>& state = states[i];
     VolumeRecord<T>& record = state.record(iteration);
     const std::vector<int>& nodes = scene.volumes[i].nodes;
-    const auto point = [&](int n) { return Vec3<T>(T(at(n, 0)), T(at(n, 1)), T(at(n, 2))); };
-    const Vec3<T> first = point(nodes[0]);
-    for (std::size_t k = 0; k < nodes.size(); ++k) record.x[k] = point(nodes[k]) - first;
+    place_volume(scene.volumes[i], [&](int n) { return Vec3<T>(T(at(n, 0)), T(at(n, 1)), T(at(n, 2))); }, record.x);
     record.lambda = iteration == 0 ? T(0.0) : state.lambda;
     const VolumeRow<T> row(scene, in, eta, w, i, record, state.gradient);
     record.dl = -(row.C + row.a * record.lambda) / row.D;

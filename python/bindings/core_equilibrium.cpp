@@ -51,7 +51,7 @@ Solution solve(const std::shared_ptr<Scene>& scene, const Array& inputs, const s
 
 py::array_t<double> vjp(const Solution& s, const std::optional<Array>& x_bar, const std::optional<Array>& lambda_bar) {
   if (x_bar) expect_size(*x_bar, s.scene->dofs(), "x_bar");
-  if (lambda_bar) expect_size(*lambda_bar, s.scene->rows, "lambda_bar");
+  if (lambda_bar) expect_size(*lambda_bar, s.scene->multipliers(), "lambda_bar");
   std::vector<double> bar(s.inputs.size());
   {
     py::gil_scoped_release release;
@@ -87,10 +87,10 @@ const Scene& scene_of(const std::vector<const Solution*>& solutions) {
   return *solutions[0]->scene;
 }
 
-// Gradients (B, total) from cotangents (B, dofs + rows) of coordinates and multipliers.
+// Gradients (B, total) from cotangents (B, dofs + multipliers) of coordinates and multipliers.
 py::array_t<double> vjp_batch(const std::vector<const Solution*>& solutions, const Array& bar, int threads) {
   const Scene& scene = scene_of(solutions);
-  const std::size_t total = scene.layout.total(), dofs = scene.dofs(), size = dofs + scene.rows;
+  const std::size_t total = scene.layout.total(), dofs = scene.dofs(), size = dofs + scene.multipliers();
   expect_size(bar, solutions.size() * size, "bar");
   py::array_t<double> out({solutions.size(), total});
   double* inputs_bar = out.mutable_data();
@@ -102,11 +102,11 @@ py::array_t<double> vjp_batch(const std::vector<const Solution*>& solutions, con
   return out;
 }
 
-// Tangents (B, dofs + rows) of coordinates and multipliers, each along a direction (B, total) of its own.
+// Tangents (B, dofs + multipliers) of coordinates and multipliers, each along a direction (B, total) of its own.
 py::array_t<double> jvp_batch(const std::vector<const Solution*>& solutions, const Array& inputs_dot, int threads) {
   using D = Dual<double, 1>;
   const Scene& scene = scene_of(solutions);
-  const std::size_t total = scene.layout.total(), dofs = scene.dofs(), size = dofs + scene.rows;
+  const std::size_t total = scene.layout.total(), dofs = scene.dofs(), size = dofs + scene.multipliers();
   expect_size(inputs_dot, solutions.size() * total, "inputs_dot");
   py::array_t<double> out({solutions.size(), size});
   double* tangents = out.mutable_data();

@@ -7,12 +7,12 @@
 namespace sheetbend::bindings {
 namespace {
 
-// (C (rows), J^T lambda (dofs)): of every constraint and on every particle, held ones too.
+// (C (rows), J^T lambda (dofs)): of every constraint, and on every particle, held ones too, volumes included.
 py::tuple evaluate_constraints(const std::shared_ptr<Scene>& scene, const Array& inputs, const Array& positions,
                                const Array& multipliers) {
   expect_size(inputs, scene->layout.total(), "inputs");
   expect_size(positions, scene->dofs(), "positions");
-  expect_size(multipliers, scene->rows, "multipliers");
+  expect_size(multipliers, scene->multipliers(), "multipliers");
   const Inputs<const double> in{scene->layout, inputs.data()};
   std::vector<double> values(scene->rows), forces(scene->dofs());
   for_each_constraint(*scene, [&]<class K>(K, const Group& group, int item) {
@@ -26,6 +26,12 @@ py::tuple evaluate_constraints(const std::shared_ptr<Scene>& scene, const Array&
         forces[scene->first_dof[group.nodes(item)[d / 3]] + d % 3] +=
             at.J[j * K::dofs + d] * multipliers.data()[first + j];
   });
+  std::vector<Vec3<double>> gradient;
+  for (std::size_t v = 0; v < scene->volumes.size(); ++v) {
+    kept_volume(*scene, in, static_cast<int>(v), positions.data(), gradient);
+    for (std::size_t k = 0; k < gradient.size(); ++k)
+      (multipliers.data()[scene->rows + v] * gradient[k]).add_to(&forces[scene->first_dof[scene->volumes[v].nodes[k]]]);
+  }
   return py::make_tuple(to_numpy(values, {static_cast<py::ssize_t>(values.size())}),
                         to_numpy(forces, {static_cast<py::ssize_t>(forces.size())}));
 }

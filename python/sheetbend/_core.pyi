@@ -175,7 +175,7 @@ class EquilibriumSolution:
     @property
     def positions(self) -> Array: ...  # (dofs,)
     @property
-    def multipliers(self) -> Array: ...  # (rows,)
+    def multipliers(self) -> Array: ...  # (rows + volumes,)
     @property
     def energy(self) -> float: ...
     @property
@@ -196,12 +196,12 @@ def equilibrium(
 def equilibria(  # inputs (batch, total)
     scene: Scene, inputs: ArrayLike, start: ArrayLike | None = None, stable: bool = True, threads: int = 1
 ) -> list[EquilibriumSolution]: ...
-def equilibria_vjp(  # bar (batch, dofs + rows)
+def equilibria_vjp(  # bar (batch, dofs + rows + volumes)
     solutions: Sequence[EquilibriumSolution], bar: ArrayLike, threads: int = 1
 ) -> Array: ...  # (batch, inputs)
 def equilibria_jvp(  # inputs_dot (batch, inputs)
     solutions: Sequence[EquilibriumSolution], inputs_dot: ArrayLike, threads: int = 1
-) -> Array: ...  # (batch, dofs + rows)
+) -> Array: ...  # (batch, dofs + rows + volumes)
 def evaluate_constraints(
     scene: Scene, inputs: ArrayLike, positions: ArrayLike, multipliers: ArrayLike
 ) -> tuple[Array, Array]: ...

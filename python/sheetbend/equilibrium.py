@@ -12,7 +12,7 @@ from . import _core
 from .checks import finite
 from .errors import SceneError, SheetbendError
 from .scene import Scene
-from .simulate import forces_by_group
+from .simulate import forces_by_group, pressures_by_volume
 
 
 class NoEquilibriumError(SheetbendError, RuntimeError):
@@ -31,6 +31,7 @@ class Equilibrium:
         unstable_modes: negative eigenvalues of the energy's Hessian; 0 = stable.
         residual: relative force imbalance.
         iterations: Newton matrices used.
+        pressures: per volume that is kept its multiplier, Pa, inside above outside.
     """
 
     positions: np.ndarray
@@ -42,23 +43,31 @@ class Equilibrium:
     solution: _core.EquilibriumSolution = field(repr=False)
     scene: Scene = field(repr=False)
     theta: np.ndarray = field(repr=False)
+    pressures: Mapping[str, float] = field(default_factory=dict)
 
     def gradient(
-        self, positions_bar: ArrayLike | None = None, forces_bar: Mapping[str, ArrayLike] | None = None
+        self,
+        positions_bar: ArrayLike | None = None,
+        forces_bar: Mapping[str, ArrayLike] | None = None,
+        pressures_bar: Mapping[str, float] | None = None,
     ) -> dict[str, float]:
         """Gradient of a loss by every named quantity, by the implicit function theorem.
 
         Args:
             positions_bar: (particles, 3), derivative of the loss by the positions.
             forces_bar: per group (count, rows), derivative by `forces`.
+            pressures_bar: per volume, derivative by `pressures`.
 
         Raises:
-            SceneError: wrong shapes.
+            SceneError: wrong shapes, no such group or volume.
         """
-        return self.by_name(self.input_gradient(positions_bar, forces_bar))
+        return self.by_name(self.input_gradient(positions_bar, forces_bar, pressures_bar))
 
     def input_gradient(
-        self, positions_bar: ArrayLike | None = None, forces_bar: Mapping[str, ArrayLike] | None = None
+        self,
+        positions_bar: ArrayLike | None = None,
+        forces_bar: Mapping[str, ArrayLike] | None = None,
+        pressures_bar: Mapping[str, float] | None = None,
     ) -> np.ndarray:
         """The same by the flat inputs (`CompiledScene.inputs`), places and rest geometry among them."""
         x_bar = (
@@ -66,13 +75,17 @@ class Equilibrium:
             if positions_bar is None
             else finite("positions_bar", positions_bar, self.positions.shape, SceneError).ravel()
         )
-        lambda_bar = None
-        if forces_bar is not None:
-            parts = {name: np.zeros(f.shape) for name, f in self.forces.items()}
-            for name, bar in forces_bar.items():
-                self.scene.group(name)
-                parts[name] = finite(f"forces_bar.{name}", bar, parts[name].shape, SceneError)
-            lambda_bar = np.concatenate([part.ravel() for part in parts.values()])
+        if forces_bar is None and pressures_bar is None:
+            return self.solution.vjp(x_bar, None)
+        lambda_bar = np.zeros(len(self.solution.multipliers))
+        forces, pressures = forces_by_group(self.scene, lambda_bar), pressures_by_volume(self.scene, lambda_bar)
+        for name, bar in (forces_bar or {}).items():
+            self.scene.group(name)
+            forces[name][...] = finite(f"forces_bar.{name}", bar, forces[name].shape, SceneError)
+        for name, given in (pressures_bar or {}).items():
+            if name not in pressures:
+                raise SceneError(f"pressures_bar.{name}", "is no volume", name, f"use one of {sorted(pressures)}")
+            pressures[name][...] = finite(f"pressures_bar.{name}", given, (), SceneError)
         return self.solution.vjp(x_bar, lambda_bar)
 
     def by_name(self, inputs_bar: np.ndarray) -> dict[str, float]:
@@ -113,6 +126,7 @@ def equilibrium(
         solution=out,
         scene=scene,
         theta=theta,
+        pressures={name: float(p) for name, p in pressures_by_volume(scene, out.multipliers).items()},
     )
 
 

@@ -76,7 +76,7 @@ def simulate(
         out["positions"].reshape(frames, -1, 3),
         velocities,
         forces_by_group(scene, out["multipliers"]),
-        dict(zip(scene.volumes.triangles, out["multipliers"].T[compiled.core.rows :], strict=True)),
+        pressures_by_volume(scene, out["multipliers"]),
     )
 
 
@@ -106,6 +106,12 @@ def forces_by_group(scene: Scene, multipliers: np.ndarray) -> dict[str, np.ndarr
         forces[g.name] = part.reshape(*part.shape[:-1], len(g.particles), rows)
         row += rows * len(g.particles)
     return forces
+
+
+def pressures_by_volume(scene: Scene, multipliers: np.ndarray) -> dict[str, np.ndarray]:
+    """Multipliers (...,) by volume, which follow those of the groups."""
+    first = scene.compiled.core.rows
+    return {name: multipliers[..., first + v] for v, name in enumerate(scene.volumes.triangles)}
 
 
 @contextmanager

@@ -32,9 +32,10 @@ def constraint_values(
     """
     x = scene.positions if positions is None else finite("positions", positions, (scene.particle_count, 3), SceneError)
     compiled = scene.compiled
-    rows = sum(len(g.particles) * KINDS[g.kind]["rows"] for g in scene.groups)
     inputs = compiled.inputs(compiled.values(values))
-    C, _ = _core.evaluate_constraints(compiled.core, inputs, x.ravel(), np.zeros(rows))
+    C, _ = _core.evaluate_constraints(
+        compiled.core, inputs, x.ravel(), np.zeros(compiled.core.rows + len(scene.volumes.triangles))
+    )
     return forces_by_group(scene, C)
 
 
@@ -72,9 +73,8 @@ def elastic_energy_gradient(rest: Equilibrium) -> dict[str, float]:
 def support_forces(rest: Equilibrium) -> Array:
     """(particles, 3) N, the force of the supports on held particles at rest, zero on free ones."""
     scene, compiled = rest.scene, rest.scene.compiled
-    multipliers = np.concatenate([rest.forces[g.name].ravel() for g in scene.groups])
     inputs = compiled.inputs(rest.theta)
-    _, forces = _core.evaluate_constraints(compiled.core, inputs, rest.positions.ravel(), multipliers)
+    _, forces = _core.evaluate_constraints(compiled.core, inputs, rest.positions.ravel(), rest.solution.multipliers)
     forces = -forces.reshape(-1, 3)
     forces[scene.free] = 0.0
     return forces

@@ -1,5 +1,4 @@
 // The volume of a closed surface: its gradient, what one projection does to it, and what is refused.
-#include "core/equilibrium/equilibrium.h"
 #include "core/scalar/complex.h"
 #include "core/solver/rollout.h"
 #include "tests/cpp/support/bipyramid.h"
@@ -117,7 +116,6 @@ TEST(SceneWithVolume, TakesSweepsAlone) {
   const Sample s = bipyramid(4);
   for (const Partition partition : {Partition::direct, Partition::newton, Partition::newton_cg})
     EXPECT_THROW(make_plan(s.scene, {.partition = partition}), std::invalid_argument);
-  EXPECT_THROW(EquilibriumSolver(s.scene).solve(s.inputs.data()), std::invalid_argument);
 }
 
 }  // namespace

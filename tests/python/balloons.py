@@ -26,3 +26,11 @@ def skin(subdivisions: int, stretch: float) -> tuple[sb.Scene, np.ndarray]:
         positions=stretch * mesh.vertices,
     )
     return scene, cloth.particles[mesh.triangles]
+
+
+def held(scene: sb.Scene, particles: list[int]) -> sb.Scene:
+    """The same, held in place so softly that no shape feels it."""
+    anchors = scene.add_particles(scene.positions[particles], 1.0)
+    scene.pin(anchors)
+    scene.add_constraints("attachment", np.column_stack([particles, anchors]), compliance=1e7, name="hold")
+    return scene

@@ -83,23 +83,29 @@ def sensitivity(
 
 
 def static_sensitivity(
-    rest: sb.Equilibrium, direction: Direction, weights: Array | None = None, forces: Mapping[str, Array] | None = None
+    rest: sb.Equilibrium,
+    direction: Direction,
+    weights: Array | None = None,
+    forces: Mapping[str, Array] | None = None,
+    pressures: Mapping[str, float] | None = None,
 ) -> tuple[float, float]:
-    """d(sum of weights * positions + sum of force weights * forces)/d(direction) of an equilibrium, forward and
-    reverse.
+    """d(sum of weights * positions + of force weights * forces + of pressure weights * pressures)/d(direction) of an
+    equilibrium, forward and reverse.
 
     Args:
         weights: (particles, 3).
         forces: per group (count, rows).
+        pressures: per volume.
     """
     scene = rest.scene
     tangent = inputs_dot(scene, direction)
     x_bar = np.zeros_like(rest.positions) if weights is None else weights
     parts = {name: np.zeros(f.shape) for name, f in rest.forces.items()} | dict(forces or {})
-    lambda_bar = np.concatenate([part.ravel() for part in parts.values()])
+    volumes = dict.fromkeys(rest.pressures, 0.0) | dict(pressures or {})
+    lambda_bar = np.concatenate([*(part.ravel() for part in parts.values()), list(volumes.values())])
     forward = float(_core.equilibria_jvp([rest.solution], tangent[None])[0] @ np.append(x_bar, lambda_bar))
     if isinstance(direction, str):
-        return forward, rest.gradient(x_bar, parts)[direction]
+        return forward, rest.gradient(x_bar, parts, volumes)[direction]
     return forward, float(rest.solution.vjp(x_bar.ravel(), lambda_bar) @ tangent)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import sheetbend as sb
-from balloons import POISSON, PRESSURE, RADIUS, SHEAR, STRETCH, YOUNG, skin
+from balloons import POISSON, PRESSURE, RADIUS, SHEAR, STRETCH, YOUNG, held, skin
 from pytest import approx
 from sheetbend.mesh import grid, icosphere
 from support import sensitivity, static_sensitivity, steps, twice
@@ -83,15 +83,6 @@ def test_gradients(method):
     shown = {row.name: row.gradient for row in report.rows}
     for name in ("pressure", "cloth_pressure", "windward_air_normal"):
         assert shown[name] > 0.0, name
-
-
-def held(scene: sb.Scene, particles: list[int]) -> sb.Scene:
-    """The same, held in place so softly that no shape feels it."""
-    rest = scene.positions[particles]
-    anchors = scene.add_particles(rest, 1.0)
-    scene.pin(anchors)
-    scene.add_constraints("attachment", np.column_stack([particles, anchors]), compliance=1e7, name="hold")
-    return scene
 
 
 def test_balloon_at_rest():

@@ -14,13 +14,10 @@ def check_rest(path: str, section: SceneSection, scene: Scene) -> None:
     """A scene of which the key at `path` wants the equilibrium must have one that `sb.equilibrium` can find.
 
     Raises:
-        ConfigError: a wind blows at its start, a volume is to be kept, or a pressure ends at a free rim.
+        ConfigError: a wind blows at its start, or a pressure ends at a free rim.
     """
     _check_still(path, section)
     for cloth in section.cloth:
-        if cloth.volume is not None:
-            fix = "give the cloth a pressure instead, or simulate with drag until the motion has died down"
-            raise ConfigError(path, "asks for a state of rest, and a cloth keeps its volume", cloth.name, fix)
         if cloth.pressure is not None:
             _check_rim(path, cloth, scene)
 

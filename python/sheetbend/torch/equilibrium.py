@@ -14,7 +14,7 @@ from ..checks import finite
 from ..equilibrium import NoEquilibriumError
 from ..errors import SceneError
 from ..scene import Scene
-from ..simulate import forces_by_group
+from ..simulate import forces_by_group, pressures_by_volume
 from .function import respond
 from .inputs import InputMap
 from .rollouts import expect_finite
@@ -28,14 +28,17 @@ class Equilibrium(NamedTuple):
     Attributes:
         positions: (*batch, particles, 3) m.
         forces: per group the multipliers (*batch, count, rows), as in `sheetbend.Equilibrium`.
+        pressures: per volume that is kept (*batch,) Pa.
     """
 
     positions: Tensor
     forces: Mapping[str, Tensor]
+    pressures: Mapping[str, Tensor]
 
 
 class Equilibria:
-    """Coordinates and multipliers (B, dofs + rows) of the equilibria for inputs (B, total), spread over threads."""
+    """Coordinates and multipliers (B, dofs + rows + volumes) of the equilibria for inputs (B, total), spread over
+    threads."""
 
     def __init__(self, scene: Scene, start: Array | None, stable: bool, threads: int) -> None:
         self._scene, self._start, self._stable, self._threads = scene, start, stable, threads
@@ -104,5 +107,6 @@ def equilibrium(
     flat = InputMap(scene)(values or {}, inputs or {})
     batch, dofs = flat.shape[:-1], scene.compiled.core.dofs
     states = respond(Equilibria(scene, x, stable, threads), flat.reshape(-1, flat.shape[-1])).reshape(*batch, -1)
-    forces: Any = forces_by_group(scene, cast(Any, states[..., dofs:]))  # slices and reshapes only, so tensors pass
-    return Equilibrium(states[..., :dofs].reshape(*batch, -1, 3), forces)
+    multipliers: Any = states[..., dofs:]  # slices and reshapes only, so tensors pass
+    forces, pressures = forces_by_group(scene, multipliers), pressures_by_volume(scene, multipliers)
+    return Equilibrium(states[..., :dofs].reshape(*batch, -1, 3), cast(Any, forces), cast(Any, pressures))
