@@ -1,9 +1,10 @@
 """Files of recordings. A format is one module with `read(path) -> Recording` and `write(recording, path)`.
 
 A reader takes the numbers as they stand in the file; length units, names and whatever else the JSON beside
-the file tells (`sidecar`) are applied here, the same for every format. To add a format, write its module
-and add its line to `FORMATS`. A format whose files do not say times or driven markers names those in `ASSUMED`:
-("times",), ("clamped",) or both; its reader assumes them, and the JSON may replace them.
+the file tells (`sidecar`) are applied here, the same for every format. A reader whose files name their length
+unit gives it as metadata["units"]. To add a format, write its module and add its line to `FORMATS`. A format whose
+files do not say times or driven markers names those in `ASSUMED`: ("times",), ("clamped",) or both; its reader
+assumes them, and the JSON may replace them.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
     name      what reports call the recording; default: the file's stem
     markers   list of names, for files that have none
     clamped   list of names or indices of driven markers, for files that do not say
-    gravity   [x, y, z] in m/s^2
+    gravity   [x, y, z] in m/s^2, in place of what the file's format says
     rate      frames per second, Hz, for files that hold no times (the first frame is at 0 s); elsewhere metadata
 
 All else is metadata, kept as it stands and in its own units: known values, license, attribution. Text under
@@ -34,7 +34,8 @@ def apply(recording: Recording, path: Path, units: str | None, assumed: tuple[st
     """The recording as read from `path`, in meters, with what the JSON beside it adds.
 
     Args:
-        recording: as the reader gave it, lengths in the unit of the file.
+        recording: as the reader gave it, lengths in the unit of the file, which is metadata["units"] where the
+            file says it.
         path: the file that was read.
         units: length unit of the file; None takes the JSON's.
         assumed: what the file does not say and the reader assumed ("times", "clamped"): the JSON replaces it.
@@ -43,7 +44,7 @@ def apply(recording: Recording, path: Path, units: str | None, assumed: tuple[st
         RecordingError: the JSON is malformed, disagrees with the file, or the unit is unknown.
     """
     beside = _read(path.with_suffix(".json"))
-    scale = _meters(units if units is not None else beside.get("units", "m"))
+    scale = _meters(_units(recording.metadata.get("units"), units, beside))
     markers = _markers(recording, beside)
     return Recording(
         positions=recording.positions * scale,
@@ -51,8 +52,8 @@ def apply(recording: Recording, path: Path, units: str | None, assumed: tuple[st
         markers=markers,
         clamped=_clamped(recording, beside, markers, "clamped" in assumed),
         name=beside.get("name", path.stem),
-        gravity=beside.get("gravity"),
-        metadata=_metadata(beside, _reserved(assumed)),
+        gravity=beside.get("gravity", recording.gravity),
+        metadata={k: v for k, v in recording.metadata.items() if k != "units"} | _metadata(beside, _reserved(assumed)),
     )
 
 
@@ -101,6 +102,15 @@ def _read(path: Path) -> dict[str, Any]:
         fix = 'write {"units": "m", ...}'
         raise RecordingError(str(path), "must be a JSON object", type(content).__name__, fix)
     return content
+
+
+def _units(in_file: str | None, given: str | None, beside: dict[str, Any]) -> Any:
+    """The file's own unit, else the one that is given, else the JSON's."""
+    said = given if given is not None else beside.get("units", in_file or "m")
+    if in_file is not None and _meters(said) != METERS[in_file]:
+        fix = "leave it out: the file says its unit"
+        raise RecordingError("units", f"differ from the file's, {in_file}", said, fix)
+    return said
 
 
 def _meters(units: Any) -> float:
