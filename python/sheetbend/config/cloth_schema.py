@@ -168,6 +168,26 @@ class Cloth(Section):
         "s",
     )
 
+    layout: list[Pair] | None = key(
+        None,
+        "material coordinates at which markers sit, in no order: at `nearest_at` each is taken by the marker nearest "
+        "to it, and markers that are nearest to none sit nowhere",
+        "m",
+        min_length=1,
+    )
+    shape: Literal["placed", "recording"] = key(
+        "placed",
+        "shape that a recording's scene starts from: as placed, or smoothly through the markers on it, as first "
+        "measured (their mean when static)",
+    )
+
+    @field_validator("layout")
+    @classmethod
+    def _beside_nearest_at(cls, layout: list[Pair] | None, info: ValidationInfo) -> list[Pair] | None:
+        if layout is not None and info.data.get("nearest_at") is None:
+            raise ValueError("says not when the cloth lies as placed|give nearest_at too")
+        return layout
+
     @field_validator("pressure")
     @classmethod
     def _beside_no_volume(cls, pressure: float | None, info: ValidationInfo) -> float | None:

@@ -16,7 +16,8 @@ from ..quantities import product
 from ..rope import Rope, add_rope
 from ..scene import Scene
 from . import scene_schema as schema
-from .cloths import build_cloth
+from .cloth_markers import seats
+from .cloths import build_cloth, placed_mesh
 from .errors import located
 from .moment import Moment
 from .winds import add_winds
@@ -149,10 +150,15 @@ def build_scene(
         if ropes is not None and rope.name not in ropes:
             continue
         _add_rope(scene, particles, f"scene.rope[{i}]", rope, moment, placed.get(rope.name, []), finer)
-    for i, cloth in enumerate(section.cloth):
+    meshes = [placed_mesh(f"scene.cloth[{i}]", cloth, folder, finer) for i, cloth in enumerate(section.cloth)]
+    by_name = {cloth.name: mesh for cloth, mesh in zip(section.cloth, meshes, strict=True)}
+    seated = {} if moment is None else seats(section.cloth, by_name, moment.whole)
+    for i, (cloth, mesh) in enumerate(zip(section.cloth, meshes, strict=True)):
         path = f"scene.cloth[{i}]"
         particles.free_name(path, cloth.name)
-        particles.add_cloth(*build_cloth(scene, path, cloth, moment, folder, finer))
+        own = {marker: place for marker, (on, place) in seated.items() if on == cloth.name}
+        coarse = mesh if finer == 1 else placed_mesh(path, cloth, folder, 1)
+        particles.add_cloth(build_cloth(scene, path, cloth, mesh, own, moment), coarse)
     add_winds(scene, section)
     for i, some in enumerate(section.particles):
         path = f"scene.particles[{i}]"
