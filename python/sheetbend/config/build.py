@@ -169,7 +169,7 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
 
 def _read(section: schema.RecordingSection, folder: Path, path: str) -> Recording:
     file = folder / section.file
-    if not file.is_file():
+    if not file.exists():
         raise ConfigError(
             f"{path}.file", "does not exist", str(file), "give a file relative to the configuration's folder"
         )

@@ -50,7 +50,13 @@ def seats(
         if section.name not in meshes:
             continue
         path, mesh = f"scene.cloth[{i}]", meshes[section.name]
-        for name, at in section.markers.items():
+        named: Mapping[str, list[float]] = {}
+        if isinstance(section.markers, str):
+            own = _on_vertices(mesh, recording)
+            given |= {name: (section.name, place) for name, place in own.items()}
+        else:
+            named = section.markers
+        for name, at in named.items():
             if name not in recording.markers:
                 fix = f"name some of: {', '.join(recording.markers)}"
                 raise ConfigError(f"{path}.markers.{name}", "is no marker of the recording", recording.name, fix)
@@ -58,7 +64,7 @@ def seats(
                 given[name] = section.name, mesh.at([at])
         if section.nearest_at is None:
             continue
-        names, x = _seen(f"{path}.nearest_at", section.nearest_at, recording, moving | set(section.markers))
+        names, x = _seen(f"{path}.nearest_at", section.nearest_at, recording, moving | set(given))
         if section.layout is not None:
             for name, place in _laid_out(f"{path}.layout", section.layout, mesh, names, x):
                 given[name] = section.name, place
@@ -69,6 +75,13 @@ def seats(
             found = (float(distances[k]), (section.name, _one(places, k)))
             nearest[name] = min(nearest.get(name, found), found, key=lambda pair: pair[0])
     return {name: seat for name, (_, seat) in nearest.items() if name not in moving} | given
+
+
+def _on_vertices(mesh: TriangleMesh, recording: Recording) -> dict[str, Places]:
+    """Markers v0, v1, ... on the vertices of these numbers."""
+    _, first = np.unique(mesh.triangles, return_index=True)
+    places = Places(first // 3, mesh.triangles[first // 3], np.eye(3)[first % 3])
+    return {m: _one(places, k) for k in range(len(first)) if (m := f"v{k}") in recording.markers}
 
 
 def _seen(path: str, time: float, recording: Recording, but: set[str]) -> tuple[list[str], np.ndarray]:

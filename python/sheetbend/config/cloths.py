@@ -88,8 +88,11 @@ def _recorded(path: str, mesh: TriangleMesh, seated: Mapping[str, Places], momen
         raise ConfigError(path, "needs markers on the cloth", "none", fix)
     order = [moment.recording.markers.index(marker) for marker in seated]
     fields = [np.concatenate([getattr(p, f) for p in seated.values()]) for f in ("triangles", "vertices", "weights")]
+    places, shape = Places(*fields), moment.shape[order]
+    if np.array_equal(places.positions(mesh.vertices), mesh.vertices) and not np.isnan(shape).any():
+        return shape  # a marker on every vertex
     with located(path):
-        return mesh.through(Places(*fields), moment.shape[order])
+        return mesh.through(places, shape)
 
 
 def _press(scene: Scene, section: schema.Cloth, cloth: Cloth) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -158,6 +159,8 @@ def build_scene(
         particles.free_name(path, cloth.name)
         own = {marker: place for marker, (on, place) in seated.items() if on == cloth.name}
         coarse = mesh if finer == 1 else placed_mesh(path, cloth, folder, 1)
+        if cloth.markers == "vertices" and moment is not None:
+            _check_sequence(f"{path}.markers", coarse, moment)
         particles.add_cloth(build_cloth(scene, path, cloth, mesh, own, moment), coarse)
     add_winds(scene, section)
     for i, some in enumerate(section.particles):
@@ -192,6 +195,13 @@ def build_scene(
     if section.pin:
         scene.pin([particles.find("scene.pin", r) for r in section.pin])
     return scene, particles
+
+
+def _check_sequence(path: str, mesh: TriangleMesh, moment: Moment) -> None:
+    vertices = sum(re.fullmatch(r"v\d+", name) is not None for name in moment.recording.markers)
+    if vertices != len(mesh.vertices):
+        fix = "give the mesh of the sequence, such as its first frame, without `merge`"
+        raise ConfigError(path, f"are on {len(mesh.vertices)} vertices, and the recording has", vertices, fix)
 
 
 def _same_length(path: str, stencils: list[list[int]]) -> None:

@@ -43,17 +43,17 @@ def apply(recording: Recording, path: Path, units: str | None, assumed: tuple[st
     Raises:
         RecordingError: the JSON is malformed, disagrees with the file, or the unit is unknown.
     """
-    beside = _read(path.with_suffix(".json"))
-    scale = _meters(_units(recording.metadata.get("units"), units, beside))
-    markers = _markers(recording, beside)
+    said = beside(path)
+    scale = _meters(_units(recording.metadata.get("units"), units, said))
+    markers = _markers(recording, said)
     return Recording(
         positions=recording.positions * scale,
-        times=_times(recording, beside) if "times" in assumed else recording.times,
+        times=_times(recording, said) if "times" in assumed else recording.times,
         markers=markers,
-        clamped=_clamped(recording, beside, markers, "clamped" in assumed),
-        name=beside.get("name", path.stem),
-        gravity=beside.get("gravity", recording.gravity),
-        metadata={k: v for k, v in recording.metadata.items() if k != "units"} | _metadata(beside, _reserved(assumed)),
+        clamped=_clamped(recording, said, markers, "clamped" in assumed),
+        name=said.get("name", path.stem),
+        gravity=said.get("gravity", recording.gravity),
+        metadata={k: v for k, v in recording.metadata.items() if k != "units"} | _metadata(said, _reserved(assumed)),
     )
 
 
@@ -90,7 +90,13 @@ def _reserved(assumed: tuple[str, ...]) -> tuple[str, ...]:
     return (*_RESERVED, "rate") if "times" in assumed else _RESERVED
 
 
-def _read(path: Path) -> dict[str, Any]:
+def beside(path: Path) -> dict[str, Any]:
+    """What the JSON beside a recording says; nothing where there is none.
+
+    Raises:
+        RecordingError: it is malformed.
+    """
+    path = path.with_suffix(".json")
     if not path.is_file():
         return {}
     try:

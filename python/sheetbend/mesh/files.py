@@ -98,6 +98,15 @@ def _other_unit(vertices: Array, unit: str) -> str:
     return f"the mesh is {size:.3g} m large, read in {unit}. Give the unit of the file, 'mm' or 'cm' or 'm'."
 
 
+def vertices_of(path: Path) -> Array:
+    """(n, 3) vertices of a file, in its order and unit.
+
+    Raises:
+        MeshError: it cannot be read.
+    """
+    return np.array(_load(path, _FORMATS[path.suffix.lower()][0]).vertices, dtype=float)
+
+
 def _read(path: Path) -> tuple[Array, NDArray[np.int64], Array | None]:
     """Vertices (n, 3), triangles (m, 3), and texture coordinates (m, 3, 2) where the file has them."""
     if path.suffix.lower() not in _FORMATS:
