@@ -9,7 +9,7 @@ from .balance import ForceBalance, force_balance
 from .baseline import no_physics
 from .cloth import Cloth, add_cloth
 from .discretization import Refinement
-from .equilibrium import Equilibrium, equilibria, equilibrium
+from .equilibrium import Equilibrium, NoEquilibriumError, equilibria, equilibrium
 from .errors import (
     ConfigError,
     DivergenceError,
@@ -68,6 +68,7 @@ __all__ = [
     "Junction",
     "Linear",
     "MeshError",
+    "NoEquilibriumError",
     "Parameter",
     "Parameters",
     "Place",

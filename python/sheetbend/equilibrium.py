@@ -14,9 +14,29 @@ from .errors import SceneError, SheetbendError
 from .scene import Scene
 from .simulate import forces_by_group, pressures_by_volume
 
+_FLAT = 1e-9  # of its extent: a sheet this near to a plane has no side to which it buckles
+
 
 class NoEquilibriumError(SheetbendError, RuntimeError):
     """The solver did not reach an equilibrium from the given start."""
+
+
+def no_rest(scene: Scene, problem: str, positions: np.ndarray) -> NoEquilibriumError:
+    """What the core says ("problem. Fix: what to do") of a start (particles, 3) m that leads to no rest."""
+    flat = [name for name, cloth in scene.cloths.items() if _flat(positions[cloth.particles])]
+    if flat:
+        problem = (
+            f"{problem.partition('. Fix: ')[0]}. Fix: start with {', '.join(flat)} bent a little. Exactly flat, and "
+            "pressed together in its plane, nothing tells a sheet to which side it buckles. add_cloth takes such "
+            "positions (mesh.through leads them through markers), and so do equilibrium (start=) and a configuration "
+            '(shape = "recording"); or hold its supports as far apart as the sheet is wide'
+        )
+    return NoEquilibriumError(f"{scene.name}: {problem}")
+
+
+def _flat(positions: np.ndarray) -> bool:
+    sizes = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
+    return bool(sizes[2] <= _FLAT * sizes[0])
 
 
 @dataclass(frozen=True)
@@ -115,7 +135,7 @@ def equilibrium(
     theta = compiled.values(values)
     out = _core.equilibrium(compiled.core, compiled.inputs(theta), x, stable)
     if not out.converged:
-        raise NoEquilibriumError(f"{scene.name}: {out.message}")
+        raise no_rest(scene, out.message, scene.positions if x is None else x.reshape(-1, 3))
     return Equilibrium(
         out.positions.reshape(-1, 3),
         forces_by_group(scene, out.multipliers),

@@ -42,8 +42,13 @@ class Field:
     measured: Array | None = None
 
 
-def plot_fields(mesh: TriangleMesh, fields: Sequence[Field], *, title: str = "") -> Figure:
+def plot_fields(
+    mesh: TriangleMesh, fields: Sequence[Field], *, title: str = "", gravity: ArrayLike = (0.0, 0.0, -9.81)
+) -> Figure:
     """Fields side by side, each with its own color bar: around zero where both signs occur, else from zero.
+
+    Args:
+        gravity: (3,), which points down in pictures of space.
 
     Raises:
         InputError: no field, or values that are neither one per triangle nor one per place.
@@ -61,7 +66,7 @@ def plot_fields(mesh: TriangleMesh, fields: Sequence[Field], *, title: str = "")
         options = {} if field.positions is None else {"projection": "3d"}
         panel = figure.add_subplot(1, len(fields), index, **options)
         if field.positions is not None:
-            drawn = _in_space(panel, mesh, field, values)
+            drawn = _in_space(panel, mesh, field, values, gravity)
         elif field.places is not None:
             drawn = _at_places(panel, mesh, field.places, values)
         else:
@@ -108,7 +113,7 @@ def _frame(panel: Axes, mesh: TriangleMesh) -> None:
     panel.locator_params(nbins=5)
 
 
-def _in_space(panel: Any, mesh: TriangleMesh, field: Field, values: Array) -> Any:
+def _in_space(panel: Any, mesh: TriangleMesh, field: Field, values: Array, gravity: ArrayLike) -> Any:
     assert field.positions is not None  # what sent it here
     art = require("mpl_toolkits.mplot3d.art3d", "plot")
     x = finite("positions", field.positions, mesh.vertices.shape, InputError)
@@ -120,27 +125,31 @@ def _in_space(panel: Any, mesh: TriangleMesh, field: Field, values: Array) -> An
         seen = np.asarray(field.measured)[np.isfinite(field.measured).all(axis=1)]
         panel.plot(*seen.T, "o", color=WARM, markersize=2.6, markeredgewidth=0, zorder=10)
         shown.append(seen)
-    box_in_space(panel, np.vstack(shown))
+    box_in_space(panel, np.vstack(shown), gravity)
     return drawn
 
 
-def box_in_space(panel: Any, points: Array) -> None:
-    """Axes that hold the points, all to one scale; a thin direction keeps a fifth of the widest."""
+def box_in_space(panel: Any, points: Array, gravity: ArrayLike) -> None:
+    """Axes that hold the points, all to one scale, the one nearest to gravity (3,) upright; a thin direction keeps a
+    fifth of the widest."""
     low, high = points.min(axis=0), points.max(axis=0)
     size = np.maximum(high - low, 0.2 * (high - low).max())
     middle = (low + high) / 2
+    down = np.asarray(gravity, dtype=float)
+    upright = int(np.abs(down).argmax()) if down.any() else 2
     for axis, name in enumerate("xyz"):
         half = 0.52 * size[axis]
-        getattr(panel, f"set_{name}lim")(middle[axis] - half, middle[axis] + half)
+        flip = -1.0 if axis == upright and down[axis] > 0.0 else 1.0
+        getattr(panel, f"set_{name}lim")(middle[axis] - flip * half, middle[axis] + flip * half)
         getattr(panel, f"{name}axis").set_tick_params(labelsize=7, colors=INK, pad=-1)
         getattr(panel, f"{name}axis").set_pane_color((1, 1, 1, 0))
         getattr(panel, f"{name}axis").line.set_color(GRAY)
         getattr(panel, f"set_{name}label")(f"{name} [m]", color=INK, fontsize=8, labelpad=0)
+    panel.view_init(elev=18, azim=-58, vertical_axis="xyz"[upright])
     panel.set_box_aspect(size, zoom=0.9)
     for axis, name in enumerate("xyz"):
         panel.locator_params(axis=name, nbins=1 + round(3 * size[axis] / size.max()))
     panel.grid(visible=False)
-    panel.view_init(elev=18, azim=-58)
 
 
 def field_colors(values: Array, line: float = 0.0) -> dict[str, Any]:

@@ -28,6 +28,7 @@ from .search import Search
 
 PROFILE_TOLERANCE = 1e-7  # relative, of the cost: an interval's rise is many times that
 Systematic = Callable[[FitProblem, np.ndarray], Mapping[str, float]]
+MISSED = 3.0  # sigmas: residuals so large are no noise
 INACCURATE = 0.5  # a start whose cost exceeds the best by this share ended elsewhere
 
 
@@ -194,7 +195,7 @@ def fit(
             for m in ends
         ),
         refits=end.refits,
-        warnings=_warnings(ends, best, interrupted) + end.doubts,
+        warnings=_warnings(ends, best, interrupted, problem.core.data_rows) + end.doubts,
     )
     return Fit(result, tuple(comparisons), wanted, corrected)
 
@@ -315,8 +316,15 @@ def _given(parameters: Parameters, values: Mapping[str, float]) -> tuple[Given, 
     return tuple(rows)
 
 
-def _warnings(ends: Sequence[Minimum], best: Minimum, interrupted: bool) -> tuple[str, ...]:
+def _warnings(ends: Sequence[Minimum], best: Minimum, interrupted: bool, rows: int) -> tuple[str, ...]:
     warnings = []
+    missed = float(np.sqrt(2.0 * best.cost / rows))
+    if missed > MISSED:
+        warnings.append(
+            f"residuals are {missed:.2g} times sigma: this motion is not the measured one, and values may be wrong by "
+            "more than their intervals say. A start far off wants short pieces first (windows) or other starts; else "
+            "see where it misses: what is held, places of markers, mesh, missing physics, or a sigma too small"
+        )
     if interrupted:
         warnings.append(
             "interrupted: intervals are the linear ones, without profiles and without refits on a finer discretization"

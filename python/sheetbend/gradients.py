@@ -37,7 +37,9 @@ class GradientRow:
         gradient: its largest absolute entry.
         complex_step: error against complex step through the templated solver.
         differences: error against central differences, whose own accuracy limits it.
-        passed: complex step within its bound, differences within theirs.
+        passed: complex step within its bound, differences within theirs; or nothing is felt.
+        unfelt: moving any tested entry by its own size changes the loss by less than rounding does, by the adjoint and
+            by complex step; relative errors of such a gradient mean nothing.
     """
 
     name: str
@@ -46,6 +48,7 @@ class GradientRow:
     complex_step: float
     differences: float
     passed: bool
+    unfelt: bool = False
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,7 @@ class GradientReport:
                 "complex_step": r.complex_step,
                 "differences": r.differences,
                 "passed": r.passed,
+                "unfelt": r.unfelt,
             }
             for r in self.rows
         }
@@ -88,7 +92,7 @@ class GradientReport:
         width = max(len(r.name) for r in self.rows)
         lines.append(f"  {'':{width}}  {'entries':>7}  {'largest':>9}  {'complex step':>12}  {'differences':>11}")
         for r in self.rows:
-            mark = "" if r.passed else "  <- fails"
+            mark = "  nothing felt beyond rounding" if r.unfelt else "" if r.passed else "  <- fails"
             lines.append(
                 f"  {r.name:{width}}  {r.size:7d}  {r.gradient:9.2e}"
                 f"  {r.complex_step:12.1e}  {r.differences:11.1e}{mark}"
@@ -189,9 +193,10 @@ def _quantity_row(
     direction[compiled.names.index(name)] = 1.0
     gradient = float(compiled.theta_bar(theta, adjoint) @ direction)
     along = compiled.inputs_dot(theta, direction)
-    step = 1e-4 * _size(float(theta @ direction), 1e-2, positive)
-    exact, rough = probe.complex_step(along), probe.differences(along, step)
-    return _row(name, 1, np.array([gradient]), np.array([exact]), np.array([rough]))
+    size = _size(float(theta @ direction), 1e-2, positive)
+    exact, rough = probe.complex_step(along), probe.differences(along, 1e-4 * size)
+    faint = np.array([probe.rounding / size])
+    return _row(name, 1, np.array([gradient]), np.array([exact]), np.array([rough]), faint)
 
 
 def _size(value: float, least: float, positive: bool) -> float:
@@ -206,25 +211,30 @@ def _array_row(
     part = adjoint[offset : offset + size]
     largest = np.argsort(-np.abs(part))[: samples // 2]
     tested = np.unique(np.concatenate([largest, rng.choice(size, min(size, samples - len(largest)), replace=False)]))
-    exact, rough = [], []
+    exact, rough, faint = [], [], []
     for i in tested:
         direction = np.zeros(len(adjoint))
         direction[offset + i] = 1.0
         exact.append(probe.complex_step(direction))
         size_of = _size(float(probe.inputs[offset + i]), 1e-3, name in POSITIVE)
         rough.append(probe.differences(direction, 1e-4 * size_of))
-    return _row(name, size, part[tested], np.array(exact), np.array(rough))
+        faint.append(probe.rounding / size_of)
+    return _row(name, size, part[tested], np.array(exact), np.array(rough), np.array(faint))
 
 
-def _row(name: str, size: int, gradient: np.ndarray, exact: np.ndarray, rough: np.ndarray) -> GradientRow:
+def _row(
+    name: str, size: int, gradient: np.ndarray, exact: np.ndarray, rough: np.ndarray, faint: np.ndarray
+) -> GradientRow:
+    """Of tested entries; `faint` is what each may be without being felt."""
+    unfelt = bool((np.maximum(np.abs(gradient), np.abs(exact)) <= faint).all())
     scale = float(np.abs(exact).max())
     if scale == 0.0:
         worst = float(np.abs(gradient).max())
-        return GradientRow(name, size, worst, worst, float(np.abs(rough).max()), worst == 0.0)
+        return GradientRow(name, size, worst, worst, float(np.abs(rough).max()), worst == 0.0 or unfelt, unfelt)
     complex_error = float(np.abs(gradient - exact).max()) / scale
     difference_error = float(np.abs(gradient - rough).max()) / scale
-    passed = complex_error <= COMPLEX_STEP_BOUND and difference_error <= DIFFERENCES_BOUND
-    return GradientRow(name, size, float(np.abs(gradient).max()), complex_error, difference_error, passed)
+    passed = unfelt or (complex_error <= COMPLEX_STEP_BOUND and difference_error <= DIFFERENCES_BOUND)
+    return GradientRow(name, size, float(np.abs(gradient).max()), complex_error, difference_error, passed, unfelt)
 
 
 def _present(compiled: CompiledScene) -> list[str]:

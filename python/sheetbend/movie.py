@@ -118,7 +118,7 @@ def _picture(motion: Motion, shown: Array, title: str) -> tuple[Figure, Any]:
     if motion.measured is not None:
         reach.append(_seen(motion.measured[shown].reshape(-1, 3)))
         key(figure, [("measured markers", WARM), ("to where they should be", INK)])
-    box_in_space(panel, np.vstack(reach))
+    box_in_space(panel, np.vstack(reach), motion.scene.gravity)
     clock = figure.text(0.02, 0.02, "", color=INK, fontsize=10)
 
     def draw(frame: int) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from . import _core
 from .covariance import Layout
-from .equilibrium import NoEquilibriumError
+from .equilibrium import no_rest
 from .errors import InputError, refusal
 from .experiment import Experiment
 from .parameters import Parameter, Parameters
@@ -269,7 +269,7 @@ class FitProblem:
             with divergence(scene):
                 markers = self.core.simulate(experiment, u)
         except _core.NoEquilibrium as error:
-            raise NoEquilibriumError(f"{scene.name}: {error}") from error
+            raise no_rest(scene, str(error), scene.positions) from error
         return markers.reshape(self.recordings[experiment].positions.shape)
 
     def rows_layout(self) -> Layout:

@@ -411,6 +411,11 @@ class Scene:
         return self._positions.values.copy()
 
     @property
+    def gravity(self) -> Array:
+        """(3,) m/s^2."""
+        return self._gravity.copy()
+
+    @property
     def free(self) -> Array:
         """Indices of the particles that can move."""
         held = np.zeros(self.particle_count, dtype=bool)

@@ -78,3 +78,16 @@ def test_many_names_are_shortened():
 def test_unknown_names_are_refused():
     with pytest.raises(sb.InputError, match=r"scales: name no quantity.*got 'foot'.*hand"):
         tip_at(0.1).require({"foot": 0.1})
+
+
+def test_a_check_does_not_judge_what_is_not_felt() -> None:
+    """A sheet that falls from rest stretches nowhere, so its gradients by stiffness are rounding, not errors."""
+    scene = sb.Scene("falling")
+    sheet = sb.mesh.grid(0.3, 0.2, 3, 2, pattern="one_way")
+    sb.add_cloth(scene, sheet, density=0.2, warp=200, shear=20, bending=1e-4, drag_linear=0.3)
+    report = sb.check_gradients(scene, [k / 60 for k in range(4)], sb.Solver(h=1 / 240, method="newton"))
+    rows = {row.name: row for row in report.rows}
+    assert report.passed, report
+    assert rows["cloth_warp"].unfelt and rows["cloth_bending"].unfelt
+    assert not rows["cloth_drag_linear"].unfelt and not rows["velocity"].unfelt
+    assert "nothing felt beyond rounding" in str(report) and report.to_dict()["gradients"]["cloth_warp"]["unfelt"]

@@ -75,6 +75,16 @@ def test_colors_go_around_zero_only_where_both_signs_occur() -> None:
         assert drawn.get_clim() == pytest.approx(ends)
 
 
+@pytest.mark.parametrize(
+    ("gravity", "axis", "turned"), [((0, -9.81, 0), 1, False), ((0, 9.81, 0), 1, True), ((0, 0, 0), 2, False)]
+)
+def test_what_gravity_pulls_at_hangs_down(gravity: tuple, axis: int, turned: bool) -> None:
+    panel = plot_fields(MESH, [Field("a", np.ones(16), MESH.vertices)], gravity=gravity).axes[0]
+    assert panel._vertical_axis == axis
+    low, high = (panel.get_xlim(), panel.get_ylim(), panel.get_zlim())[axis]
+    assert (low > high) == turned
+
+
 @pytest.mark.parametrize(("fields", "problem"), [([], "empty"), ([Field("a", np.ones(3))], "shape")])
 def test_what_is_refused(fields: list[Field], problem: str) -> None:
     with pytest.raises(sb.InputError, match=problem):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -93,6 +94,27 @@ def test_vertices_that_an_exporter_split_are_merged_on_request(tmp_path: Path) -
     mesh = sb.read_mesh(tmp_path / "split.obj", unit="cm", merge=True)
     assert len(mesh.vertices) == 16 and len(mesh.triangles) == 18 and mesh.doubts == ()
     assert mesh.areas.sum() == approx(0.09)
+
+
+def test_triangles_of_two_corners_are_left_out(tmp_path: Path) -> None:
+    """As decimation leaves them; also those that merging makes, of a sliver between two copies of a vertex."""
+    (tmp_path / "cut.obj").write_text(CUT + "f 1/1 2/2 2/2\nf 3/3 1/1 3/3\n")
+    with pytest.warns(UserWarning, match="2 triangles that name a vertex twice are left out"):
+        mesh = sb.read_mesh(tmp_path / "cut.obj", unit="mm")
+    assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3]] and mesh.material.shape == (2, 3, 2)
+    split = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\nf 1 4 5\n"
+    (tmp_path / "split.obj").write_text(split)
+    with pytest.warns(UserWarning, match="1 triangles that name"):
+        assert sb.read_mesh(tmp_path / "split.obj", merge=True).triangles.tolist() == [[0, 1, 2], [0, 2, 3]]
+
+
+@pytest.mark.parametrize(("unit", "size"), [("m", "600 m large, read in m"), ("mm", None), ("cm", None)])
+def test_a_size_that_no_fabric_has_is_named(tmp_path: Path, unit: str, size: str | None) -> None:
+    (tmp_path / "shirt.obj").write_text("v 0 0 0\nv 500 0 0\nv 500 600 0\nv 0 600 0\nf 1 2 3 4\n")
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        sb.read_mesh(tmp_path / "shirt.obj", unit=unit)
+    assert [str(w.message) for w in said if size and size in str(w.message)] or (not size and not said)
 
 
 def test_the_caller_chooses_the_material(tmp_path: Path) -> None:

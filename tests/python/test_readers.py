@@ -128,7 +128,7 @@ def test_long_csv_columns_go_by_name(tmp_path: Path) -> None:
         ("time,a_x,a_y,a_z\n", "no rows"),
         ("time,a_x,a_y\n0,1,2\n", "line 1: must have three columns"),
         ("time,a_x,a_z,a_y\n0,1,2,3\n", r"line 1: must have the column 'a_y' there \(got 'a_z'\)"),
-        ("time,a,b,c\n0,1,2,3\n", r"line 1: must have the column '_x' there \(got 'a'\). Fix: name the columns"),
+        ("time,a,b,c\n0,1,2,3\n", r"line 1: must have the column 'a_x' there \(got 'a'\). Fix: name the columns"),
         ("time,a_x,a_y,a_z\n0,NA,NA,NA\n", r"line 2: holds a cell that is no number .*an empty cell or nan"),
         ("time,a_x,a_y,a_z\n0,1,2,3\n1,1,2\n", r"line 3: must have 4 cells, like the header \(got 3\)"),
         ("time,a_x,a_y,a_z\n0,1,2,3\n1,1,2,3,4\n", "line 3: must have 4 cells"),

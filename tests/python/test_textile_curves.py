@@ -178,6 +178,15 @@ def test_a_spline_from_pulls():
     assert max(abs(r.laboratory / m.value - 1) for r, m in zip(found.readings, found.measured, strict=True)) < 0.01
 
 
+def test_poisson_is_what_jaws_hide():
+    """A wide specimen reads warp/(1 - poisson^2); told the number, the pull gives the warp."""
+    coupled = replace(FABRIC, law=sb.Linear(), poisson=0.4)
+    curve = recorded(coupled, "warp")
+    alone, told = (textile.fit_pull([curve], "warp", "linear", poisson=nu).fabric.warp for nu in (0.0, 0.4))
+    assert told == approx(coupled.warp, rel=0.01)
+    assert 1.02 < alone / coupled.warp < 1 / (1 - 0.4**2)
+
+
 def test_the_scatter_of_specimens_is_in_the_interval():
     """Strains of 0.97, 1 and 1.03: whatever the number of loads, three specimens are three."""
     plain = replace(FABRIC, law=sb.Linear())
@@ -214,6 +223,7 @@ def test_what_the_loop_loses_is_told():
         ({"curves": []}, "is empty"),
         ({"law": "cubic"}, "law: is unknown"),
         ({"along": "bias"}, "along: is unknown"),
+        ({"poisson": 1.0}, "poisson: must lie between"),
         ({"way": "up"}, "way: is unknown"),
         ({"cycle": 1}, "cycle: is none"),
         ({"curves": [tensile(), tensile()]}, "share a name"),

@@ -51,6 +51,28 @@ DIALECTS = {
         "Dehnung (%),Kraft (N)\n"
         + "".join(f'"{100 * e:g}","{f:g}"\n'.replace(".", ",") for e, f in zip(STRAIN, FORCE, strict=True))
     ).encode(),
+    "German, grouped thousands, units in a line of their own": (
+        "Einspannlänge;200;mm\nDehnung;Kraft\n%;mN\n"
+        + "".join(
+            f"{100 * e:.3f};{1e3 * f:_.2f}\n".replace(".", ",").replace("_", ".")
+            for e, f in zip(STRAIN, FORCE, strict=True)
+        )
+    ).encode(),
+    "quoted, grouped thousands": (
+        "Strain,Load\n%,mN\n"
+        + "".join(f'"{100 * e:g}","{1e3 * f:,.1f}"\n' for e, f in zip(STRAIN, FORCE, strict=True))
+    ).encode(),
+    "Swiss, apostrophes": (
+        "Dehnung (%);Kraft (mN)\n"
+        + "".join(f"{100 * e:g};{1e3 * f:_.0f}\n".replace("_", "'") for e, f in zip(STRAIN, FORCE, strict=True))
+    ).encode(),
+    "French, narrow blanks": (
+        "Allongement (%);Force (mN)\n"
+        + "".join(
+            f"{100 * e:g};{1e3 * f:_.1f}\n".replace(".", ",").replace("_", "\u202f")
+            for e, f in zip(STRAIN, FORCE, strict=True)
+        )
+    ).encode(),
 }  # fmt: skip
 
 
@@ -69,6 +91,14 @@ def test_dialects(dialect, tmp_path):
     if curve.time is not None:
         assert curve.time == approx(TIME)
     assert (curve.time is not None) == any(word in DIALECTS[dialect].lower() for word in (b"zeit", b"time"))
+
+
+def test_a_lone_group_of_thousands_wants_its_mark_told(tmp_path):
+    path = written(tmp_path, 'Strain (%),Load (mN)\n0,0\n1.5,"1,250"\n2.5,"4,500"\n')
+    with pytest.raises(RecordingError, match="tell it by decimal="):
+        textile.read_curves(path, width=WIDTH)
+    (curve,) = textile.read_curves(path, width=WIDTH, decimal=".")
+    assert curve.load * WIDTH == approx([0.0, 1.25, 4.5])
 
 
 def test_without_a_header_columns_are_told(tmp_path):
@@ -138,6 +168,7 @@ TABLE = "Time (s),Ext (mm),Load (N)\n"
         (TABLE.replace("(N)", "(kp)") + "0,0,0\n1,1,1\n2,2,2\n", {}, r"line 1, column 3 \(Load\)", "'kp'"),
         (TABLE.replace(" (N)", "") + "0,0,0\n1,1,1\n2,2,2\n", {}, "line 1, column 3", "has no unit"),
         ("Ext (mm);Load (N)\n0;0\n1;0.5\n2,5;1.5\n3;2.5\n", {}, r"line 4, column 1 \(Ext\)", "decimal mark ','"),
+        ("Ext (mm);Load (mN)\n0,0;0,5\n1,0;1.040\n2,0;2.040\n", {}, r"column 2 \(Load\)", "decimal mark '.'"),
         ("Ext (mm);Load (N)\n0,0;0\n1;0.5\n2.5;1.5\n3;2.5\n", {}, r"line 2, column 1 \(Ext\)", "decimal mark ','"),
         ("Ext (mm),Load (N)\n0,0,0,0\n0,5,1,25\n1,0,2,5\n", {}, "line 2", "twice the cells"),
         ("Ext (mm);Load (N)\n0,0;0,1\n1,0;2,5\n", {"decimal": "."}, "strip.csv", "holds no table"),

@@ -48,7 +48,8 @@ def cloth_figures(found: Fit, c: Comparison) -> dict[str, Figure]:
         ]
         if mine:
             fields.append(Field("residual of each marker, rms [mm]", rms[mine], places=places))
-        figures[cloth.name] = plot_fields(cloth.mesh, fields, title=f"{e.name}: {cloth.name} {when}")
+        title = f"{e.name}: {cloth.name} {when}"
+        figures[cloth.name] = plot_fields(cloth.mesh, fields, title=title, gravity=e.scene.gravity)
     return figures
 
 

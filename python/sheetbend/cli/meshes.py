@@ -5,7 +5,9 @@ from __future__ import annotations
 from enum import StrEnum
 from pathlib import Path
 
-from ..mesh import write_obj_sequence, write_ply
+import numpy as np
+
+from ..mesh import write_obj_sequence, write_ply, write_ply_sequence
 from ..scene import Scene
 from ..simulate import Trajectory
 from ..strain import strain_fields
@@ -16,15 +18,20 @@ class MeshFormat(StrEnum):
 
     OBJ = "obj"
     PLY = "ply"
+    PLY_SEQUENCE = "ply-sequence"
 
 
 def write_meshes(name: str, scene: Scene, motion: Trajectory, folder: Path, form: MeshFormat) -> list[str]:
-    """Every cloth of a scene, all frames as OBJ or the last as PLY; gives the paths."""
+    """Every cloth of a scene, all frames as OBJ or PLY, or the last as PLY; gives the paths."""
     written = []
     for cloth in scene.cloths.values():
         path = folder / f"{name}_{cloth.name}"
         if form is MeshFormat.OBJ:
             write_obj_sequence(path, cloth.mesh, motion.positions[:, cloth.particles])
+        elif form is MeshFormat.PLY_SEQUENCE:
+            strains = [strain_fields(scene, cloth, x) for x in motion.positions]
+            fields = {name: np.array([frame[name] for frame in strains]) for name in strains[0]}
+            write_ply_sequence(path, cloth.mesh, motion.positions[:, cloth.particles], face_fields=fields)
         else:
             path = path.with_name(f"{path.name}.ply")
             fields = strain_fields(scene, cloth, motion.positions[-1])

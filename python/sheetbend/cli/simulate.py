@@ -58,7 +58,7 @@ def simulate(
     mesh: Annotated[
         MeshFormat | None,
         typer.Option(
-            help="Also write every cloth: a folder of OBJ files, one per frame, or a PLY of the last frame with "
+            help="Also write every cloth: a folder of OBJ or PLY files, one per frame, or a PLY of the last frame with "
             "strains and energy per triangle.",
             show_default=False,
         ),

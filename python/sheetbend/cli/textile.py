@@ -50,6 +50,7 @@ def textile(
     ] = None,
     along: Annotated[Along, typer.Option(help="Direction of a pull.")] = "warp",
     law: Annotated[LawName, typer.Option(help="Fitted to a pull.")] = "exponential",
+    poisson: Annotated[float, typer.Option(help="sqrt(nu_uv nu_vu) of the fabric, where it is known.")] = 0.0,
     way: Annotated[Way, typer.Option(help="Which way of the loop the elastic law follows.")] = "loading",
     cycle: Annotated[int, typer.Option(help="Which one, from 0; -1 is the last.")] = 0,
     output: Annotated[
@@ -79,7 +80,7 @@ def textile(
         if len({c.name for c in curves}) < len(curves):
             curves = [replace(c, name=f"{k} {c.name}") for k, c in enumerate(curves, start=1)]
         fitted = test == "tension" and law != "none"
-        fit = fit_pull(curves, along, law, way=way, cycle=cycle) if fitted else None
+        fit = fit_pull(curves, along, law, way=way, cycle=cycle, poisson=poisson) if fitted else None
         text = report(curves, fit, cycle)
         console.print("\n" + text, markup=False, soft_wrap=True, end="")
         (folder / "report.txt").write_text(text, encoding="utf-8")

@@ -113,9 +113,8 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
         t0 = _start(section, recording)
         for key in ("fit", "held_out"):
             _check_window(f"{path}.{key}", getattr(section, key), recording)
-        moment = Moment(
-            recording.piece(*(section.fit if section.static and section.fit else (t0, None))), t0, section.static
-        )
+        part = recording.piece(*(section.fit if section.static and section.fit else (t0, None)))
+    moment = Moment(part, recording, t0, section.static)
     ropes = _shown(config, section, path)
     shared = not section.marker
     markers = config.marker if shared else section.marker
@@ -170,7 +169,7 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
 
 def _read(section: schema.RecordingSection, folder: Path, path: str) -> Recording:
     file = folder / section.file
-    if not file.is_file():
+    if not file.exists():
         raise ConfigError(
             f"{path}.file", "does not exist", str(file), "give a file relative to the configuration's folder"
         )

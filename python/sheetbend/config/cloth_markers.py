@@ -2,55 +2,116 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..cloth import Cloth
 from ..errors import ConfigError
-from ..markers import Place, on_cloth, on_mesh
+from ..markers import Place, on_mesh
+from ..mesh import Places, TriangleMesh
 from ..recording import Recording
 from ..scene import Scene
 from . import cloth_schema as schema
 from .errors import located
 
+Seat = tuple[str, Places]
+"""A cloth's name, and a place of its mesh."""
+
 
 def places_on_cloths(sections: Sequence[schema.Cloth], scene: Scene, recording: Recording) -> dict[str, Place]:
-    """By marker, what the keys `markers` and `nearest_at` of the scene's cloths say.
+    """By marker, what the keys `markers`, `nearest_at` and `layout` of the scene's cloths say.
+
+    Raises:
+        ConfigError: as `seats`.
+    """
+    meshes = {name: cloth.mesh for name, cloth in scene.cloths.items()}
+    seated = seats(sections, meshes, recording)
+    return {marker: on_mesh(scene.cloths[cloth], place)[0] for marker, (cloth, place) in seated.items()}
+
+
+def seats(
+    sections: Sequence[schema.Cloth], meshes: Mapping[str, TriangleMesh], recording: Recording
+) -> dict[str, Seat]:
+    """By marker, the cloth that it sits on and where.
 
     With `nearest_at` of several cloths a marker sits on the nearest one; those that move a grip sit on none.
 
+    Args:
+        meshes: by name of the cloth, as placed; cloths without one are left out of this recording.
+
     Raises:
-        ConfigError: an unknown marker, a place outside of the fabric, or no frame at `nearest_at`.
+        ConfigError: an unknown marker, a place outside of the fabric, no frame at `nearest_at`, or a place of a layout
+            that no marker takes.
     """
-    given: dict[str, Place] = {}
-    nearest: dict[str, tuple[float, Place]] = {}
+    given: dict[str, Seat] = {}
+    nearest: dict[str, tuple[float, Seat]] = {}
     moving = {m if isinstance(m, str) else recording.markers[m] for s in sections for g in s.grip for m in g.markers}
     for i, section in enumerate(sections):
-        if section.name not in scene.cloths:  # left out of this recording
+        if section.name not in meshes:
             continue
-        path, cloth = f"scene.cloth[{i}]", scene.cloths[section.name]
-        for name, at in section.markers.items():
+        path, mesh = f"scene.cloth[{i}]", meshes[section.name]
+        named: Mapping[str, list[float]] = {}
+        if isinstance(section.markers, str):
+            own = _on_vertices(mesh, recording)
+            given |= {name: (section.name, place) for name, place in own.items()}
+        else:
+            named = section.markers
+        for name, at in named.items():
             if name not in recording.markers:
                 fix = f"name some of: {', '.join(recording.markers)}"
                 raise ConfigError(f"{path}.markers.{name}", "is no marker of the recording", recording.name, fix)
             with located(f"{path}.markers.{name}"):
-                (given[name],) = on_cloth(cloth, [at])
-        if section.nearest_at is not None:
-            for name, found in _nearest(f"{path}.nearest_at", section.nearest_at, cloth, recording).items():
-                nearest[name] = min(nearest.get(name, found), found, key=lambda pair: pair[0])
-    return {name: place for name, (_, place) in nearest.items() if name not in moving} | given
+                given[name] = section.name, mesh.at([at])
+        if section.nearest_at is None:
+            continue
+        names, x = _seen(f"{path}.nearest_at", section.nearest_at, recording, moving | set(given))
+        if section.layout is not None:
+            for name, place in _laid_out(f"{path}.layout", section.layout, mesh, names, x):
+                given[name] = section.name, place
+            continue
+        places = mesh.project(x)
+        distances = np.linalg.norm(places.positions(mesh.vertices) - x, axis=1)
+        for k, name in enumerate(names):
+            found = (float(distances[k]), (section.name, _one(places, k)))
+            nearest[name] = min(nearest.get(name, found), found, key=lambda pair: pair[0])
+    return {name: seat for name, (_, seat) in nearest.items() if name not in moving} | given
 
 
-def _nearest(path: str, time: float, cloth: Cloth, recording: Recording) -> dict[str, tuple[float, Place]]:
-    """Distance [m] and place of every marker that is seen in the frame nearest to a time."""
+def _on_vertices(mesh: TriangleMesh, recording: Recording) -> dict[str, Places]:
+    """Markers v0, v1, ... on the vertices of these numbers."""
+    _, first = np.unique(mesh.triangles, return_index=True)
+    places = Places(first // 3, mesh.triangles[first // 3], np.eye(3)[first % 3])
+    return {m: _one(places, k) for k in range(len(first)) if (m := f"v{k}") in recording.markers}
+
+
+def _seen(path: str, time: float, recording: Recording, but: set[str]) -> tuple[list[str], np.ndarray]:
+    """Names and positions (k, 3) m of the markers that are seen in the frame nearest to a time, some left out."""
     first, last = recording.times[[0, -1]]
     if not first <= time <= last:
         problem = f"lies outside of the recording '{recording.name}'"
         raise ConfigError(path, problem, time, f"give a time from {first:g} to {last:g} s")
     x = recording.positions[np.abs(recording.times - time).argmin()]
-    seen = np.flatnonzero(np.isfinite(x).all(axis=1))
-    places = cloth.mesh.project(x[seen])
-    distances = np.linalg.norm(places.positions(cloth.mesh.vertices) - x[seen], axis=1)
-    found = zip(seen, distances.tolist(), on_mesh(cloth, places), strict=True)
-    return {recording.markers[k]: (distance, place) for k, distance, place in found}
+    kept = [k for k, name in enumerate(recording.markers) if np.isfinite(x[k]).all() and name not in but]
+    if not kept:
+        raise ConfigError(path, "is a time at which no marker is seen", time, "choose another")
+    return [recording.markers[k] for k in kept], x[kept]
+
+
+def _laid_out(
+    path: str, layout: list[list[float]], mesh: TriangleMesh, names: list[str], x: np.ndarray
+) -> list[tuple[str, Places]]:
+    """Each place of a layout with its marker: the nearest one, which has no other place nearer."""
+    with located(path):
+        places = mesh.at(layout)
+    apart = np.linalg.norm(places.positions(mesh.vertices)[:, None] - x, axis=2)
+    takes, taken_by = apart.argmin(axis=1), apart.argmin(axis=0)
+    empty = [layout[k] for k in range(len(layout)) if taken_by[takes[k]] != k]
+    if empty:
+        problem = f"has {len(empty)} places that no marker is nearest to"
+        fix = "place the cloth as it lies at nearest_at, choose a time at which all are seen, or leave these out"
+        raise ConfigError(path, problem, empty[:4], fix)
+    return [(names[marker], _one(places, k)) for k, marker in enumerate(takes)]
+
+
+def _one(places: Places, k: int) -> Places:
+    return Places(places.triangles[k : k + 1], places.vertices[k : k + 1], places.weights[k : k + 1])

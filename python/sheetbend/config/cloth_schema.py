@@ -161,13 +161,48 @@ class Cloth(Section):
     set: list[VertexSet] = key([], "further sets of vertices")
     pinned: list[Name] = key([], "sets that are held where they are placed")
     grip: list[Grip] = key([], "sets that are moved with markers")
-    markers: dict[str, Pair] = key({}, "material coordinates (along warp and weft) of markers, by name", "m")
+    markers: dict[str, Pair] | Literal["vertices"] = key(
+        {},
+        'material coordinates (along warp and weft) of markers, by name; or "vertices" of a mesh from a file: markers '
+        "v0, v1, ... of a sequence of meshes sit on its vertices",
+        "m",
+    )
     nearest_at: Finite | None = key(
         None,
         "time of a recording at which the cloth lies as placed: markers without another place, that move no grip, sit "
         "where they are nearest to it then",
         "s",
     )
+
+    layout: list[Pair] | None = key(
+        None,
+        "material coordinates at which markers sit, in no order: at `nearest_at` each is taken by the marker nearest "
+        "to it, and markers that are nearest to none sit nowhere",
+        "m",
+        min_length=1,
+    )
+    shape: Literal["placed", "recording"] = key(
+        "placed",
+        "shape that a recording's scene starts from: as placed, or smoothly through the markers on it, as first "
+        "measured (their mean when static)",
+    )
+
+    @field_validator("markers")
+    @classmethod
+    def _vertices_of_a_file(
+        cls, markers: dict[str, list[float]] | str, info: ValidationInfo
+    ) -> dict[str, list[float]] | str:
+        mesh = info.data.get("mesh")
+        if markers == "vertices" and isinstance(mesh, ClothMesh) and mesh.kind != "file":
+            raise ValueError("are vertices of a mesh that is from no file|give material coordinates by name")
+        return markers
+
+    @field_validator("layout")
+    @classmethod
+    def _beside_nearest_at(cls, layout: list[Pair] | None, info: ValidationInfo) -> list[Pair] | None:
+        if layout is not None and info.data.get("nearest_at") is None:
+            raise ValueError("says not when the cloth lies as placed|give nearest_at too")
+        return layout
 
     @field_validator("pressure")
     @classmethod

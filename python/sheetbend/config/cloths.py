@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,8 @@ from .. import mesh as meshes
 from ..cloth import Cloth, add_cloth
 from ..errors import ConfigError
 from ..fabric import COMPONENTS, Exponential, Law, Sinh, Spline
-from ..mesh import TriangleMesh
+from ..mesh import Places, TriangleMesh
+from ..mesh.places import nearest
 from ..mesh.subdivide import subdivided
 from ..scene import Scene
 from . import cloth_schema as schema
@@ -20,7 +22,8 @@ from .errors import located
 from .moment import Moment
 
 _ELSEWHERE = {
-    *("name", "mesh", "law", "origin", "x_axis", "y_axis", "set", "pinned", "grip", "markers", "nearest_at"),
+    *("name", "mesh", "law", "origin", "x_axis", "y_axis", "set", "pinned", "grip"),
+    *("markers", "nearest_at", "layout", "shape"),
     *("air_normal", "air_tangential", "pressure", "volume"),
 }
 """Keys of a cloth that are not arguments of `add_cloth`, or not as they stand."""
@@ -28,34 +31,68 @@ _SQUARE = 1e-6  # of the product of their lengths: how far two axes may be from 
 
 
 def build_cloth(
-    scene: Scene, path: str, section: schema.Cloth, moment: Moment | None, folder: Path, finer: int
-) -> tuple[Cloth, TriangleMesh]:
+    scene: Scene,
+    path: str,
+    section: schema.Cloth,
+    mesh: TriangleMesh,
+    seated: Mapping[str, Places],
+    moment: Moment | None,
+) -> Cloth:
     """Add a cloth with its pinned and driven vertices to a scene.
 
     Args:
-        folder: files are relative to it.
-        finer: multiplies the cells, rings or sides of its mesh; a mesh from a file is split.
-
-    Returns:
-        The cloth, and its mesh as configured, whose vertex numbers references use.
+        mesh: of `placed_mesh`.
+        seated: by marker of the recording, its place on the mesh.
 
     Raises:
         ConfigError: anything inconsistent, with the path of the key.
     """
-    coarse = _placed(path, section, moment, folder, 1)
-    mesh = coarse if finer == 1 else _placed(path, section, moment, folder, finer)
+    shape = mesh.vertices if section.shape == "placed" else _recorded(f"{path}.shape", mesh, seated, moment)
+    for i, chosen in enumerate(section.set):
+        mesh = _with_set(f"{path}.set[{i}]", mesh, shape, chosen, moment)
     pinned = [_members(f"{path}.pinned", mesh, name) for name in section.pinned]
     gripped = [_members(f"{path}.grip[{i}].set", mesh, grip.set) for i, grip in enumerate(section.grip)]
     fields = section.model_dump(exclude=_ELSEWHERE, exclude_none=True)
     with located(path, section.name):
         held = np.unique(np.concatenate([np.zeros(0, dtype=int), *pinned, *gripped]))
-        cloth = add_cloth(scene, mesh, section.name, law=_law(section.law), held=held, **fields)
+        cloth = add_cloth(scene, mesh, section.name, law=_law(section.law), held=held, positions=shape, **fields)
         for vertices in pinned:
             scene.pin(cloth.particles[vertices])
         _press(scene, section, cloth)
     for i, (grip, vertices) in enumerate(zip(section.grip, gripped, strict=True)):
-        _drive(scene, f"{path}.grip[{i}]", grip, moment, cloth, vertices)
-    return cloth, coarse
+        _drive(scene, f"{path}.grip[{i}]", grip, moment, cloth.particles[vertices], shape[vertices])
+    return cloth
+
+
+def placed_mesh(path: str, section: schema.Cloth, folder: Path, finer: int) -> TriangleMesh:
+    """The mesh where the cloth is placed.
+
+    Args:
+        folder: files are relative to it.
+        finer: multiplies its cells, rings or sides; a mesh from a file is split.
+
+    Raises:
+        ConfigError: anything inconsistent, with the path of the key.
+    """
+    with located(f"{path}.mesh"):
+        mesh = _mesh(f"{path}.mesh", section.mesh, folder, finer)
+    return replace(mesh, vertices=np.array(section.origin) + mesh.vertices @ _axes(path, section))
+
+
+def _recorded(path: str, mesh: TriangleMesh, seated: Mapping[str, Places], moment: Moment | None) -> np.ndarray:
+    """(vertices, 3) m, smoothly through the markers on a mesh at the start."""
+    if moment is None:
+        raise ConfigError(path, "needs a recording", "recording", "add a [[recording]], or leave the key out")
+    if not seated:
+        fix = "give markers, or nearest_at"
+        raise ConfigError(path, "needs markers on the cloth", "none", fix)
+    order = [moment.recording.markers.index(marker) for marker in seated]
+    fields = [np.concatenate([getattr(p, f) for p in seated.values()]) for f in ("triangles", "vertices", "weights")]
+    places, shape = Places(*fields), moment.shape[order]
+    if np.array_equal(places.positions(mesh.vertices), mesh.vertices) and not np.isnan(shape).any():
+        return shape  # a marker on every vertex
+    with located(path):
+        return mesh.through(places, shape)
 
 
 def _press(scene: Scene, section: schema.Cloth, cloth: Cloth) -> None:
@@ -65,16 +102,6 @@ def _press(scene: Scene, section: schema.Cloth, cloth: Cloth) -> None:
         scene.add_pressure(triangles, section.pressure, name=section.name)
     if section.volume is not None:
         scene.add_volume(triangles, **section.volume.model_dump(), name=section.name)
-
-
-def _placed(path: str, section: schema.Cloth, moment: Moment | None, folder: Path, finer: int) -> TriangleMesh:
-    """The mesh where the cloth starts, with all its sets."""
-    with located(f"{path}.mesh"):
-        mesh = _mesh(f"{path}.mesh", section.mesh, folder, finer)
-    mesh = replace(mesh, vertices=np.array(section.origin) + mesh.vertices @ _axes(path, section))
-    for i, chosen in enumerate(section.set):
-        mesh = _with_set(f"{path}.set[{i}]", mesh, chosen, moment)
-    return mesh
 
 
 def _mesh(path: str, section: schema.ClothMesh, folder: Path, finer: int) -> TriangleMesh:
@@ -121,12 +148,14 @@ def _axes(path: str, section: schema.Cloth) -> np.ndarray:
     return np.stack([x, y, np.cross(x, y)])
 
 
-def _with_set(path: str, mesh: TriangleMesh, chosen: schema.VertexSet, moment: Moment | None) -> TriangleMesh:
+def _with_set(
+    path: str, mesh: TriangleMesh, shape: np.ndarray, chosen: schema.VertexSet, moment: Moment | None
+) -> TriangleMesh:
     if chosen.name in mesh.sets:
         fix = f"choose a name beside: {', '.join(mesh.sets)}"
         raise ConfigError(f"{path}.name", "is a set of the mesh already", chosen.name, fix)
     if chosen.markers is not None:
-        vertices = mesh.nearest(_seen(f"{path}.markers", chosen.markers, moment))
+        vertices = nearest(shape, _seen(f"{path}.markers", chosen.markers, moment))
     elif chosen.points is not None:
         vertices = mesh.nearest(chosen.points)
     else:
@@ -173,19 +202,18 @@ def _law(section: schema.ClothLaw | None) -> Law | None:
 
 
 def _drive(
-    scene: Scene, path: str, grip: schema.Grip, moment: Moment | None, cloth: Cloth, vertices: np.ndarray
+    scene: Scene, path: str, grip: schema.Grip, moment: Moment | None, particles: np.ndarray, placed: np.ndarray
 ) -> None:
-    """Let vertices follow the line through a grip's markers."""
+    """Let particles, placed at (k, 3) m, follow the line through a grip's markers."""
     line = _seen(f"{path}.markers", grip.markers, moment)
     assert moment is not None  # `_seen` needed it
     if moment.static:
         fix = "use [[scene.drive]], which puts particles on their markers"
         raise ConfigError(path, "has no motion to follow in a recording at rest", grip.set, fix)
-    placed = cloth.mesh.vertices[vertices]
     weights = np.array([_along(line, point) for point in placed])
     with located(path):
         times, motion, names = moment.followed(grip.markers)
-        scene.follow(cloth.particles[vertices], times, motion, names, weights, placed, grip.interpolation)
+        scene.follow(particles, times, motion, names, weights, placed, grip.interpolation)
 
 
 def _along(line: np.ndarray, point: np.ndarray) -> np.ndarray:

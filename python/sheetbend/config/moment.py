@@ -13,9 +13,10 @@ from ..timeseries import mean_position
 
 @dataclass(frozen=True)
 class Moment:
-    """The frames of a recording from the scene's start on, and the shape there."""
+    """The frames of a recording from the scene's start on, the shape there, and the whole recording."""
 
     recording: Recording
+    whole: Recording
     t0: float
     static: bool
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,7 +17,8 @@ from ..quantities import product
 from ..rope import Rope, add_rope
 from ..scene import Scene
 from . import scene_schema as schema
-from .cloths import build_cloth
+from .cloth_markers import seats
+from .cloths import build_cloth, placed_mesh
 from .errors import located
 from .moment import Moment
 from .winds import add_winds
@@ -149,10 +151,17 @@ def build_scene(
         if ropes is not None and rope.name not in ropes:
             continue
         _add_rope(scene, particles, f"scene.rope[{i}]", rope, moment, placed.get(rope.name, []), finer)
-    for i, cloth in enumerate(section.cloth):
+    meshes = [placed_mesh(f"scene.cloth[{i}]", cloth, folder, finer) for i, cloth in enumerate(section.cloth)]
+    by_name = {cloth.name: mesh for cloth, mesh in zip(section.cloth, meshes, strict=True)}
+    seated = {} if moment is None else seats(section.cloth, by_name, moment.whole)
+    for i, (cloth, mesh) in enumerate(zip(section.cloth, meshes, strict=True)):
         path = f"scene.cloth[{i}]"
         particles.free_name(path, cloth.name)
-        particles.add_cloth(*build_cloth(scene, path, cloth, moment, folder, finer))
+        own = {marker: place for marker, (on, place) in seated.items() if on == cloth.name}
+        coarse = mesh if finer == 1 else placed_mesh(path, cloth, folder, 1)
+        if cloth.markers == "vertices" and moment is not None:
+            _check_sequence(f"{path}.markers", coarse, moment)
+        particles.add_cloth(build_cloth(scene, path, cloth, mesh, own, moment), coarse)
     add_winds(scene, section)
     for i, some in enumerate(section.particles):
         path = f"scene.particles[{i}]"
@@ -186,6 +195,13 @@ def build_scene(
     if section.pin:
         scene.pin([particles.find("scene.pin", r) for r in section.pin])
     return scene, particles
+
+
+def _check_sequence(path: str, mesh: TriangleMesh, moment: Moment) -> None:
+    vertices = sum(re.fullmatch(r"v\d+", name) is not None for name in moment.recording.markers)
+    if vertices != len(mesh.vertices):
+        fix = "give the mesh of the sequence, such as its first frame, without `merge`"
+        raise ConfigError(path, f"are on {len(mesh.vertices)} vertices, and the recording has", vertices, fix)
 
 
 def _same_length(path: str, stencils: list[list[int]]) -> None:

@@ -1,9 +1,10 @@
 """Files of recordings. A format is one module with `read(path) -> Recording` and `write(recording, path)`.
 
 A reader takes the numbers as they stand in the file; length units, names and whatever else the JSON beside
-the file tells (`sidecar`) are applied here, the same for every format. To add a format, write its module
-and add its line to `FORMATS`. A format whose files do not say times or driven markers names those in `ASSUMED`:
-("times",), ("clamped",) or both; its reader assumes them, and the JSON may replace them.
+the file tells (`sidecar`) are applied here, the same for every format. A reader whose files name their length
+unit gives it as metadata["units"]. To add a format, write its module and add its line to `FORMATS`. A format whose
+files do not say times or driven markers names those in `ASSUMED`: ("times",), ("clamped",) or both; its reader
+assumes them, and the JSON may replace them. A folder of meshes, a frame each, is read by `mesh_sequence`.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from types import ModuleType
 from ..errors import RecordingError
 from ..recording import Recording
 from ..recording_checks import check_seen
-from . import csv, deform, npz, sidecar
+from . import csv, deform, mesh_sequence, npz, sidecar
 
 FORMATS: dict[str, ModuleType] = {
     ".npz": npz,
@@ -26,6 +27,8 @@ FORMATS: dict[str, ModuleType] = {
 
 def read(path: Path, units: str | None = None) -> Recording:
     """Read the recording at path and the JSON beside it; see `Recording.load`."""
+    if path.is_dir() and path.suffix.lower() not in FORMATS:
+        return sidecar.apply(mesh_sequence.read(path), path, units, mesh_sequence.ASSUMED)
     file_format = _format(path)
     if not path.is_file():
         fix = "check the path; relative paths start at the working directory"

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 from ..errors import RecordingError
 from ..recording import Recording
 from . import FORMATS
+from .natural import by_number
 
 
 def recordings(folder: str | Path, pattern: str = "*", units: str | None = None) -> list[Recording]:
@@ -31,7 +31,7 @@ def recordings(folder: str | Path, pattern: str = "*", units: str | None = None)
     root = Path(folder)
     if not root.is_dir():
         raise RecordingError("folder", "is no folder", str(folder), "give the folder that holds the files")
-    files = sorted((p for p in root.glob(pattern) if p.is_file() and p.suffix.lower() in FORMATS), key=_order)
+    files = sorted((p for p in root.glob(pattern) if p.is_file() and p.suffix.lower() in FORMATS), key=by_number)
     if not files:
         inside = sorted(p.name + "/" * p.is_dir() for p in root.iterdir())
         fix = f"give the folder of the files and a pattern that they match; files end in {' or '.join(FORMATS)}"
@@ -55,9 +55,3 @@ def _load(file: Path, units: str | None) -> Recording:
         if str(file) not in error.field:
             error.add_note(f"in {file}")
         raise
-
-
-def _order(file: Path) -> list[tuple[int, str]]:
-    """Digits as numbers, all else as text."""
-    parts = re.findall(r"\d+|\D+", file.as_posix())
-    return [(int(part), "") if part.isascii() and part.isdigit() else (-1, part) for part in parts]

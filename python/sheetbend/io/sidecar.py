@@ -4,7 +4,7 @@
     name      what reports call the recording; default: the file's stem
     markers   list of names, for files that have none
     clamped   list of names or indices of driven markers, for files that do not say
-    gravity   [x, y, z] in m/s^2
+    gravity   [x, y, z] in m/s^2, in place of what the file's format says
     rate      frames per second, Hz, for files that hold no times (the first frame is at 0 s); elsewhere metadata
 
 All else is metadata, kept as it stands and in its own units: known values, license, attribution. Text under
@@ -34,7 +34,8 @@ def apply(recording: Recording, path: Path, units: str | None, assumed: tuple[st
     """The recording as read from `path`, in meters, with what the JSON beside it adds.
 
     Args:
-        recording: as the reader gave it, lengths in the unit of the file.
+        recording: as the reader gave it, lengths in the unit of the file, which is metadata["units"] where the
+            file says it.
         path: the file that was read.
         units: length unit of the file; None takes the JSON's.
         assumed: what the file does not say and the reader assumed ("times", "clamped"): the JSON replaces it.
@@ -42,17 +43,17 @@ def apply(recording: Recording, path: Path, units: str | None, assumed: tuple[st
     Raises:
         RecordingError: the JSON is malformed, disagrees with the file, or the unit is unknown.
     """
-    beside = _read(path.with_suffix(".json"))
-    scale = _meters(units if units is not None else beside.get("units", "m"))
-    markers = _markers(recording, beside)
+    said = beside(path)
+    scale = _meters(_units(recording.metadata.get("units"), units, said))
+    markers = _markers(recording, said)
     return Recording(
         positions=recording.positions * scale,
-        times=_times(recording, beside) if "times" in assumed else recording.times,
+        times=_times(recording, said) if "times" in assumed else recording.times,
         markers=markers,
-        clamped=_clamped(recording, beside, markers, "clamped" in assumed),
-        name=beside.get("name", path.stem),
-        gravity=beside.get("gravity"),
-        metadata=_metadata(beside, _reserved(assumed)),
+        clamped=_clamped(recording, said, markers, "clamped" in assumed),
+        name=said.get("name", path.stem),
+        gravity=said.get("gravity", recording.gravity),
+        metadata={k: v for k, v in recording.metadata.items() if k != "units"} | _metadata(said, _reserved(assumed)),
     )
 
 
@@ -89,7 +90,13 @@ def _reserved(assumed: tuple[str, ...]) -> tuple[str, ...]:
     return (*_RESERVED, "rate") if "times" in assumed else _RESERVED
 
 
-def _read(path: Path) -> dict[str, Any]:
+def beside(path: Path) -> dict[str, Any]:
+    """What the JSON beside a recording says; nothing where there is none.
+
+    Raises:
+        RecordingError: it is malformed.
+    """
+    path = path.with_suffix(".json")
     if not path.is_file():
         return {}
     try:
@@ -101,6 +108,15 @@ def _read(path: Path) -> dict[str, Any]:
         fix = 'write {"units": "m", ...}'
         raise RecordingError(str(path), "must be a JSON object", type(content).__name__, fix)
     return content
+
+
+def _units(in_file: str | None, given: str | None, beside: dict[str, Any]) -> Any:
+    """The file's own unit, else the one that is given, else the JSON's."""
+    said = given if given is not None else beside.get("units", in_file or "m")
+    if in_file is not None and _meters(said) != METERS[in_file]:
+        fix = "leave it out: the file says its unit"
+        raise RecordingError("units", f"differ from the file's, {in_file}", said, fix)
+    return said
 
 
 def _meters(units: Any) -> float:

@@ -3,7 +3,7 @@
 `grid`, `equilateral`, `disk` and `icosphere` make them, `read_mesh` reads them.
 """
 
-from .export import write_obj, write_obj_sequence, write_ply
+from .export import write_obj, write_obj_sequence, write_ply, write_ply_sequence
 from .files import read_mesh
 from .grids import equilateral, grid
 from .locality import renumbered
@@ -25,4 +25,5 @@ __all__ = [
     "write_obj",
     "write_obj_sequence",
     "write_ply",
+    "write_ply_sequence",
 ]

@@ -42,13 +42,7 @@ def write_obj_sequence(folder: str | Path, mesh: TriangleMesh, positions: ArrayL
         MeshError: positions of another shape, or the folder holds more frames of an earlier, longer sequence.
     """
     x = _positions(mesh, positions, (len(np.asarray(positions)),))
-    folder = Path(folder)
-    files = [folder / f"frame_{frame:05d}.obj" for frame in range(len(x))]
-    others = sorted(set(folder.glob("frame_*.obj")) - set(files))
-    if others:
-        raise MeshError("folder", "holds frames of another sequence", str(others[0]), "empty it or take another one")
-    _check_folder(folder.parent)
-    folder.mkdir(exist_ok=True)
+    files = _frame_files(Path(folder), len(x), ".obj")
     tail = _texture_and_faces(mesh)
     for path, frame in zip(files, x, strict=True):
         path.write_text(_vertex_lines(frame) + tail)
@@ -103,6 +97,55 @@ def write_ply(
     ]
     _check_folder(Path(path).parent)
     Path(path).write_bytes("\n".join([*header, ""]).encode("ascii") + vertices.tobytes() + faces.tobytes())
+
+
+def write_ply_sequence(
+    folder: str | Path,
+    mesh: TriangleMesh,
+    positions: ArrayLike,
+    vertex_fields: Mapping[str, ArrayLike] | None = None,
+    face_fields: Mapping[str, ArrayLike] | None = None,
+) -> list[Path]:
+    """Write frame_00000.ply, frame_00001.ply, ... into `folder`, which is made if it is missing, each as `write_ply`.
+
+    Args:
+        positions: (frames, n, 3) m.
+        vertex_fields: (frames, n) numbers by name.
+        face_fields: (frames, m) numbers by name.
+
+    Returns:
+        The files, in order.
+
+    Raises:
+        MeshError: as `write_ply`, or the folder holds more frames of an earlier, longer sequence.
+    """
+    x = _positions(mesh, positions, (len(np.asarray(positions)),))
+    fields: list[dict[str, Array]] = []
+    for kind, given, count in (
+        ("vertex_fields", vertex_fields, len(mesh.vertices)),
+        ("face_fields", face_fields, len(mesh.triangles)),
+    ):
+        fields.append({name: np.asarray(values, dtype=float) for name, values in (given or {}).items()})
+        for name, values in fields[-1].items():
+            if values.shape != (len(x), count):
+                shape = (len(x), count)
+                raise MeshError(f"{kind}[{name!r}]", "has the wrong shape", values.shape, f"give {shape}")
+    files = _frame_files(Path(folder), len(x), ".ply")
+    for frame, path in enumerate(files):
+        of_vertices, of_faces = ({name: values[frame] for name, values in own.items()} for own in fields)
+        write_ply(path, mesh, x[frame], of_vertices, of_faces)
+    return files
+
+
+def _frame_files(folder: Path, count: int, suffix: str) -> list[Path]:
+    """The paths of a sequence in a folder, which is made if it is missing."""
+    files = [folder / f"frame_{frame:05d}{suffix}" for frame in range(count)]
+    others = sorted(set(folder.glob(f"frame_*{suffix}")) - set(files))
+    if others:
+        raise MeshError("folder", "holds frames of another sequence", str(others[0]), "empty it or take another one")
+    _check_folder(folder.parent)
+    folder.mkdir(exist_ok=True)
+    return files
 
 
 def _positions(mesh: TriangleMesh, positions: ArrayLike | None, frames: tuple[int, ...]) -> Array:

@@ -25,6 +25,7 @@ _FORMATS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     ".ply": ({"fix_texture": False}, {"fix_texture": True}),
     ".stl": ({}, {}),
 }
+_SMALLEST, _LARGEST = 2e-3, 20.0  # m: sizes of fabrics, and of balls and sleeves made of them
 _OTHER_SIZE = 2.0  # of lengths between texture and shape: more is no stretch but another unit
 
 
@@ -48,8 +49,10 @@ def read_mesh(
         warp: (3,) direction of warp for "unfold".
         merge: make one vertex of those at equal positions, as exporters split them where normals differ.
 
+    Triangles that name a vertex twice, in the file or after merging, are left out: they have no area.
+
     Warns:
-        UserWarning: for each of the mesh's `doubts`.
+        UserWarning: for each of the mesh's `doubts`, for triangles left out, and for a size that suggests another unit.
 
     Raises:
         MeshError: the file is missing or not readable, its texture coordinates are not in meters, or its triangles are
@@ -62,7 +65,14 @@ def read_mesh(
     vertices, triangles, texture = _read(path)
     if merge:
         vertices, triangles = _merged(vertices, triangles)
-    vertices, triangles = vertices * METERS[unit], checked_triangles(triangles, len(vertices))
+    vertices, said = vertices * METERS[unit], [_other_unit(vertices * METERS[unit], unit)]
+    whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    if not whole.all():
+        triangles, texture = triangles[whole], None if texture is None else texture[whole]
+        said.append(f"{(~whole).sum()} triangles that name a vertex twice are left out.")
+    for doubt in filter(None, said):
+        warnings.warn(f"{path.name}: {doubt}", stacklevel=2)
+    triangles = checked_triangles(triangles, len(vertices))
     if isinstance(material, str) and material not in ("texture", "unfold"):
         raise MeshError("material", "is unknown", material, "use 'texture', 'unfold' or an array")
     if material is None:
@@ -78,6 +88,23 @@ def read_mesh(
     for doubt in mesh.doubts:
         warnings.warn(f"{path.name}: {doubt}", stacklevel=2)
     return mesh
+
+
+def _other_unit(vertices: Array, unit: str) -> str:
+    """A sentence on a size that no fabric has; none on others."""
+    size = float(np.ptp(vertices, axis=0).max())
+    if _SMALLEST < size < _LARGEST:
+        return ""
+    return f"the mesh is {size:.3g} m large, read in {unit}. Give the unit of the file, 'mm' or 'cm' or 'm'."
+
+
+def vertices_of(path: Path) -> Array:
+    """(n, 3) vertices of a file, in its order and unit.
+
+    Raises:
+        MeshError: it cannot be read.
+    """
+    return np.array(_load(path, _FORMATS[path.suffix.lower()][0]).vertices, dtype=float)
 
 
 def _read(path: Path) -> tuple[Array, NDArray[np.int64], Array | None]:

@@ -15,6 +15,7 @@ from ..checks import finite
 from ..errors import MeshError
 from . import bending_ratio, doubts, places, topology, validate
 from .places import Places
+from .through import through
 from .topology import Indices
 
 Array = NDArray[np.float64]
@@ -163,6 +164,21 @@ class TriangleMesh:
         """The places of the mesh that are closest to (k, 3) points in space, m."""
         triangles, weights = places.closest(self.vertices, self.triangles, validate.rows("points", points, 3))
         return Places(triangles, self.triangles[triangles], weights)
+
+    def through(self, places: Places, positions: ArrayLike) -> Array:
+        """(n, 3) m: vertices on a smooth surface that leads places of the mesh through measured positions.
+
+        A start for a cloth that is first seen hanging or in folds, from its markers (`add_cloth(..., positions=...)`).
+        The surface is a thin plate spline of the mesh's own vertices; it goes on beyond the outermost places.
+
+        Args:
+            places: k of them, such as `at` gives.
+            positions: (k, 3) m, a row of NaN for what is not seen.
+
+        Raises:
+            MeshError: positions of another shape, places that coincide, or fewer than three off a line.
+        """
+        return through(self.vertices, places.positions(self.vertices), positions)
 
     @cached_property
     def _twins(self) -> Indices:

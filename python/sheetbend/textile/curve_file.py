@@ -51,7 +51,7 @@ def read_curves(
         columns: by role ("deformation", "load", "time", "repeat"), the column's name or its number from 1, where they
             are not found or several fit.
         units: by role, where the header has none: `{"load": "cN"}`.
-        decimal: "." or ",", where the file leaves it open.
+        decimal: "." or ",", where the file leaves it open: whether a lone 1,040 is a thousand and forty.
 
     Raises:
         InputError: an argument that is unknown or missing.

@@ -3,7 +3,7 @@
 Lines above a table are its preamble; the last of them that has as many cells as the numbers is its header, or the last
 two where the lower one holds units alone. Another preamble below begins another table, which has the same header if it
 brings none. Cells are separated by semicolons, tabs, commas or blanks; the decimal mark is a point or a comma, the same
-everywhere in the file.
+everywhere in the file. Thousands may be grouped.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from .units import unit
 
 _DELIMITERS = (";", "\t", ",", None)  # None: blanks
 _NUMBER = {mark: re.compile(rf"[-+]?(\d+{mark}?\d*|{mark}\d+)([eE][-+]?\d+)?") for mark in (r"\.", ",")}
+_GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}([.,'\u2019 \u00a0\u202f])\d{3}(?:\1\d{3})*(?:([.,])\d+)?")
 _MISSING = ("nan", "inf", "na", "n/a", "null", "none")
 _HINT = "correct that cell, or leave out the line"
 
@@ -71,7 +72,7 @@ def read_tables(path: Path, decimal: str | None = None) -> list[TextTable]:
     """All tables of a file, at least one. UTF-8, UTF-16 with its mark, and Windows-1252 are read.
 
     Args:
-        decimal: "." or ","; where left out it is found.
+        decimal: "." or ","; where left out it is found. It also tells a lone 1,040 from 1.040.
 
     Raises:
         RecordingError: it is no file, holds no table of two columns, or a row is cut off.
@@ -80,6 +81,8 @@ def read_tables(path: Path, decimal: str | None = None) -> list[TextTable]:
         raise InputError("decimal", "must be a decimal mark", decimal, "give '.' or ','")
     lines = [(n, line) for n, line in enumerate(_text(path).splitlines(), start=1) if line.strip()]
     split = {d: [(n, _cells(line, d)) for n, line in lines] for d in _DELIMITERS}
+    if decimal is not None:
+        split = {d: [(n, [_ungrouped(c, decimal, True) for c in cells]) for n, cells in split[d]] for d in _DELIMITERS}
     marks = (".", ",") if decimal is None else (decimal,)
     fitting = {(d, m): sum(_is_row(cells, m) for _, cells in split[d]) for d in _DELIMITERS for m in marks}
     delimiter, mark = max(fitting, key=fitting.__getitem__)
@@ -109,7 +112,18 @@ def _cells(line: str, delimiter: str | None) -> list[str]:
 
 def _number(cell: str, mark: str) -> float | None:
     pattern = _NUMBER[r"\." if mark == "." else ","]
-    return float(cell.replace(",", ".")) if pattern.fullmatch(cell) else None
+    bare = _ungrouped(cell, mark)
+    return float(bare.replace(",", ".")) if pattern.fullmatch(bare) else None
+
+
+def _ungrouped(cell: str, mark: str, certain: bool = False) -> str:
+    """A cell without the separators of its thousands, as in 1,040.5 or 1'040. Where it is not certain that the decimal
+    mark is a comma, a lone 1.040 may be either and stays."""
+    match = _GROUPED.fullmatch(cell)
+    if match is None or match[1] == mark or match[2] not in (None, mark):
+        return cell
+    lone = not certain and match[1] in ".," and match[2] is None and cell.count(match[1]) == 1
+    return cell if lone else cell.replace(match[1], "")
 
 
 def _is_row(cells: Sequence[str], mark: str) -> bool:

@@ -1,0 +1,153 @@
+"""Exports of motion capture systems as they write them, and time stamps of robots."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sheetbend.errors import RecordingError
+from sheetbend.recording import Recording
+
+FRAMES = 5
+GRIPPER = np.array([300.0, 1200.0, -50.0]) + np.arange(FRAMES)[:, None]  # mm, y up
+TOWEL = GRIPPER[:, None] - [[0.0, 100.0, 0.0], [0.0, 200.0, 0.0]]
+LOST = 3  # frame in which the second marker was not seen
+
+
+def motive(path: Path, header: str = "Length Units,Millimeters", timecode: bool = False, **changed: str) -> Path:
+    """A take with a rigid body, where its solution expects a marker, two markers of the towel, and one never seen."""
+    columns = [("Rigid Body", "gripper", "Rotation", axis, np.zeros(FRAMES)) for axis in "XYZW"]
+    columns += [("Rigid Body", "gripper", "Position", "XYZ"[k], GRIPPER[:, k]) for k in range(3)]
+    columns += [("Rigid Body", "gripper", "Mean Marker Error", "", np.full(FRAMES, 0.2))]
+    columns += [("Rigid Body Marker", "gripper:Marker1", "Position", axis, np.zeros(FRAMES)) for axis in "XYZ"]
+    columns += [("Rigid Body Marker", "gripper:Marker1", "Marker Quality", "", np.ones(FRAMES))]
+    for name, x in {"towel:1": TOWEL[:, 0], "Unlabeled 1000": TOWEL[:, 1], "Unlabeled 7": None}.items():
+        for k in range(3):
+            values = np.full(FRAMES, np.nan) if x is None else x[:, k].copy()
+            if name == "Unlabeled 1000":
+                values[LOST] = np.nan
+            columns.append(("Marker", name, "Position", "XYZ"[k], values))
+    begin = ["Frame", "Time (Seconds)", *["TimeCode"] * timecode]
+    blank = [""] * len(begin)
+    rows = [
+        [*blank[:1], "Type", *blank[2:], *(c[0] for c in columns)],
+        [*blank[:1], "Name", *blank[2:], *(f'"{c[1]}"' for c in columns)],
+        [*blank[:1], "ID", *blank[2:], *("9F:1" for _ in columns)],
+        [*blank, *(c[2] for c in columns)],
+        [*begin, *(c[3] for c in columns)],
+    ]
+    for n in range(FRAMES):
+        cells = ["" if np.isnan(c[4][n]) else f"{c[4][n]:.6f}" for c in columns]
+        rows.append([f"{n}", f"{n / 120:.6f}", *["15:26:46:12.02"] * timecode, *cells])
+    text = f"\ufeffFormat Version,1.23,Take Name,swing 2,{header},Coordinate Space,Global\r\n\r\n"
+    text += "".join(",".join(row) + "\r\n" for row in rows)
+    for old, new in changed.items():
+        text = text.replace(old, new)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("timecode", [False, True])
+def test_a_take_of_motive(tmp_path: Path, timecode: bool) -> None:
+    take = Recording.load(motive(tmp_path / "take.csv", timecode=timecode))
+    assert take.markers == ("gripper", "towel:1", "Unlabeled 1000")
+    assert take.positions[:, 0] == pytest.approx(1e-3 * GRIPPER)
+    assert take.positions[:, 1] == pytest.approx(1e-3 * TOWEL[:, 0])
+    assert take.mask[:, 2].tolist() == [n != LOST for n in range(FRAMES)]
+    assert take.times == pytest.approx(np.arange(FRAMES) / 120, abs=1e-6)
+    assert take.gravity.tolist() == [0.0, -9.81, 0.0]
+    assert take.metadata == {"take": "swing 2"}
+    take.save(tmp_path / "saved.npz")
+    assert np.array_equal(Recording.load(tmp_path / "saved.npz").positions, take.positions, equal_nan=True)
+
+
+def test_the_json_beside_a_take_tells_the_rest(tmp_path: Path) -> None:
+    path = motive(tmp_path / "take.csv")
+    path.with_suffix(".json").write_text(json.dumps({"clamped": ["gripper"], "gravity": [0, 0, -9.81], "units": "mm"}))
+    take = Recording.load(path)
+    assert take.clamped == (0,) and take.gravity.tolist() == [0.0, 0.0, -9.81]
+    with pytest.raises(RecordingError, match="differ from the file's, mm"):
+        Recording.load(path, units="m")
+
+
+@pytest.mark.parametrize(
+    ("header", "changed", "words"),
+    [
+        ("Rotation Type,XYZ", {}, "line 1: names no length unit"),
+        ("Length Units,Feet", {}, "export in Meters, Centimeters, Millimeters"),
+        ("Length Units,Meters", {"Frame,": "Index,"}, "no rows of types, names and axes"),
+        ("Length Units,Meters", {"Position": "Speed"}, "line 7: has no columns X, Y, Z of a marker or rigid body"),
+        ("Length Units,Meters", {"1202.000000": "12o2"}, "line 10: holds a cell that is no number"),
+        ("Length Units,Meters", {"3,0.025000,": "3,"}, "line 11: must have"),
+    ],
+)
+def test_a_damaged_take_is_refused(tmp_path: Path, header: str, changed: dict, words: str) -> None:
+    with pytest.raises(RecordingError, match=words):
+        Recording.load(motive(tmp_path / "take.csv", header, **changed))
+
+
+VICON = (
+    "Segments\r\n100\r\n,,arm:hand,,,,,\r\nFrame,Sub Frame,RX,RY,RZ,TX,TY,TZ\r\n,,deg,deg,deg,mm,mm,mm\r\n"
+    "11,0,1,2,3,4,5,6\r\n\r\n"
+    "Trajectories\r\n100\r\n,,towel:a,,,towel:b,,,towel:c,,,towel:a,,\r\n"
+    "Frame,Sub Frame,X,Y,Z,X,Y,Z,X,Y,Z,X',Y',Z'\r\n,,mm,mm,mm,mm,mm,mm,mm,mm,mm,mm/s,mm/s,mm/s\r\n"
+    "11,0,1,2,3,4,5,6,,,,0,0,0\r\n12,0,1.5,2,3,,,,,,,0,0,0\r\n13,0,2,2,3,4,5,7,,,,0,0,0\r\n\r\n"
+    "Devices\r\n1000\r\n,,Force\r\nFrame,Sub Frame,Fx\r\n,,N\r\n11,0,1\r\n"
+)
+
+
+def vicon(folder: Path, old: str = "", new: str = "") -> Path:
+    path = folder / "trial.csv"
+    path.write_text(VICON.replace(old, new) if old else VICON)
+    return path
+
+
+def test_a_trial_of_vicon(tmp_path: Path) -> None:
+    trial = Recording.load(vicon(tmp_path))
+    assert trial.markers == ("towel:a", "towel:b")
+    assert trial.positions[:, 0].tolist() == [[1e-3, 2e-3, 3e-3], [1.5e-3, 2e-3, 3e-3], [2e-3, 2e-3, 3e-3]]
+    assert trial.mask[:, 1].tolist() == [True, False, True]
+    assert trial.times == pytest.approx([0.0, 0.01, 0.02]) and trial.gravity is None
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("Trajectories", "Model Outputs", "has no section Trajectories"),
+        ("11,0,1,2,3,4,5,6,,,,0,0,0\r\n", "\r\n", "has no rate, names, axes, units and frames"),
+        ("s\r\n100", "s\r\nfast", "holds a cell that is no number"),
+        (",,mm,mm,mm,mm", ",,mm,mm,mm,in", "must name one length unit"),
+        ("12,0,1.5,2,3,", "12,0,1.5,2,", "line 14: must have 14 cells"),
+        (",X,Y,Z,X,Y,Z,X,Y,Z,", ",A,Y,Z,A,Y,Z,A,Y,Z,", "has no columns X, Y, Z of a marker"),
+    ],
+)
+def test_a_damaged_trial_is_refused(tmp_path: Path, old: str, new: str, words: str) -> None:
+    with pytest.raises(RecordingError, match=words):
+        Recording.load(vicon(tmp_path, old, new))
+
+
+@pytest.mark.parametrize(
+    ("name", "stamps", "seconds"),
+    [
+        ("%time", ["1709304245123456789", "1709304245133456789"], [0.0, 0.01]),
+        ("time_ns", ["1709304245123456789", "1709304245123456790"], [0.0, 1e-9]),
+        ("Timestamp [us]", ["5", "10005"], [0.0, 0.01]),
+        ("time_ms", ["0.0", "16.7"], [0.0, 0.0167]),
+        ("Time (s)", ["1.5", "2.5"], [1.5, 2.5]),
+    ],
+)
+def test_time_stamps_of_other_units(tmp_path: Path, name: str, stamps: list, seconds: list) -> None:
+    path = tmp_path / "bag.csv"
+    path.write_text(f"{name},field.corner.x,field.corner.y,field.corner.z\n{stamps[0]},1,2,3\n{stamps[1]},4,5,6\n")
+    recording = Recording.load(path)
+    assert recording.times.tolist() == seconds
+    assert recording.markers == ("field.corner",) and recording.positions[1].tolist() == [[4.0, 5.0, 6.0]]
+
+
+def test_nanoseconds_are_not_taken_for_seconds(tmp_path: Path) -> None:
+    path = tmp_path / "bag.csv"
+    path.write_text("time,a_x,a_y,a_z\n1709304245123456789,1,2,3\n")
+    with pytest.raises(RecordingError, match="name the column time_ns"):
+        Recording.load(path)
