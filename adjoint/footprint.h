@@ -21,7 +21,7 @@ inline std::size_t plan_bytes(const Plan& plan) {
              size_in_bytes(block.window_rows) + size_in_bytes(block.multipliers) + size_in_bytes(block.positions);
     for (const MemberRun& run : block.runs)
       bytes += size_in_bytes(run.items) + size_in_bytes(run.nodes) + size_in_bytes(run.gradients) +
-               size_in_bytes(run.first_row);
+               size_in_bytes(run.first_row) + size_in_bytes(run.entries);
     // A sparse pattern: rows and columns of the matrix, and of its factor.
     bytes += block.structure.bytes();
     if (block.condensation) bytes += std::visit([](const auto& c) { return c.bytes(); }, *block.condensation);

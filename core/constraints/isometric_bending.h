@@ -33,6 +33,9 @@ struct IsometricBending : OnPoints<4> {
         p_bar[k - 1] += along[3 * k] - along[0] - y[j] * (x[3 * k + j] - x[j]);
       }
   }
+
+  template <class T>
+  static void add_hessian(const T*, const T*, const T*, T*) {}
 };
 
 }  // namespace sheetbend

@@ -78,6 +78,15 @@ struct SheetCurvature : OnPoints<6> {
       p_bar[11 + k] += Y;
     }
   }
+
+  template <class T>
+  static void add_hessian(const T* x, const T* p, const T* lambda, T* H) {
+    for (int k = 0; k < 3; ++k) {
+      const int nodes[] = {k, (k + 1) % 3, (k + 2) % 3, 3 + k};
+      const T pull = p[k] * lambda[0] + p[9] * p[3 + k] * lambda[1] + p[10] * p[6 + k] * lambda[2];
+      add_angle_hessian(x, nodes, pull, H);
+    }
+  }
 };
 
 }  // namespace sheetbend
