@@ -234,6 +234,11 @@ void ImplicitBlock::solve(const Scene& scene, const DirectBlock& block, const So
   }
 }
 
+void ImplicitBlock::take_guess(const DirectBlock& block) {
+  x_ = potential.target;
+  std::copy_n(guess.data(), row * block.movable, x_.data());
+}
+
 void ImplicitBlock::factorize(const Scene& scene, const DirectBlock& block) {
   matrix_.find(block, potential, x_);
   if (matrix_.factorize(scene, block, 0.0)) return;

@@ -32,6 +32,8 @@ class ImplicitBlock {
 
   // Throws Unbalanced. What is not a number is left for the rollout to find.
   void solve(const Scene& scene, const DirectBlock& block, const SolverOptions& options);
+  // The movable particles' guess is the solution, found before.
+  void take_guess(const DirectBlock& block);
   const double* x() { return x_.data(); }  // the solution, rows of four
 
   // The largest |R| over the largest force, at the start and after each Newton step of the last solve.

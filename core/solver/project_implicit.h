@@ -16,7 +16,7 @@ double number_of(const T& a, [[maybe_unused]] int scene) {
     return value_of(a);
 }
 
-// Hands a scene's numbers to its solver.
+// Hands a scene's numbers to its solver; the guess is where the substep ends if that is known.
 template <class T>
 void load_implicit(const SubstepState<T>& s, const DirectBlock& block, const SubstepStates<T>& states, double h,
                    BlockState<T>& state, int scene) {
@@ -39,7 +39,8 @@ void load_implicit(const SubstepState<T>& s, const DirectBlock& block, const Sub
     for (int d = 0; d < 3; ++d) {
       const int dof = s.scene.first_dof[node] + d;
       own.start[at + d] = number_of(states.x[dof], scene);
-      own.guess[at + d] = own.start[at + d] + h * number_of(states.v[dof], scene);
+      own.guess[at + d] = states.x_next ? number_of(states.x_next[dof], scene)
+                                        : own.start[at + d] + h * number_of(states.v[dof], scene);
       potential.target[at + d] = number_of(s.q[dof], scene);
     }
     own.start[at + 3] = own.guess[at + 3] = potential.target[at + 3] = number_of(s.w[node], scene);
@@ -123,15 +124,24 @@ void write_solution(const SubstepState<T>& s, const DirectBlock& block, BlockSta
   }
 }
 
-// From the predicted coordinates in state.x to those at which forces balance, with gradients and multipliers.
+// From the predicted coordinates in state.x to those at which forces balance, with gradients and multipliers. Nothing is solved where these coordinates
+// are known, as on the way back.
 template <class T>
 void project_implicit(const SubstepState<T>& s, const DirectBlock& block, const SolverOptions& options,
                       const SubstepStates<T>& states, const sheetbend_packs::KernelTable& table, BlockState<T>& state) {
   for (int scene = 0; scene < static_cast<int>(state.implicit.size()); ++scene) {
     load_implicit(s, block, states, options.h, state, scene);
-    state.implicit[scene].solve(s.scene, block, options);
+    if (states.x_next)
+      state.implicit[scene].take_guess(block);
+    else
+      state.implicit[scene].solve(s.scene, block, options);
   }
-  write_solution(s, block, state);
+  if (states.x_next)
+    for (int p = 0; p < block.movable; ++p)
+      for (int d = 0; d < 3; ++d)
+        state.x[0][sheetbend_blocks::row * p + d] = states.x_next[s.scene.first_dof[block.particles[p]] + d];
+  else
+    write_solution(s, block, state);
   if constexpr (!carries_tangents<T>) {  // whose multipliers nobody asks for
     const auto arrays = arrays_of(block, runs_of(s, block, state), state, 0);
     forward_kernels<T>(table).evaluate(arrays);

@@ -1,5 +1,5 @@
-// Implicit blocks: the Hessians of one constraint against complex steps, a matrix without its negative eigenvalues, saddles, and the end of
-// patience. Their gradients, lanes and threads are in the tests over all solvers.
+// Implicit blocks: the Hessians of one constraint against complex steps, a matrix without its negative eigenvalues, saddles, the end of patience, and the
+// way back. Their gradients, lanes and threads are in the tests over all solvers.
 #include <Eigen/Eigenvalues>
 
 #include "core/element/second_order.h"
@@ -117,6 +117,18 @@ TEST(ImplicitBlocks, LeaveItToTheRolloutToFindWhatIsNoNumber) {
   inputs[sample.scene.layout.of(Quantity::velocity) + 3 * 4] = std::nan("");
   const Plan plan = make_plan(sample.scene, solver.options(1));
   EXPECT_THROW(states(Program{sample.scene, plan, 2}, inputs), Diverged);
+}
+
+// With one matrix allowed no substep could be solved again.
+TEST(ImplicitBlocks, AreNotSolvedOnTheWayBack) {
+  const Sample sample = random_scene(92, implicit_bdf2.shape());
+  SolverOptions options = implicit_bdf2.options(1);
+  Program p{sample.scene, make_plan(sample.scene, options), 6};
+  auto recorded = record(p, sample.inputs);
+  const auto expected = gradient(p, sample.inputs, recorded);
+  p.plan.options.iterations = 1;
+  EXPECT_THROW(record(p, sample.inputs), Unbalanced);
+  EXPECT_TRUE(same_bits(gradient(p, sample.inputs, recorded), expected));
 }
 
 TEST(ImplicitBlocks, RefuseWhatTheyCannotHold) {
