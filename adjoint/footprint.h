@@ -21,7 +21,7 @@ inline std::size_t plan_bytes(const Plan& plan) {
              size_in_bytes(block.window_rows) + size_in_bytes(block.multipliers) + size_in_bytes(block.positions);
     for (const MemberRun& run : block.runs)
       bytes += size_in_bytes(run.items) + size_in_bytes(run.nodes) + size_in_bytes(run.gradients) +
-               size_in_bytes(run.first_row);
+               size_in_bytes(run.first_row) + size_in_bytes(run.entries);
     // A sparse pattern: rows and columns of the matrix, and of its factor.
     bytes += block.structure.bytes();
     if (block.condensation) bytes += std::visit([](const auto& c) { return c.bytes(); }, *block.condensation);
@@ -127,7 +127,8 @@ template <class T>
 std::size_t reverse_bytes(const Scene& scene, const Plan& plan) {
   const std::size_t dofs = scene.dofs(), rows = scene.rows, nodes = scene.nodes();
   // Cotangents, velocities, where the coordinates are corrected; then ReverseScratch.
-  const std::size_t states = 7 + (plan.options.integrator == Integrator::bdf1 ? 1 : 2);
+  const std::size_t states = 7 + (plan.options.integrator == Integrator::bdf1 ? 1 : 2) +
+                             (plan.options.partition == Partition::implicit ? 1 : 0);
   std::size_t bytes = sizeof(T) * states * dofs + substep_bytes<T>(scene, plan, true);
   for (const DirectBlock& block : plan.blocks) bytes += block_cotangent_bytes<T>(scene, block);
   bytes += volume_cotangent_bytes<T>(scene);

@@ -23,6 +23,7 @@ Tape<T> record_rollout(const Scene& scene, const Plan& plan, const T* inputs, do
   Tape<T> tape(scene, plan, steps, kept);
   std::vector<char> keep(steps + 1, 0);
   keep[0] = 1;
+  if (tape.keeps_end()) keep[steps] = 1;
   Schedule schedule = tape.schedule();
   for (auto action = schedule.next(); action && std::holds_alternative<Advance>(*action); action = schedule.next()) {
     const Advance& advance = std::get<Advance>(*action);

@@ -18,13 +18,20 @@ class StateReverse {
       : scene_(scene), plan_(plan), record_(whole(scene, plan)), scratch_(scene, plan) {
     for (auto* buffer : {&x_next_bar, &v_next_bar, &x_bar_, &v_bar_, &x_before_bar_, &v_before_bar_, &q_})
       buffer->resize(scene.dofs());
+    if (Tape<T>::ends(plan)) x_next_.resize(scene.dofs());
+  }
+
+  // The coordinates at the end of the last step.
+  void end_at(const T* x) {
+    if (!x_next_.empty()) std::copy_n(x, x_next_.size(), x_next_.data());
   }
 
   // From step n + 1 to n; seed adds the loss's cotangent at n.
   template <class Seed>
-  void step(int n, const Inputs<const T>& in, double t_next, const SubstepStates<T>& states, Seed&& seed,
+  void step(int n, const Inputs<const T>& in, double t_next, SubstepStates<T> states, Seed&& seed,
             const Inputs<T>& in_bar) {
     const Bdf bdf = Bdf::at(plan_.options, n);
+    if (!x_next_.empty()) states.x_next = x_next_.data();
     seed(n, x_bar_.data());
     try {
       correct(scene_, plan_, in, bdf, t_next, states, q_.data(), record_);
@@ -35,6 +42,7 @@ class StateReverse {
     }
     shift(x_next_bar, x_bar_, x_before_bar_);
     shift(v_next_bar, v_bar_, v_before_bar_);
+    end_at(states.x);
   }
 
   void finish(const Inputs<const T>& in, const Inputs<T>& in_bar) {
@@ -60,6 +68,7 @@ class StateReverse {
   const Scene& scene_;
   const Plan& plan_;
   std::vector<T> x_bar_, v_bar_, x_before_bar_, v_before_bar_, q_;
+  std::vector<T> x_next_;  // where the step to be reversed ends; empty where it is recomputed
   SubstepRecord<T> record_;
   ReverseScratch<T> scratch_;
 };
@@ -113,6 +122,7 @@ void rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t
   };
 
   seed(tape.steps(), reverse.x_next_bar.data());
+  if (tape.keeps_end()) reverse.end_at(tape.x(tape.steps()));
   Schedule schedule = tape.schedule();
   while (const auto action = schedule.next()) {
     if (const auto* a = std::get_if<Advance>(&*action)) {

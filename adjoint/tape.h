@@ -1,5 +1,6 @@
 // The tape of a rollout: the coordinates at substep boundaries, at all of them or at those that checkpoints.h keeps. Velocities follow from
-// them, and a substep is recomputed before it is reversed, so nothing inside a substep is kept.
+// them, and a substep is recomputed before it is reversed, so nothing inside a substep is kept. Implicit blocks are not solved again, but known
+// by where a substep ends: for them the last boundary is kept as well.
 #pragma once
 
 #include <stdexcept>
@@ -16,12 +17,17 @@ class Tape {
   // `states` boundaries fit, at least Schedule::least; more than `steps` are never needed.
   Tape(const Scene& scene, const Plan& plan, int steps, int states)
       : scene_(scene), plan_(plan), steps_(steps), states_(std::min(states, std::max(1, steps))), slot_(steps + 1, -1) {
-    x_.resize(static_cast<std::size_t>(states_) * scene.dofs());
+    x_.resize(static_cast<std::size_t>(states_ + ends(plan)) * scene.dofs());
+    if (ends(plan)) slot_[steps] = states_;
     for (int slot = states_; slot-- > 0;) spare_.push_back(slot);
   }
 
   // Boundaries whose coordinates a restart needs: the velocities at n and n-1 are read off them.
   static int window(const Plan& plan) { return plan.options.integrator == Integrator::bdf1 ? 2 : 4; }
+
+  // States that are kept beside those of the schedule.
+  static int ends(const Plan& plan) { return plan.options.partition == Partition::implicit ? 1 : 0; }
+  bool keeps_end() const { return ends(plan_) > 0; }
 
   Schedule schedule() const { return {steps_, states_, window(plan_)}; }
   int steps() const { return steps_; }
@@ -42,7 +48,7 @@ class Tape {
     return std::all_of(slot_.begin() + first, slot_.begin() + last + 1, [](int slot) { return slot >= 0; });
   }
   void forget_after(int step) {
-    for (auto slot = slot_.begin() + step + 1; slot != slot_.end(); ++slot)
+    for (auto slot = slot_.begin() + step + 1; slot != slot_.end() - ends(plan_); ++slot)
       if (*slot >= 0) spare_.push_back(std::exchange(*slot, -1));
   }
 

@@ -56,10 +56,11 @@ TapePlan plan_tape(const Scene& scene, const Plan& plan, int steps, std::size_t 
   p.heap = p.working() / 50;  // holes that the allocator leaves
   const int window = Tape<T>::window(plan), least = Schedule::least(steps, window);
   const std::size_t state = p.at_once * sizeof(T) * dofs;
-  p.least = p.working() + least * state;
+  const int ends = Tape<T>::ends(plan);
+  p.least = p.working() + (least + ends) * state;
   if (budget < p.least) throw BudgetTooSmall(p.least);
-  p.states = static_cast<int>(std::min<std::size_t>(std::max(1, steps), (budget - p.working()) / state));
-  p.tape = p.states * state;
+  p.states = static_cast<int>(std::min<std::size_t>(std::max(1, steps), (budget - p.working()) / state - ends));
+  p.tape = (p.states + ends) * state;
   p.recomputed = recomputed_steps(steps, p.states, window);
   return p;
 }

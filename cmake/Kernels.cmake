@@ -1,4 +1,5 @@
-# The kernel_table.cpp of core/points, adjoint/packs and adjoint/blocks, once per instruction set; core/packs/choose.cpp takes one at run time.
+# The kernel_table.cpp of core/points, core/blocks, adjoint/packs and adjoint/blocks, once per instruction set; core/packs/choose.cpp takes one at
+# run time.
 # Renaming the namespace keeps the variants' templates and inline functions apart.
 set(variants portable)
 # Sanitizers need minutes per instruction set: there is one.
@@ -20,8 +21,8 @@ set_source_files_properties(adjoint/packs/kernel_table.cpp PROPERTIES COMPILE_OP
 set(kernel_objects)
 foreach(variant IN LISTS variants)
   set(name ${variant})
-  add_library(sheetbend_kernels_${variant} OBJECT core/points/kernel_table.cpp adjoint/packs/kernel_table.cpp
-              adjoint/blocks/kernel_table.cpp)
+  add_library(sheetbend_kernels_${variant} OBJECT core/points/kernel_table.cpp core/blocks/kernel_table.cpp
+              adjoint/packs/kernel_table.cpp adjoint/blocks/kernel_table.cpp)
   target_include_directories(sheetbend_kernels_${variant} PRIVATE ${PROJECT_SOURCE_DIR})
   if(NOT variant STREQUAL "portable")
     set(name x86-64-${variant})

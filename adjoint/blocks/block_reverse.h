@@ -12,7 +12,7 @@ void pull_back_run(const sheetbend_blocks::Block& b, const sheetbend_blocks::Run
   for (int n = 0; n < elements<T>(r); ++n) {
     const int* rows = indices_of<T>(r.first_row, 1, n);
     const int* nodes = indices_of<T>(r.nodes, K::arity, n);
-    const auto e = load_element<K, T>(b, r, nodes, n);
+    const auto e = load_element<K, T>(b.x, r, nodes, n);
     W z[K::dofs], u[K::dofs], unused, x_bar[K::dofs]{};
     for (int k = 0; k < K::arity; ++k) {
       load_particle(numbers_of<T>(b.z), nodes + k * Pack::lanes, z + 3 * k, unused);

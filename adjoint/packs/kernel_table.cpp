@@ -8,6 +8,7 @@
 #define SHEETBEND_JOIN(a, b) SHEETBEND_JOIN_(a, b)
 
 extern "C" const sheetbend_blocks::Table SHEETBEND_JOIN(sheetbend_blocks_, SHEETBEND_VARIANT);
+extern "C" const sheetbend_blocks::PotentialKernels SHEETBEND_JOIN(sheetbend_potential_, SHEETBEND_VARIANT);
 extern "C" const sheetbend_points::Table SHEETBEND_JOIN(sheetbend_points_, SHEETBEND_VARIANT);
 
 namespace {
@@ -23,6 +24,7 @@ constexpr KernelTable table(const char* name, std::index_sequence<I...>) {
           {{&sheetbend::project_packs_vjp<std::tuple_element_t<I, sheetbend::Registry>, across_color>...},
            {&sheetbend::project_packs_vjp<std::tuple_element_t<I, sheetbend::Registry>, across_scenes>...}},
           &SHEETBEND_JOIN(sheetbend_blocks_, SHEETBEND_VARIANT),
+          &SHEETBEND_JOIN(sheetbend_potential_, SHEETBEND_VARIANT),
           &SHEETBEND_JOIN(sheetbend_points_, SHEETBEND_VARIANT)};
 }
 

@@ -16,7 +16,7 @@ void evaluate_run(const sheetbend_blocks::Block& b, const sheetbend_blocks::Run&
   for (int n = 0; n < elements<T>(r); ++n) {
     const int* rows = indices_of<T>(r.first_row, 1, n);
     const int* gradients = indices_of<T>(r.gradients, K::arity, n);
-    const auto e = load_element<K, T>(b, r, indices_of<T>(r.nodes, K::arity, n), n);
+    const auto e = load_element<K, T>(b.x, r, indices_of<T>(r.nodes, K::arity, n), n);
     const Evaluation<K, Wide<T>> value(e.x, e.p);
     Wide<T> lambda[K::rows], C_r[K::rows];
     for (int j = 0; j < K::rows; ++j) {

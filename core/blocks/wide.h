@@ -100,10 +100,9 @@ const Wide<T>* parameters_of(const sheetbend_blocks::Run& r, int n) {
 }
 
 template <class K, class T>
-Element<K, Wide<T>> load_element(const sheetbend_blocks::Block& b, const sheetbend_blocks::Run& r, const int* nodes,
-                                 int n) {
+Element<K, Wide<T>> load_element(const double* x, const sheetbend_blocks::Run& r, const int* nodes, int n) {
   Element<K, Wide<T>> e;
-  for (int k = 0; k < K::arity; ++k) load_particle(numbers_of<T>(b.x), nodes + k * Pack::lanes, e.x + 3 * k, e.w[k]);
+  for (int k = 0; k < K::arity; ++k) load_particle(numbers_of<T>(x), nodes + k * Pack::lanes, e.x + 3 * k, e.w[k]);
   const Wide<T>* values = values_of<K, T>(r, n);
   e.rates.a = values[0];
   if (r.damped) {

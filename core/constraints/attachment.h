@@ -21,6 +21,9 @@ struct Attachment : OnPoints<2> {
       for (int k = 0; k < 6; ++k) J[6 * i + k] = T(k == i ? 1.0 : k == 3 + i ? -1.0 : 0.0);
     }
   }
+
+  template <class T>
+  static void add_hessian(const T*, const T*, const T*, T*) {}
 };
 
 }  // namespace sheetbend

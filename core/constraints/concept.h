@@ -27,6 +27,8 @@
 //   template <class T> static void reverse(x, p, dl, y, a, b, x_bar, p_bar): of sum_j (v_j . J_j - y_j C_j) with v_j = dl_j a - y_j b, where dl, y (rows)
 //     and a, b (dofs) do not vary, the derivatives by J's x, Hess(C_j) v_j, and by p, added to x_bar and p_bar: what
 //     dual numbers otherwise find with a direction for each row and parameter. See membrane.h.
+//   template <class T> static void add_hessian(x, p, lambda, H): adds sum_j lambda_j Hess(C_j), its lower triangle row after row, to H: what dual
+//     numbers otherwise find with a direction per coordinate (core/element/second_order.h).
 #pragma once
 
 #include <algorithm>
@@ -58,6 +60,24 @@ concept HasReverse = requires(const double* in, double* out) { K::reverse(in, in
 
 template <class K>
 concept HasFactors = requires(const typename K::template Factors<double>& factors) { factors.C; };
+
+template <class K>
+concept HasHessian = requires(const double* in, double* out) { K::add_hessian(in, in, in, out); };
+
+// Kinds on points alone that always hold.
+template <class K>
+inline constexpr bool holds_points = K::points == K::arity && !K::unilateral;
+
+// Numbers of the lower triangle of a symmetric matrix of n rows, row after row.
+constexpr int triangle(int n) { return n * (n + 1) / 2; }
+
+// Adds the 3 x 3 numbers that belong to particles i and k of a stencil; of i = k the lower ones count.
+template <class T>
+void add_to_triangle(int i, int k, const T* block, T* H) {
+  for (int a = 0; a < 3; ++a)
+    for (int b = 0; b < (i == k ? a + 1 : 3); ++b)
+      H[i >= k ? triangle(3 * i + a) + 3 * k + b : triangle(3 * k + b) + 3 * i + a] += block[3 * a + b];
+}
 
 // What a projection leaves for its reverse: the constraint's own geometry, otherwise the coordinates (where they are).
 template <class K, class T>

@@ -24,6 +24,12 @@ struct Dihedral : OnPoints<4> {
     angle.by_a.store(J + 6);
     angle.by_b.store(J + 9);
   }
+
+  template <class T>
+  static void add_hessian(const T* x, const T*, const T* lambda, T* H) {
+    constexpr int nodes[] = {0, 1, 2, 3};
+    add_angle_hessian(x, nodes, lambda[0], H);
+  }
 };
 
 }  // namespace sheetbend

@@ -57,6 +57,9 @@ struct IsometricBending : OnPoints<4> {
         p_bar[k - 1] += dl[j] * (a[d] - a[j]) - y[j] * (b[d] - b[j] + x[d] - x[j]);
       }
   }
+
+  template <class T>
+  static void add_hessian(const T*, const T*, const T*, T*) {}
 };
 
 }  // namespace sheetbend

@@ -155,8 +155,53 @@ struct Membrane : OnPoints<3> {
     p_bar[6] += s.slope * (dl[2] * a_s - y[2] * b_s) - y[2] * s.f;
   }
 
+  // Of a component c that the rows pull at with L_c: L_c (f'' g g^T + f' Hess(strain)), g being the strain's gradient.
+  template <class T>
+  static void add_hessian(const T* x, const T* p, const T* lambda, T* H) {
+    const T half(0.5), one(1.0);
+    const T scale = one / sqrt(one - p[4] * p[4]), by_u = p[4] * scale, by_v = p[5] * scale;
+    const T N_u[3] = {-(p[0] + p[2]), p[0], p[2]}, N_v[3] = {-(p[1] + p[3]), p[1], p[3]};
+    const Vec3<T> e1 = Vec3<T>(x + 3) - Vec3<T>(x), e2 = Vec3<T>(x + 6) - Vec3<T>(x);
+    const Vec3<T> F_u = p[0] * e1 + p[2] * e2, F_v = p[1] * e1 + p[3] * e2;
+    const Bent<T> u(half * (dot(F_u, F_u) - one), p + 7, lambda[0] + by_u * lambda[1]);
+    const Bent<T> v(half * (dot(F_v, F_v) - one), p + 7 + coefficients, by_v * lambda[1]);
+    const Bent<T> shear(dot(F_u, F_v), p + 7 + 2 * coefficients, p[6] * lambda[2]);
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k <= i; ++k) {
+        const T same =
+            u.slope * N_u[i] * N_u[k] + v.slope * N_v[i] * N_v[k] + shear.slope * (N_u[i] * N_v[k] + N_v[i] * N_u[k]);
+        for (int a = 0; a < 3; ++a) H[triangle(3 * i + a) + 3 * k + a] += same;
+      }
+    if constexpr (coefficients > 0) {  // without them the law is a line
+      T g_u[dofs], g_v[dofs], g_s[dofs];
+      for (int k = 0; k < 3; ++k) {
+        (N_u[k] * F_u).store(g_u + 3 * k);
+        (N_v[k] * F_v).store(g_v + 3 * k);
+        (N_u[k] * F_v + N_v[k] * F_u).store(g_s + 3 * k);
+      }
+      for (int a = 0; a < dofs; ++a) {
+        const T of_u = u.curvature * g_u[a], of_v = v.curvature * g_v[a], of_s = shear.curvature * g_s[a];
+        for (int b = 0; b <= a; ++b) H[triangle(a) + b] += of_u * g_u[b] + of_v * g_v[b] + of_s * g_s[b];
+      }
+    }
+  }
+
  private:
   static constexpr int coefficients = Law::coefficients;
+
+  // f' and f'' of one component, times what pulls at it.
+  template <class T>
+  struct Bent {
+    T slope, curvature;
+    Bent(const T& strain, const T* of_law, const T& pull) {
+      Dual<T> at(strain), with[coefficients + 1];
+      at.d[0] = T(1.0);
+      for (int k = 0; k < coefficients; ++k) with[k].v = of_law[k];
+      const Stretched<Dual<T>> law = Law::apply(at, with);
+      slope = pull * law.slope.v;
+      curvature = pull * law.slope.d[0];
+    }
+  };
 
   // slope D - Y f of one component: strain_bar is its derivative by the strain in the slope, and the coefficients get theirs.
   template <class T>

@@ -136,6 +136,15 @@ struct SheetCurvature : OnPoints<6> {
     }
   }
 
+  template <class T>
+  static void add_hessian(const T* x, const T* p, const T* lambda, T* H) {
+    for (int k = 0; k < 3; ++k) {
+      const int nodes[] = {particle(k, 0), particle(k, 1), particle(k, 2), particle(k, 3)};
+      const T pull = p[k] * lambda[0] + p[9] * p[3 + k] * lambda[1] + p[10] * p[6 + k] * lambda[2];
+      add_angle_hessian(x, nodes, pull, H);
+    }
+  }
+
  private:
   // Which of the six is angle k's x0, x1, a, b.
   static constexpr int particle(int k, int i) { return i < 3 ? (k + i) % 3 : 3 + k; }

@@ -3,8 +3,9 @@
 #pragma once
 
 namespace sheetbend_blocks {
-struct Table;  // kernels of direct blocks, see core/blocks/kernels.h
-}
+struct Table;             // kernels of direct blocks, see core/blocks/kernels.h
+struct PotentialKernels;  // of implicit ones, see core/blocks/potential_kernels.h
+}  // namespace sheetbend_blocks
 namespace sheetbend_points {
 struct Table;  // of what a substep does point by point, see core/points/kernels.h
 }
@@ -68,6 +69,7 @@ struct KernelTable {
   void (*project_tangents[max_kinds])(const Tangents&, int begin, int end);
   void (*project_vjp[layouts][max_kinds])(const Reverse&, int begin, int end);
   const sheetbend_blocks::Table* blocks;
+  const sheetbend_blocks::PotentialKernels* potential;
   const sheetbend_points::Table* points;
 };
 

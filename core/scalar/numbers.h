@@ -24,9 +24,9 @@ using Plain = std::conditional_t<carries_tangents<T>, double, T>;
 template <class T>
 class Numbers {
  public:
-  void assign(std::size_t count) {
-    const std::size_t width = sizeof(Aligned) / sizeof(T);
-    wide_.assign((count + width - 1) / width, Aligned(0.0));
+  void assign(std::size_t count) { wide_.assign(bytes(count) / sizeof(Aligned), Aligned(0.0)); }
+  static std::size_t bytes(std::size_t count) {
+    return (count * sizeof(T) + sizeof(Aligned) - 1) / sizeof(Aligned) * sizeof(Aligned);
   }
   void clear() { std::fill(wide_.begin(), wide_.end(), Aligned(0.0)); }
   T* data() { return reinterpret_cast<T*>(wide_.data()); }

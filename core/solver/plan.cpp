@@ -118,6 +118,25 @@ CondensedShares shares_of(const Scene& scene, const DirectBlock& block, const st
   return shares;
 }
 
+// Where the lower triangle of every member's own matrix stands in the condensed one.
+void place_matrices(const Scene& scene, const CondensedPattern& c, DirectBlock& block) {
+  for (MemberRun& run : block.runs) {
+    const int arity = scene.groups[run.group].arity, dofs = 3 * arity;
+    run.entries.assign(run.items.size() * triangle(dofs), -1);
+    for (int i = 0; i < run.count; ++i) {
+      const auto dof = [&](int d) {
+        const int particle = run.nodes[lane_at(i, arity, d / 3)] / sheetbend_blocks::row;
+        return particle < block.movable ? c.dof_of[particle] + d % 3 : -1;
+      };
+      for (int a = 0; a < dofs; ++a)
+        for (int b = 0; b <= a; ++b)
+          if (const auto [column, row] = std::minmax({dof(a), dof(b)}); column >= 0)
+            run.entries[lane_at(i, triangle(dofs), triangle(a) + b)] =
+                static_cast<int>(c.structure.position(row, column));
+    }
+  }
+}
+
 // Where they stand in its factor.
 CondensedPattern factored(const Scene& scene, const DirectBlock& block, const std::map<int, int>& particle_of) {
   CondensedPattern c;
@@ -128,6 +147,7 @@ CondensedPattern factored(const Scene& scene, const DirectBlock& block, const st
       if (scene.role[node] == Role::free) joined.back().push_back(particle_of.at(node));
   }
   for (const int place : places_for_low_fill(block.movable, joined)) c.dof_of.push_back(3 * place);
+  c.dof_of.shrink_to_fit();
   c.shares = shares_of(scene, block, particle_of, c.dof_of);
   const std::vector<int>& dofs = c.shares.dofs;
   std::vector<std::pair<int, int>> entries;
@@ -137,13 +157,16 @@ CondensedPattern factored(const Scene& scene, const DirectBlock& block, const st
         if (dofs[k] + b <= dofs[i] + a) entries.emplace_back(dofs[i] + a, dofs[k] + b);
   });
   c.structure = FactorStructure(3 * block.movable, entries, false);
+  if (block.implicit) {
+    c.shares = {};  // implicit blocks add matrices of their own
+    return c;
+  }
   c.shares.for_each_pair([&](const auto&, int i, int k) {
     for (int b = 0; b < 3; ++b) {
       const int above = i == k ? b : 0;  // where the lower triangle begins
       c.entries.push_back(c.structure.position(dofs[i] + above, dofs[k] + b) - above);
     }
   });
-  c.dof_of.shrink_to_fit();
   c.entries.shrink_to_fit();
   return c;
 }
@@ -188,6 +211,7 @@ DirectBlock make_block(const Scene& scene, std::vector<Member> members, const So
   for (const int g : groups) block.runs.push_back(make_run(scene, g, particle_of, block));
   if (options.partition == Partition::newton || block.implicit)
     block.condensation = factored(scene, block, particle_of);
+  if (block.implicit) place_matrices(scene, std::get<CondensedPattern>(*block.condensation), block);
   if (options.partition == Partition::newton_cg) block.condensation = iterated(scene, block, particle_of, options);
   return block;
 }

@@ -26,6 +26,8 @@ struct MemberRun {
   std::vector<int> nodes;      // (packs, arity, 8) as in sheetbend_blocks::Run
   std::vector<int> gradients;  // (packs, arity, 8)
   std::vector<int> first_row;  // (packs, 8)
+  // (packs, triangle(dofs), 8) of implicit blocks: where a member's matrix stands in the condensed one, -1 for what is fixed or past the end
+  std::vector<int> entries = {};
 };
 
 struct DirectBlock {

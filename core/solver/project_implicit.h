@@ -3,7 +3,6 @@
 // K dx = -dR, the implicit function theorem, R being evaluated over them.
 #pragma once
 
-#include "core/solver/element_stiffness.h"
 #include "core/solver/project_block.h"
 
 namespace sheetbend {
@@ -17,22 +16,22 @@ double number_of(const T& a, [[maybe_unused]] int scene) {
     return value_of(a);
 }
 
-// Hands a scene's numbers to its solver.
+// Hands a scene's numbers to its solver; the guess is where the substep ends if that is known.
 template <class T>
 void load_implicit(const SubstepState<T>& s, const DirectBlock& block, const SubstepStates<T>& states, double h,
                    BlockState<T>& state, int scene) {
   ImplicitBlock& own = state.implicit[scene];
-  if (own.eta != s.eta) {
+  IncrementalPotential& potential = own.potential;
+  if (potential.eta != s.eta) {
     for (std::size_t r = 0; r < block.runs.size(); ++r) {
       const Group& group = s.scene.groups[block.runs[r].group];
       const int count = sheetbend_blocks::value_count(group.damped, group.parameters);
       for (int i = 0; i < static_cast<int>(block.runs[r].items.size()); ++i)
         for (int part = 0; part < count; ++part)
-          own.values[r][lane_at(i, count, part)] =
+          potential.values[r][lane_at(i, count, part)] =
               number_of<T>(state.values[r][member_number<T>(i, count, part)], scene);
     }
-    for (int j = 0; j < block.size(); ++j) own.diagonal[j] = number_of<T>(state.diagonal[j], scene);
-    own.eta = s.eta;
+    potential.eta = s.eta;
   }
   for (std::size_t p = 0; p < block.particles.size(); ++p) {
     const int node = block.particles[p];
@@ -40,13 +39,14 @@ void load_implicit(const SubstepState<T>& s, const DirectBlock& block, const Sub
     for (int d = 0; d < 3; ++d) {
       const int dof = s.scene.first_dof[node] + d;
       own.start[at + d] = number_of(states.x[dof], scene);
-      own.guess[at + d] = own.start[at + d] + h * number_of(states.v[dof], scene);
-      own.target[at + d] = number_of(s.q[dof], scene);
+      own.guess[at + d] = states.x_next ? number_of(states.x_next[dof], scene)
+                                        : own.start[at + d] + h * number_of(states.v[dof], scene);
+      potential.target[at + d] = number_of(s.q[dof], scene);
     }
-    own.start[at + 3] = own.guess[at + 3] = own.target[at + 3] = number_of(s.w[node], scene);
+    own.start[at + 3] = own.guess[at + 3] = potential.target[at + 3] = number_of(s.w[node], scene);
   }
   if (block.damped)
-    for (int j = 0; j < block.size(); ++j) own.C_r[j] = number_of<T>(state.C_r[j], scene);
+    for (int j = 0; j < block.size(); ++j) potential.C_r[j] = number_of<T>(state.C_r[j], scene);
 }
 
 // R -= J^T lambda over T at x, three numbers per particle.
@@ -98,15 +98,10 @@ void carry_first_order(const SubstepState<T>& s, const DirectBlock& block, Block
   }
 }
 
-// From the predicted coordinates in state.x to those at which forces balance, with gradients and multipliers.
+// The solution over T, with what T carries beside its value.
 template <class T>
-void project_implicit(const SubstepState<T>& s, const DirectBlock& block, const SolverOptions& options,
-                      const SubstepStates<T>& states, const sheetbend_packs::KernelTable& table, BlockState<T>& state) {
+void write_solution(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state) {
   const auto row_of = [](std::size_t p) { return sheetbend_blocks::row * p; };
-  for (int scene = 0; scene < static_cast<int>(state.implicit.size()); ++scene) {
-    load_implicit(s, block, states, options.h, state, scene);
-    state.implicit[scene].solve(s.scene, block, options);
-  }
   if constexpr (is_plain<T>) {
     for (int p = 0; p < block.movable; ++p)
       for (int d = 0; d < 3; ++d) {
@@ -127,6 +122,26 @@ void project_implicit(const SubstepState<T>& s, const DirectBlock& block, const 
     for (int p = 0; p < block.movable; ++p)
       for (int d = 0; d < 3; ++d) state.x[0][row_of(p) + d] = x[3 * p + d];
   }
+}
+
+// From the predicted coordinates in state.x to those at which forces balance, with gradients and multipliers. Nothing is solved where these coordinates
+// are known, as on the way back.
+template <class T>
+void project_implicit(const SubstepState<T>& s, const DirectBlock& block, const SolverOptions& options,
+                      const SubstepStates<T>& states, const sheetbend_packs::KernelTable& table, BlockState<T>& state) {
+  for (int scene = 0; scene < static_cast<int>(state.implicit.size()); ++scene) {
+    load_implicit(s, block, states, options.h, state, scene);
+    if (states.x_next)
+      state.implicit[scene].take_guess(block);
+    else
+      state.implicit[scene].solve(s.scene, block, options);
+  }
+  if (states.x_next)
+    for (int p = 0; p < block.movable; ++p)
+      for (int d = 0; d < 3; ++d)
+        state.x[0][sheetbend_blocks::row * p + d] = states.x_next[s.scene.first_dof[block.particles[p]] + d];
+  else
+    write_solution(s, block, state);
   if constexpr (!carries_tangents<T>) {  // whose multipliers nobody asks for
     const auto arrays = arrays_of(block, runs_of(s, block, state), state, 0);
     forward_kernels<T>(table).evaluate(arrays);

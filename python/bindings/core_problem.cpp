@@ -61,6 +61,7 @@ Experiment make_experiment(const py::dict& d) {
   o.integrator = get<std::string>(d, "integrator") == "bdf1" ? Integrator::bdf1 : Integrator::bdf2;
   o.partition = partition_of(get<std::string>(d, "partition"));
   o.iterations = get<int>(d, "iterations");
+  o.force_tolerance = get<double>(d, "force_tolerance");
   o.cg_tolerance = get<double>(d, "cg_tolerance");
   o.cg_iterations = get<int>(d, "cg_iterations");
   e.plan = make_plan(*e.scene, o);

@@ -10,10 +10,12 @@ namespace sheetbend::bindings {
 namespace {
 
 Solver make_solver(std::shared_ptr<Scene> scene, double h, const std::string& integrator, const std::string& partition,
-                   int iterations, int threads, int grain, double cg_tolerance, int cg_iterations) {
+                   int iterations, double force_tolerance, int threads, int grain, double cg_tolerance,
+                   int cg_iterations) {
   SolverOptions o;
   o.h = h;
   o.iterations = iterations;
+  o.force_tolerance = force_tolerance;
   o.threads = threads;
   o.grain = grain;
   o.cg_tolerance = cg_tolerance;
@@ -163,8 +165,8 @@ void bind_rollout(py::module_& m) {
   py::class_<Solver> solver(m, "Solver");
   solver
       .def(py::init(&make_solver), py::kw_only(), py::arg("scene"), py::arg("h"), py::arg("integrator"),
-           py::arg("partition"), py::arg("iterations"), py::arg("threads"), py::arg("grain"), py::arg("cg_tolerance"),
-           py::arg("cg_iterations"))
+           py::arg("partition"), py::arg("iterations"), py::arg("force_tolerance"), py::arg("threads"),
+           py::arg("grain"), py::arg("cg_tolerance"), py::arg("cg_iterations"))
       .def("simulate", &simulate, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
       .def("states", &states, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
       .def("force_balance", &force_balance, py::arg("inputs"), py::arg("steps"), py::arg("t0"))

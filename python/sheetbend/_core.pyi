@@ -114,6 +114,7 @@ class Solver:
         integrator: str,
         partition: str,
         iterations: int,
+        force_tolerance: float,
         threads: int,
         grain: int,
         cg_tolerance: float,

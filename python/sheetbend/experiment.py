@@ -313,6 +313,7 @@ class Experiment:
             "integrator": self.solver.integrator,
             "partition": self.solver.method,
             "iterations": self.solver.sweeps,
+            "force_tolerance": self.solver.force_tolerance,
             "cg_tolerance": self.solver.cg_tolerance,
             "cg_iterations": self.solver.cg_iterations,
             "map": map_,

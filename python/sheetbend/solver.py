@@ -25,13 +25,15 @@ class Solver:
         method: "direct" (each connected part one block, solved by its constraints: for ropes; the default), "newton"
             (the same blocks, solved by their particles: for cloth; every compliance must be positive), "newton_cg" (the
             same by conjugate gradients on two levels: for cloth of more than some 20,000 vertices, in half the memory),
-            "implicit" (each substep solved until what is left of the forces is below 1e-10 of the largest: for fabrics
-            that stiffen strongly; no rods, no rigid constraints) or "gauss_seidel" (colored; unconverged sweeps add
+            "implicit" (each substep solved until its forces balance: for fabrics that stiffen strongly; no rods, no
+            rigid constraints) or "gauss_seidel" (colored; unconverged sweeps add
             about 0.9 h^2/(m sweeps) of compliance per link).
         iterations: Newton iterations of a block (2 by default) or sweeps (10 by default); of "implicit" the Newton
             matrices that a substep may take (100 by default): more are an error.
         threads: of one rollout; results do not depend on it.
         grain: constraints per thread below which a color is not split.
+        force_tolerance: what "implicit" may leave of the forces that act along a coordinate, of their largest sum. A
+            motion and its gradient are as exact as forces balance.
         cg_tolerance: relative residual at which conjugate gradients stop ("newton_cg" runs them twice per solve).
         cg_iterations: conjugate gradients until there; more are an error.
         memory: budget of a gradient through a rollout, such as "2 GB" or a number of bytes: what does not fit on the
@@ -45,6 +47,7 @@ class Solver:
     iterations: int | None = None
     threads: int = 1
     grain: int = 256
+    force_tolerance: float = 1e-10
     cg_tolerance: float = 1e-12
     cg_iterations: int = 10_000
     memory: str | int | None = None
@@ -62,9 +65,14 @@ class Solver:
             value = getattr(self, field)
             if value is not None and (not isinstance(value, int) or value < 1):
                 raise InputError(f"solver.{field}", "must be a positive whole number", value, "give at least 1")
-        if not (isinstance(self.cg_tolerance, float) and 0.0 < self.cg_tolerance <= 1e-3):
-            problem = "must be a relative residual of at most 1e-3"
-            raise InputError("solver.cg_tolerance", problem, self.cg_tolerance, "give a small number, such as 1e-12")
+        for field, what, usual in (
+            ("force_tolerance", "share of the largest force", "1e-10"),
+            ("cg_tolerance", "relative residual", "1e-12"),
+        ):
+            value = getattr(self, field)
+            if not (isinstance(value, float) and 0.0 < value <= 1e-3):
+                fix = f"give a small number, such as {usual}"
+                raise InputError(f"solver.{field}", f"must be a {what} of at most 1e-3", value, fix)
         if self.memory is not None:
             in_bytes("solver.memory", self.memory)
 
@@ -100,6 +108,7 @@ class Solver:
                 integrator=self.integrator,
                 partition=self.method,
                 iterations=self.sweeps,
+                force_tolerance=self.force_tolerance,
                 threads=self.threads,
                 grain=self.grain,
                 cg_tolerance=self.cg_tolerance,

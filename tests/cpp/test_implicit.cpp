@@ -1,9 +1,10 @@
-// Implicit blocks: the stiffness of one constraint against complex steps, what is left of it without negative eigenvalues, saddles, and the end of
-// patience. Their gradients, lanes and threads are in the tests over all solvers.
+// Implicit blocks: the Hessians of one constraint against complex steps, a matrix without its negative eigenvalues, saddles, the end of patience, and the
+// way back. Their gradients, lanes and threads are in the tests over all solvers.
 #include <Eigen/Eigenvalues>
 
+#include "core/element/second_order.h"
 #include "core/scalar/complex.h"
-#include "core/solver/element_stiffness.h"
+#include "core/solver/newton_matrix.h"
 #include "tests/cpp/support/programs.h"
 
 namespace sheetbend::testing {
@@ -11,32 +12,31 @@ namespace {
 
 using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// J^T J/D + sum C_j Hess(C_j)/D is the derivative of J^T C/D.
-TEST(ElementStiffness, IsTheDerivativeOfTheForce) {
+TEST(SecondOrder, IsTheDerivativeOfTheGradient) {
   for (int kind = 0; kind < kind_count; ++kind)
     with_kind(kind, [&]<class K>(K) {
-      if constexpr (holds_points<K>) {
-        SCOPED_TRACE(K::name);
-        const Case sample = case_of<K>();
-        constexpr double stiffness = 3.0;
-        double lambda[K::rows];
-        const Evaluation<K, double> at(sample.x.data(), sample.p.data());
-        for (int j = 0; j < K::rows; ++j) lambda[j] = -stiffness * at.C[j];
-        std::vector<double> E(K::dofs * K::dofs), expected(E.size());
-        element_stiffness(kind, sample.x.data(), sample.p.data(), stiffness, lambda, E.data());
-        const std::vector<Complex> p(sample.p.begin(), sample.p.end());
-        for (int b = 0; b < K::dofs; ++b) {
-          std::vector<Complex> x(sample.x.begin(), sample.x.end());
-          x[b].im = complex_step;
-          const Evaluation<K, Complex> near(x.data(), p.data());
-          for (int a = 0; a < K::dofs; ++a)
-            for (int j = 0; j < K::rows; ++j)
-              expected[a * K::dofs + b] += stiffness * (near.J[j * K::dofs + a] * near.C[j]).im / complex_step;
+      SCOPED_TRACE(K::name);
+      const Case sample = case_of<K>();
+      double lambda[K::rows];
+      for (int j = 0; j < K::rows; ++j) lambda[j] = 3.0 - 1.7 * j;
+      std::vector<double> H(triangle(K::dofs)), expected;
+      const SecondOrder<K, double> at(sample.x.data(), sample.p.data());
+      const Evaluation<K, double> plain(sample.x.data(), sample.p.data());
+      EXPECT_TRUE(std::equal(at.C, at.C + K::rows, plain.C));
+      EXPECT_TRUE(std::equal(at.J, at.J + K::rows * K::dofs, plain.J));
+      at.add_hessian(lambda, H.data());
+      const std::vector<Complex> p(sample.p.begin(), sample.p.end());
+      for (int b = 0; b < K::dofs; ++b) {
+        std::vector<Complex> x(sample.x.begin(), sample.x.end());
+        x[b].im = complex_step;
+        const Evaluation<K, Complex> near(x.data(), p.data());
+        for (int a = 0; a <= b; ++a) {
+          double sum = 0.0;
+          for (int j = 0; j < K::rows; ++j) sum += lambda[j] * near.J[j * K::dofs + a].im / complex_step;
+          expected.push_back(sum);
         }
-        EXPECT_LE(relative_error(E, expected), 1e-13);
-      } else {
-        EXPECT_THROW(element_stiffness(kind, nullptr, nullptr, 1.0, nullptr, nullptr), std::logic_error);
       }
+      EXPECT_LE(relative_error(H, expected), 1e-13);
     });
 }
 
@@ -117,6 +117,18 @@ TEST(ImplicitBlocks, LeaveItToTheRolloutToFindWhatIsNoNumber) {
   inputs[sample.scene.layout.of(Quantity::velocity) + 3 * 4] = std::nan("");
   const Plan plan = make_plan(sample.scene, solver.options(1));
   EXPECT_THROW(states(Program{sample.scene, plan, 2}, inputs), Diverged);
+}
+
+// With one matrix allowed no substep could be solved again.
+TEST(ImplicitBlocks, AreNotSolvedOnTheWayBack) {
+  const Sample sample = random_scene(92, implicit_bdf2.shape());
+  SolverOptions options = implicit_bdf2.options(1);
+  Program p{sample.scene, make_plan(sample.scene, options), 6};
+  auto recorded = record(p, sample.inputs);
+  const auto expected = gradient(p, sample.inputs, recorded);
+  p.plan.options.iterations = 1;
+  EXPECT_THROW(record(p, sample.inputs), Unbalanced);
+  EXPECT_TRUE(same_bits(gradient(p, sample.inputs, recorded), expected));
 }
 
 TEST(ImplicitBlocks, RefuseWhatTheyCannotHold) {

@@ -237,6 +237,22 @@ def test_forces_that_do_not_balance_are_told() -> None:
         assert e.value.residual > 1e-10
 
 
+def test_forces_balance_as_far_as_they_are_asked_to() -> None:
+    """Fewer matrices, and the force that is left is between the two tolerances."""
+    exact, rough = (
+        sb.force_balance(strip(5.0), 0.5, replace(IMPLICIT, force_tolerance=tolerance)) for tolerance in (1e-10, 1e-4)
+    )
+    assert rough.newton_steps.sum() < 0.8 * exact.newton_steps.sum()
+    ends = [blocks[0][np.isfinite(blocks[0])][-1] for blocks in rough.left]
+    assert 1e-10 < max(ends) <= 1e-4
+
+
+@pytest.mark.parametrize("given", [0.0, 0.1, 1, float("nan")])
+def test_a_tolerance_that_is_none_is_named(given: float) -> None:
+    with pytest.raises(sb.InputError, match=r"solver\.force_tolerance: must be a share .* such as 1e-10"):
+        replace(IMPLICIT, force_tolerance=given)
+
+
 def test_rigid_constraints_are_refused() -> None:
     """Rods' frames, tethers, volumes: tests/cpp/test_implicit.cpp, test_tethers.py, test_volume.py."""
     scene = strip(1.0)

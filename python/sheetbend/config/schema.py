@@ -38,6 +38,9 @@ class SolverSection(Section):
         "Newton iterations of a block (2), at most so many matrices of an implicit one (100), or sweeps (10)",
         ge=1,
     )
+    force_tolerance: Finite = key(
+        1e-10, "what `implicit` may leave of the forces on a particle, of the largest", gt=0, le=1e-3
+    )
     cg_tolerance: Finite = key(1e-12, "relative residual at which conjugate gradients stop", gt=0, le=1e-3)
     cg_iterations: int = key(10_000, "conjugate gradients until there; more are an error", ge=1)
     memory: str | int | None = key(

@@ -1,0 +1,86 @@
+#include "core/solver/incremental_potential.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace sheetbend {
+namespace {
+
+constexpr int row = sheetbend_blocks::row;
+constexpr double nothing = 1e-8;  // a displacement, of the coordinates
+
+}  // namespace
+
+void IncrementalPotential::resize(const Scene& scene, const DirectBlock& block) {
+  for (auto* a : {&target, &push_, &magnitude_, &stiffness_}) a->assign(row * block.particles.size());
+  C_r.assign(block.size());
+  R_.assign(3 * block.movable, 0.0);
+  eta = 0.0;
+  values.resize(block.runs.size());
+  runs_.clear();
+  runs_.reserve(block.runs.size());
+  for (std::size_t r = 0; r < values.size(); ++r) {
+    const MemberRun& run = block.runs[r];
+    const Group& group = scene.groups[run.group];
+    values[r].assign(run.items.size() * sheetbend_blocks::value_count(group.damped, group.parameters));
+    runs_.push_back({group.kind, run.count, group.damped, run.nodes.data(), run.gradients.data(), run.first_row.data(),
+                     values[r].numbers(), nullptr});
+  }
+}
+
+std::size_t IncrementalPotential::bytes(const Scene& scene, const DirectBlock& block) {
+  std::size_t bytes = Numbers<double>::bytes(block.size()) + 4 * Numbers<double>::bytes(row * block.particles.size()) +
+                      sizeof(double) * 3 * block.movable;
+  for (const MemberRun& run : block.runs) {
+    const Group& group = scene.groups[run.group];
+    bytes += sizeof(sheetbend_blocks::Run) + sizeof(Numbers<double>) +
+             Numbers<double>::bytes(run.items.size() * sheetbend_blocks::value_count(group.damped, group.parameters));
+  }
+  return bytes;
+}
+
+sheetbend_blocks::Potential IncrementalPotential::arrays(const DirectBlock& block, Numbers<double>& at) {
+  sheetbend_blocks::Potential b{};
+  b.runs = runs_.data();
+  b.run_count = static_cast<int>(runs_.size());
+  b.particles = static_cast<int>(block.particles.size());
+  b.x = at.numbers();
+  b.C_r = C_r.numbers();
+  b.force = push_.numbers();
+  b.magnitude = magnitude_.numbers();
+  b.stiffness = stiffness_.numbers();
+  return b;
+}
+
+double IncrementalPotential::evaluate(const DirectBlock& block, Numbers<double>& at) {
+  const double elastic = pack_kernels().potential->evaluate(arrays(block, at));
+  double inertial = 0.0, stiffest = 0.0, farthest = 0.0, lightest = std::numeric_limits<double>::infinity();
+  const double *x = at.data(), *predicted = target.data();
+  const double *push = push_.data(), *magnitude = magnitude_.data(), *stiffness = stiffness_.data();
+  largest_ = force_ = 0.0;
+  for (int p = 0; p < block.movable; ++p) {
+    const double mass = 1.0 / x[row * p + 3];
+    lightest = std::min(lightest, mass);
+    for (int i = row * p, d = 3 * p; d < 3 * p + 3; ++i, ++d) {
+      const double away = x[i] - predicted[i];
+      R_[d] = mass * away - push[i];
+      inertial += mass * away * away;
+      largest_ = std::max(largest_, std::abs(R_[d]));
+      force_ = std::max(force_, mass * std::abs(away) + magnitude[i]);
+      stiffest = std::max(stiffest, mass + stiffness[i]);
+      farthest = std::max(farthest, std::abs(x[i]));
+    }
+  }
+  // No more than what moves a particle by nothing: near a collapsed triangle any force is rounding.
+  rounding_ = std::min(256.0 * std::numeric_limits<double>::epsilon() * stiffest, nothing * lightest) * farthest;
+  return elastic + 0.5 * inertial;
+}
+
+int IncrementalPotential::worst_node(const DirectBlock& block) const {
+  const auto worst =
+      std::max_element(R_.begin(), R_.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
+  return block.particles[(worst - R_.begin()) / 3];
+}
+
+}  // namespace sheetbend

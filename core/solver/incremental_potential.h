@@ -1,0 +1,47 @@
+// The incremental potential of an implicit step (Kane et al. 2000), whose minimum is where the substep's forces balance:
+//
+//   Phi = sum |x - x~|^2/(2 w) + sum (C + g (C - C_r))^2/(2 a (1+g))         x~: predicted, w: inverse mass
+//   R = dPhi/dx = (x - x~)/w - J^T lambda                                    lambda = -(C + g (C - C_r))/a
+//
+// R is the force that does not balance, times eta^2.
+#pragma once
+
+#include <vector>
+
+#include "core/blocks/potential_kernels.h"
+#include "core/scalar/numbers.h"
+#include "core/solver/plan.h"
+
+namespace sheetbend {
+
+class IncrementalPotential {
+ public:
+  // The problem. Rows of four (particles, 4), as in sheetbend_blocks::Block, with inverse masses; values as there.
+  Numbers<double> target;  // predicted, where fixed particles are at n+1
+  Numbers<double> C_r;
+  std::vector<Numbers<double>> values;
+  double eta = 0.0;  // of `values`; 0 where they are not filled yet
+
+  void resize(const Scene& scene, const DirectBlock& block);
+  static std::size_t bytes(const Scene& scene, const DirectBlock& block);
+
+  // Phi at `at`; R, three numbers per movable particle, and the following are then of there.
+  double evaluate(const DirectBlock& block, Numbers<double>& at);
+  const std::vector<double>& R() const { return R_; }
+  double largest() const { return largest_; }    // |R|
+  double force() const { return force_; }        // the largest sum of forces' magnitudes
+  double rounding() const { return rounding_; }  // of R, from that of the coordinates
+  double balance() const { return force_ > 0.0 ? largest_ / force_ : 0.0; }
+  int worst_node(const DirectBlock& block) const;
+
+  // The constraints' runs at `at`, as the kernels take them.
+  sheetbend_blocks::Potential arrays(const DirectBlock& block, Numbers<double>& at);
+
+ private:
+  std::vector<sheetbend_blocks::Run> runs_;
+  Numbers<double> push_, magnitude_, stiffness_;
+  std::vector<double> R_;
+  double largest_ = 0.0, force_ = 0.0, rounding_ = 0.0;
+};
+
+}  // namespace sheetbend

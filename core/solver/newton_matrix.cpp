@@ -1,0 +1,125 @@
+#include "core/solver/newton_matrix.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
+#include "core/constraints/registry.h"
+
+namespace sheetbend {
+namespace {
+
+constexpr int row = sheetbend_blocks::row, lanes = sheetbend_blocks::lanes;
+constexpr double convexities[] = {1.0 / 64.0, 1.0 / 8.0, 1.0};
+
+constexpr int most_dofs = []<class... K>(std::tuple<K...>*) {
+  return std::max({(holds_points<K> ? K::dofs : 0)...});
+}(static_cast<Registry*>(nullptr));
+
+using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, most_dofs, most_dofs>;
+
+// Numbers of a run's elements.
+std::size_t numbers_of(const Scene& scene, const MemberRun& run) {
+  return run.items.size() * triangle(3 * scene.groups[run.group].arity);
+}
+
+}  // namespace
+
+void make_convex(int dofs, double* E) {
+  Eigen::Map<Matrix> matrix(E, dofs, dofs);
+  const Eigen::SelfAdjointEigenSolver<Matrix> modes(matrix);
+  if (!(modes.eigenvalues()[0] < 0.0)) return;
+  matrix = modes.eigenvectors() * modes.eigenvalues().cwiseMax(0.0).asDiagonal() * modes.eigenvectors().transpose();
+}
+
+void NewtonMatrix::resize(const Scene& scene, const DirectBlock& block) {
+  masses_.assign(block.movable, 0.0);
+  for (auto* all : {&elements_, &convex_}) {
+    all->resize(block.runs.size());
+    for (std::size_t r = 0; r < all->size(); ++r) (*all)[r].assign(numbers_of(scene, block.runs[r]));
+  }
+  element_numbers_.clear();
+  element_numbers_.reserve(elements_.size());
+  for (auto& run : elements_) element_numbers_.push_back(run.numbers());
+  factor_.reset(pattern_of(block).structure);
+}
+
+std::size_t NewtonMatrix::bytes(const Scene& scene, const DirectBlock& block) {
+  const FactorStructure& structure = pattern_of(block).structure;
+  std::size_t bytes = sizeof(double) * (block.movable + structure.size()) + Factor<double>::bytes(structure);
+  for (const MemberRun& run : block.runs)
+    bytes += 2 * (sizeof(Numbers<double>) + Numbers<double>::bytes(numbers_of(scene, run))) + sizeof(double*);
+  return bytes;
+}
+
+void NewtonMatrix::find(const DirectBlock& block, IncrementalPotential& potential, Numbers<double>& at) {
+  for (int p = 0; p < block.movable; ++p) masses_[p] = 1.0 / at[row * p + 3];
+  arrays_ = potential.arrays(block, at);
+  arrays_.elements = element_numbers_.data();
+  pack_kernels().potential->find_elements(arrays_);
+  convex_found_ = false;
+}
+
+void NewtonMatrix::find_convex(const Scene& scene, const DirectBlock& block) {
+  convex_found_ = true;
+  Matrix E;
+  for (std::size_t r = 0; r < block.runs.size(); ++r) {
+    const int dofs = 3 * scene.groups[block.runs[r].group].arity;
+    E.resize(dofs, dofs);
+    for (int i = 0; i < block.runs[r].count; ++i) {
+      const auto at = [&](int a, int b) { return lane_at(i, triangle(dofs), triangle(a) + b); };
+      for (int a = 0; a < dofs; ++a)
+        for (int b = 0; b <= a; ++b) E(a, b) = E(b, a) = elements_[r][at(a, b)];
+      make_convex(dofs, E.data());
+      for (int a = 0; a < dofs; ++a)
+        for (int b = 0; b <= a; ++b) convex_[r][at(a, b)] = E(a, b);
+    }
+  }
+}
+
+bool NewtonMatrix::factorize(const Scene& scene, const DirectBlock& block, double convexity) {
+  const CondensedPattern& pattern = pattern_of(block);
+  factor_.reset(pattern.structure);
+  for (int p = 0; p < block.movable; ++p)
+    for (int d = pattern.dof_of[p]; d < pattern.dof_of[p] + 3; ++d)
+      factor_.values[pattern.structure.position(d, d)] = masses_[p];
+  if (convexity > 0.0 && !convex_found_) find_convex(scene, block);
+  double* values = factor_.values.data();
+  for (std::size_t r = 0; r < block.runs.size(); ++r) {
+    const std::vector<int>& entries = block.runs[r].entries;
+    const double *E = elements_[r].data(), *convex = convex_[r].data();
+    for (std::size_t e = 0; e < entries.size(); ++e)
+      if (entries[e] >= 0) values[entries[e]] += convexity > 0.0 ? E[e] + convexity * (convex[e] - E[e]) : E[e];
+  }
+  factor_.factorize(pattern.structure, pack_kernels().blocks->one.forward.factor_supernodes);
+  // A pivot that is not positive has zero for its inverse.
+  return std::all_of(factor_.inverse.begin(), factor_.inverse.end(), [](double p) { return p > 0.0; });
+}
+
+double NewtonMatrix::factorize_convex_enough(const Scene& scene, const DirectBlock& block) {
+  if (factorize(scene, block, 0.0)) return 0.0;
+  for (const double convexity : convexities)
+    if (factorize(scene, block, convexity)) return convexity;
+  return 1.0;
+}
+
+void NewtonMatrix::multiply(const DirectBlock& block, Numbers<double>& z, Numbers<double>& Kz) {
+  Kz.clear();
+  for (int p = 0; p < block.movable; ++p)
+    for (int d = row * p; d < row * p + 3; ++d) Kz[d] = masses_[p] * z[d];
+  pack_kernels().potential->multiply(arrays_, z.numbers(), Kz.numbers());
+}
+
+bool NewtonMatrix::descend(const DirectBlock& block, double* d) {
+  const auto pivot = std::find_if(factor_.inverse.begin(), factor_.inverse.end(), [](double p) { return !(p > 0.0); });
+  if (pivot == factor_.inverse.end()) return false;
+  const CondensedPattern& pattern = pattern_of(block);
+  const int at = static_cast<int>(pivot - factor_.inverse.begin());
+  std::fill(factor_.inverse.begin(), factor_.inverse.end(), 0.0);
+  factor_.inverse[at] = 1.0;
+  for (std::size_t p = 0; p < pattern.dof_of.size(); ++p)
+    for (int i = 0; i < 3; ++i) d[3 * p + i] = pattern.dof_of[p] + i == at ? 1.0 : 0.0;
+  solve(block, d);
+  return true;
+}
+
+}  // namespace sheetbend
