@@ -84,7 +84,7 @@ class Recording:
         and metadata (`sheetbend.io.sidecar`).
 
         Args:
-            path: an .npz, .csv or .pkl file, or a folder of OBJ or PLY files, a frame each.
+            path: an .npz, .csv, .c3d or .pkl file, or a folder of OBJ or PLY files, a frame each.
             units: length unit of the file, "m", "cm" or "mm"; None takes the JSON's, and meters without one.
 
         Raises:

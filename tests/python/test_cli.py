@@ -318,6 +318,18 @@ class TestInfo:
         )
         assert found["parameters"] == ["rope_EI", "rope_bend_damping"] and found["quantities"]["rope_length"] == 0.6
 
+    def test_recording(self, config: Path) -> None:
+        x = np.full((4, 2, 3), np.nan)
+        x[:, 0], x[1:, 1] = [0.1, 0.2, 0.3], [0.4, 0.5, 0.6]
+        recording = sb.Recording(x, np.arange(4) / 100, ("grip[0]", "tip"), ("grip[0]",), gravity=(0, -9.81, 0))
+        recording.save(config.parent / "take.csv")
+        shown = run("info", config.parent / "take.csv")
+        assert shown.exit_code == 0 and "4 frames, 2 markers" in shown.output and "grip[0]" in shown.output
+        assert "25.0%" in shown.output
+        found = last_line(run("info", config.parent / "take.csv", "--json"))["recording"]
+        assert found["markers"] == {"grip[0]": [0.1, 0.2, 0.3], "tip": [0.4, 0.5, 0.6]}
+        assert found["clamped"] == ["grip[0]"] and found["gravity"] == [0, -9.81, 0] and found["frames"] == 4
+
 
 class TestBadInput:
     @pytest.mark.parametrize("command", ["fit", "check", "simulate", "info"])

@@ -259,7 +259,7 @@ def test_missing_and_empty_files_are_refused(tmp_path: Path, suffix: str) -> Non
 
 
 def test_unknown_suffix_and_folder_are_refused(tmp_path: Path) -> None:
-    for name in ("motion.c3d", "motion"):
+    for name in ("motion.trc", "motion"):
         with pytest.raises(RecordingError, match=r"suffix that no reader knows .*\.npz or \.csv"):
             Recording.load(tmp_path / name)
         with pytest.raises(RecordingError, match="suffix"):

@@ -10,31 +10,39 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from .. import __version__
 from ..config import GrippedConfig, build, parse_any, scene_alone
 from ..experiment import Experiment
 from ..gripped.plausible import doubts
+from ..io import FORMATS
 from ..kinds import KINDS
 from ..optimizers import has_ceres
+from ..recording import Recording
 from ..scene import Scene
 from .gripped import RopeData, load_ropes
 from .outcome import Outcome, run
 
 PACKAGES = ("numpy", "scipy", "torch", "matplotlib", "pydantic", "rich", "typer")
+_MARKERS = 60  # shown of a recording
 
 
 def info(
     config: Annotated[
         Path | None,
-        typer.Argument(help="A TOML configuration, see docs/configuration.md.", show_default=False),
+        typer.Argument(
+            help="A TOML configuration, see docs/configuration.md, or a recording: a file or a folder of meshes.",
+            show_default=False,
+        ),
     ] = None,
     json: Annotated[
         bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
     ] = False,
 ) -> None:
-    """Show versions and what is built in; with a configuration also its scenes, quantities and parameters."""
+    """Show versions and what is built in; with a configuration also its scenes, quantities and parameters, with a
+    recording what it holds and where its markers are first seen."""
     run(lambda console: _info(console, config), json)
 
 
@@ -54,7 +62,9 @@ def _info(console: Console, path: Path | None) -> Outcome:
         ", ".join(f"{name} {version or 'missing'}" for name, version in data["packages"].items()),
         soft_wrap=True,
     )
-    if path is not None:
+    if path is not None and (path.suffix.lower() in FORMATS or path.is_dir()):
+        data["recording"] = _recording(console, Recording.load(path))
+    elif path is not None:
         data["config"] = _config(console, path)
     return Outcome(data)
 
@@ -68,6 +78,29 @@ def _packages() -> dict[str, str | None]:
         except importlib.metadata.PackageNotFoundError:
             found[name] = None
     return found
+
+
+def _recording(console: Console, recording: Recording) -> dict[str, Any]:
+    """Its size, noise and boundary, and every marker with the place where it is first seen."""
+    first = recording.mask.argmax(axis=0)
+    at = recording.positions[first, np.arange(len(first))]
+    console.print("\n" + recording.summary(), markup=False, soft_wrap=True)
+    table = Table("marker", "first seen [s]", "x [m]", "y [m]", "z [m]", "lost", box=None, pad_edge=False)
+    lost = 1.0 - recording.mask.mean(axis=0)
+    for k, marker in enumerate(recording.markers[:_MARKERS]):
+        place = (f"{x:.4g}" for x in at[k])
+        table.add_row(escape(marker), f"{recording.times[first[k]]:.4g}", *place, f"{lost[k]:.1%}")
+    console.print(table)
+    if len(recording.markers) > _MARKERS:
+        console.print(f"and {len(recording.markers) - _MARKERS} more")
+    return {
+        "name": recording.name,
+        "frames": len(recording.times),
+        "times": recording.times[[0, -1]].tolist(),
+        "markers": {marker: x.tolist() for marker, x in zip(recording.markers, at, strict=True)},
+        "clamped": [recording.markers[k] for k in recording.clamped],
+        "gravity": None if recording.gravity is None else recording.gravity.tolist(),
+    }
 
 
 def _config(console: Console, path: Path) -> dict[str, Any]:

@@ -1,4 +1,5 @@
-"""Files of recordings. A format is one module with `read(path) -> Recording` and `write(recording, path)`.
+"""Files of recordings. A format is one module with `read(path) -> Recording` and, unless it is only read,
+`write(recording, path)`.
 
 A reader takes the numbers as they stand in the file; length units, names and whatever else the JSON beside
 the file tells (`sidecar`) are applied here, the same for every format. A reader whose files name their length
@@ -15,11 +16,12 @@ from types import ModuleType
 from ..errors import RecordingError
 from ..recording import Recording
 from ..recording_checks import check_seen
-from . import csv, deform, mesh_sequence, npz, sidecar
+from . import c3d, csv, deform, mesh_sequence, npz, sidecar
 
 FORMATS: dict[str, ModuleType] = {
     ".npz": npz,
     ".csv": csv,
+    ".c3d": c3d,
     ".pkl": deform,
     ".pickle": deform,
 }
@@ -41,6 +43,8 @@ def read(path: Path, units: str | None = None) -> Recording:
 def write(recording: Recording, path: Path) -> None:
     """Write the recording and the JSON beside it; see `Recording.save`."""
     file_format = _format(path)
+    if not hasattr(file_format, "write"):
+        raise RecordingError("path", "ends in what is only read", str(path), "save it as .npz or .csv")
     if not path.parent.is_dir():
         fix = "make the folder first"
         raise RecordingError("path", "lies in a folder that does not exist", str(path), fix)
