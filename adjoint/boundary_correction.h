@@ -15,10 +15,15 @@ struct BoundaryCorrection {
   int count() const { return static_cast<int>(given.size()); }
   int unknowns() const { return sigma > 0.0 ? count() : 0; }
 
+  // Adds number i.
+  template <class T>
+  void apply(int i, const T& b, T* inputs) const {
+    for (int k = first[i]; k < first[i + 1]; ++k) inputs[target[k]] += T(weight[k]) * b;
+  }
+
   template <class T>
   void apply(const T* b, T* inputs) const {
-    for (int i = 0; i < count(); ++i)
-      for (int k = first[i]; k < first[i + 1]; ++k) inputs[target[k]] += T(weight[k]) * b[i];
+    for (int i = 0; i < count(); ++i) apply(i, b[i], inputs);
   }
 
   // b_bar += the transpose of `apply`.

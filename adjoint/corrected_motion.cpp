@@ -1,54 +1,66 @@
 #include "adjoint/corrected_motion.h"
 
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
 #include <numeric>
 
+#include "adjoint/corrected_rest.h"
 #include "adjoint/equilibrium_vjp.h"
-#include "adjoint/observation.h"
-#include "core/scalar/dual.h"
+#include "adjoint/observation_vjp.h"
+#include "core/threads/pool.h"
 
 namespace sheetbend {
 namespace {
 
 using Eight = Dual<double, 8>;
+using Eigen::Index;
+using Eigen::MatrixXd;
 
-// A marker on its own nodes: its position depends on 12 numbers.
-Marker on_own_nodes(const Marker& m) {
-  Marker own = m;
-  own.dof = {0, 3, 6, 9};
-  return own;
-}
+constexpr int numbers_per_stretch = 48;  // or those of one knot
 
-// x_bar (dofs) += the gradient of half the sum of squared residuals of one frame.
-void pull_back_frame(const Observations& o, std::size_t frame, const double* x, const double* offsets, double* x_bar) {
-  using D = Dual<double, 12>;
-  for (std::size_t m = 0; m < o.markers.size(); ++m) {
-    const std::size_t at = frame * o.markers.size() + m;
-    if (!is_seen(o, at)) continue;
-    const Marker& marker = o.markers[m];
-    D own[12], r[3];
-    for (int i = 0; i < 12; ++i) {
-      own[i].v = x[marker.dof[i / 3] + i % 3];
-      own[i].d[i] = 1.0;
-    }
-    const D offset[3] = {offsets[3 * m], offsets[3 * m + 1], offsets[3 * m + 2]};
-    marker_residuals(o, at, marker_position(on_own_nodes(marker), own, offset), r);
-    for (int i = 0; i < 12; ++i)
-      for (const D& one : r) x_bar[marker.dof[i / 3] + i % 3] += one.v * one.d[i];
+// columns = directions (orthonormal) * coordinates, but for what is no longer than about `tolerance`. The pivots are chosen on the small factor of a plain
+// QR, which goes by blocks.
+struct Compressed {
+  MatrixXd directions, coordinates;
+
+  Compressed(const MatrixXd& columns, double tolerance) {
+    const Eigen::HouseholderQR<MatrixXd> tall(columns);
+    const Index count = std::min(columns.rows(), columns.cols());
+    const Eigen::ColPivHouseholderQR<MatrixXd> small(
+        MatrixXd(tall.matrixQR().topRows(count).triangularView<Eigen::Upper>()));
+    const Index rank = (small.matrixQR().diagonal().array().abs() > tolerance).count();
+    coordinates =
+        MatrixXd(small.matrixQR().topRows(rank).triangularView<Eigen::Upper>()) * small.colsPermutation().transpose();
+    directions = MatrixXd::Zero(columns.rows(), rank);
+    directions.topRows(count) = small.householderQ() * MatrixXd::Identity(count, rank);
+    directions.applyOnTheLeft(tall.householderQ().setLength(count));
   }
+};
+
+std::vector<int> up_to(int last) {
+  std::vector<int> every(last + 1);
+  std::iota(every.begin(), every.end(), 0);
+  return every;
 }
 
 }  // namespace
 
+std::unique_ptr<Corrected> Corrected::at(const Experiment& e, const double* theta, const double* b,
+                                         Interrupt* interrupt) {
+  if (e.is_static) return std::make_unique<CorrectedRest>(e, theta, b, interrupt);
+  return std::make_unique<CorrectedMotion>(e, theta, b, interrupt);
+}
+
 CorrectedMotion::CorrectedMotion(const Experiment& e, const double* theta, const double* b, Interrupt* interrupt)
-    : e_(e), last_(e.steps()), inputs_(e.inputs_at(theta, b)), start_(inputs_), residuals_(e.residual_count()) {
+    : Corrected(e, theta, b), last_(e.steps()), start_(inputs_) {
   const Scene& scene = *e.scene;
   const std::size_t dofs = scene.dofs();
   if (e.start == Start::equilibrium) {
     rest_ = e.anchor->solve(scene, inputs_.data(), e.equilibrium, interrupt);
     std::copy(rest_->x.begin(), rest_->x.end(), &start_[scene.layout.of(Quantity::position)]);
   }
-  std::vector<int> every(last_ + 1);
-  std::iota(every.begin(), every.end(), 0);
+  const std::vector<int> every = up_to(last_);
   states_.resize(every.size() * dofs);
   tape_.emplace(record_rollout(scene, e.plan, start_.data(), e.t0, every, states_.data(), every_state, interrupt));
 
@@ -61,6 +73,7 @@ CorrectedMotion::CorrectedMotion(const Experiment& e, const double* theta, const
     place.interpolate(dofs, [&](int k) { return &states_[(place.base - 1 + k) * dofs]; }, x.data());
     r = frame_residuals(e.observed, f, x.data(), offsets, r, static_cast<double*>(nullptr));
   }
+  first_row_.push_back(residuals_.size());
 }
 
 std::vector<double> CorrectedMotion::gradient(Interrupt* interrupt) {
@@ -76,9 +89,8 @@ std::vector<double> CorrectedMotion::gradient(Interrupt* interrupt) {
     for (int k = 0; k < 4; ++k)
       for (std::size_t i = 0; i < dofs; ++i) x_bar[first + k * dofs + i] += place.weight[k] * frame_bar[i];
   }
-  std::vector<int> every(last_ + 1);
-  std::iota(every.begin(), every.end(), 0);
-  reverse_rollout(scene, e_.plan, start_.data(), e_.t0, *tape_, every, x_bar.data(), inputs_bar.data(), interrupt);
+  reverse_rollout(scene, e_.plan, start_.data(), e_.t0, *tape_, up_to(last_), x_bar.data(), inputs_bar.data(),
+                  interrupt);
   if (rest_) {
     const auto at = inputs_bar.begin() + static_cast<std::ptrdiff_t>(scene.layout.of(Quantity::position));
     const std::vector<double> rest_bar(at, at + static_cast<std::ptrdiff_t>(dofs));
@@ -89,30 +101,112 @@ std::vector<double> CorrectedMotion::gradient(Interrupt* interrupt) {
   return b_bar;
 }
 
-// The substep that an unknown begins to move: the first one after its earliest knot's support begins; 0 where it moves the start.
-int CorrectedMotion::first_step(int unknown) const {
+// A knot reaches over one piece of the boundary's motion on either side, or two; the end values hold before and after.
+CorrectedMotion::Acts CorrectedMotion::acts(int number) const {
   const Scene& scene = *e_.scene;
   const BoundaryCorrection& c = e_.correction;
-  int first = std::numeric_limits<int>::max();
-  for (int k = c.first[unknown]; k < c.first[unknown + 1]; ++k) first = std::min(first, c.target[k]);
-  const int per_knot = 3 * static_cast<int>(scene.driven.size());
-  const int knot = (first - static_cast<int>(scene.layout.of(Quantity::boundary))) / per_knot;
-  if (knot == 0) return 0;
+  const auto begin = c.target.begin() + c.first[number], end = c.target.begin() + c.first[number + 1];
+  if (begin == end) return {last_, 0};  // it moves nothing
+  const auto knot = [&](int target) {
+    return (target - static_cast<int>(scene.layout.of(Quantity::boundary))) /
+           (3 * static_cast<int>(scene.driven.size()));
+  };
   const int reach = scene.boundary.interpolation == Interpolation::cubic ? 2 : 1;
-  const double begins = scene.boundary.times[std::max(knot - reach, 0)];
-  return std::max(0, static_cast<int>(std::floor((begins - e_.t0) / e_.plan.options.h + 1e-9)) + 1);
+  const std::vector<double>& times = scene.boundary.times;
+  const int first = knot(*std::min_element(begin, end)) - reach, behind = knot(*std::max_element(begin, end)) + reach;
+  const auto step = [&](int k) { return (times[k] - e_.t0) / e_.plan.options.h; };
+  const double from = first + reach == 0 ? 0.0 : std::floor(step(std::max(first, 0)) + 1e-9) + 1.0;
+  return {static_cast<int>(std::clamp(from, 0.0, static_cast<double>(last_))),
+          behind >= static_cast<int>(times.size())
+              ? last_
+              : static_cast<int>(std::clamp(std::ceil(step(behind) - 1e-9), 0.0, static_cast<double>(last_)))};
 }
 
-void CorrectedMotion::columns(int first, int width, double* columns, Interrupt* interrupt) const {
+// A stretch begins three substeps before its first number does, so that every frame that is moved has its four states in it.
+std::vector<CorrectedMotion::Stretch> CorrectedMotion::stretches() const {
+  const int count = e_.correction.count();
+  std::vector<int> order(count), from(count), until(count);
+  for (int i = 0; i < count; ++i) {
+    const Acts a = acts(i);
+    order[i] = i;
+    from[i] = std::max(0, a.from - 3);
+    until[i] = a.until;
+  }
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return from[a] < from[b]; });
+  std::vector<Stretch> all;
+  for (int first = 0, next; first < count; first = next) {
+    next = std::min(first + numbers_per_stretch, count);
+    while (next < count && from[order[next]] == from[order[next - 1]]) ++next;
+    Stretch s{from[order[first]], next < count ? from[order[next]] : last_, {}, {}, {}, {}, {}};
+    for (int i = first; i < next; ++i) {
+      s.numbers.push_back(order[i]);
+      s.at.push_back(from[order[i]]);
+    }
+    if (!all.empty()) s.acting = all.back().onward;
+    for (const auto* numbers : {&s.acting, &s.numbers})
+      for (const int i : *numbers)
+        if (next < count && until[i] > s.end) s.onward.push_back(i);
+    const auto frame_from = [&](int step) {
+      std::size_t f = 0;
+      while (f < e_.observed.times.size() && FramePlace<double>(e_, f, inputs_.back(), last_).base - 1 < step) ++f;
+      return f;
+    };
+    s.frames[0] = frame_from(s.begin);
+    s.frames[1] = next < count ? frame_from(s.end) : e_.observed.times.size();
+    all.push_back(std::move(s));
+  }
+  return all;
+}
+
+Response CorrectedMotion::response(double tolerance, int threads, Interrupt* interrupt) const {
+  Response found{static_cast<int>(residuals_.size()), e_.correction.count(), {}};
+  const std::vector<Stretch> all = stretches();
+  const double time = last_ * e_.plan.options.h / static_cast<double>(std::max<std::size_t>(all.size(), 1));
+  const double place = *std::min_element(e_.observed.sigma.begin(), e_.observed.sigma.end());
+  const Unit unit{place, place / time};
+  MatrixXd carried(4 * e_.scene->dofs(), 0);
+  for (const Stretch& s : all) {
+    const bool last = &s == &all.back();
+    const int directions = static_cast<int>(carried.cols() + s.numbers.size());
+    Response::Segment& segment = found.segments.emplace_back();
+    segment.numbers = s.numbers;
+    segment.first_row = static_cast<int>(first_row_[s.frames[0]]);
+    segment.G = MatrixXd::Zero(static_cast<Index>(first_row_[s.frames[1]]) - segment.first_row, directions);
+    MatrixXd reached =
+        MatrixXd::Zero(last ? 0 : static_cast<Index>(4 * e_.scene->dofs() + s.onward.size()), directions);
+    parallel_for((directions + 7) / 8, threads, 1, [&](int begin, int end) {
+      for (int first = 8 * begin; first < std::min(8 * end, directions); first += 8)
+        march(s, unit, carried, first, std::min(8, directions - first), segment.G, reached, interrupt);
+    });
+    segment.R.resize(0, directions);
+    if (last) break;
+    const Compressed basis(reached, tolerance);
+    segment.R = basis.coordinates;
+    carried = basis.directions;
+  }
+  return found;
+}
+
+// Directions `first` to first + width of a stretch, from where they begin: their columns of G, and of what is reached at its end.
+void CorrectedMotion::march(const Stretch& s, const Unit& unit, const MatrixXd& carried, int first, int width,
+                            MatrixXd& G, MatrixXd& reached, Interrupt* interrupt) const {
   const Scene& scene = *e_.scene;
-  const std::size_t dofs = scene.dofs(), rows = residuals_.size();
-  int moved = last_;
-  for (int k = 0; k < width; ++k) moved = std::min(moved, first_step(first + k));
-  const int from = std::max(0, moved - 3);  // so that every frame that is moved has its four states
-  std::vector<Eight> b(e_.correction.count()), in;
-  for (int k = 0; k < width; ++k) b[first + k].d[k] = 1.0;
-  in.assign((from == 0 ? inputs_ : start_).begin(), (from == 0 ? inputs_ : start_).end());
-  e_.correction.apply(b.data(), in.data());  // of value zero: the inputs are corrected already
+  const std::size_t dofs = scene.dofs();
+  const int brought = static_cast<int>(carried.cols()), from = first < brought ? s.begin : s.at[first - brought];
+  const auto each_brought = [&](auto&& body) {
+    for (int k = 0; k < std::min(width, brought - first); ++k) body(k, carried.col(first + k));
+  };
+  const std::vector<double>& values = from == 0 ? inputs_ : start_;
+  std::vector<Eight> in(values.begin(), values.end());
+  std::vector<Eight> b(e_.correction.count());
+  each_brought([&](int k, const auto& direction) {
+    for (std::size_t i = 0; i < s.acting.size(); ++i) b[s.acting[i]].d[k] = unit.place * direction[4 * dofs + i];
+  });
+  for (int k = std::max(0, brought - first); k < width; ++k)
+    b[s.numbers[first + k - brought]].d[k] = e_.correction.sigma;
+  for (const auto* numbers : {&s.acting, &s.numbers})
+    for (const int i : *numbers)
+      e_.correction.apply(i, b[i], in.data());  // of value zero: they are in the inputs already
   if (from == 0 && rest_) {
     const auto x = equilibrium_coordinates<Eight>(scene, in.data(), e_.equilibrium, *e_.anchor, interrupt);
     std::copy(x.begin(), x.end(), &in[scene.layout.of(Quantity::position)]);
@@ -123,35 +217,50 @@ void CorrectedMotion::columns(int first, int width, double* columns, Interrupt* 
     const double* v0 = &start_[scene.layout.of(Quantity::velocity)];
     tape_->velocity(from, v0, v.data());
     tape_->velocity(from - 1, v0, v_before.data());
-    const auto duals = [&](const double* a) { return std::vector<Eight>(a, a + dofs); };
-    const auto x = duals(&states_[from * dofs]), x_before = duals(&states_[(from - 1) * dofs]);
-    const auto u = duals(v.data()), u_before = duals(v_before.data());
-    rollout.restart(from, {x.data(), x_before.data(), u.data(), u_before.data(), from});
+    const double* parts[4] = {&states_[from * dofs], &states_[(from - 1) * dofs], v.data(), v_before.data()};
+    std::array<std::vector<Eight>, 4> state;
+    for (std::size_t part = 0; part < 4; ++part) {
+      state[part].assign(parts[part], parts[part] + dofs);
+      each_brought([&](int k, const auto& direction) {
+        for (std::size_t i = 0; i < dofs; ++i) state[part][i].d[k] = unit.of(part) * direction[part * dofs + i];
+      });
+    }
+    rollout.restart(from, {state[0].data(), state[1].data(), state[2].data(), state[3].data(), from});
   }
 
-  for (int k = 0; k < width; ++k) std::fill_n(columns + k * rows, rows, 0.0);
   const std::vector<Eight> offsets(inputs_.begin() + static_cast<std::ptrdiff_t>(scene.layout.total()), inputs_.end());
   std::vector<Eight> ring(4 * dofs), x(dofs), r(3 * e_.observed.markers.size());
-  std::size_t next = 0;
+  std::size_t next = s.frames[0];
   const auto place_of = [&] { return FramePlace<Eight>(e_, next, Eight(inputs_.back()), last_); };
-  while (next < first_row_.size() && place_of().base - 1 < from) ++next;
+  while (next < s.frames[1] && place_of().base - 1 < from) ++next;
   const auto keep = [&](int step) {
     std::copy_n(rollout.x(), dofs, &ring[(step % 4) * dofs]);
-    for (; next < first_row_.size(); ++next) {
+    for (; next < s.frames[1]; ++next) {
       const FramePlace<Eight> place = place_of();
       if (step < place.base + 2) return;
       place.interpolate(dofs, [&](int k) { return &ring[((place.base - 1 + k) % 4) * dofs]; }, x.data());
       const Eight* end =
           frame_residuals(e_.observed, next, x.data(), offsets.data(), r.data(), static_cast<Eight*>(nullptr));
+      const auto row = static_cast<Index>(first_row_[next] - first_row_[s.frames[0]]);
       for (int k = 0; k < width; ++k)
-        for (std::ptrdiff_t i = 0; i < end - r.data(); ++i) columns[k * rows + first_row_[next] + i] = r[i].d[k];
+        for (std::ptrdiff_t i = 0; i < end - r.data(); ++i) G(row + i, first + k) = r[i].d[k];
     }
   };
   keep(from);
-  for (int step = from + 1; step <= last_ && next < first_row_.size(); ++step) {
-    poll(interrupt, step, scene.dofs());
+  for (int step = from; step < s.end || next < s.frames[1];) {
+    poll(interrupt, ++step, scene.dofs());
     rollout.advance();
     keep(step);
+    if (step != s.end || reached.size() == 0) continue;
+    const SubstepStates<Eight> now = rollout.state();
+    const Eight* parts[4] = {now.x, now.x_before, now.v, now.v_before};
+    for (int k = 0; k < width; ++k) {
+      for (std::size_t part = 0; part < 4; ++part)
+        for (std::size_t i = 0; i < dofs; ++i)
+          reached(part * dofs + i, first + k) = parts[part][i].d[k] / unit.of(part);
+      for (std::size_t i = 0; i < s.onward.size(); ++i)
+        reached(4 * dofs + i, first + k) = b[s.onward[i]].d[k] / unit.place;
+    }
   }
 }
 

@@ -44,7 +44,8 @@ Problem::Problem(std::vector<Experiment> experiments, std::vector<double> theta,
   }
   for (const FreeParameter& p : free_) priors_ += p.has_prior;
   for (const Experiment& e : experiments_) {
-    projections_.push_back(e.correction.unknowns() > 0 ? std::make_unique<Projection>(e, threads_) : nullptr);
+    projections_.push_back(e.correction.unknowns() > 0 ? std::make_unique<Projection>(e, parameters(), threads_)
+                                                       : nullptr);
     corrections_ += e.correction.unknowns();
   }
 }
@@ -164,7 +165,7 @@ void Problem::project(const double* u, double* residual, double* jacobian) const
     if (!projections_[e]) continue;
     Projection& own = *projections_[e];
     const auto at = [&](int r) { return jacobian + static_cast<std::size_t>(r) * parameters(); };
-    if (jacobian) own.project(u, residual + first_row_[e], at(first_row_[e]), at(row), parameters());
+    if (jacobian) own.project(u, residual + first_row_[e], at(first_row_[e]), at(row));
     for (const double b : own.b()) residual[row++] = b / experiments_[e].correction.sigma;
   }
 }

@@ -3,71 +3,58 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string>
-
-#include "core/threads/pool.h"
+#include <numeric>
 
 namespace sheetbend {
 namespace {
 
-constexpr double largest = 2e9;           // bytes of A
 constexpr double converged = 1e-13;       // of the cost: what another step would take off it
 constexpr double within_rounding = 1e-9;  // likewise, where no step that is tried lowers the cost any more
-constexpr int steps_per_matrix = 15;      // cost less than the matrix does
+constexpr double guiding = 1e-2,
+                 exact = 1e-8;  // of sigma: tolerances of an A that guides steps, and of one for intervals
+constexpr double least_damping = 1.0, largest_damping = 1e9;
+constexpr int steps_per_response = 15;  // cost less than the response does
 constexpr int most_steps = 600, most_halvings = 12;
 
-double squared(const std::vector<double>& a) {
-  double sum = 0.0;
-  for (const double x : a) sum += x * x;
-  return sum;
-}
+double sum_of_squares(const std::vector<double>& a) { return std::inner_product(a.begin(), a.end(), a.begin(), 0.0); }
 
 }  // namespace
 
-Projection::Projection(const Experiment& e, int threads)
-    : e_(&e), threads_(threads), weight_(1.0 / (e.correction.sigma * e.correction.sigma)), b_(e.correction.given) {
-  const double bytes = 8.0 * static_cast<double>(e.residual_count()) * unknowns();
-  if (bytes > largest)
-    throw std::invalid_argument(
-        e.name + ".driven_sigma: has " + std::to_string(unknowns()) + " coordinates to correct, more than " +
-        std::to_string(e.residual_count()) +
-        " residuals leave memory for. Fix: fit a shorter part, or fewer frames of every second");
+Projection::Projection(const Experiment& e, int parameters, int threads)
+    : e_(&e), parameters_(parameters), threads_(threads), given_(e.correction.given) {
+  b_ = Eigen::Map<const Eigen::VectorXd>(given_.data(), unknowns()) / e.correction.sigma;
 }
 
-void Projection::linearize(const CorrectedMotion& motion, Interrupt* interrupt) {
-  A_.resize(0, 0);  // until all of it is there
-  Eigen::MatrixXd A(static_cast<Eigen::Index>(e_->residual_count()), unknowns());
-  parallel_for((unknowns() + 7) / 8, threads_, 1, [&](int begin, int end) {
-    for (int group = begin; group < end; ++group) {
-      const int first = 8 * group;
-      motion.columns(first, std::min(8, unknowns() - first), &A(0, first), interrupt);
-    }
-  });
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(unknowns(), unknowns());
-  normal.selfadjointView<Eigen::Lower>().rankUpdate(A.transpose());
-  normal.diagonal().array() += weight_;
-  normal_.compute(normal);
-  A_ = std::move(A);
+void Projection::linearize(const Corrected& here, double tolerance, double damping, Interrupt* interrupt) {
+  known_ = false;  // until all of it is there
+  A_ = here.response(tolerance, threads_, interrupt);
+  factor_ = ResponseFactor(A_, 1.0 + damping);
+  known_ = true;
 }
 
-std::vector<double> Projection::predicted(const double* u) const {
-  if (X_.size() == 0) return b_;
-  const Eigen::VectorXd b = b_there_ + X_ * (Eigen::Map<const Eigen::VectorXd>(u, u_.size()) - u_);
-  return {b.data(), b.data() + b.size()};
+Eigen::VectorXd Projection::predicted(const double* u) const {
+  const Eigen::Map<const Eigen::VectorXd> here(u, parameters_);
+  if (X_.size() == 0 || (solved_.size() > 0 && here == solved_)) return b_;
+  return b_there_ + X_ * (here - u_);
+}
+
+std::vector<double> Projection::in_meters(const Eigen::VectorXd& b) const {
+  const Eigen::VectorXd meters = e_->correction.sigma * b;
+  return {meters.data(), meters.data() + meters.size()};
 }
 
 // Quasi-Newton steps (limited-memory BFGS, Nocedal & Wright 2006, algorithm 7.4) that begin with the normal matrix of A, from here or from an earlier
-// theta: they go downhill whatever A is, are shortened until they lower the cost, and make A anew where they are many.
+// theta: they go downhill whatever A is, are shortened until they lower the cost, and make A anew where they are many. Where no length of theirs lowers
+// it, A is made anew, and from then on steps are damped (Levenberg 1944) for as long as that is needed: far from the truth a long motion answers noise
+// by much more than in proportion.
 void Projection::solve(const double* theta, const double* u, double* residual, Interrupt* interrupt) {
   using Eigen::VectorXd;
-  const auto vector = [](const std::vector<double>& a) {
-    return Eigen::Map<const VectorXd>(a.data(), static_cast<Eigen::Index>(a.size()));
-  };
-  std::vector<double> trial = predicted(u);
-  VectorXd best, gradient, step;
+  VectorXd trial = predicted(u), best, gradient, step;
   std::vector<std::pair<VectorXd, VectorXd>> pairs;  // steps and what they change in the gradient
-  double cost = std::numeric_limits<double>::infinity(), decrease = cost;
+  std::unique_ptr<Corrected> there;                  // at best
+  double cost = std::numeric_limits<double>::infinity(), decrease = cost, damping = 0.0;
   int halvings = 0, since = 0;  // steps since A was made, or since this theta began
+  bool fresh = false;           // A is of `best`
   const auto newton = [&] {
     VectorXd q = gradient;
     std::vector<double> along(pairs.size());
@@ -76,83 +63,96 @@ void Projection::solve(const double* theta, const double* u, double* residual, I
       along[i] = s.dot(q) / s.dot(y);
       q -= along[i] * y;
     }
-    q = normal_.solve(q).eval();
+    q = factor_.solve(q).eval();
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       const auto& [s, y] = pairs[i];
       q += (along[i] - y.dot(q) / s.dot(y)) * s;
     }
     return q;
   };
+  const auto relinearize = [&] {
+    linearize(*there, guiding, damping, interrupt);
+    pairs.clear();
+    since = 0;
+    fresh = true;
+  };
   for (int turn = 0; turn < most_steps; ++turn) {
-    std::optional<CorrectedMotion> motion;
+    const bool must = std::isinf(cost) && trial == b_;  // there is nothing else to try
+    std::unique_ptr<Corrected> here;
     try {
-      motion.emplace(*e_, theta, trial.data(), interrupt);
+      here = Corrected::at(*e_, theta, in_meters(trial).data(), interrupt);
     } catch (const Diverged&) {
-      if (std::isinf(cost) && trial == b_) throw;
+      if (must) throw;
+    } catch (const Unconverged&) {
+      if (must) throw;
+    } catch (const NoEquilibrium&) {
+      if (must) throw;
     }
-    const double here = motion ? 0.5 * (squared(motion->residuals()) + weight_ * squared(trial)) : cost;
-    if (!(here < cost)) {
+    const double cost_here = here ? 0.5 * (sum_of_squares(here->residuals()) + trial.squaredNorm()) : cost;
+    if (!(cost_here < cost)) {
       if (std::isinf(cost)) {  // predicted too far
-        if (trial == b_) throw Diverged(e_->steps(), 0, e_->observed.times.back());
+        if (must) throw Diverged(e_->steps(), 0, e_->observed.times.back());
         trial = b_;
         continue;
       }
-      if (++halvings <= most_halvings) {
+      if (damping == 0.0 && ++halvings <= most_halvings) {
         step *= 0.5;
-      } else if (!pairs.empty()) {  // once more without them
-        pairs.clear();
-        step = -newton();
-        halvings = 0;
-      } else {
-        break;
+        trial = best + step;
+        continue;
       }
-      VectorXd::Map(trial.data(), step.size()) = best + step;
-      continue;
-    }
-    VectorXd next = vector(motion->gradient(interrupt)) + weight_ * vector(trial);
-    if (step.size() > 0 && step.dot(next - gradient) > 0.0) pairs.emplace_back(step, next - gradient);
-    best = vector(trial);
-    gradient = std::move(next);
-    cost = here;
-    std::copy(motion->residuals().begin(), motion->residuals().end(), residual);
-    if (A_.size() == 0 || since++ == steps_per_matrix) {
-      linearize(*motion, interrupt);
-      pairs.clear();
-      since = 0;
+      if (damping > largest_damping || (damping == 0.0 && decrease <= within_rounding * cost)) break;
+      if (!fresh) {
+        relinearize();
+      } else {
+        damping = std::max(least_damping, 10.0 * damping);
+        pairs.clear();
+        factor_ = ResponseFactor(A_, 1.0 + damping);
+      }
+    } else {
+      const double gain = (cost - cost_here) / decrease;
+      const std::vector<double> by_b = here->gradient(interrupt);
+      VectorXd next = e_->correction.sigma * VectorXd::Map(by_b.data(), unknowns()) + trial;
+      if (step.size() > 0 && step.dot(next - gradient) > 0.0) pairs.emplace_back(step, next - gradient);
+      best = trial;
+      there = std::move(here);
+      gradient = std::move(next);
+      cost = cost_here;
+      fresh = false;
+      std::copy(there->residuals().begin(), there->residuals().end(), residual);
+      const bool damped = damping > 0.0;
+      if (damped && gain > 0.5) damping = damping <= least_damping ? 0.0 : 0.1 * damping;
+      if (!known_ || damped || since++ == steps_per_response) relinearize();
     }
     step = -newton();
-    decrease = -0.5 * gradient.dot(step);
-    if (decrease <= converged * cost) break;
+    decrease = -0.5 * gradient.dot(step) + 0.5 * damping * step.squaredNorm();
+    if (damping == 0.0 && decrease <= converged * cost) break;
     halvings = 0;
-    VectorXd::Map(trial.data(), step.size()) = best + step;
+    trial = best + step;
   }
-  if (!(decrease <= within_rounding * cost)) throw NoCorrection();
-  b_.assign(best.data(), best.data() + best.size());
-  if (exact_) linearize(CorrectedMotion(*e_, theta, b_.data(), interrupt), interrupt);
+  if (damping > 0.0) factor_ = ResponseFactor(A_);
+  if (damping > 0.0 || !(decrease <= within_rounding * cost)) throw NoCorrection();
+  b_ = best;
+  solved_ = VectorXd::Map(u, parameters_);
+  given_ = in_meters(best);
+  if (exact_) linearize(*Corrected::at(*e_, theta, given_.data(), interrupt), exact, 0.0, interrupt);
   exact_ = false;
 }
 
-void Projection::project(const double* u, const double* residual, double* jacobian, double* prior_jacobian,
-                         int parameters) {
+void Projection::project(const double* u, const double* residual, double* jacobian, double* prior_jacobian) {
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  Eigen::Map<RowMajor> J(jacobian, A_.rows(), parameters), P(prior_jacobian, unknowns(), parameters);
-  const Eigen::Map<const Eigen::VectorXd> r(residual, A_.rows()), b(b_.data(), unknowns());
-  X_ = -normal_.solve(A_.transpose() * J);
-  u_ = Eigen::Map<const Eigen::VectorXd>(u, parameters);
-  b_there_ = b;
-  J += A_ * X_;
-  P = std::sqrt(weight_) * X_;
+  Eigen::Map<RowMajor> J(jacobian, A_.rows, parameters_), P(prior_jacobian, unknowns(), parameters_);
+  const Eigen::Map<const Eigen::VectorXd> r(residual, A_.rows);
+  X_ = -factor_.solve(A_.transposed(J));
+  u_ = Eigen::Map<const Eigen::VectorXd>(u, parameters_);
+  b_there_ = b_;
+  J += A_.times(X_);
+  P = X_;
   // What an A of an earlier theta adds to the gradient, taken out again along the residuals: nothing where A is exact.
-  const Eigen::VectorXd excess = X_.transpose() * (A_.transpose() * r + weight_ * b);
-  const double size = r.squaredNorm() + weight_ * b.squaredNorm();
+  const Eigen::VectorXd excess = X_.transpose() * (A_.transposed(r) + b_);
+  const double size = r.squaredNorm() + b_.squaredNorm();
   if (size == 0.0) return;
   J -= r * excess.transpose() / size;
-  P -= std::sqrt(weight_) * b * excess.transpose() / size;
-}
-
-double Projection::absorbed() const {
-  const Eigen::MatrixXd inverse = normal_.solve(Eigen::MatrixXd::Identity(unknowns(), unknowns()));
-  return unknowns() - weight_ * inverse.trace();
+  P -= b_ * excess.transpose() / size;
 }
 
 }  // namespace sheetbend

@@ -1,18 +1,17 @@
-// The correction b of one experiment's boundary, solved for at every theta (variable projection, Golub & Pereyra 1973). With r the residuals, A = dr/db
-// and s the prior's deviation,
+// The correction b of one experiment's boundary, solved for at every theta (variable projection, Golub & Pereyra 1973). With r the residuals, b in units
+// of its prior's deviation and A = dr/db,
 //
-//   b(theta) = argmin |r(theta, b)|^2 + |b/s|^2,      X = -(A^T A + s^-2)^-1 A^T J_theta,
+//   b(theta) = argmin |r(theta, b)|^2 + |b|^2,      X = -(A^T A + 1)^-1 A^T J_theta,
 //
-// and the optimizer sees the residuals [r(theta, b(theta)); b(theta)/s] with the Jacobian [J_theta + A X; X/s] (Kaufman 1975). A takes a rollout
-// for every eight numbers, while the gradient by all of them takes one adjoint. So b is made stationary by the adjoint, with steps that an A of an
-// earlier theta only guides, the gradient by theta is corrected to J_theta^T r, which it then is, and `relinearize` makes A exact for intervals.
+// and the optimizer sees the residuals [r(theta, b(theta)); b(theta)] with the Jacobian [J_theta + A X; X] (Kaufman 1975). A takes many rollouts, while the
+// gradient by all of b takes one adjoint. So b is made stationary by the adjoint, with steps that an A of an earlier theta only guides, the gradient by
+// theta is corrected to J_theta^T r, which it then is, and `relinearize` makes A exact for intervals.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <stdexcept>
 #include <vector>
 
-#include "adjoint/corrected_motion.h"
+#include "adjoint/corrected.h"
 
 namespace sheetbend {
 
@@ -25,37 +24,39 @@ struct NoCorrection : std::runtime_error {
 
 class Projection {
  public:
-  // Throws std::invalid_argument where A would not fit into memory.
-  Projection(const Experiment& e, int threads);
+  Projection(const Experiment& e, int parameters, int threads);  // parameters: of the optimizer
 
   int unknowns() const { return e_->correction.unknowns(); }
-  const std::vector<double>& b() const { return b_; }
+  const std::vector<double>& b() const { return given_; }  // [m]
 
   // b(theta), and the residuals there (residual_count); u are the optimizer's parameters that make theta. Throws what the rollout throws, and
   // NoCorrection; b is then as it was.
   void solve(const double* theta, const double* u, double* residual, Interrupt* interrupt);
 
-  // Turns J_theta (rows x parameters, row-major) into J_theta + A X and fills X/s (unknowns x parameters), where `solve` ended.
-  void project(const double* u, const double* residual, double* jacobian, double* prior_jacobian, int parameters);
+  // Turns J_theta (rows x parameters, row-major) into J_theta + A X and fills X (unknowns x parameters), where `solve` ended.
+  void project(const double* u, const double* residual, double* jacobian, double* prior_jacobian);
 
   // Lets the next `solve` make A where it ends.
   void relinearize() { exact_ = true; }
 
-  // What b absorbs of the data's degrees of freedom: the trace of A (A^T A + s^-2)^-1 A^T.
-  double absorbed() const;
+  // What b absorbs of the data's degrees of freedom: the trace of A (A^T A + 1)^-1 A^T.
+  double absorbed() const { return unknowns() - factor_.inverse_trace(); }
 
  private:
-  std::vector<double> predicted(const double* u) const;
-  void linearize(const CorrectedMotion& motion, Interrupt* interrupt);
+  Eigen::VectorXd predicted(const double* u) const;
+  std::vector<double> in_meters(const Eigen::VectorXd& b) const;
+  void linearize(const Corrected& here, double tolerance, double damping, Interrupt* interrupt);
 
   const Experiment* e_;
-  int threads_;
-  double weight_;  // s^-2
-  std::vector<double> b_;
-  bool exact_ = false;
-  Eigen::MatrixXd A_, X_;
+  int parameters_, threads_;
+  std::vector<double> given_;
+  Eigen::VectorXd b_;
+  bool exact_ = false, known_ = false;  // whether there is an A
+  Response A_;
+  ResponseFactor factor_;
+  Eigen::MatrixXd X_;
   Eigen::VectorXd u_, b_there_;  // where X was made: b goes on from there along X
-  Eigen::LLT<Eigen::MatrixXd> normal_;
+  Eigen::VectorXd solved_;       // u of the last solve
 };
 
 }  // namespace sheetbend

@@ -75,6 +75,9 @@ class Rollout {
 
   const T* x() const { return x_.data(); }
 
+  // All that the next substep begins with.
+  SubstepStates<T> state() const { return {x_.data(), x_before_.data(), v_.data(), v_before_.data(), step_}; }
+
   // Calls sink(step, x, v) for the initial state and after every substep.
   template <class Sink>
   void run(int steps, Sink&& sink, Interrupt* interrupt = nullptr) {

@@ -42,14 +42,17 @@ class Correction:
     weight: Array
 
     @classmethod
-    def of(cls, scene: Scene, until: float) -> Correction | None:
-        """Of a scene whose compared frames end at `until` s; None where it follows no markers."""
+    def of(cls, scene: Scene, until: float | None) -> Correction | None:
+        """Of a scene whose compared frames end at `until` s, or that rests at 0 s (None); None where it follows no
+        markers."""
         boundary = scene.boundary
         markers = tuple(dict.fromkeys(m for part in boundary.following for m in part.markers))
         if not markers:
             return None
         every = len(boundary.times)
-        knots = min(every, int(np.searchsorted(boundary.times, until - 1e-9)) + KNOTS_BEYOND)
+        next_knot = int(np.searchsorted(boundary.times, (0.0 if until is None else until) - 1e-9))
+        rests_on_knot = until is None and next_knot < every and boundary.times[next_knot] < 1e-9
+        knots = min(every, next_knot + (1 if rests_on_knot else KNOTS_BEYOND))
         length, target, weight = [], [], []
         for knot in range(knots):
             for marker in markers:

@@ -46,7 +46,8 @@ class Experiment:
         driven_sigma: noise of the markers that the scene follows (`Scene.follow`), m per coordinate, or "estimate"
             (from the recording itself): the fit then estimates their true motion along with the parameters, one
             correction for every frame and axis with this prior, and its intervals allow for it. `sigma` must be as
-            honest, since the two are weighed against each other. None = the recorded motion is taken for the truth.
+            honest, since the two are weighed against each other. For an equilibrium it is the noise of the places that
+            hold it, in m. None = what is recorded of them is taken for the truth.
         axes: coordinates that count, such as "xz".
         radius: distance of the markers from a pivot, m: errors are then reported as angles in rad, rms
             distance/radius; None = in m.
@@ -142,9 +143,6 @@ class Experiment:
         if given != "estimate" and not (is_number(given) and given > 0):  # type: ignore[operator]
             fix = "give the noise of the driven markers in m, or 'estimate'"
             raise InputError(field, "must be positive", given, fix)
-        if self.static:
-            fix = "leave it out: the frames of an equilibrium are averaged, and so is their noise"
-            raise InputError(field, "makes no sense for an equilibrium", given, fix)
         if not self.scene.boundary.following:
             fix = "let particles follow markers (Scene.follow, [[scene.drive]], [[scene.cloth.grip]]), or leave it out"
             raise InputError(field, "has no driven marker to correct", given, fix)
@@ -288,7 +286,7 @@ class Experiment:
 
     def correction(self, recording: Recording) -> Correction | None:
         """Of the markers that the scene follows, as far as (part of) the recording feels it; None without any."""
-        return None if self.static else Correction.of(self.scene, float(recording.times[-1]) - self.t0)
+        return Correction.of(self.scene, None if self.static else float(recording.times[-1]) - self.t0)
 
     def core(self, recording: Recording, corrected: np.ndarray | None = None) -> dict[str, Any]:
         """The experiment on (part of) its recording, for the compiled core.

@@ -11,10 +11,14 @@ from typing import Any
 import numpy as np
 
 from .errors import InputError, SheetbendError
+from .gauge import RANK_TOLERANCE
 from .optional import require
 from .problem import FitProblem
+from .wording import short
 
 OPTIMIZERS = ("auto", "ceres", "scipy")
+STUCK = 1e-5  # of the cost: a third of a standard error where residuals are ten thousand
+ROUNDING = 1e-12  # of the first cost: residuals of data without noise end as rounding errors, which have any slope
 
 
 @dataclass(frozen=True)
@@ -82,6 +86,32 @@ def minimize(
     run = _ceres if name == "ceres" else _scipy
     end = run(problem, np.array(u, dtype=float), max_iterations, tolerance, _Best(observe, u, first))
     return replace(end, first=first), name
+
+
+def judged(problem: FitProblem, end: Minimum, first: float) -> Minimum:
+    """An optimizer's end after a first cost: no convergence where the cost has still a slope. Optimizers also stop
+    where steps are small and take little off, as they are wherever no step lowers the cost: at a kink, or where
+    gradients are off."""
+    if not end.converged:
+        return end
+    left = _promised(problem, end.u)
+    if left <= STUCK or left * end.cost <= ROUNDING * first:
+        return end
+    words = f"no step lowers the cost, though its slope promises {short(100 * left, 2)} % less (a kink, a rough motion)"
+    return replace(end, converged=False, message=f"{words}: {end.message}")
+
+
+def _promised(problem: FitProblem, u: np.ndarray) -> float:
+    """Share of the cost that a Gauss-Newton step from u inside the bounds would take off, were the residuals linear."""
+    ok, r, J = problem.evaluate(u)
+    lower, upper = problem.parameters.bounds()
+    slope, size = J.T @ r, np.linalg.norm(J, axis=0)
+    free = (size > RANK_TOLERANCE * np.linalg.norm(r)) & ~((u <= lower) & (slope > 0)) & ~((u >= upper) & (slope < 0))
+    if not ok or not free.any() or not r.any():
+        return 0.0
+    columns = J[:, free] / size[free]
+    step = np.linalg.lstsq(columns, r, rcond=RANK_TOLERANCE)[0]
+    return float(np.sum((columns @ step) ** 2) / (r @ r))
 
 
 def refit(

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .errors import InputError
-from .optimizers import Minimum, Observer, Progress, minimize
+from .optimizers import Minimum, Observer, Progress, judged, minimize
 from .problem import FitProblem
 
 WINDOW_TOLERANCE = 1e-3  # relative, of the cost: a window's minimum is only a start
@@ -91,7 +91,9 @@ class Search:
                     raise KeyboardInterrupt
                 return replace(end, cost=cost, first=first, iterations=iterations), name
         end, name = minimize(problem, u, self.optimizer, self.max_iterations, self.tolerance, self._observer(None))
-        return replace(end, first=first if before else end.first, iterations=iterations + end.iterations), name
+        began = first if before else end.first
+        end = judged(problem, end, end.cost if began is None else began)
+        return replace(end, first=began, iterations=iterations + end.iterations), name
 
     def _observer(self, window: float | None) -> Observer | None:
         observe = self.progress

@@ -279,3 +279,33 @@ def test_a_refit_is_part_of_the_saved_result(tmp_path):
     assert "What refits on a finer discretization move" in found.report()
     earlier = {key: value for key, value in found.to_dict().items() if key != "refits"}
     assert sb.FitResult.from_dict(earlier).refits == ()
+
+
+@pytest.mark.parametrize("optimizer", ["scipy", pytest.param("ceres", marks=needs_ceres)])
+def test_an_end_at_a_kink_is_no_convergence(optimizer):
+    """A marker half on a particle that goes back and forth with every substep, never as far as was measured: nearest is
+    a substep, where the motion between substeps has a kink. Steps shrink there and no slope vanishes."""
+    scene = sb.Scene("zigzag", gravity=(0.0, 0.0, 0.0))
+    scene.add_particles([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]], 1.0)
+    times = 0.01 * np.arange(41)
+    motion = 0.01 * (-1.0) ** np.arange(41)[:, None, None] * np.array([1.0, 0.0, 0.0])
+    scene.drive([0], times, motion)
+    scene.add_quantity("clock", 0.004, "s", positive=False)
+    measured = np.full((9, 1, 3), np.nan)
+    measured[:8, 0, 0] = 0.006 + 1e-4 * np.arange(8)
+    measured[:8, 0, 1:] = 0.0
+    e = sb.Experiment(
+        scene=scene,
+        recording=sb.Recording(positions=measured, times=0.02 * np.arange(5, 14), name="zigzag"),
+        markers=[sb.between(0, 1, 0.5)],
+        solver=sb.Solver(h=0.01),
+        start_time=0.0,
+        time_offset="clock",
+        axes="x",
+    )
+    fit = sb.fit(e, parameters=["clock"], optimizer=optimizer, profiles=False)
+    assert fit["clock"].value == approx(0.0, abs=1e-6)  # 1 mm off, the least that it can be
+    assert not fit.result.converged
+    assert "no step lowers the cost, though its slope promises 97 % less" in fit.result.message
+    assert any("did not converge: no step" in words for words in fit.result.warnings)
+    assert "did NOT converge" in fit.report()
