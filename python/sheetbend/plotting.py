@@ -15,6 +15,7 @@ import numpy as np
 
 from .drawing import ACCENT, GRAY, INK, PALE, WARM, clean, key, new_figure
 from .errors import InputError
+from .optional import require
 from .result import Estimate
 from .timeseries import Array
 
@@ -243,6 +244,8 @@ def _estimates_panel(
         panel.ticklabel_format(axis="x", useOffset=False)
     low, high = (min(ends) / 1.5, max(ends) * 1.5) if log else _padded(min(ends), max(ends))
     panel.set_xlim(low, high)
+    if log:
+        _label_decades(panel, high / low)
     for row, estimate in enumerate(group):
         known = estimate.verdict == "identified"
         color = ACCENT if known else GRAY
@@ -261,6 +264,14 @@ def _estimates_panel(
     panel.set_yticks(range(len(group)), [estimate.name for estimate in group])
     panel.tick_params(axis="y", length=0)
     panel.set_ylim(len(group) - 0.4, -0.6)
+
+
+def _label_decades(panel: Axes, span: float) -> None:
+    """Numbers at 1, 2 and 5 of each decade, of more than three decades at 1 alone."""
+    ticker = require("matplotlib.ticker", "plot")
+    panel.xaxis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0) if span < 1e3 else (1.0,)))
+    panel.xaxis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
+    panel.xaxis.set_minor_formatter(ticker.NullFormatter())
 
 
 def _padded(low: float, high: float) -> tuple[float, float]:

@@ -96,6 +96,16 @@ def test_vertices_that_an_exporter_split_are_merged_on_request(tmp_path: Path) -
     assert mesh.areas.sum() == approx(0.09)
 
 
+@pytest.mark.filterwarnings("ignore:.*gathered seams")
+def test_a_texture_that_is_no_flat_pattern_is_named(tmp_path: Path) -> None:
+    """One half of the square is 1.4 times as wide in the texture, as unwrapping without seams leaves it."""
+    stretched = CUT.replace("vt 0.5 0\nvt 0.6 0.1\nvt 0.5 0.1", "vt 0.5 0\nvt 0.64 0.1\nvt 0.5 0.1")
+    (tmp_path / "bad.obj").write_text(stretched)
+    with pytest.warns(UserWarning, match=r"1 of 2 triangles have sides up to 1\.4 times") as said:
+        sb.read_mesh(tmp_path / "bad.obj", unit="mm")
+    assert any("material='unfold'" in str(w.message) for w in said)
+
+
 def test_triangles_of_two_corners_are_left_out(tmp_path: Path) -> None:
     """As decimation leaves them; also those that merging makes, of a sliver between two copies of a vertex."""
     (tmp_path / "cut.obj").write_text(CUT + "f 1/1 2/2 2/2\nf 3/3 1/1 3/3\n")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import itertools
 import json
 import math
 import subprocess
@@ -254,3 +255,19 @@ def test_shape_and_estimate_figures(result: FitResult) -> None:
         plot_shapes([], [])
     with pytest.raises(InputError, match="empty"):
         plot_estimates([])
+
+
+@pytest.mark.parametrize(("lower", "upper"), [(18.0, 600.0), (10.0, 5e4)])
+def test_numbers_of_a_wide_estimate_stand_apart(lower: float, upper: float) -> None:
+    """Over one to a few decades: no two labels of the axis overlap."""
+    pytest.importorskip("matplotlib")
+    from sheetbend.plotting import plot_estimates
+
+    wide = dataclasses.replace(estimate("cloth_warp", 50.0, 20.0, "weak", ""), lower=lower, upper=upper)
+    figure = plot_estimates([wide])
+    figure.canvas.draw()
+    (axis,) = (axes.xaxis for axes in figure.axes)
+    texts = [*axis.get_ticklabels(), *axis.get_ticklabels(minor=True)]
+    boxes = sorted((t.get_window_extent() for t in texts if t.get_text()), key=lambda box: box.x0)
+    assert len(boxes) >= 3
+    assert all(left.x1 < right.x0 for left, right in itertools.pairwise(boxes))

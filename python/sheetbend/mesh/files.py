@@ -26,6 +26,7 @@ _FORMATS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     ".stl": ({}, {}),
 }
 _SMALLEST, _LARGEST = 2e-3, 20.0  # m: sizes of fabrics, and of balls and sleeves made of them
+_DISTORTED = 1.25  # of a side: more than fabrics stretch in a drape
 _OTHER_SIZE = 2.0  # of lengths between texture and shape: more is no stretch but another unit
 
 
@@ -81,6 +82,9 @@ def read_mesh(
         coordinates = finite("material", material, None, MeshError)
     elif material == "texture":
         coordinates = _scaled_texture(path, vertices[triangles], texture, texture_size)
+        distorted = _distortion(vertices[triangles], coordinates)
+        if distorted:
+            warnings.warn(f"{path.name}: {distorted}", stacklevel=2)
     else:
         refuse_broken(triangles, len(vertices))
         coordinates = unfold(vertices, triangles, warp)
@@ -163,6 +167,20 @@ def _scaled_texture(path: Path, corners: Array, texture: Array | None, size: flo
         problem = f"makes {flat:.3g} m^2 of fabric from a shape of {shape:.3g} m^2"
         raise MeshError("texture_size", problem, scale.tolist(), fix)
     return scaled
+
+
+def _distortion(corners: Array, flat: Array) -> str:
+    """A sentence on triangles whose sides are far from those in the material; none where there are none."""
+    shape, sides = (np.linalg.norm(np.roll(x, -1, axis=1) - x, axis=2) for x in (corners, flat))
+    ratio = shape / np.maximum(sides, np.finfo(float).tiny)
+    off = np.exp(np.abs(np.log(np.maximum(ratio, np.finfo(float).tiny))))
+    far = (off > _DISTORTED).any(axis=1)
+    if not far.any():
+        return ""
+    return (
+        f"{far.sum()} of {len(far)} triangles have sides up to {off.max():.2g} times longer or shorter than in the "
+        "texture: as a flat pattern it would start them strained. Give material='unfold' where the shape is at rest."
+    )
 
 
 def _per_vertex(coordinates: Array, triangles: NDArray[np.int64], count: int) -> Array:
