@@ -64,31 +64,21 @@ void EquilibriumDerivative::vjp(const double* x_bar, const double* lambda_bar, d
     c_bar.add_to(&fixed[scene_.first_dof[nodes[2]]]);
   });
 
-  using D = Dual<double, 1>;
-  std::vector<Vec3<D>> along, gradient;
+  std::vector<Vec3<double>> x, along, gradient;
   for (int i = 0; i < static_cast<int>(scene_.volumes.size()); ++i) {
     const Volume& volume = scene_.volumes[i];
     const double p = at_.lambda[scene_.rows + i], v_here = v[scene_.rows + i];
-    place_volume(
-        volume,
-        [&](int n) {
-          D x[3];
-          for (int d = 0; d < 3; ++d) {
-            x[d].v = at_.x[scene_.first_dof[n] + d];
-            x[d].d[0] = u[scene_.first_dof[n] + d];
-          }
-          return Vec3<D>(x);
-        },
-        along);
-    gradient.resize(along.size());
-    enclosed(volume, along, gradient);
+    const auto dof = [&](std::size_t k) { return scene_.first_dof[volume.nodes[k]]; };
+    for (auto* a : {&x, &along, &gradient}) a->resize(volume.nodes.size());
+    place_volume([&](std::size_t k) { return Vec3<double>(&at_.x[dof(k)]); }, x);
+    enclosed(volume, x, gradient);
+    for (std::size_t k = 0; k < x.size(); ++k) {
+      along[k] = -p * Vec3<double>(&u[dof(k)]);
+      (-v_here * gradient[k]).add_to(&fixed[dof(k)]);
+    }
+    for_each_hessian_times(volume, x, along, [&](int k, const Vec3<double>& share) { share.add_to(&fixed[dof(k)]); });
     bar.of(Quantity::volume)[i] += v_here;
     bar.of(Quantity::volume_compliance)[i] -= v_here * p;
-    for (std::size_t k = 0; k < gradient.size(); ++k) {
-      const auto by = [&](const D& g) { return -(p * g.d[0] + v_here * g.v); };
-      Vec3<double>(by(gradient[k].x), by(gradient[k].y), by(gradient[k].z))
-          .add_to(&fixed[scene_.first_dof[volume.nodes[k]]]);
-    }
   }
 
   const Vec3<double> gravity(in.of(Quantity::gravity));

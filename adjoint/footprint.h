@@ -18,7 +18,10 @@ inline std::size_t plan_bytes(const Plan& plan) {
   for (const PackedColor& color : plan.packs.colors) bytes += size_in_bytes(color.items) + size_in_bytes(color.nodes);
   for (const DirectBlock& block : plan.blocks) {
     bytes += size_in_bytes(block.members) + size_in_bytes(block.particles) + size_in_bytes(block.window) +
-             size_in_bytes(block.window_rows) + size_in_bytes(block.multipliers) + size_in_bytes(block.positions);
+             size_in_bytes(block.window_rows) + size_in_bytes(block.multipliers) + size_in_bytes(block.positions) +
+             size_in_bytes(block.volumes);
+    for (const BlockVolume& volume : block.volumes)
+      bytes += size_in_bytes(volume.particles) + size_in_bytes(volume.gradients);
     for (const MemberRun& run : block.runs)
       bytes += size_in_bytes(run.items) + size_in_bytes(run.nodes) + size_in_bytes(run.gradients) +
                size_in_bytes(run.first_row) + size_in_bytes(run.entries);
@@ -44,7 +47,7 @@ std::size_t block_bytes(const Scene& scene, const DirectBlock& block, int kept_i
   const std::size_t particles = of(sheetbend_blocks::row * block.particles.size());
   std::size_t factor = sizeof(Factor<T>) + sizeof(CondensedSolver<T>) + Factor<T>::bytes(block.structure);
   if (block.condensation && !block.implicit)
-    factor += CondensedSolver<T>::bytes(*block.condensation, block.movable, block.size());
+    factor += CondensedSolver<T>::bytes(*block.condensation, block.movable, block.size(), block.volumes.size());
   std::size_t bytes =
       sizeof(BlockState<T>) + 2 * of(block.size()) + (block.damped ? 2 * (particles + of(block.size())) : 0) +
       iterations * (of(sheetbend_blocks::row * block.window_rows.size()) + of(rows) + particles + factor) +
@@ -55,6 +58,8 @@ std::size_t block_bytes(const Scene& scene, const DirectBlock& block, int kept_i
     bytes += of(run.items.size() * sheetbend_blocks::value_count(group.damped, group.parameters));
     bytes += sizeof(sheetbend_blocks::Run);
   }
+  for (const BlockVolume& volume : block.volumes)
+    bytes += sizeof(BlockVolumeState<T>) + 2 * sizeof(Vec3<T>) * volume.particles.size();
   return bytes;
 }
 
@@ -66,6 +71,8 @@ std::size_t block_cotangent_bytes(const Scene& scene, const DirectBlock& block) 
   std::size_t bytes =
       sizeof(BlockCotangents<T>) + (block.damped ? 4 : 2) * particles + of(right_side<T>(block)) + 2 * of(block.size());
   for (const MemberRun& run : block.runs) bytes += of(run.items.size() * (2 + scene.groups[run.group].parameters));
+  for (const BlockVolume& volume : block.volumes)
+    bytes += sizeof(typename BlockCotangents<T>::VolumeValues) + sizeof(Vec3<T>) * volume.particles.size();
   if (block.implicit) bytes += 2 * sizeof(T) * 3 * block.movable;  // p and what it gathers
   return bytes;
 }
@@ -77,19 +84,19 @@ std::size_t row_bytes(const PackPlan& plan) {
 
 // The VolumeStates.
 template <class T>
-std::size_t volume_bytes(const Scene& scene, int kept_iterations) {
+std::size_t volume_bytes(const Scene& scene, const Plan& plan, int kept_iterations) {
   const std::size_t iterations = std::max(1, kept_iterations);
   std::size_t bytes = 0;
-  for (const Volume& volume : scene.volumes)
+  for (const Volume& volume : std::span(scene.volumes).first(swept_volumes(scene, plan)))
     bytes += sizeof(VolumeState<T>) + iterations * sizeof(VolumeRecord<T>) +
              (iterations + 1) * sizeof(Vec3<T>) * volume.nodes.size();
   return bytes;
 }
 
 template <class T>
-std::size_t volume_cotangent_bytes(const Scene& scene) {
+std::size_t volume_cotangent_bytes(const Scene& scene, const Plan& plan) {
   std::size_t bytes = 0;
-  for (const Volume& volume : scene.volumes)
+  for (const Volume& volume : std::span(scene.volumes).first(swept_volumes(scene, plan)))
     bytes += sizeof(VolumeCotangents<T>) + sizeof(Vec3<T>) * volume.nodes.size();
   return bytes;
 }
@@ -100,7 +107,7 @@ std::size_t substep_bytes(const Scene& scene, const Plan& plan, bool keeps_itera
   std::size_t bytes = sizeof(T) * (scene.has_drag ? 2 : 1) * static_cast<std::size_t>(scene.nodes());
   if constexpr (!std::is_same_v<T, double>) bytes += sizeof(sheetbend_points::Frame) * scene.directors.size();
   for (const DirectBlock& block : plan.blocks) bytes += block_bytes<T>(scene, block, kept);
-  bytes += volume_bytes<T>(scene, kept);
+  bytes += volume_bytes<T>(scene, plan, kept);
   if (plan.colors.empty()) return bytes;
   bytes += sizeof(T) * damped_rows(scene);
   if constexpr (in_packs<T>) {
@@ -131,7 +138,7 @@ std::size_t reverse_bytes(const Scene& scene, const Plan& plan) {
                              (plan.options.partition == Partition::implicit ? 1 : 0);
   std::size_t bytes = sizeof(T) * states * dofs + substep_bytes<T>(scene, plan, true);
   for (const DirectBlock& block : plan.blocks) bytes += block_cotangent_bytes<T>(scene, block);
-  bytes += volume_cotangent_bytes<T>(scene);
+  bytes += volume_cotangent_bytes<T>(scene, plan);
   if (scene.yields) bytes += sizeof(T) * dofs;
   if (!sweeps_packs<T>(plan)) bytes += sizeof(T) * (dofs + nodes);
   if (plan.colors.empty()) return bytes;

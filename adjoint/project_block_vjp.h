@@ -3,6 +3,7 @@
 
 #include "adjoint/blocks/block_reverse.h"
 #include "adjoint/element/rates_vjp.h"
+#include "adjoint/volume_vjp.h"
 #include "core/solver/project_block.h"
 
 namespace sheetbend {
@@ -21,6 +22,11 @@ struct BlockCotangents {
   Numbers<T> x, z, y, lambda, C_r;
   Numbers<T> x_now, x_before;      // of the states that damping refers to
   std::vector<Numbers<T>> values;  // per run
+  struct VolumeValues {
+    T rest{}, a{};           // of what is kept, and of a
+    std::vector<Vec3<T>> v;  // of dV/dx
+  };
+  std::vector<VolumeValues> volumes;
   double eta = 0.0;
 
   void resize(const Scene& scene, const DirectBlock& block) {
@@ -32,6 +38,8 @@ struct BlockCotangents {
     values.resize(block.runs.size());
     for (std::size_t r = 0; r < values.size(); ++r)
       values[r].assign(block.runs[r].items.size() * (2 + scene.groups[block.runs[r].group].parameters));
+    volumes.resize(block.volumes.size());
+    for (std::size_t v = 0; v < volumes.size(); ++v) volumes[v].v.resize(block.volumes[v].particles.size());
   }
 };
 
@@ -50,6 +58,12 @@ void finish_block(const Scene& scene, const DirectBlock& block, const Inputs<con
     }
     bar.values[r].clear();
   }
+  for (std::size_t v = 0; v < block.volumes.size(); ++v) {
+    const int volume = block.volumes[v].volume;
+    in_bar.of(Quantity::volume)[volume] += std::exchange(bar.volumes[v].rest, T(0.0));
+    in_bar.of(Quantity::volume_compliance)[volume] +=
+        std::exchange(bar.volumes[v].a, T(0.0)) * T(1.0 / (bar.eta * bar.eta));
+  }
   bar.eta = 0.0;
 }
 
@@ -65,6 +79,33 @@ void begin_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const T
     bar.lambda[row] = lambda_bar ? lambda_bar[block.multipliers[row]] : T(0.0);
   for (int p = 0; p < block.movable; ++p)
     std::copy_n(x_bar + s.scene.first_dof[block.particles[p]], 3, bar.x.data() + sheetbend_blocks::row * p);
+}
+
+// The volumes' own share, as pull_back() is that of the constraints.
+template <class T>
+void pull_back_volumes(const Scene& scene, const DirectBlock& block, BlockState<T>& state, int iteration,
+                       BlockCotangents<T>& bar) {
+  auto& own = state.at(iteration);
+  const auto vector_at = [](Numbers<T>& rows, int particle) {
+    return Vec3<T>(rows.data() + sheetbend_blocks::row * static_cast<std::size_t>(particle));
+  };
+  for (std::size_t i = 0; i < block.volumes.size(); ++i) {
+    const BlockVolume& volume = block.volumes[i];
+    const T dl = own.dl[volume.row], y = bar.y[volume.row];
+    typename BlockCotangents<T>::VolumeValues& values = bar.volumes[i];
+    values.rest += y;
+    values.a -= y * (state.at(state.lambda, iteration)[volume.row] + dl);
+    bar.lambda[volume.row] -= state.diagonal[volume.row] * y;
+    for (std::size_t k = 0; k < values.v.size(); ++k) {
+      const int p = volume.particles[k];
+      const T w = p < block.movable ? state.at(state.x, iteration)[sheetbend_blocks::row * p + 3] : T(0.0);
+      values.v[k] = w * (dl * vector_at(bar.z, p) - y * vector_at(own.u, p));
+    }
+    place_volume(volume, state, iteration, state.volumes[i].x);
+    for_each_hessian_times(
+        scene.volumes[volume.volume], state.volumes[i].x, values.v,
+        [&](int k, const Vec3<T>& share) { share.add_to(bar.x.data() + sheetbend_blocks::row * volume.particles[k]); });
+  }
 }
 
 template <class T>
@@ -85,6 +126,7 @@ void project_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const
     solve_sparse(block, state, iteration, bar.y.data());
   reverse.spread(arrays);
   reverse.pull_back(arrays);
+  pull_back_volumes(s.scene, block, state, iteration, bar);
 }
 
 // Writes the cotangents of the predicted coordinates of movable nodes and adds those of inverse masses (nodes). Those of fixed nodes stay

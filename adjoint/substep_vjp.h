@@ -19,7 +19,8 @@ struct ReverseScratch {
   std::vector<BlockCotangents<T>> blocks;
   std::vector<VolumeCotangents<T>> volumes;
 
-  ReverseScratch(const Scene& scene, const Plan& plan) : blocks(plan.blocks.size()), volumes(scene.volumes.size()) {
+  ReverseScratch(const Scene& scene, const Plan& plan)
+      : blocks(plan.blocks.size()), volumes(swept_volumes(scene, plan)) {
     for (std::size_t v = 0; v < volumes.size(); ++v) volumes[v].v.resize(scene.volumes[v].nodes.size());
     for (std::size_t b = 0; b < blocks.size(); ++b) blocks[b].resize(scene, plan.blocks[b]);
     if (!plan.colors.empty()) C_r.resize(damped_rows(scene));

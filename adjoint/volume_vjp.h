@@ -38,14 +38,8 @@ void project_volumes_vjp(const Scene& scene, const Inputs<const T>& in, double e
       bar.v[k] = (w[nodes[k]] * record.dl) * (z - y * g[k]);
       z.store(q_bar.of(nodes[k]));
     }
-    const auto add_hessian = [&](int a, int b, int c) {
-      scaled(1.0 / 6.0, cross(bar.v[b], record.x[c]) + cross(record.x[b], bar.v[c])).add_to(q_bar.of(nodes[a]));
-    };
-    for (const auto& [a, b, c] : volume.triangles) {
-      add_hessian(a, b, c);
-      add_hessian(b, c, a);
-      add_hessian(c, a, b);
-    }
+    for_each_hessian_times(volume, record.x, bar.v,
+                           [&](int k, const Vec3<T>& share) { share.add_to(q_bar.of(nodes[k])); });
   }
 }
 

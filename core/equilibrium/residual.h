@@ -86,8 +86,8 @@ inline std::vector<double> compliances(const Scene& scene, const Inputs<const do
 template <class T>
 T kept_volume(const Scene& scene, const Inputs<const T>& in, int i, const T* x, std::vector<Vec3<T>>& gradient) {
   const Volume& volume = scene.volumes[i];
-  std::vector<Vec3<T>> at;
-  place_volume(volume, [&](int n) { return Vec3<T>(x + scene.first_dof[n]); }, at);
+  std::vector<Vec3<T>> at(volume.nodes.size());
+  place_volume([&](std::size_t k) { return Vec3<T>(x + scene.first_dof[volume.nodes[k]]); }, at);
   gradient.resize(at.size());
   return enclosed(volume, at, gradient) - in.of(Quantity::volume)[i];
 }

@@ -29,6 +29,7 @@ struct BlockNumbers {
   const T* diagonal;       // D = a/(1+g), per row
   const int *window, *rows;  // as in sheetbend_blocks::Block
   int movable, size;
+  int volumes = 0;  // rows of kept volumes, the last of `size`
 
   T inverse_mass(int particle) const { return x[sheetbend_blocks::row * static_cast<long>(particle) + 3]; }
 

@@ -3,7 +3,7 @@
 
 #include "core/blocks/kernels.h"
 #include "core/scalar/numbers.h"
-#include "core/solver/plan.h"
+#include "core/solver/block_volume.h"
 
 namespace sheetbend {
 
@@ -20,7 +20,7 @@ void refer_tangents(const sheetbend_blocks::References& references, int size,
 }
 
 // The directions' share of one iteration: after the values are solved for, before they are pushed. solve_sparse(b) is for blocks that are no band.
-template <class State, class Solve>
+template <class T, class State, class Solve>
 void project_tangents(const DirectBlock& block, const sheetbend_blocks::TangentKernels& kernels,
                       const sheetbend_blocks::Block& arrays, State& state, int iteration, Solve&& solve_sparse) {
   auto& own = state.at(iteration);
@@ -34,6 +34,7 @@ void project_tangents(const DirectBlock& block, const sheetbend_blocks::TangentK
   t.dl = own.dl.directions();
   t.u = own.u.directions();
   kernels.right_side(arrays, t);
+  add_volume_tangents<T>(block, arrays, t, state);
   if (block.banded())
     kernels.solve(arrays, t.dl);
   else

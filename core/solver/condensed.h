@@ -2,6 +2,9 @@
 //   A^-1 b = D^-1 (b - J H^-1 J^T D^-1 b),     H = W^-1 + J^T D^-1 J     (Woodbury)
 // H is the Hessian of implicit Euler without the curvature of C: global Newton. A sheet has an eighth as many coordinates as scalar constraints, and its H
 // a fraction of A's fill. H is factored, or solved with by conjugate gradients.
+//
+// The rows g of kept volumes may be rigid, and would fill H: they stay beside it. From z = H^-1 J^T D^-1 b of the constraints alone their part of the
+// solution is p = S^-1 (b_p - g^T z), S = a + g^T H^-1 g, which adds H^-1 g p to z.
 #pragma once
 
 #include <algorithm>
@@ -20,13 +23,15 @@ template <class T>
 class CondensedSolver {
  public:
   void prepare(const Condensation& plan, const BlockNumbers<T>& block, typename Factor<T>::FactorSupernodes compiled) {
-    stiffness_.resize(block.size);
-    for (int row = 0; row < block.size; ++row) stiffness_[row] = T(1.0) / block.diagonal[row];
+    const int constraints = block.size - block.volumes;
+    stiffness_.assign(block.size, T(0.0));
+    for (int row = 0; row < constraints; ++row) stiffness_[row] = T(1.0) / block.diagonal[row];
     if (const auto* pattern = std::get_if<CondensedPattern>(&plan))
       factor_.factorize(*pattern, block, stiffness_.data(), compiled);
     else
       cg_.prepare(std::get<CondensedIteration>(plan).aggregation, block, stiffness_.data(),
                   is_plain<T> ? compiled : nullptr);
+    if (block.volumes > 0) prepare_volumes(plan, block);
   }
 
   // b = A^-1 b, with the numbers that were prepared.
@@ -34,7 +39,7 @@ class CondensedSolver {
   void solve(const Condensation& plan, const BlockNumbers<T>& block, U* b) const {
     const int rows = block.size;
     std::vector<U>& own = scratch<U>();
-    own.resize(work(plan, block.movable, rows));
+    own.resize(work(plan, block.movable, rows, block.volumes));
     U *y = own.data(), *rest = y + rows, *room = rest + rows;
     std::copy_n(b, rows, y);
     solve_once(plan, block, y, room);
@@ -47,16 +52,16 @@ class CondensedSolver {
   }
 
   // Numbers that solve() works on.
-  static std::size_t work(const Condensation& plan, std::size_t movable, std::size_t rows) {
+  static std::size_t work(const Condensation& plan, std::size_t movable, std::size_t rows, std::size_t volumes) {
     const auto* iteration = std::get_if<CondensedIteration>(&plan);
-    return 3 * rows + 3 * movable +
+    return 3 * rows + 3 * movable + volumes +
            (iteration ? CondensedCg<T>::work(iteration->aggregation) : CondensedFactor<T>::work(movable));
   }
 
   // What it holds once it has solved.
-  static std::size_t bytes(const Condensation& plan, std::size_t movable, std::size_t rows) {
+  static std::size_t bytes(const Condensation& plan, std::size_t movable, std::size_t rows, std::size_t volumes) {
     const auto* pattern = std::get_if<CondensedPattern>(&plan);
-    return sizeof(T) * (rows + work(plan, movable, rows)) +
+    return sizeof(T) * (rows + work(plan, movable, rows, volumes) + volumes * (6 * movable + volumes)) +
            (pattern ? Factor<T>::bytes(pattern->structure)
                     : CondensedCg<T>::bytes(std::get<CondensedIteration>(plan).aggregation));
   }
@@ -71,15 +76,68 @@ class CondensedSolver {
   // y = D^-1 (y - J H^-1 J^T D^-1 y)
   template <class U>
   void solve_once(const Condensation& plan, const BlockNumbers<T>& block, U* y, U* room) const {
-    U *scaled = room, *z = scaled + block.size, *rest = z + 3 * static_cast<std::size_t>(block.movable);
+    const int constraints = block.size - block.volumes;
+    U *scaled = room, *z = scaled + block.size, *p = z + 3 * static_cast<std::size_t>(block.movable);
     for (int i = 0; i < block.size; ++i) scaled[i] = stiffness_[i] * y[i];
     block.transpose_times(scaled, z);
-    if (const auto* pattern = std::get_if<CondensedPattern>(&plan))
-      factor_.solve(*pattern, z, rest);
-    else
-      cg_.solve(std::get<CondensedIteration>(plan), z, rest);
+    solve_particles(plan, z, p + block.volumes);
+    if (block.volumes > 0) add_volumes(block, y + constraints, z, p);
     block.subtract_times(z, y);
-    for (int i = 0; i < block.size; ++i) y[i] = stiffness_[i] * y[i];
+    for (int i = 0; i < constraints; ++i) y[i] = stiffness_[i] * y[i];
+    std::copy_n(p, block.volumes, y + constraints);
+  }
+
+  // z = H^-1 z
+  template <class U>
+  void solve_particles(const Condensation& plan, U* z, U* room) const {
+    if (const auto* pattern = std::get_if<CondensedPattern>(&plan))
+      factor_.solve(*pattern, z, room);
+    else
+      cg_.solve(std::get<CondensedIteration>(plan), z, room);
+  }
+
+  // g, H^-1 g and the factors of S.
+  void prepare_volumes(const Condensation& plan, const BlockNumbers<T>& block) {
+    const int count = block.volumes;
+    const std::size_t dofs = 3 * static_cast<std::size_t>(block.movable);
+    gradients_.resize(count * dofs);
+    schur_.resize(static_cast<std::size_t>(count) * count);
+    std::vector<T>& own = scratch<T>();
+    own.resize(work(plan, block.movable, block.size, count));
+    for (int v = 0; v < count; ++v) {
+      std::fill_n(own.data(), block.size, T(0.0));
+      own[block.size - count + v] = T(1.0);
+      block.transpose_times(own.data(), &gradients_[v * dofs]);
+    }
+    responses_ = gradients_;
+    for (int v = 0; v < count; ++v) solve_particles(plan, &responses_[v * dofs], own.data());
+    T* L = schur_.data();
+    for (int v = 0; v < count; ++v)
+      for (int w = 0; w <= v; ++w) {
+        T sum = v == w ? block.diagonal[block.size - count + v] : T(0.0);
+        for (std::size_t d = 0; d < dofs; ++d) sum += gradients_[v * dofs + d] * responses_[w * dofs + d];
+        for (int k = 0; k < w; ++k) sum -= L[v * count + k] * L[k * count + k] * L[w * count + k];
+        L[v * count + w] = v == w ? sum : sum / L[w * count + w];
+      }
+  }
+
+  // p = S^-1 (b_p - g^T z), z += H^-1 g p
+  template <class U>
+  void add_volumes(const BlockNumbers<T>& block, const U* b, U* z, U* p) const {
+    const int count = block.volumes;
+    const std::size_t dofs = 3 * static_cast<std::size_t>(block.movable);
+    const T* L = schur_.data();
+    for (int v = 0; v < count; ++v) {
+      p[v] = b[v];
+      for (std::size_t d = 0; d < dofs; ++d) p[v] -= gradients_[v * dofs + d] * z[d];
+      for (int k = 0; k < v; ++k) p[v] -= L[v * count + k] * p[k];
+    }
+    for (int v = count; v-- > 0;) {
+      p[v] = p[v] / L[v * count + v];
+      for (int k = v + 1; k < count; ++k) p[v] -= L[k * count + v] * p[k];
+    }
+    for (int v = 0; v < count; ++v)
+      for (std::size_t d = 0; d < dofs; ++d) z[d] += responses_[v * dofs + d] * p[v];
   }
 
   // rest = b - A y
@@ -105,7 +163,9 @@ class CondensedSolver {
 
   CondensedFactor<T> factor_;
   CondensedCg<T> cg_;
-  std::vector<T> stiffness_;  // D^-1
+  std::vector<T> stiffness_;              // D^-1; zero in the rows of volumes
+  std::vector<T> gradients_, responses_;  // g and H^-1 g of the volumes, three numbers per movable particle
+  std::vector<T> schur_;                  // (volumes, volumes) factors of S: L below the diagonal, the pivots on it
   mutable std::vector<T> scratch_;
 };
 

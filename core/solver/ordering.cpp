@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 #include <numeric>
+#include <set>
 
 namespace sheetbend {
 namespace {
@@ -44,6 +45,22 @@ std::vector<int> cuthill_mckee(const std::vector<std::vector<int>>& neighbors, i
     order.insert(order.end(), next.begin(), next.end());
   }
   return order;
+}
+
+// A kept volume makes one component of all that it touches: the lowest.
+void join_by_volumes(const Scene& scene, std::vector<int>& component) {
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (const Volume& volume : scene.volumes) {
+      std::set<int> touched;
+      for (const int n : volume.nodes)
+        if (movable(scene, n)) touched.insert(component[n]);
+      if (touched.size() < 2) continue;
+      changed = true;
+      for (int& c : component)
+        if (touched.contains(c)) c = *touched.begin();
+    }
+  }
 }
 
 struct Keyed {
@@ -97,6 +114,7 @@ std::vector<std::vector<Member>> connected_chains(const Scene& scene) {
     }
     ++components;
   }
+  join_by_volumes(scene, component);
   // Constraints go by the mean place of their nodes, nodes by that of their constraints, from the ranks on: so links and joints of a rope
   // alternate also at its ends, where whole ranks would widen the band.
   std::vector<double> place(rank.begin(), rank.end());

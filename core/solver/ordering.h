@@ -12,7 +12,7 @@ namespace sheetbend {
 // A color's constraints then stand in the order of their lowest node.
 std::vector<Color> color_constraints(const Scene& scene);
 
-// Connected sets of constraints (through movable nodes), each in an order that makes a chain a narrow band: nodes are numbered by
+// Connected sets of constraints (through movable nodes and kept volumes), each in an order that makes a chain a narrow band: nodes are numbered by
 // Cuthill-McKee from an end, constraints follow their first node.
 std::vector<std::vector<Member>> connected_chains(const Scene& scene);
 

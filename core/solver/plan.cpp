@@ -18,8 +18,8 @@ constexpr int lanes = sheetbend_blocks::lanes;
 // A movable node and the rows that it takes part in, ascending.
 using Users = std::vector<std::pair<int, std::vector<int>>>;
 
-// Numbers the members' rows and lists those of every movable node; nodes in the order in which elimination meets them.
-Users number_rows(const Scene& scene, std::vector<Member>& members) {
+// Numbers the rows of members and volumes and lists those of every movable node; nodes in the order in which elimination meets them.
+Users number_rows(const Scene& scene, std::vector<Member>& members, std::vector<BlockVolume>& volumes) {
   Users users;
   std::map<int, int> place;
   int rows = 0;
@@ -34,17 +34,38 @@ Users number_rows(const Scene& scene, std::vector<Member>& members) {
         for (int row = m.first_row; row < rows; ++row) users[at->second].second.push_back(row);
       }
   }
+  for (BlockVolume& v : volumes) {
+    v.row = rows++;
+    for (const int node : scene.volumes[v.volume].nodes)
+      if (scene.role[node] == Role::free) users[place.at(node)].second.push_back(v.row);
+  }
   return users;
 }
 
+// The volumes around the members' nodes; connected_chains() has left none of their nodes to other members.
+std::vector<BlockVolume> volumes_around(const Scene& scene, const std::vector<Member>& members) {
+  if (scene.volumes.empty()) return {};
+  std::set<int> nodes;
+  for (const Member& m : members)
+    for (const int node : scene.groups[m.group].nodes(m.item))
+      if (scene.role[node] == Role::free) nodes.insert(node);
+  std::vector<BlockVolume> volumes;
+  for (int v = 0; v < static_cast<int>(scene.volumes.size()); ++v)
+    if (std::ranges::any_of(scene.volumes[v].nodes, [&](int node) { return nodes.contains(node); }))
+      volumes.push_back({v, 0, {}, {}});
+  return volumes;
+}
+
 // Every pair of rows that share a movable node.
-FactorStructure structure_of(const Scene& scene, const std::vector<Member>& members, const Users& users) {
+FactorStructure structure_of(const Scene& scene, const std::vector<Member>& members,
+                             const std::vector<BlockVolume>& volumes, const Users& users) {
   std::vector<std::pair<int, int>> entries;
   for (const auto& [node, rows] : users)
     for (const int row : rows)
       for (const int column : rows)
         if (column <= row) entries.emplace_back(row, column);
-  return {members.back().first_row + scene.groups[members.back().group].rows, entries};
+  const int rows = members.back().first_row + scene.groups[members.back().group].rows;
+  return {rows + static_cast<int>(volumes.size()), entries, volumes.empty()};
 }
 
 // A particle of the block, with the rows that it takes part in. Windows of a band have no gaps: rows between that do not touch the particle
@@ -96,6 +117,16 @@ MemberRun make_run(const Scene& scene, int g, const std::map<int, int>& particle
     }
   }
   return run;
+}
+
+void add_volumes(const Scene& scene, const std::map<int, int>& particle_of, DirectBlock& block) {
+  for (BlockVolume& v : block.volumes) {
+    for (const int node : scene.volumes[v.volume].nodes) {
+      v.particles.push_back(scene.role[node] == Role::free ? particle_of.at(node) : add_particle(block, node, {v.row}));
+      v.gradients.push_back(gradient_row(block, v.particles.back(), v.row));
+    }
+    block.multipliers.push_back(scene.rows + v.volume);
+  }
 }
 
 // The constraints' shares of the condensed matrix, whose particles have these first dofs.
@@ -182,14 +213,16 @@ CondensedIteration iterated(const Scene& scene, const DirectBlock& block, const 
 
 DirectBlock make_block(const Scene& scene, std::vector<Member> members, const SolverOptions& options) {
   const bool condensed = options.partition != Partition::direct;
-  Users users = number_rows(scene, members);
-  FactorStructure structure = condensed ? FactorStructure(0, {}) : structure_of(scene, members, users);
+  std::vector<BlockVolume> volumes = volumes_around(scene, members);
+  Users users = number_rows(scene, members, volumes);
+  FactorStructure structure = condensed ? FactorStructure(0, {}) : structure_of(scene, members, volumes, users);
   if (!condensed && !structure.banded()) {
     order_for_low_fill(scene, members);
-    users = number_rows(scene, members);
-    structure = structure_of(scene, members, users);
+    users = number_rows(scene, members, volumes);
+    structure = structure_of(scene, members, volumes, users);
   }
   DirectBlock block{std::move(members), {}, {}, {0}, {}, {}, {}, 0, false, false, std::move(structure)};
+  block.volumes = std::move(volumes);
   block.implicit = options.partition == Partition::implicit;
   if (condensed) block.condensation.emplace();  // to be filled in: it has no band
   std::map<int, int> particle_of;
@@ -209,6 +242,7 @@ DirectBlock make_block(const Scene& scene, std::vector<Member> members, const So
     for (int j = 0; j < group.rows; ++j) block.multipliers.push_back(group.first_row + m.item * group.rows + j);
   }
   for (const int g : groups) block.runs.push_back(make_run(scene, g, particle_of, block));
+  add_volumes(scene, particle_of, block);
   if (options.partition == Partition::newton || block.implicit)
     block.condensation = factored(scene, block, particle_of);
   if (block.implicit) place_matrices(scene, std::get<CondensedPattern>(*block.condensation), block);
@@ -244,8 +278,21 @@ void expect_no_unilateral(const Scene& scene) {
 void expect_no_volume(const Scene& scene) {
   if (!scene.volumes.empty())
     throw std::invalid_argument("solver.method: the volume of " + scene.volumes.front().name +
-                                " couples all its vertices, which only sweeps take. Fix: use gauss_seidel, or give a "
-                                "pressure instead");
+                                " is to be kept, which implicit substeps do not do. Fix: use newton, newton_cg, direct "
+                                "or gauss_seidel, or give a pressure instead");
+}
+
+// Blocks are made of constraints and what they join.
+void expect_constraints_around_volumes(const Scene& scene) {
+  if (scene.volumes.empty()) return;
+  std::vector<char> joined(scene.nodes(), false);
+  for (const Group& group : scene.groups)
+    for (const int node : group.stencil) joined[node] = true;
+  for (const Volume& volume : scene.volumes)
+    for (const int node : volume.nodes)
+      if (scene.role[node] == Role::free && !joined[node])
+        throw std::invalid_argument("solver.method: particle " + std::to_string(node) + " of the volume of " +
+                                    volume.name + " is in no constraint. Fix: use gauss_seidel, or give it a skin");
 }
 
 // Next to torques the inertia of a director is nothing, and a Newton step turns it as far as it likes.
@@ -262,9 +309,12 @@ Plan make_plan(const Scene& scene, const SolverOptions& options) {
   check(options);
   if (options.partition != Partition::gauss_seidel) {
     expect_no_unilateral(scene);
+    expect_constraints_around_volumes(scene);
+  }
+  if (options.partition == Partition::implicit) {
+    expect_points(scene);
     expect_no_volume(scene);
   }
-  if (options.partition == Partition::implicit) expect_points(scene);
   Plan plan{options, {}, {}, {}};
   if (options.partition == Partition::gauss_seidel) {
     plan.colors = color_constraints(scene);

@@ -30,6 +30,13 @@ struct MemberRun {
   std::vector<int> entries = {};
 };
 
+// A kept volume of a block, with one row behind those of the constraints. Windows and gradients have it as any other row.
+struct BlockVolume {
+  int volume, row;
+  std::vector<int> particles;  // per node of the volume
+  std::vector<int> gradients;  // likewise, its gradient row
+};
+
 struct DirectBlock {
   std::vector<Member> members;  // in elimination order
   std::vector<MemberRun> runs;  // the same by group
@@ -44,6 +51,7 @@ struct DirectBlock {
   bool implicit = false;      // solved until its forces balance
   FactorStructure structure;  // of its constraints' matrix; empty where it is condensed
   std::optional<Condensation> condensation = {};
+  std::vector<BlockVolume> volumes = {};
 
   int size() const { return static_cast<int>(multipliers.size()); }
   bool banded() const { return !condensation && structure.banded(); }

@@ -7,6 +7,7 @@
 #include "core/blocks/block_forward.h"
 #include "core/scalar/numbers.h"
 #include "core/solver/block_tangents.h"
+#include "core/solver/block_volume.h"
 #include "core/solver/implicit_block.h"
 #include "core/solver/placed.h"
 #include "core/solver/plan.h"
@@ -49,6 +50,7 @@ struct BlockState {
   std::vector<Numbers<T>> values;     // per run
   std::vector<const double*> value_directions;  // of duals, where those of `values` stand
   std::vector<sheetbend_blocks::Run> runs;
+  std::vector<BlockVolumeState<T>> volumes;
   Numbers<T> C_r, diagonal;
   // What damped constraints are at a state that damping refers to.
   struct Values {
@@ -96,6 +98,8 @@ void BlockState<T>::resize(const Scene& scene, const DirectBlock& block, int kep
   }
   implicit.resize(block.implicit ? scenes_of<T> : 0);
   for (ImplicitBlock& scene_ : implicit) scene_.resize(scene, block);
+  volumes.resize(block.volumes.size());
+  for (std::size_t v = 0; v < volumes.size(); ++v) volumes[v].resize(block.volumes[v]);
   runs.reserve(block.runs.size());
   values.resize(block.runs.size());
   for (std::size_t r = 0; r < values.size(); ++r) {
@@ -129,6 +133,8 @@ void fill_values(const SubstepState<T>& s, const DirectBlock& block, BlockState<
       for (int j = 0; j < group.rows; ++j) state.diagonal[run.first_row[i] + j] = rates.a * rates.scale;
     }
   }
+  for (const BlockVolume& v : block.volumes)
+    state.diagonal[v.row] = s.inputs.of(Quantity::volume_compliance)[v.volume] * T(1.0 / (s.eta * s.eta));
   state.eta = s.eta;
 }
 
@@ -234,7 +240,8 @@ BlockNumbers<Plain<T>> numbers_of_block(const DirectBlock& block, BlockState<T>&
           block.window.data(),
           block.window_rows.data(),
           block.movable,
-          block.size()};
+          block.size(),
+          static_cast<int>(block.volumes.size())};
 }
 
 // b = A^-1 b for blocks that are no band, factored or prepared before.
@@ -280,6 +287,7 @@ void project_block(const SubstepState<T>& s, const DirectBlock& block, const she
   const auto& runs = runs_of(s, block, state);
   const auto arrays = arrays_of(block, runs, state, iteration);
   kernels.evaluate(arrays);
+  evaluate_volumes(s.scene, s.inputs, block, state, iteration);
   if (block.banded()) {
     kernels.factor(arrays);
     kernels.solve(arrays, arrays.dl);
@@ -292,8 +300,8 @@ void project_block(const SubstepState<T>& s, const DirectBlock& block, const she
     solve_sparse(block, state, iteration, state.at(iteration).dl.data());
   }
   if constexpr (carries_tangents<T>)
-    project_tangents(block, table.blocks->tangents, arrays, state, iteration,
-                     [&](Pack* b) { solve_sparse(block, state, iteration, b); });
+    project_tangents<T>(block, table.blocks->tangents, arrays, state, iteration,
+                        [&](Pack* b) { solve_sparse(block, state, iteration, b); });
   kernels.push(arrays);
 }
 

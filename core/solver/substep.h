@@ -13,7 +13,12 @@
 
 namespace sheetbend {
 
-// Volumes are projected between sweeps, so their scenes have one section.
+// Volumes that are projected between sweeps; blocks have them among their rows.
+inline std::size_t swept_volumes(const Scene& scene, const Plan& plan) {
+  return plan.options.partition == Partition::gauss_seidel ? scene.volumes.size() : 0;
+}
+
+// Their scenes have one section.
 template <class T>
 Sections sections_of_record(const Scene& scene, const Plan& plan, int kept) {
   return scene.volumes.empty() ? sections_of<T>(plan.packs, kept) : Sections{kept, kept};
@@ -36,7 +41,7 @@ struct SubstepRecord {
     const int kept = kept_iterations(plan, keep_iterations);
     blocks.resize(plan.blocks.size());
     for (std::size_t b = 0; b < blocks.size(); ++b) blocks[b].resize(scene, plan.blocks[b], kept);
-    volumes.resize(scene.volumes.size());
+    volumes.resize(swept_volumes(scene, plan));
     for (std::size_t v = 0; v < volumes.size(); ++v) volumes[v].resize(scene.volumes[v], kept);
     if (plan.colors.empty()) return;
     C_r.resize(damped_rows(scene));

@@ -36,12 +36,11 @@ struct VolumeState {
   VolumeRecord<T>& record(int iteration) { return iterations[iterations.size() == 1 ? 0 : iteration]; }
 };
 
-// Coordinates of the volume's nodes from the first one.
+// Coordinates of a volume's nodes from the first one; point(k) is where node k of the volume is.
 template <class T, class Point>
-void place_volume(const Volume& volume, Point&& point, std::vector<Vec3<T>>& x) {
-  x.resize(volume.nodes.size());
-  const Vec3<T> first = point(volume.nodes[0]);
-  for (std::size_t k = 0; k < x.size(); ++k) x[k] = point(volume.nodes[k]) - first;
+void place_volume(Point&& point, std::vector<Vec3<T>>& x) {
+  const Vec3<T> first = point(0);
+  for (std::size_t k = 0; k < x.size(); ++k) x[k] = point(k) - first;
 }
 
 // V, and its gradient.
@@ -58,6 +57,18 @@ T enclosed(const Volume& volume, const std::vector<Vec3<T>>& x, std::vector<Vec3
   }
   for (Vec3<T>& g : gradient) g = scaled(1.0 / 6.0, g);
   return T(1.0 / 6.0) * sum;
+}
+
+// Hess(V) v, node by node, to add(node of the volume, share).
+template <class T, class Add>
+void for_each_hessian_times(const Volume& volume, const std::vector<Vec3<T>>& x, const std::vector<Vec3<T>>& v,
+                            Add&& add) {
+  const auto share = [&](int a, int b, int c) { add(a, scaled(1.0 / 6.0, cross(v[b], x[c]) + cross(x[b], v[c]))); };
+  for (const auto& [a, b, c] : volume.triangles) {
+    share(a, b, c);
+    share(b, c, a);
+    share(c, a, b);
+  }
 }
 
 // The row of a volume at recorded coordinates; `gradient` receives dV/dx.
@@ -83,7 +94,8 @@ void project_volumes(const Scene& scene, const Inputs<const T>& in, double eta, 
     VolumeState<T>& state = states[i];
     VolumeRecord<T>& record = state.record(iteration);
     const std::vector<int>& nodes = scene.volumes[i].nodes;
-    place_volume(scene.volumes[i], [&](int n) { return Vec3<T>(T(at(n, 0)), T(at(n, 1)), T(at(n, 2))); }, record.x);
+    place_volume([&](std::size_t k) { return Vec3<T>(T(at(nodes[k], 0)), T(at(nodes[k], 1)), T(at(nodes[k], 2))); },
+                 record.x);
     record.lambda = iteration == 0 ? T(0.0) : state.lambda;
     const VolumeRow<T> row(scene, in, eta, w, i, record, state.gradient);
     record.dl = -(row.C + row.a * record.lambda) / row.D;

@@ -365,10 +365,10 @@ class Scene:
     ) -> None:
         """Let a closed surface keep its volume V, by the energy (V - rest)^2/(2 compliance) (Macklin et al. 2016, 6.5).
 
-        Method "gauss_seidel" takes it, and equilibria do. The pressure that it takes, inside above outside, is in
-        `Equilibrium.pressures`, and in `Trajectory.pressures` with an error of O(h^2); long substeps are calm, unlike
-        those of `add_pressure`. The numbers are the quantities `<name>_volume` and, unless zero,
-        `<name>_volume_compliance`.
+        All methods but "implicit" take it, and equilibria do. The pressure that it takes, inside above outside, is in
+        `Equilibrium.pressures` and `Trajectory.pressures`, in moving scenes with an error of O(h^2). Long substeps of
+        "gauss_seidel" are calm, those of blocks tremble as with `add_pressure`. The numbers are the quantities
+        `<name>_volume` and, unless zero, `<name>_volume_compliance`.
 
         Args:
             triangles: (count, 3) particles, counterclockwise as seen from outside; every edge is between two of them.

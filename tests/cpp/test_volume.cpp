@@ -112,9 +112,10 @@ TEST(SceneWithVolume, NamesWhatIsWrong) {
   for (const Triangles& bad : {open, turned, director}) EXPECT_THROW(build(bad), std::invalid_argument);
 }
 
-TEST(SceneWithVolume, TakesSweepsAlone) {
+// Blocks are made of constraints.
+TEST(SceneWithVolume, OfLooseParticlesTakesSweepsAlone) {
   const Sample s = bipyramid(4);
-  for (const Partition partition : {Partition::direct, Partition::newton, Partition::newton_cg})
+  for (const Partition partition : {Partition::direct, Partition::newton, Partition::newton_cg, Partition::implicit})
     EXPECT_THROW(make_plan(s.scene, {.partition = partition}), std::invalid_argument);
 }
 

@@ -199,24 +199,14 @@ def test_what_is_refused(folder: Path, old: str, new: str, field: str, words: st
     assert words in f"{caught.value.problem}. {caught.value.fix}", str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("method", "line", "field", "fix"),
-    [
-        ("newton", "", "solver.method", "use gauss_seidel"),
-        ("newton_cg", "", "solver.method", "use gauss_seidel"),
-        ("direct", "", "solver.method", "use gauss_seidel"),
-    ],
-)
-def test_the_command_line_refuses_a_volume_before_it_starts(
-    folder: Path, method: str, line: str, field: str, fix: str
-) -> None:
-    path = changed(folder, recorded_balloon(folder, line), ('"gauss_seidel"', f'"{method}"'))
+def test_the_command_line_refuses_a_volume_before_it_starts(folder: Path) -> None:
+    path = changed(folder, recorded_balloon(folder), ('"gauss_seidel"', '"implicit"'))
     for command in ("info", "simulate", "fit"):
         result = CliRunner().invoke(app, [command, str(path), "--json"])
         assert result.exit_code == 2, result.output
         error = json.loads(result.stdout.splitlines()[-1])["error"]
-        assert error["field"] == field
-        assert fix in error["fix"]
+        assert error["field"] == "solver.method"
+        assert "use newton" in error["fix"]
         assert not (folder / "out").exists()
 
 
@@ -242,8 +232,9 @@ def test_a_fit_finds_the_volume_of_a_balloon_at_rest(folder: Path) -> None:
     assert found["value"] == pytest.approx(6e-3, rel=1e-6)
 
 
-def test_a_balloon_that_keeps_its_volume_is_simulated(folder: Path) -> None:
-    path = changed(folder, recorded_balloon(folder))
+@pytest.mark.parametrize("method", ["gauss_seidel", "newton"])
+def test_a_balloon_that_keeps_its_volume_is_simulated(folder: Path, method: str) -> None:
+    path = changed(folder, recorded_balloon(folder), ('"gauss_seidel"', f'"{method}"'))
     result = CliRunner().invoke(app, ["simulate", str(path), "--json"])
     assert result.exit_code == 0, result.output
     with np.load(folder / "out/balloon/ball.npz") as motion:

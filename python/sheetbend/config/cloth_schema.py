@@ -109,8 +109,8 @@ class Grip(Section):
 
 
 class ClothVolume(Section):
-    """[scene.cloth.volume]: a closed mesh keeps its volume, `Scene.add_volume`, at rest and in motions with method
-    "gauss_seidel". The table may be empty. Its numbers are the quantities `<name>_volume` and, unless zero,
+    """[scene.cloth.volume]: a closed mesh keeps its volume, `Scene.add_volume`, at rest and in motions with any method
+    but "implicit". The table may be empty. Its numbers are the quantities `<name>_volume` and, unless zero,
     `<name>_volume_compliance`."""
 
     rest: Finite | None = key(None, "what it keeps; the volume of the mesh as placed when left out", "m^3", gt=0)

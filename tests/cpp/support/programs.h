@@ -82,7 +82,7 @@ struct Solver {
     return {.ropes = ropes,
             .net = net,
             .unilateral = sweeps,
-            .volumes = sweeps,
+            .volumes = sweeps || (net && partition != Partition::implicit),
             .directors = partition != Partition::implicit};
   }
   SolverOptions options(int iterations) const {

@@ -20,7 +20,7 @@ struct SceneShape {
   int ropes = 5;  // the first two are damped; five of them make a net sparse
   bool net = false;
   bool unilateral = false;  // also those kinds, which direct blocks do not hold
-  bool volumes = false;     // likewise
+  bool volumes = false;     // which leave no chain, and implicit blocks do not hold
   bool directors = true;    // kinds that have them, which implicit blocks do not hold
 };
 
@@ -146,6 +146,7 @@ struct SceneBuilder {
     }
     add_brace(rope[k - 1], ring[0]);
     const int below = add_particle(x[3 * corner], x[3 * corner + 1], x[3 * corner + 2] - 2.0 * r);
+    add_brace(ring[2], below);
     VolumeSpec volume{"volume", {}};
     for (int k = 0; k < 4; ++k) {
       volume.triangles.push_back({corner, ring[k], ring[(k + 1) % 4]});
