@@ -286,7 +286,15 @@ class Experiment:
 
     def correction(self, recording: Recording) -> Correction | None:
         """Of the markers that the scene follows, as far as (part of) the recording feels it; None without any."""
-        return Correction.of(self.scene, None if self.static else float(recording.times[-1]) - self.t0)
+        until = None if self.static else float(recording.times[-1]) - self.t0
+        if until not in self._corrections:
+            self._corrections[until] = Correction.of(self.scene, until)
+        return self._corrections[until]
+
+    @cached_property
+    def _corrections(self) -> dict[float | None, Correction | None]:
+        """By what they are made from, which no problem on the frozen scene changes."""
+        return {}
 
     def core(self, recording: Recording, corrected: np.ndarray | None = None) -> dict[str, Any]:
         """The experiment on (part of) its recording, for the compiled core.

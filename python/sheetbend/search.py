@@ -92,7 +92,10 @@ class Search:
                 return replace(end, cost=cost, first=first, iterations=iterations), name
         end, name = minimize(problem, u, self.optimizer, self.max_iterations, self.tolerance, self._observer(None))
         began = first if before else end.first
-        end = judged(problem, end, end.cost if began is None else began)
+        try:
+            end = judged(problem, end, end.cost if began is None else began)
+        except KeyboardInterrupt:
+            end = replace(end, interrupted=True)
         return replace(end, first=began, iterations=iterations + end.iterations), name
 
     def _observer(self, window: float | None) -> Observer | None:

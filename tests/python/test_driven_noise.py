@@ -343,6 +343,13 @@ def test_a_long_motion_is_corrected():
     assert 0.4 * len(r) < problem.core.absorbed(0) + float(r @ r) < 1.2 * len(r)
 
 
+def test_problems_of_one_experiment_share_what_their_correction_moves():
+    e = shaken(19)
+    problem_of(e)
+    assert e.correction(e.fitted()) is e.correction(e.fitted())
+    assert e.correction(e.fitted()) is not e.correction(e.fitted().piece(None, 0.3))
+
+
 def test_a_correction_that_does_not_converge_is_no_answer():
     """Residuals that are nothing but rounding errors have no minimum that could be found."""
     times = np.arange(21) / 60
