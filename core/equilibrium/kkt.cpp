@@ -6,8 +6,8 @@
 #include <span>
 #include <utility>
 
+#include "core/element/second_order.h"
 #include "core/equilibrium/residual.h"
-#include "core/scalar/dual.h"
 
 namespace sheetbend {
 namespace {
@@ -112,25 +112,13 @@ void Kkt::assemble(const double* inputs, const double* x, const double* lambda, 
   force_stiffness_ = force_stiffness;
   double *H = H_.data(), *J = J_.data();
   for_each_constraint(scene_, [&]<class K>(K, const Group& group, int item) {
-    using D = Dual<double, K::dofs>;
-    constexpr int P = parameter_count<K>;
-    double local[K::dofs];
+    double local[K::dofs], own[triangle(K::dofs)]{};
     gather<K>(scene_, group, item, x, local);
-    D xd[K::dofs], pd[P > 0 ? P : 1], Cd[K::rows], Jd[K::rows * K::dofs];
-    for (int d = 0; d < K::dofs; ++d) {
-      xd[d].v = local[d];
-      xd[d].d[d] = 1.0;
-    }
-    for (int k = 0; k < P; ++k) pd[k].v = rest_parameters<K>(in, group, item)[k];
-    K::evaluate(xd, pd, Cd, Jd);
-    const double* l = lambda + group.first_row + item * K::rows;
+    const SecondOrder<K, double> at(local, rest_parameters<K>(in, group, item));
+    at.add_hessian(lambda + group.first_row + item * K::rows, own);
     for (int a = 0; a < K::dofs; ++a)
-      for (int b = 0; b < K::dofs; ++b) {
-        double sum = 0.0;
-        for (int j = 0; j < K::rows; ++j) sum += l[j] * Jd[j * K::dofs + a].d[b];
-        *H++ = sum;
-      }
-    for (int e = 0; e < K::rows * K::dofs; ++e) *J++ = Jd[e].v;
+      for (int b = 0; b < K::dofs; ++b) *H++ = own[a >= b ? triangle(a) + b : triangle(b) + a];
+    J = std::copy(std::begin(at.J), std::end(at.J), J);
   });
   const double* given = in.of(Quantity::pressure);
   std::vector<double> pressures(given, given + scene_.air.size());
