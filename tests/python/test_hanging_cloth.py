@@ -146,6 +146,7 @@ def test_a_bent_start_rests_where_a_flat_one_is_told_to_bend() -> None:
         ([("nearest_at = 0.0\n", ""), (f"layout = {LAYOUT.tolist()}\n", "")], "three points off a line"),
         ([("0.03, 0.03", "0.5, 0.03")], "layout.*lie outside of the material"),
         ([("nearest_at = 0.0", "nearest_at = 9.0")], "lies outside of the recording"),
+        ([('set = "left_hand"\nmarkers = ["left"]', 'set = "left_hand"\nmarkers = [40]')], "out of range"),
     ],
 )
 def test_what_tells_too_little_is_refused(folder: Path, edits: list, words: str) -> None:

@@ -45,7 +45,8 @@ def seats(
     """
     given: dict[str, Seat] = {}
     nearest: dict[str, tuple[float, Seat]] = {}
-    moving = {m if isinstance(m, str) else recording.markers[m] for s in sections for g in s.grip for m in g.markers}
+    by_number = dict(enumerate(recording.markers))  # numbers that are none are refused where the grip is made
+    moving = {m if isinstance(m, str) else by_number.get(m, "") for s in sections for g in s.grip for m in g.markers}
     for i, section in enumerate(sections):
         if section.name not in meshes:
             continue
@@ -81,7 +82,8 @@ def _on_vertices(mesh: TriangleMesh, recording: Recording) -> dict[str, Places]:
     """Markers v0, v1, ... on the vertices of these numbers."""
     _, first = np.unique(mesh.triangles, return_index=True)
     places = Places(first // 3, mesh.triangles[first // 3], np.eye(3)[first % 3])
-    return {m: _one(places, k) for k in range(len(first)) if (m := f"v{k}") in recording.markers}
+    known = set(recording.markers)
+    return {m: _one(places, k) for k in range(len(first)) if (m := f"v{k}") in known}
 
 
 def _seen(path: str, time: float, recording: Recording, but: set[str]) -> tuple[list[str], np.ndarray]:

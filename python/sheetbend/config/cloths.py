@@ -86,7 +86,8 @@ def _recorded(path: str, mesh: TriangleMesh, seated: Mapping[str, Places], momen
     if not seated:
         fix = "give markers, or nearest_at"
         raise ConfigError(path, "needs markers on the cloth", "none", fix)
-    order = [moment.recording.markers.index(marker) for marker in seated]
+    number = {marker: k for k, marker in enumerate(moment.recording.markers)}
+    order = [number[marker] for marker in seated]
     fields = [np.concatenate([getattr(p, f) for p in seated.values()]) for f in ("triangles", "vertices", "weights")]
     places, shape = Places(*fields), moment.shape[order]
     if np.array_equal(places.positions(mesh.vertices), mesh.vertices) and not np.isnan(shape).any():
