@@ -12,7 +12,7 @@
 
 namespace sheetbend {
 
-// E (dofs, dofs), row by row, without its negative eigenvalues; dofs <= most_dofs.
+// E (dofs, dofs), row by row, without its negative eigenvalues; of at most the most dofs that a constraint has.
 void make_convex(int dofs, double* E);
 
 class NewtonMatrix {
