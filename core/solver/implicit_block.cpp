@@ -145,7 +145,7 @@ double ImplicitBlock::curvature(const DirectBlock& block) {
 // alone bends Phi down.
 bool ImplicitBlock::leave_saddle(const Scene& scene, const DirectBlock& block) {
   matrix_.factorize(scene, block, 0.0);
-  if (!matrix_.descend(block, d_.data())) return false;
+  if (!matrix_.find_negative_direction(block, d_.data())) return false;
   matrix_.factorize(scene, block, convexity_);
   std::vector<double> back(d_.size());
   double bend = curvature(block);

@@ -109,7 +109,7 @@ void NewtonMatrix::multiply(const DirectBlock& block, Numbers<double>& z, Number
   pack_kernels().potential->multiply(arrays_, z.numbers(), Kz.numbers());
 }
 
-bool NewtonMatrix::descend(const DirectBlock& block, double* d) {
+bool NewtonMatrix::find_negative_direction(const DirectBlock& block, double* d) {
   const auto pivot = std::find_if(factor_.inverse.begin(), factor_.inverse.end(), [](double p) { return !(p > 0.0); });
   if (pivot == factor_.inverse.end()) return false;
   const CondensedPattern& pattern = pattern_of(block);

@@ -43,7 +43,7 @@ class NewtonMatrix {
   void multiply(const DirectBlock& block, Numbers<double>& z, Numbers<double>& Kz);
 
   // d = L^-T e of the first pivot that is not positive, a direction in which what was factored is not convex. False where there is none.
-  bool descend(const DirectBlock& block, double* d);
+  bool find_negative_direction(const DirectBlock& block, double* d);
 
  private:
   static const CondensedPattern& pattern_of(const DirectBlock& block) {
