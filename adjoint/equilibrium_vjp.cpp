@@ -37,13 +37,20 @@ void EquilibriumDerivative::vjp(const double* x_bar, const double* lambda_bar, d
   for_each_constraint(scene_, [&]<class K>(K, const Group& group, int item) {
     const int first_row = group.first_row + item * K::rows;
     double x[K::dofs], away[K::dofs], by[K::dofs]{};
-    constexpr double none[K::dofs]{};
     gather<K>(scene_, group, item, at_.x.data(), x);
     gather<K>(scene_, group, item, u.data(), away);
     for (double& a : away) a = -a;
     const double* p = rest_parameters<K>(in, group, item);
-    gradients_vjp<K>(x, p, &at_.lambda[first_row], &v[first_row], away, none, by,
-                     bar.of(Quantity::rest) + (p - in.of(Quantity::rest)));
+    double* p_bar = bar.of(Quantity::rest) + (p - in.of(Quantity::rest));
+    if constexpr (HasReverse<K>) {
+      constexpr double none[K::dofs]{};
+      K::reverse(x, p, &at_.lambda[first_row], &v[first_row], away, none, by, p_bar);
+    } else {
+      double along[K::rows * K::dofs];
+      for (int j = 0; j < K::rows; ++j)
+        for (int d = 0; d < K::dofs; ++d) along[j * K::dofs + d] = at_.lambda[first_row + j] * away[d];
+      gradients_vjp<K>(x, p, &v[first_row], along, by, p_bar);
+    }
     const Evaluation<K, double> value(x, p);
     for (int j = 0; j < K::rows; ++j) {
       bar.of(Quantity::compliance)[group.first + item] -= v[first_row + j] * at_.lambda[first_row + j];

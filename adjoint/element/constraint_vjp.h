@@ -54,37 +54,33 @@ void values_vjp(const T* x, const T* p, const T* C_bar, T* x_bar, T* p_bar) {
   }
 }
 
-// Of sum_j (v_j . J_j - y_j C_j) with v_j = dl_j a - y_j b held: x_bar += Hess(C_j) v_j, p_bar += v_j . dJ_j/dp - y_j dC_j/dp.
+// Of sum_j (v_j . J_j - y_j C_j) with y_j and v_j (rows x dofs) held: x_bar += Hess(C_j) v_j, p_bar += v_j . dJ_j/dp - y_j dC_j/dp. For kinds without a
+// reverse of their own.
 template <class K, class T>
-void gradients_vjp(const T* x, const T* p, const T* dl, const T* y, const T* a, const T* b, T* x_bar, T* p_bar) {
-  if constexpr (HasReverse<K>) {
-    K::reverse(x, p, dl, y, a, b, x_bar, p_bar);
-  } else {
-    constexpr int inside = inside_count<K>, last = (K::rows - 1) * K::dofs;
-    const auto v = [&](int j, int d) { return dl[j] * a[d] - y[j] * b[d]; };
-    using D = Dual<T, K::rows + inside>;
-    D at[K::dofs], with[parameter_count<K> + 1], C[K::rows], J[K::rows * K::dofs];
-    for (int d = 0; d < K::dofs; ++d) {
-      at[d].v = x[d];
-      for (int j = 0; j < K::rows; ++j) at[d].d[j] = times_factor<K>(p, j, v(j, d));
+void gradients_vjp(const T* x, const T* p, const T* y, const T* v, T* x_bar, T* p_bar) {
+  constexpr int inside = inside_count<K>, last = (K::rows - 1) * K::dofs;
+  using D = Dual<T, K::rows + inside>;
+  D at[K::dofs], with[parameter_count<K> + 1], C[K::rows], J[K::rows * K::dofs];
+  for (int d = 0; d < K::dofs; ++d) {
+    at[d].v = x[d];
+    for (int j = 0; j < K::rows; ++j) at[d].d[j] = times_factor<K>(p, j, v[j * K::dofs + d]);
+  }
+  load_inside<K>(p, with);
+  for (int k = 0; k < inside; ++k) with[K::factors + k].d[K::rows + k] = T(1.0);
+  evaluate_on_duals<K, K::rows + inside>(at, with, C, J);
+  for (int j = 0; j < K::rows; ++j) {
+    for (int d = 0; d < K::dofs; ++d) x_bar[d] += J[j * K::dofs + d].d[j];
+    for (int k = 0; k < inside; ++k) {
+      T sum = -(times_factor<K>(p, j, y[j]) * C[j].d[K::rows + k]);
+      for (int d = 0; d < K::dofs; ++d) sum += at[d].d[j] * J[j * K::dofs + d].d[K::rows + k];
+      p_bar[K::factors + k] += sum;
     }
-    load_inside<K>(p, with);
-    for (int k = 0; k < inside; ++k) with[K::factors + k].d[K::rows + k] = T(1.0);
-    evaluate_on_duals<K, K::rows + inside>(at, with, C, J);
-    for (int j = 0; j < K::rows; ++j) {
-      for (int d = 0; d < K::dofs; ++d) x_bar[d] += J[j * K::dofs + d].d[j];
-      for (int k = 0; k < inside; ++k) {
-        T sum = -(times_factor<K>(p, j, y[j]) * C[j].d[K::rows + k]);
-        for (int d = 0; d < K::dofs; ++d) sum += at[d].d[j] * J[j * K::dofs + d].d[K::rows + k];
-        p_bar[K::factors + k] += sum;
-      }
-      if (j < K::offsets) p_bar[K::factors + inside + j] += y[j];
-    }
-    if constexpr (K::factors) {
-      T sum = -(y[K::rows - 1] * C[K::rows - 1].v);
-      for (int d = 0; d < K::dofs; ++d) sum += v(K::rows - 1, d) * J[last + d].v;
-      p_bar[0] += sum;
-    }
+    if (j < K::offsets) p_bar[K::factors + inside + j] += y[j];
+  }
+  if constexpr (K::factors) {
+    T sum = -(y[K::rows - 1] * C[K::rows - 1].v);
+    for (int d = 0; d < K::dofs; ++d) sum += v[last + d] * J[last + d].v;
+    p_bar[0] += sum;
   }
 }
 

@@ -42,18 +42,30 @@ void pull_back_rates(const Element<K, T>& e, const T* lambda, const T* C_r, cons
 template <bool alone = false, class K, class T>
 void pull_back(const Element<K, T>& e, const Kept<K, T>& at, const T* lambda, const T* C_r, const T* dl, const T* y,
                const T* z, const T* u, T* x_bar, ElementCotangent<K, T>& bar) {
-  T a[K::dofs], b[K::dofs], near[K::rows];
-  unrolled<K::dofs>([&](int d) {
-    a[d] = e.w[d / 3] * z[d];
-    b[d] = alone ? T(0.0) : e.w[d / 3] * u[d];
-  });
+  const auto v = [&](int j, int d) {
+    if constexpr (alone)
+      return dl[j] * (e.w[d / 3] * z[d]);
+    else
+      return e.w[d / 3] * (dl[j] * z[d] - y[j] * u[d]);
+  };
+  T near[K::rows];
   if constexpr (HasGeometry<K>) {
     T along[K::dofs];
-    unrolled<K::dofs>([&](int d) { along[d] = alone ? dl[0] * a[d] : dl[0] * a[d] - y[0] * b[d]; });
+    unrolled<K::dofs>([&](int d) { along[d] = v(0, d); });
     at.add_hessian_times(along, x_bar);
     for (int k = 0; k < parameter_count<K>; ++k) bar.p[k] += y[k];  // C = f(x) - p
+  } else if constexpr (HasReverse<K>) {
+    T a[K::dofs], b[K::dofs];
+    for (int d = 0; d < K::dofs; ++d) {
+      a[d] = e.w[d / 3] * z[d];
+      b[d] = e.w[d / 3] * u[d];
+    }
+    K::reverse(at.x, e.p, dl, y, a, b, x_bar, bar.p);
   } else {
-    gradients_vjp<K>(at.x, e.p, dl, y, a, b, x_bar, bar.p);
+    T along[K::rows * K::dofs];
+    for (int j = 0; j < K::rows; ++j)
+      for (int d = 0; d < K::dofs; ++d) along[j * K::dofs + d] = v(j, d);
+    gradients_vjp<K>(at.x, e.p, y, along, x_bar, bar.p);
     if constexpr (K::periodic)
       if (C_r) C_r = on_branch<K>(at.x, e.p, C_r, near);
   }
