@@ -325,6 +325,8 @@ def _warnings(ends: Sequence[Minimum], best: Minimum, interrupted: bool, rows: i
             "more than their intervals say. A start far off wants short pieces first (windows) or other starts; else "
             "see where it misses: what is held, places of markers, mesh, missing physics, or a sigma too small"
         )
+    if best.converged and best.doubt:
+        warnings.append(f"the fit ended where {best.doubt}; intervals take the cost as smooth")
     if interrupted:
         warnings.append(
             "interrupted: intervals are the linear ones, without profiles and without refits on a finer discretization"

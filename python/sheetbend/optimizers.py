@@ -17,6 +17,7 @@ from .problem import FitProblem
 from .wording import short
 
 OPTIMIZERS = ("auto", "ceres", "scipy")
+LOST = 0.1  # of the cost: a slope that promises so much is no end
 STUCK = 1e-5  # of the cost: a third of a standard error where residuals are ten thousand
 ROUNDING = 1e-12  # of the first cost: residuals of data without noise end as rounding errors, which have any slope
 
@@ -34,7 +35,8 @@ class Progress:
 
 @dataclass(frozen=True)
 class Minimum:
-    """Where an optimizer ended; `interrupted` by Ctrl-C, with its best so far. `first` is the cost where it began."""
+    """Where an optimizer ended; `interrupted` by Ctrl-C, with its best so far. `first` is the cost where it began,
+    `doubt` says what speaks against its being a minimum."""
 
     u: np.ndarray
     cost: float
@@ -44,6 +46,7 @@ class Minimum:
     interrupted: bool
     message: str
     first: float | None = None
+    doubt: str = ""
 
 
 Observer = Callable[[Progress], None]
@@ -89,7 +92,8 @@ def minimize(
 
 
 def judged(problem: FitProblem, end: Minimum, first: float) -> Minimum:
-    """An optimizer's end after a first cost: no convergence where the cost has still a slope. Optimizers also stop
+    """An optimizer's end after a first cost: in doubt where the cost has still a slope, and no convergence where that
+    promises a good part of the cost. Optimizers also stop
     where steps are small and take little off, as they are wherever no step lowers the cost: at a kink, or where
     gradients are off."""
     if not end.converged:
@@ -98,7 +102,7 @@ def judged(problem: FitProblem, end: Minimum, first: float) -> Minimum:
     if left <= STUCK or left * end.cost <= ROUNDING * first:
         return end
     words = f"no step lowers the cost, though its slope promises {short(100 * left, 2)} % less (a kink, a rough motion)"
-    return replace(end, converged=False, message=f"{words}: {end.message}")
+    return replace(end, converged=left < LOST, message=f"{words}: {end.message}", doubt=words)
 
 
 def _promised(problem: FitProblem, u: np.ndarray) -> float:

@@ -11,6 +11,7 @@ import pytest
 import sheetbend as sb
 import sheetbend.search as search
 from pytest import approx
+from sheetbend import optimizers
 from sheetbend.discretization import Refinement
 from sheetbend.optimizers import Progress, has_ceres, minimize
 from sheetbend.problem import FitProblem, as_parameters
@@ -309,3 +310,14 @@ def test_an_end_at_a_kink_is_no_convergence(optimizer):
     assert "no step lowers the cost, though its slope promises 97 % less" in fit.result.message
     assert any("did not converge: no step" in words for words in fit.result.warnings)
     assert "did NOT converge" in fit.report()
+
+
+@pytest.mark.parametrize(
+    ("promised", "converged", "doubted"), [(1e-6, True, False), (0.01, True, True), (0.5, False, True)]
+)
+def test_a_slope_at_the_end_is_told_and_a_steep_one_is_no_end(monkeypatch, promised, converged, doubted):
+    end = optimizers.Minimum(np.zeros(1), 2.0, 3, 4, True, False, "small steps")
+    monkeypatch.setattr(optimizers, "_promised", lambda problem, u: promised)
+    found = optimizers.judged(None, end, first=10.0)
+    assert (found.converged, bool(found.doubt)) == (converged, doubted)
+    assert found.message.endswith("small steps")
