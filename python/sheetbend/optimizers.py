@@ -93,9 +93,8 @@ def minimize(
 
 def judged(problem: FitProblem, end: Minimum, first: float) -> Minimum:
     """An optimizer's end after a first cost: in doubt where the cost has still a slope, and no convergence where that
-    promises a good part of the cost. Optimizers also stop
-    where steps are small and take little off, as they are wherever no step lowers the cost: at a kink, or where
-    gradients are off."""
+    promises a good part of the cost. Optimizers also stop where steps are small and take little off, as they are
+    wherever no step lowers the cost: at a kink, or where gradients are off."""
     if not end.converged:
         return end
     left = _promised(problem, end.u)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import sheetbend as sb
 from sheetbend.mesh import icosphere
 
@@ -34,3 +35,17 @@ def held(scene: sb.Scene, particles: list[int]) -> sb.Scene:
     scene.pin(anchors)
     scene.add_constraints("attachment", np.column_stack([particles, anchors]), compliance=1e7, name="hold")
     return scene
+
+
+def expect_bits_of_a_loop(scene, times, solver, volume):
+    """Batches over a kept volume, in torch, are what each scene is alone, with its gradient."""
+    torch = pytest.importorskip("torch")
+    st = pytest.importorskip("sheetbend.torch")
+    batch = (volume * torch.linspace(0.9, 1.2, 10, dtype=torch.float64)).requires_grad_()
+    x = st.simulate(scene, times, solver, values={"cloth_volume": batch})
+    weights = torch.linspace(-1.0, 1.0, x[0].numel(), dtype=torch.float64).reshape(x[0].shape)
+    (bars,) = torch.autograd.grad((x * weights).sum(), batch)
+    for one, x_of_one, bar in zip(batch.tolist(), x, bars, strict=True):
+        run = sb.rollout(scene, times, solver, {"cloth_volume": one})
+        assert (run.positions == x_of_one.detach().numpy()).all()
+        assert run.gradient(weights.numpy()).quantities["cloth_volume"] == float(bar)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import sheetbend as sb
-from balloons import RADIUS, STRETCH, held, skin
+from balloons import RADIUS, STRETCH, expect_bits_of_a_loop, held, skin
 from pytest import approx
 from sheetbend.mesh import icosphere
 from sheetbend.volume import enclosed_volume
@@ -125,14 +125,4 @@ def test_the_content_of_a_ball_is_recovered():
 
 @pytest.mark.parametrize("method", METHODS)
 def test_batches_have_the_bits_of_a_loop(method):
-    torch = pytest.importorskip("torch")
-    st = pytest.importorskip("sheetbend.torch")
-    scene, solver, times = ball(), sb.Solver(h=1 / 400, method=method), [0.0, 0.02]
-    batch = (INSIDE * torch.linspace(0.9, 1.2, 10, dtype=torch.float64)).requires_grad_()
-    x = st.simulate(scene, times, solver, values={"cloth_volume": batch})
-    weights = torch.linspace(-1.0, 1.0, x[0].numel(), dtype=torch.float64).reshape(x[0].shape)
-    (bars,) = torch.autograd.grad((x * weights).sum(), batch)
-    for one, x_of_one, bar in zip(batch.tolist(), x, bars, strict=True):
-        run = sb.rollout(scene, times, solver, {"cloth_volume": one})
-        assert (run.positions == x_of_one.detach().numpy()).all()
-        assert run.gradient(weights.numpy()).quantities["cloth_volume"] == float(bar)
+    expect_bits_of_a_loop(ball(), [0.0, 0.02], sb.Solver(h=1 / 400, method=method), INSIDE)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
 
 from ..errors import RecordingError
+from ..timeseries import Array
 
 Row = tuple[int, list[str]]  # line number in the file, from 1, and the cells
 
@@ -48,6 +50,15 @@ def number(path: Path, line: int, cell: str) -> float:
     if np.isinf(found):
         refuse(path, line, "holds an infinite number; leave the cell empty for a marker not seen", cell)
     return found
+
+
+def points_seen(
+    path: Path, rows: Sequence[Row], names: Sequence[str], first: Sequence[int]
+) -> tuple[Array, tuple[str, ...]]:
+    """Points (rows, k, 3) whose x, y, z stand from columns `first` on, and their names, without those never seen."""
+    x = np.array([[[number(path, row, cells[k + axis]) for axis in range(3)] for k in first] for row, cells in rows])
+    seen = ~np.isnan(x[:, :, 0]).all(axis=0)
+    return x[:, seen], tuple(names[k] for k, ever in zip(first, seen, strict=True) if ever)
 
 
 def refuse(path: Path, line: int, problem: str, got: object, fix: str = "correct that line") -> NoReturn:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import RecordingError
 from ..recording import Recording
-from .cells import number, refuse, split
+from .cells import number, points_seen, refuse, split
 
 _UNITS = {"Meters": "m", "Centimeters": "cm", "Millimeters": "mm"}
 _READ = ("Marker", "Rigid Body")
@@ -60,8 +60,6 @@ def read(path: Path, text: list[tuple[int, str]]) -> Recording:
         if len(cells) != width:
             refuse(path, row, f"must have {width} cells, like the header", len(cells))
     times = np.array([number(path, row, cells[1]) for row, cells in frames])
-    x = np.array([[[number(path, row, cells[k + axis]) for axis in range(3)] for k in first] for row, cells in frames])
-    seen = ~np.isnan(x[:, :, 0]).all(axis=0)
-    markers = tuple(names[k] for k, ever in zip(first, seen, strict=True) if ever)
+    x, markers = points_seen(path, frames, names, first)
     metadata = {"units": _UNITS[about["Length Units"]], "take": about.get("Take Name", "")}
-    return Recording(x[:, seen], times, markers, gravity=_DOWN, metadata=metadata)
+    return Recording(x, times, markers, gravity=_DOWN, metadata=metadata)

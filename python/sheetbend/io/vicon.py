@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import RecordingError
 from ..recording import Recording
-from .cells import number, refuse, split
+from .cells import number, points_seen, refuse, split
 from .sidecar import METERS
 
 _SECTIONS = ("Devices", "Joints", "Model Outputs", "Segments", "Trajectories")
@@ -57,10 +57,8 @@ def read(path: Path, text: list[tuple[int, str]]) -> Recording:
         if len(cells) < width:
             refuse(path, row, f"must have {width} cells, like the header", len(cells))
     count = np.array([number(path, row, cells[0]) for row, cells in frames])
-    x = np.array([[[number(path, row, cells[k + axis]) for axis in range(3)] for k in first] for row, cells in frames])
-    seen = ~np.isnan(x[:, :, 0]).all(axis=0)
-    markers = tuple(names[k] for k, ever in zip(first, seen, strict=True) if ever)
-    return Recording(x[:, seen], (count - count[0]) / hertz, markers, metadata={"units": told.pop()})
+    x, markers = points_seen(path, frames, names, first)
+    return Recording(x, (count - count[0]) / hertz, markers, metadata={"units": told.pop()})
 
 
 def _title(line: str) -> str:
