@@ -3,7 +3,7 @@
 # Renaming the namespace keeps the variants' templates and inline functions apart.
 set(variants portable)
 # Sanitizers need minutes per instruction set: there is one.
-if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64" AND NOT SHEETBEND_SANITIZE)
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64" AND NOT SHEETBEND_SANITIZE AND NOT SHEETBEND_PORTABLE_KERNELS)
   list(APPEND variants v2 v3 v4)
   set_source_files_properties(core/packs/choose.cpp PROPERTIES COMPILE_DEFINITIONS SHEETBEND_X86_KERNELS)
 endif()
