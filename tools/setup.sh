@@ -105,6 +105,12 @@ with open(sys.argv[1], "rb") as file:
 PYTHON
 }
 
+# Compiles through ccache where it is installed; paths in the cache are relative, so another checkout finds what this one compiled.
+use_compiler_cache() {
+  has_command ccache || return 0
+  export CMAKE_CXX_COMPILER_LAUNCHER=ccache CCACHE_BASEDIR="$ROOT" CCACHE_NOHASHDIR=1
+}
+
 # install_sheetbend EXTRAS: builds in place of pip's throw-away directory, so that a second build compiles only what changed.
 install_sheetbend() {
   local extras=$1 found
@@ -128,4 +134,5 @@ install_sheetbend() {
 set_up() {
   install_system_packages
   make_environment
+  use_compiler_cache
 }
