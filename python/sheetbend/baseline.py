@@ -7,13 +7,15 @@ blend  on a rope held at both ends, every free marker follows the ends: from whe
        arc length. This is exact when both ends move alike and the rope is carried along. Where a grip drives
        several markers, the end is the one next to the free ones.
 
+For a scene that drives particles, carried.py adds two more: every marker moves rigidly with the grips.
+
 hold and blend are given where each free marker is first seen in the piece; blend also the recorded ends
 throughout, as a simulation is. Errors are distances in space, m, over free markers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,10 +25,12 @@ from .errors import RecordingError
 from .recording import Recording
 from .timeseries import Array, mean_position
 
-_IN_WORDS = {
+IN_WORDS = {
     "hold": "every marker stays where it is first seen",
     "rest": "every marker stays at its mean position in the fitted data",
     "blend": "every marker follows the two ends, weighted by arc length",
+    "carried": "every marker moves rigidly with the grips from where it is first seen",
+    "carried shape": "the mean shape of the fitted data moves rigidly with the grips",
 }
 
 
@@ -35,7 +39,7 @@ class NoPhysics:
     """The strongest prediction without physics for a held-out piece.
 
     Attributes:
-        kind: "hold", "rest" or "blend".
+        kind: "hold", "rest", "blend", "carried" or "carried shape".
         words: for reports, what it predicts.
         errors: rms error of each baseline that applies, m.
         positions: (frames, markers, 3) m, the prediction.
@@ -168,7 +172,9 @@ def rms_about(recording: Recording, reference: ArrayLike, scored: NDArray[np.boo
     return float(np.sqrt(np.mean(np.sum(distance**2, axis=-1))))
 
 
-def no_physics(fitted: Recording | Sequence[Recording], held_out: Recording) -> NoPhysics:
+def no_physics(
+    fitted: Recording | Sequence[Recording], held_out: Recording, more: Mapping[str, Array] | None = None
+) -> NoPhysics:
     """The strongest baseline for a held-out piece: of those that apply, the one with the smallest error.
 
     Taking the smallest favors the baseline, so a simulation that beats it beats them all. `rest` applies
@@ -179,6 +185,8 @@ def no_physics(fitted: Recording | Sequence[Recording], held_out: Recording) -> 
         fitted: what the fit saw, one recording or several with the markers of `held_out`.
         held_out: the piece to predict. Its first sight of each free marker is given to `hold` and `blend`
             and scored for none, except in a single frame (a static shape), where only `rest` applies.
+        more: further predictions (frames, markers, 3) m by kind: "carried" and "carried shape"
+            (`carried.carried_baselines`).
 
     Raises:
         RecordingError: the markers differ, nothing is left to score, or no baseline applies.
@@ -186,7 +194,7 @@ def no_physics(fitted: Recording | Sequence[Recording], held_out: Recording) -> 
     rest = rest_baseline(fitted)
     _check_same_markers(fitted if isinstance(fitted, Recording) else fitted[0], held_out)
     scored = _free_and_seen(held_out)
-    candidates: dict[str, Array] = {}
+    candidates: dict[str, Array] = dict(more or {})
     if not np.isnan(rest[scored.any(axis=0)]).any():
         candidates["rest"] = np.broadcast_to(rest, held_out.positions.shape).copy()
     if len(held_out.times) > 1:
@@ -199,7 +207,8 @@ def no_physics(fitted: Recording | Sequence[Recording], held_out: Recording) -> 
         raise RecordingError("held_out", "has no baseline: one frame, of markers not seen before", 1, fix)
     errors = {kind: rms_about(held_out, prediction, scored) for kind, prediction in candidates.items()}
     kind = min(errors, key=errors.__getitem__)
-    return NoPhysics(kind, f"{kind}: {_IN_WORDS[kind]}", errors, candidates[kind], errors[kind], scored)
+    words = f"{kind}: {IN_WORDS[kind]}"
+    return NoPhysics(kind, words, errors, candidates[kind], errors[kind], scored)
 
 
 def _check_same_markers(one: Recording, other: Recording) -> None:

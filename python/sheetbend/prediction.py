@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .baseline import no_physics
+from .carried import carried_baselines
 from .errors import RecordingError
 from .experiment import Experiment
 from .optimizers import refit
@@ -185,7 +186,7 @@ def _with_baseline(c: Comparison, experiments: Sequence[Experiment]) -> Comparis
         target = c.recording
     if not source or target is None:
         return c
-    guess = no_physics(source, target)
+    guess = no_physics(source, target, carried_baselines(e, source if e.held_out is not None else (), target))
     predicted = np.full(c.simulated.shape, np.nan)
     predicted[held] = np.where(guess.scored[..., None], guess.positions, target.positions)
     return replace(c, baseline=predicted, baseline_words=guess.words)

@@ -1,0 +1,122 @@
+"""The baseline for driven scenes: a shape that grips carry along is predicted without error."""
+
+from __future__ import annotations
+
+import numpy as np
+import sheetbend as sb
+from sheetbend.baseline import no_physics
+from sheetbend.carried import carried_baselines
+
+T = np.linspace(0.0, 1.0, 41)
+NEAR = 1e-8  # m: what decides between rotations that fit equally well moves the others by 1e-9 of an angle
+
+
+def turned(angle: np.ndarray, axis: tuple[float, float, float]) -> np.ndarray:
+    """Rotation matrices (frames, 3, 3) about a unit axis (Rodrigues)."""
+    k = np.cross(np.eye(3), axis)
+    return np.eye(3) + np.sin(angle)[:, None, None] * k.T + (1 - np.cos(angle))[:, None, None] * (k.T @ k.T)
+
+
+def poses(axis: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
+    """(frames, 3, 3) and (frames, 3) m."""
+    return turned(1.2 * np.sin(3 * T), axis), np.stack([0.1 * np.sin(4 * T), 0.05 * T, 0.2 * T**2], axis=1)
+
+
+def placed(x: np.ndarray, turn: np.ndarray, shift: np.ndarray) -> np.ndarray:
+    return np.einsum("fij,pj->fpi", turn, x) + shift[:, None]
+
+
+def held_cloth(rows: list[list[int]], motions: list[tuple[np.ndarray, np.ndarray]]) -> tuple[sb.Scene, np.ndarray]:
+    """A cloth of 5 x 4 vertices whose sets of vertices follow rigid motions; also all vertices, (20, 3) m."""
+    mesh = sb.mesh.grid(0.4, 0.3, 4, 3, pattern="one_way")
+    scene = sb.Scene("held")
+    cloth = sb.add_cloth(scene, mesh, density=0.2, warp=100, shear=10, bending=1e-4)
+    x = scene.positions[cloth.particles]
+    for row, motion in zip(rows, motions, strict=True):
+        scene.drive(cloth.particles[row], T, placed(x[row], *motion))
+    return scene, x
+
+
+def experiment(scene: sb.Scene, x: np.ndarray, free: list[int]) -> sb.Experiment:
+    recording = sb.Recording(x[:, free], T, markers=[f"v{i}" for i in free])
+    places = [sb.on_particle(i) for i in free]
+    return sb.Experiment(scene=scene, recording=recording, markers=places, fit=(0.0, 0.5), held_out=(0.5, 1.0))
+
+
+def predicted(e: sb.Experiment) -> dict[str, np.ndarray]:
+    held = e.held()
+    assert held is not None
+    return carried_baselines(e, [e.fitted()], held)
+
+
+def test_a_shape_on_one_grip_is_carried_exactly() -> None:
+    motion = poses((0.6, 0.0, 0.8))
+    scene, x = held_cloth([[0, 1, 2, 5]], [motion])
+    e = experiment(scene, placed(x, *motion), [8, 13, 19])
+    found = predicted(e)
+    assert set(found) == {"carried", "carried shape"}
+    for prediction in found.values():
+        assert np.abs(prediction - e.held().positions).max() < NEAR  # type: ignore[union-attr]
+
+
+def test_particles_on_a_line_turn_by_the_smallest_rotation() -> None:
+    """The grip is a row along x that turns about y: nothing turns about the row itself."""
+    motion = poses((0.0, 1.0, 0.0))
+    scene, x = held_cloth([[0, 1, 2]], [motion])
+    e = experiment(scene, placed(x, *motion), [8, 13])
+    assert np.abs(predicted(e)["carried"] - e.held().positions).max() < 1e-6  # type: ignore[union-attr]
+
+
+def test_one_particle_only_translates() -> None:
+    turn, shift = poses((0.0, 0.0, 1.0))
+    still = np.broadcast_to(np.eye(3), turn.shape)
+    scene, x = held_cloth([[0]], [(still, shift)])
+    e = experiment(scene, placed(x, still, shift), [8, 13])
+    assert np.abs(predicted(e)["carried"] - e.held().positions).max() < 1e-12  # type: ignore[union-attr]
+
+
+def test_two_grips_share_a_marker_by_nearness() -> None:
+    """One corner stays, the other is lifted: the middle of the edge between them rises half as far."""
+    still = np.broadcast_to(np.eye(3), (len(T), 3, 3))
+    lift = np.stack([0 * T, 0 * T, 1e-5 * T], axis=1)
+    scene, x = held_cloth([[0], [4]], [(still, 0 * lift), (still, lift)])
+    e = experiment(scene, placed(x, still, 0 * lift), [2, 1])
+    up = predicted(e)["carried"][..., 2] - x[0, 2]
+    times = e.held().times  # type: ignore[union-attr]
+    expected = (times - times[0])[:, None] * 1e-5 * np.array([0.5, 0.25])
+    assert np.abs(up - expected).max() < 1e-12
+
+
+def test_the_report_takes_the_harder_baseline() -> None:
+    motion = poses((0.6, 0.0, 0.8))
+    scene, x = held_cloth([[0, 1, 2, 5]], [motion])
+    noise = np.random.default_rng(1).normal(size=(len(T), len(x), 3))
+    e = experiment(scene, placed(x, *motion) + 1e-3 * noise, [8, 13, 19])
+    held = e.held()
+    assert held is not None
+    alone = no_physics([e.fitted()], held)
+    found = no_physics([e.fitted()], held, predicted(e))
+    assert found.kind == "carried shape" and found.rms < 2.5e-3 < 0.05 < alone.rms
+    assert found.words == "carried shape: the mean shape of the fitted data moves rigidly with the grips"
+    assert {*alone.errors, "carried", "carried shape"} == set(found.errors)
+
+
+def test_nothing_is_carried_where_nothing_moves() -> None:
+    mesh = sb.mesh.grid(0.4, 0.3, 4, 3, pattern="one_way")
+    scene = sb.Scene("pinned")
+    cloth = sb.add_cloth(scene, mesh, density=0.2, warp=100, shear=10, bending=1e-4)
+    scene.pin(cloth.particles[[0, 4]])
+    x = np.broadcast_to(scene.positions, (len(T), 20, 3))
+    assert predicted(experiment(scene, x, [8, 13])) == {}
+
+
+def test_a_rope_held_by_one_grip_with_direction() -> None:
+    """The grip of a rod drives a node, a ghost and a director: place, direction and roll carry the shape."""
+    turn, shift = poses((0.0, 0.6, 0.8))
+    grip = sb.Grip(T, shift, turn[:, :, 0], turn[:, :, 2])
+    scene = sb.rod(0.4, 8, density=0.05, EI=1e-3, GJ=1e-3, start=grip)
+    nodes = scene.ropes["rod"].particles
+    x = np.zeros((len(T), scene.particle_count, 3))
+    x[:, nodes] = placed(scene.positions[nodes] - scene.positions[nodes[0]], turn, shift)
+    e = experiment(scene, x, [int(nodes[3]), int(nodes[8])])
+    assert np.abs(predicted(e)["carried"] - e.held().positions).max() < NEAR  # type: ignore[union-attr]
