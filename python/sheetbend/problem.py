@@ -151,6 +151,11 @@ class FitProblem:
             [self.experiments[i] for i in chosen], self.given, [self.recordings[i] for i in chosen], self.threads, part
         )
 
+    def values_of(self, e: Experiment, u: np.ndarray) -> dict[str, float]:
+        """Physical values at u (free,) of the quantities of an experiment's scene that are parameters."""
+        values = self.parameters.to_physical(u)
+        return {name: values[key] for name, key in self._keys(e).items() if key in values}
+
     def _keys(self, e: Experiment) -> dict[str, str]:
         """Expanded parameter name of each quantity of an experiment, whether or not it is a parameter."""
         private = {p.name for p in self.given.values() if p.private}
