@@ -15,6 +15,7 @@ from .driven_noise import doubts
 from .errors import InputError
 from .experiment import Experiment
 from .floors import solver_floors
+from .growth import Growth, growths
 from .identifiability import Identifiability, Nuisance, identify
 from .leave_one_out import MEANING, companions, each_left_out
 from .optimizers import Minimum, Observer, refit
@@ -22,7 +23,7 @@ from .parameters import Parameter, Parameters
 from .prediction import Comparison, compare, predicted_values
 from .problem import FitProblem, ParameterLike, as_parameters
 from .recording import Recording
-from .result import Estimate, FitResult, Given, RecordingFit, Refit, Start
+from .result import Estimate, FitResult, Given, MotionGrowth, RecordingFit, Refit, Start
 from .scene import Scene
 from .search import Search
 
@@ -80,7 +81,7 @@ def fit(
     *,
     optimizer: str = "auto",
     starts: Sequence[Mapping[str, float]] = (),
-    windows: Sequence[float] = (),
+    windows: Sequence[float] | str = "auto",
     tolerance: float = 1e-10,
     refine: Refinement | None = None,
     systematic: Systematic | None = None,
@@ -99,7 +100,8 @@ def fit(
         optimizer: "ceres", "scipy", or "auto" (Ceres where it was built).
         starts: further starting values by name; the best end wins, all are reported.
         windows: s, increasing: so much of every motion from its scene's start on is fitted first, one after another,
-            each from where the one before ended; for a start far off, from which the whole motion diverges or misleads.
+            each from where the one before ended. "auto" chooses the lengths, and none where the first step on the whole
+            motion keeps what it promises; () for none.
         tolerance: relative change of the cost that counts as none.
         refine: also refit on a finer discretization, and count what that moves as a part of the intervals (see
             `discretization`).
@@ -138,7 +140,8 @@ def fit(
         for e in fitted:
             companions(e, fitted, wanted)
     problem = FitProblem(fitted, wanted, threads=threads)
-    ends, name, interrupted = search.run(problem)
+    found = search.run(problem)
+    ends, name, interrupted = found.ends, found.optimizer, found.interrupted
     best = ends[0]
     values = problem.parameters.to_physical(best.u)
 
@@ -151,9 +154,9 @@ def fit(
         more = {} if systematic is None else systematic(problem, best.u)
         refined = to_the_limit(refits, problem.parameters, values)
         judged = _judge(problem, best.u, refined, more, refitter if profiles else None)
-        found = predicted_values(experiments, wanted, values, refitter, threads)
+        predicted = predicted_values(experiments, wanted, values, refitter, threads)
         doubted = () if refitter is None else doubts(problem, best.u, judged)
-        return _Conclusion(refits, judged, *found, doubted)
+        return _Conclusion(refits, judged, *predicted, doubted)
 
     left_out: dict[str, Comparison] = {}
     try:
@@ -190,11 +193,18 @@ def fit(
         autocorrelation_time=judged.autocorrelation_time,
         starts=tuple(
             Start(
-                cost=m.cost, iterations=m.iterations, converged=m.converged, values=problem.parameters.to_physical(m.u)
+                cost=m.cost if np.isfinite(m.cost) else None,
+                iterations=m.iterations,
+                converged=m.converged,
+                values=problem.parameters.to_physical(m.u),
             )
             for m in ends
         ),
         refits=end.refits,
+        growth=_growth(found.growths, growths(problem, best.u)),
+        windows=best.windows,
+        evaluations=sum(m.evaluations for m in ends),
+        jacobians=sum(m.jacobians for m in ends),
         warnings=_warnings(ends, best, interrupted, problem.core.data_rows) + end.doubts,
     )
     return Fit(result, tuple(comparisons), wanted, corrected)
@@ -301,6 +311,22 @@ def _errors(
     )
 
 
+def _growth(start: Sequence[Growth], end: Sequence[Growth]) -> tuple[MotionGrowth, ...]:
+    return tuple(
+        MotionGrowth(
+            name=first.name,
+            largest=(_finite(first.largest), _finite(last.largest)),
+            rate=(first.rate, last.rate),
+            until=(first.until, last.until),
+        )
+        for first, last in zip(start, end, strict=True)
+    )
+
+
+def _finite(number: float) -> float | None:
+    return number if np.isfinite(number) else None
+
+
 def _given(parameters: Parameters, values: Mapping[str, float]) -> tuple[Given, ...]:
     rows = []
     for name, p in parameters.items():
@@ -331,9 +357,12 @@ def _warnings(ends: Sequence[Minimum], best: Minimum, interrupted: bool, rows: i
         warnings.append(
             "interrupted: intervals are the linear ones, without profiles and without refits on a finer discretization"
         )
-    elsewhere = [m for m in ends if m.cost > best.cost * (1.0 + INACCURATE)]
+    elsewhere = [m for m in ends if best.cost * (1.0 + INACCURATE) < m.cost < np.inf]
     if elsewhere:
         warnings.append(f"{len(elsewhere)} of {len(ends)} starts ended in a worse minimum: the cost has several")
+    without = [m for m in ends if m.cost == np.inf]
+    if without:
+        warnings.append(f"{len(without)} of {len(ends)} starts led nowhere: {without[0].message}")
     if not best.converged and not best.interrupted:
         warnings.append(f"the fit did not converge: {best.message}")
     return tuple(warnings)

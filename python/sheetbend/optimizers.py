@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .approach import step_limits
 from .errors import InputError, SheetbendError
 from .gauge import RANK_TOLERANCE
 from .optional import require
@@ -36,7 +37,8 @@ class Progress:
 @dataclass(frozen=True)
 class Minimum:
     """Where an optimizer ended; `interrupted` by Ctrl-C, with its best so far. `first` is the cost where it began,
-    `doubt` says what speaks against its being a minimum."""
+    `doubt` says what speaks against its being a minimum. `evaluations` simulated all experiments, `jacobians` of these
+    with derivatives; `windows` [s] were fitted before."""
 
     u: np.ndarray
     cost: float
@@ -47,6 +49,8 @@ class Minimum:
     message: str
     first: float | None = None
     doubt: str = ""
+    jacobians: int = 0
+    windows: tuple[float, ...] = ()
 
 
 Observer = Callable[[Progress], None]
@@ -57,20 +61,11 @@ def has_ceres() -> bool:
     return importlib.util.find_spec("sheetbend._ceres") is not None
 
 
-def minimize(
-    problem: FitProblem,
-    u: np.ndarray,
-    optimizer: str = "auto",
-    max_iterations: int = 200,
-    tolerance: float = 1e-10,
-    observe: Observer | None = None,
-) -> tuple[Minimum, str]:
-    """Minimize half the sum of squared residuals from u (free,), inside the parameters' bounds; also returns the
-    optimizer's name.
+def named(optimizer: str) -> str:
+    """The optimizer that a name stands for.
 
     Raises:
-        InputError: unknown optimizer, or Ceres asked for and not built.
-        SheetbendError: the start itself has no answer (divergence, no equilibrium).
+        InputError: unknown, or Ceres asked for and not built.
     """
     if optimizer not in OPTIMIZERS:
         raise InputError("optimizer", "is unknown", optimizer, f"use one of: {', '.join(OPTIMIZERS)}")
@@ -81,11 +76,34 @@ def minimize(
             "ceres",
             "install Ceres (libceres-dev) and rebuild, or use 'scipy'",
         )
-    name = optimizer if optimizer != "auto" else "ceres" if has_ceres() else "scipy"
-    ok, r, _ = problem.evaluate(u, jacobian=False)
-    if not ok:
-        raise SheetbendError(f"the fit cannot start: {problem.core.failure or 'a residual is not finite'}")
-    first = 0.5 * float(r @ r)
+    return optimizer if optimizer != "auto" else "ceres" if has_ceres() else "scipy"
+
+
+def minimize(
+    problem: FitProblem,
+    u: np.ndarray,
+    optimizer: str = "auto",
+    max_iterations: int = 200,
+    tolerance: float = 1e-10,
+    observe: Observer | None = None,
+    first: float | None = None,
+) -> tuple[Minimum, str]:
+    """Minimize half the sum of squared residuals from u (free,), inside the parameters' limits, no step longer than
+    `approach.step_limits`; also returns the optimizer's name.
+
+    Args:
+        first: the cost at u, where it is known.
+
+    Raises:
+        InputError: see `named`.
+        SheetbendError: the start itself has no answer (divergence, no equilibrium).
+    """
+    name = named(optimizer)
+    if first is None:
+        ok, r, _ = problem.evaluate(u, jacobian=False)
+        if not ok:
+            raise SheetbendError(f"the fit cannot start: {problem.core.failure or 'a residual is not finite'}")
+        first = 0.5 * float(r @ r)
     run = _ceres if name == "ceres" else _scipy
     end = run(problem, np.array(u, dtype=float), max_iterations, tolerance, _Best(observe, u, first))
     return replace(end, first=first), name
@@ -107,7 +125,7 @@ def judged(problem: FitProblem, end: Minimum, first: float) -> Minimum:
 def _promised(problem: FitProblem, u: np.ndarray) -> float:
     """Share of the cost that a Gauss-Newton step from u inside the bounds would take off, were the residuals linear."""
     ok, r, J = problem.evaluate(u)
-    lower, upper = problem.parameters.bounds()
+    lower, upper = problem.parameters.limits()
     slope, size = J.T @ r, np.linalg.norm(J, axis=0)
     free = (size > RANK_TOLERANCE * np.linalg.norm(r)) & ~((u <= lower) & (slope > 0)) & ~((u >= upper) & (slope < 0))
     if not ok or not free.any() or not r.any():
@@ -147,7 +165,8 @@ class _Best:
 def _ceres(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: float, best: _Best) -> Minimum:
     from . import _ceres as ceres
 
-    lower, upper = problem.parameters.bounds()
+    lower, upper = problem.parameters.limits()
+    u = np.clip(u, lower, upper)
     interrupted = False
 
     def observe(iteration: int, cost: float, step: float, gradient: float, at: list[float]) -> bool:
@@ -161,6 +180,8 @@ def _ceres(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: f
             u=u,
             lower=lower,
             upper=upper,
+            longest_step=step_limits(problem.parameters),
+            held=[],
             max_iterations=max_iterations,
             tolerance=tolerance,
             observe=observe,
@@ -176,25 +197,40 @@ def _ceres(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: f
             False,
             True,
             "interrupted: the best point so far",
+            jacobians=out.get("jacobians", 0),
         )
     return Minimum(
-        np.array(out["u"]), out["cost"], out["iterations"], out["evaluations"], out["converged"], False, out["message"]
+        np.array(out["u"]),
+        out["cost"],
+        out["iterations"],
+        out["evaluations"],
+        out["converged"],
+        False,
+        out["message"],
+        jacobians=out["jacobians"],
     )
 
 
 def _scipy(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: float, best: _Best) -> Minimum:
     optimize = require("scipy.optimize", "fit")
     lower, upper = problem.parameters.bounds()
+    limits, longest = problem.parameters.limits(), step_limits(problem.parameters)
     last: dict[str, Any] = {"u": None}
-    count = 0
+    left: np.ndarray | None = None  # where the step began
+    count = jacobians = 0
 
     def evaluated(at: np.ndarray, jacobian: bool) -> dict[str, Any]:
-        nonlocal count
+        nonlocal count, jacobians, left
+        too_far = left is not None and bool((np.abs(at - left) > longest).any())
+        if not jacobian and (too_far or (at < limits[0]).any() or (at > limits[1]).any()):
+            return {"r": np.full(problem.core.rows, np.inf), "J": None}  # SciPy shortens its step
+        if jacobian:
+            left = at.copy()
         if last["u"] is None or not np.array_equal(last["u"], at) or (jacobian and last["J"] is None):
             count += 1
             jacobian |= problem.cheap_jacobian  # most steps are taken, and then it is needed anyway
+            jacobians += jacobian
             ok, r, J = problem.evaluate(at, jacobian)
-            # SciPy shortens its step where a residual is not finite.
             last.update(
                 u=at.copy(), r=r if ok else np.full(problem.core.rows, np.inf), J=J if jacobian and ok else None
             )
@@ -205,7 +241,7 @@ def _scipy(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: f
     try:
         out = optimize.least_squares(
             lambda at: evaluated(at, False)["r"],
-            np.clip(u, lower, upper),
+            np.clip(u, *limits),
             jac=lambda at: evaluated(at, True)["J"],
             bounds=(lower, upper),
             x_scale="jac",
@@ -215,5 +251,7 @@ def _scipy(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: f
             max_nfev=max_iterations,
         )
     except KeyboardInterrupt:
-        return Minimum(best.u, best.cost, count, count, False, True, "interrupted: the best point so far")
-    return Minimum(out.x, float(out.cost), int(out.njev), int(out.nfev), out.status > 0, False, out.message)
+        words = "interrupted: the best point so far"
+        return Minimum(best.u, best.cost, count, count, False, True, words, jacobians=jacobians)
+    found = (out.x, float(out.cost), int(out.njev), count, out.status > 0, False, out.message)
+    return Minimum(*found, jacobians=jacobians)

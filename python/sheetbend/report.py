@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from typing import TYPE_CHECKING
 
 from .optional import require
-from .result import Estimate, FitResult, Given, RecordingFit
+from .result import Estimate, FitResult, Given, MotionGrowth, RecordingFit
 from .tables import Section, plain_section, rich_section
 from .wording import figures, short
 
@@ -17,6 +18,8 @@ CORRELATION_SHOWN = 0.3
 """Smallest correlation (absolute value) that the report lists."""
 CORRELATIONS_SHOWN = 15
 """Number of correlations that the report lists at most; fit.json has them all."""
+GROWTH_SHOWN = 10.0
+"""Growth of small displacements from which on the report tells it."""
 
 _SAME_MINIMUM = 0.01  # starts that end within 1 % of the best cost found the same minimum
 
@@ -222,11 +225,24 @@ def _correlations(result: FitResult) -> Section:
     return Section(f"Correlations ({left_out})", ("parameter", "with", "correlation"), rows)
 
 
+def _grown(growth: MotionGrowth) -> str:
+    """Of small displacements along one motion, at the end of the fit."""
+    largest = growth.largest[1]
+    size = "without limit" if largest is None else f"{largest:.2g} times"
+    until = "" if growth.until[1] is None else f"; beyond {growth.until[1]:.3g} s nothing can be derived from it"
+    return f"small displacements grow {size}{until}"
+
+
 def _course(result: FitResult) -> Section:
     notes = [("cost", f"{result.cost:.6g} over {result.rows:,} residuals, {len(result.estimates)} free parameters")]
     if result.first_cost is not None:
         fell = f", {result.first_cost / result.cost:,.3g} times the end's" if result.cost > 0 else ""
         notes.append(("at the start", f"{result.first_cost:.6g}{fell}"))
+    if result.evaluations:
+        notes.append(("simulations", f"{result.evaluations:,}, {result.jacobians:,} of them with a Jacobian"))
+    if result.windows:
+        notes.append(("windows fitted first", ", ".join(f"{length:.3g}" for length in result.windows) + " s"))
+    notes += [(f"growth in {g.name}", _grown(g)) for g in result.growth if (g.largest[1] or math.inf) > GROWTH_SHOWN]
     if result.jacobian_seconds is not None:
         notes.append(("a Jacobian took", f"{result.jacobian_seconds:.3g} s"))
     if result.autocorrelation_time > 1.05:
@@ -234,9 +250,10 @@ def _course(result: FitResult) -> Section:
         words = f"one in {time:.3g} counts as independent; the intervals allow for it"
         notes.append(("neighboring residuals are alike", words))
     if len(result.starts) > 1:
-        best = min(start.cost for start in result.starts)
-        same = sum(start.cost <= best * (1 + _SAME_MINIMUM) for start in result.starts)
-        worst = max(start.cost for start in result.starts)
-        words = f"{same} of {len(result.starts)} ended within 1 % of the best cost; the worst at {worst:.4g}"
+        costs = [start.cost for start in result.starts if start.cost is not None]
+        same = sum(cost <= min(costs) * (1 + _SAME_MINIMUM) for cost in costs)
+        words = f"{same} of {len(result.starts)} ended within 1 % of the best cost; the worst at {max(costs):.4g}"
+        if len(costs) < len(result.starts):
+            words += f"; {len(result.starts) - len(costs)} diverged"
         notes.append(("starts", words))
     return Section("Course", notes=tuple(notes))

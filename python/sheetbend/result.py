@@ -104,9 +104,9 @@ class RecordingFit:
 
 @dataclass(frozen=True, kw_only=True)
 class Start:
-    """One start of a multi-start fit: cost at its end, and the physical values there."""
+    """One start of a multi-start fit: cost at its end, None where the motion diverges, and physical values there."""
 
-    cost: float
+    cost: float | None
     iterations: int
     converged: bool
     values: Mapping[str, float]
@@ -125,6 +125,24 @@ class Refit:
     name: str
     to_limit: float
     moved: Mapping[str, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionGrowth:
+    """How far small displacements grow along one fitted motion, see `growth.Growth`: each as (at the start, at the end
+    of the fit).
+
+    Attributes:
+        name: of the experiment.
+        largest: growth; None where it overflows or the motion diverges.
+        rate: 1/s, of its logarithm.
+        until: s from the scene's start, up to which it stays below `growth.ROUGH`; None where it always does.
+    """
+
+    name: str
+    largest: tuple[float | None, float | None]
+    rate: tuple[float, float]
+    until: tuple[float | None, float | None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,6 +165,10 @@ class FitResult:
         starts: the ends of all starts, best first.
         refits: on finer discretizations, of which `Estimate.discretization` is made.
         optimizer, iterations, seconds, converged, interrupted, message: how it went.
+        growth: of every fitted motion.
+        windows: s, the lengths that were fitted first, as given or chosen.
+        evaluations, jacobians: how often all experiments were simulated, and how often of these with a Jacobian, over
+            all starts and windows, up to the minimum.
         warnings: what a reader must know before using the numbers.
     """
 
@@ -170,6 +192,10 @@ class FitResult:
     refits: tuple[Refit, ...] = ()
     warnings: tuple[str, ...] = ()
     first_cost: float | None = None
+    growth: tuple[MotionGrowth, ...] = ()
+    windows: tuple[float, ...] = ()
+    evaluations: int = 0
+    jacobians: int = 0
     jacobian_seconds: float | None = None
 
     def __getitem__(self, name: str) -> Estimate:
@@ -228,6 +254,11 @@ class FitResult:
         values["estimates"] = tuple(_estimate(name, part) for name, part in data["parameters"].items())
         values["recordings"] = tuple(RecordingFit(name=name, **part) for name, part in data["recordings"].items())
         values["gauges"], values["warnings"] = tuple(data["gauges"]), tuple(data["warnings"])
+        values["windows"] = tuple(data.get("windows", ()))
+        values["growth"] = tuple(
+            MotionGrowth(**{key: tuple(part) if isinstance(part, list) else part for key, part in row.items()})
+            for row in data.get("growth", ())
+        )
         return cls(baseline=data["baseline_is"], **values)
 
     def save(self, path: str | Path) -> None:
