@@ -3,7 +3,7 @@
 A trust region of one radius, as Ceres and SciPy have it, suits all parameters at once. In logarithms that fails in two
 ways: a parameter that the data hardly see at this point (a drag far too small) is thrown by tens of decades in a step
 and never returns, or the radius shrinks for its sake and holds up all others. Here each parameter has its own limit for
-one step (a factor of 10 on a log scale, a few natural scales elsewhere), and the linear least-squares problem is
+one step (a factor of 10 on a log scale, a natural scale elsewhere), and the linear least-squares problem is
 solved inside that box: what would go further stops at its side, and the others take the step that is best given that.
 A weak ridge keeps parameters where they are as long as moving them promises next to nothing.
 """
@@ -20,9 +20,10 @@ from .problem import FitProblem
 from .timeseries import Array
 
 LOG_STEP = math.log(10.0)
-LINEAR_STEP = 3.0  # natural scales
+LINEAR_STEP = 1.0  # natural scales
 RIDGE = 1e-3  # of the cost: what a parameter's longest step must promise to be worth taking
 GOOD, POOR = 0.75, 0.25  # of the decrease that the linear model promises
+WITHIN = 0.9  # of the way to the box's side: such a step was not held up by it
 NEAR = 0.2  # of the longest step: so short a step, and as good as promised, is near the minimum
 SHORTEST = 1e-6  # of the longest step: where no shorter one helps, the slope is wrong
 
@@ -51,8 +52,8 @@ class Approach:
 
     Attributes:
         u: (free,) where it is, with its cost (half the sum of squares): infinite where the start has no answer.
-        free: whether its last step was short of every limit, and as good as promised.
-        near: whether it was a small part of what the limits allow, too.
+        free: whether its last step was as good as promised at the first try, and held up by no limit.
+        near: whether the last step was as good as promised, held up by no limit, and a small part of the longest.
         promised: share of the cost that the last step was to take off.
         taken: share of the cost that it took off.
         iterations: steps so far.
@@ -83,8 +84,9 @@ class Approach:
             return False
         self.iterations += 1
         self._tally.iterations += 1
-        longest = self._longest
+        longest, tries = self._longest, 0
         while self._radius > SHORTEST:
+            tries += 1
             box = self._radius * longest
             lower, upper = np.maximum(self._lower - self.u, -box), np.minimum(self._upper - self.u, box)
             s = inside(self._J, self._r, math.sqrt(2.0 * RIDGE * self.cost) / longest, lower, upper)
@@ -94,13 +96,14 @@ class Approach:
                 return False
             cost, r, J = self._evaluated(self.u + s, self.problem.cheap_jacobian)
             share, used = (self.cost - cost) / promised, float(np.max(np.abs(s) / longest))
+            inner = share > GOOD and used < WITHIN * self._radius
             if share < POOR:
                 self._radius = 0.3 * min(self._radius, used)
             elif share > GOOD:
                 self._radius = min(1.0, 3.0 * self._radius)
             if share > 0.0:
-                self.free = share > GOOD and used < 0.9
-                self.near = self.free and used < NEAR
+                self.near = inner and used < NEAR
+                self.free = inner and tries == 1
                 self.taken = 1.0 - cost / self.cost
                 self.u, self.cost, self._r, self._J = self.u + s, cost, r, J
                 return True

@@ -102,7 +102,7 @@ def minimize(
     if first is None:
         ok, r, _ = problem.evaluate(u, jacobian=False)
         if not ok:
-            raise SheetbendError(f"the fit cannot start: {problem.core.failure or 'a residual is not finite'}")
+            raise SheetbendError(f"the fit cannot start: {problem.failure}")
         first = 0.5 * float(r @ r)
     run = _ceres if name == "ceres" else _scipy
     end = run(problem, np.array(u, dtype=float), max_iterations, tolerance, _Best(observe, u, first))
@@ -163,10 +163,41 @@ class _Best:
 
 
 def _ceres(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: float, best: _Best) -> Minimum:
+    """Ceres, with parameters that rest at a limit held there: it searches along every step that it projects."""
+    lower, upper = problem.parameters.limits()
+    u = np.clip(u, lower, upper)
+    held = _resting(problem, u)
+    end = _ceres_holding(problem, u, held, max_iterations, tolerance, best)
+    if end.interrupted or not held or _resting(problem, end.u) >= held:
+        return end
+    again = _ceres_holding(problem, end.u, frozenset(), max_iterations, tolerance, best)
+    return replace(
+        again,
+        iterations=end.iterations + again.iterations,
+        evaluations=end.evaluations + again.evaluations,
+        jacobians=end.jacobians + again.jacobians,
+    )
+
+
+def _resting(problem: FitProblem, u: np.ndarray) -> frozenset[int]:
+    """Parameters that lie at a limit and would go beyond it; not all of them."""
+    lower, upper = problem.parameters.limits()
+    if not ((u <= lower) | (u >= upper)).any():
+        return frozenset()
+    ok, r, J = problem.evaluate(u)
+    if not ok:
+        return frozenset()
+    slope = J.T @ r
+    resting = np.flatnonzero(((u <= lower) & (slope > 0.0)) | ((u >= upper) & (slope < 0.0)))
+    return frozenset(resting.tolist()) if len(resting) < len(u) else frozenset()
+
+
+def _ceres_holding(
+    problem: FitProblem, u: np.ndarray, held: frozenset[int], max_iterations: int, tolerance: float, best: _Best
+) -> Minimum:
     from . import _ceres as ceres
 
     lower, upper = problem.parameters.limits()
-    u = np.clip(u, lower, upper)
     interrupted = False
 
     def observe(iteration: int, cost: float, step: float, gradient: float, at: list[float]) -> bool:
@@ -181,7 +212,7 @@ def _ceres(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: f
             lower=lower,
             upper=upper,
             longest_step=step_limits(problem.parameters),
-            held=[],
+            held=sorted(held),
             max_iterations=max_iterations,
             tolerance=tolerance,
             observe=observe,

@@ -11,7 +11,7 @@ import numpy as np
 from . import _core
 from .covariance import Layout
 from .equilibrium import no_rest
-from .errors import InputError, refusal
+from .errors import InputError, SceneError, refusal
 from .experiment import Experiment
 from .parameters import Parameter, Parameters
 from .quantities import Quantity
@@ -213,12 +213,35 @@ class FitProblem:
         if jacobian and self._last is not None and np.array_equal(self._last[0], u):
             return self._last[1]
         began = time.perf_counter()
-        found = self.core.evaluate(u, jacobian)
+        found = self.core.evaluate(u, jacobian) if self.exists(u) else (False, *self._nothing(jacobian))
         if found[0]:
             self.seconds[jacobian] = time.perf_counter() - began
         if jacobian:
             self._last = np.array(u, dtype=float), found
         return found
+
+    def exists(self, u: np.ndarray) -> bool:
+        """Whether every compliance, and the mass of everything that moves, is finite and not negative at u (free,):
+        sums of terms, such as a rod's softness in modes, may leave that."""
+        for e in self.experiments:
+            compiled = e.scene.compiled
+            try:
+                inputs = compiled.inputs(compiled.values(self.values_of(e, u)))
+            except SceneError:
+                return False
+            parts = {name: inputs[first : first + size] for name, (first, size) in compiled.layout.items()}
+            if (parts["compliance"] < 0.0).any() or (parts["mass"][e.scene.free] < 0.0).any():
+                return False
+        return True
+
+    @property
+    def failure(self) -> str:
+        """Why the last evaluation was not ok."""
+        return self.core.failure or "a residual is not finite, or a compliance or a mass is negative"
+
+    def _nothing(self, jacobian: bool) -> tuple[np.ndarray, np.ndarray]:
+        rows, columns = self.core.rows, len(self.parameters.free)
+        return np.full(rows, np.nan), np.full((rows if jacobian else 0, columns), np.nan)
 
     def evaluate_exactly(self, u: np.ndarray) -> tuple[bool, np.ndarray, np.ndarray]:
         """`evaluate` with corrections linearized at u itself, as intervals need it; a fit's own steps may use an

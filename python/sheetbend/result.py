@@ -256,7 +256,7 @@ class FitResult:
         values["gauges"], values["warnings"] = tuple(data["gauges"]), tuple(data["warnings"])
         values["windows"] = tuple(data.get("windows", ()))
         values["growth"] = tuple(
-            MotionGrowth(**{key: tuple(part) if isinstance(part, list) else part for key, part in row.items()})
+            MotionGrowth(**row | {key: tuple(row[key]) for key in ("largest", "rate", "until")})
             for row in data.get("growth", ())
         )
         return cls(baseline=data["baseline_is"], **values)

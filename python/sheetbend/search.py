@@ -22,7 +22,7 @@ from .windows import chosen, cut, holds_frames
 AUTO = "auto"
 WINDOW_TOLERANCE = 1e-2  # of the cost: a window's minimum is only a start
 WINDOW_STEPS = 40
-NEAR_TOLERANCE = 1e-4  # of the cost: what is left is for the optimizer
+NEAR_TOLERANCE = 1e-3  # of the cost: what is left is for the optimizer
 BACK = 0.1  # of the length: where windows so little longer diverge, there is no way on
 
 
@@ -144,7 +144,7 @@ class _Way:
         elif self.search.windows:
             walk = self._through(whole, [float(length) for length in self.search.windows], u)
         if not np.isfinite(walk.cost):
-            raise SheetbendError(f"the fit cannot start: {whole.core.failure or 'a residual is not finite'}")
+            raise SheetbendError(f"the fit cannot start: {whole.failure}")
         self._walk(walk, NEAR_TOLERANCE, most, None)
         if whole is not self.problem:
             walk = Approach(self.problem, walk.u, self.taken)

@@ -173,10 +173,10 @@ class FitSection(Section):
 
     optimizer: Literal["auto", "ceres", "scipy"] = key("auto", "Ceres where it was built, else SciPy")
     starts: list[dict[str, Finite]] = key([], "further starting values by name; the best end wins")
-    windows: list[Finite] = key(
-        [],
-        "increasing lengths: so much of every motion from its start on is fitted first, one after another; for a start "
-        "far off",
+    windows: Literal["auto"] | list[Finite] = key(
+        "auto",
+        "increasing lengths: so much of every motion from its start on is fitted first, one after another; auto chooses "
+        "them, and none for a start nearby; [] = none",
         "s",
     )
     max_iterations: int = key(200, "per start and window", ge=1)

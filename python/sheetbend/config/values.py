@@ -13,8 +13,8 @@ from .schema import Config, ParameterSection
 
 
 def with_values(config: Config, values: Mapping[str, float]) -> Config:
-    """The configuration starting at the values (by expanded name, as in fit.json), without `windows`, which are for a
-    start far off; names that it does not fit are left out.
+    """The configuration starting at the values (by expanded name, as in fit.json), without the `windows` that it
+    gives, which are for a start far off; names that it does not fit are left out.
 
     Shared parameters start at `parameters.NAME.initial`, private ones at the recordings' `values`.
     """
@@ -32,7 +32,7 @@ def with_values(config: Config, values: Mapping[str, float]) -> Config:
             recordings[i] = recordings[i].model_copy(update={"values": {**recordings[i].values, base: value}})
         elif not recording:
             parameters[base] = section.model_copy(update={"initial": value})
-    fit = config.fit.model_copy(update={"windows": []}) if config.fit.windows else config.fit
+    fit = config.fit.model_copy(update={"windows": []}) if isinstance(config.fit.windows, list) else config.fit
     return config.model_copy(update={"parameters": parameters, "recording": recordings, "fit": fit})
 
 
