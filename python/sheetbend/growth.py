@@ -71,6 +71,26 @@ class Growth:
         above = np.flatnonzero(~(self.sigma < limit))
         return None if len(above) == 0 else float(self.times[max(above[0] - 1, 0)])
 
+    def to_dict(self) -> dict[str, float | None]:
+        """For JSON: largest (None where it overflows), rate, until."""
+        return {
+            "largest": self.largest if np.isfinite(self.largest) else None,
+            "rate": self.rate,
+            "until": self.until,
+        }
+
+
+def in_words(found: Growth) -> str:
+    """One line for people."""
+    size = f"at most {found.largest:.3g} times" if np.isfinite(found.largest) else "without limit"
+    until = "" if found.until is None else f"; nothing can be derived from it beyond {found.until:.3g} s"
+    return f"{found.name}: small displacements grow {size} over {found.times[-1]:.3g} s{until}"
+
+
+def over_fit(e: Experiment) -> Growth:
+    """`growth` of one moving experiment over its fitted part, at its scene's own values."""
+    return growth(e, float(e.fitted().times[-1]) - e.t0)
+
 
 def growths(problem: FitProblem, u: Array) -> tuple[Growth, ...]:
     """Growth of every moving experiment of a problem over its fitted part.

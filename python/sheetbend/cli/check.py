@@ -13,6 +13,7 @@ from rich.console import Console
 from ..config import Study, build, parse, scene_alone
 from ..experiment import Experiment
 from ..gradients import GradientReport, check_gradients
+from ..growth import in_words, over_fit
 from ..jacobian_check import JacobianReport, check_jacobian
 from ..problem import FitProblem, as_parameters
 from .outcome import Code, Outcome, run
@@ -30,7 +31,7 @@ def check(
     ] = False,
 ) -> None:
     """Check the gradients of every recording's scene over a short stretch, and the residuals' Jacobian; exit 5 where
-    one fails."""
+    one fails. Also tells how far small displacements grow along every fitted motion."""
     run(lambda console: _check(console, config), json)
 
 
@@ -44,12 +45,16 @@ def _check(console: Console, path: Path) -> Outcome:
             gradients[name] = report
         else:
             jacobians[name] = report
+    grown = [over_fit(e) for e in study.experiments if not e.static and e.predict is None]
+    for g in grown:
+        console.print(in_words(g), markup=False, soft_wrap=True)
     passed = all(r.passed for r in gradients.values()) and all(r.passed for r in jacobians.values())
     data = {
         "name": study.config.experiment.name,
         "passed": passed,
         "gradients": {name: r.to_dict() for name, r in gradients.items()},
         "jacobians": {name: r.to_dict() for name, r in jacobians.items()},
+        "growth": {g.name: g.to_dict() for g in grown},
     }
     return Outcome(data, Code.DONE if passed else Code.CHECK_FAILED)
 

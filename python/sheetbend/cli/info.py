@@ -17,6 +17,7 @@ from .. import __version__
 from ..config import GrippedConfig, build, parse_any, scene_alone
 from ..experiment import Experiment
 from ..gripped.plausible import doubts
+from ..growth import in_words, over_fit
 from ..io import FORMATS
 from ..kinds import KINDS
 from ..optimizers import has_ceres
@@ -113,6 +114,9 @@ def _config(console: Console, path: Path) -> dict[str, Any]:
     first = study.experiments[0].scene if study.experiments else scene_alone(config, path.parent)[0]
     for scene in scenes:
         console.print("  " + ", ".join(f"{name} {_text(value)}" for name, value in scene.items()), soft_wrap=True)
+    grown = [over_fit(e) for e in study.experiments if not e.static and e.predict is None]
+    for g in grown:
+        console.print(f"  {in_words(g)}", markup=False, soft_wrap=True)
     table = Table("quantity", "value", "unit", "parameter", box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for name, q in first.quantities.items():
         table.add_row(name, f"{q.value:.6g}", q.unit, _role(study.parameters.get(name)))
@@ -122,6 +126,7 @@ def _config(console: Console, path: Path) -> dict[str, Any]:
         "scenes": scenes,
         "quantities": {n: q.value for n, q in first.quantities.items()},
         "parameters": list(study.parameters),
+        "growth": {g.name: g.to_dict() for g in grown},
     }
 
 

@@ -175,8 +175,8 @@ class FitSection(Section):
     starts: list[dict[str, Finite]] = key([], "further starting values by name; the best end wins")
     windows: Literal["auto"] | list[Finite] = key(
         "auto",
-        "increasing lengths: so much of every motion from its start on is fitted first, one after another; auto chooses "
-        "them, and none for a start nearby; [] = none",
+        "increasing lengths: so much of every motion from its start on is fitted first, one after another; auto "
+        "chooses them, and none for a start nearby; [] = none",
         "s",
     )
     max_iterations: int = key(200, "per start and window", ge=1)
