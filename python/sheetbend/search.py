@@ -23,6 +23,7 @@ AUTO = "auto"
 WINDOW_TOLERANCE = 1e-2  # of the cost: a window's minimum is only a start
 WINDOW_STEPS = 40
 NEAR_TOLERANCE = 1e-3  # of the cost: what is left is for the optimizer
+MUCH, DONE = 0.25, 1e-3  # of the cost: what a first step promises where the start is near, and at the minimum
 BACK = 0.1  # of the length: where windows so little longer diverge, there is no way on
 
 
@@ -181,10 +182,11 @@ class _Way:
         return self._counted(Minimum(u, math.inf, 0, 0, False, False, words))
 
     def _starts_near(self, walk: Approach) -> bool:
-        """Whether the first step on the whole motion keeps what it promises, short of every limit."""
+        """Whether the first step on the whole motion promises much of the cost (or nothing is left to promise), keeps
+        it, and is short of every limit. Far off, the slope of a long motion promises little."""
         if np.isfinite(walk.cost) and walk.step():
             self._arrived(walk, None)
-        return walk.free
+        return walk.free and not DONE < walk.promised < MUCH
 
     def _through(self, whole: FitProblem, lengths: Sequence[float], u: np.ndarray) -> Approach:
         """Fit window after window; where one diverges at the values of the one before, one in between comes first.

@@ -64,9 +64,9 @@ def cut(problem: FitProblem, length: float) -> FitProblem:
 
 
 def holds_frames(problem: FitProblem, length: float) -> bool:
-    """Whether every motion has a fitted frame within `length` s."""
+    """Whether every motion has two fitted frames within `length` s."""
     pairs = zip(problem.experiments, problem.recordings, strict=True)
-    return all(e.static or bool((r.times < e.t0 + length).any()) for e, r in pairs)
+    return all(e.static or bool((r.times < e.t0 + length).sum() >= 2) for e, r in pairs)
 
 
 def _determined(problem: FitProblem, length: float) -> bool:
