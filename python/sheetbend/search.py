@@ -24,6 +24,7 @@ WINDOW_TOLERANCE = 1e-2  # of the cost: a window's minimum is only a start
 WINDOW_STEPS = 40
 NEAR_TOLERANCE = 1e-3  # of the cost: what is left is for the optimizer
 MUCH, DONE = 0.25, 1e-3  # of the cost: what a first step promises where the start is near, and at the minimum
+NOISE = 2.0  # sigmas: a start whose residuals are no larger is near, too
 BACK = 0.1  # of the length: where windows so little longer diverge, there is no way on
 
 
@@ -146,10 +147,10 @@ class _Way:
             walk = self._through(whole, [float(length) for length in self.search.windows], u)
         if not np.isfinite(walk.cost):
             raise SheetbendError(f"the fit cannot start: {whole.failure}")
-        self._walk(walk, NEAR_TOLERANCE, most, None)
+        self._walk(walk, NEAR_TOLERANCE, most - 1, None)
         if whole is not self.problem:
             walk = Approach(self.problem, walk.u, self.taken)
-            self._walk(walk, NEAR_TOLERANCE, most, None)
+            self._walk(walk, NEAR_TOLERANCE, most - 1, None)
         before = self.taken.iterations
         end, _ = minimize(
             self.problem,
@@ -186,7 +187,8 @@ class _Way:
         it, and is short of every limit. Far off, the slope of a long motion promises little."""
         if np.isfinite(walk.cost) and walk.step():
             self._arrived(walk, None)
-        return walk.free and not DONE < walk.promised < MUCH
+        noise = walk.cost < 0.5 * NOISE**2 * self.problem.core.data_rows
+        return walk.free and (noise or not DONE < walk.promised < MUCH)
 
     def _through(self, whole: FitProblem, lengths: Sequence[float], u: np.ndarray) -> Approach:
         """Fit window after window; where one diverges at the values of the one before, one in between comes first.
@@ -199,7 +201,7 @@ class _Way:
             if math.isfinite(walk.cost):
                 if part is whole:
                     return walk
-                self._walk(walk, WINDOW_TOLERANCE, WINDOW_STEPS, ahead[0])
+                self._walk(walk, WINDOW_TOLERANCE, min(WINDOW_STEPS, self.search.max_iterations), ahead[0])
                 u, reached = walk.u, ahead.pop(0)
                 self.windows.append(reached)
                 continue

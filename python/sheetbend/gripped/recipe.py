@@ -326,6 +326,7 @@ class _Search:
             parameters=_starting(parameters, values),
             refine=None if interrupted else refine,
             systematic=offset_reach,
+            windows=(),
             threads=self.threads,
             profiles=False,
             max_iterations=1 if interrupted else LONG,
