@@ -25,6 +25,7 @@ RIDGE = 1e-3  # of the cost: what a parameter's longest step must promise to be 
 GOOD, POOR = 0.75, 0.25  # of the decrease that the linear model promises
 WITHIN = 0.9  # of the way to the box's side: such a step was not held up by it
 NEAR = 0.2  # of the longest step: so short a step, and as good as promised, is near the minimum
+LEAST = 1e-8  # of the cost: steps that promise less are left to the optimizer
 SHORTEST = 1e-6  # of the longest step: where no shorter one helps, the slope is wrong
 
 
@@ -80,10 +81,11 @@ class Approach:
         """Go to a lower cost; False where no step inside the limits promises or gives one."""
         if self._J is None:
             _, self._r, self._J = self._evaluated(self.u, True)
-        if self._J is None or not np.isfinite(self._J).all() or self.cost == 0.0:
+        if self.cost == 0.0:
+            self.promised = 0.0
             return False
-        self.iterations += 1
-        self._tally.iterations += 1
+        if self._J is None or not np.isfinite(self._J).all():
+            return False
         longest, tries = self._longest, 0
         while self._radius > SHORTEST:
             tries += 1
@@ -92,7 +94,7 @@ class Approach:
             s = inside(self._J, self._r, math.sqrt(2.0 * RIDGE * self.cost) / longest, lower, upper)
             promised = self.cost - 0.5 * float(np.sum((self._r + self._J @ s) ** 2))
             self.promised = promised / self.cost
-            if not promised > 0.0:
+            if self.promised < LEAST:
                 return False
             cost, r, J = self._evaluated(self.u + s, self.problem.cheap_jacobian)
             share, used = (self.cost - cost) / promised, float(np.max(np.abs(s) / longest))
@@ -106,6 +108,8 @@ class Approach:
                 self.free = inner and tries == 1
                 self.taken = 1.0 - cost / self.cost
                 self.u, self.cost, self._r, self._J = self.u + s, cost, r, J
+                self.iterations += 1
+                self._tally.iterations += 1
                 return True
         return False
 

@@ -26,8 +26,8 @@ from .solver import Solver
 from .timeseries import Array
 
 ROUGH = 1e4
-"""Growth above which nothing is derived from a Jacobian. Measured: a flag in the wind that is fitted to 1e-10 has 255, a
-real double pendulum over 2 s has 2.4, a cloth whose fit stalls where it starts has 2e18."""
+"""Growth above which nothing is derived from a Jacobian. Measured: a flag in the wind that is fitted to 1e-10 has 255,
+a real double pendulum over 2 s has 2.4, a cloth whose fit stalls where it starts has 2e18."""
 DIRECTIONS = 8  # as many tangents as one rollout carries
 FRAMES = 100  # at which sigma is taken, at most
 SEED = 19

@@ -141,7 +141,7 @@ class _Way:
             self.first, self.u = walk.cost, walk.u
         if self.search.windows == AUTO:
             lengths = chosen(self.problem, grown)
-            if lengths and not self._starts_near(walk):
+            if (lengths or not np.isfinite(walk.cost)) and not self._starts_near(walk):
                 walk = self._through(whole, lengths, u)
         elif self.search.windows:
             walk = self._through(whole, [float(length) for length in self.search.windows], u)
@@ -188,7 +188,9 @@ class _Way:
         if np.isfinite(walk.cost) and walk.step():
             self._arrived(walk, None)
         noise = walk.cost < 0.5 * NOISE**2 * self.problem.core.data_rows
-        return walk.free and (noise or not DONE < walk.promised < MUCH)
+        if walk.promised < DONE:
+            return noise or walk.free
+        return walk.free and (noise or walk.promised > MUCH)
 
     def _through(self, whole: FitProblem, lengths: Sequence[float], u: np.ndarray) -> Approach:
         """Fit window after window; where one diverges at the values of the one before, one in between comes first.
