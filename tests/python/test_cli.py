@@ -211,6 +211,7 @@ class TestFit:
 class TestCheck:
     def test_passes(self, config: Path) -> None:
         found = last_line(run("check", config, "--json"))
+        assert found["growth"]["swing"]["until"] is None
         assert found["passed"] and found["exit_code"] == 0
         gradients = found["gradients"]["swing"]["gradients"]
         assert gradients["rope_EI"]["complex_step"] < 1e-8 and gradients["rope_EI"]["passed"]
@@ -317,6 +318,7 @@ class TestInfo:
             and scene["constraints"] == {"rope_stretch": 6, "rope_bend": 5}
         )
         assert found["parameters"] == ["rope_EI", "rope_bend_damping"] and found["quantities"]["rope_length"] == 0.6
+        assert found["growth"]["swing"]["largest"] >= 1.0 and found["growth"]["swing"]["until"] is None
 
     def test_recording(self, config: Path) -> None:
         x = np.full((4, 2, 3), np.nan)
