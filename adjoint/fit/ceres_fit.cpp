@@ -132,7 +132,8 @@ CeresResult minimize_with_ceres(const EvaluationFunction& evaluation, std::vecto
     if (std::isfinite(upper[i])) problem.SetParameterUpperBound(u.data(), static_cast<int>(i), upper[i]);
   }
   // With a bound Ceres searches along each step that it projects, which is slow where parameters rest on theirs: those are left out.
-  if (!options.held.empty()) problem.SetManifold(u.data(), new ceres::SubsetManifold(static_cast<int>(u.size()), options.held));
+  if (!options.held.empty())
+    problem.SetManifold(u.data(), new ceres::SubsetManifold(static_cast<int>(u.size()), options.held));
 
   ceres::Solver::Options o;
   o.minimizer_type = ceres::TRUST_REGION;

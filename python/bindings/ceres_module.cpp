@@ -12,8 +12,8 @@ namespace {
 
 // observe(iteration, cost, step_norm, gradient_max, u) -> bool: go on?
 py::dict minimize(const py::capsule& evaluation, std::vector<double> u, const std::vector<double>& lower,
-                  const std::vector<double>& upper, std::vector<double> longest_step, std::vector<int> held, int max_iterations,
-                  double tolerance, const py::function& observe) {
+                  const std::vector<double>& upper, std::vector<double> longest_step, std::vector<int> held,
+                  int max_iterations, double tolerance, const py::function& observe) {
   const auto* function =
       static_cast<const EvaluationFunction*>(PyCapsule_GetPointer(evaluation.ptr(), EvaluationFunction::capsule_name));
   if (function == nullptr) throw py::error_already_set();
