@@ -136,15 +136,20 @@ class _Way:
         whole = (
             self.problem.uncorrected(self.problem.recordings) if self.problem.estimates_corrections else self.problem
         )
-        walk = Approach(whole, u, self.taken)
-        if np.isfinite(walk.cost):
-            self.first, self.u = walk.cost, walk.u
+        given = [] if isinstance(self.search.windows, str) else [float(length) for length in self.search.windows]
+        if given:
+            ok, r, _ = whole.evaluate(u, jacobian=False)
+            self.taken.evaluations += 1
+            cost = 0.5 * float(r @ r) if ok else math.inf
+            self._began(u, cost)
+            walk = self._through(whole, given, u)
+        else:
+            walk = Approach(whole, u, self.taken)
+            self._began(walk.u, walk.cost)
         if self.search.windows == AUTO:
             lengths = chosen(self.problem, grown)
             if (lengths or not np.isfinite(walk.cost)) and not self._starts_near(walk):
                 walk = self._through(whole, lengths, u)
-        elif self.search.windows:
-            walk = self._through(whole, [float(length) for length in self.search.windows], u)
         if not np.isfinite(walk.cost):
             raise SheetbendError(f"the fit cannot start: {whole.failure}")
         self._walk(walk, NEAR_TOLERANCE, most - 1, None)
@@ -166,6 +171,10 @@ class _Way:
         except KeyboardInterrupt:
             end = replace(end, interrupted=True)
         return self._counted(end)
+
+    def _began(self, u: np.ndarray, cost: float) -> None:
+        if np.isfinite(cost):
+            self.first, self.u = cost, u
 
     def interrupted(self) -> Minimum | None:
         """The best point so far, after Ctrl-C; None before the first, or where the whole motion diverges there."""
