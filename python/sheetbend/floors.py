@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 
 from .experiment import Experiment
-from .identifiability import Floor
+from .judge import Floor
 from .parameters import Parameters
 
 

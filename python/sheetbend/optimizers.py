@@ -97,14 +97,14 @@ def judged(problem: FitProblem, end: Minimum, first: float) -> Minimum:
     wherever no step lowers the cost: at a kink, or where gradients are off."""
     if not end.converged:
         return end
-    left = _promised(problem, end.u)
+    left = promised(problem, end.u)
     if left <= STUCK or left * end.cost <= ROUNDING * first:
         return end
     words = f"no step lowers the cost, though its slope promises {short(100 * left, 2)} % less (a kink, a rough motion)"
     return replace(end, converged=left < LOST, message=f"{words}: {end.message}", doubt=words)
 
 
-def _promised(problem: FitProblem, u: np.ndarray) -> float:
+def promised(problem: FitProblem, u: np.ndarray) -> float:
     """Share of the cost that a Gauss-Newton step from u inside the bounds would take off, were the residuals linear."""
     ok, r, J = problem.evaluate(u)
     lower, upper = problem.parameters.bounds()

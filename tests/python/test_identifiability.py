@@ -10,7 +10,8 @@ from scipy import signal, special
 from sheetbend.covariance import Layout, covariance
 from sheetbend.errors import InputError
 from sheetbend.gauge import null_space
-from sheetbend.identifiability import Floor, identify
+from sheetbend.identifiability import identify
+from sheetbend.judge import Floor
 from sheetbend.parameters import Parameter, Parameters
 from sheetbend.profile import profile_interval
 

@@ -11,7 +11,7 @@ import pytest
 import sheetbend as sb
 import sheetbend.search as search
 from pytest import approx
-from sheetbend import optimizers
+from sheetbend import conclude, optimizers
 from sheetbend.discretization import Refinement
 from sheetbend.optimizers import Progress, has_ceres, minimize
 from sheetbend.problem import FitProblem, as_parameters
@@ -149,7 +149,7 @@ def test_an_interrupted_fit_refits_nothing(optimizer, monkeypatch):
     def never(*_: object, **__: object) -> None:
         raise AssertionError("a refit after Ctrl-C")
 
-    monkeypatch.setattr(fitting, "refit", never)
+    monkeypatch.setattr(conclude, "refit", never)
     monkeypatch.setattr(fitting, "refined_estimates", never)
     found = sb.fit([swinging()], parameters=WANTED, optimizer=optimizer, refine=Refinement(), progress=interrupt_at(2))
     assert found.result.interrupted and not found.result.converged
@@ -317,7 +317,7 @@ def test_an_end_at_a_kink_is_no_convergence(optimizer):
 )
 def test_a_slope_at_the_end_is_told_and_a_steep_one_is_no_end(monkeypatch, promised, converged, doubted):
     end = optimizers.Minimum(np.zeros(1), 2.0, 3, 4, True, False, "small steps")
-    monkeypatch.setattr(optimizers, "_promised", lambda problem, u: promised)
+    monkeypatch.setattr(optimizers, "promised", lambda problem, u: promised)
     found = optimizers.judged(None, end, first=10.0)
     assert (found.converged, bool(found.doubt)) == (converged, doubted)
     assert found.message.endswith("small steps")
