@@ -11,6 +11,9 @@ from .wording import width_words
 
 IDENTIFIED = 0.2
 """Largest 95 % half-width of an identified parameter, as a part of its value (or of its scale)."""
+RAN_OFF = math.log(1e3)
+"""On a log scale: a parameter that a fit moved so far from its start, and that data do not see there, ran off."""
+_NEAR = 1e-3  # of a logarithm: so near the farthest that a search looks
 
 
 def known(parameter: Parameter, value: float, lower: float, upper: float) -> tuple[str, str]:
@@ -20,8 +23,14 @@ def known(parameter: Parameter, value: float, lower: float, upper: float) -> tup
     return ("identified", f"known {width}") if precise else ("weak", f"known only {width}")
 
 
-def open_estimate(parameter: Parameter, value: float, words: str, more: tuple[float, float] = (0.0, 0.0)) -> Estimate:
-    """Of a parameter that is not determined, in words why; `more`: discretization and systematic parts."""
+def open_estimate(
+    parameter: Parameter,
+    value: float,
+    words: str,
+    more: tuple[float, float] = (0.0, 0.0),
+    verdict: str = "not identifiable",
+) -> Estimate:
+    """Of a parameter without an interval, in words why; `more`: discretization and systematic parts."""
     return Estimate(
         name=parameter.name,
         value=value,
@@ -32,9 +41,32 @@ def open_estimate(parameter: Parameter, value: float, words: str, more: tuple[fl
         statistical=None,
         discretization=float(more[0]),
         systematic=float(more[1]),
-        verdict="not identifiable",
+        verdict=verdict,
         words=words,
     )
+
+
+def ran_off(parameter: Parameter, value: float) -> bool:
+    """Whether the fit moved a parameter many times its size away from its start."""
+    start = parameter.initial
+    if start is None:
+        return False
+    if parameter.log:
+        return abs(parameter.to_internal(value) - parameter.to_internal(start)) > RAN_OFF
+    return abs(value - start) > math.exp(RAN_OFF) * max(abs(start), parameter.scale or 0.0) > 0
+
+
+def at_far_limit(parameter: Parameter, value: float) -> bool:
+    """Whether a parameter on a log scale went as far from its start as a search looks, a factor of a million."""
+    start = parameter.initial
+    if start is None or not parameter.log:
+        return False
+    return abs(parameter.to_internal(value) - parameter.to_internal(start)) > FARTHEST - _NEAR
+
+
+def has_answer(parameter: Parameter, value: float, part: float) -> bool:
+    """Whether a part of an interval is a number, and on a log scale no factor of a million."""
+    return math.isfinite(part) and not (parameter.log and part >= 0.99 * value * math.expm1(FARTHEST))
 
 
 def linear_ends(parameter: Parameter, internal: float, reach: float) -> Ends:

@@ -11,16 +11,28 @@ import numpy as np
 
 from .covariance import Layout, covariance
 from .gauge import Gauge, null_space
-from .intervals import clipped, half_width, is_precise, known, linear_ends, open_estimate, widened
+from .intervals import (
+    at_far_limit,
+    clipped,
+    half_width,
+    has_answer,
+    is_precise,
+    known,
+    linear_ends,
+    open_estimate,
+    ran_off,
+    widened,
+)
 from .optional import require
 from .parameters import Parameter, Parameters
 from .profile import FARTHEST, Ends, profile_interval
 from .result import Correlation, Estimate
 from .timeseries import Array
-from .wording import figures, floor_words, quantity, side_words
+from .wording import figures, floor_words, quantity, ran_off_words, side_words
 
 LEVEL = 0.95
 _AT_BOUND = 1e-6
+_ROUNDING = 1e-14
 _LARGEST = 700.0  # exponent of a number that a computer can hold
 _OPEN = 30.0  # natural scales: data that leave more of a parameter open, all others known, do not contain it
 _LINEAR = 0.2  # a rise of the cost that differs by less from the linear picture's confirms it
@@ -100,6 +112,9 @@ class Judge:
         """Value, interval and verdict of the parameter in that column; `more`: discretization and systematic parts."""
         parameter = self.parameters[self.parameters.free[column]]
         value = parameter.to_physical(self.internal[column])
+        counted = tuple(part if has_answer(parameter, value, part) else 0.0 for part in more)
+        note = "" if counted == more else "; a refit that ran off or diverged is not counted in the interval"
+        more = (counted[0], counted[1])
         if column not in self.space.determined:
             return open_estimate(parameter, value, self._undetermined(parameter.name), more)
         alone = float(self.alone[column])
@@ -111,14 +126,19 @@ class Judge:
         index = columns.index(column)
         t = float(self.quantile(spread.degrees[index], 0.5 + LEVEL / 2))
         reach = t * math.sqrt(spread.matrix[index, index])
+        if reach <= _ROUNDING * max(abs(self.internal[column]), 1.0) and spread.residual_variance > 1:
+            words = "its interval would be narrower than rounding: no motion tells a parameter so well"
+            return open_estimate(parameter, value, words, more, "rough")
         ends = linear_ends(parameter, self.internal[column], reach)
+        if spread.residual_variance == 0 and reach == 0:
+            note += "; the residuals are exactly zero, so that nothing tells how wrong it may be"
         if self._limit(column) is not None:
             ends = clipped(parameter, ends)
         elif self.profile is not None and not is_precise(parameter, value, ends, sum(more)):
             rise = t**2 * spread.residual_variance * float(spread.inflation[index]) / 2
             if rise > 0 and not self._confirmed(column, reach):
                 step = min(reach, 1.0) if parameter.log else reach
-                ends = profile_interval(
+                found = profile_interval(
                     partial(self.profile, parameter.name),
                     value,
                     rise,
@@ -127,7 +147,9 @@ class Judge:
                     upper=parameter.upper,
                     log=parameter.log,
                 )
-        return self._judged(column, parameter, value, ends, more, floor)
+                ends, diverged = _with_answers(found, ends)
+                note += diverged
+        return self._judged(column, parameter, value, ends, more, floor, note)
 
     def _judged(
         self,
@@ -137,14 +159,18 @@ class Judge:
         ends: Ends,
         more: tuple[float, float],
         floor: Floor | None,
+        note: str,
     ) -> Estimate:
         if ends == (None, None):
             words = "the cost stays level on both sides: the data hardly depend on it"
-            return open_estimate(parameter, value, words, more)
+            words = ran_off_words(parameter, value) if ran_off(parameter, value) else words
+            return open_estimate(parameter, value, words + note, more)
         lower, upper = widened(parameter, value, ends, sum(more))
         half = half_width((lower, upper))
         if floor is not None and (value >= floor.value if floor.ceiling else value <= floor.value):
             verdict, words = "at its floor", floor_words(parameter, floor.value, floor.ceiling, floor.reason)
+        elif at_far_limit(parameter, value):
+            verdict, words = "at a bound", f"{ran_off_words(parameter, value)} (as far as a search looks)"
         elif (limit := self._limit(column)) is not None:
             verdict, words = "at a bound", f"stopped at its {limit}: widen it, or doubt the model"
         elif lower is None or upper is None:
@@ -153,6 +179,7 @@ class Judge:
             verdict, words = known(parameter, value, lower, upper)
         if column in self.by_prior:
             words += "; through its prior, not through the data"
+        words += note
         return Estimate(
             name=parameter.name,
             value=value,
@@ -203,6 +230,10 @@ class Judge:
         )
 
     def _undetermined(self, name: str) -> str:
+        parameter = self.parameters[name]
+        value = parameter.to_physical(self.internal[self.parameters.free.index(name)])
+        if ran_off(parameter, value):
+            return ran_off_words(parameter, value)
         if name in self.space.flat:
             return "moves no residual: the data do not contain it; fix it or give it a prior"
         words = "; ".join(gauge.words for gauge in self.space.gauges if name in gauge.members)
@@ -241,3 +272,13 @@ class Judge:
         if self.at_lower[column]:
             return f"lower bound {quantity(parameter.lower, parameter)}"
         return f"upper bound {quantity(parameter.upper, parameter)}" if self.at_upper[column] else None
+
+
+def _with_answers(found: Ends, linear: Ends) -> tuple[Ends, str]:
+    """Ends of a profile, the linear one wherever the profile has no answer, and a note that says so."""
+    sides = [side for side, end in zip(("below", "above"), found, strict=True) if end is not None and math.isnan(end)]
+    if not sides:
+        return found, ""
+    kept = [end if end is None or not math.isnan(end) else other for end, other in zip(found, linear, strict=True)]
+    note = f"; the fits with it held {' and '.join(sides)} diverged: there the interval is the linear one"
+    return (kept[0], kept[1]), note
