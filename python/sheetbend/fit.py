@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from .conclude import course_warnings, judged_parameters
+from .conclude import Elsewhere, judged_parameters, misfit, warnings_of, without_verdict
+from .contradictions import between_parts, doubtful, elsewhere, held_out_motion, residual_shifts
 from .discretization import Refinement, refined_estimates, to_the_limit
 from .driven_noise import doubts
 from .errors import InputError
@@ -139,6 +140,10 @@ def fit(
     best = ends[0]
     values = problem.parameters.to_physical(best.u)
 
+    lost = without_verdict(problem, best)
+    if len(lost) == len(problem.parameters.free):  # then no refit tells anything
+        refine, systematic = None, None
+
     def conclude(refitter: str | None) -> _Conclusion:
         refits = (
             ()
@@ -147,10 +152,10 @@ def fit(
         )
         more = {} if systematic is None else systematic(problem, best.u)
         refined = to_the_limit(refits, problem.parameters, values)
-        judged = judged_parameters(problem, best.u, refined, more, refitter if profiles else None)
+        judged, lower = judged_parameters(problem, best.u, refined, more, refitter if profiles else None, lost)
         found = predicted_values(experiments, wanted, values, refitter, threads)
-        doubted = () if refitter is None else doubts(problem, best.u, judged)
-        return _Conclusion(refits, judged, *found, doubted)
+        doubted = () if refitter is None or lost else doubts(problem, best.u, judged)
+        return _Conclusion(refits, judged, lower, *found, doubted)
 
     left_out: dict[str, Comparison] = {}
     try:
@@ -164,9 +169,20 @@ def fit(
     comparisons = compare(experiments, wanted, end.values, threads, corrected)
     rows = problem.core.first_rows
     count = {e.name: rows[i + 1] - rows[i] for i, e in enumerate(fitted)}
+    errors = tuple(_errors(c, count, left_out, corrected) for c in comparisons)
+    shifts = [] if interrupted else residual_shifts(problem, best.u, refine)
+    starts_elsewhere = [
+        Elsewhere(m.cost - best.cost, problem.parameters.to_physical(m.u), "another start") for m in ends[1:]
+    ]
+    contradicted = (
+        held_out_motion(problem, comparisons, errors)
+        | elsewhere(problem, judged, best.cost, [*starts_elsewhere, *end.lower])
+        | between_parts(problem, best.u, judged, shifts)
+    )
+    estimates = doubtful(judged.estimates, contradicted)
     result = FitResult(
-        estimates=judged.estimates,
-        recordings=tuple(_errors(c, count, left_out, corrected) for c in comparisons),
+        estimates=estimates,
+        recordings=errors,
         cost=best.cost,
         first_cost=best.first,
         jacobian_seconds=problem.seconds.get(True),
@@ -192,7 +208,8 @@ def fit(
             for m in ends
         ),
         refits=end.refits,
-        warnings=course_warnings(ends, best, interrupted, problem.core.data_rows) + end.doubts,
+        misfit=misfit(problem, best.u),
+        warnings=warnings_of(ends, interrupted, problem, estimates) + end.doubts,
     )
     return Fit(result, tuple(comparisons), wanted, corrected)
 
@@ -203,6 +220,7 @@ class _Conclusion:
 
     refits: tuple[Refit, ...]
     judged: Identifiability
+    lower: tuple[Elsewhere, ...]  # where profiles ended
     values: dict[str, float]  # of all experiments
     given: tuple[Given, ...]
     corrected: dict[str, np.ndarray]  # of experiments that are only predicted

@@ -251,7 +251,7 @@ def _estimates_panel(
         color = ACCENT if known else GRAY
         left = low if estimate.lower is None else estimate.lower
         right = high if estimate.upper is None else estimate.upper
-        if estimate.verdict != "not identifiable":
+        if estimate.lower is not None or estimate.upper is not None:
             panel.plot([left, right], [row, row], color=color, linewidth=2, solid_capstyle="butt")
         face = color if known else "white"
         panel.plot(estimate.value, row, "o", color=color, markersize=5, markerfacecolor=face)

@@ -6,7 +6,7 @@ import textwrap
 from typing import TYPE_CHECKING
 
 from .optional import require
-from .result import Estimate, FitResult, Given, RecordingFit
+from .result import UNSOUND, Estimate, FitResult, Given, RecordingFit
 from .tables import Section, plain_section, rich_section
 from .wording import figures, short
 
@@ -24,7 +24,9 @@ _SAME_MINIMUM = 0.01  # starts that end within 1 % of the best cost found the sa
 def sections(result: FitResult) -> list[Section]:
     """The report as data, empty sections left out."""
     parts = [
+        _misfit(result),
         _parameters(result),
+        _unsound(result),
         _interval_parts(result),
         _refits(result),
         _recordings(result),
@@ -73,6 +75,30 @@ def rich_report(result: FitResult) -> Group:
         parts += ["", *rich_section(section)]
     group: Group = console.Group(*parts)
     return group
+
+
+def _misfit(result: FitResult) -> Section:
+    m = result.misfit
+    if m is None:
+        return Section("Misfit")
+    told = [short(1e3 * sigma) for sigma in (m.smallest_sigma, m.largest_sigma)]
+    sigma = f"{told[0]} mm" if told[0] == told[1] else f"{told[0]} to {told[1]} mm"
+    beyond = f"{short(1e3 * m.model_error)} mm in each coordinate" if m.model_error > 0 else "residuals are below sigma"
+    notes = (
+        ("reduced chi-square", f"{short(m.reduced_chi_square)}, against the given sigma of {sigma}"),
+        ("model error beyond sigma", beyond),
+    )
+    return Section("Misfit", notes=notes)
+
+
+def _unsound(result: FitResult) -> Section:
+    """What speaks against the fit, once for all parameters that it is true of."""
+    words: dict[str, list[Estimate]] = {}
+    for estimate in result.estimates:
+        if estimate.verdict in UNSOUND:
+            words.setdefault(estimate.words, []).append(estimate)
+    notes = [(f"{', '.join(e.name for e in of)} ({of[0].verdict})", said) for said, of in words.items()]
+    return Section("What contradicts this fit", notes=tuple(notes))
 
 
 def _parameters(result: FitResult) -> Section:
@@ -203,7 +229,9 @@ def _unknown(result: FitResult) -> Section:
         members = [e.name for e in result.estimates if gauge in e.words]
         notes.append((" and ".join(members), f"{gauge}; fix one of them or give it a prior"))
     for estimate in result.estimates:
-        if estimate.verdict != "identified" and not any(gauge in estimate.words for gauge in result.gauges):
+        if estimate.verdict not in ("identified", *UNSOUND) and not any(
+            gauge in estimate.words for gauge in result.gauges
+        ):
             notes.append((estimate.name, estimate.words))
     if any(e.verdict == "at its floor" for e in result.estimates):
         others = [e.name for e in result.estimates if e.verdict in ("identified", "weak")]

@@ -16,10 +16,15 @@ from .errors import InputError
 
 FORMAT = "sheetbend fit 1"
 
-VERDICTS = ("identified", "weak", "one-sided", "at a bound", "at its floor", "not identifiable")
+UNSOUND = ("rough", "no minimum", "doubtful")
+"""Verdicts of an estimate that nothing should rest on; a command that fits exits with 4 for each of them."""
+
+VERDICTS = ("identified", "weak", "one-sided", "at a bound", "at its floor", "not identifiable", *UNSOUND)
 """identified: 95 % half-width at most 20 % of the value; weak: above; one-sided: bounded from one side only;
-at a bound: of the user; at its floor: the solver's own stiffness or damping; not
-identifiable: gauge or flat."""
+at a bound: of the user; at its floor: the solver's own stiffness or damping; not identifiable: gauge or flat;
+rough: derivatives of the motion grow so fast that nothing follows from them; no minimum: the optimizer ended where the
+cost still falls; doubtful: a minimum that separate parts of the data, another start or held-out motion contradict.
+Rough and no minimum have no interval."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,6 +108,22 @@ class RecordingFit:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Misfit:
+    """How large the residuals are against what was told of their size.
+
+    Attributes:
+        reduced_chi_square: sum of squared residuals in units of sigma, over the degrees of freedom.
+        smallest_sigma, largest_sigma: expected errors of a coordinate that the experiments were given, m.
+        model_error: root mean square of one coordinate's residual beyond sigma, m; 0 where it is not larger.
+    """
+
+    reduced_chi_square: float
+    smallest_sigma: float
+    largest_sigma: float
+    model_error: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Start:
     """One start of a multi-start fit: cost at its end, and the physical values there."""
 
@@ -146,6 +167,7 @@ class FitResult:
         autocorrelation_time: frames of residual that count as one, 1 when they are independent.
         starts: the ends of all starts, best first.
         refits: on finer discretizations, of which `Estimate.discretization` is made.
+        misfit: residuals against the sigma that was told; None in files of earlier versions.
         optimizer, iterations, seconds, converged, interrupted, message: how it went.
         warnings: what a reader must know before using the numbers.
     """
@@ -170,6 +192,7 @@ class FitResult:
     refits: tuple[Refit, ...] = ()
     warnings: tuple[str, ...] = ()
     first_cost: float | None = None
+    misfit: Misfit | None = None
     jacobian_seconds: float | None = None
 
     def __getitem__(self, name: str) -> Estimate:
@@ -178,6 +201,11 @@ class FitResult:
             if estimate.name == name:
                 return estimate
         raise KeyError(f"no estimate of {name!r}; there are: {', '.join(e.name for e in self.estimates)}")
+
+    @property
+    def sound(self) -> bool:
+        """Whether no verdict is one of `UNSOUND`."""
+        return not any(estimate.verdict in UNSOUND for estimate in self.estimates)
 
     @property
     def values(self) -> dict[str, float]:
@@ -228,6 +256,7 @@ class FitResult:
         values["estimates"] = tuple(_estimate(name, part) for name, part in data["parameters"].items())
         values["recordings"] = tuple(RecordingFit(name=name, **part) for name, part in data["recordings"].items())
         values["gauges"], values["warnings"] = tuple(data["gauges"]), tuple(data["warnings"])
+        values["misfit"] = Misfit(**data["misfit"]) if data.get("misfit") else None
         return cls(baseline=data["baseline_is"], **values)
 
     def save(self, path: str | Path) -> None:

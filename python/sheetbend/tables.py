@@ -15,6 +15,9 @@ _COLORS = {
     "at a bound": "red",
     "at its floor": "red",
     "not identifiable": "red",
+    "rough": "bold red",
+    "no minimum": "bold red",
+    "doubtful": "bold red",
 }
 
 

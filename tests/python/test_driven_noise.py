@@ -280,7 +280,7 @@ def test_the_noise_can_be_taken_from_the_recording():
 
 def test_a_fit_that_takes_noise_for_motion_says_so():
     fit = sb.fit(shaken(13, frames=61, driven_sigma=None), parameters=WANTED, profiles=False)
-    (warning,) = fit.result.warnings
+    warning = fit.result.warnings[-1]
     assert "noise of its driven markers (0.29 mm" in warning and "set driven_sigma" in warning
     clean = sb.fit(shaken(13, driven=1e-5, frames=61, driven_sigma=None), parameters=WANTED, profiles=False)
     assert not clean.result.warnings
@@ -428,7 +428,7 @@ def test_an_interrupted_fit_keeps_its_best():
 
     e = shaken(17)
     fit = sb.fit(e, parameters=WANTED, progress=stop)
-    assert fit.result.interrupted and fit["rope_EI"].lower is not None
+    assert fit.result.interrupted and fit["rope_EI"].verdict == "no minimum"
     assert fit.corrections[e.name].shape == (41, 1, 3)
 
 

@@ -58,8 +58,9 @@ def run(command: Callable[[Console], Outcome], as_json: bool) -> None:
 
 
 def code_of(results: Sequence[FitResult], strictly: bool) -> Code:
-    """Of fits: whether all converged, and whether every one (strictly: every parameter) is identifiable."""
-    if not all(result.converged for result in results):
+    """Of fits: whether all converged to sound verdicts, and whether every one (strictly: every parameter) is
+    identifiable."""
+    if not all(result.converged and result.sound for result in results):
         return Code.NOT_CONVERGED
     unknown = [[e.verdict == "not identifiable" for e in result.estimates] for result in results]
     return Code.NOT_IDENTIFIABLE if any(any(u) if strictly else all(u) for u in unknown) else Code.DONE
