@@ -42,17 +42,24 @@ def doubtful(estimates: Sequence[Estimate], doubts: Mapping[str, str]) -> tuple[
 
 
 def between_parts(
-    problem: FitProblem, u: Array, judged: Identifiability, shifts: Sequence[Array] = ()
+    problem: FitProblem, u: Array, judged: Identifiability, refinement: Refinement | None = None
 ) -> dict[str, str]:
     """By parameter, that separate parts of the data (time, markers, recordings) ask for different values.
 
     All parameters together must differ between the parts by more than chance explains at the 1 % level. Those are named
     of which a part differs from the others by more than its 95 % interval, and from the estimate by more than the
-    estimate's, what the discretization moves in that part counted. No simulation is needed beyond the last Jacobian.
+    estimate's, what the discretization moves in that part counted. No simulation is needed beyond the last Jacobian,
+    unless parts differ.
 
     Args:
-        shifts: (rows,) changes of the data's residuals on finer discretizations, which explain a part of them.
+        refinement: of the discretization; where parts differ, one simulation each tells what it explains of that.
     """
+    words = _between(problem, u, judged, [])
+    shifts = _residual_shifts(problem, u, refinement) if words and refinement is not None else []
+    return _between(problem, u, judged, shifts) if shifts else words
+
+
+def _between(problem: FitProblem, u: Array, judged: Identifiability, shifts: Sequence[Array]) -> dict[str, str]:
     _, r, J = problem.evaluate(u)
     rows, names = problem.core.data_rows, problem.parameters.free
     estimates = {e.name: e for e in judged.estimates}
@@ -103,11 +110,9 @@ def _reach(parameter: Parameter, e: Estimate) -> float:
     )
 
 
-def residual_shifts(problem: FitProblem, u: Array, refinement: Refinement | None) -> list[Array]:
-    """(rows,) what the data's residuals change at half the step and on a finer mesh, where these are asked for: one
-    simulation each. One that has no answer there is left out."""
-    if refinement is None:
-        return []
+def _residual_shifts(problem: FitProblem, u: Array, refinement: Refinement) -> list[Array]:
+    """(rows,) what the data's residuals change at half the step and on a finer mesh, where these are asked for. One
+    that has no answer there is left out."""
     finer: list[Sequence[Experiment]] = []
     if refinement.halve_step and any(not e.static for e in problem.experiments):
         finer.append([replace(e, solver=e.solver.with_h(e.solver.h / 2)) for e in problem.experiments])

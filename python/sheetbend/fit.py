@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .conclude import Elsewhere, judged_parameters, misfit, warnings_of, without_verdict
-from .contradictions import between_parts, doubtful, elsewhere, held_out_motion, residual_shifts
+from .contradictions import between_parts, doubtful, elsewhere, held_out_motion
 from .discretization import Refinement, refined_estimates, to_the_limit
 from .driven_noise import doubts
 from .errors import InputError
@@ -155,7 +155,8 @@ def fit(
         judged, lower = judged_parameters(problem, best.u, refined, more, refitter if profiles else None, lost)
         found = predicted_values(experiments, wanted, values, refitter, threads)
         doubted = () if refitter is None or lost else doubts(problem, best.u, judged)
-        return _Conclusion(refits, judged, lower, *found, doubted)
+        parts = {} if refitter is None else between_parts(problem, best.u, judged, refine)
+        return _Conclusion(refits, judged, lower, *found, doubted, parts)
 
     left_out: dict[str, Comparison] = {}
     try:
@@ -170,14 +171,13 @@ def fit(
     rows = problem.core.first_rows
     count = {e.name: rows[i + 1] - rows[i] for i, e in enumerate(fitted)}
     errors = tuple(_errors(c, count, left_out, corrected) for c in comparisons)
-    shifts = [] if interrupted else residual_shifts(problem, best.u, refine)
     starts_elsewhere = [
         Elsewhere(m.cost - best.cost, problem.parameters.to_physical(m.u), "another start") for m in ends[1:]
     ]
     contradicted = (
         held_out_motion(problem, comparisons, errors)
         | elsewhere(problem, judged, best.cost, [*starts_elsewhere, *end.lower])
-        | between_parts(problem, best.u, judged, shifts)
+        | end.parts
     )
     estimates = doubtful(judged.estimates, contradicted)
     result = FitResult(
@@ -225,6 +225,7 @@ class _Conclusion:
     given: tuple[Given, ...]
     corrected: dict[str, np.ndarray]  # of experiments that are only predicted
     doubts: tuple[str, ...]
+    parts: dict[str, str]  # by parameter, of which parts of the data ask for different values
 
 
 def _experiments(
