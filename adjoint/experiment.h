@@ -26,11 +26,18 @@ struct Observations {
   double loss_scale = 1.0;  // in units of sigma
 };
 
+// A further rollout of the same motion at a shorter substep, for extrapolation in time, and the weight of its markers.
+struct FinerRun {
+  Plan plan;
+  double weight;
+};
+
 // The inputs of an experiment are the scene's, then an offset (3) per marker [m], then the recording's time offset [s].
 struct Experiment {
   std::string name;
   std::shared_ptr<const Scene> scene;
   Plan plan;
+  std::vector<FinerRun> finer;  // predicted markers are their weighted sum; those of `plan` weigh the rest up to 1
   ParameterMap map;
   Observations observed;
   BoundaryCorrection correction;
@@ -42,7 +49,8 @@ struct Experiment {
 
   std::size_t inputs() const { return scene->layout.total() + 3 * observed.markers.size() + 1; }
   std::size_t residual_count() const;  // one per axis of every marker and frame that was seen
-  int steps() const;                   // substeps until the last frame
+  int steps() const { return steps(plan); }
+  int steps(const Plan& run) const;  // substeps until the last frame
   void check() const;
 
   // The scene's inputs at parameters theta and a correction b (correction.count()), then the observation's.
@@ -57,6 +65,14 @@ struct Experiment {
   // Fills, when not null, residuals (residual_count) and simulated markers (frames, markers, 3). Throws Diverged, Unconverged or NoEquilibrium.
   template <class T>
   void residuals(const T* theta, const T* b, T* r, T* simulated, Interrupt* interrupt) const;
+
+ private:
+  // Calls frame(number, coordinates at its time) for every frame of a rollout with that plan; `in` as `inputs_at`.
+  template <class T, class Frame>
+  void run(const Plan& own, const T* in, Frame&& frame, Interrupt* interrupt) const;
+  // Predicted markers (frames, markers, 3) of all runs together.
+  template <class T>
+  std::vector<T> extrapolated(const T* in, Interrupt* interrupt) const;
 };
 
 }  // namespace sheetbend

@@ -65,6 +65,10 @@ Experiment make_experiment(const py::dict& d) {
   o.cg_tolerance = get<double>(d, "cg_tolerance");
   o.cg_iterations = get<int>(d, "cg_iterations");
   e.plan = make_plan(*e.scene, o);
+  for (const auto& [h, weight] : get<std::vector<std::pair<double, double>>>(d, "finer")) {
+    o.h = h;
+    e.finer.push_back({make_plan(*e.scene, o), weight});
+  }
   e.map = make_map(get<py::dict>(d, "map"));
   e.observed = make_observations(get<py::dict>(d, "observed"));
   if (!d["correction"].is_none()) e.correction = make_correction(get<py::dict>(d, "correction"));

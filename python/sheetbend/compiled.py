@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from . import _core
 from .errors import SceneError, refusal
+from .extrapolation import kinks
 from .quantities import FUNCTIONS, Term
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ class CompiledScene:
         layout: input array name -> (offset, size) in the flat input vector.
         names: quantity names in the order of theta.
         theta: their values.
+        kinks: what makes its motions not smooth in time, in words; empty if nothing.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -59,6 +61,7 @@ class CompiledScene:
         self.names = tuple(scene.quantities)
         self.theta = np.array([q.value for q in scene.quantities.values()], dtype=float)
         self._positive = tuple(q.positive for q in scene.quantities.values())
+        self.kinks = kinks(scene)
         self._base = self._pack(scene)
         self._terms = [*scene.terms, *scene.boundary.terms()]
 

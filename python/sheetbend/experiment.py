@@ -304,6 +304,8 @@ class Experiment:
                 fit finds it where there is a `driven_sigma`, and otherwise it is zero.
         """
         compiled = self.scene.compiled
+        if not self.static:
+            self.solver.check_smooth(compiled)
         offsets = [place.offset or (0.0, 0.0, 0.0) for place in self.compared_places]
         observed = self.observed(recording)
         for marker, m in zip(observed["markers"], self.compared, strict=True):
@@ -312,10 +314,14 @@ class Experiment:
         map_["base"][compiled.core.inputs : -1] = np.ravel(offsets)
         correction = self.correction(recording)
         sigma = 0.0 if corrected is not None else self.driven_noise or 0.0
+        if sigma > 0.0 and self.solver.extrapolate > 1 and not self.static:
+            fix = "leave one of the two out"
+            raise InputError(f"{self.name}.driven_sigma", "does not go with runs that are extrapolated", sigma, fix)
         return {
             "name": self.name,
             "scene": compiled.core,
             "h": self.solver.h,
+            "finer": [] if self.static else list(self.solver.runs[1:]),
             "integrator": self.solver.integrator,
             "partition": self.solver.method,
             "iterations": self.solver.sweeps,

@@ -48,6 +48,13 @@ class SolverSection(Section):
         'budget of an adjoint gradient (`check`), such as "2 GB" or a number of bytes: what does not fit is computed '
         "again; a fit carries tangents forward and keeps no tape",
     )
+    extrapolate: int = key(
+        1,
+        "runs at h, h/2 and h/4 that are combined at the frames: 1 (off), 2 (third order) or 3 (fourth order, seven"
+        " times the substeps); for smooth motions",
+        ge=1,
+        le=3,
+    )
 
     @field_validator("memory")
     @classmethod
