@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from .discretization import Refinement, refined_estimates, to_the_limit
+from .discretization import Refinement, settled, to_the_limit, wanted_refinement
 from .driven_noise import doubts
 from .errors import InputError
 from .experiment import Experiment
-from .floors import solver_floors
+from .floors import at_floor_of_sweeps, solver_floors
 from .identifiability import Identifiability, Nuisance, identify
 from .leave_one_out import MEANING, companions, each_left_out
 from .optimizers import Minimum, Observer, refit
@@ -22,9 +22,10 @@ from .parameters import Parameter, Parameters
 from .prediction import Comparison, compare, predicted_values
 from .problem import FitProblem, ParameterLike, as_parameters
 from .recording import Recording
-from .result import Estimate, FitResult, Given, RecordingFit, Refit, Start
+from .result import Estimate, FitResult, Given, RecordingFit, Start
 from .scene import Scene
 from .search import Search
+from .time_step import Settled
 
 PROFILE_TOLERANCE = 1e-7  # relative, of the cost: an interval's rise is many times that
 Systematic = Callable[[FitProblem, np.ndarray], Mapping[str, float]]
@@ -82,7 +83,7 @@ def fit(
     starts: Sequence[Mapping[str, float]] = (),
     windows: Sequence[float] = (),
     tolerance: float = 1e-10,
-    refine: Refinement | None = None,
+    refine: Refinement | str | bool | None = "auto",
     systematic: Systematic | None = None,
     leave_one_out: bool = False,
     profiles: bool = True,
@@ -101,8 +102,10 @@ def fit(
         windows: s, increasing: so much of every motion from its scene's start on is fitted first, one after another,
             each from where the one before ended; for a start far off, from which the whole motion diverges or misleads.
         tolerance: relative change of the cost that counts as none.
-        refine: also refit on a finer discretization, and count what that moves as a part of the intervals (see
-            `discretization`).
+        refine: "auto" moves the estimates to the limit of short substeps and counts what that leaves open in the
+            intervals, at the cost of some three evaluations with tangents. A `Refinement` says more, above all how to
+            make the same experiments on a finer mesh, which "auto" does not know: "mesh not counted" stands in the
+            table then. False (or None) counts nothing, as suits a recording that was simulated at the same substep.
         systematic: (problem, internal minimum) -> half-widths of what else the intervals are to count, by parameter, in
             its unit.
         leave_one_out: also predict every recording that holds nothing out by a fit to the others.
@@ -124,6 +127,7 @@ def fit(
     wanted = as_parameters(parameters, experiments)
     if threads < 1:
         raise InputError("threads", "must be positive", threads, "give at least 1")
+    refinement = wanted_refinement(refine)
     search = Search(optimizer, starts, windows, max_iterations, tolerance, progress)
     began = time.perf_counter()
     fitted = [e for e in experiments if e.predict is None]
@@ -140,37 +144,35 @@ def fit(
     problem = FitProblem(fitted, wanted, threads=threads)
     ends, name, interrupted = search.run(problem)
     best = ends[0]
-    values = problem.parameters.to_physical(best.u)
 
     def conclude(refitter: str | None) -> _Conclusion:
-        refits = (
-            ()
-            if refine is None or refitter is None
-            else refined_estimates(refine, experiments, wanted, problem, best.u, refitter, threads)
-        )
-        more = {} if systematic is None else systematic(problem, best.u)
-        refined = to_the_limit(refits, problem.parameters, values)
-        judged = _judge(problem, best.u, refined, more, refitter if profiles else None)
-        found = predicted_values(experiments, wanted, values, refitter, threads)
-        doubted = () if refitter is None else doubts(problem, best.u, judged)
-        return _Conclusion(refits, judged, *found, doubted)
+        at, every = settled(refinement, experiments, problem, best, refitter)
+        values = problem.parameters.to_physical(at.u)
+        more = {} if systematic is None else systematic(at.problem, at.u)
+        refined = to_the_limit(at.refits, problem.parameters, values)
+        judged = _judge(at.problem, at.u, refined, more, refitter if profiles else None)
+        judged = at_floor_of_sweeps(_moved(judged, at.moved), at.refits)
+        found = predicted_values(every, wanted, values, refitter, threads)
+        doubted = () if refitter is None else doubts(at.problem, at.u, judged)
+        return _Conclusion(at, tuple(every), judged, *found, doubted)
 
     left_out: dict[str, Comparison] = {}
     try:
         end = conclude(None if interrupted else name)
         if leave_one_out and not interrupted:
-            left_out = each_left_out(fitted, wanted, values, name, threads)
+            left_out = each_left_out(fitted, wanted, end.values, name, threads)
     except KeyboardInterrupt:
         interrupted = True
         end = conclude(None)
-    judged, corrected = end.judged, problem.corrections(best.u) | end.corrected
-    comparisons = compare(experiments, wanted, end.values, threads, corrected)
+    at, judged = end.at, end.judged
+    corrected = at.problem.corrections(at.u) | end.corrected
+    comparisons = compare(end.experiments, wanted, end.values, threads, corrected)
     rows = problem.core.first_rows
     count = {e.name: rows[i + 1] - rows[i] for i, e in enumerate(fitted)}
     result = FitResult(
         estimates=judged.estimates,
         recordings=tuple(_errors(c, count, left_out, corrected) for c in comparisons),
-        cost=best.cost,
+        cost=best.cost if at.problem is problem else at.cost,
         first_cost=best.first,
         jacobian_seconds=problem.seconds.get(True),
         rows=problem.core.data_rows,
@@ -180,7 +182,7 @@ def fit(
         converged=best.converged,
         interrupted=interrupted,
         message=best.message,
-        given=_given(problem.parameters, values) + end.given,
+        given=_given(problem.parameters, end.values) + end.given,
         correlations=judged.correlations,
         gauges=tuple(g.words for g in judged.gauges),
         baseline="; ".join(
@@ -194,7 +196,8 @@ def fit(
             )
             for m in ends
         ),
-        refits=end.refits,
+        refits=at.refits,
+        not_counted=at.not_counted,
         warnings=_warnings(ends, best, interrupted, problem.core.data_rows) + end.doubts,
     )
     return Fit(result, tuple(comparisons), wanted, corrected)
@@ -204,7 +207,8 @@ def fit(
 class _Conclusion:
     """What follows from a minimum."""
 
-    refits: tuple[Refit, ...]
+    at: Settled
+    experiments: tuple[Experiment, ...]  # as they are compared
     judged: Identifiability
     values: dict[str, float]  # of all experiments
     given: tuple[Given, ...]
@@ -255,6 +259,11 @@ def _judge(
         cost=lambda at: _cost(problem, at),
         nuisance=Nuisance(J[behind:], sum(map(problem.core.absorbed, range(len(problem.experiments))))),
     )
+
+
+def _moved(judged: Identifiability, by: Mapping[str, float]) -> Identifiability:
+    """With how far each estimate was moved to the limit of short substeps."""
+    return replace(judged, estimates=tuple(replace(e, moved=by.get(e.name, 0.0)) for e in judged.estimates))
 
 
 def _cost(problem: FitProblem, u: np.ndarray) -> float:

@@ -79,7 +79,7 @@ def _parameters(result: FitResult) -> Section:
     rows = [_estimate_row(estimate) for estimate in result.estimates]
     rows += [_given_row(given) for given in result.given]
     headers = ("parameter", "value", "+/-", "95 % interval", "unit", "verdict")
-    return Section("Parameters", headers, tuple(rows))
+    return Section("Parameters", headers, tuple(rows), tuple(("intervals", words) for words in result.not_counted))
 
 
 def _estimate_row(estimate: Estimate) -> tuple[str, ...]:
@@ -105,13 +105,18 @@ def _given_row(given: Given) -> tuple[str, ...]:
 def _interval_parts(result: FitResult) -> Section:
     rows = []
     counted = any(e.systematic > 0 for e in result.estimates)
+    moved = any(e.moved != 0 for e in result.estimates)
     for e in result.estimates:
         if e.discretization + e.systematic > 0 and e.half_width is not None:
             parts = (e.half_width, e.statistical, e.discretization, *([e.systematic] if counted else []))
+            parts += (e.moved,) if moved else ()
             rows.append((e.name, *figures(parts, e.half_width), e.unit))
-    more = ["systematic"] if counted else []
+    more = (["systematic"] if counted else []) + (["value moved by"] if moved else [])
     headers = ("parameter", "+/-", "statistical", "discretization", *more, "unit")
-    return Section("Where the intervals come from", headers, tuple(rows))
+    note = "values are moved to the limit of short substeps, and what that leaves open is counted"
+    return Section(
+        "Where the intervals come from", headers, tuple(rows), (("time step", note),) if moved and rows else ()
+    )
 
 
 def _refits(result: FitResult) -> Section:

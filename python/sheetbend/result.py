@@ -31,10 +31,12 @@ class Estimate:
         lower, upper: 95 % interval, all parts together; None where it is open.
         half_width: half of it, None where it is open.
         statistical: half-width from the residuals alone, None where it is open.
-        discretization: what refits at half the step and twice the nodes move; 0 when that was not measured.
+        discretization: half-width of what the time step, the mesh and sweeps leave open, see `FitResult.refits`; 0 when
+            that was not measured.
         systematic: half-width of what else the interval counts; 0 when nothing.
         verdict: one of `VERDICTS`.
         words: the verdict as a sentence.
+        moved: how far the value was moved to the limit of short substeps, in `unit`; it is contained in `value`.
     """
 
     name: str
@@ -48,6 +50,7 @@ class Estimate:
     verdict: str
     words: str
     systematic: float = 0.0
+    moved: float = 0.0
 
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:
@@ -146,6 +149,7 @@ class FitResult:
         autocorrelation_time: frames of residual that count as one, 1 when they are independent.
         starts: the ends of all starts, best first.
         refits: on finer discretizations, of which `Estimate.discretization` is made.
+        not_counted: what of the discretization the intervals leave out, such as "mesh not counted", and why.
         optimizer, iterations, seconds, converged, interrupted, message: how it went.
         warnings: what a reader must know before using the numbers.
     """
@@ -171,6 +175,7 @@ class FitResult:
     warnings: tuple[str, ...] = ()
     first_cost: float | None = None
     jacobian_seconds: float | None = None
+    not_counted: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of that name; KeyError names the ones there are."""
@@ -228,6 +233,7 @@ class FitResult:
         values["estimates"] = tuple(_estimate(name, part) for name, part in data["parameters"].items())
         values["recordings"] = tuple(RecordingFit(name=name, **part) for name, part in data["recordings"].items())
         values["gauges"], values["warnings"] = tuple(data["gauges"]), tuple(data["warnings"])
+        values["not_counted"] = tuple(data.get("not_counted", ()))
         return cls(baseline=data["baseline_is"], **values)
 
     def save(self, path: str | Path) -> None:

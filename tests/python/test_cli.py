@@ -44,6 +44,10 @@ fit = [0.0, 0.2]
 held_out = [0.2, 0.31]
 sigma = 1e-4
 
+[fit]
+halve_step = false
+double_segments = false
+
 [output]
 figures = "none"
 
@@ -165,11 +169,11 @@ class TestFit:
         found = last_line(run("fit", config, "--json"))
         assert found["parameters"]["idle"]["verdict"] == "not identifiable" and found["exit_code"] == 0
         assert last_line(run("fit", config, "--json", "--strict"))["exit_code"] == 3
-        config.write_text(config.read_text() + "\n[fit]\nstrict = true\n")
+        edited(config, "[fit]", "[fit]\nstrict = true")
         assert last_line(run("fit", config, "--json"))["exit_code"] == 3
 
     def test_too_few_iterations_exit_4(self, config: Path) -> None:
-        config.write_text(config.read_text() + "\n[fit]\nmax_iterations = 1\n")
+        edited(config, "[fit]", "[fit]\nmax_iterations = 1")
         found = last_line(run("fit", config, "--json"))
         assert not found["converged"] and found["exit_code"] == 4
 
@@ -180,9 +184,22 @@ class TestFit:
         assert last_line(result)["error"]["message"]
 
     def test_refinement_enters_the_intervals(self, config: Path) -> None:
-        config.write_text(config.read_text() + "\n[fit]\nhalve_step = true\ndouble_segments = true\n")
+        edited(config, "halve_step = false\ndouble_segments = false", "halve_step = true\ndouble_segments = true")
         found = last_line(run("fit", config, "--json"))
         assert found["parameters"]["rope_EI"]["discretization"] > 0
+
+    def test_time_step_and_mesh_count_unless_they_are_switched_off(self, config: Path) -> None:
+        found = run("fit", config)
+        assert "time step not counted" in found.stdout and "mesh not counted" in found.stdout
+        off = last_line(run("fit", config, "--json"))
+        assert off["not_counted"] == ["time step not counted", "mesh not counted"]
+        edited(config, "[fit]\nhalve_step = false\ndouble_segments = false\n", "")
+        found = last_line(run("fit", config, "--json"))
+        assert found["not_counted"] == []
+        assert [made["name"] for made in found["refits"]] == ["time step", "finer mesh"]
+        rope = found["parameters"]["rope_EI"]
+        assert rope["moved"] != 0 and rope["half_width"] > 2 * off["parameters"]["rope_EI"]["half_width"]
+        assert rope["interval"][0] < 1e-3 < rope["interval"][1]
 
     def test_ctrl_c_reports_the_best_so_far(self, tmp_path: Path) -> None:
         recorded(tmp_path, 100)
@@ -360,7 +377,7 @@ class TestBadInput:
         assert last_line(run("fit", config, "--json"))["error"]["field"] == "recording[0].predict"
 
     def test_unknown_start(self, config: Path) -> None:
-        config.write_text(config.read_text() + "\n[fit]\nstarts = [{ rope_EA = 1.0 }]\n")
+        edited(config, "[fit]", "[fit]\nstarts = [{ rope_EA = 1.0 }]")
         assert last_line(run("fit", config, "--json"))["error"]["field"] == "fit.starts[0].rope_EA"
 
     def test_resume_from_what_is_no_fit(self, config: Path) -> None:

@@ -124,7 +124,7 @@ class TestFit:
         EI = rope["parameters"]["rope_EI"]
         value = rope["values"]["rope_EI"]
         moved = [made["to_limit"] * np.log1p(made["moved"]["rope_EI"] / value) for made in rope["refits"]]
-        assert [made["name"] for made in rope["refits"]] == ["half the step", "finer mesh"]
+        assert [made["name"] for made in rope["refits"]] == ["time step", "finer mesh"]
         assert EI["discretization"] == pytest.approx(value * np.expm1(np.hypot(*moved))) and EI["discretization"] > 0
         assert EI["half_width"] > EI["statistical"] > 0
 

@@ -190,17 +190,16 @@ class FitSection(Section):
     tolerance: Finite = key(1e-10, "relative change of the cost that counts as none", gt=0, lt=1)
     threads: int = key(1, "over recordings and derivatives; results do not depend on it", ge=1)
     halve_step: bool = key(
-        False, "refit at half the substep; what moves, carried on to the limit, counts in the intervals"
+        True,
+        "move the estimates to the limit of short substeps and count what that leaves open in the intervals; some three"
+        " evaluations with tangents",
     )
-    double_segments: bool = key(
-        False,
-        "refit with twice the segments in every rope and twice the cells in every cloth; what moves, carried on to the "
-        "limit, counts in the intervals",
+    double_segments: bool | None = key(
+        None,
+        "left out: one simulation with twice the segments in every rope and twice the cells in every cloth, and what"
+        " its residuals would move counts; true: refit there; false: the mesh does not count",
     )
-    linear_refits: bool = key(
-        False,
-        "instead of each of these refits one Gauss-Newton step with the Jacobian of the fit: a simulation each",
-    )
+    linear_refits: bool = key(False, "with `double_segments = true`: the one simulation instead of the refit")
     profiles: bool = key(
         True, "refit the others along weak parameters for their intervals; false: linear intervals, which cost nothing"
     )
