@@ -155,6 +155,26 @@ def test_a_finer_mesh_is_counted_where_it_can_be_made_and_named_where_not(tmp_pa
     assert all(off(found[name], truth) < 1 for name, truth in zip(wanted, (2e-3, 0.02, 0.01), strict=True))
 
 
+def test_a_sheet_on_a_mesh_three_times_too_coarse_is_not_identified():
+    """6 cells fitted to 18: drag comes out 32 % too low, four half-widths of an interval without the mesh."""
+    recording = recorded(1 / 480, cells=18, noise=1e-4)
+
+    def of(cells: int) -> sb.Experiment:
+        e = watched(recording, cells=cells)
+        for name in ("cloth_warp", "cloth_shear"):
+            e.scene.quantities[name] = replace(e.scene.quantities[name], value=TRUE[name.removeprefix("cloth_")])
+        return e
+
+    truth = {"cloth_bending": 5e-5, "cloth_drag_linear": 0.1}
+    alone = sb.fit(of(6), parameters=list(truth), profiles=False)
+    assert alone["cloth_drag_linear"].verdict == "identified" and off(alone["cloth_drag_linear"], 0.1) > 3
+    assert "mesh not counted" in alone.report().split("Where the intervals")[0]
+    finer = sb.Refinement(finer=lambda: [of(12)], linear=True)
+    found = sb.fit(of(6), parameters=list(truth), profiles=False, refine=finer)
+    for name, value in truth.items():
+        assert found[name].verdict == "weak" and off(found[name], value) < 1
+
+
 def test_a_refinement_that_has_no_answer_is_named_and_does_not_end_the_fit():
     recording = of_sixty_links()
     coarse = replace(rope(10, 3e-3), recording=recording)
