@@ -150,7 +150,7 @@ def fit(
         values = problem.parameters.to_physical(at.u)
         more = {} if systematic is None else systematic(at.problem, at.u)
         refined = to_the_limit(at.refits, problem.parameters, values)
-        judged = _judge(at.problem, at.u, refined, more, refitter if profiles else None)
+        judged = _judge(at, problem, best.u, refined, more, refitter if profiles else None)
         judged = at_floor_of_sweeps(_moved(judged, at.moved), at.refits)
         found = predicted_values(every, wanted, values, refitter, threads)
         doubted = () if refitter is None else doubts(at.problem, at.u, judged)
@@ -237,13 +237,20 @@ def _experiments(
 
 
 def _judge(
-    problem: FitProblem,
-    u: np.ndarray,
+    at: Settled,
+    fitted: FitProblem,
+    end: np.ndarray,
     refined: Mapping[str, float],
     systematic: Mapping[str, float],
     refitter: str | None,
 ) -> Identifiability:
-    """Verdicts and intervals; without a refitter the intervals are the linear ones."""
+    """Verdicts and intervals; without a refitter the intervals are the linear ones.
+
+    Profiles ask the problem as it was fitted, whose minimum is `end`, and move along with the estimate: runs that are
+    combined would take three times as long.
+    """
+    problem, u = at.problem, at.u
+    moved, (lower, upper) = u - end, fitted.parameters.bounds()
     _, r, J = problem.evaluate_exactly(u)
     rows, behind = problem.prior_rows
     return identify(
@@ -255,8 +262,8 @@ def _judge(
         floors=solver_floors(problem.experiments, problem.parameters),
         discretization=refined,
         systematic=systematic,
-        profile=None if refitter is None or len(problem.parameters.free) == 1 else _profile(problem, u, refitter),
-        cost=lambda at: _cost(problem, at),
+        profile=None if refitter is None or len(u) == 1 else _shifted(_profile(fitted, end, refitter), fitted, moved),
+        cost=lambda x: _cost(fitted, np.clip(x - moved, lower, upper)),
         nuisance=Nuisance(J[behind:], sum(map(problem.core.absorbed, range(len(problem.experiments))))),
     )
 
@@ -269,6 +276,19 @@ def _moved(judged: Identifiability, by: Mapping[str, float]) -> Identifiability:
 def _cost(problem: FitProblem, u: np.ndarray) -> float:
     ok, r, _ = problem.evaluate(u, jacobian=False)
     return 0.5 * float(r @ r) if ok else np.inf
+
+
+def _shifted(
+    profile: Callable[[str, float], float], problem: FitProblem, moved: np.ndarray
+) -> Callable[[str, float], float]:
+    """The profile around an estimate that was moved, internally."""
+
+    def cost(name: str, value: float) -> float:
+        parameter, by = problem.parameters[name], moved[problem.parameters.free.index(name)]
+        before = value if by == 0.0 else parameter.to_physical(parameter.to_internal(value) - by)
+        return profile(name, float(np.clip(before, parameter.lower, parameter.upper)))
+
+    return cost
 
 
 def _profile(problem: FitProblem, u: np.ndarray, refitter: str) -> Callable[[str, float], float]:
