@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "adjoint/rollout.h"
+#include "core/solver/redundant_rows.h"
 #include "python/bindings/solver.h"
 
 namespace sheetbend::bindings {
@@ -74,6 +75,14 @@ std::vector<std::vector<std::vector<double>>> force_balance(const Solver& s, con
       },
       &interrupt);
   return all;
+}
+
+// Which rows of the first substep say what others say already, in words; empty where there are none.
+std::string redundant(const Solver& s, const Array& inputs, double t0) {
+  expect_size(inputs, s.scene->layout.total(), "inputs");
+  Release release;
+  const double* x = inputs.data() + s.scene->layout.of(Quantity::position);
+  return describe(*s.scene, redundant_rows(*s.scene, s.plan, inputs.data(), t0), x);
 }
 
 py::array_t<double> states(const Solver& s, const Array& inputs, const Steps& steps, double t0) {
@@ -170,6 +179,7 @@ void bind_rollout(py::module_& m) {
       .def("simulate", &simulate, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
       .def("states", &states, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
       .def("force_balance", &force_balance, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
+      .def("redundant", &redundant, py::arg("inputs"), py::arg("t0"))
       .def("simulate_batch", &simulate_batch, py::arg("inputs"), py::arg("steps"), py::arg("t0"),
            py::arg("lengths") = Lengths())
       .def_property_readonly("blocks",

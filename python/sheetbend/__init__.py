@@ -33,6 +33,7 @@ from .markers import Place, along_rope, between, on_cloth, on_particle, on_rope
 from .mesh import TriangleMesh, read_mesh
 from .parameters import Parameter, Parameters
 from .recording import Recording
+from .redundancy import RedundantConstraintsWarning
 from .result import FitResult
 from .rod import Rod, add_rod, rod
 from .rod_junction import Junction
@@ -74,6 +75,7 @@ __all__ = [
     "Place",
     "Recording",
     "RecordingError",
+    "RedundantConstraintsWarning",
     "Refinement",
     "Rod",
     "Rollout",

@@ -131,6 +131,7 @@ class Solver:
     def complex_step(self, inputs: ArrayLike, direction: ArrayLike, steps: Sequence[int], t0: float) -> Array: ...
     # per substep, per block: the force left at the start and after each Newton step, over the largest one
     def force_balance(self, inputs: ArrayLike, steps: int, t0: float) -> list[list[list[float]]]: ...
+    def redundant(self, inputs: ArrayLike, t0: float) -> str: ...  # rows that others say already, in words
     # lengths: (batch,) frames of each scene, or none where all have every frame
     def simulate_batch(
         self, inputs: ArrayLike, steps: Sequence[int], t0: float, lengths: Sequence[int] = ()
@@ -189,6 +190,8 @@ class EquilibriumSolution:
     def converged(self) -> bool: ...
     @property
     def message(self) -> str: ...
+    @property
+    def redundant(self) -> str: ...  # rows that others say already, in words
     def vjp(self, x_bar: ArrayLike | None = None, lambda_bar: ArrayLike | None = None) -> Array: ...
 
 def equilibrium(

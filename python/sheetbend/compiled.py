@@ -26,6 +26,8 @@ class CompiledScene:
     Attributes:
         core: the compiled topology.
         layout: input array name -> (offset, size) in the flat input vector.
+        name: of the scene.
+        kinds: of its constraints.
         names: quantity names in the order of theta.
         theta: their values.
     """
@@ -56,6 +58,8 @@ class CompiledScene:
         except ValueError as error:
             raise refusal(error, SceneError, scene.name) from error
         self.layout: dict[str, tuple[int, int]] = self.core.layout
+        self.name = scene.name
+        self.kinds = frozenset(g.kind for g in scene.groups)
         self.names = tuple(scene.quantities)
         self.theta = np.array([q.value for q in scene.quantities.values()], dtype=float)
         self._positive = tuple(q.positive for q in scene.quantities.values())

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from . import _core
 from .checks import is_number
 from .correction import Correction, recorded_noise
 from .errors import InputError, RecordingError
@@ -296,6 +297,11 @@ class Experiment:
         """By what they are made from, which no problem on the frozen scene changes."""
         return {}
 
+    @cached_property
+    def _stepper(self) -> _core.Solver:
+        """Made once, so that what the solver refuses or warns of is told before any fit."""
+        return self.solver.core(self.scene.compiled)
+
     def core(self, recording: Recording, corrected: np.ndarray | None = None) -> dict[str, Any]:
         """The experiment on (part of) its recording, for the compiled core.
 
@@ -311,6 +317,8 @@ class Experiment:
         map_ = compiled.map(3 * len(offsets) + 1, self.extra_terms())
         map_["base"][compiled.core.inputs : -1] = np.ravel(offsets)
         correction = self.correction(recording)
+        if not self.static:
+            _ = self._stepper
         sigma = 0.0 if corrected is not None else self.driven_noise or 0.0
         return {
             "name": self.name,

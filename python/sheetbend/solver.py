@@ -9,6 +9,7 @@ from . import _core
 from .compiled import CompiledScene
 from .errors import InputError, refusal
 from .memory import in_bytes
+from .redundancy import warn_redundant
 
 INTEGRATORS = ("bdf1", "bdf2")
 METHODS = ("direct", "gauss_seidel", "implicit", "newton", "newton_cg")
@@ -95,14 +96,20 @@ class Solver:
 
         Raises:
             InputError: the method cannot step the scene, such as "newton" with rigid constraints.
+
+        Warns:
+            RedundantConstraintsWarning: method "direct", and some rigid constraints follow from others at the start.
         """
         if self.method in ("implicit", "newton", "newton_cg"):
             offset, size = scene.layout["compliance"]
             if size and not (scene.inputs()[offset : offset + size] > 0).all():
                 fix = "use 'direct', or give every constraint a compliance"
                 raise InputError("solver.method", "cannot hold rigid constraints", self.method, fix)
+        if self.method == "direct" and self.sweeps == 1 and "shear" in scene.kinds:
+            problem = "loses up to half of the digits of gradients of rods that shear (GA)"
+            raise InputError("solver.iterations", problem, 1, "use 2, or leave GA out")
         try:
-            return _core.Solver(
+            core = _core.Solver(
                 scene=scene.core,
                 h=self.h,
                 integrator=self.integrator,
@@ -116,3 +123,6 @@ class Solver:
             )
         except ValueError as error:
             raise refusal(error, InputError, self.method) from error
+        if self.method == "direct":
+            warn_redundant(scene.name, core.redundant(scene.inputs(), 0.0))
+        return core

@@ -93,7 +93,9 @@ def scene_alone(config: schema.Config, folder: Path = Path()) -> tuple[Scene, So
     """The scene of a configuration without recordings, and its solver; files of meshes are relative to `folder`."""
     scene, _ = build_scene(config.experiment.name, config.scene, None, {}, folder=folder)
     _start_values(scene, config, {}, "")
-    return scene, solver_for(config.solver, None)
+    solver = solver_for(config.solver, None)
+    solver.core(scene.compiled)  # raise or warn here, before any work starts
+    return scene, solver
 
 
 def solver_for(section: schema.SolverSection, recording: Recording | None) -> Solver:
