@@ -134,6 +134,8 @@ void bind_equilibrium(py::module_& m) {
       .def_property_readonly("iterations", [](const Solution& s) { return s.at.iterations; })
       .def_property_readonly("unstable_modes", [](const Solution& s) { return s.at.unstable_modes; })
       .def_property_readonly("converged", [](const Solution& s) { return s.at.converged; })
+      .def_property_readonly("redundant",
+                             [](const Solution& s) { return describe(*s.scene, s.at.left_out, s.at.x.data()); })
       .def_property_readonly("message", [](const Solution& s) { return s.at.message; })
       .def("vjp", &vjp, py::arg("x_bar") = py::none(), py::arg("lambda_bar") = py::none());
   m.def("equilibrium", &solve, py::arg("scene"), py::arg("inputs"), py::arg("start") = py::none(),
