@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from . import _core
 from .checks import is_number
 from .correction import Correction, recorded_noise
 from .errors import InputError, RecordingError
@@ -298,9 +297,10 @@ class Experiment:
         return {}
 
     @cached_property
-    def _stepper(self) -> _core.Solver:
-        """Made once, so that what the solver refuses or warns of is told before any fit."""
-        return self.solver.core(self.scene.compiled)
+    def _can_step(self) -> bool:
+        """Asked once, so that what the solver refuses or warns of is told before any fit."""
+        self.solver.core(self.scene.compiled)
+        return True
 
     def core(self, recording: Recording, corrected: np.ndarray | None = None) -> dict[str, Any]:
         """The experiment on (part of) its recording, for the compiled core.
@@ -317,8 +317,7 @@ class Experiment:
         map_ = compiled.map(3 * len(offsets) + 1, self.extra_terms())
         map_["base"][compiled.core.inputs : -1] = np.ravel(offsets)
         correction = self.correction(recording)
-        if not self.static:
-            _ = self._stepper
+        assert self.static or self._can_step
         sigma = 0.0 if corrected is not None else self.driven_noise or 0.0
         return {
             "name": self.name,
