@@ -42,9 +42,8 @@ bool EquilibriumSolver::step(State& s, double mu, const double* alpha, double sh
     dx = s.r_x;
     dl = s.r_l;
     for (int i = 0; i < scene_.dofs(); ++i) dx[i] = -(dx[i] - mu * kkt_.metric(i) * (x[i] - s.x[i]));
-    s.for_each_row([&](int c, int row) {
-      dl[row] = -(dl[row] - left[row] + (alpha[c] - s.compliance[c]) * lambda[row]);
-    });
+    s.for_each_row(
+        [&](int c, int row) { dl[row] = -(dl[row] - left[row] + (alpha[c] - s.compliance[c]) * lambda[row]); });
     if (!finite(dx) || !finite(dl) || !kkt_.solve(dx.data(), dl.data(), 1e-8)) return false;
     for (int i = 0; i < scene_.dofs(); ++i) x[i] += dx[i];
     for (std::size_t i = 0; i < lambda.size(); ++i) lambda[i] += dl[i];

@@ -73,8 +73,8 @@ bool finite(const std::vector<double>& v) {
   return std::all_of(v.begin(), v.end(), [](double a) { return std::isfinite(a); });
 }
 
-EquilibriumState::EquilibriumState(const Scene& scene_, const double* inputs, const double* start_x, const double* start_lambda,
-      const EquilibriumOptions& o)
+EquilibriumState::EquilibriumState(const Scene& scene_, const double* inputs, const double* start_x,
+                                   const double* start_lambda, const EquilibriumOptions& o)
     : scene(scene_),
       in{scene_.layout, inputs},
       options(o),

@@ -91,8 +91,8 @@ TEST_P(RedundantRows, HaveTheGradientOfTheMotion) {
   for (const double a : reverse) ASSERT_LT(std::abs(a), 1e4);
   for (const unsigned seed : {1u, 2u}) {
     const auto v = some_direction(sample, seed), in_plane = some_direction(sample, seed, true);
-    const double step = complex_step_along([&](const std::vector<Complex>& in) { return std::vector{loss(program, in)}; },
-                                           sample.inputs, v)[0];
+    const auto losses = [&](const std::vector<Complex>& in) { return std::vector{loss(program, in)}; };
+    const double step = complex_step_along(losses, sample.inputs, v)[0];
     EXPECT_NEAR(product(reverse, v), step, 1e-9 * std::abs(step));
     const auto moved = [&](double size) {
       std::vector<double> in = sample.inputs;
