@@ -10,11 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 class Diverged(RuntimeError):
-    """A state that is not finite."""
+    """A state that is not finite or means nothing, or a gradient that grew beyond meaning."""
 
     substep: int
     time: float
     particle: int
+    seen: str  # of the particle, such as "is not finite"
 
 class Unconverged(RuntimeError):
     """Conjugate gradients ran out of iterations."""
@@ -127,6 +128,10 @@ class Solver:
         self, inputs: ArrayLike, steps: Sequence[int], t0: float, memory: int | None = None
     ) -> tuple[Array, Tape]: ...  # (frames, dofs)
     def vjp(self, inputs: ArrayLike, tape: Tape, steps: Sequence[int], x_bar: ArrayLike, t0: float) -> Array: ...
+    # the same, with the substeps that were computed again for it
+    def reverse(
+        self, inputs: ArrayLike, tape: Tape, steps: Sequence[int], x_bar: ArrayLike, t0: float
+    ) -> tuple[Array, int]: ...
     def jvp(self, inputs: ArrayLike, inputs_dot: ArrayLike, steps: Sequence[int], t0: float) -> tuple[Array, Array]: ...
     def complex_step(self, inputs: ArrayLike, direction: ArrayLike, steps: Sequence[int], t0: float) -> Array: ...
     # per substep, per block: the force left at the start and after each Newton step, over the largest one

@@ -21,7 +21,9 @@ TEXTS = {
 
 def libraries() -> set[str]:
     """First folders of what the compiled sources include from elsewhere."""
-    sources = [p for f in ("core", "adjoint", "python/bindings") for p in (ROOT / f).rglob("*") if p.suffix in (".h", ".cpp")]
+    sources = [
+        p for f in ("core", "adjoint", "python/bindings") for p in (ROOT / f).rglob("*") if p.suffix in (".h", ".cpp")
+    ]
     found = {name for p in sources for name in re.findall(r"#include <([\w.]+)/", p.read_text())}
     assert len(sources) > 50 and "Eigen" in found
     return found
