@@ -28,6 +28,19 @@ Solver make_solver(std::shared_ptr<Scene> scene, double h, const std::string& in
   return {std::move(scene), std::move(plan)};
 }
 
+// The arguments of make_solver, in order.
+py::tuple arguments_of(const Solver& s) {
+  const SolverOptions& o = s.plan.options;
+  return py::make_tuple(s.scene, o.h, o.integrator == Integrator::bdf1 ? "bdf1" : "bdf2", name_of(o.partition),
+                        o.iterations, o.force_tolerance, o.threads, o.grain, o.cg_tolerance, o.cg_iterations);
+}
+
+Solver solver_of(const py::tuple& a) {
+  return make_solver(a[0].cast<std::shared_ptr<Scene>>(), a[1].cast<double>(), a[2].cast<std::string>(),
+                     a[3].cast<std::string>(), a[4].cast<int>(), a[5].cast<double>(), a[6].cast<int>(),
+                     a[7].cast<int>(), a[8].cast<double>(), a[9].cast<int>());
+}
+
 // Forward only: positions, velocities and constraint multipliers in force units at the wanted substeps.
 py::dict simulate(const Solver& s, const Array& inputs, const Steps& steps, double t0) {
   check(s, inputs, 1, steps);
@@ -167,6 +180,7 @@ void bind_rollout(py::module_& m) {
       .def(py::init(&make_solver), py::kw_only(), py::arg("scene"), py::arg("h"), py::arg("integrator"),
            py::arg("partition"), py::arg("iterations"), py::arg("force_tolerance"), py::arg("threads"),
            py::arg("grain"), py::arg("cg_tolerance"), py::arg("cg_iterations"))
+      .def(py::pickle(&arguments_of, &solver_of))
       .def("simulate", &simulate, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
       .def("states", &states, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
       .def("force_balance", &force_balance, py::arg("inputs"), py::arg("steps"), py::arg("t0"))

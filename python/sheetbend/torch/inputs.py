@@ -38,9 +38,7 @@ class ParameterMap:
         # Each quantity under each function is computed once; terms pick factors from these, ones fill up short terms.
         each = np.stack([arrays["function"], arrays["parameter"]], 1).astype(np.int64).reshape(-1, 2)
         pairs, place = np.unique(each, axis=0, return_inverse=True)
-        self._groups = [
-            (_TORCH[name], torch.from_numpy(pairs[pairs[:, 0] == number, 1])) for name, number in FUNCTIONS.items()
-        ]
+        self._groups = [(name, torch.from_numpy(pairs[pairs[:, 0] == number, 1])) for name, number in FUNCTIONS.items()]
         first = np.asarray(arrays["first_factor"])
         count = np.diff(first)
         filled = np.full((len(count), int(count.max(initial=0))), len(pairs))
@@ -51,7 +49,7 @@ class ParameterMap:
     def __call__(self, theta: Tensor) -> Tensor:
         """(..., quantities) to (..., total)."""
         batch = theta.shape[:-1]
-        functions = [f(theta.index_select(-1, which)) for f, which in self._groups]
+        functions = [_TORCH[name](theta.index_select(-1, which)) for name, which in self._groups]
         values = torch.cat([*functions, theta.new_ones(*batch, 1)], -1)
         product = self._coefficient
         for column in self._factors.unbind(1):
