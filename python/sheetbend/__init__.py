@@ -39,6 +39,7 @@ from .rod_junction import Junction
 from .rollout import Gradient, Rollout, rollout
 from .rope import Rope, add_rope, rope
 from .scene import Scene
+from .scene_file import load_scene, save_scene
 from .scores import Score, Scores, coordinate_error, scores
 from .simulate import Trajectory, simulate
 from .solver import Solver
@@ -105,6 +106,7 @@ __all__ = [
     "equilibrium",
     "fit",
     "force_balance",
+    "load_scene",
     "mesh",
     "no_physics",
     "on_cloth",
@@ -115,6 +117,7 @@ __all__ = [
     "rod",
     "rollout",
     "rope",
+    "save_scene",
     "scores",
     "simulate",
     "support_forces",

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 
 
 VECTORS = ("position", "velocity", "boundary", "force", "wind")
+NOT_NEGATIVE = (
+    *("mass", "compliance", "damping", "drag_linear", "drag_quadratic", "air_normal", "air_tangential"),
+    *("volume", "volume_compliance"),
+)
 
 
 class CompiledScene:
@@ -59,6 +63,8 @@ class CompiledScene:
         self.names = tuple(scene.quantities)
         self.theta = np.array([q.value for q in scene.quantities.values()], dtype=float)
         self._positive = tuple(q.positive for q in scene.quantities.values())
+        self._limits = tuple(q.limits for q in scene.quantities.values())
+        self._heavy = np.setdiff1d(scene.free, list(scene.directors))  # what moves by its mass
         self._base = self._pack(scene)
         self._terms = [*scene.terms, *scene.boundary.terms()]
 
@@ -102,7 +108,8 @@ class CompiledScene:
         """theta with some quantities changed, shape (quantities,).
 
         Raises:
-            SceneError: an unknown name, no finite number, or a negative one where it must be positive.
+            SceneError: an unknown name, no finite number, a negative one where it must be positive, or one outside the
+                quantity's limits.
         """
         theta = self.theta.copy()
         for name, value in (changes or {}).items():
@@ -118,13 +125,17 @@ class CompiledScene:
             if not np.isfinite(theta[k]) or (self._positive[k] and theta[k] < 0.0):
                 wanted = "a positive number" if self._positive[k] else "a finite number"
                 raise SceneError(f"values.{name}", f"must be {wanted}", value, "give it in SI units")
+            low, high = self._limits[k] or (-np.inf, np.inf)
+            if not low <= theta[k] <= high:
+                raise SceneError(f"values.{name}", f"must lie in {low:g} to {high:g}", value, "give it in SI units")
         return theta
 
     def inputs(self, theta: np.ndarray | None = None) -> np.ndarray:
         """Flat inputs, shape (core.inputs,).
 
         Raises:
-            SceneError: some are not finite, as where a stiffness is zero.
+            SceneError: some are not finite, as where a stiffness is zero; a mass, compliance, damping, drag or volume
+                is negative; or a particle that moves has no mass.
         """
         theta = self.theta if theta is None else theta
         found = self._map.inputs(theta)
@@ -133,6 +144,18 @@ class CompiledScene:
             raise SceneError(
                 "values", "make inputs that are not finite", got or theta.tolist(), "give positive numbers"
             )
+        for array in NOT_NEGATIVE:
+            offset, size = self.layout[array]
+            part = found[offset : offset + size]
+            bad = part < 0.0
+            if array == "mass":
+                bad[self._heavy] |= part[self._heavy] == 0.0
+            if bad.any():
+                used = {name for t in self._terms if t.array == array for name, _ in t.factors}
+                got = {n: float(v) for n, v in zip(self.names, theta, strict=True) if n in used}
+                wrong = "zero or negative" if array == "mass" else "negative"
+                problem = f"make a {array} {wrong} (entry {int(np.argmax(bad))}: {part[np.argmax(bad)]:g})"
+                raise SceneError("values", problem, got, "give positive stiffness, density and drag, and smaller modes")
         return found
 
     def inputs_dot(self, theta: np.ndarray, theta_dot: np.ndarray) -> np.ndarray:
