@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from . import _core
 from .compiled import CompiledScene
 from .errors import InputError, refusal
-from .memory import in_bytes
+from .memory import free_memory, in_bytes
 
 INTEGRATORS = ("bdf1", "bdf2")
 METHODS = ("direct", "gauss_seidel", "implicit", "newton", "newton_cg")
@@ -37,8 +37,8 @@ class Solver:
         cg_tolerance: relative residual at which conjugate gradients stop ("newton_cg" runs them twice per solve).
         cg_iterations: conjugate gradients until there; more are an error.
         memory: budget of a gradient through a rollout, such as "2 GB" or a number of bytes: what does not fit on the
-            tape is computed again, with the same result. None = keep every substep boundary. `tape_plan` tells what a
-            budget costs. Tangents (`fit`, forward mode) keep no tape.
+            tape is computed again, with the same result. None = half of the memory that is free when it is recorded.
+            `tape_plan` tells what a budget costs. Tangents (`fit`, forward mode) keep no tape.
     """
 
     h: float = 1e-3
@@ -77,9 +77,9 @@ class Solver:
             in_bytes("solver.memory", self.memory)
 
     @property
-    def budget(self) -> int | None:
-        """`memory` in bytes."""
-        return None if self.memory is None else in_bytes("solver.memory", self.memory)
+    def budget(self) -> int:
+        """`memory` in bytes; by default half of the memory that is free now."""
+        return free_memory() // 2 if self.memory is None else in_bytes("solver.memory", self.memory)
 
     @property
     def sweeps(self) -> int:

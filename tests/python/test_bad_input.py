@@ -398,3 +398,33 @@ def test_a_fit_that_cannot_start_says_why():
 def test_no_equilibrium_is_an_error_of_its_own():
     with pytest.raises(NoEquilibriumError, match=r"(?s)no rest.*Fix"):
         sb.equilibrium(rope(pinned=()))
+
+
+def soft_rod() -> sb.Scene:
+    rod = sb.rod(0.3, 6, density=0.05, EI=1e-3, GJ=1e-3, softness_modes=(1,))
+    rod.pin([0])
+    return rod
+
+
+@pytest.mark.parametrize("run", [sb.simulate, sb.rollout], ids=["simulate", "rollout"])
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"rod_softness_1": -1.5}, r"make a compliance negative.*rod_softness_1"),
+        ({"rod_density": 0.0}, r"make a mass zero or negative.*rod_density"),
+        ({"rod_EI": 0.0}, r"not finite.*rod_EI"),
+        ({"rod_EI": -1.0}, r"rod_EI: must be a positive number"),
+        ({"rod_EI": np.inf}, r"rod_EI: must be a positive number"),
+    ],
+)
+def test_values_that_make_no_physics_are_refused(run, values, words):
+    with pytest.raises(sb.SceneError, match=words):
+        run(soft_rod(), [0.0, 0.01], sb.Solver(h=1e-3), values)
+
+
+def test_values_outside_limits_are_refused():
+    mesh = sb.mesh.equilateral(0.3, 0.3, 3)
+    scene = sb.Scene()
+    sb.add_cloth(scene, mesh, density=0.2, warp=60, weft=50, shear=5, poisson=0.2)
+    with pytest.raises(sb.SceneError, match=r"cloth_poisson: must lie in -1 to 1 \(got 1.5\)"):
+        sb.simulate(scene, [0.0, 0.01], values={"cloth_poisson": 1.5})
