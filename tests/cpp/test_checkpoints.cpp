@@ -135,21 +135,23 @@ TEST_P(Checkpoints, GiveTheBitsOfTheWholeTape) {
 }
 
 // Reverses of a tape that drops states take turns; those of a whole one only read it. The thread sanitizer looks at both.
-TEST_P(Checkpoints, ServeSeveralThreads) {
-  const Sample sample = random_scene(75, GetParam().shape());
-  const Program p = program(sample.scene);
-  const auto whole = gradient(p, sample.inputs);
-  for (const int kept : {Schedule::least(p.steps, Tape<double>::window(p.plan)), 40}) {
-    auto recorded = record(p, sample.inputs, kept);
-    std::atomic<int> same = 0;
-    std::vector<std::thread> threads;
-    for (int t = 0; t < 4; ++t)
-      threads.emplace_back([&] {
-        for (int turn = 0; turn < 3; ++turn) same += same_bits(gradient(p, sample.inputs, recorded), whole);
-      });
-    for (std::thread& thread : threads) thread.join();
-    EXPECT_EQ(same, 12) << kept << " states";
-    EXPECT_TRUE(same_bits(gradient(p, sample.inputs, recorded), whole)) << kept << " states, afterwards";
+TEST(CheckpointsInThreads, GiveTheBitsOfTheWholeTape) {
+  for (const Partition partition : {Partition::direct, Partition::gauss_seidel}) {
+    const Sample sample = random_scene(75, {.ropes = 2});
+    const Program p{sample.scene, make_plan(sample.scene, {.h = 4e-3, .partition = partition}), 40};
+    const auto whole = gradient(p, sample.inputs);
+    for (const int kept : {Schedule::least(p.steps, Tape<double>::window(p.plan)), 40}) {
+      auto recorded = record(p, sample.inputs, kept);
+      std::atomic<int> same = 0;
+      std::vector<std::thread> threads;
+      for (int t = 0; t < 4; ++t)
+        threads.emplace_back([&] {
+          for (int turn = 0; turn < 3; ++turn) same += same_bits(gradient(p, sample.inputs, recorded), whole);
+        });
+      for (std::thread& thread : threads) thread.join();
+      EXPECT_EQ(same, 12) << kept << " states";
+      EXPECT_TRUE(same_bits(gradient(p, sample.inputs, recorded), whole)) << kept << " states, afterwards";
+    }
   }
 }
 
