@@ -137,7 +137,7 @@ TEST_P(Checkpoints, GiveTheBitsOfTheWholeTape) {
 // Reverses of a tape that drops states take turns; those of a whole one only read it. The thread sanitizer looks at both.
 TEST(CheckpointsInThreads, GiveTheBitsOfTheWholeTape) {
   for (const Partition partition : {Partition::direct, Partition::gauss_seidel}) {
-    const Sample sample = random_scene(75, {.ropes = 2});
+    const Sample sample = random_scene(75);
     const Program p{sample.scene, make_plan(sample.scene, {.h = 4e-3, .partition = partition}), 40};
     const auto whole = gradient(p, sample.inputs);
     for (const int kept : {Schedule::least(p.steps, Tape<double>::window(p.plan)), 40}) {
