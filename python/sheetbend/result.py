@@ -12,7 +12,10 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from .door import reading
 from .errors import InputError
+from .json_file import json_content
+from .typed import as_dataclass, listed, mapping
 
 FORMAT = "sheetbend fit 1"
 
@@ -214,21 +217,20 @@ class FitResult:
         """The inverse of `to_dict`.
 
         Raises:
-            InputError: it is no fit, or one of another format.
+            InputError: it is no fit, one of another format, or a field is missing, unknown or of another type; it names
+                its path.
         """
         found = data.get("format") if isinstance(data, Mapping) else data
         if found != FORMAT:
             raise InputError("format", "is not the one that this version reads", found, f"use {FORMAT!r}")
-        data = {"refits": [], **data}  # which files of earlier versions do not have
-        plain = {field.name for field in fields(cls)} & data.keys() - {"baseline"}
-        nested = {"given": Given, "correlations": Correlation, "starts": Start, "refits": Refit}
-        values = {name: data[name] for name in plain}
-        for name, kind in nested.items():
-            values[name] = tuple(kind(**part) for part in data[name])
-        values["estimates"] = tuple(_estimate(name, part) for name, part in data["parameters"].items())
-        values["recordings"] = tuple(RecordingFit(name=name, **part) for name, part in data["recordings"].items())
-        values["gauges"], values["warnings"] = tuple(data["gauges"]), tuple(data["warnings"])
-        return cls(baseline=data["baseline_is"], **values)
+        known = {field.name for field in fields(cls)}
+        values = {name: value for name, value in data.items() if name in known}
+        values["baseline"] = data.get("baseline_is", "")
+        estimates = mapping(data.get("parameters"), "parameters")
+        values["estimates"] = [_estimate(name, part) for name, part in estimates.items()]
+        recordings = mapping(data.get("recordings"), "recordings")
+        values["recordings"] = [_recording(name, part) for name, part in recordings.items()]
+        return as_dataclass(cls, values, "")
 
     def save(self, path: str | Path) -> None:
         """Write `to_dict` as JSON."""
@@ -241,13 +243,13 @@ class FitResult:
         Raises:
             InputError: the file holds no fit.
         """
-        try:
-            data = json.loads(Path(path).read_text(encoding="utf-8"))
-        except ValueError as error:  # no JSON, or no text
-            raise InputError(
-                str(path), f"is no JSON ({error})", path, "give a file that FitResult.save wrote"
-            ) from error
-        return cls.from_dict(data)
+        path = Path(path)
+        with reading(path, InputError):
+            data = json_content(path, InputError, finite=True)
+            try:
+                return cls.from_dict(data)
+            except InputError as error:
+                raise InputError(f"{path}: {error.field}", error.problem, error.got, error.fix) from error
 
     def report(self) -> str:
         """The report as plain text, at most 100 columns wide."""
@@ -256,10 +258,19 @@ class FitResult:
         return plain(self)
 
 
-def _estimate(name: str, part: Mapping[str, Any]) -> Estimate:
-    lower, upper = part["interval"]
-    rest = {key: value for key, value in part.items() if key != "interval"}
-    return Estimate(name=name, lower=lower, upper=upper, **rest)
+def _estimate(name: str, part: object) -> Estimate:
+    where = f"parameters.{name}"
+    told = mapping(part, where)
+    ends = listed(told.get("interval"), f"{where}.interval")
+    if len(ends) != 2:
+        raise InputError(f"{where}.interval", "must be [lower, upper]", ends, "give both, null where open")
+    rest = {key: value for key, value in told.items() if key != "interval"}
+    return as_dataclass(Estimate, {"name": name, "lower": ends[0], "upper": ends[1], **rest}, where)
+
+
+def _recording(name: str, part: object) -> RecordingFit:
+    where = f"recordings.{name}"
+    return as_dataclass(RecordingFit, {"name": name, **mapping(part, where)}, where)
 
 
 def _strict(value: Any) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from ..config import Study, build, parse, scene_alone
+from ..config import Study, load, scene_alone
 from ..experiment import Experiment
 from ..gradients import GradientReport, check_gradients
 from ..jacobian_check import JacobianReport, check_jacobian
@@ -35,11 +35,11 @@ def check(
 
 
 def _check(console: Console, path: Path) -> Outcome:
-    study = build(parse(path), path.parent)
+    study = load(path)
     gradients: dict[str, GradientReport] = {}
     jacobians: dict[str, JacobianReport] = {}
     for name, report in _reports(study):
-        console.print(str(report), markup=False, soft_wrap=True)
+        console.print(str(report), soft_wrap=True)
         if isinstance(report, GradientReport):
             gradients[name] = report
         else:

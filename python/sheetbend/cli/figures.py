@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ import numpy as np
 from .. import plotting
 from ..config import Config
 from ..equilibrium import equilibrium
+from ..experiment import Experiment
 from ..fit import Fit
 from ..prediction import Comparison
 from .cloth_figures import cloth_figures
@@ -32,11 +33,11 @@ def write_figures(found: Fit, config: Config, folder: Path) -> list[str]:
     if len(moving) > 1:
         figures["motions"] = plotting.plot_motions([_liveliest(c) for c in moving], title=config.experiment.name)
     for c in moving:
-        name = _file_name(c)
+        name = c.experiment.name
         figures[f"{name}_markers"] = _trajectories(c)
         figures[f"{name}_residuals"] = _residuals(c)
     for c in found.comparisons:
-        figures |= {f"{_file_name(c)}_{name}": figure for name, figure in cloth_figures(found, c).items()}
+        figures |= {f"{c.experiment.name}_{name}": figure for name, figure in cloth_figures(found, c).items()}
     published = _published(found, config)
     figures["estimates"] = plotting.plot_estimates(
         found.result.estimates, published=published, title=config.experiment.name
@@ -46,8 +47,16 @@ def write_figures(found: Fit, config: Config, folder: Path) -> list[str]:
     return [f"{name}.{form}" for name in figures]
 
 
-def _file_name(c: Comparison) -> str:
-    return re.sub(r"[^A-Za-z0-9_.-]", "_", c.experiment.name)
+def figure_files(experiments: Sequence[Experiment], config: Config) -> list[str]:
+    """Every file that `write_figures` may write, known before the fit."""
+    form = config.output.figures
+    if form == "none":
+        return []
+    names = ["estimates", "shapes", "motions"]
+    for e in experiments:
+        names += [] if e.static else [f"{e.name}_markers", f"{e.name}_residuals"]
+        names += [f"{e.name}_{cloth}" for cloth in e.scene.cloths]
+    return [f"{name}.{form}" for name in names]
 
 
 def _shapes(found: Fit, comparisons: list[Comparison]) -> Figure:

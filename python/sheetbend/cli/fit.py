@@ -10,19 +10,22 @@ from rich.console import Console
 
 from ..config import Config, GrippedConfig, Study, build, parse_any
 from ..config.values import with_values, write
+from ..door import reading
 from ..errors import ConfigError
 from ..fit import Fit
 from ..fit import fit as run_fit
+from ..movie import movie_paths
 from ..problem import FitProblem, as_parameters
 from ..report import plain, rich_report
 from ..result import FitResult
-from .figures import write_figures
+from .figures import figure_files, write_figures
 from .folders import made
-from .gripped import fit_ropes, load_ropes
+from .gripped import fit_ropes, load_ropes, rope_files
 from .movies import OPTION, MoviePath, check_before, write_movies
 from .outcome import Outcome, code_of, run
 from .progress import Iterations
-from .screen import show
+from .screen import heading, show
+from .targets import check_targets
 
 
 def fit(
@@ -60,11 +63,17 @@ def _fit(
             raise ConfigError("--resume", "is not for ropes between grips", str(resume), fix)
         if movie is not None:
             raise ConfigError(OPTION, "is not for ropes between grips", str(movie), "leave it out")
-        ropes = load_ropes(config, path.parent)
+        with reading(path, ConfigError):
+            ropes = load_ropes(config, path.parent)
+        check_targets("--output", _place(config, output), [_place(config, output) / f for f in rope_files(config)])
         return fit_ropes(console, config, ropes, _folder(console, config, output), strict)
-    study = _study(config, path.parent, resume)
+    with reading(path, ConfigError):
+        study = _study(config, path.parent, resume)
+    check_targets("--output", _place(config, output), [_place(config, output) / f for f in _files(study)])
     if movie is not None:
         check_before(movie, [e.scene for e in study.experiments if not e.static])
+        names = [e.name for e in study.experiments if not e.static]
+        check_targets(OPTION, movie.parent, movie_paths(movie, names).values())
     config, folder = study.config, _folder(console, config, output)
     fitted = [e for e in study.experiments if e.predict is None]
     problem = FitProblem(fitted, as_parameters(study.parameters, study.experiments))
@@ -82,11 +91,20 @@ def _fit(
     return Outcome(data, code_of([found.result], strict or config.fit.strict))
 
 
+def _place(config: Config | GrippedConfig, output: Path | None) -> Path:
+    return output if output is not None else Path("out") / config.experiment.name
+
+
+def _files(study: Study) -> list[str]:
+    """What `_write` may leave behind."""
+    return ["fit.json", "report.txt", "fitted.toml", *figure_files(study.experiments, study.config)]
+
+
 def _folder(console: Console, config: Config | GrippedConfig, output: Path | None) -> Path:
     """Where results go, made; and the experiment's name on the screen."""
-    folder = output if output is not None else Path("out") / config.experiment.name
+    folder = _place(config, output)
     made("--output", folder)
-    console.print(f"[bold]{config.experiment.name}[/]  {config.experiment.about}")
+    heading(console, config.experiment.name, config.experiment.about)
     return folder
 
 

@@ -22,7 +22,7 @@ from ..recording_checks import marker_indices
 from ..tables import plain_section
 from .gripped_figure import write_figure
 from .outcome import Code, Outcome, code_of
-from .screen import show
+from .screen import heading, show
 
 RUNGS: dict[str, Rung] = {"twist": TWIST, "tilts": TILTS, "rest": REST, "yield": YIELD, "varying": VARYING}
 
@@ -73,6 +73,13 @@ def _check_nominal(nominal: Sequence[Sequence[float]], key: str, motions: Sequen
                 raise ConfigError(key, f"{error.problem} of {motion.recording.name}", error.got, error.fix) from error
 
 
+def rope_files(config: GrippedConfig) -> list[str]:
+    """Every file that `fit_ropes` may write; names relative to the folder."""
+    form = config.output.figures
+    names = ["fit.json", "report.txt", *([] if form == "none" else [f"predicted.{form}"])]
+    return ["report.txt", *(f"{rope.name}/{name}" for rope in config.gripped_rope for name in names)]
+
+
 def fit_ropes(
     console: Console, config: GrippedConfig, ropes: Sequence[RopeData], folder: Path, strict: bool
 ) -> Outcome:
@@ -84,7 +91,9 @@ def fit_ropes(
     files: list[str] = []
     stopped = False
     for rope in ropes:
-        console.print(f"\n[bold]{rope.section.name}[/]  {len(rope.train)} recordings to fit, {len(rope.unseen)} unseen")
+        heading(
+            console, rope.section.name, f"{len(rope.train)} recordings to fit, {len(rope.unseen)} unseen", above="\n"
+        )
         try:
             found = _fit(console, config, rope, [RUNGS[name] for name in rope.section.rungs])
             report, stopped = _judged(console, config, rope, found)
@@ -100,7 +109,7 @@ def fit_ropes(
             break
     summary = plain_section(overview(reports))
     (folder / "report.txt").write_text("\n".join(summary) + "\n", encoding="utf-8")
-    console.print("\n" + "\n".join(summary), markup=False, soft_wrap=True)
+    console.print("\n" + "\n".join(summary), soft_wrap=True)
     console.print(f"\nwritten to {folder}: report.txt, {', '.join(files)}", soft_wrap=True)
     missing = [rope.section.name for rope in ropes[len(reports) :]]
     if missing:
@@ -134,7 +143,7 @@ def _fit(console: Console, config: GrippedConfig, rope: RopeData, ladder: Sequen
         sigma=s.sigma,
         gravity=(s.gravity[0], s.gravity[1], s.gravity[2]),
         threads=config.fit.threads,
-        say=lambda text: console.print(f"  {time.perf_counter() - began:6.1f} s  {text}", markup=False, soft_wrap=True),
+        say=lambda text: console.print(f"  {time.perf_counter() - began:6.1f} s  {text}", soft_wrap=True),
     )
 
 
@@ -153,7 +162,7 @@ def _judged(console: Console, config: GrippedConfig, rope: RopeData, found: Rope
     except KeyboardInterrupt:
         return report, True
     except SheetbendError as error:  # a comparison that cannot be made costs no result
-        console.print(f"  no comparison without twist: {error}", markup=False, soft_wrap=True)
+        console.print(f"  no comparison without twist: {error}", soft_wrap=True)
         return report, False
     return replace(report, without_twist=evaluate(bare, rope.unseen)), bare.fit.result.interrupted
 

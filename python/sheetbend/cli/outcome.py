@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -13,15 +14,20 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
+from ..door import noting
 from ..errors import InputError, SheetbendError
 from ..optional import MissingExtraError
 from ..result import FitResult
+from .screen import Screen
+
+_SHOWN = 2000  # characters of what was wrong
 
 
 class Code(IntEnum):
     """Exit codes."""
 
     DONE = 0
+    DEFECT = 1
     BAD_INPUT = 2
     NOT_IDENTIFIABLE = 3
     NOT_CONVERGED = 4
@@ -42,9 +48,10 @@ def run(command: Callable[[Console], Outcome], as_json: bool) -> None:
 
     With `as_json` stdout holds one JSON object and nothing else; everything for people goes to stderr.
     """
-    console = Console(stderr=as_json, highlight=False)
+    console = Screen(stderr=as_json)
     try:
-        outcome = command(console)
+        with noting():
+            outcome = command(console)
     except (InputError, MissingExtraError) as error:
         outcome = _failed(error, Code.BAD_INPUT)
     except SheetbendError as error:
@@ -52,6 +59,9 @@ def run(command: Callable[[Console], Outcome], as_json: bool) -> None:
     except KeyboardInterrupt:
         _complain("interrupted", [])
         outcome = Outcome({"error": {"message": "interrupted"}}, Code.INTERRUPTED)
+    except Exception as error:  # no bad input, which ends in errors of the package where it is read
+        traceback.print_exc()
+        outcome = Outcome({"error": {"message": f"a defect of sheetbend: {error!r}"[:_SHOWN]}}, Code.DEFECT)
     if as_json:
         print(json.dumps(strict({**outcome.data, "exit_code": int(outcome.code)}), allow_nan=False), flush=True)
     raise typer.Exit(int(outcome.code))
@@ -81,12 +91,12 @@ def _failed(error: SheetbendError, code: Code) -> Outcome:
     _complain(str(error), more)
     told: dict[str, Any] = {"message": str(error)}
     if isinstance(error, InputError):
-        told |= {"field": error.field, "problem": error.problem, "got": repr(error.got), "fix": error.fix}
+        told |= {"field": error.field, "problem": error.problem, "got": repr(error.got)[:_SHOWN], "fix": error.fix}
     return Outcome({"error": told | ({"more": more} if more else {})}, code)
 
 
 def _complain(message: str, more: list[str]) -> None:
-    console = Console(stderr=True, highlight=False, soft_wrap=True)
-    console.print(Text.assemble(("error ", "bold red"), message))
+    console = Screen(stderr=True)
+    console.print(Text.assemble(("error ", "bold red"), message), soft_wrap=True)
     for other in more:
-        console.print(Text.assemble(("  and ", "red"), other))
+        console.print(Text.assemble(("  and ", "red"), other), soft_wrap=True)

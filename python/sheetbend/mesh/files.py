@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..checks import finite
+from ..door import note, reading
 from ..errors import MeshError
 from ..io.sidecar import METERS
 from ..optional import require
@@ -60,7 +61,18 @@ def read_mesh(
             no surface.
         MissingExtraError: trimesh is not installed.
     """
-    path = Path(path)
+    with reading(path, MeshError):
+        return _mesh(Path(path), material, unit, texture_size, warp, merge)
+
+
+def _mesh(
+    path: Path,
+    material: str | ArrayLike | None,
+    unit: str,
+    texture_size: float | ArrayLike,
+    warp: ArrayLike,
+    merge: bool,
+) -> TriangleMesh:
     if unit not in METERS:
         raise MeshError("unit", "is unknown", unit, f"use one of {', '.join(METERS)}")
     vertices, triangles, texture = _read(path)
@@ -72,7 +84,7 @@ def read_mesh(
         triangles, texture = triangles[whole], None if texture is None else texture[whole]
         said.append(f"{(~whole).sum()} triangles that name a vertex twice are left out.")
     for doubt in filter(None, said):
-        warnings.warn(f"{path.name}: {doubt}", stacklevel=2)
+        warnings.warn(f"{path.name}: {doubt}", stacklevel=3)
     triangles = checked_triangles(triangles, len(vertices))
     if isinstance(material, str) and material not in ("texture", "unfold"):
         raise MeshError("material", "is unknown", material, "use 'texture', 'unfold' or an array")
@@ -84,13 +96,13 @@ def read_mesh(
         coordinates = _scaled_texture(path, vertices[triangles], texture, texture_size)
         distorted = _distortion(vertices[triangles], coordinates)
         if distorted:
-            warnings.warn(f"{path.name}: {distorted}", stacklevel=2)
+            warnings.warn(f"{path.name}: {distorted}", stacklevel=3)
     else:
         refuse_broken(triangles, len(vertices))
         coordinates = unfold(vertices, triangles, warp)
     mesh = TriangleMesh(vertices, triangles, _per_vertex(coordinates, triangles, len(vertices)))
     for doubt in mesh.doubts:
-        warnings.warn(f"{path.name}: {doubt}", stacklevel=2)
+        warnings.warn(f"{path.name}: {doubt}", stacklevel=3)
     return mesh
 
 
@@ -129,10 +141,12 @@ def _read(path: Path) -> tuple[Array, NDArray[np.int64], Array | None]:
 
 def _load(path: Path, options: dict[str, Any]) -> Any:
     trimesh = require("trimesh", "mesh")
+    note(path)
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), path.open("rb") as file:
             warnings.simplefilter("ignore", RuntimeWarning)  # of arithmetic on what a file leaves out
-            mesh = trimesh.load_mesh(str(path), process=False, **options)
+            # as a stream, so that the library opens no other file that this one names
+            mesh = trimesh.load_mesh(file, file_type=path.suffix.lower()[1:], process=False, **options)
     except Exception as problem:  # whatever a damaged file makes the library raise
         raise MeshError(
             str(path), f"cannot be read ({problem})", type(problem).__name__, "export it again"
