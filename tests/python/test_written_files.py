@@ -86,7 +86,7 @@ NO_FILES = {
 
 @pytest.mark.parametrize("name", NO_FILES.values(), ids=NO_FILES)
 def test_a_recording_has_the_name_of_a_file(tmp_path: Path, name: str) -> None:
-    with pytest.raises(sb.RecordingError, match="name: .*Fix: "):
+    with pytest.raises(sb.RecordingError, match=r"name: .*Fix: "):
         sb.Recording(np.zeros((2, 1, 3)), [0.0, 1.0], name=name)
     sb.Recording(np.zeros((2, 1, 3)), [0.0, 1.0]).save(tmp_path / "a.npz")
     (tmp_path / "a.json").write_text(json.dumps({"name": name}))

@@ -76,7 +76,9 @@ def _content(path: Path) -> dict[str, Any]:
         raise ConfigError(str(path), "holds a key of very many parts", path.name, fix)
     try:
         content = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, ValueError) as error:  # ValueError: a number of too many digits
+    except UnicodeError:
+        raise
+    except ValueError as error:  # tomllib's own is one, and so is that of a number of too many digits
         raise ConfigError(str(path), f"is no valid TOML: {error}", path.name, "correct that line") from error
     check_depth(path, content, ConfigError)
     _check_texts(content)

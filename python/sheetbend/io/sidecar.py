@@ -85,10 +85,10 @@ def write(recording: Recording, path: Path, assumed: tuple[str, ...] = ()) -> No
     }
     try:
         text = json.dumps(content, indent=1, ensure_ascii=False)
-        check_depth(path.with_suffix(".json"), content, RecordingError)
     except (TypeError, ValueError, RecursionError) as error:
         fix = "keep plain numbers, text, lists and dicts in metadata"
         raise RecordingError("metadata", "cannot be written as JSON", str(error), fix) from error
+    check_depth(path.with_suffix(".json"), content, RecordingError)
     write_text(path.with_suffix(".json"), text + "\n")
 
 
