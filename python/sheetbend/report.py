@@ -117,7 +117,7 @@ def _interval_parts(result: FitResult) -> Section:
 def _refits(result: FitResult) -> Section:
     rows = []
     for e in result.estimates if result.refits else ():
-        moved = [refit.moved[e.name] for refit in result.refits]
+        moved = [refit.moved.get(e.name) for refit in result.refits]
         if e.half_width is not None:
             rows.append((e.name, *figures(moved, e.half_width / 10), e.unit))
     headers = ("parameter", *(refit.name for refit in result.refits), "unit")

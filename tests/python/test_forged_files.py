@@ -299,6 +299,22 @@ def test_a_forged_trial_is_refused(tmp_path: Path, name: str) -> None:
     refused(path, "is damaged or cut off")
 
 
+# ---- meshes ---------------------------------------------------------------------------------------------
+
+
+def test_a_mesh_of_large_numbers_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("trimesh")
+    for number in ("2147483648", "9" * 5000, "400"):  # a table up to 2147483648 takes 17 GB
+        path = tmp_path / "a.obj"
+        path.write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 {number}\n")
+        refused(path, "", sb.read_mesh)
+    facet = "facet normal 0 0 x\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
+    path = tmp_path / "a.stl"
+    path.write_text(f"solid a\n{facet}endsolid a\n" + " " * 100)
+    assert len(sb.read_mesh(path).triangles) == 1
+    assert capfd.readouterr() == ("", "")  # the library would log tracebacks
+
+
 # ---- JSON and TOML --------------------------------------------------------------------------------------
 
 JSON = {
@@ -370,6 +386,12 @@ def fit() -> dict[str, Any]:
         markers=[sb.on_particle(k) for k in range(motion.positions.shape[1])],
     )
     return found.result.to_dict()
+
+
+def test_a_fit_whose_refits_lack_a_parameter_is_reported(tmp_path: Path, fit: dict[str, Any]) -> None:
+    path = tmp_path / "fit.json"
+    path.write_text(json.dumps(fit | {"refits": [{"name": "finer", "to_limit": 2.0, "moved": {}}]}))
+    assert "finer" in sb.FitResult.load(path).report()
 
 
 def test_a_fit_comes_back(tmp_path: Path, fit: dict[str, Any]) -> None:

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import logging
+import re
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +28,7 @@ Array = NDArray[np.float64]
 # How trimesh keeps the order of the file's vertices, and how it splits them where texture coordinates differ.
 _FORMATS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     ".obj": ({"maintain_order": True, "skip_materials": True}, {"skip_materials": True}),
-    ".ply": ({"fix_texture": False}, {"fix_texture": True}),
+    ".ply": ({"fix_texture": False, "skip_materials": True}, {"fix_texture": True, "skip_materials": True}),
     ".stl": ({}, {}),
 }
 _SMALLEST, _LARGEST = 2e-3, 20.0  # m: sizes of fabrics, and of balls and sleeves made of them
@@ -143,9 +148,12 @@ def _load(path: Path, options: dict[str, Any]) -> Any:
     trimesh = require("trimesh", "mesh")
     note(path)
     try:
-        with warnings.catch_warnings(), path.open("rb") as file:
+        content = path.read_bytes()
+        if path.suffix.lower() == ".obj":
+            _check_corners(content)
+        with warnings.catch_warnings(), _quiet():
             warnings.simplefilter("ignore", RuntimeWarning)  # of arithmetic on what a file leaves out
-            # as a stream, so that the library opens no other file that this one names
+            file = BytesIO(content)  # so that the library opens no other file, which this one may name
             mesh = trimesh.load_mesh(file, file_type=path.suffix.lower()[1:], process=False, **options)
     except Exception as problem:  # whatever a damaged file makes the library raise
         raise MeshError(
@@ -154,6 +162,26 @@ def _load(path: Path, options: dict[str, Any]) -> Any:
     if len(mesh.faces) == 0:
         raise MeshError(str(path), "has no triangles", f"{len(mesh.vertices)} vertices", "export it with its faces")
     return mesh
+
+
+def _check_corners(content: bytes) -> None:
+    """Refuse faces of an OBJ whose corners are not among the vertices: the library makes tables up to their numbers."""
+    size = len(content)
+    for face in re.finditer(rb"(?m)^[ \t]*f[^\n]*?[0-9]{%d}[^\n]*" % len(str(size)), content):
+        largest = max(re.findall(rb"[0-9]+", face[0]), key=len)
+        if len(largest) > len(str(size)) or int(largest) > size:
+            raise ValueError("a face names a vertex that is not there")
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Without what the library logs of damaged files; their errors are told."""
+    log = logging.getLogger("trimesh")
+    before, log.disabled = log.disabled, True
+    try:
+        yield
+    finally:
+        log.disabled = before
 
 
 def _merged(vertices: Array, triangles: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
