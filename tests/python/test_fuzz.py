@@ -11,16 +11,16 @@ import pytest
 
 PROGRAM = Path(__file__).with_name("fuzz.py")
 CASES = {
-    "csv": 600,
-    "mocap": 400,
-    "npz": 600,
-    "pickle": 800,
-    "c3d": 800,
-    "json": 600,
-    "toml": 300,
-    "fit": 600,
-    "mesh": 250,
-    "curve": 400,
+    "csv": 1500,
+    "mocap": 1000,
+    "npz": 1500,
+    "pickle": 2000,
+    "c3d": 2000,
+    "json": 1000,
+    "toml": 400,
+    "fit": 1000,
+    "mesh": 400,
+    "curve": 500,
 }
 
 

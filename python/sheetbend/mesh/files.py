@@ -176,12 +176,14 @@ def _check_corners(content: bytes) -> None:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Without what the library logs of damaged files; their errors are told."""
-    log = logging.getLogger("trimesh")
-    before, log.disabled = log.disabled, True
+    log, silent = logging.getLogger("trimesh"), logging.NullHandler()
+    before, log.propagate = log.propagate, False  # its parts log under names of their own
+    log.addHandler(silent)
     try:
         yield
     finally:
-        log.disabled = before
+        log.removeHandler(silent)
+        log.propagate = before
 
 
 def _merged(vertices: Array, triangles: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
