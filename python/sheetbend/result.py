@@ -265,7 +265,12 @@ def _estimate(name: str, part: object) -> Estimate:
     if len(ends) != 2:
         raise InputError(f"{where}.interval", "must be [lower, upper]", ends, "give both, null where open")
     rest = {key: value for key, value in told.items() if key != "interval"}
-    return as_dataclass(Estimate, {"name": name, "lower": ends[0], "upper": ends[1], **rest}, where)
+    found = as_dataclass(Estimate, {"name": name, "lower": ends[0], "upper": ends[1], **rest}, where)
+    for field in ("half_width", "statistical", "discretization", "systematic"):
+        width = getattr(found, field)
+        if width is not None and width < 0:
+            raise InputError(f"{where}.{field}", "must not be negative", width, "give a half-width")
+    return found
 
 
 def _recording(name: str, part: object) -> RecordingFit:

@@ -86,9 +86,12 @@ def _number(value: object, where: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         _refuse(where, "must be a number", value)
     try:
-        return float(value)
+        number = float(value)
     except OverflowError:
-        _refuse(where, "must be a number that a double holds", "more than 308 digits")
+        number = math.inf
+    if not math.isfinite(number):
+        _refuse(where, "must be a finite number", "a number beyond 1.8e308")
+    return number
 
 
 def _joined(where: str, name: str) -> str:

@@ -401,6 +401,8 @@ def test_a_fit_comes_back(tmp_path: Path, fit: dict[str, Any]) -> None:
     path = tmp_path / "fit.json"
     path.write_text(json.dumps(fit))
     assert sb.FitResult.load(path).to_dict() == fit
+    path.write_text(json.dumps(fit).replace(json.dumps(fit["cost"]), "1e999"))
+    refused(path, "must be a finite number", sb.FitResult.load)
 
 
 Forge = Callable[[dict[str, Any]], Any]
@@ -410,7 +412,8 @@ FORGED: dict[str, tuple[Forge, str]] = {
     "no value": (lambda d: d["parameters"]["rope_EI"].pop("value"), r"parameters\.rope_EI\.value: is missing"),
     "a value in letters": (lambda d: d["parameters"]["rope_EI"].update(value="1"), r"rope_EI\.value: must be a number"),
     "a value in a list": (lambda d: d["parameters"]["rope_EI"].update(value=[]), r"rope_EI\.value: must be a number"),
-    "a value of 400 digits": (lambda d: d["parameters"]["rope_EI"].update(value=10**400), "that a double holds"),
+    "a value of 400 digits": (lambda d: d["parameters"]["rope_EI"].update(value=10**400), "must be a finite number"),
+    "a negative width": (lambda d: d["parameters"]["rope_EI"].update(half_width=-1e-3), "must not be negative"),
     "true for a value": (lambda d: d["parameters"]["rope_EI"].update(value=True), r"rope_EI\.value: must be a number"),
     "an open interval": (lambda d: d["parameters"]["rope_EI"].update(interval=[1.0]), r"must be \[lower, upper\]"),
     "no interval": (lambda d: d["parameters"]["rope_EI"].update(interval=None), "interval: must be a list"),
