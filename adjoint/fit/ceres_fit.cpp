@@ -6,7 +6,6 @@
 #endif
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -29,10 +28,9 @@ class Point : public ceres::EvaluationCallback {
     if ((!new_point || u_ == at_) && (!with_jacobian || has_jacobian_)) return;
     if (status == EvaluationStatus::interrupted) return;
     const bool both = with_jacobian || seconds_[1] < cheap * seconds_[0];
-    const auto began = std::chrono::steady_clock::now();
-    status = evaluation_.call(evaluation_.problem, u_.data(), residual.data(), both ? jacobian.data() : nullptr);
-    if (status == EvaluationStatus::ok)
-      seconds_[both] = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+    double seconds = 0.0;
+    status = evaluation_.call(evaluation_.problem, u_.data(), residual.data(), both ? jacobian.data() : nullptr, &seconds);
+    if (status == EvaluationStatus::ok && std::isfinite(seconds)) seconds_[both] = seconds;
     has_jacobian_ = both;
     at_ = u_;
     ++evaluations;

@@ -1,7 +1,7 @@
 """Types of the compiled module: the core, its adjoint and the least-squares evaluation. Arrays are C-contiguous
 float64."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -244,3 +244,7 @@ class Problem:
     def absorbed(self, arg0: int, /) -> float: ...
     def relinearize(self) -> None: ...
     def evaluation(self) -> object: ...  # a capsule for _ceres.minimize
+
+def evaluation_of(  # the same of (u, jacobian) -> ((ok, residuals, Jacobian), seconds or None)
+    rows: int, parameters: int, function: Callable[[Array, bool], tuple[tuple[bool, Array, Array], float | None]]
+) -> object: ...

@@ -20,6 +20,29 @@ if TYPE_CHECKING:
 VECTORS = ("position", "velocity", "boundary", "force", "wind")
 
 
+def specification(scene: Scene) -> dict[str, Any]:
+    """The topology of a scene, as the compiled core is made from it."""
+    return {
+        "particles": scene.particle_count,
+        "directors": [(d, *edge) for d, edge in scene.directors.items()],
+        "pinned": sorted(scene.pinned),
+        "driven": list(scene.boundary.driven),
+        "boundary_times": [] if not scene.boundary.driven else list(scene.boundary.times),
+        "boundary_interpolation": scene.boundary.interpolation,
+        "loaded": list(scene.forces.particles),
+        "force_times": scene.forces.times.tolist(),
+        "has_drag": scene.has_drag,
+        "air": scene.air.triangles.tolist(),
+        "wind_times": scene.air.times.tolist(),
+        "groups": [
+            {"name": g.name, "kind": g.kind, "damped": g.damped, "stencil": g.particles.ravel()} for g in scene.groups
+        ],
+        "volumes": [
+            {"name": name, "triangles": triangles.tolist()} for name, triangles in scene.volumes.triangles.items()
+        ],
+    }
+
+
 class CompiledScene:
     """Built once by `Scene.compiled`.
 
@@ -32,27 +55,7 @@ class CompiledScene:
 
     def __init__(self, scene: Scene) -> None:
         try:
-            self.core = _core.Scene(
-                particles=scene.particle_count,
-                directors=[(d, *edge) for d, edge in scene.directors.items()],
-                pinned=sorted(scene.pinned),
-                driven=list(scene.boundary.driven),
-                boundary_times=[] if not scene.boundary.driven else list(scene.boundary.times),
-                boundary_interpolation=scene.boundary.interpolation,
-                loaded=list(scene.forces.particles),
-                force_times=scene.forces.times.tolist(),
-                has_drag=scene.has_drag,
-                air=scene.air.triangles.tolist(),
-                wind_times=scene.air.times.tolist(),
-                groups=[
-                    {"name": g.name, "kind": g.kind, "damped": g.damped, "stencil": g.particles.ravel()}
-                    for g in scene.groups
-                ],
-                volumes=[
-                    {"name": name, "triangles": triangles.tolist()}
-                    for name, triangles in scene.volumes.triangles.items()
-                ],
-            )
+            self.core = _core.Scene(**specification(scene))
         except ValueError as error:
             raise refusal(error, SceneError, scene.name) from error
         self.layout: dict[str, tuple[int, int]] = self.core.layout

@@ -16,6 +16,7 @@ from .errors import InputError
 from .experiment import Experiment
 from .floors import solver_floors
 from .identifiability import Identifiability, Nuisance, identify
+from .journal import journaled
 from .leave_one_out import MEANING, companions, each_left_out
 from .optimizers import Minimum, Observer, refit
 from .parameters import Parameter, Parameters
@@ -53,6 +54,11 @@ class Fit:
         return self.result[name]
 
     @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C ended it."""
+        return self.result.interrupted
+
+    @property
     def values(self) -> dict[str, float]:
         """All parameters' values by (expanded) name."""
         return self.result.values
@@ -73,6 +79,7 @@ class Fit:
         self.result.save(path)
 
 
+@journaled
 def fit(
     scene: Scene | Experiment | Sequence[Experiment],
     recording: Recording | None = None,
@@ -89,6 +96,7 @@ def fit(
     max_iterations: int = 200,
     threads: int = 1,
     progress: Observer | None = None,
+    journal: str | Path | None = None,
     **experiment: Any,
 ) -> Fit:
     """Fit quantities of scenes to recordings.
@@ -111,6 +119,9 @@ def fit(
         max_iterations: per start and window.
         threads: over experiments and Jacobian columns; the result does not depend on it.
         progress: called after every iteration.
+        journal: file that keeps every evaluation until the fit is done (see `sheetbend.journal`). After a kill, the
+            same call with the same file goes on from there and gives the same bits; with another recording, scene or
+            version it is refused.
 
     Returns:
         Fit. On Ctrl-C it holds the best point so far, marked `interrupted`, with linear intervals: whatever needs a

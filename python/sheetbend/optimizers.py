@@ -157,7 +157,7 @@ def _ceres(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: f
     out: dict[str, Any] = {}
     try:
         out = ceres.minimize(
-            evaluation=problem.core.evaluation(),
+            evaluation=problem.evaluator.capsule(),
             u=u,
             lower=lower,
             upper=upper,

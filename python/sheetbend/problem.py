@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from . import _core
+from . import _core, content
 from .covariance import Layout
 from .equilibrium import no_rest
 from .errors import InputError, refusal
 from .experiment import Experiment
+from .journal import Evaluator
 from .parameters import Parameter, Parameters
 from .quantities import Quantity
 from .recording import Recording
@@ -85,6 +85,7 @@ class FitProblem:
         experiments: in order.
         parameters: with private ones expanded to one per experiment that has them.
         core: the compiled problem.
+        evaluator: evaluates it, through the journal that was open when it was made.
         seconds: that the last evaluation from here took, with (True) and without a Jacobian.
     """
 
@@ -109,16 +110,14 @@ class FitProblem:
         self.parameters = self._expanded(parameters) if expanded is None else expanded
         theta, slots, slot_of = self._slots()
         held = [None if corrected is None else corrected.get(e.name, NOTHING) for e in self.experiments]
+        cores = [e.core(r, b) for e, r, b in zip(self.experiments, self.recordings, held, strict=True)]
+        free = self._free(slot_of)
         try:
-            self.core = _core.Problem(
-                experiments=[e.core(r, b) for e, r, b in zip(self.experiments, self.recordings, held, strict=True)],
-                theta=theta,
-                slots=slots,
-                free=self._free(slot_of),
-                threads=threads,
-            )
+            self.core = _core.Problem(experiments=cores, theta=theta, slots=slots, free=free, threads=threads)
         except ValueError as error:
             raise refusal(error, InputError, [len(r.times) for r in self.recordings]) from error
+        scenes = [e.scene for e in self.experiments]
+        self.evaluator = Evaluator(self.core, lambda: content.of_problem(scenes, cores, theta, slots, free))
 
     def holding(self, name: str, value: float) -> FitProblem:
         """The same problem with one (expanded) parameter held at a value."""
@@ -207,10 +206,9 @@ class FitProblem:
         a minimum asks for it."""
         if jacobian and self._last is not None and np.array_equal(self._last[0], u):
             return self._last[1]
-        began = time.perf_counter()
-        found = self.core.evaluate(u, jacobian)
-        if found[0]:
-            self.seconds[jacobian] = time.perf_counter() - began
+        found, seconds = self.evaluator(u, jacobian)
+        if found[0] and seconds is not None:
+            self.seconds[jacobian] = seconds
         if jacobian:
             self._last = np.array(u, dtype=float), found
         return found
@@ -218,10 +216,11 @@ class FitProblem:
     def evaluate_exactly(self, u: np.ndarray) -> tuple[bool, np.ndarray, np.ndarray]:
         """`evaluate` with corrections linearized at u itself, as intervals need it; a fit's own steps may use an
         earlier linearization, which leaves the gradient exact."""
-        if self.estimates_corrections:
-            self.core.relinearize()
-            self._last = None
-        return self.evaluate(u)
+        if not self.estimates_corrections:
+            return self.evaluate(u)
+        self.core.relinearize()
+        self._last = np.array(u, dtype=float), self.core.evaluate(u)  # not a journal's: this one changes the core
+        return self._last[1]
 
     @property
     def estimates_corrections(self) -> bool:
