@@ -18,7 +18,8 @@ from .floors import solver_floors
 from .identifiability import Identifiability, Nuisance, identify
 from .journal import journaled
 from .leave_one_out import MEANING, companions, each_left_out
-from .optimizers import Minimum, Observer, refit
+from .optimizers import Minimum, Observer, ceres_trouble, refit
+from .optional import require
 from .parameters import Parameter, Parameters
 from .prediction import Comparison, compare, predicted_values
 from .problem import FitProblem, ParameterLike, as_parameters
@@ -135,6 +136,7 @@ def fit(
     wanted = as_parameters(parameters, experiments)
     if threads < 1:
         raise InputError("threads", "must be positive", threads, "give at least 1")
+    require("scipy.special", "fit")  # of intervals, behind all the work
     search = Search(optimizer, starts, windows, max_iterations, tolerance, progress)
     began = time.perf_counter()
     fitted = [e for e in experiments if e.predict is None]
@@ -150,6 +152,8 @@ def fit(
             companions(e, fitted, wanted)
     problem = FitProblem(fitted, wanted, threads=threads)
     ends, name, interrupted = search.run(problem)
+    trouble = ceres_trouble() if optimizer == "auto" else ""
+    fallback = (f"SciPy stands in for Ceres, which does not load: {trouble}",) if trouble else ()
     best = ends[0]
     values = problem.parameters.to_physical(best.u)
 
@@ -206,7 +210,7 @@ def fit(
             for m in ends
         ),
         refits=end.refits,
-        warnings=_warnings(ends, best, interrupted, problem.core.data_rows) + end.doubts,
+        warnings=_warnings(ends, best, interrupted, problem.core.data_rows) + end.doubts + fallback,
     )
     return Fit(result, tuple(comparisons), wanted, corrected)
 

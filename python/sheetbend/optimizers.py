@@ -3,9 +3,11 @@ same function."""
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -53,8 +55,20 @@ Observer = Callable[[Progress], None]
 
 
 def has_ceres() -> bool:
-    """Whether the Ceres module was built."""
-    return importlib.util.find_spec("sheetbend._ceres") is not None
+    """Whether the Ceres module was built, and loads."""
+    return importlib.util.find_spec("sheetbend._ceres") is not None and not ceres_trouble()
+
+
+@cache
+def ceres_trouble() -> str:
+    """Why a Ceres module that was built does not load, as where its library is of another version; else empty."""
+    try:
+        importlib.import_module("sheetbend._ceres")
+    except ModuleNotFoundError:
+        return ""
+    except ImportError as error:
+        return str(error)
+    return ""
 
 
 def minimize(
@@ -77,7 +91,7 @@ def minimize(
     if optimizer == "ceres" and not has_ceres():
         raise InputError(
             "optimizer",
-            "was not built into this installation",
+            f"does not load: {ceres_trouble()}" if ceres_trouble() else "was not built into this installation",
             "ceres",
             "install Ceres (libceres-dev) and rebuild, or use 'scipy'",
         )

@@ -18,6 +18,7 @@ from .errors import InputError
 from .optional import require
 from .result import Estimate
 from .timeseries import Array
+from .whole import written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,8 +30,9 @@ _AXES = "xyz"
 
 
 def save(figure: Figure, path: str | Path) -> None:
-    """Write a figure; the format follows from the name (png, svg, pdf)."""
-    figure.savefig(path, dpi=160, facecolor="white")
+    """Write a figure, whole or not at all; the format follows from the name (png, svg, pdf)."""
+    with written(path) as beside:
+        figure.savefig(beside, dpi=160, facecolor="white")
 
 
 def plot_trajectories(

@@ -188,7 +188,7 @@ class TestFit:
                     break
             rest = process.stderr.read()
             found = json.loads(process.stdout.read().splitlines()[-1])
-        assert process.returncode == 4, rest
+        assert process.returncode == 130, rest
         rope = found["ropes"]["rope_1"]
         assert rope["interrupted"] and not rope["converged"] and rope["error"] < rope["blend"]
         assert [step["name"] for step in rope["steps"]] == [TWIST.name]
@@ -211,7 +211,7 @@ class TestFit:
         monkeypatch.setattr(gripped, "fit_rope", interrupted)
         result = run("fit", config, "--json")
         found = last_line(result)
-        assert found["exit_code"] == 4 and set(found["ropes"]) == {"rope_1"} and found["not_fitted"] == ["rope_2"]
+        assert found["exit_code"] == 130 and set(found["ropes"]) == {"rope_1"} and found["not_fitted"] == ["rope_2"]
         assert "not fitted are rope_2" in result.stderr and "rope_1" in Path("out/ropes/report.txt").read_text()
 
 
@@ -253,9 +253,9 @@ class TestOtherCommands:
         error = last_line(run(command, config, "--json"))["error"]
         assert error["field"] == "gripped_rope" and "sheetbend fit" in error["fix"]
 
-    def test_resume_is_for_scenes(self, config: Path) -> None:
-        error = last_line(run("fit", config, "--json", "--resume", "fit.json"))["error"]
-        assert error["field"] == "--resume"
+    def test_from_is_for_scenes(self, config: Path) -> None:
+        error = last_line(run("fit", config, "--json", "--from", "fit.json"))["error"]
+        assert error["field"] == "--from"
 
 
 BAD = [

@@ -7,21 +7,39 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from rich.console import Console
 
 from .. import plotting
-from ..config import Config
+from ..config import Config, GrippedConfig
 from ..equilibrium import equilibrium
 from ..fit import Fit
+from ..optional import require
 from ..prediction import Comparison
 from .cloth_figures import cloth_figures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+BACKENDS = {"png": "agg", "svg": "svg", "pdf": "pdf"}
 
-def write_figures(found: Fit, config: Config, folder: Path) -> list[str]:
-    """Measured against simulated for every recording, and the estimates; gives the files' names."""
+
+def figures_form(console: Console, config: Config | GrippedConfig) -> str:
+    """The format of figures that is asked for; "none" where matplotlib is missing or does not load, which is said
+    before the work."""
     form = config.output.figures
+    if form == "none":
+        return form
+    try:
+        require("matplotlib.figure", "plot")
+        require(f"matplotlib.backends.backend_{BACKENDS[form]}", "plot")
+    except Exception as error:  # a broken installation may raise anything while it loads
+        console.print(f"no figures will be drawn: {error}", markup=False, soft_wrap=True)
+        return "none"
+    return form
+
+
+def write_figures(found: Fit, config: Config, form: str, folder: Path) -> list[str]:
+    """Measured against simulated for every recording, and the estimates; gives the files' names."""
     if form == "none":
         return []
     figures: dict[str, Figure] = {}

@@ -20,6 +20,8 @@ from ..gripped.report import overview
 from ..io.folder import recordings
 from ..recording_checks import marker_indices
 from ..tables import plain_section
+from ..whole import write_text
+from .figures import figures_form
 from .gripped_figure import write_figure
 from .outcome import Code, Outcome, code_of
 from .screen import show
@@ -80,6 +82,7 @@ def fit_ropes(
 
     After Ctrl-C what is whole is reported: the ropes that are done, and of the present one the last finished rung.
     """
+    form = figures_form(console, config)
     reports: list[RopeReport] = []
     files: list[str] = []
     stopped = False
@@ -95,11 +98,11 @@ def fit_ropes(
             break
         reports.append(report)
         show(console, report.rich, report.plain)
-        files += _write(report, config, rope, folder)
+        files += _write(report, form, rope, folder)
         if stopped:
             break
     summary = plain_section(overview(reports))
-    (folder / "report.txt").write_text("\n".join(summary) + "\n", encoding="utf-8")
+    write_text(folder / "report.txt", "\n".join(summary) + "\n")
     console.print("\n" + "\n".join(summary), markup=False, soft_wrap=True)
     console.print(f"\nwritten to {folder}: report.txt, {', '.join(files)}", soft_wrap=True)
     missing = [rope.section.name for rope in ropes[len(reports) :]]
@@ -113,7 +116,7 @@ def fit_ropes(
         "not_fitted": missing,
     }
     results = [report.result for report in reports]
-    return Outcome(data, Code.NOT_CONVERGED if stopped else code_of(results, strict or config.fit.strict))
+    return Outcome(data, Code.INTERRUPTED if stopped else code_of(results, strict or config.fit.strict))
 
 
 def _fit(console: Console, config: GrippedConfig, rope: RopeData, ladder: Sequence[Rung]) -> RopeFit:
@@ -158,13 +161,13 @@ def _judged(console: Console, config: GrippedConfig, rope: RopeData, found: Rope
     return replace(report, without_twist=evaluate(bare, rope.unseen)), bare.fit.result.interrupted
 
 
-def _write(report: RopeReport, config: GrippedConfig, rope: RopeData, folder: Path) -> list[str]:
+def _write(report: RopeReport, form: str, rope: RopeData, folder: Path) -> list[str]:
     """Everything that a rope leaves behind; names relative to the folder."""
     own = folder / report.name
     own.mkdir(parents=True, exist_ok=True)
     text = json.dumps(report.to_dict(), indent=2, allow_nan=False) + "\n"
-    (own / "fit.json").write_text(text, encoding="utf-8")
-    (own / "report.txt").write_text(report.plain(), encoding="utf-8")
+    write_text(own / "fit.json", text)
+    write_text(own / "report.txt", report.plain())
     drawn = report.unseen or evaluate(report.found, rope.train)
-    names = ["fit.json", "report.txt", *write_figure(report, drawn, config.output.figures, own)]
+    names = ["fit.json", "report.txt", *write_figure(report, drawn, form, own)]
     return [f"{report.name}/{name}" for name in names]

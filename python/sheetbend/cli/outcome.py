@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any
 
@@ -16,6 +16,7 @@ from rich.text import Text
 from ..errors import InputError, SheetbendError
 from ..optional import MissingExtraError
 from ..result import FitResult
+from .stopping import Stopping
 
 
 class Code(IntEnum):
@@ -26,7 +27,8 @@ class Code(IntEnum):
     NOT_IDENTIFIABLE = 3
     NOT_CONVERGED = 4
     CHECK_FAILED = 5
-    INTERRUPTED = 130
+    INTERRUPTED = 130  # by Ctrl-C
+    TERMINATED = 143  # by SIGTERM
 
 
 @dataclass(frozen=True)
@@ -38,13 +40,15 @@ class Outcome:
 
 
 def run(command: Callable[[Console], Outcome], as_json: bool) -> None:
-    """Run a command, report its errors, and exit with its code.
+    """Run a command, report its errors, and exit with its code. SIGTERM stops it as Ctrl-C does.
 
     With `as_json` stdout holds one JSON object and nothing else; everything for people goes to stderr.
     """
     console = Console(stderr=as_json, highlight=False)
+    stopping = Stopping()
     try:
-        outcome = command(console)
+        with stopping:
+            outcome = command(console)
     except (InputError, MissingExtraError) as error:
         outcome = _failed(error, Code.BAD_INPUT)
     except SheetbendError as error:
@@ -52,13 +56,18 @@ def run(command: Callable[[Console], Outcome], as_json: bool) -> None:
     except KeyboardInterrupt:
         _complain("interrupted", [])
         outcome = Outcome({"error": {"message": "interrupted"}}, Code.INTERRUPTED)
+    if outcome.code is Code.INTERRUPTED and stopping.terminated:
+        outcome = replace(outcome, code=Code.TERMINATED)
     if as_json:
         print(json.dumps(strict({**outcome.data, "exit_code": int(outcome.code)}), allow_nan=False), flush=True)
     raise typer.Exit(int(outcome.code))
 
 
 def code_of(results: Sequence[FitResult], strictly: bool) -> Code:
-    """Of fits: whether all converged, and whether every one (strictly: every parameter) is identifiable."""
+    """Of fits: whether all got to their end, converged, and whether every one (strictly: every parameter) is
+    identifiable."""
+    if any(result.interrupted for result in results):
+        return Code.INTERRUPTED
     if not all(result.converged for result in results):
         return Code.NOT_CONVERGED
     unknown = [[e.verdict == "not identifiable" for e in result.estimates] for result in results]

@@ -1,4 +1,4 @@
-"""Configurations with other starting values: how a fit is written back, and resumed."""
+"""Configurations with other starting values: how a fit is written back, and started from."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..optional import require
+from ..whole import write_text
 from .schema import Config, ParameterSection
 
 
@@ -49,7 +50,7 @@ def write(config: Config, path: Path, folder: Path) -> None:
     meshes = [cloth["mesh"] for cloth in content["scene"].get("cloth", [])]
     for table in [*content.get("recording", []), *(mesh for mesh in meshes if "file" in mesh)]:
         table["file"] = Path(os.path.relpath(folder / table["file"], path.parent)).as_posix()
-    path.write_text(require("tomli_w", "cli").dumps(content), encoding="utf-8")
+    write_text(path, require("tomli_w", "cli").dumps(content))
 
 
 def _inside(section: ParameterSection, value: float) -> float:

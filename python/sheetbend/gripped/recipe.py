@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +22,7 @@ from ..discretization import Refinement
 from ..errors import InputError, SheetbendError
 from ..experiment import Experiment
 from ..fit import Fit, fit
+from ..journal import journaled
 from ..optimizers import minimize
 from ..parameters import Parameter, Parameters
 from ..problem import FitProblem
@@ -73,6 +75,11 @@ class RopeFit:
     fit: Fit
     warnings: tuple[str, ...]
 
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C ended it."""
+        return self.fit.interrupted
+
     def predict(self, recording: Recording | GrippedMotion) -> Array:
         """(frames, markers, 3) m: open loop from the first frame, gripped markers as recorded."""
         (motion,) = motions_of([recording], self.model.smoothing)
@@ -99,6 +106,7 @@ def predict(
         return list(pool.map(one, range(len(motions))))
 
 
+@journaled
 def fit_rope(
     recordings: Sequence[Recording | GrippedMotion],
     *,
@@ -116,6 +124,7 @@ def fit_rope(
     gravity: tuple[float, float, float] = GRAVITY,
     threads: int = 1,
     say: Say = lambda text: None,
+    journal: str | Path | None = None,
 ) -> RopeFit:
     """Fit a rope's parameters to recordings between two grips.
 
@@ -136,6 +145,7 @@ def fit_rope(
         gravity: m/s^2, where the recordings do not tell.
         threads: the result does not depend on it.
         say: called with a line on each step.
+        journal: file that keeps every evaluation until the rope is fitted, as that of `sheetbend.fit`.
 
     Returns:
         RopeFit. After Ctrl-C the one of the last finished rung, its fit marked `interrupted`.
