@@ -317,7 +317,7 @@ class TestTrouble:
         with Journal(tmp_path / "journal.sqlite") as kept:  # what was committed before is whole
             problem = problem_of(swinging())
             problem.evaluate(problem.parameters.initial())
-            assert len(kept) > 2 and kept.read == 1
+            assert len(kept) >= 1 and kept.read == 1
 
     def test_is_a_warning_in_python(self, path: Path) -> None:
         with Journal(path) as kept:
