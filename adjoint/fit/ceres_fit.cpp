@@ -27,9 +27,10 @@ class Point : public ceres::EvaluationCallback {
   void PrepareForEvaluation(bool with_jacobian, bool new_point) override {
     if ((!new_point || u_ == at_) && (!with_jacobian || has_jacobian_)) return;
     if (status == EvaluationStatus::interrupted) return;
-    const bool both = with_jacobian || seconds_[1] < cheap * seconds_[0];
+    const bool both = with_jacobian || evaluation_.jacobian_along || seconds_[1] < cheap * seconds_[0];
     double seconds = 0.0;
-    status = evaluation_.call(evaluation_.problem, u_.data(), residual.data(), both ? jacobian.data() : nullptr, &seconds);
+    status =
+        evaluation_.call(evaluation_.problem, u_.data(), residual.data(), both ? jacobian.data() : nullptr, &seconds);
     if (status == EvaluationStatus::ok && std::isfinite(seconds)) seconds_[both] = seconds;
     has_jacobian_ = both;
     at_ = u_;

@@ -113,8 +113,8 @@ py::capsule evaluation(const Problem& p) {
       return EvaluationStatus::interrupted;
     }
   };
-  return py::capsule(new EvaluationFunction{&p, p.rows(), p.parameters(), call}, EvaluationFunction::capsule_name,
-                     [](void* f) { delete static_cast<EvaluationFunction*>(f); });
+  return py::capsule(new EvaluationFunction{&p, p.rows(), p.parameters(), call, !p.state().empty()},
+                     EvaluationFunction::capsule_name, [](void* f) { delete static_cast<EvaluationFunction*>(f); });
 }
 
 // What a Python function is asked for by `evaluation_of`.
@@ -125,7 +125,7 @@ struct Asked {
 
 // The same of a Python function (u, with_jacobian) -> ((ok, residual, jacobian), seconds or None). What it raises passes through the optimizer,
 // except for KeyboardInterrupt, which ends it with its best so far.
-py::capsule evaluation_of(int rows, int parameters, py::function function) {
+py::capsule evaluation_of(int rows, int parameters, py::function function, bool jacobian_along) {
   const auto call = [](const void* asked, const double* u, double* residual, double* jacobian, double* seconds) {
     const Asked& a = *static_cast<const Asked*>(asked);
     const py::gil_scoped_acquire gil;
@@ -148,7 +148,7 @@ py::capsule evaluation_of(int rows, int parameters, py::function function) {
     }
   };
   return py::capsule(
-      new EvaluationFunction{new Asked{rows, parameters, std::move(function)}, rows, parameters, call},
+      new EvaluationFunction{new Asked{rows, parameters, std::move(function)}, rows, parameters, call, jacobian_along},
       EvaluationFunction::capsule_name, [](void* f) {
         const auto* made = static_cast<EvaluationFunction*>(f);
         delete static_cast<const Asked*>(made->problem);
@@ -221,8 +221,16 @@ void bind_problem(py::module_& m) {
            })
       .def("absorbed", &Problem::absorbed)
       .def("relinearize", &Problem::relinearize)
+      .def("state",
+           [](const Problem& p) {
+             const std::vector<double> state = p.state();
+             return to_numpy(state, {static_cast<py::ssize_t>(state.size())});
+           })
+      .def("restore",
+           [](const Problem& p, const Array& state) { p.restore({state.data(), state.data() + state.size()}); })
       .def("evaluation", &evaluation);
-  m.def("evaluation_of", &evaluation_of, py::arg("rows"), py::arg("parameters"), py::arg("function"));
+  m.def("evaluation_of", &evaluation_of, py::arg("rows"), py::arg("parameters"), py::arg("function"),
+        py::arg("jacobian_along") = false);
 }
 
 }  // namespace sheetbend::bindings

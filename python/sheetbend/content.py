@@ -20,7 +20,7 @@ from .compiled import CompiledScene, specification
 if TYPE_CHECKING:
     from .scene import Scene
 
-PLAIN = (bool, int, float, str, np.generic, type(None))
+PLAIN = (bool, int, float, str, bytes, np.generic, type(None))
 _scenes: WeakKeyDictionary[CompiledScene, str] = WeakKeyDictionary()  # digests of frozen scenes
 
 

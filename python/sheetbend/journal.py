@@ -5,8 +5,8 @@ same bits. So no optimizer's state is saved. A fit that goes on after a kill run
 evaluation that the journal has, and so walks the same path to the same bits. The journal also remembers the seconds
 that an evaluation took, since optimizers decide by them whether to make a Jacobian along with the residuals.
 
-Problems that correct driven markers (`driven_sigma`) are the exception: their evaluations start where the last one
-ended, so a fit that goes on ends within the optimizer's tolerance of the uninterrupted one, not at its bits.
+Where driven markers are corrected (`driven_sigma`), an evaluation also depends on where the last one ended. That state
+is then a part of the key, and the state behind the evaluation a part of the value.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ ROOM = 1e9  # bytes, of all values; when it is full no more Jacobians are kept, 
 TABLES = """
 CREATE TABLE IF NOT EXISTS about (part TEXT, label TEXT, text TEXT NOT NULL, PRIMARY KEY (part, label));
 CREATE TABLE IF NOT EXISTS evaluation (
-  key BLOB PRIMARY KEY, residuals BLOB NOT NULL, seconds REAL, jacobian BLOB, jacobian_seconds REAL
+  key BLOB PRIMARY KEY, residuals BLOB NOT NULL, seconds REAL, jacobian BLOB, jacobian_seconds REAL, state BLOB
 );
 """
 
@@ -91,7 +91,7 @@ class Journal(AbstractContextManager["Journal"]):
                 self._db.execute("BEGIN IMMEDIATE")
                 self._expect("fit", {**content.of_software(), **(about or {})})
                 kept = self._db.execute("SELECT key, jacobian IS NOT NULL FROM evaluation").fetchall()
-                sizes = "coalesce(sum(length(residuals) + coalesce(length(jacobian), 0)), 0)"
+                sizes = "coalesce(sum(length(residuals) + length(state) + coalesce(length(jacobian), 0)), 0)"
                 self._size: int = self._db.execute(f"SELECT {sizes} FROM evaluation").fetchone()[0]
                 self._db.execute("COMMIT")
             except BaseException:
@@ -150,9 +150,21 @@ class Journal(AbstractContextManager["Journal"]):
                 self._problem_known = True
         return content.digest(made_from).encode()
 
-    def evaluate(self, problem: bytes, u: np.ndarray, jacobian: bool, make: Callable[[], Evaluation]) -> Timed:
+    def evaluate(
+        self,
+        problem: bytes,
+        u: np.ndarray,
+        jacobian: bool,
+        make: Callable[[], Evaluation],
+        state: Callable[[], bytes] = bytes,
+    ) -> tuple[Evaluation, float | None, bytes | None]:
         """The evaluation of a problem at u (free,): as it was kept, or made now and kept. One that is not ok is not
-        kept: to make it again is quick, as it ends where the motion diverges."""
+        kept: to make it again is quick, as it ends where the motion diverges.
+
+        Returns:
+            The evaluation, the seconds that it took when it was made, where they are known, and where it was kept the
+            `state` behind it.
+        """
         point = np.ascontiguousarray(u, dtype=float)
         key = hashlib.blake2b(problem + point.tobytes(), digest_size=16).digest()
         if not self.trouble and (self._known.get(key, False) or (not jacobian and key in self._known)):
@@ -165,28 +177,28 @@ class Journal(AbstractContextManager["Journal"]):
         seconds = time.perf_counter() - began
         self.made += 1
         if found[0] and not self.trouble:
-            self._keep(key, found, jacobian, seconds)
-        return found, seconds
+            self._keep(key, found, jacobian, seconds, state())
+        return found, seconds, None
 
-    def _kept(self, key: bytes, jacobian: bool, free: int) -> Timed | None:
+    def _kept(self, key: bytes, jacobian: bool, free: int) -> tuple[Evaluation, float | None, bytes] | None:
         columns = "residuals, jacobian, jacobian_seconds" if jacobian else "residuals, NULL, seconds"
         with self._lock:
             try:
-                row = self._db.execute(f"SELECT {columns} FROM evaluation WHERE key = ?", (key,)).fetchone()
+                row = self._db.execute(f"SELECT {columns}, state FROM evaluation WHERE key = ?", (key,)).fetchone()
             except sqlite3.Error as error:
                 self._stop(error)
                 return None
         residuals = np.frombuffer(row[0]).copy()
-        if not jacobian:
-            return (True, residuals, np.zeros((0, free))), row[2]
-        return (True, residuals, _unpacked(row[1], len(residuals), free)), row[2]
+        J = _unpacked(row[1], len(residuals), free) if jacobian else np.zeros((0, free))
+        return (True, residuals, J), row[2], row[3]
 
-    def _keep(self, key: bytes, found: Evaluation, jacobian: bool, seconds: float) -> None:
+    def _keep(self, key: bytes, found: Evaluation, jacobian: bool, seconds: float, state: bytes) -> None:
         residuals = found[1].tobytes()
         packed = _packed(found[2]) if jacobian else None
         if packed is not None and (len(packed) > LARGEST_JACOBIAN or self._size + len(packed) > ROOM):
             packed = None
-        if (key in self._known and packed is None) or self._size + len(residuals) > 2 * ROOM:
+        more = len(packed or b"") + (0 if key in self._known else len(residuals) + len(state))
+        if (key in self._known and packed is None) or self._size + more > 2 * ROOM:
             return
         with self._lock:
             try:
@@ -197,9 +209,9 @@ class Journal(AbstractContextManager["Journal"]):
                     self._db.execute(update, (packed, seconds, key))
                 else:
                     took = (None, seconds) if jacobian else (seconds, None)
-                    row = (key, residuals, took[0], packed, took[1])
-                    self._db.execute("INSERT INTO evaluation VALUES (?, ?, ?, ?, ?)", row)
-                self._size += len(packed or b"") + (0 if key in self._known else len(residuals))
+                    row = (key, residuals, took[0], packed, took[1], state)
+                    self._db.execute("INSERT INTO evaluation VALUES (?, ?, ?, ?, ?, ?)", row)
+                self._size += more
                 self._known[key] = packed is not None
                 if time.monotonic() - self._committed >= COMMIT_SECONDS:
                     self._db.execute("COMMIT")
@@ -242,13 +254,24 @@ class Evaluator:
             return found, time.perf_counter() - began
         if self._made_from is not None:
             self._key, self._made_from = self._journal.problem(self._made_from()), None
-        return self._journal.evaluate(self._key, u, jacobian, lambda: self._core.evaluate(u, jacobian))
+        key, state = self._key, self._state()
+        if state:
+            key += content.digest([state, jacobian]).encode()  # a Jacobian too changes the state
+        found, seconds, behind = self._journal.evaluate(
+            key, u, jacobian, lambda: self._core.evaluate(u, jacobian), self._state
+        )
+        if behind:
+            self._core.restore(np.frombuffer(behind))
+        return found, seconds
+
+    def _state(self) -> bytes:
+        return self._core.state().tobytes()
 
     def capsule(self) -> object:
         """The same for Ceres; the problem must outlive it."""
         if self._journal is None:
             return self._core.evaluation()
-        return _core.evaluation_of(self._core.rows, self._core.parameters, self)
+        return _core.evaluation_of(self._core.rows, self._core.parameters, self, bool(self._state()))
 
 
 class Interruptible(Protocol):

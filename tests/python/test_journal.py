@@ -236,6 +236,58 @@ class TestFits:
             )
 
 
+def shaken() -> sb.Experiment:
+    """A rope that hangs from a hand, whose recorded motion is noisy and corrected."""
+    times = np.arange(16) / 50
+    hand = 0.02 * np.minimum(times / 0.1, 1.0)[:, None] * np.sin(10 * times[:, None] + np.array([0.0, 0.3, 0.6]))
+
+    def scene(motion: np.ndarray, EI: float) -> sb.Scene:
+        made = sb.Scene("rope")
+        rope = sb.add_rope(
+            made, "rope", points=[[0, 0, 0], [0, 0, -0.4]], segments=4, density=0.05, EI=EI, bend_damping=0.02
+        )
+        made.follow(rope.particles[:1], times, motion[:, None], ["hand"])
+        return made
+
+    exact = sb.simulate(scene(hand, 2e-3), times, SOLVER).positions[:, [2, 4]]
+    positions = np.concatenate([hand[:, None], exact], axis=1)
+    positions += 3e-4 * np.random.default_rng(0).standard_normal(positions.shape)
+    return sb.Experiment(
+        scene=scene(positions[:, 0], 3e-3),
+        recording=sb.Recording(positions, times, markers=("hand", "a", "b")),
+        markers=[None, sb.on_particle(2), sb.on_particle(4)],
+        solver=SOLVER,
+        sigma=3e-4,
+        driven_sigma=3e-4,
+    )
+
+
+class TestCorrections:
+    """Their evaluations depend on where the last one ended."""
+
+    def test_a_restored_state_goes_on_to_the_same_bits(self) -> None:
+        problem, other, untouched = problem_of(shaken()), problem_of(shaken()), problem_of(shaken())
+        u = problem.parameters.initial()
+        problem.core.evaluate(u, True)
+        problem.core.evaluate(u + 0.1, False)
+        problem.core.relinearize()
+        other.core.restore(problem.core.state())
+        for step in (0.15, 0.3):
+            (_, r, J), (_, s, K) = (p.core.evaluate(u + step, True) for p in (problem, other))
+            assert r.tobytes() == s.tobytes() and J.tobytes() == K.tobytes()
+            assert problem.core.absorbed(0) == other.core.absorbed(0)
+            assert problem.core.state().tobytes() == other.core.state().tobytes()
+        _, r, _ = untouched.core.evaluate(u + 0.3, True)
+        assert r.tobytes() != s.tobytes()  # else this shows nothing
+
+    @pytest.mark.parametrize("optimizer", OPTIMIZERS)
+    def test_a_fit_goes_on_to_the_same_bits(self, optimizer: str, path: Path) -> None:
+        given = {"parameters": WANTED, "optimizer": optimizer, "profiles": False}
+        whole = sb.fit(shaken(), **given)
+        assert sb.fit(shaken(), **given, journal=path, progress=stop_at(2)).interrupted
+        assert bits(sb.fit(shaken(), **given, journal=path)) == bits(whole)
+
+
 class TestRefusals:
     def begun(self, path: Path) -> None:
         with Journal(path, {"[fit]": "abc"}):
