@@ -30,6 +30,7 @@ from . import _core, content
 from .errors import InputError
 
 COMMIT_SECONDS = 0.1  # at least, between commits: what a kill may cost besides the evaluation under way
+SHARE, GRACE = 0.02, 0.05  # of the time of evaluations, and s, that writing may take; what is beyond is made again
 LARGEST_JACOBIAN = 64e6  # bytes; a larger one is made again
 ROOM = 1e9  # bytes, of all values; when it is full no more Jacobians are kept, and no more residuals at twice as much
 TABLES = """
@@ -79,6 +80,7 @@ class Journal(AbstractContextManager["Journal"]):
         self._say = say or (lambda text: warnings.warn(text, RuntimeWarning, stacklevel=2))
         self._lock = threading.RLock()
         self._committed = time.monotonic()
+        self._worked = self._spent = 0.0  # s, in evaluations, and in keeping them
         self._problem_known, self._finished = False, False
         self._token: Token[Journal | None] | None = None
         try:
@@ -159,7 +161,8 @@ class Journal(AbstractContextManager["Journal"]):
         state: Callable[[], bytes] = bytes,
     ) -> tuple[Evaluation, float | None, bytes | None]:
         """The evaluation of a problem at u (free,): as it was kept, or made now and kept. One that is not ok is not
-        kept: to make it again is quick, as it ends where the motion diverges.
+        kept: to make it again is quick, as it ends where the motion diverges. Nor are all of those that take little
+        longer than to write them.
 
         Returns:
             The evaluation, the seconds that it took when it was made, where they are known, and where it was kept the
@@ -176,8 +179,11 @@ class Journal(AbstractContextManager["Journal"]):
         found = make()
         seconds = time.perf_counter() - began
         self.made += 1
-        if found[0] and not self.trouble:
+        self._worked += seconds
+        if found[0] and not self.trouble and self._spent <= GRACE + SHARE * self._worked:
+            began = time.thread_time()
             self._keep(key, found, jacobian, seconds, state())
+            self._spent += time.thread_time() - began
         return found, seconds, None
 
     def _kept(self, key: bytes, jacobian: bool, free: int) -> tuple[Evaluation, float | None, bytes] | None:

@@ -380,6 +380,23 @@ class TestTrouble:
             assert problem.evaluate(problem.parameters.initial() + 0.1)[0]
 
 
+def test_what_writing_costs_is_limited(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    keep = Journal._keep
+
+    def slowly(self: Journal, *arguments: Any) -> None:
+        began = time.thread_time()
+        while time.thread_time() < began + 0.02:
+            pass
+        keep(self, *arguments)
+
+    monkeypatch.setattr(Journal, "_keep", slowly)
+    with Journal(path) as kept:
+        problem = problem_of(swinging())
+        for k in range(50):
+            problem.evaluate(problem.parameters.initial() + 1e-3 * k)
+        assert 3 <= len(kept) < 10  # three within the grace
+
+
 def test_no_more_than_ten_commits_a_second(path: Path) -> None:
     commits = []
     with Journal(path) as kept:
