@@ -12,6 +12,7 @@ is then a part of the key, and the state behind the evaluation a part of the val
 from __future__ import annotations
 
 import hashlib
+import shutil
 import sqlite3
 import threading
 import time
@@ -33,6 +34,7 @@ COMMIT_SECONDS = 0.1  # at least, between commits: what a kill may cost besides 
 SHARE, GRACE = 0.02, 0.05  # of the time of evaluations, and s, that writing may take; what is beyond is made again
 LARGEST_JACOBIAN = 64e6  # bytes; a larger one is made again
 ROOM = 1e9  # bytes, of all values; when it is full no more Jacobians are kept, and no more residuals at twice as much
+RESERVE = 30e6  # bytes of the disk that are left to the results
 TABLES = """
 CREATE TABLE IF NOT EXISTS about (part TEXT, label TEXT, text TEXT NOT NULL, PRIMARY KEY (part, label));
 CREATE TABLE IF NOT EXISTS evaluation (
@@ -56,7 +58,7 @@ class Journal(AbstractContextManager["Journal"]):
     Attributes:
         path: the file.
         read, made: how many evaluations were read from it, and how many were made.
-        trouble: why it is written to no longer, as when the disk is full; empty as long as it is.
+        trouble: why it is used no longer, as when the disk is full; empty as long as it is.
     """
 
     def __init__(
@@ -68,7 +70,7 @@ class Journal(AbstractContextManager["Journal"]):
             path: of the file, on a local disk if there is one.
             about: labels and texts of what the fit is made from. They are compared with those that the journal was
                 begun with, as are the versions of the software, the machine, and the first problem that is evaluated.
-            say: called with `trouble`; issues a RuntimeWarning by default.
+            say: called with `trouble`, or where the disk has no room left to write; issues a RuntimeWarning by default.
 
         Raises:
             InputError: the file is of another fit (the message says what differs), is no journal, is in use, or cannot
@@ -80,6 +82,7 @@ class Journal(AbstractContextManager["Journal"]):
         self._say = say or (lambda text: warnings.warn(text, RuntimeWarning, stacklevel=2))
         self._lock = threading.RLock()
         self._committed = time.monotonic()
+        self._writing = True
         self._worked = self._spent = 0.0  # s, in evaluations, and in keeping them
         self._problem_known, self._finished = False, False
         self._token: Token[Journal | None] | None = None
@@ -180,7 +183,7 @@ class Journal(AbstractContextManager["Journal"]):
         seconds = time.perf_counter() - began
         self.made += 1
         self._worked += seconds
-        if found[0] and not self.trouble and self._spent <= GRACE + SHARE * self._worked:
+        if found[0] and self._writing and self._spent <= GRACE + SHARE * self._worked:
             began = time.thread_time()
             self._keep(key, found, jacobian, seconds, state())
             self._spent += time.thread_time() - began
@@ -208,6 +211,11 @@ class Journal(AbstractContextManager["Journal"]):
             return
         with self._lock:
             try:
+                if shutil.disk_usage(self.path.parent).free < RESERVE:
+                    self._writing = False
+                    left = f"less than {RESERVE / 1e6:g} MB are left on its disk"
+                    self._say(f"the journal {self.path} is no longer written: {left}")
+                    return
                 if not self._db.in_transaction:
                     self._db.execute("BEGIN IMMEDIATE")
                 if key in self._known:
@@ -222,7 +230,7 @@ class Journal(AbstractContextManager["Journal"]):
                 if time.monotonic() - self._committed >= COMMIT_SECONDS:
                     self._db.execute("COMMIT")
                     self._committed = time.monotonic()
-            except sqlite3.Error as error:
+            except (sqlite3.Error, OSError) as error:
                 self._stop(error)
 
     def _expect(self, part: str, texts: Mapping[str, str]) -> None:
@@ -237,8 +245,9 @@ class Journal(AbstractContextManager["Journal"]):
             fix = "run it with what it was begun with, or begin anew without it"
             raise InputError("journal", f"is of another fit; different are {', '.join(changes)}", str(self.path), fix)
 
-    def _stop(self, error: sqlite3.Error) -> None:
+    def _stop(self, error: Exception) -> None:
         """A journal that cannot be used is given up; the fit is not."""
+        self._writing = False
         self.trouble = f"the journal {self.path} is no longer used ({error}); the fit goes on without it"
         self._say(self.trouble)
 

@@ -371,6 +371,22 @@ class TestTrouble:
             problem.evaluate(problem.parameters.initial())
             assert len(kept) >= 1 and kept.read == 1
 
+    def test_a_disk_that_is_nearly_full_is_left_to_the_results(
+        self, path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        with Journal(path):
+            problem = problem_of(swinging())
+            u = problem.parameters.initial()
+            problem.evaluate(u)
+        monkeypatch.setattr(journal, "RESERVE", 1e18)
+        said: list[str] = []
+        with Journal(path, say=said.append) as kept:
+            problem = problem_of(swinging())
+            for step in (0.0, 0.1, 0.2):
+                problem.evaluate(u + step)
+            assert (kept.read, kept.made, len(kept)) == (1, 2, 1)
+        assert len(said) == 1 and "are left on its disk" in said[0]
+
     def test_is_a_warning_in_python(self, path: Path) -> None:
         with Journal(path) as kept:
             kept._db.execute("DROP TABLE evaluation")
