@@ -27,10 +27,20 @@ void Experiment::check() const {
     throw std::invalid_argument(name + ": measured and sigma must be (frames, markers, 3) and (frames, markers)");
   if (is_static && frames != 1)
     throw std::invalid_argument(name + ": an equilibrium has one frame. Fix: give each shape as a recording");
+  if (least.size() != most.size() || (!least.empty() && least.size() != scene->layout.total()))
+    throw std::invalid_argument(name + ": the ranges do not fit the scene");
   if (map.base.size() != inputs()) throw std::invalid_argument(name + ": the parameter map does not fit the scene");
   if (correction.first.size() != correction.given.size() + 1)
     throw std::invalid_argument(name + ": the correction does not fit its own numbers");
   if (residual_count() == 0) throw std::invalid_argument(name + ": every marker is missing in every frame");
+}
+
+void Experiment::refuse(std::size_t input, double value) const {
+  int q = 0;
+  while (input >= scene->layout.offset[q + 1]) ++q;
+  throw OutOfDomain(std::string(quantity_names[q]) + ": entry " + std::to_string(input - scene->layout.offset[q]) +
+                    " would be " + std::to_string(value) +
+                    ". Fix: bound the parameters that it is made from, or start elsewhere");
 }
 
 template <class T>

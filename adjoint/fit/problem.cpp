@@ -16,13 +16,6 @@ namespace {
 
 std::mutex failing;  // over what is said of failures
 
-inline double exp(double a) { return std::exp(a); }
-template <int N>
-Dual<double, N> exp(const Dual<double, N>& a) {
-  const double e = std::exp(a.v);
-  return Dual<double, N>::map(a, e, e);
-}
-
 }  // namespace
 
 Problem::Problem(std::vector<Experiment> experiments, std::vector<double> theta,
@@ -113,6 +106,8 @@ bool Problem::attempt(int experiment, F&& f) const {
   } catch (const Unconverged& error) {
     return fail(error);
   } catch (const NoEquilibrium& error) {
+    return fail(error);
+  } catch (const OutOfDomain& error) {
     return fail(error);
   } catch (const NoCorrection& error) {
     return fail(error);

@@ -8,9 +8,11 @@ namespace sheetbend::bindings {
 
 ParameterMap make_map(const py::dict& d) {
   ParameterMap map;
-  const auto base = d["base"].cast<Array>(), coefficient = d["coefficient"].cast<Array>();
+  const auto base = d["base"].cast<Array>(), coefficient = d["coefficient"].cast<Array>(),
+             weight = d["weight"].cast<Array>();
   map.base.assign(base.data(), base.data() + base.size());
   map.coefficient.assign(coefficient.data(), coefficient.data() + coefficient.size());
+  map.weight.assign(weight.data(), weight.data() + weight.size());
   map.target = whole_numbers(d["target"]);
   map.first_factor = whole_numbers(d["first_factor"]);
   map.parameter = whole_numbers(d["parameter"]);

@@ -66,6 +66,8 @@ Experiment make_experiment(const py::dict& d) {
   o.cg_iterations = get<int>(d, "cg_iterations");
   e.plan = make_plan(*e.scene, o);
   e.map = make_map(get<py::dict>(d, "map"));
+  e.least = numbers(d, "least");
+  e.most = numbers(d, "most");
   e.observed = make_observations(get<py::dict>(d, "observed"));
   if (!d["correction"].is_none()) e.correction = make_correction(get<py::dict>(d, "correction"));
   e.is_static = get<bool>(d, "is_static");

@@ -323,6 +323,8 @@ class Experiment:
             "cg_tolerance": self.solver.cg_tolerance,
             "cg_iterations": self.solver.cg_iterations,
             "map": map_,
+            "least": compiled.domain.least,
+            "most": compiled.domain.most,
             "observed": observed,
             "correction": None
             if correction is None

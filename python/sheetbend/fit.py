@@ -138,6 +138,7 @@ def fit(
         for e in fitted:
             companions(e, fitted, wanted)
     problem = FitProblem(fitted, wanted, threads=threads)
+    problem.check_start()
     ends, name, interrupted = search.run(problem)
     best = ends[0]
     values = problem.parameters.to_physical(best.u)

@@ -120,6 +120,17 @@ class FitProblem:
         except ValueError as error:
             raise refusal(error, InputError, [len(r.times) for r in self.recordings]) from error
 
+    def check_start(self) -> None:
+        """Refuse starting values that make a stiffness, mass or length negative.
+
+        Raises:
+            SceneError: names the quantities.
+        """
+        theta = self.core.physical(self.parameters.initial())
+        for e, mine in zip(self.experiments, self._slots()[1], strict=True):
+            e.scene.compiled.domain.check_quantities(theta[None, mine])
+            e.scene.compiled.inputs(theta[mine])
+
     def holding(self, name: str, value: float) -> FitProblem:
         """The same problem with one (expanded) parameter held at a value."""
         held = self.parameters.replace(name, fixed=True, initial=value, prior=None, lower=-np.inf, upper=np.inf)
@@ -263,6 +274,7 @@ class FitProblem:
 
         Raises:
             DivergenceError, NoEquilibriumError: the physics has no answer.
+            InputError: a stiffness, mass or length is negative.
         """
         scene = self.experiments[experiment].scene
         try:
@@ -270,6 +282,8 @@ class FitProblem:
                 markers = self.core.simulate(experiment, u)
         except _core.NoEquilibrium as error:
             raise no_rest(scene, str(error), scene.positions) from error
+        except ValueError as error:
+            raise refusal(error, InputError, self.parameters.to_physical(u)) from error
         return markers.reshape(self.recordings[experiment].positions.shape)
 
     def rows_layout(self) -> Layout:

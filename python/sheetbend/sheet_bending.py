@@ -25,8 +25,8 @@ class SheetCurvature:
     """The triangles of a mesh that have three neighbors, as core/constraints/sheet_curvature.h takes them.
 
     Triangles at a border have the curvature of their neighbors: their area counts there, unless no hinge of theirs can
-    move, and only on neighbors with one that can. A clamp of two rows of held vertices or more acts in the middle between the last row and the one before it:
-    the hinges on the last row count half a row of triangles on either side.
+    move, and only on neighbors with one that can. A clamp of two rows of held vertices or more acts in the middle
+    between the last row and the one before it: the hinges on the last row count half a row of triangles on either side.
 
     Attributes:
         stencils: (count, 6) vertices: the triangle's, then those opposite across its edges v0v1, v1v2, v2v0.

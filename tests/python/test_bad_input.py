@@ -266,7 +266,7 @@ SOLVER = {
     "value of text": ("values.rope_EA", lambda: sb.simulate(rope(), [0.01], values={"rope_EA": "stiff"})),
     "no value": ("values.rope_EA", lambda: sb.equilibrium(rope(), values={"rope_EA": None})),
     "negative stiffness": ("values.rope_EA", lambda: sb.simulate(rope(), [0.01], values={"rope_EA": -1.0})),
-    "stiffness of zero": ("values", lambda: sb.simulate(rope(), [0.01], values={"rope_EA": 0.0})),
+    "stiffness of zero": ("values.rope_EA", lambda: sb.simulate(rope(), [0.01], values={"rope_EA": 0.0})),
     "gradient check off the grid": ("times", lambda: sb.check_gradients(rope(), [0.00037])),
     "equilibrium from the wrong shape": ("start", lambda: sb.equilibrium(rope(), start=[[0, 0, 0]])),
     "equilibrium from NaN": ("start", lambda: sb.equilibrium(rope(), start=np.full((5, 3), NAN))),
