@@ -15,6 +15,7 @@ from .driven_noise import doubts
 from .errors import InputError
 from .experiment import Experiment
 from .floors import solver_floors
+from .given import check_given, half_widths, premises
 from .identifiability import Identifiability, Nuisance, identify
 from .leave_one_out import MEANING, companions, each_left_out
 from .optimizers import Minimum, Observer, refit
@@ -22,7 +23,7 @@ from .parameters import Parameter, Parameters
 from .prediction import Comparison, compare, predicted_values
 from .problem import FitProblem, ParameterLike, as_parameters
 from .recording import Recording
-from .result import Estimate, FitResult, Given, RecordingFit, Refit, Start
+from .result import Estimate, FitResult, Given, Premise, RecordingFit, Refit, Start
 from .scene import Scene
 from .search import Search
 
@@ -84,6 +85,7 @@ def fit(
     tolerance: float = 1e-10,
     refine: Refinement | None = None,
     systematic: Systematic | None = None,
+    given: Mapping[str, float] | None = None,
     leave_one_out: bool = False,
     profiles: bool = True,
     max_iterations: int = 200,
@@ -105,6 +107,10 @@ def fit(
             `discretization`).
         systematic: (problem, internal minimum) -> half-widths of what else the intervals are to count, by parameter, in
             its unit.
+        given: standard deviations of numbers that the fit takes as given, by name; they then count in the intervals. Of
+            quantities that must be positive it is relative (`{"rope_density": 0.02}` is 2 %), of others in their unit;
+            "gravity" (its direction) and "clamp_direction" are in rad, "clamps" and "markers" (their places) in m. What
+            each of these numbers moves is in `FitResult.premises` in any case.
         leave_one_out: also predict every recording that holds nothing out by a fit to the others.
         profiles: refit the others along the worst parameters for their intervals; without, intervals are the linear
             ones, which cost nothing beside the fit.
@@ -139,6 +145,7 @@ def fit(
             companions(e, fitted, wanted)
     problem = FitProblem(fitted, wanted, threads=threads)
     problem.check_start()
+    check_given(given or {}, problem)
     ends, name, interrupted = search.run(problem)
     best = ends[0]
     values = problem.parameters.to_physical(best.u)
@@ -149,12 +156,15 @@ def fit(
             if refine is None or refitter is None
             else refined_estimates(refine, experiments, wanted, problem, best.u, refitter, threads)
         )
-        more = {} if systematic is None else systematic(problem, best.u)
+        rests_on = () if refitter is None else premises(problem, best.u, given or {})
+        more = dict(half_widths(rests_on, problem.parameters.free))
+        for parameter, reach in ({} if systematic is None else systematic(problem, best.u)).items():
+            more[parameter] = more.get(parameter, 0.0) + reach
         refined = to_the_limit(refits, problem.parameters, values)
         judged = _judge(problem, best.u, refined, more, refitter if profiles else None)
         found = predicted_values(experiments, wanted, values, refitter, threads)
         doubted = () if refitter is None else doubts(problem, best.u, judged)
-        return _Conclusion(refits, judged, *found, doubted)
+        return _Conclusion(refits, judged, *found, doubted, rests_on)
 
     left_out: dict[str, Comparison] = {}
     try:
@@ -196,6 +206,7 @@ def fit(
             for m in ends
         ),
         refits=end.refits,
+        premises=end.premises,
         warnings=_warnings(ends, best, interrupted, problem.core.data_rows) + end.doubts,
     )
     return Fit(result, tuple(comparisons), wanted, corrected)
@@ -211,6 +222,7 @@ class _Conclusion:
     given: tuple[Given, ...]
     corrected: dict[str, np.ndarray]  # of experiments that are only predicted
     doubts: tuple[str, ...]
+    premises: tuple[Premise, ...]
 
 
 def _experiments(

@@ -120,14 +120,20 @@ class FitProblem:
         except ValueError as error:
             raise refusal(error, InputError, [len(r.times) for r in self.recordings]) from error
 
+    def known(self, u: np.ndarray) -> tuple[np.ndarray, list[list[int]], dict[int, tuple[str, float]]]:
+        """All values at u, where each experiment's quantities are among them, and by place the parameter that is there:
+        the one that carries its value, and the factor to it."""
+        _, slots, slot_of = self._slots()
+        return self.core.physical(u), slots, {slot: self.parameters.roots[name] for name, slot in slot_of.items()}
+
     def check_start(self) -> None:
         """Refuse starting values that make a stiffness, mass or length negative.
 
         Raises:
             SceneError: names the quantities.
         """
-        theta = self.core.physical(self.parameters.initial())
-        for e, mine in zip(self.experiments, self._slots()[1], strict=True):
+        theta, slots, _ = self.known(self.parameters.initial())
+        for e, mine in zip(self.experiments, slots, strict=True):
             e.scene.compiled.domain.check_quantities(theta[None, mine])
             e.scene.compiled.inputs(theta[mine])
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from .optional import require
-from .result import Estimate, FitResult, Given, RecordingFit
+from .result import Estimate, FitResult, Given, Premise, RecordingFit
 from .tables import Section, plain_section, rich_section
 from .wording import figures, short
 
@@ -18,6 +19,12 @@ CORRELATION_SHOWN = 0.3
 CORRELATIONS_SHOWN = 15
 """Number of correlations that the report lists at most; fit.json has them all."""
 
+PREMISES_SHOWN = 8
+"""Number of given values that the report lists at most, those with the strongest effects; fit.json has them all."""
+PREMISE_COLUMNS = 4
+"""Number of parameters above which a given value is listed with the one that it moves most."""
+_FELT = 0.02  # of a half-width: given values that move every parameter by less are not listed
+
 _SAME_MINIMUM = 0.01  # starts that end within 1 % of the best cost found the same minimum
 
 
@@ -27,6 +34,7 @@ def sections(result: FitResult) -> list[Section]:
         _parameters(result),
         _interval_parts(result),
         _refits(result),
+        _premises(result),
         _recordings(result),
         _held_out_motion(result),
         _unknown(result),
@@ -240,3 +248,60 @@ def _course(result: FitResult) -> Section:
         words = f"{same} of {len(result.starts)} ended within 1 % of the best cost; the worst at {worst:.4g}"
         notes.append(("starts", words))
     return Section("Course", notes=tuple(notes))
+
+
+def _premises(result: FitResult) -> Section:
+    """What the fit took as given: how far an error of each moves the parameters, the strongest first."""
+    closed = [e for e in result.estimates if e.half_width]
+
+    def strength(premise: Premise, e: Estimate) -> float:
+        return abs(premise.moved.get(e.name, 0.0)) / (e.half_width or 1.0)
+
+    every = [p for p in result.premises if any(strength(p, e) > _FELT for e in closed)]
+    every.sort(key=lambda p: -max(strength(p, e) for e in closed))
+    wide = len(closed) > PREMISE_COLUMNS
+    rows = []
+    for p in every[:PREMISES_SHOWN]:
+        value = "" if p.value is None else f"{short(p.value, 4)} {p.unit}".rstrip()
+        shown = [max(closed, key=lambda e: strength(p, e))] if wide else closed
+        moved = [f"{e.name} {_moved(p, e)}" if wide else _moved(p, e) for e in shown]
+        times = [f"{short(strength(p, shown[0]), 2)}"] if wide else []
+        counted = "" if p.sd is None else f"{short(p.sd, 2)} {p.unit}".rstrip()
+        rows.append((p.name, value, p.words, *moved, *times, *([counted] if any(q.sd for q in every) else [])))
+    columns = ("moves most", "half-widths") if wide else tuple(e.name for e in closed)
+    headers = ("given", "value", "if off by", *columns, *(["sd counted"] if any(q.sd for q in every) else []))
+    return Section("What the result rests on", headers, tuple(rows), _rests_on(every, closed, strength) if rows else ())
+
+
+def _moved(premise: Premise, e: Estimate) -> str:
+    moved = premise.moved.get(e.name)
+    if moved is None:
+        return ""
+    if abs(moved) < 1e-3 * (e.half_width or 0.0):
+        return "0"
+    sign = "" if premise.name == "markers" else "+"
+    if e.half_width is not None and abs(e.value) > e.half_width:
+        return f"{100 * moved / abs(e.value):{sign}.2g} %"
+    return f"{moved:{sign}.2g} {e.unit}".rstrip()
+
+
+def _rests_on(
+    premises: Sequence[Premise], closed: Sequence[Estimate], strength: Callable[[Premise, Estimate], float]
+) -> tuple[tuple[str, str], ...]:
+    """What the reader is to make of the table."""
+    notes = []
+    left = len(premises) - PREMISES_SHOWN
+    if left > 0:
+        notes.append(("not listed", f"{left} given values with weaker effects"))
+    exact = [p for p in premises if p.sd is None]
+    if exact:
+        strongest = max(closed, key=lambda e: strength(exact[0], e))
+        times = strength(exact[0], strongest)
+        words = "The intervals take these values as exact"
+        if len(exact) < len(premises):
+            words = "The intervals take the values without a standard deviation as exact"
+        if times > 1:
+            far = f"an error of {exact[0].words} in {exact[0].name} would move {strongest.name}"
+            words += f", but {far} by {short(times, 2)} half-widths"
+        notes.append(("", f"{words}. Standard deviations (given = ...) make them count"))
+    return tuple(notes)

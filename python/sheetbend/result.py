@@ -65,6 +65,28 @@ class Given:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Premise:
+    """A number that the fit took as given, and what an error in it moves.
+
+    Attributes:
+        name: of a quantity, or such as "gravity toward x", "clamps along z", "markers".
+        value: in `unit`; None for what is a place or a direction.
+        off_by: the error, in `unit`, whose effect is told; `words` says it, such as "1 %".
+        moved: of each fitted parameter that is determined, in its unit, by that error (of several independent errors
+            the root of the sum of squares).
+        sd: its standard deviation in `unit`, which then counts in the intervals; None where none was given.
+    """
+
+    name: str
+    value: float | None
+    unit: str
+    off_by: float
+    words: str
+    moved: Mapping[str, float]
+    sd: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
 class Correlation:
     """Correlation of two estimates in internal coordinates."""
 
@@ -147,6 +169,7 @@ class FitResult:
         starts: the ends of all starts, best first.
         refits: on finer discretizations, of which `Estimate.discretization` is made.
         optimizer, iterations, seconds, converged, interrupted, message: how it went.
+        premises: numbers that the fit took as given, and what an error in each moves.
         warnings: what a reader must know before using the numbers.
     """
 
@@ -171,6 +194,7 @@ class FitResult:
     warnings: tuple[str, ...] = ()
     first_cost: float | None = None
     jacobian_seconds: float | None = None
+    premises: tuple[Premise, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of that name; KeyError names the ones there are."""
@@ -219,9 +243,9 @@ class FitResult:
         found = data.get("format") if isinstance(data, Mapping) else data
         if found != FORMAT:
             raise InputError("format", "is not the one that this version reads", found, f"use {FORMAT!r}")
-        data = {"refits": [], **data}  # which files of earlier versions do not have
+        data = {"refits": [], "premises": [], **data}  # which files of earlier versions do not have
         plain = {field.name for field in fields(cls)} & data.keys() - {"baseline"}
-        nested = {"given": Given, "correlations": Correlation, "starts": Start, "refits": Refit}
+        nested = {"given": Given, "correlations": Correlation, "starts": Start, "refits": Refit, "premises": Premise}
         values = {name: data[name] for name in plain}
         for name, kind in nested.items():
             values[name] = tuple(kind(**part) for part in data[name])

@@ -70,7 +70,7 @@ def _table(section: Section) -> list[str]:
 
 
 def _flush_left(section: Section) -> list[bool]:
-    words = {"parameter", "with", "recording", "unit", "verdict", "step", "stays", "rope"}
+    words = {"parameter", "with", "recording", "unit", "verdict", "step", "stays", "rope", "given"}
     return [header in words for header in section.headers]
 
 

@@ -56,6 +56,7 @@ class Study:
             "windows": fit.windows,
             "tolerance": fit.tolerance,
             "refine": refine,
+            "given": {name: section.sd for name, section in self.config.given.items()},
             "profiles": fit.profiles,
             "leave_one_out": fit.leave_one_out,
             "max_iterations": fit.max_iterations,

@@ -168,6 +168,18 @@ class ParameterSection(Section):
     scale: Finite | None = key(None, "natural size of what may be zero", gt=0)
 
 
+class GivenSection(Section):
+    """How uncertain a number is that the fit takes as given. One table each: [given.NAME], NAME being a quantity that
+    is not fitted, "gravity" or "clamp_direction" (directions, rad), "clamps" or "markers" (places, m)."""
+
+    sd: Finite = key(
+        ...,
+        "standard deviation, which then counts in the intervals: relative for what must be positive (0.02 is 2 %), "
+        "else in the quantity's unit",
+        gt=0,
+    )
+
+
 class FitSection(Section):
     """[fit]: how the fit runs."""
 
@@ -216,6 +228,7 @@ class Config(Section):
     marker: list[Marker] = key([], "places of markers, shared by the recordings")
     recording: list[RecordingSection] = key([], "the recordings")
     parameters: dict[str, ParameterSection] = key({}, "what is fitted")
+    given: dict[str, GivenSection] = key({}, "how uncertain the numbers are that the fit takes as given")
     fit: FitSection = key(FitSection(), "how the fit runs")
     output: OutputSection = key(OutputSection(), "what is written")
     published: dict[str, Finite | Window] = key(
