@@ -252,7 +252,8 @@ def _course(result: FitResult) -> Section:
 
 def _premises(result: FitResult) -> Section:
     """What the fit took as given: how far an error of each moves the parameters, the strongest first."""
-    closed = [e for e in result.estimates if e.half_width]
+    every_one = [e for e in result.estimates if e.half_width]
+    closed = [e for e in every_one if not e.name.endswith("]")] or every_one  # those of one recording: see fit.json
 
     def strength(premise: Premise, e: Estimate) -> float:
         return abs(premise.moved.get(e.name, 0.0)) / (e.half_width or 1.0)

@@ -234,7 +234,7 @@ class TestCheck:
     def test_a_wrong_gradient_exits_5(self, config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         from sheetbend.cli import check
 
-        def wrong(scene: sb.Scene, *_: object) -> GradientReport:
+        def wrong(scene: sb.Scene, *_: object, **__: object) -> GradientReport:
             return GradientReport(scene.name, 1, (GradientRow("rope_EI", 1, 1.0, 1e-3, 1e-3, False),), 0.0)
 
         monkeypatch.setattr(check, "check_gradients", wrong)

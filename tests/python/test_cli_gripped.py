@@ -248,9 +248,16 @@ class TestOtherCommands:
         (doubt,) = last_line(run("info", config, "--json"))["config"]["ropes"]["rope_1"]["doubts"]
         assert "check `gravity`" in doubt and "is doubtful: the rope sags" in run("info", config).stdout
 
-    @pytest.mark.parametrize("command", ["simulate", "check"])
-    def test_commands_for_scenes_say_that_there_is_none(self, config: Path, command: str) -> None:
-        error = last_line(run(command, config, "--json"))["error"]
+    def test_check_takes_the_model_with_all_its_rungs(self, config: Path) -> None:
+        edited(config, ('["twist", "tilts"]', '["twist", "tilts", "rest", "yield", "varying"]'))
+        found = last_line(run("check", config, "--json"))
+        assert found["passed"] and found["exit_code"] == 0
+        rows, columns = found["gradients"]["rope_1"]["gradients"], found["jacobians"]["rope_1"]["parameters"]
+        wanted = {"rope_EI", "rope_GJ", "rope_end_tilt_2", "rope_curvature_1_3", "rope_yield_share", "rope_softness_2"}
+        assert wanted <= set(rows) and wanted <= set(columns)
+
+    def test_simulate_says_that_there_is_no_scene(self, config: Path) -> None:
+        error = last_line(run("simulate", config, "--json"))["error"]
         assert error["field"] == "gripped_rope" and "sheetbend fit" in error["fix"]
 
     def test_resume_is_for_scenes(self, config: Path) -> None:

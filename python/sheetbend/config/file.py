@@ -34,7 +34,7 @@ def parse(path: str | Path) -> Config:
     """
     config = parse_any(path)
     if isinstance(config, GrippedConfig):
-        fix = "use `sheetbend fit` or `sheetbend info`"
+        fix = "use `sheetbend fit`, `sheetbend check` or `sheetbend info`"
         raise ConfigError("gripped_rope", "takes the place of a scene: here is none to build", str(path), fix)
     return config
 

@@ -31,6 +31,7 @@ from .model import GRAVITY, NAME, RopeModel, nominal_directions, shared_gravity
 from .motion import Array, GrippedMotion, motions_of
 from .offsets import offset_reach
 from .plausible import doubts
+from .start import started
 
 BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first
 LINKS_PER_BENDING_LENGTH = 3.0  # below this EI reads too high and GJ too low
@@ -224,10 +225,7 @@ class _Search:
         """The best of several stiffnesses on short windows, then on longer ones."""
         ends = []
         for length in bending_lengths:
-            EI = model.density * 9.81 * length**3
-            start = {"EI": EI, "GJ": 0.7 * EI, "bend_damping": 0.03, "twist_damping": 0.03, "drag_linear": 0.02}
-            start["length"] = float(np.mean([m.length for m in self.all]))
-            candidate = model.with_values(**start)
+            candidate = started(model, self.all, length)
             values = self._minimum(candidate, rung.parameters, {}, self.windows[0], SHORT)
             cost = self._cost(candidate, values, self.middle)
             self.say(f"start at a bending length of {length:g} m: EI {values[f'{NAME}_EI']:.3g}, cost {cost:.4g}")
