@@ -260,18 +260,28 @@ def _premises(result: FitResult) -> Section:
 
     every = [p for p in result.premises if any(strength(p, e) > _FELT for e in closed)]
     every.sort(key=lambda p: -max(strength(p, e) for e in closed))
-    wide = len(closed) > PREMISE_COLUMNS
-    rows = []
+    counted = any(p.sd for p in every)
+    listed = []
     for p in every[:PREMISES_SHOWN]:
         value = "" if p.value is None else f"{short(p.value, 4)} {p.unit}".rstrip()
-        shown = [max(closed, key=lambda e: strength(p, e))] if wide else closed
-        moved = [f"{e.name} {_moved(p, e)}" if wide else _moved(p, e) for e in shown]
-        times = [f"{short(strength(p, shown[0]), 2)}"] if wide else []
-        counted = "" if p.sd is None else f"{short(p.sd, 2)} {p.unit}".rstrip()
-        rows.append((p.name, value, p.words, *moved, *times, *([counted] if any(q.sd for q in every) else [])))
-    columns = ("moves most", "half-widths") if wide else tuple(e.name for e in closed)
-    headers = ("given", "value", "if off by", *columns, *(["sd counted"] if any(q.sd for q in every) else []))
+        sd = "" if p.sd is None else f"{short(p.sd, 2)} {p.unit}".rstrip()
+        listed.append(((p.name, value, p.words), p, (sd,) if counted else ()))
+    ends = ("sd counted",) if counted else ()
+    headers = ("given", "value", "if off by", *(e.name for e in closed), *ends)
+    rows = [(*before, *(_moved(p, e) for e in closed), *after) for before, p, after in listed]
+    if len(closed) > PREMISE_COLUMNS or _wide((headers, *rows)):
+        most = [max(closed, key=lambda e, p=p: strength(p, e)) for _, p, _ in listed]  # type: ignore[misc]
+        headers = ("given", "value", "if off by", "moves most", "half-widths", *ends)
+        rows = [
+            (*before, f"{e.name} {_moved(p, e)}", short(strength(p, e), 2), *after)
+            for (before, p, after), e in zip(listed, most, strict=True)
+        ]
     return Section("What the result rests on", headers, tuple(rows), _rests_on(every, closed, strength) if rows else ())
+
+
+def _wide(lines: Sequence[tuple[str, ...]]) -> bool:
+    """Whether a table does not fit a report."""
+    return sum(2 + max(map(len, column)) for column in zip(*lines, strict=True)) > 100
 
 
 def _moved(premise: Premise, e: Estimate) -> str:

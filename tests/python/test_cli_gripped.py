@@ -157,17 +157,20 @@ class TestFit:
         assert run("fit", config).exit_code == 0
         assert sorted(smoothed) == ["00", "00", "01", "02"]
 
-    def test_the_nominal_directions_are_the_fits(self, config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        edited(config, ('"rope_1/eval"', '"rope_1/eval"\nnominal = [[2, 0, -2], [1, 0, 1]]'))
+    def test_nominal_directions_and_the_density_s_deviation_are_the_fits(
+        self, config: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        more = '"rope_1/eval"\nnominal = [[2, 0, -2], [1, 0, 1]]\ndensity_sd = 0.02'
+        edited(config, ('"rope_1/eval"', more))
         given = []
 
         def noted(*arguments: Any, **options: Any) -> Any:
-            given.append(options["nominal"])
+            given.append((options["nominal"], options["given"]))
             raise KeyboardInterrupt
 
         monkeypatch.setattr(gripped, "fit_rope", noted)
         run("fit", config, "--json")
-        assert given == [([2, 0, -2], [1, 0, 1])]
+        assert given == [(([2, 0, -2], [1, 0, 1]), {"rope_density": 0.02})]
 
     def test_without_eval_there_is_nothing_to_score(self, config: Path) -> None:
         edited(config, ('eval = "rope_1/eval"\n', ""), ('["twist", "tilts"]', '["twist"]'))

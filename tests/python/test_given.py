@@ -141,6 +141,19 @@ def test_a_density_that_is_off_is_named_and_counts(recording: sb.Recording) -> N
     assert honest.systematic == pytest.approx(1.96 * 0.1 * estimate.value, rel=1e-3)
 
 
+def test_the_report_stays_narrow(recording: sb.Recording, plain: sb.Fit) -> None:
+    """Columns by parameter where they fit, else what moves most; shared parameters before those of one recording."""
+    lines = plain.report().splitlines()
+    assert max(map(len, lines)) <= 100
+    start = lines.index("What the result rests on")
+    assert lines[start + 2].split() == ["given", "value", "if", "off", "by", *FITTED]
+    more = {"rope_length": None, "rope_density": {"prior": (0.05, 0.01)}}
+    found = sb.fit(experiment(hanging(), recording), parameters=dict.fromkeys(FITTED) | more, profiles=False)
+    lines = found.report().splitlines()
+    assert max(map(len, lines)) <= 100
+    assert lines[lines.index("What the result rests on") + 2].split()[-3:] == ["moves", "most", "half-widths"]
+
+
 def test_gravity_that_is_off_is_named_and_counts(recording: sb.Recording) -> None:
     off = (9.81 * math.sin(DEGREE), 0, -9.81 * math.cos(DEGREE))
     found = fit(hanging(gravity=off), recording)

@@ -15,6 +15,7 @@ from ..config import GrippedConfig, GrippedRopeSection
 from ..errors import ConfigError, RecordingError, SceneError, SheetbendError
 from ..gripped import WITHOUT_TWIST, GrippedMotion, RopeFit, RopeReport, Rung, evaluate, fit_rope
 from ..gripped.ladder import REST, TILTS, TWIST, VARYING, YIELD
+from ..gripped.model import NAME
 from ..gripped.motion import motions_of
 from ..gripped.report import overview
 from ..io.folder import recordings
@@ -133,6 +134,7 @@ def _fit(console: Console, config: GrippedConfig, rope: RopeData, ladder: Sequen
         smoothing=s.smoothing,
         sigma=s.sigma,
         gravity=(s.gravity[0], s.gravity[1], s.gravity[2]),
+        given=None if s.density_sd is None else {f"{NAME}_density": s.density_sd},
         threads=config.fit.threads,
         say=lambda text: console.print(f"  {time.perf_counter() - began:6.1f} s  {text}", markup=False, soft_wrap=True),
     )

@@ -46,6 +46,9 @@ class GrippedRopeSection(Section):
 
     name: Name = key(..., "names the rope in results, and their folder")
     density: Finite = key(..., "mass per length, weighed: motion tells stiffness over density only", "kg/m", gt=0)
+    density_sd: Finite | None = key(
+        None, "relative standard deviation of the density, which then counts in the intervals (0.02 is 2 %)", gt=0
+    )
     train: str = key(..., "folder of the recordings to fit, relative to the configuration")
     eval: str | None = key(None, "folder of recordings that are only predicted, from their first frame")
     pattern: str = key("*", 'which files of these folders, such as "*.pkl"', min_length=1)

@@ -115,6 +115,7 @@ def fit_rope(
     smoothing: float = 0.08,
     sigma: float = 5e-3,
     gravity: tuple[float, float, float] = GRAVITY,
+    given: Mapping[str, float] | None = None,
     threads: int = 1,
     say: Say = lambda text: None,
 ) -> RopeFit:
@@ -135,6 +136,7 @@ def fit_rope(
         smoothing: s, of the recorded grips and starts.
         sigma: m, expected error of a marker.
         gravity: m/s^2, where the recordings do not tell.
+        given: standard deviations of what the fit takes as given, such as {"rope_density": 0.02}; see `sheetbend.fit`.
         threads: the result does not depend on it.
         say: called with a line on each step.
 
@@ -168,7 +170,7 @@ def fit_rope(
         sigma=sigma,
         gravity=gravity,
     )
-    search = _Search(motions, validate, windows, threads, say)
+    search = _Search(motions, validate, windows, given or {}, threads, say)
     found = search.run(model, ladder, bending_lengths, max_segments)
     return replace(found, warnings=(*doubtful, *found.warnings))
 
@@ -179,6 +181,7 @@ class _Search:
         motions: Sequence[GrippedMotion],
         validate: float,
         windows: Sequence[tuple[float, float]],
+        given: Mapping[str, float],
         threads: int,
         say: Say,
     ) -> None:
@@ -187,7 +190,7 @@ class _Search:
         self.all = list(motions)
         self.fitted = [m for i, m in enumerate(motions) if i not in others]
         self.others = [m for i, m in enumerate(motions) if i in others]
-        self.windows, self.threads, self.say = windows, threads, say
+        self.windows, self.given, self.threads, self.say = windows, given, threads, say
         self.middle, self.longest = windows[min(1, len(windows) - 1)], windows[-1]
 
     def run(
@@ -324,6 +327,7 @@ class _Search:
             parameters=_starting(parameters, values),
             refine=None if interrupted else refine,
             systematic=offset_reach,
+            given=self.given,
             threads=self.threads,
             profiles=False,
             max_iterations=1 if interrupted else LONG,
