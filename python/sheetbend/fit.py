@@ -156,7 +156,7 @@ def fit(
             if refine is None or refitter is None
             else refined_estimates(refine, experiments, wanted, problem, best.u, refitter, threads)
         )
-        rests_on = () if refitter is None else premises(problem, best.u, given or {})
+        rests_on, unknown = ((), ()) if refitter is None else premises(problem, best.u, given or {})
         more = dict(half_widths(rests_on, problem.parameters.free))
         for parameter, reach in ({} if systematic is None else systematic(problem, best.u)).items():
             more[parameter] = more.get(parameter, 0.0) + reach
@@ -164,7 +164,7 @@ def fit(
         judged = _judge(problem, best.u, refined, more, refitter if profiles else None)
         found = predicted_values(experiments, wanted, values, refitter, threads)
         doubted = () if refitter is None else doubts(problem, best.u, judged)
-        return _Conclusion(refits, judged, *found, doubted, rests_on)
+        return _Conclusion(refits, judged, *found, doubted + unknown, rests_on)
 
     left_out: dict[str, Comparison] = {}
     try:

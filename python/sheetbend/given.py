@@ -17,7 +17,7 @@ import numpy as np
 
 from . import _core
 from .checks import is_number
-from .errors import InputError
+from .errors import InputError, SheetbendError
 from .experiment import Experiment
 from .gauge import RANK_TOLERANCE
 from .markers import Place
@@ -76,8 +76,9 @@ def check_given(given: Mapping[str, float], problem: FitProblem) -> None:
             raise InputError(f"given.{name}", "must be positive", sd, fix)
 
 
-def premises(problem: FitProblem, u: Array, given: Mapping[str, float]) -> tuple[Premise, ...]:
-    """What the told numbers would move in the fitted parameters, those without any effect left out.
+def premises(problem: FitProblem, u: Array, given: Mapping[str, float]) -> tuple[tuple[Premise, ...], tuple[str, ...]]:
+    """What the told numbers would move in the fitted parameters, those without any effect left out; and a warning where
+    that cannot be measured, which costs no fit.
 
     Args:
         u: (free,) the minimum in internal coordinates.
@@ -85,20 +86,25 @@ def premises(problem: FitProblem, u: Array, given: Mapping[str, float]) -> tuple
             their unit; "gravity" (each of two directions) and "clamp_direction" in rad, "clamps" (each axis) and
             "markers" (each marker) in m.
     """
-    ok, _, J = problem.evaluate_exactly(u)
-    if not ok:
-        return ()
     told: dict[str, _Told] = {}
-    rows, corrections = problem.core.first_rows, problem.corrections(u)
-    for i, (e, r) in enumerate(zip(problem.experiments, problem.recordings, strict=True)):
-        _collect(told, problem, u, i, J[rows[i] : rows[i + 1]], e, r, corrections.get(e.name))
+    try:
+        ok, _, J = problem.evaluate_exactly(u)
+        if not ok:
+            raise SheetbendError(problem.core.failure)
+        rows, corrections = problem.core.first_rows, problem.corrections(u)
+        for i, (e, r) in enumerate(zip(problem.experiments, problem.recordings, strict=True)):
+            _collect(told, problem, u, i, J[rows[i] : rows[i + 1]], e, r, corrections.get(e.name))
+    except (SheetbendError, _core.NoEquilibrium) as error:
+        uncounted = ", and their standard deviations do not count" if given else ""
+        return (), (f"what errors of the given values would move is not known{uncounted}: {error}",)
     solve = _Response(problem, u, J)
-    return tuple(
+    found = tuple(
         premise
         for name, one in told.items()
         for premise in _premises(name, one, solve, given)
         if any(abs(moved) > NOTHING_FELT * abs(solve.size[parameter]) for parameter, moved in premise.moved.items())
     )
+    return found, ()
 
 
 def half_widths(found: tuple[Premise, ...], names: tuple[str, ...]) -> dict[str, float]:
@@ -217,7 +223,7 @@ def _collect(
         )
         ok, _, columns = core.evaluate(np.array(at))
         if not ok:
-            raise InputError(e.name, "has no derivatives at the minimum", core.failure, "fit a shorter part of it")
+            raise SheetbendError(core.failure)
         for (_, label, weight, one), column in zip(entries, columns.T, strict=True):
             one.add(label, J.T @ (weight * column))
     by_gravity = dict(zip(gravity, columns.T[len(columns.T) - len(names) :], strict=True))

@@ -213,6 +213,17 @@ def test_what_is_not_told_is_refused(recording: sb.Recording) -> None:
             fit(hanging(), recording, given=given)
 
 
+def test_what_cannot_be_measured_costs_no_fit(recording: sb.Recording, monkeypatch: pytest.MonkeyPatch) -> None:
+    def lost(*_: object) -> None:
+        raise sb.DivergenceError(3, 0.1, 2, "rope")
+
+    monkeypatch.setattr("sheetbend.given._collect", lost)
+    found = fit(hanging(), recording, given={"rope_density": 0.1})
+    assert found.result.converged
+    assert found.result.premises == ()
+    assert any("do not count: the rollout diverged" in warning for warning in found.result.warnings)
+
+
 def test_it_is_kept_in_the_file_and_older_files_load(plain: sb.Fit, tmp_path) -> None:
     plain.save(tmp_path / "fit.json")
     assert FitResult.load(tmp_path / "fit.json").premises == plain.result.premises
