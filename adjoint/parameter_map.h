@@ -65,7 +65,8 @@ struct ParameterMap {
     for (std::size_t i = 0; i < base.size(); ++i) inputs[i] = T(base[i]);
     for (std::size_t t = 0; t < target.size(); ++t) {
       T product(coefficient[t]);
-      for (int k = first_factor[t]; k < first_factor[t + 1]; ++k) product *= evaluate(function[k], theta[parameter[k]], weight[k]);
+      for (int k = first_factor[t]; k < first_factor[t + 1]; ++k)
+        product *= evaluate(function[k], theta[parameter[k]], weight[k]);
       inputs[target[t]] += product;
     }
   }
