@@ -69,7 +69,7 @@ CorrectedMotion::CorrectedMotion(const Experiment& e, const double* theta, const
   double* r = residuals_.data();
   for (std::size_t f = 0; f < e.observed.times.size(); ++f) {
     first_row_.push_back(r - residuals_.data());
-    const FramePlace<double> place(e, f, inputs_.back(), last_);
+    const FramePlace<double> place(e, e.plan, f, inputs_.back(), last_);
     place.interpolate(dofs, [&](int k) { return &states_[(place.base - 1 + k) * dofs]; }, x.data());
     r = frame_residuals(e.observed, f, x.data(), offsets, r, static_cast<double*>(nullptr));
   }
@@ -81,7 +81,7 @@ std::vector<double> CorrectedMotion::gradient(Interrupt* interrupt) {
   const std::size_t dofs = scene.dofs();
   std::vector<double> x_bar(states_.size()), x(dofs), frame_bar(dofs), inputs_bar(scene.layout.total());
   for (std::size_t f = 0; f < e_.observed.times.size(); ++f) {
-    const FramePlace<double> place(e_, f, inputs_.back(), last_);
+    const FramePlace<double> place(e_, e_.plan, f, inputs_.back(), last_);
     const std::size_t first = (place.base - 1) * dofs;
     place.interpolate(dofs, [&](int k) { return &states_[first + k * dofs]; }, x.data());
     std::fill(frame_bar.begin(), frame_bar.end(), 0.0);
@@ -148,7 +148,9 @@ std::vector<CorrectedMotion::Stretch> CorrectedMotion::stretches() const {
         if (next < count && until[i] > s.end) s.onward.push_back(i);
     const auto frame_from = [&](int step) {
       std::size_t f = 0;
-      while (f < e_.observed.times.size() && FramePlace<double>(e_, f, inputs_.back(), last_).base - 1 < step) ++f;
+      while (f < e_.observed.times.size() &&
+             FramePlace<double>(e_, e_.plan, f, inputs_.back(), last_).base - 1 < step)
+        ++f;
       return f;
     };
     s.frames[0] = frame_from(s.begin);
@@ -231,7 +233,7 @@ void CorrectedMotion::march(const Stretch& s, const Unit& unit, const MatrixXd& 
   const std::vector<Eight> offsets(inputs_.begin() + static_cast<std::ptrdiff_t>(scene.layout.total()), inputs_.end());
   std::vector<Eight> ring(4 * dofs), x(dofs), r(3 * e_.observed.markers.size());
   std::size_t next = s.frames[0];
-  const auto place_of = [&] { return FramePlace<Eight>(e_, next, Eight(inputs_.back()), last_); };
+  const auto place_of = [&] { return FramePlace<Eight>(e_, e_.plan, next, Eight(inputs_.back()), last_); };
   while (next < s.frames[1] && place_of().base - 1 < from) ++next;
   const auto keep = [&](int step) {
     std::copy_n(rollout.x(), dofs, &ring[(step % 4) * dofs]);

@@ -7,7 +7,7 @@ namespace sheetbend {
 EquilibriumDerivative::EquilibriumDerivative(const Scene& scene, const double* inputs, const Equilibrium& at)
     : scene_(scene), inputs_(inputs, inputs + scene.layout.total()), at_(at), kkt_(scene) {
   if (!at.converged) throw NoEquilibrium(at.message);
-  kkt_.assemble(inputs, at_.x.data(), at_.lambda.data(), at_.force_stiffness);
+  kkt_.assemble(inputs, at_.x.data(), at_.lambda.data(), at_.force_stiffness, at_.left_out);
   if (!kkt_.factorize(0.0, compliances(scene, {scene.layout, inputs_.data()}).data()))
     throw NoEquilibrium(
         "equilibrium: the Newton matrix is singular, so the shape has no derivative (a fold, or a part that moves "
@@ -32,6 +32,7 @@ void EquilibriumDerivative::vjp(const double* x_bar, const double* lambda_bar, d
     fixed = u;
   }
   if (lambda_bar) v.assign(lambda_bar, lambda_bar + scene_.multipliers());
+  for (const RedundantRow& r : at_.left_out) v[r.row] = 0.0;
   solve(u, v);
 
   for_each_constraint(scene_, [&]<class K>(K, const Group& group, int item) {

@@ -51,6 +51,7 @@ class EquilibriumDerivative {
     for (int k = 0; k < Tangents<T>::count; ++k) {
       for (std::size_t i = 0; i < r_x.size(); ++i) x_dot[i] = -Tangents<T>::part(r_x[i], k);
       for (std::size_t i = 0; i < r_l.size(); ++i) lambda_dot[i] = -Tangents<T>::part(r_l[i], k);
+      for (const RedundantRow& r : at_.left_out) lambda_dot[r.row] = 0.0;
       solve(x_dot, lambda_dot);
       for (std::size_t i = 0; i < r_x.size(); ++i) Tangents<T>::part(at_x[i], k) += x_dot[i];
       for (std::size_t i = 0; i < r_l.size(); ++i) Tangents<T>::part(at_lambda[i], k) = lambda_dot[i];

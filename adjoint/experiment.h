@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -26,12 +27,25 @@ struct Observations {
   double loss_scale = 1.0;  // in units of sigma
 };
 
+// A further rollout of the same motion at a shorter substep, for extrapolation in time, and the weight of its markers.
+struct FinerRun {
+  Plan plan;
+  double weight;
+};
+
+// Parameters that make no sense, such as those that make a mass negative.
+struct OutOfDomain : std::domain_error {
+  using std::domain_error::domain_error;
+};
+
 // The inputs of an experiment are the scene's, then an offset (3) per marker [m], then the recording's time offset [s].
 struct Experiment {
   std::string name;
   std::shared_ptr<const Scene> scene;
   Plan plan;
+  std::vector<FinerRun> finer;  // predicted markers are their weighted sum; those of `plan` weigh the rest up to 1
   ParameterMap map;
+  std::vector<double> least, most;  // of the scene's inputs
   Observations observed;
   BoundaryCorrection correction;
   bool is_static = false;  // the recording shows an equilibrium
@@ -42,21 +56,33 @@ struct Experiment {
 
   std::size_t inputs() const { return scene->layout.total() + 3 * observed.markers.size() + 1; }
   std::size_t residual_count() const;  // one per axis of every marker and frame that was seen
-  int steps() const;                   // substeps until the last frame
+  int steps() const { return steps(plan); }
+  int steps(const Plan& run) const;  // substeps until the last frame
   void check() const;
+  [[noreturn]] void refuse(std::size_t input, double value) const;
 
-  // The scene's inputs at parameters theta and a correction b (correction.count()), then the observation's.
+  // The scene's inputs at parameters theta and a correction b (correction.count()), then the observation's. Throws OutOfDomain.
   template <class T>
   std::vector<T> inputs_at(const T* theta, const T* b) const {
     std::vector<T> in(inputs());
     map.apply(theta, in.data());
+    for (std::size_t i = 0; i < least.size(); ++i)
+      if (!(value_of(in[i]) >= least[i] && value_of(in[i]) <= most[i])) refuse(i, value_of(in[i]));
     correction.apply(b, in.data());
     return in;
   }
 
-  // Fills, when not null, residuals (residual_count) and simulated markers (frames, markers, 3). Throws Diverged, Unconverged or NoEquilibrium.
+  // Fills, when not null, residuals (residual_count) and simulated markers (frames, markers, 3). Throws Diverged, Unconverged, NoEquilibrium or OutOfDomain.
   template <class T>
   void residuals(const T* theta, const T* b, T* r, T* simulated, Interrupt* interrupt) const;
+
+ private:
+  // Calls frame(number, coordinates at its time) for every frame of a rollout with that plan; `in` as `inputs_at`.
+  template <class T, class Frame>
+  void run(const Plan& own, const T* in, Frame&& frame, Interrupt* interrupt) const;
+  // Predicted markers (frames, markers, 3) of all runs together.
+  template <class T>
+  std::vector<T> extrapolated(const T* in, Interrupt* interrupt) const;
 };
 
 }  // namespace sheetbend

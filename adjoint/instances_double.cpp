@@ -7,7 +7,7 @@ template void rollout_states<double>(const Scene&, const Plan&, const double*, d
                                      Interrupt*);
 template Tape<double> record_rollout<double>(const Scene&, const Plan&, const double*, double, const std::vector<int>&,
                                              double*, int, Interrupt*);
-template void reverse_rollout<double>(const Scene&, const Plan&, const double*, double, Tape<double>&,
+template long reverse_rollout<double>(const Scene&, const Plan&, const double*, double, Tape<double>&,
                                       const std::vector<int>&, const double*, double*, Interrupt*);
 
 }  // namespace sheetbend

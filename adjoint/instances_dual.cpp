@@ -6,7 +6,7 @@ namespace sheetbend {
 template Tape<Dual<double, 1>> record_rollout<Dual<double, 1>>(const Scene&, const Plan&, const Dual<double, 1>*,
                                                                double, const std::vector<int>&, Dual<double, 1>*, int,
                                                                Interrupt*);
-template void reverse_rollout<Dual<double, 1>>(const Scene&, const Plan&, const Dual<double, 1>*, double,
+template long reverse_rollout<Dual<double, 1>>(const Scene&, const Plan&, const Dual<double, 1>*, double,
                                                Tape<Dual<double, 1>>&, const std::vector<int>&, const Dual<double, 1>*,
                                                Dual<double, 1>*, Interrupt*);
 

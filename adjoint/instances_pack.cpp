@@ -7,7 +7,7 @@ template void rollout_states<Pack>(const Scene&, const Plan&, const Pack*, doubl
                                    Interrupt*);
 template Tape<Pack> record_rollout<Pack>(const Scene&, const Plan&, const Pack*, double, const std::vector<int>&, Pack*,
                                          int, Interrupt*);
-template void reverse_rollout<Pack>(const Scene&, const Plan&, const Pack*, double, Tape<Pack>&,
+template long reverse_rollout<Pack>(const Scene&, const Plan&, const Pack*, double, Tape<Pack>&,
                                     const std::vector<int>&, const Pack*, Pack*, Interrupt*);
 
 }  // namespace sheetbend

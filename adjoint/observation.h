@@ -53,8 +53,8 @@ struct FramePlace {
   int base;
   std::array<T, 4> weight;
 
-  FramePlace(const Experiment& e, std::size_t frame, const T& time_offset, int last) {
-    const T place = (T(e.observed.times[frame] - e.t0) + time_offset) * T(1.0 / e.plan.options.h);
+  FramePlace(const Experiment& e, const Plan& run, std::size_t frame, const T& time_offset, int last) {
+    const T place = (T(e.observed.times[frame] - e.t0) + time_offset) * T(1.0 / run.options.h);
     base = std::clamp(static_cast<int>(std::floor(value_of(place) + 1e-9)), 1, last - 2);
     weight = cubic_weights(place - T(base));
   }

@@ -21,10 +21,10 @@ template <class T>
 Tape<T> record_rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0, const std::vector<int>& wanted,
                        T* states, int kept, Interrupt* interrupt);
 
-// Cotangents x_bar of the wanted states to inputs_bar (added). The tape serves for any number of reverses; what was dropped from it is
-// computed again. T: double, Pack, Dual<double, 1>.
+// Cotangents x_bar of the wanted states to inputs_bar (added). The tape serves for any number of reverses, from any number of threads; what was
+// dropped from it is computed again, one reverse after the other. Returns the substeps that were computed again. T: double, Pack, Dual<double, 1>.
 template <class T>
-void reverse_rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0, Tape<T>& tape,
+long reverse_rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0, Tape<T>& tape,
                      const std::vector<int>& wanted, const T* x_bar, T* inputs_bar, Interrupt* interrupt);
 
 }  // namespace sheetbend

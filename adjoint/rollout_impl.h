@@ -40,15 +40,19 @@ Tape<T> record_rollout(const Scene& scene, const Plan& plan, const T* inputs, do
 }
 
 template <class T>
-void reverse_rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0, Tape<T>& tape,
+long reverse_rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0, Tape<T>& tape,
                      const std::vector<int>& wanted, const T* x_bar, T* inputs_bar, Interrupt* interrupt) {
   const std::size_t dofs = scene.dofs();
   std::size_t left = wanted.size();
+  CotangentGrowth<T> growth;
   const auto seed = [&](int step, T* bar) {
-    for (; left > 0 && wanted[left - 1] == step; --left)
-      for (std::size_t i = 0; i < dofs; ++i) bar[i] += x_bar[(left - 1) * dofs + i];
+    for (; left > 0 && wanted[left - 1] == step; --left) {
+      const T* own = x_bar + (left - 1) * dofs;
+      growth.seed(own, dofs);
+      for (std::size_t i = 0; i < dofs; ++i) bar[i] += own[i];
+    }
   };
-  rollout_vjp<T>(scene, plan, inputs, t0, tape, seed, inputs_bar, interrupt);
+  return rollout_vjp<T>(scene, plan, inputs, t0, tape, seed, growth, inputs_bar, interrupt);
 }
 
 }  // namespace sheetbend

@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "adjoint/growth.h"
 #include "adjoint/substep_vjp.h"
 #include "adjoint/tape.h"
 
@@ -88,12 +89,14 @@ void initial_state_vjp(const Scene& scene, double t0, const T* x_bar, const T* v
   }
 }
 
-// Reverses the rollout that `tape` recorded. seed(step, x_bar) adds the loss's cotangent of x at `step` (0 .. steps) to x_bar; inputs_bar (layout.total())
-// receives, added, the gradient by every input. Cost: one forward substep and its reverse per substep, and a forward substep for each
-// that the tape's schedule advances again.
+// Reverses the rollout that `tape` recorded. seed(step, x_bar) adds the loss's cotangent of x at `step` (0 .. steps) to x_bar and shows it to `growth`;
+// inputs_bar (layout.total()) receives, added, the gradient by every input. Returns how many substeps were advanced again. Cost: one forward substep
+// and its reverse per substep, and a forward substep for each that the tape's schedule advances again. Throws Diverged where cotangents grow
+// beyond meaning.
 template <class T, class Seed>
-void rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t0, Tape<T>& tape, Seed&& seed,
-                 T* inputs_bar, Interrupt* interrupt = nullptr) {
+long rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t0, Tape<T>& tape, Seed&& seed,
+                 const CotangentGrowth<T>& growth, T* inputs_bar, Interrupt* interrupt = nullptr) {
+  const auto turn = tape.turn(interrupt);
   const Inputs<const T> in{scene.layout, inputs};
   const Inputs<T> in_bar{scene.layout, inputs_bar};
   std::vector<T> v(scene.dofs()), v_before(plan.options.integrator == Integrator::bdf1 ? 0 : scene.dofs());
@@ -132,10 +135,12 @@ void rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t
     const int n = std::get<Reverse>(*action).step;
     poll(interrupt, n, scene.dofs());
     reverse.step(n, in, t0 + (n + 1) * plan.options.h, state(n), seed, in_bar);
+    if (n % growth.every == 0) growth.look(n, t0 + n * plan.options.h, scene, reverse.x_next_bar.data());
   }
   reverse.finish(in, in_bar);
   initial_state_vjp(scene, t0, reverse.x_next_bar.data(), reverse.v_next_bar.data(), in_bar);
-  tape.count_recomputed(recomputed);
+  if (forward) tape.count_recomputed(recomputed);
+  return recomputed;
 }
 
 }  // namespace sheetbend

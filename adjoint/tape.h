@@ -1,8 +1,13 @@
 // The tape of a rollout: the coordinates at substep boundaries, at all of them or at those that checkpoints.h keeps. Velocities follow from
 // them, and a substep is recomputed before it is reversed, so nothing inside a substep is kept. Implicit blocks are not solved again, but known
 // by where a substep ends: for them the last boundary is kept as well.
+//
+// A reverse writes to a tape that dropped boundaries, so such reverses wait for each other; a whole tape is only read, by any number at a time.
 #pragma once
 
+#include <chrono>
+#include <memory>
+#include <mutex>
 #include <stdexcept>
 #include <vector>
 
@@ -35,6 +40,16 @@ class Tape {
   std::size_t bytes() const { return x_.size() * sizeof(T); }
   long recomputed() const { return recomputed_; }  // substeps that the last reverse advanced again
   void count_recomputed(long substeps) { recomputed_ = substeps; }
+
+  // Held by a reverse for as long as it uses the tape. Waiting can be interrupted. By the system's clock, since the thread sanitizer of gcc 12 does
+  // not see locks that wait by the steady one.
+  std::unique_lock<std::timed_mutex> turn(Interrupt* interrupt) {
+    if (states_ >= steps_) return {};
+    std::unique_lock lock(*mutex_, std::defer_lock);
+    while (!lock.try_lock_until(std::chrono::system_clock::now() + std::chrono::milliseconds(50)))
+      if (interrupt) interrupt->poll();
+    return lock;
+  }
 
   void record(int step, const T* x) {
     if (slot_[step] < 0) {
@@ -84,6 +99,7 @@ class Tape {
   const Plan& plan_;
   int steps_, states_;
   long recomputed_ = 0;
+  std::unique_ptr<std::timed_mutex> mutex_ = std::make_unique<std::timed_mutex>();  // apart, so that tapes can be moved
   std::vector<int> slot_, spare_;  // per boundary where it stands in x_, or -1
   std::vector<T> x_;
 };

@@ -86,7 +86,7 @@ make_environment() {
 fingerprint() {
   (
     cd "$ROOT" || exit
-    find pyproject.toml CMakeLists.txt cmake core adjoint python -type f ! -name '*.pyc' ! -path '*/.*' -print0 |
+    find pyproject.toml CMakeLists.txt LICENSE licenses cmake core adjoint python -type f ! -name '*.pyc' ! -path '*/.*' -print0 |
       sort -z | xargs -0 sha256sum
     "$VENV/bin/python" --version
     for header in eigen3/Eigen/Core ceres/ceres.h; do

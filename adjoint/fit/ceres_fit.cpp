@@ -6,7 +6,6 @@
 #endif
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -19,36 +18,55 @@ constexpr double cheap = 3.0;
 // All experiments are simulated once per point, here, before Ceres asks for residuals.
 class Point : public ceres::EvaluationCallback {
  public:
-  Point(const EvaluationFunction& evaluation, const std::vector<double>& u)
+  Point(const EvaluationFunction& evaluation, const std::vector<double>& u, const std::vector<double>& longest)
       : evaluation_(evaluation),
         u_(u),
+        longest_(longest),
         residual(evaluation.rows),
         jacobian(static_cast<std::size_t>(evaluation.rows) * u.size()) {}
 
   void PrepareForEvaluation(bool with_jacobian, bool new_point) override {
+    if (with_jacobian) last_ = u_;  // also where the Jacobian was made along before: steps must not depend on that
     if ((!new_point || u_ == at_) && (!with_jacobian || has_jacobian_)) return;
     if (status == EvaluationStatus::interrupted) return;
-    const bool both = with_jacobian || seconds_[1] < cheap * seconds_[0];
-    const auto began = std::chrono::steady_clock::now();
-    status = evaluation_.call(evaluation_.problem, u_.data(), residual.data(), both ? jacobian.data() : nullptr);
-    if (status == EvaluationStatus::ok)
-      seconds_[both] = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+    if (!with_jacobian && too_far()) {
+      status = EvaluationStatus::no_answer;
+      has_jacobian_ = false;
+      at_ = u_;
+      return;
+    }
+    const bool both = with_jacobian || evaluation_.jacobian_along || seconds_[1] < cheap * seconds_[0];
+    double seconds = 0.0;
+    status =
+        evaluation_.call(evaluation_.problem, u_.data(), residual.data(), both ? jacobian.data() : nullptr, &seconds);
+    if (status == EvaluationStatus::ok && std::isfinite(seconds)) seconds_[both] = seconds;
     has_jacobian_ = both;
     at_ = u_;
     ++evaluations;
+    jacobians += both;
   }
 
  private:
+  // A step longer than it may be is refused without a run, so that the trust region shrinks at no cost: its radius is in units of the
+  // Jacobian's columns, no limit in logarithms. Ceres asks for a Jacobian only at points that it goes on from.
+  bool too_far() const {
+    if (last_.empty()) return false;
+    for (std::size_t i = 0; i < u_.size(); ++i)
+      if (std::abs(u_[i] - last_[i]) > longest_[i]) return true;
+    return false;
+  }
+
   const EvaluationFunction& evaluation_;
   const std::vector<double>& u_;
-  std::vector<double> at_;
+  const std::vector<double>& longest_;
+  std::vector<double> at_, last_;
   bool has_jacobian_ = false;
   double seconds_[2]{0.0, std::numeric_limits<double>::infinity()};  // of the last evaluation without, with a Jacobian
 
  public:
   std::vector<double> residual, jacobian;
   EvaluationStatus status = EvaluationStatus::ok;
-  int evaluations = 0;
+  int evaluations = 0, jacobians = 0;
 };
 
 class Residuals : public ceres::CostFunction {
@@ -101,7 +119,7 @@ class Watch : public ceres::IterationCallback {
 CeresResult minimize_with_ceres(const EvaluationFunction& evaluation, std::vector<double> u,
                                 const std::vector<double>& lower, const std::vector<double>& upper,
                                 const CeresOptions& options, const Observe& observe) {
-  Point point(evaluation, u);
+  Point point(evaluation, u, options.longest_step);
   Watch watch(observe, point, u);
   ceres::Problem::Options problem_options;
   problem_options.evaluation_callback = &point;
@@ -112,6 +130,9 @@ CeresResult minimize_with_ceres(const EvaluationFunction& evaluation, std::vecto
     if (std::isfinite(lower[i])) problem.SetParameterLowerBound(u.data(), static_cast<int>(i), lower[i]);
     if (std::isfinite(upper[i])) problem.SetParameterUpperBound(u.data(), static_cast<int>(i), upper[i]);
   }
+  // With a bound Ceres searches along each step that it projects, which is slow where parameters rest on theirs: those are left out.
+  if (!options.held.empty())
+    problem.SetManifold(u.data(), new ceres::SubsetManifold(static_cast<int>(u.size()), options.held));
 
   ceres::Solver::Options o;
   o.minimizer_type = ceres::TRUST_REGION;
@@ -137,6 +158,7 @@ CeresResult minimize_with_ceres(const EvaluationFunction& evaluation, std::vecto
   result.cost = summary.final_cost;
   result.iterations = std::max(0, static_cast<int>(summary.iterations.size()) - 1);
   result.evaluations = point.evaluations;
+  result.jacobians = point.jacobians;
   result.converged = summary.termination_type == ceres::CONVERGENCE;
   result.stopped = summary.termination_type == ceres::USER_FAILURE || point.status == EvaluationStatus::interrupted;
   result.message = summary.message;

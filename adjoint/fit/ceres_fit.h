@@ -12,6 +12,8 @@ namespace sheetbend {
 struct CeresOptions {
   int max_iterations = 200;
   double function_tolerance = 1e-12, gradient_tolerance = 1e-12, parameter_tolerance = 1e-12;
+  std::vector<double> longest_step;  // of each parameter; infinite where there is none
+  std::vector<int> held;             // parameters that stay, in order; not all of them
 };
 
 struct CeresProgress {
@@ -22,7 +24,7 @@ struct CeresProgress {
 struct CeresResult {
   std::vector<double> u;
   double cost = 0.0;
-  int iterations = 0, evaluations = 0;
+  int iterations = 0, evaluations = 0, jacobians = 0;
   bool converged = false, stopped = false;  // stopped: by Ctrl-C or by the observer
   std::string message;
 };

@@ -16,13 +16,6 @@ namespace {
 
 std::mutex failing;  // over what is said of failures
 
-inline double exp(double a) { return std::exp(a); }
-template <int N>
-Dual<double, N> exp(const Dual<double, N>& a) {
-  const double e = std::exp(a.v);
-  return Dual<double, N>::map(a, e, e);
-}
-
 }  // namespace
 
 Problem::Problem(std::vector<Experiment> experiments, std::vector<double> theta,
@@ -114,6 +107,8 @@ bool Problem::attempt(int experiment, F&& f) const {
     return fail(error);
   } catch (const NoEquilibrium& error) {
     return fail(error);
+  } catch (const OutOfDomain& error) {
+    return fail(error);
   } catch (const NoCorrection& error) {
     return fail(error);
   }
@@ -125,8 +120,7 @@ bool Problem::evaluate(const double* u, double* residual, double* jacobian, Inte
   std::atomic<bool> ok = true;
   for (int e = 0; e < static_cast<int>(experiments_.size()) && ok; ++e)
     if (projections_[e])
-      ok = attempt(
-          e, [&](int) { projections_[e]->solve(local_theta(u, e).data(), u, residual + first_row_[e], interrupt); });
+      ok = attempt(e, [&](int) { projections_[e]->solve(local_theta(u, e), u, residual + first_row_[e], interrupt); });
   if (!ok) return false;
   const std::vector<Sweep> jobs = sweeps(jacobian != nullptr);
   parallel_for(static_cast<int>(jobs.size()), threads_, 1, [&](int begin, int end) {
@@ -213,6 +207,19 @@ double Problem::absorbed(int experiment) const {
 void Problem::relinearize() const {
   for (const auto& own : projections_)
     if (own) own->relinearize();
+}
+
+std::vector<double> Problem::state() const {
+  std::vector<double> numbers;
+  for (const auto& own : projections_)
+    if (own) own->save(numbers);
+  return numbers;
+}
+
+void Problem::restore(const std::vector<double>& state) const {
+  const double* next = state.data();
+  for (const auto& own : projections_)
+    if (own) own->restore(next);
 }
 
 std::vector<double> Problem::physical(const double* u) const {

@@ -51,6 +51,11 @@ class Problem {
   // Lets the next evaluation linearize the corrections where it ends, for intervals.
   void relinearize() const;
 
+  // What an evaluation depends on besides u, where corrections are estimated: they go on from where the last one ended. Empty otherwise. A
+  // problem with a restored state, which must be one of its own, gives the same bits.
+  std::vector<double> state() const;
+  void restore(const std::vector<double>& state) const;
+
   std::vector<double> physical(const double* u) const;  // theta
   const std::string& failure() const { return failure_; }
 

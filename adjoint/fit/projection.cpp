@@ -25,11 +25,60 @@ Projection::Projection(const Experiment& e, int parameters, int threads)
   b_ = Eigen::Map<const Eigen::VectorXd>(given_.data(), unknowns()) / e.correction.sigma;
 }
 
-void Projection::linearize(const Corrected& here, double tolerance, double damping, Interrupt* interrupt) {
-  known_ = false;  // until all of it is there
-  A_ = here.response(tolerance, threads_, interrupt);
-  factor_ = ResponseFactor(A_, 1.0 + damping);
+void Projection::linearize(const Corrected& here, Place place, double damping, Interrupt* interrupt) {
+  known_ = stale_ = false;  // until all of it is there
+  A_ = here.response(place.tolerance, threads_, interrupt);
+  factor(damping);
+  place_ = std::move(place);
   known_ = true;
+}
+
+void Projection::factor(double damping) {
+  factor_ = ResponseFactor(A_, 1.0 + damping);
+  damping_ = damping;
+}
+
+void Projection::renew(Interrupt* interrupt) {
+  if (!stale_) return;
+  const auto here = Corrected::at(*e_, place_.theta.data(), place_.b.data(), interrupt);
+  linearize(*here, Place(place_), damping_, interrupt);
+}
+
+void Projection::save(std::vector<double>& numbers) const {
+  const auto append = [&](const double* first, std::size_t size) {
+    numbers.push_back(static_cast<double>(size));
+    numbers.insert(numbers.end(), first, first + size);
+  };
+  numbers.insert(numbers.end(), {double(exact_), double(known_), damping_, place_.tolerance});
+  append(place_.theta.data(), place_.theta.size());
+  append(place_.b.data(), place_.b.size());
+  for (const Eigen::VectorXd* v : {&b_, &u_, &b_there_, &solved_}) append(v->data(), v->size());
+  append(X_.data(), X_.size());
+}
+
+void Projection::restore(const double*& numbers) {
+  const auto next = [&] { return *numbers++; };
+  const auto taken = [&] {
+    const auto size = static_cast<Eigen::Index>(next());
+    const Eigen::VectorXd v = Eigen::VectorXd::Map(numbers, size);
+    numbers += size;
+    return v;
+  };
+  const auto list = [&] {
+    const Eigen::VectorXd v = taken();
+    return std::vector<double>(v.data(), v.data() + v.size());
+  };
+  exact_ = next() != 0.0;
+  known_ = next() != 0.0;
+  damping_ = next();
+  place_.tolerance = next();
+  place_.theta = list();
+  place_.b = list();
+  for (Eigen::VectorXd* v : {&b_, &u_, &b_there_, &solved_}) *v = taken();
+  const Eigen::VectorXd X = taken();
+  X_ = Eigen::MatrixXd::Map(X.data(), X.size() == 0 ? 0 : unknowns(), parameters_);
+  given_ = in_meters(b_);
+  stale_ = known_;
 }
 
 Eigen::VectorXd Projection::predicted(const double* u) const {
@@ -47,8 +96,9 @@ std::vector<double> Projection::in_meters(const Eigen::VectorXd& b) const {
 // theta: they go downhill whatever A is, are shortened until they lower the cost, and make A anew where they are many. Where no length of theirs lowers
 // it, A is made anew, and from then on steps are damped (Levenberg 1944) for as long as that is needed: far from the truth a long motion answers noise
 // by much more than in proportion.
-void Projection::solve(const double* theta, const double* u, double* residual, Interrupt* interrupt) {
+void Projection::solve(const std::vector<double>& theta, const double* u, double* residual, Interrupt* interrupt) {
   using Eigen::VectorXd;
+  renew(interrupt);
   VectorXd trial = predicted(u), best, gradient, step;
   std::vector<std::pair<VectorXd, VectorXd>> pairs;  // steps and what they change in the gradient
   std::unique_ptr<Corrected> there;                  // at best
@@ -71,7 +121,7 @@ void Projection::solve(const double* theta, const double* u, double* residual, I
     return q;
   };
   const auto relinearize = [&] {
-    linearize(*there, guiding, damping, interrupt);
+    linearize(*there, {theta, in_meters(best), guiding}, damping, interrupt);
     pairs.clear();
     since = 0;
     fresh = true;
@@ -80,7 +130,7 @@ void Projection::solve(const double* theta, const double* u, double* residual, I
     const bool must = std::isinf(cost) && trial == b_;  // there is nothing else to try
     std::unique_ptr<Corrected> here;
     try {
-      here = Corrected::at(*e_, theta, in_meters(trial).data(), interrupt);
+      here = Corrected::at(*e_, theta.data(), in_meters(trial).data(), interrupt);
     } catch (const Diverged&) {
       if (must) throw;
     } catch (const Unconverged&) {
@@ -106,7 +156,7 @@ void Projection::solve(const double* theta, const double* u, double* residual, I
       } else {
         damping = std::max(least_damping, 10.0 * damping);
         pairs.clear();
-        factor_ = ResponseFactor(A_, 1.0 + damping);
+        factor(damping);
       }
     } else {
       const double gain = (cost - cost_here) / decrease;
@@ -129,12 +179,13 @@ void Projection::solve(const double* theta, const double* u, double* residual, I
     halvings = 0;
     trial = best + step;
   }
-  if (damping > 0.0) factor_ = ResponseFactor(A_);
+  if (damping > 0.0) factor(0.0);
   if (damping > 0.0 || !(decrease <= within_rounding * cost)) throw NoCorrection();
   b_ = best;
   solved_ = VectorXd::Map(u, parameters_);
   given_ = in_meters(best);
-  if (exact_) linearize(*Corrected::at(*e_, theta, given_.data(), interrupt), exact, 0.0, interrupt);
+  if (exact_)
+    linearize(*Corrected::at(*e_, theta.data(), given_.data(), interrupt), {theta, given_, exact}, 0.0, interrupt);
   exact_ = false;
 }
 

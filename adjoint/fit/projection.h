@@ -31,7 +31,7 @@ class Projection {
 
   // b(theta), and the residuals there (residual_count); u are the optimizer's parameters that make theta. Throws what the rollout throws, and
   // NoCorrection; b is then as it was.
-  void solve(const double* theta, const double* u, double* residual, Interrupt* interrupt);
+  void solve(const std::vector<double>& theta, const double* u, double* residual, Interrupt* interrupt);
 
   // Turns J_theta (rows x parameters, row-major) into J_theta + A X and fills X (unknowns x parameters), where `solve` ended.
   void project(const double* u, const double* residual, double* jacobian, double* prior_jacobian);
@@ -40,20 +40,38 @@ class Projection {
   void relinearize() { exact_ = true; }
 
   // What b absorbs of the data's degrees of freedom: the trace of A (A^T A + 1)^-1 A^T.
-  double absorbed() const { return unknowns() - factor_.inverse_trace(); }
+  double absorbed() {
+    renew(nullptr);
+    return unknowns() - factor_.inverse_trace();
+  }
+
+  // Everything besides u that later results depend on, appended to numbers; and a projection that goes on from there to the same bits, which
+  // takes what it reads off their front. A is too large to keep: only where it was made is, and it is made again when it is needed.
+  void save(std::vector<double>& numbers) const;
+  void restore(const double*& numbers);
 
  private:
   Eigen::VectorXd predicted(const double* u) const;
   std::vector<double> in_meters(const Eigen::VectorXd& b) const;
-  void linearize(const Corrected& here, double tolerance, double damping, Interrupt* interrupt);
+  // A at (theta, b), where `here` was made.
+  struct Place {
+    std::vector<double> theta, b;  // b [m]
+    double tolerance = 0.0;
+  };
+  void linearize(const Corrected& here, Place place, double damping, Interrupt* interrupt);
+  void factor(double damping);
+  void renew(Interrupt* interrupt);  // makes A where a restored state says that it was made
 
   const Experiment* e_;
   int parameters_, threads_;
   std::vector<double> given_;
   Eigen::VectorXd b_;
   bool exact_ = false, known_ = false;  // whether there is an A
+  bool stale_ = false;                  // whether it is still to be made again
   Response A_;
-  ResponseFactor factor_;
+  Place place_;            // of A
+  ResponseFactor factor_;  // of A^T A + 1 + damping_
+  double damping_ = 0.0;
   Eigen::MatrixXd X_;
   Eigen::VectorXd u_, b_there_;  // where X was made: b goes on from there along X
   Eigen::VectorXd solved_;       // u of the last solve

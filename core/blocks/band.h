@@ -5,7 +5,7 @@
 
 #include <iterator>
 
-#include "core/scalar/scalar.h"
+#include "core/scalar/pivot.h"
 
 namespace sheetbend {
 
@@ -18,13 +18,6 @@ inline int stored_band(int band) {
   for (const int b : unrolled_bands)
     if (band <= b) return b;
   return band;
-}
-
-// A row whose pivot is exactly zero (nothing of it can move) gets the solution zero.
-template <class T>
-T inverse_pivot(const T& d) {
-  const T inverse = T(1.0) / d;
-  return select(d > T(0.0), inverse, T(0.0));
 }
 
 // Calls f with the band as a constant, or with 0 where it is not among the unrolled ones.
@@ -49,6 +42,7 @@ void factorize_band(int n, int any_band, T* A, T* inverse) {
     T* column = A + static_cast<long>(j) * (band + 1);
     T sum[(Band > 0 ? Band : max_band) + 1]{};
     for (int i = 0; i <= band; ++i) sum[i] = column[i];
+    const T diagonal = sum[0];
 #pragma GCC unroll 16
     for (int k = band; k >= 2; --k) {
       const T* left = column - static_cast<long>(k) * (band + 1);
@@ -59,7 +53,7 @@ void factorize_band(int n, int any_band, T* A, T* inverse) {
     const T* left = column - (band + 1);
 #pragma GCC unroll 17
     for (int i = 1; i <= band; ++i) sum[i - 1] -= (left[1] * left[i]) * inverse[j - 1];
-    inverse[j] = inverse_pivot(sum[0]);
+    inverse[j] = inverse_pivot(sum[0], diagonal);
     for (int i = 0; i <= band; ++i) column[i] = sum[i];
   }
 }

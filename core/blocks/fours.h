@@ -95,6 +95,7 @@ void factorize_band_by_fours(int n, double* A, double* inverse) {
     double* column = A + static_cast<long>(j) * (Band + 1);
     ColumnInFours<Band> sum;
     unrolled<fours>([&](auto c) { sum.at[c] = first_of_four<Band + 1 - 4 * c>(column + 4 * c); });
+    const double diagonal = column[0];
     unrolled<Band - 2>([&](auto done) {
       constexpr int k = Band - decltype(done)::value;
       const double* left = column - static_cast<long>(k) * Band;
@@ -106,7 +107,7 @@ void factorize_band_by_fours(int n, double* A, double* inverse) {
     for (int c = 0; c < fours; ++c) sum.at[c] -= l * before_that.from_2(c);
 #pragma GCC unroll 5
     for (int c = 0; c < fours; ++c) sum.at[c] -= (first * before.from_1(c)) * inverse[j - 1];
-    inverse[j] = inverse_pivot(sum.at[0][0]);
+    inverse[j] = inverse_pivot(sum.at[0][0], diagonal);
 #pragma GCC unroll 5
     for (int c = 0; c < fours; ++c)
       for (int i = 0; i < 4 && 4 * c + i <= Band; ++i) column[4 * c + i] = sum.at[c][i];

@@ -34,6 +34,7 @@ struct Supernodes {
   const long* panel;            // (count): where its numbers begin
   const int* update_start;      // (count + 1)
   const Update* updates;
+  double least_pivot;  // a smaller one, as a share of its row's own diagonal, counts as zero (core/scalar/pivot.h)
 };
 
 // One iteration of a block. Particles: the movable ones first, then one per use of a fixed one. Rows are those of the matrix. A particle's

@@ -58,7 +58,10 @@ struct SupernodalFactor {
 
   void factorize() const {
     for (int node = 0; node < s.count; ++node) {
-      for (int c = 0; c < width(node); ++c) place[first(node) + c] = c;
+      for (int c = 0; c < width(node); ++c) {
+        place[first(node) + c] = c;
+        inverse[first(node) + c] = panels[s.panel[node] + c * static_cast<long>(s.length[node]) + c];  // the diagonal
+      }
       for (int r = 0; r < below(node); ++r) place[rows(node)[r]] = width(node) + r;
       for (int u = s.update_start[node]; u < s.update_start[node + 1]; ++u) update(node, s.updates[u]);
       eliminate(node);
@@ -104,7 +107,8 @@ struct SupernodalFactor {
     T* panel = panels + s.panel[node];
     for (int k = 0; k < width(node); ++k) {
       T* column = panel + k * length;
-      const T scale = inverse[first(node) + k] = inverse_pivot(column[k]);
+      T& scale = inverse[first(node) + k];
+      scale = inverse_pivot(column[k], scale, s.least_pivot);
       for (int c = k + 1; c < width(node); ++c) subtract_rows(panel + c * length, column, column[c] * scale, c, used);
       for (int r = k + 1; r < used; ++r) column[r] = column[r] * scale;
     }

@@ -40,7 +40,7 @@ struct Element {
       T A[K::rows * K::rows];
       J.matrix(w, A);
       for (int i = 0; i < K::rows; ++i) A[i * K::rows + i] = A[i * K::rows + i] + rates.a * rates.scale;
-      SmallLdlt<K::rows, T>(A).solve(b);
+      SmallLdlt<K::rows, T>(A, redundant_pivot).solve(b);
     }
   }
 };

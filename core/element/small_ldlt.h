@@ -1,8 +1,8 @@
 // LDL^T of a tiny symmetric matrix over any scalar, without pivoting: A is J W J^T plus a non-negative diagonal.
-// A row whose pivot is exactly zero (nothing of it can move) gets the solution zero.
+// A pivot below `least` of its row's own diagonal counts as zero (core/scalar/pivot.h).
 #pragma once
 
-#include "core/scalar/scalar.h"
+#include "core/scalar/pivot.h"
 
 namespace sheetbend {
 
@@ -10,7 +10,7 @@ template <int N, class T>
 class SmallLdlt {
  public:
   // Takes the lower triangle of A, row-major.
-  explicit SmallLdlt(const T* A) {
+  explicit SmallLdlt(const T* A, double least = 0.0) {
     for (int i = 0; i < N; ++i) {
       for (int j = 0; j < i; ++j) {
         T sum = A[i * N + j];
@@ -20,7 +20,7 @@ class SmallLdlt {
       T sum = A[i * N + i];
       for (int k = 0; k < i; ++k) sum -= L_[i][k] * L_[i][k] * D_[k];
       D_[i] = sum;
-      inverse_[i] = inverse_or_zero(sum);
+      inverse_[i] = inverse_pivot(sum, A[i * N + i], least);
     }
   }
 

@@ -7,9 +7,12 @@
 // (the natural monotonicity test: Deuflhard, Newton Methods for Nonlinear Problems); otherwise mu grows. Constraints that the
 // start violates by far are softened at first. Saddles are left along a direction of negative curvature. So a solution is stable
 // wherever the start allows; soft wires have several, and which one is found depends on the start (see branches.h).
+//
+// Rigid rows that others say already have no multipliers of their own, and A no inverse: they are left out, as a direct block leaves them out.
 #pragma once
 
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -37,8 +40,11 @@ struct Equilibrium {
   bool converged = false;
   double t0 = 0.0;
   double force_stiffness = 0.0;  // scale of stiffness where the multipliers give none  [N/m]
-  std::string message;           // why not converged and what to do; empty otherwise
+  std::vector<RedundantRow> left_out;  // rigid rows that others say already at x; their multipliers are zero
+  std::string message;                 // why not converged and what to do; empty otherwise
 };
+
+struct EquilibriumState;
 
 class EquilibriumSolver {
  public:
@@ -53,13 +59,16 @@ class EquilibriumSolver {
   const Scene& scene() const { return scene_; }
 
  private:
-  struct State;
-  bool step(State& s, double mu, const double* alpha);
+  using State = EquilibriumState;
+  bool step(State& s, double mu, const double* alpha, double share = 1.0);
   void estimate_multipliers(State& s);
   void leave_saddle(State& s);
 
+  void find_redundant_rows(State& s);
+
   const Scene& scene_;
   Kkt kkt_;
+  std::optional<Plan> blocks_;  // of the constraints, for redundant rows
 };
 
 }  // namespace sheetbend

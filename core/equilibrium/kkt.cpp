@@ -107,7 +107,8 @@ Kkt::Kkt(const Scene& scene) : scene_(scene), unknown_(scene.dofs(), -1), presse
   factor_.analyzePattern(K_);
 }
 
-void Kkt::assemble(const double* inputs, const double* x, const double* lambda, double force_stiffness) {
+void Kkt::assemble(const double* inputs, const double* x, const double* lambda, double force_stiffness,
+                   const std::vector<RedundantRow>& left_out) {
   const Inputs<const double> in{scene_.layout, inputs};
   force_stiffness_ = force_stiffness;
   double *H = H_.data(), *J = J_.data();
@@ -120,6 +121,11 @@ void Kkt::assemble(const double* inputs, const double* x, const double* lambda, 
       for (int b = 0; b < K::dofs; ++b) *H++ = own[a >= b ? triangle(a) + b : triangle(b) + a];
     J = std::copy(std::begin(at.J), std::end(at.J), J);
   });
+  for (const RedundantRow& r : left_out) {
+    const Group& group = group_of(scene_, r.row);
+    const std::size_t dofs = 3 * static_cast<std::size_t>(group.arity);
+    std::fill_n(&J_[group.first_gradient + (r.row - group.first_row) * dofs], dofs, 0.0);
+  }
   const double* given = in.of(Quantity::pressure);
   std::vector<double> pressures(given, given + scene_.air.size());
   std::vector<Vec3<double>> gradient;

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "core/scene/scene.h"
+#include "core/solver/redundant_rows.h"
 
 namespace sheetbend {
 
@@ -29,8 +30,9 @@ class Kkt {
   explicit Kkt(const Scene& scene);
 
   // Evaluates H and J at x (dofs) and lambda (multipliers). force_stiffness [N/m], a typical force over a typical length, is the scale
-  // of stiffness where the multipliers give none.
-  void assemble(const double* inputs, const double* x, const double* lambda, double force_stiffness);
+  // of stiffness where the multipliers give none. Rows that are left out have no gradient: with a right side of zero their multiplier stays.
+  void assemble(const double* inputs, const double* x, const double* lambda, double force_stiffness,
+                const std::vector<RedundantRow>& left_out);
 
   // Factors K for mu >= 0 [N/m] and the compliance of each constraint and volume. False where K is singular to rounding.
   bool factorize(double mu, const double* compliance);

@@ -116,8 +116,10 @@ class CondensedSolver {
       for (int w = 0; w <= v; ++w) {
         T sum = v == w ? block.diagonal[block.size - count + v] : T(0.0);
         for (std::size_t d = 0; d < dofs; ++d) sum += gradients_[v * dofs + d] * responses_[w * dofs + d];
+        const T own = sum;
         for (int k = 0; k < w; ++k) sum -= L[v * count + k] * L[k * count + k] * L[w * count + k];
-        L[v * count + w] = v == w ? sum : sum / L[w * count + w];
+        L[v * count + w] =
+            v == w ? select(sum > T(redundant_pivot) * own, sum, T(0.0)) : over_pivot(sum, L[w * count + w]);
       }
   }
 
@@ -133,11 +135,18 @@ class CondensedSolver {
       for (int k = 0; k < v; ++k) p[v] -= L[v * count + k] * p[k];
     }
     for (int v = count; v-- > 0;) {
-      p[v] = p[v] / L[v * count + v];
+      p[v] = over_pivot(p[v], L[v * count + v]);
       for (int k = v + 1; k < count; ++k) p[v] -= L[k * count + v] * p[k];
     }
     for (int v = 0; v < count; ++v)
       for (std::size_t d = 0; d < dofs; ++d) z[d] += responses_[v * dofs + d] * p[v];
+  }
+
+  // a/pivot; zero in the row of a volume that others keep already, whose pivot is zero (pivot.h).
+  template <class U>
+  static U over_pivot(const U& a, const T& pivot) {
+    const T left_out = select(pivot > T(0.0), T(0.0), T(1.0));
+    return ((T(1.0) - left_out) * a) / (pivot + left_out);
   }
 
   // rest = b - A y

@@ -65,7 +65,7 @@ FactorStructure structure_of(const Scene& scene, const std::vector<Member>& memb
       for (const int column : rows)
         if (column <= row) entries.emplace_back(row, column);
   const int rows = members.back().first_row + scene.groups[members.back().group].rows;
-  return {rows + static_cast<int>(volumes.size()), entries, volumes.empty()};
+  return {rows + static_cast<int>(volumes.size()), entries, volumes.empty(), redundant_pivot};
 }
 
 // A particle of the block, with the rows that it takes part in. Windows of a band have no gaps: rows between that do not touch the particle

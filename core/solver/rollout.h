@@ -1,27 +1,11 @@
 // A rollout: substeps from the initial state. The forward program is the same whether its states are kept (the tape) or not.
 #pragma once
 
-#include <memory>
-#include <stdexcept>
-#include <string>
-
+#include "core/solver/divergence.h"
 #include "core/solver/interrupt.h"
 #include "core/solver/substep.h"
 
 namespace sheetbend {
-
-// A state became infinite or NaN.
-struct Diverged : std::runtime_error {
-  int substep, node;
-  double time;
-  Diverged(int substep_, int node_, double time_)
-      : std::runtime_error("the rollout diverged at substep " + std::to_string(substep_) +
-                           " (t = " + std::to_string(time_) + " s), first at particle " + std::to_string(node_) +
-                           ". Fix: use a smaller substep, more iterations, or check masses and stiffnesses"),
-        substep(substep_),
-        node(node_),
-        time(time_) {}
-};
 
 template <class T>
 class Rollout {
@@ -78,13 +62,15 @@ class Rollout {
   // All that the next substep begins with.
   SubstepStates<T> state() const { return {x_.data(), x_before_.data(), v_.data(), v_before_.data(), step_}; }
 
-  // Calls sink(step, x, v) for the initial state and after every substep.
+  // Calls sink(step, x, v) for the initial state and after every substep. Throws Diverged, also for a finite state that means nothing.
   template <class Sink>
   void run(int steps, Sink&& sink, Interrupt* interrupt = nullptr) {
+    Watch<T> watch(scene_, plan_.options, in_, t0_, x_.data());
     sink(0, x_.data(), v_.data());
     for (int n = 0; n < steps; ++n) {
       poll(interrupt, n, scene_.dofs());
       advance();
+      if (step_ % Watch<T>::every == 0 || n + 1 == steps) watch.look(step_, time(step_), x_.data(), v_.data());
       sink(step_, x_.data(), v_.data());
     }
   }

@@ -11,7 +11,9 @@ constexpr int widest_supernode =
 
 }  // namespace
 
-FactorStructure::FactorStructure(int n, const std::vector<std::pair<int, int>>& entries, bool may_be_banded) : n_(n) {
+FactorStructure::FactorStructure(int n, const std::vector<std::pair<int, int>>& entries, bool may_be_banded,
+                                 double least_pivot)
+    : n_(n), least_pivot_(least_pivot) {
   std::size_t nonzeros = 0;
   for (const auto& [row, column] : entries) {
     band_ = std::max(band_, row - column);
@@ -118,7 +120,8 @@ sheetbend_blocks::Supernodes FactorStructure::supernodes() const {
           length_.data(),
           panel_.data(),
           update_start_.data(),
-          updates_.data()};
+          updates_.data(),
+          least_pivot_};
 }
 
 std::size_t FactorStructure::values() const {

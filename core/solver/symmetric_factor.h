@@ -13,8 +13,10 @@ namespace sheetbend {
 // The pattern: which entries of the lower triangle exist and where their values stand.
 class FactorStructure {
  public:
-  // entries: (row, column) pairs of the lower triangle in elimination order, duplicates allowed; the diagonal is always there.
-  FactorStructure(int n, const std::vector<std::pair<int, int>>& entries, bool may_be_banded = true);
+  // entries: (row, column) pairs of the lower triangle in elimination order, duplicates allowed; the diagonal is always there. least_pivot: as in
+  // sheetbend_blocks::Supernodes; that of a band, which only constraints' matrices have, is redundant_pivot.
+  FactorStructure(int n, const std::vector<std::pair<int, int>>& entries, bool may_be_banded = true,
+                  double least_pivot = 0.0);
 
   int size() const { return n_; }
   bool banded() const { return banded_; }
@@ -36,6 +38,7 @@ class FactorStructure {
 
   int n_ = 0, band_ = 0;
   bool banded_ = true;
+  double least_pivot_ = 0.0;
   std::size_t fill_ = 0;  // entries of L below its diagonal
   // As in sheetbend_blocks::Supernodes; node_ of every column.
   int widest_ = 0, longest_ = 0;

@@ -12,12 +12,17 @@ namespace {
 
 // observe(iteration, cost, step_norm, gradient_max, u) -> bool: go on?
 py::dict minimize(const py::capsule& evaluation, std::vector<double> u, const std::vector<double>& lower,
-                  const std::vector<double>& upper, int max_iterations, double tolerance, const py::function& observe) {
+                  const std::vector<double>& upper, std::vector<double> longest_step, std::vector<int> held,
+                  int max_iterations, double tolerance, const py::function& observe) {
   const auto* function =
       static_cast<const EvaluationFunction*>(PyCapsule_GetPointer(evaluation.ptr(), EvaluationFunction::capsule_name));
   if (function == nullptr) throw py::error_already_set();
   if (static_cast<int>(u.size()) != function->parameters) throw std::invalid_argument("u: does not fit the problem");
+  if (longest_step.size() != u.size() || lower.size() != u.size() || upper.size() != u.size())
+    throw std::invalid_argument("bounds, longest_step: do not fit u");
   CeresOptions options;
+  options.longest_step = std::move(longest_step);
+  options.held = std::move(held);
   options.max_iterations = max_iterations;
   options.function_tolerance = options.gradient_tolerance = options.parameter_tolerance = tolerance;
   std::exception_ptr raised;
@@ -41,6 +46,7 @@ py::dict minimize(const py::capsule& evaluation, std::vector<double> u, const st
   out["cost"] = r.cost;
   out["iterations"] = r.iterations;
   out["evaluations"] = r.evaluations;
+  out["jacobians"] = r.jacobians;
   out["converged"] = r.converged;
   out["stopped"] = r.stopped;
   out["message"] = r.message;
@@ -52,5 +58,5 @@ py::dict minimize(const py::capsule& evaluation, std::vector<double> u, const st
 PYBIND11_MODULE(_ceres, m) {
   m.doc() = "Levenberg-Marquardt by Ceres on a sheetbend problem.";
   m.def("minimize", &minimize, py::kw_only(), py::arg("evaluation"), py::arg("u"), py::arg("lower"), py::arg("upper"),
-        py::arg("max_iterations"), py::arg("tolerance"), py::arg("observe"));
+        py::arg("longest_step"), py::arg("held"), py::arg("max_iterations"), py::arg("tolerance"), py::arg("observe"));
 }

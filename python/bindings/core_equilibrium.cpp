@@ -120,10 +120,32 @@ py::array_t<double> jvp_batch(const std::vector<const Solution*>& solutions, con
   return out;
 }
 
+py::tuple parts_of(const Solution& s) {
+  const Equilibrium& at = s.at;
+  return py::make_tuple(s.scene, s.inputs, at.x, at.lambda, at.energy, at.residual, at.iterations, at.unstable_modes,
+                        at.converged, at.t0, at.force_stiffness, at.message);
+}
+
+Solution solution_of(const py::tuple& parts) {
+  Equilibrium at;
+  at.x = parts[2].cast<std::vector<double>>();
+  at.lambda = parts[3].cast<std::vector<double>>();
+  at.energy = parts[4].cast<double>();
+  at.residual = parts[5].cast<double>();
+  at.iterations = parts[6].cast<int>();
+  at.unstable_modes = parts[7].cast<int>();
+  at.converged = parts[8].cast<bool>();
+  at.t0 = parts[9].cast<double>();
+  at.force_stiffness = parts[10].cast<double>();
+  at.message = parts[11].cast<std::string>();
+  return {parts[0].cast<std::shared_ptr<Scene>>(), parts[1].cast<std::vector<double>>(), std::move(at)};
+}
+
 }  // namespace
 
 void bind_equilibrium(py::module_& m) {
   py::class_<Solution>(m, "EquilibriumSolution")
+      .def(py::pickle(&parts_of, &solution_of))
       .def_property_readonly(
           "positions", [](const Solution& s) { return to_numpy(s.at.x, {static_cast<py::ssize_t>(s.at.x.size())}); })
       .def_property_readonly(
@@ -134,6 +156,8 @@ void bind_equilibrium(py::module_& m) {
       .def_property_readonly("iterations", [](const Solution& s) { return s.at.iterations; })
       .def_property_readonly("unstable_modes", [](const Solution& s) { return s.at.unstable_modes; })
       .def_property_readonly("converged", [](const Solution& s) { return s.at.converged; })
+      .def_property_readonly("redundant",
+                             [](const Solution& s) { return describe(*s.scene, s.at.left_out, s.at.x.data()); })
       .def_property_readonly("message", [](const Solution& s) { return s.at.message; })
       .def("vjp", &vjp, py::arg("x_bar") = py::none(), py::arg("lambda_bar") = py::none());
   m.def("equilibrium", &solve, py::arg("scene"), py::arg("inputs"), py::arg("start") = py::none(),

@@ -26,16 +26,24 @@ py::tuple record(const py::object& self, const Array& inputs, const Steps& steps
   return py::make_tuple(states, tape);
 }
 
-py::array_t<double> vjp(const Solver& s, const Array& inputs, Tape<double>& tape, const Steps& steps,
-                        const Array& x_bar, double t0) {
+// (gradient, substeps that were computed again for it).
+py::tuple reverse(const Solver& s, const Array& inputs, Tape<double>& tape, const Steps& steps, const Array& x_bar,
+                  double t0) {
   check(s, inputs, 1, steps);
   expect_size(x_bar, steps.size() * s.scene->dofs(), "x_bar");
   auto out = zeros({s.scene->layout.total()});
   double* inputs_bar = out.mutable_data();
-  Release release;
-  SignalInterrupt interrupt;
-  reverse_rollout(*s.scene, s.plan, inputs.data(), t0, tape, steps, x_bar.data(), inputs_bar, &interrupt);
-  return out;
+  const long recomputed = [&] {
+    Release release;
+    SignalInterrupt interrupt;
+    return reverse_rollout(*s.scene, s.plan, inputs.data(), t0, tape, steps, x_bar.data(), inputs_bar, &interrupt);
+  }();
+  return py::make_tuple(out, recomputed);
+}
+
+py::object vjp(const Solver& s, const Array& inputs, Tape<double>& tape, const Steps& steps, const Array& x_bar,
+               double t0) {
+  return reverse(s, inputs, tape, steps, x_bar, t0)[0];
 }
 
 // Records and reverses a batch, eight scenes at a time. seed(pack, x) makes cotangents of the states x (frames of the pack, dofs).
@@ -115,6 +123,7 @@ void bind_gradient(py::module_& m, py::class_<Solver>& solver) {
       .def_readonly("recomputed", &TapePlan::recomputed);
   solver.def("tape_plan", &tape_plan, py::arg("steps"), py::arg("scenes") = 1, py::arg("memory") = py::none())
       .def("record", &record, py::arg("inputs"), py::arg("steps"), py::arg("t0"), py::arg("memory") = py::none())
+      .def("reverse", &reverse, py::arg("inputs"), py::arg("tape"), py::arg("steps"), py::arg("x_bar"), py::arg("t0"))
       .def("vjp", &vjp, py::arg("inputs"), py::arg("tape"), py::arg("steps"), py::arg("x_bar"), py::arg("t0"))
       .def("vjp_batch", &vjp_batch, py::arg("inputs"), py::arg("steps"), py::arg("x_bar"), py::arg("t0"),
            py::arg("memory") = py::none(), py::arg("lengths") = Lengths())

@@ -8,9 +8,11 @@ namespace sheetbend::bindings {
 
 ParameterMap make_map(const py::dict& d) {
   ParameterMap map;
-  const auto base = d["base"].cast<Array>(), coefficient = d["coefficient"].cast<Array>();
+  const auto base = d["base"].cast<Array>(), coefficient = d["coefficient"].cast<Array>(),
+             weight = d["weight"].cast<Array>();
   map.base.assign(base.data(), base.data() + base.size());
   map.coefficient.assign(coefficient.data(), coefficient.data() + coefficient.size());
+  map.weight.assign(weight.data(), weight.data() + weight.size());
   map.target = whole_numbers(d["target"]);
   map.first_factor = whole_numbers(d["first_factor"]);
   map.parameter = whole_numbers(d["parameter"]);
@@ -18,9 +20,32 @@ ParameterMap make_map(const py::dict& d) {
   return map;
 }
 
+namespace {
+
+// What make_map takes.
+py::dict arrays_of(const ParameterMap& map) {
+  const auto numbers = [](const std::vector<int>& values) {
+    return py::array_t<int>(static_cast<py::ssize_t>(values.size()), values.data());
+  };
+  std::vector<int> function;
+  for (const Factor1d f : map.function) function.push_back(static_cast<int>(f));
+  py::dict d;
+  d["base"] = to_numpy(map.base, {static_cast<py::ssize_t>(map.base.size())});
+  d["coefficient"] = to_numpy(map.coefficient, {static_cast<py::ssize_t>(map.coefficient.size())});
+  d["weight"] = to_numpy(map.weight, {static_cast<py::ssize_t>(map.weight.size())});
+  d["target"] = numbers(map.target);
+  d["first_factor"] = numbers(map.first_factor);
+  d["parameter"] = numbers(map.parameter);
+  d["function"] = numbers(function);
+  return d;
+}
+
+}  // namespace
+
 void bind_map(py::module_& m) {
   py::class_<ParameterMap>(m, "ParameterMap")
       .def(py::init(&make_map))
+      .def(py::pickle(&arrays_of, &make_map))
       .def("inputs",
            [](const ParameterMap& map, const Array& theta) {
              py::array_t<double> out(static_cast<py::ssize_t>(map.base.size()));

@@ -48,6 +48,7 @@ PYBIND11_MODULE(_core, m) {
       error.attr("substep") = e.substep;
       error.attr("particle") = e.node;
       error.attr("time") = e.time;
+      error.attr("seen") = e.seen;
       PyErr_SetObject(diverged.ptr(), error.ptr());
     } catch (const BudgetTooSmall& e) {
       py::object error = py::handle(too_small)(e.what());

@@ -1,6 +1,11 @@
 // Least-squares problems from Python: built from plain dictionaries that sheetbend.fit assembles.
 #include "adjoint/fit/problem.h"
 
+#include <algorithm>
+#include <chrono>
+#include <limits>
+#include <optional>
+
 #include "adjoint/fit/evaluation.h"
 #include "python/bindings/interrupt.h"
 #include "python/bindings/solver.h"
@@ -65,7 +70,13 @@ Experiment make_experiment(const py::dict& d) {
   o.cg_tolerance = get<double>(d, "cg_tolerance");
   o.cg_iterations = get<int>(d, "cg_iterations");
   e.plan = make_plan(*e.scene, o);
+  for (const auto& [h, weight] : get<std::vector<std::pair<double, double>>>(d, "finer")) {
+    o.h = h;
+    e.finer.push_back({make_plan(*e.scene, o), weight});
+  }
   e.map = make_map(get<py::dict>(d, "map"));
+  e.least = numbers(d, "least");
+  e.most = numbers(d, "most");
   e.observed = make_observations(get<py::dict>(d, "observed"));
   if (!d["correction"].is_none()) e.correction = make_correction(get<py::dict>(d, "correction"));
   e.is_static = get<bool>(d, "is_static");
@@ -93,6 +104,62 @@ Problem make_problem(const std::vector<py::dict>& experiments, std::vector<doubl
   for (const py::dict& d : experiments) e.push_back(make_experiment(d));
   for (const py::dict& d : free) f.push_back(make_free(d));
   return Problem(std::move(e), std::move(theta), std::move(slots), std::move(f), threads);
+}
+
+// The compiled evaluation, for sheetbend._ceres; the problem must outlive it.
+py::capsule evaluation(const Problem& p) {
+  const auto call = [](const void* problem, const double* u, double* residual, double* jacobian, double* seconds) {
+    SignalInterrupt interrupt;
+    try {
+      const auto began = std::chrono::steady_clock::now();
+      const bool ok = static_cast<const Problem*>(problem)->evaluate(u, residual, jacobian, &interrupt);
+      *seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+      return ok ? EvaluationStatus::ok : EvaluationStatus::no_answer;
+    } catch (const Interrupted&) {
+      return EvaluationStatus::interrupted;
+    }
+  };
+  return py::capsule(new EvaluationFunction{&p, p.rows(), p.parameters(), call, !p.state().empty()},
+                     EvaluationFunction::capsule_name, [](void* f) { delete static_cast<EvaluationFunction*>(f); });
+}
+
+// What a Python function is asked for by `evaluation_of`.
+struct Asked {
+  int rows, parameters;
+  py::function function;
+};
+
+// The same of a Python function (u, with_jacobian) -> ((ok, residual, jacobian), seconds or None). What it raises passes through the optimizer,
+// except for KeyboardInterrupt, which ends it with its best so far.
+py::capsule evaluation_of(int rows, int parameters, py::function function, bool jacobian_along) {
+  const auto call = [](const void* asked, const double* u, double* residual, double* jacobian, double* seconds) {
+    const Asked& a = *static_cast<const Asked*>(asked);
+    const py::gil_scoped_acquire gil;
+    try {
+      const auto [found, took] =
+          a.function(Array(a.parameters, u), jacobian != nullptr).cast<std::pair<py::tuple, std::optional<double>>>();
+      const auto r = found[1].cast<Array>(), J = found[2].cast<Array>();
+      *seconds = took.value_or(std::numeric_limits<double>::quiet_NaN());
+      if (!found[0].cast<bool>()) return EvaluationStatus::no_answer;
+      expect_size(r, a.rows, "residuals");
+      std::copy_n(r.data(), r.size(), residual);
+      if (jacobian) {
+        expect_size(J, static_cast<std::size_t>(a.rows) * a.parameters, "jacobian");
+        std::copy_n(J.data(), J.size(), jacobian);
+      }
+      return EvaluationStatus::ok;
+    } catch (const py::error_already_set& error) {
+      if (!error.matches(PyExc_KeyboardInterrupt)) throw;
+      return EvaluationStatus::interrupted;
+    }
+  };
+  return py::capsule(
+      new EvaluationFunction{new Asked{rows, parameters, std::move(function)}, rows, parameters, call, jacobian_along},
+      EvaluationFunction::capsule_name, [](void* f) {
+        const auto* made = static_cast<EvaluationFunction*>(f);
+        delete static_cast<const Asked*>(made->problem);
+        delete made;
+      });
 }
 
 // (ok, residual, jacobian or None)
@@ -160,21 +227,16 @@ void bind_problem(py::module_& m) {
            })
       .def("absorbed", &Problem::absorbed)
       .def("relinearize", &Problem::relinearize)
-      // The compiled evaluation, for sheetbend._ceres; the problem must outlive it.
-      .def("evaluation", [](const Problem& p) {
-        const auto call = [](const void* problem, const double* u, double* residual, double* jacobian) {
-          SignalInterrupt interrupt;
-          try {
-            return static_cast<const Problem*>(problem)->evaluate(u, residual, jacobian, &interrupt)
-                       ? EvaluationStatus::ok
-                       : EvaluationStatus::no_answer;
-          } catch (const Interrupted&) {
-            return EvaluationStatus::interrupted;
-          }
-        };
-        return py::capsule(new EvaluationFunction{&p, p.rows(), p.parameters(), call}, EvaluationFunction::capsule_name,
-                           [](void* f) { delete static_cast<EvaluationFunction*>(f); });
-      });
+      .def("state",
+           [](const Problem& p) {
+             const std::vector<double> state = p.state();
+             return to_numpy(state, {static_cast<py::ssize_t>(state.size())});
+           })
+      .def("restore",
+           [](const Problem& p, const Array& state) { p.restore({state.data(), state.data() + state.size()}); })
+      .def("evaluation", &evaluation);
+  m.def("evaluation_of", &evaluation_of, py::arg("rows"), py::arg("parameters"), py::arg("function"),
+        py::arg("jacobian_along") = false);
 }
 
 }  // namespace sheetbend::bindings

@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "adjoint/rollout.h"
+#include "core/solver/redundant_rows.h"
 #include "python/bindings/solver.h"
 
 namespace sheetbend::bindings {
@@ -26,6 +27,19 @@ Solver make_solver(std::shared_ptr<Scene> scene, double h, const std::string& in
   o.partition = partition_of(partition);
   Plan plan = make_plan(*scene, o);
   return {std::move(scene), std::move(plan)};
+}
+
+// The arguments of make_solver, in order.
+py::tuple arguments_of(const Solver& s) {
+  const SolverOptions& o = s.plan.options;
+  return py::make_tuple(s.scene, o.h, o.integrator == Integrator::bdf1 ? "bdf1" : "bdf2", name_of(o.partition),
+                        o.iterations, o.force_tolerance, o.threads, o.grain, o.cg_tolerance, o.cg_iterations);
+}
+
+Solver solver_of(const py::tuple& a) {
+  return make_solver(a[0].cast<std::shared_ptr<Scene>>(), a[1].cast<double>(), a[2].cast<std::string>(),
+                     a[3].cast<std::string>(), a[4].cast<int>(), a[5].cast<double>(), a[6].cast<int>(),
+                     a[7].cast<int>(), a[8].cast<double>(), a[9].cast<int>());
 }
 
 // Forward only: positions, velocities and constraint multipliers in force units at the wanted substeps.
@@ -74,6 +88,14 @@ std::vector<std::vector<std::vector<double>>> force_balance(const Solver& s, con
       },
       &interrupt);
   return all;
+}
+
+// Which rows of the first substep say what others say already, in words; empty where there are none.
+std::string redundant(const Solver& s, const Array& inputs, double t0) {
+  expect_size(inputs, s.scene->layout.total(), "inputs");
+  Release release;
+  const double* x = inputs.data() + s.scene->layout.of(Quantity::position);
+  return describe(*s.scene, redundant_rows(*s.scene, s.plan, inputs.data(), t0), x);
 }
 
 py::array_t<double> states(const Solver& s, const Array& inputs, const Steps& steps, double t0) {
@@ -167,9 +189,11 @@ void bind_rollout(py::module_& m) {
       .def(py::init(&make_solver), py::kw_only(), py::arg("scene"), py::arg("h"), py::arg("integrator"),
            py::arg("partition"), py::arg("iterations"), py::arg("force_tolerance"), py::arg("threads"),
            py::arg("grain"), py::arg("cg_tolerance"), py::arg("cg_iterations"))
+      .def(py::pickle(&arguments_of, &solver_of))
       .def("simulate", &simulate, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
       .def("states", &states, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
       .def("force_balance", &force_balance, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
+      .def("redundant", &redundant, py::arg("inputs"), py::arg("t0"))
       .def("simulate_batch", &simulate_batch, py::arg("inputs"), py::arg("steps"), py::arg("t0"),
            py::arg("lengths") = Lengths())
       .def_property_readonly("blocks",

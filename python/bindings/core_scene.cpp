@@ -1,10 +1,13 @@
+// Scenes from Python, and back to what they were made from.
 #include "core/scene/scene.h"
 
 #include <memory>
 
+#include "core/constraints/registry.h"
 #include "python/bindings/core_module.h"
 
 namespace sheetbend::bindings {
+using namespace py::literals;
 namespace {
 
 Interpolation interpolation_of(const std::string& name) {
@@ -13,49 +16,64 @@ Interpolation interpolation_of(const std::string& name) {
   throw std::invalid_argument("interpolation: got '" + name + "'. Fix: use 'cubic' or 'linear'");
 }
 
-std::shared_ptr<const Scene> make_scene(int particles, const std::vector<std::array<int, 4>>& directors,
-                                        std::vector<int> pinned, std::vector<int> driven,
-                                        std::vector<double> boundary_times, const std::string& boundary_interpolation,
-                                        std::vector<int> loaded, std::vector<double> force_times, bool has_drag,
-                                        std::vector<std::array<int, 3>> air, std::vector<double> wind_times,
-                                        const std::vector<py::dict>& groups, const std::vector<py::dict>& volumes) {
+using Triangles = std::vector<std::array<int, 3>>;
+
+// Keyword arguments of Python's Scene to a scene.
+std::shared_ptr<Scene> make_scene(const py::kwargs& given) {
   SceneSpec spec;
-  spec.particles = particles;
-  for (const auto& [node, tail, head, normal] : directors) spec.directors.push_back({node, tail, head, normal});
-  spec.pinned = std::move(pinned);
-  spec.driven = std::move(driven);
-  spec.loaded = std::move(loaded);
-  spec.has_drag = has_drag;
-  spec.boundary = {std::move(boundary_times), interpolation_of(boundary_interpolation)};
-  spec.force = {std::move(force_times), Interpolation::linear};
-  spec.air = std::move(air);
-  spec.wind = {std::move(wind_times), Interpolation::linear};
-  for (const py::dict& g : groups)
+  spec.particles = given["particles"].cast<int>();
+  for (const auto& [node, tail, head, normal] : given["directors"].cast<std::vector<std::array<int, 4>>>())
+    spec.directors.push_back({node, tail, head, normal});
+  spec.pinned = whole_numbers(given["pinned"]);
+  spec.driven = whole_numbers(given["driven"]);
+  spec.loaded = whole_numbers(given["loaded"]);
+  spec.has_drag = given["has_drag"].cast<bool>();
+  spec.boundary = {given["boundary_times"].cast<std::vector<double>>(),
+                   interpolation_of(given["boundary_interpolation"].cast<std::string>())};
+  spec.force = {given["force_times"].cast<std::vector<double>>(), Interpolation::linear};
+  spec.air = given["air"].cast<Triangles>();
+  spec.wind = {given["wind_times"].cast<std::vector<double>>(), Interpolation::linear};
+  for (const py::handle g : given["groups"])
     spec.groups.push_back({g["name"].cast<std::string>(), g["kind"].cast<std::string>(), g["damped"].cast<bool>(),
                            whole_numbers(g["stencil"])});
-  for (const py::dict& v : volumes)
-    spec.volumes.push_back({v["name"].cast<std::string>(), v["triangles"].cast<std::vector<std::array<int, 3>>>()});
-  return std::make_shared<const Scene>(build_scene(spec));
+  for (const py::handle v : given["volumes"])
+    spec.volumes.push_back({v["name"].cast<std::string>(), v["triangles"].cast<Triangles>()});
+  return std::make_shared<Scene>(build_scene(spec));
+}
+
+// The keyword arguments that make a scene, again.
+py::dict arguments_of(const Scene& s) {
+  std::vector<std::array<int, 4>> directors;
+  for (const Director& d : s.directors) directors.push_back({d.node, d.tail, d.head, d.normal});
+  py::list groups, volumes;
+  for (const Group& g : s.groups) {
+    const std::string kind = [&] {
+      std::string name;
+      with_kind(g.kind, [&]<class K>(K) { name = K::name; });
+      return name;
+    }();
+    groups.append(py::dict("name"_a = g.name, "kind"_a = kind, "damped"_a = g.damped,
+                           "stencil"_a = py::array_t<int>(static_cast<py::ssize_t>(g.stencil.size()), g.stencil.data())));
+  }
+  for (const Volume& v : s.volumes) {
+    Triangles triangles = v.triangles;
+    for (auto& t : triangles)
+      for (int& n : t) n = v.nodes[n];
+    volumes.append(py::dict("name"_a = v.name, "triangles"_a = triangles));
+  }
+  const bool cubic = s.boundary.interpolation == Interpolation::cubic;
+  return py::dict("particles"_a = s.nodes(), "directors"_a = directors, "pinned"_a = s.pinned, "driven"_a = s.driven,
+                  "boundary_times"_a = s.boundary.times, "boundary_interpolation"_a = cubic ? "cubic" : "linear",
+                  "loaded"_a = s.loaded, "force_times"_a = s.force.times, "has_drag"_a = s.has_drag, "air"_a = s.air,
+                  "wind_times"_a = s.wind.times, "groups"_a = groups, "volumes"_a = volumes);
 }
 
 }  // namespace
 
 void bind_scene(py::module_& m) {
   py::class_<Scene, std::shared_ptr<Scene>>(m, "Scene")
-      .def(py::init([](int particles, const std::vector<std::array<int, 4>>& directors, std::vector<int> pinned,
-                       std::vector<int> driven, std::vector<double> boundary_times,
-                       const std::string& boundary_interpolation, std::vector<int> loaded,
-                       std::vector<double> force_times, bool has_drag, std::vector<std::array<int, 3>> air,
-                       std::vector<double> wind_times, const std::vector<py::dict>& groups,
-                       const std::vector<py::dict>& volumes) {
-             return std::const_pointer_cast<Scene>(
-                 make_scene(particles, directors, std::move(pinned), std::move(driven), std::move(boundary_times),
-                            boundary_interpolation, std::move(loaded), std::move(force_times), has_drag, std::move(air),
-                            std::move(wind_times), groups, volumes));
-           }),
-           py::kw_only(), py::arg("particles"), py::arg("directors"), py::arg("pinned"), py::arg("driven"),
-           py::arg("boundary_times"), py::arg("boundary_interpolation"), py::arg("loaded"), py::arg("force_times"),
-           py::arg("has_drag"), py::arg("air"), py::arg("wind_times"), py::arg("groups"), py::arg("volumes"))
+      .def(py::init(&make_scene))
+      .def(py::pickle(&arguments_of, [](const py::dict& given) { return make_scene(py::kwargs(given)); }))
       .def_property_readonly("layout",
                              [](const Scene& s) {
                                py::dict layout;

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "adjoint/tape_plan.h"
 #include "core/scalar/pack.h"
@@ -19,13 +21,20 @@ struct Solver {
   Plan plan;
 };
 
+inline constexpr std::array<std::pair<const char*, Partition>, 5> partitions{{{"direct", Partition::direct},
+                                                                              {"newton", Partition::newton},
+                                                                              {"newton_cg", Partition::newton_cg},
+                                                                              {"implicit", Partition::implicit},
+                                                                              {"gauss_seidel", Partition::gauss_seidel}}};
+
+inline const char* name_of(Partition partition) {
+  return std::ranges::find(partitions, partition, &std::pair<const char*, Partition>::second)->first;
+}
+
 // Throws std::invalid_argument where there is none of that name.
 inline Partition partition_of(const std::string& name) {
-  if (name == "direct") return Partition::direct;
-  if (name == "newton") return Partition::newton;
-  if (name == "newton_cg") return Partition::newton_cg;
-  if (name == "implicit") return Partition::implicit;
-  if (name == "gauss_seidel") return Partition::gauss_seidel;
+  for (const auto& [known, partition] : partitions)
+    if (name == known) return partition;
   throw std::invalid_argument("partition: got '" + name +
                               "'. Fix: use 'direct', 'newton', 'newton_cg', 'implicit' or 'gauss_seidel'");
 }

@@ -33,12 +33,14 @@ from .markers import Place, along_rope, between, on_cloth, on_particle, on_rope
 from .mesh import TriangleMesh, read_mesh
 from .parameters import Parameter, Parameters
 from .recording import Recording
+from .redundancy import RedundantConstraintsWarning
 from .result import FitResult
 from .rod import Rod, add_rod, rod
 from .rod_junction import Junction
 from .rollout import Gradient, Rollout, rollout
 from .rope import Rope, add_rope, rope
 from .scene import Scene
+from .scene_file import load_scene, save_scene
 from .scores import Score, Scores, coordinate_error, scores
 from .simulate import Trajectory, simulate
 from .solver import Solver
@@ -74,6 +76,7 @@ __all__ = [
     "Place",
     "Recording",
     "RecordingError",
+    "RedundantConstraintsWarning",
     "Refinement",
     "Rod",
     "Rollout",
@@ -105,6 +108,7 @@ __all__ = [
     "equilibrium",
     "fit",
     "force_balance",
+    "load_scene",
     "mesh",
     "no_physics",
     "on_cloth",
@@ -115,6 +119,7 @@ __all__ = [
     "rod",
     "rollout",
     "rope",
+    "save_scene",
     "scores",
     "simulate",
     "support_forces",

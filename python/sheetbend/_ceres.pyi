@@ -1,6 +1,6 @@
 """Types of the module that links Ceres; it is built where Ceres is installed and loads when a fit asks for it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -11,6 +11,8 @@ def minimize(
     u: ArrayLike,
     lower: ArrayLike,
     upper: ArrayLike,
+    longest_step: ArrayLike,
+    held: Sequence[int],
     max_iterations: int,
     tolerance: float,
     observe: Callable[..., bool],

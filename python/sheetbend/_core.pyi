@@ -1,7 +1,7 @@
 """Types of the compiled module: the core, its adjoint and the least-squares evaluation. Arrays are C-contiguous
 float64."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,11 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 class Diverged(RuntimeError):
-    """A state that is not finite."""
+    """A state that is not finite or means nothing, or a gradient that grew beyond meaning."""
 
     substep: int
     time: float
     particle: int
+    seen: str  # of the particle, such as "is not finite"
 
 class Unconverged(RuntimeError):
     """Conjugate gradients ran out of iterations."""
@@ -127,10 +128,15 @@ class Solver:
         self, inputs: ArrayLike, steps: Sequence[int], t0: float, memory: int | None = None
     ) -> tuple[Array, Tape]: ...  # (frames, dofs)
     def vjp(self, inputs: ArrayLike, tape: Tape, steps: Sequence[int], x_bar: ArrayLike, t0: float) -> Array: ...
+    # the same, with the substeps that were computed again for it
+    def reverse(
+        self, inputs: ArrayLike, tape: Tape, steps: Sequence[int], x_bar: ArrayLike, t0: float
+    ) -> tuple[Array, int]: ...
     def jvp(self, inputs: ArrayLike, inputs_dot: ArrayLike, steps: Sequence[int], t0: float) -> tuple[Array, Array]: ...
     def complex_step(self, inputs: ArrayLike, direction: ArrayLike, steps: Sequence[int], t0: float) -> Array: ...
     # per substep, per block: the force left at the start and after each Newton step, over the largest one
     def force_balance(self, inputs: ArrayLike, steps: int, t0: float) -> list[list[list[float]]]: ...
+    def redundant(self, inputs: ArrayLike, t0: float) -> str: ...  # rows that others say already, in words
     # lengths: (batch,) frames of each scene, or none where all have every frame
     def simulate_batch(
         self, inputs: ArrayLike, steps: Sequence[int], t0: float, lengths: Sequence[int] = ()
@@ -189,6 +195,8 @@ class EquilibriumSolution:
     def converged(self) -> bool: ...
     @property
     def message(self) -> str: ...
+    @property
+    def redundant(self) -> str: ...  # rows that others say already, in words
     def vjp(self, x_bar: ArrayLike | None = None, lambda_bar: ArrayLike | None = None) -> Array: ...
 
 def equilibrium(
@@ -243,4 +251,13 @@ class Problem:
     def correction(self, arg0: int, /) -> Array: ...
     def absorbed(self, arg0: int, /) -> float: ...
     def relinearize(self) -> None: ...
+    def state(self) -> Array: ...  # what evaluations depend on besides u; empty where no correction is estimated
+    def restore(self, arg0: ArrayLike, /) -> None: ...
     def evaluation(self) -> object: ...  # a capsule for _ceres.minimize
+
+def evaluation_of(  # the same of (u, jacobian) -> ((ok, residuals, Jacobian), seconds or None)
+    rows: int,
+    parameters: int,
+    function: Callable[[Array, bool], tuple[tuple[bool, Array, Array], float | None]],
+    jacobian_along: bool = False,
+) -> object: ...

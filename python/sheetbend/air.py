@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from .checks import check_increasing, finite, per_item, triangle_array
 from .errors import SceneError
-from .quantities import Term
+from .quantities import ZERO_OR_MORE, Term
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -75,7 +75,8 @@ class Air:
     def _name(self, scene: Scene, name: str, array: str, values: Array, unit: str) -> None:
         """Let a quantity, `<name>_<array>`, stand for the one value of triangles that are about to be appended."""
         value = float(values[0])
-        quantity = scene.add_quantity(f"{name}_{array}", value, unit, positive=value > 0)
+        limits = None if value > 0 or array == "pressure" else ZERO_OR_MORE
+        quantity = scene.add_quantity(f"{name}_{array}", value, unit, positive=value > 0, limits=limits)
         where = len(self.triangles) + np.arange(len(values))
         scene.add_terms([Term(array, where, 1.0, ((quantity, "identity"),))])
         values[:] = 0.0

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from .checks import finite, is_number, points
 from .errors import SceneError
-from .quantities import product
+from .quantities import ZERO_OR_MORE, product
 from .scene import Array, Scene
 
 TimeConstant = tuple[float, dict[str, str]]
@@ -139,7 +139,8 @@ def add_drag(
         if not (is_number(value) and value >= 0):
             raise SceneError(f"{name}_drag_{kind}", "must be zero or more", value, f"give a number in {unit}")
         scene.has_drag = True
-        quantity = scene.add_quantity(f"{name}_drag_{kind}", value, unit, positive=value > 0)
+        limits = None if value > 0 else ZERO_OR_MORE
+        quantity = scene.add_quantity(f"{name}_drag_{kind}", value, unit, positive=value > 0, limits=limits)
         factors = {quantity: "identity", f"{name}_length": "identity"}
         scene.add_terms(
             [

@@ -91,7 +91,8 @@ def add_cloth(
             quadratic form of that, flat at rest).
         curved: the mesh's vertices are the shape at rest of the bending; flat by default.
         held: vertices that will be pinned or driven: triangles and hinges among them alone are left out. To clamp a
-            sheet with the curvature model hold two rows: the clamp then acts in the middle between them.
+            sheet with the curvature model hold two rows or more: the clamp then acts in the middle between the last row
+            and the one before it. A single row is a hinge line.
         positions: (vertices, 3) m, the initial shape; the mesh's vertices by default.
         membrane_damping, bend_damping: Kelvin-Voigt time constants, s.
         drag_linear, drag_quadratic: air drag per area, isotropic.

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
+from .domain import Domain
 from .errors import SceneError, refusal
+from .extrapolation import kinks
 from .quantities import FUNCTIONS, Term
 
 if TYPE_CHECKING:
@@ -20,45 +22,55 @@ if TYPE_CHECKING:
 VECTORS = ("position", "velocity", "boundary", "force", "wind")
 
 
+def specification(scene: Scene) -> dict[str, Any]:
+    """The topology of a scene, as the compiled core is made from it."""
+    return {
+        "particles": scene.particle_count,
+        "directors": [(d, *edge) for d, edge in scene.directors.items()],
+        "pinned": sorted(scene.pinned),
+        "driven": list(scene.boundary.driven),
+        "boundary_times": [] if not scene.boundary.driven else list(scene.boundary.times),
+        "boundary_interpolation": scene.boundary.interpolation,
+        "loaded": list(scene.forces.particles),
+        "force_times": scene.forces.times.tolist(),
+        "has_drag": scene.has_drag,
+        "air": scene.air.triangles.tolist(),
+        "wind_times": scene.air.times.tolist(),
+        "groups": [
+            {"name": g.name, "kind": g.kind, "damped": g.damped, "stencil": g.particles.ravel()} for g in scene.groups
+        ],
+        "volumes": [
+            {"name": name, "triangles": triangles.tolist()} for name, triangles in scene.volumes.triangles.items()
+        ],
+    }
+
+
 class CompiledScene:
     """Built once by `Scene.compiled`.
 
     Attributes:
         core: the compiled topology.
         layout: input array name -> (offset, size) in the flat input vector.
+        name: of the scene.
+        kinds: of its constraints.
         names: quantity names in the order of theta.
         theta: their values.
+        kinks: what makes its motions not smooth in time, in words; empty if nothing.
+        domain: which quantities and inputs make sense.
     """
 
     def __init__(self, scene: Scene) -> None:
         try:
-            self.core = _core.Scene(
-                particles=scene.particle_count,
-                directors=[(d, *edge) for d, edge in scene.directors.items()],
-                pinned=sorted(scene.pinned),
-                driven=list(scene.boundary.driven),
-                boundary_times=[] if not scene.boundary.driven else list(scene.boundary.times),
-                boundary_interpolation=scene.boundary.interpolation,
-                loaded=list(scene.forces.particles),
-                force_times=scene.forces.times.tolist(),
-                has_drag=scene.has_drag,
-                air=scene.air.triangles.tolist(),
-                wind_times=scene.air.times.tolist(),
-                groups=[
-                    {"name": g.name, "kind": g.kind, "damped": g.damped, "stencil": g.particles.ravel()}
-                    for g in scene.groups
-                ],
-                volumes=[
-                    {"name": name, "triangles": triangles.tolist()}
-                    for name, triangles in scene.volumes.triangles.items()
-                ],
-            )
+            self.core = _core.Scene(**specification(scene))
         except ValueError as error:
             raise refusal(error, SceneError, scene.name) from error
         self.layout: dict[str, tuple[int, int]] = self.core.layout
+        self.name = scene.name
+        self.kinds = frozenset(g.kind for g in scene.groups)
         self.names = tuple(scene.quantities)
         self.theta = np.array([q.value for q in scene.quantities.values()], dtype=float)
-        self._positive = tuple(q.positive for q in scene.quantities.values())
+        self.kinks = kinks(scene)
+        self.domain = Domain(scene, self.layout)
         self._base = self._pack(scene)
         self._terms = [*scene.terms, *scene.boundary.terms()]
 
@@ -80,15 +92,21 @@ class CompiledScene:
         offsets = {array: offset for array, (offset, _) in self.layout.items()} | {"extra": self.core.inputs}
         every = [*self._terms, *terms]
         entries = np.array([np.size(t.index) for t in every], dtype=int)
-        lengths = np.array([len(t.factors) for t in every], dtype=int)
-        parameter = np.array([order[name] for t in every for name, _ in t.factors], dtype=int)
-        function = np.array([FUNCTIONS[f] for t in every for _, f in t.factors], dtype=int)
+        lengths = np.array([len(t.quantities) for t in every], dtype=int)
+        parameter = np.array([order[name] for t in every for name in t.quantities], dtype=int)
+        functions = [(*(f for _, f in t.factors), *("exp" for _ in t.exponents)) for t in every]
+        function = np.array([FUNCTIONS[f] for own in functions for f in own], dtype=int)
         # Every entry of a term has all of its factors: where they stand in the two lists above.
         length = np.repeat(lengths, entries)
         first_factor = np.concatenate([[0], np.cumsum(length)])
         first = np.repeat(np.cumsum(lengths) - lengths, entries)
         place = np.repeat(first - first_factor[:-1], length) + np.arange(first_factor[-1])
         coefficients = [_spread(t.coefficient, k) for t, k in zip(every, entries, strict=True)]
+        weight = np.ones(len(place))  # of a quantity in an exponential
+        for t, k, start in zip(every, entries, first_factor[np.cumsum(entries) - entries], strict=True):
+            for e, (_, own) in enumerate(t.exponents, start=len(t.factors)):
+                width = len(t.quantities)
+                weight[start + e : start + k * width : width] = own
         return {
             "base": np.concatenate([self._base, np.zeros(extra)]) if extra else self._base,
             "target": _joined([offsets[t.array] + np.ravel(t.index) for t in every]),
@@ -96,13 +114,14 @@ class CompiledScene:
             "first_factor": first_factor,
             "parameter": parameter[place],
             "function": function[place],
+            "weight": weight,
         }
 
     def values(self, changes: Mapping[str, float] | None = None) -> np.ndarray:
         """theta with some quantities changed, shape (quantities,).
 
         Raises:
-            SceneError: an unknown name, no finite number, or a negative one where it must be positive.
+            SceneError: an unknown name, no finite number, or one outside the range of its quantity.
         """
         theta = self.theta.copy()
         for name, value in (changes or {}).items():
@@ -115,24 +134,18 @@ class CompiledScene:
                 theta[k] = value
             except (TypeError, ValueError):
                 theta[k] = np.nan
-            if not np.isfinite(theta[k]) or (self._positive[k] and theta[k] < 0.0):
-                wanted = "a positive number" if self._positive[k] else "a finite number"
-                raise SceneError(f"values.{name}", f"must be {wanted}", value, "give it in SI units")
+        self.domain.check_quantities(theta[None])
         return theta
 
     def inputs(self, theta: np.ndarray | None = None) -> np.ndarray:
         """Flat inputs, shape (core.inputs,).
 
         Raises:
-            SceneError: some are not finite, as where a stiffness is zero.
+            SceneError: some are not finite, or negative where that makes no sense; names the quantities.
         """
         theta = self.theta if theta is None else theta
         found = self._map.inputs(theta)
-        if not np.isfinite(found).all():
-            got = {n: float(v) for n, v, p in zip(self.names, theta, self._positive, strict=True) if p and not v > 0.0}
-            raise SceneError(
-                "values", "make inputs that are not finite", got or theta.tolist(), "give positive numbers"
-            )
+        self.domain.check_inputs(found[None], theta)
         return found
 
     def inputs_dot(self, theta: np.ndarray, theta_dot: np.ndarray) -> np.ndarray:

@@ -32,6 +32,7 @@ Integers = NDArray[np.integer[Any]]
 
 NEGLIGIBLE = 1e-10  # share of a parameter's variance
 _MAX_ORDER = 20
+_ZERO = 1e-290  # sum of squares: the numbers are so small that ratios of them are rounding
 _CORRECTIONS = 2  # the second already changes the intervals by less than 1 %
 
 
@@ -118,11 +119,14 @@ def covariance(
     prior = np.zeros((0, count)) if prior_jacobian is None else prior_jacobian
     size = np.sqrt((jacobian**2).sum(0) + (prior**2).sum(0))
     jacobian, prior = jacobian / size, prior / size
-    bread = np.linalg.inv(jacobian.T @ jacobian + prior.T @ prior)
+    root = _root(np.vstack([jacobian, prior]))
+    bread = root @ root.T
     influence = jacobian @ bread  # of a row on the estimate
     absorbed = taken + float((influence * jacobian).sum())  # parameters' worth of residual that the fit took away
     if rows - absorbed < 0.5:
         raise InputError("residuals", "must outnumber the free parameters", rows, f"give more than {count} rows")
+    if float(residuals @ residuals) < _ZERO:
+        residuals = np.zeros(rows)
     variance = float(residuals @ residuals) / (rows - absorbed)
     from_data = variance * (influence.T @ influence)
     from_prior = bread @ prior.T @ prior @ bread
@@ -131,10 +135,10 @@ def covariance(
     told = white > NEGLIGIBLE * (white + np.diag(from_prior))  # else the prior says it all, and the rest is rounding
     if told.any():
         grid = _Grid(layout, residuals)
-        spectral, time = _spectral(grid, jacobian, bread)
+        spectral, time = _spectral(grid, jacobian, root)
         robust = _newey_west(grid, influence) * rows / (rows - absorbed)
-        largest = np.maximum(np.diag(spectral), robust)
-        inflation[told] = np.maximum(largest[told] / white[told], 1.0)
+        wider = np.maximum(np.diag(spectral), robust)
+        inflation[told] = np.maximum(wider[told] / white[told], 1.0)
         if np.all(np.diag(spectral)[told] > 1e-6 * white[told]):  # else its correlations mean nothing: one frame, say
             from_data = spectral
         stretch = np.ones(count)
@@ -189,9 +193,14 @@ class _Grid:
         return matrix
 
 
-def _spectral(grid: _Grid, jacobian: Array, bread: Array) -> tuple[Array, float]:
-    """B J' Omega J B with Omega = C (x) rho, and the autocorrelation time of rho in frames."""
-    root = np.linalg.cholesky(bread)
+def _root(rows: Array) -> Array:
+    """(p, p) W with W W' = (rows' rows)^-1, from the triangle of rows = Q R: the product rows' rows would lose half the
+    digits, and its inverse may have negative eigenvalues."""
+    return np.linalg.solve(np.linalg.qr(rows, mode="r"), np.eye(rows.shape[1]))
+
+
+def _spectral(grid: _Grid, jacobian: Array, root: Array) -> tuple[Array, float]:
+    """B J' Omega J B with Omega = C (x) rho and B = root root', and the autocorrelation time of rho in frames."""
     columns = [grid.dense(column) for column in (jacobian @ root).T]  # H = Q Q' takes Omega to cov(residuals)
     mixing = grid.channel_covariance()
     rows = grid.mask.sum()
@@ -272,7 +281,9 @@ def _newey_west(grid: _Grid, influence: Array) -> Array:
     lagged = [product(lag) for lag in range(pilot + 1)]
     level = np.abs(lagged[0] + 2 * sum(lagged[1:]))
     slope = 2 * sum(lag * lagged[lag] for lag in range(1, pilot + 1)) if pilot else np.zeros_like(level)
-    bandwidth = 1.1447 * (slope**2 / np.maximum(level, 1e-12 * lagged[0]) ** 2 * frames) ** (1 / 3)
+    level = np.maximum(level, 1e-12 * lagged[0])
+    bend = np.divide(slope, level, out=np.zeros_like(slope), where=level > 0)  # zero: no residual where it acts
+    bandwidth = 1.1447 * (bend**2 * frames) ** (1 / 3)
     lags = np.minimum(bandwidth.astype(int), longest // 4)
     total = lagged[0].copy()
     for lag in range(1, int(lags.max()) + 1):

@@ -1,9 +1,10 @@
 """The second half of an interval: what a finer discretization would move.
 
-A parameter is physical only if the next mesh and the next time step agree about it. The refits start at the estimate
-and cost about as much as the fit itself; a single Gauss-Newton step with the Jacobian of the fit costs one simulation,
-and is right to first order in what the residuals change. A halving removes 1 - 2^-p of an error of order p, so what it
-moves is carried on to the limit (Richardson): 4/3 of it for meshes and BDF2, twice for BDF1.
+A parameter is physical only if the next mesh and the next time step agree about it. By default the estimate is moved to
+the limit of short substeps (see `time_step`). The mesh counts where a finer one can be made: by a refit, which costs
+more than the fit itself, or by linear refinement, one simulation of the finer mesh at the estimate and one Gauss-Newton
+step, which is right to first order in what the residuals change. A halving removes 1 - 2^-p of an error of order p, so
+what it moves is multiplied up to the limit (Richardson): by 4/3 for meshes, by 2 for sweeps.
 """
 
 from __future__ import annotations
@@ -14,16 +15,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .errors import SheetbendError
+from .errors import InputError, SheetbendError
 from .experiment import Experiment
-from .gauge import RANK_TOLERANCE
-from .optimizers import refit
+from .linear_step import moves, one_step
+from .optimizers import Minimum, refit
 from .parameters import Parameters
 from .problem import FitProblem
 from .profile import FARTHEST
 from .result import Refit
+from .time_step import SECOND_ORDER, SWEEPS, TIME_STEP, Settled, combined, settle
 
-_SECOND_ORDER = 4.0 / 3.0
+MESH = "mesh"
 
 
 @dataclass(frozen=True)
@@ -31,9 +33,9 @@ class Refinement:
     """How to refine.
 
     Attributes:
-        halve_step: refit motions at half the substep.
-        finer: makes the same experiments with twice the nodes; None = the mesh is not refined.
-        linear: one Gauss-Newton step with the Jacobian of the fit stands for each refit.
+        halve_step: move the estimate to the limit of short substeps, and count what that leaves open.
+        finer: makes the same experiments with twice the nodes; None = the mesh is not counted.
+        linear: one Gauss-Newton step with the Jacobian of the fit stands for the refit on the finer mesh.
     """
 
     halve_step: bool = True
@@ -41,30 +43,92 @@ class Refinement:
     linear: bool = False
 
 
+AUTO = Refinement(linear=True)
+NONE = Refinement(halve_step=False)
+
+
+def wanted_refinement(given: Refinement | str | bool | None) -> Refinement:
+    """What `refine` of `fit` means.
+
+    Raises:
+        InputError: none of the forms that it may have.
+    """
+    if isinstance(given, Refinement):
+        return given
+    if given == "auto" or given is True:
+        return AUTO
+    if given is None or given is False:
+        return NONE
+    fix = "give 'auto', False or a Refinement"
+    raise InputError("refine", "is no way to refine", given, fix)
+
+
+def settled(
+    refinement: Refinement,
+    experiments: Sequence[Experiment],
+    problem: FitProblem,
+    end: Minimum,
+    optimizer: str | None,
+) -> tuple[Settled, Sequence[Experiment]]:
+    """The fit with its discretization counted, and all experiments as the estimate explains them; Ctrl-C passes.
+
+    Args:
+        optimizer: of refits; None after Ctrl-C, where nothing is counted any more.
+    """
+    if optimizer is None:
+        return Settled(problem, end.u, not_counted=_left_out(NONE, problem.experiments)), experiments
+    missing = _left_out(refinement, problem.experiments)
+    found = Settled(problem, end.u)
+    if refinement.halve_step and any(not e.static for e in problem.experiments):
+        if end.converged:
+            found = settle(problem, end.u)
+        else:
+            missing = (f"{TIME_STEP} not counted: the fit did not converge", *missing)
+    refits, failed = refined_estimates(refinement, experiments, problem, end.u, found.u, optimizer)
+    whole = replace(found, refits=(*found.refits, *refits), not_counted=(*found.not_counted, *missing, *failed))
+    return whole, combined(experiments) if found.problem is not problem else experiments
+
+
+def _left_out(refinement: Refinement, experiments: Sequence[Experiment]) -> tuple[str, ...]:
+    """What intervals are not asked to count although the experiments have it."""
+    found = []
+    if not refinement.halve_step and any(not e.static for e in experiments):
+        found.append(f"{TIME_STEP} not counted")
+    if refinement.finer is None and any(e.scene.ropes or e.scene.cloths for e in experiments):
+        found.append(f"{MESH} not counted")
+    return tuple(found)
+
+
 def refined_estimates(
     refinement: Refinement,
     experiments: Sequence[Experiment],
-    parameters: Parameters,
     problem: FitProblem,
     u: np.ndarray,
+    at: np.ndarray,
     optimizer: str,
-    threads: int = 1,
-) -> tuple[Refit, ...]:
-    """By how much each refit moves each free parameter, in its unit. Ctrl-C passes through.
+) -> tuple[tuple[Refit, ...], tuple[str, ...]]:
+    """By how much each refit moves each free parameter, in its unit; and what could not be counted, with its cause.
+    Ctrl-C passes through.
 
-    Raises:
-        SheetbendError: the finer experiments have no answer at the estimate.
+    Args:
+        problem: of the fit, at the substep of the experiments; u: its minimum.
+        at: where the estimate is by now, from which the same internal steps are told.
     """
+    made: list[Refit] = []
+    failed: list[str] = []
     here = problem.parameters.to_physical(u)
-    moved = []
     for name, refined, to_limit in _refits(refinement, experiments):
-        finer = FitProblem(refined, parameters, threads=threads)
-        start = finer.parameters.to_internal(here)
-        end = _one_step(problem, finer, u) if refinement.linear else refit(finer, start, optimizer).u
-        there = finer.parameters.to_physical(end)
-        moves = {key: there[key] - here[key] for key in problem.parameters.free}
-        moved.append(Refit(name=name, to_limit=to_limit, moved=moves))
-    return tuple(moved)
+        try:
+            finer = FitProblem(refined(), problem.given, threads=problem.threads)
+            if refinement.linear or name == SWEEPS:
+                end = one_step(problem, finer, u)
+            else:
+                end = refit(finer, finer.parameters.to_internal(here), optimizer).u
+        except SheetbendError as error:
+            failed.append(f"{name} not counted: {error}")
+            continue
+        made.append(Refit(name=name, to_limit=to_limit, moved=moves(problem.parameters, at, at + end - u)))
+    return tuple(made), tuple(failed)
 
 
 def to_the_limit(refits: Iterable[Refit], parameters: Parameters, values: Mapping[str, float]) -> dict[str, float]:
@@ -85,30 +149,23 @@ def to_the_limit(refits: Iterable[Refit], parameters: Parameters, values: Mappin
     }
 
 
-def _one_step(problem: FitProblem, finer: FitProblem, u: np.ndarray) -> np.ndarray:
-    """Where the minimum goes to first order; parameters at a bound stay there."""
-    _, r, J = problem.evaluate(u)
-    ok, there, _ = finer.evaluate(u, jacobian=False)
-    if not ok:
-        raise SheetbendError(f"the refinement cannot start: {finer.core.failure or 'a residual is not finite'}")
-    lower, upper = problem.parameters.bounds()
-    inside = (u > lower) & (u < upper)
-    size = np.maximum(np.linalg.norm(J[:, inside], axis=0), np.finfo(float).tiny)
-    step = np.linalg.lstsq(J[:, inside] / size, r - there, rcond=RANK_TOLERANCE)[0] / size
-    end = u.copy()
-    end[inside] += step
-    return np.clip(end, lower, upper)
-
-
-def _refits(refinement: Refinement, experiments: Sequence[Experiment]) -> list[tuple[str, list[Experiment], float]]:
-    """What is refined, the finer experiments, and the factor from what they move to the limit."""
+def _refits(
+    refinement: Refinement, experiments: Sequence[Experiment]
+) -> list[tuple[str, Callable[[], list[Experiment]], float]]:
+    """What is refined, what makes the finer experiments, and the factor from what they move to the limit."""
     fitted = [e for e in experiments if e.predict is None]
     moving = [e for e in fitted if not e.static]
-    refits = []
-    if refinement.halve_step and moving:
-        first_order = any(e.solver.integrator == "bdf1" for e in moving)
-        finer = [replace(e, solver=e.solver.with_h(e.solver.h / 2)) for e in fitted]
-        refits.append(("half the step", finer, 2.0 if first_order else _SECOND_ORDER))
+    refits: list[tuple[str, Callable[[], list[Experiment]], float]] = []
+    if refinement.halve_step and any(e.solver.method == "gauss_seidel" for e in moving):
+        refits.append((SWEEPS, lambda: [_swept(e) for e in fitted], 2.0))
     if refinement.finer is not None:
-        refits.append(("finer mesh", [e for e in refinement.finer() if e.predict is None], _SECOND_ORDER))
+        make = refinement.finer
+        refits.append(("finer mesh", lambda: [e for e in make() if e.predict is None], SECOND_ORDER))
     return refits
+
+
+def _swept(e: Experiment) -> Experiment:
+    """With twice as many sweeps."""
+    if e.solver.method != "gauss_seidel":
+        return e
+    return replace(e, solver=replace(e.solver, iterations=2 * e.solver.sweeps))

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from . import _core
 from .checks import finite
 from .errors import SceneError, SheetbendError
+from .redundancy import warn_redundant
 from .scene import Scene
 from .simulate import forces_by_group, pressures_by_volume
 
@@ -129,6 +130,9 @@ def equilibrium(
         SceneError: the start has the wrong shape.
         ValueError: air blows on triangles at the start; still air leaves a scene at rest as it is.
         NoEquilibriumError: not converged; says how far it came and what to try.
+
+    Warns:
+        RedundantConstraintsWarning: some rigid constraints follow from others at rest.
     """
     compiled = scene.compiled
     x = None if start is None else finite("start", start, (scene.particle_count, 3), SceneError).ravel()
@@ -136,6 +140,7 @@ def equilibrium(
     out = _core.equilibrium(compiled.core, compiled.inputs(theta), x, stable)
     if not out.converged:
         raise no_rest(scene, out.message, scene.positions if x is None else x.reshape(-1, 3))
+    warn_redundant(scene.name, out.redundant)
     return Equilibrium(
         out.positions.reshape(-1, 3),
         forces_by_group(scene, out.multipliers),

@@ -57,27 +57,39 @@ class ConfigError(InputError):
 
 
 class DivergenceError(SheetbendError, RuntimeError):
-    """A rollout left the finite numbers.
+    """A rollout left the finite numbers, or reached a state or a gradient that means nothing.
+
+    A finite state counts as diverged where the energy put into the scene does not explain it by a wide margin:
+    particles that move too fast, constraints stretched to several times their width, a scene shrunk to a point. A
+    gradient counts as diverged where it grows by more than 1/eps = 4.5e15 on its way back through time, so that
+    rounding errors decide it.
 
     Args:
-        substep: index of the substep that failed, from 0.
+        substep: index of the substep after which it was seen, from 0. Finite states are looked at every 32 substeps
+            and at the end.
         time: its time, s.
-        particle: index of the first particle that is not finite.
+        particle: index of the first particle that is at fault.
         where: what was being computed, in words (solver, constraint group).
+        seen: what was seen of the particle.
     """
 
-    def __init__(self, substep: int, time: float, particle: int, where: str) -> None:
-        super().__init__(substep, time, particle, where)
+    def __init__(self, substep: int, time: float, particle: int, where: str, seen: str = "is not finite") -> None:
+        super().__init__(substep, time, particle, where, seen)
         self.substep = substep
         self.time = time
         self.particle = particle
         self.where = where
+        self.seen = seen
 
     def __str__(self) -> str:
+        fix = (
+            "end the motion earlier, or differentiate it in shorter pieces"
+            if "gradient" in self.seen
+            else "use a smaller substep or more iterations, and check masses, forces and boundary motion near that time"
+        )
         return (
-            f"the rollout diverged: particle {self.particle} is not finite after substep {self.substep} "
-            f"(t = {self.time:.6g} s), in {self.where}. Fix: use a smaller substep or more iterations, and "
-            "check masses, forces and boundary motion near that time."
+            f"the rollout diverged: particle {self.particle} {self.seen}, after substep {self.substep} "
+            f"(t = {self.time:.6g} s), in {self.where}. Fix: {fix}."
         )
 
 

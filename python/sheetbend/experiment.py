@@ -296,6 +296,12 @@ class Experiment:
         """By what they are made from, which no problem on the frozen scene changes."""
         return {}
 
+    @cached_property
+    def _can_step(self) -> bool:
+        """Asked once, so that what the solver refuses or warns of is told before any fit."""
+        self.solver.core(self.scene.compiled)
+        return True
+
     def core(self, recording: Recording, corrected: np.ndarray | None = None) -> dict[str, Any]:
         """The experiment on (part of) its recording, for the compiled core.
 
@@ -304,6 +310,8 @@ class Experiment:
                 fit finds it where there is a `driven_sigma`, and otherwise it is zero.
         """
         compiled = self.scene.compiled
+        if not self.static:
+            self.solver.check_smooth(compiled)
         offsets = [place.offset or (0.0, 0.0, 0.0) for place in self.compared_places]
         observed = self.observed(recording)
         for marker, m in zip(observed["markers"], self.compared, strict=True):
@@ -311,11 +319,16 @@ class Experiment:
         map_ = compiled.map(3 * len(offsets) + 1, self.extra_terms())
         map_["base"][compiled.core.inputs : -1] = np.ravel(offsets)
         correction = self.correction(recording)
+        _ = self.static or self._can_step
         sigma = 0.0 if corrected is not None else self.driven_noise or 0.0
+        if sigma > 0.0 and self.solver.extrapolate > 1 and not self.static:
+            fix = "leave one of the two out"
+            raise InputError(f"{self.name}.driven_sigma", "does not go with runs that are extrapolated", sigma, fix)
         return {
             "name": self.name,
             "scene": compiled.core,
             "h": self.solver.h,
+            "finer": [] if self.static else list(self.solver.runs[1:]),
             "integrator": self.solver.integrator,
             "partition": self.solver.method,
             "iterations": self.solver.sweeps,
@@ -323,6 +336,8 @@ class Experiment:
             "cg_tolerance": self.solver.cg_tolerance,
             "cg_iterations": self.solver.cg_iterations,
             "map": map_,
+            "least": compiled.domain.least,
+            "most": compiled.domain.most,
             "observed": observed,
             "correction": None
             if correction is None

@@ -10,26 +10,30 @@ from typing import Any
 
 import numpy as np
 
-from .discretization import Refinement, refined_estimates, to_the_limit
+from .conclude import Elsewhere, judged_parameters, misfit, warnings_of, without_verdict
+from .contradictions import between_parts, doubtful, elsewhere, held_out_motion
+from .discretization import Refinement, settled, to_the_limit, wanted_refinement
 from .driven_noise import doubts
 from .errors import InputError
 from .experiment import Experiment
-from .floors import solver_floors
-from .identifiability import Identifiability, Nuisance, identify
+from .floors import at_floor_of_sweeps
+from .given import check_given, half_widths, premises
+from .growth import Growth, growths
+from .identifiability import Identifiability
+from .journal import journaled
 from .leave_one_out import MEANING, companions, each_left_out
-from .optimizers import Minimum, Observer, refit
+from .optimizers import Observer, ceres_trouble
+from .optional import require
 from .parameters import Parameter, Parameters
 from .prediction import Comparison, compare, predicted_values
 from .problem import FitProblem, ParameterLike, as_parameters
 from .recording import Recording
-from .result import Estimate, FitResult, Given, RecordingFit, Refit, Start
+from .result import Estimate, FitResult, Given, MotionGrowth, Premise, RecordingFit, Start
 from .scene import Scene
 from .search import Search
+from .time_step import Settled
 
-PROFILE_TOLERANCE = 1e-7  # relative, of the cost: an interval's rise is many times that
 Systematic = Callable[[FitProblem, np.ndarray], Mapping[str, float]]
-MISSED = 3.0  # sigmas: residuals so large are no noise
-INACCURATE = 0.5  # a start whose cost exceeds the best by this share ended elsewhere
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,11 @@ class Fit:
         return self.result[name]
 
     @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C ended it."""
+        return self.result.interrupted
+
+    @property
     def values(self) -> dict[str, float]:
         """All parameters' values by (expanded) name."""
         return self.result.values
@@ -73,6 +82,7 @@ class Fit:
         self.result.save(path)
 
 
+@journaled
 def fit(
     scene: Scene | Experiment | Sequence[Experiment],
     recording: Recording | None = None,
@@ -80,15 +90,17 @@ def fit(
     *,
     optimizer: str = "auto",
     starts: Sequence[Mapping[str, float]] = (),
-    windows: Sequence[float] = (),
+    windows: Sequence[float] | str = "auto",
     tolerance: float = 1e-10,
-    refine: Refinement | None = None,
+    refine: Refinement | str | bool | None = "auto",
     systematic: Systematic | None = None,
+    given: Mapping[str, float] | None = None,
     leave_one_out: bool = False,
     profiles: bool = True,
     max_iterations: int = 200,
     threads: int = 1,
     progress: Observer | None = None,
+    journal: str | Path | None = None,
     **experiment: Any,
 ) -> Fit:
     """Fit quantities of scenes to recordings.
@@ -99,18 +111,28 @@ def fit(
         optimizer: "ceres", "scipy", or "auto" (Ceres where it was built).
         starts: further starting values by name; the best end wins, all are reported.
         windows: s, increasing: so much of every motion from its scene's start on is fitted first, one after another,
-            each from where the one before ended; for a start far off, from which the whole motion diverges or misleads.
+            each from where the one before ended. "auto" chooses the lengths, and none where the first step on the whole
+            motion keeps what it promises; () for none.
         tolerance: relative change of the cost that counts as none.
-        refine: also refit on a finer discretization, and count what that moves as a part of the intervals (see
-            `discretization`).
+        refine: "auto" moves the estimates to the limit of short substeps and counts what that leaves open in the
+            intervals, at the cost of some three evaluations with tangents. A `Refinement` says more, above all how to
+            make the same experiments on a finer mesh, which "auto" does not know: "mesh not counted" stands in the
+            table then. False (or None) counts nothing, as suits a recording that was simulated at the same substep.
         systematic: (problem, internal minimum) -> half-widths of what else the intervals are to count, by parameter, in
             its unit.
+        given: standard deviations of numbers that the fit takes as given, by name; they then count in the intervals. Of
+            quantities that must be positive it is relative (`{"rope_density": 0.02}` is 2 %), of others in their unit;
+            "gravity" (its direction) and "clamp_direction" are in rad, "clamps" and "markers" (their places) in m. What
+            each of these numbers moves is in `FitResult.premises` in any case.
         leave_one_out: also predict every recording that holds nothing out by a fit to the others.
         profiles: refit the others along the worst parameters for their intervals; without, intervals are the linear
             ones, which cost nothing beside the fit.
         max_iterations: per start and window.
         threads: over experiments and Jacobian columns; the result does not depend on it.
         progress: called after every iteration.
+        journal: file that keeps every evaluation until the fit is done (see `sheetbend.journal`). After a kill, the
+            same call with the same file goes on from there and gives the same bits; with another recording, scene or
+            version it is refused.
 
     Returns:
         Fit. On Ctrl-C it holds the best point so far, marked `interrupted`, with linear intervals: whatever needs a
@@ -124,6 +146,8 @@ def fit(
     wanted = as_parameters(parameters, experiments)
     if threads < 1:
         raise InputError("threads", "must be positive", threads, "give at least 1")
+    require("scipy.special", "fit")  # of intervals, behind all the work
+    refinement = wanted_refinement(refine)
     search = Search(optimizer, starts, windows, max_iterations, tolerance, progress)
     began = time.perf_counter()
     fitted = [e for e in experiments if e.predict is None]
@@ -138,39 +162,63 @@ def fit(
         for e in fitted:
             companions(e, fitted, wanted)
     problem = FitProblem(fitted, wanted, threads=threads)
-    ends, name, interrupted = search.run(problem)
+    problem.check_start()
+    check_given(given or {}, problem)
+    found = search.run(problem)
+    ends, name, interrupted = found.ends, found.optimizer, found.interrupted
+    trouble = ceres_trouble() if optimizer == "auto" else ""
+    fallback = (f"SciPy stands in for Ceres, which does not load: {trouble}",) if trouble else ()
     best = ends[0]
-    values = problem.parameters.to_physical(best.u)
+
+    grown = growths(problem, best.u)
+    lost = without_verdict(problem, best, grown)
+    if len(lost) == len(problem.parameters.free):  # then no refit tells anything
+        refinement, systematic = wanted_refinement(False), None
 
     def conclude(refitter: str | None) -> _Conclusion:
-        refits = (
-            ()
-            if refine is None or refitter is None
-            else refined_estimates(refine, experiments, wanted, problem, best.u, refitter, threads)
+        at, every = settled(refinement, experiments, problem, best, refitter)
+        values = problem.parameters.to_physical(at.u)
+        rests_on, unknown = ((), ()) if refitter is None or lost else premises(at.problem, at.u, given or {})
+        more = dict(half_widths(rests_on, problem.parameters.free))
+        for parameter, reach in ({} if systematic is None else systematic(at.problem, at.u)).items():
+            more[parameter] = more.get(parameter, 0.0) + reach
+        refined = to_the_limit(at.refits, problem.parameters, values)
+        judged, lower = judged_parameters(
+            at.problem, at.u, refined, more, refitter if profiles else None, lost, (problem, best.u)
         )
-        more = {} if systematic is None else systematic(problem, best.u)
-        refined = to_the_limit(refits, problem.parameters, values)
-        judged = _judge(problem, best.u, refined, more, refitter if profiles else None)
-        found = predicted_values(experiments, wanted, values, refitter, threads)
-        doubted = () if refitter is None else doubts(problem, best.u, judged)
-        return _Conclusion(refits, judged, *found, doubted)
+        judged = at_floor_of_sweeps(_moved(judged, at.moved), at.refits)
+        predicted = predicted_values(every, wanted, values, refitter, threads)
+        doubted = () if refitter is None or lost else doubts(at.problem, at.u, judged)
+        parts = {} if refitter is None else between_parts(at.problem, at.u, judged, refinement)
+        return _Conclusion(at, tuple(every), judged, lower, *predicted, doubted + unknown, rests_on, parts)
 
     left_out: dict[str, Comparison] = {}
     try:
         end = conclude(None if interrupted else name)
         if leave_one_out and not interrupted:
-            left_out = each_left_out(fitted, wanted, values, name, threads)
+            left_out = each_left_out(fitted, wanted, end.values, name, threads)
     except KeyboardInterrupt:
         interrupted = True
         end = conclude(None)
-    judged, corrected = end.judged, problem.corrections(best.u) | end.corrected
-    comparisons = compare(experiments, wanted, end.values, threads, corrected)
+    at, judged = end.at, end.judged
+    corrected = at.problem.corrections(at.u) | end.corrected
+    comparisons = compare(end.experiments, wanted, end.values, threads, corrected)
     rows = problem.core.first_rows
     count = {e.name: rows[i + 1] - rows[i] for i, e in enumerate(fitted)}
+    errors = tuple(_errors(c, count, left_out, corrected) for c in comparisons)
+    starts_elsewhere = [
+        Elsewhere(m.cost - best.cost, problem.parameters.to_physical(m.u), "another start") for m in ends[1:]
+    ]
+    contradicted = (
+        held_out_motion(problem, comparisons, errors)
+        | elsewhere(problem, judged, best.cost, [*starts_elsewhere, *end.lower])
+        | end.parts
+    )
+    estimates = doubtful(judged.estimates, contradicted)
     result = FitResult(
-        estimates=judged.estimates,
-        recordings=tuple(_errors(c, count, left_out, corrected) for c in comparisons),
-        cost=best.cost,
+        estimates=estimates,
+        recordings=errors,
+        cost=best.cost if at.problem is problem else at.cost,
         first_cost=best.first,
         jacobian_seconds=problem.seconds.get(True),
         rows=problem.core.data_rows,
@@ -180,7 +228,7 @@ def fit(
         converged=best.converged,
         interrupted=interrupted,
         message=best.message,
-        given=_given(problem.parameters, values) + end.given,
+        given=_given(problem.parameters, end.values) + end.given,
         correlations=judged.correlations,
         gauges=tuple(g.words for g in judged.gauges),
         baseline="; ".join(
@@ -190,12 +238,22 @@ def fit(
         autocorrelation_time=judged.autocorrelation_time,
         starts=tuple(
             Start(
-                cost=m.cost, iterations=m.iterations, converged=m.converged, values=problem.parameters.to_physical(m.u)
+                cost=m.cost if np.isfinite(m.cost) else None,
+                iterations=m.iterations,
+                converged=m.converged,
+                values=problem.parameters.to_physical(m.u),
             )
             for m in ends
         ),
-        refits=end.refits,
-        warnings=_warnings(ends, best, interrupted, problem.core.data_rows) + end.doubts,
+        refits=at.refits,
+        not_counted=at.not_counted,
+        premises=end.premises,
+        misfit=misfit(at.problem, at.u),
+        growth=_growth(found.growths, grown),
+        windows=best.windows,
+        evaluations=sum(m.evaluations for m in ends),
+        jacobians=sum(m.jacobians for m in ends),
+        warnings=warnings_of(ends, interrupted, problem, estimates) + end.doubts + fallback,
     )
     return Fit(result, tuple(comparisons), wanted, corrected)
 
@@ -204,12 +262,16 @@ def fit(
 class _Conclusion:
     """What follows from a minimum."""
 
-    refits: tuple[Refit, ...]
+    at: Settled
+    experiments: tuple[Experiment, ...]  # as they are compared
     judged: Identifiability
+    lower: tuple[Elsewhere, ...]  # where profiles ended
     values: dict[str, float]  # of all experiments
     given: tuple[Given, ...]
     corrected: dict[str, np.ndarray]  # of experiments that are only predicted
     doubts: tuple[str, ...]
+    premises: tuple[Premise, ...]
+    parts: dict[str, str]  # by parameter, of which parts of the data ask for different values
 
 
 def _experiments(
@@ -232,58 +294,9 @@ def _experiments(
     return experiments
 
 
-def _judge(
-    problem: FitProblem,
-    u: np.ndarray,
-    refined: Mapping[str, float],
-    systematic: Mapping[str, float],
-    refitter: str | None,
-) -> Identifiability:
-    """Verdicts and intervals; without a refitter the intervals are the linear ones."""
-    _, r, J = problem.evaluate_exactly(u)
-    rows, behind = problem.prior_rows
-    return identify(
-        problem.parameters,
-        u,
-        r[:rows],
-        J[:rows],
-        layout=problem.rows_layout(),
-        floors=solver_floors(problem.experiments, problem.parameters),
-        discretization=refined,
-        systematic=systematic,
-        profile=None if refitter is None or len(problem.parameters.free) == 1 else _profile(problem, u, refitter),
-        cost=lambda at: _cost(problem, at),
-        nuisance=Nuisance(J[behind:], sum(map(problem.core.absorbed, range(len(problem.experiments))))),
-    )
-
-
-def _cost(problem: FitProblem, u: np.ndarray) -> float:
-    ok, r, _ = problem.evaluate(u, jacobian=False)
-    return 0.5 * float(r @ r) if ok else np.inf
-
-
-def _profile(problem: FitProblem, u: np.ndarray, refitter: str) -> Callable[[str, float], float]:
-    """(name, value) -> cost with that parameter held and the others refitted, of the experiments that it reaches."""
-    values = problem.parameters.to_physical(u)
-    ends: dict[str, dict[float, np.ndarray]] = {}  # by name and value held: where the others ended, all internal
-
-    def cost(name: str, value: float) -> float:
-        part, parameter = problem.around(name), problem.parameters[name]
-        if part.parameters.free == (name,):
-            return _cost(part, part.parameters.to_internal({name: value}))
-        held = part.holding(name, value)
-        mean, sd = parameter.prior or (value, 1.0)
-        pull = (parameter.to_internal(value) - parameter.to_internal(mean)) / sd
-        at = parameter.to_internal(value)
-        known = ends.setdefault(name, {parameter.to_internal(values[name]): held.parameters.to_internal(values)})
-        start = known[min(known, key=lambda other: abs(other - at))]
-        if not np.isfinite(_cost(held, start)):
-            return np.inf  # the motion diverges: out of the question
-        end = refit(held, start, refitter, 50, PROFILE_TOLERANCE)
-        known[at] = end.u
-        return end.cost + 0.5 * pull**2
-
-    return cost
+def _moved(judged: Identifiability, by: Mapping[str, float]) -> Identifiability:
+    """With how far each estimate was moved to the limit of short substeps."""
+    return replace(judged, estimates=tuple(replace(e, moved=by.get(e.name, 0.0)) for e in judged.estimates))
 
 
 def _errors(
@@ -301,6 +314,22 @@ def _errors(
     )
 
 
+def _growth(start: Sequence[Growth], end: Sequence[Growth]) -> tuple[MotionGrowth, ...]:
+    return tuple(
+        MotionGrowth(
+            name=first.name,
+            largest=(_finite(first.largest), _finite(last.largest)),
+            rate=(first.rate, last.rate),
+            until=(first.until, last.until),
+        )
+        for first, last in zip(start, end, strict=True)
+    )
+
+
+def _finite(number: float) -> float | None:
+    return number if np.isfinite(number) else None
+
+
 def _given(parameters: Parameters, values: Mapping[str, float]) -> tuple[Given, ...]:
     rows = []
     for name, p in parameters.items():
@@ -314,26 +343,3 @@ def _given(parameters: Parameters, values: Mapping[str, float]) -> tuple[Given, 
             )
             rows.append(Given(name=name, value=values[name], unit=p.unit, words=words))
     return tuple(rows)
-
-
-def _warnings(ends: Sequence[Minimum], best: Minimum, interrupted: bool, rows: int) -> tuple[str, ...]:
-    warnings = []
-    missed = float(np.sqrt(2.0 * best.cost / rows))
-    if missed > MISSED:
-        warnings.append(
-            f"residuals are {missed:.2g} times sigma: this motion is not the measured one, and values may be wrong by "
-            "more than their intervals say. A start far off wants short pieces first (windows) or other starts; else "
-            "see where it misses: what is held, places of markers, mesh, missing physics, or a sigma too small"
-        )
-    if best.converged and best.doubt:
-        warnings.append(f"the fit ended where {best.doubt}; intervals take the cost as smooth")
-    if interrupted:
-        warnings.append(
-            "interrupted: intervals are the linear ones, without profiles and without refits on a finer discretization"
-        )
-    elsewhere = [m for m in ends if m.cost > best.cost * (1.0 + INACCURATE)]
-    if elsewhere:
-        warnings.append(f"{len(elsewhere)} of {len(ends)} starts ended in a worse minimum: the cost has several")
-    if not best.converged and not best.interrupted:
-        warnings.append(f"the fit did not converge: {best.message}")
-    return tuple(warnings)

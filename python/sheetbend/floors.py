@@ -4,11 +4,16 @@ shows no material."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from .experiment import Experiment
-from .identifiability import Floor
+from .identifiability import Identifiability
+from .judge import Floor
 from .parameters import Parameters
+from .result import Estimate, Refit
+from .time_step import SWEEPS
+from .wording import short
 
 
 def solver_floors(experiments: Sequence[Experiment], parameters: Parameters) -> dict[str, Floor]:
@@ -44,6 +49,26 @@ def solver_floors(experiments: Sequence[Experiment], parameters: Parameters) -> 
                 mass = e.scene.quantities[f"{rope.name}_density"].value * link
                 floors[name] = _hidden(link * mass * sweeps / (0.9 * h * h), sweeps, h, "direct")
     return floors
+
+
+def at_floor_of_sweeps(judged: Identifiability, refits: Iterable[Refit]) -> Identifiability:
+    """Estimates that twice as many sweeps would move by more than their interval are at the floor of the solver."""
+    estimates = judged.estimates
+    for made in refits:
+        if made.name == SWEEPS:
+            estimates = tuple(_swept(e, made) for e in estimates)
+    return replace(judged, estimates=estimates)
+
+
+def _swept(e: Estimate, made: Refit) -> Estimate:
+    by = made.to_limit * made.moved[e.name]
+    if e.statistical is None or abs(by) <= e.statistical:
+        return e
+    words = (
+        f"the sweeps of the solver have not converged: twice as many would move it by {short(made.moved[e.name])} "
+        f"{e.unit}; use method = 'newton' or 'direct', more sweeps or shorter substeps"
+    )
+    return replace(e, verdict="at its floor", words=words)
 
 
 def membrane_names(fabric: str) -> tuple[str, str, str]:

@@ -1,7 +1,14 @@
-"""A gradient check that users can run on their own scene: the adjoint against independent paths."""
+"""A gradient check that users can run on their own scene: the adjoint against independent paths.
+
+Each path is judged down to its own noise. Complex step and adjoint agree to 1e-8, or to what rounding leaves of them:
+how far the adjoint itself moves when the last digits of the inputs do. Differences agree to 1e-4, or to their own
+error, which the change from one step to half of it tells.
+"""
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import _core
 from .compiled import CompiledScene
 from .errors import InputError
+from .gradient_probe import DIFFERENCES_BOUND, JITTERS, LOUD, Probe, jittered
 from .scene import Scene
 from .simulate import divergence, substeps
 from .solver import Solver
@@ -19,8 +26,8 @@ from .tape import budget
 
 COMPLEX_STEP_BOUND = 1e-8
 DOT_PRODUCT_BOUND = 1e-9
-DIFFERENCES_BOUND = 1e-4
-STEP_FACTORS = (1e4, 1e2, 1.0, 1e-2)
+RUNS = 6.0  # of the scene for differences along one direction, mostly
+SHORTER = (1.0, 0.5, 0.25, 0.125)
 POSITIVE = (
     *("mass", "compliance", "damping", "drag_linear", "drag_quadratic", "air_normal", "air_tangential"),
     *("volume", "volume_compliance"),
@@ -37,7 +44,9 @@ class GradientRow:
         gradient: its largest absolute entry.
         complex_step: error against complex step through the templated solver.
         differences: error against central differences, whose own accuracy limits it.
-        passed: complex step within its bound, differences within theirs; or nothing is felt.
+        passed: complex step within its bound, differences within theirs, or within their noise; or nothing is felt.
+        rounding: what complex step and adjoint may differ by for rounding, likewise relative.
+        noise: what differences may be off by for their own error (infinite where none could be taken).
         unfelt: moving any tested entry by its own size changes the loss by less than rounding does, by the adjoint and
             by complex step; relative errors of such a gradient mean nothing.
     """
@@ -49,16 +58,26 @@ class GradientRow:
     differences: float
     passed: bool
     unfelt: bool = False
+    noise: float = 0.0
+    rounding: float = 0.0
 
 
 @dataclass(frozen=True)
 class GradientReport:
-    """What `check_gradients` found. `dot_product` is the relative gap of <J v, w> = <v, J^T w> for random v, w."""
+    """What `check_gradients` found.
+
+    Attributes:
+        scene, steps: its name, and the substeps of the stretch.
+        rows: one per quantity and array.
+        dot_product: relative gap of <J v, w> = <v, J^T w> for random v, w.
+        sampled: what was left out to keep to a time limit, in words; empty where nothing was.
+    """
 
     scene: str
     steps: int
     rows: tuple[GradientRow, ...]
     dot_product: float
+    sampled: str = ""
 
     @property
     def passed(self) -> bool:
@@ -72,6 +91,8 @@ class GradientReport:
                 "gradient": r.gradient,
                 "complex_step": r.complex_step,
                 "differences": r.differences,
+                "rounding": r.rounding,
+                "noise": r.noise if math.isfinite(r.noise) else None,
                 "passed": r.passed,
                 "unfelt": r.unfelt,
             }
@@ -82,6 +103,7 @@ class GradientReport:
             "steps": self.steps,
             "gradients": gradients,
             "dot_product": self.dot_product,
+            "sampled": self.sampled,
             "passed": self.passed,
         }
 
@@ -89,10 +111,12 @@ class GradientReport:
         lines = [
             f"Gradient check of '{self.scene}' over {self.steps} substeps: {'passed' if self.passed else 'FAILED'}"
         ]
+        if self.sampled:
+            lines.append(f"  {self.sampled}")
         width = max(len(r.name) for r in self.rows)
         lines.append(f"  {'':{width}}  {'entries':>7}  {'largest':>9}  {'complex step':>12}  {'differences':>11}")
         for r in self.rows:
-            mark = "  nothing felt beyond rounding" if r.unfelt else "" if r.passed else "  <- fails"
+            mark = "  nothing felt beyond rounding" if r.unfelt else _noisy(r) if r.passed else "  <- fails"
             lines.append(
                 f"  {r.name:{width}}  {r.size:7d}  {r.gradient:9.2e}"
                 f"  {r.complex_step:12.1e}  {r.differences:11.1e}{mark}"
@@ -105,6 +129,14 @@ class GradientReport:
         return "\n".join(lines)
 
 
+def _noisy(row: GradientRow) -> str:
+    """Which path cannot be judged down to its bound, and down to what it can."""
+    words = [f"complex step good to {row.rounding:.0e}"] if row.rounding > COMPLEX_STEP_BOUND else []
+    if row.noise > DIFFERENCES_BOUND:
+        words.append(f"differences good to {row.noise:.0e}" if math.isfinite(row.noise) else "no differences")
+    return "".join(f"  {part}" for part in words)
+
+
 def check_gradients(
     scene: Scene,
     times: ArrayLike,
@@ -112,6 +144,7 @@ def check_gradients(
     samples: int = 6,
     seed: int = 0,
     values: Mapping[str, float] | None = None,
+    seconds: float | None = None,
 ) -> GradientReport:
     """Check the adjoint of a scene's rollout for every named quantity and every input array.
 
@@ -121,6 +154,8 @@ def check_gradients(
     Args:
         times: (frames,) s on the substep grid; a short stretch of motion is enough.
         values: quantities to change, by name.
+        seconds: about how long the check may take. A scene that takes longer is checked on fewer entries, or along one
+            direction of all entries of an array, and over fewer substeps; the report says so.
 
     Raises:
         InputError, DivergenceError: as `simulate`; times without a substep, or fewer than one sample.
@@ -132,109 +167,177 @@ def check_gradients(
     if samples < 1:
         raise InputError("samples", "must be positive", samples, "give at least 1")
     compiled = scene.compiled
-    rng = np.random.default_rng(seed)
     core = solver.core(compiled)
     theta = compiled.values(values)
     inputs = compiled.inputs(theta)
+    sampled = ""
     with divergence(scene), budget(solver):
+        if seconds is not None:
+            steps, samples, sampled = _within(seconds, compiled, core, inputs, steps, samples)
+        rng = np.random.default_rng(seed)
         _, tape = core.record(inputs, steps, 0.0, solver.budget)
         weights = rng.standard_normal((len(steps), compiled.core.dofs))
         adjoint = core.vjp(inputs, tape, steps, weights, 0.0)
-        probe = _Probe(core, inputs, steps, weights)
+        probe = Probe(core, inputs, steps, weights, adjoint)
+        jitter = _jitter(core, inputs, steps, weights, adjoint, solver, np.random.default_rng(seed + 1))
         rows = [
-            _quantity_row(compiled, probe, theta, adjoint, name, scene.quantities[name].positive)
+            _quantity_row(compiled, probe, theta, adjoint, jitter, name, scene.quantities[name].positive)
             for name in compiled.names
         ]
-        rows += [_array_row(compiled, probe, adjoint, name, samples, rng) for name in _present(compiled)]
+        rows += [_array_row(compiled, probe, adjoint, jitter, name, samples, rng) for name in _present(compiled)]
         dot = _dot_product(core, inputs, steps, weights, adjoint, rng)
-    return GradientReport(scene.name, steps[-1], tuple(rows), dot)
+    return GradientReport(scene.name, steps[-1], tuple(rows), dot, sampled)
 
 
-class _Probe:
-    """Derivatives of the loss along directions of the inputs, by the two independent paths."""
+def _jitter(
+    core: Any,
+    inputs: np.ndarray,
+    steps: Sequence[int],
+    weights: np.ndarray,
+    adjoint: np.ndarray,
+    solver: Solver,
+    rng: np.random.Generator,
+) -> np.ndarray:
+    """(JITTERS, inputs) by how much the adjoint moves when the last digits of the inputs do."""
+    moved = []
+    for _ in range(JITTERS):
+        x = jittered(inputs, rng)
+        moved.append(core.vjp(x, core.record(x, steps, 0.0, solver.budget)[1], steps, weights, 0.0) - adjoint)
+    return np.array(moved)
 
-    def __init__(self, core: Any, inputs: np.ndarray, steps: Sequence[int], weights: np.ndarray) -> None:
-        self.core, self.inputs, self.steps, self.weights = core, inputs, steps, weights
-        self.rounding = np.finfo(float).eps * float(
-            np.abs(core.simulate(inputs, steps, 0.0)["positions"] * weights).sum()
-        )
 
-    def complex_step(self, direction: np.ndarray) -> float:
-        return float((self.core.complex_step(self.inputs, direction, self.steps, 0.0) * self.weights).sum())
+def _within(
+    seconds: float, compiled: CompiledScene, core: Any, inputs: np.ndarray, steps: list[int], samples: int
+) -> tuple[list[int], int, str]:
+    """Substeps and samples (0: all entries of an array at once) whose check takes about so long, and what that leaves
+    out, in words."""
+    began = time.perf_counter()
+    core.complex_step(inputs, np.zeros(len(inputs)), [1], 0.0)
+    between = time.perf_counter()
+    core.simulate(inputs, [1], 0.0)
+    once = (between - began) + RUNS * (time.perf_counter() - between)  # of one direction and substep
+    quantities, arrays = len(compiled.names), len(_present(compiled))
+    for share in SHORTER:
+        chosen = sorted({math.ceil(share * step) for step in steps})
+        left = seconds / (once * chosen[-1]) - quantities
+        if left >= arrays or share == SHORTER[-1]:
+            break
+    possible = max(0, int(left / arrays))
+    possible = samples if possible >= samples else possible if possible > 1 else 0
+    words = [] if chosen == steps else [f"over {chosen[-1]} of {steps[-1]} substeps"]
+    if possible < samples:
+        words.append(f"{possible or 'all'} entries of an array {'each' if possible else 'along one direction'}")
+    return chosen, possible, f"sampled to take about {seconds:.0f} s: {', '.join(words)}" if words else ""
 
-    def loss(self, inputs: np.ndarray) -> float:
-        return float((self.core.simulate(inputs, self.steps, 0.0)["positions"] * self.weights).sum())
 
-    def differences(self, direction: np.ndarray, step: float) -> float:
-        """Central differences with one Richardson step, at the step size where truncation and rounding together are
-        least.
+@dataclass(frozen=True)
+class _Entry:
+    """One tested derivative: by the adjoint, by complex step, by differences with their error, what it may be without
+    being felt, and what rounding moves in the adjoint."""
 
-        No single step suits all: rounding drowns a faint gradient at small ones, and rigid links turn soft at large
-        ones. How much halving the step changes the differences tells their truncation error (Ridders 1982).
-        """
-
-        def at(size: float) -> tuple[float, float]:
-            try:
-                coarse, fine = self._central(direction, size), self._central(direction, size / 2.0)
-            except (_core.Diverged, _core.Unconverged):  # a step as large as a mass
-                return np.inf, np.nan
-            return abs(fine - coarse) + self.rounding / size, (4.0 * fine - coarse) / 3.0
-
-        return min(at(step * factor) for factor in STEP_FACTORS)[1]
-
-    def _central(self, direction: np.ndarray, step: float) -> float:
-        return (self.loss(self.inputs + step * direction) - self.loss(self.inputs - step * direction)) / (2.0 * step)
+    gradient: float
+    exact: float
+    rough: float
+    error: float
+    faint: float
+    rounding: float
 
 
 def _quantity_row(
-    compiled: CompiledScene, probe: _Probe, theta: np.ndarray, adjoint: np.ndarray, name: str, positive: bool
+    compiled: CompiledScene,
+    probe: Probe,
+    theta: np.ndarray,
+    adjoint: np.ndarray,
+    jitter: np.ndarray,
+    name: str,
+    positive: bool,
 ) -> GradientRow:
     direction = np.zeros(len(theta))
     direction[compiled.names.index(name)] = 1.0
     gradient = float(compiled.theta_bar(theta, adjoint) @ direction)
     along = compiled.inputs_dot(theta, direction)
-    size = _size(float(theta @ direction), 1e-2, positive)
-    exact, rough = probe.complex_step(along), probe.differences(along, 1e-4 * size)
-    faint = np.array([probe.rounding / size])
-    return _row(name, 1, np.array([gradient]), np.array([exact]), np.array([rough]), faint)
-
-
-def _size(value: float, least: float, positive: bool) -> float:
-    """What a step is judged against: a positive number's own size, however small."""
-    return value if positive and value > 0 else max(abs(value), least)
+    exact = probe.complex_step(along)
+    size = probe.size(float(theta @ direction), 1e-2, positive, exact)
+    moved = _rounding(probe, along, jitter @ along, gradient, exact, abs(gradient))
+    found = probe.differences(along, 1e-4 * size, exact)
+    return _row(name, 1, [_Entry(gradient, exact, *found, probe.rounding / size, moved)])
 
 
 def _array_row(
-    compiled: CompiledScene, probe: _Probe, adjoint: np.ndarray, name: str, samples: int, rng: np.random.Generator
+    compiled: CompiledScene,
+    probe: Probe,
+    adjoint: np.ndarray,
+    jitter: np.ndarray,
+    name: str,
+    samples: int,
+    rng: np.random.Generator,
 ) -> GradientRow:
     offset, size = compiled.layout[name]
-    part = adjoint[offset : offset + size]
+    part, own = adjoint[offset : offset + size], probe.inputs[offset : offset + size]
+    if samples == 0:
+        return _row(name, size, [_all_at_once(probe, part, jitter, own, offset, name in POSITIVE, rng)])
     largest = np.argsort(-np.abs(part))[: samples // 2]
     tested = np.unique(np.concatenate([largest, rng.choice(size, min(size, samples - len(largest)), replace=False)]))
-    exact, rough, faint = [], [], []
+    entries = []
     for i in tested:
         direction = np.zeros(len(adjoint))
         direction[offset + i] = 1.0
-        exact.append(probe.complex_step(direction))
-        size_of = _size(float(probe.inputs[offset + i]), 1e-3, name in POSITIVE)
-        rough.append(probe.differences(direction, 1e-4 * size_of))
-        faint.append(probe.rounding / size_of)
-    return _row(name, size, part[tested], np.array(exact), np.array(rough), np.array(faint))
+        exact = probe.complex_step(direction)
+        size_of = probe.size(float(own[i]), 1e-3, name in POSITIVE, exact)
+        found = probe.differences(direction, 1e-4 * size_of, exact)
+        moved = _rounding(probe, direction, jitter[:, offset + i], float(part[i]), exact, float(np.abs(part).max()))
+        entries.append(_Entry(float(part[i]), exact, *found, probe.rounding / size_of, moved))
+    return _row(name, size, entries)
 
 
-def _row(
-    name: str, size: int, gradient: np.ndarray, exact: np.ndarray, rough: np.ndarray, faint: np.ndarray
-) -> GradientRow:
-    """Of tested entries; `faint` is what each may be without being felt."""
+def _all_at_once(
+    probe: Probe,
+    part: np.ndarray,
+    jitter: np.ndarray,
+    own: np.ndarray,
+    offset: int,
+    positive: bool,
+    rng: np.random.Generator,
+) -> _Entry:
+    """The derivative along one direction in which every entry of an array counts, by its own size and in the sense of
+    its gradient, so that nothing cancels."""
+    sizes = np.array([probe.size(float(v), 1e-3, positive, float(g)) for v, g in zip(own, part, strict=True)])
+    direction = np.zeros(len(probe.inputs))
+    mine = sizes * np.where(part < 0, -1.0, 1.0) * rng.uniform(0.5, 1.0, len(part))
+    direction[offset : offset + len(part)] = mine
+    exact = probe.complex_step(direction)
+    gradient = float(part @ mine)
+    moved = _rounding(probe, direction, jitter @ direction, gradient, exact, abs(gradient))
+    return _Entry(gradient, exact, *probe.differences(direction, 1e-4, exact), probe.rounding, moved)
+
+
+def _rounding(
+    probe: Probe, direction: np.ndarray, jitter: np.ndarray, gradient: float, exact: float, scale: float
+) -> float:
+    """What rounding may make of the gap between adjoint and complex step; the noise of the latter, which costs runs,
+    only where it matters."""
+    noise = LOUD * float(np.abs(jitter).max())
+    if abs(gradient - exact) <= COMPLEX_STEP_BOUND * scale + noise:
+        return noise
+    return noise + LOUD * probe.noise(direction, exact)
+
+
+def _row(name: str, size: int, entries: Sequence[_Entry]) -> GradientRow:
+    """Of tested entries, relative to the largest."""
+    columns = np.array([(e.gradient, e.exact, e.rough, e.error, e.faint, e.rounding) for e in entries]).T
+    gradient, exact, rough, error, faint, rounding = columns
     unfelt = bool((np.maximum(np.abs(gradient), np.abs(exact)) <= faint).all())
-    scale = float(np.abs(exact).max())
+    scale, worst = float(np.abs(exact).max()), float(np.abs(gradient).max())
     if scale == 0.0:
-        worst = float(np.abs(gradient).max())
         return GradientRow(name, size, worst, worst, float(np.abs(rough).max()), worst == 0.0 or unfelt, unfelt)
-    complex_error = float(np.abs(gradient - exact).max()) / scale
-    difference_error = float(np.abs(gradient - rough).max()) / scale
-    passed = unfelt or (complex_error <= COMPLEX_STEP_BOUND and difference_error <= DIFFERENCES_BOUND)
-    return GradientRow(name, size, float(np.abs(gradient).max()), complex_error, difference_error, passed, unfelt)
+    by_complex, by_differences = np.abs(gradient - exact), np.abs(gradient - rough)
+    agrees = (by_complex <= COMPLEX_STEP_BOUND * scale + rounding).all()
+    agrees &= ((by_differences <= DIFFERENCES_BOUND * scale + error) | np.isinf(error)).all()
+    told = np.isfinite(error)
+    far = float(by_differences[told].max(initial=0.0)) / scale
+    passed = bool(unfelt or agrees)
+    floors = float(error.max()) / scale, float(rounding.max()) / scale
+    return GradientRow(name, size, worst, float(by_complex.max()) / scale, far, passed, unfelt, *floors)
 
 
 def _present(compiled: CompiledScene) -> list[str]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 import re
+from pathlib import Path
 
 from .errors import InputError
 
@@ -28,6 +30,42 @@ def in_bytes(field: str, amount: object) -> int:
         fix = f'give bytes, or a text such as "2 GB"; units are {", ".join(UNITS)}'
         raise InputError(field, "is no amount of memory", amount, fix)
     return int(size)
+
+
+def free_memory() -> int:
+    """Bytes that this process may still take: what the machine has available, less where a control group allows
+    less."""
+    free = [_available()]
+    for folder in ("/sys/fs/cgroup", "/sys/fs/cgroup/memory"):
+        for limit, used in (("memory.max", "memory.current"), ("memory.limit_in_bytes", "memory.usage_in_bytes")):
+            try:
+                most = int(Path(folder, limit).read_text())
+                free.append(max(0, most - int(Path(folder, used).read_text())))
+            except (OSError, ValueError):  # no such group, or "max"
+                continue
+    return min(free)
+
+
+def expect_room(field: str, size: int, fix: str) -> None:
+    """Refuse what does not fit in the free memory, before anything is allocated.
+
+    Raises:
+        InputError: `size` bytes are more than are free.
+    """
+    free = free_memory()
+    if size > free:
+        raise InputError(field, f"needs {in_words(size)} of memory, of which {in_words(free)} are free", size, fix)
+
+
+def _available() -> int:
+    """What the machine has available; where it does not tell, all of its memory."""
+    try:
+        for line in Path("/proc/meminfo").read_text().splitlines():
+            if line.startswith("MemAvailable:"):
+                return int(line.split()[1]) * 1024
+    except (OSError, ValueError, IndexError):
+        pass
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
 
 
 def in_words(size: int) -> str:

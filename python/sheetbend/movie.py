@@ -15,6 +15,7 @@ from .field_plot import box_in_space, field_colors
 from .optional import require
 from .scene import Scene
 from .strain import green_strain
+from .whole import written
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -76,7 +77,7 @@ def save_movie(motion: Motion, path: Path, title: str = "") -> int:
     figure, draw = _picture(motion, shown, title)
     path.parent.mkdir(parents=True, exist_ok=True)
     writer = require("matplotlib.animation", "plot").PillowWriter(fps=rate)
-    with writer.saving(figure, str(path), dpi=_DPI):
+    with written(path) as beside, writer.saving(figure, str(beside), dpi=_DPI):
         for frame in shown:
             draw(frame)
             writer.grab_frame()

@@ -17,6 +17,10 @@ import numpy as np
 from .errors import InputError
 from .timeseries import Array
 
+DEFAULT_RANGE = 1e6
+"""Factor either way from its initial value within which a search keeps a parameter on a log scale without bounds."""
+RESTS = 1e-3  # of a logarithm: so near a limit a parameter has run off
+
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
@@ -225,6 +229,27 @@ class Parameters(Mapping[str, Parameter]):
         lower = np.array([self[name].to_internal(self[name].lower) for name in self.free])
         upper = np.array([self[name].to_internal(self[name].upper) for name in self.free])
         return lower, upper
+
+    def limits(self) -> tuple[Array, Array]:
+        """Internal bounds that a search keeps to, each of shape (free,): the user's, and `DEFAULT_RANGE` either way
+        from the initial value for a parameter on a log scale that has none on that side. An end there has run off."""
+        lower, upper = self.bounds()
+        log = np.array([self[name].log for name in self.free])
+        far = np.where(log, math.log(DEFAULT_RANGE), math.inf)
+        start = self.initial()
+        return (
+            np.where(np.isfinite(lower), lower, start - far),
+            np.where(np.isfinite(upper), upper, start + far),
+        )
+
+    def ran_off(self, internal: Array) -> tuple[str, ...]:
+        """Names of free parameters that have gone to a limit that no user set; internal: shape (free,)."""
+        internal, bounds, limits = self._vector(internal), self.bounds(), self.limits()
+        at = [
+            (abs(internal - limit) < RESTS) & ~np.isfinite(bound) & np.isfinite(limit)
+            for limit, bound in zip(limits, bounds, strict=True)
+        ]
+        return tuple(name for name, lower, upper in zip(self.free, *at, strict=True) if lower or upper)
 
     def to_internal(self, values: Mapping[str, float]) -> Array:
         """Internal vector, shape (free,), of the physical values of the free parameters."""

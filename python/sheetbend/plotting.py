@@ -18,6 +18,7 @@ from .errors import InputError
 from .optional import require
 from .result import Estimate
 from .timeseries import Array
+from .whole import written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,8 +30,9 @@ _AXES = "xyz"
 
 
 def save(figure: Figure, path: str | Path) -> None:
-    """Write a figure; the format follows from the name (png, svg, pdf)."""
-    figure.savefig(path, dpi=160, facecolor="white")
+    """Write a figure, whole or not at all; the format follows from the name (png, svg, pdf)."""
+    with written(path) as beside:
+        figure.savefig(beside, dpi=160, facecolor="white")
 
 
 def plot_trajectories(
@@ -251,7 +253,7 @@ def _estimates_panel(
         color = ACCENT if known else GRAY
         left = low if estimate.lower is None else estimate.lower
         right = high if estimate.upper is None else estimate.upper
-        if estimate.verdict != "not identifiable":
+        if estimate.lower is not None or estimate.upper is not None:
             panel.plot([left, right], [row, row], color=color, linewidth=2, solid_capstyle="butt")
         face = color if known else "white"
         panel.plot(estimate.value, row, "o", color=color, markersize=5, markerfacecolor=face)

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from . import _core
+from . import _core, content
 from .covariance import Layout
 from .equilibrium import no_rest
 from .errors import InputError, refusal
 from .experiment import Experiment
+from .journal import Evaluator
 from .parameters import Parameter, Parameters
 from .quantities import Quantity
 from .recording import Recording
@@ -85,6 +85,7 @@ class FitProblem:
         experiments: in order.
         parameters: with private ones expanded to one per experiment that has them.
         core: the compiled problem.
+        evaluator: evaluates it, through the journal that was open when it was made.
         seconds: that the last evaluation from here took, with (True) and without a Jacobian.
     """
 
@@ -109,16 +110,31 @@ class FitProblem:
         self.parameters = self._expanded(parameters) if expanded is None else expanded
         theta, slots, slot_of = self._slots()
         held = [None if corrected is None else corrected.get(e.name, NOTHING) for e in self.experiments]
+        cores = [e.core(r, b) for e, r, b in zip(self.experiments, self.recordings, held, strict=True)]
+        free = self._free(slot_of)
         try:
-            self.core = _core.Problem(
-                experiments=[e.core(r, b) for e, r, b in zip(self.experiments, self.recordings, held, strict=True)],
-                theta=theta,
-                slots=slots,
-                free=self._free(slot_of),
-                threads=threads,
-            )
+            self.core = _core.Problem(experiments=cores, theta=theta, slots=slots, free=free, threads=threads)
         except ValueError as error:
             raise refusal(error, InputError, [len(r.times) for r in self.recordings]) from error
+        scenes = [e.scene for e in self.experiments]
+        self.evaluator = Evaluator(self.core, lambda: content.of_problem(scenes, cores, theta, slots, free))
+
+    def known(self, u: np.ndarray) -> tuple[np.ndarray, list[list[int]], dict[int, tuple[str, float]]]:
+        """All values at u, where each experiment's quantities are among them, and by place the parameter that is there:
+        the one that carries its value, and the factor to it."""
+        _, slots, slot_of = self._slots()
+        return self.core.physical(u), slots, {slot: self.parameters.roots[name] for name, slot in slot_of.items()}
+
+    def check_start(self) -> None:
+        """Refuse starting values that make a stiffness, mass or length negative.
+
+        Raises:
+            SceneError: names the quantities.
+        """
+        theta, slots, _ = self.known(self.parameters.initial())
+        for e, mine in zip(self.experiments, slots, strict=True):
+            e.scene.compiled.domain.check_quantities(theta[None, mine])
+            e.scene.compiled.inputs(theta[mine])
 
     def holding(self, name: str, value: float) -> FitProblem:
         """The same problem with one (expanded) parameter held at a value."""
@@ -150,6 +166,11 @@ class FitProblem:
         return FitProblem(
             [self.experiments[i] for i in chosen], self.given, [self.recordings[i] for i in chosen], self.threads, part
         )
+
+    def values_of(self, e: Experiment, u: np.ndarray) -> dict[str, float]:
+        """Physical values at u (free,) of the quantities of an experiment's scene that are parameters."""
+        values = self.parameters.to_physical(u)
+        return {name: values[key] for name, key in self._keys(e).items() if key in values}
 
     def _keys(self, e: Experiment) -> dict[str, str]:
         """Expanded parameter name of each quantity of an experiment, whether or not it is a parameter."""
@@ -207,13 +228,17 @@ class FitProblem:
         a minimum asks for it."""
         if jacobian and self._last is not None and np.array_equal(self._last[0], u):
             return self._last[1]
-        began = time.perf_counter()
-        found = self.core.evaluate(u, jacobian)
-        if found[0]:
-            self.seconds[jacobian] = time.perf_counter() - began
+        found, seconds = self.evaluator(u, jacobian)
+        if found[0] and seconds is not None:
+            self.seconds[jacobian] = seconds
         if jacobian:
             self._last = np.array(u, dtype=float), found
         return found
+
+    @property
+    def failure(self) -> str:
+        """Why the last evaluation was not ok."""
+        return self.core.failure or "a residual is not finite"
 
     def evaluate_exactly(self, u: np.ndarray) -> tuple[bool, np.ndarray, np.ndarray]:
         """`evaluate` with corrections linearized at u itself, as intervals need it; a fit's own steps may use an
@@ -251,7 +276,10 @@ class FitProblem:
 
     @property
     def cheap_jacobian(self) -> bool:
-        """Whether a Jacobian costs little more than the residuals alone, as where both share the factors of a cloth."""
+        """Whether a Jacobian costs little more than the residuals alone, as where both share the factors of a cloth, or
+        is always made along, as where corrections go on from the last evaluation: no last digit hangs on a clock."""
+        if self.estimates_corrections:
+            return True
         return True in self.seconds and self.seconds[True] < CHEAP * self.seconds.get(False, 0.0)
 
     def simulate(self, u: np.ndarray) -> list[np.ndarray]:
@@ -263,6 +291,7 @@ class FitProblem:
 
         Raises:
             DivergenceError, NoEquilibriumError: the physics has no answer.
+            InputError: a stiffness, mass or length is negative.
         """
         scene = self.experiments[experiment].scene
         try:
@@ -270,6 +299,8 @@ class FitProblem:
                 markers = self.core.simulate(experiment, u)
         except _core.NoEquilibrium as error:
             raise no_rest(scene, str(error), scene.positions) from error
+        except ValueError as error:
+            raise refusal(error, InputError, self.parameters.to_physical(u)) from error
         return markers.reshape(self.recordings[experiment].positions.shape)
 
     def rows_layout(self) -> Layout:

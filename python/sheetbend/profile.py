@@ -12,6 +12,7 @@ FARTHEST = math.log(1e6)
 """On a log scale nobody looks beyond a factor of a million."""
 
 _DOUBLINGS = 14
+_HALVINGS = 8
 
 Ends = tuple[float | None, float | None]
 """Lower and upper end of an interval in physical units, None where it is open."""
@@ -41,7 +42,8 @@ def profile_interval(
 
     Returns:
         The two ends; None on a side where the cost never rises that far up to the bound, or within
-        2^14 steps (on a log scale: a factor of a million).
+        2^14 steps (on a log scale: a factor of a million). NaN where the profile has no finite value before it rises
+        that far.
     """
     if not (rise > 0 and step > 0):
         raise InputError("profile_interval", "needs a positive rise and step", (rise, step), "give both above 0")
@@ -50,7 +52,8 @@ def profile_interval(
 
     def height(position: float) -> float:
         """About linear in the distance; 1 at the end of the interval."""
-        return math.sqrt(max(profile(here.to_physical(position)) - best, 0.0) / rise)
+        cost = profile(here.to_physical(position))
+        return math.sqrt(max(cost - best, 0.0) / rise) if math.isfinite(cost) else math.inf
 
     ends: list[float | None] = []
     farthest = FARTHEST if log else step * 2.0**_DOUBLINGS
@@ -62,7 +65,8 @@ def profile_interval(
 
 
 def _crossing(height: Callable[[float], float], start: float, step: float, bound: float) -> float | None:
-    """Where the height reaches 1, by doubling steps, then safeguarded secants; None if it never does."""
+    """Where the height reaches 1, by doubling steps, then safeguarded secants; None if it never does, NaN if only
+    infinite heights lie beyond."""
     inside, low = start, 0.0
     for doubling in range(_DOUBLINGS + 1):
         outside = start + step * 2.0**doubling
@@ -75,6 +79,17 @@ def _crossing(height: Callable[[float], float], start: float, step: float, bound
         inside, low = outside, high
     else:
         return None
+    for _ in range(_HALVINGS):  # back from where there is no answer
+        if math.isfinite(high):
+            break
+        middle = 0.5 * (inside + outside)
+        reached = height(middle)
+        if reached >= 1:
+            outside, high = middle, reached
+        else:
+            inside, low = middle, reached
+    if not math.isfinite(high):
+        return math.nan
     for _ in range(40):
         if abs(outside - inside) <= 0.002 * abs(outside - start) or high - low < 1e-12:
             break

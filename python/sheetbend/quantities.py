@@ -1,8 +1,8 @@
 """Named physical quantities of a scene and how the solver's inputs are made of them.
 
 An input (a compliance, a mass, a rest length, a coordinate) is a sum of terms, each a coefficient times a product of
-simple functions of
-named quantities: a link's compliance is `length/segments * 1/EA`. The map and its derivative are compiled
+simple functions of named quantities: a link's compliance is `length/segments * 1/EA`. Fields that must stay positive
+have exponentials of weighted quantities among the factors. The map and its derivative are compiled
 (adjoint/parameter_map.h).
 """
 
@@ -16,7 +16,8 @@ import numpy as np
 
 from .errors import SceneError
 
-FUNCTIONS = {"identity": 0, "inverse": 1, "square": 2, "sin": 3, "cos": 4, "sqrt": 5, "inverse_sqrt": 6}
+FUNCTIONS = {"identity": 0, "inverse": 1, "square": 2, "sin": 3, "cos": 4, "sqrt": 5, "inverse_sqrt": 6, "exp": 7}
+ZERO_OR_MORE = (0.0, math.inf)  # limits of a quantity that starts at zero and cannot be negative
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Quantity:
         unit: SI.
         positive: whether only positive values make sense (such are fitted on a log scale by default).
         scale: a natural size in `unit` where zero is a sensible value (angles, offsets), else None.
-        limits: between which values it makes sense, where that is not just positive.
+        limits: least and largest value that make sense, where that is not just positive.
     """
 
     name: str
@@ -48,13 +49,19 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Term:
-    """coefficient * prod f(quantity), added to entry `index` of the input array `array`; or to several entries, with
-    index (k,), each distinct, and one coefficient for all or (k,)."""
+    """coefficient * prod f(quantity) * exp(sum weight * quantity), added to entry `index` of the input array `array`;
+    or to several entries, with index (k,), each distinct, and one coefficient (and weight) for all or (k,)."""
 
     array: str
     index: int | np.ndarray
     coefficient: float | np.ndarray
     factors: tuple[tuple[str, str], ...]  # (quantity, function)
+    exponents: tuple[tuple[str, float | np.ndarray], ...] = ()  # (quantity, weight)
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of the quantities in it."""
+        return tuple(name for name, _ in (*self.factors, *self.exponents))
 
 
 def term(array: str, index: int, coefficient: float, **functions: str) -> Term:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import timeseries
 from .errors import RecordingError
+from .names import checked_name
 from .recording_checks import (
     check_seen,
     checked_gravity,
@@ -39,14 +40,15 @@ class Recording:
         times: (frames,) float64, s, strictly increasing; the intervals need not be equal.
         markers: one name per marker; "m0", "m1", ... when none are given. On a rope, in order along it.
         clamped: indices of the markers whose motion is given (the boundary); names are accepted too.
-        name: what reports call it.
+        name: what reports call it, and the files that are written of it (`names.checked_name`).
         gravity: (3,) m/s^2 in the frame of the positions, or None when the source does not say.
         metadata: what else the source tells (known values, license, attribution); JSON values. Frame
             numbers in it count from the first frame of the source, also after `piece`.
 
     Raises:
         RecordingError: a field has the wrong shape or type, infinite values, a marker seen in part or never,
-            times that do not increase, names or indices that are repeated or out of range.
+            times that do not increase, names or indices that are repeated or out of range, or the name can be that
+            of no file.
     """
 
     positions: Array
@@ -69,8 +71,7 @@ class Recording:
             gravity=None if self.gravity is None else _read_only(checked_gravity(self.gravity)),
             metadata=checked_metadata(self.metadata),
         )
-        if not isinstance(self.name, str) or not self.name:
-            raise RecordingError("name", "must be a non-empty string", self.name, "give the recording a name")
+        checked_name("name", self.name)
 
     def __repr__(self) -> str:
         frames, markers = self.mask.shape
@@ -112,7 +113,8 @@ class Recording:
     @property
     def free(self) -> tuple[int, ...]:
         """Indices of the markers that are not clamped: those that a simulation must explain."""
-        return tuple(i for i in range(len(self.markers)) if i not in self.clamped)
+        driven = set(self.clamped)
+        return tuple(i for i in range(len(self.markers)) if i not in driven)
 
     def piece(self, start: float | None = None, stop: float | None = None) -> Recording:
         """Frames with start <= time < stop (s; None = open), with their absolute times.
@@ -163,10 +165,11 @@ class Recording:
         if not chosen:
             fix = choose_from(self.markers)
             raise RecordingError("select", "must name at least one marker", markers, fix)
+        driven = set(self.clamped)
         return self._derive(
             positions=self.positions[:, chosen],
             markers=tuple(self.markers[i] for i in chosen),
-            clamped=tuple(new for new, old in enumerate(chosen) if old in self.clamped),
+            clamped=tuple(new for new, old in enumerate(chosen) if old in driven),
         )
 
     def resample(self, times: ArrayLike, kind: Kind = "linear", max_gap: float | None = None) -> Recording:

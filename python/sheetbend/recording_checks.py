@@ -22,12 +22,13 @@ def marker_indices(what: str, chosen: Iterable[str | int], markers: tuple[str, .
     """
     if isinstance(chosen, str) or not isinstance(chosen, Iterable):
         raise RecordingError(what, "must be a list of markers", chosen, f"write [{chosen!r}]")
-    indices: list[int] = []
+    number = {name: i for i, name in enumerate(markers)}
+    indices: dict[int, None] = {}
     for item in chosen:
         if isinstance(item, str):
-            if item not in markers:
+            if item not in number:
                 raise RecordingError(what, "names an unknown marker", item, choose_from(markers))
-            index = markers.index(item)
+            index = number[item]
         else:
             index = _integer(what, item)
             if not 0 <= index < len(markers):
@@ -35,7 +36,7 @@ def marker_indices(what: str, chosen: Iterable[str | int], markers: tuple[str, .
                 raise RecordingError(what, f"is out of range for {len(markers)} markers", index, fix)
         if index in indices:
             raise RecordingError(what, "names a marker twice", item, "name each marker once")
-        indices.append(index)
+        indices[index] = None
     return tuple(indices)
 
 
@@ -135,12 +136,14 @@ def checked_markers(names: Iterable[str], count: int) -> tuple[str, ...]:
     if len(names) != count:
         fix = f"give {count} names, one per marker of positions"
         raise RecordingError("markers", "must be one name per marker", len(names), fix)
+    earlier: set[str] = set()
     for i, name in enumerate(names):
         if not isinstance(name, str) or not name.isprintable() or not name or name != name.strip():
             fix = "use text without line breaks or spaces at its ends"
             raise RecordingError("markers", f"holds no name at {i}", name, fix)
-        if name in names[:i]:
+        if name in earlier:
             raise RecordingError("markers", "holds a name twice", name, "give every marker a name of its own")
+        earlier.add(name)
     return names
 
 

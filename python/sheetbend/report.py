@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from .optional import require
-from .result import Estimate, FitResult, Given, RecordingFit
+from .result import UNSOUND, Estimate, FitResult, Given, MotionGrowth, Premise, RecordingFit
 from .tables import Section, plain_section, rich_section
 from .wording import figures, short
 
@@ -17,6 +19,14 @@ CORRELATION_SHOWN = 0.3
 """Smallest correlation (absolute value) that the report lists."""
 CORRELATIONS_SHOWN = 15
 """Number of correlations that the report lists at most; fit.json has them all."""
+GROWTH_SHOWN = 10.0
+"""Growth of small displacements from which on the report tells it."""
+
+PREMISES_SHOWN = 8
+"""Number of given values that the report lists at most, those with the strongest effects; fit.json has them all."""
+PREMISE_COLUMNS = 4
+"""Number of parameters above which a given value is listed with the one that it moves most."""
+_FELT = 0.02  # of a half-width: given values that move every parameter by less are not listed
 
 _SAME_MINIMUM = 0.01  # starts that end within 1 % of the best cost found the same minimum
 
@@ -24,9 +34,12 @@ _SAME_MINIMUM = 0.01  # starts that end within 1 % of the best cost found the sa
 def sections(result: FitResult) -> list[Section]:
     """The report as data, empty sections left out."""
     parts = [
+        _misfit(result),
         _parameters(result),
+        _unsound(result),
         _interval_parts(result),
         _refits(result),
+        _premises(result),
         _recordings(result),
         _held_out_motion(result),
         _unknown(result),
@@ -75,11 +88,35 @@ def rich_report(result: FitResult) -> Group:
     return group
 
 
+def _misfit(result: FitResult) -> Section:
+    m = result.misfit
+    if m is None:
+        return Section("Misfit")
+    told = [short(1e3 * sigma) for sigma in (m.smallest_sigma, m.largest_sigma)]
+    sigma = f"{told[0]} mm" if told[0] == told[1] else f"{told[0]} to {told[1]} mm"
+    beyond = f"{short(1e3 * m.model_error)} mm in each coordinate" if m.model_error > 0 else "residuals are below sigma"
+    notes = (
+        ("reduced chi-square", f"{short(m.reduced_chi_square)}, against the given sigma of {sigma}"),
+        ("model error beyond sigma", beyond),
+    )
+    return Section("Misfit", notes=notes)
+
+
+def _unsound(result: FitResult) -> Section:
+    """What speaks against the fit, once for all parameters that it is true of."""
+    words: dict[str, list[Estimate]] = {}
+    for estimate in result.estimates:
+        if estimate.verdict in UNSOUND:
+            words.setdefault(estimate.words, []).append(estimate)
+    notes = [(f"{', '.join(e.name for e in of)} ({of[0].verdict})", said) for said, of in words.items()]
+    return Section("What contradicts this fit", notes=tuple(notes))
+
+
 def _parameters(result: FitResult) -> Section:
     rows = [_estimate_row(estimate) for estimate in result.estimates]
     rows += [_given_row(given) for given in result.given]
     headers = ("parameter", "value", "+/-", "95 % interval", "unit", "verdict")
-    return Section("Parameters", headers, tuple(rows))
+    return Section("Parameters", headers, tuple(rows), tuple(("intervals", words) for words in result.not_counted))
 
 
 def _estimate_row(estimate: Estimate) -> tuple[str, ...]:
@@ -105,19 +142,24 @@ def _given_row(given: Given) -> tuple[str, ...]:
 def _interval_parts(result: FitResult) -> Section:
     rows = []
     counted = any(e.systematic > 0 for e in result.estimates)
+    moved = any(e.moved != 0 for e in result.estimates)
     for e in result.estimates:
         if e.discretization + e.systematic > 0 and e.half_width is not None:
             parts = (e.half_width, e.statistical, e.discretization, *([e.systematic] if counted else []))
+            parts += (e.moved,) if moved else ()
             rows.append((e.name, *figures(parts, e.half_width), e.unit))
-    more = ["systematic"] if counted else []
+    more = (["systematic"] if counted else []) + (["value moved by"] if moved else [])
     headers = ("parameter", "+/-", "statistical", "discretization", *more, "unit")
-    return Section("Where the intervals come from", headers, tuple(rows))
+    note = "values are moved to the limit of short substeps, and what that leaves open is counted"
+    return Section(
+        "Where the intervals come from", headers, tuple(rows), (("time step", note),) if moved and rows else ()
+    )
 
 
 def _refits(result: FitResult) -> Section:
     rows = []
     for e in result.estimates if result.refits else ():
-        moved = [refit.moved[e.name] for refit in result.refits]
+        moved = [refit.moved.get(e.name) for refit in result.refits]
         if e.half_width is not None:
             rows.append((e.name, *figures(moved, e.half_width / 10), e.unit))
     headers = ("parameter", *(refit.name for refit in result.refits), "unit")
@@ -203,7 +245,9 @@ def _unknown(result: FitResult) -> Section:
         members = [e.name for e in result.estimates if gauge in e.words]
         notes.append((" and ".join(members), f"{gauge}; fix one of them or give it a prior"))
     for estimate in result.estimates:
-        if estimate.verdict != "identified" and not any(gauge in estimate.words for gauge in result.gauges):
+        if estimate.verdict not in ("identified", *UNSOUND) and not any(
+            gauge in estimate.words for gauge in result.gauges
+        ):
             notes.append((estimate.name, estimate.words))
     if any(e.verdict == "at its floor" for e in result.estimates):
         others = [e.name for e in result.estimates if e.verdict in ("identified", "weak")]
@@ -222,11 +266,24 @@ def _correlations(result: FitResult) -> Section:
     return Section(f"Correlations ({left_out})", ("parameter", "with", "correlation"), rows)
 
 
+def _grown(growth: MotionGrowth) -> str:
+    """Of small displacements along one motion, at the end of the fit."""
+    largest = growth.largest[1]
+    size = "without limit" if largest is None else f"{largest:.2g} times"
+    until = "" if growth.until[1] is None else f"; beyond {growth.until[1]:.3g} s nothing can be derived from it"
+    return f"small displacements grow {size}{until}"
+
+
 def _course(result: FitResult) -> Section:
     notes = [("cost", f"{result.cost:.6g} over {result.rows:,} residuals, {len(result.estimates)} free parameters")]
     if result.first_cost is not None:
         fell = f", {result.first_cost / result.cost:,.3g} times the end's" if result.cost > 0 else ""
         notes.append(("at the start", f"{result.first_cost:.6g}{fell}"))
+    if result.evaluations:
+        notes.append(("simulations", f"{result.evaluations:,}, {result.jacobians:,} of them with a Jacobian"))
+    if result.windows:
+        notes.append(("windows fitted first", ", ".join(f"{length:.3g}" for length in result.windows) + " s"))
+    notes += [(f"growth in {g.name}", _grown(g)) for g in result.growth if (g.largest[1] or math.inf) > GROWTH_SHOWN]
     if result.jacobian_seconds is not None:
         notes.append(("a Jacobian took", f"{result.jacobian_seconds:.3g} s"))
     if result.autocorrelation_time > 1.05:
@@ -234,9 +291,78 @@ def _course(result: FitResult) -> Section:
         words = f"one in {time:.3g} counts as independent; the intervals allow for it"
         notes.append(("neighboring residuals are alike", words))
     if len(result.starts) > 1:
-        best = min(start.cost for start in result.starts)
-        same = sum(start.cost <= best * (1 + _SAME_MINIMUM) for start in result.starts)
-        worst = max(start.cost for start in result.starts)
-        words = f"{same} of {len(result.starts)} ended within 1 % of the best cost; the worst at {worst:.4g}"
+        costs = [start.cost for start in result.starts if start.cost is not None]
+        same = sum(cost <= min(costs) * (1 + _SAME_MINIMUM) for cost in costs)
+        words = f"{same} of {len(result.starts)} ended within 1 % of the best cost; the worst at {max(costs):.4g}"
+        if len(costs) < len(result.starts):
+            words += f"; {len(result.starts) - len(costs)} diverged"
         notes.append(("starts", words))
     return Section("Course", notes=tuple(notes))
+
+
+def _premises(result: FitResult) -> Section:
+    """What the fit took as given: how far an error of each moves the parameters, the strongest first."""
+    every_one = [e for e in result.estimates if e.half_width]
+    closed = [e for e in every_one if not e.name.endswith("]")] or every_one  # those of one recording: see fit.json
+
+    def strength(premise: Premise, e: Estimate) -> float:
+        return abs(premise.moved.get(e.name, 0.0)) / (e.half_width or 1.0)
+
+    every = [p for p in result.premises if any(strength(p, e) > _FELT for e in closed)]
+    every.sort(key=lambda p: -max(strength(p, e) for e in closed))
+    counted = any(p.sd for p in every)
+    listed = []
+    for p in every[:PREMISES_SHOWN]:
+        value = "" if p.value is None else f"{short(p.value, 4)} {p.unit}".rstrip()
+        sd = "" if p.sd is None else f"{short(p.sd, 2)} {p.unit}".rstrip()
+        listed.append(((p.name, value, p.words), p, (sd,) if counted else ()))
+    ends = ("sd counted",) if counted else ()
+    headers = ("given", "value", "if off by", *(e.name for e in closed), *ends)
+    rows = [(*before, *(_moved(p, e) for e in closed), *after) for before, p, after in listed]
+    if len(closed) > PREMISE_COLUMNS or _wide((headers, *rows)):
+        most = [max(closed, key=lambda e, p=p: strength(p, e)) for _, p, _ in listed]  # type: ignore[misc]
+        headers = ("given", "value", "if off by", "moves most", "half-widths", *ends)
+        rows = [
+            (*before, f"{e.name} {_moved(p, e)}", short(strength(p, e), 2), *after)
+            for (before, p, after), e in zip(listed, most, strict=True)
+        ]
+    return Section("What the result rests on", headers, tuple(rows), _rests_on(every, closed, strength) if rows else ())
+
+
+def _wide(lines: Sequence[tuple[str, ...]]) -> bool:
+    """Whether a table does not fit a report."""
+    return sum(2 + max(map(len, column)) for column in zip(*lines, strict=True)) > 100
+
+
+def _moved(premise: Premise, e: Estimate) -> str:
+    moved = premise.moved.get(e.name)
+    if moved is None:
+        return ""
+    if abs(moved) < 1e-3 * (e.half_width or 0.0):
+        return "0"
+    sign = "" if premise.name == "markers" else "+"
+    if e.half_width is not None and abs(e.value) > e.half_width:
+        return f"{100 * moved / abs(e.value):{sign}.2g} %"
+    return f"{moved:{sign}.2g} {e.unit}".rstrip()
+
+
+def _rests_on(
+    premises: Sequence[Premise], closed: Sequence[Estimate], strength: Callable[[Premise, Estimate], float]
+) -> tuple[tuple[str, str], ...]:
+    """What the reader is to make of the table."""
+    notes = []
+    left = len(premises) - PREMISES_SHOWN
+    if left > 0:
+        notes.append(("not listed", f"{left} given values with weaker effects"))
+    exact = [p for p in premises if p.sd is None]
+    if exact:
+        strongest = max(closed, key=lambda e: strength(exact[0], e))
+        times = strength(exact[0], strongest)
+        words = "The intervals take these values as exact"
+        if len(exact) < len(premises):
+            words = "The intervals take the values without a standard deviation as exact"
+        if times > 1:
+            far = f"an error of {exact[0].words} in {exact[0].name} would move {strongest.name}"
+            words += f", but {far} by {short(times, 2)} half-widths"
+        notes.append(("", f"{words}. Standard deviations (given = ...) make them count"))
+    return tuple(notes)

@@ -12,14 +12,23 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from .door import reading
 from .errors import InputError
+from .json_file import json_content
+from .typed import as_dataclass, listed, mapping
+from .whole import write_text
 
 FORMAT = "sheetbend fit 1"
 
-VERDICTS = ("identified", "weak", "one-sided", "at a bound", "at its floor", "not identifiable")
+UNSOUND = ("rough", "no minimum", "doubtful")
+"""Verdicts of an estimate that nothing should rest on; a command that fits exits with 4 for each of them."""
+
+VERDICTS = ("identified", "weak", "one-sided", "at a bound", "at its floor", "not identifiable", *UNSOUND)
 """identified: 95 % half-width at most 20 % of the value; weak: above; one-sided: bounded from one side only;
-at a bound: of the user; at its floor: the solver's own stiffness or damping; not
-identifiable: gauge or flat."""
+at a bound: of the user; at its floor: the solver's own stiffness or damping; not identifiable: gauge or flat;
+rough: derivatives of the motion grow so fast that nothing follows from them; no minimum: the optimizer ended where the
+cost still falls; doubtful: a minimum that separate parts of the data, another start or held-out motion contradict.
+Rough and no minimum have no interval."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,10 +40,12 @@ class Estimate:
         lower, upper: 95 % interval, all parts together; None where it is open.
         half_width: half of it, None where it is open.
         statistical: half-width from the residuals alone, None where it is open.
-        discretization: what refits at half the step and twice the nodes move; 0 when that was not measured.
+        discretization: half-width of what the time step, the mesh and sweeps leave open, see `FitResult.refits`; 0 when
+            that was not measured.
         systematic: half-width of what else the interval counts; 0 when nothing.
         verdict: one of `VERDICTS`.
         words: the verdict as a sentence.
+        moved: how far the value was moved to the limit of short substeps, in `unit`; it is contained in `value`.
     """
 
     name: str
@@ -48,6 +59,7 @@ class Estimate:
     verdict: str
     words: str
     systematic: float = 0.0
+    moved: float = 0.0
 
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:
@@ -62,6 +74,28 @@ class Given:
     value: float
     unit: str
     words: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Premise:
+    """A number that the fit took as given, and what an error in it moves.
+
+    Attributes:
+        name: of a quantity, or such as "gravity toward x", "clamps along z", "markers".
+        value: in `unit`; None for what is a place or a direction.
+        off_by: the error, in `unit`, whose effect is told; `words` says it, such as "1 %".
+        moved: of each fitted parameter that is determined, in its unit, by that error (of several independent errors
+            the root of the sum of squares).
+        sd: its standard deviation in `unit`, which then counts in the intervals; None where none was given.
+    """
+
+    name: str
+    value: float | None
+    unit: str
+    off_by: float
+    words: str
+    moved: Mapping[str, float]
+    sd: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,10 +137,26 @@ class RecordingFit:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Start:
-    """One start of a multi-start fit: cost at its end, and the physical values there."""
+class Misfit:
+    """How large the residuals are against what was told of their size.
 
-    cost: float
+    Attributes:
+        reduced_chi_square: sum of squared residuals in units of sigma, over the degrees of freedom.
+        smallest_sigma, largest_sigma: expected errors of a coordinate that the experiments were given, m.
+        model_error: root mean square of one coordinate's residual beyond sigma, m; 0 where it is not larger.
+    """
+
+    reduced_chi_square: float
+    smallest_sigma: float
+    largest_sigma: float
+    model_error: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """One start of a multi-start fit: cost at its end, None where the motion diverges, and physical values there."""
+
+    cost: float | None
     iterations: int
     converged: bool
     values: Mapping[str, float]
@@ -128,6 +178,24 @@ class Refit:
 
 
 @dataclass(frozen=True, kw_only=True)
+class MotionGrowth:
+    """How far small displacements grow along one fitted motion, see `growth.Growth`: each as (at the start, at the end
+    of the fit).
+
+    Attributes:
+        name: of the experiment.
+        largest: growth; None where it overflows or the motion diverges.
+        rate: 1/s, of its logarithm.
+        until: s from the scene's start, up to which it stays below `growth.ROUGH`; None where it always does.
+    """
+
+    name: str
+    largest: tuple[float | None, float | None]
+    rate: tuple[float, float]
+    until: tuple[float | None, float | None]
+
+
+@dataclass(frozen=True, kw_only=True)
 class FitResult:
     """A finished (or interrupted) fit.
 
@@ -146,7 +214,14 @@ class FitResult:
         autocorrelation_time: frames of residual that count as one, 1 when they are independent.
         starts: the ends of all starts, best first.
         refits: on finer discretizations, of which `Estimate.discretization` is made.
+        not_counted: what of the discretization the intervals leave out, such as "mesh not counted", and why.
+        misfit: residuals against the sigma that was told; None in files of earlier versions.
         optimizer, iterations, seconds, converged, interrupted, message: how it went.
+        growth: of every fitted motion.
+        windows: s, the lengths that were fitted first, as given or chosen.
+        evaluations, jacobians: how often all experiments were simulated, and how often of these with a Jacobian, over
+            all starts and windows, up to the minimum.
+        premises: numbers that the fit took as given, and what an error in each moves.
         warnings: what a reader must know before using the numbers.
     """
 
@@ -170,7 +245,14 @@ class FitResult:
     refits: tuple[Refit, ...] = ()
     warnings: tuple[str, ...] = ()
     first_cost: float | None = None
+    growth: tuple[MotionGrowth, ...] = ()
+    windows: tuple[float, ...] = ()
+    evaluations: int = 0
+    jacobians: int = 0
+    misfit: Misfit | None = None
     jacobian_seconds: float | None = None
+    premises: tuple[Premise, ...] = ()
+    not_counted: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of that name; KeyError names the ones there are."""
@@ -178,6 +260,11 @@ class FitResult:
             if estimate.name == name:
                 return estimate
         raise KeyError(f"no estimate of {name!r}; there are: {', '.join(e.name for e in self.estimates)}")
+
+    @property
+    def sound(self) -> bool:
+        """Whether no verdict is one of `UNSOUND`."""
+        return not any(estimate.verdict in UNSOUND for estimate in self.estimates)
 
     @property
     def values(self) -> dict[str, float]:
@@ -214,25 +301,24 @@ class FitResult:
         """The inverse of `to_dict`.
 
         Raises:
-            InputError: it is no fit, or one of another format.
+            InputError: it is no fit, one of another format, or a field is missing, unknown or of another type; it names
+                its path.
         """
         found = data.get("format") if isinstance(data, Mapping) else data
         if found != FORMAT:
             raise InputError("format", "is not the one that this version reads", found, f"use {FORMAT!r}")
-        data = {"refits": [], **data}  # which files of earlier versions do not have
-        plain = {field.name for field in fields(cls)} & data.keys() - {"baseline"}
-        nested = {"given": Given, "correlations": Correlation, "starts": Start, "refits": Refit}
-        values = {name: data[name] for name in plain}
-        for name, kind in nested.items():
-            values[name] = tuple(kind(**part) for part in data[name])
-        values["estimates"] = tuple(_estimate(name, part) for name, part in data["parameters"].items())
-        values["recordings"] = tuple(RecordingFit(name=name, **part) for name, part in data["recordings"].items())
-        values["gauges"], values["warnings"] = tuple(data["gauges"]), tuple(data["warnings"])
-        return cls(baseline=data["baseline_is"], **values)
+        known = {field.name for field in fields(cls)}
+        values = {name: value for name, value in data.items() if name in known}
+        values["baseline"] = data.get("baseline_is", "")
+        estimates = mapping(data.get("parameters"), "parameters")
+        values["estimates"] = [_estimate(name, part) for name, part in estimates.items()]
+        recordings = mapping(data.get("recordings"), "recordings")
+        values["recordings"] = [_recording(name, part) for name, part in recordings.items()]
+        return as_dataclass(cls, values, "")
 
     def save(self, path: str | Path) -> None:
-        """Write `to_dict` as JSON."""
-        Path(path).write_text(json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        """Write `to_dict` as JSON, whole or not at all."""
+        write_text(path, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n")
 
     @classmethod
     def load(cls, path: str | Path) -> FitResult:
@@ -241,13 +327,13 @@ class FitResult:
         Raises:
             InputError: the file holds no fit.
         """
-        try:
-            data = json.loads(Path(path).read_text(encoding="utf-8"))
-        except ValueError as error:  # no JSON, or no text
-            raise InputError(
-                str(path), f"is no JSON ({error})", path, "give a file that FitResult.save wrote"
-            ) from error
-        return cls.from_dict(data)
+        path = Path(path)
+        with reading(path, InputError):
+            data = json_content(path, InputError, finite=True)
+            try:
+                return cls.from_dict(data)
+            except InputError as error:
+                raise InputError(f"{path}: {error.field}", error.problem, error.got, error.fix) from error
 
     def report(self) -> str:
         """The report as plain text, at most 100 columns wide."""
@@ -256,10 +342,24 @@ class FitResult:
         return plain(self)
 
 
-def _estimate(name: str, part: Mapping[str, Any]) -> Estimate:
-    lower, upper = part["interval"]
-    rest = {key: value for key, value in part.items() if key != "interval"}
-    return Estimate(name=name, lower=lower, upper=upper, **rest)
+def _estimate(name: str, part: object) -> Estimate:
+    where = f"parameters.{name}"
+    told = mapping(part, where)
+    ends = listed(told.get("interval"), f"{where}.interval")
+    if len(ends) != 2:
+        raise InputError(f"{where}.interval", "must be [lower, upper]", ends, "give both, null where open")
+    rest = {key: value for key, value in told.items() if key != "interval"}
+    found = as_dataclass(Estimate, {"name": name, "lower": ends[0], "upper": ends[1], **rest}, where)
+    for field in ("half_width", "statistical", "discretization", "systematic"):
+        width = getattr(found, field)
+        if width is not None and width < 0:
+            raise InputError(f"{where}.{field}", "must not be negative", width, "give a half-width")
+    return found
+
+
+def _recording(name: str, part: object) -> RecordingFit:
+    where = f"recordings.{name}"
+    return as_dataclass(RecordingFit, {"name": name, **mapping(part, where)}, where)
 
 
 def _strict(value: Any) -> Any:

@@ -118,9 +118,10 @@ def add_rod(
             left. Small motion shows EI.
         curvature_modes: k of rest-curvature modes cos(k pi s / length), about both frame axes; each starts at zero.
         twist_modes: the same of the rest twist per length.
-        softness_modes: the same of the bending compliance, relative to length/EI: a rod that is stiffer in places.
+        softness_modes: the same of the logarithm of the bending compliance over length/EI: a rod that is stiffer in
+            places. The compliance is length/EI exp(sum of modes), so it stays positive.
         density_modes: the same of the density, relative to it: a rod that is heavier in places; from k = 1 on they
-            leave its weight as it is.
+            leave its weight as it is. Values that make a mass negative are refused.
 
     Returns:
         Rod, also kept as `scene.ropes[name]`.
@@ -210,7 +211,7 @@ def add_rod(
     axes = [chain[at - 1], chain[at], chain[at + 1]] if normals is None else [normals[at - 1], normals[at]]
     before = int(ghosts[0] is not None)
     joints = Joints(scene, name, np.stack([*axes, directors[at - 1], directors[at]], axis=1), at - before, segments)
-    joints.bend(EI, EI2, bend_damping, yield_curvature, yield_share)
+    joints.bend(EI, EI2, bend_damping, yield_curvature, yield_share, softness_modes)
     if normals is not None and GA is not None:
         hold = {f"{name}_EI": "identity", f"{name}_length": "inverse"}
         scene.add_terms([product("mass", n, HOLD, hold) for n in normals])
@@ -218,7 +219,6 @@ def add_rod(
         shear(scene, name, np.column_stack([edges[links], normals[links], directors[links]]), GA, shear_damping)
     joints.twist(twist_damping)
     joints.rest(curvature_modes, twist_modes)
-    joints.soften(softness_modes)
     add_drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
     sections = np.zeros(0, dtype=int) if normals is None else normals
     built = Rod(name, nodes, link * np.arange(segments + 1), ghosts[0], ghosts[1], directors, sections)

@@ -12,6 +12,7 @@ from .quantities import Term
 from .scene import Array, Scene
 
 Factors = tuple[tuple[str, str], ...]
+Exponents = tuple[tuple[str, Array], ...]
 _INVERSE = {"identity": "inverse", "inverse": "identity"}
 
 
@@ -39,17 +40,20 @@ class Joints:
         damping: float | None,
         yield_curvature: float | None,
         yield_share: float | None,
+        softness_modes: Sequence[int],
     ) -> None:
-        """Material curvatures; with a set per joint where they yield."""
+        """Material curvatures; with a set per joint where they yield. Compliance length/EI exp(sum of modes): each mode
+        starts at zero, and no value of one makes a stiffness negative."""
         scene, name = self._scene, self._name
         scene.add_quantity(f"{name}_EI", EI, "N m^2")
+        softness = mode_quantities(scene, name, "softness", softness_modes, self._s)
         stencils, kind = self._stencils, "section_curvature" if self._sections else "material_curvature"
         if yield_curvature is not None:
             sets = scene.add_particles(np.zeros((len(stencils), 3)), 1.0)
             scene.pin(sets)
             kind = "section_yielding_curvature" if self._sections else "yielding_curvature"
             stencils = np.column_stack([stencils, sets])
-        self._group("bend", kind, f"{name}_EI", stencils, damping)
+        self._group("bend", kind, f"{name}_EI", stencils, damping, tuple(softness))
         start, width = first_value(scene, f"{name}_bend"), 3 if yield_curvature is None else 5
         first = start + width * np.arange(len(stencils))
         self._rest_of_bend = width - 2
@@ -78,7 +82,7 @@ class Joints:
     def twist(self, damping: float | None) -> None:
         """Twist between neighboring edges; the quantity GJ is there already."""
         kind = "section_twist" if self._sections else "twist"
-        self._group("twist", kind, f"{self._name}_GJ", self._stencils, damping)
+        self._group("twist", kind, f"{self._name}_GJ", self._stencils, damping, ())
 
     def rest(self, curvature_modes: Sequence[int], twist_modes: Sequence[int]) -> None:
         """Rest curvature and twist in modes cos(k pi s/length)."""
@@ -95,16 +99,11 @@ class Joints:
                 own: Factors = ((mode, "identity"), (self._length, "identity"), *factors)
                 self._scene.add_terms([Term("rest", index, self._share * weights, own)])
 
-    def soften(self, modes: Sequence[int]) -> None:
-        """Compliance length/EI (1 + sum of modes), each mode starting at zero."""
-        first = self._scene.group(f"{self._name}_bend")[1] + np.arange(len(self._stencils))
-        for mode, weights in mode_quantities(self._scene, self._name, "softness", modes, self._s):
-            factors: Factors = ((mode, "identity"), (self._length, "identity"), (f"{self._name}_EI", "inverse"))
-            self._scene.add_terms([Term("compliance", first, self._share * weights, factors)])
-
-    def _group(self, label: str, kind: str, stiffness: str, stencils: Array, damping: float | None) -> None:
+    def _group(
+        self, label: str, kind: str, stiffness: str, stencils: Array, damping: float | None, softness: Exponents
+    ) -> None:
         compliance = self._share, (self._length, "identity")
-        _add_elastic(self._scene, f"{self._name}_{label}", kind, stencils, compliance, stiffness, damping)
+        _add_elastic(self._scene, f"{self._name}_{label}", kind, stencils, compliance, stiffness, damping, softness)
 
 
 def shear(scene: Scene, name: str, stencils: Array, GA: float, damping: float | None) -> None:
@@ -126,19 +125,22 @@ def _add_elastic(
     compliance: tuple[Array | float, tuple[str, str]],
     stiffness: str,
     damping: float | None,
+    softness: Exponents = (),
 ) -> None:
-    """Add constraints of compliance coefficient length^(+-1) / stiffness, damped by a Kelvin-Voigt time constant.
+    """Add constraints of compliance coefficient length^(+-1) / stiffness exp(softness), damped by a Kelvin-Voigt time
+    constant.
 
     Args:
         compliance: the coefficient, and the quantity of the length with its function.
         stiffness: its quantity.
         damping: s, of the new quantity `<group>_damping`; None = undamped.
+        softness: quantities and their weights in each constraint.
     """
     coefficient, (length, power) = compliance
     zero = np.zeros(len(stencils))
     scene.add_constraints(kind, stencils, name=group, compliance=zero, damping=None if damping is None else zero)
     first = scene.group(group)[1] + np.arange(len(stencils))
-    scene.add_terms([Term("compliance", first, coefficient, ((length, power), (stiffness, "inverse")))])
+    scene.add_terms([Term("compliance", first, coefficient, ((length, power), (stiffness, "inverse")), softness)])
     if damping is not None:
         tau = scene.add_quantity(f"{group}_damping", damping, "s")
         factors: Factors = ((tau, "identity"), (stiffness, "identity"), (length, _INVERSE[power]))

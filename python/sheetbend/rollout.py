@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -14,9 +15,10 @@ from .errors import EmptyGradientError, InputError
 from .scene import Scene
 from .simulate import divergence, substeps
 from .solver import Solver
-from .tape import TapePlan, as_plan, budget
+from .tape import TapePlan, planned
 
 Array = np.ndarray
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -75,33 +77,37 @@ class Rollout:
         self._steps = substeps(times, solver.h)
         self._theta = self._compiled.values(values)
         self._inputs = self._compiled.inputs(self._theta)
-        with budget(solver):
-            self.plan: TapePlan = as_plan(self._core.tape_plan(self._steps, 1, solver.budget), solver)
+        allowed = solver.budget
+        self.plan: TapePlan = planned(self._core, self._steps, solver, allowed)
+        if solver.memory is None and self.plan.policy != "every boundary":
+            log.warning("%s: solver.memory is not given, so half of the free memory is used. %s", scene.name, self.plan)
         self._tape: _core.Tape
         with divergence(scene):
-            states, self._tape = self._core.record(self._inputs, self._steps, 0.0, solver.budget)
+            states, self._tape = self._core.record(self._inputs, self._steps, 0.0, allowed)
         self.times: Array = np.array(self._steps) * solver.h
         self.positions: Array = states.reshape(len(self._steps), -1, 3)
 
     def gradient(self, positions_bar: ArrayLike) -> Gradient:
         """The gradient of a loss whose derivative by the positions is `positions_bar`, (frames, particles, 3).
 
-        May be called again, with other cotangents.
+        May be called again, with other cotangents, and from several threads; where the tape dropped states they take
+        turns.
 
         Raises:
             InputError: wrong shape, NaN.
+            DivergenceError: the gradient grew by more than 1/eps on its way back through the motion.
             UnconvergedError: as `rollout`.
         """
         bar = np.asarray(positions_bar, dtype=float)
         if bar.shape != self.positions.shape or not np.isfinite(bar).all():
             bar = finite("positions_bar", positions_bar, self.positions.shape, InputError)
         with divergence(self._scene):
-            inputs_bar = self._core.vjp(self._inputs, self._tape, self._steps, bar, 0.0)
+            inputs_bar, recomputed = self._core.reverse(self._inputs, self._tape, self._steps, bar, 0.0)
         by_quantity = self._compiled.theta_bar(self._theta, inputs_bar)
         return Gradient(
             dict(zip(self._compiled.names, by_quantity.tolist(), strict=True)),
             self._compiled.unpack(inputs_bar),
-            self._tape.recomputed,
+            recomputed,
             self._tape.bytes,
             float(np.finfo(float).eps * np.abs(self.positions).max() * np.abs(bar).sum()),
         )
@@ -110,7 +116,10 @@ class Rollout:
 def rollout(
     scene: Scene, times: ArrayLike, solver: Solver | None = None, values: Mapping[str, float] | None = None
 ) -> Rollout:
-    """Simulate a scene and keep what its gradient needs, within `solver.memory`.
+    """Simulate a scene and keep what its gradient needs, within `solver.memory`, by default half of the free memory.
+
+    Where that default makes the gradient compute states again, a warning of the logger "sheetbend.rollout" says what it
+    costs.
 
     Args:
         scene: is frozen by this.
@@ -119,8 +128,8 @@ def rollout(
         values: quantities to change for this run, by name.
 
     Raises:
-        InputError: times off the grid, unknown quantities, a budget below the least that works.
-        DivergenceError: a state became infinite; says when and where.
+        InputError: times off the grid, unknown quantities, a budget below the least that works or above what is free.
+        DivergenceError: a state became infinite, or nothing put into the scene explains it; says when and where.
         UnconvergedError: method "newton_cg" ran out of iterations, here or in a gradient.
         UnbalancedError: method "implicit" did not bring a substep's forces into balance.
     """

@@ -19,7 +19,7 @@ from .forces import Forces
 from .frames import Frame, directors_of, normals_of
 from .group import Group, make_group
 from .kinds import KINDS, UNITS
-from .quantities import Quantity, Term, product
+from .quantities import ZERO_OR_MORE, Quantity, Term, product
 from .scene_checks import validate
 from .volume import Volumes
 
@@ -279,7 +279,7 @@ class Scene:
         """Add terms to the inputs (array names and order as in `CompiledScene.layout`)."""
         self._building()
         for t in terms:
-            missing = [q for q, _ in t.factors if q not in self.quantities]
+            missing = [q for q in t.quantities if q not in self.quantities]
             if missing:
                 raise SceneError("terms", "use unknown quantities", missing, "declare them with add_quantity")
         self.terms += terms
@@ -482,6 +482,7 @@ class Scene:
     def _scalar(self, quantity: str, array: str, first: int, values: Array, kind: str) -> None:
         """Move one value shared by a whole group into a quantity."""
         unit = UNITS[kind][array]
-        self.add_quantity(quantity, float(values[0]), unit, positive=float(values[0]) > 0.0)
+        value = float(values[0])
+        self.add_quantity(quantity, value, unit, positive=value > 0.0, limits=None if value > 0.0 else ZERO_OR_MORE)
         self.add_terms([Term(array, first + np.arange(len(values)), 1.0, ((quantity, "identity"),))])
         values[:] = 0.0

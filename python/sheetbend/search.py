@@ -1,22 +1,48 @@
-"""How a fit finds its minimum: from every start, through short windows first where they are asked for.
+"""How a fit finds its minimum: from every start, through short windows first where they help (`windows`), by steps that
+are limited for each parameter (`approach`), and by Ceres or SciPy once it is near.
 
-The cost of a long motion is rugged far from its minimum, and where the motion is sensitive its derivative says nothing
-about a large step. Over a short window from the same start it is smooth. Corrections of driven markers come last: far
-from the minimum they would explain away what the parameters have to.
+Corrections of driven markers come last: far from the minimum they would explain away what the parameters have to.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .errors import InputError
-from .optimizers import Minimum, Observer, Progress, judged, minimize
+from .approach import Approach, Tally
+from .errors import InputError, SheetbendError
+from .growth import Growth, growths
+from .optimizers import Minimum, Observer, Progress, judged, minimize, named
 from .problem import FitProblem
+from .windows import chosen, cut, holds_frames
 
-WINDOW_TOLERANCE = 1e-3  # relative, of the cost: a window's minimum is only a start
+AUTO = "auto"
+WINDOW_TOLERANCE = 1e-2  # of the cost: a window's minimum is only a start
+WINDOW_STEPS = 40
+NEAR_TOLERANCE = 1e-3  # of the cost: what is left is for the optimizer
+MUCH, DONE = 0.25, 1e-3  # of the cost: what a first step promises where the start is near, and at the minimum
+NOISE = 2.0  # sigmas: a start whose residuals are no larger is near, too
+BACK = 0.1  # of the length: where windows so little longer diverge, there is no way on
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search found.
+
+    Attributes:
+        ends: of all starts, best first; those that diverged last, with an infinite cost.
+        optimizer: name of the one that ended the search.
+        interrupted: whether Ctrl-C did.
+        growths: of the motions at the first start.
+    """
+
+    ends: tuple[Minimum, ...]
+    optimizer: str
+    interrupted: bool
+    growths: tuple[Growth, ...]
 
 
 @dataclass(frozen=True)
@@ -25,7 +51,7 @@ class Search:
 
     optimizer: str = "auto"
     starts: Sequence[Mapping[str, float]] = ()
-    windows: Sequence[float] = ()
+    windows: Sequence[float] | str = AUTO
     max_iterations: int = 200
     tolerance: float = 1e-10
     progress: Observer | None = None
@@ -35,35 +61,45 @@ class Search:
             raise InputError("max_iterations", "must be positive", self.max_iterations, "give at least 1")
         if not 0 < self.tolerance < 1:
             raise InputError("tolerance", "must lie between 0 and 1", self.tolerance, "give a relative change of cost")
+        if isinstance(self.windows, str):
+            if self.windows != AUTO:
+                raise InputError("windows", "are unknown", self.windows, "give lengths in s, [] for none, or 'auto'")
+            return
         w = np.array(self.windows, dtype=float)
         if not (np.isfinite(w).all() and (np.diff(w, prepend=0.0) > 0).all()):
             raise InputError("windows", "must be positive and increase", list(self.windows), "give lengths in s")
 
-    def run(self, problem: FitProblem) -> tuple[list[Minimum], str, bool]:
-        """Ends of all starts, best first; the optimizer's name; whether Ctrl-C ended the search.
+    def run(self, problem: FitProblem) -> Found:
+        """Search from every start.
 
         Raises:
             InputError: starts of what is not fitted, or windows that hold no frame.
-            SheetbendError: a start has no answer.
+            SheetbendError: no start has an answer.
         """
-        first: list[tuple[float | None, FitProblem]] = [(length, _cut(problem, length)) for length in self.windows]
-        if problem.estimates_corrections:
-            first.append((None, problem.uncorrected(problem.recordings)))
+        name = named(self.optimizer)
+        points = self._points(problem)
+        for length in () if self.windows == AUTO else self.windows:
+            cut(problem, float(length))
         ends: list[Minimum] = []
-        interrupted, name = False, ""
-        for u in self._points(problem):
+        began: tuple[Growth, ...] = ()
+        for u in points:
+            way = _Way(self, problem, name)
             try:
-                end, name = self._end(problem, first, u)
-            except KeyboardInterrupt:  # before the first point of this start
-                if not ends:
+                grown = growths(problem, u) if not ends or self.windows == AUTO else ()
+                began = began or grown
+                ends.append(way.end(u, grown))
+            except KeyboardInterrupt:
+                end = way.interrupted()
+                if end is None and not ends:  # before the first point of the first start
                     raise
-                interrupted = True
-                break
-            ends.append(end)
-            if end.interrupted:
-                interrupted = True
-                break
-        return sorted(ends, key=lambda m: m.cost), name, interrupted
+                return Found(_best_first(ends if end is None else [*ends, end]), name, True, began)
+            except SheetbendError as error:
+                ends.append(way.diverged(u, str(error)))
+            if ends[-1].interrupted:
+                return Found(_best_first(ends), name, True, began)
+        if not any(np.isfinite(end.cost) for end in ends):
+            raise SheetbendError(ends[0].message)
+        return Found(_best_first(ends), name, False, began)
 
     def _points(self, problem: FitProblem) -> list[np.ndarray]:
         first = problem.parameters.to_physical(problem.parameters.initial())
@@ -77,51 +113,140 @@ class Search:
             points.append(problem.parameters.to_internal(first | dict(changes)))
         return points
 
-    def _end(
-        self, problem: FitProblem, before: Sequence[tuple[float | None, FitProblem]], u: np.ndarray
-    ) -> tuple[Minimum, str]:
-        first, iterations = _cost(before[-1][1] if problem.estimates_corrections else problem, u) if before else None, 0
-        for length, part in before:
-            tolerance = max(self.tolerance, WINDOW_TOLERANCE)
-            end, name = minimize(part, u, self.optimizer, self.max_iterations, tolerance, self._observer(length))
-            u, iterations = end.u, iterations + end.iterations
-            if end.interrupted:
-                cost = _cost(problem, u)
-                if cost is None:
-                    raise KeyboardInterrupt
-                return replace(end, cost=cost, first=first, iterations=iterations), name
-        end, name = minimize(problem, u, self.optimizer, self.max_iterations, self.tolerance, self._observer(None))
-        began = first if before else end.first
+
+def _best_first(ends: Sequence[Minimum]) -> tuple[Minimum, ...]:
+    return tuple(sorted(ends, key=lambda m: m.cost))
+
+
+@dataclass
+class _Way:
+    """From one start to its end: what it went through, and where it is."""
+
+    search: Search
+    problem: FitProblem
+    optimizer: str
+    windows: list[float] = field(default_factory=list)  # s, that were fitted
+    taken: Tally = field(default_factory=Tally)
+    first: float | None = None  # cost of the whole motion at the start
+    u: np.ndarray | None = None  # the best point of what was fitted last
+
+    def end(self, u: np.ndarray, grown: Sequence[Growth]) -> Minimum:
+        """Raises SheetbendError where the whole motion diverges at the start and after every window."""
+        most = self.search.max_iterations
+        whole = (
+            self.problem.uncorrected(self.problem.recordings) if self.problem.estimates_corrections else self.problem
+        )
+        given = [] if isinstance(self.search.windows, str) else [float(length) for length in self.search.windows]
+        if given:
+            ok, r, _ = whole.evaluate(u, jacobian=False)
+            self.taken.evaluations += 1
+            cost = 0.5 * float(r @ r) if ok else math.inf
+            self._began(u, cost)
+            walk = self._through(whole, given, u)
+        else:
+            walk = Approach(whole, u, self.taken)
+            self._began(walk.u, walk.cost)
+        if self.search.windows == AUTO:
+            lengths = chosen(self.problem, grown)
+            if (lengths or not np.isfinite(walk.cost)) and not self._starts_near(walk):
+                walk = self._through(whole, lengths, u)
+        if not np.isfinite(walk.cost):
+            raise SheetbendError(f"the fit cannot start: {whole.failure}")
+        self._walk(walk, NEAR_TOLERANCE, most - 1, None)
+        if whole is not self.problem:
+            walk = Approach(self.problem, walk.u, self.taken)
+            self._walk(walk, NEAR_TOLERANCE, most - 1, None)
+        before = self.taken.iterations
+        end, _ = minimize(
+            self.problem,
+            walk.u,
+            self.optimizer,
+            max(1, most - walk.iterations),
+            self.search.tolerance,
+            self._observer(None, before),
+            first=walk.cost if np.isfinite(walk.cost) else None,
+        )
         try:
-            end = judged(problem, end, end.cost if began is None else began)
+            end = judged(self.problem, end, end.cost if self.first is None else self.first)
         except KeyboardInterrupt:
             end = replace(end, interrupted=True)
-        return replace(end, first=began, iterations=iterations + end.iterations), name
+        return self._counted(end)
 
-    def _observer(self, window: float | None) -> Observer | None:
-        observe = self.progress
+    def _began(self, u: np.ndarray, cost: float) -> None:
+        if np.isfinite(cost):
+            self.first, self.u = cost, u
+
+    def interrupted(self) -> Minimum | None:
+        """The best point so far, after Ctrl-C; None before the first, or where the whole motion diverges there."""
+        if self.u is None:
+            return None
+        ok, r, _ = self.problem.evaluate(self.u, jacobian=False)
+        if not ok:
+            return None
+        return self._counted(
+            Minimum(self.u, 0.5 * float(r @ r), 0, 1, False, True, "interrupted: the best point so far")
+        )
+
+    def diverged(self, u: np.ndarray, words: str) -> Minimum:
+        """The row of a start that has no answer."""
+        return self._counted(Minimum(u, math.inf, 0, 0, False, False, words))
+
+    def _starts_near(self, walk: Approach) -> bool:
+        """Whether the first step on the whole motion promises much of the cost (or nothing is left to promise), keeps
+        it, and is short of every limit. Far off, the slope of a long motion promises little."""
+        if np.isfinite(walk.cost) and walk.step():
+            self._arrived(walk, None)
+        noise = walk.cost < 0.5 * NOISE**2 * self.problem.core.data_rows
+        if walk.promised < DONE:
+            return noise or walk.free
+        return walk.free and (noise or walk.promised > MUCH)
+
+    def _through(self, whole: FitProblem, lengths: Sequence[float], u: np.ndarray) -> Approach:
+        """Fit window after window; where one diverges at the values of the one before, one in between comes first.
+        Gives the whole motion at the end of the last."""
+        longest = max(float(r.times[-1]) - e.t0 for e, r in zip(whole.experiments, whole.recordings, strict=True))
+        ahead, reached = [*lengths, math.inf], 0.0
+        while True:
+            part = whole if math.isinf(ahead[0]) else cut(whole, ahead[0])
+            walk = Approach(part, u, self.taken)
+            if math.isfinite(walk.cost):
+                if part is whole:
+                    return walk
+                self._walk(walk, WINDOW_TOLERANCE, min(WINDOW_STEPS, self.search.max_iterations), ahead[0])
+                u, reached = walk.u, ahead.pop(0)
+                self.windows.append(reached)
+                continue
+            upto = min(ahead[0], longest)
+            between = 0.5 * (reached + upto)
+            if upto - reached < BACK * upto or not holds_frames(whole, between):
+                return Approach(whole, u, self.taken)
+            ahead.insert(0, between)
+
+    def _walk(self, walk: Approach, tolerance: float, most: int, window: float | None) -> None:
+        """Steps until the next promises little, and on the whole motion until it is near."""
+        while walk.iterations < most and not (window is None and walk.near) and walk.step():
+            self._arrived(walk, window)
+            if walk.promised < tolerance or walk.taken < tolerance:
+                break
+
+    def _arrived(self, walk: Approach, window: float | None) -> None:
+        self.u = walk.u
+        observe = self._observer(window, 0)
+        if observe is not None:
+            observe(Progress(self.taken.iterations, walk.cost, walk.u.copy()))
+
+    def _observer(self, window: float | None, before: int) -> Observer | None:
+        observe = self.search.progress
         if observe is None:
             return None
+        return lambda p: observe(replace(p, iteration=before + p.iteration, window=window))
 
-        def told(progress: Progress) -> None:
-            observe(replace(progress, window=window))
-
-        return told
-
-
-def _cost(problem: FitProblem, u: np.ndarray) -> float | None:
-    """None where the motion diverges."""
-    ok, r, _ = problem.evaluate(u, jacobian=False)
-    return 0.5 * float(r @ r) if ok else None
-
-
-def _cut(problem: FitProblem, length: float) -> FitProblem:
-    """The problem with the first `length` s of every motion from its scene's start on."""
-    pieces = []
-    for e, recording in zip(problem.experiments, problem.recordings, strict=True):
-        last = e.t0 + length
-        if not e.static and not (recording.times < last).any():
-            fix = "make it longer, or leave it out"
-            raise InputError("windows", f"hold no fitted frame of '{e.name}'", length, fix)
-        pieces.append(recording if e.static else recording.piece(None, last))
-    return problem.uncorrected(pieces)
+    def _counted(self, end: Minimum) -> Minimum:
+        return replace(
+            end,
+            first=self.first,
+            iterations=self.taken.iterations + end.iterations,
+            evaluations=self.taken.evaluations + end.evaluations,
+            jacobians=self.taken.jacobians + end.jacobians,
+            windows=tuple(self.windows),
+        )

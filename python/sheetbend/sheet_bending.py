@@ -24,8 +24,9 @@ WEAKER = (
 class SheetCurvature:
     """The triangles of a mesh that have three neighbors, as core/constraints/sheet_curvature.h takes them.
 
-    Triangles at a border have the curvature of their neighbors: their area counts there. A clamp acts in the middle
-    between the last row of held vertices and the one before it.
+    Triangles at a border have the curvature of their neighbors: their area counts there, unless no hinge of theirs can
+    move, and only on neighbors with one that can. A clamp of two rows of held vertices or more acts in the middle
+    between the last row and the one before it: the hinges on the last row count half a row of triangles on either side.
 
     Attributes:
         stencils: (count, 6) vertices: the triangle's, then those opposite across its edges v0v1, v1v2, v2v0.
@@ -41,7 +42,9 @@ class SheetCurvature:
         if not full.any():
             why = "needs triangles with three neighbors"
             raise SceneError("bending", why, mesh, "use a mesh of at least two cells across, or the dihedral model")
-        area = _with_borders(mesh, hinge)[full]
+        moves = free[mesh.triangles].any(axis=1)
+        moves |= ((hinge >= 0) & free[mesh.hinges[hinge]].any(axis=2)).any(axis=1)
+        area = _with_borders(mesh, hinge, moves)[full]
         hinge, corners = hinge[full], mesh.corners[full]
         side = (mesh.hinge_triangles[hinge, 0] != np.flatnonzero(full)[:, None]).astype(
             int
@@ -108,22 +111,28 @@ def _hinges_of_triangles(mesh: TriangleMesh) -> Array:
     return found
 
 
-def _with_borders(mesh: TriangleMesh, hinge: Array) -> Array:
-    """(m,) m^2, areas after every triangle that lacks a neighbor has given its own to those nearer to complete ones."""
+def _with_borders(mesh: TriangleMesh, hinge: Array, moves: Array) -> Array:
+    """(m,) m^2, areas after every triangle that lacks a neighbor has given its own to those nearer to complete ones.
+
+    Args:
+        moves: (m,) whether a hinge of the triangle can; the area of the others, inside a clamp, does not count.
+    """
     neighbor = np.where(hinge[..., None] >= 0, mesh.hinge_triangles[hinge], -1)
     own = np.arange(len(hinge))[:, None]
     neighbor = np.where(neighbor[..., 0] == own, neighbor[..., 1], neighbor[..., 0])
-    distance = np.where((hinge >= 0).all(axis=1), 0, -1)
+    distance = np.where((hinge >= 0).all(axis=1) & moves, 0, -1)
     step = 0
     while (distance < 0).any():
         near = ((neighbor >= 0) & (distance[neighbor] == step)).any(axis=1) & (distance < 0)
         if not near.any():
+            if not moves[distance < 0].any():
+                break
             raise SceneError("bending", "cannot reach a part of the mesh", mesh, "leave out parts of a triangle or two")
         step += 1
         distance[near] = step
-    area = mesh.areas.copy()
+    area = np.where(moves, mesh.areas, 0.0)
     for d in range(step, 0, -1):
-        for t in np.flatnonzero(distance == d):
+        for t in np.flatnonzero((distance == d) & (area > 0)):
             to = [n for n in neighbor[t] if n >= 0 and distance[n] == d - 1]
             area[to] += area[t] / len(to)
     return area

@@ -13,8 +13,11 @@ from . import _core
 from .checks import finite
 from .errors import DivergenceError, InputError, UnbalancedError, UnconvergedError
 from .kinds import KINDS
+from .memory import expect_room
 from .scene import Scene
 from .solver import Solver
+
+MOST_SUBSTEPS = 2**31 - 1  # that the core counts
 
 
 @dataclass(frozen=True)
@@ -54,8 +57,8 @@ def simulate(
         start: (particles, 3) m, positions to start from instead of the scene's, such as an equilibrium's.
 
     Raises:
-        InputError: times off the grid, unknown quantities.
-        DivergenceError: a state became infinite; says when and where.
+        InputError: times off the grid, unknown quantities, more frames than fit in the free memory.
+        DivergenceError: a state became infinite, or nothing put into the scene explains it; says when and where.
         UnconvergedError: method "newton_cg" ran out of iterations.
         UnbalancedError: method "implicit" did not bring a substep's forces into balance; says when and where.
     """
@@ -66,9 +69,11 @@ def simulate(
     if start is not None:
         offset, size = compiled.layout["position"]
         inputs[offset : offset + size] = finite("start", start, (scene.particle_count, 3), InputError).ravel()
+    frames = len(steps)
+    numbers = 2 * compiled.core.dofs + compiled.core.rows + len(scene.volumes.triangles)
+    expect_room("times", 8 * frames * numbers, f"ask for fewer than {frames} frames at a time")
     with divergence(scene):
         out = solver.core(compiled).simulate(inputs, steps, 0.0)
-    frames = len(steps)
     velocities = out["velocities"].reshape(frames, -1, 3)
     velocities[:, list(scene.directors)] = 0.0
     return Trajectory(
@@ -94,6 +99,8 @@ def substeps(times: ArrayLike, h: float) -> list[int]:
             float(t[off][0]),
             "choose h so that it divides the frame interval",
         )
+    if steps[-1] > MOST_SUBSTEPS:
+        raise InputError("times", f"take more than {MOST_SUBSTEPS} substeps of {h:g} s", float(t[-1]), "end earlier")
     return steps.astype(int).tolist()
 
 
@@ -120,7 +127,7 @@ def divergence(scene: Scene) -> Iterator[None]:
     try:
         yield
     except _core.Diverged as error:
-        raise DivergenceError(error.substep, error.time, error.particle, scene.name) from error
+        raise DivergenceError(error.substep, error.time, error.particle, scene.name, error.seen) from error
     except _core.Unbalanced as error:
         when = (error.substep, error.time, error.particle)
         raise UnbalancedError(error.problem, error.fix, *when, error.residual, scene.name) from error

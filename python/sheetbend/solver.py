@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import cast
 
 from . import _core
 from .compiled import CompiledScene
 from .errors import InputError, refusal
-from .memory import in_bytes
+from .extrapolation import MOST, Extrapolated, weights
+from .memory import free_memory, in_bytes
+from .redundancy import warn_redundant
 
 INTEGRATORS = ("bdf1", "bdf2")
 METHODS = ("direct", "gauss_seidel", "implicit", "newton", "newton_cg")
@@ -37,8 +40,12 @@ class Solver:
         cg_tolerance: relative residual at which conjugate gradients stop ("newton_cg" runs them twice per solve).
         cg_iterations: conjugate gradients until there; more are an error.
         memory: budget of a gradient through a rollout, such as "2 GB" or a number of bytes: what does not fit on the
-            tape is computed again, with the same result. None = keep every substep boundary. `tape_plan` tells what a
-            budget costs. Tangents (`fit`, forward mode) keep no tape.
+            tape is computed again, with the same result. None = half of the memory that is free when it is recorded.
+            `tape_plan` tells what a budget costs. Tangents (`fit`, forward mode) keep no tape.
+        extrapolate: number of runs that are combined at the frames: 1 (the default, off); 2, at h and h/2, third order
+            with "bdf2"; 3, at h, h/2 and h/4, fourth order, in seven times the substeps of one run. For smooth motions:
+            scenes with joints that yield or with linear knots of driven particles are refused, and so is
+            "gauss_seidel" (and with it tethers), whose error comes from sweeps.
     """
 
     h: float = 1e-3
@@ -51,6 +58,7 @@ class Solver:
     cg_tolerance: float = 1e-12
     cg_iterations: int = 10_000
     memory: str | int | None = None
+    extrapolate: int = 1
 
     def __post_init__(self) -> None:
         if not (isinstance(self.h, int | float) and math.isfinite(self.h) and self.h > 0):
@@ -75,11 +83,17 @@ class Solver:
                 raise InputError(f"solver.{field}", f"must be a {what} of at most 1e-3", value, fix)
         if self.memory is not None:
             in_bytes("solver.memory", self.memory)
+        runs = self.extrapolate
+        if not isinstance(runs, int) or isinstance(runs, bool) or not 1 <= runs <= MOST:
+            raise InputError("solver.extrapolate", "is no number of runs", runs, f"give 1 (off) to {MOST}")
+        if runs > 1 and self.method == "gauss_seidel":
+            fix = "use 'direct' or 'newton', or leave it out"
+            raise InputError("solver.extrapolate", "does not go with sweeps that do not converge", runs, fix)
 
     @property
-    def budget(self) -> int | None:
-        """`memory` in bytes."""
-        return None if self.memory is None else in_bytes("solver.memory", self.memory)
+    def budget(self) -> int:
+        """`memory` in bytes; by default half of the memory that is free now."""
+        return free_memory() // 2 if self.memory is None else in_bytes("solver.memory", self.memory)
 
     @property
     def sweeps(self) -> int:
@@ -90,21 +104,46 @@ class Solver:
         """The same solver at another substep."""
         return replace(self, h=h)
 
+    @property
+    def runs(self) -> tuple[tuple[float, float], ...]:
+        """Substep [s] and weight of each run."""
+        return tuple((self.h / 2**k, w) for k, w in enumerate(weights(self.integrator, self.extrapolate)))
+
+    def check_smooth(self, scene: CompiledScene) -> None:
+        """Raises InputError where runs are to be combined and the scene's motions are not smooth in time."""
+        if self.extrapolate > 1 and scene.kinks:
+            fix = "leave it out (1) and shorten h"
+            raise InputError(
+                "solver.extrapolate", f"is for smooth motions: the scene has {scene.kinks}", self.extrapolate, fix
+            )
+
     def core(self, scene: CompiledScene) -> _core.Solver:
-        """The compiled solver for a scene.
+        """The compiled solver for a scene, or what is called as it is and combines several.
 
         Raises:
             InputError: the method cannot step the scene, such as "newton" with rigid constraints.
+
+        Warns:
+            RedundantConstraintsWarning: method "direct", and some rigid constraints follow from others at the start.
         """
+        self.check_smooth(scene)
+        if self.extrapolate == 1:
+            return self._one(scene, self.h)
+        return cast(_core.Solver, Extrapolated([self._one(scene, h) for h, _ in self.runs], [w for _, w in self.runs]))
+
+    def _one(self, scene: CompiledScene, h: float) -> _core.Solver:
         if self.method in ("implicit", "newton", "newton_cg"):
             offset, size = scene.layout["compliance"]
             if size and not (scene.inputs()[offset : offset + size] > 0).all():
                 fix = "use 'direct', or give every constraint a compliance"
                 raise InputError("solver.method", "cannot hold rigid constraints", self.method, fix)
+        if self.method == "direct" and self.sweeps == 1 and "shear" in scene.kinds:
+            problem = "loses up to half of the digits of gradients of rods that shear (GA)"
+            raise InputError("solver.iterations", problem, 1, "use 2, or leave GA out")
         try:
-            return _core.Solver(
+            core = _core.Solver(
                 scene=scene.core,
-                h=self.h,
+                h=h,
                 integrator=self.integrator,
                 partition=self.method,
                 iterations=self.sweeps,
@@ -116,3 +155,6 @@ class Solver:
             )
         except ValueError as error:
             raise refusal(error, InputError, self.method) from error
+        if self.method == "direct":
+            warn_redundant(scene.name, core.redundant(scene.inputs(), 0.0))
+        return core

@@ -15,6 +15,9 @@ _COLORS = {
     "at a bound": "red",
     "at its floor": "red",
     "not identifiable": "red",
+    "rough": "bold red",
+    "no minimum": "bold red",
+    "doubtful": "bold red",
 }
 
 
@@ -70,7 +73,7 @@ def _table(section: Section) -> list[str]:
 
 
 def _flush_left(section: Section) -> list[bool]:
-    words = {"parameter", "with", "recording", "unit", "verdict", "step", "stays", "rope"}
+    words = {"parameter", "with", "recording", "unit", "verdict", "step", "stays", "rope", "given"}
     return [header in words for header in section.headers]
 
 

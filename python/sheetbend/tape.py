@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from . import _core
 from .errors import InputError
-from .memory import in_words, least_in_words
+from .memory import expect_room, free_memory, in_words, least_in_words
 from .scene import Scene
 from .simulate import substeps
 from .solver import Solver
@@ -20,7 +20,7 @@ from .solver import Solver
 class TapePlan:
     """A tape under a budget, for one gradient.
 
-    Without a budget, or with a large one, the tape keeps the positions at every substep boundary. Otherwise it keeps
+    With a large budget the tape keeps the positions at every substep boundary. Otherwise it keeps
     those of some boundaries, placed by binomial checkpointing (Griewank & Walther 2000), and the forward program runs
     again between them. Every substep is recomputed once more as it is reversed; that is part of any gradient here and
     not counted.
@@ -34,7 +34,8 @@ class TapePlan:
             and the record that a substep is reversed from), "heap" (what allocators waste). The scene itself is not
             counted.
         recomputed: substeps that the forward program runs again.
-        budget: bytes, or None.
+        budget: bytes: `Solver.memory`, or half of the free memory where that is not given. None where it is not given
+            and every boundary fits.
         least: the smallest budget that would do, bytes.
     """
 
@@ -68,7 +69,7 @@ class TapePlan:
             if self.recomputed
             else "no substep runs again"
         )
-        budget = "no budget" if self.budget is None else f"budget {in_words(self.budget)}"
+        budget = "fits in half of the free memory" if self.budget is None else f"budget {in_words(self.budget)}"
         parts = ", ".join(f"{name} {in_words(size)}" for name, size in self.working.items())
         return (
             f"gradient over {self.steps} substeps: {in_words(self.total)} ({budget}, least {in_words(self.least)})\n"
@@ -83,26 +84,33 @@ def tape_plan(scene: Scene, times: ArrayLike, solver: Solver | None = None, scen
     Args:
         scene: is frozen by this.
         times: (frames,) s on the substep grid: where the loss looks.
-        solver: its `memory` is the budget; `Solver()` by default.
+        solver: its `memory` is the budget, by default half of the free memory; `Solver()` by default.
         scenes: batch size; a batch goes eight scenes to a vector, one vector per thread at a time.
 
     Raises:
-        InputError: times off the grid; a budget below the least that works.
+        InputError: times off the grid; a budget below the least that works, or a gradient that does not fit in the
+            free memory.
     """
     solver = solver or Solver()
     if not isinstance(scenes, int) or scenes < 1:
         raise InputError("scenes", "must be a positive whole number", scenes, "give the size of the batch, at least 1")
-    steps = substeps(times, solver.h)
+    return planned(solver.core(scene.compiled), substeps(times, solver.h), solver, solver.budget, scenes)
+
+
+def planned(core: _core.Solver, steps: Sequence[int], solver: Solver, allowed: int, scenes: int = 1) -> TapePlan:
+    """The core's plan under a budget of `allowed` bytes, in the package's words.
+
+    Raises:
+        InputError: the budget is below the least that works, or above what the machine has free.
+    """
     with budget(solver):
-        plan = solver.core(scene.compiled).tape_plan(steps, scenes, solver.budget)
-    return as_plan(plan, solver)
-
-
-def as_plan(plan: _core.TapePlan, solver: Solver) -> TapePlan:
-    """The core's plan in the package's words."""
+        plan = core.tape_plan(steps, scenes, allowed)
     names = ("inputs", "frames", "plan", "forward", "reverse", "heap")
     working = {name: getattr(plan, name) for name in names}
-    return TapePlan(plan.steps, plan.states, plan.tape, working, plan.recomputed, solver.budget, plan.least)
+    own = None if solver.memory is None and plan.states >= plan.steps else allowed
+    found = TapePlan(plan.steps, plan.states, plan.tape, working, plan.recomputed, own, plan.least)
+    expect_room("solver.memory", found.total, "lower the budget, or ask for fewer frames at a time")
+    return found
 
 
 @contextmanager
@@ -111,10 +119,12 @@ def budget(solver: Solver) -> Iterator[None]:
     try:
         yield
     except _core.BudgetTooSmall as error:
-        raise InputError(
-            "solver.memory",
-            f"is too small for this gradient, which needs {least_in_words(error.needed)} even when it keeps the fewest "
-            "states",
-            solver.memory,
-            f'give at least memory = "{least_in_words(error.needed)}", ask for fewer frames at a time, or leave it out',
-        ) from error
+        least = least_in_words(error.needed)
+        if solver.memory is None:
+            problem, got = "is half of the free memory by default, and too small", in_words(free_memory() // 2)
+            fix = f'ask for fewer frames at a time, or give memory = "{least}" if the machine has it'
+        else:
+            problem, got = "is too small", str(solver.memory)
+            fix = f'give at least memory = "{least}", ask for fewer frames at a time, or leave it out'
+        problem += f" for this gradient, which needs {least} even when it keeps the fewest states"
+        raise InputError("solver.memory", problem, got, fix) from error

@@ -71,12 +71,28 @@ def elastic_energy_gradient(rest: Equilibrium) -> dict[str, float]:
 
 
 def support_forces(rest: Equilibrium) -> Array:
-    """(particles, 3) N, the force of the supports on held particles at rest, zero on free ones."""
+    """(particles, 3) N, the force of the supports on held particles at rest, zero on free ones.
+
+    They carry what constraints, kept volumes and given pressures put on held particles; not the weight of those, whose
+    masses are not used.
+    """
     scene, compiled = rest.scene, rest.scene.compiled
     inputs = compiled.inputs(rest.theta)
     _, forces = _core.evaluate_constraints(compiled.core, inputs, rest.positions.ravel(), rest.solution.multipliers)
-    forces = -forces.reshape(-1, 3)
+    forces = -(forces.reshape(-1, 3) + _pressure_forces(scene, inputs, rest.positions))
     forces[scene.free] = 0.0
+    return forces
+
+
+def _pressure_forces(scene: Scene, inputs: Array, positions: Array) -> Array:
+    """(particles, 3) N, pressure times area of each triangle in air, a third to every corner."""
+    offset, size = scene.compiled.layout["pressure"]
+    triangles = np.reshape(scene.air.triangles, (-1, 3)).astype(int)
+    first, second, third = np.moveaxis(positions[triangles], 1, 0)
+    each = inputs[offset : offset + size, None] * np.cross(second - first, third - first) / 6.0
+    forces = np.zeros_like(positions)
+    for corner in triangles.T:
+        np.add.at(forces, corner, each)
     return forces
 
 

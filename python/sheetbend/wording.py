@@ -54,6 +54,14 @@ def side_words(parameter: Parameter, lower: float | None, upper: float | None) -
     return "open on both sides"
 
 
+def ran_off_words(parameter: Parameter, value: float) -> str:
+    """Of a parameter that a fit moved so far that the data no longer depend on it."""
+    start = parameter.initial if parameter.initial is not None else value
+    far = f"ran off from {quantity(start, parameter)} to {quantity(value, parameter)}"
+    side = "smaller" if abs(value) < abs(start) else "larger"
+    return f"{far}: {side} values explain the data as well, or the fit lost it; start elsewhere or give it bounds"
+
+
 def width_words(parameter: Parameter, value: float, lower: float, upper: float) -> str:
     """How well a closed interval knows its value: relative where it has a clear size, else absolute."""
     half_width = (upper - lower) / 2

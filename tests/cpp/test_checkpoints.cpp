@@ -1,5 +1,7 @@
 // The schedule of checkpoints by itself, and gradients under budgets against those of the whole tape.
+#include <atomic>
 #include <map>
+#include <thread>
 
 #include "tests/cpp/support/programs.h"
 
@@ -129,6 +131,27 @@ TEST_P(Checkpoints, GiveTheBitsOfTheWholeTape) {
     EXPECT_EQ(recorded.tape.recomputed(), recomputed_steps(p.steps, kept, window)) << kept << " states";
     // Once more from the same tape, whose states have been dropped.
     EXPECT_TRUE(same_bits(gradient(p, sample.inputs, recorded), whole)) << kept << " states, again";
+  }
+}
+
+// Reverses of a tape that drops states take turns; those of a whole one only read it. The thread sanitizer looks at both.
+TEST(CheckpointsInThreads, GiveTheBitsOfTheWholeTape) {
+  for (const Partition partition : {Partition::direct, Partition::gauss_seidel}) {
+    const Sample sample = random_scene(75);
+    const Program p{sample.scene, make_plan(sample.scene, {.h = 4e-3, .partition = partition}), 40};
+    const auto whole = gradient(p, sample.inputs);
+    for (const int kept : {Schedule::least(p.steps, Tape<double>::window(p.plan)), 40}) {
+      auto recorded = record(p, sample.inputs, kept);
+      std::atomic<int> same = 0;
+      std::vector<std::thread> threads;
+      for (int t = 0; t < 4; ++t)
+        threads.emplace_back([&] {
+          for (int turn = 0; turn < 3; ++turn) same += same_bits(gradient(p, sample.inputs, recorded), whole);
+        });
+      for (std::thread& thread : threads) thread.join();
+      EXPECT_EQ(same, 12) << kept << " states";
+      EXPECT_TRUE(same_bits(gradient(p, sample.inputs, recorded), whole)) << kept << " states, afterwards";
+    }
   }
 }
 

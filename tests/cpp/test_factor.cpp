@@ -174,6 +174,31 @@ TEST_P(FactorOf, RowsOfZerosGetZero) {
   EXPECT_LE(relative_error(x, {expected.data(), static_cast<std::size_t>(n)}), 1e-13);
 }
 
+// A row that follows from those before it has a pivot of rounding alone. It gets the solution zero, and the others what they have without it.
+TEST_P(FactorOf, RedundantRowsGetZero) {
+  const int n = 50;
+  const Entries entries = GetParam().entries(n);
+  const FactorStructure s(n, entries, true, redundant_pivot);
+  for (const double scale : {1e-6, 1.0, 1e9}) {
+    Eigen::MatrixXd A = scale * random_matrix(n, entries, 6);
+    const std::vector<int> redundant{18, 31, n - 1};
+    Eigen::MatrixXd rest = A;
+    for (const int k : redundant) {
+      const Eigen::VectorXd column = rest.col(k).head(k);
+      A(k, k) = column.dot(rest.topLeftCorner(k, k).partialPivLu().solve(column));
+      rest.row(k).setZero(), rest.col(k).setZero();
+      rest(k, k) = scale;
+    }
+    Eigen::VectorXd b = scale * Eigen::VectorXd::LinSpaced(n, 1.0, 2.0);
+    const auto x = solved(s, factored<double>(s, entries, [&](int i, int j) { return A(i, j); }),
+                          std::vector<double>(b.begin(), b.end()));
+    for (const int k : redundant) b[k] = 0.0;
+    const Eigen::VectorXd expected = rest.partialPivLu().solve(b);
+    for (const int k : redundant) EXPECT_EQ(x[k], 0.0) << "row " << k;
+    EXPECT_LE(relative_error(x, {expected.data(), static_cast<std::size_t>(n)}), 1e-12) << scale;
+  }
+}
+
 // Also with rows of zeros, at the ends and inside.
 TEST(Factor, ByFoursHasTheSameBits) {
   constexpr int band = 10;
@@ -256,6 +281,16 @@ TEST(FactorCost, GrowsLinearlyOverRopesRingsAndTrees) {
     EXPECT_LE(ring(n), 4u * n);
     EXPECT_LE(branches(n), 3u * n);
   }
+}
+
+TEST(SmallLdlt, LeavesRedundantRowsOut) {
+  Eigen::Matrix<double, 3, 2> J;
+  J << 1.0, 0.3, -0.2, 2.0, 0.7, 1.9;
+  const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> A = 1e3 * J * J.transpose();
+  Eigen::Vector3d b(1.0, -2.0, 0.5), x = b;
+  SmallLdlt<3, double>(A.data(), redundant_pivot).solve(x.data());
+  EXPECT_EQ(x[2], 0.0);
+  EXPECT_LE((A * x - b).head(2).norm(), 1e-12);
 }
 
 TEST(SmallLdlt, SolvesAsEigenDoesAndSkipsZeroRows) {

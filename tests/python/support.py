@@ -116,7 +116,8 @@ def refitted(
     x = sb.simulate(scene, times, solver).positions[:, seen]
     recording = sb.Recording(positions=x, times=times, name="twin")
     parameters = {name: {"initial": value} for name, value in start.items()}
-    return sb.fit(scene, recording, parameters, markers=[sb.on_particle(n) for n in seen], solver=solver)
+    places = [sb.on_particle(n) for n in seen]
+    return sb.fit(scene, recording, parameters, markers=places, solver=solver, refine=False)
 
 
 def slope_along(estimate: Callable[[Array], float], series: Array, series_dot: Array) -> float:

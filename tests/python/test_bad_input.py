@@ -266,7 +266,7 @@ SOLVER = {
     "value of text": ("values.rope_EA", lambda: sb.simulate(rope(), [0.01], values={"rope_EA": "stiff"})),
     "no value": ("values.rope_EA", lambda: sb.equilibrium(rope(), values={"rope_EA": None})),
     "negative stiffness": ("values.rope_EA", lambda: sb.simulate(rope(), [0.01], values={"rope_EA": -1.0})),
-    "stiffness of zero": ("values", lambda: sb.simulate(rope(), [0.01], values={"rope_EA": 0.0})),
+    "stiffness of zero": ("values.rope_EA", lambda: sb.simulate(rope(), [0.01], values={"rope_EA": 0.0})),
     "gradient check off the grid": ("times", lambda: sb.check_gradients(rope(), [0.00037])),
     "equilibrium from the wrong shape": ("start", lambda: sb.equilibrium(rope(), start=[[0, 0, 0]])),
     "equilibrium from NaN": ("start", lambda: sb.equilibrium(rope(), start=np.full((5, 3), NAN))),
@@ -398,3 +398,33 @@ def test_a_fit_that_cannot_start_says_why():
 def test_no_equilibrium_is_an_error_of_its_own():
     with pytest.raises(NoEquilibriumError, match=r"(?s)no rest.*Fix"):
         sb.equilibrium(rope(pinned=()))
+
+
+def soft_rod() -> sb.Scene:
+    rod = sb.rod(0.3, 6, density=0.05, EI=1e-3, GJ=1e-3, density_modes=(1,))
+    rod.pin([0])
+    return rod
+
+
+@pytest.mark.parametrize("run", [sb.simulate, sb.rollout], ids=["simulate", "rollout"])
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"rod_density_1": -1.5}, r"rod_density_1: makes the mass of particle 0 negative"),
+        ({"rod_density": 0.0}, r"rod_density: makes the mass of particle 1 zero"),
+        ({"rod_EI": 0.0}, r"rod_EI: makes the compliance of constraint 0 of group 'rod_bend' not finite"),
+        ({"rod_EI": -1.0}, r"rod_EI: must be a positive number"),
+        ({"rod_EI": np.inf}, r"rod_EI: must be a finite number"),
+    ],
+)
+def test_values_that_make_no_physics_are_refused(run, values, words):
+    with pytest.raises(sb.SceneError, match=words):
+        run(soft_rod(), [0.0, 0.01], sb.Solver(h=1e-3), values)
+
+
+def test_values_outside_limits_are_refused():
+    mesh = sb.mesh.equilateral(0.3, 0.3, 3)
+    scene = sb.Scene()
+    sb.add_cloth(scene, mesh, density=0.2, warp=60, weft=50, shear=5, poisson=0.2)
+    with pytest.raises(sb.SceneError, match=r"cloth_poisson: must be between -1 and 1 \(got 1.5\)"):
+        sb.simulate(scene, [0.0, 0.01], values={"cloth_poisson": 1.5})

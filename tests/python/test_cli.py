@@ -44,6 +44,10 @@ fit = [0.0, 0.2]
 held_out = [0.2, 0.31]
 sigma = 1e-4
 
+[fit]
+halve_step = false
+double_segments = false
+
 [output]
 figures = "none"
 
@@ -128,20 +132,20 @@ class TestFit:
         assert result.exit_code in (0, 3, 4), result.output
         assert (Path("out") / "swing" / "shapes.png").stat().st_size > 5000
 
-    def test_fitted_configuration_and_resume_start_at_the_end(self, config: Path) -> None:
+    def test_a_fitted_configuration_and_from_start_at_the_end(self, config: Path) -> None:
         first = last_line(run("fit", config, "--json"))
         again = last_line(run("fit", "out/swing/fitted.toml", "--json", "--output", "again"))
-        resumed = last_line(run("fit", config, "--json", "--resume", "out/swing/fit.json", "--output", "resumed"))
+        resumed = last_line(run("fit", config, "--json", "--from", "out/swing/fit.json", "--output", "resumed"))
         assert first["iterations"] >= 3
         for other in (again, resumed):
             assert other["iterations"] <= 1
             assert other["cost"] == pytest.approx(first["cost"], rel=1e-9)
 
-    def test_private_parameters_resume_too(self, config: Path) -> None:
+    def test_private_parameters_start_from_a_fit_too(self, config: Path) -> None:
         edited(config, "[parameters.rope_bend_damping]", "[parameters.rope_bend_damping]\nprivate = true")
         first = last_line(run("fit", config, "--json"))
         assert "rope_bend_damping[swing]" in first["parameters"]
-        resumed = last_line(run("fit", config, "--json", "--resume", "out/swing/fit.json", "--output", "resumed"))
+        resumed = last_line(run("fit", config, "--json", "--from", "out/swing/fit.json", "--output", "resumed"))
         assert resumed["iterations"] <= 1
 
     def test_nothing_identifiable_exits_3(self, config: Path) -> None:
@@ -165,11 +169,11 @@ class TestFit:
         found = last_line(run("fit", config, "--json"))
         assert found["parameters"]["idle"]["verdict"] == "not identifiable" and found["exit_code"] == 0
         assert last_line(run("fit", config, "--json", "--strict"))["exit_code"] == 3
-        config.write_text(config.read_text() + "\n[fit]\nstrict = true\n")
+        edited(config, "[fit]", "[fit]\nstrict = true")
         assert last_line(run("fit", config, "--json"))["exit_code"] == 3
 
     def test_too_few_iterations_exit_4(self, config: Path) -> None:
-        config.write_text(config.read_text() + "\n[fit]\nmax_iterations = 1\n")
+        edited(config, "[fit]", "[fit]\nmax_iterations = 1")
         found = last_line(run("fit", config, "--json"))
         assert not found["converged"] and found["exit_code"] == 4
 
@@ -180,9 +184,22 @@ class TestFit:
         assert last_line(result)["error"]["message"]
 
     def test_refinement_enters_the_intervals(self, config: Path) -> None:
-        config.write_text(config.read_text() + "\n[fit]\nhalve_step = true\ndouble_segments = true\n")
+        edited(config, "halve_step = false\ndouble_segments = false", "halve_step = true\ndouble_segments = true")
         found = last_line(run("fit", config, "--json"))
         assert found["parameters"]["rope_EI"]["discretization"] > 0
+
+    def test_time_step_and_mesh_count_unless_they_are_switched_off(self, config: Path) -> None:
+        found = run("fit", config)
+        assert "time step not counted" in found.stdout and "mesh not counted" in found.stdout
+        off = last_line(run("fit", config, "--json"))
+        assert off["not_counted"] == ["time step not counted", "mesh not counted"]
+        edited(config, "[fit]\nhalve_step = false\ndouble_segments = false\n", "")
+        found = last_line(run("fit", config, "--json"))
+        assert found["not_counted"] == []
+        assert [made["name"] for made in found["refits"]] == ["time step", "finer mesh"]
+        rope = found["parameters"]["rope_EI"]
+        assert rope["moved"] != 0 and rope["half_width"] > 2 * off["parameters"]["rope_EI"]["half_width"]
+        assert rope["interval"][0] < 1e-3 < rope["interval"][1]
 
     def test_ctrl_c_reports_the_best_so_far(self, tmp_path: Path) -> None:
         recorded(tmp_path, 100)
@@ -202,7 +219,7 @@ class TestFit:
             # One evaluation more and the report take less than a second here; a profile or the rest of the fit takes
             # minutes.
             assert time.perf_counter() - stopped < 20.0
-        assert process.returncode == 4, rest
+        assert process.returncode == 130, rest
         assert found["interrupted"] and not found["converged"]
         assert "best point so far" in rest
         assert sb.FitResult.load(tmp_path / "out" / "swing" / "fit.json").interrupted
@@ -211,6 +228,7 @@ class TestFit:
 class TestCheck:
     def test_passes(self, config: Path) -> None:
         found = last_line(run("check", config, "--json"))
+        assert found["growth"]["swing"]["until"] is None
         assert found["passed"] and found["exit_code"] == 0
         gradients = found["gradients"]["swing"]["gradients"]
         assert gradients["rope_EI"]["complex_step"] < 1e-8 and gradients["rope_EI"]["passed"]
@@ -234,7 +252,7 @@ class TestCheck:
     def test_a_wrong_gradient_exits_5(self, config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         from sheetbend.cli import check
 
-        def wrong(scene: sb.Scene, *_: object) -> GradientReport:
+        def wrong(scene: sb.Scene, *_: object, **__: object) -> GradientReport:
             return GradientReport(scene.name, 1, (GradientRow("rope_EI", 1, 1.0, 1e-3, 1e-3, False),), 0.0)
 
         monkeypatch.setattr(check, "check_gradients", wrong)
@@ -317,6 +335,7 @@ class TestInfo:
             and scene["constraints"] == {"rope_stretch": 6, "rope_bend": 5}
         )
         assert found["parameters"] == ["rope_EI", "rope_bend_damping"] and found["quantities"]["rope_length"] == 0.6
+        assert found["growth"]["swing"]["largest"] >= 1.0 and found["growth"]["swing"]["until"] is None
 
     def test_recording(self, config: Path) -> None:
         x = np.full((4, 2, 3), np.nan)
@@ -360,14 +379,14 @@ class TestBadInput:
         assert last_line(run("fit", config, "--json"))["error"]["field"] == "recording[0].predict"
 
     def test_unknown_start(self, config: Path) -> None:
-        config.write_text(config.read_text() + "\n[fit]\nstarts = [{ rope_EA = 1.0 }]\n")
+        edited(config, "[fit]", "[fit]\nstarts = [{ rope_EA = 1.0 }]")
         assert last_line(run("fit", config, "--json"))["error"]["field"] == "fit.starts[0].rope_EA"
 
-    def test_resume_from_what_is_no_fit(self, config: Path) -> None:
-        assert last_line(run("fit", config, "--json", "--resume", "no.json"))["error"]["field"] == "--resume"
+    def test_from_what_is_no_fit(self, config: Path) -> None:
+        assert last_line(run("fit", config, "--json", "--from", "no.json"))["error"]["field"] == "--from"
         for content in (b"{}", b"[]", b"no json", b"\x80\x81"):
             Path("bad.json").write_bytes(content)
-            assert run("fit", config, "--resume", "bad.json").exit_code == 2
+            assert run("fit", config, "--from", "bad.json").exit_code == 2
 
     @pytest.mark.parametrize("command", ["fit", "simulate"])
     @pytest.mark.parametrize("folder", ["my.toml", "my.toml/below"])

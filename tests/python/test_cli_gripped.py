@@ -124,7 +124,7 @@ class TestFit:
         EI = rope["parameters"]["rope_EI"]
         value = rope["values"]["rope_EI"]
         moved = [made["to_limit"] * np.log1p(made["moved"]["rope_EI"] / value) for made in rope["refits"]]
-        assert [made["name"] for made in rope["refits"]] == ["half the step", "finer mesh"]
+        assert [made["name"] for made in rope["refits"]] == ["time step", "finer mesh"]
         assert EI["discretization"] == pytest.approx(value * np.expm1(np.hypot(*moved))) and EI["discretization"] > 0
         assert EI["half_width"] > EI["statistical"] > 0
 
@@ -138,9 +138,8 @@ class TestFit:
         table = (folder / "report.txt").read_text()
         assert "rope_1" in table and "without twist" in table
         report = (own / "report.txt").read_text()
-        assert (
-            "half the step" in report and "finer mesh" in report and "systematic" in report and "not counted" in report
-        )
+        for words in ("time step", "finer mesh", "systematic", "not counted"):
+            assert words in report, report
         assert "rope_GJ" in report and "error/blend" in report and TILTS.name in report
         assert max(len(line) for line in report.splitlines()) <= 100
 
@@ -157,17 +156,20 @@ class TestFit:
         assert run("fit", config).exit_code == 0
         assert sorted(smoothed) == ["00", "00", "01", "02"]
 
-    def test_the_nominal_directions_are_the_fits(self, config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        edited(config, ('"rope_1/eval"', '"rope_1/eval"\nnominal = [[2, 0, -2], [1, 0, 1]]'))
+    def test_nominal_directions_and_the_density_s_deviation_are_the_fits(
+        self, config: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        more = '"rope_1/eval"\nnominal = [[2, 0, -2], [1, 0, 1]]\ndensity_sd = 0.02'
+        edited(config, ('"rope_1/eval"', more))
         given = []
 
         def noted(*arguments: Any, **options: Any) -> Any:
-            given.append(options["nominal"])
+            given.append((options["nominal"], options["given"]))
             raise KeyboardInterrupt
 
         monkeypatch.setattr(gripped, "fit_rope", noted)
         run("fit", config, "--json")
-        assert given == [([2, 0, -2], [1, 0, 1])]
+        assert given == [(([2, 0, -2], [1, 0, 1]), {"rope_density": 0.02})]
 
     def test_without_eval_there_is_nothing_to_score(self, config: Path) -> None:
         edited(config, ('eval = "rope_1/eval"\n', ""), ('["twist", "tilts"]', '["twist"]'))
@@ -188,7 +190,7 @@ class TestFit:
                     break
             rest = process.stderr.read()
             found = json.loads(process.stdout.read().splitlines()[-1])
-        assert process.returncode == 4, rest
+        assert process.returncode == 130, rest
         rope = found["ropes"]["rope_1"]
         assert rope["interrupted"] and not rope["converged"] and rope["error"] < rope["blend"]
         assert [step["name"] for step in rope["steps"]] == [TWIST.name]
@@ -211,7 +213,7 @@ class TestFit:
         monkeypatch.setattr(gripped, "fit_rope", interrupted)
         result = run("fit", config, "--json")
         found = last_line(result)
-        assert found["exit_code"] == 4 and set(found["ropes"]) == {"rope_1"} and found["not_fitted"] == ["rope_2"]
+        assert found["exit_code"] == 130 and set(found["ropes"]) == {"rope_1"} and found["not_fitted"] == ["rope_2"]
         assert "not fitted are rope_2" in result.stderr and "rope_1" in Path("out/ropes/report.txt").read_text()
 
 
@@ -248,14 +250,21 @@ class TestOtherCommands:
         (doubt,) = last_line(run("info", config, "--json"))["config"]["ropes"]["rope_1"]["doubts"]
         assert "check `gravity`" in doubt and "is doubtful: the rope sags" in run("info", config).stdout
 
-    @pytest.mark.parametrize("command", ["simulate", "check"])
-    def test_commands_for_scenes_say_that_there_is_none(self, config: Path, command: str) -> None:
-        error = last_line(run(command, config, "--json"))["error"]
+    def test_check_takes_the_model_with_all_its_rungs(self, config: Path) -> None:
+        edited(config, ('["twist", "tilts"]', '["twist", "tilts", "rest", "yield", "varying"]'))
+        found = last_line(run("check", config, "--json"))
+        assert found["passed"] and found["exit_code"] == 0
+        rows, columns = found["gradients"]["rope_1"]["gradients"], found["jacobians"]["rope_1"]["parameters"]
+        wanted = {"rope_EI", "rope_GJ", "rope_end_tilt_2", "rope_curvature_1_3", "rope_yield_share", "rope_softness_2"}
+        assert wanted <= set(rows) and wanted <= set(columns)
+
+    def test_simulate_says_that_there_is_no_scene(self, config: Path) -> None:
+        error = last_line(run("simulate", config, "--json"))["error"]
         assert error["field"] == "gripped_rope" and "sheetbend fit" in error["fix"]
 
-    def test_resume_is_for_scenes(self, config: Path) -> None:
-        error = last_line(run("fit", config, "--json", "--resume", "fit.json"))["error"]
-        assert error["field"] == "--resume"
+    def test_from_is_for_scenes(self, config: Path) -> None:
+        error = last_line(run("fit", config, "--json", "--from", "fit.json"))["error"]
+        assert error["field"] == "--from"
 
 
 BAD = [

@@ -103,15 +103,17 @@ def test_a_curved_sheet_rests_in_its_shape():
 # --- O-17: a strip clamped level, under its own weight
 
 
-def cantilever(gamma: float, rows: int, pattern: str, width: float = 0.5, **options) -> tuple[sb.Scene, np.ndarray]:
+def cantilever(
+    gamma: float, rows: int, pattern: str, width: float = 0.5, held_rows: int = 3, **options
+) -> tuple[sb.Scene, np.ndarray]:
     """Strip of length 1 on `rows` rows of triangles, and the weights that pick its mean drop.
 
-    A clamp acts in the middle between its two rows.
+    A clamp acts in the middle between the last two rows of vertices that it holds.
     """
-    cell = 1.0 / (rows + 0.5)
+    cell, inside = 1.0 / (rows + 0.5), held_rows - 1
     across = max(2, round(width / cell))
-    mesh = sb.mesh.grid((rows + 2) * cell, width, rows + 2, across, pattern=pattern)
-    held = mesh.within((-1, -1, -1), (2.001 * cell, width + 1, 1))
+    mesh = sb.mesh.grid((rows + inside) * cell, width, rows + inside, across, pattern=pattern)
+    held = mesh.within((-1, -1, -1), ((inside + 0.001) * cell, width + 1, 1))
     density = 0.2
     rigidity = density * G / gamma
     scene = sb.Scene("cantilever", gravity=(0, 0, -G))
@@ -122,6 +124,20 @@ def cantilever(gamma: float, rows: int, pattern: str, width: float = 0.5, **opti
     tip = mesh.sets["right"]
     drop[cloth.particles[tip], 2] = -1.0 / len(tip)
     return scene, drop
+
+
+def test_a_clamp_of_two_rows_is_of_second_order():
+    closed = bending.heavy_elastica(8.0).drop
+    errors = []
+    for rows in (10, 20):
+        drops = []
+        for held_rows in (2, 3):
+            scene, drop = cantilever(8.0, rows, "one_way", held_rows=held_rows)
+            drops.append((sb.equilibrium(scene).positions * drop).sum())
+        assert drops[0] == approx(drops[1], rel=1e-6)  # what lies inside the clamp does not count
+        errors.append(abs(drops[0] / closed - 1))
+    assert errors[0] < 6e-3
+    assert errors[0] > 3.5 * errors[1]
 
 
 @pytest.mark.parametrize("gamma", [1.0, 4.0, 8.0, 20.0])

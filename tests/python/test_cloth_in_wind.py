@@ -28,7 +28,7 @@ def made() -> ModuleType:
     return module
 
 
-def small(folder: Path, made: ModuleType, profiles: bool = True) -> sb.Fit:
+def small(folder: Path, made: ModuleType, **options: object) -> sb.Fit:
     """The experiment on a coarse mesh and its first frames, of a cloth simulated there at a quarter of the step."""
     built, cloth = made.scene(CELLS)
     times = np.arange(FRAMES) / made.RATE
@@ -42,7 +42,7 @@ def small(folder: Path, made: ModuleType, profiles: bool = True) -> sb.Fit:
     described["recording"][0]["file"] = "small.npz"
     (folder / "small.toml").write_text(tomli_w.dumps(described))
     study = load(folder / "small.toml")
-    return sb.fit(study.experiments, parameters=study.parameters, **(study.options | {"profiles": profiles}))
+    return sb.fit(study.experiments, parameters=study.parameters, **(study.options | options))
 
 
 def test_six_numbers_are_found_from_far(tmp_path: Path, made: ModuleType) -> None:
@@ -58,12 +58,14 @@ def test_six_numbers_are_found_from_far(tmp_path: Path, made: ModuleType) -> Non
 def test_a_stiffness_that_does_not_show_is_named(tmp_path: Path, made: ModuleType) -> None:
     """Of a fabric that hardly gives the recording tells a least stiffness; the other five are as before."""
     made.TRUE["cloth_warp"] = 4000.0
-    found = small(tmp_path, made, profiles=False)
+    found = small(tmp_path, made, profiles=False, refine=False)
     told = found.report().split("What the data cannot tell")[1]
     assert found["cloth_warp"].verdict != "identified"
     assert "cloth_warp" in told.split("Correlations")[0]
     for name in ("wind_y", "cloth_air_normal"):
-        assert found[name].verdict == "identified" and found[name].value == pytest.approx(made.TRUE[name], rel=0.02)
+        # The recording is of shorter substeps, which refine=False leaves out: parts of the data may disagree about it.
+        assert found[name].verdict in ("identified", "doubtful")
+        assert found[name].value == pytest.approx(made.TRUE[name], rel=0.02)
 
 
 def test_the_shipped_recording_and_configuration(made: ModuleType) -> None:

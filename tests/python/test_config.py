@@ -284,7 +284,7 @@ class TestBuild:
         study = load(extended(folder, scene, parameters="\n[fit]\ndouble_segments = true\n"))
         refine = study.options["refine"]
         (finer,) = refine.finer()
-        assert finer.scene.particle_count == 13 and not refine.halve_step
+        assert finer.scene.particle_count == 13 and not refine.linear
         heavy = {t.index for t in finer.scene.terms if t.array == "mass" and "_mass" in t.factors[0][0]}
         assert heavy == {4, 10}
 

@@ -316,7 +316,8 @@ def test_without_a_recording(folder: Path) -> None:
 
 class TestCommands:
     def test_fit_finds_the_shear_stiffness_and_draws_the_cloth(self, folder: Path) -> None:
-        path = changed(folder, ('figures = "none"', 'figures = "png"'))
+        matched = ("[output]", "[fit]\nhalve_step = false\ndouble_segments = false\n\n[output]")
+        path = changed(folder, matched, ('figures = "none"', 'figures = "png"'))
         found = run("fit", path)
         low, high = found["parameters"]["cloth_shear"]["interval"]
         assert found["parameters"]["cloth_shear"]["verdict"] == "identified"

@@ -49,6 +49,7 @@ WHOLE: dict[str, Any] = {
     "marker": [{"marker": "m0", "particle": "a"}],
     "recording": [{"file": "r.npz", "marker": [{"marker": "m0", "particle": "a"}]}],
     "parameters": {"NAME": {}},
+    "given": {"NAME": {"sd": 0.1}},
     "fit": {},
     "output": {},
 }

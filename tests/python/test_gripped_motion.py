@@ -256,7 +256,7 @@ def test_a_rung_stays_only_where_it_predicts_others_better(
     fitted: float, others: float, stays: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     motions = [GrippedMotion.of(carried_about(), 0.0) for _ in range(2)]
-    search = _Search(motions, 0.5, [(0.5, 0.5)], 1, print)
+    search = _Search(motions, 0.5, [(0.5, 0.5)], {}, 1, print)
     errors = iter([1.0, 1.0, fitted, others])
     monkeypatch.setattr(search, "_error", lambda *_: next(errors))
     first = search._step("first", model_of(motions[0]), {}, [], 0.0)

@@ -240,9 +240,8 @@ def test_gradients_of_everything(integrator, options):
     report = sb.check_gradients(everything(**options), np.arange(0, 41, 10) / 400, solver, values=SET)
     rows = {row.name: row for row in report.rows}
     # The derivative by what holds a director, of which a roll is 1e7 times the torque, is good to rounding times that.
-    held_back = rows.pop("mass")
-    assert held_back.complex_step < 1e-6 and held_back.differences < 1e-4
-    assert all(row.passed for row in rows.values()), str(report)
+    assert report.passed, str(report)
+    assert rows["mass"].complex_step < 1e-6
     assert report.dot_product < 1e-11
     for name in everything(**options).quantities:
         assert rows[name].gradient > 0, name

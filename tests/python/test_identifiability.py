@@ -10,7 +10,8 @@ from scipy import signal, special
 from sheetbend.covariance import Layout, covariance
 from sheetbend.errors import InputError
 from sheetbend.gauge import null_space
-from sheetbend.identifiability import Floor, identify
+from sheetbend.identifiability import identify
+from sheetbend.judge import Floor
 from sheetbend.parameters import Parameter, Parameters
 from sheetbend.profile import profile_interval
 
@@ -248,6 +249,21 @@ def test_flat() -> None:
     assert estimate.upper is None
 
 
+@pytest.mark.parametrize(("start", "words"), [(1e6, "smaller values"), (1e-6, "larger values")])
+def test_a_parameter_that_ran_off_is_told_from_one_that_the_data_never_contained(start: float, words: str) -> None:
+    """Its column is flat because of where it went."""
+    parameters, residuals, jacobian = one(1.0, column=np.zeros(400), log=True, initial=start, unit="N")
+    estimate = identify(parameters, np.zeros(1), residuals, jacobian).estimates[0]
+    assert estimate.verdict == "not identifiable" and "moves no residual" not in estimate.words
+    assert f"ran off from {start:g} N to 1 N" in estimate.words.replace("1000000", "1e+06") and words in estimate.words
+
+
+def test_an_end_as_far_as_a_search_looks_is_no_identified_value() -> None:
+    parameters, residuals, jacobian = one(1.0, log=True, initial=1e6)
+    estimate = identify(parameters, np.zeros(1), residuals, jacobian).estimates[0]
+    assert estimate.verdict == "at a bound" and "ran off" in estimate.words
+
+
 def test_at_a_bound() -> None:
     estimate = judge(one(1.0, upper=1.0))
     assert estimate.verdict == "at a bound"
@@ -304,6 +320,58 @@ def test_discretization_is_added_and_both_are_reported() -> None:
     assert both.discretization == 0.05
     assert both.half_width == pytest.approx(statistical.half_width + 0.05)
     assert judge(one(1.0), discretization={"p": 0.5}).verdict == "weak"
+
+
+@pytest.mark.parametrize("moved", [math.nan, math.inf, math.expm1(math.log(1e6))])
+def test_a_refit_that_diverged_is_named_and_not_counted(moved: float) -> None:
+    plain = judge(one(1.0, log=True))
+    estimate = judge(one(1.0, log=True), discretization={"p": moved})
+    assert (estimate.lower, estimate.upper, estimate.discretization) == (plain.lower, plain.upper, 0.0)
+    assert "ran off or diverged is not counted" in estimate.words and "not counted" not in plain.words
+
+
+def test_a_profile_that_diverges_leaves_the_linear_end_and_says_so() -> None:
+    """Above 1.2 the motion has no answer; below, the profile is steeper than the linear picture."""
+    problem = one(16.0, log=True)
+    base, asked = 0.5 * problem[1] @ problem[1], []
+
+    def profile(name: str, value: float) -> float:
+        asked.append(value)
+        return math.inf if value > 1.2 else base + 4e3 * math.log(value) ** 2
+
+    estimate, linear = judge(problem, profile=profile), judge(problem)
+    assert estimate.upper == linear.upper and estimate.lower > linear.lower
+    assert "with it held above diverged" in estimate.words
+    assert len(asked) < 40
+    assert math.isnan(profile_interval(lambda p: p if p < 3 else math.nan, 1.0, 9.0, step=1.0)[1])
+
+
+def test_residuals_of_zero_leave_intervals_of_no_width_that_are_named() -> None:
+    for size in (0.0, 1e-200, 1e-160):  # squares of the second are zero, of the third nearly
+        parameters, residuals, jacobian = one(size, log=True)
+        estimate = identify(parameters, parameters.initial(), residuals, jacobian).estimates[0]
+        assert estimate.lower == estimate.value == estimate.upper == 1.0
+        assert "residuals are exactly zero" in estimate.words
+
+
+def test_nothing_is_known_better_than_to_rounding() -> None:
+    parameters, residuals, jacobian = one(10.0)
+    estimate = identify(parameters, parameters.initial(), residuals, 1e30 * jacobian).estimates[0]
+    assert estimate.verdict == "rough" and estimate.half_width is None
+
+
+def test_many_nearly_dependent_columns_have_a_covariance() -> None:
+    """Their condition number is 1e5: that of the product J'J, 1e10, leaves an inverse with negative eigenvalues."""
+    rng, rows = np.random.default_rng(3), 400
+    basis = np.linalg.qr(rng.standard_normal((rows, 24)))[0]
+    turn = np.linalg.qr(rng.standard_normal((24, 24)))[0]
+    jacobian = basis @ np.diag(np.logspace(0, -5.5, 24)) @ turn
+    residuals = rng.standard_normal(rows)
+    residuals -= basis @ (basis.T @ residuals)
+    found = covariance(residuals, jacobian)
+    exact = turn.T @ np.diag(np.logspace(0, 11, 24)) @ turn * found.residual_variance
+    ratio = np.diag(found.matrix) / np.diag(exact) / found.inflation
+    np.testing.assert_allclose(ratio, 1.0, rtol=1e-6)
 
 
 def test_correlations() -> None:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend import _core
+from sheetbend.errors import InputError
 from sheetbend.memory import in_bytes, in_words, least_in_words
 
 STEPS = 120
@@ -270,3 +271,43 @@ def test_measured_peak_of_a_cloth_stays_within_the_budget(share: float, integrat
     budget, planned, recomputed, measured = map(int, done.stdout.split())
     assert (recomputed > 0) == (share < 1.0)
     assert 0.75 * planned <= measured <= budget, done.stdout
+
+
+def test_without_a_budget_half_of_the_free_memory_is_used_and_told(monkeypatch, caplog):
+    scene, solver = net(), SOLVERS[3]
+    expected = sb.rollout(scene, TIMES, solver)
+    assert expected.plan.budget is None and "fits in half of the free memory" in str(expected.plan) and not caplog.text
+    free = 2 * budgets(scene, solver)[2]
+    monkeypatch.setattr("sheetbend.solver.free_memory", lambda: free)
+    found = sb.rollout(scene, TIMES, solver)
+    assert found.plan.policy == "binomial" and found.plan.total <= found.plan.budget == free // 2
+    assert "solver.memory is not given" in caplog.text and str(found.plan) in caplog.text
+    bar = np.ones_like(expected.positions)
+    assert found.gradient(bar).quantities == expected.gradient(bar).quantities
+    monkeypatch.setattr("sheetbend.solver.free_memory", lambda: 1000)
+    with pytest.raises(InputError, match=r"half of the free memory by default, and too small.*fewer frames"):
+        sb.rollout(scene, TIMES, solver)
+
+
+def wide() -> sb.Scene:
+    """400 particles: ten million states of them are 96 GB."""
+    return sb.rope(1.0, 400, density=0.05, EA=100.0)
+
+
+def test_ten_million_substeps_are_planned_within_the_free_memory():
+    plan = sb.tape_plan(wide(), [1e4], sb.Solver(h=1e-3))
+    assert plan.steps == 10**7 and plan.policy == "binomial" and plan.total <= plan.budget
+
+
+def test_what_does_not_fit_is_refused_before_it_runs(monkeypatch):
+    monkeypatch.setattr("sheetbend.memory.free_memory", lambda: 10**9)
+    scene, solver = wide(), sb.Solver(h=1e-3, memory="3 GB")
+    times = np.broadcast_to(np.float64(1.0), 10**5)
+    with pytest.raises(InputError, match=r"times: needs .* GB of memory, of which 1.00 GB are free.*fewer"):
+        sb.simulate(scene, times, solver)
+    with pytest.raises(InputError, match=r"solver.memory: needs .* of which 1.00 GB are free"):
+        sb.rollout(scene, times, solver)
+    with pytest.raises(InputError, match=r"solver.memory: needs .* of which 1.00 GB are free"):
+        sb.rollout(scene, [1e3], solver)
+    with pytest.raises(InputError, match="more than 2147483647 substeps"):
+        sb.simulate(scene, [1e8], solver)

@@ -245,8 +245,8 @@ DOUBLE = b"cnumpy\ndtype\n(X\x02\x00\x00\x00f8\x89\x88tR"
         (b"c_codecs\nencode\n(X\x01\x00\x00\x00aX\x05\x00\x00\x00utf_7tR.", "utf_7"),
         (b"\x80\x02Nr\xff\xff\xff\x7f.", "memo index 2147483647"),  # pickle.load would reserve 32 GB for this
         (b"\x80\x04\x8e\xff\xff\xff\xff\xff\x00\x00\x00.", "damaged"),
-        (b"\x80\x02X\x01\x00\x00\x00aQ.", "persistent"),
-        (b"\x80\x05\x97.", "buffer"),
+        (b"\x80\x02X\x01\x00\x00\x00aQ.", "BINPERSID"),
+        (b"\x80\x05\x97.", "NEXT_BUFFER"),
         (b"\x80\x09N.", "protocol"),
         (b"N.N.", "goes on after the end.*2 bytes"),
         (b"](h\x00e.", "damaged"),

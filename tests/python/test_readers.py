@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sheetbend import io
 from sheetbend.errors import RecordingError
+from sheetbend.names import flaw
 from sheetbend.recording import Recording
 
 in_one_folder = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
@@ -38,7 +39,7 @@ def recordings(draw: st.DrawFn) -> Recording:
         times=times,
         markers=draw(st.lists(names, min_size=markers, max_size=markers, unique=True)),
         clamped=draw(st.lists(st.integers(0, markers - 1), unique=True)),
-        name=draw(names),
+        name=draw(names.filter(lambda name: flaw(name) is None)),
         gravity=draw(st.none() | st.tuples(coordinates, coordinates, coordinates)),
         metadata=draw(st.dictionaries(st.text().filter(lambda key: key not in reserved), json_values, max_size=3)),
     )

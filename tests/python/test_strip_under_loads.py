@@ -73,7 +73,7 @@ def config(tmp_path: Path) -> Path:
 def test_stiffness_and_narrowing_of_a_strip_are_found(config: Path) -> None:
     study = load(config)
     assert [e.name for e in study.experiments] == ["pull_1N", "pull_2N", "pull_3N"]
-    found = sb.fit(study.experiments, parameters=study.parameters, **study.options)
+    found = sb.fit(study.experiments, parameters=study.parameters, **study.options | {"refine": False})
     for name, share in (("warp", 0.01), ("poisson", 0.1)):
         estimate = found[f"cloth_{name}"]
         assert estimate.verdict == "identified" and estimate.half_width < share * estimate.value

@@ -357,11 +357,11 @@ double = torch.float64
             "batch: dimensions do not broadcast",
         ),
         ({"rope_EI": torch.ones(0, dtype=double)}, {}, "batch: is empty"),
-        ({"rope_EI": torch.tensor(torch.nan, dtype=double)}, {}, "compliance: is not finite"),
+        ({"rope_EI": torch.tensor(torch.nan, dtype=double)}, {}, r"values\.rope_EI: must be a finite number"),
         (
             {"rope_density": torch.tensor([0.05, torch.inf], dtype=double)},
             {},
-            "mass: is not finite in scene 1 of the batch",
+            r"values\.rope_density: must be a finite number in scene 1 of the batch",
         ),
     ],
 )

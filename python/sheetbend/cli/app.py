@@ -16,7 +16,8 @@ from .textile import textile
 app = typer.Typer(
     name="sheetbend",
     help="Simulate ropes, beams and cloth, and find their physical parameters from recordings, with error bars.",
-    epilog="Exit codes: 0 done, 2 bad input, 3 not identifiable, 4 did not converge, 5 a check failed.",
+    epilog="Exit codes: 0 done, 2 bad input, 3 not identifiable, 4 did not converge or is doubtful, 5 a check failed, "
+    "130 and 143 stopped by Ctrl-C and SIGTERM.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,

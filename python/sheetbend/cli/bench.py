@@ -16,6 +16,7 @@ from ..bench.ladder import measure_ladder
 from ..bench.rod import measure_rod
 from ..errors import InputError
 from .outcome import Code, Outcome, run
+from .screen import heading
 
 NAMES = (*WORKLOADS, "chain", "rod", "cloth", "ladder")
 
@@ -93,10 +94,11 @@ def _check(name: str, threads: int, repeats: int, frames: int | None, figure: Pa
 
 def _print_workload(console: Console, data: Mapping[str, Any]) -> None:
     scenes = "one scene" if data["scenes"] == 1 else f"{data['scenes']} scenes"
-    console.print(
-        f"[bold]{data['workload']}[/]  {scenes}, {data['particles']:,} particles, {data['colors']} colors in the "
-        f"workload's own order, {data['projections']:,} projections",
-        soft_wrap=True,
+    heading(
+        console,
+        data["workload"],
+        f"{scenes}, {data['particles']:,} particles, {data['colors']} colors in the workload's own order, "
+        f"{data['projections']:,} projections",
     )
     console.print(f"  {_conditions(data)}, {data['repeats']} runs")
     console.print("  ns per projection   median   fastest   on the processor")
@@ -107,7 +109,7 @@ def _print_workload(console: Console, data: Mapping[str, Any]) -> None:
 
 
 def _print_chain(console: Console, data: Mapping[str, Any]) -> None:
-    console.print(f"[bold]chain[/]  ropes on the direct solver; {_conditions(data)}")
+    heading(console, "chain", f"ropes on the direct solver; {_conditions(data)}")
     console.print("  segments  substeps   forward  gradient  ratio   (ns per segment and substep)")
     for row in data["rows"]:
         console.print(
@@ -124,7 +126,7 @@ def _print_chain(console: Console, data: Mapping[str, Any]) -> None:
 
 
 def _print_rod(console: Console, data: Mapping[str, Any]) -> None:
-    console.print(f"[bold]rod[/]  12 markers between two grips; {_conditions(data)}")
+    heading(console, "rod", f"12 markers between two grips; {_conditions(data)}")
     forward = data["forward_ns"]
     for name, words in (
         ("forward", "forward, one iteration"),

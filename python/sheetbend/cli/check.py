@@ -10,15 +10,23 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from ..config import Study, build, parse, scene_alone
+from ..chain import unit_vector
+from ..config import GrippedConfig, Study, load, parse_any, scene_alone
 from ..experiment import Experiment
 from ..gradients import GradientReport, check_gradients
+from ..gripped.model import RopeModel, nominal_directions
+from ..gripped.start import started, whole
+from ..growth import in_words, over_fit
 from ..jacobian_check import JacobianReport, check_jacobian
+from ..parameters import Parameters
 from ..problem import FitProblem, as_parameters
+from ..solver import Solver
+from .gripped import RUNGS, RopeData, load_ropes
 from .outcome import Code, Outcome, run
 
 FRAMES, SUBSTEPS = 4, 4  # of the stretch: long enough for both time-stepping starts and several compositions
 FITTED_FRAMES = 5
+SECONDS, LEAST = 40.0, 5.0  # about what the gradients of all scenes together may take, and those of one
 
 
 def check(
@@ -30,26 +38,38 @@ def check(
     ] = False,
 ) -> None:
     """Check the gradients of every recording's scene over a short stretch, and the residuals' Jacobian; exit 5 where
-    one fails."""
+    one fails. Of large scenes a sample is checked, and named. Also reports how far small displacements grow along every
+    fitted motion."""
     run(lambda console: _check(console, config), json)
 
 
 def _check(console: Console, path: Path) -> Outcome:
-    study = build(parse(path), path.parent)
+    config = parse_any(path)
+    fitted: tuple[Experiment, ...] = ()
+    if isinstance(config, GrippedConfig):
+        found = _of_ropes(config, path.parent)
+    else:
+        study = load(path)
+        found = _reports(study)
+        fitted = tuple(e for e in study.experiments if not e.static and e.predict is None)
     gradients: dict[str, GradientReport] = {}
     jacobians: dict[str, JacobianReport] = {}
-    for name, report in _reports(study):
+    for name, report in found:
         console.print(str(report), markup=False, soft_wrap=True)
         if isinstance(report, GradientReport):
             gradients[name] = report
         else:
             jacobians[name] = report
+    grown = [over_fit(e) for e in fitted]
+    for g in grown:
+        console.print(in_words(g), markup=False, soft_wrap=True)
     passed = all(r.passed for r in gradients.values()) and all(r.passed for r in jacobians.values())
     data = {
-        "name": study.config.experiment.name,
+        "name": config.experiment.name,
         "passed": passed,
         "gradients": {name: r.to_dict() for name, r in gradients.items()},
         "jacobians": {name: r.to_dict() for name, r in jacobians.items()},
+        "growth": {g.name: g.to_dict() for g in grown},
     }
     return Outcome(data, Code.DONE if passed else Code.CHECK_FAILED)
 
@@ -57,13 +77,48 @@ def _check(console: Console, path: Path) -> Outcome:
 def _reports(study: Study) -> Iterator[tuple[str, GradientReport | JacobianReport]]:
     if not study.experiments:
         scene, solver = scene_alone(study.config, study.folder)
-        yield scene.name, check_gradients(scene, solver.h * SUBSTEPS * np.arange(FRAMES + 1), solver)
+        yield scene.name, check_gradients(scene, _stretch(solver), solver, seconds=SECONDS)
+    each = max(SECONDS / max(len(study.experiments), 1), LEAST)
     for e in study.experiments:
         if not e.static:
-            yield e.name, check_gradients(e.scene, e.solver.h * SUBSTEPS * np.arange(FRAMES + 1), e.solver)
+            yield e.name, check_gradients(e.scene, _stretch(e.solver), e.solver, seconds=each)
         report = _jacobian(study, e)
         if report is not None:
             yield e.name, report
+
+
+def _of_ropes(config: GrippedConfig, folder: Path) -> Iterator[tuple[str, GradientReport | JacobianReport]]:
+    """Of each rope its first recording, with all that its rungs may add to the model, at the first start."""
+    ropes = load_ropes(config, folder)
+    for rope in ropes:
+        e, parameters = _started(rope)
+        each = max(SECONDS / len(ropes), LEAST)
+        yield rope.section.name, check_gradients(e.scene, _stretch(e.solver), e.solver, seconds=each)
+        part = e.fitted().frames(slice(0, FITTED_FRAMES))
+        yield rope.section.name, check_jacobian(FitProblem([e], parameters, [part]), rope.section.name)
+
+
+def _started(rope: RopeData) -> tuple[Experiment, Parameters]:
+    s = rope.section
+    nominal = (
+        nominal_directions(rope.train) if s.nominal is None else tuple(unit_vector("nominal", d) for d in s.nominal)
+    )
+    model = RopeModel(
+        density=s.density,
+        nominal=(nominal[0], nominal[1]),
+        values={},
+        segments=s.segments,
+        substeps=s.substeps,
+        smoothing=s.smoothing,
+        sigma=s.sigma,
+        gravity=(s.gravity[0], s.gravity[1], s.gravity[2]),
+    )
+    model = started(model, rope.train, s.bending_lengths[0])
+    return whole(model, [RUNGS[name] for name in s.rungs], rope.train[0], s.windows[0][0])
+
+
+def _stretch(solver: Solver) -> np.ndarray:
+    return solver.h * SUBSTEPS * np.arange(FRAMES + 1)
 
 
 def _jacobian(study: Study, e: Experiment) -> JacobianReport | None:

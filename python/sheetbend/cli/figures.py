@@ -2,26 +2,45 @@
 
 from __future__ import annotations
 
-import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from rich.console import Console
 
 from .. import plotting
-from ..config import Config
+from ..config import Config, GrippedConfig
 from ..equilibrium import equilibrium
+from ..experiment import Experiment
 from ..fit import Fit
+from ..optional import require
 from ..prediction import Comparison
 from .cloth_figures import cloth_figures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+BACKENDS = {"png": "agg", "svg": "svg", "pdf": "pdf"}
 
-def write_figures(found: Fit, config: Config, folder: Path) -> list[str]:
-    """Measured against simulated for every recording, and the estimates; gives the files' names."""
+
+def figures_form(console: Console, config: Config | GrippedConfig) -> str:
+    """The format of figures that is asked for; "none" where matplotlib is missing or does not load, which is said
+    before the work."""
     form = config.output.figures
+    if form == "none":
+        return form
+    try:
+        require("matplotlib.figure", "plot")
+        require(f"matplotlib.backends.backend_{BACKENDS[form]}", "plot")
+    except Exception as error:  # a broken installation may raise anything while it loads
+        console.print(f"no figures will be drawn: {error}", markup=False, soft_wrap=True)
+        return "none"
+    return form
+
+
+def write_figures(found: Fit, config: Config, form: str, folder: Path) -> list[str]:
+    """Measured against simulated for every recording, and the estimates; gives the files' names."""
     if form == "none":
         return []
     figures: dict[str, Figure] = {}
@@ -32,11 +51,11 @@ def write_figures(found: Fit, config: Config, folder: Path) -> list[str]:
     if len(moving) > 1:
         figures["motions"] = plotting.plot_motions([_liveliest(c) for c in moving], title=config.experiment.name)
     for c in moving:
-        name = _file_name(c)
+        name = c.experiment.name
         figures[f"{name}_markers"] = _trajectories(c)
         figures[f"{name}_residuals"] = _residuals(c)
     for c in found.comparisons:
-        figures |= {f"{_file_name(c)}_{name}": figure for name, figure in cloth_figures(found, c).items()}
+        figures |= {f"{c.experiment.name}_{name}": figure for name, figure in cloth_figures(found, c).items()}
     published = _published(found, config)
     figures["estimates"] = plotting.plot_estimates(
         found.result.estimates, published=published, title=config.experiment.name
@@ -46,8 +65,16 @@ def write_figures(found: Fit, config: Config, folder: Path) -> list[str]:
     return [f"{name}.{form}" for name in figures]
 
 
-def _file_name(c: Comparison) -> str:
-    return re.sub(r"[^A-Za-z0-9_.-]", "_", c.experiment.name)
+def figure_files(experiments: Sequence[Experiment], config: Config) -> list[str]:
+    """Every file that `write_figures` may write, known before the fit."""
+    form = config.output.figures
+    if form == "none":
+        return []
+    names = ["estimates", "shapes", "motions"]
+    for e in experiments:
+        names += [] if e.static else [f"{e.name}_markers", f"{e.name}_residuals"]
+        names += [f"{e.name}_{cloth}" for cloth in e.scene.cloths]
+    return [f"{name}.{form}" for name in names]
 
 
 def _shapes(found: Fit, comparisons: list[Comparison]) -> Figure:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -10,34 +12,48 @@ from rich.console import Console
 
 from ..config import Config, GrippedConfig, Study, build, parse_any
 from ..config.values import with_values, write
+from ..door import reading
 from ..errors import ConfigError
 from ..fit import Fit
 from ..fit import fit as run_fit
+from ..journal import Journal
+from ..movie import movie_paths
 from ..problem import FitProblem, as_parameters
+from ..recording import Recording
 from ..report import plain, rich_report
 from ..result import FitResult
-from .figures import write_figures
-from .folders import made
-from .gripped import fit_ropes, load_ropes
+from ..whole import write_text
+from .figures import figure_files, figures_form, write_figures
+from .folders import alone, made
+from .gripped import fit_ropes, load_ropes, rope_files
+from .journals import journal_in, made_from
 from .movies import OPTION, MoviePath, check_before, write_movies
-from .outcome import Outcome, code_of, run
+from .outcome import Code, Outcome, code_of, run
 from .progress import Iterations
-from .screen import show
+from .screen import heading, show
+from .targets import check_targets
 
 
 def fit(
     config: Annotated[
         Path, typer.Argument(help="A TOML configuration, see docs/configuration.md.", show_default=False)
     ],
+    more: Annotated[list[str] | None, typer.Argument(hidden=True)] = None,
     output: Annotated[
         Path | None,
         typer.Option(
             help="Folder for fit.json, figures, report and fitted.toml; out/NAME when left out.", show_default=False
         ),
     ] = None,
-    resume: Annotated[
-        Path | None, typer.Option(help="Start from the values of an earlier fit.json.", show_default=False)
+    start: Annotated[
+        Path | None, typer.Option("--from", help="Start from the values of an earlier fit.json.", show_default=False)
     ] = None,
+    resume: Annotated[
+        bool,
+        typer.Option(
+            "--resume", help="Go on with a fit that was killed or stopped, from the journal in its output folder."
+        ),
+    ] = False,
     movie: MoviePath = None,
     strict: Annotated[
         bool, typer.Option("--strict", help="Exit 3 when any parameter is not identifiable, not only when all are.")
@@ -46,33 +62,67 @@ def fit(
         bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
     ] = False,
 ) -> None:
-    """Fit parameters to recordings. Ctrl-C stops at the best point so far and still reports."""
-    run(lambda console: _fit(console, config, output, resume, movie, strict), json)
+    """Fit parameters to recordings. Ctrl-C and SIGTERM stop at the best point so far and still report."""
+
+    def command(console: Console) -> Outcome:
+        if more:
+            fix = "give one configuration; values of an earlier fit are started from with --from fit.json"
+            raise ConfigError("--resume" if resume else "arguments", "are too many", [str(config), *more], fix)
+        return _fit(console, config, output, start, resume, movie, strict)
+
+    run(command, json)
 
 
 def _fit(
-    console: Console, path: Path, output: Path | None, resume: Path | None, movie: Path | None, strict: bool
+    console: Console,
+    path: Path,
+    output: Path | None,
+    start: Path | None,
+    resume: bool,
+    movie: Path | None,
+    strict: bool,
 ) -> Outcome:
     config = parse_any(path)
     if isinstance(config, GrippedConfig):
-        if resume is not None:
+        if start is not None:
             fix = "leave it out: the recipe finds its own starts"
-            raise ConfigError("--resume", "is not for ropes between grips", str(resume), fix)
+            raise ConfigError("--from", "is not for ropes between grips", str(start), fix)
         if movie is not None:
             raise ConfigError(OPTION, "is not for ropes between grips", str(movie), "leave it out")
-        ropes = load_ropes(config, path.parent)
-        return fit_ropes(console, config, ropes, _folder(console, config, output), strict)
-    study = _study(config, path.parent, resume)
+        with reading(path, ConfigError):
+            ropes = load_ropes(config, path.parent)
+        place = _place(config, output)
+        check_targets("--output", place, [place / f for f in rope_files(config)])
+        recordings = [m.recording for rope in ropes for m in (*rope.train, *rope.unseen)]
+        with _kept(console, config, recordings, place, resume) as (folder, journal):
+            outcome = fit_ropes(console, config, ropes, folder, strict)
+            _end(console, journal, outcome)
+            return outcome
+    with reading(path, ConfigError):
+        study = _study(config, path.parent, start)
+    place = _place(config, output)
+    check_targets("--output", place, [place / f for f in _files(study)])
     if movie is not None:
         check_before(movie, [e.scene for e in study.experiments if not e.static])
-    config, folder = study.config, _folder(console, config, output)
+        names = [e.name for e in study.experiments if not e.static]
+        check_targets(OPTION, movie.parent, movie_paths(movie, names).values())
+    recordings = [e.recording for e in study.experiments]
+    with _kept(console, study.config, recordings, place, resume) as (folder, journal):
+        outcome = _fit_study(console, study, folder, movie, strict)
+        _end(console, journal, outcome)
+        return outcome
+
+
+def _fit_study(console: Console, study: Study, folder: Path, movie: Path | None, strict: bool) -> Outcome:
+    config = study.config
     fitted = [e for e in study.experiments if e.predict is None]
     problem = FitProblem(fitted, as_parameters(study.parameters, study.experiments))
     _check_starts(config, problem)
+    form = figures_form(console, config)
     with Iterations(console, problem.parameters) as progress:
         found = run_fit(study.experiments, parameters=study.parameters, progress=progress, **study.options)
     show(console, lambda: rich_report(found.result), lambda: plain(found.result))
-    files = _write(found, study, folder)
+    files = _write(found, study, form, folder)
     console.print(f"\nwritten to {folder}: {', '.join(files)}", soft_wrap=True)
     if movie is not None:
         movies = write_movies(found, movie)
@@ -82,15 +132,41 @@ def _fit(
     return Outcome(data, code_of([found.result], strict or config.fit.strict))
 
 
-def _folder(console: Console, config: Config | GrippedConfig, output: Path | None) -> Path:
-    """Where results go, made; and the experiment's name on the screen."""
-    folder = output if output is not None else Path("out") / config.experiment.name
-    made("--output", folder)
-    console.print(f"[bold]{config.experiment.name}[/]  {config.experiment.about}")
-    return folder
+def _place(config: Config | GrippedConfig, output: Path | None) -> Path:
+    return output if output is not None else Path("out") / config.experiment.name
 
 
-def _study(config: Config, source: Path, resume: Path | None) -> Study:
+def _files(study: Study) -> list[str]:
+    """What `_write` may leave behind."""
+    return ["fit.json", "report.txt", "fitted.toml", *figure_files(study.experiments, study.config)]
+
+
+@contextmanager
+def _kept(
+    console: Console, config: Config | GrippedConfig, recordings: Sequence[Recording], place: Path, resume: bool
+) -> Iterator[tuple[Path, Journal | None]]:
+    """Where results go, made and locked, with the journal of the fit; and the experiment's name on the screen."""
+    folder = made("--output", place)
+    heading(console, config.experiment.name, config.experiment.about)
+
+    def say(text: str) -> None:
+        console.print(text, markup=False, soft_wrap=True)
+
+    with alone("--output", folder), journal_in(folder, made_from(config, recordings), resume, say) as journal:
+        yield folder, journal
+
+
+def _end(console: Console, journal: Journal | None, outcome: Outcome) -> None:
+    """All results are written: the journal goes, unless `--resume` can go on with it."""
+    if journal is None:
+        return
+    if outcome.code is Code.INTERRUPTED:
+        console.print("the journal stays: the same command with --resume goes on from here", soft_wrap=True)
+    else:
+        journal.finish()
+
+
+def _study(config: Config, source: Path, start: Path | None) -> Study:
     if not config.recording:
         raise ConfigError(
             "recording", "is missing", None, "add a [[recording]] with its file, or use `sheetbend simulate`"
@@ -109,10 +185,10 @@ def _study(config: Config, source: Path, resume: Path | None) -> Study:
             None,
             "add a [parameters.NAME] for what is to be fitted; `sheetbend info` lists the names",
         )
-    if resume is not None:
-        if not resume.is_file():
-            raise ConfigError("--resume", "is no file", str(resume), "give the fit.json of an earlier fit")
-        config = with_values(config, FitResult.load(resume).values)
+    if start is not None:
+        if not start.is_file():
+            raise ConfigError("--from", "is no file", str(start), "give the fit.json of an earlier fit")
+        config = with_values(config, FitResult.load(start).values)
     return build(config, source)
 
 
@@ -128,9 +204,9 @@ def _check_starts(config: Config, problem: FitProblem) -> None:
                 )
 
 
-def _write(found: Fit, study: Study, folder: Path) -> list[str]:
+def _write(found: Fit, study: Study, form: str, folder: Path) -> list[str]:
     """Everything a fit leaves behind; names relative to the folder."""
     found.save(folder / "fit.json")
-    (folder / "report.txt").write_text(plain(found.result), encoding="utf-8")
+    write_text(folder / "report.txt", plain(found.result))
     write(with_values(study.config, found.values), folder / "fitted.toml", study.folder)
-    return ["fit.json", "report.txt", "fitted.toml", *write_figures(found, study.config, folder)]
+    return ["fit.json", "report.txt", "fitted.toml", *write_figures(found, study.config, form, folder)]

@@ -15,14 +15,17 @@ from ..config import GrippedConfig, GrippedRopeSection
 from ..errors import ConfigError, RecordingError, SceneError, SheetbendError
 from ..gripped import WITHOUT_TWIST, GrippedMotion, RopeFit, RopeReport, Rung, evaluate, fit_rope
 from ..gripped.ladder import REST, TILTS, TWIST, VARYING, YIELD
+from ..gripped.model import NAME
 from ..gripped.motion import motions_of
 from ..gripped.report import overview
 from ..io.folder import recordings
 from ..recording_checks import marker_indices
 from ..tables import plain_section
+from ..whole import write_text
+from .figures import figures_form
 from .gripped_figure import write_figure
 from .outcome import Code, Outcome, code_of
-from .screen import show
+from .screen import heading, show
 
 RUNGS: dict[str, Rung] = {"twist": TWIST, "tilts": TILTS, "rest": REST, "yield": YIELD, "varying": VARYING}
 
@@ -73,6 +76,13 @@ def _check_nominal(nominal: Sequence[Sequence[float]], key: str, motions: Sequen
                 raise ConfigError(key, f"{error.problem} of {motion.recording.name}", error.got, error.fix) from error
 
 
+def rope_files(config: GrippedConfig) -> list[str]:
+    """Every file that `fit_ropes` may write; names relative to the folder."""
+    form = config.output.figures
+    names = ["fit.json", "report.txt", *([] if form == "none" else [f"predicted.{form}"])]
+    return ["report.txt", *(f"{rope.name}/{name}" for rope in config.gripped_rope for name in names)]
+
+
 def fit_ropes(
     console: Console, config: GrippedConfig, ropes: Sequence[RopeData], folder: Path, strict: bool
 ) -> Outcome:
@@ -80,11 +90,14 @@ def fit_ropes(
 
     After Ctrl-C what is whole is reported: the ropes that are done, and of the present one the last finished rung.
     """
+    form = figures_form(console, config)
     reports: list[RopeReport] = []
     files: list[str] = []
     stopped = False
     for rope in ropes:
-        console.print(f"\n[bold]{rope.section.name}[/]  {len(rope.train)} recordings to fit, {len(rope.unseen)} unseen")
+        heading(
+            console, rope.section.name, f"{len(rope.train)} recordings to fit, {len(rope.unseen)} unseen", above="\n"
+        )
         try:
             found = _fit(console, config, rope, [RUNGS[name] for name in rope.section.rungs])
             report, stopped = _judged(console, config, rope, found)
@@ -95,11 +108,11 @@ def fit_ropes(
             break
         reports.append(report)
         show(console, report.rich, report.plain)
-        files += _write(report, config, rope, folder)
+        files += _write(report, form, rope, folder)
         if stopped:
             break
     summary = plain_section(overview(reports))
-    (folder / "report.txt").write_text("\n".join(summary) + "\n", encoding="utf-8")
+    write_text(folder / "report.txt", "\n".join(summary) + "\n")
     console.print("\n" + "\n".join(summary), markup=False, soft_wrap=True)
     console.print(f"\nwritten to {folder}: report.txt, {', '.join(files)}", soft_wrap=True)
     missing = [rope.section.name for rope in ropes[len(reports) :]]
@@ -113,7 +126,7 @@ def fit_ropes(
         "not_fitted": missing,
     }
     results = [report.result for report in reports]
-    return Outcome(data, Code.NOT_CONVERGED if stopped else code_of(results, strict or config.fit.strict))
+    return Outcome(data, Code.INTERRUPTED if stopped else code_of(results, strict or config.fit.strict))
 
 
 def _fit(console: Console, config: GrippedConfig, rope: RopeData, ladder: Sequence[Rung]) -> RopeFit:
@@ -133,8 +146,9 @@ def _fit(console: Console, config: GrippedConfig, rope: RopeData, ladder: Sequen
         smoothing=s.smoothing,
         sigma=s.sigma,
         gravity=(s.gravity[0], s.gravity[1], s.gravity[2]),
+        given=None if s.density_sd is None else {f"{NAME}_density": s.density_sd},
         threads=config.fit.threads,
-        say=lambda text: console.print(f"  {time.perf_counter() - began:6.1f} s  {text}", markup=False, soft_wrap=True),
+        say=lambda text: console.print(f"  {time.perf_counter() - began:6.1f} s  {text}", soft_wrap=True),
     )
 
 
@@ -153,18 +167,18 @@ def _judged(console: Console, config: GrippedConfig, rope: RopeData, found: Rope
     except KeyboardInterrupt:
         return report, True
     except SheetbendError as error:  # a comparison that cannot be made costs no result
-        console.print(f"  no comparison without twist: {error}", markup=False, soft_wrap=True)
+        console.print(f"  no comparison without twist: {error}", soft_wrap=True)
         return report, False
     return replace(report, without_twist=evaluate(bare, rope.unseen)), bare.fit.result.interrupted
 
 
-def _write(report: RopeReport, config: GrippedConfig, rope: RopeData, folder: Path) -> list[str]:
+def _write(report: RopeReport, form: str, rope: RopeData, folder: Path) -> list[str]:
     """Everything that a rope leaves behind; names relative to the folder."""
     own = folder / report.name
     own.mkdir(parents=True, exist_ok=True)
     text = json.dumps(report.to_dict(), indent=2, allow_nan=False) + "\n"
-    (own / "fit.json").write_text(text, encoding="utf-8")
-    (own / "report.txt").write_text(report.plain(), encoding="utf-8")
+    write_text(own / "fit.json", text)
+    write_text(own / "report.txt", report.plain())
     drawn = report.unseen or evaluate(report.found, rope.train)
-    names = ["fit.json", "report.txt", *write_figure(report, drawn, config.output.figures, own)]
+    names = ["fit.json", "report.txt", *write_figure(report, drawn, form, own)]
     return [f"{report.name}/{name}" for name in names]

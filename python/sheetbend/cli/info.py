@@ -10,13 +10,15 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from .. import __version__
 from ..config import GrippedConfig, build, parse_any, scene_alone
+from ..door import reading
+from ..errors import ConfigError
 from ..experiment import Experiment
 from ..gripped.plausible import doubts
+from ..growth import in_words, over_fit
 from ..io import FORMATS
 from ..kinds import KINDS
 from ..optimizers import has_ceres
@@ -24,6 +26,7 @@ from ..recording import Recording
 from ..scene import Scene
 from .gripped import RopeData, load_ropes
 from .outcome import Outcome, run
+from .screen import heading
 
 PACKAGES = ("numpy", "scipy", "torch", "matplotlib", "pydantic", "rich", "typer")
 _MARKERS = 60  # shown of a recording
@@ -49,7 +52,7 @@ def info(
 def _info(console: Console, path: Path | None) -> Outcome:
     data: dict[str, Any] = {"sheetbend": __version__, "python": platform.python_version(), "packages": _packages()}
     data |= {"ceres": has_ceres(), "constraints": {name: kind["arity"] for name, kind in KINDS.items()}}
-    console.print(f"[bold]sheetbend {__version__}[/]  Python {data['python']}, {platform.machine()}")
+    heading(console, f"sheetbend {__version__}", f"Python {data['python']}, {platform.machine()}")
     console.print(
         "  optimizers   ",
         "ceres, scipy" if has_ceres() else "scipy (Ceres was not built: install libceres-dev and reinstall)",
@@ -84,12 +87,12 @@ def _recording(console: Console, recording: Recording) -> dict[str, Any]:
     """Its size, noise and boundary, and every marker with the place where it is first seen."""
     first = recording.mask.argmax(axis=0)
     at = recording.positions[first, np.arange(len(first))]
-    console.print("\n" + recording.summary(), markup=False, soft_wrap=True)
+    console.print("\n" + recording.summary(), soft_wrap=True)
     table = Table("marker", "first seen [s]", "x [m]", "y [m]", "z [m]", "lost", box=None, pad_edge=False)
     lost = 1.0 - recording.mask.mean(axis=0)
     for k, marker in enumerate(recording.markers[:_MARKERS]):
         place = (f"{x:.4g}" for x in at[k])
-        table.add_row(escape(marker), f"{recording.times[first[k]]:.4g}", *place, f"{lost[k]:.1%}")
+        table.add_row(marker, f"{recording.times[first[k]]:.4g}", *place, f"{lost[k]:.1%}")
     console.print(table)
     if len(recording.markers) > _MARKERS:
         console.print(f"and {len(recording.markers) - _MARKERS} more")
@@ -106,13 +109,19 @@ def _recording(console: Console, recording: Recording) -> dict[str, Any]:
 def _config(console: Console, path: Path) -> dict[str, Any]:
     config = parse_any(path)
     if isinstance(config, GrippedConfig):
-        return _ropes(console, config, load_ropes(config, path.parent))
-    study = build(config, path.parent)
-    console.print(f"\n[bold]{config.experiment.name}[/]  {config.experiment.about}")
-    scenes = [_recorded(e) for e in study.experiments] or [_counts(scene_alone(config, path.parent)[0])]
-    first = study.experiments[0].scene if study.experiments else scene_alone(config, path.parent)[0]
+        with reading(path, ConfigError):
+            ropes = load_ropes(config, path.parent)
+        return _ropes(console, config, ropes)
+    with reading(path, ConfigError):
+        study = build(config, path.parent)
+        first = study.experiments[0].scene if study.experiments else scene_alone(config, path.parent)[0]
+    heading(console, config.experiment.name, config.experiment.about, above="\n")
+    scenes = [_recorded(e) for e in study.experiments] or [_counts(first)]
     for scene in scenes:
         console.print("  " + ", ".join(f"{name} {_text(value)}" for name, value in scene.items()), soft_wrap=True)
+    grown = [over_fit(e) for e in study.experiments if not e.static and e.predict is None]
+    for g in grown:
+        console.print(f"  {in_words(g)}", markup=False, soft_wrap=True)
     table = Table("quantity", "value", "unit", "parameter", box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for name, q in first.quantities.items():
         table.add_row(name, f"{q.value:.6g}", q.unit, _role(study.parameters.get(name)))
@@ -122,12 +131,13 @@ def _config(console: Console, path: Path) -> dict[str, Any]:
         "scenes": scenes,
         "quantities": {n: q.value for n, q in first.quantities.items()},
         "parameters": list(study.parameters),
+        "growth": {g.name: g.to_dict() for g in grown},
     }
 
 
 def _ropes(console: Console, config: GrippedConfig, ropes: list[RopeData]) -> dict[str, Any]:
     """Ropes between grips: what was recorded, and what is to be fitted."""
-    console.print(f"\n[bold]{config.experiment.name}[/]  {config.experiment.about}")
+    heading(console, config.experiment.name, config.experiment.about, above="\n")
     told: dict[str, dict[str, Any]] = {}
     doubtful = {rope.section.name: doubts(rope.train, rope.section.gravity) for rope in ropes}
     for rope in ropes:
@@ -150,7 +160,7 @@ def _ropes(console: Console, config: GrippedConfig, ropes: list[RopeData]) -> di
     for name, sentences in doubtful.items():
         told[name]["doubts"] = list(sentences)
         for sentence in sentences:
-            console.print(f"  {name} is doubtful: {sentence}", markup=False, soft_wrap=True)
+            console.print(f"  {name} is doubtful: {sentence}", soft_wrap=True)
     return {"name": config.experiment.name, "ropes": told}
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..mesh import write_obj_sequence, write_ply, write_ply_sequence
+from ..mesh.export import frame_files
 from ..scene import Scene
 from ..simulate import Trajectory
 from ..strain import strain_fields
@@ -19,6 +20,18 @@ class MeshFormat(StrEnum):
     OBJ = "obj"
     PLY = "ply"
     PLY_SEQUENCE = "ply-sequence"
+
+
+def mesh_files(name: str, scene: Scene, frames: int, folder: Path, form: MeshFormat) -> list[Path]:
+    """Every file that `write_meshes` will write."""
+    files: list[Path] = []
+    for cloth in scene.cloths:
+        path = folder / f"{name}_{cloth}"
+        if form is MeshFormat.PLY:
+            files.append(path.with_name(f"{path.name}.ply"))
+        else:
+            files += frame_files(path, frames, ".obj" if form is MeshFormat.OBJ else ".ply")
+    return files
 
 
 def write_meshes(name: str, scene: Scene, motion: Trajectory, folder: Path, form: MeshFormat) -> list[str]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import traceback
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any
 
@@ -13,20 +14,27 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
+from ..door import noting
 from ..errors import InputError, SheetbendError
 from ..optional import MissingExtraError
 from ..result import FitResult
+from .screen import Screen
+from .stopping import Stopping
+
+_SHOWN = 2000  # characters of what was wrong
 
 
 class Code(IntEnum):
     """Exit codes."""
 
     DONE = 0
+    DEFECT = 1
     BAD_INPUT = 2
     NOT_IDENTIFIABLE = 3
     NOT_CONVERGED = 4
     CHECK_FAILED = 5
-    INTERRUPTED = 130
+    INTERRUPTED = 130  # by Ctrl-C
+    TERMINATED = 143  # by SIGTERM
 
 
 @dataclass(frozen=True)
@@ -38,13 +46,15 @@ class Outcome:
 
 
 def run(command: Callable[[Console], Outcome], as_json: bool) -> None:
-    """Run a command, report its errors, and exit with its code.
+    """Run a command, report its errors, and exit with its code. SIGTERM stops it as Ctrl-C does.
 
     With `as_json` stdout holds one JSON object and nothing else; everything for people goes to stderr.
     """
-    console = Console(stderr=as_json, highlight=False)
+    console = Screen(stderr=as_json)
+    stopping = Stopping()
     try:
-        outcome = command(console)
+        with noting(), stopping:
+            outcome = command(console)
     except (InputError, MissingExtraError) as error:
         outcome = _failed(error, Code.BAD_INPUT)
     except SheetbendError as error:
@@ -52,14 +62,22 @@ def run(command: Callable[[Console], Outcome], as_json: bool) -> None:
     except KeyboardInterrupt:
         _complain("interrupted", [])
         outcome = Outcome({"error": {"message": "interrupted"}}, Code.INTERRUPTED)
+    except Exception as error:  # no bad input, which ends in errors of the package where it is read
+        traceback.print_exc()
+        outcome = Outcome({"error": {"message": f"a defect of sheetbend: {error!r}"[:_SHOWN]}}, Code.DEFECT)
+    if outcome.code is Code.INTERRUPTED and stopping.terminated:
+        outcome = replace(outcome, code=Code.TERMINATED)
     if as_json:
         print(json.dumps(strict({**outcome.data, "exit_code": int(outcome.code)}), allow_nan=False), flush=True)
     raise typer.Exit(int(outcome.code))
 
 
 def code_of(results: Sequence[FitResult], strictly: bool) -> Code:
-    """Of fits: whether all converged, and whether every one (strictly: every parameter) is identifiable."""
-    if not all(result.converged for result in results):
+    """Of fits: whether all got to their end, converged to sound verdicts, and whether every one (strictly: every
+    parameter) is identifiable."""
+    if any(result.interrupted for result in results):
+        return Code.INTERRUPTED
+    if not all(result.converged and result.sound for result in results):
         return Code.NOT_CONVERGED
     unknown = [[e.verdict == "not identifiable" for e in result.estimates] for result in results]
     return Code.NOT_IDENTIFIABLE if any(any(u) if strictly else all(u) for u in unknown) else Code.DONE
@@ -81,12 +99,12 @@ def _failed(error: SheetbendError, code: Code) -> Outcome:
     _complain(str(error), more)
     told: dict[str, Any] = {"message": str(error)}
     if isinstance(error, InputError):
-        told |= {"field": error.field, "problem": error.problem, "got": repr(error.got), "fix": error.fix}
+        told |= {"field": error.field, "problem": error.problem, "got": repr(error.got)[:_SHOWN], "fix": error.fix}
     return Outcome({"error": told | ({"more": more} if more else {})}, code)
 
 
 def _complain(message: str, more: list[str]) -> None:
-    console = Console(stderr=True, highlight=False, soft_wrap=True)
-    console.print(Text.assemble(("error ", "bold red"), message))
+    console = Screen(stderr=True)
+    console.print(Text.assemble(("error ", "bold red"), message), soft_wrap=True)
     for other in more:
-        console.print(Text.assemble(("  and ", "red"), other))
+        console.print(Text.assemble(("  and ", "red"), other), soft_wrap=True)

@@ -1,17 +1,51 @@
-"""Reports on the screen."""
+"""What commands print: texts as they are, without rich's markup, and nothing that would steer the terminal."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from typing import Any
 
-from rich.console import Console, RenderableType
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
+from rich.text import Text
+
+from ..names import steering
 
 REPORT_WIDTH = 100
+
+
+class Screen(Console):
+    """A console for names and texts that come from files: brackets stay brackets, control characters are spelled out.
+    Color comes from `Text` alone."""
+
+    def __init__(self, stderr: bool = False, width: int | None = None) -> None:
+        super().__init__(stderr=stderr, width=width, highlight=False, markup=False, emoji=False)
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """As rich's, of the text spelled out: so that columns are as wide as what stands in them."""
+        return super().render_str(spelled(text), **options)
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """As rich's, every segment of text spelled out."""
+        for segment in super().render(renderable, options):
+            yield segment if segment.control else segment._replace(text=spelled(segment.text))
+
+
+def heading(console: Console, name: str, about: str, above: str = "") -> None:
+    """Print a name in bold, and what there is to say about it."""
+    console.print(Text.assemble(above, (name, "bold"), "  ", about), soft_wrap=True)
+
+
+def spelled(text: str) -> str:
+    """A text whose control characters, other than the ends of lines, are written as escapes: \\x1b."""
+    if not steering(text, "\n\t"):
+        return text
+    return "".join(repr(c)[1:-1] if steering(c, "\n\t") else c for c in text)
 
 
 def show(console: Console, rich: Callable[[], RenderableType], plain: Callable[[], str]) -> None:
     """In color in a terminal; where that is narrow its lines wrap, but no column is lost."""
     if console.is_terminal:
-        Console(stderr=console.stderr, highlight=False, width=max(console.width, REPORT_WIDTH)).print(rich())
+        Screen(stderr=console.stderr, width=max(console.width, REPORT_WIDTH)).print(rich())
     else:
-        console.print("\n" + plain(), markup=False, soft_wrap=True, end="")
+        console.print("\n" + plain(), soft_wrap=True, end="")

@@ -10,7 +10,8 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from ..config import Study, build, parse, scene_alone
+from ..config import Study, load, scene_alone
+from ..door import reading
 from ..equilibrium import equilibrium
 from ..errors import ConfigError
 from ..experiment import Experiment
@@ -19,10 +20,13 @@ from ..scene import Scene
 from ..simulate import Trajectory
 from ..simulate import simulate as run_simulation
 from ..solver import Solver
+from ..whole import written
 from .folders import made
-from .meshes import MeshFormat, write_meshes
-from .movies import MoviePath, check_before
+from .meshes import MeshFormat, mesh_files, write_meshes
+from .movies import OPTION, MoviePath, check_before
 from .outcome import Outcome, run
+from .screen import heading
+from .targets import check_targets
 
 FRAME = 0.01  # s between frames where no recording tells
 DURATION = 1.0  # s where no recording tells
@@ -84,18 +88,22 @@ def _simulate(
 ) -> Outcome:
     if duration is not None and not (np.isfinite(duration) and duration > 0):
         raise ConfigError("--duration", "must be positive", duration, "give s")
-    study = build(parse(path), path.parent)
+    with reading(path, ConfigError):
+        study = load(path)
+        tasks = _tasks(study, duration, recording)
     name = study.config.experiment.name
     folder = output if output is not None else Path("out") / name
-    tasks = _tasks(study, duration, recording)
     if mesh is not None and not any(task.scene.cloths for task in tasks):
         raise ConfigError("--mesh", "needs a cloth, and the scene has none", mesh.value, "leave it out")
     moving = [task for task in tasks if not task.static]
     if movie is not None:
         check_before(movie, [task.scene for task in moving])
     movies = {} if movie is None else movie_paths(movie, [task.name for task in moving])
+    check_targets("--output", folder, [file for task in tasks for file in _files(task, folder, mesh)])
+    if movie is not None:
+        check_targets(OPTION, movie.parent, movies.values())
     made("--output", folder)
-    console.print(f"[bold]{name}[/]  {study.config.experiment.about}")
+    heading(console, name, study.config.experiment.about)
     done = {task.name: _run(console, task, folder, mesh, movies.get(task.name)) for task in tasks}
     return Outcome({"name": name, "simulated": done})
 
@@ -124,17 +132,26 @@ def _task(e: Experiment, duration: float | None) -> Task:
     return Task(e.name, e.scene, e.solver, np.arange(0.0, length + frame / 2, frame), at_rest=e.start == "equilibrium")
 
 
+def _files(task: Task, folder: Path, mesh: MeshFormat | None) -> list[Path]:
+    """What a task leaves in the folder."""
+    meshes = [] if mesh is None else mesh_files(task.name, task.scene, len(task.times), folder, mesh)
+    return [folder / f"{task.name}.npz", *meshes]
+
+
 def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, movie: Path | None) -> dict[str, Any]:
     motion = _motion(task)
     path = folder / f"{task.name}.npz"
     arrays: dict[str, Any] = {f"force_{group}": values for group, values in motion.forces.items()}
     arrays |= {f"pressure_{name}": values for name, values in motion.pressures.items()}
-    np.savez_compressed(path, times=motion.times, positions=motion.positions, velocities=motion.velocities, **arrays)
+    with written(path) as beside:
+        np.savez_compressed(
+            beside, times=motion.times, positions=motion.positions, velocities=motion.velocities, **arrays
+        )
     moved = np.linalg.norm(motion.positions - motion.positions[0], axis=2)
-    written = {} if mesh is None else {"meshes": write_meshes(task.name, task.scene, motion, folder, mesh)}
+    more = {} if mesh is None else {"meshes": write_meshes(task.name, task.scene, motion, folder, mesh)}
     if movie is not None:
         save_movie(Motion(task.scene, motion.times, motion.positions), movie, task.name)
-        written["movie"] = [str(movie)]
+        more["movie"] = [str(movie)]
     summary = {
         "npz": str(path),
         "frames": len(motion.times),
@@ -144,7 +161,7 @@ def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, mo
         "largest_displacement": float(moved.max()),
         "largest_speed": float(np.linalg.norm(motion.velocities, axis=2).max()),
         "largest_force": {group: float(np.abs(values).max()) for group, values in motion.forces.items()},
-        **written,
+        **more,
     }
     told = (
         "at rest"
@@ -156,7 +173,7 @@ def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, mo
         if task.static
         else f", moved up to {summary['largest_displacement']:.4g} m at up to {summary['largest_speed']:.4g} m/s"
     )
-    files = ", ".join([str(path), *(file for made in written.values() for file in made)])
+    files = ", ".join([str(path), *(file for made in more.values() for file in made)])
     console.print(f"  {task.name}: {summary['particles']} particles, {told}{reach}; {files}", soft_wrap=True)
     return summary
 

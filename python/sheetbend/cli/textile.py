@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,8 +14,10 @@ from rich.console import Console
 from ..errors import ConfigError, InputError
 from ..textile import Curve, fit_pull, mean_curve, read_curves
 from ..textile.units import quantity
+from ..whole import write_text
 from .folders import made
 from .outcome import Code, Outcome, run
+from .targets import check_targets
 from .textile_figure import write_figure
 from .textile_report import report, to_dict, write_mean
 
@@ -65,7 +68,6 @@ def textile(
     """Read a testing machine's curves, print their KES numbers, and fit the law of a pull with intervals."""
 
     def command(console: Console) -> Outcome:
-        folder = made("--output", output if output is not None else Path("out") / files[0].stem)
         columns, units = _pairs("--column", column), _pairs("--unit", unit)
         at, across = _size("--length", length), _size("--width", width)
         curves = [
@@ -79,11 +81,14 @@ def textile(
             curves = [c.from_pretension(_pretension(pretension, c)) for c in curves]
         if len({c.name for c in curves}) < len(curves):
             curves = [replace(c, name=f"{k} {c.name}") for k, c in enumerate(curves, start=1)]
+        folder = output if output is not None else Path("out") / files[0].stem
+        check_targets("--output", folder, [folder / name for name in ("report.txt", "mean.csv", f"curves.{figures}")])
+        made("--output", folder)
         fitted = test == "tension" and law != "none"
         fit = fit_pull(curves, along, law, way=way, cycle=cycle, poisson=poisson) if fitted else None
         text = report(curves, fit, cycle)
-        console.print("\n" + text, markup=False, soft_wrap=True, end="")
-        (folder / "report.txt").write_text(text, encoding="utf-8")
+        console.print("\n" + text, soft_wrap=True, end="")
+        write_text(folder / "report.txt", text)
         mean = mean_curve(curves, way, cycle=cycle)
         write_mean(curves[0].test, mean, folder / "mean.csv")
         drawn = write_figure(curves, mean, way, fit, along, figures, folder)
@@ -107,7 +112,7 @@ def _pairs(option: str, given: Sequence[str] | None) -> dict[str, str]:
 
 
 def _numbered(columns: Mapping[str, str]) -> dict[str, str | int]:
-    return {role: int(value) if value.isdigit() else value for role, value in columns.items()}
+    return {role: int(value) if re.fullmatch(r"[0-9]{1,6}", value) else value for role, value in columns.items()}
 
 
 def _size(option: str, given: str | None) -> float | str | None:

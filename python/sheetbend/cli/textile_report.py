@@ -12,6 +12,7 @@ import numpy as np
 from ..tables import Section, plain_section
 from ..textile import Curve, FabricFit, MeanCurve, Reading, bending_loop, shear_loop, tensile_loop
 from ..timeseries import Array
+from ..whole import written
 from ..wording import short
 
 _COLUMNS = {
@@ -74,7 +75,8 @@ def to_dict(curves: Sequence[Curve], fit: FabricFit | None, cycle: int) -> dict[
 def write_mean(test: str, mean: MeanCurve, path: Path) -> None:
     """The mean curve and its scatter as a table that `read_curves` takes."""
     table = np.column_stack([mean.deformation, mean.load, mean.scatter])
-    np.savetxt(path, table[:, : 3 if mean.count > 1 else 2], "%.9g", ",", header=_header(test, mean), comments="")
+    with written(path) as beside:
+        np.savetxt(beside, table[:, : 3 if mean.count > 1 else 2], "%.9g", ",", header=_header(test, mean), comments="")
 
 
 def _header(test: str, mean: MeanCurve) -> str:

@@ -46,21 +46,26 @@ class Study:
     def options(self) -> dict[str, Any]:
         """Keyword arguments of `sb.fit`."""
         fit = self.config.fit
-        refine = None
-        if fit.halve_step or fit.double_segments:
-            finer = (lambda: build(self.config, self.folder, finer=2).experiments) if fit.double_segments else None
-            refine = Refinement(halve_step=fit.halve_step, finer=finer, linear=fit.linear_refits)
         return {
             "optimizer": fit.optimizer,
             "starts": fit.starts,
             "windows": fit.windows,
             "tolerance": fit.tolerance,
-            "refine": refine,
+            "refine": self._refinement,
+            "given": {name: section.sd for name, section in self.config.given.items()},
             "profiles": fit.profiles,
             "leave_one_out": fit.leave_one_out,
             "max_iterations": fit.max_iterations,
             "threads": fit.threads,
         }
+
+    @property
+    def _refinement(self) -> Refinement:
+        """Whatever has a mesh can be made finer."""
+        fit, scene = self.config.fit, self.config.scene
+        meshed = fit.double_segments is not False and bool(scene.rope or scene.cloth)
+        finer = (lambda: build(self.config, self.folder, finer=2).experiments) if meshed else None
+        return Refinement(halve_step=fit.halve_step, finer=finer, linear=fit.linear_refits or not fit.double_segments)
 
 
 def build(config: schema.Config, folder: Path, finer: int = 1) -> Study:
@@ -93,7 +98,9 @@ def scene_alone(config: schema.Config, folder: Path = Path()) -> tuple[Scene, So
     """The scene of a configuration without recordings, and its solver; files of meshes are relative to `folder`."""
     scene, _ = build_scene(config.experiment.name, config.scene, None, {}, folder=folder)
     _start_values(scene, config, {}, "")
-    return scene, solver_for(config.solver, None)
+    solver = solver_for(config.solver, None)
+    solver.core(scene.compiled)  # raise or warn here, before any work starts
+    return scene, solver
 
 
 def solver_for(section: schema.SolverSection, recording: Recording | None) -> Solver:

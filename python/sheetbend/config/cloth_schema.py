@@ -6,7 +6,7 @@ from typing import Any, Literal, Self
 
 from pydantic import ValidationInfo, field_validator, model_validator
 
-from .section import Finite, Name, Pair, Section, Vector, key
+from .section import MOST_CELLS, Finite, Name, Pair, Section, Vector, key
 
 MESH_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "grid": (("width", "height", "nx", "ny"), ("pattern", "warp")),
@@ -24,13 +24,13 @@ class ClothMesh(Section):
     kind: Literal["grid", "equilateral", "disk", "file"] = key(..., "which of them")
     width: Finite | None = key(None, "of a grid or equilateral triangles, along x", "m", gt=0)
     height: Finite | None = key(None, "of a grid or equilateral triangles, along y", "m", gt=0)
-    nx: int | None = key(None, "cells of a grid along x, or sides of equilateral triangles", ge=1)
-    ny: int | None = key(None, "cells of a grid along y", ge=1)
+    nx: int | None = key(None, "cells of a grid along x, or sides of equilateral triangles", ge=1, le=MOST_CELLS)
+    ny: int | None = key(None, "cells of a grid along y", ge=1, le=MOST_CELLS)
     pattern: Literal["alternating", "crossed", "one_way"] | None = key(
         None, '`grid` only, diagonals; "one_way" when left out: its inner vertices have six neighbors'
     )
     radius: Finite | None = key(None, "of a disk around the origin", "m", gt=0)
-    rings: int | None = key(None, "of a disk", ge=1)
+    rings: int | None = key(None, "of a disk", ge=1, le=MOST_CELLS)
     support: Finite | None = key(None, "radius of a circle of the disk whose vertices are the set `support`", "m", gt=0)
     file: str | None = key(None, "OBJ, PLY or STL, relative to the configuration")
     unit: Literal["m", "cm", "mm"] | None = key(None, "length unit of the file; m when left out")

@@ -2,28 +2,38 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
+from ..door import bounded_bytes, reading
 from ..errors import ConfigError
+from ..json_file import check_depth
+from ..names import steering
 from .build import Study, build
 from .errors import from_validation
 from .gripped_schema import GrippedConfig
 from .schema import Config
+
+LARGEST = 2**22
+"""Bytes of a configuration."""
+_PART = r"(?:[A-Za-z0-9_-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
+_MANY_PARTS = re.compile(rf"(?<![A-Za-z0-9_-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{50}}")
 
 
 def load(path: str | Path) -> Study:
     """Read, check and build a configuration.
 
     Raises:
-        ConfigError: the file is missing, no TOML, or a key is unknown, missing or wrong; more problems are in its
-            notes.
+        ConfigError: the file is missing, no TOML, larger than `LARGEST`, or a key is unknown, missing or wrong; more
+            problems are in its notes.
     """
     path = Path(path)
-    return build(parse(path), path.parent)
+    with reading(path, ConfigError):
+        return build(parse(path), path.parent)
 
 
 def parse(path: str | Path) -> Config:
@@ -34,7 +44,7 @@ def parse(path: str | Path) -> Config:
     """
     config = parse_any(path)
     if isinstance(config, GrippedConfig):
-        fix = "use `sheetbend fit` or `sheetbend info`"
+        fix = "use `sheetbend fit`, `sheetbend check` or `sheetbend info`"
         raise ConfigError("gripped_rope", "takes the place of a scene: here is none to build", str(path), fix)
     return config
 
@@ -45,20 +55,48 @@ def parse_any(path: str | Path) -> Config | GrippedConfig:
     Raises:
         ConfigError: as `load`.
     """
-    data = _content(Path(path))
-    model = GrippedConfig if "gripped_rope" in data else Config
-    try:
-        return model.model_validate(data)
-    except ValidationError as error:
-        raise from_validation(error, model) from error
+    with reading(path, ConfigError):
+        data = _content(Path(path))
+        model = GrippedConfig if "gripped_rope" in data else Config
+        try:
+            return model.model_validate(data)
+        except ValidationError as error:
+            raise from_validation(error, model) from error
 
 
 def _content(path: Path) -> dict[str, Any]:
     if not path.is_file():
         raise ConfigError(str(path), "is no file", str(path), "give the path of a configuration, such as my.toml")
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(str(path), f"is no valid TOML: {error}", path.name, "correct that line") from error
+        text = bounded_bytes(path, LARGEST, ConfigError).decode("utf-8")
     except UnicodeDecodeError as error:
         raise ConfigError(str(path), "is no UTF-8 text", path.name, "save it as UTF-8") from error
+    if _MANY_PARTS.search(text):  # which the parser takes time for that grows as their square
+        fix = "write tables, as docs/configuration.md shows them"
+        raise ConfigError(str(path), "holds a key of very many parts", path.name, fix)
+    try:
+        content = tomllib.loads(text)
+    except UnicodeError:
+        raise
+    except ValueError as error:  # tomllib's own is one, and so is that of a number of too many digits
+        raise ConfigError(str(path), f"is no valid TOML: {error}", path.name, "correct that line") from error
+    check_depth(path, content, ConfigError)
+    _check_texts(content)
+    return content
+
+
+def _check_texts(content: Any, key: str = "") -> None:
+    """Refuse texts that would steer a terminal where they are printed.
+
+    Raises:
+        ConfigError: a key or a value holds a control character; it names the key.
+    """
+    if isinstance(content, str) and steering(content, "\n\t"):
+        raise ConfigError(key or "a key", "holds a control character", content, "use characters that print")
+    if isinstance(content, dict):
+        for name, part in content.items():
+            _check_texts(name, key)
+            _check_texts(part, f"{key}.{name}" if key else name)
+    if isinstance(content, list):
+        for i, part in enumerate(content):
+            _check_texts(part, f"{key}[{i}]")

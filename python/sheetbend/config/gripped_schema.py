@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, field_validator
 
 from ..gripped import fit_rope
 from .schema import ExperimentSection, OutputSection
-from .section import Finite, Name, Pair, Section, Vector, key
+from .section import MOST_LINKS, Finite, Name, Pair, Section, Vector, key
 
 RungName = Literal["twist", "tilts", "rest", "yield", "varying"]
 RUNGS: tuple[RungName, ...] = ("twist", "tilts", "rest", "yield", "varying")
@@ -46,6 +46,9 @@ class GrippedRopeSection(Section):
 
     name: Name = key(..., "names the rope in results, and their folder")
     density: Finite = key(..., "mass per length, weighed: motion tells stiffness over density only", "kg/m", gt=0)
+    density_sd: Finite | None = key(
+        None, "relative standard deviation of the density, which then counts in the intervals (0.02 is 2 %)", gt=0
+    )
     train: str = key(..., "folder of the recordings to fit, relative to the configuration")
     eval: str | None = key(None, "folder of recordings that are only predicted, from their first frame")
     pattern: str = key("*", 'which files of these folders, such as "*.pkl"', min_length=1)
@@ -82,7 +85,7 @@ class GrippedRopeSection(Section):
     bending_lengths: list[Positive] = key(
         _default("bending_lengths"), "of the starts, (EI/(density g))^(1/3); the best one wins", "m", min_length=1
     )
-    segments: int = key(_default("segments"), "links at the start", ge=4)
+    segments: int = key(_default("segments"), "links at the start", ge=4, le=MOST_LINKS)
     max_segments: int = key(
         _default("max_segments"), "links are doubled, up to these, until EI moves by less than 5 %", ge=4
     )

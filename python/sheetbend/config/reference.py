@@ -38,6 +38,7 @@ HEADERS: dict[str, type[Section]] = {
     "[[recording]]": schema.RecordingSection,
     "[[marker]], [[recording.marker]]": schema.Marker,
     "[parameters.NAME]": schema.ParameterSection,
+    "[given.NAME]": schema.GivenSection,
     "[fit]": schema.FitSection,
     "[output]": schema.OutputSection,
 }

@@ -7,7 +7,7 @@ from typing import Any, Literal, Self
 from pydantic import model_validator
 
 from .cloth_schema import Cloth, with_fabrics
-from .section import Finite, Name, Reference, Section, Vector, key
+from .section import MOST_LINKS, Finite, Name, Reference, Section, Vector, key
 
 
 class Rope(Section):
@@ -15,7 +15,7 @@ class Rope(Section):
 
     name: Name = key("rope", "prefix of its quantities: <name>_EI and so on")
     length: Finite | None = key(None, "rest length; that of `points` when left out", "m", gt=0)
-    segments: int = key(40, "number of equal links", ge=1)
+    segments: int = key(40, "number of equal links", ge=1, le=MOST_LINKS)
     density: Finite = key(..., "mass per length", "kg/m", gt=0)
     EA: Finite | None = key(None, "axial stiffness; inextensible when left out", "N", gt=0)
     EI: Finite | None = key(None, "bending stiffness; no bending when left out", "N m^2", gt=0)

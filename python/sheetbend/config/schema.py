@@ -48,6 +48,13 @@ class SolverSection(Section):
         'budget of an adjoint gradient (`check`), such as "2 GB" or a number of bytes: what does not fit is computed '
         "again; a fit carries tangents forward and keeps no tape",
     )
+    extrapolate: int = key(
+        1,
+        "runs at h, h/2 and h/4 that are combined at the frames: 1 (off), 2 (third order) or 3 (fourth order, seven"
+        " times the substeps); for smooth motions",
+        ge=1,
+        le=3,
+    )
 
     @field_validator("memory")
     @classmethod
@@ -168,32 +175,43 @@ class ParameterSection(Section):
     scale: Finite | None = key(None, "natural size of what may be zero", gt=0)
 
 
+class GivenSection(Section):
+    """How uncertain a number is that the fit takes as given. One table each: [given.NAME], NAME being a quantity that
+    is not fitted, "gravity" or "clamp_direction" (directions, rad), "clamps" or "markers" (places, m)."""
+
+    sd: Finite = key(
+        ...,
+        "standard deviation, which then counts in the intervals: relative for what must be positive (0.02 is 2 %), "
+        "else in the quantity's unit",
+        gt=0,
+    )
+
+
 class FitSection(Section):
     """[fit]: how the fit runs."""
 
     optimizer: Literal["auto", "ceres", "scipy"] = key("auto", "Ceres where it was built, else SciPy")
     starts: list[dict[str, Finite]] = key([], "further starting values by name; the best end wins")
-    windows: list[Finite] = key(
-        [],
-        "increasing lengths: so much of every motion from its start on is fitted first, one after another; for a start "
-        "far off",
+    windows: Literal["auto"] | list[Finite] = key(
+        "auto",
+        "increasing lengths: so much of every motion from its start on is fitted first, one after another; auto "
+        "chooses them, and none for a start nearby; [] = none",
         "s",
     )
     max_iterations: int = key(200, "per start and window", ge=1)
     tolerance: Finite = key(1e-10, "relative change of the cost that counts as none", gt=0, lt=1)
     threads: int = key(1, "over recordings and derivatives; results do not depend on it", ge=1)
     halve_step: bool = key(
-        False, "refit at half the substep; what moves, carried on to the limit, counts in the intervals"
+        True,
+        "move the estimates to the limit of short substeps and count what that leaves open in the intervals; some three"
+        " evaluations with tangents",
     )
-    double_segments: bool = key(
-        False,
-        "refit with twice the segments in every rope and twice the cells in every cloth; what moves, carried on to the "
-        "limit, counts in the intervals",
+    double_segments: bool | None = key(
+        None,
+        "left out: one simulation with twice the segments in every rope and twice the cells in every cloth, and what"
+        " its residuals would move counts; true: refit there; false: the mesh does not count",
     )
-    linear_refits: bool = key(
-        False,
-        "instead of each of these refits one Gauss-Newton step with the Jacobian of the fit: a simulation each",
-    )
+    linear_refits: bool = key(False, "with `double_segments = true`: the one simulation instead of the refit")
     profiles: bool = key(
         True, "refit the others along weak parameters for their intervals; false: linear intervals, which cost nothing"
     )
@@ -216,6 +234,7 @@ class Config(Section):
     marker: list[Marker] = key([], "places of markers, shared by the recordings")
     recording: list[RecordingSection] = key([], "the recordings")
     parameters: dict[str, ParameterSection] = key({}, "what is fitted")
+    given: dict[str, GivenSection] = key({}, "how uncertain the numbers are that the fit takes as given")
     fit: FitSection = key(FitSection(), "how the fit runs")
     output: OutputSection = key(OutputSection(), "what is written")
     published: dict[str, Finite | Window] = key(

@@ -7,11 +7,25 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from ..names import flaw
+
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Vector = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 Pair = Annotated[list[Finite], Field(min_length=2, max_length=2)]
+MOST_LINKS, MOST_CELLS = 100_000, 2_000
+"""Of a rope, and of a cloth along one direction: more is a slip of the pen, which must not take all memory."""
 NAME, REFERENCE, AXES = r"^[A-Za-z][A-Za-z0-9_.-]*$", r"^[^:\s]+(:\S+)?$", "^[xyz]{1,3}$"
-Name = Annotated[str, Field(pattern=NAME)]
+
+
+def _file_name(name: str) -> str:
+    found = flaw(name)
+    if found is not None:
+        raise ValueError("|".join(found))
+    return name
+
+
+Name = Annotated[str, Field(pattern=NAME), AfterValidator(_file_name)]
+"""Names results, and the files that are written of them."""
 Reference = Annotated[str, Field(pattern=REFERENCE)]
 """A particle: "NAME:INDEX" (negative ones count from the end), "NAME:start" and "NAME:end" of a rope, "NAME:pivot" and
 "NAME:end" of an arm or pendulum, "NAME:SET:INDEX" of a cloth (its mesh's corners are "NAME:corners:0" to

@@ -1,4 +1,4 @@
-"""Configurations with other starting values: how a fit is written back, and resumed."""
+"""Configurations with other starting values: how a fit is written back, and started from."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from ..optional import require
+from ..whole import write_text
 from .schema import Config, ParameterSection
 
 
 def with_values(config: Config, values: Mapping[str, float]) -> Config:
-    """The configuration starting at the values (by expanded name, as in fit.json), without `windows`, which are for a
-    start far off; names that it does not fit are left out.
+    """The configuration starting at the values (by expanded name, as in fit.json), without the `windows` that it
+    gives, which are for a start far off; names that it does not fit are left out.
 
     Shared parameters start at `parameters.NAME.initial`, private ones at the recordings' `values`.
     """
@@ -32,7 +33,7 @@ def with_values(config: Config, values: Mapping[str, float]) -> Config:
             recordings[i] = recordings[i].model_copy(update={"values": {**recordings[i].values, base: value}})
         elif not recording:
             parameters[base] = section.model_copy(update={"initial": value})
-    fit = config.fit.model_copy(update={"windows": []}) if config.fit.windows else config.fit
+    fit = config.fit.model_copy(update={"windows": []}) if isinstance(config.fit.windows, list) else config.fit
     return config.model_copy(update={"parameters": parameters, "recording": recordings, "fit": fit})
 
 
@@ -49,7 +50,7 @@ def write(config: Config, path: Path, folder: Path) -> None:
     meshes = [cloth["mesh"] for cloth in content["scene"].get("cloth", [])]
     for table in [*content.get("recording", []), *(mesh for mesh in meshes if "file" in mesh)]:
         table["file"] = Path(os.path.relpath(folder / table["file"], path.parent)).as_posix()
-    path.write_text(require("tomli_w", "cli").dumps(content), encoding="utf-8")
+    write_text(path, require("tomli_w", "cli").dumps(content))
 
 
 def _inside(section: ParameterSection, value: float) -> float:

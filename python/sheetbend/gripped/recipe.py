@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +22,7 @@ from ..discretization import Refinement
 from ..errors import InputError, SheetbendError
 from ..experiment import Experiment
 from ..fit import Fit, fit
+from ..journal import journaled
 from ..optimizers import minimize
 from ..parameters import Parameter, Parameters
 from ..problem import FitProblem
@@ -31,6 +33,7 @@ from .model import GRAVITY, NAME, RopeModel, nominal_directions, shared_gravity
 from .motion import Array, GrippedMotion, motions_of
 from .offsets import offset_reach
 from .plausible import doubts
+from .start import started
 
 BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first
 LINKS_PER_BENDING_LENGTH = 3.0  # below this EI reads too high and GJ too low
@@ -73,6 +76,11 @@ class RopeFit:
     fit: Fit
     warnings: tuple[str, ...]
 
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C ended it."""
+        return self.fit.interrupted
+
     def predict(self, recording: Recording | GrippedMotion) -> Array:
         """(frames, markers, 3) m: open loop from the first frame, gripped markers as recorded."""
         (motion,) = motions_of([recording], self.model.smoothing)
@@ -99,6 +107,7 @@ def predict(
         return list(pool.map(one, range(len(motions))))
 
 
+@journaled
 def fit_rope(
     recordings: Sequence[Recording | GrippedMotion],
     *,
@@ -114,8 +123,10 @@ def fit_rope(
     smoothing: float = 0.08,
     sigma: float = 5e-3,
     gravity: tuple[float, float, float] = GRAVITY,
+    given: Mapping[str, float] | None = None,
     threads: int = 1,
     say: Say = lambda text: None,
+    journal: str | Path | None = None,
 ) -> RopeFit:
     """Fit a rope's parameters to recordings between two grips.
 
@@ -134,8 +145,10 @@ def fit_rope(
         smoothing: s, of the recorded grips and starts.
         sigma: m, expected error of a marker.
         gravity: m/s^2, where the recordings do not tell.
+        given: standard deviations of what the fit takes as given, such as {"rope_density": 0.02}; see `sheetbend.fit`.
         threads: the result does not depend on it.
         say: called with a line on each step.
+        journal: file that keeps every evaluation until the rope is fitted, as that of `sheetbend.fit`.
 
     Returns:
         RopeFit. After Ctrl-C the one of the last finished rung, its fit marked `interrupted`.
@@ -167,7 +180,7 @@ def fit_rope(
         sigma=sigma,
         gravity=gravity,
     )
-    search = _Search(motions, validate, windows, threads, say)
+    search = _Search(motions, validate, windows, given or {}, threads, say)
     found = search.run(model, ladder, bending_lengths, max_segments)
     return replace(found, warnings=(*doubtful, *found.warnings))
 
@@ -178,6 +191,7 @@ class _Search:
         motions: Sequence[GrippedMotion],
         validate: float,
         windows: Sequence[tuple[float, float]],
+        given: Mapping[str, float],
         threads: int,
         say: Say,
     ) -> None:
@@ -186,7 +200,7 @@ class _Search:
         self.all = list(motions)
         self.fitted = [m for i, m in enumerate(motions) if i not in others]
         self.others = [m for i, m in enumerate(motions) if i in others]
-        self.windows, self.threads, self.say = windows, threads, say
+        self.windows, self.given, self.threads, self.say = windows, given, threads, say
         self.middle, self.longest = windows[min(1, len(windows) - 1)], windows[-1]
 
     def run(
@@ -224,10 +238,7 @@ class _Search:
         """The best of several stiffnesses on short windows, then on longer ones."""
         ends = []
         for length in bending_lengths:
-            EI = model.density * 9.81 * length**3
-            start = {"EI": EI, "GJ": 0.7 * EI, "bend_damping": 0.03, "twist_damping": 0.03, "drag_linear": 0.02}
-            start["length"] = float(np.mean([m.length for m in self.all]))
-            candidate = model.with_values(**start)
+            candidate = started(model, self.all, length)
             values = self._minimum(candidate, rung.parameters, {}, self.windows[0], SHORT)
             cost = self._cost(candidate, values, self.middle)
             self.say(f"start at a bending length of {length:g} m: EI {values[f'{NAME}_EI']:.3g}, cost {cost:.4g}")
@@ -326,6 +337,8 @@ class _Search:
             parameters=_starting(parameters, values),
             refine=None if interrupted else refine,
             systematic=offset_reach,
+            windows=(),
+            given=self.given,
             threads=self.threads,
             profiles=False,
             max_iterations=1 if interrupted else LONG,

@@ -54,7 +54,7 @@ def trades(result: FitResult) -> tuple[tuple[str, str], ...]:
         if abs(correlation) >= STRONG:
             notes.append((what, f"{words(values)} (correlation {correlation:+.2f})"))
     GJ = next((e for e in result.estimates if e.name == f"{NAME}_GJ"), None)
-    if GJ is not None and _open_above(GJ):
+    if GJ is not None and GJ.verdict not in ("rough", "no minimum") and _open_above(GJ):
         least = "" if GJ.lower is None else f": at least {short(GJ.lower)} N m^2"
         notes.append(("GJ", f"bounded from below only{least}; a rope stiffer in twist would move alike"))
     notes.append(("EA", "not fitted: the rope is taken as inextensible, and motion would bound EA from below only"))

@@ -13,9 +13,11 @@ from __future__ import annotations
 from pathlib import Path
 from types import ModuleType
 
+from ..door import reading
 from ..errors import RecordingError
 from ..recording import Recording
 from ..recording_checks import check_seen
+from ..whole import written
 from . import c3d, csv, deform, mesh_sequence, npz, sidecar
 
 FORMATS: dict[str, ModuleType] = {
@@ -29,6 +31,11 @@ FORMATS: dict[str, ModuleType] = {
 
 def read(path: Path, units: str | None = None) -> Recording:
     """Read the recording at path and the JSON beside it; see `Recording.load`."""
+    with reading(path):
+        return _read(path if path.name.strip(".") else path.resolve(), units)
+
+
+def _read(path: Path, units: str | None) -> Recording:
     if path.is_dir() and path.suffix.lower() not in FORMATS:
         return sidecar.apply(mesh_sequence.read(path), path, units, mesh_sequence.ASSUMED)
     file_format = _format(path)
@@ -50,7 +57,8 @@ def write(recording: Recording, path: Path) -> None:
         raise RecordingError("path", "lies in a folder that does not exist", str(path), fix)
     check_seen(recording.positions, recording.markers)  # a piece may lack a marker; a file may not
     sidecar.write(recording, path, _assumed(file_format))
-    file_format.write(recording, path)
+    with written(path) as beside:
+        file_format.write(recording, beside)
 
 
 def _format(path: Path) -> ModuleType:

@@ -8,6 +8,7 @@ frame of the file. The file does not say which way is down.
 
 from __future__ import annotations
 
+import math
 import struct
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +27,7 @@ _BLOCK = 512
 _KEY = 0x50
 _ORDERS = {84: "<", 85: "<", 86: ">"}
 _DEC = 85
+_MOST_BLOCKS = 255  # of parameters: a byte counts them
 _NO_PLACES = ("ANGLES", "FORCES", "MOMENTS", "POWERS")
 
 
@@ -58,7 +60,7 @@ def read(path: Path) -> Recording:
     try:
         machine, said = _parameters(data)
         return _recording(path, data, machine, said)
-    except (struct.error, IndexError, ValueError, KeyError) as error:
+    except (struct.error, IndexError, ValueError, KeyError, TypeError, OverflowError) as error:
         if isinstance(error, RecordingError):
             raise
         fix = "export it again as C3D"
@@ -108,6 +110,7 @@ def _labels(said: dict[tuple[str, str], Any], count: int) -> list[str]:
 def _parameters(data: bytes) -> tuple[_Machine, dict[tuple[str, str], Any]]:
     """Lists of text or numbers by group and name."""
     at = (data[0] - 1) * _BLOCK
+    data = data[: at + _MOST_BLOCKS * _BLOCK]
     processor = data[at + 3]
     machine = _Machine(_ORDERS[processor], processor == _DEC)
     groups: dict[int, str] = {}
@@ -120,20 +123,23 @@ def _parameters(data: bytes) -> tuple[_Machine, dict[tuple[str, str], Any]]:
         name = data[at + 2 : at + 2 + abs(length)].decode("latin-1").strip().upper()
         at += 2 + abs(length)
         (step,) = machine.words(data[at : at + 2])
+        end = at + int(step)
+        if step < 0:
+            raise ValueError("a parameter points back to an earlier one")
         if group < 0:
             groups[-group] = name
         else:
-            found.append((group, name, _value(data, at + 2, machine)))
+            found.append((group, name, _value(data[: end if step else None], at + 2, machine)))
         if step == 0:
             break
-        at += int(step)
+        at = end
     return machine, {(groups[group], name): value for group, name, value in found if group in groups}
 
 
 def _value(data: bytes, at: int, machine: _Machine) -> list[Any]:
     kind, dimensions = struct.unpack_from("bB", data, at)
     shape = list(data[at + 2 : at + 2 + dimensions])
-    begin, count = at + 2 + dimensions, int(np.prod(shape, dtype=int))
+    begin, count = at + 2 + dimensions, math.prod(shape)
     body = data[begin : begin + count * abs(kind)]
     if len(body) < count * abs(kind):
         raise ValueError("a parameter ends beyond the file")

@@ -13,6 +13,7 @@ from ..timeseries import Array
 from .cells import Row, number, refuse
 
 _NAME = re.compile(r"(%time)|(?:time|timestamp)[\s_]*[(\[]?\s*(s|sec|seconds|ms|us|ns)?\s*[)\]]?", re.IGNORECASE)
+_LONGEST = 40  # characters: blanks of a longer one would be matched in ever more ways
 _PER_SECOND = {"ms": 10**3, "us": 10**6, "ns": 10**9}
 _LATEST = 1e11  # s: later than any clock that counts seconds
 
@@ -20,7 +21,7 @@ _LATEST = 1e11  # s: later than any clock that counts seconds
 def unit(name: str) -> str | None:
     """ "s", "ms", "us" or "ns", of a column called `time`, `time_ns`, `Time (s)`, `timestamp_ms` or so; None where
     the name is not that of a time. ROS's `%time` is in ns."""
-    match = _NAME.fullmatch(name)
+    match = _NAME.fullmatch(name) if len(name) <= _LONGEST else None
     if match is None:
         return None
     told = "ns" if match[1] else (match[2] or "s").lower()

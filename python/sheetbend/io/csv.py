@@ -28,6 +28,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..door import check_room
 from ..errors import RecordingError
 from ..recording import Recording
 from ..timeseries import Array
@@ -44,7 +45,8 @@ def read(path: Path) -> Recording:
     """Read any of the layouts.
 
     Raises:
-        RecordingError: the file is no text, has no header or no rows, or a line is wrong (which is named).
+        RecordingError: the file is no text, has no header or no rows, a line is wrong (which is named), or rows of many
+            markers at many times would make a table larger than `door.check_room` allows.
     """
     text = lines(path)
     for system in (motive, vicon):
@@ -115,6 +117,8 @@ def _read_long(path: Path, header: list[str], rows: list[Row], times: Array) -> 
     markers = list(dict.fromkeys(cells[column["marker"]] for _, cells in rows))
     marker_of = {marker: i for i, marker in enumerate(markers)}
 
+    room = 24 * len(frames) * len(markers)
+    check_room(path, f"positions of {len(frames)} frames and {len(markers)} markers", room)
     positions = np.full((len(frames), len(markers), 3), np.nan)
     first_line: dict[tuple[int, str], int] = {}
     for (line, cells), frame in zip(rows, frame_of.tolist(), strict=True):

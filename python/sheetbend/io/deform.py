@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..door import check_room
 from ..errors import RecordingError
 from ..recording import Recording
 from . import plain_pickle
@@ -68,4 +69,6 @@ def _stacked(path: Path, frames: list[NDArray[Any]]) -> NDArray[Any]:
         if frame.shape != frames[0].shape:
             fix = f"give every frame the markers of the first, {frames[0].shape[1]}, with NaN where one was not seen"
             raise RecordingError(f"{path}: frame {i}", "has another number of markers", frame.shape[1], fix)
+    room = 8 * len(frames) * frames[0].size
+    check_room(path, f"{len(frames)} frames of {frames[0].shape[1]} markers", room)
     return np.stack(frames).transpose(0, 2, 1)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..door import check_room
 from ..errors import MeshError, RecordingError
 from ..recording import Recording
 from . import sidecar
@@ -37,7 +38,12 @@ def read(path: Path) -> Recording:
         fix = f'write {{"rate": 25, "units": "m"}} with the frames per second into {path.with_suffix(".json").name}'
         raise RecordingError(str(path.with_suffix(".json")), "does not say the rate", "no rate", fix)
     frames: list[np.ndarray] = []
+    in_files = sum(file.stat().st_size for file in files)
     for file in files:
+        if frames:
+            check_room(
+                path, f"{len(files)} frames of {len(frames[0])} vertices", len(files) * frames[0].nbytes, in_files
+            )
         try:
             frames.append(vertices_of(file))
         except MeshError as error:

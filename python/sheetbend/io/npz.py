@@ -4,30 +4,39 @@
     times      (frames,)             s, strictly increasing
     clamped    (driven,)             optional: indices of the markers whose motion is given
 
-Further arrays are allowed and not read.
+Further arrays are allowed and not read. A few bytes of an archive can unpack to gigabytes: sizes are checked
+before anything is unpacked (`door.check_room`), against what the archive says and against what its arrays say.
 """
 
 from __future__ import annotations
 
+import math
 import zipfile
 import zlib
+from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.lib import format as npy
 
+from ..door import check_room
 from ..errors import RecordingError
 from ..recording import Recording
 
 _REQUIRED = ("positions", "times")
-# What NumPy and zipfile raise on damaged archives, and NumPy on arrays that only pickle could read.
+# What zipfile and NumPy raise on damaged archives and headers; what else they may is told by `reading`.
 _DAMAGE = (OSError, EOFError, ValueError, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error)
+_PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # as NumPy does; others take memory as the file says
+_HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
 
 def read(path: Path) -> Recording:
     """Read an archive.
 
     Raises:
-        RecordingError: it is no NPZ archive, is damaged, lacks a key, or an array is not plain numbers.
+        RecordingError: it is no NPZ archive, is damaged, lacks a key, holds more than `door.check_room` allows, or
+            an array is not plain numbers.
     """
     arrays = _arrays(path)
     return Recording(
@@ -45,26 +54,55 @@ def write(recording: Recording, path: Path) -> None:
 
 
 def _arrays(path: Path) -> dict[str, np.ndarray]:
+    with path.open("rb") as file:
+        if file.read(len(npy.MAGIC_PREFIX)) == npy.MAGIC_PREFIX:
+            fix = "write the arrays by name with numpy.savez(path, positions=..., times=...)"
+            raise RecordingError(str(path), "is a single array (NPY), not an NPZ archive", path.name, fix)
     try:
-        archive = np.load(path, allow_pickle=False)
+        archive = zipfile.ZipFile(path)
     except _DAMAGE as error:
         fix = "write it with numpy.savez or Recording.save"
         raise RecordingError(str(path), "is no NPZ archive, or a damaged one", str(error), fix) from error
-    if not isinstance(archive, np.lib.npyio.NpzFile):
-        fix = "write the arrays by name with numpy.savez(path, positions=..., times=...)"
-        raise RecordingError(str(path), "is a single array (NPY), not an NPZ archive", archive.shape, fix)
     with archive:
-        missing = [key for key in _REQUIRED if key not in archive.files]
+        members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
+        missing = [key for key in _REQUIRED if key not in members]
         if missing:
             fix = "store positions (frames, markers, 3) and times (frames,) under these names"
-            raise RecordingError(str(path), f"lacks {' and '.join(missing)}", sorted(archive.files), fix)
-        wanted = [key for key in (*_REQUIRED, "clamped") if key in archive.files]
-        return {key: _array(archive, key, path) for key in wanted}
+            raise RecordingError(str(path), f"lacks {' and '.join(missing)}", sorted(members), fix)
+        wanted = {key: members[key] for key in (*_REQUIRED, "clamped") if key in members}
+        unpacked = sum(info.file_size for info in wanted.values())
+        check_room(path, f"arrays that unpack to {unpacked} bytes", unpacked)
+        return {key: _array(archive, info, path, key) for key, info in wanted.items()}
 
 
-def _array(archive: np.lib.npyio.NpzFile, key: str, path: Path) -> np.ndarray:
+def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path, key: str) -> np.ndarray:
     try:
-        return archive[key]
+        if info.compress_type not in _PACKED:
+            raise ValueError(f"packed by method {info.compress_type}, not by deflate")
+        with archive.open(info) as member:
+            content = member.read(info.file_size + 1)  # checked; zipfile gives no more, and compares the checksum
+        return _unpacked(content)
     except _DAMAGE as error:
         fix = "store plain numeric arrays, and copy or export the file again if it is damaged"
         raise RecordingError(f"{path}: {key}", "cannot be read", str(error), fix) from error
+
+
+def _unpacked(content: bytes) -> np.ndarray:
+    """The array of an NPY file, whose header may say no more than there is."""
+    stream = BytesIO(content)
+    version = npy.read_magic(stream)
+    if version not in _HEADERS:
+        raise ValueError(f"version {version} of NPY, which is not for plain arrays")
+    shape, by_columns, dtype = _HEADERS[version](stream)
+    if dtype.hasobject:
+        raise ValueError("an array of Python objects")
+    _check_shape(shape, dtype, len(content) - stream.tell())
+    if 0 in shape or dtype.itemsize == 0:
+        return np.zeros(shape, dtype)
+    flat: np.ndarray = np.frombuffer(content, dtype, offset=stream.tell())
+    return flat.reshape(shape, order="F" if by_columns else "C")
+
+
+def _check_shape(shape: tuple[int, ...], dtype: np.dtype[Any], size: int) -> None:
+    if any(n < 0 for n in shape) or math.prod(shape) * dtype.itemsize != size:
+        raise ValueError(f"an array of shape {shape}, {dtype}, from {size} bytes")

@@ -20,14 +20,19 @@ from typing import Any
 
 import numpy as np
 
+from ..door import note
 from ..errors import RecordingError
+from ..json_file import check_depth, json_content
+from ..names import checked_name
 from ..recording import UNNAMED, Recording
 from ..recording_checks import checked_markers, default_markers, marker_indices
 from ..timeseries import Array
+from ..whole import write_text
 
 METERS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 _RESERVED = ("units", "name", "markers", "clamped", "gravity", "arrays")
 _SAME_FRAME = 1e-6  # frame intervals
+_FASTEST = 1e15  # Hz: beyond it times of frames coincide
 
 
 def apply(recording: Recording, path: Path, units: str | None, assumed: tuple[str, ...] = ()) -> Recording:
@@ -51,7 +56,7 @@ def apply(recording: Recording, path: Path, units: str | None, assumed: tuple[st
         times=_times(recording, said) if "times" in assumed else recording.times,
         markers=markers,
         clamped=_clamped(recording, said, markers, "clamped" in assumed),
-        name=said.get("name", path.stem),
+        name=_name(path, said),
         gravity=said.get("gravity", recording.gravity),
         metadata={k: v for k, v in recording.metadata.items() if k != "units"} | _metadata(said, _reserved(assumed)),
     )
@@ -80,10 +85,11 @@ def write(recording: Recording, path: Path, assumed: tuple[str, ...] = ()) -> No
     }
     try:
         text = json.dumps(content, indent=1, ensure_ascii=False)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, RecursionError) as error:
         fix = "keep plain numbers, text, lists and dicts in metadata"
         raise RecordingError("metadata", "cannot be written as JSON", str(error), fix) from error
-    path.with_suffix(".json").write_text(text + "\n", encoding="utf-8")
+    check_depth(path.with_suffix(".json"), content, RecordingError)
+    write_text(path.with_suffix(".json"), text + "\n")
 
 
 def _reserved(assumed: tuple[str, ...]) -> tuple[str, ...]:
@@ -97,17 +103,25 @@ def beside(path: Path) -> dict[str, Any]:
         RecordingError: it is malformed.
     """
     path = path.with_suffix(".json")
+    note(path)
     if not path.is_file():
         return {}
-    try:
-        content = json.loads(path.read_text(encoding="utf-8-sig"))
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        fix = "mend it, or move it away"
-        raise RecordingError(str(path), "is malformed JSON", str(error), fix) from error
+    content = json_content(path, RecordingError)
     if not isinstance(content, dict):
         fix = 'write {"units": "m", ...}'
         raise RecordingError(str(path), "must be a JSON object", type(content).__name__, fix)
     return content
+
+
+def _name(path: Path, beside: dict[str, Any]) -> str:
+    """That of the JSON, else the file's stem."""
+    if "name" in beside:
+        return checked_name(f"{path.with_suffix('.json')}: name", beside["name"])
+    try:
+        return checked_name(str(path), path.stem)
+    except RecordingError as error:
+        fix = f'{error.fix}: rename the file, or write {{"name": "..."}} into {path.with_suffix(".json").name}'
+        raise RecordingError(str(path), f"has a name that {error.problem}", path.stem, fix) from None
 
 
 def _units(in_file: str | None, given: str | None, beside: dict[str, Any]) -> Any:
@@ -132,7 +146,7 @@ def _times(recording: Recording, beside: dict[str, Any]) -> Array:
     if "rate" not in beside:
         return recording.times
     rate = beside["rate"]
-    if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0 < rate < np.inf:
+    if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0 < rate < _FASTEST:
         raise RecordingError("rate", "must be a positive number", rate, "give the frames per second in Hz")
     return np.arange(len(recording.times)) / rate
 

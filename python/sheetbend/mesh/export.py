@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..checks import finite
 from ..errors import MeshError
+from ..whole import write_text, written
 from .triangle_mesh import TriangleMesh
 
 Array = NDArray[np.float64]
@@ -26,7 +27,7 @@ def write_obj(path: str | Path, mesh: TriangleMesh, positions: ArrayLike | None 
     """
     x = _positions(mesh, positions, ())
     _check_folder(Path(path).parent)
-    Path(path).write_text(_vertex_lines(x) + _texture_and_faces(mesh))
+    write_text(path, _vertex_lines(x) + _texture_and_faces(mesh))
 
 
 def write_obj_sequence(folder: str | Path, mesh: TriangleMesh, positions: ArrayLike) -> list[Path]:
@@ -45,7 +46,7 @@ def write_obj_sequence(folder: str | Path, mesh: TriangleMesh, positions: ArrayL
     files = _frame_files(Path(folder), len(x), ".obj")
     tail = _texture_and_faces(mesh)
     for path, frame in zip(files, x, strict=True):
-        path.write_text(_vertex_lines(frame) + tail)
+        write_text(path, _vertex_lines(frame) + tail)
     return files
 
 
@@ -96,7 +97,8 @@ def write_ply(
         "end_header",
     ]
     _check_folder(Path(path).parent)
-    Path(path).write_bytes("\n".join([*header, ""]).encode("ascii") + vertices.tobytes() + faces.tobytes())
+    with written(path) as beside:
+        beside.write_bytes("\n".join([*header, ""]).encode("ascii") + vertices.tobytes() + faces.tobytes())
 
 
 def write_ply_sequence(
@@ -137,9 +139,14 @@ def write_ply_sequence(
     return files
 
 
+def frame_files(folder: Path, count: int, suffix: str) -> list[Path]:
+    """The paths of a sequence in a folder, in order."""
+    return [folder / f"frame_{frame:05d}{suffix}" for frame in range(count)]
+
+
 def _frame_files(folder: Path, count: int, suffix: str) -> list[Path]:
     """The paths of a sequence in a folder, which is made if it is missing."""
-    files = [folder / f"frame_{frame:05d}{suffix}" for frame in range(count)]
+    files = frame_files(folder, count, suffix)
     others = sorted(set(folder.glob(f"frame_*{suffix}")) - set(files))
     if others:
         raise MeshError("folder", "holds frames of another sequence", str(others[0]), "empty it or take another one")

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import logging
+import re
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..checks import finite
+from ..door import note, reading
 from ..errors import MeshError
 from ..io.sidecar import METERS
 from ..optional import require
@@ -22,7 +28,7 @@ Array = NDArray[np.float64]
 # How trimesh keeps the order of the file's vertices, and how it splits them where texture coordinates differ.
 _FORMATS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     ".obj": ({"maintain_order": True, "skip_materials": True}, {"skip_materials": True}),
-    ".ply": ({"fix_texture": False}, {"fix_texture": True}),
+    ".ply": ({"fix_texture": False, "skip_materials": True}, {"fix_texture": True, "skip_materials": True}),
     ".stl": ({}, {}),
 }
 _SMALLEST, _LARGEST = 2e-3, 20.0  # m: sizes of fabrics, and of balls and sleeves made of them
@@ -60,7 +66,18 @@ def read_mesh(
             no surface.
         MissingExtraError: trimesh is not installed.
     """
-    path = Path(path)
+    with reading(path, MeshError):
+        return _mesh(Path(path), material, unit, texture_size, warp, merge)
+
+
+def _mesh(
+    path: Path,
+    material: str | ArrayLike | None,
+    unit: str,
+    texture_size: float | ArrayLike,
+    warp: ArrayLike,
+    merge: bool,
+) -> TriangleMesh:
     if unit not in METERS:
         raise MeshError("unit", "is unknown", unit, f"use one of {', '.join(METERS)}")
     vertices, triangles, texture = _read(path)
@@ -72,7 +89,7 @@ def read_mesh(
         triangles, texture = triangles[whole], None if texture is None else texture[whole]
         said.append(f"{(~whole).sum()} triangles that name a vertex twice are left out.")
     for doubt in filter(None, said):
-        warnings.warn(f"{path.name}: {doubt}", stacklevel=2)
+        warnings.warn(f"{path.name}: {doubt}", stacklevel=3)
     triangles = checked_triangles(triangles, len(vertices))
     if isinstance(material, str) and material not in ("texture", "unfold"):
         raise MeshError("material", "is unknown", material, "use 'texture', 'unfold' or an array")
@@ -84,13 +101,13 @@ def read_mesh(
         coordinates = _scaled_texture(path, vertices[triangles], texture, texture_size)
         distorted = _distortion(vertices[triangles], coordinates)
         if distorted:
-            warnings.warn(f"{path.name}: {distorted}", stacklevel=2)
+            warnings.warn(f"{path.name}: {distorted}", stacklevel=3)
     else:
         refuse_broken(triangles, len(vertices))
         coordinates = unfold(vertices, triangles, warp)
     mesh = TriangleMesh(vertices, triangles, _per_vertex(coordinates, triangles, len(vertices)))
     for doubt in mesh.doubts:
-        warnings.warn(f"{path.name}: {doubt}", stacklevel=2)
+        warnings.warn(f"{path.name}: {doubt}", stacklevel=3)
     return mesh
 
 
@@ -129,10 +146,15 @@ def _read(path: Path) -> tuple[Array, NDArray[np.int64], Array | None]:
 
 def _load(path: Path, options: dict[str, Any]) -> Any:
     trimesh = require("trimesh", "mesh")
+    note(path)
     try:
-        with warnings.catch_warnings():
+        content = path.read_bytes()
+        if path.suffix.lower() == ".obj":
+            _check_corners(content)
+        with warnings.catch_warnings(), _quiet():
             warnings.simplefilter("ignore", RuntimeWarning)  # of arithmetic on what a file leaves out
-            mesh = trimesh.load_mesh(str(path), process=False, **options)
+            file = BytesIO(content)  # so that the library opens no other file, which this one may name
+            mesh = trimesh.load_mesh(file, file_type=path.suffix.lower()[1:], process=False, **options)
     except Exception as problem:  # whatever a damaged file makes the library raise
         raise MeshError(
             str(path), f"cannot be read ({problem})", type(problem).__name__, "export it again"
@@ -140,6 +162,28 @@ def _load(path: Path, options: dict[str, Any]) -> Any:
     if len(mesh.faces) == 0:
         raise MeshError(str(path), "has no triangles", f"{len(mesh.vertices)} vertices", "export it with its faces")
     return mesh
+
+
+def _check_corners(content: bytes) -> None:
+    """Refuse faces of an OBJ whose corners are not among the vertices: the library makes tables up to their numbers."""
+    size = len(content)
+    for face in re.finditer(rb"(?m)^[ \t]*f[^\n]*?[0-9]{%d}[^\n]*" % len(str(size)), content):
+        largest = max(re.findall(rb"[0-9]+", face[0]), key=len)
+        if len(largest) > len(str(size)) or int(largest) > size:
+            raise ValueError("a face names a vertex that is not there")
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Without what the library logs of damaged files; their errors are told."""
+    log, silent = logging.getLogger("trimesh"), logging.NullHandler()
+    before, log.propagate = log.propagate, False  # its parts log under names of their own
+    log.addHandler(silent)
+    try:
+        yield
+    finally:
+        log.removeHandler(silent)
+        log.propagate = before
 
 
 def _merged(vertices: Array, triangles: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:

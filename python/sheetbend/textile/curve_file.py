@@ -9,7 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ..door import reading
 from ..errors import InputError, RecordingError
+from ..names import checked_name
 from ..timeseries import Array
 from .curve import TESTS, Curve
 from .table_columns import Choice, Column, find_columns, in_order, needed_columns
@@ -21,6 +23,9 @@ _DIMENSIONS = {
     "shear": (("length", "angle"), ("force", "force per width")),
     "bending": (("curvature",), ("moment", "moment per width")),
 }
+
+_SIZE = re.compile(r"\W*([^\W\d]*)\W*?([\d.,]+)\W*([^\W\d]*)\W*")
+_LONGEST = 60  # characters behind the words: more would be matched in ever more ways
 
 
 def read_curves(
@@ -59,11 +64,19 @@ def read_curves(
     """
     if test not in TESTS:
         raise InputError("test", "is unknown", test, f"use one of {', '.join(TESTS)}")
-    path, choice = Path(path), Choice(dict(columns or {}), dict(units or {}))
+    choice = Choice(dict(columns or {}), dict(units or {}))
+    with reading(path):
+        return _curves(Path(path), test, length, width, choice, decimal)
+
+
+def _curves(
+    path: Path, test: str, length: float | str | None, width: float | str | None, choice: Choice, decimal: str | None
+) -> tuple[Curve, ...]:
     tables = read_tables(path, decimal)
     at, across = _size(path, tables, "length", length), _size(path, tables, "width", width)
     found = [arrays for table in tables for arrays in _repeats(table, test, choice, at, across)]
-    names = [path.stem] if len(found) == 1 else [f"{path.stem} {k}" for k in range(1, len(found) + 1)]
+    name = checked_name(str(path), path.stem)
+    names = [name] if len(found) == 1 else [f"{name} {k}" for k in range(1, len(found) + 1)]
     return tuple(Curve(name, test, *arrays, at, across) for name, arrays in zip(names, found, strict=True))
 
 
@@ -81,7 +94,8 @@ def _told(path: Path, tables: Sequence[TextTable], field: str, words: str) -> fl
             text = " ".join(cells)
             if not text.lower().startswith(words.lower()):
                 continue
-            match = re.fullmatch(r"\W*([^\W\d]*)\W*?([\d.,]+)\W*([^\W\d]*)\W*", text[len(words) :])
+            behind = text[len(words) :]
+            match = _SIZE.fullmatch(behind) if len(behind) <= _LONGEST else None
             told = [u for u in (unit(match[1]), unit(match[3])) if u and u.dimension == "length"] if match else []
             if match is None or not told:
                 raise RecordingError(

@@ -12,7 +12,7 @@ from ..equilibrium import NoEquilibriumError
 from ..errors import InputError
 from ..fabric import Fabric, Spline, Stiffening
 from ..gauge import null_space
-from ..identifiability import known, open_estimate
+from ..intervals import known, open_estimate
 from ..optional import require
 from ..parameters import Parameter, Parameters
 from ..result import Estimate

@@ -17,13 +17,21 @@ from typing import NoReturn
 
 import numpy as np
 
+from ..door import bounded_bytes
 from ..errors import InputError, RecordingError
 from .units import unit
 
+LARGEST = 2**25
+"""Bytes of a file."""
 _DELIMITERS = (";", "\t", ",", None)  # None: blanks
 _NUMBER = {mark: re.compile(rf"[-+]?(\d+{mark}?\d*|{mark}\d+)([eE][-+]?\d+)?") for mark in (r"\.", ",")}
 _GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}([.,'\u2019 \u00a0\u202f])\d{3}(?:\1\d{3})*(?:([.,])\d+)?")
 _MISSING = ("nan", "inf", "na", "n/a", "null", "none")
+MOST_LINES = 500_000
+"""Of a file."""
+MOST_COLUMNS = 1000
+"""Of a table."""
+_LONGEST = 100  # characters of a column's name: longer ones would be matched in ever more ways
 _HINT = "correct that cell, or leave out the line"
 
 Line = tuple[int, list[str]]  # number in the file, from 1, and stripped cells
@@ -79,12 +87,18 @@ def read_tables(path: Path, decimal: str | None = None) -> list[TextTable]:
     """
     if decimal not in (None, ".", ","):
         raise InputError("decimal", "must be a decimal mark", decimal, "give '.' or ','")
-    lines = [(n, line) for n, line in enumerate(_text(path).splitlines(), start=1) if line.strip()]
-    split = {d: [(n, _cells(line, d)) for n, line in lines] for d in _DELIMITERS}
+    text = _text(path)
+    lines = [(n, line) for n, line in enumerate(text.splitlines(), start=1) if line.strip()]
+    if len(lines) > MOST_LINES:
+        fix = "cut it into pieces, or export fewer points per second"
+        raise RecordingError(str(path), f"has more than {MOST_LINES:,} lines", len(lines), fix)
+    split = {d: [(n, _cells(line, d)) for n, line in lines] for d in _DELIMITERS if d is None or d in text}
     if decimal is not None:
-        split = {d: [(n, [_ungrouped(c, decimal, True) for c in cells]) for n, cells in split[d]] for d in _DELIMITERS}
+        split = {
+            d: [(n, [_ungrouped(c, decimal, True) for c in cells]) for n, cells in own] for d, own in split.items()
+        }
     marks = (".", ",") if decimal is None else (decimal,)
-    fitting = {(d, m): sum(_is_row(cells, m) for _, cells in split[d]) for d in _DELIMITERS for m in marks}
+    fitting = {(d, m): sum(_is_row(cells, m) for _, cells in split[d]) for d in split for m in marks}
     delimiter, mark = max(fitting, key=fitting.__getitem__)
     if not fitting[delimiter, mark]:
         fix = "export the columns as text, or tell the decimal mark by decimal="
@@ -95,7 +109,7 @@ def read_tables(path: Path, decimal: str | None = None) -> list[TextTable]:
 def _text(path: Path) -> str:
     if not path.is_file():
         raise RecordingError("path", "is no file", str(path), "check the path")
-    data = path.read_bytes()
+    data = bounded_bytes(path, LARGEST)
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return data.decode("utf-16", errors="replace")
     try:
@@ -107,7 +121,8 @@ def _text(path: Path) -> str:
 def _cells(line: str, delimiter: str | None) -> list[str]:
     if delimiter is None:
         return line.split()
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])]
+    cells = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
+    return [cell.strip() for cell in cells] or [""]
 
 
 def _number(cell: str, mark: str) -> float | None:
@@ -169,12 +184,17 @@ def _first(cells: Sequence[str]) -> str:
 def _table(
     path: Path, above: list[Line], rows: list[Line], mark: str, delimiter: str | None, before: TextTable | None
 ) -> TextTable:
-    while all(not cells[-1] for _, cells in rows):  # a delimiter that ends every line
-        rows = [(line, cells[:-1]) for line, cells in rows]
-        above = [(line, cells[:-1] if not cells[-1] else cells) for line, cells in above]
+    empty = min(_empty_at_end(cells) for _, cells in rows)  # delimiters that end every line
+    rows = [(line, cells[: len(cells) - empty]) for line, cells in rows]
+    above = [(line, cells[: len(cells) - min(empty, _empty_at_end(cells))]) for line, cells in above]
     width = len(rows[0][1])
-    while above and len(above[-1][1]) == width and _starts_with_number(above[-1][1]):
-        rows.insert(0, above.pop())  # a first row that is wrong
+    if width > MOST_COLUMNS:
+        fix = "export fewer columns, or check the delimiter"
+        raise RecordingError(f"{path}, line {rows[0][0]}", f"has more than {MOST_COLUMNS} columns", width, fix)
+    first = len(above)
+    while first and len(above[first - 1][1]) == width and _starts_with_number(above[first - 1][1]):
+        first -= 1  # a first row that is wrong
+    above, rows = above[:first], above[first:] + rows
     header = next((k for k in range(len(above) - 1, -1, -1)[:2] if _is_header(above[k][1], width)), None)
     if header is None:
         if above and delimiter == "," and width == 2 * len(above[-1][1]):
@@ -203,14 +223,21 @@ def _table(
     return TextTable(path, mark, tuple(above[:header]), *columns, line, tuple(rows))
 
 
+def _empty_at_end(cells: Sequence[str]) -> int:
+    return next((k for k, cell in enumerate(reversed(cells)) if cell), len(cells))
+
+
 def _is_header(cells: Sequence[str], width: int) -> bool:
     return len(cells) == width and any(cells) and all(_number(c, m) is None for c in cells for m in (".", ","))
 
 
 def _with_unit(name: str) -> tuple[str, str]:
     """A header's name and unit: "Load (N)", "Kraft [cN]", "Weg in mm", "F / N", "force_N"."""
-    bracket = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", name)
+    if len(name) > _LONGEST:
+        return name, ""
+    bare = " ".join(name.split())  # so that blanks are matched in one way
+    bracket = re.fullmatch(r"(.*?) ?[\[(]([^\])]*)[\])]", bare)
     if bracket:
         return bracket[1], bracket[2].strip()
-    loose = re.fullmatch(r"(.*?)(?:\s+in\s+|\s*/\s*|\s*,\s*|\s+|_)([^\s_]+)", name)
+    loose = re.fullmatch(r"(.*?)(?: in | ?/ ?| ?, ?| |_)([^\s_]+)", bare)
     return (loose[1], loose[2]) if loose and not loose[2].isdigit() and unit(loose[2]) else (name, "")

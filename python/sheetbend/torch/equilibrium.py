@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple, NoReturn, cast
 
 import numpy as np
@@ -17,7 +17,6 @@ from ..scene import Scene
 from ..simulate import forces_by_group, pressures_by_volume
 from .function import respond
 from .inputs import InputMap
-from .rollouts import expect_finite
 
 Array = np.ndarray
 
@@ -40,12 +39,15 @@ class Equilibria:
     """Coordinates and multipliers (B, dofs + rows + volumes) of the equilibria for inputs (B, total), spread over
     threads."""
 
-    def __init__(self, scene: Scene, start: Array | None, stable: bool, threads: int) -> None:
+    def __init__(
+        self, scene: Scene, start: Array | None, stable: bool, threads: int, replaced: Collection[str]
+    ) -> None:
         self._scene, self._start, self._stable, self._threads = scene, start, stable, threads
+        self._replaced = replaced
         self._kept: tuple[Array, list[_core.EquilibriumSolution]] | None = None
 
     def value(self, inputs: Array) -> Array:
-        """Raises InputError where inputs are not finite, NoEquilibriumError."""
+        """Raises InputError where inputs are not finite or negative without sense, NoEquilibriumError."""
         return np.stack([np.concatenate([s.positions, s.multipliers]) for s in self._solutions(inputs)])
 
     def vjp(self, inputs: Array, states_bar: Array) -> Array:
@@ -65,7 +67,7 @@ class Equilibria:
         kept = self._kept
         if kept is not None and np.array_equal(kept[0], inputs):
             return kept[1]
-        expect_finite(self._scene, inputs)
+        self._scene.compiled.domain.check_inputs(inputs, replaced=self._replaced)
         # jacrev and jacfwd repeat one scene once per row or column.
         rows, scene_of = np.unique(inputs, axis=0, return_inverse=True)
         distinct = _core.equilibria(self._scene.compiled.core, rows, self._start, self._stable, self._threads)
@@ -100,13 +102,15 @@ def equilibrium(
 
     Raises:
         SceneError: the start has the wrong shape.
-        InputError: a tensor with an unknown name, of the wrong shape or dtype, on another device, or not finite.
+        InputError: a tensor with an unknown name, of the wrong shape or dtype, on another device, not finite, or with a
+            negative stiffness, mass or length; the message names the quantity and the scene of the batch.
         NoEquilibriumError: not converged; says how far it came and what to try.
     """
     x = None if start is None else finite("start", start, (scene.particle_count, 3), SceneError).ravel()
     flat = InputMap(scene)(values or {}, inputs or {})
     batch, dofs = flat.shape[:-1], scene.compiled.core.dofs
-    states = respond(Equilibria(scene, x, stable, threads), flat.reshape(-1, flat.shape[-1])).reshape(*batch, -1)
+    equilibria = Equilibria(scene, x, stable, threads, tuple(inputs or ()))
+    states = respond(equilibria, flat.reshape(-1, flat.shape[-1])).reshape(*batch, -1)
     multipliers: Any = states[..., dofs:]  # slices and reshapes only, so tensors pass
     forces, pressures = forces_by_group(scene, multipliers), pressures_by_volume(scene, multipliers)
     return Equilibrium(states[..., :dofs].reshape(*batch, -1, 3), cast(Any, forces), cast(Any, pressures))

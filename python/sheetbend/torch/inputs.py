@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
+from torch.autograd import Function
 
 from ..errors import InputError
 from ..quantities import FUNCTIONS
@@ -21,11 +23,13 @@ _TORCH: Mapping[str, Callable[[Tensor], Tensor]] = {
     "cos": torch.cos,
     "sqrt": torch.sqrt,
     "inverse_sqrt": torch.rsqrt,
+    "exp": torch.exp,
 }
 
 
 class ParameterMap:
-    """inputs[target] = base[target] + sum of coefficient * prod f(theta), in the order of adjoint/parameter_map.h.
+    """inputs[target] = base[target] + sum of coefficient * prod f(weight * theta), in the order of
+    adjoint/parameter_map.h; only exponentials have weights other than one.
 
     Plain torch operations, so every transform differentiates and batches it by itself.
     """
@@ -36,14 +40,15 @@ class ParameterMap:
         self._target = torch.tensor(arrays["target"], dtype=torch.long)
         self._coefficient = torch.tensor(arrays["coefficient"], dtype=torch.float64)
         # Each quantity under each function is computed once; terms pick factors from these, ones fill up short terms.
-        each = np.stack([arrays["function"], arrays["parameter"]], 1).astype(np.int64).reshape(-1, 2)
-        pairs, place = np.unique(each, axis=0, return_inverse=True)
+        each = np.stack([arrays["function"], arrays["parameter"], arrays["weight"]], 1).astype(float).reshape(-1, 3)
+        distinct, place = np.unique(each, axis=0, return_inverse=True)
+        own = {name: distinct[distinct[:, 0] == number] for name, number in FUNCTIONS.items()}
         self._groups = [
-            (_TORCH[name], torch.from_numpy(pairs[pairs[:, 0] == number, 1])) for name, number in FUNCTIONS.items()
+            (name, torch.tensor(rows[:, 1], dtype=torch.long), torch.tensor(rows[:, 2])) for name, rows in own.items()
         ]
         first = np.asarray(arrays["first_factor"])
         count = np.diff(first)
-        filled = np.full((len(count), int(count.max(initial=0))), len(pairs))
+        filled = np.full((len(count), int(count.max(initial=0))), len(distinct))
         for k in range(filled.shape[1]):
             filled[count > k, k] = place.ravel()[first[:-1][count > k] + k]
         self._factors = torch.from_numpy(filled)
@@ -51,7 +56,7 @@ class ParameterMap:
     def __call__(self, theta: Tensor) -> Tensor:
         """(..., quantities) to (..., total)."""
         batch = theta.shape[:-1]
-        functions = [f(theta.index_select(-1, which)) for f, which in self._groups]
+        functions = [_TORCH[name](weight * theta.index_select(-1, which)) for name, which, weight in self._groups]
         values = torch.cat([*functions, theta.new_ones(*batch, 1)], -1)
         product = self._coefficient
         for column in self._factors.unbind(1):
@@ -64,7 +69,8 @@ class InputMap:
 
     def __init__(self, scene: Scene) -> None:
         compiled = scene.compiled
-        self._names, self._layout = compiled.names, compiled.layout
+        self._names, self._layout, self._domain = compiled.names, compiled.layout, compiled.domain
+        self._without_effect = _without_effect(scene)
         self._shapes = {name: tuple(array.shape) for name, array in scene.base_arrays().items()}
         self._theta = torch.tensor(compiled.theta, dtype=torch.float64)
         self._map = ParameterMap(scene)
@@ -74,7 +80,7 @@ class InputMap:
 
         Raises:
             InputError: unknown name, not a tensor, not float64, not on the CPU, wrong shape, batches that do not
-                broadcast.
+                broadcast, arrays without effect in this scene, values outside the range of their quantity.
         """
         batches = {name: self._batch_of_value(name, value) for name, value in values.items()}
         batches |= {name: self._batch_of_array(name, array) for name, array in arrays.items()}
@@ -101,6 +107,8 @@ class InputMap:
         present = [n for n, (_, size) in self._layout.items() if size > 0]
         if name not in present:
             raise InputError(field, "is no input array of the scene", name, f"name one of: {', '.join(present)}")
+        if name in self._without_effect:
+            raise InputError(field, "has no effect on this scene", name, self._without_effect[name])
         shape, wanted = _dense(field, array), self._shapes[name]
         dims = len(shape) - len(wanted)
         if dims < 0 or shape[dims:] != wanted:
@@ -112,7 +120,47 @@ class InputMap:
         if not values:
             return self._theta.expand(*batch, -1)
         each = [values.get(name, default) for name, default in zip(self._names, self._theta, strict=True)]
-        return torch.stack([torch.as_tensor(v, dtype=torch.float64).expand(batch) for v in each], -1)
+        theta = torch.stack([torch.as_tensor(v, dtype=torch.float64).expand(batch) for v in each], -1)
+        rows = theta.reshape(-1, len(each))
+        out: Tensor = _Checked.apply(self._domain.check_quantities, rows)  # type: ignore[no-untyped-call]
+        return out.reshape(theta.shape)
+
+
+class _Checked(Function):
+    """(check, rows) -> rows, once `check` has seen their numbers; under every transform."""
+
+    @staticmethod
+    def forward(check: Callable[[np.ndarray], None], rows: Tensor) -> Tensor:
+        check(rows.detach().numpy())
+        return rows.clone()
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: Tensor) -> None:
+        pass
+
+    @staticmethod
+    def backward(ctx: Any, rows_bar: Tensor) -> tuple[None, Tensor]:
+        return None, rows_bar
+
+    @staticmethod
+    def jvp(ctx: Any, _: None, rows_dot: Tensor) -> Tensor:
+        return rows_dot.clone()
+
+    @staticmethod
+    def vmap(info: Any, in_dims: tuple[None, int], check: Any, rows: Tensor) -> tuple[Tensor, int]:
+        every = rows.movedim(in_dims[1], 0)
+        out: Tensor = _Checked.apply(check, every.flatten(0, 1))  # type: ignore[no-untyped-call]
+        return out.reshape(every.shape), 0
+
+
+def _without_effect(scene: Scene) -> dict[str, str]:
+    """The arrays that the scene has no use for, and what gives it one."""
+    found = {}
+    if not scene.has_drag:
+        found = dict.fromkeys(("drag_linear", "drag_quadratic"), "call scene.set_drag first (zero will do)")
+    if not any(g.damped for g in scene.groups):
+        found["damping"] = "add a group with damping (zero will do)"
+    return found
 
 
 def _dense(field: str, tensor: object) -> tuple[int, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,7 @@ class Rollouts:
         solver: its memory is the budget of a gradient.
         keep_tape: keep the tape of a single rollout for the `vjp` that will follow, which else records it again.
         lengths: (B,) how many of the steps each scene has; then it stands still, and those frames have no derivatives.
+        replaced: names of the input arrays that were given as they are, for messages.
     """
 
     def __init__(
@@ -38,14 +39,15 @@ class Rollouts:
         keep_tape: bool,
         solver: Solver,
         lengths: Array | None = None,
+        replaced: Collection[str] = (),
     ) -> None:
         self._scene, self._core, self._steps, self._keep_tape = scene, core, list(steps), keep_tape
-        self._solver, self._lengths = solver, lengths
+        self._solver, self._lengths, self._replaced = solver, lengths, replaced
         self._kept: tuple[Array, Any] | None = None
 
     def value(self, inputs: Array) -> Array:
-        """Positions. Raises InputError where inputs are not finite, DivergenceError."""
-        expect_finite(self._scene, inputs)
+        """Positions. Raises InputError where inputs are not finite or negative without sense, DivergenceError."""
+        self._scene.compiled.domain.check_inputs(inputs, replaced=self._replaced)
         lengths = self._lengths_of(inputs)
         out: Array
         with divergence(self._scene):
@@ -99,15 +101,3 @@ class Rollouts:
         with budget(self._solver):
             states, tape = self._core.record(inputs[0], self._steps, 0.0, self._solver.budget)
         return states, tape
-
-
-def expect_finite(scene: Scene, inputs: Array) -> None:
-    """Raises InputError that names the array and the scene of the batch where inputs (B, total) are not finite."""
-    bad = np.argwhere(~np.isfinite(inputs))
-    if len(bad) == 0:
-        return
-    row, column = bad[0].tolist()
-    array = next(name for name, (offset, size) in scene.compiled.layout.items() if offset <= column < offset + size)
-    where = f" in scene {row} of the batch" if len(inputs) > 1 else ""
-    fix = "check the values and arrays given; stiffness and density must be positive, as `SceneModule` keeps them"
-    raise InputError(array, f"is not finite{where}", float(inputs[row, column]), fix)

@@ -37,7 +37,7 @@ class Simulation:
         batch = flat.shape[:-1]
         keep_tape = torch.is_grad_enabled() and flat.requires_grad
         own = None if lengths is None else _checked(lengths, batch, len(self._steps))
-        rollouts = Rollouts(self.scene, self._core, self._steps, keep_tape, self.solver, own)
+        rollouts = Rollouts(self.scene, self._core, self._steps, keep_tape, self.solver, own, tuple(inputs or ()))
         states = respond(rollouts, flat.reshape(-1, flat.shape[-1]))
         return states.reshape(*batch, len(self._steps), -1, 3)
 
@@ -70,7 +70,8 @@ def simulate(
             parameters,), "boundary" (knots, driven, 3), "force" (knots, loaded, 3), "gravity" (3,), "drag_linear",
             "drag_quadratic" (particles,), "wind" (knots, 3), "air_normal", "air_tangential",
             "pressure" (triangles in air,), "volume", "volume_compliance" (volumes,).
-            Constraints and rest parameters come group after group, as added.
+            Constraints and rest parameters come group after group, as added. An array that this scene has no use for
+            is refused: drag where none was set, damping where no group is damped.
         lengths: (*batch,) how many of the frames each scene has, where recordings differ in length; all by default.
             After its last frame a scene stands still, and what a loss makes of those frames has no gradient. Scenes of
             like length share a vector, so short ones do not pay for long ones.
@@ -80,7 +81,8 @@ def simulate(
 
     Raises:
         InputError: times off the grid; lengths that fit neither batch nor frames; a budget below the least that works;
-            a tensor with an unknown name, of the wrong shape or dtype, on another device, or not finite.
+            a tensor with an unknown name, of the wrong shape or dtype, on another device, not finite, or with a
+            negative stiffness, mass or length; the message names the quantity and the scene of the batch.
         DivergenceError: a state became infinite; says when and where.
     """
     return Simulation(scene, times, solver)(values, inputs, lengths)

@@ -1,0 +1,206 @@
+"""What `fuzz.py` feeds to which reader: small files of every format, as tests write and experiments ship them."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import sheetbend as sb
+import test_c3d
+import test_config_cloth
+import test_motion_capture
+import test_written_files
+from mutations import json_tree, mutated, packed, toml_tree
+from sheetbend import config, result
+from sheetbend.cli.gripped import load_ropes
+from sheetbend.door import reading
+from sheetbend.names import flaw
+from sheetbend.textile import read_curves
+
+EXPERIMENTS = Path(__file__).resolve().parents[2] / "experiments"
+
+Files = dict[str, bytes]
+
+
+@dataclass(frozen=True)
+class Target:
+    """A reader, what is fed to it (the first file of each seed is mutated), and how."""
+
+    seeds: Callable[[Path], list[Files]]
+    read: Callable[[Path], object]
+    mutate: Callable[[random.Random, bytes, list[bytes]], bytes]
+
+
+# ---- seeds ----------------------------------------------------------------------------------------------
+
+
+def _saved(folder: Path, suffix: str) -> bytes:
+    recording = sb.Recording(
+        np.random.default_rng(1).normal(size=(4, 5, 3)), np.arange(4) / 100, ["a", "b", "c", "d", "e"], clamped=[0]
+    )
+    recording.save(folder / f"saved{suffix}")
+    return (folder / f"saved{suffix}").read_bytes()
+
+
+def _csv(folder: Path) -> list[Files]:
+    long = "time,marker,x,y,z\n" + "".join(f"{k // 3 / 100},m{k % 3},{k}.5,2,nan\n" for k in range(12))
+    stamps = "# a remark\n%time\ta.x\ta.y\ta.z\n1700000000000000001\t1\t2\t3\n1700000000010000001\t\t\t\n"
+    texts = [_saved(folder, ".csv"), long.encode(), stamps.encode()]
+    return [{"take.csv": text} for text in texts]
+
+
+def _mocap(folder: Path) -> list[Files]:
+    written = (
+        test_motion_capture.motive(folder / "take.csv"),
+        test_motion_capture.motive(folder / "code.csv", timecode=True),
+        test_motion_capture.vicon(folder),
+    )
+    return [{"take.csv": path.read_bytes()} for path in written]
+
+
+def _npz(folder: Path) -> list[Files]:
+    shipped = EXPERIMENTS / "wires" / "data" / "red_0.npz"
+    return [{"take.npz": _saved(folder, ".npz")}, {"take.npz": shipped.read_bytes()}]
+
+
+def _pickles(folder: Path) -> list[Files]:
+    frames = np.random.default_rng(1).normal(size=(4, 3, 5))
+    contents = (list(frames), frames, frames.tolist(), frames.transpose(2, 1, 0), [f.astype(">f4") for f in frames])
+    return [{"take.pkl": pickle.dumps(c, protocol=k)} for c in contents for k in range(6)]
+
+
+def _c3d(folder: Path) -> list[Files]:
+    kinds = [(kind, scale) for kind in (test_c3d.INTEL, test_c3d.DEC, test_c3d.MIPS) for scale in (-0.1, 0.1)]
+    return [{"take.c3d": test_c3d.written(folder, kind, scale).read_bytes()} for kind, scale in kinds]
+
+
+def _sidecar(folder: Path) -> list[Files]:
+    said = {
+        "units": "mm, s", "name": "swing 3", "markers": ["a", "b", "c", "d", "e"], "clamped": ["a", 1], "rate": 120,
+        "gravity": [0, 0, -9.81], "known": {"length": 0.3}, "attribution": "a laboratory", "arrays": {"x": [[4, 2, 3]]},
+    }  # fmt: skip
+    archive, rope = _saved(folder, ".npz"), _saved(folder, ".pkl")
+    shipped = (EXPERIMENTS / "beam" / "data" / "beam_gravity_b.json").read_bytes()
+    return [
+        {"take.json": json.dumps(said).encode(), "take.npz": archive},
+        {"take.json": json.dumps(said).encode(), "take.pkl": rope},
+        {"take.json": shipped, "take.pkl": rope},
+    ]
+
+
+def _toml(folder: Path) -> list[Files]:
+    scene = sb.rope(0.6, 4, density=0.05, EA=1e3, EI=1e-3)
+    motion = sb.simulate(scene, np.arange(6) / 100, sb.Solver(h=1 / 400))
+    sb.Recording(motion.positions, motion.times, name="swing").save(folder / "swing.npz")
+    sheet = sb.Recording(np.repeat(test_config_cloth.PLACED[None], 4, axis=0), np.arange(4) / 100, ["a", "b", "c"])
+    sheet.save(folder / "sheet.npz")
+    data = {name: (folder / name).read_bytes() for name in ("swing.npz", "sheet.npz", "sheet.json", "swing.json")}
+    texts = [test_written_files.ROPE, test_config_cloth.CLOTH]
+    for name in ("pendulum", "twin", "twin_cloth", "gripped_ropes", "wires", "beam"):
+        text = (EXPERIMENTS / name / f"{name}.toml").read_text()
+        texts.append(text.replace("data/", f"{EXPERIMENTS}/{name}/data/"))
+    return [{"my.toml": text.encode(), **data} for text in texts]
+
+
+def _fits(folder: Path) -> list[Files]:
+    estimate = result.Estimate(
+        name="EI", value=1e-3, unit="N m^2", lower=9e-4, upper=None, half_width=None, statistical=None,
+        discretization=0.0, verdict="one-sided", words="bounded",
+    )  # fmt: skip
+    found = result.FitResult(
+        estimates=(estimate,),
+        recordings=(result.RecordingFit(name="a", rows=9, rms=1e-3, held_out=2e-3, baseline=3e-3, motion=1e-2),),
+        given=(result.Given(name="EA", value=1.0, unit="N", words="fixed"),),
+        correlations=(result.Correlation(first="EI", second="EI", value=0.5),),
+        starts=(result.Start(cost=1.0, iterations=3, converged=True, values={"EI": 1e-3}),) * 2,
+        refits=(result.Refit(name="finer mesh", to_limit=4 / 3, moved={"EI": 1e-5}),),
+        gauges=("EI/EA is known",), warnings=("a warning",), cost=1.0, rows=9, optimizer="ceres", iterations=3,
+        seconds=0.1, converged=True,
+    )  # fmt: skip
+    return [{"fit.json": json.dumps(found.to_dict()).encode()}]
+
+
+def _meshes(folder: Path) -> list[Files]:
+    mesh = sb.mesh.grid(0.2, 0.2, 2, 2)
+    sb.mesh.write_obj(folder / "a.obj", mesh)
+    sb.mesh.write_ply(folder / "a.ply", mesh, face_fields={"strain": np.zeros(len(mesh.triangles))})
+    x, t = mesh.vertices.tolist(), mesh.triangles.tolist()
+    head = ["ply", "format ascii 1.0", "comment TextureFile a.png", "element vertex 9"]
+    head += [f"property float {axis}" for axis in "xyz"]
+    head += [f"element face {len(t)}", "property list uchar int vertex_indices", "end_header"]
+    rows = [f"{a} {b} {c}" for a, b, c in x] + [f"3 {a} {b} {c}" for a, b, c in t]
+    facets = []
+    for row in t:
+        corners = [f"vertex {a} {b} {c}" for a, b, c in (x[k] for k in row)]
+        facets += ["facet normal 0 0 1", "outer loop", *corners, "endloop", "endfacet"]
+    binary_stl = bytes(80) + len(t).to_bytes(4, "little")
+    for row in t:
+        binary_stl += np.array([[0, 0, 1], *(x[k] for k in row)], dtype="<f4").tobytes() + b"\0\0"
+    return [
+        {"a.obj": (folder / "a.obj").read_bytes()},
+        {"a.ply": (folder / "a.ply").read_bytes()},
+        {"a.ply": "\n".join([*head, *rows, ""]).encode()},
+        {"a.stl": "\n".join(["solid a", *facets, "endsolid a", ""]).encode()},
+        {"a.stl": binary_stl},
+    ]
+
+
+def _curves(folder: Path) -> list[Files]:
+    rows = "".join(f"{k / 10:.1f};{k * k / 7:.3f}\n" for k in range(9)).replace(".", ",")
+    semicolons = f"Width;50;mm\nWeg [mm];Kraft [N]\n{rows}"
+    rows = "".join(f"{k}\t{k / 9:.4f}\t{k / 5:.3f}\n" for k in range(9))
+    tabs = f"Gauge length\t20 cm\nTime (s)\tLoad (N)\tExtension (mm)\n{rows}"
+    repeats = "strain %, force_N, strain %, force_N\n" + "".join(f"{k},{k}.5,{k},{k}.25\n" for k in range(9))
+    latin = "Dehnung in %  Kraft/cN\n" + "".join(f"{k}  1'{k:03}.5\n" for k in range(9))
+    files = (semicolons.encode(), tabs.encode("utf-16"), repeats.encode(), latin.encode("cp1252"))
+    return [{"strip.csv": content} for content in files]
+
+
+# ---- readers --------------------------------------------------------------------------------------------
+
+
+def _recording(path: Path) -> None:
+    found = sb.Recording.load(path)
+    assert flaw(found.name) is None and np.isfinite(found.times).all()
+    found.summary()
+
+
+def _beside(path: Path) -> None:
+    _recording(next(p for p in path.parent.iterdir() if p.suffix in (".npz", ".pkl")))
+
+
+def _configuration(path: Path) -> None:
+    found = config.parse_any(path)
+    if isinstance(found, config.GrippedConfig):
+        with reading(path, sb.ConfigError):
+            load_ropes(found, path.parent)
+    elif config.load(path).experiments == ():
+        with reading(path, sb.ConfigError):
+            config.scene_alone(found, path.parent)
+
+
+def _fit(path: Path) -> None:
+    sb.FitResult.load(path).report()
+
+
+def _curve(path: Path) -> None:
+    read_curves(path, length=0.2, width="Width")
+
+
+TARGETS: dict[str, Target] = {
+    "csv": Target(_csv, _recording, mutated),
+    "mocap": Target(_mocap, _recording, mutated),
+    "npz": Target(_npz, _recording, packed),
+    "pickle": Target(_pickles, _recording, mutated),
+    "c3d": Target(_c3d, _recording, mutated),
+    "json": Target(_sidecar, _beside, json_tree),
+    "toml": Target(_toml, _configuration, toml_tree),
+    "fit": Target(_fits, _fit, json_tree),
+    "mesh": Target(_meshes, sb.read_mesh, mutated),
+    "curve": Target(_curves, _curve, mutated),
+}
