@@ -35,7 +35,6 @@ from sheetbend.gripped.ladder import TILTS, TWIST
 
 ROPES = Path(__file__).resolve().parents[1] / "experiments" / "gripped_ropes"
 WANTED = ("rope_EI", "rope_bend_damping", "rope_drag_linear")
-STARTING = 1.0  # s, about what a process takes before its first evaluation
 
 
 def swinging(seed: int, segments: int, seconds: float) -> sb.Experiment:
@@ -142,11 +141,9 @@ class Study:
         self.folder, self.size, self.say = folder, size, say
 
     def whole(self, kind: str, seed: int) -> tuple[dict[str, Any], float]:
-        """The result of an uninterrupted fit without a journal, and its seconds."""
+        """The result of an uninterrupted fit without a journal, and its seconds, without those of Python's start."""
         prepare(kind, seed, self.folder)
-        began = time.perf_counter()
-        result = self._ended(self._begun(kind, seed, None))
-        return result, time.perf_counter() - began - STARTING
+        return self._ended(self._begun(kind, seed, None))
 
     def killed(self, kind: str, seed: int, kills: int, seconds: float) -> Killed:
         """The same with a journal, killed at random moments and resumed. Each time the process dies a while after it
@@ -168,7 +165,7 @@ class Study:
                 return None
             assert process.returncode == -signal.SIGKILL, process.returncode
             kept.append(evaluations(kept_in))
-        result = self._ended(self._begun(kind, seed, kept_in))
+        result, _ = self._ended(self._begun(kind, seed, kept_in))
         assert not kept_in.exists(), "a finished fit leaves no journal"
         return Killed(tuple(kept), result)
 
@@ -177,10 +174,11 @@ class Study:
         return subprocess.Popen([sys.executable, __file__, "--child", task], stdout=subprocess.PIPE, text=True)
 
     @staticmethod
-    def _ended(process: subprocess.Popen[str]) -> dict[str, Any]:
+    def _ended(process: subprocess.Popen[str]) -> tuple[dict[str, Any], float]:
         out, _ = process.communicate()
         assert process.returncode == 0, process.returncode
-        return json.loads(out)
+        result, seconds = json.loads(out)
+        return result, seconds
 
 
 def evaluations(path: Path) -> int:
@@ -244,7 +242,9 @@ def mortal(wait: float) -> None:
 def child(kind: str, seed: int, folder: str, size: int, path: str | None, wait: float | None) -> None:
     if wait is not None:
         mortal(wait)
-    print(json.dumps(fitted(kind, seed, Path(folder), path, size)))
+    began = time.perf_counter()
+    result = fitted(kind, seed, Path(folder), path, size)
+    print(json.dumps([result, time.perf_counter() - began]))
 
 
 if __name__ == "__main__":
