@@ -90,7 +90,7 @@ void initial_state_vjp(const Scene& scene, double t0, const T* x_bar, const T* v
 }
 
 // Reverses the rollout that `tape` recorded. seed(step, x_bar) adds the loss's cotangent of x at `step` (0 .. steps) to x_bar and shows it to `growth`;
-// inputs_bar (layout.total()) receives, added, the gradient by every input. Returns how many substeps were advanced again. Cost: one forward substep
+// inputs_bar (layout.total()) receives, added, the gradient with respect to every input. Returns how many substeps were advanced again. Cost: one forward substep
 // and its reverse per substep, and a forward substep for each that the tape's schedule advances again. Throws Diverged where cotangents grow
 // beyond meaning.
 template <class T, class Seed>

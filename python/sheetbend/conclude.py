@@ -98,7 +98,7 @@ def judged_parameters(
         discretization=refined,
         systematic=systematic,
         profile=None if profiles is None else _shifted(profiles, asked.parameters, moved),
-        cost=lambda at: cost_at(asked, np.clip(at - moved, lower, upper)),
+        cost=lambda at: asked.cost(np.clip(at - moved, lower, upper)),
         nuisance=Nuisance(J[behind:], sum(map(problem.core.absorbed, range(len(problem.experiments))))),
     )
     return judged, () if profiles is None else tuple(profiles.lower)
@@ -150,12 +150,6 @@ def misfit(problem: FitProblem, u: Array) -> Misfit:
     )
 
 
-def cost_at(problem: FitProblem, u: Array) -> float:
-    """Half the sum of squares; infinite where the motion diverges."""
-    ok, r, _ = problem.evaluate(u, jacobian=False)
-    return 0.5 * float(r @ r) if ok else np.inf
-
-
 def _shifted(
     profile: Callable[[str, float], float], parameters: Parameters, moved: Array
 ) -> Callable[[str, float], float]:
@@ -183,7 +177,7 @@ class _Profiles:
     def __call__(self, name: str, value: float) -> float:
         part, parameter = self.problem.around(name), self.problem.parameters[name]
         if part.parameters.free == (name,):
-            return cost_at(part, part.parameters.to_internal({name: value}))
+            return part.cost(part.parameters.to_internal({name: value}))
         held = part.holding(name, value)
         mean, sd = parameter.prior or (value, 1.0)
         pull = (parameter.to_internal(value) - parameter.to_internal(mean)) / sd
@@ -191,7 +185,7 @@ class _Profiles:
         start = {parameter.to_internal(self.values[name]): held.parameters.to_internal(self.values)}
         known = self.ends.setdefault(name, start)
         start_at = known[min(known, key=lambda other: abs(other - at))]
-        if not np.isfinite(cost_at(held, start_at)):
+        if not np.isfinite(held.cost(start_at)):
             return np.inf
         try:
             end = refit(held, start_at, self.refitter, 50, PROFILE_TOLERANCE)
@@ -205,7 +199,7 @@ class _Profiles:
     def _compare(self, name: str, value: float, part: FitProblem, there: Mapping[str, float], cost: float) -> None:
         """Keep an end that is lower than the estimate by more than its residual variance."""
         if name not in self.here:
-            here = cost_at(part, part.parameters.to_internal(self.values))
+            here = part.cost(part.parameters.to_internal(self.values))
             self.here[name] = (here, here / max(part.core.data_rows - len(part.parameters.free), 1))
         here, variance = self.here[name]
         if cost < here - variance and variance > NOISELESS:

@@ -18,6 +18,7 @@ from .prediction import Comparison
 from .problem import FitProblem
 from .profile import FARTHEST
 from .result import UNSOUND, Estimate, RecordingFit
+from .time_step import SECOND_ORDER, halved
 from .timeseries import Array, mean_position
 from .wording import figures, short
 
@@ -26,7 +27,6 @@ ORDINALS = ("first", "second", "third")
 MOST_RECORDINGS = 8  # each of them is compared with the others; more are compared by halves
 FEWEST_MARKERS = 4  # that are compared by halves
 SEEN = 3.0  # times sigma: a motion that can be told from noise
-LIMIT = 4.0 / 3.0  # from a refinement's shift to that of ever finer ones, see `discretization`
 TRADES = 0.3  # correlation from which on a parameter shares the error of another
 APART = 2.0  # half-widths from the estimate: another minimum
 
@@ -85,8 +85,8 @@ def _between(problem: FitProblem, u: Array, judged: Identifiability, shifts: Seq
     words = {}
     for d in found.differences:
         name, column = names[used[d.column]], used[d.column]
-        reach = _reach(problem.parameters[name], estimates[name]) + LIMIT * d.shift
-        if abs(d.steps[0] - d.steps[1]) > d.reach + LIMIT * d.shift and abs(d.steps[0]) > reach:
+        reach = _reach(problem.parameters[name], estimates[name]) + SECOND_ORDER * d.shift
+        if abs(d.steps[0] - d.steps[1]) > d.reach + SECOND_ORDER * d.shift and abs(d.steps[0]) > reach:
             words[name] = _difference_words(problem.parameters[name], u[column], d)
     return _drawn_along(judged, words)
 
@@ -115,7 +115,7 @@ def _residual_shifts(problem: FitProblem, u: Array, refinement: Refinement) -> l
     that has no answer there is left out."""
     finer: list[Sequence[Experiment]] = []
     if refinement.halve_step and any(not e.static for e in problem.experiments):
-        finer.append([replace(e, solver=e.solver.with_h(e.solver.h / 2)) for e in problem.experiments])
+        finer.append(halved(problem.experiments))
     if refinement.finer is not None:
         finer.append([e for e in refinement.finer() if e.predict is None])
     _, r, _ = problem.evaluate(u)

@@ -90,7 +90,7 @@ def premises(problem: FitProblem, u: Array, given: Mapping[str, float]) -> tuple
     try:
         ok, _, J = problem.evaluate_exactly(u)
         if not ok:
-            raise SheetbendError(problem.core.failure)
+            raise SheetbendError(problem.failure)
         rows, corrections = problem.core.first_rows, problem.corrections(u)
         for i, (e, r) in enumerate(zip(problem.experiments, problem.recordings, strict=True)):
             _collect(told, problem, u, i, J[rows[i] : rows[i + 1]], e, r, corrections.get(e.name))

@@ -20,7 +20,7 @@ def one_step(problem: FitProblem, finer: FitProblem, u: np.ndarray) -> np.ndarra
     _, r, J = problem.evaluate(u)
     ok, there, _ = finer.evaluate(u, jacobian=False)
     if not ok:
-        raise SheetbendError(f"the refinement cannot start: {finer.core.failure or 'a residual is not finite'}")
+        raise SheetbendError(f"the refinement cannot start: {finer.failure}")
     if there.shape != r.shape:
         fix = "make them of the same recordings, with the same markers"
         raise InputError("refine.finer", "makes experiments with other residuals", (len(there), len(r)), fix)

@@ -235,6 +235,11 @@ class FitProblem:
             self._last = np.array(u, dtype=float), found
         return found
 
+    def cost(self, u: np.ndarray) -> float:
+        """Half the sum of squares at u (free,); infinite where the physics has no answer."""
+        ok, r, _ = self.evaluate(u, jacobian=False)
+        return 0.5 * float(r @ r) if ok else np.inf
+
     @property
     def failure(self) -> str:
         """Why the last evaluation was not ok."""

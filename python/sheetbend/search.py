@@ -138,10 +138,8 @@ class _Way:
         )
         given = [] if isinstance(self.search.windows, str) else [float(length) for length in self.search.windows]
         if given:
-            ok, r, _ = whole.evaluate(u, jacobian=False)
+            self._began(u, whole.cost(u))
             self.taken.evaluations += 1
-            cost = 0.5 * float(r @ r) if ok else math.inf
-            self._began(u, cost)
             walk = self._through(whole, given, u)
         else:
             walk = Approach(whole, u, self.taken)
@@ -180,12 +178,10 @@ class _Way:
         """The best point so far, after Ctrl-C; None before the first, or where the whole motion diverges there."""
         if self.u is None:
             return None
-        ok, r, _ = self.problem.evaluate(self.u, jacobian=False)
-        if not ok:
+        cost = self.problem.cost(self.u)
+        if not np.isfinite(cost):
             return None
-        return self._counted(
-            Minimum(self.u, 0.5 * float(r @ r), 0, 1, False, True, "interrupted: the best point so far")
-        )
+        return self._counted(Minimum(self.u, cost, 0, 1, False, True, "interrupted: the best point so far"))
 
     def diverged(self, u: np.ndarray, words: str) -> Minimum:
         """The row of a start that has no answer."""

@@ -57,9 +57,9 @@ def _lower_nearby(problem: FitProblem, end: Minimum) -> str:
             for there in (max(at - step, lower[column]), min(at + step, upper[column])):
                 u: Array = np.array(end.u, dtype=float)
                 u[column] = there
-                ok, r, _ = problem.evaluate(u, jacobian=False)
-                if ok and 0.5 * float(r @ r) < end.cost * (1 - FAR):
-                    less = 100 * (1 - 0.5 * float(r @ r) / end.cost)
+                cost = problem.cost(u)
+                if cost < end.cost * (1 - FAR):
+                    less = 100 * (1 - cost / end.cost)
                     value = f"{short(parameter.to_physical(there))} {parameter.unit}".rstrip()
                     return f"it hardly moved, though {name} = {value} alone takes {short(less, 2)} % off the cost"
     return ""

@@ -299,8 +299,7 @@ class _Search:
 
     def _cost(self, model: RopeModel, values: Mapping[str, float], window: tuple[float, float]) -> float:
         problem = _problem(_experiments(model, self.fitted, window), (TWIST.parameters[0],), values, self.threads)
-        ok, r, _ = problem.evaluate(problem.parameters.initial(), jacobian=False)
-        return 0.5 * float(r @ r) if ok else np.inf
+        return problem.cost(problem.parameters.initial())
 
     def _step(
         self, name: str, model: RopeModel, values: Mapping[str, float], before: Sequence[Step], began: float
