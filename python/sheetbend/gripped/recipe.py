@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,9 +34,12 @@ from .model import GRAVITY, NAME, RopeModel, nominal_directions, shared_gravity
 from .motion import Array, GrippedMotion, motions_of
 from .offsets import offset_reach
 from .plausible import doubts
+from .split import split
 from .start import started
+from .windows import SPANS, Span, counted, everything, places
 
 BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first
+UNIT = 1.0  # kg/m, of a rope that was not weighed: what is fitted is then over the density
 LINKS_PER_BENDING_LENGTH = 3.0  # below this EI reads too high and GJ too low
 SETTLED = 0.05  # relative change of EI at which links are short enough
 BETTER = 0.99  # error of a step that stays, over that without it
@@ -111,12 +115,12 @@ def predict(
 def fit_rope(
     recordings: Sequence[Recording | GrippedMotion],
     *,
-    density: float,
+    density: float | None = None,
     nominal: tuple[ArrayLike, ArrayLike] | None = None,
     ladder: Sequence[Rung] = LADDER,
     validate: float = 0.25,
     bending_lengths: Sequence[float] = BENDING_LENGTHS,
-    windows: Sequence[tuple[float, float]] = ((0.5, 8.0), (1.5, 15.0), (5.0, 60.0)),
+    windows: Sequence[Span] | Literal["all"] = SPANS,
     segments: int = 12,
     max_segments: int = 48,
     substeps: int = 2,
@@ -132,14 +136,16 @@ def fit_rope(
 
     Args:
         recordings: with two or more clamped markers at each end; or their motions, smoothed already.
-        density: kg/m, weighed.
+        density: kg/m, weighed. None = not known: then stiffness and drag over the density are fitted and reported, such
+            as EI/density in m^4/s^2.
         nominal: directions (3,) of the start and the end grip from which their frames are carried; the mean recorded
             ones by default.
         ladder: the rungs, in order; the first one always stays.
-        validate: share of the recordings that decide whether a rung stays, and that no rung is fitted to; the last fit
-            sees all.
+        validate: share of the recordings that decide whether a rung stays, and that no rung is fitted to; where that is
+            none, the share of the time of each recording, its end. The last fit sees all.
         bending_lengths: m, of the starts.
-        windows: (length, total) in s: each fit sees windows of this length, of about this total.
+        windows: (length, total) in s: each fit sees windows of this length, of about this total, the last one those of
+            the last entry. "all" = the default ones, but the last fit sees every window of all recordings.
         segments, max_segments: links at the start, and at most; they are doubled until EI moves by less than 5 %.
         substeps: per frame.
         smoothing: s, of the recorded grips and starts.
@@ -157,8 +163,9 @@ def fit_rope(
         InputError, RecordingError: anything inconsistent, named, before work starts.
         KeyboardInterrupt: before the first rung was finished.
     """
-    if not (np.isfinite(density) and density > 0):
-        raise InputError("density", "must be positive", density, "weigh the rope and give kg/m")
+    if density is not None and not (np.isfinite(density) and density > 0):
+        fix = "weigh the rope and give kg/m, or leave it out: then EI/density is fitted"
+        raise InputError("density", "must be positive", density, fix)
     if not recordings:
         raise InputError("recordings", "are empty", 0, "give at least one")
     if not 0 <= validate < 1:
@@ -169,7 +176,7 @@ def fit_rope(
     for doubt in doubtful:
         say(f"doubtful: {doubt}")
     model = RopeModel(
-        density=density,
+        density=UNIT if density is None else density,
         nominal=nominal_directions(motions)
         if nominal is None
         else (unit_vector("nominal", nominal[0]), unit_vector("nominal", nominal[1])),
@@ -190,18 +197,16 @@ class _Search:
         self,
         motions: Sequence[GrippedMotion],
         validate: float,
-        windows: Sequence[tuple[float, float]],
+        windows: Sequence[Span] | Literal["all"],
         given: Mapping[str, float],
         threads: int,
         say: Say,
     ) -> None:
-        count = len(motions)
-        others = set(np.linspace(0, count - 1, round(validate * count), dtype=int).tolist()) if count > 1 else set()
         self.all = list(motions)
-        self.fitted = [m for i, m in enumerate(motions) if i not in others]
-        self.others = [m for i, m in enumerate(motions) if i in others]
-        self.windows, self.given, self.threads, self.say = windows, given, threads, say
-        self.middle, self.longest = windows[min(1, len(windows) - 1)], windows[-1]
+        self.fitted, self.others = split(motions, validate)
+        self.windows, self.given, self.threads, self.say = SPANS if windows == "all" else windows, given, threads, say
+        self.middle, self.longest = self.windows[min(1, len(self.windows) - 1)], self.windows[-1]
+        self.last = everything(motions, self.longest[0]) if windows == "all" else self.longest
 
     def run(
         self, model: RopeModel, ladder: Sequence[Rung], bending_lengths: Sequence[float], max_segments: int
@@ -328,11 +333,11 @@ class _Search:
     ) -> Fit:
         """The fit to all recordings, and what half the step and twice the links would move; after Ctrl-C one iteration
         of it, which the intervals need."""
-        self.say(f"the fit that counts, to all {len(self.all)} recordings")
+        self.say(f"the fit that counts, to {counted(self.all, self.last)}")
         finer = replace(model, segments=2 * model.segments)
-        refine = Refinement(finer=lambda: _experiments(finer, self.all, self.longest), linear=True)
+        refine = Refinement(finer=lambda: _experiments(finer, self.all, self.last), linear=True)
         last = fit(
-            _experiments(model, self.all, self.longest),
+            _experiments(model, self.all, self.last),
             parameters=_starting(parameters, values),
             refine=None if interrupted else refine,
             systematic=offset_reach,
@@ -353,18 +358,9 @@ class _Search:
 
 
 def _experiments(model: RopeModel, motions: Sequence[GrippedMotion], window: tuple[float, float]) -> list[Experiment]:
-    """Windows of one length, spread over all recordings, of about the total time."""
-    length, total = window
-    whole = [float(m.recording.times[-1] - m.recording.times[0]) for m in motions]
-    places = [
-        (m, start)
-        for m, duration in zip(motions, whole, strict=True)
-        for start in (m.recording.times[0] + length * np.arange(max(1, int(duration / length + 1e-9)))).tolist()
-        if m.shown(int(np.searchsorted(m.recording.times, start - 1e-9)))
-    ]
-    count = max(1, min(len(places), round(total / length)))
-    chosen = [places[i] for i in np.unique(np.linspace(0, len(places) - 1, count).astype(int))]
-    return [model.experiment(m, (start, start + length)) for m, start in chosen]
+    """Of the windows of a span."""
+    length = window[0]
+    return [model.experiment(m, (start, start + length)) for m, start in places(motions, window)]
 
 
 def _starting(parameters: Sequence[Parameter], values: Mapping[str, float]) -> list[Parameter]:
