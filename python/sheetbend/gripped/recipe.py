@@ -33,13 +33,14 @@ from .ladder import LADDER, TWIST, Rung
 from .model import GRAVITY, NAME, RopeModel, nominal_directions, shared_gravity
 from .motion import Array, GrippedMotion, motions_of
 from .offsets import offset_reach
+from .over_density import UNIT, as_quantities, named_over_density, over_density
 from .plausible import doubts
+from .screening import screened
 from .split import split
 from .start import started
 from .windows import SPANS, Span, counted, everything, places
 
 BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first
-UNIT = 1.0  # kg/m, of a rope that was not weighed: what is fitted is then over the density
 LINKS_PER_BENDING_LENGTH = 3.0  # below this EI reads too high and GJ too low
 SETTLED = 0.05  # relative change of EI at which links are short enough
 BETTER = 0.99  # error of a step that stays, over that without it
@@ -72,6 +73,8 @@ class RopeFit:
         steps: what was tried, in order.
         fit: the last fit with intervals and verdicts.
         warnings: what a reader must know before using the numbers.
+        weighed: whether the density is known. Otherwise the model has 1 kg/m, and names in `values` and in the fit's
+            result say what is over the density, such as `rope_EI/density`.
     """
 
     model: RopeModel
@@ -79,6 +82,7 @@ class RopeFit:
     steps: tuple[Step, ...]
     fit: Fit
     warnings: tuple[str, ...]
+    weighed: bool = True
 
     @property
     def interrupted(self) -> bool:
@@ -88,7 +92,7 @@ class RopeFit:
     def predict(self, recording: Recording | GrippedMotion) -> Array:
         """(frames, markers, 3) m: open loop from the first frame, gripped markers as recorded."""
         (motion,) = motions_of([recording], self.model.smoothing)
-        return predict(self.model, [motion], self.values)[0]
+        return predict(self.model, [motion], as_quantities(self.values))[0]
 
 
 def predict(
@@ -135,7 +139,8 @@ def fit_rope(
     """Fit a rope's parameters to recordings between two grips.
 
     Args:
-        recordings: with two or more clamped markers at each end; or their motions, smoothed already.
+        recordings: with two or more clamped markers at each end; or their motions, smoothed already. What is wrong with
+            single ones is mended, or they are left out; the warnings name them (`gripped.screened`).
         density: kg/m, weighed. None = not known: then stiffness and drag over the density are fitted and reported, such
             as EI/density in m^4/s^2.
         nominal: directions (3,) of the start and the end grip from which their frames are carried; the mean recorded
@@ -170,9 +175,12 @@ def fit_rope(
         raise InputError("recordings", "are empty", 0, "give at least one")
     if not 0 <= validate < 1:
         raise InputError("validate", "must be a share below 1", validate, "give such as 0.25")
-    motions = motions_of(recordings, smoothing)
+    usable = screened(recordings, smoothing)
+    motions = usable.motions
     shared_gravity([m.recording for m in motions])
     doubtful = doubts(motions, gravity)
+    for note in usable.notes:
+        say(note)
     for doubt in doubtful:
         say(f"doubtful: {doubt}")
     model = RopeModel(
@@ -189,7 +197,13 @@ def fit_rope(
     )
     search = _Search(motions, validate, windows, given or {}, threads, say)
     found = search.run(model, ladder, bending_lengths, max_segments)
-    return replace(found, warnings=(*doubtful, *found.warnings))
+    found = replace(found, warnings=(*usable.notes, *doubtful, *found.warnings))
+    if density is not None:
+        return found
+    result = over_density(found.fit.result)
+    return replace(
+        found, fit=replace(found.fit, result=result), values=named_over_density(found.values, result), weighed=False
+    )
 
 
 class _Search:
