@@ -151,7 +151,7 @@ class TestScreened:
         frozen = moving()
         frozen[100:200, :2] = frozen[100, :2]
         with pytest.raises(sb.RecordingError, match="stood still"):
-            screened([recorded(frozen, "a"), recorded(moving(), "b")], 0.08)
+            screened([recorded(frozen, "a"), recorded(frozen, "b"), recorded(moving(), "c")], 0.08)
 
     def test_motions_stay_and_what_was_screened_is_returned(self) -> None:
         found = screened([recorded(moving())], 0.08)
