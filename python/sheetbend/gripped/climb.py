@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import SheetbendError
-from ..experiment import Experiment, Window
+from ..experiment import Experiment
 from ..parameters import Parameter
 from .bounds import bounded
 from .descent import bearable, descend
@@ -19,6 +19,7 @@ from .model import NAME, RopeModel
 from .motion import GrippedMotion
 from .pieces import experiments_of, problem_of
 from .start import started
+from .windows import Span
 
 SETTLED = 0.05  # relative change of EI at which links are short enough
 ENOUGH = 1e-3  # of the cost: what a step must promise while searching
@@ -75,7 +76,7 @@ class Climb:
     """
 
     def __init__(
-        self, motions: Sequence[GrippedMotion], share: float, windows: Sequence[Window], threads: int, say: Say
+        self, motions: Sequence[GrippedMotion], share: float, windows: Sequence[Span], threads: int, say: Say
     ) -> None:
         self.given = tuple(motions)
         self.split = Split.of(motions, share)
@@ -98,9 +99,9 @@ class Climb:
 
     @property
     def whole(self) -> list[GrippedMotion]:
-        """All motions that belong, each once and uncut, in their order."""
-        kept = self.split.judged if self.split.since > 0.0 else self.split.motions
-        return sorted(kept, key=lambda m: next(k for k, one in enumerate(self.given) if one is m))
+        """All motions that belong, uncut."""
+        kept = {id(m) for m in self.split.motions}
+        return [m for m in self.given if self.split.cut or id(m) in kept]
 
     def equal(self) -> list[Rope]:
         """What was tried and predicts as well as the rope that was found."""
@@ -220,7 +221,7 @@ class Climb:
             self.say(f"{rung.name}: {error}")
             return None
 
-    def _on(self, rope: Rope, window: Window) -> Rope:
+    def _on(self, rope: Rope, window: Span) -> Rope:
         """The rope fitted to such windows.
 
         Raises:
@@ -231,7 +232,7 @@ class Climb:
             raise SheetbendError(f"the motion diverges on windows of {window[0]:g} s")
         return found[0]
 
-    def _descended(self, rope: Rope, window: Window, most: int = LONG) -> tuple[Rope, float] | None:
+    def _descended(self, rope: Rope, window: Span, most: int = LONG) -> tuple[Rope, float] | None:
         """A rope and its cost after a descent on those windows that do not diverge at its values; None where most do."""
         experiments = experiments_of(rope.model, self.split.fitted, window)
         free = bounded(rope.parameters, rope.model, self.split.fitted, window[0])
@@ -257,7 +258,7 @@ class Climb:
     def _leave_out(self, errors: np.ndarray) -> bool:
         """Leave recordings out of fitting and judging that do not belong to the others; whether there were any."""
         found = misfits(errors)
-        if len(found) == 0 or self.split.since > 0.0:
+        if len(found) == 0 or self.split.cut:
             return False
         smaller = self.split.without(found)
         if not smaller.fitted or (self.split.judged and not smaller.judged):

@@ -13,7 +13,6 @@ import numpy as np
 
 from ..discretization import Refinement
 from ..errors import SheetbendError
-from ..experiment import Window
 from ..fit import Fit, fit
 from ..wording import short
 from .bounds import bounded
@@ -23,16 +22,18 @@ from .ladder import TWIST
 from .model import NAME
 from .motion import GrippedMotion
 from .offsets import offset_reach
-from .pieces import experiments_of, problem_of, starting, windows_of
+from .pieces import experiments_of, problem_of, starting
+from .windows import Span, counted, places
 
 MOST = 30  # iterations, at most
+MANY = 12  # recordings: of a larger set the time of the last fit is told
 EVALUATIONS = 15  # with derivatives, of such a fit and its intervals, for an estimate of its time
 
 
 def conclude(
     climb: Climb,
     motions: Sequence[GrippedMotion],
-    window: Window,
+    window: Span,
     given: Mapping[str, float],
     interrupted: bool,
 ) -> tuple[Fit, dict[str, float]]:
@@ -46,9 +47,9 @@ def conclude(
     assert rope is not None
     experiments = experiments_of(rope.model, motions, window)
     parameters = bounded(rope.parameters, rope.model, motions, window[0])
-    say(f"the fit that counts, to {_what(motions, window)}")
-    if np.isinf(window[1]):
-        say(f"which takes about {_seconds(rope, motions, window, threads):.0f} s")
+    say(f"the fit that counts, to {counted(motions, window)}")
+    if len(motions) > MANY:
+        say(f"which takes about {short(_seconds(rope, motions, window, threads), 1)} s")
     found = descend(experiments, parameters, rope.values, 1 if interrupted else MOST, threads)
     if not found.finite:
         raise SheetbendError("the fit that counts diverges where the last rung ended")
@@ -98,13 +99,7 @@ def _together(offsets: Mapping[str, float], spread: Mapping[str, float]) -> dict
     return {name: float(np.hypot(reach, spread.get(name, 0.0))) for name, reach in offsets.items()}
 
 
-def _what(motions: Sequence[GrippedMotion], window: Window) -> str:
-    count = len(windows_of(motions, window))
-    windows = f"{count} window{'s' if count > 1 else ''} of {window[0]:g} s"
-    return f"{windows} of {len(motions)} recording{'s' if len(motions) > 1 else ''}"
-
-
-def _seconds(rope: Rope, motions: Sequence[GrippedMotion], window: Window, threads: int) -> float:
+def _seconds(rope: Rope, motions: Sequence[GrippedMotion], window: Span, threads: int) -> float:
     one = problem_of(experiments_of(rope.model, motions[:1], (window[0], window[0])), rope.parameters, rope.values)
     one.evaluate(one.parameters.initial())
-    return EVALUATIONS * one.seconds.get(True, 0.0) * len(windows_of(motions, window)) / threads
+    return EVALUATIONS * one.seconds.get(True, 0.0) * len(places(motions, window)) / threads

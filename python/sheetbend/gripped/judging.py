@@ -18,12 +18,12 @@ from .ladder import TWIST
 from .model import NAME, RopeModel
 from .motion import Array, GrippedMotion
 from .pieces import problem_of
+from .split import split
 
 BETTER = 0.99  # median ratio of errors on what was not fitted, below which a larger model stays
 EQUAL = 0.03  # by which the median ratio of models that predict equally well differs from 1
 LUCK = 1 / 3  # probability of so many better ones by chance, above which they show nothing
 PIECES = 4  # at least, that a verdict rests on
-CUT = 0.7  # of a single recording, before which it is fitted
 FAR = 4.0  # error over the median, beyond which a recording does not belong
 SPREAD = 4.0  # standard deviations of the logarithms of errors (from their median), likewise
 GIVEN = 2  # frames that a prediction starts from
@@ -35,31 +35,22 @@ class Split:
 
     Attributes:
         fitted: motions.
-        judged: motions that are predicted from their first frame; none where all is fitted.
-        since: s after the first frame, from which on they are judged; 0 where they are no part of the fitted.
+        judged: motions that are predicted from their first frame; none where what is fitted decides.
+        cut: whether these are parts of the same recordings.
         pieces: in time, by which each is judged, so that few recordings give a verdict too.
     """
 
     fitted: tuple[GrippedMotion, ...]
     judged: tuple[GrippedMotion, ...]
-    since: float = 0.0
-    pieces: int = 1
+    cut: bool
+    pieces: int
 
     @classmethod
     def of(cls, motions: Sequence[GrippedMotion], share: float) -> Split:
-        """About that share of the motions is judged, at least one; a single one is cut in time."""
-        count = len(motions)
-        if share == 0.0:
-            return cls(tuple(motions), ())
-        if count == 1:
-            (motion,) = motions
-            seconds = CUT * float(motion.recording.times[-1] - motion.recording.times[0])
-            return cls((_until(motion, seconds),), (motion,), seconds, PIECES)
-        wanted = max(1, round(share * count))
-        others = set(np.linspace(0, count - 1, wanted, dtype=int).tolist())
-        fitted = tuple(m for i, m in enumerate(motions) if i not in others)
-        judged = tuple(m for i, m in enumerate(motions) if i in others)
-        return cls(fitted, judged, 0.0, -(-PIECES // wanted))
+        """About that share of the motions, or of the time of each, is judged (`split`)."""
+        fitted, judged = split(motions, share)
+        cut = not any(fitted[0] is m for m in motions)
+        return cls(tuple(fitted), tuple(judged), cut, -(-PIECES // max(len(judged), 1)))
 
     @property
     def motions(self) -> tuple[GrippedMotion, ...]:
@@ -68,9 +59,10 @@ class Split:
 
     def without(self, numbers: Collection[int]) -> Split:
         """The same without some of `motions`."""
-        kept = [m for k, m in enumerate(self.motions) if k not in numbers]
-        count = len(kept) - sum(k >= len(self.fitted) for k in range(len(self.motions)) if k not in numbers)
-        return replace(self, fitted=tuple(kept[:count]), judged=tuple(kept[count:]))
+        count = len(self.fitted)
+        fitted = tuple(m for k, m in enumerate(self.fitted) if k not in numbers)
+        judged = tuple(m for k, m in enumerate(self.judged, count) if k not in numbers)
+        return replace(self, fitted=fitted, judged=judged, pieces=-(-PIECES // max(len(judged), 1)))
 
 
 @dataclass(frozen=True)
@@ -143,21 +135,17 @@ def errors_of(model: RopeModel, values: Mapping[str, float], split: Split, threa
     motions = [*split.fitted, *split.judged]
     predicted = predict(model, motions, values, threads)
     count = len(split.fitted)
-    fitted = np.array([_error(m, x, 0.0, 1, reach)[0] for m, x in zip(motions[:count], predicted, strict=False)])
-    judged = [
-        _error(m, x, split.since, split.pieces, reach) for m, x in zip(motions[count:], predicted[count:], strict=True)
-    ]
+    fitted = np.array([_error(m, x, 1, reach)[0] for m, x in zip(motions[:count], predicted, strict=False)])
+    judged = [_error(m, x, split.pieces, reach) for m, x in zip(motions[count:], predicted[count:], strict=True)]
     return Errors(fitted, np.array(judged) if judged else fitted)
 
 
-def _error(motion: GrippedMotion, predicted: Array, since: float, pieces: int, reach: float) -> Array:
-    times = motion.recording.times
+def _error(motion: GrippedMotion, predicted: Array, pieces: int, reach: float) -> Array:
     off = np.abs(predicted - motion.recording.positions)
     seen = motion.recording.mask
     if not (off[seen] <= reach).all():  # false where it is not a number
         return np.full(pieces, np.inf)
-    first = max(GIVEN, int(np.searchsorted(times - times[0], since - 1e-9)))
-    parts = np.array_split(np.arange(first, len(times)), pieces)
+    parts = np.array_split(np.arange(GIVEN, len(off)), pieces)
     return np.array([float(np.mean(off[part][seen[part]])) for part in parts])
 
 
@@ -201,11 +189,3 @@ def predict(
 
     with ThreadPoolExecutor(threads) as pool:
         return list(pool.map(one, range(len(motions))))
-
-
-def _until(motion: GrippedMotion, seconds: float) -> GrippedMotion:
-    """The motion's first seconds."""
-    times = motion.recording.times
-    piece = motion.recording.piece(None, float(times[0]) + seconds)
-    frames = slice(0, len(piece.times))
-    return replace(motion, recording=piece, positions=motion.positions[frames], velocities=motion.velocities[frames])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -72,6 +72,16 @@ class GrippedMotion:
     def free(self) -> range:
         """Numbers of the markers between the grips."""
         return range(self.inner[0] + 1, self.inner[1])
+
+    @property
+    def seconds(self) -> float:
+        """How long it lasts."""
+        return float(self.recording.times[-1] - self.recording.times[0])
+
+    def frames(self, which: slice) -> GrippedMotion:
+        """A piece, smoothed as the whole was; places of markers and the length stay those of the whole."""
+        part = self.recording.frames(which)
+        return replace(self, recording=part, positions=self.positions[which], velocities=self.velocities[which])
 
     def directions(self, end: bool) -> Array:
         """(frames, 3) unit directions of a gripped piece, in the rope's direction of travel."""

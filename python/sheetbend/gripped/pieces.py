@@ -7,34 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..experiment import Experiment, Window
+from ..experiment import Experiment
 from ..parameters import Parameter, Parameters
 from ..problem import FitProblem
 from .model import RopeModel
 from .motion import GrippedMotion
+from .windows import Span, places
 
 
-def windows_of(motions: Sequence[GrippedMotion], window: Window) -> list[tuple[GrippedMotion, Window]]:
-    """(motion, (start, stop) in s) of windows of one length, spread over all motions, of about the total time.
-
-    Args:
-        window: (length, total) in s; an infinite total takes all there are.
-    """
-    length, total = window
-    whole = [float(m.recording.times[-1] - m.recording.times[0]) for m in motions]
-    places = [
-        (m, (start, start + length))
-        for m, duration in zip(motions, whole, strict=True)
-        for start in (m.recording.times[0] + length * np.arange(max(1, int(duration / length + 1e-9)))).tolist()
-        if m.shown(int(np.searchsorted(m.recording.times, start - 1e-9)))
-    ]
-    count = len(places) if np.isinf(total) else max(1, min(len(places), round(total / length)))
-    return [places[i] for i in np.unique(np.linspace(0, len(places) - 1, count).astype(int))]
-
-
-def experiments_of(model: RopeModel, motions: Sequence[GrippedMotion], window: Window) -> list[Experiment]:
-    """The model on `windows_of` the motions, each predicted open loop from its first frame."""
-    return [model.experiment(m, span) for m, span in windows_of(motions, window)]
+def experiments_of(model: RopeModel, motions: Sequence[GrippedMotion], span: Span) -> list[Experiment]:
+    """The model on the windows of a span, each predicted open loop from its first frame."""
+    return [model.experiment(m, (start, start + span[0])) for m, start in places(motions, span)]
 
 
 def problem_of(

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,10 +29,11 @@ from .ladder import LADDER, Rung
 from .model import GRAVITY, NAME, RopeModel, nominal_directions, shared_gravity
 from .motion import Array, GrippedMotion, motions_of
 from .plausible import doubts
+from .windows import SPANS, Span, everything
 
 BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first
 LINKS_PER_BENDING_LENGTH = 3.0  # below this EI reads too high and GJ too low
-WINDOWS = ((0.5, 8.0), (1.5, 15.0), (5.0, 60.0))
+UNIT = 1.0  # kg/m, of a rope that was not weighed: what is fitted is then over the density
 ALL = "all"
 
 
@@ -71,12 +73,12 @@ class RopeFit:
 def fit_rope(
     recordings: Sequence[Recording | GrippedMotion],
     *,
-    density: float,
+    density: float | None = None,
     nominal: tuple[ArrayLike, ArrayLike] | None = None,
     ladder: Sequence[Rung] = LADDER,
     validate: float = 0.25,
     bending_lengths: Sequence[float] = BENDING_LENGTHS,
-    windows: Sequence[tuple[float, float]] | str = WINDOWS,
+    windows: Sequence[Span] | Literal["all"] = SPANS,
     segments: int = 12,
     max_segments: int = 48,
     substeps: int = 2,
@@ -92,15 +94,16 @@ def fit_rope(
 
     Args:
         recordings: with two or more clamped markers at each end; or their motions, smoothed already.
-        density: kg/m of the rope without its markers, weighed.
+        density: kg/m of the rope without its markers, weighed. None = not known: then stiffness and drag over the
+            density are fitted and reported, such as EI/density in m^4/s^2.
         nominal: directions (3,) of the start and the end grip from which their frames are carried; the mean recorded
             ones by default.
         ladder: the rungs, in order; the first one always stays.
-        validate: share of the recordings that decide whether a rung stays, and that no rung is fitted to; of a single
-            recording the last part. The last fit sees all. 0 judges by what was fitted.
+        validate: share of the recordings that decide whether a rung stays, and that no rung is fitted to; where that is
+            none, the share of the time of each recording, its end. The last fit sees all. At 0 what is fitted decides.
         bending_lengths: m, of the starts.
-        windows: (length, total) in s: each fit sees windows of this length, of about this total; or "all": the last fit
-            sees every window there is.
+        windows: (length, total) in s: each fit sees windows of this length, of about this total, the last one those of
+            the last entry. "all" = the default ones, but the last fit sees every window of all recordings.
         segments, max_segments: links at the start, and at most; they are doubled until EI moves by less than 5 %.
         substeps: per frame.
         smoothing: s, of the recorded grips and starts.
@@ -119,23 +122,20 @@ def fit_rope(
         SheetbendError: every start diverges.
         KeyboardInterrupt: before the first rung was finished.
     """
-    if not (np.isfinite(density) and density > 0):
-        raise InputError("density", "must be positive", density, "weigh the rope and give kg/m")
+    if density is not None and not (np.isfinite(density) and density > 0):
+        fix = "weigh the rope and give kg/m, or leave it out: then EI/density is fitted"
+        raise InputError("density", "must be positive", density, fix)
     if not recordings:
         raise InputError("recordings", "are empty", 0, "give at least one")
     if not 0 <= validate < 1:
         raise InputError("validate", "must be a share below 1", validate, "give such as 0.25")
-    if isinstance(windows, str) and windows != ALL:
-        raise InputError("windows", "are unknown", windows, "give (length, total) in s of each stage, or 'all'")
-    stages = WINDOWS if isinstance(windows, str) else tuple(windows)
-    last = (stages[-1][0], np.inf) if isinstance(windows, str) else stages[-1]
     motions = motions_of(recordings, smoothing)
     shared_gravity([m.recording for m in motions])
     doubtful = doubts(motions, gravity)
     for doubt in doubtful:
         say(f"doubtful: {doubt}")
     model = RopeModel(
-        density=density,
+        density=UNIT if density is None else density,
         nominal=nominal_directions(motions)
         if nominal is None
         else (unit_vector("nominal", nominal[0]), unit_vector("nominal", nominal[1])),
@@ -146,7 +146,8 @@ def fit_rope(
         sigma=sigma,
         gravity=gravity,
     )
-    climb, interrupted = Climb(motions, validate, stages, threads, say), False
+    spans = SPANS if windows == ALL else windows
+    climb, interrupted = Climb(motions, validate, spans, threads, say), False
     try:
         climb.run(model, ladder, bending_lengths, max_segments)
     except KeyboardInterrupt:
@@ -155,6 +156,7 @@ def fit_rope(
         interrupted = True
         say(f"interrupted: going back to {next(s.name for s in reversed(climb.steps) if s.stays)}")
     kept = climb.whole
+    last = everything(kept, spans[-1][0]) if windows == ALL else spans[-1]
     found, spread = conclude(climb, kept, last, given or {}, interrupted)
     assert climb.rope is not None
     rope, values = climb.rope, found.values
