@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -63,7 +63,7 @@ class Rope:
     model: RopeModel
     parameters: Parts
     values: dict[str, float]
-    errors: Errors | None = None
+    errors: Errors = field(default_factory=Errors.none)
 
 
 class Climb:
@@ -93,9 +93,9 @@ class Climb:
         self._keep(ladder[0], self._straight(model, ladder[0], bending_lengths, most_links), None, began)
         for rung in ladder[1:]:
             began = time.perf_counter()
-            assert self.rope is not None and self.rope.errors is not None
+            assert self.rope is not None
             found = self._tried(rung, self.rope)
-            self._keep(rung, found, None if found is None else verdict(found.errors, self.rope.errors), began)  # type: ignore[arg-type]
+            self._keep(rung, found, None if found is None else verdict(found.errors, self.rope.errors), began)
 
     @property
     def whole(self) -> list[GrippedMotion]:
@@ -105,21 +105,16 @@ class Climb:
 
     def equal(self) -> list[Rope]:
         """What was tried and predicts as well as the rope that was found."""
-        assert self.rope is not None and self.rope.errors is not None
-        here = self.rope.errors
-        alike = []
-        for other in self.tried:
-            if other is not self.rope and other.errors is not None:
-                told = verdict(other.errors, here)
-                if abs(told.ratio - 1.0) <= EQUAL:
-                    alike.append(other)
-        return alike
+        assert self.rope is not None
+        here = self._judged(self.rope).errors
+        others = [self._judged(rope) for rope in self.tried if rope.values is not self.rope.values]
+        return [rope for rope in others if abs(verdict(rope.errors, here).ratio - 1.0) <= EQUAL]
 
     def _keep(self, rung: Rung, found: Rope | None, told: Verdict | None, began: float) -> None:
         """Note a rung that was tried, and take it where it stays."""
         first = self.rope is None
         stays = found is not None and (first or (told is not None and told.stays))
-        fitted, others = (np.inf, np.inf) if found is None or found.errors is None else found.errors.typical
+        fitted, others = (np.inf, np.inf) if found is None else found.errors.typical
         if found is not None:
             self.tried.append(found)
             if stays:
@@ -129,18 +124,18 @@ class Climb:
         step = Step(rung.name, fitted, others, stays, time.perf_counter() - began, EI=EI, **judged)  # type: ignore[arg-type]
         self.steps.append(step)
         self._tell(step)  # once it counts: who is told of a step may stop there
+        if stays and not first and self.rope is not None and self._leave_out(self.rope.errors.whole):
+            # the better the model, the clearer what does not belong; the next rung has to beat a fit without it
+            self.rope = self._judged(self._on(self.rope, self.longest))
 
     def _tell(self, step: Step) -> None:
         if not np.isfinite(step.others):
             self.say(f"{step.name}: diverges, does not stay")
             return
         errors = f"{1e3 * step.fitted:.3g} mm, {1e3 * step.others:.3g} mm on others"
-        ratio = (
-            ""
-            if step.ratio is None
-            else f", {step.ratio:.3g} times without it, better on {step.better} of {step.count}"
-        )
-        self.say(f"{step.name}: {errors}{ratio}{'' if step.stays else ', does not stay'}")
+        if step.ratio is not None:
+            errors += f", {step.ratio:.3g} times without it, better on {step.better} of {step.count}"
+        self.say(f"{step.name}: {errors}{'' if step.stays else ', does not stay'}")
 
     def _straight(self, model: RopeModel, rung: Rung, bending_lengths: Sequence[float], most_links: int) -> Rope:
         """The first rung, from the best start that gets to its end.
@@ -173,8 +168,8 @@ class Climb:
         ends.sort(key=lambda end: end[:2])
         ropes = [rope for _, _, rope in ends]
         if ropes:
-            least = np.min([rope.errors.whole for rope in ropes if rope.errors is not None], axis=0)
-            self._leave_out(np.where(np.isfinite(least), least[np.isfinite(least)].min(initial=1.0), np.inf))
+            least = np.min([rope.errors.whole for rope in ropes], axis=0)
+            self._leave_out(least)
         return ropes
 
     def _refined(self, rope: Rope, most_links: int) -> Rope:
@@ -193,10 +188,9 @@ class Climb:
             self.say(f"{rope.model.segments} to {finer.model.segments} links move EI by {100 * moved:.2g} %")
             rope = finer
         rope = self._judged(self._on(rope, self.longest))
-        assert rope.errors is not None
         if self._leave_out(rope.errors.whole):
             rope = self._judged(self._on(rope, self.longest))
-        if not np.isfinite(rope.errors.typical).all():  # type: ignore[union-attr]
+        if not np.isfinite(rope.errors.typical).all():
             raise SheetbendError("most predictions diverge")
         return rope
 
@@ -233,7 +227,7 @@ class Climb:
         return found[0]
 
     def _descended(self, rope: Rope, window: Span, most: int = LONG) -> tuple[Rope, float] | None:
-        """A rope and its cost after a descent on those windows that do not diverge at its values; None where most do."""
+        """A rope and its cost after a descent on the windows that do not diverge at first; None where most do."""
         experiments = experiments_of(rope.model, self.split.fitted, window)
         free = bounded(rope.parameters, rope.model, self.split.fitted, window[0])
         end = descend(experiments, free, rope.values, most, self.threads, ENOUGH)

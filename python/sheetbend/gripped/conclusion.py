@@ -77,7 +77,7 @@ def conclude(
 
 
 def model_spread(rope: Rope, equal: Sequence[Rope]) -> dict[str, float]:
-    """By how much parameters of the straight rope differ at most in models that predict equally well, in their units."""
+    """By how much parameters of the straight rope differ at most in models that predict equally well, in their unit."""
     names = [p.name for p in TWIST.parameters if p.log and p.name != f"{NAME}_length"]
     free = {p.name for p in rope.parameters if p.tied_to is None}
     return {
@@ -92,7 +92,8 @@ def spread_words(spread: Mapping[str, float], values: Mapping[str, float]) -> st
     EI = f"{NAME}_EI"
     if EI not in spread:
         return ""
-    return f"what else the model has (models that predict equally well differ in EI by {short(100 * spread[EI] / values[EI], 2)} %)"
+    part = short(100 * spread[EI] / values[EI], 2)
+    return f"what else the model has (models that predict equally well differ in EI by up to {part} %)"
 
 
 def _together(offsets: Mapping[str, float], spread: Mapping[str, float]) -> dict[str, float]:

@@ -24,7 +24,7 @@ BETTER = 0.99  # median ratio of errors on what was not fitted, below which a la
 EQUAL = 0.03  # by which the median ratio of models that predict equally well differs from 1
 LUCK = 1 / 3  # probability of so many better ones by chance, above which they show nothing
 PIECES = 4  # at least, that a verdict rests on
-FAR = 4.0  # error over the median, beyond which a recording does not belong
+FAR = 2.0  # error over the median, beyond which a recording does not belong
 SPREAD = 4.0  # standard deviations of the logarithms of errors (from their median), likewise
 GIVEN = 2  # frames that a prediction starts from
 
@@ -76,6 +76,11 @@ class Errors:
 
     fitted: Array
     judged: Array
+
+    @classmethod
+    def none(cls) -> Errors:
+        """Of what was not predicted yet."""
+        return cls(np.zeros(0), np.zeros(0))
 
     @property
     def whole(self) -> Array:

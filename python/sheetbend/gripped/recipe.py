@@ -34,7 +34,6 @@ from .windows import SPANS, Span, everything
 BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first
 LINKS_PER_BENDING_LENGTH = 3.0  # below this EI reads too high and GJ too low
 UNIT = 1.0  # kg/m, of a rope that was not weighed: what is fitted is then over the density
-ALL = "all"
 
 
 @dataclass(frozen=True)
@@ -146,7 +145,7 @@ def fit_rope(
         sigma=sigma,
         gravity=gravity,
     )
-    spans = SPANS if windows == ALL else windows
+    spans: Sequence[Span] = SPANS if isinstance(windows, str) else windows
     climb, interrupted = Climb(motions, validate, spans, threads, say), False
     try:
         climb.run(model, ladder, bending_lengths, max_segments)
@@ -156,7 +155,7 @@ def fit_rope(
         interrupted = True
         say(f"interrupted: going back to {next(s.name for s in reversed(climb.steps) if s.stays)}")
     kept = climb.whole
-    last = everything(kept, spans[-1][0]) if windows == ALL else spans[-1]
+    last = everything(kept, spans[-1][0]) if isinstance(windows, str) else spans[-1]
     found, spread = conclude(climb, kept, last, given or {}, interrupted)
     assert climb.rope is not None
     rope, values = climb.rope, found.values
