@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib
 import json
 import os
+import pickle
+import shutil
 import signal
 import subprocess
 import sys
@@ -238,6 +240,41 @@ class TestClamped:
         assert error["field"] == "gripped_rope[0].train" and "clamped" in error["problem"]
 
 
+class TestBadFiles:
+    """One file of a folder that is wrong costs at most itself."""
+
+    ORDER = (0, 1, 2, 5, 4, 3, *range(6, 13))
+
+    @pytest.fixture
+    def spoiled(self, config: Path, data: Path) -> Path:
+        """In train/01 the last grip is exchanged from half on, in train/02 two free markers are throughout."""
+        Path("rope_1").unlink()
+        shutil.copytree(data / "rope_1", "rope_1")
+        for name, order, first in (("01", [*range(11), 12, 11], 100), ("02", list(self.ORDER), 0)):
+            frames = pickle.loads((data / "rope_1" / "train" / f"{name}.pkl").read_bytes())
+            changed = [frame if k < first else frame[:, order] for k, frame in enumerate(frames)]
+            Path(f"rope_1/train/{name}.pkl").write_bytes(pickle.dumps([frame.tolist() for frame in changed]))
+        return config
+
+    def test_it_is_mended_or_left_out_with_a_word(self, spoiled: Path) -> None:
+        rope = last_line(run("info", spoiled, "--json"))["config"]["ropes"]["rope_1"]
+        assert rope["train"] == 2
+        first, second = rope["notes"]
+        assert first == "01: m11 and m12 of the last grip were exchanged from frame 100 (1 s) on, and are put back"
+        assert second.startswith("02 is left out: ") and "m5, m4, m3" in second
+
+    def test_the_configuration_reorders_one_file(self, spoiled: Path, data: Path) -> None:
+        order = [f"m{k}" for k in self.ORDER]
+        edited(spoiled, ("density = 0.045", f'density = 0.045\nreorder = {{ "train/02" = {json.dumps(order)} }}'))
+        rope = last_line(run("info", spoiled, "--json"))["config"]["ropes"]["rope_1"]
+        assert rope["train"] == 3 and len(rope["notes"]) == 1
+        (loaded,) = gripped.load_ropes(parse_any(spoiled), Path())
+        for name, motion in zip(("00", "01", "02"), loaded.train, strict=True):
+            right = sb.Recording.load(data / "rope_1" / "train" / f"{name}.pkl")
+            np.testing.assert_array_equal(motion.recording.positions, right.positions)
+            assert motion.recording.markers == right.markers and motion.recording.clamped == right.clamped
+
+
 class TestOtherCommands:
     def test_info_shows_what_the_folders_hold(self, config: Path) -> None:
         rope = last_line(run("info", config, "--json"))["config"]["ropes"]["rope_1"]
@@ -268,7 +305,17 @@ class TestOtherCommands:
 
 
 BAD = [
-    ("density = 0.045\n", "", "gripped_rope[0].density", "add density to [[gripped_rope]]"),
+    ("density = 0.045\n", "density_sd = 0.02\n", "gripped_rope[0]", "give density"),
+    ("density = 0.045", 'density = 0.045\nreorder = { "test/00" = [0] }', "gripped_rope[0].reorder", '"train/NAME"'),
+    ("density = 0.045", 'density = 0.045\nreorder = { "train/9" = [0] }', "gripped_rope[0].reorder", "such as 00"),
+    ("density = 0.045", 'density = 0.045\nreorder = { "train/00" = [1, 0] }', "gripped_rope[0].reorder.train/00", "13"),
+    (
+        "density = 0.045",
+        'density = 0.045\nreorder = { "eval/00" = ["q"] }',
+        "gripped_rope[0].reorder.eval/00",
+        "unknown",
+    ),
+    ("[[0.5, 1.5], [1.0, 4.0]]", '"every"', "gripped_rope[0].windows", "all"),
     ("density = 0.045", "density = 0.0", "gripped_rope[0].density", "greater than 0"),
     ("density = 0.045", "density = 0.045\nEI = 1.0", "gripped_rope[0].EI", "density"),
     ("bending_lengths", "bending_length", "gripped_rope[0].bending_length", "did you mean 'bending_lengths'"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,12 +13,12 @@ from rich.console import Console
 from ..chain import unit_vector
 from ..config import GrippedConfig, GrippedRopeSection
 from ..errors import ConfigError, RecordingError, SceneError, SheetbendError
-from ..gripped import WITHOUT_TWIST, GrippedMotion, RopeFit, RopeReport, Rung, evaluate, fit_rope
+from ..gripped import WITHOUT_TWIST, GrippedMotion, RopeFit, RopeReport, Rung, Screened, evaluate, fit_rope, screened
 from ..gripped.ladder import REST, TILTS, TWIST, VARYING, YIELD
 from ..gripped.model import NAME
-from ..gripped.motion import motions_of
 from ..gripped.report import overview
 from ..io.folder import recordings
+from ..recording import Recording
 from ..recording_checks import marker_indices
 from ..tables import plain_section
 from ..whole import write_text
@@ -35,8 +35,8 @@ class RopeData:
     """A rope's section with its recordings, smoothed."""
 
     section: GrippedRopeSection
-    train: Sequence[GrippedMotion]
-    unseen: Sequence[GrippedMotion]
+    train: Screened
+    unseen: Screened
 
 
 def load_ropes(config: GrippedConfig, folder: Path) -> list[RopeData]:
@@ -47,24 +47,51 @@ def load_ropes(config: GrippedConfig, folder: Path) -> list[RopeData]:
     """
     ropes = []
     for i, section in enumerate(config.gripped_rope):
-        train = _load(section, f"gripped_rope[{i}].train", folder / section.train)
-        unseen = [] if section.eval is None else _load(section, f"gripped_rope[{i}].eval", folder / section.eval)
+        where = f"gripped_rope[{i}]"
+        train = _load(section, where, "train", folder / section.train)
+        unseen = Screened(()) if section.eval is None else _load(section, where, "eval", folder / section.eval)
         ropes.append(RopeData(section, train, unseen))
     return ropes
 
 
-def _load(section: GrippedRopeSection, key: str, folder: Path) -> list[GrippedMotion]:
+def _load(section: GrippedRopeSection, where: str, part: str, folder: Path) -> Screened:
     try:
         found = recordings(folder, section.pattern, section.units)
+        found = _reordered(found, section.reorder, f"{where}.reorder", part)
         if section.clamped is not None:
             found = [replace(r, clamped=marker_indices("clamped", section.clamped, r.markers)) for r in found]
-        motions = motions_of(found, section.smoothing)
+        motions = screened(found, section.smoothing)
     except RecordingError as error:
-        where = "" if error.field in ("folder", str(folder)) else f"{error.field} "
-        raise ConfigError(key, f"{where}{error.problem}", error.got, error.fix) from error
+        which = "" if error.field in ("folder", str(folder)) else f"{error.field} "
+        raise ConfigError(f"{where}.{part}", f"{which}{error.problem}", error.got, error.fix) from error
     if section.nominal is not None:
-        _check_nominal(section.nominal, f"{key.rpartition('.')[0]}.nominal", motions)
+        _check_nominal(section.nominal, f"{where}.nominal", motions)
     return motions
+
+
+def _reordered(
+    found: Sequence[Recording], reorder: Mapping[str, Sequence[str | int]], key: str, part: str
+) -> list[Recording]:
+    """Recordings of a folder with the markers of those that the configuration names in another order; names, and which
+    are gripped, stay where they are along the rope."""
+    orders = {name.partition("/")[2]: order for name, order in reorder.items() if name.startswith(f"{part}/")}
+    unknown = sorted(orders.keys() - {r.name for r in found})
+    if unknown:
+        names = ", ".join(r.name for r in found[:5])
+        raise ConfigError(key, f"names a recording that {part} does not have", unknown[0], f"use such as {names}")
+    changed = []
+    for r in found:
+        order = list(range(len(r.markers)))
+        if r.name in orders:
+            try:
+                order = list(marker_indices("reorder", orders[r.name], r.markers))
+            except RecordingError as error:
+                raise ConfigError(f"{key}.{part}/{r.name}", error.problem, error.got, error.fix) from error
+        if len(order) != len(r.markers):
+            fix = f"list all {len(r.markers)} in their order along the rope"
+            raise ConfigError(f"{key}.{part}/{r.name}", "does not hold every marker", len(order), fix)
+        changed.append(replace(r, positions=r.positions[:, order]) if r.name in orders else r)
+    return changed
 
 
 def _check_nominal(nominal: Sequence[Sequence[float]], key: str, motions: Sequence[GrippedMotion]) -> None:
@@ -139,7 +166,7 @@ def _fit(console: Console, config: GrippedConfig, rope: RopeData, ladder: Sequen
         ladder=ladder,
         validate=s.validate_share,
         bending_lengths=s.bending_lengths,
-        windows=[(length, total) for length, total in s.windows],
+        windows="all" if s.windows == "all" else [(length, total) for length, total in s.windows],
         segments=s.segments,
         max_segments=s.max_segments,
         substeps=s.substeps,

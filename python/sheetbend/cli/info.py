@@ -150,13 +150,22 @@ def _ropes(console: Console, config: GrippedConfig, ropes: list[RopeData]) -> di
             "length": float(np.mean([m.length for m in motions])),
             "density": rope.section.density,
             "rungs": rope.section.rungs,
+            "notes": [*rope.train.notes, *rope.unseen.notes],
         }
     table = Table("rope", "train", "eval", "to fit", "free markers", "length", "density", "rungs", box=None)
     for name, row in told.items():
         units = {"seconds": "s", "length": "m", "density": "kg/m"}
-        cells = [f"{_text(value)} {units.get(key, '')}".rstrip() for key, value in row.items() if key != "rungs"]
+        shown = {"density": "not weighed"} if row["density"] is None else {}
+        cells = [
+            shown.get(key) or f"{_text(value)} {units.get(key, '')}".rstrip()
+            for key, value in row.items()
+            if key not in ("rungs", "notes")
+        ]
         table.add_row(name, *cells, ", ".join(row["rungs"]))
     console.print(table)
+    for name, row in told.items():
+        for note in row["notes"]:
+            console.print(f"  {name}: {note}", markup=False, soft_wrap=True)
     for name, sentences in doubtful.items():
         told[name]["doubts"] = list(sentences)
         for sentence in sentences:

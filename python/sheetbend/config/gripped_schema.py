@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import inspect
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field, field_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from ..gripped import fit_rope
 from .schema import ExperimentSection, OutputSection
@@ -45,7 +45,13 @@ class GrippedRopeSection(Section):
     """[[gripped_rope]]: a rope between two grips, and how it is fitted. A list."""
 
     name: Name = key(..., "names the rope in results, and their folder")
-    density: Finite = key(..., "mass per length, weighed: motion tells stiffness over density only", "kg/m", gt=0)
+    density: Finite | None = key(
+        None,
+        "mass per length, weighed; when left out, what follows from motion alone is fitted and reported: stiffness and "
+        "drag over the density, such as EI/density in m^4/s^2",
+        "kg/m",
+        gt=0,
+    )
     density_sd: Finite | None = key(
         None, "relative standard deviation of the density, which then counts in the intervals (0.02 is 2 %)", gt=0
     )
@@ -55,6 +61,12 @@ class GrippedRopeSection(Section):
     units: Literal["m", "cm", "mm"] | None = key(None, "length unit of the files; their JSONs' when left out")
     clamped: list[str | int] | None = key(
         None, "names or numbers of the gripped markers, two or more at each end; the files' when left out"
+    )
+    reorder: dict[str, list[str | int]] = key(
+        {},
+        "order of the markers along the rope of single files, such as "
+        '{ "train/02" = [0, 1, 2, 3, 5, 4, 6, 7] } or with their names; all markers of the file, once each. Exchanged '
+        "markers of a grip need no entry: they are found and put back",
     )
     gravity: Vector = key(_default("gravity"), "in the axes of the recordings, where their JSONs do not tell", "m/s^2")
     nominal: Directions | None = key(
@@ -71,16 +83,17 @@ class GrippedRopeSection(Section):
     )
     validate_share: Finite = key(
         _default("validate"),
-        "share of the recordings in `train` that decide whether a rung stays; the last fit sees all",
+        "share of the recordings in `train` that decide whether a rung stays; where that is none, the end of each "
+        "recording does, this share of its time; the last fit sees all",
         ge=0,
         lt=1,
     )
-    windows: list[Span] = key(
+    windows: Annotated[list[Span], Field(min_length=1)] | Literal["all"] = key(
         _default("windows"),
         "[length, total] of the pieces that a fit sees, each predicted open loop: short ones first, whose cost is "
-        "smooth",
+        'smooth; "all" = these defaults, but the last fit sees every window of all recordings, and says first how long '
+        "that takes",
         "s",
-        min_length=1,
     )
     bending_lengths: list[Positive] = key(
         _default("bending_lengths"), "of the starts, (EI/(density g))^(1/3); the best one wins", "m", min_length=1
@@ -100,6 +113,20 @@ class GrippedRopeSection(Section):
             order = ", ".join(f'"{rung}"' for rung in RUNGS)
             raise ValueError(f'must be in order, each once, "twist" first|leave out some of {order}')
         return rungs
+
+    @model_validator(mode="after")
+    def _weighed(self) -> Self:
+        if self.density is None and self.density_sd is not None:
+            raise ValueError("density_sd needs a density|give density, or leave density_sd out")
+        return self
+
+    @field_validator("reorder")
+    @classmethod
+    def _of_a_folder(cls, reorder: dict[str, list[str | int]]) -> dict[str, list[str | int]]:
+        for name in reorder:
+            if name.partition("/")[0] not in ("train", "eval"):
+                raise ValueError(f'names {name!r}|write "train/NAME" or "eval/NAME"')
+        return reorder
 
 
 class GrippedFitSection(Section):

@@ -7,6 +7,7 @@ from .model import RopeModel
 from .motion import GrippedMotion
 from .recipe import RopeFit, fit_rope
 from .report import RopeReport
+from .screening import Screened, screened
 from .trades import trades
 from .without_twist import WITHOUT_TWIST
 
@@ -19,8 +20,10 @@ __all__ = [
     "RopeModel",
     "RopeReport",
     "Rung",
+    "Screened",
     "Step",
     "evaluate",
     "fit_rope",
+    "screened",
     "trades",
 ]

@@ -52,7 +52,7 @@ class GrippedMotion:
         if len(recording.times) < 3:
             problem = f"of {recording.name} are fewer than three frames"
             raise RecordingError("times", problem, len(recording.times), "leave the recording out, or record a motion")
-        inner = _inner(recording)
+        inner = gripped_ends(recording)
         check_order(recording, inner)
         recording, positions = _bridged(recording)
         x, v = smoothed(recording.times, positions, smoothing)
@@ -184,7 +184,12 @@ def _curve(points: Array, s: Array) -> Array:
     return np.asarray(spline(np.linspace(s[0], s[-1], POLYLINE)))
 
 
-def _inner(recording: Recording) -> tuple[int, int]:
+def gripped_ends(recording: Recording) -> tuple[int, int]:
+    """Numbers of the two inner gripped markers.
+
+    Raises:
+        RecordingError: the first two and the last two markers or more are not the gripped ones.
+    """
     count, held = len(recording.markers), set(recording.clamped)
     first = next((k for k in range(count) if k not in held), count)
     last = next((k for k in reversed(range(count)) if k not in held), -1)

@@ -9,7 +9,7 @@ to, and those that it was fitted to no worse (`judging`, `climb`).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -28,12 +28,13 @@ from .judging import predict
 from .ladder import LADDER, Rung
 from .model import GRAVITY, NAME, RopeModel, nominal_directions, shared_gravity
 from .motion import Array, GrippedMotion, motions_of
+from .over_density import UNIT, as_quantities, named_over_density, over_density
 from .plausible import doubts
+from .screening import screened
 from .windows import SPANS, Span, everything
 
 BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first
 LINKS_PER_BENDING_LENGTH = 3.0  # below this EI reads too high and GJ too low
-UNIT = 1.0  # kg/m, of a rope that was not weighed: what is fitted is then over the density
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,8 @@ class RopeFit:
         steps: what was tried, in order.
         fit: the last fit with intervals and verdicts.
         warnings: what a reader must know before using the numbers.
+        weighed: whether the density is known. Otherwise the model has 1 kg/m, and names in `values` and in the fit's
+            result say what is over the density, such as `rope_EI/density`.
         spread: by how much models that predict equally well differ at most, by parameter in its unit; the intervals
             count it.
     """
@@ -55,6 +58,7 @@ class RopeFit:
     steps: tuple[Step, ...]
     fit: Fit
     warnings: tuple[str, ...]
+    weighed: bool = True
     spread: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -65,7 +69,7 @@ class RopeFit:
     def predict(self, recording: Recording | GrippedMotion) -> Array:
         """(frames, markers, 3) m: open loop from the first frame, gripped markers as recorded."""
         (motion,) = motions_of([recording], self.model.smoothing)
-        return predict(self.model, [motion], self.values)[0]
+        return predict(self.model, [motion], as_quantities(self.values))[0]
 
 
 @journaled
@@ -92,7 +96,8 @@ def fit_rope(
     """Fit a rope's parameters to recordings between two grips.
 
     Args:
-        recordings: with two or more clamped markers at each end; or their motions, smoothed already.
+        recordings: with two or more clamped markers at each end; or their motions, smoothed already. What is wrong with
+            single ones is mended, or they are left out; the warnings name them (`gripped.screened`).
         density: kg/m of the rope without its markers, weighed. None = not known: then stiffness and drag over the
             density are fitted and reported, such as EI/density in m^4/s^2.
         nominal: directions (3,) of the start and the end grip from which their frames are carried; the mean recorded
@@ -128,9 +133,12 @@ def fit_rope(
         raise InputError("recordings", "are empty", 0, "give at least one")
     if not 0 <= validate < 1:
         raise InputError("validate", "must be a share below 1", validate, "give such as 0.25")
-    motions = motions_of(recordings, smoothing)
+    usable = screened(recordings, smoothing)
+    motions = usable.motions
     shared_gravity([m.recording for m in motions])
     doubtful = doubts(motions, gravity)
+    for note in usable.notes:
+        say(note)
     for doubt in doubtful:
         say(f"doubtful: {doubt}")
     model = RopeModel(
@@ -160,12 +168,17 @@ def fit_rope(
     assert climb.rope is not None
     rope, values = climb.rope, found.values
     warnings = (
+        *usable.notes,
         *doubtful,
         *climb.left_out,
         *at_bounds(rope.parameters, values, rope.model, kept, last[0]),
         *_short_links(rope.model, values),
     )
-    return RopeFit(rope.model.at(values), values, tuple(climb.steps), found, warnings, spread)
+    model = rope.model.at(values)
+    if density is None:
+        result = over_density(found.result)
+        found, values = replace(found, result=result), named_over_density(values, result)
+    return RopeFit(model, values, tuple(climb.steps), found, warnings, density is not None, spread)
 
 
 def _short_links(model: RopeModel, values: Mapping[str, float]) -> list[str]:
