@@ -29,12 +29,7 @@ def bounded(
 ) -> list[Parameter]:
     """The parameters with the bounds of a fit to windows of that length, s; narrower ones of their own stay."""
     limits = _limits(model, motions, window)
-    return [
-        replace(p, lower=max(p.lower, limits[p.name][0]), upper=min(p.upper, limits[p.name][1]))
-        if p.name in limits and p.tied_to is None
-        else p
-        for p in parameters
-    ]
+    return [_within(p, *limits[p.name]) if p.name in limits and p.tied_to is None else p for p in parameters]
 
 
 def at_bounds(
@@ -55,6 +50,12 @@ def at_bounds(
             if math.isfinite(bound) and abs(value - bound) <= near and name in WORDS:
                 found.append(f"{name} ends at its bound, {short(bound)} {p.unit}: {WORDS[name][above]}")
     return tuple(found)
+
+
+def _within(p: Parameter, lower: float, upper: float) -> Parameter:
+    """With these bounds too, and a start between them."""
+    lower, upper = max(p.lower, lower), min(p.upper, upper)
+    return replace(p, lower=lower, upper=upper, initial=float(np.clip(p.initial or lower, lower, upper)))
 
 
 def _limits(model: RopeModel, motions: Sequence[GrippedMotion], window: float) -> dict[str, tuple[float, float]]:

@@ -22,7 +22,7 @@ from .start import started
 from .windows import Span
 
 SETTLED = 0.05  # relative change of EI at which links are short enough
-ENOUGH = 1e-3  # of the cost: what a step must promise while searching
+ENOUGH = 2e-3  # of the cost: what a step must promise while searching
 SHORT, LONG = 12, 30  # iterations, at most, of a start, and of a fit to long windows
 
 Say = Callable[[str], None]
@@ -203,7 +203,7 @@ class Climb:
         for start in ({}, *rung.starts):
             shifted = {f"{NAME}_{k}": v for k, v in start.items() if k != "EI"}
             shifted[f"{NAME}_EI"] = rope.values[f"{NAME}_EI"] * start.get("EI", 1.0)
-            found = self._descended(Rope(larger, parameters, {**rope.values, **shifted}), self.middle)
+            found = self._descended(Rope(larger, parameters, {**rope.values, **shifted}), self.middle, SHORT)
             if found is not None:
                 ends.append(found)
         if not ends:

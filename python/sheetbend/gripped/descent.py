@@ -15,6 +15,7 @@ import numpy as np
 
 from ..approach import Approach
 from ..experiment import Experiment
+from ..optimizers import ROUNDING, STUCK
 from ..parameters import Parameter
 from ..problem import FitProblem
 from .model import NAME
@@ -53,9 +54,8 @@ def negligible(problem: FitProblem) -> float:
 
 def bearable(problem: FitProblem, cost: float) -> bool:
     """Whether a cost is one of motions that stay near the rope: off by less than its length on average."""
-    worst = [
-        problem.values_of(e, problem.parameters.initial())[f"{NAME}_length"] / e.sigma for e in problem.experiments
-    ]
+    name, u = f"{NAME}_length", problem.parameters.initial()
+    worst = [problem.values_of(e, u).get(name, e.scene.quantities[name].value) / e.sigma for e in problem.experiments]
     return bool(cost < 0.5 * problem.core.data_rows * max(worst) ** 2)
 
 
@@ -72,20 +72,20 @@ def descend(
 
     Args:
         most: steps.
-        enough: share of the cost that a step must promise, where that is more than `negligible`.
+        enough: share of the cost that a step must promise and take off, where that is more than `negligible`.
         followed: called with each step's number and cost.
     """
     problem = problem_of(experiments, parameters, values, threads)
     walk = Approach(problem, problem.parameters.initial())
-    least, ended = max(enough, negligible(problem)), False
+    least, ended, first = max(enough, negligible(problem)), False, walk.cost
     if not bearable(problem, walk.cost):
         return Descent(problem.parameters.to_physical(walk.u), np.inf, 0, False)
     while walk.iterations < most:
         if not walk.step():  # nothing left to promise, or no shorter step helps
-            ended = walk.promised < max(least, 1e-5)
+            ended = walk.promised < max(least, STUCK) or walk.promised * walk.cost <= ROUNDING * first
             break
         followed(walk.iterations, walk.cost)
-        if walk.promised < least:
+        if walk.promised < least or walk.taken < enough:
             ended = True
             break
     return Descent(problem.parameters.to_physical(walk.u), walk.cost, walk.iterations, ended)

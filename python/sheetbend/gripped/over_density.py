@@ -47,6 +47,11 @@ def named_over_density(values: Mapping[str, float], result: FitResult) -> dict[s
     return {f"{k}{OVER}" if k in over else k: v for k, v in values.items() if k != _DENSITY}
 
 
+def quantity(name: str) -> str:
+    """The model's quantity that a value over the density is of."""
+    return name.removesuffix(OVER)
+
+
 def as_quantities(values: Mapping[str, float]) -> dict[str, float]:
     """Values under the names of the model's quantities, for a rope of 1 kg/m where they are over the density."""
     return {name.removesuffix(OVER): value for name, value in values.items()}
