@@ -437,3 +437,32 @@ class TestTrades:
 def test_the_rungs_of_the_configuration_are_those_of_the_recipe() -> None:
     assert tuple(gripped.RUNGS) == gripped_schema.RUNGS
     assert tuple(gripped.RUNGS.values()) == (TWIST, TILTS, REST, YIELD, VARYING) == tuple(LADDER)
+
+
+class TestNotWeighed:
+    """Without a density what follows is stiffness over the density, and nothing looks like newtons."""
+
+    @pytest.fixture
+    def told(self, config: Path) -> tuple[dict[str, Any], dict[str, Any], str]:
+        """The ropes of a fit with and of one without the density, and the report of the second."""
+        edited(config, ('["twist", "tilts"]', '["twist"]'), ("[[0.5, 1.5], [1.0, 4.0]]", "[[0.5, 1.5]]"))
+        known = last_line(run("fit", config, "--json", "--output", "known"))["ropes"]["rope_1"]
+        edited(config, ("density = 0.045\n", ""))
+        rope = last_line(run("fit", config, "--json", "--output", "unknown"))["ropes"]["rope_1"]
+        return known, rope, Path("unknown/rope_1/report.txt").read_text() + Path("unknown/report.txt").read_text()
+
+    def test_stiffness_and_drag_are_over_the_density(self, told: tuple[dict[str, Any], dict[str, Any], str]) -> None:
+        known, rope, report = told
+        assert known["weighed"] and not rope["weighed"]
+        for name, unit in (("EI", "m^4/s^2"), ("GJ", "m^4/s^2"), ("drag_linear", "1/s")):
+            over = rope["parameters"][f"rope_{name}/density"]
+            assert over["unit"] == unit and f"rope_{name}" not in rope["parameters"]
+        EI, true = rope["values"]["rope_EI/density"], known["values"]["rope_EI"] / 0.045
+        assert EI == pytest.approx(true, rel=0.02) == rope["parameters"]["rope_EI/density"]["value"]
+        assert rope["parameters"]["rope_bend_damping"]["unit"] == "s"
+        assert rope["error"] == pytest.approx(known["error"], rel=0.02)
+        assert "N m^2" not in json.dumps({**rope, "trades": ""}) and "rope_density" not in json.dumps(rope)
+        assert all(moved["rope_EI/density"] for moved in (refit["moved"] for refit in rope["refits"]))
+        assert FitResult.load(Path("unknown/rope_1/fit.json"))["rope_EI/density"].value == EI
+        assert "m^4/s^2" in report and "rope_EI/density" in report and "weigh the rope for EI" in report
+        assert report.count("N m^2") == 1  # what weighing would give

@@ -41,9 +41,14 @@ def over_density(result: FitResult) -> FitResult:
     return FitResult.from_dict(_renamed(data, re.compile(rf"\b(?:{'|'.join(map(re.escape, names))})\b(?!/density)")))
 
 
+def is_over_density(result: FitResult) -> bool:
+    """Whether it is one of a rope that was not weighed."""
+    return any(name.endswith(OVER) for name in result.values)
+
+
 def named_over_density(values: Mapping[str, float], result: FitResult) -> dict[str, float]:
     """Values under the names that a result of `over_density` gives them; the density, which is not known, left out."""
-    over = {name.removesuffix(OVER) for name in result.values if name.endswith(OVER)}
+    over = {quantity(name) for name in result.values if name.endswith(OVER)}
     return {f"{k}{OVER}" if k in over else k: v for k, v in values.items() if k != _DENSITY}
 
 
@@ -54,7 +59,7 @@ def quantity(name: str) -> str:
 
 def as_quantities(values: Mapping[str, float]) -> dict[str, float]:
     """Values under the names of the model's quantities, for a rope of 1 kg/m where they are over the density."""
-    return {name.removesuffix(OVER): value for name, value in values.items()}
+    return {quantity(name): value for name, value in values.items()}
 
 
 def in_units(text: str) -> str:

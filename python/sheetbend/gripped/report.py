@@ -13,6 +13,7 @@ from ..tables import Section, plain_section, rich_section
 from ..wording import short
 from .evaluation import Evaluation
 from .model import NAME
+from .over_density import as_quantities, in_units, is_over_density
 from .recipe import RopeFit
 from .trades import trades
 
@@ -45,7 +46,8 @@ class RopeReport:
             for part, where in ((self.unseen, ""), (self.without_twist, " without twist"))
             for name in (part.diverged if part is not None else ())
         )
-        return replace(result, warnings=(*result.warnings, *self.found.warnings, *more))
+        notes = tuple(f"unseen recording {note}" for note in (self.unseen.notes if self.unseen is not None else ()))
+        return replace(result, warnings=(*result.warnings, *self.found.warnings, *notes, *more))
 
     def plain(self, width: int = 100) -> str:
         """As plain text."""
@@ -75,6 +77,7 @@ class RopeReport:
         steps = [{k: _finite(v) for k, v in asdict(step).items()} for step in self.found.steps]
         return self.result.to_dict() | {
             "rope": self.name,
+            "weighed": self.found.weighed,
             "values": dict(self.found.values),
             "segments": self.found.model.segments,
             "steps": steps,
@@ -101,7 +104,8 @@ def counted(result: FitResult) -> tuple[tuple[str, str], ...]:
     """(counted or not, sentence) of what makes the intervals."""
     refined = "".join(f", {made.name}" for made in result.refits)
     seen = "markers beside the rope by as much as the residuals show (systematic)"
-    unseen = "a roll of the grips that nothing shows, noise of the grips, the weight"
+    weight = "" if is_over_density(result) else ", the weight"
+    unseen = f"a roll of the grips that nothing shows, noise of the grips{weight}"
     return (("counted", f"residuals that are alike over time{refined}, {seen}"), ("not counted", unseen))
 
 
@@ -122,13 +126,16 @@ def overview(reports: list[RopeReport]) -> Section:
     """One line per rope: errors on unseen recordings, and the stiffness."""
     rows = []
     for r in reports:
-        told, values = errors(r.unseen, r.without_twist), r.found.values
+        told, values = errors(r.unseen, r.without_twist), as_quantities(r.found.values)
         EI, GJ = values[f"{NAME}_EI"], values[f"{NAME}_GJ"]
         numbers = (_mm(told[key]) for key in ("blend", "without_twist", "error"))
-        rows.append((r.name, *numbers, "mm", short(EI), short(GJ / EI)))
-    headers = ("rope", "blend", "without twist", "fitted", "unit", "EI [N m^2]", "GJ/EI")
-    note = "mean absolute coordinate error of recordings that were not fitted; blend: no physics"
-    return Section("Ropes", headers, tuple(rows), (("errors", note),))
+        unit = "N m^2" if r.found.weighed else in_units("N m^2")
+        rows.append((r.name, *numbers, "mm", short(EI), unit, short(GJ / EI)))
+    headers = ("rope", "blend", "without twist", "fitted", "unit", "EI", "unit", "GJ/EI")
+    notes = [("errors", "mean absolute coordinate error of recordings that were not fitted; blend: no physics")]
+    if not all(r.found.weighed for r in reports):
+        notes.append(("EI", f"in {in_units('N m^2')} it is that over the density, of ropes that were not weighed"))
+    return Section("Ropes", headers, tuple(rows), tuple(notes))
 
 
 def _mm(error: float | None) -> str:
