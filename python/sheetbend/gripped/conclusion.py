@@ -22,6 +22,7 @@ from .ladder import TWIST
 from .model import NAME
 from .motion import GrippedMotion
 from .offsets import offset_reach
+from .over_density import as_quantities
 from .pieces import experiments_of, problem_of, starting
 from .windows import Span, counted, places
 
@@ -92,7 +93,7 @@ def spread_words(spread: Mapping[str, float], values: Mapping[str, float]) -> st
     EI = f"{NAME}_EI"
     if EI not in spread:
         return ""
-    part = short(100 * spread[EI] / values[EI], 2)
+    part = short(100 * spread[EI] / as_quantities(values)[EI], 2)
     return f"what else the model has (models that predict equally well differ in EI by up to {part} %)"
 
 

@@ -21,7 +21,7 @@ from ..problem import FitProblem
 from .model import NAME
 from .pieces import problem_of
 
-DISTANCE = 0.05  # standard deviations to the minimum, over all parameters, at which a descent has ended
+DISTANCE = 0.03  # standard deviations to the minimum, of a parameter, at which a descent has ended
 ALIKE = 20.0  # frames over which residuals of a moving rope are alike, at least
 
 
@@ -49,7 +49,7 @@ class Descent:
 
 def negligible(problem: FitProblem) -> float:
     """Share of the cost below which a promised decrease is a small part of the interval."""
-    return DISTANCE**2 * ALIKE / max(problem.core.data_rows, 1)
+    return len(problem.parameters.free) * DISTANCE**2 * ALIKE / max(problem.core.data_rows, 1)
 
 
 def bearable(problem: FitProblem, cost: float) -> bool:

@@ -90,11 +90,10 @@ REST = Rung(
         _plain(f"curvature_{axis}_{k}", "1/m", smooth(2.0, k), 1.0) for k in CURVATURE_MODES for axis in (1, 2)
     ),
 )
-MARKERS = Rung(
-    "places and mass of the markers",
-    options={"places": True, "marker_share": 0.05},
-    parameters=(_log("marker_share", 0.05, "", sd=0.7),),
-    each_marker=(_plain("place_{}", "m", 0.005, 0.005),),
+VARYING = Rung(
+    "stiffness along the rope",
+    options={"softness_modes": SOFTNESS_MODES},
+    parameters=tuple(_plain(f"softness_{k}", "", smooth(0.45, k), 0.3) for k in SOFTNESS_MODES),
 )
 YIELD = Rung(
     "yield",
@@ -105,9 +104,10 @@ YIELD = Rung(
     ),
     starts=({"yield_curvature": 1.0, "yield_share": 0.5, "EI": 1.5},),
 )
-VARYING = Rung(
-    "stiffness along the rope",
-    options={"softness_modes": SOFTNESS_MODES},
-    parameters=tuple(_plain(f"softness_{k}", "", smooth(0.45, k), 0.3) for k in SOFTNESS_MODES),
+MARKERS = Rung(
+    "places and mass of the markers",
+    options={"places": True, "marker_share": 0.05},
+    parameters=(_log("marker_share", 0.05, "", sd=0.7),),
+    each_marker=(_plain("place_{}", "m", 0.005, 0.005),),
 )
-LADDER = (TWIST, TILTS, REST, MARKERS, YIELD, VARYING)
+LADDER = (TWIST, TILTS, REST, VARYING, YIELD, MARKERS)
