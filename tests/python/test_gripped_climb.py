@@ -29,11 +29,7 @@ TRUE = {"rope_EI": 0.03}
 @cache
 def shown(name: str = "shown", **values: float) -> GrippedMotion:
     """The rope as the model moves it with these quantities."""
-    model = replace(
-        MODEL.with_values(**{k[5:]: v for k, v in TRUE.items()}),
-        places="rope_place_5" in values,
-        marker_share=0.1 if "rope_marker_share" in values else None,
-    )
+    model = replace(MODEL, places="rope_place_5" in values)
     (x,) = predict(model, [MOTION], {**TRUE, **values})
     return replace(MOTION, recording=replace(MOTION.recording, positions=x, name=name))
 
@@ -60,19 +56,19 @@ class TestLadder:
         u = problem.parameters.initial() + 0.01
         _, _, J = problem.evaluate(u)
         names = problem.parameters.free
-        for name in ("rope_marker_share", place_of(4), "rope_curvature_2_8", "rope_softness_6", "rope_yield_share"):
+        for name in (place_of(4), "rope_curvature_2_8", "rope_softness_6", "rope_yield_share"):
             k, h = names.index(name), 1e-5
             step = h * (np.arange(len(u)) == k)
             (_, above, _), (_, below, _) = (problem.evaluate(u + s, jacobian=False) for s in (step, -step))
             slope = (above - below) / (2 * h)
             assert np.abs(slope - J[:, k]).max() < 1e-4 * np.abs(J[:, k]).max(), name
 
-    def test_the_place_and_the_mass_of_markers_come_back(self) -> None:
-        true = {place_of(5): 0.004, place_of(8): -0.003, "rope_marker_share": 0.1}
+    def test_the_places_of_markers_come_back(self) -> None:
+        true = {place_of(5): 0.004, place_of(8): -0.003}
         motion = shown(**true)
         model = replace(MODEL.with_values(EI=TRUE["rope_EI"]), **MARKERS.options)
         wanted = [replace(p, prior=None) for p in MARKERS.wanted(motion)]
-        assert [p.name for p in wanted] == ["rope_marker_share", *(place_of(k) for k in motion.free)]
+        assert [p.name for p in wanted] == [place_of(k) for k in motion.free]
         end = descend(experiments_of(model, [motion], (1.0, 1.0)), wanted, {}, 20)
         assert end.ended
         for name, value in true.items():

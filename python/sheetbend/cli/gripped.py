@@ -169,6 +169,7 @@ def _fit(console: Console, config: GrippedConfig, rope: RopeData, ladder: Sequen
     return fit_rope(
         rope.train,
         density=s.density,
+        marker_mass=s.marker_mass,
         nominal=None if s.nominal is None else (s.nominal[0], s.nominal[1]),
         ladder=ladder,
         validate=s.validate_share,

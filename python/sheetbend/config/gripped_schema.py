@@ -55,6 +55,13 @@ class GrippedRopeSection(Section):
     density_sd: Finite | None = key(
         None, "relative standard deviation of the density, which then counts in the intervals (0.02 is 2 %)", gt=0
     )
+    marker_mass: Finite | None = key(
+        None,
+        "mass of each free marker that was not weighed with the rope, 0 where they were; when left out, 5 % of the "
+        "density count in the intervals",
+        "kg",
+        ge=0,
+    )
     train: str = key(..., "folder of the recordings to fit, relative to the configuration")
     eval: str | None = key(None, "folder of recordings that are only predicted, from their first frame")
     pattern: str = key("*", 'which files of these folders, such as "*.pkl"', min_length=1)
@@ -77,7 +84,7 @@ class GrippedRopeSection(Section):
     rungs: list[RungName] = key(
         list(RUNGS),
         "what the model gets, one after another: straight with twist, tilts of the grips, rest curvature, a stiffness "
-        "that varies along the rope, yield, places and mass of the markers; a rung stays only if it predicts most "
+        "that varies along the rope, yield, places of the markers along it; a rung stays only if it predicts most "
         "recordings better that it was not fitted to, and no worse those that it was",
         min_length=1,
     )

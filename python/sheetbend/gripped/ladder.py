@@ -105,9 +105,8 @@ YIELD = Rung(
     starts=({"yield_curvature": 1.0, "yield_share": 0.5, "EI": 1.5},),
 )
 MARKERS = Rung(
-    "places and mass of the markers",
-    options={"places": True, "marker_share": 0.05},
-    parameters=(_log("marker_share", 0.05, "", sd=0.7),),
+    "places of the markers",
+    options={"places": True},
     each_marker=(_plain("place_{}", "m", 0.005, 0.005),),
 )
 LADDER = (TWIST, TILTS, REST, VARYING, YIELD, MARKERS)

@@ -19,7 +19,6 @@ from ..solver import Solver
 from .motion import Array, GrippedMotion
 
 NAME = "rope"
-MARKER_SHARE = f"{NAME}_marker_share"
 GRAVITY = (0.0, 0.0, -9.81)
 
 
@@ -36,8 +35,8 @@ class RopeModel:
         curvature_modes, softness_modes, density_modes: see `add_rod`.
         places: let each free marker stand off from its measured place along the rope, by the quantity
             `rope_place_<its number>`, m.
-        marker_share: mass of a free marker over that of the rope between two of them on average, the quantity
-            `rope_marker_share`; None = `density` counts the markers.
+        marker_mass: kg of each free marker, beside `density`; spread over the rope it does the same, so that no motion
+            tells it.
         segments: links between the grips.
         substeps: per frame.
         iterations: Newton iterations per substep.
@@ -54,7 +53,7 @@ class RopeModel:
     softness_modes: Sequence[int] = ()
     density_modes: Sequence[int] = ()
     places: bool = False
-    marker_share: float | None = None
+    marker_mass: float = 0.0
     segments: int = 12
     substeps: int = 2
     iterations: int = 1
@@ -98,20 +97,17 @@ class RopeModel:
         if self.places:
             for k in motion.free:
                 scene.add_quantity(place_of(k), 0.0, "m", positive=False, scale=5e-3)
-        if self.marker_share is not None:
-            self._weigh_markers(scene, motion, self.marker_share)
+        if self.marker_mass > 0.0:
+            self._weigh_markers(scene, motion)
         return scene
 
-    def _weigh_markers(self, scene: Scene, motion: GrippedMotion, share: float) -> None:
+    def _weigh_markers(self, scene: Scene, motion: GrippedMotion) -> None:
         """Each free marker's mass, shared by the two nodes beside it."""
         rod: Rod = scene.ropes[NAME]
-        scene.add_quantity(MARKER_SHARE, share, "")
-        factors = {MARKER_SHARE: "identity", f"{NAME}_density": "identity", f"{NAME}_length": "identity"}
-        part = 1.0 / (len(motion.free) + 1)  # of the rope's mass
         for k in motion.free:
             link, ahead = divmod(float(motion.fractions[k]) * self.segments, 1.0)
             for node, near in ((int(link), 1.0 - ahead), (int(link) + 1, ahead)):
-                scene.add_terms([product("mass", int(rod.particles[node]), part * near, factors)])
+                scene.add_terms([product("mass", int(rod.particles[node]), self.marker_mass * near, {})])
 
     def experiment(self, motion: GrippedMotion, window: Window | None = None) -> Experiment:
         """A window of a recording (all of it by default), predicted open loop from its first frame."""

@@ -8,6 +8,7 @@ to, and those that it was fitted to no worse (`judging`, `climb`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -34,6 +35,8 @@ from .screening import screened
 from .windows import SPANS, Span, everything
 
 BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first
+DENSITY = f"{NAME}_density"
+MARKERS_UNKNOWN = 0.05  # of the rope's mass, standard deviation of that of markers of which nothing is known
 LINKS_PER_BENDING_LENGTH = 3.0  # below this EI reads too high and GJ too low
 
 
@@ -77,6 +80,7 @@ def fit_rope(
     recordings: Sequence[Recording | GrippedMotion],
     *,
     density: float | None = None,
+    marker_mass: float | None = None,
     nominal: tuple[ArrayLike, ArrayLike] | None = None,
     ladder: Sequence[Rung] = LADDER,
     validate: float = 0.25,
@@ -100,6 +104,8 @@ def fit_rope(
             single ones is mended, or they are left out; the warnings name them (`gripped.screened`).
         density: kg/m of the rope without its markers, weighed. None = not known: then stiffness and drag over the
             density are fitted and reported, such as EI/density in m^4/s^2.
+        marker_mass: kg of each free marker that was not weighed with the rope; 0 where they were. None = not known:
+            then 5 % of the density count in the intervals.
         nominal: directions (3,) of the start and the end grip from which their frames are carried; the mean recorded
             ones by default.
         ladder: the rungs, in order; the first one always stays.
@@ -129,6 +135,11 @@ def fit_rope(
     if density is not None and not (np.isfinite(density) and density > 0):
         fix = "weigh the rope and give kg/m, or leave it out: then EI/density is fitted"
         raise InputError("density", "must be positive", density, fix)
+    if marker_mass is not None and not (np.isfinite(marker_mass) and marker_mass >= 0):
+        raise InputError("marker_mass", "must be zero or more", marker_mass, "weigh a marker and give kg")
+    if marker_mass and density is None:
+        fix = "weigh the rope too and give its density, or leave it out"
+        raise InputError("marker_mass", "needs the rope's density", marker_mass, fix)
     if not recordings:
         raise InputError("recordings", "are empty", 0, "give at least one")
     if not 0 <= validate < 1:
@@ -147,6 +158,7 @@ def fit_rope(
         if nominal is None
         else (unit_vector("nominal", nominal[0]), unit_vector("nominal", nominal[1])),
         values={},
+        marker_mass=marker_mass or 0.0,
         segments=segments,
         substeps=substeps,
         smoothing=smoothing,
@@ -164,7 +176,10 @@ def fit_rope(
         say(f"interrupted: going back to {next(s.name for s in reversed(climb.steps) if s.stays)}")
     kept = climb.whole
     last = everything(kept, spans[-1][0]) if isinstance(windows, str) else spans[-1]
-    found, spread = conclude(climb, kept, last, given or {}, interrupted)
+    sds = dict(given or {})
+    if marker_mass is None:
+        sds[DENSITY] = math.hypot(sds.get(DENSITY, 0.0), MARKERS_UNKNOWN)
+    found, spread = conclude(climb, kept, last, sds, interrupted)
     assert climb.rope is not None
     rope, values = climb.rope, found.values
     warnings = (
