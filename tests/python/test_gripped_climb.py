@@ -11,13 +11,14 @@ import sheetbend as sb
 from sheetbend.gripped import GrippedMotion, RopeModel
 from sheetbend.gripped.bounds import at_bounds, bounded
 from sheetbend.gripped.climb import Climb, Rope
-from sheetbend.gripped.conclusion import model_spread, spread_words
+from sheetbend.gripped.conclusion import checked, model_spread, spread_words
 from sheetbend.gripped.descent import descend, negligible
 from sheetbend.gripped.judging import Errors, predict
 from sheetbend.gripped.ladder import LADDER, MARKERS, REST, TWIST, VARYING, YIELD, smooth
 from sheetbend.gripped.model import place_of
 from sheetbend.gripped.pieces import experiments_of, problem_of
 from sheetbend.gripped.start import started, whole
+from sheetbend.optimizers import minimize
 from test_gripped_motion import carried_about, model_of
 
 MOTION = GrippedMotion.of(carried_about(), 0.0)
@@ -153,6 +154,25 @@ class TestClimb:
         climb._keep(YIELD, None, None, 0.0)
         assert climb.rope is before and [s.stays for s in climb.steps] == [True, False, False]
         assert said[-1] == "yield: diverges, does not stay"
+
+
+class TestConclusion:
+    def test_a_finer_rope_that_diverges_is_not_counted(self) -> None:
+        good, bad = (experiments_of(MODEL, [m], (1.0, 1.0)) for m in (shown(), shaken("bad")))
+        assert checked(good, STIFFNESS, {}, 1) is good
+        with pytest.raises(sb.SheetbendError, match="diverges"):
+            checked(bad, STIFFNESS, {}, 1)
+
+    def test_no_end_of_an_optimizer_has_a_negative_cost(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Ceres tells a cost of -1 where it cannot begin; that must not win over a real end."""
+        ceres = pytest.importorskip("sheetbend._ceres")
+        problem = problem_of(experiments_of(MODEL, [shown()], (1.0, 1.0)), STIFFNESS, {})
+        u = problem.parameters.initial()
+        failed = {"u": u, "cost": -1.0, "iterations": 0, "evaluations": 1, "jacobians": 1}
+        failed |= {"converged": False, "stopped": False, "message": "no derivatives"}
+        monkeypatch.setattr(ceres, "minimize", lambda **_: failed)
+        end, _ = minimize(problem, u, "ceres")
+        assert end.cost == problem.cost(u) and not end.converged
 
 
 class TestSpread:

@@ -13,11 +13,13 @@ import numpy as np
 
 from ..discretization import Refinement
 from ..errors import SheetbendError
+from ..experiment import Experiment
 from ..fit import Fit, fit
+from ..parameters import Parameter
 from ..wording import short
 from .bounds import bounded
 from .climb import Climb, Rope
-from .descent import descend, negligible
+from .descent import bearable, descend, negligible
 from .ladder import TWIST
 from .model import NAME
 from .motion import GrippedMotion
@@ -55,11 +57,16 @@ def conclude(
     if not found.finite:
         raise SheetbendError("the fit that counts diverges where the last rung ended")
     spread = model_spread(rope, climb.equal())
-    finer = replace(rope.model, segments=2 * rope.model.segments)
+    say(f"{'ended' if found.ended else 'not ended'} after {found.iterations} steps")
+
+    def finer() -> list[Experiment]:
+        model = replace(rope.model, segments=2 * rope.model.segments)
+        return checked(experiments_of(model, motions, window), parameters, found.values, threads)
+
     last = fit(
         experiments,
         parameters=starting(parameters, found.values),
-        refine=None if interrupted else Refinement(finer=lambda: experiments_of(finer, motions, window), linear=True),
+        refine=None if interrupted else Refinement(finer=finer, linear=True),
         systematic=lambda problem, u: _together(offset_reach(problem, u), spread),
         windows=(),
         given=given,
@@ -75,6 +82,20 @@ def conclude(
         return last, spread
     warning = "interrupted: later rungs were not tried, and the last fit did not get to its end"
     return replace(last, result=replace(last.result, interrupted=True, converged=False, warnings=(warning,))), spread
+
+
+def checked(
+    experiments: list[Experiment], parameters: Sequence[Parameter], values: Mapping[str, float], threads: int
+) -> list[Experiment]:
+    """The experiments, whose motions at these values stay near the rope.
+
+    Raises:
+        SheetbendError: they do not, so that no step from there tells anything.
+    """
+    problem = problem_of(experiments, parameters, values, threads)
+    if not bearable(problem, problem.cost(problem.parameters.initial())):
+        raise SheetbendError("the motion diverges")
+    return experiments
 
 
 def model_spread(rope: Rope, equal: Sequence[Rope]) -> dict[str, float]:
