@@ -263,6 +263,29 @@ class TestBadFiles:
         assert first == "01: m11 and m12 of the last grip were exchanged from frame 100 (1 s) on, and are put back"
         assert second.startswith("02 is left out: ") and "m5, m4, m3" in second
 
+    def test_the_report_names_it_in_train_and_in_eval(self, spoiled: Path) -> None:
+        edited(spoiled, ('["twist", "tilts"]', '["twist"]'), ("[[0.5, 1.5], [1.0, 4.0]]", "[[0.5, 0.5]]"))
+        shutil.copy("rope_1/train/01.pkl", "rope_1/eval/01.pkl")
+        result = run("fit", spoiled, "--json")
+        rope = last_line(result)["ropes"]["rope_1"]
+        exchanged = "01: m11 and m12 of the last grip were exchanged from frame 100 (1 s) on, and are put back"
+        assert exchanged in rope["warnings"] and f"unseen recording {exchanged}" in rope["warnings"]
+        assert any(warning.startswith("02 is left out: ") for warning in rope["warnings"])
+        assert exchanged in result.stderr and set(rope["unseen"]) == {"00", "01"}
+
+    def test_a_damaged_file_is_left_out(self, spoiled: Path) -> None:
+        path = Path("rope_1/train/00.pkl")
+        path.write_bytes(path.read_bytes()[:1000])
+        rope = last_line(run("info", spoiled, "--json"))["config"]["ropes"]["rope_1"]
+        assert rope["notes"][0].startswith("00.pkl is left out: it is no pickle, or a damaged one")
+        assert rope["train"] == 1
+
+    def test_where_no_file_can_be_read_the_first_one_s_reason_is_told(self, spoiled: Path) -> None:
+        for path in Path("rope_1/train").glob("*.pkl"):
+            path.write_bytes(b"nothing")
+        error = last_line(run("info", spoiled, "--json"))["error"]
+        assert error["field"] == "gripped_rope[0].train" and "00.pkl is no pickle" in error["problem"]
+
     def test_the_configuration_reorders_one_file(self, spoiled: Path, data: Path) -> None:
         order = [f"m{k}" for k in self.ORDER]
         edited(spoiled, ("density = 0.045", f'density = 0.045\nreorder = {{ "train/02" = {json.dumps(order)} }}'))

@@ -62,8 +62,9 @@ def load_ropes(config: GrippedConfig, folder: Path) -> list[RopeData]:
 
 
 def _load(section: GrippedRopeSection, where: str, part: str, folder: Path) -> Screened:
+    refused: dict[str, RecordingError] = {}
     try:
-        found = recordings(folder, section.pattern, section.units)
+        found = recordings(folder, section.pattern, section.units, refused)
         found = _reordered(found, section.reorder, f"{where}.reorder", part)
         if section.clamped is not None:
             found = [replace(r, clamped=marker_indices("clamped", section.clamped, r.markers)) for r in found]
@@ -73,7 +74,8 @@ def _load(section: GrippedRopeSection, where: str, part: str, folder: Path) -> S
         raise ConfigError(f"{where}.{part}", f"{which}{error.problem}", error.got, error.fix) from error
     if section.nominal is not None:
         _check_nominal(section.nominal, f"{where}.nominal", motions)
-    return motions
+    unread = (f"{name} is left out: it {error.problem}" for name, error in refused.items())
+    return replace(motions, notes=(*unread, *motions.notes))
 
 
 def _reordered(

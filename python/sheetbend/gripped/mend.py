@@ -1,9 +1,9 @@
 """Mends a single recording of a gripped rope: exchanged neighbors, markers seen elsewhere, and tracking that froze.
 
-All three are found from the recording alone. Two neighbors are exchanged at a frame where the exchanged order continues
-both paths far better; the markers of a grip are so throughout where their direction leads away from the rope. A marker
-is elsewhere between two jumps that no rope makes, and frozen where its numbers repeat exactly although the frame before
-or after shows it moving.
+All three are found from the recording alone. Two neighbors are exchanged at a frame at which the direction from one to
+the other turns round, and throughout where the line through all markers is then shorter. A marker is elsewhere between
+two jumps that no rope makes, and frozen where its numbers repeat exactly although the frame before or after shows it
+moving.
 """
 
 from __future__ import annotations
@@ -21,8 +21,10 @@ from ..timeseries import mean_position
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-CONTINUES = 0.5  # way of two exchanged neighbors from frame to frame, over that in the given order
-FORGOTTEN = 0.1  # s, after which an order is not compared any more
+TURNED = -0.5  # cosine of the angle by which two neighbors turn from frame to frame when they are exchanged
+STRETCHED = 2.0  # by which their distance changes at most in that
+FORGOTTEN = 0.1  # s, after which directions are not compared any more
+SHORTER, SHORTER_AT_END = 0.8, 0.98  # links beside two neighbors, exchanged over given, that exchange them throughout
 JUMP = 0.05  # of the rope's length, from one frame to the next beyond the usual way: no marker of a rope does that
 SUDDEN = 200.0  # m/s^2, the same for frames that are far apart in time
 REPEATS, LASTS = 5, 0.05  # frames and s of equal numbers that count as frozen
@@ -56,47 +58,68 @@ def mended(recording: Recording, inner: tuple[int, int]) -> tuple[Recording, tup
 
 def _in_order(recording: Recording, inner: tuple[int, int]) -> tuple[Array, list[str]]:
     """(frames, markers, 3) m with neighbors exchanged back, and words on each exchange."""
-    words = []
     positions = recording.positions.copy()
-    for first in range(positions.shape[1] - 1):
-        pair = [first, first + 1]
-        state = _exchanges(recording.times, positions[:, pair])
-        of = {inner[0] - 1: " of the first grip", inner[1]: " of the last grip"}.get(first, "")
-        if not of:
-            wrong = state if 2 * state.sum() <= len(state) else ~state
-        elif first == inner[1]:
-            wrong = state ^ (_leads(positions, inner[1], -1, state) < 0.0)
-        else:
-            wrong = state ^ (_leads(positions, inner[0], 1, state) < 0.0)
-        if wrong.any():
-            frames = np.flatnonzero(wrong)[:, None]
-            positions[frames, pair] = positions[frames, pair[::-1]]
-            names = " and ".join(recording.markers[k] for k in pair)
-            words.append(f"{names}{of} were exchanged {_when(recording, wrong)}, and are put back")
+    pairs = range(positions.shape[1] - 1)
+    wrong = np.zeros((len(pairs), len(positions)), dtype=bool)
+    for k in pairs:
+        state = _turned(recording.times, positions[:, k + 1] - positions[:, k])
+        wrong[k] = state if 2 * state.sum() <= len(state) else ~state
+        _exchange(positions, k, wrong[k])
+    for k in _throughout(positions):
+        wrong[k] = ~wrong[k]
+    words = []
+    of = {inner[0] - 1: " of the first grip", inner[1]: " of the last grip"}
+    for k in np.flatnonzero(wrong.any(axis=1)).tolist():
+        names = f"{recording.markers[k]} and {recording.markers[k + 1]}{of.get(k, '')}"
+        words.append(f"{names} were exchanged {_when(recording, wrong[k])}, and are put back")
     return positions, words
 
 
-def _exchanges(times: Array, pair: Array) -> Mask:
-    """(frames,) whether two markers (frames, 2, 3) are the other way round than in the first frame."""
-    seen = np.flatnonzero(np.isfinite(pair).all(axis=(1, 2)))
-    x, t = pair[seen], times[seen]
-    given, other = (np.linalg.norm(after - x[:-1], axis=2).sum(axis=1) for after in (x[1:], x[1:, ::-1]))
-    state = np.zeros(len(times), dtype=int)
-    state[seen[1:]] = (other < CONTINUES * given) & (np.diff(t) <= FORGOTTEN)
-    return np.asarray(np.cumsum(state) % 2 == 1)
+def _turned(times: Array, along: Array) -> Mask:
+    """(frames,) whether two neighbors are the other way round than in the first frame, from one to the other (frames,
+    3)."""
+    seen = np.flatnonzero(np.isfinite(along[:, 0]))
+    distance = np.maximum(np.linalg.norm(along[seen], axis=1), np.finfo(float).tiny)
+    d = along[seen] / distance[:, None]
+    turned = np.zeros(len(times), dtype=int)
+    turned[seen[1:]] = (
+        ((d[1:] * d[:-1]).sum(axis=1) < TURNED)
+        & (np.abs(np.diff(np.log(distance))) < np.log(STRETCHED))
+        & (np.diff(times[seen]) <= FORGOTTEN)
+    )
+    return np.asarray(np.cumsum(turned) % 2 == 1)
 
 
-def _leads(positions: Array, k: int, ahead: int, state: Mask) -> float:
-    """Sum over the frames of the cosine between a grip's direction into the rope and the rope's beside it, where both
-    are taken as if the frames of `state` had the grip's markers exchanged."""
-    grip = positions[:, k] - positions[:, k - ahead]
-    rope = positions[:, k + ahead] - positions[:, k]
-    rope_exchanged = positions[:, k + ahead] - positions[:, k - ahead]
-    turned = state[:, None]
-    grip, rope = np.where(turned, -grip, grip), np.where(turned, rope_exchanged, rope)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        cosine = (grip * rope).sum(axis=1) / (np.linalg.norm(grip, axis=1) * np.linalg.norm(rope, axis=1))
-    return float(np.nansum(cosine))
+def _throughout(positions: Array) -> list[int]:
+    """Exchanges pairs of neighbors back that are so in all frames, by their first markers, as long as the line through
+    all markers becomes clearly shorter about them."""
+    distance = mean_position(np.linalg.norm(positions[:, :, None] - positions[:, None], axis=3))
+    order = list(range(positions.shape[1]))
+    done: list[int] = []
+
+    def gain(k: int) -> float:
+        """By how much the links beside a pair become shorter when it is exchanged; 0 where that is not clear."""
+        a, b = order[k], order[k + 1]
+        before, after = order[k - 1 : k] if k else [], order[k + 2 : k + 3]
+        given = sum(distance[c, a] for c in before) + sum(distance[b, c] for c in after)
+        exchanged = sum(distance[c, b] for c in before) + sum(distance[a, c] for c in after)
+        clear = exchanged < (SHORTER if before and after else SHORTER_AT_END) * given
+        return float(given - exchanged) if clear else 0.0
+
+    while True:
+        gains = [gain(k) for k in range(len(order) - 1)]
+        best = int(np.argmax(gains))
+        if gains[best] == 0.0:
+            return done
+        order[best], order[best + 1] = order[best + 1], order[best]
+        _exchange(positions, best, np.ones(len(positions), dtype=bool))
+        done.append(best)
+
+
+def _exchange(positions: Array, k: int, which: Mask) -> None:
+    """Exchange markers k and k + 1 in some frames."""
+    frames = np.flatnonzero(which)[:, None]
+    positions[frames, [k, k + 1]] = positions[frames, [k + 1, k]]
 
 
 def _frozen(times: Array, track: Array) -> Mask:

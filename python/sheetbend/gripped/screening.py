@@ -55,7 +55,7 @@ def screened(recordings: Sequence[Recording | GrippedMotion], smoothing: float) 
         recordings: of one rope. Motions stay as they are; what was screened already is returned.
 
     Raises:
-        RecordingError: half of the recordings or more cannot be used: the first one's reason.
+        RecordingError: more than half of the recordings cannot be used: the first one's reason.
     """
     if isinstance(recordings, Screened):
         return recordings
@@ -78,7 +78,7 @@ def screened(recordings: Sequence[Recording | GrippedMotion], smoothing: float) 
             notes.append(f"{recording.name} is left out: {reasons or f'{error.field} {error.problem}; {error.fix}'}")
         else:
             notes += [f"{recording.name}: {what}" for what in words]
-    if errors and 2 * len(errors) >= len(recordings):
+    if 2 * len(errors) > len(recordings):
         raise errors[0]
     same, others = _of_one_rope(kept)
     return Screened(tuple(same), (*notes, *others))
