@@ -20,7 +20,7 @@ from sheetbend.cli import gripped
 from sheetbend.cli.app import app
 from sheetbend.config import GrippedConfig, gripped_schema, parse, parse_any
 from sheetbend.gripped import LADDER, GrippedMotion, trades
-from sheetbend.gripped.ladder import REST, TILTS, TWIST, VARYING, YIELD
+from sheetbend.gripped.ladder import MARKERS, REST, TILTS, TWIST, VARYING, YIELD
 from sheetbend.result import Correlation, Estimate, FitResult
 from typer.testing import CliRunner, Result
 
@@ -459,7 +459,7 @@ class TestTrades:
 
 def test_the_rungs_of_the_configuration_are_those_of_the_recipe() -> None:
     assert tuple(gripped.RUNGS) == gripped_schema.RUNGS
-    assert tuple(gripped.RUNGS.values()) == (TWIST, TILTS, REST, YIELD, VARYING) == tuple(LADDER)
+    assert tuple(gripped.RUNGS.values()) == (TWIST, TILTS, REST, VARYING, YIELD, MARKERS) == tuple(LADDER)
 
 
 class TestNotWeighed:

@@ -14,7 +14,7 @@ from ..chain import unit_vector
 from ..config import GrippedConfig, GrippedRopeSection
 from ..errors import ConfigError, RecordingError, SceneError, SheetbendError
 from ..gripped import WITHOUT_TWIST, GrippedMotion, RopeFit, RopeReport, Rung, Screened, evaluate, fit_rope, screened
-from ..gripped.ladder import REST, TILTS, TWIST, VARYING, YIELD
+from ..gripped.ladder import MARKERS, REST, TILTS, TWIST, VARYING, YIELD
 from ..gripped.model import NAME
 from ..gripped.report import overview
 from ..io.folder import recordings
@@ -27,7 +27,14 @@ from .gripped_figure import write_figure
 from .outcome import Code, Outcome, code_of
 from .screen import heading, show
 
-RUNGS: dict[str, Rung] = {"twist": TWIST, "tilts": TILTS, "rest": REST, "yield": YIELD, "varying": VARYING}
+RUNGS: dict[str, Rung] = {
+    "twist": TWIST,
+    "tilts": TILTS,
+    "rest": REST,
+    "varying": VARYING,
+    "yield": YIELD,
+    "markers": MARKERS,
+}
 
 
 @dataclass(frozen=True)
@@ -164,6 +171,7 @@ def _fit(console: Console, config: GrippedConfig, rope: RopeData, ladder: Sequen
     return fit_rope(
         rope.train,
         density=s.density,
+        marker_mass=s.marker_mass,
         nominal=None if s.nominal is None else (s.nominal[0], s.nominal[1]),
         ladder=ladder,
         validate=s.validate_share,

@@ -11,8 +11,8 @@ from ..gripped import fit_rope
 from .schema import ExperimentSection, OutputSection
 from .section import MOST_LINKS, Finite, Name, Pair, Section, Vector, key
 
-RungName = Literal["twist", "tilts", "rest", "yield", "varying"]
-RUNGS: tuple[RungName, ...] = ("twist", "tilts", "rest", "yield", "varying")
+RungName = Literal["twist", "tilts", "rest", "varying", "yield", "markers"]
+RUNGS: tuple[RungName, ...] = ("twist", "tilts", "rest", "varying", "yield", "markers")
 RECIPE = {name: option.default for name, option in inspect.signature(fit_rope).parameters.items()}
 
 
@@ -55,6 +55,13 @@ class GrippedRopeSection(Section):
     density_sd: Finite | None = key(
         None, "relative standard deviation of the density, which then counts in the intervals (0.02 is 2 %)", gt=0
     )
+    marker_mass: Finite | None = key(
+        None,
+        "mass of each free marker that was not weighed with the rope, 0 where they were; when left out, 5 % of the "
+        "density count in the intervals",
+        "kg",
+        ge=0,
+    )
     train: str = key(..., "folder of the recordings to fit, relative to the configuration")
     eval: str | None = key(None, "folder of recordings that are only predicted, from their first frame")
     pattern: str = key("*", 'which files of these folders, such as "*.pkl"', min_length=1)
@@ -76,9 +83,9 @@ class GrippedRopeSection(Section):
     )
     rungs: list[RungName] = key(
         list(RUNGS),
-        "what the model gets, one after another: straight with twist, tilts of the grips, rest curvature, yield, a "
-        "stiffness that varies along the rope; a rung stays only if it predicts recordings better that it was not "
-        "fitted to, and no worse those that it was",
+        "what the model gets, one after another: straight with twist, tilts of the grips, rest curvature, a stiffness "
+        "that varies along the rope, yield, places of the markers along it; a rung stays only if it predicts most "
+        "recordings better that it was not fitted to, and no worse those that it was",
         min_length=1,
     )
     validate_share: Finite = key(
@@ -108,10 +115,10 @@ class GrippedRopeSection(Section):
 
     @field_validator("rungs")
     @classmethod
-    def _in_order(cls, rungs: list[RungName]) -> list[RungName]:
-        if rungs != [rung for rung in RUNGS if rung in rungs] or rungs[0] != "twist":
+    def _each_once(cls, rungs: list[RungName]) -> list[RungName]:
+        if len(set(rungs)) < len(rungs) or rungs[0] != "twist":
             order = ", ".join(f'"{rung}"' for rung in RUNGS)
-            raise ValueError(f'must be in order, each once, "twist" first|leave out some of {order}')
+            raise ValueError(f'must be given each once, "twist" first|leave out some of {order}')
         return rungs
 
     @model_validator(mode="after")

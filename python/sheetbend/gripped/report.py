@@ -11,10 +11,12 @@ from ..optional import require
 from ..result import FitResult
 from ..tables import Section, plain_section, rich_section
 from ..wording import short
+from .conclusion import spread_words
 from .evaluation import Evaluation
 from .model import NAME
 from .over_density import as_quantities, in_units, is_over_density
 from .recipe import RopeFit
+from .stiffness import stiffness_section, tangent_stiffness
 from .trades import trades
 
 if TYPE_CHECKING:
@@ -80,6 +82,8 @@ class RopeReport:
             "weighed": self.found.weighed,
             "values": dict(self.found.values),
             "segments": self.found.model.segments,
+            "tangent_stiffness": tangent_stiffness(self.result),
+            "model_spread": dict(self.found.spread),
             "steps": steps,
             "trades": [f"{what}: {words}" for what, words in trades(self.result)],
             **errors(self.unseen, self.without_twist),
@@ -87,26 +91,45 @@ class RopeReport:
 
     def _sections(self) -> list[Section]:
         rows = [
-            (s.name, _mm(s.fitted), _mm(s.others), "mm", "yes" if s.stays else "no", f"{s.seconds:.1f}")
+            (
+                s.name,
+                _mm(s.fitted),
+                _mm(s.others),
+                "mm",
+                "" if s.ratio is None else short(s.ratio),
+                "" if s.ratio is None else f"{s.better} of {s.count}",
+                "yes" if s.stays else "no",
+                f"{s.seconds:.1f}",
+            )
             for s in self.found.steps
         ]
-        meaning = "mean absolute coordinate error of whole recordings, predicted from their first frame"
-        notes = (("fitted, others", f"{meaning}: those that the step was fitted to, and those that it was not"),)
-        headers = ("step", "fitted", "others", "unit", "stays", "seconds")
+        meaning = "median of the mean absolute coordinate errors of recordings, predicted from their first frame"
+        notes = (
+            ("fitted, others", f"{meaning}: those that the step was fitted to, and those that it was not"),
+            ("ratio", "median ratio of the errors of others with and without the step"),
+            ("better", "how many of the others (or of their pieces) it predicts better"),
+        )
+        headers = ("step", "fitted", "others", "unit", "ratio", "better", "stays", "seconds")
+        stiffness = stiffness_section(self.result)
         return [
+            *([] if stiffness is None else [stiffness]),
             Section("Steps", headers, tuple(rows), notes),
             Section("What trades against what", notes=trades(self.result)),
-            Section("What the intervals count", notes=counted(self.result)),
+            Section(
+                "What the intervals count",
+                notes=counted(self.result, spread_words(self.found.spread, self.found.values)),
+            ),
         ]
 
 
-def counted(result: FitResult) -> tuple[tuple[str, str], ...]:
-    """(counted or not, sentence) of what makes the intervals."""
+def counted(result: FitResult, spread: str = "") -> tuple[tuple[str, str], ...]:
+    """(counted or not, sentence) of what makes the intervals; `spread`: words on models that predict equally well."""
     refined = "".join(f", {made.name}" for made in result.refits)
     seen = "markers beside the rope by as much as the residuals show (systematic)"
     weight = "" if is_over_density(result) else ", the weight"
     unseen = f"a roll of the grips that nothing shows, noise of the grips{weight}"
-    return (("counted", f"residuals that are alike over time{refined}, {seen}"), ("not counted", unseen))
+    model = f", {spread}" if spread else ""
+    return (("counted", f"residuals that are alike over time{refined}, {seen}{model}"), ("not counted", unseen))
 
 
 def errors(unseen: Evaluation | None, without_twist: Evaluation | None) -> dict[str, Any]:
