@@ -113,7 +113,8 @@ def fit_rope(
             none, the share of the time of each recording, its end. The last fit sees all. At 0 what is fitted decides.
         bending_lengths: m, of the starts.
         windows: (length, total) in s: each fit sees windows of this length, of about this total, the last one those of
-            the last entry. "all" = the default ones, but the last fit sees every window of all recordings.
+            the last entry (half as many decide on rungs). "all" = the default ones, but the last fit sees every window
+            of all recordings.
         segments, max_segments: links at the start, and at most; they are doubled until EI moves by less than 5 %.
         substeps: per frame.
         smoothing: s, of the recorded grips and starts.
