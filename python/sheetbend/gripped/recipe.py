@@ -36,7 +36,7 @@ from .windows import SPANS, Span, everything
 
 BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first
 DENSITY = f"{NAME}_density"
-MARKERS_UNKNOWN = 0.05  # of the rope's mass, standard deviation of that of markers of which nothing is known
+MARKERS_UNKNOWN = 0.08  # of the rope's mass, standard deviation of that of markers of which nothing is known
 LINKS_PER_BENDING_LENGTH = 3.0  # below this EI reads too high and GJ too low
 
 
@@ -105,7 +105,7 @@ def fit_rope(
         density: kg/m of the rope without its markers, weighed. None = not known: then stiffness and drag over the
             density are fitted and reported, such as EI/density in m^4/s^2.
         marker_mass: kg of each free marker that was not weighed with the rope; 0 where they were. None = not known:
-            then 5 % of the density count in the intervals.
+            then 8 % of the density count in the intervals.
         nominal: directions (3,) of the start and the end grip from which their frames are carried; the mean recorded
             ones by default.
         ladder: the rungs, in order; the first one always stays.
