@@ -485,6 +485,7 @@ class TestNotWeighed:
         assert rope["parameters"]["rope_bend_damping"]["unit"] == "s"
         assert rope["error"] == pytest.approx(known["error"], rel=0.02)
         assert "N m^2" not in json.dumps({**rope, "trades": ""}) and "rope_density" not in json.dumps(rope)
+        assert "EI" not in rope["steps"][0] and rope["steps"][0]["EI/density"] > 0.0
         assert all(moved["rope_EI/density"] for moved in (refit["moved"] for refit in rope["refits"]))
         assert FitResult.load(Path("unknown/rope_1/fit.json"))["rope_EI/density"].value == EI
         assert "m^4/s^2" in report and "rope_EI/density" in report and "weigh the rope for EI" in report

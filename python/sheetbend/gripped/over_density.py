@@ -8,7 +8,7 @@ the density, in the unit that follows: EI as EI/density in m^4/s^2.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..result import FitResult
@@ -65,6 +65,11 @@ def as_quantities(values: Mapping[str, float]) -> dict[str, float]:
 def in_units(text: str) -> str:
     """Words with units over the density."""
     return _UNIT.sub(lambda found: UNITS[found.group()], text)
+
+
+def said_over_density(say: Callable[[str], None]) -> Callable[[str], None]:
+    """A way to say lines in which stiffness is that over the density."""
+    return lambda text: say(re.sub(r"\b(EI|GJ)\b(?!/)", rf"\1{OVER}", in_units(text)))
 
 
 def _renamed(part: Any, names: re.Pattern[str]) -> Any:

@@ -29,7 +29,7 @@ from .judging import predict
 from .ladder import LADDER, Rung
 from .model import GRAVITY, NAME, RopeModel, nominal_directions, shared_gravity
 from .motion import Array, GrippedMotion, motions_of
-from .over_density import UNIT, as_quantities, named_over_density, over_density
+from .over_density import UNIT, as_quantities, named_over_density, over_density, said_over_density
 from .plausible import doubts
 from .screening import screened
 from .windows import SPANS, Span, everything
@@ -145,6 +145,8 @@ def fit_rope(
         raise InputError("recordings", "are empty", 0, "give at least one")
     if not 0 <= validate < 1:
         raise InputError("validate", "must be a share below 1", validate, "give such as 0.25")
+    if density is None:
+        say = said_over_density(say)
     usable = screened(recordings, smoothing)
     motions = usable.motions
     shared_gravity([m.recording for m in motions])
@@ -194,6 +196,7 @@ def fit_rope(
     if density is None:
         result = over_density(found.result)
         found, values = replace(found, result=result), named_over_density(values, result)
+        spread = named_over_density(spread, result)
     return RopeFit(model, values, tuple(climb.steps), found, warnings, density is not None, spread)
 
 

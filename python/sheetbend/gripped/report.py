@@ -14,7 +14,7 @@ from ..wording import short
 from .conclusion import spread_words
 from .evaluation import Evaluation
 from .model import NAME
-from .over_density import as_quantities, in_units, is_over_density
+from .over_density import OVER, as_quantities, in_units, is_over_density
 from .recipe import RopeFit
 from .stiffness import stiffness_section, tangent_stiffness
 from .trades import trades
@@ -76,7 +76,8 @@ class RopeReport:
 
     def to_dict(self) -> dict[str, Any]:
         """Strict JSON values; what `FitResult.load` reads, and beside it the steps, the trades and the errors in m."""
-        steps = [{k: _finite(v) for k, v in asdict(step).items()} for step in self.found.steps]
+        EI = "EI" if self.found.weighed else f"EI{OVER}"
+        steps = [{EI if k == "EI" else k: _finite(v) for k, v in asdict(step).items()} for step in self.found.steps]
         return self.result.to_dict() | {
             "rope": self.name,
             "weighed": self.found.weighed,
@@ -117,7 +118,7 @@ class RopeReport:
             Section("What trades against what", notes=trades(self.result)),
             Section(
                 "What the intervals count",
-                notes=counted(self.result, spread_words(self.found.spread, self.found.values)),
+                notes=counted(self.result, spread_words(as_quantities(self.found.spread), self.found.values)),
             ),
         ]
 
