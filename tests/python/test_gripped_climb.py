@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend.gripped import GrippedMotion, RopeModel
+from sheetbend.gripped import GrippedMotion, RopeModel, fit_rope
 from sheetbend.gripped.bounds import at_bounds, bounded
 from sheetbend.gripped.climb import Climb, Rope
 from sheetbend.gripped.conclusion import checked, model_spread, spread_words
@@ -169,6 +169,17 @@ class TestConclusion:
         assert checked(good, STIFFNESS, {}, 1) is good
         with pytest.raises(sb.SheetbendError, match="diverges"):
             checked(bad, STIFFNESS, {}, 1)
+
+    def test_ctrl_c_in_the_last_fit_costs_no_result(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        def stopped(*_: object) -> dict[str, float]:
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr(sb.gripped.conclusion, "_at_the_end", stopped)
+        ladder, windows = [TWIST], [(1.0, 2.0)]
+        options = {"density": 0.06, "ladder": ladder, "windows": windows, "smoothing": 0.0, "validate": 0.0}
+        found = fit_rope([shown()], bending_lengths=(0.3,), max_segments=12, **options)
+        assert found.interrupted and not found.fit.result.converged and found.steps[0].stays
+        assert found.values["rope_EI"] == pytest.approx(0.03, rel=0.15)
 
     def test_no_end_of_an_optimizer_has_a_negative_cost(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """Ceres tells a cost of -1 where it cannot begin; that must not win over a real end."""
