@@ -8,13 +8,13 @@ from functools import cache
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend.gripped import GrippedMotion, RopeModel
+from sheetbend.gripped import GrippedMotion, RopeModel, fit_rope
 from sheetbend.gripped.bounds import at_bounds, bounded
 from sheetbend.gripped.climb import Climb, Rope
 from sheetbend.gripped.conclusion import checked, model_spread, spread_words
 from sheetbend.gripped.descent import descend, negligible
 from sheetbend.gripped.judging import Errors, predict
-from sheetbend.gripped.ladder import LADDER, MARKERS, REST, TWIST, VARYING, YIELD, smooth
+from sheetbend.gripped.ladder import LADDER, MARKERS, REST, TILTS, TWIST, VARYING, YIELD, Rung, smooth
 from sheetbend.gripped.model import place_of
 from sheetbend.gripped.pieces import experiments_of, problem_of
 from sheetbend.gripped.start import started, whole
@@ -124,12 +124,12 @@ class TestDescent:
 
 
 class TestClimb:
-    def climbed(self, motions: list[GrippedMotion]) -> tuple[Climb, list[str]]:
+    def climbed(self, motions: list[GrippedMotion], *more: Rung) -> tuple[Climb, list[str]]:
         said: list[str] = []
         climb = Climb(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, said.append)
         model = RopeModel(density=0.06, nominal=MODEL.nominal, values={}, smoothing=0.0)
         twist = replace(TWIST, parameters=TWIST.parameters[:4])
-        climb.run(model, [twist], (0.3,), 12)
+        climb.run(model, [twist, *more], (0.3,), 12)
         return climb, said
 
     def test_one_recording_that_flies_apart_is_left_out_with_a_word(self) -> None:
@@ -140,6 +140,13 @@ class TestClimb:
         assert [m.recording.name for m in climb.whole] == ["0", "1", "2", "3", "4"]
         (sentence,) = climb.left_out
         assert sentence.startswith("bad is left out of the fit: its prediction diverges") and sentence in said
+
+    def test_from_one_recording_a_rung_is_judged_by_its_end(self) -> None:
+        """Once nothing was left to judge by, and every rung stayed."""
+        climb, _ = self.climbed([shown("only")], TILTS)
+        assert [m.recording.name for m in climb.whole] == ["only"] and climb.whole[0].seconds == 1.0
+        assert len(climb.split.fitted[0].recording.times) < 80
+        assert climb.steps[0].stays and (climb.steps[1].count, climb.steps[1].ratio is None) == (4, False)
 
     def test_where_everything_diverges_it_says_so(self) -> None:
         with pytest.raises(sb.SheetbendError, match="no start of a straight rope"):
@@ -162,6 +169,17 @@ class TestConclusion:
         assert checked(good, STIFFNESS, {}, 1) is good
         with pytest.raises(sb.SheetbendError, match="diverges"):
             checked(bad, STIFFNESS, {}, 1)
+
+    def test_ctrl_c_in_the_last_fit_costs_no_result(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        def stopped(*_: object) -> dict[str, float]:
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr(sb.gripped.conclusion, "_at_the_end", stopped)
+        ladder, windows = [TWIST], [(1.0, 2.0)]
+        options = {"density": 0.06, "ladder": ladder, "windows": windows, "smoothing": 0.0, "validate": 0.0}
+        found = fit_rope([shown()], bending_lengths=(0.3,), max_segments=12, **options)
+        assert found.interrupted and not found.fit.result.converged and found.steps[0].stays
+        assert found.values["rope_EI"] == pytest.approx(0.03, rel=0.15)
 
     def test_no_end_of_an_optimizer_has_a_negative_cost(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """Ceres tells a cost of -1 where it cannot begin; that must not win over a real end."""

@@ -57,7 +57,7 @@ class GrippedRopeSection(Section):
     )
     marker_mass: Finite | None = key(
         None,
-        "mass of each free marker that was not weighed with the rope, 0 where they were; when left out, 5 % of the "
+        "mass of each free marker that was not weighed with the rope, 0 where they were; when left out, 8 % of the "
         "density count in the intervals",
         "kg",
         ge=0,

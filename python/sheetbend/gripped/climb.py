@@ -22,6 +22,7 @@ from .start import started
 from .windows import Span
 
 SETTLED = 0.05  # relative change of EI at which links are short enough
+SEARCHED = 0.5  # of the total of long windows that the last fit sees: enough to decide on rungs
 ENOUGH = 2e-3  # of the cost: what a step must promise while searching
 SHORT, LONG = 12, 30  # iterations, at most, of a start, and of a fit to long windows
 
@@ -81,7 +82,8 @@ class Climb:
         self.given = tuple(motions)
         self.split = Split.of(motions, share)
         self.windows, self.threads, self.say = windows, threads, say
-        self.middle, self.longest = windows[min(1, len(windows) - 1)], windows[-1]
+        length, total = windows[-1]
+        self.middle, self.longest = windows[min(1, len(windows) - 1)], (length, max(length, SEARCHED * total))
         self.left_out: list[str] = []
         self.steps: list[Step] = []
         self.tried: list[Rope] = []

@@ -53,19 +53,22 @@ def conclude(
     say(f"the fit that counts, to {counted(motions, window)}")
     if len(motions) > MANY:
         say(f"which takes about {short(_seconds(rope, motions, window, threads), 1)} s")
-    found = descend(experiments, parameters, rope.values, 1 if interrupted else MOST, threads)
-    if not found.finite:
-        raise SheetbendError("the fit that counts diverges where the last rung ended")
-    spread = model_spread(rope, climb.equal())
-    say(f"{'ended' if found.ended else 'not ended'} after {found.iterations} steps")
+    values, spread = rope.values, dict[str, float]()
+    if not interrupted:
+        try:
+            spread = model_spread(rope, climb.equal())
+            values = _at_the_end(climb, experiments, parameters)
+        except KeyboardInterrupt:
+            interrupted = True
+            say("interrupted: the fit that counts did not get to its end")
 
     def finer() -> list[Experiment]:
         model = replace(rope.model, segments=2 * rope.model.segments)
-        return checked(experiments_of(model, motions, window), parameters, found.values, threads)
+        return checked(experiments_of(model, motions, window), parameters, values, threads)
 
     last = fit(
         experiments,
-        parameters=starting(parameters, found.values),
+        parameters=starting(parameters, values),
         refine=None if interrupted else Refinement(finer=finer, linear=True),
         systematic=lambda problem, u: _together(offset_reach(problem, u), spread),
         windows=(),
@@ -73,7 +76,7 @@ def conclude(
         threads=threads,
         profiles=False,
         max_iterations=1 if interrupted else MOST,
-        tolerance=negligible(problem_of(experiments, parameters, found.values, threads)),
+        tolerance=negligible(problem_of(experiments, parameters, values, threads)),
     )
     for refit in last.result.refits:
         moved = refit.moved[f"{NAME}_EI"] / last.values[f"{NAME}_EI"]
@@ -82,6 +85,20 @@ def conclude(
         return last, spread
     warning = "interrupted: later rungs were not tried, and the last fit did not get to its end"
     return replace(last, result=replace(last.result, interrupted=True, converged=False, warnings=(warning,))), spread
+
+
+def _at_the_end(climb: Climb, experiments: Sequence[Experiment], parameters: Sequence[Parameter]) -> dict[str, float]:
+    """Values at the minimum.
+
+    Raises:
+        SheetbendError: the motion diverges.
+    """
+    assert climb.rope is not None
+    found = descend(experiments, parameters, climb.rope.values, MOST, climb.threads)
+    if not found.finite:
+        raise SheetbendError("the fit that counts diverges where the last rung ended")
+    climb.say(f"{'ended' if found.ended else 'not ended'} after {found.iterations} steps")
+    return found.values
 
 
 def checked(

@@ -36,7 +36,7 @@ from .windows import SPANS, Span, everything
 
 BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first
 DENSITY = f"{NAME}_density"
-MARKERS_UNKNOWN = 0.05  # of the rope's mass, standard deviation of that of markers of which nothing is known
+MARKERS_UNKNOWN = 0.08  # of the rope's mass, standard deviation of that of markers of which nothing is known
 LINKS_PER_BENDING_LENGTH = 3.0  # below this EI reads too high and GJ too low
 
 
@@ -105,7 +105,7 @@ def fit_rope(
         density: kg/m of the rope without its markers, weighed. None = not known: then stiffness and drag over the
             density are fitted and reported, such as EI/density in m^4/s^2.
         marker_mass: kg of each free marker that was not weighed with the rope; 0 where they were. None = not known:
-            then 5 % of the density count in the intervals.
+            then 8 % of the density count in the intervals.
         nominal: directions (3,) of the start and the end grip from which their frames are carried; the mean recorded
             ones by default.
         ladder: the rungs, in order; the first one always stays.
@@ -113,7 +113,8 @@ def fit_rope(
             none, the share of the time of each recording, its end. The last fit sees all. At 0 what is fitted decides.
         bending_lengths: m, of the starts.
         windows: (length, total) in s: each fit sees windows of this length, of about this total, the last one those of
-            the last entry. "all" = the default ones, but the last fit sees every window of all recordings.
+            the last entry (half as many decide on rungs). "all" = the default ones, but the last fit sees every window
+            of all recordings.
         segments, max_segments: links at the start, and at most; they are doubled until EI moves by less than 5 %.
         substeps: per frame.
         smoothing: s, of the recorded grips and starts.

@@ -127,9 +127,13 @@ def counted(result: FitResult, spread: str = "") -> tuple[tuple[str, str], ...]:
     """(counted or not, sentence) of what makes the intervals; `spread`: words on models that predict equally well."""
     refined = "".join(f", {made.name}" for made in result.refits)
     seen = "markers beside the rope by as much as the residuals show (systematic)"
-    weight = "" if is_over_density(result) else ", the weight"
-    unseen = f"a roll of the grips that nothing shows, noise of the grips{weight}"
     model = f", {spread}" if spread else ""
+    density = next((p for p in result.premises if p.name == f"{NAME}_density" and p.sd and p.value), None)
+    unseen = "a roll of the grips that nothing shows, noise of the grips"
+    if density is not None and density.sd is not None and density.value is not None:
+        model += f", the density to {short(100 * density.sd / density.value, 2)} % (1 sd, unweighed markers included)"
+    elif not is_over_density(result):
+        unseen += ", the weight"
     return (("counted", f"residuals that are alike over time{refined}, {seen}{model}"), ("not counted", unseen))
 
 
