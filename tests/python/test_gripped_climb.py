@@ -148,6 +148,18 @@ class TestClimb:
         assert len(climb.split.fitted[0].recording.times) < 80
         assert climb.steps[0].stays and (climb.steps[1].count, climb.steps[1].ratio is None) == (4, False)
 
+    def test_a_rung_is_tried_again_after_a_later_one_stayed(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        told: list[str] = []
+        answers = iter([False, True, False, True])  # tilts, rest, yield; tilts again; yield came after what stayed
+
+        def climbed(_: Climb, rung: Rung) -> bool:
+            told.append(rung.name)
+            return next(answers)
+
+        monkeypatch.setattr(Climb, "_climbed", climbed)
+        self.climbed([shown("only")], TILTS, REST, YIELD)
+        assert told == [TILTS.name, REST.name, YIELD.name, TILTS.name]
+
     def test_where_everything_diverges_it_says_so(self) -> None:
         with pytest.raises(sb.SheetbendError, match="no start of a straight rope"):
             self.climbed([shaken(f"{k}") for k in range(3)])

@@ -93,11 +93,18 @@ class Climb:
         """Climb; Ctrl-C passes, and leaves what is finished."""
         began = time.perf_counter()
         self._keep(ladder[0], self._straight(model, ladder[0], bending_lengths, most_links), None, began)
-        for rung in ladder[1:]:
-            began = time.perf_counter()
-            assert self.rope is not None
-            found = self._tried(rung, self.rope)
-            self._keep(rung, found, None if found is None else verdict(found.errors, self.rope.errors), began)
+        stayed = [self._climbed(rung) for rung in ladder[1:]]
+        last = max((k for k, stays in enumerate(stayed) if stays), default=0)
+        for rung in (rung for rung, stays in zip(ladder[1 : 1 + last], stayed, strict=False) if not stays):
+            self._climbed(rung)  # what helped nothing before may help beside what stayed later
+
+    def _climbed(self, rung: Rung) -> bool:
+        """Try a rung; whether it stays."""
+        began = time.perf_counter()
+        assert self.rope is not None
+        found = self._tried(rung, self.rope)
+        self._keep(rung, found, None if found is None else verdict(found.errors, self.rope.errors), began)
+        return self.steps[-1].stays
 
     @property
     def whole(self) -> list[GrippedMotion]:
