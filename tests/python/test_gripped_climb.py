@@ -14,7 +14,7 @@ from sheetbend.gripped.climb import Climb, Rope
 from sheetbend.gripped.conclusion import checked, model_spread, spread_words
 from sheetbend.gripped.descent import descend, negligible
 from sheetbend.gripped.judging import Errors, predict
-from sheetbend.gripped.ladder import LADDER, MARKERS, REST, TILTS, TWIST, VARYING, YIELD, Rung, smooth
+from sheetbend.gripped.ladder import LADDER, MARKERS, REST, TILTS, TWIST, VARYING, YIELD, Rung, smooth, together
 from sheetbend.gripped.model import place_of
 from sheetbend.gripped.pieces import experiments_of, problem_of
 from sheetbend.gripped.start import started, whole
@@ -147,6 +147,23 @@ class TestClimb:
         assert [m.recording.name for m in climb.whole] == ["only"] and climb.whole[0].seconds == 1.0
         assert len(climb.split.fitted[0].recording.times) < 80
         assert climb.steps[0].stays and (climb.steps[1].count, climb.steps[1].ratio is None) == (4, False)
+
+    def test_a_rung_is_tried_again_after_a_later_one_stayed(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        told: list[str] = []
+        # tilts, rest, yield, varying; tilts again; yield and varying came after what stayed, and are tried together
+        answers = iter([False, True, False, False, True, True])
+
+        def climbed(_: Climb, rung: Rung) -> bool:
+            told.append(rung.name)
+            return next(answers)
+
+        monkeypatch.setattr(Climb, "_climbed", climbed)
+        self.climbed([shown("only")], TILTS, REST, YIELD, VARYING)
+        names = [TILTS.name, REST.name, YIELD.name, VARYING.name, TILTS.name]
+        assert told == [*names, "yield and stiffness along the rope"]
+        both = together([YIELD, VARYING])
+        assert both.parameters == (*YIELD.parameters, *VARYING.parameters) and both.starts == YIELD.starts
+        assert both.options == VARYING.options and both.values == YIELD.values
 
     def test_where_everything_diverges_it_says_so(self) -> None:
         with pytest.raises(sb.SheetbendError, match="no start of a straight rope"):

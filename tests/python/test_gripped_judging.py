@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from sheetbend.gripped import GrippedMotion
-from sheetbend.gripped.judging import Errors, Split, errors_of, misfits, verdict
+from sheetbend.gripped.judging import Errors, Split, errors_of, misfits, predict, verdict
 from test_gripped_motion import carried_about, model_of
 
 INF = np.inf
@@ -90,6 +90,16 @@ class TestSplit:
         found = errors_of(model_of(motions[0]), {"rope_length": motions[0].length}, Split.of(motions, 0.25))
         assert found.fitted.shape == (3,) and found.judged.shape == (1, 4)
         assert found.whole[0] == found.fitted[0] and found.whole[3] == pytest.approx(found.fitted[0], rel=0.02)
+
+    def test_the_end_of_a_recording_is_predicted_from_its_beginning(self) -> None:
+        """What slides inside has a history: a prediction that starts in the middle does not know it."""
+        (motion,) = self.motions(1)
+        split = Split.of([motion], 0.25)
+        assert split.judged == (motion,) and split.since == (len(split.fitted[0].recording.times),) == (76,)
+        values = {"rope_length": motion.length}
+        (x,) = predict(model_of(motion), [motion], values)
+        expected = np.abs(x - motion.recording.positions)[76:].mean()
+        assert errors_of(model_of(motion), values, split).judged.mean() == pytest.approx(expected, rel=0.02)
 
     def test_a_prediction_beyond_the_rope_diverges(self) -> None:
         (motion,) = self.motions(1)

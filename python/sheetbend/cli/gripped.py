@@ -14,7 +14,7 @@ from ..chain import unit_vector
 from ..config import GrippedConfig, GrippedRopeSection
 from ..errors import ConfigError, RecordingError, SceneError, SheetbendError
 from ..gripped import WITHOUT_TWIST, GrippedMotion, RopeFit, RopeReport, Rung, Screened, evaluate, fit_rope, screened
-from ..gripped.ladder import MARKERS, REST, TILTS, TWIST, VARYING, YIELD
+from ..gripped.ladder import AND, MARKERS, REST, TILTS, TWIST, VARYING, YIELD
 from ..gripped.model import NAME
 from ..gripped.report import overview
 from ..io.folder import recordings
@@ -197,7 +197,7 @@ def _judged(console: Console, config: GrippedConfig, rope: RopeData, found: Rope
     if not config.fit.without_twist or not rope.unseen:
         return report, False
     console.print("  for comparison without twist:")
-    kept = {step.name for step in found.steps if step.stays}
+    kept = {name for step in found.steps if step.stays for name in step.name.split(AND)}
     ladder = [RUNGS[name] for name in rope.section.rungs[1:]]
     try:
         bare = _fit(console, config, rope, [WITHOUT_TWIST, *(rung for rung in ladder if rung.name in kept)])

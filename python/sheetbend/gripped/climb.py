@@ -14,7 +14,7 @@ from ..parameters import Parameter
 from .bounds import bounded
 from .descent import bearable, descend
 from .judging import EQUAL, Errors, Split, Verdict, errors_of, misfits, verdict
-from .ladder import Rung
+from .ladder import Rung, together
 from .model import NAME, RopeModel
 from .motion import GrippedMotion
 from .pieces import experiments_of, problem_of
@@ -93,11 +93,23 @@ class Climb:
         """Climb; Ctrl-C passes, and leaves what is finished."""
         began = time.perf_counter()
         self._keep(ladder[0], self._straight(model, ladder[0], bending_lengths, most_links), None, began)
-        for rung in ladder[1:]:
-            began = time.perf_counter()
-            assert self.rope is not None
-            found = self._tried(rung, self.rope)
-            self._keep(rung, found, None if found is None else verdict(found.errors, self.rope.errors), began)
+        stayed = [self._climbed(rung) for rung in ladder[1:]]
+        last = max((k for k, stays in enumerate(stayed) if stays), default=-1)
+        dropped = []
+        for k, (rung, stays) in enumerate(zip(ladder[1:], stayed, strict=True)):
+            # what helped nothing before may help beside what stayed later
+            if not stays and not (k < last and self._climbed(rung)):
+                dropped.append(rung)
+        if len(dropped) > 1:  # or only beside another: stiffness that varies looks like yield, and yield like it
+            self._climbed(together(dropped))
+
+    def _climbed(self, rung: Rung) -> bool:
+        """Try a rung; whether it stays."""
+        began = time.perf_counter()
+        assert self.rope is not None
+        found = self._tried(rung, self.rope)
+        self._keep(rung, found, None if found is None else verdict(found.errors, self.rope.errors), began)
+        return self.steps[-1].stays
 
     @property
     def whole(self) -> list[GrippedMotion]:

@@ -36,21 +36,31 @@ class Split:
     Attributes:
         fitted: motions.
         judged: motions that are predicted from their first frame; none where what is fitted decides.
-        cut: whether these are parts of the same recordings.
+        since: frames of each of these from which on it is judged. Of a recording that is cut in time the first part is
+            predicted too: what slides inside a rope has a history, and a motion cannot start in its middle.
         pieces: in time, by which each is judged, so that few recordings give a verdict too.
     """
 
     fitted: tuple[GrippedMotion, ...]
     judged: tuple[GrippedMotion, ...]
-    cut: bool
+    since: tuple[int, ...]
     pieces: int
 
     @classmethod
     def of(cls, motions: Sequence[GrippedMotion], share: float) -> Split:
         """About that share of the motions, or of the time of each, is judged (`split`)."""
         fitted, judged = split(motions, share)
-        cut = not any(fitted[0] is m for m in motions)
-        return cls(tuple(fitted), tuple(judged), cut, -(-PIECES // max(len(judged), 1)))
+        since = [GIVEN] * len(judged)
+        if judged and not any(fitted[0] is m for m in motions):
+            shown = [len(part.recording.times) for part in fitted]
+            halves = [(m, n) for m, n in zip(motions, shown, strict=True) if n < len(m.recording.times)]
+            judged, since = [m for m, _ in halves], [n for _, n in halves]
+        return cls(tuple(fitted), tuple(judged), tuple(since), -(-PIECES // max(len(judged), 1)))
+
+    @property
+    def cut(self) -> bool:
+        """Whether parts of the same recordings are fitted and judged."""
+        return any(first > GIVEN for first in self.since)
 
     @property
     def motions(self) -> tuple[GrippedMotion, ...]:
@@ -61,8 +71,9 @@ class Split:
         """The same without some of `motions`."""
         count = len(self.fitted)
         fitted = tuple(m for k, m in enumerate(self.fitted) if k not in numbers)
-        judged = tuple(m for k, m in enumerate(self.judged, count) if k not in numbers)
-        return replace(self, fitted=fitted, judged=judged, pieces=-(-PIECES // max(len(judged), 1)))
+        kept = [k for k in range(len(self.judged)) if count + k not in numbers]
+        judged, since = tuple(self.judged[k] for k in kept), tuple(self.since[k] for k in kept)
+        return Split(fitted, judged, since, -(-PIECES // max(len(judged), 1)))
 
 
 @dataclass(frozen=True)
@@ -140,17 +151,20 @@ def errors_of(model: RopeModel, values: Mapping[str, float], split: Split, threa
     motions = [*split.fitted, *split.judged]
     predicted = predict(model, motions, values, threads)
     count = len(split.fitted)
-    fitted = np.array([_error(m, x, 1, reach)[0] for m, x in zip(motions[:count], predicted, strict=False)])
-    judged = [_error(m, x, split.pieces, reach) for m, x in zip(motions[count:], predicted[count:], strict=True)]
+    fitted = np.array([_error(m, x, GIVEN, 1, reach)[0] for m, x in zip(motions[:count], predicted, strict=False)])
+    judged = [
+        _error(m, x, first, split.pieces, reach)
+        for m, x, first in zip(split.judged, predicted[count:], split.since, strict=True)
+    ]
     return Errors(fitted, np.array(judged) if judged else fitted)
 
 
-def _error(motion: GrippedMotion, predicted: Array, pieces: int, reach: float) -> Array:
+def _error(motion: GrippedMotion, predicted: Array, first: int, pieces: int, reach: float) -> Array:
     off = np.abs(predicted - motion.recording.positions)
     seen = motion.recording.mask
     if not (off[seen] <= reach).all():  # false where it is not a number
         return np.full(pieces, np.inf)
-    parts = np.array_split(np.arange(GIVEN, len(off)), pieces)
+    parts = np.array_split(np.arange(first, len(off)), pieces)
     return np.array([float(np.mean(off[part][seen[part]])) for part in parts])
 
 

@@ -8,7 +8,7 @@ at worst, and a fine mode has to be shown by the motion.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from ..parameters import Parameter
@@ -46,6 +46,21 @@ class Rung:
         """What it adds to the fit of motions with these markers."""
         each = (replace(p, name=p.name.format(k)) for k in motion.free for p in self.each_marker)
         return (*self.parameters, *each)
+
+
+AND = " and "
+
+
+def together(rungs: Sequence[Rung]) -> Rung:
+    """One rung of several."""
+    return Rung(
+        AND.join(rung.name for rung in rungs),
+        {key: value for rung in rungs for key, value in rung.options.items()},
+        {key: value for rung in rungs for key, value in rung.values.items()},
+        tuple(p for rung in rungs for p in rung.parameters),
+        tuple(p for rung in rungs for p in rung.each_marker),
+        tuple(start for rung in rungs for start in rung.starts),
+    )
 
 
 def smooth(first: float, k: int) -> float:

@@ -90,6 +90,10 @@ class RopeReport:
             **errors(self.unseen, self.without_twist),
         }
 
+    @property
+    def _unit(self) -> str:
+        return "N m^2" if self.found.weighed else in_units("N m^2")
+
     def _sections(self) -> list[Section]:
         rows = [
             (
@@ -99,6 +103,7 @@ class RopeReport:
                 "mm",
                 "" if s.ratio is None else short(s.ratio),
                 "" if s.ratio is None else f"{s.better} of {s.count}",
+                "" if s.EI is None else short(s.EI),
                 "yes" if s.stays else "no",
                 f"{s.seconds:.1f}",
             )
@@ -109,8 +114,9 @@ class RopeReport:
             ("fitted, others", f"{meaning}: those that the step was fitted to, and those that it was not"),
             ("ratio", "median ratio of the errors of others with and without the step"),
             ("better", "how many of the others (or of their pieces) it predicts better"),
+            ("EI", f"with the step, {self._unit}: it depends on what else the model has"),
         )
-        headers = ("step", "fitted", "others", "unit", "ratio", "better", "stays", "seconds")
+        headers = ("step", "fitted", "others", "unit", "ratio", "better", "EI", "stays", "seconds")
         stiffness = stiffness_section(self.result)
         return [
             *([] if stiffness is None else [stiffness]),
