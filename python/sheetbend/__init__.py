@@ -27,6 +27,7 @@ from .fabric import Exponential, Fabric, Linear, Sinh, Spline
 from .fit import Fit, fit
 from .gradients import GradientReport, check_gradients
 from .grip import Grip
+from .hand_eye import HandEye
 from .io.folder import recordings
 from .kinds import KINDS
 from .markers import Place, along_rope, between, on_cloth, on_particle, on_rope
@@ -46,6 +47,7 @@ from .simulate import Trajectory, simulate
 from .solver import Solver
 from .tape import TapePlan, tape_plan
 from .tethers import add_tethers
+from .tool import Tool
 from .values import constraint_values, elastic_energy, support_forces
 
 __version__ = "0.1.0"
@@ -66,6 +68,7 @@ __all__ = [
     "Gradient",
     "GradientReport",
     "Grip",
+    "HandEye",
     "InputError",
     "Junction",
     "Linear",
@@ -90,6 +93,7 @@ __all__ = [
     "Solver",
     "Spline",
     "TapePlan",
+    "Tool",
     "Trajectory",
     "TriangleMesh",
     "UnbalancedError",

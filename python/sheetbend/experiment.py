@@ -39,7 +39,9 @@ class Experiment:
         start: "given" (the scene's initial state) or "equilibrium" (of the scene at the start, forces included), for
             motions.
         start_time: recording time at which the scene starts, s; the start of the fit window by default.
-        time_offset: name of a quantity [s] that shifts the recording's clock, or None.
+        time_offset: name of a quantity [s] that is added to the recording's times to get the scene's, or None. It is
+            negative for a camera that is late: what its frame at 1 s shows happened at 0.7 s of the scene where it is
+            -0.3 s.
         offsets: per marker name, names of quantities that are added to its offset (tangent, normal, tangent x normal),
             None for none.
         sigma: expected error of a marker, m: scales residuals against priors and between experiments.

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .clock import outside, told_clocks
 from .conclude import Elsewhere, judged_parameters, misfit, warnings_of, without_verdict
 from .contradictions import between_parts, doubtful, elsewhere, held_out_motion
 from .discretization import Refinement, settled, to_the_limit, wanted_refinement
@@ -215,6 +216,8 @@ def fit(
         | end.parts
     )
     estimates = doubtful(judged.estimates, contradicted)
+    errors = told_clocks(errors, end.experiments, end.values, estimates)
+    shifted = tuple(outside(end.experiments, end.values))
     result = FitResult(
         estimates=estimates,
         recordings=errors,
@@ -253,7 +256,7 @@ def fit(
         windows=best.windows,
         evaluations=sum(m.evaluations for m in ends),
         jacobians=sum(m.jacobians for m in ends),
-        warnings=warnings_of(ends, interrupted, problem, estimates) + end.doubts + fallback,
+        warnings=warnings_of(ends, interrupted, problem, estimates) + end.doubts + shifted + fallback,
     )
     return Fit(result, tuple(comparisons), wanted, corrected)
 

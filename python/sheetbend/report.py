@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from .optional import require
+from .report_driven import driven_sections
 from .result import UNSOUND, Estimate, FitResult, Given, MotionGrowth, Premise, RecordingFit
 from .tables import Section, plain_section, rich_section
 from .wording import figures, short
@@ -42,6 +43,7 @@ def sections(result: FitResult) -> list[Section]:
         _premises(result),
         _recordings(result),
         _held_out_motion(result),
+        *driven_sections(result),
         _unknown(result),
         _correlations(result),
         _course(result),

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -117,6 +117,11 @@ class RecordingFit:
         held_out: over the part that the fit did not see; None when there is none.
         baseline: over the same part, of a prediction without physics.
         motion: over the same part, of the measured markers about their mean; None for an equilibrium.
+        without_physics: of a driven scene, the error of every prediction without physics by kind (`baseline.IN_WORDS`),
+            over the held-out part, or where there is none over the fitted one.
+        late: s, by which the recording's clock is late, from its `time_offset`: a frame stamped t shows the scene at
+            t - late. None without one.
+        late_half_width: s, of the 95 % interval of that; None where it is open or the clock was not fitted.
         driven_sigma: prior of the correction of its driven markers, m; None without one.
         corrected_by: root mean square of one coordinate of that correction, m.
         measured_frequency, simulated_frequency: first frequency there, Hz; None where the part shows fewer than three
@@ -134,6 +139,9 @@ class RecordingFit:
     unit: str = "m"
     driven_sigma: float | None = None
     corrected_by: float | None = None
+    without_physics: Mapping[str, float] = field(default_factory=dict)
+    late: float | None = None
+    late_half_width: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -350,10 +358,10 @@ def _estimate(name: str, part: object) -> Estimate:
         raise InputError(f"{where}.interval", "must be [lower, upper]", ends, "give both, null where open")
     rest = {key: value for key, value in told.items() if key != "interval"}
     found = as_dataclass(Estimate, {"name": name, "lower": ends[0], "upper": ends[1], **rest}, where)
-    for field in ("half_width", "statistical", "discretization", "systematic"):
-        width = getattr(found, field)
+    for part_of in ("half_width", "statistical", "discretization", "systematic"):
+        width = getattr(found, part_of)
         if width is not None and width < 0:
-            raise InputError(f"{where}.{field}", "must not be negative", width, "give a half-width")
+            raise InputError(f"{where}.{part_of}", "must not be negative", width, "give a half-width")
     return found
 
 

@@ -160,8 +160,9 @@ class Scene:
         self._building()
         self.boundary.follow(particles, times, motion, markers, weights, placed, interpolation, self.particle_count)
 
-    def add_motion_term(self, particle: int, coefficients: ArrayLike, factors: Mapping[str, str]) -> None:
-        """Add to a driven particle's motion (knots, 3) coefficients times a product of functions of quantities.
+    def add_motion_term(self, particle: ArrayLike, coefficients: ArrayLike, factors: Mapping[str, str]) -> None:
+        """Add to a driven particle's motion (knots, 3) coefficients times a product of functions of quantities; to
+        those of several particles (k,) with coefficients (knots, k, 3).
 
         Raises:
             SceneError: the particle is not driven, shapes, NaN, or unknown quantities.

@@ -46,7 +46,7 @@ def experiment(scene: sb.Scene, x: np.ndarray, free: list[int]) -> sb.Experiment
 def predicted(e: sb.Experiment) -> dict[str, np.ndarray]:
     held = e.held()
     assert held is not None
-    return carried_baselines(e, [e.fitted()], held)
+    return carried_baselines(e, [(e, e.fitted())], held)
 
 
 def test_a_shape_on_one_grip_is_carried_exactly() -> None:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 from pydantic import field_validator, model_validator
 
 from ..errors import InputError
 from ..memory import in_bytes
+from .cloth_schema import MarkerGrid
 from .scene_schema import SceneSection
 from .section import AXES, Finite, Name, Pair, Reference, Section, Vector, Window, key
+from .tools import with_corrections
 
 
 class ExperimentSection(Section):
@@ -119,6 +121,7 @@ class RecordingSection(Section):
     )
     fit: Window | None = key(None, "[start, stop] in the recording's time: what the fit sees; all when left out", "s")
     held_out: Window | None = key(None, "[start, stop]: what is only predicted, from the same start", "s")
+    tools: dict[Name, str] = key({}, "poses of tools in this recording: files by tool, see `scene.tool.file`")
     start_time: Finite | None = key(
         None, "recording time at which the scene starts; the start of `fit` when left out", "s"
     )
@@ -149,11 +152,16 @@ class RecordingSection(Section):
     loss: Literal["squares", "soft_l1", "huber"] = key("squares", "robust loss")
     loss_scale: Finite = key(1.0, "where the robust loss sets in, in units of sigma", gt=0)
     marker: list[Marker] = key([], "places of this recording's markers; those of [[marker]] when left out")
+    grids: dict[Name, MarkerGrid] = key({}, "by cloth, markers on a grid in this recording, instead of the cloth's own")
     offsets: dict[str, list[str]] = key(
         {},
         'per marker [a, b, c]: quantities added to its offset along (tangent, normal, tangent x normal), "" for none',
     )
-    time_offset: str | None = key(None, "a quantity (s) that shifts the recording's clock")
+    time_offset: str | None = key(
+        None,
+        "a quantity (s) that is added to the recording's times to get the scene's: -0.3 belongs to a camera that is "
+        "0.3 s late (what its frame at 1 s shows happened at 0.7 s). Start the scene early enough: `start_time`",
+    )
     values: dict[str, Finite] = key(
         {}, "quantities whose value is known to differ here; for private parameters the initial value"
     )
@@ -240,3 +248,8 @@ class Config(Section):
     published: dict[str, Finite | Window] = key(
         {}, "values by others, or [lowest, highest], shown beside the estimates"
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _tools_have_their_parameters(cls, given: Any) -> Any:
+        return with_corrections(given) if isinstance(given, dict) else given

@@ -11,6 +11,8 @@ from ..names import flaw
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Vector = Annotated[list[Finite], Field(min_length=3, max_length=3)]
+Quaternion = Annotated[list[Finite], Field(min_length=4, max_length=4)]
+Counts = Annotated[list[Annotated[int, Field(ge=1, le=1000)]], Field(min_length=2, max_length=2)]
 Pair = Annotated[list[Finite], Field(min_length=2, max_length=2)]
 MOST_LINKS, MOST_CELLS = 100_000, 2_000
 """Of a rope, and of a cloth along one direction: more is a slip of the pen, which must not take all memory."""
