@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from pytest import approx
+from sheetbend.cli.app import app
 from sheetbend.config import build, parse
 from sheetbend.tool import accelerations
+from typer.testing import CliRunner
 
 Array = np.ndarray
 VALUES = {"robot_x": 0.01, "robot_y": -0.02, "robot_turn_x": 0.05, "robot_turn_y": -0.03, "robot_turn_z": 0.08}
@@ -300,3 +302,16 @@ def test_damaged_files_of_poses_are_refused(tmp_path: Path, text: str, problem: 
         sb.Tool.load(tmp_path / "poses.csv")
     with pytest.raises(sb.RecordingError, match="does not exist"):
         sb.Tool.load(tmp_path / "none.csv")
+
+
+def test_simulate_and_fit_write_predicted_markers(folder: Path) -> None:
+    """The recording was simulated from the same scene, so at the start values the markers come out as recorded."""
+    (folder / "held.toml").write_text(CONFIG + "initial = 1e-4\n\n[fit]\nhalve_step = false\ndouble_segments = false\n")
+    out = folder / "out"
+    for command in (["simulate"], ["fit"]):
+        result = CliRunner().invoke(app, [*command, str(folder / "held.toml"), "--output", str(out / command[0])])
+        assert result.exit_code in (0, 4), result.output
+        found = sb.Recording.load(out / command[0] / "predicted_seen.npz")
+        recorded = sb.Recording.load(folder / "seen.npz")
+        assert found.markers == recorded.markers and found.times == approx(recorded.times)
+        assert found.positions == approx(recorded.positions, abs=1e-6 if command == ["fit"] else 1e-12)

@@ -29,6 +29,7 @@ from .gripped import fit_ropes, load_ropes, rope_files
 from .journals import journal_in, made_from
 from .movies import OPTION, MoviePath, check_before, write_movies
 from .outcome import Code, Outcome, code_of, run
+from .predicted import predicted_files, save_predicted
 from .progress import Iterations
 from .screen import heading, show
 from .targets import check_targets
@@ -138,7 +139,8 @@ def _place(config: Config | GrippedConfig, output: Path | None) -> Path:
 
 def _files(study: Study) -> list[str]:
     """What `_write` may leave behind."""
-    return ["fit.json", "report.txt", "fitted.toml", *figure_files(study.experiments, study.config)]
+    markers = predicted_files(e.name for e in study.experiments)
+    return ["fit.json", "report.txt", "fitted.toml", *markers, *figure_files(study.experiments, study.config)]
 
 
 @contextmanager
@@ -209,4 +211,7 @@ def _write(found: Fit, study: Study, form: str, folder: Path) -> list[str]:
     found.save(folder / "fit.json")
     write_text(folder / "report.txt", plain(found.result))
     write(with_values(study.config, found.values), folder / "fitted.toml", study.folder)
-    return ["fit.json", "report.txt", "fitted.toml", *write_figures(found, study.config, form, folder)]
+    markers = [
+        file for c in found.comparisons for file in save_predicted(c.recording, c.simulated, c.experiment.name, folder)
+    ]
+    return ["fit.json", "report.txt", "fitted.toml", *markers, *write_figures(found, study.config, form, folder)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,6 +17,7 @@ from ..equilibrium import equilibrium
 from ..errors import ConfigError
 from ..experiment import Experiment
 from ..movie import Motion, movie_paths, save_movie
+from ..recording import Recording
 from ..scene import Scene
 from ..simulate import Trajectory
 from ..simulate import simulate as run_simulation
@@ -25,6 +27,7 @@ from .folders import made
 from .meshes import MeshFormat, mesh_files, write_meshes
 from .movies import OPTION, MoviePath, check_before
 from .outcome import Outcome, run
+from .predicted import at_starting_values, predicted_files, save_predicted
 from .screen import heading
 from .targets import check_targets
 
@@ -34,7 +37,8 @@ DURATION = 1.0  # s where no recording tells
 
 @dataclass(frozen=True)
 class Task:
-    """A scene and how it is to be run; `times` (frames,) s from its start."""
+    """A scene and how it is to be run; `times` (frames,) s from its start. `predicted` gives the markers of its
+    recording as measured and as simulated."""
 
     name: str
     scene: Scene
@@ -42,6 +46,7 @@ class Task:
     times: np.ndarray
     static: bool = False
     at_rest: bool = False
+    predicted: Callable[[], tuple[Recording, np.ndarray]] | None = None
 
 
 def simulate(
@@ -73,7 +78,7 @@ def simulate(
     ] = False,
 ) -> None:
     """Simulate a scene and write its trajectory as NPZ: times, positions, velocities, the constraints' forces, and the
-    pressures of volumes that are kept."""
+    pressures of volumes that are kept; with a recording also its markers as simulated, predicted_NAME.npz."""
     run(lambda console: _simulate(console, config, output, duration, recording, mesh, movie), json)
 
 
@@ -124,18 +129,24 @@ def _tasks(study: Study, duration: float | None, recording: str | None) -> list[
 
 def _task(e: Experiment, duration: float | None) -> Task:
     """Frames as often as the recording's, on the substep grid."""
+
+    def predicted() -> tuple[Recording, np.ndarray]:
+        return at_starting_values(e, duration)
+
     if e.static:
-        return Task(e.name, e.scene, e.solver, np.zeros(1), static=True)
+        return Task(e.name, e.scene, e.solver, np.zeros(1), static=True, predicted=predicted)
     frame = float(np.median(np.diff(e.recording.times)))
     frame = max(round(frame / e.solver.h), 1) * e.solver.h
     length = duration or float(e.recording.times[-1]) - e.t0
-    return Task(e.name, e.scene, e.solver, np.arange(0.0, length + frame / 2, frame), at_rest=e.start == "equilibrium")
+    times = np.arange(0.0, length + frame / 2, frame)
+    return Task(e.name, e.scene, e.solver, times, at_rest=e.start == "equilibrium", predicted=predicted)
 
 
 def _files(task: Task, folder: Path, mesh: MeshFormat | None) -> list[Path]:
     """What a task leaves in the folder."""
     meshes = [] if mesh is None else mesh_files(task.name, task.scene, len(task.times), folder, mesh)
-    return [folder / f"{task.name}.npz", *meshes]
+    markers = [] if task.predicted is None else [folder / file for file in predicted_files([task.name])]
+    return [folder / f"{task.name}.npz", *markers, *meshes]
 
 
 def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, movie: Path | None) -> dict[str, Any]:
@@ -149,6 +160,8 @@ def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, mo
         )
     moved = np.linalg.norm(motion.positions - motion.positions[0], axis=2)
     more = {} if mesh is None else {"meshes": write_meshes(task.name, task.scene, motion, folder, mesh)}
+    if task.predicted is not None:
+        more["markers"] = [str(folder / file) for file in save_predicted(*task.predicted(), task.name, folder)]
     if movie is not None:
         save_movie(Motion(task.scene, motion.times, motion.positions), movie, task.name)
         more["movie"] = [str(movie)]
