@@ -310,7 +310,7 @@ class FitProblem:
 
     def rows_layout(self) -> Layout:
         """Where each data row comes from, for the covariance."""
-        recording, channel, frame = [], [], []
+        recording, channel, frame, kind = [], [], [], []
         for i, (e, r) in enumerate(zip(self.experiments, self.recordings, strict=True)):
             seen_frame, seen_marker = np.nonzero(r.mask)
             axes = np.tile(np.arange(len(e.axes)), len(seen_frame))
@@ -319,4 +319,5 @@ class FitProblem:
             # Along a static shape the points are the series.
             channel.append(axes if e.static else markers * len(e.axes) + axes)
             frame.append(markers if e.static else frames)
-        return Layout(np.concatenate(recording), np.concatenate(channel), np.concatenate(frame))
+            kind.append(0 * axes if e.static else axes)
+        return Layout(*(np.concatenate(part) for part in (recording, channel, frame, kind)))
