@@ -23,6 +23,7 @@ from .growth import Growth, growths
 from .identifiability import Identifiability
 from .journal import journaled
 from .leave_one_out import MEANING, companions, each_left_out
+from .losses import loss_doubts
 from .optimizers import Observer, ceres_trouble
 from .optional import require
 from .parameters import Parameter, Parameters
@@ -189,7 +190,9 @@ def fit(
         )
         judged = at_floor_of_sweeps(_moved(judged, at.moved), at.refits)
         predicted = predicted_values(every, wanted, values, refitter, threads)
-        doubted = () if refitter is None or lost else doubts(at.problem, at.u, judged)
+        doubted = (
+            () if refitter is None or lost else doubts(at.problem, at.u, judged) + loss_doubts(at.problem, at.u, judged)
+        )
         parts = {} if refitter is None else between_parts(at.problem, at.u, judged, refinement)
         return _Conclusion(at, tuple(every), judged, lower, *predicted, doubted + unknown, rests_on, parts)
 
