@@ -42,12 +42,11 @@ def lateness(recording: RecordingFit) -> str:
     if recording.late is None:
         return ""
     side = "late" if recording.late >= 0 else "early"
-    size, half = figures((abs(recording.late), recording.late_half_width), recording.late_half_width)
-    shown = 1.0 - recording.late
-    return (
-        f"its clock is {size}{f' +/- {half}' if half else ''} s {side}: a frame stamped 1 s shows what happened at "
-        f"{short(shown)} s"
-    )
+    size = short(abs(recording.late))
+    if recording.late_half_width is not None:
+        numbers = (abs(recording.late), recording.late_half_width)
+        size = " +/- ".join(figures(numbers, recording.late_half_width))
+    return f"its clock is {size} s {side}: a frame stamped 1 s shows what happened at {short(1.0 - recording.late)} s"
 
 
 def outside(experiments: Sequence[Experiment], values: Mapping[str, float]) -> Iterator[str]:
