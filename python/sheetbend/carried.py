@@ -96,10 +96,7 @@ def _motion(e: Experiment, grip: Sequence[int], times: Array, every: Values) -> 
     values = {name: value for name, value in every.get(e.name, {}).items() if name in scene.quantities}
     inputs = scene.compiled.inputs(scene.compiled.values(values))
     knots = scene.compiled.unpack(inputs)["boundary"].reshape(len(boundary.times), -1, 3)
-    clock = 0.0
-    if e.time_offset is not None:
-        clock = values.get(e.time_offset, scene.quantities[e.time_offset].value)
-    at = np.clip(times - e.t0 + clock, boundary.times[0], boundary.times[-1])
+    at = np.clip(e.scene_times(times, values), boundary.times[0], boundary.times[-1])
     driven = interpolate(boundary.times, knots, at, "cubic", np.inf)
     slot = {p: i for i, p in enumerate(boundary.driven)}
 

@@ -229,6 +229,16 @@ class Experiment:
             return self.start_time
         return float(self.recording.times[0] if self.fit is None else self.fit[0])
 
+    def scene_times(self, times: np.ndarray, values: Mapping[str, float]) -> np.ndarray:
+        """Times (frames,) s of the recording on the scene's clock, which starts at zero.
+
+        Args:
+            values: of quantities of the scene, for the clock's offset; as the scene has it by default.
+        """
+        name = self.time_offset
+        offset = 0.0 if name is None else values.get(name, self.scene.quantities[name].value)
+        return np.asarray(times - self.t0 + offset)
+
     def observed(self, recording: Recording) -> dict[str, Any]:
         """Observations for the compiled core; the scene's clock starts at 0."""
         times = np.zeros(1) if self.static else recording.times - self.t0

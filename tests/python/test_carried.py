@@ -9,6 +9,7 @@ import pytest
 import sheetbend as sb
 from sheetbend.baseline import no_physics
 from sheetbend.carried import carried_baselines
+from sheetbend.cli import cloth_figures
 from sheetbend.clock import lateness, outside, told_clocks
 from sheetbend.result import Estimate, RecordingFit
 
@@ -214,3 +215,15 @@ def test_frames_outside_of_the_motion_are_told() -> None:
     assert list(outside([e], {"clock": -LATE})) == []
     (words,) = outside([e], {"clock": 0.2})
     assert "0.2 s behind the end" in words
+
+
+def test_a_figure_shows_the_cloth_at_the_shifted_time() -> None:
+    """Measured markers once lay beside a cloth that was drawn at the camera's time instead of the scene's."""
+    e, _ = late_cloth(-LATE)
+    found = sb.fit(e, parameters=["robot_turn_x"], refine=False)
+    (c,) = found.comparisons
+    frame, positions = cloth_figures._state(c, found.values_of(e))
+    drawn = positions[[place.particles[0] for place in e.compared_places]]
+    assert np.abs(drawn - c.simulated[frame]).max() < 0.012  # half a substep at 0.7 m/s
+    assert e.scene_times(np.array([0.5]), {}) == pytest.approx([0.4])
+    assert e.scene_times(np.array([0.5]), {"clock": 0.1}) == pytest.approx([0.6])
