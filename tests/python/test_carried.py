@@ -224,6 +224,6 @@ def test_a_figure_shows_the_cloth_at_the_shifted_time() -> None:
     (c,) = found.comparisons
     frame, positions = cloth_figures._state(c, found.values_of(e))
     drawn = positions[[place.particles[0] for place in e.compared_places]]
-    assert np.abs(drawn - c.simulated[frame]).max() < 0.012  # half a substep at 0.7 m/s
+    assert np.abs(drawn - c.simulated[frame]).max() < 0.02  # half a substep; at the camera's time it is 0.3
     assert e.scene_times(np.array([0.5]), {}) == pytest.approx([0.4])
     assert e.scene_times(np.array([0.5]), {"clock": 0.1}) == pytest.approx([0.6])
