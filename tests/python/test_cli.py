@@ -116,6 +116,8 @@ class TestFit:
             "fit.json",
             "report.txt",
             "fitted.toml",
+            "predicted_swing.npz",
+            "predicted_swing.json",
             "swing_markers.svg",
             "swing_residuals.svg",
             "estimates.svg",
