@@ -39,6 +39,7 @@ Integers = NDArray[np.integer[Any]]
 NEGLIGIBLE = 1e-10  # share of a parameter's variance
 _MAX_ORDER = 20
 _ZERO = 1e-290  # sum of squares: the numbers are so small that ratios of them are rounding
+_SILENT = 1e-20  # of the loudest kind's sum of squares: rounding, which has no spectrum
 _CORRECTIONS = 2  # the second already changes the intervals by less than 1 %
 
 
@@ -171,12 +172,21 @@ class _Grid:
         np.minimum.at(first, self._recording, layout.frame)
         self._frame = layout.frame - first[self._recording]
         self.recordings = channels[0]  # of each channel
-        self.kinds = np.zeros(len(self.recordings), dtype=int)
-        self.kinds[self._channel] = np.unique(layout.kind, return_inverse=True)[1]  # type: ignore[arg-type]
         self.frames = int(self._frame.max()) + 1
         self.length = 2 << (2 * self.frames - 1).bit_length()  # twice what lags need: narrow spectral peaks count
         self.residuals = self.dense(residuals)
         self.mask = self.dense(np.ones(len(residuals)))
+        self.kinds = self._kinds(np.unique(np.asarray(layout.kind), return_inverse=True)[1])
+
+    def _kinds(self, each: Integers) -> Integers:
+        """(channels,) from 0 on, of those of each row; silent ones, such as the axis across a planar motion, count to
+        the loudest."""
+        kinds = np.zeros(len(self.recordings), dtype=int)
+        kinds[self._channel] = each
+        power = np.bincount(kinds, (self.residuals**2).sum(0))
+        silent = power <= _SILENT * power.max()
+        kinds[silent[kinds]] = int(np.argmax(power))
+        return np.asarray(np.unique(kinds, return_inverse=True)[1])
 
     def dense(self, column: Array) -> Array:
         """(rows,) as (frames, channels)."""

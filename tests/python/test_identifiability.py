@@ -433,3 +433,14 @@ def test_loud_white_channels_do_not_hide_slow_quiet_ones() -> None:
     held = np.mean(inside, axis=0)
     assert held[0] > 0.8, held
     assert held[1] > 0.9, held
+
+
+def test_an_axis_without_residuals_has_no_spectrum_of_its_own() -> None:
+    """A planar motion: nothing is off across it."""
+    rng = np.random.default_rng(0)
+    axis = np.tile(np.arange(3), 40)
+    layout = Layout(np.zeros_like(axis), axis, np.repeat(np.arange(40), 3), axis)
+    errors = rng.standard_normal(120)
+    errors[axis == 1] = 0.0
+    found = covariance(errors, np.ones((120, 1)), layout)
+    assert np.isfinite(found.matrix).all() and found.matrix[0, 0] > 0
