@@ -9,7 +9,7 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 from sheetbend.cli.app import app
-from sheetbend.config import build, parse
+from sheetbend.config import build, parse, scene_alone
 from sheetbend.tool import accelerations
 from typer.testing import CliRunner
 
@@ -315,3 +315,52 @@ def test_simulate_and_fit_write_predicted_markers(folder: Path) -> None:
         recorded = sb.Recording.load(folder / "seen.npz")
         assert found.markers == recorded.markers and found.times == approx(recorded.times)
         assert found.positions == approx(recorded.positions, abs=1e-6 if command == ["fit"] else 1e-12)
+
+
+ROPE = """
+[experiment]
+name = "hung"
+
+[solver]
+h = 0.01
+
+[[scene.tool]]
+name = "robot"
+file = "poses.csv"
+flex = 1e-3
+
+[[scene.rope]]
+length = 0.2
+segments = 2
+density = 0.05
+direction = [0, 0, -1]
+
+[[scene.drive]]
+particles = ["rope:start"]
+tool = "robot"
+points = [[0.0, 0.1, 0.0]]
+"""
+
+
+def test_a_rope_rides_on_a_tool_in_a_configuration(folder: Path) -> None:
+    (folder / "hung.toml").write_text(ROPE)
+    scene, _ = scene_alone(parse(folder / "hung.toml"), folder)
+    driver = tool()
+    bare = sb.Tool(driver.times, driver.positions, driver.quaternions, sb.HandEye("robot"))
+    assert inputs(scene, {"robot_flex": 1e-12})["boundary"] == approx(bare.path([[0.0, 0.1, 0.0]])[:, 0], abs=1e-9)
+    assert {*driver.frame.quantities, "robot_flex"} <= set(scene.quantities)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        ('tool = "robot"', 'tool = "robot"\nmarkers = ["m0"]'),
+        ('tool = "robot"\npoints', "points"),
+        ("[[0.0, 0.1, 0.0]]", "[[0.0, 0.1, 0.0]]\noffset = [0.0, 0.0, 0.1]"),
+    ],
+)
+def test_a_drive_has_one_mover(folder: Path, change: tuple[str, str]) -> None:
+    (folder / "hung.toml").write_text(ROPE.replace(*change))
+    with pytest.raises(sb.ConfigError) as caught:
+        parse(folder / "hung.toml")
+    assert caught.value.field == "scene.drive[0]"
