@@ -61,13 +61,19 @@ class Pendulum(Section):
     """A point mass on a massless rigid arm, swinging in the x-z plane, `sb.add_pendulum`. A list:
     [[scene.pendulum]]."""
 
-    name: Name = key("pendulum", "prefix of its quantities: <name>_length, _mass, _angle, _rate, _hinge_viscosity")
+    name: Name = key(
+        "pendulum",
+        "prefix of its quantities: <name>_length, _mass, _angle, _rate, _hinge_viscosity, _friction, _drag",
+    )
     length: Finite = key(..., "from pivot to mass", "m", gt=0)
     mass: Finite = key(1.0, "of the point", "kg", gt=0)
     pivot: Vector | Name = key([0.0, 0.0, 0.0], "a fixed point, or the name of the arm whose end carries this one", "m")
     angle: Finite = key(0.0, "initial angle from straight down towards +x", "rad")
     rate: Finite = key(0.0, "initial rate of the angle", "rad/s")
     viscosity: Finite | None = key(None, "of the pivot: torque over rate", "N m s/rad", gt=0)
+    friction: Finite | None = key(None, "dry friction of the pivot: <name>_friction, Coulomb's torque", "N m", gt=0)
+    slip_angle: Finite = key(1e-3, "how far the pivot gives before it slides; small beside the swing", "rad", gt=0)
+    drag: Finite | None = key(None, "quadratic air drag: <name>_drag, torque over rate squared", "N m s^2/rad^2", ge=0)
 
 
 class Arm(Section):
@@ -76,7 +82,8 @@ class Arm(Section):
 
     name: Name = key(
         "arm",
-        "prefix of its quantities: <name>_mass, _first_moment, _inertia, _length, _angle, _rate, _hinge_viscosity",
+        "prefix of its quantities: <name>_mass, _first_moment, _inertia, _length, _angle, _rate, _hinge_viscosity, "
+        "_friction, _drag",
     )
     mass: Finite = key(..., "its mass", "kg", gt=0)
     first_moment: Finite = key(..., "mass times distance from pivot to center of mass", "kg m", gt=0)
@@ -87,6 +94,16 @@ class Arm(Section):
     rate: Finite = key(0.0, "initial rate of the angle", "rad/s")
     viscosity: Finite | None = key(
         None, "of the pivot: torque over the rate of the angle between the two arms", "N m s/rad", gt=0
+    )
+    friction: Finite | None = key(
+        None, "dry friction of the pivot between the two arms: <name>_friction, Coulomb's torque", "N m", gt=0
+    )
+    slip_angle: Finite = key(1e-3, "how far the pivot gives before it slides; small beside the swing", "rad", gt=0)
+    drag: Finite | None = key(
+        None,
+        "quadratic air drag on the arm's end: <name>_drag, torque over the rate squared when its pivot rests",
+        "N m s^2/rad^2",
+        ge=0,
     )
 
 
