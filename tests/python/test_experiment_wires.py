@@ -43,6 +43,15 @@ def test_EI_of_two_rehangings_predicts_the_third(study):
         assert study.gap(c) <= 1.5 * study.gap(c, c.baseline)
 
 
+def test_the_holders_own_angle_moves_the_mean_of_the_others_nearer(study):
+    """White: the first 9 cm beside each clamp tell the angles; what the model misses alike in all shapes drops out."""
+    rows = study.own_angles("white")
+    mean = {name: np.mean([row[name] for row in rows]) for name in rows[0]}
+    assert mean["moved"] < 0.75 * mean["baseline"]
+    assert mean["model"] > mean["baseline"]  # by itself the model is no nearer
+    assert mean["moved"] == pytest.approx(1.3, abs=0.2)
+
+
 def test_rehangings_scatter_as_published(study):
     row = study.one_by_one("white")
     assert row["sd_percent"] == pytest.approx(row["published_percent"], abs=3)
