@@ -20,7 +20,8 @@ from .curve import Curve, chosen, mean_curve
 from .strip_laws import STRIP_LAWS, StripLaw
 
 _LEVELS, _FEWEST = 8, 5
-_SCATTER, _SCATTER_FREEDOM = 0.07, 4  # of the logarithm of the load, before specimens are seen
+_NEAR_END = 2  # levels at which specimens are compared: slack shows where the load grows fastest
+_SCATTER, _SCATTER_FREEDOM = 0.07, 3  # of the logarithm of the load, before specimens are seen
 _WANDER, _WANDER_FREEDOM = 0.08, 4  # of the logarithm of the load, per root of an e-fold of strain; before a fit
 _DRAWS = 1000  # of a law
 _TAIL = 5  # degrees of freedom of Student's t, from which draws are proposed
@@ -74,7 +75,7 @@ class Levels:
             fix = "cut the slack off by from_pretension"
             raise InputError("curves", f"bear nothing in more than {_LEVELS - _FEWEST} of {_LEVELS} levels", first, fix)
         loads = loads[:, first:]
-        off = np.log(loads[:, loads.shape[1] // 2 :])
+        off = np.log(loads[:, -_NEAR_END:])
         squares = float(((off - off.mean(axis=0)) ** 2).sum() / off.shape[1])
         freedom = _SCATTER_FREEDOM + len(ways) - 1
         scatter = math.sqrt((_SCATTER_FREEDOM * _SCATTER**2 + squares) / freedom)
