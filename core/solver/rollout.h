@@ -80,8 +80,14 @@ class Rollout {
     record_.lambda.resize(scene_.multipliers());
     if constexpr (in_packs<T>)
       if (!plan_.colors.empty()) unpack_multipliers(scene_, plan_.packs, record_.packs, record_.lambda.data());
-    for (std::size_t b = 0; b < plan_.blocks.size(); ++b)
-      unpack_multipliers(plan_.blocks[b], record_.blocks[b], record_.lambda.data());
+    for (std::size_t b = 0; b < plan_.blocks.size(); ++b) {
+      BlockState<T>& block = record_.blocks[b];
+      if constexpr (carries_tangents<T>)
+        if (plan_.blocks[b].implicit)
+          carry_multipliers(SubstepState<T>{scene_, in_, block.eta, nullptr, nullptr, nullptr, nullptr},
+                            plan_.blocks[b], block);
+      unpack_multipliers(plan_.blocks[b], block, record_.lambda.data());
+    }
     for (std::size_t v = 0; v < record_.volumes.size(); ++v)
       record_.lambda[scene_.rows + v] = record_.volumes[v].lambda;
     return record_.lambda.data();

@@ -25,6 +25,9 @@ from .errors import (
 from .experiment import Experiment
 from .fabric import Exponential, Fabric, Linear, Sinh, Spline
 from .fit import Fit, fit
+from .force_readings import simulate_forces
+from .force_recording import ForceRecording
+from .force_sensor import ForceSensor
 from .gradients import GradientReport, check_gradients
 from .grip import Grip
 from .io.folder import recordings
@@ -63,6 +66,8 @@ __all__ = [
     "Fit",
     "FitResult",
     "ForceBalance",
+    "ForceRecording",
+    "ForceSensor",
     "Gradient",
     "GradientReport",
     "Grip",
@@ -122,6 +127,7 @@ __all__ = [
     "save_scene",
     "scores",
     "simulate",
+    "simulate_forces",
     "support_forces",
     "tape_plan",
 ]

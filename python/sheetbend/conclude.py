@@ -139,8 +139,9 @@ def misfit(problem: FitProblem, u: Array) -> Misfit:
     _, r, _ = problem.evaluate(u)
     rows = problem.core.data_rows
     sigma = np.array([e.sigma for e in problem.experiments])
-    each = sigma[problem.rows_layout().recording]
-    beyond = float(np.mean(each**2 * (r[:rows] ** 2 - 1.0)))
+    layout = problem.rows_layout()
+    seen = layout.clocks == 0
+    beyond = float(np.mean(sigma[layout.recording[seen]] ** 2 * (r[:rows][seen] ** 2 - 1.0)))
     taken = len(problem.parameters.free) + sum(map(problem.core.absorbed, range(len(sigma))))
     return Misfit(
         reduced_chi_square=float(r[:rows] @ r[:rows]) / max(rows - taken, 1.0),

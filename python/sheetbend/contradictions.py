@@ -156,18 +156,18 @@ def _private(problem: FitProblem, jacobian: Array) -> list[tuple[slice, list[int
 def splits(problem: FitProblem, jacobian: Array) -> list[Split]:
     """The data by time (halves, thirds, quarters), by place of the markers (halves of the same weight in the Jacobian)
     and by recording."""
-    layout, count = problem.rows_layout(), len(problem.experiments)
+    layout, count, when = problem.rows_layout(), len(problem.experiments), problem.row_times()
     size = np.maximum(np.linalg.norm(jacobian, axis=0), np.finfo(float).tiny)
     weight = ((jacobian / size) ** 2).sum(axis=1)
     time, place = np.full(len(weight), -1.0), np.full(len(weight), -1)
     for i, (e, recording) in enumerate(zip(problem.experiments, problem.recordings, strict=True)):
         mine = layout.recording == i
-        frame, marker = layout.frame[mine], layout.channel[mine] // len(e.axes)
-        if e.static:
-            marker = frame
-        else:
-            at = recording.times[frame]
-            time[mine] = (at - at[0]) / (np.ptp(at) * (1 + 1e-9) + np.finfo(float).tiny)
+        if not e.static:
+            at = when[mine]
+            at = at - at.min()
+            time[mine] = at / (np.ptp(at) * (1 + 1e-9) + np.finfo(float).tiny)
+        mine &= layout.clocks == 0  # where sensors are is no place among the markers
+        marker = layout.frame[mine] if e.static else layout.channel[mine] // len(e.axes)
         along = _along(recording.positions)
         if np.isfinite(along[marker]).all() and len(set(marker.tolist())) >= FEWEST_MARKERS:
             place[mine] = _half(along[marker], weight[mine])

@@ -44,25 +44,35 @@ class Layout:
         recording: which recording; rows of different recordings are independent.
         channel: which series within it (a marker coordinate); channels of one recording may correlate.
         frame: the place within the series: frame number in time, or point number along a static shape.
+        clock: which clock within the recording counts the frames, 0 for all by default; rows of different clocks are
+            independent.
     """
 
     recording: Integers
     channel: Integers
     frame: Integers
+    clock: Integers | None = None
 
     def __post_init__(self) -> None:
-        for field in ("recording", "channel", "frame"):
+        if self.clock is None:
+            object.__setattr__(self, "clock", np.zeros_like(np.asarray(self.frame)))
+        for field in ("recording", "channel", "frame", "clock"):
             array = np.asarray(getattr(self, field))
             if array.ndim != 1 or not np.issubdtype(array.dtype, np.integer):
                 raise InputError(f"layout.{field}", "must be one integer per row", array, "give shape (rows,)")
             object.__setattr__(self, field, array)
-        if not len(self.recording) == len(self.channel) == len(self.frame):
-            lengths = (len(self.recording), len(self.channel), len(self.frame))
+        lengths = tuple(len(part) for part in (self.recording, self.channel, self.frame, self.clocks))
+        if len(set(lengths)) > 1:
             raise InputError("layout", "has arrays of different lengths", lengths, "give one entry per residual row")
-        places = np.stack([self.recording, self.channel, self.frame])
+        places = np.stack([self.recording, self.clocks, self.channel, self.frame])
         if np.unique(places, axis=1).shape[1] != len(self.frame):
             fix = "number the recordings, channels and frames apart"
             raise InputError("layout", "has two rows in one place", len(self.frame), fix)
+
+    @property
+    def clocks(self) -> Integers:
+        """(rows,) `clock`, also where none was given."""
+        return np.zeros_like(self.frame) if self.clock is None else self.clock
 
     @staticmethod
     def series(rows: int) -> Layout:
@@ -152,9 +162,10 @@ class _Grid:
     """Rows laid out as (frames, channels) arrays, zero where there is no row."""
 
     def __init__(self, layout: Layout, residuals: Array) -> None:
-        owner, self._recording = np.unique(layout.recording, return_inverse=True)
+        series = np.stack([layout.recording, layout.clocks])
+        owner, self._recording = np.unique(series, axis=1, return_inverse=True)
         channels, self._channel = np.unique(np.stack([self._recording, layout.channel]), axis=1, return_inverse=True)
-        first = np.full(len(owner), np.iinfo(int).max)
+        first = np.full(owner.shape[1], np.iinfo(int).max)
         np.minimum.at(first, self._recording, layout.frame)
         self._frame = layout.frame - first[self._recording]
         self.recordings = channels[0]  # of each channel

@@ -249,6 +249,7 @@ def fit(
         not_counted=at.not_counted,
         premises=end.premises,
         misfit=misfit(at.problem, at.u),
+        forces=tuple(row for c in comparisons for one in c.forces for row in one.fits()),
         growth=_growth(found.growths, grown),
         windows=best.windows,
         evaluations=sum(m.evaluations for m in ends),

@@ -11,6 +11,7 @@ from .baseline import no_physics
 from .carried import carried_baselines
 from .errors import RecordingError
 from .experiment import Experiment
+from .force_comparison import ForceComparison, force_comparisons
 from .optimizers import refit
 from .oscillation import along, dominant_direction, first_frequency
 from .parameters import Parameters
@@ -32,6 +33,7 @@ class Comparison:
         baseline: (frames, markers, 3) of the no-physics prediction on the held-out frames, NaN elsewhere; None without
             one.
         baseline_words: what that prediction is.
+        forces: the same of every force sensor.
     """
 
     experiment: Experiment
@@ -40,6 +42,7 @@ class Comparison:
     held_out: np.ndarray
     baseline: np.ndarray | None = None
     baseline_words: str = ""
+    forces: tuple[ForceComparison, ...] = ()
 
     def rms(
         self, frames: np.ndarray, predicted: np.ndarray | None = None, scored: np.ndarray | None = None
@@ -149,8 +152,8 @@ def compare(
     problem = FitProblem(experiments, parameters, [part for part, _ in parts], threads, corrected=corrected or {})
     u = problem.parameters.to_internal(values)
     comparisons = []
-    for e, (part, held), simulated in zip(experiments, parts, problem.simulate(u), strict=True):
-        plain = Comparison(e, part, simulated, held)
+    for i, (e, (part, held), simulated) in enumerate(zip(experiments, parts, problem.simulate(u), strict=True)):
+        plain = Comparison(e, part, simulated, held, forces=force_comparisons(problem, i, u))
         comparisons.append(_with_baseline(plain, experiments))
     return comparisons
 

@@ -41,6 +41,7 @@ def sections(result: FitResult) -> list[Section]:
         _refits(result),
         _premises(result),
         _recordings(result),
+        _forces(result),
         _held_out_motion(result),
         _unknown(result),
         _correlations(result),
@@ -189,6 +190,20 @@ def _recordings(result: FitResult) -> Section:
         if words
     )
     return Section("Recordings", headers, tuple(rows), notes)
+
+
+def _forces(result: FitResult) -> Section:
+    rows = [
+        (f.recording, f.sensor, str(f.rows), *("" if x is None else short(x) for x in (f.rms, f.held_out, f.baseline)))
+        for f in result.forces
+    ]
+    units = [(f.unit,) for f in result.forces]
+    headers: tuple[str, ...] = ("recording", "sensor", "rows", "fitted rms", "held-out rms", "constant", "unit")
+    every = [(*row, *unit) for row, unit in zip(rows, units, strict=True)]
+    if all(f.held_out is None for f in result.forces):
+        headers, every = headers[:4] + headers[5:], [row[:4] + row[5:] for row in every]
+    note = ("constant", "rms of the prediction that the force stays at its mean over the fitted part")
+    return Section("Forces", headers, tuple(every), (note,) if every else ())
 
 
 def _corrected(recording: RecordingFit) -> str:

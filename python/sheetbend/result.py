@@ -137,6 +137,29 @@ class RecordingFit:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ForceFit:
+    """How well the forces of one sensor are explained: rms of one component, in `unit`.
+
+    Attributes:
+        recording, sensor: names.
+        rows: number of residuals that took part in the fit.
+        rms: over the fitted part; None where all of it was held out.
+        held_out: over the part that the fit did not see; None when there is none.
+        baseline: over the held-out part, or the fitted one where nothing is held out, of a constant: the mean of the
+            fitted part.
+        unit: "N", or "N m" for torques.
+    """
+
+    recording: str
+    sensor: str
+    rows: int
+    rms: float | None
+    held_out: float | None
+    baseline: float | None
+    unit: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class Misfit:
     """How large the residuals are against what was told of their size.
 
@@ -221,6 +244,7 @@ class FitResult:
         windows: s, the lengths that were fitted first, as given or chosen.
         evaluations, jacobians: how often all experiments were simulated, and how often of these with a Jacobian, over
             all starts and windows, up to the minimum.
+        forces: errors per force sensor.
         premises: numbers that the fit took as given, and what an error in each moves.
         warnings: what a reader must know before using the numbers.
     """
@@ -253,6 +277,7 @@ class FitResult:
     jacobian_seconds: float | None = None
     premises: tuple[Premise, ...] = ()
     not_counted: tuple[str, ...] = ()
+    forces: tuple[ForceFit, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of that name; KeyError names the ones there are."""

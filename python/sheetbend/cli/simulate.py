@@ -15,6 +15,7 @@ from ..door import reading
 from ..equilibrium import equilibrium
 from ..errors import ConfigError
 from ..experiment import Experiment
+from ..force_readings import sensor_readings
 from ..movie import Motion, movie_paths, save_movie
 from ..scene import Scene
 from ..simulate import Trajectory
@@ -42,6 +43,7 @@ class Task:
     times: np.ndarray
     static: bool = False
     at_rest: bool = False
+    experiment: Experiment | None = None
 
 
 def simulate(
@@ -72,8 +74,8 @@ def simulate(
         bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
     ] = False,
 ) -> None:
-    """Simulate a scene and write its trajectory as NPZ: times, positions, velocities, the constraints' forces, and the
-    pressures of volumes that are kept."""
+    """Simulate a scene and write its trajectory as NPZ: times, positions, velocities, the constraints' forces, the
+    pressures of volumes that are kept, and what force sensors read (sensor_NAME_times, _forces, _torques)."""
     run(lambda console: _simulate(console, config, output, duration, recording, mesh, movie), json)
 
 
@@ -129,7 +131,14 @@ def _task(e: Experiment, duration: float | None) -> Task:
     frame = float(np.median(np.diff(e.recording.times)))
     frame = max(round(frame / e.solver.h), 1) * e.solver.h
     length = duration or float(e.recording.times[-1]) - e.t0
-    return Task(e.name, e.scene, e.solver, np.arange(0.0, length + frame / 2, frame), at_rest=e.start == "equilibrium")
+    return Task(
+        e.name,
+        e.scene,
+        e.solver,
+        np.arange(0.0, length + frame / 2, frame),
+        at_rest=e.start == "equilibrium",
+        experiment=e,
+    )
 
 
 def _files(task: Task, folder: Path, mesh: MeshFormat | None) -> list[Path]:
@@ -143,6 +152,7 @@ def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, mo
     path = folder / f"{task.name}.npz"
     arrays: dict[str, Any] = {f"force_{group}": values for group, values in motion.forces.items()}
     arrays |= {f"pressure_{name}": values for name, values in motion.pressures.items()}
+    arrays |= _readings(task)
     with written(path) as beside:
         np.savez_compressed(
             beside, times=motion.times, positions=motion.positions, velocities=motion.velocities, **arrays
@@ -176,6 +186,20 @@ def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, mo
     files = ", ".join([str(path), *(file for made in more.values() for file in made)])
     console.print(f"  {task.name}: {summary['particles']} particles, {told}{reach}; {files}", soft_wrap=True)
     return summary
+
+
+def _readings(task: Task) -> dict[str, np.ndarray]:
+    """What the recording's force sensors read along the motion, at the times at which they recorded."""
+    e = task.experiment
+    found: dict[str, np.ndarray] = {}
+    if e is None:
+        return found
+    for sensor in e.forces:
+        until = e.t0 + float(task.times[-1])
+        times, read = sensor_readings(sensor, e.scene, e.solver, None, e.start, e.t0, until)
+        parts = {"times": times, "forces": read[:, :3], "torques": read[:, 3:]}
+        found |= {f"sensor_{sensor.name}_{key}": part for key, part in parts.items()}
+    return found
 
 
 def _motion(task: Task) -> Trajectory:

@@ -23,6 +23,7 @@ from ..solver import Solver
 from . import schema
 from .cloth_markers import places_on_cloths
 from .errors import located
+from .forces import force_sensors
 from .moment import Moment
 from .rest import check_rest
 from .scene_schema import SceneSection
@@ -131,6 +132,7 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
     scene, particles = build_scene(
         recording.name, described, moment, _along(ropes, markers, numbers, recording), finer, ropes, folder
     )
+    forces = force_sensors(path, section.force, scene, particles, folder)
     _start_values(scene, config, section.values, path)
     if section.static or section.start == "equilibrium":
         check_rest(f"{path}.static" if section.static else f"{path}.start", described, scene)
@@ -162,6 +164,7 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
             fit=_window(section.fit),
             held_out=_window(section.held_out),
             solver=solver_for(config.solver, recording),
+            forces=forces,
             offsets={m: _offset(f"{path}.offsets.{m}", names, scene) for m, names in section.offsets.items()},
             **plain,
         )

@@ -36,6 +36,7 @@ HEADERS: dict[str, type[Section]] = {
     "[[scene.drive]]": scene_schema.Drive,
     "[scene.quantities.NAME]": scene_schema.ExtraQuantity,
     "[[recording]]": schema.RecordingSection,
+    "[[recording.force]]": schema.ForceSection,
     "[[marker]], [[recording.marker]]": schema.Marker,
     "[parameters.NAME]": schema.ParameterSection,
     "[given.NAME]": schema.GivenSection,

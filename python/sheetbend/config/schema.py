@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from ..errors import InputError
 from ..memory import in_bytes
@@ -103,6 +103,38 @@ class Marker(Section):
         return self
 
 
+class ForceSection(Section):
+    """The forces that a sensor at a support measured. A list: [[recording.force]]."""
+
+    file: str = key(..., "CSV (time, fx, fy, fz, ...) or NPZ, relative to the configuration; in the sensor's axes")
+    at: list[str] = key(
+        ...,
+        'the support: ["ROPE:start"] or ["ROPE:end"] for the end of a rope with its grip, ["CLOTH:SET"] for a set of '
+        "vertices, or particles; all of them held; torques are taken at the first",
+        min_length=1,
+    )
+    name: Name | None = key(None, "its quantities begin with it; the file's when left out")
+    sigma: Finite = key(..., "expected error of a force", "N", gt=0)
+    torque_sigma: Finite | None = key(None, "expected error of a torque; torques do not count without", "N m", gt=0)
+    axes: str = key("xyz", "forces that count, in the sensor's axes", pattern=AXES)
+    torque_axes: str = key("xyz", "torques that count", pattern=AXES)
+    reads: Literal["support", "body"] = key(
+        "support", 'the force that the support puts on the body, or ("body") its opposite'
+    )
+    quaternion: Annotated[list[Finite], Field(min_length=4, max_length=4)] = key(
+        [0.0, 0.0, 0.0, 1.0],
+        "(x, y, z, w) from the sensor's axes to the world's, of one that does not turn; the file's count before it",
+    )
+    arm: Vector = key([0.0, 0.0, 0.0], "from the first particle to the point of the torques, sensor's axes", "m")
+    average: Finite = key(0.0, "time before each sample over which the sensor takes the mean", "s", ge=0)
+    bias: bool = key(False, "quantities NAME_bias_x, ... are added to what it reads")
+    torque_bias: bool = key(False, "quantities NAME_torque_bias_x, ... likewise")
+    tool: bool = key(False, "it also carries a tool: quantities NAME_tool_mass, NAME_tool_center_x, ...")
+    time_offset: str | bool | None = key(
+        None, "a quantity (s) that shifts its clock, or true for one of its own, NAME_time_offset"
+    )
+
+
 class RecordingSection(Section):
     """A recording. A list: [[recording]]; each gets a scene object of its own from the shared description."""
 
@@ -154,6 +186,7 @@ class RecordingSection(Section):
         'per marker [a, b, c]: quantities added to its offset along (tangent, normal, tangent x normal), "" for none',
     )
     time_offset: str | None = key(None, "a quantity (s) that shifts the recording's clock")
+    force: list[ForceSection] = key([], "forces that were measured at its supports")
     values: dict[str, Finite] = key(
         {}, "quantities whose value is known to differ here; for private parameters the initial value"
     )

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 import zipfile
 import zlib
+from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -38,11 +39,12 @@ def read(path: Path) -> Recording:
         RecordingError: it is no NPZ archive, is damaged, lacks a key, holds more than `door.check_room` allows, or
             an array is not plain numbers.
     """
-    arrays = _arrays(path)
+    fix = "store positions (frames, markers, 3) and times (frames,) under these names"
+    found = arrays(path, _REQUIRED, ("clamped",), fix)
     return Recording(
-        positions=arrays["positions"],
-        times=arrays["times"],
-        clamped=np.atleast_1d(arrays.get("clamped", np.array([], dtype=np.int64))).tolist(),
+        positions=found["positions"],
+        times=found["times"],
+        clamped=np.atleast_1d(found.get("clamped", np.array([], dtype=np.int64))).tolist(),
     )
 
 
@@ -53,10 +55,17 @@ def write(recording: Recording, path: Path) -> None:
         np.savez_compressed(file, positions=recording.positions, times=recording.times, clamped=clamped)
 
 
-def _arrays(path: Path) -> dict[str, np.ndarray]:
+def arrays(
+    path: Path, required: Sequence[str], optional: Sequence[str], fix: str = "store them under these names"
+) -> dict[str, np.ndarray]:
+    """The arrays of an archive: all that are required, and the optional ones that are there.
+
+    Raises:
+        RecordingError: as `read`; `fix` says what to do where one is missing.
+    """
     with path.open("rb") as file:
         if file.read(len(npy.MAGIC_PREFIX)) == npy.MAGIC_PREFIX:
-            fix = "write the arrays by name with numpy.savez(path, positions=..., times=...)"
+            fix = "write the arrays by name with numpy.savez(path, " + ", ".join(f"{key}=..." for key in required) + ")"
             raise RecordingError(str(path), "is a single array (NPY), not an NPZ archive", path.name, fix)
     try:
         archive = zipfile.ZipFile(path)
@@ -65,11 +74,10 @@ def _arrays(path: Path) -> dict[str, np.ndarray]:
         raise RecordingError(str(path), "is no NPZ archive, or a damaged one", str(error), fix) from error
     with archive:
         members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
-        missing = [key for key in _REQUIRED if key not in members]
+        missing = [key for key in required if key not in members]
         if missing:
-            fix = "store positions (frames, markers, 3) and times (frames,) under these names"
             raise RecordingError(str(path), f"lacks {' and '.join(missing)}", sorted(members), fix)
-        wanted = {key: members[key] for key in (*_REQUIRED, "clamped") if key in members}
+        wanted = {key: members[key] for key in (*required, *optional) if key in members}
         unpacked = sum(info.file_size for info in wanted.values())
         check_room(path, f"arrays that unpack to {unpacked} bytes", unpacked)
         return {key: _array(archive, info, path, key) for key, info in wanted.items()}
