@@ -163,7 +163,8 @@ class _Grid:
 
     def __init__(self, layout: Layout, residuals: Array) -> None:
         series = np.stack([layout.recording, layout.clocks])
-        owner, self._recording = np.unique(series, axis=1, return_inverse=True)
+        owner, inverse = np.unique(series, axis=1, return_inverse=True)
+        self._recording = np.ravel(inverse)
         channels, self._channel = np.unique(np.stack([self._recording, layout.channel]), axis=1, return_inverse=True)
         first = np.full(owner.shape[1], np.iinfo(int).max)
         np.minimum.at(first, self._recording, layout.frame)

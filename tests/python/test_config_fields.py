@@ -47,7 +47,13 @@ WHOLE: dict[str, Any] = {
         "quantities": {"NAME": {}},
     },
     "marker": [{"marker": "m0", "particle": "a"}],
-    "recording": [{"file": "r.npz", "marker": [{"marker": "m0", "particle": "a"}]}],
+    "recording": [
+        {
+            "file": "r.npz",
+            "marker": [{"marker": "m0", "particle": "a"}],
+            "force": [{"file": "f.csv", "at": ["a"], "sigma": 0.1}],
+        }
+    ],
     "parameters": {"NAME": {}},
     "given": {"NAME": {"sd": 0.1}},
     "fit": {},

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import field_validator, model_validator
 
 from ..errors import InputError
 from ..memory import in_bytes
 from .scene_schema import SceneSection
-from .section import AXES, Finite, Name, Pair, Reference, Section, Vector, Window, key
+from .section import AXES, Finite, Name, Pair, Quaternion, Reference, Section, Vector, Window, key
 
 
 class ExperimentSection(Section):
@@ -121,7 +121,7 @@ class ForceSection(Section):
     reads: Literal["support", "body"] = key(
         "support", 'the force that the support puts on the body, or ("body") its opposite'
     )
-    quaternion: Annotated[list[Finite], Field(min_length=4, max_length=4)] = key(
+    quaternion: Quaternion = key(
         [0.0, 0.0, 0.0, 1.0],
         "(x, y, z, w) from the sensor's axes to the world's, of one that does not turn; the file's count before it",
     )

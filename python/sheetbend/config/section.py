@@ -41,6 +41,15 @@ def _ascending(pair: list[float]) -> list[float]:
 Window = Annotated[Pair, AfterValidator(_ascending)]
 
 
+def _turning(four: list[float]) -> list[float]:
+    if not any(four):
+        raise ValueError("has no length|give (x, y, z, w)")
+    return four
+
+
+Quaternion = Annotated[list[Finite], Field(min_length=4, max_length=4), AfterValidator(_turning)]
+
+
 class Section(BaseModel):
     """A table of the file: no unknown keys, no text where a number belongs, nothing infinite."""
 
