@@ -80,7 +80,8 @@ struct Experiment {
     return in;
   }
 
-  // Fills, when not null, residuals (residual_count), simulated markers (frames, markers, 3) and readings of sensors. Throws Diverged, Unconverged, NoEquilibrium or OutOfDomain.
+  // Fills, when not null, residuals (residual_count), simulated markers (frames, markers, 3) and readings of sensors (readings()).
+  // Throws Diverged, Unconverged, NoEquilibrium or OutOfDomain.
   template <class T>
   void residuals(const T* theta, const T* b, T* r, T* simulated, T* sensed, Interrupt* interrupt) const;
 

@@ -35,12 +35,12 @@ struct ForceSensor {
   SupportReader reader;
   std::array<double, 3> arm{};
   double sign = 1.0;               // -1 where the body's force on the support is read
-  std::vector<double> times;       // (instants) [s], ascending
-  std::vector<int> sample;         // (instants)
-  std::vector<double> share;       // (instants) in the mean of the sample
-  std::vector<double> rotation;    // (samples, 9) R by rows
-  std::vector<double> measured;    // (samples, 6), NaN = not measured
-  std::array<double, 6> sigma{};   // [N], [N m]
+  std::vector<double> times;      // (instants) [s], ascending
+  std::vector<int> sample;        // (instants)
+  std::vector<double> share;      // (instants) in the mean of the sample
+  std::vector<double> rotation;   // (samples, 9) R by rows
+  std::vector<double> measured;   // (samples, 6), NaN = not measured
+  std::array<double, 6> sigma{};  // [N], [N m]
 
   std::size_t samples() const { return measured.size() / channels; }
   std::size_t rows() const {

@@ -119,7 +119,9 @@ class SupportReader {
     int triangle, node;
   };
 
-  bool holds(int node) const { return std::find(support_.nodes.begin(), support_.nodes.end(), node) != support_.nodes.end(); }
+  bool holds(int node) const {
+    return std::find(support_.nodes.begin(), support_.nodes.end(), node) != support_.nodes.end();
+  }
   bool carries(int node) const {
     return std::find(support_.carried.begin(), support_.carried.end(), node) != support_.carried.end();
   }
