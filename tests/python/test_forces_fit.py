@@ -22,9 +22,9 @@ SPAN = 1.2  # s
 NOISE, FORCE_NOISE = 5e-4, 0.02  # m, N
 
 
-def rod() -> sb.Scene:
+def rod(knots: int = 201) -> sb.Scene:
     """A rod of 0.6 m between two grips; one shakes it along and across."""
-    t = np.linspace(0.0, 2.0, 201)
+    t = np.linspace(0.0, 2.0, knots)
     rise = np.minimum(t / 0.2, 1.0) ** 2 * (3 - 2 * np.minimum(t / 0.2, 1.0))
     place = np.stack([0.5 + 0.05 * rise * np.sin(7 * t), 0.0 * t, 0.08 * rise * np.sin(9 * t)], axis=1)
     turns = np.stack([0 * t, np.sin(0.1 * rise * np.sin(8 * t)), 0 * t, np.cos(0.1 * rise * np.sin(8 * t))], axis=1)
@@ -369,3 +369,25 @@ def test_noise_of_what_drives_is_told_where_forces_feel_it() -> None:
     assert "smoother poses" in told
     with pytest.raises(sb.InputError, match="correction of driven markers"):
         replace(e, driven_sigma=2e-4)
+
+
+def test_two_grips_share_what_the_momentum_needs() -> None:
+    """Their forces add up to the rate of the rod's momentum less its weight, and so do their torques, those on the
+    directors among them. The rates are those of BDF2; knots are close together, for accelerations jump at each."""
+    h, n = 1 / 1200, 300
+    scene, solver = rod(knots=4001), sb.Solver(h=h)
+    rope = scene.ropes["rod"].particles
+    start = sb.equilibrium(scene).positions
+    x = sb.simulate(scene, np.arange(n + 1) * h, solver, start=start).positions[:, rope]
+    mass = TRUTH["rod_density"] * 0.6 / 12 * np.array([0.5, *[1.0] * 11, 0.5])
+    steps = np.arange(60, n - 20, 16)
+    v = np.zeros_like(x)
+    v[2:] = (3 * x[2:] - 4 * x[1:-1] + x[:-2]) / (2 * h)
+    rate = (3 * v[steps] - 4 * v[steps - 1] + v[steps - 2]) / (2 * h)
+    needed = mass[:, None] * (rate - np.array([0.0, 0.0, -9.81]))
+    force, torque = needed.sum(axis=1), np.cross(x[steps], needed).sum(axis=1)
+    ends = [sb.simulate_forces(scene, steps * h, ("rod", e), solver, start="equilibrium") for e in ("start", "end")]
+    about = sum(e.torques + np.cross(x[steps, k], e.forces) for e, k in zip(ends, (0, -1), strict=True))
+    assert np.abs(ends[0].forces - ends[1].forces).max() > 0.5
+    assert ends[0].forces + ends[1].forces == approx(force, abs=1e-4 * np.abs(force).max())
+    assert about == approx(torque, abs=1e-4 * np.abs(torque).max())
