@@ -148,6 +148,15 @@ def covariance(
     return Covariance(matrix, np.maximum(rows / inflation - absorbed, 1.0), inflation, variance, time)
 
 
+def autocorrelation(residuals: Array, layout: Layout, lags: int = _MAX_ORDER) -> Array:
+    """(lags,) correlation of residuals with those of the same series 1, 2, ... frames later, over all series."""
+    if not residuals.any():
+        return np.zeros(0)
+    grid = _Grid(layout, residuals)
+    sums = grid.lags((np.abs(grid.transform(grid.residuals)) ** 2).sum(1), min(lags, grid.frames // 2))
+    return np.asarray(sums[1:] / sums[0])
+
+
 class _Grid:
     """Rows laid out as (frames, channels) arrays, zero where there is no row."""
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .beginnings import Beginning, checked, of_beginnings
 from .conclude import Elsewhere, judged_parameters, misfit, warnings_of, without_verdict
 from .contradictions import between_parts, doubtful, elsewhere, held_out_motion
 from .discretization import Refinement, settled, to_the_limit, wanted_refinement
@@ -168,9 +169,15 @@ def fit(
     ends, name, interrupted = found.ends, found.optimizer, found.interrupted
     trouble = ceres_trouble() if optimizer == "auto" else ""
     fallback = (f"SciPy stands in for Ceres, which does not load: {trouble}",) if trouble else ()
+    grown, begun = growths(problem, ends[0].u), tuple[Beginning, ...]()
+    if not interrupted:
+        try:
+            ends, begun = checked(search, problem, ends, grown)
+        except KeyboardInterrupt:
+            interrupted = True
+    if ends[0] is not found.ends[0]:
+        grown = growths(problem, ends[0].u)
     best = ends[0]
-
-    grown = growths(problem, best.u)
     lost = without_verdict(problem, best, grown)
     if len(lost) == len(problem.parameters.free):  # then no refit tells anything
         refinement, systematic = wanted_refinement(False), None
@@ -189,7 +196,10 @@ def fit(
         judged = at_floor_of_sweeps(_moved(judged, at.moved), at.refits)
         predicted = predicted_values(every, wanted, values, refitter, threads)
         doubted = () if refitter is None or lost else doubts(at.problem, at.u, judged)
-        parts = {} if refitter is None else between_parts(at.problem, at.u, judged, refinement)
+        parts: dict[str, str] = {}
+        if refitter is not None:
+            parts = of_beginnings(problem, best.u, judged, begun, refinement)
+            parts |= between_parts(at.problem, at.u, judged, refinement)
         return _Conclusion(at, tuple(every), judged, lower, *predicted, doubted + unknown, rests_on, parts)
 
     left_out: dict[str, Comparison] = {}
