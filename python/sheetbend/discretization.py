@@ -2,9 +2,10 @@
 
 A parameter is physical only if the next mesh and the next time step agree about it. By default the estimate is moved to
 the limit of short substeps (see `time_step`). The mesh counts where a finer one can be made: by a refit, which costs
-more than the fit itself, or by linear refinement, one simulation of the finer mesh at the estimate and one Gauss-Newton
-step, which is right to first order in what the residuals change. A halving removes 1 - 2^-p of an error of order p, so
-what it moves is multiplied up to the limit (Richardson): by 4/3 for meshes, by 2 for sweeps.
+more than the fit itself, or by linear refinement, two simulations of the finer mesh and two Gauss-Newton steps with the
+Jacobian of the fit. A halving removes 1 - 2^-p of an error of order p, so what it moves is multiplied up to the limit
+(Richardson): by 4/3 for meshes, by 2 for sweeps. The estimate is moved to the limit of fine meshes too where the mesh
+is fine enough for that (see `fine_meshes`).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 
 from .errors import InputError, SheetbendError
 from .experiment import Experiment
+from .fine_meshes import left_open, two_steps
 from .linear_step import moves, one_step
 from .optimizers import Minimum, refit
 from .parameters import Parameters
@@ -35,7 +37,7 @@ class Refinement:
     Attributes:
         halve_step: move the estimate to the limit of short substeps, and count what that leaves open.
         finer: makes the same experiments with twice the nodes; None = the mesh is not counted.
-        linear: one Gauss-Newton step with the Jacobian of the fit stands for the refit on the finer mesh.
+        linear: Gauss-Newton steps with the Jacobian of the fit stand for the refit on the finer mesh.
     """
 
     halve_step: bool = True
@@ -120,19 +122,23 @@ def refined_estimates(
     for name, refined, to_limit in _refits(refinement, experiments):
         try:
             finer = FitProblem(refined(), problem.given, threads=problem.threads)
-            if refinement.linear or name == SWEEPS:
+            rest: np.ndarray | float = 0.0
+            if name == SWEEPS:
                 end = one_step(problem, finer, u)
+            elif refinement.linear:
+                end, rest = two_steps(problem, finer, u)
             else:
                 end = refit(finer, finer.parameters.to_internal(here), optimizer).u
         except SheetbendError as error:
             failed.append(f"{name} not counted: {error}")
             continue
-        made.append(Refit(name=name, to_limit=to_limit, moved=moves(problem.parameters, at, at + end - u)))
+        left = {} if name == SWEEPS else left_open(problem.parameters, at, to_limit * (end - u), to_limit * rest)
+        made.append(Refit(name=name, to_limit=to_limit, moved=moves(problem.parameters, at, at + end - u), left=left))
     return tuple(made), tuple(failed)
 
 
 def to_the_limit(refits: Iterable[Refit], parameters: Parameters, values: Mapping[str, float]) -> dict[str, float]:
-    """By how much each parameter would move up to the limit, in its unit: root sum of squares over the refits.
+    """By how much each parameter would still move up to the limit, in its unit: root sum of squares over the refits.
 
     A logarithmic one moves by a factor, and its size is that of the factor upward: from 1 to 0.4 is 1.5, as to 2.5;
     nothing is told apart from a factor of a million.
@@ -140,9 +146,10 @@ def to_the_limit(refits: Iterable[Refit], parameters: Parameters, values: Mappin
     total: dict[str, float] = {}
     for made in refits:
         for name, moved in made.moved.items():
+            open_, factor = (made.left[name], 1.0) if name in made.left else (moved, made.to_limit)
             log = parameters[name].log
-            step = math.log(max(1.0 + moved / values[name], math.exp(-FARTHEST))) if log else moved
-            total[name] = math.hypot(total.get(name, 0.0), made.to_limit * step)
+            step = math.log(max(1.0 + open_ / values[name], math.exp(-FARTHEST))) if log else open_
+            total[name] = math.hypot(total.get(name, 0.0), factor * step)
     return {
         name: values[name] * math.expm1(min(size, FARTHEST)) if parameters[name].log else size
         for name, size in total.items()

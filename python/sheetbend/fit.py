@@ -17,6 +17,7 @@ from .discretization import Refinement, settled, to_the_limit, wanted_refinement
 from .driven_noise import doubts
 from .errors import InputError
 from .experiment import Experiment
+from .fine_meshes import at_the_limit
 from .floors import at_floor_of_sweeps
 from .given import check_given, half_widths, premises
 from .growth import Growth, growths
@@ -47,12 +48,15 @@ class Fit:
         parameters: as given, private ones not expanded.
         corrections: by experiment with a `driven_sigma`, (knots, markers, 3) m, what the fit added to the markers that
             the scene follows, up to the end of the fitted part.
+        on_mesh: values that explain the recordings on the mesh of the experiments, of which `comparisons` tells;
+            `values` are those at the limit of fine meshes, where these were counted.
     """
 
     result: FitResult
     comparisons: tuple[Comparison, ...]
     parameters: Parameters
     corrections: Mapping[str, np.ndarray] = field(default_factory=dict)
+    on_mesh: Mapping[str, float] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Estimate:
         return self.result[name]
@@ -68,9 +72,11 @@ class Fit:
         return self.result.values
 
     def values_of(self, experiment: Experiment) -> dict[str, float]:
-        """Every quantity of an experiment's scene: as fitted, the private ones its own; else as the scene has it."""
+        """Every quantity of an experiment's scene, to simulate it with: as fitted on its mesh, the private ones its
+        own; else as the scene has it."""
+        values = {**self.values, **self.on_mesh}
         return {
-            name: self.values.get(f"{name}[{experiment.name}]", self.values.get(name, quantity.value))
+            name: values.get(f"{name}[{experiment.name}]", values.get(name, quantity.value))
             for name, quantity in experiment.scene.quantities.items()
         }
 
@@ -117,8 +123,9 @@ def fit(
         tolerance: relative change of the cost that counts as none.
         refine: "auto" moves the estimates to the limit of short substeps and counts what that leaves open in the
             intervals, at the cost of some three evaluations with tangents. A `Refinement` says more, above all how to
-            make the same experiments on a finer mesh, which "auto" does not know: "mesh not counted" stands in the
-            table then. False (or None) counts nothing, as suits a recording that was simulated at the same substep.
+            make the same experiments on a finer mesh, to whose limit the estimates are moved as well; "auto" does not
+            know how, and "mesh not counted" stands in the table then. False (or None) counts nothing, as suits a
+            recording that was simulated at the same substep.
         systematic: (problem, internal minimum) -> half-widths of what else the intervals are to count, by parameter, in
             its unit.
         given: standard deviations of numbers that the fit takes as given, by name; they then count in the intervals. Of
@@ -224,7 +231,8 @@ def fit(
         | elsewhere(problem, judged, best.cost, [*starts_elsewhere, *end.lower])
         | end.parts
     )
-    estimates = doubtful(judged.estimates, contradicted)
+    estimates, limit = at_the_limit(doubtful(judged.estimates, contradicted), at.refits, problem.parameters, at.u)
+    values = end.values | problem.parameters.to_physical(limit)
     result = FitResult(
         estimates=estimates,
         recordings=errors,
@@ -238,7 +246,7 @@ def fit(
         converged=best.converged,
         interrupted=interrupted,
         message=best.message,
-        given=_given(problem.parameters, end.values) + end.given,
+        given=_given(problem.parameters, values) + end.given,
         correlations=judged.correlations,
         gauges=tuple(g.words for g in judged.gauges),
         baseline="; ".join(
@@ -265,7 +273,7 @@ def fit(
         jacobians=sum(m.jacobians for m in ends),
         warnings=warnings_of(ends, interrupted, problem, estimates) + end.doubts + fallback,
     )
-    return Fit(result, tuple(comparisons), wanted, corrected)
+    return Fit(result, tuple(comparisons), wanted, corrected, end.values)
 
 
 @dataclass(frozen=True)

@@ -150,9 +150,10 @@ def _interval_parts(result: FitResult) -> Section:
             rows.append((e.name, *figures(parts, e.half_width), e.unit))
     more = (["systematic"] if counted else []) + (["value moved by"] if moved else [])
     headers = ("parameter", "+/-", "statistical", "discretization", *more, "unit")
-    note = "values are moved to the limit of short substeps, and what that leaves open is counted"
+    meshes = " and of fine meshes" if any(refit.left for refit in result.refits) else ""
+    note = f"values are moved to the limit of short substeps{meshes}, and what that leaves open is counted"
     return Section(
-        "Where the intervals come from", headers, tuple(rows), (("time step", note),) if moved and rows else ()
+        "Where the intervals come from", headers, tuple(rows), (("discretization", note),) if moved and rows else ()
     )
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +45,8 @@ class Estimate:
         systematic: half-width of what else the interval counts; 0 when nothing.
         verdict: one of `VERDICTS`.
         words: the verdict as a sentence.
-        moved: how far the value was moved to the limit of short substeps, in `unit`; it is contained in `value`.
+        moved: how far the value was moved to the limit of short substeps and fine meshes, in `unit`; it is contained in
+            `value`.
     """
 
     name: str
@@ -169,12 +170,15 @@ class Refit:
     Attributes:
         name: what was refined.
         to_limit: factor from what it moves to the limit of ever finer ones.
-        moved: of each fitted parameter, finer minus reported, in its unit.
+        moved: of each fitted parameter, finer minus fitted, in its unit.
+        left: half-width of what is open all the same, of each parameter, in its unit. Where it is smaller than what is
+            moved, the estimate was moved to the limit. Empty where all that it moves, up to the limit, is counted.
     """
 
     name: str
     to_limit: float
     moved: Mapping[str, float]
+    left: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -307,7 +311,7 @@ class FitResult:
         found = data.get("format") if isinstance(data, Mapping) else data
         if found != FORMAT:
             raise InputError("format", "is not the one that this version reads", found, f"use {FORMAT!r}")
-        known = {field.name for field in fields(cls)}
+        known = {one.name for one in fields(cls)}
         values = {name: value for name, value in data.items() if name in known}
         values["baseline"] = data.get("baseline_is", "")
         estimates = mapping(data.get("parameters"), "parameters")
@@ -350,10 +354,10 @@ def _estimate(name: str, part: object) -> Estimate:
         raise InputError(f"{where}.interval", "must be [lower, upper]", ends, "give both, null where open")
     rest = {key: value for key, value in told.items() if key != "interval"}
     found = as_dataclass(Estimate, {"name": name, "lower": ends[0], "upper": ends[1], **rest}, where)
-    for field in ("half_width", "statistical", "discretization", "systematic"):
-        width = getattr(found, field)
+    for part in ("half_width", "statistical", "discretization", "systematic"):
+        width = getattr(found, part)
         if width is not None and width < 0:
-            raise InputError(f"{where}.{field}", "must not be negative", width, "give a half-width")
+            raise InputError(f"{where}.{part}", "must not be negative", width, "give a half-width")
     return found
 
 

@@ -151,8 +151,16 @@ def test_a_finer_mesh_is_counted_where_it_can_be_made_and_named_where_not(tmp_pa
     assert alone["rope_EI"].verdict == "identified" and off(alone["rope_EI"], 2e-3) > 2
     finer = sb.Refinement(finer=lambda: [replace(rope(20), recording=recording)], linear=True)
     found = sb.fit(coarse, parameters=wanted, profiles=False, refine=finer)
-    assert found.result.not_counted == () and found.values == alone.values
+    assert found.result.not_counted == () and dict(found.on_mesh) == alone.values
     assert all(off(found[name], truth) < 1 for name, truth in zip(wanted, (2e-3, 0.02, 0.01), strict=True))
+    EI, before = found["rope_EI"], alone["rope_EI"]
+    assert EI.value - EI.moved == approx(before.value - before.moved) and EI.verdict == "identified"
+    assert abs(EI.value - 2e-3) < 0.1 * abs(before.value - 2e-3) and EI.half_width < 4 * before.half_width
+    found.save(tmp_path / "fit.json")
+    assert sb.FitResult.load(tmp_path / "fit.json") == found.result
+    assert "and of fine meshes" in found.report()
+    step = found.result.refits[-1]
+    assert step.name == "finer mesh" and 0 < step.left["rope_EI"] < 0.3 * abs(step.to_limit * step.moved["rope_EI"])
 
 
 def test_a_sheet_on_a_mesh_three_times_too_coarse_is_not_identified():
