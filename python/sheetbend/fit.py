@@ -24,6 +24,7 @@ from .growth import Growth, growths
 from .identifiability import Identifiability
 from .journal import journaled
 from .leave_one_out import MEANING, companions, each_left_out
+from .misread import misread
 from .optimizers import Observer, ceres_trouble
 from .optional import require
 from .parameters import Parameter, Parameters
@@ -271,7 +272,10 @@ def fit(
         windows=best.windows,
         evaluations=sum(m.evaluations for m in ends),
         jacobians=sum(m.jacobians for m in ends),
-        warnings=warnings_of(ends, interrupted, problem, estimates) + end.doubts + fallback,
+        warnings=warnings_of(ends, interrupted, problem, estimates)
+        + end.doubts
+        + fallback
+        + (() if interrupted else misread(problem, best.u)),
     )
     return Fit(result, tuple(comparisons), wanted, corrected, end.values)
 
