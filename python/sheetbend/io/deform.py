@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from ..door import check_room
 from ..errors import RecordingError
 from ..recording import Recording
+from ..whole import written
 from . import plain_pickle
 
 ASSUMED = ("times", "clamped")
@@ -54,7 +55,7 @@ def read(path: Path) -> Recording:
 def write(recording: Recording, path: Path) -> None:
     """Write a list of float64 arrays (3, markers), one per frame; markers not seen are NaN."""
     frames = [np.ascontiguousarray(frame.T) for frame in recording.positions]
-    with path.open("wb") as file:
+    with written(path) as beside, beside.open("wb") as file:
         pickle.dump(frames, file, protocol=4)
 
 

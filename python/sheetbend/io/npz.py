@@ -23,6 +23,7 @@ from numpy.lib import format as npy
 from ..door import check_room
 from ..errors import RecordingError
 from ..recording import Recording
+from ..whole import written
 
 _REQUIRED = ("positions", "times")
 # What zipfile and NumPy raise on damaged archives and headers; what else they may is told by `reading`.
@@ -49,7 +50,7 @@ def read(path: Path) -> Recording:
 def write(recording: Recording, path: Path) -> None:
     """Write positions, times and clamped, compressed."""
     clamped = np.array(recording.clamped, dtype=np.int64)
-    with path.open("wb") as file:  # an open file keeps NumPy from appending a second suffix
+    with written(path) as beside, beside.open("wb") as file:  # an open file keeps NumPy from appending a second suffix
         np.savez_compressed(file, positions=recording.positions, times=recording.times, clamped=clamped)
 
 
