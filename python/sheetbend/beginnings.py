@@ -38,6 +38,7 @@ from .wording import short
 FRAMES = 12  # of every motion: fewer do not tell how residuals correlate
 LARGE = 4.0  # of the residuals' mean square, in sigma squared
 COLORED = 0.2  # autocorrelation of residuals that are not noise
+KNOWN = 1.0  # of the same: a beginning that leaves more of a parameter open tells nothing of it
 TOLERANCE = 1e-4  # of the cost: a beginning's minimum
 CLEAR = 0.03
 """Part of a value, or of its scale, by which a beginning must differ: short beginnings of good real recordings, whose
@@ -179,7 +180,8 @@ def _differences(problem: FitProblem, u: Array, b: Beginning, level: float) -> M
         return {}
     t = float(special.stdtrit(degrees, 0.975))
     found = {c: (float(d), t * float(s)) for c, d, s in zip(columns, step, sd, strict=True)}
-    return {c: (d, s) for c, (d, s) in found.items() if abs(d) > max(s, CLEAR * _size(problem, u, c))}
+    size = {c: _size(problem, u, c) for c in columns}
+    return {c: (d, s) for c, (d, s) in found.items() if abs(d) > max(s, CLEAR * size[c]) and s < KNOWN * size[c]}
 
 
 def _size(problem: FitProblem, u: Array, column: int) -> float:

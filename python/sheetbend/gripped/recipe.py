@@ -229,7 +229,7 @@ class _Search:
             interrupted = True
             self.say(f"interrupted: going back to {next(s.name for s in reversed(steps) if s.stays)}")
         last = self._conclude(model, parameters, values, interrupted)
-        values = last.values
+        values = {**last.values, **last.on_mesh}  # of the model's own mesh
         return RopeFit(model.at(values), values, tuple(steps), last, tuple(_warnings(model, values)))
 
     def _first(
