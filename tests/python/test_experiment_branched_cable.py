@@ -12,6 +12,8 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 
+pytestmark = pytest.mark.slow
+
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "branched_cable"
 NAMES = ("trunk_EI", "left_EI", "right_EI", "trunk_bend_damping")
 OWN = ("study", "make_data", "harness")

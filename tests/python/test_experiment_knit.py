@@ -12,6 +12,8 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 
+pytestmark = pytest.mark.slow
+
 GARTER = {"knit_warp": 5.61, "knit_weft": 2.52, "knit_poisson": 0.332}  # of the README, exponential law
 BEYOND = {"x": 23.5, "y": 14.2}  # % of the force beyond 60 % of the range, of the README
 CARRIED_ON = {"weighted": {"x": 16.0, "y": 8.6}, "sinh": {"x": 12.2, "y": 9.8}}  # the same of the weighted fits

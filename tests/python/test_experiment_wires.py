@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 import sheetbend as sb
 
+pytestmark = pytest.mark.slow
+
 FOLDER = Path(__file__).parents[2] / "experiments" / "wires"
 GAP = {"white": 5.0, "black": 12.0, "red": 10.0}  # mm, the goal for the mean over the three shapes of a wire
 

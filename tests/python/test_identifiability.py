@@ -52,6 +52,7 @@ def coverage(correlation: float, frames: int, channels: int = 1, common: float =
     return honest / SEEDS, naive / SEEDS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("correlation", "frames", "channels", "common"),
     [(0.0, 100, 1, 0.0), (0.5, 400, 1, 0.0), (0.8, 400, 1, 0.0), (0.6, 200, 4, 0.0), (0.6, 200, 4, 0.7)],

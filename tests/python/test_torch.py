@@ -611,6 +611,7 @@ def backward():
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(importlib.util.find_spec("sheetbend._ceres") is None, reason="built without Ceres")
 @pytest.mark.parametrize("order", ["backward(); fit(); backward()", "fit(); backward(); fit()"])
 def test_torch_and_ceres_share_a_process(order: str) -> None:
