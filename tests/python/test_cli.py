@@ -115,6 +115,7 @@ class TestFit:
         assert names == {
             "fit.json",
             "report.txt",
+            "report.html",
             "fitted.toml",
             "swing_markers.svg",
             "swing_residuals.svg",

@@ -90,7 +90,7 @@ def _simulate(
         raise ConfigError("--duration", "must be positive", duration, "give s")
     with reading(path, ConfigError):
         study = load(path)
-        tasks = _tasks(study, duration, recording)
+        tasks = tasks_of(study, duration, recording)
     name = study.config.experiment.name
     folder = output if output is not None else Path("out") / name
     if mesh is not None and not any(task.scene.cloths for task in tasks):
@@ -108,7 +108,12 @@ def _simulate(
     return Outcome({"name": name, "simulated": done})
 
 
-def _tasks(study: Study, duration: float | None, recording: str | None) -> list[Task]:
+def tasks_of(study: Study, duration: float | None, recording: str | None) -> list[Task]:
+    """What a configuration asks to run: one task for each of its recordings, or its scene alone.
+
+    Raises:
+        ConfigError: the configuration has no recording of that name.
+    """
     experiments = [e for e in study.experiments if recording in (None, e.name)]
     if recording is not None and not experiments:
         known = ", ".join(e.name for e in study.experiments) or "none"
@@ -139,7 +144,7 @@ def _files(task: Task, folder: Path, mesh: MeshFormat | None) -> list[Path]:
 
 
 def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, movie: Path | None) -> dict[str, Any]:
-    motion = _motion(task)
+    motion = motion_of(task)
     path = folder / f"{task.name}.npz"
     arrays: dict[str, Any] = {f"force_{group}": values for group, values in motion.forces.items()}
     arrays |= {f"pressure_{name}": values for name, values in motion.pressures.items()}
@@ -178,7 +183,8 @@ def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, mo
     return summary
 
 
-def _motion(task: Task) -> Trajectory:
+def motion_of(task: Task) -> Trajectory:
+    """The motion; of a shape at rest one frame with its forces."""
     start = None
     if task.static or task.at_rest:
         rest = equilibrium(task.scene)
