@@ -11,12 +11,36 @@ namespace sheetbend {
 std::size_t Experiment::residual_count() const {
   std::size_t seen = 0;
   for (std::size_t i = 0; i < observed.measured.size(); i += 3) seen += !std::isnan(observed.measured[i]);
-  return observed.axes.size() * seen;
+  std::size_t count = observed.axes.size() * seen;
+  for (const ForceSensor& sensor : sensors) count += sensor.rows();
+  return count;
+}
+
+std::size_t Experiment::readings() const {
+  std::size_t count = 0;
+  for (const ForceSensor& sensor : sensors) count += sensor.measured.size();
+  return count;
 }
 
 int Experiment::steps(const Plan& run) const {
   if (is_static) return 0;
-  return std::max(3, static_cast<int>(std::ceil((observed.times.back() - t0) / run.options.h - 1e-9)) + 1);
+  double last = observed.times.back();
+  for (const ForceSensor& sensor : sensors)
+    if (!sensor.times.empty()) last = std::max(last, sensor.times.back());
+  const int least = sensors.empty() ? 3 : 4;
+  return std::max(least, static_cast<int>(std::ceil((last - t0) / run.options.h - 1e-9)) + 1);
+}
+
+template <class T>
+int Experiment::steps_at(const Plan& run, const T* in) const {
+  const int plain = steps(run);
+  double most = plain;
+  for (std::size_t s = 0; s < sensors.size(); ++s) {
+    if (sensors[s].times.empty()) continue;
+    const double late = value_of(in[time_offset_at() + ForceSensor::inputs * (s + 1)]);
+    most = std::max(most, std::ceil((sensors[s].times.back() + late - t0) / run.options.h - 1e-9) + 1.0);
+  }
+  return static_cast<int>(std::min(most, 2.0 * plain));
 }
 
 void Experiment::check() const {
@@ -32,6 +56,15 @@ void Experiment::check() const {
   if (map.base.size() != inputs()) throw std::invalid_argument(name + ": the parameter map does not fit the scene");
   if (correction.first.size() != correction.given.size() + 1)
     throw std::invalid_argument(name + ": the correction does not fit its own numbers");
+  if (is_static && !sensors.empty())
+    throw std::invalid_argument(name + ": force sensors are read along motions, not at rest");
+  if (correction.unknowns() > 0 && !sensors.empty())
+    throw std::invalid_argument(name + ": driven markers are not corrected beside force sensors. Fix: leave out one");
+  for (const ForceSensor& sensor : sensors)
+    if (sensor.measured.size() % ForceSensor::channels != 0 || sensor.rotation.size() != 9 * sensor.samples() ||
+        sensor.times.size() != sensor.sample.size() || sensor.times.size() != sensor.share.size() ||
+        !std::is_sorted(sensor.times.begin(), sensor.times.end()))
+      throw std::invalid_argument(name + ": the arrays of a force sensor do not fit each other");
   if (residual_count() == 0) throw std::invalid_argument(name + ": every marker is missing in every frame");
   if (!finer.empty() && correction.unknowns() > 0)
     throw std::invalid_argument(name +
@@ -39,16 +72,35 @@ void Experiment::check() const {
 }
 
 template <class T, class Frame>
-void Experiment::run(const Plan& own, const T* in, Frame&& frame, Interrupt* interrupt) const {
-  const T time_offset = in[inputs() - 1];
-  const int last = steps(own);
+void Experiment::run(const Plan& own, const T* in, Frame&& frame, double weight, T* means,
+                     Interrupt* interrupt) const {
+  const T time_offset = in[time_offset_at()];
+  const int last = steps_at(own, in);
   const std::size_t dofs = scene->dofs();
   std::vector<T> ring(4 * dofs), x(dofs);
   std::size_t next_frame = 0;
   Rollout<T> rollout(*scene, own, in, t0);
+  const Inputs<const T> scene_in{scene->layout, in};
+  std::vector<SensorRun<T>> runs;
+  for (std::size_t s = 0; s < sensors.size(); ++s)
+    runs.emplace_back(sensors[s], *scene, in, in + time_offset_at() + 1 + ForceSensor::inputs * s, own.options.h, t0,
+                      last);
+  const auto read = [&](int step, const T* x, const T* v) {
+    if (step == 0) return;
+    const T* lambda = nullptr;
+    T* to = means;
+    for (std::size_t s = 0; s < runs.size(); ++s, to += sensors[s - 1].measured.size()) {
+      if (!runs[s].wants(step)) continue;
+      if (!lambda) lambda = rollout.multipliers();
+      const double eta = Bdf::at(own.options, step - 1).eta;
+      runs[s].take(step, sensors[s].reader.read(*scene, scene_in, eta, rollout.time(step), x, v, lambda));
+      runs[s].read(step, T(weight), to);
+    }
+  };
   rollout.run(
       last,
-      [&](int step, const T* state, const T*) {
+      [&](int step, const T* state, const T* speed) {
+        read(step, state, speed);
         std::copy_n(state, dofs, &ring[(step % 4) * dofs]);
         for (; next_frame < observed.times.size(); ++next_frame) {
           const FramePlace<T> place(*this, own, next_frame, time_offset, last);
@@ -61,7 +113,7 @@ void Experiment::run(const Plan& own, const T* in, Frame&& frame, Interrupt* int
 }
 
 template <class T>
-std::vector<T> Experiment::extrapolated(const T* in, Interrupt* interrupt) const {
+std::vector<T> Experiment::extrapolated(const T* in, T* means, Interrupt* interrupt) const {
   const T* offsets = &in[scene->layout.total()];
   std::vector<T> markers(observed.measured.size(), T(0.0)), one(markers.size());
   const auto add = [&](const Plan& own, double weight) {
@@ -70,7 +122,7 @@ std::vector<T> Experiment::extrapolated(const T* in, Interrupt* interrupt) const
         [&](std::size_t f, const T* x) {
           frame_residuals(observed, f, x, offsets, static_cast<T*>(nullptr), one.data());
         },
-        interrupt);
+        weight, means, interrupt);
     for (std::size_t i = 0; i < markers.size(); ++i) markers[i] += T(weight) * one[i];
   };
   double rest = 1.0;
@@ -89,7 +141,7 @@ void Experiment::refuse(std::size_t input, double value) const {
 }
 
 template <class T>
-void Experiment::residuals(const T* theta, const T* b, T* r, T* simulated, Interrupt* interrupt) const {
+void Experiment::residuals(const T* theta, const T* b, T* r, T* simulated, T* sensed, Interrupt* interrupt) const {
   std::vector<T> in = inputs_at(theta, b);
   const T* offsets = &in[scene->layout.total()];
   if (is_static || start == Start::equilibrium) {
@@ -101,22 +153,28 @@ void Experiment::residuals(const T* theta, const T* b, T* r, T* simulated, Inter
     std::copy(x.begin(), x.end(), in.begin() + static_cast<std::ptrdiff_t>(scene->layout.of(Quantity::position)));
   }
 
+  std::vector<T> means(readings(), T(0.0));
   if (finer.empty()) {
     run(
         plan, in.data(),
-        [&](std::size_t f, const T* x) { r = frame_residuals(observed, f, x, offsets, r, simulated); }, interrupt);
-    return;
+        [&](std::size_t f, const T* x) { r = frame_residuals(observed, f, x, offsets, r, simulated); }, 1.0,
+        means.data(), interrupt);
+  } else {
+    const std::vector<T> markers = extrapolated(in.data(), means.data(), interrupt);
+    if (simulated) std::copy(markers.begin(), markers.end(), simulated);
+    for (std::size_t at = 0; r && at < markers.size() / 3; ++at)
+      if (is_seen(observed, at)) r = marker_residuals(observed, at, Vec3<T>(&markers[3 * at]), r);
   }
-  const std::vector<T> markers = extrapolated(in.data(), interrupt);
-  if (simulated) std::copy(markers.begin(), markers.end(), simulated);
-  for (std::size_t at = 0; r && at < markers.size() / 3; ++at)
-    if (is_seen(observed, at)) r = marker_residuals(observed, at, Vec3<T>(&markers[3 * at]), r);
+  T* mean = means.data();
+  for (std::size_t s = 0; s < sensors.size(); mean += sensors[s++].measured.size())
+    r = sensor_residuals(sensors[s], &in[time_offset_at() + 1 + ForceSensor::inputs * s], mean, r);
+  if (sensed) std::copy(means.begin(), means.end(), sensed);
 }
 
-template void Experiment::residuals<double>(const double*, const double*, double*, double*, Interrupt*) const;
+template void Experiment::residuals<double>(const double*, const double*, double*, double*, double*, Interrupt*) const;
 template void Experiment::residuals<Dual<double, 4>>(const Dual<double, 4>*, const Dual<double, 4>*, Dual<double, 4>*,
-                                                     Dual<double, 4>*, Interrupt*) const;
+                                                     Dual<double, 4>*, Dual<double, 4>*, Interrupt*) const;
 template void Experiment::residuals<Dual<double, 8>>(const Dual<double, 8>*, const Dual<double, 8>*, Dual<double, 8>*,
-                                                     Dual<double, 8>*, Interrupt*) const;
+                                                     Dual<double, 8>*, Dual<double, 8>*, Interrupt*) const;
 
 }  // namespace sheetbend

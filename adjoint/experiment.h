@@ -8,6 +8,7 @@
 
 #include "adjoint/boundary_correction.h"
 #include "adjoint/equilibrium_tangents.h"
+#include "adjoint/force_sensor.h"
 #include "adjoint/markers.h"
 #include "adjoint/parameter_map.h"
 #include "core/solver/rollout.h"
@@ -38,7 +39,8 @@ struct OutOfDomain : std::domain_error {
   using std::domain_error::domain_error;
 };
 
-// The inputs of an experiment are the scene's, then an offset (3) per marker [m], then the recording's time offset [s].
+// The inputs of an experiment are the scene's, then an offset (3) per marker [m], then the recording's time offset [s], then those of each
+// force sensor.
 struct Experiment {
   std::string name;
   std::shared_ptr<const Scene> scene;
@@ -47,6 +49,7 @@ struct Experiment {
   ParameterMap map;
   std::vector<double> least, most;  // of the scene's inputs
   Observations observed;
+  std::vector<ForceSensor> sensors;
   BoundaryCorrection correction;
   bool is_static = false;  // the recording shows an equilibrium
   Start start = Start::given;
@@ -54,10 +57,15 @@ struct Experiment {
   EquilibriumOptions equilibrium;
   std::shared_ptr<EquilibriumAnchor> anchor = std::make_shared<EquilibriumAnchor>();
 
-  std::size_t inputs() const { return scene->layout.total() + 3 * observed.markers.size() + 1; }
-  std::size_t residual_count() const;  // one per axis of every marker and frame that was seen
+  std::size_t time_offset_at() const { return scene->layout.total() + 3 * observed.markers.size(); }
+  std::size_t inputs() const { return time_offset_at() + 1 + ForceSensor::inputs * sensors.size(); }
+  std::size_t residual_count() const;  // one per axis of every marker and frame that was seen, then those of the sensors
+  std::size_t readings() const;        // six per sample of every sensor
   int steps() const { return steps(plan); }
-  int steps(const Plan& run) const;  // substeps until the last frame
+  int steps(const Plan& run) const;  // substeps until the last frame and sample
+  // The same where the sensors' clocks are shifted, by no more than the motion is long.
+  template <class T>
+  int steps_at(const Plan& run, const T* in) const;
   void check() const;
   [[noreturn]] void refuse(std::size_t input, double value) const;
 
@@ -72,17 +80,19 @@ struct Experiment {
     return in;
   }
 
-  // Fills, when not null, residuals (residual_count) and simulated markers (frames, markers, 3). Throws Diverged, Unconverged, NoEquilibrium or OutOfDomain.
+  // Fills, when not null, residuals (residual_count), simulated markers (frames, markers, 3) and readings of sensors (readings()).
+  // Throws Diverged, Unconverged, NoEquilibrium or OutOfDomain.
   template <class T>
-  void residuals(const T* theta, const T* b, T* r, T* simulated, Interrupt* interrupt) const;
+  void residuals(const T* theta, const T* b, T* r, T* simulated, T* sensed, Interrupt* interrupt) const;
 
  private:
-  // Calls frame(number, coordinates at its time) for every frame of a rollout with that plan; `in` as `inputs_at`.
+  // Calls frame(number, coordinates at its time) for every frame of a rollout with that plan, and adds weight times what sensors read
+  // to their means (readings); `in` as `inputs_at`.
   template <class T, class Frame>
-  void run(const Plan& own, const T* in, Frame&& frame, Interrupt* interrupt) const;
-  // Predicted markers (frames, markers, 3) of all runs together.
+  void run(const Plan& own, const T* in, Frame&& frame, double weight, T* means, Interrupt* interrupt) const;
+  // Predicted markers (frames, markers, 3) of all runs together; means as in `run`.
   template <class T>
-  std::vector<T> extrapolated(const T* in, Interrupt* interrupt) const;
+  std::vector<T> extrapolated(const T* in, T* means, Interrupt* interrupt) const;
 };
 
 }  // namespace sheetbend

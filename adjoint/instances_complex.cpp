@@ -3,6 +3,7 @@
 
 namespace sheetbend {
 
+template class Rollout<Complex>;
 template void rollout_states<Complex>(const Scene&, const Plan&, const Complex*, double, const std::vector<int>&,
                                       Complex*, Interrupt*);
 

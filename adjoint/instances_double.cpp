@@ -3,6 +3,7 @@
 
 namespace sheetbend {
 
+template class Rollout<double>;
 template void rollout_states<double>(const Scene&, const Plan&, const double*, double, const std::vector<int>&, double*,
                                      Interrupt*);
 template Tape<double> record_rollout<double>(const Scene&, const Plan&, const double*, double, const std::vector<int>&,

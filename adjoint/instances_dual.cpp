@@ -3,6 +3,7 @@
 
 namespace sheetbend {
 
+template class Rollout<Dual<double, 1>>;
 template Tape<Dual<double, 1>> record_rollout<Dual<double, 1>>(const Scene&, const Plan&, const Dual<double, 1>*,
                                                                double, const std::vector<int>&, Dual<double, 1>*, int,
                                                                Interrupt*);

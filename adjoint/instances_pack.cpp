@@ -3,6 +3,7 @@
 
 namespace sheetbend {
 
+template class Rollout<Pack>;
 template void rollout_states<Pack>(const Scene&, const Plan&, const Pack*, double, const std::vector<int>&, Pack*,
                                    Interrupt*);
 template Tape<Pack> record_rollout<Pack>(const Scene&, const Plan&, const Pack*, double, const std::vector<int>&, Pack*,

@@ -3,6 +3,7 @@
 
 namespace sheetbend {
 
+template class Rollout<Dual<double, 8>>;
 template void rollout_states<Dual<double, 8>>(const Scene&, const Plan&, const Dual<double, 8>*, double,
                                               const std::vector<int>&, Dual<double, 8>*, Interrupt*);
 

@@ -4,7 +4,6 @@
 
 #include <limits>
 
-#include "adjoint/rollout_vjp.h"
 #include "adjoint/tape.h"
 
 namespace sheetbend {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "adjoint/rollout.h"
+#include "adjoint/rollout_vjp.h"
 
 namespace sheetbend {
 

@@ -32,13 +32,13 @@ void yield_vjp(const Scene& scene, const Inputs<const T>& in, const T* state, T*
     for (int j = 0; j < K::rows; ++j)
       e_bar[j] = at.f * set_bar[j] + at.y_over_length * at.inverse_length * along * at.e[j];
 
-    // e = C - (1 - share) set, where C holds -share set: by the set -1, by the share 0
+    // de/dset = -1; with a share e = C - (1 - share) set, where C holds -share set: by the share 0
     T by_x[K::dofs]{}, by_p[parameter_count<K>]{};
-    values_vjp<K>(at.x, p, e_bar, by_x, by_p);
+    values_vjp<Slider<K>>(at.x, p, e_bar, by_x, by_p);
     for (int d = 0; d < K::dofs - 3; ++d) x_bar[scene.first_dof[nodes[d / 3]] + d % 3] += by_x[d];
     for (int j = 0; j < K::rows; ++j) set_bar[j] -= e_bar[j];
-    for (int k = 0; k < parameter_count<K>; ++k)
-      if (k != K::share_parameter) p_bar[k] += by_p[k];
+    if constexpr (shares_load<K>) by_p[K::share_parameter] = T(0.0);
+    for (int k = 0; k < parameter_count<K>; ++k) p_bar[k] += by_p[k];
   });
 }
 

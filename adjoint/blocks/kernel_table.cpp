@@ -1,9 +1,16 @@
 // Compiled once per instruction set, like adjoint/packs/kernel_table.cpp.
-#include "adjoint/blocks/block_reverse.h"
-#include "core/blocks/block_tangents.h"
+#include "adjoint/blocks/kernels_of_kind.h"
+#include "core/constraints/cold_kinds.h"
 
 #define SHEETBEND_JOIN_(a, b) a##b
 #define SHEETBEND_JOIN(a, b) SHEETBEND_JOIN_(a, b)
+
+namespace sheetbend {
+
+#define SHEETBEND_ELSEWHERE(K) SHEETBEND_BLOCK_KERNELS(extern, K)
+SHEETBEND_COLD_KINDS(SHEETBEND_ELSEWHERE)
+
+}  // namespace sheetbend
 
 namespace {
 

@@ -73,7 +73,7 @@ void Problem::evaluate_columns(const double* u, int experiment, int first, doubl
   std::vector<D> r(rows);
   const std::vector<D> b(correction(experiment).begin(), correction(experiment).end());
   experiments_[experiment].residuals(local_theta(duals.data(), experiment).data(), b.data(), r.data(),
-                                     static_cast<D*>(nullptr), interrupt);
+                                     static_cast<D*>(nullptr), static_cast<D*>(nullptr), interrupt);
   for (int i = 0; i < rows; ++i) {
     const std::size_t row = first_row_[experiment] + i;
     if (first == 0) residual[row] = r[i].v;
@@ -130,7 +130,7 @@ bool Problem::evaluate(const double* u, double* residual, double* jacobian, Inte
         if (width == 0) {
           if (!projections_[e])
             experiments_[e].residuals(local_theta(u, e).data(), correction(e).data(), residual + first_row_[e],
-                                      static_cast<double*>(nullptr), interrupt);
+                                      static_cast<double*>(nullptr), static_cast<double*>(nullptr), interrupt);
         } else if (width == 4) {
           evaluate_columns<4>(u, e, first, residual, jacobian, interrupt);
         } else {
@@ -168,8 +168,16 @@ std::vector<double> Problem::simulate(int experiment, const double* u, Interrupt
   const Experiment& e = experiments_.at(experiment);
   std::vector<double> markers(e.observed.measured.size());
   e.residuals(local_theta(u, experiment).data(), correction(experiment).data(), static_cast<double*>(nullptr),
-              markers.data(), interrupt);
+              markers.data(), static_cast<double*>(nullptr), interrupt);
   return markers;
+}
+
+std::vector<double> Problem::readings(int experiment, const double* u, Interrupt* interrupt) const {
+  const Experiment& e = experiments_.at(experiment);
+  std::vector<double> read(e.readings());
+  e.residuals(local_theta(u, experiment).data(), correction(experiment).data(), static_cast<double*>(nullptr),
+              static_cast<double*>(nullptr), read.data(), interrupt);
+  return read;
 }
 
 std::vector<double> Problem::respond(int experiment, const double* u, const double* changes, int count,
@@ -186,7 +194,7 @@ std::vector<double> Problem::respond(int experiment, const double* u, const doub
       const int width = std::min(8, count - first);
       for (int k = 0; k < width; ++k)
         for (std::size_t i = 0; i < numbers; ++i) b[i].d[k] = changes[(first + k) * numbers + i];
-      e.residuals(theta.data(), b.data(), r.data(), static_cast<D*>(nullptr), interrupt);
+      e.residuals(theta.data(), b.data(), r.data(), static_cast<D*>(nullptr), static_cast<D*>(nullptr), interrupt);
       for (int k = 0; k < width; ++k)
         for (std::size_t i = 0; i < rows; ++i) moved[(first + k) * rows + i] = r[i].d[k];
     }

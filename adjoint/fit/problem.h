@@ -38,6 +38,9 @@ class Problem {
   // Simulated markers (frames, markers, 3) of one experiment, its boundary corrected as it was in the last evaluation.
   std::vector<double> simulate(int experiment, const double* u, Interrupt* interrupt) const;
 
+  // What the force sensors of one experiment read, likewise: (samples, 6) of one after the other.
+  std::vector<double> readings(int experiment, const double* u, Interrupt* interrupt) const;
+
   // What `count` changes of an experiment's correction (count x its numbers) make of its residuals, (count x residuals), to first order.
   std::vector<double> respond(int experiment, const double* u, const double* changes, int count,
                               Interrupt* interrupt) const;

@@ -1,8 +1,8 @@
 // Compiled once per instruction set, with the namespace `sheetbend` renamed (-Dsheetbend=sheetbend_...): templates and inline functions of two
 // variants are then different functions, and the linker cannot put one in the place of the other.
-#include "adjoint/packs/project_packs_vjp.h"
+#include "adjoint/packs/kernels_of_kind.h"
+#include "core/constraints/cold_kinds.h"
 #include "core/constraints/registry.h"
-#include "core/packs/project_tangents.h"
 
 #define SHEETBEND_JOIN_(a, b) a##b
 #define SHEETBEND_JOIN(a, b) SHEETBEND_JOIN_(a, b)
@@ -10,6 +10,13 @@
 extern "C" const sheetbend_blocks::Table SHEETBEND_JOIN(sheetbend_blocks_, SHEETBEND_VARIANT);
 extern "C" const sheetbend_blocks::PotentialKernels SHEETBEND_JOIN(sheetbend_potential_, SHEETBEND_VARIANT);
 extern "C" const sheetbend_points::Table SHEETBEND_JOIN(sheetbend_points_, SHEETBEND_VARIANT);
+
+namespace sheetbend {
+
+#define SHEETBEND_ELSEWHERE(K) SHEETBEND_PACK_KERNELS(extern, K)
+SHEETBEND_COLD_KINDS(SHEETBEND_ELSEWHERE)
+
+}  // namespace sheetbend
 
 namespace {
 

@@ -64,6 +64,10 @@ concept HasFactors = requires(const typename K::template Factors<double>& factor
 template <class K>
 concept HasHessian = requires(const double* in, double* out) { K::add_hessian(in, in, in, out); };
 
+// Kinds with a set: their last node moves at the end of a substep as yield.h says.
+template <class K>
+inline constexpr bool Yields = requires { K::yield_parameter; };
+
 // Kinds on points alone that always hold.
 template <class K>
 inline constexpr bool holds_points = K::points == K::arity && !K::unilateral;

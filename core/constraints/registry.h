@@ -11,6 +11,7 @@
 #include "core/constraints/dihedral.h"
 #include "core/constraints/distance.h"
 #include "core/constraints/exponential_strain.h"
+#include "core/constraints/friction_hinge.h"
 #include "core/constraints/hinge.h"
 #include "core/constraints/isometric_bending.h"
 #include "core/constraints/material_curvature.h"
@@ -47,7 +48,8 @@ using Registry = std::tuple<   //
     IsometricBending,          //
     SheetCurvature,            //
     Area,                      //
-    Tether>;
+    Tether,                    //
+    FrictionHinge>;
 
 inline constexpr int kind_count = std::tuple_size_v<Registry>;
 

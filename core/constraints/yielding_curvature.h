@@ -10,10 +10,6 @@
 
 namespace sheetbend {
 
-// Kinds with a set: their last node moves at the end of a substep as yield.h says.
-template <class K>
-inline constexpr bool Yields = requires { K::yield_parameter; };
-
 template <class Elastic>
 struct YieldingInFrames : OnPoints<Elastic::arity + 1> {
   static constexpr int points = Elastic::points;

@@ -8,7 +8,6 @@
 #define SHEETBEND_DECLARE(variant) extern "C" const sheetbend_packs::KernelTable* sheetbend_kernels_##variant();
 SHEETBEND_DECLARE(portable)
 #ifdef SHEETBEND_X86_KERNELS
-SHEETBEND_DECLARE(v2)
 SHEETBEND_DECLARE(v3)
 SHEETBEND_DECLARE(v4)
 #endif
@@ -35,15 +34,13 @@ std::vector<const sheetbend_packs::KernelTable*> available_kernels() {
   std::vector<const sheetbend_packs::KernelTable*> available;
 #ifdef SHEETBEND_X86_KERNELS
   __builtin_cpu_init();
-  const bool v2 = __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt");
-  const bool v3 = v2 && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") &&
+  const bool v3 = __builtin_cpu_supports("popcnt") && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") &&
                   __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("fma");
   const bool v4 = v3 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
                   __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
                   __builtin_cpu_supports("avx512vl");
   if (v4) available.push_back(sheetbend_kernels_v4());
   if (v3) available.push_back(sheetbend_kernels_v3());
-  if (v2) available.push_back(sheetbend_kernels_v2());
 #endif
   available.push_back(sheetbend_kernels_portable());
   return available;

@@ -148,7 +148,7 @@ void sweep_again(const PackPlan& plan, const sheetbend_packs::KernelTable& kerne
 template <class T>
 void unpack_multipliers(const Scene& scene, const PackPlan& plan, PackState<T>& state, T* lambda);
 
-// The kernels that this machine can run, widest first: of x86-64-v4, x86-64-v3, x86-64-v2, portable. They give the same bits.
+// The kernels that this machine can run, widest first: of x86-64-v4, x86-64-v3, portable. They give the same bits.
 std::vector<const sheetbend_packs::KernelTable*> available_kernels();
 
 // The first of them, or the one that the environment variable SHEETBEND_ISA names. Throws std::runtime_error for one that cannot run.

@@ -49,20 +49,24 @@ void load_implicit(const SubstepState<T>& s, const DirectBlock& block, const Sub
     for (int j = 0; j < block.size(); ++j) potential.C_r[j] = number_of<T>(state.C_r[j], scene);
 }
 
-// R -= J^T lambda over T at x, three numbers per particle.
-template <class T>
-void subtract_elastic_forces(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state,
-                             const std::vector<T>& x, std::vector<T>& R) {
+// The particle, in the block's order, of place k of a run's constraint.
+template <class K>
+int particle_of(const MemberRun& run, int i, int k) {
+  return run.nodes[lane_at(i, K::arity, k)] / sheetbend_blocks::row;
+}
+
+// Calls f(K{}, run, i, J, lambda) for every constraint over T, at the coordinates at(particle, d): lambda = -(C + g (C - C_r))/a.
+template <class T, class At, class F>
+void for_each_elastic(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state, At&& at, F&& f) {
   for (const MemberRun& run : block.runs) {
     const Group& group = s.scene.groups[run.group];
-    with_kind(group.kind, [&]<class K>(K) {
+    with_kind(group.kind, [&]<class K>(K kind) {
       if constexpr (holds_points<K>)
         for (int i = 0; i < run.count; ++i) {
           const int item = run.items[i];
           constexpr int P = parameter_count<K>;
-          T local[K::dofs], lambda[K::rows], push[K::dofs];
-          const auto particle = [&](int k) { return run.nodes[lane_at(i, K::arity, k)] / sheetbend_blocks::row; };
-          for (int d = 0; d < K::dofs; ++d) local[d] = x[3 * particle(d / 3) + d % 3];
+          T local[K::dofs], lambda[K::rows];
+          for (int d = 0; d < K::dofs; ++d) local[d] = at(particle_of<K>(run, i, d / 3), d % 3);
           const Evaluation<K, T> value(
               local, s.inputs.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(item) * P);
           const Rates<T> rates(s.inputs.of(Quantity::compliance)[group.first + item],
@@ -72,12 +76,37 @@ void subtract_elastic_forces(const SubstepState<T>& s, const DirectBlock& block,
             if (group.damped) residual += rates.g * difference<K>(value.C[j], T(state.C_r[run.first_row[i] + j]));
             lambda[j] = -(residual / rates.a);
           }
-          transpose_times<K>(value.J, lambda, push);
-          for (int d = 0; d < K::dofs; ++d)
-            if (particle(d / 3) < block.movable) R[3 * particle(d / 3) + d % 3] -= push[d];
+          f(kind, run, i, value.J, lambda);
         }
     });
   }
+}
+
+// R -= J^T lambda over T at x, three numbers per particle.
+template <class T>
+void subtract_elastic_forces(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state,
+                             const std::vector<T>& x, std::vector<T>& R) {
+  for_each_elastic(
+      s, block, state, [&](int particle, int d) { return x[3 * particle + d]; },
+      [&]<class K>(K, const MemberRun& run, int i, const T* J, const T* lambda) {
+        T push[K::dofs];
+        transpose_times<K>(J, lambda, push);
+        for (int d = 0; d < K::dofs; ++d) {
+          const int particle = particle_of<K>(run, i, d / 3);
+          if (particle < block.movable) R[3 * particle + d % 3] -= push[d];
+        }
+      });
+}
+
+// The multipliers of scalars that carry tangents, which the solution comes without.
+template <class T>
+void carry_multipliers(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state) {
+  for_each_elastic(
+      s, block, state,
+      [&](int particle, int d) { return T(state.x[0][sheetbend_blocks::row * static_cast<std::size_t>(particle) + d]); },
+      [&]<class K>(K, const MemberRun& run, int i, const T*, const T* lambda) {
+        for (int j = 0; j < K::rows; ++j) state.lambda[0][run.first_row[i] + j] = lambda[j];
+      });
 }
 
 // What a scalar carries beside its value at the solution x (particles, 3), which comes with the value alone.
@@ -142,7 +171,7 @@ void project_implicit(const SubstepState<T>& s, const DirectBlock& block, const 
         state.x[0][sheetbend_blocks::row * p + d] = states.x_next[s.scene.first_dof[block.particles[p]] + d];
   else
     write_solution(s, block, state);
-  if constexpr (!carries_tangents<T>) {  // whose multipliers nobody asks for
+  if constexpr (!carries_tangents<T>) {  // whose multipliers are found where they are asked for
     const auto arrays = arrays_of(block, runs_of(s, block, state), state, 0);
     forward_kernels<T>(table).evaluate(arrays);
     T* dl = state.at(0).dl.data();

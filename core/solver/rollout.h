@@ -1,61 +1,29 @@
 // A rollout: substeps from the initial state. The forward program is the same whether its states are kept (the tape) or not.
+// Compiled once per scalar (adjoint/instances_*.cpp): whoever steps a rollout does not compile the solver again.
 #pragma once
 
+#include "core/scalar/complex.h"
+#include "core/scalar/dual.h"
 #include "core/solver/divergence.h"
 #include "core/solver/interrupt.h"
 #include "core/solver/substep.h"
 
 namespace sheetbend {
 
+// T: double, Pack, Complex, Dual<double, 1>, Dual<double, 4> or Dual<double, 8>.
 template <class T>
 class Rollout {
  public:
-  Rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0 = 0.0)
-      : scene_(scene), plan_(plan), in_{scene.layout, inputs}, t0_(t0) {
-    for (auto* buffer : {&x_, &x_before_, &x_next_, &v_, &v_before_, &v_next_}) buffer->resize(scene.dofs());
-    record_.resize(scene, plan, false);
-    initial_state(scene, in_, t0, x_.data(), v_.data());
-    x_before_ = x_;
-    v_before_ = v_;
-  }
+  Rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0 = 0.0);
+  ~Rollout();
 
   // Driven nodes start where their boundary is at t0.
-  static void initial_state(const Scene& scene, const Inputs<const T>& in, double t0, T* x, T* v) {
-    std::copy_n(in.of(Quantity::position), scene.dofs(), x);
-    std::copy_n(in.of(Quantity::velocity), scene.dofs(), v);
-    if (scene.driven.empty()) return;
-    const KnotWeights k = scene.boundary.at(t0);
-    for (std::size_t i = 0; i < scene.driven.size(); ++i)
-      at_knots(k, in.of(Quantity::boundary), static_cast<int>(scene.driven.size()), static_cast<int>(i))
-          .store(x + scene.first_dof[scene.driven[i]]);
-  }
+  static void initial_state(const Scene& scene, const Inputs<const T>& in, double t0, T* x, T* v);
 
-  void advance() {
-    const Bdf bdf = Bdf::at(plan_.options, step_);
-    bool finite;
-    try {
-      finite = substep(scene_, plan_, in_, bdf, time(step_ + 1),
-                       {x_.data(), x_before_.data(), v_.data(), v_before_.data(), step_}, x_next_.data(),
-                       v_next_.data(), record_);
-    } catch (const Unbalanced& e) {
-      throw Unbalanced(e, step_ + 1, time(step_ + 1));
-    }
-    ++step_;
-    std::swap(x_before_, x_);
-    std::swap(x_, x_next_);
-    std::swap(v_before_, v_);
-    std::swap(v_, v_next_);
-    if (!finite) throw_diverged();
-  }
+  void advance();
 
   // Goes on from another state, at `step`.
-  void restart(int step, const SubstepStates<T>& s) {
-    step_ = step;
-    std::copy_n(s.x, x_.size(), x_.data());
-    std::copy_n(s.x_before, x_.size(), x_before_.data());
-    std::copy_n(s.v, v_.size(), v_.data());
-    std::copy_n(s.v_before, v_.size(), v_before_.data());
-  }
+  void restart(int step, const SubstepStates<T>& s);
 
   const T* x() const { return x_.data(); }
 
@@ -76,33 +44,15 @@ class Rollout {
   }
 
   // The last substep's multipliers (scene.multipliers()); zero before the first.
-  const T* multipliers() {
-    record_.lambda.resize(scene_.multipliers());
-    if constexpr (in_packs<T>)
-      if (!plan_.colors.empty()) unpack_multipliers(scene_, plan_.packs, record_.packs, record_.lambda.data());
-    for (std::size_t b = 0; b < plan_.blocks.size(); ++b)
-      unpack_multipliers(plan_.blocks[b], record_.blocks[b], record_.lambda.data());
-    for (std::size_t v = 0; v < record_.volumes.size(); ++v)
-      record_.lambda[scene_.rows + v] = record_.volumes[v].lambda;
-    return record_.lambda.data();
-  }
+  const T* multipliers();
 
   // Of the last substep, per implicit block: the force left at the start and after each Newton step, over the largest one.
-  std::vector<std::vector<double>> balance() const {
-    std::vector<std::vector<double>> all;
-    for (const BlockState<T>& block : record_.blocks)
-      for (const ImplicitBlock& scene : block.implicit) all.push_back(scene.balance());
-    return all;
-  }
+  std::vector<std::vector<double>> balance() const;
 
   double time(int step) const { return t0_ + step * plan_.options.h; }
 
  private:
-  void throw_diverged() const {
-    for (int n = 0; n < scene_.nodes(); ++n)
-      for (int d = 0; d < scene_.dim[n]; ++d)
-        if (!all_finite(x_[scene_.first_dof[n] + d])) throw Diverged(step_, n, time(step_));
-  }
+  void throw_diverged() const;
 
   const Scene& scene_;
   const Plan& plan_;
@@ -112,5 +62,97 @@ class Rollout {
   std::vector<T> x_, x_before_, x_next_, v_, v_before_, v_next_;
   SubstepRecord<T> record_;
 };
+
+template <class T>
+Rollout<T>::Rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0)
+    : scene_(scene), plan_(plan), in_{scene.layout, inputs}, t0_(t0) {
+  for (auto* buffer : {&x_, &x_before_, &x_next_, &v_, &v_before_, &v_next_}) buffer->resize(scene.dofs());
+  record_.resize(scene, plan, false);
+  initial_state(scene, in_, t0, x_.data(), v_.data());
+  x_before_ = x_;
+  v_before_ = v_;
+}
+
+template <class T>
+Rollout<T>::~Rollout() = default;
+
+template <class T>
+void Rollout<T>::initial_state(const Scene& scene, const Inputs<const T>& in, double t0, T* x, T* v) {
+  std::copy_n(in.of(Quantity::position), scene.dofs(), x);
+  std::copy_n(in.of(Quantity::velocity), scene.dofs(), v);
+  if (scene.driven.empty()) return;
+  const KnotWeights k = scene.boundary.at(t0);
+  for (std::size_t i = 0; i < scene.driven.size(); ++i)
+    at_knots(k, in.of(Quantity::boundary), static_cast<int>(scene.driven.size()), static_cast<int>(i))
+        .store(x + scene.first_dof[scene.driven[i]]);
+}
+
+template <class T>
+void Rollout<T>::advance() {
+  const Bdf bdf = Bdf::at(plan_.options, step_);
+  bool finite;
+  try {
+    finite = substep(scene_, plan_, in_, bdf, time(step_ + 1),
+                     {x_.data(), x_before_.data(), v_.data(), v_before_.data(), step_}, x_next_.data(), v_next_.data(),
+                     record_);
+  } catch (const Unbalanced& e) {
+    throw Unbalanced(e, step_ + 1, time(step_ + 1));
+  }
+  ++step_;
+  std::swap(x_before_, x_);
+  std::swap(x_, x_next_);
+  std::swap(v_before_, v_);
+  std::swap(v_, v_next_);
+  if (!finite) throw_diverged();
+}
+
+template <class T>
+void Rollout<T>::restart(int step, const SubstepStates<T>& s) {
+  step_ = step;
+  std::copy_n(s.x, x_.size(), x_.data());
+  std::copy_n(s.x_before, x_.size(), x_before_.data());
+  std::copy_n(s.v, v_.size(), v_.data());
+  std::copy_n(s.v_before, v_.size(), v_before_.data());
+}
+
+template <class T>
+const T* Rollout<T>::multipliers() {
+  record_.lambda.resize(scene_.multipliers());
+  if constexpr (in_packs<T>)
+    if (!plan_.colors.empty()) unpack_multipliers(scene_, plan_.packs, record_.packs, record_.lambda.data());
+  for (std::size_t b = 0; b < plan_.blocks.size(); ++b) {
+    BlockState<T>& block = record_.blocks[b];
+    if constexpr (carries_tangents<T>)
+      if (plan_.blocks[b].implicit)
+        carry_multipliers(SubstepState<T>{scene_, in_, block.eta, nullptr, nullptr, nullptr, nullptr},
+                          plan_.blocks[b], block);
+    unpack_multipliers(plan_.blocks[b], block, record_.lambda.data());
+  }
+  for (std::size_t v = 0; v < record_.volumes.size(); ++v)
+    record_.lambda[scene_.rows + v] = record_.volumes[v].lambda;
+  return record_.lambda.data();
+}
+
+template <class T>
+std::vector<std::vector<double>> Rollout<T>::balance() const {
+  std::vector<std::vector<double>> all;
+  for (const BlockState<T>& block : record_.blocks)
+    for (const ImplicitBlock& scene : block.implicit) all.push_back(scene.balance());
+  return all;
+}
+
+template <class T>
+void Rollout<T>::throw_diverged() const {
+  for (int n = 0; n < scene_.nodes(); ++n)
+    for (int d = 0; d < scene_.dim[n]; ++d)
+      if (!all_finite(x_[scene_.first_dof[n] + d])) throw Diverged(step_, n, time(step_));
+}
+
+extern template class Rollout<double>;
+extern template class Rollout<Pack>;
+extern template class Rollout<Complex>;
+extern template class Rollout<Dual<double, 1>>;
+extern template class Rollout<Dual<double, 4>>;
+extern template class Rollout<Dual<double, 8>>;
 
 }  // namespace sheetbend

@@ -1,7 +1,8 @@
-// Yield at the end of a substep: where the sliding spring's own curvature e = C - (1 - share) set is longer than y, its set follows,
+// Yield at the end of a substep: where the sliding spring is strained by e longer than y, its set follows,
 //
 //   set' = set + f e,   f = max(0, 1 - y/|e|)        (return mapping of a circular yield surface: Simo & Hughes 1998, sec. 3.3)
 //
+// e = C - (1 - share) set for a kind with a spring beside it (yielding_curvature.h), otherwise C of the kind's Slider (friction_hinge.h);
 // evaluated at the state that the substep has found. The branch is taken by the values alone, so the reverse repeats it.
 #pragma once
 
@@ -10,6 +11,23 @@
 #include "core/scene/scene.h"
 
 namespace sheetbend {
+
+// What the strain of the sliding spring is made from: the kind itself, or its Slider, with the same stencil and parameters.
+template <class K>
+struct SliderOf {
+  using type = K;
+};
+template <class K>
+  requires requires { typename K::Slider; }
+struct SliderOf<K> {
+  using type = typename K::Slider;
+};
+template <class K>
+using Slider = typename SliderOf<K>::type;
+
+// Whether a spring stands beside the sliding one and takes part of the load.
+template <class K>
+inline constexpr bool shares_load = requires { K::share_parameter; };
 
 template <class K, class T>
 struct Yield {
@@ -25,11 +43,12 @@ struct Yield {
   template <class At>
   Yield(At&& at, const T* p) {
     for (int d = 0; d < K::dofs; ++d) x[d] = at(d);
-    K::evaluate(x, p, C, J);
+    Slider<K>::evaluate(x, p, C, J);
     const T one(1.0), y = p[K::yield_parameter];
     T length2(0.0);
     for (int j = 0; j < K::rows; ++j) {
-      e[j] = C[j] - (one - p[K::share_parameter]) * x[set + j];
+      e[j] = C[j];
+      if constexpr (shares_load<K>) e[j] = C[j] - (one - p[K::share_parameter]) * x[set + j];
       length2 += e[j] * e[j];
     }
     slides = length2 > y * y;
@@ -66,7 +85,8 @@ void yield(const Scene& scene, const Inputs<const Dual<double, N>>& in, Dual<dou
   using Directed = Dual<double, N>;
   if (!scene.yields) return;
   for_each_yielding(scene, [&]<class K>(K, const Group& group, int item, std::size_t value) {
-    constexpr int P = parameter_count<K>, inside = P - K::offsets, set = K::dofs - 3;
+    using Sliding = Slider<K>;
+    constexpr int P = parameter_count<K>, inside = P - Sliding::offsets, set = K::dofs - 3;
     const Directed* p = in.of(Quantity::rest) + value;
     const auto nodes = group.nodes(item);
     const auto at = [&](int d) -> Directed& { return state[scene.first_dof[nodes[d / 3]] + d % 3]; };
@@ -80,17 +100,18 @@ void yield(const Scene& scene, const Inputs<const Dual<double, N>>& in, Dual<dou
     for (int d = 0; d < K::dofs; ++d) xd[d].v = values.x[d];
     for (int k = 0; k < P; ++k) pd[k].v = own[k];
     for (int k = 0; k < inside; ++k) pd[k].d[k] = 1.0;
-    K::evaluate(xd, pd, C, J);
+    Sliding::evaluate(xd, pd, C, J);
     Directed e[K::rows], length2;
     for (int j = 0; j < K::rows; ++j) {
       e[j].v = values.C[j];
       for (int i = 0; i < N; ++i) {
-        double sum = -p[inside + j].d[i];
+        double sum = 0.0;
+        if constexpr (Sliding::offsets > 0) sum = -p[inside + j].d[i];
         for (int k = 0; k < inside; ++k) sum += C[j].d[k] * p[k].d[i];
         for (int d = 0; d < K::dofs; ++d) sum += values.J[j * K::dofs + d] * at(d).d[i];
         e[j].d[i] = sum;
       }
-      e[j] -= (Directed(1.0) - p[K::share_parameter]) * at(set + j);
+      if constexpr (shares_load<K>) e[j] -= (Directed(1.0) - p[K::share_parameter]) * at(set + j);
       length2 += e[j] * e[j];
     }
     // in the order of Yield, so that the values have its bits

@@ -91,9 +91,9 @@ def where() -> np.ndarray:
     return LENGTH * np.arange(1, MARKERS + 1) / MARKERS
 
 
-def experiment(wanted: Mapping[str, float], measured: sb.Recording) -> sb.Experiment:
-    """The fit's rod with the recording."""
-    made = scene(1, wanted)
+def experiment(wanted: Mapping[str, float], measured: sb.Recording, finer: int = 1) -> sb.Experiment:
+    """The fit's rod with the recording, or one of `finer` times the links."""
+    made = scene(finer, wanted)
     rod = made.ropes["rod"]
     return sb.Experiment(
         scene=made,

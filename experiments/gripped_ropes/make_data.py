@@ -1,9 +1,13 @@
 """Writes recordings of five synthetic ropes held by two moving grips, in the layout of the DEFORM rope data.
 
     python experiments/gripped_ropes/make_data.py FOLDER [--train 6] [--eval 3] [--ropes 5] [--seconds 5] [--seed 7]
+        [--nasty]
 
 SYNTHETIC, no measurement. FOLDER/rope_1/train/00.pkl and so on, each a list of frames (3, markers) at 100 Hz, and
 FOLDER/rope_1.json with the true values. A recording depends on the seed, its rope, its set and its number alone.
+
+With --nasty the ropes have what real ones showed (`true_ropes`), some training files are spoiled (`spoil`), every other
+rope is written as lists of lists of numbers, and the JSON also tells what the true values miss of the eval recordings.
 """
 
 from __future__ import annotations
@@ -11,6 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import pickle
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +24,11 @@ from grip_motion import KNOTS, NOMINAL, UP, motion
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 from sheetbend.grip import Grip
-from true_ropes import GRAVITY, GRIPPED, MODES, Array, Rope, ropes
+from sheetbend.gripped import GrippedMotion
+from sheetbend.quantities import product
+from sheetbend.scores import coordinate_error
+from spoil import BELONGS, SPOILED
+from true_ropes import GRAVITY, GRIPPED, Array, Rope, ropes
 
 SEGMENTS, H = 120, 1 / 1600
 RATE = 100  # Hz, of the frames
@@ -27,7 +36,8 @@ NOISE = 5e-4  # m, standard deviation of each coordinate of each marker
 CREEP = ((1 / 100, 20.0), (1 / 400, 5.0), (H, 0.5))  # substeps and times, s, until the rope is at rest at first
 SNAP = 60.0  # m/s^2; a motion at which the rope snaps over, so that its path hangs on a hair, is drawn anew
 SETS = ("train", "eval")
-PHYSICAL = ("density", "EI", "GJ", "bend_damping", "twist_damping", "drag_linear")
+PHYSICAL = ("density", "EI", "GJ", "bend_damping", "twist_damping", "drag_linear", "yield_curvature", "yield_share")
+MODELED, MODELED_H, SMOOTHED = 48, 1 / 800, 0.08  # links, substep and smoothing, s, of predictions with the true values
 
 
 def scene(rope: Rope, start: Grip, end: Grip, segments: int = SEGMENTS) -> sb.Scene:
@@ -44,10 +54,27 @@ def scene(rope: Rope, start: Grip, end: Grip, segments: int = SEGMENTS) -> sb.Sc
         end=end,
         tilts=True,
         roll=True,
-        curvature_modes=MODES,
+        curvature_modes=_modes(rope, "curvature_1"),
+        softness_modes=_modes(rope, "softness"),
         **stiffness,
     )
+    if rope.marker_mass:
+        _weigh_down(built, rope)
     return built
+
+
+def _modes(rope: Rope, quantity: str) -> list[int]:
+    return [int(name.rpartition("_")[2]) for name in rope.values if name.startswith(f"{quantity}_")]
+
+
+def _weigh_down(built: sb.Scene, rope: Rope) -> None:
+    """Each free marker's mass, shared by the two nodes beside it."""
+    rod = built.ropes["rod"]
+    for place in rope.places:
+        k = int(np.searchsorted(rod.arc_length, place)) - 1
+        ahead = (place - rod.arc_length[k]) / (rod.arc_length[k + 1] - rod.arc_length[k])
+        for node, share in ((k, 1.0 - ahead), (k + 1, ahead)):
+            built.add_terms([product("mass", int(rod.particles[node]), float(rope.marker_mass * share), {})])
 
 
 def _hanging(first: Array, last: Array, length: float) -> Array:
@@ -89,7 +116,7 @@ def free_markers(rope: Rope, nodes: Array, directors: Array) -> Array:
     """(frames, free markers, 3) m, with their slack."""
     segments = nodes.shape[1] - 1
     arc = rope.free_length * np.arange(segments + 1) / segments
-    place = rope.free_length * np.arange(1, rope.markers - 3) / (rope.markers - 3) + rope.slack[:, 2]
+    place = rope.places + rope.slack[:, 2]
     line = CubicSpline(arc, nodes, axis=1)
     along = line(place, 1)
     along /= np.linalg.norm(along, axis=2, keepdims=True)
@@ -118,10 +145,27 @@ def recording(rope: Rope, part: str, number: int, seed: int, seconds: float) -> 
     return clean + NOISE * rng.standard_normal(clean.shape)
 
 
-def write(path: Path, positions: Array) -> None:
-    """A list of frames (3, markers)."""
+def write(path: Path, positions: Array, lists: bool = False) -> None:
+    """A list of frames (3, markers), arrays or lists of lists of numbers."""
+    frames = [np.ascontiguousarray(frame.T) for frame in positions]
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(pickle.dumps([np.ascontiguousarray(frame.T) for frame in positions], protocol=4))
+    path.write_bytes(pickle.dumps([frame.tolist() for frame in frames] if lists else frames, protocol=4))
+
+
+def missed(rope: Rope, positions: Array) -> float:
+    """Mean error of a coordinate, m, of the true values, as `sheetbend.gripped.evaluate` scores a fit.
+
+    They are simulated between the grips as recorded and smoothed, from the true shape at rest. The places of the
+    markers along the rope are known, how far they sit beside it is not.
+    """
+    count = rope.markers
+    recorded = sb.Recording(positions, np.arange(len(positions)) / RATE, clamped=(0, 1, count - 2, count - 1))
+    motion = GrippedMotion.of(recorded, SMOOTHED)
+    grips = [motion.grip(end, slice(None), nominal) for end, nominal in zip((False, True), NOMINAL, strict=True)]
+    straight = replace(rope, slack=rope.slack * [0.0, 0.0, 1.0])
+    found = positions.copy()
+    found[:, 2:-2] = free_markers(straight, *simulated(rope, *grips, len(positions) / RATE, MODELED, MODELED_H))
+    return coordinate_error(recorded, found)
 
 
 def describe(rope: Rope, seed: int) -> dict[str, object]:
@@ -132,6 +176,9 @@ def describe(rope: Rope, seed: int) -> dict[str, object]:
         "markers": rope.markers,
         "extra_roll": rope.extra_roll,
         "marker_slack": rope.slack.tolist(),
+        "marker_places": rope.places.tolist(),
+        "marker_mass": rope.marker_mass,
+        "weighed": rope.weighed,
         "nominal_directions": {"start": NOMINAL[0].tolist(), "end": NOMINAL[1].tolist()},
         "made_with": {
             "segments": SEGMENTS,
@@ -145,12 +192,24 @@ def describe(rope: Rope, seed: int) -> dict[str, object]:
     }
 
 
-def main(folder: Path, train: int, evaluation: int, count: int, seconds: float, seed: int) -> None:
-    for rope in ropes(seed)[:count]:
-        for part, number in ((SETS[0], train), (SETS[1], evaluation)):
-            for k in range(number):
-                write(folder / rope.name / part / f"{k:02d}.pkl", recording(rope, part, k, seed, seconds))
-        (folder / f"{rope.name}.json").write_text(json.dumps(describe(rope, seed), indent=2) + "\n")
+def main(folder: Path, train: int, evaluation: int, count: int, seconds: float, seed: int, nasty: bool = False) -> None:
+    known = {rope.name: rope for rope in ropes(seed, nasty)}
+    for rope in list(known.values())[:count]:
+        told = describe(rope, seed)
+        for k in range(train):
+            which = (rope.name, k) if nasty else None
+            positions = recording(known[BELONGS.get(which, rope.name)], "train", k, seed, seconds)
+            spoiled = SPOILED[which](positions) if which in SPOILED else positions
+            write(folder / rope.name / "train" / f"{k:02d}.pkl", spoiled, rope.lists)
+        unseen = [recording(rope, "eval", k, seed, seconds) for k in range(evaluation)]
+        for k, positions in enumerate(unseen):
+            write(folder / rope.name / "eval" / f"{k:02d}.pkl", positions, rope.lists)
+        if nasty:
+            told["missed_by_true_values"] = [missed(rope, positions) for positions in unseen]
+            words = {which: what.__name__ for which, what in SPOILED.items()}
+            words |= {which: f"a recording of {other}" for which, other in BELONGS.items()}
+            told["spoiled"] = {f"{k:02d}": what for (name, k), what in words.items() if name == rope.name and k < train}
+        (folder / f"{rope.name}.json").write_text(json.dumps(told, indent=2) + "\n")
         print(f"{rope.name}: {train} + {evaluation} recordings", flush=True)
 
 
@@ -162,5 +221,6 @@ if __name__ == "__main__":
     parser.add_argument("--ropes", type=int, default=5)
     parser.add_argument("--seconds", type=float, default=5.0)
     parser.add_argument("--seed", type=int, default=7)
+    parser.add_argument("--nasty", action="store_true")
     given = parser.parse_args()
-    main(given.folder, given.train, given.eval, given.ropes, given.seconds, given.seed)
+    main(given.folder, given.train, given.eval, given.ropes, given.seconds, given.seed, given.nasty)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 GRIPPED = 0.03  # m of rope in each grip, between its two markers
 GRAVITY = 9.81  # m/s^2
-MODES = (0, 1, 2)  # of the rest curvature
+MODES = (0, 1, 2)  # of the rest curvature of a clean rope
+SHARES = (1.0, 0.7, 0.4)  # sizes of these modes
+NASTY_SHARES = (1.0, 0.7, 0.5, 0.4, 0.35, 0.3, 0.25, 0.2, 0.15)  # nine modes of a nasty rope
+SOFTNESS = (0.25, 0.2, 0.15, 0.12, 0.1, 0.08)  # of its modes 1 to 6, of the logarithm of the compliance
+YIELDS_AT = 0.35  # its yield curvature times its bending length
+UNEVEN = (0.75, 1.3)  # of its markers' distances, beside equal ones
 
 Array = np.ndarray
 
@@ -22,6 +27,10 @@ class Rope:
         extra_roll: rad, by which the end grip slowly rolls beside what `Grip.from_markers` knows: a model error.
         slack: (free markers, 3) m, where a marker sits off its material point: along the rope's two directors, and
             along its arc.
+        places: (free markers,) m, arc lengths of the material points from the start grip.
+        marker_mass: kg of each free marker.
+        lists: whether its pickles hold lists of numbers instead of NumPy arrays.
+        weighed: whether whoever fits it knows its density.
     """
 
     name: str
@@ -30,14 +39,22 @@ class Rope:
     values: dict[str, float]
     extra_roll: float
     slack: Array
+    places: Array
+    marker_mass: float = 0.0
+    lists: bool = False
+    weighed: bool = True
 
     @property
     def free_length(self) -> float:
         return self.length - 2.0 * GRIPPED
 
 
-def ropes(seed: int = 7) -> list[Rope]:
-    """Five ropes, from soft to stiff: the bending length (EI/(density g))^(1/3) goes from 0.1 to 0.45 m."""
+def ropes(seed: int = 7, nasty: bool = False) -> list[Rope]:
+    """Five ropes, from soft to stiff: the bending length (EI/(density g))^(1/3) goes from 0.1 to 0.45 m.
+
+    Args:
+        nasty: also give them a finer rest shape, uneven stiffness, internal friction, uneven and heavy markers.
+    """
     table = [
         # markers, length, density, bending length, GJ/EI, bend and twist damping, drag, rest curvature, extra roll
         (13, 1.04, 0.045, 0.10, 0.60, 0.030, 0.030, 4e-3, 2.0, 0.0),
@@ -46,7 +63,8 @@ def ropes(seed: int = 7) -> list[Rope]:
         (13, 1.00, 0.070, 0.33, 0.80, 0.010, 0.015, 8e-3, 0.6, 0.0),
         (12, 0.96, 0.110, 0.45, 1.00, 0.008, 0.010, 5e-3, 0.3, 0.0),
     ]
-    return [_rope(number, seed, *row) for number, row in enumerate(table, start=1)]
+    clean = [_rope(number, seed, *row) for number, row in enumerate(table, start=1)]
+    return [_nasty(rope, number, seed) for number, rope in enumerate(clean, start=1)] if nasty else clean
 
 
 def _rope(
@@ -67,7 +85,7 @@ def _rope(
     EI = density * GRAVITY * bending_length**3
     values = {"density": density, "EI": EI, "GJ": ratio * EI}
     values |= {"bend_damping": bend_damping, "twist_damping": twist_damping, "drag_linear": drag}
-    for k, share in zip(MODES, (1.0, 0.7, 0.4), strict=True):
+    for k, share in zip(MODES, SHARES, strict=True):
         angle = rng.uniform(0.0, 2.0 * np.pi)
         values[f"curvature_1_{k}"] = share * curvature * np.cos(angle)
         values[f"curvature_2_{k}"] = share * curvature * np.sin(angle)
@@ -78,4 +96,24 @@ def _rope(
     free = markers - 4
     around, off = rng.uniform(0.0, 2.0 * np.pi, free), rng.uniform(1e-3, 2e-3, free)
     slack = np.stack([off * np.cos(around), off * np.sin(around), rng.uniform(-3e-3, 3e-3, free)], axis=1)
-    return Rope(f"rope_{number}", markers, length, values, extra_roll, slack)
+    places = (length - 2.0 * GRIPPED) * np.arange(1, free + 1) / (free + 1)
+    return Rope(f"rope_{number}", markers, length, values, extra_roll, slack, places)
+
+
+def _nasty(rope: Rope, number: int, seed: int) -> Rope:
+    """The same with what real ropes showed: half of them in lists, the third not weighed."""
+    rng = np.random.default_rng([seed, number, 1])
+    values = {k: v for k, v in rope.values.items() if not k.startswith("curvature_")}
+    bending_length = (values["EI"] / (values["density"] * GRAVITY)) ** (1.0 / 3.0)
+    size = np.hypot(rope.values["curvature_1_0"], rope.values["curvature_2_0"])
+    for k, share in enumerate(NASTY_SHARES):
+        angle = rng.uniform(0.0, 2.0 * np.pi)
+        values[f"curvature_1_{k}"], values[f"curvature_2_{k}"] = share * size * np.array([np.cos(angle), np.sin(angle)])
+    for k, most in enumerate(SOFTNESS, start=1):
+        values[f"softness_{k}"] = rng.choice([-1.0, 1.0]) * most
+    values["yield_curvature"], values["yield_share"] = YIELDS_AT / bending_length, rng.uniform(0.3, 0.5)
+    gaps = rng.uniform(*UNEVEN, rope.markers - 3)
+    places = rope.free_length * np.cumsum(gaps)[:-1] / gaps.sum()
+    values = {k: float(v) for k, v in values.items()}
+    odd = number % 2 == 1
+    return replace(rope, values=values, places=places, marker_mass=6e-4, lists=odd, weighed=number != 3)

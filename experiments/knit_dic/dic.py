@@ -1,13 +1,15 @@
 """The stretched sheet's recording, and the model that is to explain it. The unit of length is the sheet's width."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
+from scipy.interpolate import RegularGridInterpolator
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
-from sheetbend.mesh import grid
+from sheetbend.mesh import TriangleMesh, grid
 
 DATA = Path(__file__).parent / "data"
 STEM = "garter_y_dic_frames01_24"
@@ -36,15 +38,44 @@ def rows(still):
     return points[0], points[-1]
 
 
-def experiment(still, law, cells=CELLS):
-    """A still as an equilibrium between its first and its last row of points."""
-    mesh = grid(1.0, HEIGHT, *cells)
-    x, y = mesh.vertices[:, 0], mesh.vertices[:, 1]
+def moved_to(still, uv):
+    """Where points of the sheet, (n, 2) at rest, are in a still, (n, 2); in widths."""
+    lattice = scaled(REST).reshape(ROWS, COLUMNS, 3)
+    x, y = lattice[0, :, 0], lattice[::-1, 0, 1]
+    points = scaled(STILLS[still - 1]).reshape(ROWS, COLUMNS, 3)[::-1, :, :2]
+    return RegularGridInterpolator((y, x), points)(np.clip(uv, (x[0], y[0]), (x[-1], y[-1]))[:, ::-1])
+
+
+def places_of(cloth, flat):
+    """Places of the points inside, in the triangles of the sheet as it is in still 1."""
+    return sb.on_cloth(replace(cloth, mesh=flat), np.clip(scaled(REST[INSIDE])[:, :2], 0.0, (1.0, HEIGHT)))
+
+
+def missed(rest, places, shape):
+    """(points, 3) what coarse triangles between vertices at `shape` miss of the points inside in the still `rest`."""
+    if rest == 1:
+        return np.zeros((len(places), 3))
+    between = np.array([np.array(p.weights) @ shape[list(p.particles)] for p in places])
+    return scaled(STILLS[rest - 1])[INSIDE] - between
+
+
+def experiment(still, law, cells=CELLS, rest=1, change=None):
+    """A still as an equilibrium between its first and its last row of points.
+
+    `rest` is the still whose shape is the one without stress; `change(scene, cloth, flat)` adds to the scene, where
+    `flat` is the mesh in still 1.
+    """
+    flat = grid(1.0, HEIGHT, *cells)
+    x, y = flat.vertices[:, 0], flat.vertices[:, 1]
+    mesh = flat
+    if rest != 1:
+        shape = moved_to(rest, flat.vertices[:, :2])
+        mesh = TriangleMesh(np.column_stack([shape, np.zeros(len(shape))]), flat.triangles, shape, flat.sets)
     top, bottom = rows(still)
     columns = np.linspace(0.0, 1.0, COLUMNS)
     share = (y / HEIGHT)[:, None]
     ends = [np.stack([np.interp(x, columns, row[:, k]) for k in range(3)], axis=1) for row in (bottom, top)]
-    held = np.concatenate([mesh.sets["bottom"], mesh.sets["top"]])
+    held = np.concatenate([flat.sets["bottom"], flat.sets["top"]])
     scene = sb.Scene(f"still_{still}", gravity=(0.0, 0.0, 0.0))
     cloth = sb.add_cloth(
         scene,
@@ -62,13 +93,13 @@ def experiment(still, law, cells=CELLS):
         positions=(1 - share) * ends[0] + share * ends[1],
     )
     scene.pin(cloth.particles[held])
+    if change is not None:
+        change(scene, cloth, flat)
+    places = places_of(cloth, flat)
+    shown = scaled(STILLS[still - 1])[INSIDE] - missed(rest, places, mesh.vertices)
     recording = sb.Recording(
-        positions=scaled(STILLS[still - 1])[None, INSIDE],
-        times=np.zeros(1),
-        name=scene.name,
-        metadata={"attribution": ATTRIBUTION},
+        positions=shown[None], times=np.zeros(1), name=scene.name, metadata={"attribution": ATTRIBUTION}
     )
-    places = sb.on_cloth(cloth, np.clip(scaled(REST[INSIDE])[:, :2], 0.0, (1.0, HEIGHT)))
     return sb.Experiment(
         scene=scene, recording=recording, markers=places, static=True, sigma=NOISE_PX / PX, axes="xy", predict=None
     )

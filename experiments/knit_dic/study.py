@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
-from dic import CELLS, COLUMNS, INSIDE, ORIGIN, PX, REST, ROWS, STILLS, blended, experiment, harmonic
+from dic import CELLS, COLUMNS, INSIDE, ORIGIN, PX, REST, ROWS, STILLS, blended, experiment, harmonic, scaled
 
 FITTED, PREDICTED = tuple(range(2, 17)), tuple(range(17, 25))  # still 1 is the shape at rest
 COARSE = (4, 8, 12, 16)
@@ -34,19 +34,19 @@ def fitted(stills=FITTED, parameters=None, law=None, cells=CELLS, refine=False):
     return sb.fit(built(cells), parameters=parameters or RATIOS | FIXED, refine=finer, profiles=False)
 
 
-def predicted(still, values, law=None, cells=CELLS):
+def predicted(still, values, law=None, cells=CELLS, rest=1, change=None):
     """Points inside at given values, (points, 3) px."""
-    e = experiment(still, law or sb.Linear(), cells)
+    e = experiment(still, law or sb.Linear(), cells, rest, change)
     known = {name: value for name, value in values.items() if name in e.scene.quantities}
     x = sb.equilibrium(e.scene, values=known).positions
     points = [np.array(place.weights) @ x[list(place.particles)] for place in e.places]
-    return ORIGIN + PX * np.array(points)
+    return ORIGIN + PX * (np.array(points) + scaled(measured(still)) - e.recording.positions[0])
 
 
-def carried_on(still):
-    """The blend, and each point's deviation from it along a line against stretch through the fitted stills."""
-    off = np.array([(measured(k) - inside(blended(k))).ravel() for k in FITTED])
-    slope, start = np.polyfit([stretch(k) for k in FITTED], off, 1)
+def carried_on(still, stills=FITTED):
+    """The blend, and each point's deviation from it along a line against stretch through some stills."""
+    off = np.array([(measured(k) - inside(blended(k))).ravel() for k in stills])
+    slope, start = np.polyfit([stretch(k) for k in stills], off, 1)
     return inside(blended(still)) + (start + slope * stretch(still)).reshape(-1, 3)
 
 
@@ -70,8 +70,14 @@ def gap(points, still):
     return float(np.linalg.norm(points - measured(still), axis=1).mean())
 
 
+def errors(predict):
+    """Mean errors of stills 17 to 24, px and in % of the mean displacement from rest, and px of still 24."""
+    each = [gap(predict(k), k) for k in PREDICTED]
+    moved = float(np.mean([gap(REST[INSIDE], k) for k in PREDICTED]))
+    return {"px": float(np.mean(each)), "percent": 100 * float(np.mean(each)) / moved, "of still 24": each[-1]}
+
+
 def compared(values):
-    """Mean errors of stills 17 to 24, px and in % of the mean displacement from rest."""
     predictions = {
         "fitted ratios": lambda k: predicted(k, values),
         "finer mesh": lambda k: predicted(k, values, cells=tuple(2 * n for n in CELLS)),
@@ -81,16 +87,7 @@ def compared(values):
         "blend of both rows": lambda k: inside(blended(k)),
         "blend, each point's deviation carried on": carried_on,
     }
-    moved = float(np.mean([gap(REST[INSIDE], k) for k in PREDICTED]))
-    table = {}
-    for name, predict in predictions.items():
-        each = [gap(predict(k), k) for k in PREDICTED]
-        table[name] = {
-            "px": float(np.mean(each)),
-            "percent": 100 * float(np.mean(each)) / moved,
-            "of still 24": each[-1],
-        }
-    return table
+    return {name: errors(predict) for name, predict in predictions.items()}
 
 
 def summary(fit):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
+from reduce import reduced
 from scipy.optimize import isotonic_regression
 from sheetbend.mesh import grid
 
@@ -77,10 +78,12 @@ class Pull:
         return np.mean([self.repeats[i].force_at(strains) for i in FITTED], axis=0)
 
 
-def read(knit, along, share=SHARE):
-    arrays = np.load(DATA / f"{knit}_{along}.npz")
-    told = json.loads((DATA / f"{knit}_{along}.json").read_text(encoding="utf-8"))
-    found = [_repeat(*parts) for parts in zip(arrays["force"].astype(float), arrays["pins"].astype(float), strict=True)]
+def read(knit, along, share=SHARE, folder=DATA):
+    """A pull of a folder that holds <knit>_<along>.npz and .json, reduced or as the source has them."""
+    path = folder / f"{knit}_{along}.npz"
+    told = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+    force, pins = reduced(path)
+    found = [_repeat(*parts) for parts in zip(force.astype(float), pins.astype(float), strict=True)]
     repeats = tuple(repeat for repeat, _, _ in found)
     slack, clamps = (float(np.mean([found[i][k] for i in FITTED])) for k in (1, 2))
     end = max(r.strain[-1] for r in repeats)

@@ -20,11 +20,15 @@ WORDS = (
 
 
 def reduced(path):
-    """Force (5, bins) N and pins (5, bins, 7, 2) in clamp widths."""
+    """Force (repeats, bins) N and pins (repeats, bins, 7, 2) in clamp widths, of the source's file or one that is
+    reduced already."""
     source = np.load(path)
+    if "force" in source:
+        return source["force"], source["pins"]
     clamp = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))["clamp_px"]
-    force, pins = np.full((5, BINS), np.nan), np.full((5, BINS, 7, 2), np.nan)
-    for repeat in range(5):
+    count = sum(name.startswith("force_") for name in source)
+    force, pins = np.full((count, BINS), np.nan), np.full((count, BINS, 7, 2), np.nan)
+    for repeat in range(count):
         F, x = source[f"force_{repeat + 1}"], source[f"pins_px_{repeat + 1}"] / clamp
         extension = np.linalg.norm(x[:, TOP] - x[:, BOTTOM], axis=1)
         edges = np.linspace(extension.min(), extension.max(), BINS + 1)[1:-1]

@@ -6,6 +6,7 @@ out/wires/study.json.
 """
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,8 @@ from sheetbend.config import build, parse
 FILE = Path(__file__).parent / "wires.toml"
 CONFIG = parse(FILE)
 PUBLISHED = {"white": 5, "black": 14, "red": 17}  # standard deviation of EI over five rehangings, % of its mean
+
+NEAR, NEAR_SIGMA = 3, 0.003  # points beside each clamp from which a holder's angle is found: 9 cm; m
 
 
 def study(wire, shapes=(0, 1, 2), angles=True, modes=(1,), predicted=None):
@@ -92,6 +95,58 @@ def leave_one_out(wire):
             }
         )
     return rows
+
+
+def hung(wire, shape, known, near=None):
+    """One shape at a known EI and set, (51, 3) m, with holder angles found from its first `near` points beside each
+    clamp (all of them if None)."""
+    (experiment,) = study(wire, shapes=(shape,)).experiments
+    places, last = list(experiment.places), len(experiment.places) - 1
+    seen = [near is None or 0 < k <= near or last - near <= k < last for k in range(len(places))]
+    shown = replace(
+        experiment,
+        markers=[place if part else None for place, part in zip(places, seen, strict=True)],
+        sigma=experiment.sigma if near is None else NEAR_SIGMA,
+    )
+    angle = {key: value for key, value in given_angle(wire).items() if key != "private"}
+    angles = {f"{wire}_{end}_angle": angle for end in ("start", "end")}
+    fixed = {name: {"initial": value, "fixed": True} for name, value in known.items()}
+    fit = sb.fit([shown], parameters=fixed | angles, profiles=False)
+    scene = experiment.scene
+    values = {q: fit.values[q] for q in scene.quantities if q in fit.values}
+    x = sb.equilibrium(scene, values=values).positions
+    return np.array([np.array(place.weights) @ x[list(place.particles)] for place in places])
+
+
+def given_angle(wire):
+    """Prior and bounds of a holder's angle in wires.toml."""
+    return CONFIG.parameters[f"{wire}_start_angle"].model_dump(exclude_unset=True)
+
+
+def own_angles(wire, near=NEAR):
+    """The third shape with its own holder angles, EI and set from the other two: by the model alone, and as the mean of
+    the other two shapes moved by what the model makes of the difference in angles. mm, over the points that no angle
+    was found from (all of them if `near` is None), beside the mean of the other two."""
+    photos = [study(wire, shapes=(k,)).experiments[0].recording.positions[0] for k in range(3)]
+    rows, rest = [], slice((near or 0) + 1, 50 - (near or 0))
+    for k in range(3):
+        fit = fitted(study(wire, predicted=k), profiles=False)
+        known = {name: fit.values[name] for name in (f"{wire}_EI", f"{wire}_set_1")}
+        model, others = [hung(wire, j, known, near) for j in range(3)], [j for j in range(3) if j != k]
+        predictions = {
+            "model": model[k],
+            "moved": np.mean([photos[j] + model[k] - model[j] for j in others], axis=0),
+            "baseline": np.mean([photos[j] for j in others], axis=0),
+        }
+        rows.append(
+            {n: 1e3 * float(np.linalg.norm((p - photos[k])[rest], axis=1).mean()) for n, p in predictions.items()}
+        )
+    return rows
+
+
+def own_angles_of_all(wire):
+    """The same with angles from the whole shape: what an exact angle would be worth."""
+    return own_angles(wire, None)
 
 
 def refinement():
@@ -189,11 +244,14 @@ def text(value):
     return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
+STUDIES = (explained, one_by_one, leave_one_out, own_angles, own_angles_of_all, uniform_set, branches)
+
+
 def main():
     tables = {"all nine": refinement()}
     show(tables)
     for wire in PUBLISHED:
-        tables[wire] = {f.__name__: f(wire) for f in (explained, one_by_one, leave_one_out, uniform_set, branches)}
+        tables[wire] = {f.__name__: f(wire) for f in STUDIES}
         show({wire: tables[wire]})
     Path("out/wires").mkdir(parents=True, exist_ok=True)
     Path("out/wires/study.json").write_text(json.dumps(tables, indent=1) + "\n", encoding="utf-8")

@@ -47,6 +47,20 @@ Observations make_observations(const py::dict& d) {
   return o;
 }
 
+ForceSensor make_sensor(const Scene& scene, const py::dict& d) {
+  ForceSensor s;
+  s.reader = SupportReader(scene, {whole_numbers(d["particles"]), whole_numbers(d["carried"]), get<int>(d, "about")});
+  s.arm = get<std::array<double, 3>>(d, "arm");
+  s.sign = get<double>(d, "sign");
+  s.times = numbers(d, "times");
+  s.sample = whole_numbers(d["sample"]);
+  s.share = numbers(d, "share");
+  s.rotation = numbers(d, "rotation");
+  s.measured = numbers(d, "measured");
+  s.sigma = get<std::array<double, 6>>(d, "sigma");
+  return s;
+}
+
 BoundaryCorrection make_correction(const py::dict& d) {
   BoundaryCorrection c;
   c.sigma = get<double>(d, "sigma");
@@ -78,6 +92,7 @@ Experiment make_experiment(const py::dict& d) {
   e.least = numbers(d, "least");
   e.most = numbers(d, "most");
   e.observed = make_observations(get<py::dict>(d, "observed"));
+  for (const py::handle sensor : d["sensors"]) e.sensors.push_back(make_sensor(*e.scene, sensor.cast<py::dict>()));
   if (!d["correction"].is_none()) e.correction = make_correction(get<py::dict>(d, "correction"));
   e.is_static = get<bool>(d, "is_static");
   e.start = get<bool>(d, "starts_at_equilibrium") ? Start::equilibrium : Start::given;
@@ -205,6 +220,17 @@ void bind_problem(py::module_& m) {
                markers = p.simulate(experiment, u.data(), &interrupt);
              }
              return to_numpy(markers, {static_cast<py::ssize_t>(markers.size() / 3), 3});
+           })
+      .def("readings",
+           [](const Problem& p, int experiment, const Array& u) {
+             expect_size(u, p.parameters(), "u");
+             std::vector<double> read;
+             {
+               py::gil_scoped_release release;
+               SignalInterrupt interrupt;
+               read = p.readings(experiment, u.data(), &interrupt);
+             }
+             return to_numpy(read, {static_cast<py::ssize_t>(read.size() / 6), 6});
            })
       .def("respond",
            [](const Problem& p, int experiment, const Array& u, const Array& changes) {

@@ -5,6 +5,7 @@ to recordings, with intervals and words for what the data cannot tell.
 """
 
 from . import mesh
+from .arm import Arm, add_arm, add_pendulum
 from .balance import ForceBalance, force_balance
 from .baseline import no_physics
 from .cloth import Cloth, add_cloth
@@ -25,8 +26,12 @@ from .errors import (
 from .experiment import Experiment
 from .fabric import Exponential, Fabric, Linear, Sinh, Spline
 from .fit import Fit, fit
+from .force_readings import simulate_forces
+from .force_recording import ForceRecording
+from .force_sensor import ForceSensor
 from .gradients import GradientReport, check_gradients
 from .grip import Grip
+from .hand_eye import HandEye
 from .io.folder import recordings
 from .kinds import KINDS
 from .markers import Place, along_rope, between, on_cloth, on_particle, on_rope
@@ -46,12 +51,14 @@ from .simulate import Trajectory, simulate
 from .solver import Solver
 from .tape import TapePlan, tape_plan
 from .tethers import add_tethers
+from .tool import Tool
 from .values import constraint_values, elastic_energy, support_forces
 
 __version__ = "0.1.0"
 
 __all__ = [
     "KINDS",
+    "Arm",
     "Cloth",
     "ConfigError",
     "DivergenceError",
@@ -63,9 +70,12 @@ __all__ = [
     "Fit",
     "FitResult",
     "ForceBalance",
+    "ForceRecording",
+    "ForceSensor",
     "Gradient",
     "GradientReport",
     "Grip",
+    "HandEye",
     "InputError",
     "Junction",
     "Linear",
@@ -90,11 +100,14 @@ __all__ = [
     "Solver",
     "Spline",
     "TapePlan",
+    "Tool",
     "Trajectory",
     "TriangleMesh",
     "UnbalancedError",
     "UnconvergedError",
+    "add_arm",
     "add_cloth",
+    "add_pendulum",
     "add_rod",
     "add_rope",
     "add_tethers",
@@ -122,6 +135,7 @@ __all__ = [
     "save_scene",
     "scores",
     "simulate",
+    "simulate_forces",
     "support_forces",
     "tape_plan",
 ]

@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike
 from .checks import finite
 from .errors import SceneError
 from .markers import Place
+from .pivot import SLIP_ANGLE, add_resistance
 from .quantities import Term
 from .scene import Array, Scene
 
@@ -67,12 +68,15 @@ def add_arm(
     angle: float = 0.0,
     rate: float = 0.0,
     viscosity: float | None = None,
+    friction: float | None = None,
+    slip_angle: float = SLIP_ANGLE,
+    drag: float | None = None,
 ) -> Arm:
     """Add a rigid arm.
 
     Quantities: `<name>_mass` kg, `<name>_first_moment` kg m, `<name>_inertia` kg m^2, `<name>_length` m,
-    `<name>_angle` rad, `<name>_rate` rad/s, and with viscosity `<name>_hinge_viscosity` N m s/rad. Angle and rate are
-    the initial state.
+    `<name>_angle` rad, `<name>_rate` rad/s, with viscosity `<name>_hinge_viscosity` N m s/rad, with friction
+    `<name>_friction` N m, and with drag `<name>_drag` N m s^2/rad^2. Angle and rate are the initial state.
 
     Args:
         mass: kg. It plays no part in the motion where the pivot is fixed.
@@ -85,7 +89,12 @@ def add_arm(
         angle: from straight down (-z) towards +x, rad; not relative to another arm.
         rate: of the angle, rad/s.
         viscosity: of the pivot, torque = viscosity * rate of the angle between the two arms (or between the arm and
-            the ground).
+            the ground), N m s/rad.
+        friction: dry friction of the pivot, the torque of Coulomb's law, N m: it opposes any motion and holds the joint
+            against a smaller torque. It starts unstrained.
+        slip_angle: how far the joint gives elastically before it slides, rad.
+        drag: of the air, as a torque over the square of the arm's rate when its pivot rests, N m s^2/rad^2; it acts on
+            the arm's end against the end's velocity.
 
     Raises:
         SceneError: values that no body has, or a length that would make a particle's mass negative; the message gives
@@ -106,7 +115,8 @@ def add_arm(
     end, left, right = arm.particles[-3:]
     pairs = [(arm.pivot, end), (arm.pivot, left), (arm.pivot, right), (end, left), (end, right)]
     _links(scene, name, pairs, [1.0, near, near, far, far], length)
-    _hinge(scene, arm, pivot, viscosity)
+    carrier = pivot if isinstance(pivot, Arm) else None
+    add_resistance(scene, arm, carrier, viscosity=viscosity, friction=friction, slip_angle=slip_angle, drag=drag)
     return arm
 
 
@@ -120,12 +130,15 @@ def add_pendulum(
     angle: float = 0.0,
     rate: float = 0.0,
     viscosity: float | None = None,
+    friction: float | None = None,
+    slip_angle: float = SLIP_ANGLE,
+    drag: float | None = None,
 ) -> Arm:
     """Add a simple pendulum: a point mass on a massless rigid arm.
 
     It moves like any rigid body on a fixed pivot whose inertia/first_moment is `length`, at a tenth of the cost of
     `add_arm`. Quantities: `<name>_mass` kg, `<name>_length` m, and `<name>_angle`, `<name>_rate`,
-    `<name>_hinge_viscosity`; arguments as there.
+    `<name>_hinge_viscosity`, `<name>_friction`, `<name>_drag`; arguments as there.
 
     Raises:
         SceneError: values that are not positive or not finite.
@@ -136,7 +149,8 @@ def add_pendulum(
     scene.add_quantity(f"{name}_mass", mass, "kg")
     scene.add_terms([Term("mass", arm.end, 1.0, ((f"{name}_mass", "identity"),))])
     _links(scene, name, [(arm.pivot, arm.end)], [1.0], length)
-    _hinge(scene, arm, pivot, viscosity)
+    carrier = pivot if isinstance(pivot, Arm) else None
+    add_resistance(scene, arm, carrier, viscosity=viscosity, friction=friction, slip_angle=slip_angle, drag=drag)
     return arm
 
 
@@ -252,17 +266,3 @@ def _links(scene: Scene, name: str, pairs: list[tuple[int, int]], parts: list[fl
     scene.groups[-1].rest[:] = 0.0
     first = sum(g.rest.size for g in scene.groups[:-1])
     scene.add_terms([Term("rest", first + i, part, ((f"{name}_length", "identity"),)) for i, part in enumerate(parts)])
-
-
-def _hinge(scene: Scene, arm: Arm, pivot: ArrayLike | Arm, viscosity: float | None) -> None:
-    """A viscous pivot, against the arm that carries this one or against a fixed direction."""
-    if viscosity is None:
-        return
-    if isinstance(pivot, Arm):
-        before = pivot.pivot
-    else:
-        before = int(scene.add_particles([np.add(arm.root, (0.0, 0.0, 1.0))], 0.0)[0])
-        scene.pin([before])
-    scene.add_constraints(
-        "hinge", [(before, arm.pivot, arm.end)], name=f"{arm.name}_hinge", viscosity=viscosity, normal=(0.0, 1.0, 0.0)
-    )

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .covariance import Integers, Layout, covariance
+from .covariance import Covariance, Integers, Layout, covariance
 from .gauge import RANK_TOLERANCE, null_space
 from .optional import require
 from .timeseries import Array
@@ -146,8 +146,7 @@ def _compared(
     step = -np.linalg.lstsq(every[:, used] / size, left, rcond=None)[0] / size
     left = left + every[:, used] @ step
     spread = covariance(left[:rows], every[:rows, used], layout, every[rows:, used], taken + len(private))
-    short = (1 + _SHORT * (spread.autocorrelation_time - 1) / (np.ptp(layout.frame) + 1)) ** 2
-    V = short * spread.matrix
+    V = short_of_frames(spread, int(np.ptp(layout.frame)) + 1) * spread.matrix
     degrees = max(float(np.median((spread.degrees / (2 - 1 / spread.inflation))[compared])), 1.0)
     sd = np.sqrt(np.diag(V))
     values, turn = np.linalg.eigh((V / np.outer(sd, sd))[np.ix_(compared, compared)])
@@ -163,6 +162,11 @@ def _compared(
     return _told(
         chance, split, shared, full, whole, moved, float(require("scipy.special", "fit").stdtrit(degrees, 0.975))
     )
+
+
+def short_of_frames(spread: Covariance, frames: int) -> float:
+    """Factor of variances that few frames, many of them alike, make too small."""
+    return float((1 + _SHORT * (spread.autocorrelation_time - 1) / frames) ** 2)
 
 
 def _independent(every: Array) -> list[int]:

@@ -48,7 +48,7 @@ class Boundary:
         self.interpolation = "cubic"
         self.following: list[Following] = []
         self._values: list[Array] = []
-        self._terms: list[tuple[int, Array, dict[str, str]]] = []
+        self._terms: list[tuple[Array, Array, dict[str, str]]] = []
 
     def drive(
         self, particles: ArrayLike, times: ArrayLike, positions: ArrayLike, interpolation: str, particle_count: int
@@ -101,24 +101,30 @@ class Boundary:
         self.following.append(Following(first + np.arange(len(which)), names, w, placed is not None))
 
     def add_term(
-        self, particle: int, coefficients: ArrayLike, factors: Mapping[str, str], quantities: Collection[str]
+        self, particles: ArrayLike, coefficients: ArrayLike, factors: Mapping[str, str], quantities: Collection[str]
     ) -> None:
         """See `Scene.add_motion_term`."""
-        if particle not in self.driven:
-            raise SceneError("particle", "is not driven", particle, "drive it first")
-        values = finite("coefficients", coefficients, (len(self.times), 3), SceneError)
+        slot = {p: k for k, p in enumerate(self.driven)}
+        which = [int(p) for p in np.ravel(particles)]
+        loose = [p for p in which if p not in slot]
+        if loose:
+            raise SceneError("particle", "is not driven", loose[0], "drive it first")
+        shape = (len(self.times), *np.shape(particles), 3)
+        values = finite("coefficients", coefficients, shape, SceneError).reshape(len(self.times), len(which), 3)
         missing = [q for q in factors if q not in quantities]
         if missing:
             raise SceneError("factors", "use unknown quantities", missing, "declare them with add_quantity")
-        self._terms.append((self.driven.index(particle), values, dict(factors)))
+        self._terms.append((np.array([slot[p] for p in which]), values, dict(factors)))
 
     def terms(self) -> list[Term]:
         """Of all motions; their places are known once every driven particle is."""
-        places = 3 * len(self.driven) * np.arange(len(self.times))[:, None] + np.arange(3)
-        return [
-            Term("boundary", (places + 3 * slot).ravel(), values.ravel(), tuple(factors.items()))
-            for slot, values, factors in self._terms
-        ]
+        knots = 3 * len(self.driven) * np.arange(len(self.times))[:, None, None]
+        found = []
+        for slots, values, factors in self._terms:
+            axes = np.flatnonzero(values.any(axis=(0, 1)))  # the others get nothing
+            places = knots + 3 * slots[:, None] + axes
+            found.append(Term("boundary", places.ravel(), values[..., axes].ravel(), tuple(factors.items())))
+        return found
 
     @property
     def values(self) -> Array:

@@ -8,7 +8,7 @@ grip would carry it, weighted by one over its distance from each: on a straight 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -21,13 +21,24 @@ _NEAREST_TO_IDENTITY = 1e-9  # share of a grip's spread that decides between rot
 _CLOSEST = 1e-9  # m: a marker on a grip moves with that grip
 
 
-def carried_baselines(e: Experiment, fitted: Sequence[Recording], target: Recording) -> dict[str, Array]:
+Source = tuple[Experiment, Recording]
+"""An experiment, and the part of its recording that the fit saw."""
+Values = Mapping[str, Mapping[str, float]]
+"""By experiment, values of quantities of its scene."""
+
+
+def carried_baselines(
+    e: Experiment, fitted: Sequence[Source], target: Recording, values: Values | None = None
+) -> dict[str, Array]:
     """Predictions (frames, markers, 3) m of a recording's markers from the motion of its scene's grips.
 
     Args:
         e: the experiment that is predicted; its scene drives particles.
-        fitted: parts of the same recording that the fit saw, with the markers of `target`; may be empty.
+        fitted: what the fit saw, of the same recording or of others with the markers of `target`; may be empty. Those
+            whose scene does not hold the same particles are left out.
         target: the part to predict.
+        values: fitted quantities; those of a tool's frame and of a recording's clock count, so that the baseline knows
+            the grips as well as the simulation does. As given by default.
 
     Returns:
         "carried" (from each marker's first sight in `target`) and, where `fitted` shows every marker, "carried shape";
@@ -36,7 +47,8 @@ def carried_baselines(e: Experiment, fitted: Sequence[Recording], target: Record
     grips = [] if e.static else _grips(e.scene)
     if not grips:
         return {}
-    moving = [_motion(e, grip, target.times) for grip in grips]
+    values = values or {}
+    moving = [_motion(e, grip, target.times, values) for grip in grips]
     first = np.argmax(target.mask, axis=0)
     start = target.positions[first, np.arange(len(first))]
     weights = _weights(start, [points[first] for points in moving])
@@ -46,7 +58,8 @@ def carried_baselines(e: Experiment, fitted: Sequence[Recording], target: Record
         for g, points in enumerate(moving):
             carried[g][:, seen] = _rigid(points[frame], points, start[seen])
     found = {"carried": _blended(carried, weights)}
-    shapes = [_mean_in_grip(e, grip, fitted) for grip in grips] if fitted else []
+    alike = [source for source in fitted if _grips(source[0].scene) == grips]
+    shapes = [_mean_in_grip(grip, alike, values) for grip in grips] if alike else []
     if shapes and not any(np.isnan(x).any() for _, x in shapes):
         placed = [_rigid(at, points, x) for (at, x), points in zip(shapes, moving, strict=True)]
         found["carried shape"] = _blended(np.stack(placed), weights)
@@ -76,12 +89,14 @@ def _grips(scene: Scene) -> list[list[int]]:
     return [grip for grip in sets.values() if any(p not in scene.directors for p in grip)]
 
 
-def _motion(e: Experiment, grip: Sequence[int], times: Array) -> Array:
+def _motion(e: Experiment, grip: Sequence[int], times: Array, every: Values) -> Array:
     """(frames, points, 3) m of a grip's particles at times of the recording. A director counts as a point one edge away
     from the node that its edge starts from."""
     scene, boundary = e.scene, e.scene.boundary
-    knots = scene.compiled.unpack(scene.compiled.inputs())["boundary"].reshape(len(boundary.times), -1, 3)
-    at = np.clip(times - e.t0, boundary.times[0], boundary.times[-1])
+    values = {name: value for name, value in every.get(e.name, {}).items() if name in scene.quantities}
+    inputs = scene.compiled.inputs(scene.compiled.values(values))
+    knots = scene.compiled.unpack(inputs)["boundary"].reshape(len(boundary.times), -1, 3)
+    at = np.clip(e.scene_times(times, values), boundary.times[0], boundary.times[-1])
     driven = interpolate(boundary.times, knots, at, "cubic", np.inf)
     slot = {p: i for i, p in enumerate(boundary.driven)}
 
@@ -127,14 +142,14 @@ def _blended(predictions: Array, weights: Array) -> Array:
     return np.asarray(np.einsum("gm,gfmk->fmk", weights, predictions))
 
 
-def _mean_in_grip(e: Experiment, grip: Sequence[int], fitted: Sequence[Recording]) -> tuple[Array, Array]:
+def _mean_in_grip(grip: Sequence[int], fitted: Sequence[Source], values: Values) -> tuple[Array, Array]:
     """A grip's points (points, 3) at the first fitted frame, and the markers' mean (markers, 3) after each frame is
     brought back to that one; NaN for a marker that is never seen."""
-    moving = [_motion(e, grip, r.times) for r in fitted]
+    moving = [_motion(e, grip, r.times, values) for e, r in fitted]
     at = moving[0][0]
     back = [
         _rigid(points, at[None], x)
-        for motion, r in zip(moving, fitted, strict=True)
+        for motion, (_, r) in zip(moving, fitted, strict=True)
         for points, x in zip(motion, r.positions, strict=True)
     ]
     return at, mean_position(np.concatenate(back))

@@ -9,6 +9,7 @@ import numpy as np
 
 from .errors import SheetbendError
 from .floors import solver_floors
+from .gauge import RANK_TOLERANCE
 from .growth import Growth
 from .identifiability import Identifiability, identify
 from .intervals import open_estimate, ran_off
@@ -22,7 +23,9 @@ from .stationary import no_minimum
 from .timeseries import Array
 from .wording import short
 
-PROFILE_TOLERANCE = 1e-7  # relative, of the cost: an interval's rise is many times that
+PROFILE_TOLERANCE = 0.02
+"""Of the cost of one row: what an interval's end rises by is a hundred times that. A relative tolerance of all rows
+together would waste steps on few rows, and stop too early on many."""
 NOISELESS = 1e-18  # of sigma squared: data without noise, whose residuals are rounding errors
 INACCURATE = 0.5  # a start whose cost exceeds the best by this share ended elsewhere
 
@@ -139,8 +142,9 @@ def misfit(problem: FitProblem, u: Array) -> Misfit:
     _, r, _ = problem.evaluate(u)
     rows = problem.core.data_rows
     sigma = np.array([e.sigma for e in problem.experiments])
-    each = sigma[problem.rows_layout().recording]
-    beyond = float(np.mean(each**2 * (r[:rows] ** 2 - 1.0)))
+    layout = problem.rows_layout()
+    seen = layout.clocks == 0
+    beyond = float(np.mean(sigma[layout.recording[seen]] ** 2 * (r[:rows][seen] ** 2 - 1.0)))
     taken = len(problem.parameters.free) + sum(map(problem.core.absorbed, range(len(sigma))))
     return Misfit(
         reduced_chi_square=float(r[:rows] @ r[:rows]) / max(rows - taken, 1.0),
@@ -184,17 +188,33 @@ class _Profiles:
         at = parameter.to_internal(value)
         start = {parameter.to_internal(self.values[name]): held.parameters.to_internal(self.values)}
         known = self.ends.setdefault(name, start)
-        start_at = known[min(known, key=lambda other: abs(other - at))]
-        if not np.isfinite(held.cost(start_at)):
+        start_at, cost = self._nearest(held, part, name, at)
+        if not np.isfinite(cost):
             return np.inf
         try:
-            end = refit(held, start_at, self.refitter, 50, PROFILE_TOLERANCE)
+            end = refit(held, start_at, self.refitter, 50, min(PROFILE_TOLERANCE / part.core.data_rows, 1e-5))
         except SheetbendError:
             return np.inf
         known[at] = end.u
         cost = end.cost + 0.5 * pull**2
         self._compare(name, value, part, held.parameters.to_physical(end.u), cost)
         return cost
+
+    def _nearest(self, held: FitProblem, part: FitProblem, name: str, at: float) -> tuple[Array, float]:
+        """Where to begin with a parameter held at an internal value, and the cost there: where the others ended at the
+        nearest value known, or on the line through two of these (of the linear picture, where there is but one)."""
+        known = self.ends[name]
+        near, *others = sorted(known, key=lambda other: abs(other - at))
+        if others:
+            slope = (known[others[0]] - known[near]) / (others[0] - near)
+        else:
+            _, _, J = part.evaluate(part.parameters.to_internal(self.values))
+            column = part.parameters.free.index(name)
+            rest = np.delete(J, column, axis=1)
+            size = np.maximum(np.linalg.norm(rest, axis=0), np.finfo(float).tiny)
+            slope = -np.linalg.lstsq(rest / size, J[:, column], rcond=RANK_TOLERANCE)[0] / size
+        ahead = np.clip(known[near] + (at - near) * slope, *held.parameters.limits())
+        return min(((u, held.cost(u)) for u in (ahead, known[near])), key=lambda pair: pair[1])
 
     def _compare(self, name: str, value: float, part: FitProblem, there: Mapping[str, float], cost: float) -> None:
         """Keep an end that is lower than the estimate by more than its residual variance."""

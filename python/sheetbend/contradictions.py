@@ -85,13 +85,13 @@ def _between(problem: FitProblem, u: Array, judged: Identifiability, shifts: Seq
     words = {}
     for d in found.differences:
         name, column = names[used[d.column]], used[d.column]
-        reach = _reach(problem.parameters[name], estimates[name]) + SECOND_ORDER * d.shift
+        reach = reach_of(problem.parameters[name], estimates[name]) + SECOND_ORDER * d.shift
         if abs(d.steps[0] - d.steps[1]) > d.reach + SECOND_ORDER * d.shift and abs(d.steps[0]) > reach:
             words[name] = _difference_words(problem.parameters[name], u[column], d)
-    return _drawn_along(judged, words)
+    return drawn_along(judged, words)
 
 
-def _drawn_along(judged: Identifiability, words: Mapping[str, str]) -> dict[str, str]:
+def drawn_along(judged: Identifiability, words: Mapping[str, str]) -> dict[str, str]:
     """The doubts with those of the parameters that trade with the doubtful ones, whose errors they share."""
     along: dict[str, str] = {}
     for pair in sorted(judged.correlations, key=lambda pair: -abs(pair.value)):
@@ -102,7 +102,7 @@ def _drawn_along(judged: Identifiability, words: Mapping[str, str]) -> dict[str,
     return {**along, **words}
 
 
-def _reach(parameter: Parameter, e: Estimate) -> float:
+def reach_of(parameter: Parameter, e: Estimate) -> float:
     """Half-width in the internal coordinate, of the narrower side where these differ; infinite without an interval."""
     at = parameter.to_internal(e.value)
     return min(
@@ -110,17 +110,22 @@ def _reach(parameter: Parameter, e: Estimate) -> float:
     )
 
 
-def _residual_shifts(problem: FitProblem, u: Array, refinement: Refinement) -> list[Array]:
-    """(rows,) what the data's residuals change at half the step and on a finer mesh, where these are asked for. One
-    that has no answer there is left out."""
+def finer_experiments(problem: FitProblem, refinement: Refinement) -> list[Sequence[Experiment]]:
+    """The fitted experiments at half the step and on a finer mesh, where these are asked for."""
     finer: list[Sequence[Experiment]] = []
     if refinement.halve_step and any(not e.static for e in problem.experiments):
         finer.append(halved(problem.experiments))
     if refinement.finer is not None:
         finer.append([e for e in refinement.finer() if e.predict is None])
+    return finer
+
+
+def _residual_shifts(problem: FitProblem, u: Array, refinement: Refinement) -> list[Array]:
+    """(rows,) what the data's residuals change at half the step and on a finer mesh, where these are asked for. One
+    that has no answer there is left out."""
     _, r, _ = problem.evaluate(u)
     shifts, rows = [], problem.core.data_rows
-    for experiments in finer:
+    for experiments in finer_experiments(problem, refinement):
         ok, there, _ = FitProblem(experiments, problem.given, threads=problem.threads).evaluate(u, jacobian=False)
         if ok:
             shifts.append(there[:rows] - r[:rows])
@@ -128,17 +133,20 @@ def _residual_shifts(problem: FitProblem, u: Array, refinement: Refinement) -> l
 
 
 def _difference_words(p: Parameter, at: float, found: Difference) -> str:
-    said = []
-    for step, reach in zip(found.steps, found.reaches, strict=True):
-        center, reach = (min(max(x, -FARTHEST), FARTHEST) for x in (step, reach)) if p.log else (step, reach)
-        value = p.to_physical(at + center)
-        half = (p.to_physical(at + center + reach) - p.to_physical(at + center - reach)) / 2
-        number, width = figures((value, half), half)
-        said.append(f"{number} +/- {width} {p.unit}".rstrip())
+    said = [value_words(p, at, step, reach) for step, reach in zip(found.steps, found.reaches, strict=True)]
     return (
         f"parts of the data contradict each other: {found.name} asks for {said[0]}, the rest for {said[1]} (to first "
         "order); the model lacks something, or this is not its lowest minimum"
     )
+
+
+def value_words(p: Parameter, at: float, step: float, reach: float) -> str:
+    """The value an internal step away from a point, with its half-width."""
+    center, reach = (min(max(x, -FARTHEST), FARTHEST) for x in (step, reach)) if p.log else (step, reach)
+    value = p.to_physical(at + center)
+    half = (p.to_physical(at + center + reach) - p.to_physical(at + center - reach)) / 2
+    number, width = figures((value, half), half)
+    return f"{number} +/- {width} {p.unit}".rstrip()
 
 
 def _private(problem: FitProblem, jacobian: Array) -> list[tuple[slice, list[int]]]:
@@ -156,18 +164,18 @@ def _private(problem: FitProblem, jacobian: Array) -> list[tuple[slice, list[int
 def splits(problem: FitProblem, jacobian: Array) -> list[Split]:
     """The data by time (halves, thirds, quarters), by place of the markers (halves of the same weight in the Jacobian)
     and by recording."""
-    layout, count = problem.rows_layout(), len(problem.experiments)
+    layout, count, when = problem.rows_layout(), len(problem.experiments), problem.row_times()
     size = np.maximum(np.linalg.norm(jacobian, axis=0), np.finfo(float).tiny)
     weight = ((jacobian / size) ** 2).sum(axis=1)
     time, place = np.full(len(weight), -1.0), np.full(len(weight), -1)
     for i, (e, recording) in enumerate(zip(problem.experiments, problem.recordings, strict=True)):
         mine = layout.recording == i
-        frame, marker = layout.frame[mine], layout.channel[mine] // len(e.axes)
-        if e.static:
-            marker = frame
-        else:
-            at = recording.times[frame]
-            time[mine] = (at - at[0]) / (np.ptp(at) * (1 + 1e-9) + np.finfo(float).tiny)
+        if not e.static:
+            at = when[mine]
+            at = at - at.min()
+            time[mine] = at / (np.ptp(at) * (1 + 1e-9) + np.finfo(float).tiny)
+        mine &= layout.clocks == 0  # where sensors are is no place among the markers
+        marker = layout.frame[mine] if e.static else layout.channel[mine] // len(e.axes)
         along = _along(recording.positions)
         if np.isfinite(along[marker]).all() and len(set(marker.tolist())) >= FEWEST_MARKERS:
             place[mine] = _half(along[marker], weight[mine])

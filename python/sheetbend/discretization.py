@@ -2,9 +2,10 @@
 
 A parameter is physical only if the next mesh and the next time step agree about it. By default the estimate is moved to
 the limit of short substeps (see `time_step`). The mesh counts where a finer one can be made: by a refit, which costs
-more than the fit itself, or by linear refinement, one simulation of the finer mesh at the estimate and one Gauss-Newton
-step, which is right to first order in what the residuals change. A halving removes 1 - 2^-p of an error of order p, so
-what it moves is multiplied up to the limit (Richardson): by 4/3 for meshes, by 2 for sweeps.
+more than the fit itself, or by linear refinement, two simulations of the finer mesh and two Gauss-Newton steps with the
+Jacobian of the fit. A halving removes 1 - 2^-p of an error of order p, so what it moves is multiplied up to the limit
+(Richardson): by 4/3 for meshes, by 2 for sweeps. The estimate is moved to the limit of fine meshes too where the mesh
+is fine enough for that (see `fine_meshes`).
 """
 
 from __future__ import annotations
@@ -17,11 +18,13 @@ import numpy as np
 
 from .errors import InputError, SheetbendError
 from .experiment import Experiment
+from .fine_meshes import left_open, two_steps
 from .linear_step import moves, one_step
 from .optimizers import Minimum, refit
 from .parameters import Parameters
 from .problem import FitProblem
 from .profile import FARTHEST
+from .refuted import refuted, words
 from .result import Refit
 from .time_step import SECOND_ORDER, SWEEPS, TIME_STEP, Settled, combined, settle
 
@@ -35,7 +38,7 @@ class Refinement:
     Attributes:
         halve_step: move the estimate to the limit of short substeps, and count what that leaves open.
         finer: makes the same experiments with twice the nodes; None = the mesh is not counted.
-        linear: one Gauss-Newton step with the Jacobian of the fit stands for the refit on the finer mesh.
+        linear: Gauss-Newton steps with the Jacobian of the fit stand for the refit on the finer mesh.
     """
 
     halve_step: bool = True
@@ -84,8 +87,13 @@ def settled(
             found = settle(problem, end.u)
         else:
             missing = (f"{TIME_STEP} not counted: the fit did not converge", *missing)
-    refits, failed = refined_estimates(refinement, experiments, problem, end.u, found.u, optimizer)
-    whole = replace(found, refits=(*found.refits, *refits), not_counted=(*found.not_counted, *missing, *failed))
+    refits, failed, warnings = refined_estimates(refinement, experiments, problem, end.u, found.u, optimizer)
+    whole = replace(
+        found,
+        refits=(*found.refits, *refits),
+        not_counted=(*found.not_counted, *missing, *failed),
+        warnings=(*found.warnings, *warnings),
+    )
     return whole, combined(experiments) if found.problem is not problem else experiments
 
 
@@ -106,9 +114,9 @@ def refined_estimates(
     u: np.ndarray,
     at: np.ndarray,
     optimizer: str,
-) -> tuple[tuple[Refit, ...], tuple[str, ...]]:
-    """By how much each refit moves each free parameter, in its unit; and what could not be counted, with its cause.
-    Ctrl-C passes through.
+) -> tuple[tuple[Refit, ...], tuple[str, ...], tuple[str, ...]]:
+    """By how much each refit moves each free parameter, in its unit; what could not be counted, with its cause; and
+    warnings where the data speak against a refinement. Ctrl-C passes through.
 
     Args:
         problem: of the fit, at the substep of the experiments; u: its minimum.
@@ -116,23 +124,34 @@ def refined_estimates(
     """
     made: list[Refit] = []
     failed: list[str] = []
+    warnings: list[str] = []
     here = problem.parameters.to_physical(u)
     for name, refined, to_limit in _refits(refinement, experiments):
         try:
             finer = FitProblem(refined(), problem.given, threads=problem.threads)
-            if refinement.linear or name == SWEEPS:
+            rest: np.ndarray | float = 0.0
+            if name == SWEEPS:
                 end = one_step(problem, finer, u)
+            elif refinement.linear:
+                end, rest = two_steps(problem, finer, u)
             else:
                 end = refit(finer, finer.parameters.to_internal(here), optimizer).u
         except SheetbendError as error:
             failed.append(f"{name} not counted: {error}")
             continue
-        made.append(Refit(name=name, to_limit=to_limit, moved=moves(problem.parameters, at, at + end - u)))
-    return tuple(made), tuple(failed)
+        left: dict[str, float] = {}  # all of it
+        if name != SWEEPS:
+            ok, there, _ = finer.evaluate(end, jacobian=False)
+            if ok and refuted(problem, u, there):
+                warnings.append(words("fine meshes", "on the same mesh", "double_segments = false in a configuration"))
+            else:
+                left = left_open(problem.parameters, at, to_limit * (end - u), to_limit * rest)
+        made.append(Refit(name=name, to_limit=to_limit, moved=moves(problem.parameters, at, at + end - u), left=left))
+    return tuple(made), tuple(failed), tuple(warnings)
 
 
 def to_the_limit(refits: Iterable[Refit], parameters: Parameters, values: Mapping[str, float]) -> dict[str, float]:
-    """By how much each parameter would move up to the limit, in its unit: root sum of squares over the refits.
+    """By how much each parameter would still move up to the limit, in its unit: root sum of squares over the refits.
 
     A logarithmic one moves by a factor, and its size is that of the factor upward: from 1 to 0.4 is 1.5, as to 2.5;
     nothing is told apart from a factor of a million.
@@ -140,9 +159,10 @@ def to_the_limit(refits: Iterable[Refit], parameters: Parameters, values: Mappin
     total: dict[str, float] = {}
     for made in refits:
         for name, moved in made.moved.items():
+            open_, factor = (made.left[name], 1.0) if name in made.left else (moved, made.to_limit)
             log = parameters[name].log
-            step = math.log(max(1.0 + moved / values[name], math.exp(-FARTHEST))) if log else moved
-            total[name] = math.hypot(total.get(name, 0.0), made.to_limit * step)
+            step = math.log(max(1.0 + open_ / values[name], math.exp(-FARTHEST))) if log else open_
+            total[name] = math.hypot(total.get(name, 0.0), factor * step)
     return {
         name: values[name] * math.expm1(min(size, FARTHEST)) if parameters[name].log else size
         for name, size in total.items()

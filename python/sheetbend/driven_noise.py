@@ -32,14 +32,16 @@ class DrivenNoise:
     Attributes:
         experiment: its name.
         noise: m, of its driven markers, as the recording shows it.
-        moved: m, by which such noise moves a compared marker.
-        residual: m.
+        moved: by which such noise moves a compared marker, m, or what a force sensor reads, N.
+        residual: of these, in the same unit.
+        sensor: name of the force sensor; empty for the markers.
     """
 
     experiment: str
     noise: float
     moved: float
     residual: float
+    sensor: str = ""
 
     @property
     def harms(self) -> bool:
@@ -54,7 +56,8 @@ def driven_noises(problem: FitProblem, u: Array) -> tuple[tuple[DrivenNoise, ...
         Of every experiment whose scene follows noisy markers; and by how much all of them together are expected to have
         moved each free parameter, in internal coordinates, where one of them harms.
     """
-    rows, found = problem.core.first_rows, []
+    rows, layout = problem.core.first_rows, problem.rows_layout()
+    found: list[DrivenNoise] = []
     _, r, J = problem.evaluate(u)
     draws: dict[int, Array] = {}
     for i, (e, recording) in enumerate(zip(problem.experiments, problem.recordings, strict=True)):
@@ -63,8 +66,15 @@ def driven_noises(problem: FitProblem, u: Array) -> tuple[tuple[DrivenNoise, ...
         if correction is None or not noise:
             continue
         draws[i] = noise * np.random.default_rng(0).standard_normal((DIRECTIONS, int(np.prod(correction.shape))))
-        moved = e.sigma * _rms(problem.core.respond(i, u, draws[i]))
-        found.append(DrivenNoise(e.name, noise, moved, e.sigma * _rms(r[rows[i] : rows[i + 1]])))
+        moved, left = problem.core.respond(i, u, draws[i]), r[rows[i] : rows[i + 1]]
+        clock, channel = layout.clocks[layout.recording == i], layout.channel[layout.recording == i]
+        parts = [("", e.sigma, clock == 0)]
+        parts += [(s.name, s.sigma, (clock == k) & (channel < 3)) for k, s in enumerate(e.forces, start=1)]
+        found += [
+            DrivenNoise(e.name, noise, sigma * _rms(moved[:, part]), sigma * _rms(left[part]), sensor)
+            for sensor, sigma, part in parts
+            if part.any()
+        ]
     if not any(one.harms for one in found):
         return tuple(found), {}
 
@@ -97,12 +107,20 @@ def _uncorrected(problem: FitProblem, u: Array, judged: Identifiability) -> list
             named.append(f"{estimate.name} by some {size} too {'high' if by > 0 else 'low'}")
     bias = f", and the fit is drawn off, {', '.join(named)} to first order" if named else ""
     return [
-        f"{one.experiment}: noise of its driven markers ({short(1e3 * one.noise, 2)} mm, from the recording) moves the "
-        f"compared ones by {short(1e3 * one.moved, 2)} mm, beside a residual of {short(1e3 * one.residual, 2)} mm "
-        f"(of one coordinate). The intervals do not allow for it{bias}: set driven_sigma"
+        f"{one.experiment}: noise of its driven markers ({short(1e3 * one.noise, 2)} mm, from the recording) moves "
+        f"{_moved_words(one)} (of one coordinate). The intervals do not allow for it{bias}: "
+        + ("drive the grips by smoother poses, or leave the forces out" if one.sensor else "set driven_sigma")
         for one in found
         if one.harms
     ]
+
+
+def _moved_words(one: DrivenNoise) -> str:
+    if one.sensor:
+        return f"what {one.sensor} reads by {short(one.moved, 2)} N, beside a residual of {short(one.residual, 2)} N"
+    return (
+        f"the compared ones by {short(1e3 * one.moved, 2)} mm, beside a residual of {short(1e3 * one.residual, 2)} mm"
+    )
 
 
 def _corrected(problem: FitProblem, u: Array) -> list[str]:

@@ -13,6 +13,7 @@ import numpy as np
 from .checks import is_number
 from .correction import Correction, recorded_noise
 from .errors import InputError, RecordingError
+from .force_sensor import INPUTS, ForceSensor
 from .markers import Place, places_for
 from .quantities import Term, product
 from .recording import Recording
@@ -39,7 +40,9 @@ class Experiment:
         start: "given" (the scene's initial state) or "equilibrium" (of the scene at the start, forces included), for
             motions.
         start_time: recording time at which the scene starts, s; the start of the fit window by default.
-        time_offset: name of a quantity [s] that shifts the recording's clock, or None.
+        time_offset: name of a quantity [s] that is added to the recording's times to get the scene's, or None. It is
+            negative for a camera that is late: what its frame at 1 s shows happened at 0.7 s of the scene where it is
+            -0.3 s.
         offsets: per marker name, names of quantities that are added to its offset (tangent, normal, tangent x normal),
             None for none.
         sigma: expected error of a marker, m: scales residuals against priors and between experiments.
@@ -52,6 +55,7 @@ class Experiment:
         radius: distance of the markers from a pivot, m: errors are then reported as angles in rad, rms
             distance/radius; None = in m.
         loss: "squares", "soft_l1" or "huber", with loss_scale in units of sigma.
+        forces: sensors whose recorded forces are residuals too, beside those of the markers; for motions.
         predict: None takes part in the fit. Otherwise the recording is only predicted, with the shared parameters as
             fitted on the others and its private ones either fitted to its own fit window ("window": initial states,
             offsets) or set to the mean of the others' ("mean").
@@ -76,6 +80,7 @@ class Experiment:
     loss: str = "squares"
     loss_scale: float = 1.0
     predict: str | None = None
+    forces: Sequence[ForceSensor] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.recording, Recording):
@@ -87,6 +92,7 @@ class Experiment:
                 f"{self.name}.sigma", "must be positive", self.sigma, "give the expected error of a marker in m"
             )
         self._check_driven_sigma()
+        self._check_forces()
         if not self.axes or set(self.axes) - set("xyz") or len(set(self.axes)) != len(self.axes):
             raise InputError(f"{self.name}.axes", "must be some of x, y, z", self.axes, "give such as 'xz'")
         if self.radius is not None and not (math.isfinite(self.radius) and self.radius > 0):
@@ -147,6 +153,19 @@ class Experiment:
             fix = "let particles follow markers (Scene.follow, [[scene.drive]], [[scene.cloth.grip]]), or leave it out"
             raise InputError(field, "has no driven marker to correct", given, fix)
         assert self.driven_noise is not None
+
+    def _check_forces(self) -> None:
+        names = [sensor.name for sensor in self.forces]
+        if len(set(names)) != len(names):
+            raise InputError(f"{self.name}.forces", "share a name", names, "give each sensor a name of its own")
+        if self.forces and self.static:
+            fix = "give a motion, or fit a still load by its shape alone"
+            raise InputError(f"{self.name}.forces", "are compared along motions, not at rest", names, fix)
+        if self.forces and self.driven_sigma is not None:
+            fix = "leave out driven_sigma, or the forces"
+            raise InputError(f"{self.name}.forces", "do not go with a correction of driven markers", names, fix)
+        for i, sensor in enumerate(self.forces):
+            sensor.check(self.scene, f"{self.name}.force[{i}]")
 
     @cached_property
     def driven_noise(self) -> float | None:
@@ -227,6 +246,16 @@ class Experiment:
             return self.start_time
         return float(self.recording.times[0] if self.fit is None else self.fit[0])
 
+    def scene_times(self, times: np.ndarray, values: Mapping[str, float]) -> np.ndarray:
+        """Times (frames,) s of the recording on the scene's clock, which starts at zero.
+
+        Args:
+            values: of quantities of the scene, for the clock's offset; as the scene has it by default.
+        """
+        name = self.time_offset
+        offset = 0.0 if name is None else values.get(name, self.scene.quantities[name].value)
+        return np.asarray(times - self.t0 + offset)
+
     def observed(self, recording: Recording) -> dict[str, Any]:
         """Observations for the compiled core; the scene's clock starts at 0."""
         times = np.zeros(1) if self.static else recording.times - self.t0
@@ -259,6 +288,16 @@ class Experiment:
         if self.time_offset is not None:
             terms.append(product("extra", 3 * len(self.compared), 1.0, {self.time_offset: "identity"}))
         return terms
+
+    def sensor_terms(self) -> list[Term]:
+        """Terms of the inputs of the force sensors, which follow the time offset."""
+        first = 3 * len(self.compared) + 1
+        return [term for k, sensor in enumerate(self.forces) for term in sensor.terms(first + INPUTS * k)]
+
+    def sensed(self, recording: Recording) -> list[dict[str, Any]]:
+        """The force sensors for the compiled core, with the samples that (part of) the recording spans."""
+        span = (float(recording.times[0]), float(recording.times[-1]))
+        return [sensor.core(self.scene, self.t0, span, self.solver.h) for sensor in self.forces]
 
     def _check_names(self) -> None:
         known = self.scene.quantities
@@ -316,8 +355,9 @@ class Experiment:
         observed = self.observed(recording)
         for marker, m in zip(observed["markers"], self.compared, strict=True):
             marker["carries_offset"] = marker["carries_offset"] or self.recording.markers[m] in self.offsets
-        map_ = compiled.map(3 * len(offsets) + 1, self.extra_terms())
-        map_["base"][compiled.core.inputs : -1] = np.ravel(offsets)
+        extra = 3 * len(offsets) + 1 + INPUTS * len(self.forces)
+        map_ = compiled.map(extra, [*self.extra_terms(), *self.sensor_terms()])
+        map_["base"][compiled.core.inputs : compiled.core.inputs + 3 * len(offsets)] = np.ravel(offsets)
         correction = self.correction(recording)
         _ = self.static or self._can_step
         sigma = 0.0 if corrected is not None else self.driven_noise or 0.0
@@ -339,6 +379,7 @@ class Experiment:
             "least": compiled.domain.least,
             "most": compiled.domain.most,
             "observed": observed,
+            "sensors": self.sensed(recording),
             "correction": None
             if correction is None
             else correction.core(compiled.layout["boundary"][0], sigma, corrected),

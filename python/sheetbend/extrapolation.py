@@ -42,6 +42,8 @@ def kinks(scene: Scene) -> str:
     found = []
     if any("yielding" in group.kind for group in scene.groups):
         found.append("joints that yield")
+    if any(group.kind == "friction_hinge" for group in scene.groups):
+        found.append("joints with dry friction")
     if scene.boundary.driven and scene.boundary.interpolation == "linear":
         found.append("driven particles with linear knots, which kick them (use 'cubic')")
     return " and ".join(found)

@@ -10,18 +10,23 @@ from typing import Any
 
 import numpy as np
 
+from .beginnings import Beginning, checked, of_beginnings
+from .clock import outside, told_clocks
 from .conclude import Elsewhere, judged_parameters, misfit, warnings_of, without_verdict
 from .contradictions import between_parts, doubtful, elsewhere, held_out_motion
 from .discretization import Refinement, settled, to_the_limit, wanted_refinement
 from .driven_noise import doubts
 from .errors import InputError
 from .experiment import Experiment
+from .fine_meshes import at_the_limit
 from .floors import at_floor_of_sweeps
 from .given import check_given, half_widths, premises
 from .growth import Growth, growths
 from .identifiability import Identifiability
 from .journal import journaled
 from .leave_one_out import MEANING, companions, each_left_out
+from .losses import loss_doubts
+from .misread import misread
 from .optimizers import Observer, ceres_trouble
 from .optional import require
 from .parameters import Parameter, Parameters
@@ -46,12 +51,15 @@ class Fit:
         parameters: as given, private ones not expanded.
         corrections: by experiment with a `driven_sigma`, (knots, markers, 3) m, what the fit added to the markers that
             the scene follows, up to the end of the fitted part.
+        on_mesh: values that explain the recordings on the mesh of the experiments, of which `comparisons` tells;
+            `values` are those at the limit of fine meshes, where these were counted.
     """
 
     result: FitResult
     comparisons: tuple[Comparison, ...]
     parameters: Parameters
     corrections: Mapping[str, np.ndarray] = field(default_factory=dict)
+    on_mesh: Mapping[str, float] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Estimate:
         return self.result[name]
@@ -67,9 +75,11 @@ class Fit:
         return self.result.values
 
     def values_of(self, experiment: Experiment) -> dict[str, float]:
-        """Every quantity of an experiment's scene: as fitted, the private ones its own; else as the scene has it."""
+        """Every quantity of an experiment's scene, to simulate it with: as fitted on its mesh, the private ones its
+        own; else as the scene has it."""
+        values = {**self.values, **self.on_mesh}
         return {
-            name: self.values.get(f"{name}[{experiment.name}]", self.values.get(name, quantity.value))
+            name: values.get(f"{name}[{experiment.name}]", values.get(name, quantity.value))
             for name, quantity in experiment.scene.quantities.items()
         }
 
@@ -116,8 +126,10 @@ def fit(
         tolerance: relative change of the cost that counts as none.
         refine: "auto" moves the estimates to the limit of short substeps and counts what that leaves open in the
             intervals, at the cost of some three evaluations with tangents. A `Refinement` says more, above all how to
-            make the same experiments on a finer mesh, which "auto" does not know: "mesh not counted" stands in the
-            table then. False (or None) counts nothing, as suits a recording that was simulated at the same substep.
+            make the same experiments on a finer mesh, to whose limit the estimates are moved as well; "auto" does not
+            know how, and "mesh not counted" stands in the table then. Where the data speak against a limit, as those
+            of a recording do that was simulated at the same substep, the estimate stays, and all that it would move
+            counts. False (or None) counts nothing.
         systematic: (problem, internal minimum) -> half-widths of what else the intervals are to count, by parameter, in
             its unit.
         given: standard deviations of numbers that the fit takes as given, by name; they then count in the intervals. Of
@@ -168,9 +180,15 @@ def fit(
     ends, name, interrupted = found.ends, found.optimizer, found.interrupted
     trouble = ceres_trouble() if optimizer == "auto" else ""
     fallback = (f"SciPy stands in for Ceres, which does not load: {trouble}",) if trouble else ()
+    grown, begun = growths(problem, ends[0].u), tuple[Beginning, ...]()
+    if not interrupted:
+        try:
+            ends, begun = checked(search, problem, ends, grown)
+        except KeyboardInterrupt:
+            interrupted = True
+    if ends[0] is not found.ends[0]:
+        grown = growths(problem, ends[0].u)
     best = ends[0]
-
-    grown = growths(problem, best.u)
     lost = without_verdict(problem, best, grown)
     if len(lost) == len(problem.parameters.free):  # then no refit tells anything
         refinement, systematic = wanted_refinement(False), None
@@ -188,8 +206,13 @@ def fit(
         )
         judged = at_floor_of_sweeps(_moved(judged, at.moved), at.refits)
         predicted = predicted_values(every, wanted, values, refitter, threads)
-        doubted = () if refitter is None or lost else doubts(at.problem, at.u, judged)
-        parts = {} if refitter is None else between_parts(at.problem, at.u, judged, refinement)
+        doubted: tuple[str, ...] = ()
+        parts: dict[str, str] = {}
+        if refitter is not None:
+            parts = of_beginnings(problem, best.u, judged, begun, refinement)
+            parts |= between_parts(at.problem, at.u, judged, refinement)
+            if not lost:
+                doubted = doubts(at.problem, at.u, judged) + loss_doubts(at.problem, at.u, judged)
         return _Conclusion(at, tuple(every), judged, lower, *predicted, doubted + unknown, rests_on, parts)
 
     left_out: dict[str, Comparison] = {}
@@ -214,7 +237,10 @@ def fit(
         | elsewhere(problem, judged, best.cost, [*starts_elsewhere, *end.lower])
         | end.parts
     )
-    estimates = doubtful(judged.estimates, contradicted)
+    estimates, limit = at_the_limit(doubtful(judged.estimates, contradicted), at.refits, problem.parameters, at.u)
+    values = end.values | problem.parameters.to_physical(limit)
+    errors = told_clocks(errors, end.experiments, end.values, estimates)
+    shifted = tuple(outside(end.experiments, end.values))
     result = FitResult(
         estimates=estimates,
         recordings=errors,
@@ -228,7 +254,7 @@ def fit(
         converged=best.converged,
         interrupted=interrupted,
         message=best.message,
-        given=_given(problem.parameters, end.values) + end.given,
+        given=_given(problem.parameters, values) + end.given,
         correlations=judged.correlations,
         gauges=tuple(g.words for g in judged.gauges),
         baseline="; ".join(
@@ -249,13 +275,19 @@ def fit(
         not_counted=at.not_counted,
         premises=end.premises,
         misfit=misfit(at.problem, at.u),
+        forces=tuple(row for c in comparisons for one in c.forces for row in one.fits()),
         growth=_growth(found.growths, grown),
         windows=best.windows,
         evaluations=sum(m.evaluations for m in ends),
         jacobians=sum(m.jacobians for m in ends),
-        warnings=warnings_of(ends, interrupted, problem, estimates) + end.doubts + fallback,
+        warnings=warnings_of(ends, interrupted, problem, estimates)
+        + end.doubts
+        + at.warnings
+        + shifted
+        + fallback
+        + (() if interrupted else misread(problem, best.u)),
     )
-    return Fit(result, tuple(comparisons), wanted, corrected)
+    return Fit(result, tuple(comparisons), wanted, corrected, end.values)
 
 
 @dataclass(frozen=True)

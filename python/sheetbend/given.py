@@ -212,7 +212,8 @@ def _collect(
             Term("gravity", np.arange(3), v, ((name, "identity"),))
             for name, v in zip(names, gravity.values(), strict=True)
         ]
-        map_ = e.scene.compiled.map(3 * len(e.compared) + 1, [*e.extra_terms(), *terms], [*e.scene.quantities, *names])
+        terms = [*e.extra_terms(), *e.sensor_terms(), *terms]
+        map_ = e.scene.compiled.map(3 * len(e.compared) + 1, terms, [*e.scene.quantities, *names])
         d["map"] = map_ | {"base": d["map"]["base"]}
         core = _core.Problem(
             experiments=[d],
@@ -273,6 +274,8 @@ def _observe(
     frames, seen = np.nonzero(r.mask)
     axes = [AXES.index(a) for a in e.axes]
     marker = np.repeat(seen, len(axes))
+    J = J[: len(marker)]  # the rows of the markers; forces do not depend on where these are taken to sit
+    by_gravity = {axis: column[: len(marker)] for axis, column in by_gravity.items()}
 
     def rows(change: Array) -> Array:
         """Residuals' change by the markers' (frames, markers, 3) m; of a robust loss with its weight as it is."""
@@ -350,10 +353,12 @@ def _simulated(
         "measured": measured,
         "sigma": np.ones(measured.shape[:2]),
     }
+    d["sensors"] = []
     terms = [replace(t, index=3 * every) if np.ravel(t.index)[0] == 3 * n else t for t in e.extra_terms()]
     base = d["map"]["base"]
     map_ = e.scene.compiled.map(3 * every + 1, terms)
-    map_["base"][: len(base) - 1] = base[:-1]
+    own = e.scene.compiled.core.inputs + 3 * n
+    map_["base"][:own] = base[:own]
     d["map"] = map_
     core = _core.Problem(experiments=[d], theta=theta, slots=[list(range(len(theta)))], free=[], threads=1)
     with divergence(e.scene):

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from .checks import finite
 from .errors import SceneError
+from .hand_eye import HandEye, rotated, unit_quaternions
 
 Array = np.ndarray
 
@@ -22,12 +23,14 @@ class Grip:
         position: (knots, 3) m, where the rod enters the grip; (1, 3) for a grip that stays.
         direction: the same shape, unit vectors, the rod's direction of travel there (from its start to its end).
         director: the same shape, unit vectors across direction, the first axis of the material frame.
+        frame: the frame of the poses, whose correction moves the grip; None where they are in the recording's frame.
     """
 
     times: Array
     position: Array
     direction: Array
     director: Array
+    frame: HandEye | None = None
 
     @classmethod
     def fixed(cls, position: ArrayLike, direction: ArrayLike, director: ArrayLike | None = None) -> Grip:
@@ -44,6 +47,8 @@ class Grip:
         quaternions: ArrayLike,
         direction: ArrayLike = (1.0, 0.0, 0.0),
         director: ArrayLike = (0.0, 0.0, 1.0),
+        offset: ArrayLike = (0.0, 0.0, 0.0),
+        frame: HandEye | None = None,
     ) -> Grip:
         """Recorded poses, roll included.
 
@@ -53,6 +58,8 @@ class Grip:
             quaternions: (knots, 4), (x, y, z, w), from the gripper's own axes to the world's.
             direction: the rod's direction of travel in the gripper's axes.
             director: the frame's first axis in the gripper's axes.
+            offset: m, where the rod enters the grip, in the gripper's axes.
+            frame: of the poses, where that is not the recording's: its six quantities then correct the transform.
 
         Raises:
             SceneError: shapes, NaN, times that do not increase, quaternions of no length, a director along the
@@ -60,10 +67,13 @@ class Grip:
         """
         t = _knots(times)
         x = finite("positions", positions, (len(t), 3), SceneError)
-        q = _units("quaternions", quaternions, (len(t), 4))
+        q = unit_quaternions("quaternions", quaternions, (len(t), 4))
         d = _units("direction", direction, (3,))
-        along = _rotated(q, d)
-        return cls(t, x, along, _across(along, _rotated(q, finite("director", director, (3,), SceneError))))
+        x = x + rotated(q, finite("offset", offset, (3,), SceneError))
+        along, second = rotated(q, d), rotated(q, finite("director", director, (3,), SceneError))
+        if frame is not None:
+            x, along, second = frame.points(x), frame.directions(along), frame.directions(second)
+        return cls(t, x, along, _across(along, second), frame)
 
     @classmethod
     def from_markers(
@@ -156,10 +166,3 @@ def _units(
     if (size == 0).any():
         raise SceneError(field, "has no length", v[np.argmin(size)].tolist() if v.ndim > 1 else v.tolist(), fix)
     return np.asarray(v / size)
-
-
-def _rotated(quaternions: Array, vector: Array) -> Array:
-    """(knots, 3): vector (3,) turned by unit quaternions (x, y, z, w)."""
-    xyz, w = quaternions[:, :3], quaternions[:, 3:]
-    twice = 2.0 * np.cross(xyz, vector)
-    return np.asarray(vector + w * twice + np.cross(xyz, twice))

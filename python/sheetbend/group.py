@@ -64,9 +64,7 @@ def make_group(
         if (values < 0).any():
             raise SceneError(f"{name}.{field}", "must not be negative", float(values.min()), "give zero or more")
     if kind in NEEDS_COMPLIANCE and not (alpha > 0).all():
-        why = "is rigid, and a straight rigid joint has a singular projection (rank 2 of 3)"
-        raise SceneError(
-            f"{name}.compliance", why, float(alpha.min()), "give a positive compliance, Voronoi length / EI"
-        )
+        why, fix = NEEDS_COMPLIANCE[kind]
+        raise SceneError(f"{name}.compliance", why, float(alpha.min()), fix)
     inside = rest_values(name, kind, KINDS[kind]["parameters"], positions[stencil], rest, normal)
     return Group(name, kind, stencil, alpha, beta, damping is not None, inside)

@@ -14,7 +14,7 @@ from .errors import InputError
 from .field_plot import box_in_space, field_colors
 from .optional import require
 from .scene import Scene
-from .strain import green_strain
+from .strain import largest_strain
 from .whole import written
 
 if TYPE_CHECKING:
@@ -96,7 +96,9 @@ def _picture(motion: Motion, shown: Array, title: str) -> tuple[Figure, Any]:
     figure = new_figure(5.6, 4.6, title or " ")
     panel: Any = figure.add_subplot(projection="3d", computed_zorder=False)  # what is measured stays in front
     cloths = motion.scene.cloths.values()
-    strains = {c.name: {k: _stretch(c.mesh, motion.positions[k, c.particles]) for k in shown} for c in cloths}
+    strains = {
+        c.name: {k: 1e2 * largest_strain(c.mesh, motion.positions[k, c.particles]) for k in shown} for c in cloths
+    }
     sheets = []
     if strains:
         every = np.concatenate([values for own in strains.values() for values in own.values()])
@@ -136,12 +138,6 @@ def _picture(motion: Motion, shown: Array, title: str) -> tuple[Figure, Any]:
                 off.set_segments(pairs[np.isfinite(pairs).all(axis=(1, 2))])
 
     return figure, draw
-
-
-def _stretch(mesh: Any, positions: Array) -> Array:
-    """(triangles,) %, the larger principal Green strain where it is positive."""
-    u, v, shear = green_strain(mesh, positions).T
-    return 1e2 * np.maximum((u + v) / 2 + np.hypot((u - v) / 2, shear / 2), 0.0)
 
 
 def _seen(points: Array) -> Array:

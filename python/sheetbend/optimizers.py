@@ -244,6 +244,9 @@ def _ceres_holding(
             "interrupted: the best point so far",
             jacobians=out.get("jacobians", 0),
         )
+    if not 0.0 <= out["cost"] < np.inf:  # Ceres tells a cost of -1 where its first point has no derivatives
+        counts = out["iterations"], out["evaluations"]
+        return Minimum(best.u, best.cost, *counts, False, False, out["message"], jacobians=out["jacobians"])
     return Minimum(
         np.array(out["u"]),
         out["cost"],

@@ -112,6 +112,7 @@ class FitProblem:
         held = [None if corrected is None else corrected.get(e.name, NOTHING) for e in self.experiments]
         cores = [e.core(r, b) for e, r, b in zip(self.experiments, self.recordings, held, strict=True)]
         free = self._free(slot_of)
+        self.sensed = [core["sensors"] for core in cores]
         try:
             self.core = _core.Problem(experiments=cores, theta=theta, slots=slots, free=free, threads=threads)
         except ValueError as error:
@@ -308,9 +309,17 @@ class FitProblem:
             raise refusal(error, InputError, self.parameters.to_physical(u)) from error
         return markers.reshape(self.recordings[experiment].positions.shape)
 
+    def readings(self, experiment: int, u: np.ndarray) -> list[np.ndarray]:
+        """What the force sensors of one experiment read at u: (samples, 6) of each, N and N m in its axes."""
+        with divergence(self.experiments[experiment].scene):
+            every = self.core.readings(experiment, u)
+        ends = np.cumsum([len(sensor["measured"]) for sensor in self.sensed[experiment]])
+        return np.split(every, ends[:-1]) if len(ends) else []
+
     def rows_layout(self) -> Layout:
-        """Where each data row comes from, for the covariance."""
-        recording, channel, frame = [], [], []
+        """Where each data row comes from, for the covariance. Markers are on clock 0, force sensors on clocks of their
+        own; each axis of either is a kind of its own, but along a static shape all are one."""
+        recording, channel, frame, kind, clock = [], [], [], [], []
         for i, (e, r) in enumerate(zip(self.experiments, self.recordings, strict=True)):
             seen_frame, seen_marker = np.nonzero(r.mask)
             axes = np.tile(np.arange(len(e.axes)), len(seen_frame))
@@ -319,4 +328,26 @@ class FitProblem:
             # Along a static shape the points are the series.
             channel.append(axes if e.static else markers * len(e.axes) + axes)
             frame.append(markers if e.static else frames)
-        return Layout(np.concatenate(recording), np.concatenate(channel), np.concatenate(frame))
+            kind.append(0 * axes if e.static else axes)
+            clock.append(np.zeros(len(axes), dtype=int))
+            for k, sensor in enumerate(self.sensed[i], start=1):
+                sample, reads = np.nonzero(~np.isnan(sensor["measured"]))
+                recording.append(np.full(len(sample), i))
+                channel.append(reads)
+                frame.append(sample)
+                kind.append(3 + reads)
+                clock.append(np.full(len(sample), k))
+        return Layout(*(np.concatenate(part) for part in (recording, channel, frame, kind, clock)))
+
+    def row_times(self) -> np.ndarray:
+        """(rows,) s, when each data row was recorded; of an equilibrium NaN."""
+        times = []
+        for e, r, sensed in zip(self.experiments, self.recordings, self.sensed, strict=True):
+            seen_frame, _ = np.nonzero(r.mask)
+            when = np.full(len(seen_frame), np.nan) if e.static else r.times[seen_frame]
+            times.append(np.repeat(when, len(e.axes)))
+            for force, sensor in zip(e.forces, sensed, strict=True):
+                span = (float(r.times[0]), float(r.times[-1]))
+                at = force.recording.times[force.kept(e.t0, span)]
+                times.append(at[np.nonzero(~np.isnan(sensor["measured"]))[0]])
+        return np.concatenate(times)

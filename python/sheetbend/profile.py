@@ -13,6 +13,7 @@ FARTHEST = math.log(1e6)
 
 _DOUBLINGS = 14
 _HALVINGS = 8
+_THERE = 0.005  # of the height at the end of an interval
 
 Ends = tuple[float | None, float | None]
 """Lower and upper end of an interval in physical units, None where it is open."""
@@ -96,6 +97,8 @@ def _crossing(height: Callable[[float], float], start: float, step: float, bound
         part = (1 - low) / (high - low)
         middle = inside + min(max(part, 0.1), 0.9) * (outside - inside)
         reached = height(middle)
+        if abs(reached - 1) < _THERE:
+            return middle
         if reached >= 1:
             outside, high = middle, reached
         else:

@@ -11,8 +11,19 @@ class RedundantConstraintsWarning(UserWarning):
 
 
 def warn_redundant(where: str, which: str) -> None:
-    """Warn that a scene has such constraints; `which` is the core's description, empty where there are none."""
-    if which:
+    """Warn that a scene has such constraints; `which` is the core's description, empty where there are none. A row that
+    follows from no other is no such constraint: its pivot is lost in rounding, or no number."""
+    if not which:
+        return
+    if any(not part.partition("follows from")[2].strip() for part in which.split("; ") if "follows from" in part):
+        lost = ", ".join(part.partition(" follows from")[0] for part in which.split("; ") if "follows from" in part)
+        warnings.warn(
+            f"{where}: constraints are left out that have no answer in double precision: {lost}. Fix: give a substep, "
+            "stiffness and masses whose sizes differ by less",
+            RedundantConstraintsWarning,
+            stacklevel=3,
+        )
+    else:
         warnings.warn(
             f"{where}: rigid constraints that follow from others are left out: {which}. Their forces are zero, and "
             "their rest values have no effect. Fix: remove them, or give them a compliance",

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from .optional import require
+from .report_driven import driven_sections
 from .result import UNSOUND, Estimate, FitResult, Given, MotionGrowth, Premise, RecordingFit
 from .tables import Section, plain_section, rich_section
 from .wording import figures, short
@@ -41,7 +42,9 @@ def sections(result: FitResult) -> list[Section]:
         _refits(result),
         _premises(result),
         _recordings(result),
+        _forces(result),
         _held_out_motion(result),
+        *driven_sections(result),
         _unknown(result),
         _correlations(result),
         _course(result),
@@ -150,9 +153,10 @@ def _interval_parts(result: FitResult) -> Section:
             rows.append((e.name, *figures(parts, e.half_width), e.unit))
     more = (["systematic"] if counted else []) + (["value moved by"] if moved else [])
     headers = ("parameter", "+/-", "statistical", "discretization", *more, "unit")
-    note = "values are moved to the limit of short substeps, and what that leaves open is counted"
+    meshes = " and of fine meshes" if any(refit.left for refit in result.refits) else ""
+    note = f"values are moved to the limit of short substeps{meshes}, and what that leaves open is counted"
     return Section(
-        "Where the intervals come from", headers, tuple(rows), (("time step", note),) if moved and rows else ()
+        "Where the intervals come from", headers, tuple(rows), (("discretization", note),) if moved and rows else ()
     )
 
 
@@ -189,6 +193,20 @@ def _recordings(result: FitResult) -> Section:
         if words
     )
     return Section("Recordings", headers, tuple(rows), notes)
+
+
+def _forces(result: FitResult) -> Section:
+    rows = [
+        (f.recording, f.sensor, str(f.rows), *("" if x is None else short(x) for x in (f.rms, f.held_out, f.baseline)))
+        for f in result.forces
+    ]
+    units = [(f.unit,) for f in result.forces]
+    headers: tuple[str, ...] = ("recording", "sensor", "rows", "fitted rms", "held-out rms", "constant", "unit")
+    every = [(*row, *unit) for row, unit in zip(rows, units, strict=True)]
+    if all(f.held_out is None for f in result.forces):
+        headers, every = headers[:4] + headers[5:], [row[:4] + row[5:] for row in every]
+    note = ("constant", "rms of the prediction that the force stays at its mean over the fitted part")
+    return Section("Forces", headers, tuple(every), (note,) if every else ())
 
 
 def _corrected(recording: RecordingFit) -> str:

@@ -43,6 +43,8 @@ def rest_values(
         return np.array(finite(f"{name}.rest", rest, (count, width), SceneError))
     if kind in IN_A_PLANE:
         return _planar(name, count, rest, normal)
+    if kind == "friction_hinge":
+        return _planar(name, count, _yield_angles(name, count, rest), normal)
     values = np.zeros((count, width))
     offsets = parameters.index("rest_1") if "rest_1" in parameters else 0
     values[:, :offsets] = 1.0
@@ -60,6 +62,15 @@ def _positive(name: str, what: str, initial: Array, rest: ArrayLike | None) -> A
         fix = "move the particles apart or give rest"
         raise SceneError(f"{name}.rest", f"{what} of constraint {bad} is not positive", float(sizes[bad]), fix)
     return np.array(sizes)[:, None]
+
+
+def _yield_angles(name: str, count: int, rest: ArrayLike | None) -> Array:
+    if rest is None:
+        raise SceneError(f"{name}.rest", "is missing", None, "give (count,) rad, the angle at which the joint slides")
+    angles = per_item(f"{name}.rest", rest, count)
+    if (angles <= 0).any():
+        raise SceneError(f"{name}.rest", "must be positive", float(angles.min()), "give rad, such as 0.001")
+    return angles
 
 
 def _planar(name: str, count: int, rest: ArrayLike | None, normal: ArrayLike | None) -> Array:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +45,8 @@ class Estimate:
         systematic: half-width of what else the interval counts; 0 when nothing.
         verdict: one of `VERDICTS`.
         words: the verdict as a sentence.
-        moved: how far the value was moved to the limit of short substeps, in `unit`; it is contained in `value`.
+        moved: how far the value was moved to the limit of short substeps and fine meshes, in `unit`; it is contained in
+            `value`.
     """
 
     name: str
@@ -117,6 +118,11 @@ class RecordingFit:
         held_out: over the part that the fit did not see; None when there is none.
         baseline: over the same part, of a prediction without physics.
         motion: over the same part, of the measured markers about their mean; None for an equilibrium.
+        without_physics: of a driven scene, the error of every prediction without physics by kind (`baseline.IN_WORDS`),
+            over the held-out part, or where there is none over the fitted one.
+        late: s, by which the recording's clock is late, from its `time_offset`: a frame stamped t shows the scene at
+            t - late. None without one.
+        late_half_width: s, of the 95 % interval of that; None where it is open or the clock was not fitted.
         driven_sigma: prior of the correction of its driven markers, m; None without one.
         corrected_by: root mean square of one coordinate of that correction, m.
         measured_frequency, simulated_frequency: first frequency there, Hz; None where the part shows fewer than three
@@ -134,6 +140,32 @@ class RecordingFit:
     unit: str = "m"
     driven_sigma: float | None = None
     corrected_by: float | None = None
+    without_physics: Mapping[str, float] = field(default_factory=dict)
+    late: float | None = None
+    late_half_width: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceFit:
+    """How well the forces of one sensor are explained: rms of one component, in `unit`.
+
+    Attributes:
+        recording, sensor: names.
+        rows: number of residuals that took part in the fit.
+        rms: over the fitted part; None where all of it was held out.
+        held_out: over the part that the fit did not see; None when there is none.
+        baseline: over the held-out part, or the fitted one where nothing is held out, of a constant: the mean of the
+            fitted part.
+        unit: "N", or "N m" for torques.
+    """
+
+    recording: str
+    sensor: str
+    rows: int
+    rms: float | None
+    held_out: float | None
+    baseline: float | None
+    unit: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,12 +201,15 @@ class Refit:
     Attributes:
         name: what was refined.
         to_limit: factor from what it moves to the limit of ever finer ones.
-        moved: of each fitted parameter, finer minus reported, in its unit.
+        moved: of each fitted parameter, finer minus fitted, in its unit.
+        left: half-width of what is open all the same, of each parameter, in its unit. Where it is smaller than what is
+            moved, the estimate was moved to the limit. Empty where all that it moves, up to the limit, is counted.
     """
 
     name: str
     to_limit: float
     moved: Mapping[str, float]
+    left: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -221,6 +256,7 @@ class FitResult:
         windows: s, the lengths that were fitted first, as given or chosen.
         evaluations, jacobians: how often all experiments were simulated, and how often of these with a Jacobian, over
             all starts and windows, up to the minimum.
+        forces: errors per force sensor.
         premises: numbers that the fit took as given, and what an error in each moves.
         warnings: what a reader must know before using the numbers.
     """
@@ -253,6 +289,7 @@ class FitResult:
     jacobian_seconds: float | None = None
     premises: tuple[Premise, ...] = ()
     not_counted: tuple[str, ...] = ()
+    forces: tuple[ForceFit, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of that name; KeyError names the ones there are."""
@@ -307,7 +344,7 @@ class FitResult:
         found = data.get("format") if isinstance(data, Mapping) else data
         if found != FORMAT:
             raise InputError("format", "is not the one that this version reads", found, f"use {FORMAT!r}")
-        known = {field.name for field in fields(cls)}
+        known = {one.name for one in fields(cls)}
         values = {name: value for name, value in data.items() if name in known}
         values["baseline"] = data.get("baseline_is", "")
         estimates = mapping(data.get("parameters"), "parameters")
@@ -350,10 +387,10 @@ def _estimate(name: str, part: object) -> Estimate:
         raise InputError(f"{where}.interval", "must be [lower, upper]", ends, "give both, null where open")
     rest = {key: value for key, value in told.items() if key != "interval"}
     found = as_dataclass(Estimate, {"name": name, "lower": ends[0], "upper": ends[1], **rest}, where)
-    for field in ("half_width", "statistical", "discretization", "systematic"):
-        width = getattr(found, field)
+    for part_of in ("half_width", "statistical", "discretization", "systematic"):
+        width = getattr(found, part_of)
         if width is not None and width < 0:
-            raise InputError(f"{where}.{field}", "must not be negative", width, "give a half-width")
+            raise InputError(f"{where}.{part_of}", "must not be negative", width, "give a half-width")
     return found
 
 

@@ -91,7 +91,11 @@ class End:
         else:
             poses = [grip.position, grip.position + stub * grip.direction, grip.director]
             motion = np.stack(poses + [grip.direction for _ in section], axis=1)
-            scene.drive([node, ghost, director, *section], grip.times, motion)
+            nodes = [node, ghost, director, *section]
+            if grip.frame is None:
+                scene.drive(nodes, grip.times, motion)
+            else:
+                grip.frame.drive(scene, nodes, grip.times, motion, vectors=[n in scene.directors for n in nodes])
         second = np.cross(grip.direction, grip.director)
         if tilts:
             for k, axis in ((1, grip.director), (2, second)):
@@ -107,7 +111,9 @@ class End:
 
 def _add_motion(scene: Scene, grip: Grip, node: int, by: Array, factors: dict[str, str]) -> None:
     if not grip.stays:
-        scene.add_motion_term(node, by, factors)
+        terms = [(factors, by)] if grip.frame is None else grip.frame.turned(by, factors)
+        for own, coefficients in terms:
+            scene.add_motion_term(node, coefficients, own)
     else:
         scene.add_terms([product("position", 3 * node + k, by[0, k], factors) for k in range(3)])
 

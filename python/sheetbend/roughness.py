@@ -52,7 +52,9 @@ def rough_parameters(
 
 def _words(problem: FitProblem, i: int, u: Array, jacobian: Array, growth: Growth | None) -> str:
     """Why nothing follows from the rows of one experiment; empty where something does."""
-    e = problem.experiments[i]
+    e, layout = problem.experiments[i], problem.rows_layout()
+    seen = layout.clocks[layout.recording == i] == 0
+    jacobian = jacobian[seen]
     with np.errstate(invalid="ignore", over="ignore"):
         moved = np.abs(jacobian) * (e.sigma * _changes(problem, u) / _size(problem, i))  # sizes of the scene
     moved[np.isnan(moved)] = np.inf
@@ -63,8 +65,7 @@ def _words(problem: FitProblem, i: int, u: Array, jacobian: Array, growth: Growt
         name = problem.parameters.free[int(column)]
         change = "a factor of two" if problem.parameters[name].log else "its size"
         cause = f"to first order, {name} moved by {change} moves markers by {_sizes(float(moved[row, column]))}"
-        layout = problem.rows_layout()
-        frames = layout.frame[layout.recording == i]
+        frames = layout.frame[layout.recording == i][seen]
         late = frames[(moved > 1.0).any(axis=1)].min()
         until = float(problem.recordings[i].times[max(late - 1, 0)]) - e.t0
     else:

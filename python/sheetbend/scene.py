@@ -160,8 +160,9 @@ class Scene:
         self._building()
         self.boundary.follow(particles, times, motion, markers, weights, placed, interpolation, self.particle_count)
 
-    def add_motion_term(self, particle: int, coefficients: ArrayLike, factors: Mapping[str, str]) -> None:
-        """Add to a driven particle's motion (knots, 3) coefficients times a product of functions of quantities.
+    def add_motion_term(self, particle: ArrayLike, coefficients: ArrayLike, factors: Mapping[str, str]) -> None:
+        """Add to a driven particle's motion (knots, 3) coefficients times a product of functions of quantities; to
+        those of several particles (k,) with coefficients (knots, k, 3).
 
         Raises:
             SceneError: the particle is not driven, shapes, NaN, or unknown quantities.
@@ -197,25 +198,27 @@ class Scene:
         constraint (their gradients are in the input arrays).
 
         Args:
-            kind: a name in sheetbend.KINDS: "distance", "attachment"; of ropes "bend", "planar_bend", "hinge"; of rods
+            kind: a name in sheetbend.KINDS: "distance", "attachment"; of ropes "bend", "planar_bend", "hinge",
+                "friction_hinge"; of rods
                 "material_curvature", "yielding_curvature", "twist", "shear" and, between sections, "section_curvature",
                 "section_yielding_curvature", "section_twist"; of cloth "strain", "exponential_strain",
                 "sinh_strain", "spline_strain", "sheet_curvature", "dihedral", "isometric_bending", "area", "tether".
             particles: (count, arity) indices.
             name: of the group; the kind by default.
             compliance: 0 = rigid; distance, attachment, tether m/N; bend, planar_bend 1/(N m) (Voronoi length / EI);
-                hinge rad/(N m); material_curvature 1/(N m), twist rad/(N m) (Voronoi length / EI or GJ), shear
-                1/(N m) (1/(GA length)); strains
-                1/(N m) (1/(area warp stiffness)); dihedral rad/(N m); isometric_bending 1/(N m) (1/B);
-                sheet_curvature 1/(N m^3) (1/(area B)); area m^3/N.
+                hinge rad/(N m); friction_hinge rad/(N m) (yield angle / torque); material_curvature 1/(N m), twist
+                rad/(N m) (Voronoi length / EI or GJ), shear 1/(N m) (1/(GA length)); strains 1/(N m) (1/(area warp
+                stiffness)); dihedral rad/(N m); isometric_bending 1/(N m) (1/B); sheet_curvature 1/(N m^3)
+                (1/(area B)); area m^3/N.
             damping: beta of the Rayleigh dissipation (Macklin et al. 2016, eq. 26): force per rate of C.
             viscosity: the element resists the rate of C only: distance N s/m, hinge N m s/rad; excludes compliance and
                 damping.
             rest: (count,) rest length m, of a tether its greatest length (the initial length by default), planar rest
                 (natural curvature times Voronoi length), angle rad (zero by default), area m^2 (the initial one); of
-                material_curvature (count, 2), of twist (count,) rad, of attachment (count, 3) m the offset of the first
-                particle from the second; of strains, isometric_bending and sheet_curvature all parameters of KINDS,
-                (count, parameters).
+                friction_hinge (count,) the yield angle rad (its last particle is pinned, and its x the angle rad at
+                which the joint is unstrained); of material_curvature (count, 2), of twist (count,) rad, of attachment
+                (count, 3) m the offset of the first particle from the second; of strains, isometric_bending and
+                sheet_curvature all parameters of KINDS, (count, parameters).
             normal: unit plane normal, (3,) or (count, 3), of planar kinds.
 
         Raises:

@@ -101,6 +101,14 @@ class Search:
             raise SheetbendError(ends[0].message)
         return Found(_best_first(ends), name, False, began)
 
+    def onward(self, problem: FitProblem, u: np.ndarray) -> Minimum:
+        """Search on the whole motion from a point that came out of its windows. Ctrl-C passes through.
+
+        Raises:
+            SheetbendError: the motion has no answer there.
+        """
+        return _Way(replace(self, windows=()), problem, named(self.optimizer)).end(u, ())
+
     def _points(self, problem: FitProblem) -> list[np.ndarray]:
         first = problem.parameters.to_physical(problem.parameters.initial())
         points = [problem.parameters.initial()]
@@ -116,6 +124,15 @@ class Search:
 
 def _best_first(ends: Sequence[Minimum]) -> tuple[Minimum, ...]:
     return tuple(sorted(ends, key=lambda m: m.cost))
+
+
+def fitted_window(part: FitProblem, u: np.ndarray, tolerance: float) -> Approach:
+    """At a minimum of a window, searched from u; its cost is infinite where the window has no answer there."""
+    walk = Approach(part, u)
+    while walk.iterations < WINDOW_STEPS and walk.step():
+        if walk.promised < tolerance or walk.taken < tolerance:
+            break
+    return walk
 
 
 @dataclass

@@ -31,6 +31,16 @@ def green_strain(mesh: TriangleMesh, positions: ArrayLike) -> Array:
     return np.stack([((u * u).sum(-1) - 1) / 2, ((v * v).sum(-1) - 1) / 2, (u * v).sum(-1)], axis=-1)
 
 
+def largest_strain(mesh: TriangleMesh, positions: ArrayLike) -> Array:
+    """(m,) the larger principal Green strain of every triangle where it is positive, else 0.
+
+    Raises:
+        SceneError: positions of another shape than (vertices, 3).
+    """
+    u, v, shear = green_strain(mesh, positions).T
+    return np.maximum((u + v) / 2 + np.hypot((u - v) / 2, shear / 2), 0.0)
+
+
 def strain_fields(
     scene: Scene, cloth: Cloth, positions: ArrayLike, values: Mapping[str, float] | None = None
 ) -> dict[str, Array]:

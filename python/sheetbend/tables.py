@@ -59,7 +59,7 @@ def rich_section(section: Section) -> list[object]:
 def _table(section: Section) -> list[str]:
     if not section.rows:
         return []
-    left = _flush_left(section)
+    left = flush_left(section)
     lines = (section.headers, *section.rows)
     widths = [max(len(line[column]) for line in lines) for column in range(len(section.headers))]
     aligned = [
@@ -72,7 +72,8 @@ def _table(section: Section) -> list[str]:
     return [f"  {line}".rstrip() for line in aligned]
 
 
-def _flush_left(section: Section) -> list[bool]:
+def flush_left(section: Section) -> list[bool]:
+    """Of each column: words are flush left, numbers flush right."""
     words = {"parameter", "with", "recording", "unit", "verdict", "step", "stays", "rope", "given"}
     return [header in words for header in section.headers]
 
@@ -96,7 +97,7 @@ def _rich_table(section: Section) -> object:
     box = require("rich.box", "cli")
     table = require("rich.table", "cli").Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, header_style="dim")
     text = require("rich.text", "cli").Text
-    for header, flush in zip(section.headers, _flush_left(section), strict=True):
+    for header, flush in zip(section.headers, flush_left(section), strict=True):
         table.add_column(header, justify="left" if flush else "right", no_wrap=header != "verdict")
     for row in section.rows:
         table.add_row(*(text(cell, style=_COLORS.get(cell, "")) for cell in row))

@@ -16,6 +16,7 @@ from .errors import SheetbendError
 from .experiment import Experiment
 from .linear_step import gauss_newton, moves, one_step
 from .problem import FitProblem
+from .refuted import refuted, words
 from .result import Refit
 
 TIME_STEP, SWEEPS = "time step", "twice the sweeps"
@@ -34,6 +35,7 @@ class Settled:
         moved: by how much, of each free parameter, in its unit; empty where nothing was moved.
         refits: what of the time step is left to count.
         not_counted: why nothing of it is, where it is not.
+        warnings: where the data speak against a limit.
     """
 
     problem: FitProblem
@@ -41,6 +43,7 @@ class Settled:
     moved: Mapping[str, float] = field(default_factory=dict)
     refits: tuple[Refit, ...] = ()
     not_counted: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     @property
     def cost(self) -> float:
@@ -93,6 +96,10 @@ def _moved(problem: FitProblem, u: np.ndarray) -> Settled:
         if float(np.sum((J @ (onward - at)) ** 2)) <= THERE**2 * scatter:
             break
         before, at = after, onward
+    if refuted(problem, u, limit.evaluate(end, jacobian=False)[1]):
+        whole = Refit(name=TIME_STEP, to_limit=1.0, moved=moves(problem.parameters, u, end))
+        told = words("short substeps", "at the same substep", "refine=False, or halve_step = false in a configuration,")
+        return Settled(problem, u, refits=(whole,), warnings=(told,))
     finest = _at(problem, combined(halved(problem.experiments)))
     left = np.abs(THIRD_ORDER * (one_step(limit, finest, end) - end)) + np.abs(onward - end)
     rest = Refit(name=TIME_STEP, to_limit=1.0, moved=moves(problem.parameters, end, end + left))

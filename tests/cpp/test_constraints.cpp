@@ -179,7 +179,7 @@ TYPED_TEST(Constraint, ParameterDerivativesMatchComplexStep) {
     for (int k = 0; k < parameter_count<K>; ++k) {
       const auto e = unit(z.size(), K::dofs + k);
       const auto found = dual_along<K>(z, e), oracle = complex_step_along(evaluate_joined<K, Complex>, z, e);
-      if constexpr (Yields<K>)
+      if constexpr (requires { K::share_parameter; })
         if (k == K::yield_parameter) continue;  // acts in yield() alone
       EXPECT_GT(largest(std::span(oracle).first(K::rows)), 0.0) << K::parameters[k];
       EXPECT_LE(relative_error(std::span(found).first(K::rows), std::span(oracle).first(K::rows)), 1e-13)
@@ -293,6 +293,21 @@ TEST(Hinge, AngleTakesTheShortWayRound) {
   for (const double theta : {0.95 * pi, 0.9 * pi}) {
     const std::vector<double> x{0, 0, 0, 1, 0, 0, 1 + std::cos(theta), std::sin(theta), 0};
     EXPECT_NEAR(evaluate<Hinge>(x, p)[0], theta + 0.9 * pi - 2 * pi, 1e-14);
+  }
+}
+
+// dC/dtheta times C is the torque times the compliance: the angle while the joint sticks, the yield angle while it slides.
+TEST(FrictionHinge, TorqueGrowsWithTheAngleUpToTheYieldAngleAndStays) {
+  const double yield = 0.02, set = 0.3, arm = 2.0;
+  for (const double angle : {-2.5, -0.1, -0.021, -0.019, -0.005, 0.005, 0.019, 0.021, 0.1, 2.5}) {
+    const double theta = set + angle;
+    const auto value = evaluate<FrictionHinge>(
+        std::vector<double>{0, 0, 0, 1, 0, 0, 1 + arm * std::cos(theta), arm * std::sin(theta), 0, set, 0, 0},
+        std::vector<double>{0, 0, 1, yield});
+    const double slope = -value[1 + 9];  // the set moves against the angle
+    EXPECT_NEAR(value[0] * slope, std::clamp(angle, -yield, yield), 1e-14) << angle;
+    const double size = std::abs(angle), energy = size <= yield ? angle * angle : yield * (2.0 * size - yield);
+    EXPECT_NEAR(value[0] * std::abs(value[0]), std::copysign(energy, angle), 1e-14);
   }
 }
 

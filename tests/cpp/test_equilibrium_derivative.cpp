@@ -55,8 +55,9 @@ AtRest every_kind() {
     else
       for (int k = 0; k + K::points <= n + 1; ++k)
         for (int i = 0; i < K::arity; ++i) {
-          const int past = i - K::points;  // two directors, then a set
-          group.stencil.push_back(past < 0 ? k + i : past < 2 ? directors + k + past : sets + k);
+          const int past = i - K::points;  // directors, then a set
+          const bool is_set = Yields<K> && i == K::arity - 1;
+          group.stencil.push_back(past < 0 ? k + i : is_set ? sets + k : directors + k + past);
         }
     spec.groups.push_back(group);
   });

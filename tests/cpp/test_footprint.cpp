@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <new>
 
+#include "adjoint/footprint.h"
 #include "adjoint/tape_plan.h"
 #include "core/scalar/dual.h"
 #include "tests/cpp/support/bipyramid.h"

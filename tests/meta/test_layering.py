@@ -32,7 +32,7 @@ ALLOWED = {
     "core/equilibrium": {"core/scalar", "core/constraints", "core/scene", "core/element", "core/solver"},
     "adjoint/element": {"core/scalar", "core/scene", "core/element"},
     "adjoint/packs": {"core/constraints", "core/scene", "core/packs", "core/threads", "adjoint/element"},
-    "adjoint/blocks": {"core/blocks", "adjoint/element"},
+    "adjoint/blocks": {"core/constraints", "core/blocks", "adjoint/element"},
     "adjoint": {
         "core/scalar",
         "core/constraints",

@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 
-@pytest.mark.parametrize("tool", ["ruff check", "ruff format --check", "mypy"])
+@pytest.mark.parametrize("tool", ["ruff check", "ruff format --check", pytest.param("mypy", marks=pytest.mark.slow)])
 def test_passes(tool: str, tmp_path: Path) -> None:
     cache = ["--cache-dir", str(tmp_path)]
     command = [sys.executable, "-m", *tool.split(), *cache, *([] if tool == "mypy" else ["."])]

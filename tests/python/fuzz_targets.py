@@ -101,7 +101,7 @@ def _toml(folder: Path) -> list[Files]:
     sheet.save(folder / "sheet.npz")
     data = {name: (folder / name).read_bytes() for name in ("swing.npz", "sheet.npz", "sheet.json", "swing.json")}
     texts = [test_written_files.ROPE, test_config_cloth.CLOTH]
-    for name in ("pendulum", "twin", "twin_cloth", "gripped_ropes", "wires", "beam"):
+    for name in ("pendulum", "twin", "twin_cloth", "gripped_ropes", "wires", "beam", "held_cloth"):
         text = (EXPERIMENTS / name / f"{name}.toml").read_text()
         texts.append(text.replace("data/", f"{EXPERIMENTS}/{name}/data/"))
     return [{"my.toml": text.encode(), **data} for text in texts]
@@ -161,6 +161,13 @@ def _curves(folder: Path) -> list[Files]:
     return [{"strip.csv": content} for content in files]
 
 
+def _poses(folder: Path) -> list[Files]:
+    rows = "".join(f"{k / 10},{k},0,{k / 7:.3f},0,0,{k / 9:.4f},1\n" for k in range(9))
+    np.savez(folder / "tool.npz", times=np.arange(4.0), positions=np.zeros((4, 3)), quaternions=np.ones((4, 4)))
+    header = "time,x,y,z,qx,qy,qz,qw\n"
+    return [{"tool.csv": (header + rows).encode()}, {"tool.npz": (folder / "tool.npz").read_bytes()}]
+
+
 # ---- readers --------------------------------------------------------------------------------------------
 
 
@@ -203,4 +210,5 @@ TARGETS: dict[str, Target] = {
     "fit": Target(_fits, _fit, json_tree),
     "mesh": Target(_meshes, sb.read_mesh, mutated),
     "curve": Target(_curves, _curve, mutated),
+    "poses": Target(_poses, sb.Tool.load, mutated),
 }

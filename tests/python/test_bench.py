@@ -167,6 +167,7 @@ class TestGradients:
         one, two = Problem(w, 1).gradient(), Problem(w, 2).gradient()
         assert (one.parameters == two.parameters).all() and (one.start == two.start).all()
 
+    @pytest.mark.slow
     def test_chain(self) -> None:
         assert gradient_error() <= 1e-9
 
@@ -255,6 +256,7 @@ class TestChainAndLadder:
         assert [row["segments"] for row in found["rows"]] == [20, 50, 200, 1000, 5000, 20000]
         assert found["batch"]["ropes"] == 64 and found["batch"]["gradient_speedup"] > 0
 
+    @pytest.mark.slow
     def test_cloth(self) -> None:
         found = {**measure_cloth(repeats=1, cells=(4, 6)), "exit_code": 0}
         expect_figures(found)

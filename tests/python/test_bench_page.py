@@ -88,6 +88,7 @@ def test_what_is_measured_again_replaces_the_old(scripts: None) -> None:
     assert found["threads"] == [{"workload": "W2"}] and found["chain"] == 2
 
 
+@pytest.mark.slow
 def test_the_plain_loop_gives_the_shipped_reference(scripts: None, tmp_path: Path) -> None:
     import plain
 
@@ -99,6 +100,7 @@ def test_the_plain_loop_gives_the_shipped_reference(scripts: None, tmp_path: Pat
     assert plain.run(program, "W1s", 1)["losses"][0] == pytest.approx(0.0748491949, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_the_plain_sheet_is_the_package_s(scripts: None, tmp_path: Path) -> None:
     """Value and gradient of a sheet with strain and hinges, by a program that shares no code with the package."""
     import plain

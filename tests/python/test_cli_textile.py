@@ -54,6 +54,23 @@ def test_a_pull(tmp_path):
     assert mean.load[-1] == approx(STIFFNESS * 0.05, rel=0.2)
 
 
+def test_a_forecast_and_a_chosen_law(tmp_path):
+    """The same words and figures as in Python."""
+    files = [strip(tmp_path / f"{k}.csv", share) for k, share in enumerate((0.98, 1.0, 1.02))]
+    out, sizes = tmp_path / "out", ["--length", "20 cm", "--width", "Width"]
+    options = ["--law", "chosen", "--weights", "chosen", "--forecast", "--figures", "none", "--json"]
+    done = run(*files, *sizes, *options, "--output", str(out))
+    assert done.exit_code == 0, done.stderr
+    told = json.loads(done.stdout)
+    curves = [c for file in files for c in textile.read_curves(file, length=LENGTH, width=WIDTH)]
+    found = textile.forecast_pull(curves)
+    assert told["forecast"]["load"] == approx(found.load.tolist())
+    assert told["forecast"]["shares"] == approx(found.shares)
+    report = (out / "report.txt").read_text(encoding="utf-8")
+    assert str(found) in report and "law chosen by what the pulls" in " ".join(report.split())
+    assert run(*files, *sizes, "--weights", "many", "--output", str(out)).exit_code != 0
+
+
 def test_a_loop_of_shear(tmp_path):
     angle = np.concatenate([np.linspace(0, 8, 81), np.linspace(8, 0, 81)[1:]])
     force = np.where(np.arange(161) < 81, 1.0, 0.6) * angle

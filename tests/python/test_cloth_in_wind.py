@@ -46,7 +46,7 @@ def small(folder: Path, made: ModuleType, **options: object) -> sb.Fit:
 
 
 def test_six_numbers_are_found_from_far(tmp_path: Path, made: ModuleType) -> None:
-    found = small(tmp_path, made)
+    found = small(tmp_path, made, refine=sb.Refinement())  # of the recording's own mesh: only the time step counts
     assert found.result.converged and found.result.first_cost > 1e3 * found.result.cost
     for name, truth in made.TRUE.items():
         assert found[name].lower <= truth <= found[name].upper, found[name]

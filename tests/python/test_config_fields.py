@@ -34,6 +34,7 @@ WHOLE: dict[str, Any] = {
                 "law": {"kind": "exponential", "warp": 10.0, "weft": 10.0, "shear": 5.0},
                 "set": [{"name": "clips", "points": [[0, 0, 0]]}],
                 "grip": [{"set": "left", "markers": ["m0"]}],
+                "grid": {"first": [0, 0], "last": [0.1, 0.1], "counts": [2, 2]},
             }
         ],
         "particles": [{"name": "a", "positions": [[0, 0, 0]]}],
@@ -43,11 +44,19 @@ WHOLE: dict[str, Any] = {
         "point_mass": [{"name": "p", "particle": "a", "mass": 1.0}],
         "force": [{"particles": ["a"], "force": [0, 0, 1]}],
         "wind": {"velocity": [1, 0, 0]},
+        "tool": [{"name": "t"}],
         "drive": [{"particles": ["a"], "markers": ["m0"]}],
         "quantities": {"NAME": {}},
     },
     "marker": [{"marker": "m0", "particle": "a"}],
-    "recording": [{"file": "r.npz", "marker": [{"marker": "m0", "particle": "a"}]}],
+    "recording": [
+        {
+            "file": "r.npz",
+            "marker": [{"marker": "m0", "particle": "a"}],
+            "grids": {"NAME": {"first": [0, 0], "last": [0.1, 0.1], "counts": [2, 2]}},
+            "force": [{"file": "f.csv", "at": ["a"], "sigma": 0.1}],
+        }
+    ],
     "parameters": {"NAME": {}},
     "given": {"NAME": {"sd": 0.1}},
     "fit": {},

@@ -55,16 +55,17 @@ def off(e: sb.result.Estimate, truth: float) -> float:
 
 
 def test_a_coarse_substep_is_not_identified_stiffness():
-    """Measured at 1/960 and fitted at 1/240: the warp reads 20 % too stiff, more than its interval, until the estimate
-    is moved to the limit of short substeps."""
+    """Measured at 1/960 and fitted at 1/240: the warp reads 15 % too stiff, at the end of its interval, until the
+    estimate is moved to the limit of short substeps."""
     recording = recorded()
     plain = sb.fit(watched(recording), parameters=WANTED, profiles=False, refine=False)
-    assert off(plain["cloth_warp"], TRUE["warp"]) > 1 and plain["cloth_warp"].verdict == "identified"
+    assert plain["cloth_warp"].value > 1.15 * TRUE["warp"] and plain["cloth_warp"].verdict == "identified"
     assert "time step not counted" in plain.report()
     found = sb.fit(watched(recording), parameters=WANTED, profiles=False)
     for name in ("warp", "shear"):
         assert off(found[f"cloth_{name}"], TRUE[name]) < 1
     warp = found["cloth_warp"]
+    assert off(warp, TRUE["warp"]) < 0.5 * off(plain["cloth_warp"], TRUE["warp"])
     assert warp.value - warp.moved == approx(plain["cloth_warp"].value)
     assert warp.verdict == "identified" and warp.half_width < plain["cloth_warp"].half_width
     assert 0 < warp.discretization < 0.1 * abs(warp.moved)
@@ -151,8 +152,16 @@ def test_a_finer_mesh_is_counted_where_it_can_be_made_and_named_where_not(tmp_pa
     assert alone["rope_EI"].verdict == "identified" and off(alone["rope_EI"], 2e-3) > 2
     finer = sb.Refinement(finer=lambda: [replace(rope(20), recording=recording)], linear=True)
     found = sb.fit(coarse, parameters=wanted, profiles=False, refine=finer)
-    assert found.result.not_counted == () and found.values == alone.values
+    assert found.result.not_counted == () and dict(found.on_mesh) == alone.values
     assert all(off(found[name], truth) < 1 for name, truth in zip(wanted, (2e-3, 0.02, 0.01), strict=True))
+    EI, before = found["rope_EI"], alone["rope_EI"]
+    assert EI.value - EI.moved == approx(before.value - before.moved) and EI.verdict == "identified"
+    assert abs(EI.value - 2e-3) < 0.1 * abs(before.value - 2e-3) and EI.half_width < 4 * before.half_width
+    found.save(tmp_path / "fit.json")
+    assert sb.FitResult.load(tmp_path / "fit.json") == found.result
+    assert "and of fine meshes" in found.report()
+    step = found.result.refits[-1]
+    assert step.name == "finer mesh" and 0 < step.left["rope_EI"] < 0.3 * abs(step.to_limit * step.moved["rope_EI"])
 
 
 def test_a_sheet_on_a_mesh_three_times_too_coarse_is_not_identified():
@@ -180,11 +189,13 @@ def test_a_refinement_that_has_no_answer_is_named_and_does_not_end_the_fit():
     recording = of_sixty_links()
     coarse = replace(rope(10, 3e-3), recording=recording)
     broken = replace(rope(20), recording=recording, solver=sb.Solver(h=1e-300))
-    for linear in (True, False):
-        refine = sb.Refinement(finer=lambda: [broken], linear=linear)
-        found = sb.fit(coarse, parameters=["rope_EI"], refine=refine)
+    ways = [sb.Refinement(finer=lambda: [broken], linear=linear) for linear in (True, False)]
+    with pytest.warns(sb.RedundantConstraintsWarning, match="no answer in double precision") as told:
+        fits = [sb.fit(coarse, parameters=["rope_EI"], refine=refine) for refine in ways]
+    for found in fits:
         (words,) = found.result.not_counted
         assert words.startswith("finer mesh not counted: ") and found.result.converged
+    assert not any("follows from" in str(w.message) for w in told)
 
 
 def test_what_refine_may_be():

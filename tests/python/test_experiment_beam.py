@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import importlib.util
+import sys
+import tomllib
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -65,3 +69,58 @@ def test_first_frequency_of_the_loaded_beam(fit: Fit) -> None:
 def test_nothing_of_the_material_is_fitted_to_the_loaded_run(fit: Fit) -> None:
     own = [given.name for given in fit.result.given if "[loaded]" in given.name]
     assert own == ["pull_z[loaded]"]
+
+
+@pytest.fixture(scope="module")
+def find() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("beam_find", BEAM.with_name("find.py"))
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses look their module up
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_recordings_numbers_are_found(find: ModuleType) -> None:
+    """Turning points within a fifth of a frame, offsets within 0.02 mm, frequencies within 2 % of those in the file."""
+    config, here, frequencies = find.of_config()
+    for section in config.recording:
+        one = here[section.name]
+        assert np.abs(one.offsets - [m.offset for m in section.marker]).max() < 2e-5
+        if section.start_time is not None:
+            assert one.turning[0] == pytest.approx(section.start_time, abs=2e-3)
+    assert here["fall"].released == pytest.approx(0.66, abs=0.02)
+    assert frequencies["fall"] == pytest.approx(config.scene.rope[0].loss_frequency, rel=0.02)
+    assert frequencies["loaded"] == pytest.approx(config.recording[-1].values["beam_loss_frequency"], rel=0.02)
+
+
+def test_a_fit_with_what_was_found_is_the_same(find: ModuleType, fit: Fit) -> None:
+    study = find.build(find.with_found(*find.of_config()), BEAM.parent)
+    other = sb.fit(study.experiments, parameters=study.parameters, profiles=False)
+    assert other["beam_EI"].value == pytest.approx(fit["beam_EI"].value, rel=2e-3)
+    assert row(other, "loaded").held_out == pytest.approx(row(fit, "loaded").held_out, rel=0.02)
+
+
+def test_turning_points_of_a_damped_fall(find: ModuleType) -> None:
+    """A fall from rest at 0.113 s: lows and highs half a period apart, none missed and none made up by noise."""
+    t = np.arange(0.0, 2.0, 0.01)
+    after = np.maximum(t - 0.113, 0.0)
+    z = 6e-3 * (np.exp(-1.5 * after) * np.cos(2 * np.pi * 4.3 * after) - 1.0)
+    z += 5e-6 * np.random.default_rng(4).standard_normal(len(t))
+    turns = find.turning_points(t, z)
+    late = np.arctan(1.5 / (2 * np.pi * 4.3)) / (
+        2 * np.pi * 4.3
+    )  # damping makes every turn come before the half period
+    expected = 0.113 + np.arange(1, len(turns) + 1) / 8.6 - late
+    assert len(turns) > 8
+    assert turns[:6] == pytest.approx(expected[:6], abs=1.5e-3)
+
+
+def test_lines_for_a_new_recording(find: ModuleType) -> None:
+    config, here, frequencies = find.of_config()
+    rope = config.scene.rope[0]
+    text = find.lines("new", here["loaded"], frequencies["fall"], rope.density * rope.length, 0.052)
+    section = tomllib.loads(text)["recording"][0]
+    assert section["start_time"] == pytest.approx(0.563, abs=1e-3)
+    assert section["values"]["beam_loss_frequency"] == pytest.approx(4.26, abs=0.05)
+    assert [len(m["offset"]) for m in section["marker"]] == [3, 3, 3]

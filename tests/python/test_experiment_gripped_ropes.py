@@ -7,11 +7,13 @@ import json
 import pickle
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
+import sheetbend as sb
 from sheetbend.grip import Grip
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "gripped_ropes"
@@ -24,7 +26,7 @@ def script() -> Iterator[ModuleType]:
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(FOLDER))
         yield importlib.import_module("make_data")
-        for name in ("make_data", "grip_motion", "true_ropes"):
+        for name in ("make_data", "grip_motion", "spoil", "true_ropes"):
             del sys.modules[name]
 
 
@@ -117,3 +119,58 @@ def test_without_twist_the_recording_is_missed(script: ModuleType, clean: Path) 
 def test_with_noise_the_true_values_miss_by_about_the_noise(script: ModuleType, noisy: Path) -> None:
     error = np.abs(from_files(script, noisy, "train") - positions(noisy, "train")[:, 2:-2])
     assert 0.6 * script.NOISE < error.mean() < 3.0 * script.NOISE
+
+
+@pytest.fixture(scope="module")
+def folder(script: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of a rope with everything that the clean ones leave out, in short recordings."""
+    folder = tmp_path_factory.mktemp("nasty")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(script, "SEGMENTS", 40)
+        patch.setattr(script, "H", 1 / 800)
+        patch.setattr(script, "CREEP", ((1 / 100, 10.0),))
+        script.main(folder, train=4, evaluation=1, count=1, seconds=0.5, seed=7, nasty=True)
+    return folder
+
+
+class TestNasty:
+    def test_its_pickles_are_lists_of_numbers_and_are_read(self, folder: Path) -> None:
+        path = folder / "rope_1" / "eval" / "00.pkl"
+        frames = pickle.loads(path.read_bytes())
+        assert {type(part) for part in (frames, frames[0], frames[0][0])} == {list} and type(frames[0][0][0]) is float
+        assert (len(frames), len(frames[0]), len(frames[0][0])) == (50, 3, 13)
+        assert np.array_equal(sb.Recording.load(path).positions, np.array(frames).transpose(0, 2, 1))
+
+    def test_the_last_grip_is_exchanged_in_two_files(self, folder: Path) -> None:
+        told = truth(folder)
+        assert told["spoiled"] == {"02": "exchanged_midway", "03": "exchanged"}
+        away = []
+        for k in range(4):
+            x = sb.Recording.load(folder / "rope_1" / "train" / f"{k:02d}.pkl").positions
+            away.append(((x[:, -1] - x[:, -2]) * (x[:, -2] - x[:, -3])).sum(axis=1) < 0.0)
+        assert not away[0].any() and not away[1].any() and away[3].all()
+        assert np.flatnonzero(away[2])[0] == round(0.858 * 50) and away[2][round(0.858 * 50) :].all()
+
+    def test_the_true_values_miss_the_unseen_recording_by_little_more_than_the_noise(
+        self, script: ModuleType, folder: Path
+    ) -> None:
+        told = truth(folder)
+        (missed,) = told["missed_by_true_values"]
+        assert 0.5 * script.NOISE < missed < 3.0 * script.NOISE
+        names = set(told["true"])
+        assert {f"curvature_{axis}_{k}" for axis in (1, 2) for k in range(9)} <= names
+        assert {f"softness_{k}" for k in range(1, 7)} <= names and {"yield_curvature", "yield_share"} <= names
+        gaps = np.diff(told["marker_places"])
+        assert gaps.max() > 1.2 * gaps.min() and told["marker_mass"] > 0.0
+
+    def test_a_marker_weighs_what_the_file_says(self, script: ModuleType) -> None:
+        rope = script.ropes(7, nasty=True)[0]
+        heavy, light = (self.masses(script, r) for r in (rope, replace(rope, marker_mass=0.0)))
+        assert heavy.sum() - light.sum() == pytest.approx(9 * rope.marker_mass, rel=1e-9)
+
+    def masses(self, script: ModuleType, rope: object) -> Array:
+        start, end = (Grip.fixed(place, nominal) for place, nominal in zip(self.ENDS, script.NOMINAL, strict=True))
+        compiled = script.scene(rope, start, end, 40).compiled
+        return compiled.unpack(compiled.inputs())["mass"]
+
+    ENDS = ((0.0, 0.0, 0.0), (0.6, 0.0, 0.0))

@@ -12,6 +12,8 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 
+pytestmark = pytest.mark.slow
+
 GARTER = {"knit_warp": 5.61, "knit_weft": 2.52, "knit_poisson": 0.332}  # of the README, exponential law
 BEYOND = {"x": 23.5, "y": 14.2}  # % of the force beyond 60 % of the range, of the README
 CARRIED_ON = {"weighted": {"x": 16.0, "y": 8.6}, "sinh": {"x": 12.2, "y": 9.8}}  # the same of the weighted fits
@@ -35,7 +37,7 @@ def pulled() -> SimpleNamespace:
 
 @pytest.fixture(scope="module")
 def stretched() -> SimpleNamespace:
-    return scripts_of("knit_dic", "dic", "study")
+    return scripts_of("knit_dic", "dic", "study", "uneven")
 
 
 @pytest.fixture(scope="module")
@@ -155,6 +157,48 @@ def test_unseen_stills_are_a_third_nearer_than_harmonic(stretched, ratios):
     for still in (17, 24):
         plain = study.gap(study.inside(stretched.dic.harmonic(still)), still)
         assert study.gap(study.predicted(still, ratios.values), still) < 2 / 3 * plain
+
+
+def test_the_sheet_settles_beside_its_clamps_first(stretched):
+    """At 0.7 % of mean strain the rows at the clamps carry nearly all of it; at 26 % all carry about the same."""
+    top, middle, bottom = stretched.uneven.settling(3)
+    assert min(top, bottom) > 10 * abs(middle)
+    late = np.array(stretched.uneven.settling(16))
+    assert late.max() < 1.3 * late.min()
+
+
+def test_a_settled_shape_at_rest_foresees_twice_as_well(stretched):
+    """Two stills; the README has the table of five."""
+    uneven = stretched.uneven
+    found = {}
+    for rest in (1, uneven.SETTLED):
+        model = uneven.Model(rest=rest)
+        fit = model.fitted((10, 16))
+        found[rest] = stretched.study.gap(model.predicted(24, fit.values), 24)
+    assert found[uneven.SETTLED] < 0.7 * found[1]
+
+
+def test_a_field_of_stiffness_makes_one_side_stretch_less(stretched):
+    """Stiffer at the left by e^0.2 and softer at the right: the middle row turns, and a zero field changes nothing."""
+    uneven, dic = stretched.uneven, stretched.dic
+    model = uneven.Model(along=1)
+    plain = dic.experiment(16, model.law)
+    e = dic.experiment(16, model.law, change=model.change(16))
+    rest = sb.equilibrium(plain.scene).positions
+    assert sb.equilibrium(e.scene).positions == approx(rest, abs=1e-12)
+    stiffer_below = sb.equilibrium(e.scene, values={"field_1_0": 0.2}).positions
+    inner = np.abs(stiffer_below - rest).max(axis=1) > 1e-9
+    assert (stiffer_below - rest)[inner, 1].mean() < -1e-3  # the lower half stretches less, so what is between sinks
+
+
+def test_slip_moves_the_held_rows(stretched):
+    uneven, dic = stretched.uneven, stretched.dic
+    model = uneven.Model(slip=True)
+    e = dic.experiment(16, model.law, change=model.change(16))
+    free = sb.equilibrium(e.scene).positions
+    held = sb.equilibrium(e.scene, values={"slip_top": 0.1}).positions
+    moved = held[:, 1] - free[:, 1]
+    assert moved.min() == approx(-0.1 * stretched.study.stretch(16) * dic.HEIGHT, rel=1e-6)
 
 
 def test_harmonic_keeps_the_driven_rows_and_is_linear_in_them(stretched):

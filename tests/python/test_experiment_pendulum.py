@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,47 +23,103 @@ def study(name: str) -> Study:
     return build(parse(path), path.parent)
 
 
+def edited(name: str, folder: Path, *edits: tuple[str, str]) -> Study:
+    """The study with parts of its configuration exchanged."""
+    text = (EXPERIMENTS / name / f"{name}.toml").read_text()
+    for before, after in edits:
+        assert text.count(before) == 1, before
+        text = text.replace(before, after)
+    (folder / "edited.toml").write_text(text)
+    return build(parse(folder / "edited.toml"), EXPERIMENTS / name)
+
+
+def fitted(s: Study, **options: Any) -> sb.Fit:
+    return sb.fit(s.experiments, parameters=s.parameters, **s.options | options)
+
+
 @pytest.fixture(scope="module")
 def single() -> sb.Fit:
-    s = study("pendulum")
-    return sb.fit(s.experiments, parameters=s.parameters, **s.options)
+    return fitted(study("pendulum"))
 
 
-def test_unseen_pieces_of_5_s_are_predicted_from_their_first_samples(single: sb.Fit) -> None:
-    pieces = [r for r in single.result.recordings if r.rows == 0]
+@pytest.fixture(scope="module")
+def last_third(tmp_path_factory: pytest.TempPathFactory) -> sb.Fit:
+    """The same fit to the last third of the recording; nothing is predicted."""
+    windows = {
+        "fit = [0.0, 3.0]": "fit = [24.6, 27.6]",
+        "values = { arm_angle = 1.6, arm_rate = -2.1 }": "values = { arm_angle = -0.4, arm_rate = 5.4 }",
+        "fit = [3.0, 6.0]": "fit = [27.6, 30.6]",
+        "values = { arm_angle = -0.2, arm_rate = -10.7 }": "values = { arm_angle = -0.5, arm_rate = -4.4 }",
+        "fit = [6.0, 9.0]": "fit = [30.6, 33.6]",
+        "values = { arm_angle = -1.0, arm_rate = 6.3 }": "values = { arm_angle = 0.6, arm_rate = -2.0 }",
+        "fit = [9.0, 12.0]": "fit = [33.6, 36.6]",
+        "values = { arm_angle = 1.2, arm_rate = -2.3 }": "values = { arm_angle = 0.1, arm_rate = 4.7 }",
+    }
+    found = edited("pendulum", tmp_path_factory.mktemp("last"), *windows.items())
+    return fitted(replace(found, experiments=found.experiments[:4]))
+
+
+def test_unseen_pieces_are_predicted_from_their_first_samples(single: sb.Fit) -> None:
+    pieces = {r.name: r for r in single.result.recordings if r.rows == 0}
     held = [e.held_out for e in study("pendulum").experiments if e.predict]
-    assert len(pieces) == 6 and all(5.0 - (stop - start) < 0.11 for start, stop in held)
-    assert all(r.unit == "rad" and r.held_out < 0.015 for r in pieces), [(r.name, r.held_out) for r in pieces]
+    assert [round(stop - start) for start, stop in held] == [5, 5, 5, 9]
+    assert all(r.unit == "rad" and r.held_out < 0.01 for r in pieces.values()), pieces
+    assert pieces["last_9s"].held_out < 0.005
+
+
+def test_friction_of_the_first_and_of_the_last_third_agree_or_are_doubted(single: sb.Fit, last_third: sb.Fit) -> None:
+    """The bearing's friction wanders by a tenth; intervals that miss each other do not go unmarked."""
+    for name in ("arm_friction", "arm_drag"):
+        one, other = single[name], last_third[name]
+        assert other.value == pytest.approx(one.value, rel=0.17)
+        meet = max(one.lower, other.lower) < min(one.upper, other.upper)
+        assert meet or "doubtful" in (one.verdict, other.verdict), (str(one), str(other))
+
+
+def test_viscosity_alone_misses_what_dry_friction_and_drag_predict(single: sb.Fit, tmp_path: Path) -> None:
+    edits = (
+        ("friction = 5e-4\ndrag = 1e-5", "viscosity = 1e-4"),
+        ("[parameters.arm_friction]\n\n[parameters.arm_drag]", "[parameters.arm_hinge_viscosity]"),
+    )
+    found = edited("pendulum", tmp_path, *edits)
+    viscous = fitted(replace(found, experiments=(*found.experiments[:4], found.experiments[5])), refine=None)
+    for name, part in (("fitted_0s", "rms"), ("from_17_5s", "held_out")):
+        ours, theirs = (next(r for r in f.result.recordings if r.name == name) for f in (single, viscous))
+        assert getattr(theirs, part) > 1.5 * getattr(ours, part), (name, theirs, ours)
 
 
 def test_the_reported_angles_are_angles(single: sb.Fit) -> None:
-    piece = next(c for c in single.comparisons if c.experiment.name == "from_20s")
+    piece = next(c for c in single.comparisons if c.experiment.name == "from_17_5s")
     measured, simulated = (
         np.arctan2(x[piece.held_out, 0, 0], -x[piece.held_out, 0, 2])
         for x in (piece.recording.positions, piece.simulated)
     )
-    assert next(r for r in single.result.recordings if r.name == "from_20s").held_out == pytest.approx(
+    assert next(r for r in single.result.recordings if r.name == "from_17_5s").held_out == pytest.approx(
         np.sqrt(np.mean((measured - simulated) ** 2)), rel=1e-3
     )
 
 
-def test_only_the_ratio_of_friction_and_mass_is_known(single: sb.Fit) -> None:
+def test_only_ratios_to_the_mass_are_known(single: sb.Fit, tmp_path: Path) -> None:
     assert single["arm_length"].verdict == "identified"
     assert single["arm_length"].value == pytest.approx(AUTHORS_LENGTH, rel=5e-3)
-    assert {single[f"arm_{q}"].verdict for q in ("mass", "hinge_viscosity")} == {"not identifiable"}
-    (gauge,) = single.result.gauges
-    assert "only the ratio arm_hinge_viscosity/arm_mass is known: " in gauge
-    ratio = single.values["arm_hinge_viscosity"] / single.values["arm_mass"]
-    value, half = (float(word) for word in gauge.rpartition(": ")[2].split(" +/- "))
-    assert value == pytest.approx(ratio, rel=1e-3) and 0 < half < 0.02 * value
-    assert "only the ratio arm_hinge_viscosity/arm_mass is known" in " ".join(single.report().split())
+    free = ("[parameters.arm_friction]", "[parameters.arm_mass]\n\n[parameters.arm_friction]")
+    s = edited("pendulum", tmp_path, free)
+    found = fitted(replace(s, experiments=s.experiments[:4]), refine=None)
+    assert {found[f"arm_{q}"].verdict for q in ("mass", "friction", "drag")} == {"not identifiable"}
+    (gauge,) = found.result.gauges
+    for torque in ("friction", "drag"):
+        ratio = found.values[f"arm_{torque}"] / found.values["arm_mass"]
+        assert ratio == pytest.approx(single.values[f"arm_{torque}"] / 0.14274, rel=1e-3)
+        assert f"arm_{torque}" in gauge
+    assert "arm_mass" in gauge
 
 
 def test_double_pendulum_knows_ratios_only() -> None:
     s = study("double_pendulum")
     short = [replace(e, fit=(e.fit[0], e.fit[0] + 0.6)) for e in s.experiments if e.predict is None]
     private = {name: given for name, given in s.parameters.items() if given.get("private")}
-    body = [f"{arm}_{q}" for arm in ("upper", "lower") for q in ("mass", "first_moment", "inertia", "hinge_viscosity")]
+    body = [f"{arm}_{q}" for arm in ("upper", "lower") for q in ("mass", "first_moment", "inertia", "friction")]
+    body.append("lower_drag")
     problem = FitProblem(short, as_parameters(dict.fromkeys(body) | private, short))
     names = problem.parameters.free
     _, _, jacobian = problem.evaluate(problem.parameters.initial())
@@ -81,8 +138,7 @@ def test_double_pendulum_knows_ratios_only() -> None:
 def test_double_pendulum_is_predicted_over_2_s() -> None:
     s = study("double_pendulum")
     chosen = [e for e in s.experiments if e.name in ("fitted_17s", "fitted_36s", "from_20s", "from_40s")]
-    fixed = s.parameters | {"lower_hinge_viscosity": {"fixed": True, "initial": 1e-5}}
-    found = sb.fit(chosen, parameters=fixed, threads=2)
+    found = sb.fit(chosen, parameters=s.parameters, threads=2)
     pieces = [r for r in found.result.recordings if r.rows == 0]
     assert [r.name for r in pieces] == ["from_20s", "from_40s"]
     assert all(r.held_out < 0.02 * r.baseline for r in pieces)

@@ -16,6 +16,8 @@ from sheetbend.config.build import Study
 from sheetbend.config.values import with_values
 from sheetbend.problem import FitProblem, as_parameters
 
+pytestmark = pytest.mark.slow
+
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "twin_cloth"
 SCRIPT = runpy.run_path(str(FOLDER / "make_data.py"))
 PORTABILITY = runpy.run_path(str(FOLDER / "portability.py"))

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from pytest import approx
 
+pytestmark = pytest.mark.slow
+
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "wires"
 EI_ALONE = {"white": (7.93e-5, 1.002), "black": (8.94e-4, 1.616), "red": (6.83e-4, 1.802)}  # of the README: EI, GJ/EI
 

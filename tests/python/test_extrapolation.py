@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from pytest import approx
+from sheetbend.arm import add_pendulum
 from sheetbend.extrapolation import weights
 from sheetbend.problem import FitProblem, as_parameters
 
@@ -151,7 +152,9 @@ def test_a_fit_sees_the_combination_of_its_markers(loss):
 
 def test_what_is_not_smooth_is_refused():
     yielding = sb.rod(0.3, 6, density=0.05, EI=1e-3, GJ=1e-3, yield_curvature=3.0, yield_share=0.5)
-    for scene, cause in ((yielding, "yield"), (driven(60, "linear"), "linear knots")):
+    sliding = sb.Scene("pendulum")
+    add_pendulum(sliding, length=0.2, mass=0.1, angle=1.0, friction=1e-3)
+    for scene, cause in ((yielding, "yield"), (sliding, "dry friction"), (driven(60, "linear"), "linear knots")):
         with pytest.raises(sb.InputError, match=cause):
             sb.simulate(scene, FRAMES, sb.Solver(h=1 / 240, extrapolate=2))
         assert np.isfinite(sb.simulate(scene, FRAMES, sb.Solver(h=1 / 240)).positions).all()

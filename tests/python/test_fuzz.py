@@ -24,6 +24,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reader", CASES)
 def test_no_mutated_file_does_harm(tmp_path: Path, reader: str) -> None:
     if reader == "mesh":

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.gripped import GrippedMotion, RopeModel
+from sheetbend.gripped.judging import predict
 from sheetbend.gripped.model import nominal_directions, shared_gravity
 from sheetbend.gripped.motion import smoothed
-from sheetbend.gripped.recipe import _experiments, _Search, predict
+from sheetbend.gripped.pieces import experiments_of
 
 TIMES = np.arange(101) / 100.0
 LENGTH, SPAN, GRIP = 0.9, 0.6, 0.03  # m between the grips: arc, chord; and in each grip
@@ -139,7 +140,7 @@ class TestMotion:
         positions[45:56, 2:7] = np.nan
         motion = GrippedMotion.of(carried_about(positions=positions), 0.08)
         assert not motion.shown(50)
-        starts = [e.start_time for e in _experiments(model_of(motion), [motion], (0.25, 5.0))]
+        starts = [e.start_time for e in experiments_of(model_of(motion), [motion], (0.25, 5.0))]
         assert starts == pytest.approx([0.0, 0.25, 0.75])
 
     def test_a_recording_that_starts_with_few_markers_is_refused_with_a_time_to_start_from(self) -> None:
@@ -245,20 +246,3 @@ class TestModel:
         lost = GrippedMotion.of(carried_about(positions=positions), 0.08)
         expected, found = (predict(model_of(whole), [motion], {})[0] for motion in (whole, lost))
         np.testing.assert_allclose(found, expected, atol=1e-4)
-
-
-@pytest.mark.parametrize(
-    ("fitted", "others", "stays"),
-    [(0.9, 0.9, True), (1.0, 0.9, True), (0.9, 0.995, False), (1.01, 0.9, False)],
-    ids=["better", "better on others", "hardly better", "worse where it was fitted"],
-)
-def test_a_rung_stays_only_where_it_predicts_others_better(
-    fitted: float, others: float, stays: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    motions = [GrippedMotion.of(carried_about(), 0.0) for _ in range(2)]
-    search = _Search(motions, 0.5, [(0.5, 0.5)], {}, 1, print)
-    errors = iter([1.0, 1.0, fitted, others])
-    monkeypatch.setattr(search, "_error", lambda *_: next(errors))
-    first = search._step("first", model_of(motions[0]), {}, [], 0.0)
-    assert first.stays
-    assert search._step("second", model_of(motions[0]), {}, [first], 0.0).stays == stays

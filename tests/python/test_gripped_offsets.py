@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 from sheetbend.gripped import GrippedMotion
+from sheetbend.gripped.judging import predict
 from sheetbend.gripped.offsets import offset_reach
-from sheetbend.gripped.recipe import predict
 from sheetbend.optimizers import minimize
 from sheetbend.parameters import Parameter, Parameters
 from sheetbend.problem import FitProblem

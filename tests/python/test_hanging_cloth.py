@@ -128,6 +128,7 @@ def held_apart(share: float) -> tuple[sb.Scene, np.ndarray]:
     return built, flat + np.outer(0.01 * np.sin(np.pi * u / 0.5) * (1 - v / 0.4), [0.0, 1.0, 0.0])
 
 
+@pytest.mark.slow
 def test_a_bent_start_rests_where_a_flat_one_is_told_to_bend() -> None:
     built, bent = held_apart(0.96)
     rest = sb.equilibrium(built, bent)

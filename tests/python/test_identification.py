@@ -124,6 +124,7 @@ def test_what_a_model_misses_stands_above_the_table(sigma):
 # --- noise
 
 
+@pytest.mark.slow
 def test_intervals_mean_what_they_say():
     """Over seeds: the estimates scatter as sigma^2 (J'J)^-1 says, and 95 % intervals hold the truth 92 to 98 times of
     100."""

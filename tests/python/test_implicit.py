@@ -122,6 +122,7 @@ def damped(stiffening: float = 5.0) -> sb.Scene:
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["bdf1", "bdf2"])
 def test_gradients_are_the_program_s(integrator: str) -> None:
     report = sb.check_gradients(damped(), steps(1 / 60, 4), replace(IMPLICIT, integrator=integrator), samples=2)

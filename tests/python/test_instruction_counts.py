@@ -54,6 +54,6 @@ def test_every_kind_is_recorded() -> None:
         f"{kind}{damped} {what}" for kind in sb.KINDS for damped in ("", " damped") for what in ("forward", "gradient")
     }
     for sets in json.loads((FOLDER / "expected.json").read_text()).values():
-        assert set(sets) == {"x86-64-v2", "x86-64-v3"}
+        assert set(sets) == {"x86-64-v3"}
         for counts in sets.values():
             assert set(counts) == wanted

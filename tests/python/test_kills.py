@@ -12,6 +12,7 @@ from sheetbend.optimizers import has_ceres
 TOOLS = Path(__file__).resolve().parents[2] / "tools"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["ceres", "scipy", "profiles", "gripped"])
 def test_killed_fits_end_at_the_same_bits(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(TOOLS))

@@ -106,6 +106,7 @@ def test_torch_keeps_to_the_budget(solver: sb.Solver) -> None:
     assert stored is not None and torch.allclose(stored, gradients(None, 1)[1] * 1e-5, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_second_derivatives_keep_to_the_budget() -> None:
     torch = pytest.importorskip("torch")
     import sheetbend.torch as st
@@ -250,6 +251,7 @@ print(budget, plan.total, plan.recomputed, now("VmHWM") - before)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="only Linux resets the high-water mark")
 @pytest.mark.parametrize(
     ("share", "integrator", "path"),

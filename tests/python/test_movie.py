@@ -67,6 +67,7 @@ def sheet(count: int) -> Motion:
     return Motion(scene, np.linspace(0.0, 1.0, count), x * widths)
 
 
+@pytest.mark.slow
 def test_a_cloth_darkens_as_it_is_strained(tmp_path: Path) -> None:
     count = save_movie(sheet(11), tmp_path / "sheet.gif", "sheet")
     pictures = frames(tmp_path / "sheet.gif")
@@ -75,6 +76,7 @@ def test_a_cloth_darkens_as_it_is_strained(tmp_path: Path) -> None:
     assert dark[-1] > 4 * dark[0]
 
 
+@pytest.mark.slow
 def test_a_long_motion_keeps_its_time_in_fewer_frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(movie, "MOST_FRAMES", 12)
     motion = sheet(1001)
@@ -85,6 +87,7 @@ def test_a_long_motion_keeps_its_time_in_fewer_frames(tmp_path: Path, monkeypatc
         assert gif.info["duration"] * (count - 1) == pytest.approx(10_000, rel=0.05)
 
 
+@pytest.mark.slow
 def test_measured_markers_and_where_they_should_be(tmp_path: Path) -> None:
     motion = sheet(3)
     x = motion.positions[:, [0, 12, 24]]

@@ -86,6 +86,7 @@ def test_a_looser_tolerance_ends_elsewhere() -> None:
     assert 1e-9 < np.abs(rough - exact).max() < 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cells", [(6, 8), (24, 33), (48, 66)])
 def test_iterations_do_not_grow_with_the_mesh(cells: tuple[int, int]) -> None:
     """With 3 x 3 blocks for a preconditioner they grew like the mesh's width, to 458 for 1,426 vertices."""

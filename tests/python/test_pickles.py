@@ -55,8 +55,21 @@ def test_a_list_of_frames_is_read(tmp_path: Path, protocol: int) -> None:
         tuple(FRAMES),
         [np.asfortranarray(frame) for frame in FRAMES],
         [frame.astype(">f8") for frame in FRAMES],
+        np.stack(FRAMES).tolist(),
+        [[list(row) for row in frame] for frame in FRAMES],
+        [tuple(map(tuple, frame.tolist())) for frame in FRAMES],
     ],
-    ids=["array", "view", "columns first", "tuple", "frames by columns", "big-endian"],
+    ids=[
+        "array",
+        "view",
+        "columns first",
+        "tuple",
+        "frames by columns",
+        "big-endian",
+        "lists of floats",
+        "lists of NumPy floats",
+        "tuples of floats",
+    ],
 )
 def test_every_form_of_the_same_numbers_is_read(tmp_path: Path, content: object, protocol: int) -> None:
     assert np.array_equal(Recording.load(stored(tmp_path, content, protocol)).positions, POSITIONS)
@@ -306,6 +319,22 @@ def lost(marker: int) -> list[np.ndarray]:
 def test_another_shape_is_refused(tmp_path: Path, content: object, words: str) -> None:
     with pytest.raises(RecordingError, match=words):
         Recording.load(stored(tmp_path, content))
+
+
+@pytest.mark.parametrize("form", [np.asarray, np.ndarray.tolist, list], ids=["array", "lists", "list of arrays"])
+@pytest.mark.parametrize("axes", [(0, 2, 1), (1, 2, 0), (1, 0, 2), (2, 1, 0)])
+def test_another_order_of_axes_is_refused_with_what_puts_it_right(
+    tmp_path: Path, axes: tuple[int, ...], form: Callable[[np.ndarray], object]
+) -> None:
+    """A minute of frames (3, markers): the fix, done to the file's numbers, is read."""
+    right = RNG.normal(size=(600, 3, 12))
+    wrong = np.ascontiguousarray(right.transpose(axes))
+    with pytest.raises(RecordingError) as caught:
+        Recording.load(stored(tmp_path, form(wrong)))
+    told = caught.value.fix.partition("numpy.transpose(x, (")[2].partition(")")[0]
+    put_right = wrong.transpose([int(k) for k in told.split(",")])
+    np.testing.assert_array_equal(put_right, right)
+    assert Recording.load(stored(tmp_path, form(np.ascontiguousarray(put_right)))).positions.shape == (600, 12, 3)
 
 
 def beside(path: Path, **content: object) -> Path:

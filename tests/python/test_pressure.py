@@ -36,6 +36,7 @@ def inflated(subdivisions: int) -> tuple[float, float]:
     return float(radii.mean()), by["cloth_pressure"]
 
 
+@pytest.mark.slow
 def test_balloon_finds_its_radius():
     """O-35: p = 2 sigma/R of a St. Venant-Kirchhoff membrane, and its derivative; spheres of triangles get there with
     the square of their edges, a fourth per subdivision."""
@@ -74,6 +75,7 @@ def test_a_loose_sheet_is_pushed_along_its_normal():
     assert np.ptp(z) < 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["newton", "newton_cg", "gauss_seidel"])
 def test_gradients(method):
     scene = balloon(1)

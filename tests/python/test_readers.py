@@ -54,6 +54,7 @@ def assert_same(one: Recording, other: Recording) -> None:
     assert one.gravity is None or np.array_equal(one.gravity, other.gravity)
 
 
+@pytest.mark.slow
 @in_one_folder
 @given(recording=recordings(), suffix=st.sampled_from([".npz", ".csv", ".CSV", ".NPZ"]))
 def test_saving_and_loading_give_the_same_bits(tmp_path: Path, recording: Recording, suffix: str) -> None:

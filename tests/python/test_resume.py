@@ -25,6 +25,7 @@ from sheetbend.cli.app import app
 from sheetbend.optimizers import Progress, has_ceres
 from typer.testing import CliRunner, Result
 
+WRITTEN = {"fit.json", "report.txt", "report.html", "fitted.toml", "predicted_swing.npz", "predicted_swing.json"}
 ROPE = """\
 [experiment]
 name = "swing"
@@ -126,7 +127,7 @@ class TestResume:
         assert "goes on with" in resumed.stdout and " 0 evaluations" not in resumed.stdout
         whole = json.loads(Path("whole/fit.json").read_text())
         assert results() == {key: value for key, value in whole.items() if key not in TIMED}
-        assert {p.name for p in OUT.iterdir()} == {"fit.json", "report.txt", "fitted.toml"}
+        assert {p.name for p in OUT.iterdir()} == WRITTEN
 
     def test_after_ctrl_c_it_goes_on_to_the_end(self, config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         result = stopped(config, monkeypatch, KeyboardInterrupt())
@@ -186,6 +187,8 @@ class TestResume:
         (OUT / "journal.sqlite").mkdir(parents=True)
         found = run("fit", config, "--resume")
         assert found.exit_code == 2 and "cannot go on" in found.output
+        found = run("fit", config)
+        assert found.exit_code == 2 and "cannot be removed" in found.output
         (OUT / "journal.sqlite").rmdir()
         assert run("fit", config).exit_code == 0
 
@@ -318,7 +321,7 @@ class TestMissing:
         assert result.exit_code == 0, result.output
         words = result.stdout.index("no figures will be drawn: this needs matplotlib")
         assert words < result.stdout.index("iteration")
-        assert {p.name for p in OUT.iterdir()} == {"fit.json", "report.txt", "fitted.toml"}
+        assert {p.name for p in OUT.iterdir()} == WRITTEN
 
     def test_without_scipy_nothing_is_evaluated(self, config: Path) -> None:
         code = """

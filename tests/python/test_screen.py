@@ -81,7 +81,7 @@ def test_a_defect_keeps_the_json_line(config: Path, monkeypatch: pytest.MonkeyPa
     def broken(*arguments: object) -> None:
         raise ZeroDivisionError("of ours")
 
-    monkeypatch.setattr(simulate, "_motion", broken)
+    monkeypatch.setattr(simulate, "motion_of", broken)
     result = run("simulate", config, "--json")
     assert result.exit_code == 1 and "of ours" in json.loads(result.stdout)["error"]["message"]
     assert "Traceback" in result.stderr

@@ -174,6 +174,7 @@ def test_a_rod_in_a_hand_is_found_from_100_times_off(rod, optimizer, far):
     assert found.ends[0].evaluations < 70
 
 
+@pytest.mark.slow
 def test_twelve_numbers_of_a_rod_need_no_bounds():
     """The draw of experiments/far_starts that took 200 iterations to nowhere when Ceres began at the start."""
     truth = hand_held.TWELVE

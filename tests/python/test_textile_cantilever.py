@@ -29,6 +29,7 @@ def test_the_error_falls_with_the_square_of_the_cell():
     assert coarse / fine == approx(4.0, rel=0.15)
 
 
+@pytest.mark.slow
 def test_the_rule_of_peirce_is_right_to_a_two_thousandth():
     fine, finer = (textile.cantilever(STIFF, cells=n).rigidity.value / STIFF.bending for n in (12, 24))
     assert finer + (finer - fine) / 3.0 == approx(8.004197 / 8.0, abs=5e-4)

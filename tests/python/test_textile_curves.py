@@ -178,6 +178,7 @@ def test_a_spline_from_pulls():
     assert max(abs(r.laboratory / m.value - 1) for r, m in zip(found.readings, found.measured, strict=True)) < 0.01
 
 
+@pytest.mark.slow
 def test_poisson_is_what_jaws_hide():
     """A wide specimen reads warp/(1 - poisson^2); told the number, the pull gives the warp."""
     coupled = replace(FABRIC, law=sb.Linear(), poisson=0.4)
@@ -187,6 +188,7 @@ def test_poisson_is_what_jaws_hide():
     assert 1.02 < alone / coupled.warp < 1 / (1 - 0.4**2)
 
 
+@pytest.mark.slow
 def test_the_scatter_of_specimens_is_in_the_interval():
     """Strains of 0.97, 1 and 1.03: whatever the number of loads, three specimens are three."""
     plain = replace(FABRIC, law=sb.Linear())

@@ -28,6 +28,7 @@ def followed(state: textile.DrapeState, fabric: sb.Fabric, rings: int = RINGS) -
     return textile.drape_state(sb.equilibrium(scene, start))
 
 
+@pytest.mark.slow
 def test_states_by_energy(woven):
     energies = [state.energy for state in woven.states]
     assert len(energies) >= 3
@@ -52,6 +53,7 @@ def test_the_limper_the_smaller_the_shadow(woven):
     assert seen == sorted(seen, reverse=True)
 
 
+@pytest.mark.slow
 def test_a_limp_cloth_hangs_from_the_plate():
     """Down to what a mesh of 11 rings can show: its held ring reaches 6.4 mm beyond the plates, 8.3 % of the ring."""
     seen = [
@@ -68,6 +70,7 @@ def test_shear_holds_the_cloth_up(woven):
     assert seen == sorted(seen)
 
 
+@pytest.mark.slow
 def test_the_mesh_moves_the_coefficient_by_less_than_two_percent(woven):
     state = next(state for state in woven.states if state.nodes == 4)
     coarse = followed(state, WOVEN, 11)

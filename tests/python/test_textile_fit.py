@@ -58,6 +58,7 @@ def product(**powers: float) -> Callable[[sb.Fabric], Reading]:
     return test
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth_for_nineteen_of_twenty_laboratories():
     tests = [product(warp=1.0), product(warp=0.5, weft=0.5), product(weft=-1.0, shear=0.3), product(shear=2.0)]
     noise = np.random.default_rng(3).standard_normal((400, len(tests)))
@@ -69,6 +70,7 @@ def test_intervals_hold_the_truth_for_nineteen_of_twenty_laboratories():
     assert 20 <= outside <= 75  # of 1200: 60 where no misfit widens them, fewer by what it does
 
 
+@pytest.mark.slow
 def test_a_pull_along_the_yarns_does_not_contain_shear():
     found = textile.fit_fabric([measured(pulled("warp"))], START, ["warp", "shear"])
     warp, shear = found.estimates
@@ -84,6 +86,7 @@ def test_numbers_that_share_one_reading_are_told_together():
     assert all("shear" in e.words and "warp" in e.words for e in found.estimates)
 
 
+@pytest.mark.slow
 def test_readings_that_contradict_widen_the_intervals():
     twice = [measured(pulled("warp"), off=off) for off in (-5.0, 5.0)]
     found = textile.fit_fabric(twice, START, ["warp"])
@@ -94,6 +97,7 @@ def test_readings_that_contradict_widen_the_intervals():
     assert "widened" in str(found) and "widened" not in str(alike)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "name", "other"),
     [

@@ -611,6 +611,7 @@ def backward():
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(importlib.util.find_spec("sheetbend._ceres") is None, reason="built without Ceres")
 @pytest.mark.parametrize("order", ["backward(); fit(); backward()", "fit(); backward(); fit()"])
 def test_torch_and_ceres_share_a_process(order: str) -> None:
@@ -661,3 +662,30 @@ class TestCloth:
             parts.append([p.grad for p in alone.parameters()])
         for p, *each in zip(module.parameters(), *parts, strict=True):
             torch.testing.assert_close(p.grad, sum(each), rtol=1e-12, atol=0.0)
+
+
+# --- forces at supports
+
+
+def test_forces_at_a_support_have_the_gradients_of_differences(scene):
+    rope = scene.ropes["rope"]
+    names = ("rope_EI", "rope_density", "rope_length")
+    at = [int(rope.particles[0])]
+
+    def read(*values: Tensor) -> Tensor:
+        return st.forces(scene, [0.04, 0.06], at, SOLVER, dict(zip(names, values, strict=True)), arm=(0.1, 0.0, 0.0))
+
+    start = [torch.tensor(scene.quantities[name].value, dtype=torch.float64, requires_grad=True) for name in names]
+    found = read(*start)
+    plain = sb.simulate_forces(scene, [0.04, 0.06], at, SOLVER, arm=(0.1, 0.0, 0.0))
+    assert torch.equal(found.detach(), torch.from_numpy(np.hstack([plain.forces, plain.torques])))
+    weights = torch.linspace(-1.0, 1.0, 12, dtype=torch.float64).reshape(2, 6)
+    (weights * found).sum().backward()
+    for k, value in enumerate(start):
+        step = 1e-3 * float(value.detach())
+        moved = []
+        for by in (2, 1, -1, -2):
+            at_k = [v.detach() + by * step * (i == k) for i, v in enumerate(start)]
+            moved.append(float((weights * read(*at_k)).sum()))
+        slope = (8 * (moved[1] - moved[2]) - (moved[0] - moved[3])) / (12 * step)
+        assert float(value.grad) == pytest.approx(slope, rel=1e-8)

@@ -117,6 +117,7 @@ def test_balloon_has_its_pressure():
     assert blown_up(2, iterations=40) == approx(blown_up(2), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_pressure_of_a_balloon_by_its_stiffness():
     """O-35: dp/dY = p/Y, read off the volume that a little compliance gives away; and dp/dV."""
     compliance = 1e-8

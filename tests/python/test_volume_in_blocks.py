@@ -104,6 +104,7 @@ def test_motions_end_at_rest():
     assert lengths[0] == approx(lengths[1], rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scene", "method"), [(ball(damping=1e-4), "newton"), *((bellows(), method) for method in METHODS)]
 )

@@ -8,6 +8,7 @@ import sys
 import textwrap
 from pathlib import Path
 
+import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.whole import UnwrittenError, write_text, written
@@ -113,3 +114,21 @@ def test_results_are_written_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     with pytest.raises(UnwrittenError, match="No space left on device"):
         result.save(path)
     assert path.read_text() == "earlier" and names(tmp_path) == ["fit.json"]
+
+
+@pytest.mark.parametrize("suffix", ["npz", "csv", "pkl"])
+def test_a_recording_that_cannot_be_written_keeps_the_earlier_one(
+    suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / f"motion.{suffix}"
+    recording = sb.Recording(positions=np.zeros((3, 12, 3)), times=np.arange(3) / 100, name="motion")
+    recording.save(path)
+    before = path.read_bytes()
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("sheetbend.whole._on_disk", full)
+    with pytest.raises(UnwrittenError, match="the earlier file is kept"):
+        recording.save(path)
+    assert path.read_bytes() == before and not [name for name in names(tmp_path) if name.startswith(".")]

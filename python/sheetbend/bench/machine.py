@@ -11,8 +11,7 @@ from .. import _core
 
 LEVELS = {
     "x86-64-v4": {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"},
-    "x86-64-v3": {"avx2", "bmi1", "bmi2", "fma"},
-    "x86-64-v2": {"sse4_2", "popcnt"},
+    "x86-64-v3": {"popcnt", "avx2", "bmi1", "bmi2", "fma"},
 }
 """Instruction sets that the kernels are compiled for, widest first, and the processor flags that each adds."""
 

@@ -12,6 +12,7 @@ from .fit import fit
 from .info import info
 from .simulate import simulate
 from .textile import textile
+from .view import view
 
 app = typer.Typer(
     name="sheetbend",
@@ -41,5 +42,5 @@ def options(
     """Simulate ropes, beams and cloth, and find their physical parameters from recordings, with error bars."""
 
 
-for command in (simulate, fit, check, info, textile, bench):
+for command in (simulate, fit, view, check, info, textile, bench):
     app.command()(command)

@@ -15,7 +15,9 @@ from ..config import GrippedConfig, Study, load, parse_any, scene_alone
 from ..experiment import Experiment
 from ..gradients import GradientReport, check_gradients
 from ..gripped.model import RopeModel, nominal_directions
+from ..gripped.over_density import UNIT
 from ..gripped.start import started, whole
+from ..gripped.windows import SPANS
 from ..growth import in_words, over_fit
 from ..jacobian_check import JacobianReport, check_jacobian
 from ..parameters import Parameters
@@ -104,7 +106,7 @@ def _started(rope: RopeData) -> tuple[Experiment, Parameters]:
         nominal_directions(rope.train) if s.nominal is None else tuple(unit_vector("nominal", d) for d in s.nominal)
     )
     model = RopeModel(
-        density=s.density,
+        density=UNIT if s.density is None else s.density,
         nominal=(nominal[0], nominal[1]),
         values={},
         segments=s.segments,
@@ -114,7 +116,9 @@ def _started(rope: RopeData) -> tuple[Experiment, Parameters]:
         gravity=(s.gravity[0], s.gravity[1], s.gravity[2]),
     )
     model = started(model, rope.train, s.bending_lengths[0])
-    return whole(model, [RUNGS[name] for name in s.rungs], rope.train[0], s.windows[0][0])
+    return whole(
+        model, [RUNGS[name] for name in s.rungs], rope.train[0], (SPANS if s.windows == "all" else s.windows)[0][0]
+    )
 
 
 def _stretch(solver: Solver) -> np.ndarray:

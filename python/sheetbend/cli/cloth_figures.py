@@ -62,7 +62,7 @@ def _state(c: Comparison, values: dict[str, float]) -> tuple[int, np.ndarray]:
     first = x[np.isfinite(x).any(axis=(1, 2)).argmax()]
     moved = np.nansum((x - first) ** 2, axis=(1, 2)) / np.maximum(np.isfinite(x).sum(axis=(1, 2)), 1)
     frame = int(moved.argmax())
-    time = round((c.recording.times[frame] - e.t0) / e.solver.h) * e.solver.h
+    time = round(float(e.scene_times(c.recording.times[frame], values)) / e.solver.h) * e.solver.h
     start = equilibrium(e.scene, values=values).positions if e.start == "equilibrium" else None
     return frame, simulate(e.scene, [0.0, max(time, 0.0)], e.solver, values, start).positions[-1]
 

@@ -14,6 +14,7 @@ from ..config import Config, GrippedConfig
 from ..equilibrium import equilibrium
 from ..experiment import Experiment
 from ..fit import Fit
+from ..force_plot import plot_forces
 from ..optional import require
 from ..prediction import Comparison
 from .cloth_figures import cloth_figures
@@ -54,6 +55,7 @@ def write_figures(found: Fit, config: Config, form: str, folder: Path) -> list[s
         name = c.experiment.name
         figures[f"{name}_markers"] = _trajectories(c)
         figures[f"{name}_residuals"] = _residuals(c)
+        figures |= {f"{name}_{one.sensor}": plot_forces(one) for one in c.forces}
     for c in found.comparisons:
         figures |= {f"{c.experiment.name}_{name}": figure for name, figure in cloth_figures(found, c).items()}
     published = _published(found, config)
@@ -73,6 +75,7 @@ def figure_files(experiments: Sequence[Experiment], config: Config) -> list[str]
     names = ["estimates", "shapes", "motions"]
     for e in experiments:
         names += [] if e.static else [f"{e.name}_markers", f"{e.name}_residuals"]
+        names += [f"{e.name}_{sensor.name}" for sensor in e.forces]
         names += [f"{e.name}_{cloth}" for cloth in e.scene.cloths]
     return [f"{name}.{form}" for name in names]
 

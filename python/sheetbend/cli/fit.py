@@ -29,6 +29,8 @@ from .gripped import fit_ropes, load_ropes, rope_files
 from .journals import journal_in, made_from
 from .movies import OPTION, MoviePath, check_before, write_movies
 from .outcome import Code, Outcome, code_of, run
+from .pages import PAGE, page_possible, write_fit_page
+from .predicted import predicted_files, save_predicted
 from .progress import Iterations
 from .screen import heading, show
 from .targets import check_targets
@@ -42,7 +44,8 @@ def fit(
     output: Annotated[
         Path | None,
         typer.Option(
-            help="Folder for fit.json, figures, report and fitted.toml; out/NAME when left out.", show_default=False
+            help="Folder for fit.json, report.html, report.txt, figures and fitted.toml; out/NAME when left out.",
+            show_default=False,
         ),
     ] = None,
     start: Annotated[
@@ -108,21 +111,21 @@ def _fit(
         check_targets(OPTION, movie.parent, movie_paths(movie, names).values())
     recordings = [e.recording for e in study.experiments]
     with _kept(console, study.config, recordings, place, resume) as (folder, journal):
-        outcome = _fit_study(console, study, folder, movie, strict)
+        outcome = _fit_study(console, study, path, folder, movie, strict)
         _end(console, journal, outcome)
         return outcome
 
 
-def _fit_study(console: Console, study: Study, folder: Path, movie: Path | None, strict: bool) -> Outcome:
+def _fit_study(console: Console, study: Study, source: Path, folder: Path, movie: Path | None, strict: bool) -> Outcome:
     config = study.config
     fitted = [e for e in study.experiments if e.predict is None]
     problem = FitProblem(fitted, as_parameters(study.parameters, study.experiments))
     _check_starts(config, problem)
-    form = figures_form(console, config)
+    form, page = figures_form(console, config), page_possible(console)
     with Iterations(console, problem.parameters) as progress:
         found = run_fit(study.experiments, parameters=study.parameters, progress=progress, **study.options)
     show(console, lambda: rich_report(found.result), lambda: plain(found.result))
-    files = _write(found, study, form, folder)
+    files = _write(found, study, source, form, page, folder)
     console.print(f"\nwritten to {folder}: {', '.join(files)}", soft_wrap=True)
     if movie is not None:
         movies = write_movies(found, movie)
@@ -138,7 +141,9 @@ def _place(config: Config | GrippedConfig, output: Path | None) -> Path:
 
 def _files(study: Study) -> list[str]:
     """What `_write` may leave behind."""
-    return ["fit.json", "report.txt", "fitted.toml", *figure_files(study.experiments, study.config)]
+    markers = predicted_files(e.name for e in study.experiments)
+    figures = figure_files(study.experiments, study.config)
+    return ["fit.json", "report.txt", PAGE, "fitted.toml", *markers, *figures]
 
 
 @contextmanager
@@ -204,9 +209,14 @@ def _check_starts(config: Config, problem: FitProblem) -> None:
                 )
 
 
-def _write(found: Fit, study: Study, form: str, folder: Path) -> list[str]:
+def _write(found: Fit, study: Study, source: Path, form: str, page: bool, folder: Path) -> list[str]:
     """Everything a fit leaves behind; names relative to the folder."""
     found.save(folder / "fit.json")
     write_text(folder / "report.txt", plain(found.result))
     write(with_values(study.config, found.values), folder / "fitted.toml", study.folder)
-    return ["fit.json", "report.txt", "fitted.toml", *write_figures(found, study.config, form, folder)]
+    pages = write_fit_page(found, study.config, source, folder) if page else []
+    markers = [
+        file for c in found.comparisons for file in save_predicted(c.recording, c.simulated, c.experiment.name, folder)
+    ]
+    figures = write_figures(found, study.config, form, folder)
+    return ["fit.json", "report.txt", *pages, "fitted.toml", *markers, *figures]

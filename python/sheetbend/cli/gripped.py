@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,21 +13,29 @@ from rich.console import Console
 from ..chain import unit_vector
 from ..config import GrippedConfig, GrippedRopeSection
 from ..errors import ConfigError, RecordingError, SceneError, SheetbendError
-from ..gripped import WITHOUT_TWIST, GrippedMotion, RopeFit, RopeReport, Rung, evaluate, fit_rope
-from ..gripped.ladder import REST, TILTS, TWIST, VARYING, YIELD
+from ..gripped import WITHOUT_TWIST, GrippedMotion, RopeFit, RopeReport, Rung, Screened, evaluate, fit_rope, screened
+from ..gripped.ladder import AND, MARKERS, REST, TILTS, TWIST, VARYING, YIELD
 from ..gripped.model import NAME
-from ..gripped.motion import motions_of
 from ..gripped.report import overview
 from ..io.folder import recordings
+from ..recording import Recording
 from ..recording_checks import marker_indices
 from ..tables import plain_section
 from ..whole import write_text
 from .figures import figures_form
 from .gripped_figure import write_figure
 from .outcome import Code, Outcome, code_of
+from .pages import PAGE, page_possible, write_rope_page
 from .screen import heading, show
 
-RUNGS: dict[str, Rung] = {"twist": TWIST, "tilts": TILTS, "rest": REST, "yield": YIELD, "varying": VARYING}
+RUNGS: dict[str, Rung] = {
+    "twist": TWIST,
+    "tilts": TILTS,
+    "rest": REST,
+    "varying": VARYING,
+    "yield": YIELD,
+    "markers": MARKERS,
+}
 
 
 @dataclass(frozen=True)
@@ -35,8 +43,8 @@ class RopeData:
     """A rope's section with its recordings, smoothed."""
 
     section: GrippedRopeSection
-    train: Sequence[GrippedMotion]
-    unseen: Sequence[GrippedMotion]
+    train: Screened
+    unseen: Screened
 
 
 def load_ropes(config: GrippedConfig, folder: Path) -> list[RopeData]:
@@ -47,24 +55,53 @@ def load_ropes(config: GrippedConfig, folder: Path) -> list[RopeData]:
     """
     ropes = []
     for i, section in enumerate(config.gripped_rope):
-        train = _load(section, f"gripped_rope[{i}].train", folder / section.train)
-        unseen = [] if section.eval is None else _load(section, f"gripped_rope[{i}].eval", folder / section.eval)
+        where = f"gripped_rope[{i}]"
+        train = _load(section, where, "train", folder / section.train)
+        unseen = Screened(()) if section.eval is None else _load(section, where, "eval", folder / section.eval)
         ropes.append(RopeData(section, train, unseen))
     return ropes
 
 
-def _load(section: GrippedRopeSection, key: str, folder: Path) -> list[GrippedMotion]:
+def _load(section: GrippedRopeSection, where: str, part: str, folder: Path) -> Screened:
+    refused: dict[str, RecordingError] = {}
     try:
-        found = recordings(folder, section.pattern, section.units)
+        found = recordings(folder, section.pattern, section.units, refused)
+        found = _reordered(found, section.reorder, f"{where}.reorder", part)
         if section.clamped is not None:
             found = [replace(r, clamped=marker_indices("clamped", section.clamped, r.markers)) for r in found]
-        motions = motions_of(found, section.smoothing)
+        motions = screened(found, section.smoothing)
     except RecordingError as error:
-        where = "" if error.field in ("folder", str(folder)) else f"{error.field} "
-        raise ConfigError(key, f"{where}{error.problem}", error.got, error.fix) from error
+        which = "" if error.field in ("folder", str(folder)) else f"{error.field} "
+        raise ConfigError(f"{where}.{part}", f"{which}{error.problem}", error.got, error.fix) from error
     if section.nominal is not None:
-        _check_nominal(section.nominal, f"{key.rpartition('.')[0]}.nominal", motions)
-    return motions
+        _check_nominal(section.nominal, f"{where}.nominal", motions)
+    unread = (f"{name} is left out: it {error.problem}" for name, error in refused.items())
+    return replace(motions, notes=(*unread, *motions.notes))
+
+
+def _reordered(
+    found: Sequence[Recording], reorder: Mapping[str, Sequence[str | int]], key: str, part: str
+) -> list[Recording]:
+    """Recordings of a folder with the markers of those that the configuration names in another order; names, and which
+    are gripped, stay where they are along the rope."""
+    orders = {name.partition("/")[2]: order for name, order in reorder.items() if name.startswith(f"{part}/")}
+    unknown = sorted(orders.keys() - {r.name for r in found})
+    if unknown:
+        names = ", ".join(r.name for r in found[:5])
+        raise ConfigError(key, f"names a recording that {part} does not have", unknown[0], f"use such as {names}")
+    changed = []
+    for r in found:
+        order = list(range(len(r.markers)))
+        if r.name in orders:
+            try:
+                order = list(marker_indices("reorder", orders[r.name], r.markers))
+            except RecordingError as error:
+                raise ConfigError(f"{key}.{part}/{r.name}", error.problem, error.got, error.fix) from error
+        if len(order) != len(r.markers):
+            fix = f"list all {len(r.markers)} in their order along the rope"
+            raise ConfigError(f"{key}.{part}/{r.name}", "does not hold every marker", len(order), fix)
+        changed.append(replace(r, positions=r.positions[:, order]) if r.name in orders else r)
+    return changed
 
 
 def _check_nominal(nominal: Sequence[Sequence[float]], key: str, motions: Sequence[GrippedMotion]) -> None:
@@ -79,7 +116,7 @@ def _check_nominal(nominal: Sequence[Sequence[float]], key: str, motions: Sequen
 def rope_files(config: GrippedConfig) -> list[str]:
     """Every file that `fit_ropes` may write; names relative to the folder."""
     form = config.output.figures
-    names = ["fit.json", "report.txt", *([] if form == "none" else [f"predicted.{form}"])]
+    names = ["fit.json", "report.txt", PAGE, *([] if form == "none" else [f"predicted.{form}"])]
     return ["report.txt", *(f"{rope.name}/{name}" for rope in config.gripped_rope for name in names)]
 
 
@@ -90,7 +127,7 @@ def fit_ropes(
 
     After Ctrl-C what is whole is reported: the ropes that are done, and of the present one the last finished rung.
     """
-    form = figures_form(console, config)
+    form, page = figures_form(console, config), page_possible(console)
     reports: list[RopeReport] = []
     files: list[str] = []
     stopped = False
@@ -108,7 +145,7 @@ def fit_ropes(
             break
         reports.append(report)
         show(console, report.rich, report.plain)
-        files += _write(report, form, rope, folder)
+        files += _write(report, form, page, rope, folder)
         if stopped:
             break
     summary = plain_section(overview(reports))
@@ -135,11 +172,12 @@ def _fit(console: Console, config: GrippedConfig, rope: RopeData, ladder: Sequen
     return fit_rope(
         rope.train,
         density=s.density,
+        marker_mass=s.marker_mass,
         nominal=None if s.nominal is None else (s.nominal[0], s.nominal[1]),
         ladder=ladder,
         validate=s.validate_share,
         bending_lengths=s.bending_lengths,
-        windows=[(length, total) for length, total in s.windows],
+        windows="all" if s.windows == "all" else [(length, total) for length, total in s.windows],
         segments=s.segments,
         max_segments=s.max_segments,
         substeps=s.substeps,
@@ -160,7 +198,7 @@ def _judged(console: Console, config: GrippedConfig, rope: RopeData, found: Rope
     if not config.fit.without_twist or not rope.unseen:
         return report, False
     console.print("  for comparison without twist:")
-    kept = {step.name for step in found.steps if step.stays}
+    kept = {name for step in found.steps if step.stays for name in step.name.split(AND)}
     ladder = [RUNGS[name] for name in rope.section.rungs[1:]]
     try:
         bare = _fit(console, config, rope, [WITHOUT_TWIST, *(rung for rung in ladder if rung.name in kept)])
@@ -172,7 +210,7 @@ def _judged(console: Console, config: GrippedConfig, rope: RopeData, found: Rope
     return replace(report, without_twist=evaluate(bare, rope.unseen)), bare.fit.result.interrupted
 
 
-def _write(report: RopeReport, form: str, rope: RopeData, folder: Path) -> list[str]:
+def _write(report: RopeReport, form: str, page: bool, rope: RopeData, folder: Path) -> list[str]:
     """Everything that a rope leaves behind; names relative to the folder."""
     own = folder / report.name
     own.mkdir(parents=True, exist_ok=True)
@@ -180,5 +218,6 @@ def _write(report: RopeReport, form: str, rope: RopeData, folder: Path) -> list[
     write_text(own / "fit.json", text)
     write_text(own / "report.txt", report.plain())
     drawn = report.unseen or evaluate(report.found, rope.train)
-    names = ["fit.json", "report.txt", *write_figure(report, drawn, form, own)]
+    pages = write_rope_page(report, drawn, own) if page else []
+    names = ["fit.json", "report.txt", *pages, *write_figure(report, drawn, form, own)]
     return [f"{report.name}/{name}" for name in names]

@@ -21,7 +21,7 @@ from ..gripped.plausible import doubts
 from ..growth import in_words, over_fit
 from ..io import FORMATS
 from ..kinds import KINDS
-from ..optimizers import has_ceres
+from ..optimizers import ceres_trouble, has_ceres
 from ..recording import Recording
 from ..scene import Scene
 from .gripped import RopeData, load_ropes
@@ -49,13 +49,18 @@ def info(
     run(lambda console: _info(console, config), json)
 
 
+def _without_ceres() -> str:
+    trouble = ceres_trouble()
+    return f"Ceres does not load: {trouble}" if trouble else "Ceres was not built: install libceres-dev and reinstall"
+
+
 def _info(console: Console, path: Path | None) -> Outcome:
     data: dict[str, Any] = {"sheetbend": __version__, "python": platform.python_version(), "packages": _packages()}
     data |= {"ceres": has_ceres(), "constraints": {name: kind["arity"] for name, kind in KINDS.items()}}
     heading(console, f"sheetbend {__version__}", f"Python {data['python']}, {platform.machine()}")
     console.print(
         "  optimizers   ",
-        "ceres, scipy" if has_ceres() else "scipy (Ceres was not built: install libceres-dev and reinstall)",
+        "ceres, scipy" if has_ceres() else f"scipy ({_without_ceres()})",
     )
     console.print(
         "  constraints  ", ", ".join(f"{name} ({arity})" for name, arity in data["constraints"].items()), soft_wrap=True
@@ -150,13 +155,22 @@ def _ropes(console: Console, config: GrippedConfig, ropes: list[RopeData]) -> di
             "length": float(np.mean([m.length for m in motions])),
             "density": rope.section.density,
             "rungs": rope.section.rungs,
+            "notes": [*rope.train.notes, *rope.unseen.notes],
         }
     table = Table("rope", "train", "eval", "to fit", "free markers", "length", "density", "rungs", box=None)
     for name, row in told.items():
         units = {"seconds": "s", "length": "m", "density": "kg/m"}
-        cells = [f"{_text(value)} {units.get(key, '')}".rstrip() for key, value in row.items() if key != "rungs"]
+        shown = {"density": "not weighed"} if row["density"] is None else {}
+        cells = [
+            shown.get(key) or f"{_text(value)} {units.get(key, '')}".rstrip()
+            for key, value in row.items()
+            if key not in ("rungs", "notes")
+        ]
         table.add_row(name, *cells, ", ".join(row["rungs"]))
     console.print(table)
+    for name, row in told.items():
+        for note in row["notes"]:
+            console.print(f"  {name}: {note}", markup=False, soft_wrap=True)
     for name, sentences in doubtful.items():
         told[name]["doubts"] = list(sentences)
         for sentence in sentences:

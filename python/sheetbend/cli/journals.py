@@ -32,12 +32,19 @@ def journal_in(folder: Path, about: Mapping[str, str], resume: bool, say: Say) -
     """The journal in use; None where none can be, which costs no fit. `Journal.finish` removes it.
 
     Raises:
-        ConfigError: it is to go on, but the journal is of something else, or cannot be read.
+        ConfigError: it is to go on, but the journal is of something else, or cannot be read; or an earlier one cannot
+            be removed.
     """
     path = folder / NAME
     begun = path.exists()
     if begun and not resume:
-        remove(path)
+        try:
+            remove(path)
+        except OSError as error:
+            fix = "move it away, or give another folder"
+            raise ConfigError(
+                "--output", f"has a {NAME} that cannot be removed: {error.strerror}", str(path), fix
+            ) from error
         say(f"begins anew: an unfinished run in {folder} is given up ({OPTION} would have gone on with it)")
     elif resume and not begun:
         say(f"nothing to resume in {folder}: the fit begins")

@@ -47,7 +47,8 @@ def write_movies(found: Fit, path: Path) -> list[str]:
 def _motion(found: Fit, c: Comparison) -> Motion:
     """The fitted motion at the substeps nearest to the recorded frames."""
     e, values = c.experiment, found.values_of(c.experiment)
-    times = np.rint(np.maximum(c.recording.times - e.t0, 0.0) / e.solver.h) * e.solver.h
+    at = np.maximum(e.scene_times(c.recording.times, values), 0.0)
+    times, frames = np.unique(np.rint(at / e.solver.h) * e.solver.h, return_inverse=True)
     start = equilibrium(e.scene, values=values).positions if e.start == "equilibrium" else None
-    positions = simulate(e.scene, times, e.solver, values, start).positions
+    positions = simulate(e.scene, times, e.solver, values, start).positions[frames]
     return Motion(e.scene, c.recording.times, positions, c.recording.positions, c.simulated)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,7 +16,9 @@ from ..door import reading
 from ..equilibrium import equilibrium
 from ..errors import ConfigError
 from ..experiment import Experiment
+from ..force_readings import sensor_readings
 from ..movie import Motion, movie_paths, save_movie
+from ..recording import Recording
 from ..scene import Scene
 from ..simulate import Trajectory
 from ..simulate import simulate as run_simulation
@@ -25,6 +28,7 @@ from .folders import made
 from .meshes import MeshFormat, mesh_files, write_meshes
 from .movies import OPTION, MoviePath, check_before
 from .outcome import Outcome, run
+from .predicted import at_starting_values, predicted_files, save_predicted
 from .screen import heading
 from .targets import check_targets
 
@@ -34,7 +38,8 @@ DURATION = 1.0  # s where no recording tells
 
 @dataclass(frozen=True)
 class Task:
-    """A scene and how it is to be run; `times` (frames,) s from its start."""
+    """A scene and how it is to be run; `times` (frames,) s from its start. `predicted` gives the markers of its
+    recording as measured and as simulated."""
 
     name: str
     scene: Scene
@@ -42,6 +47,8 @@ class Task:
     times: np.ndarray
     static: bool = False
     at_rest: bool = False
+    predicted: Callable[[], tuple[Recording, np.ndarray]] | None = None
+    experiment: Experiment | None = None
 
 
 def simulate(
@@ -72,8 +79,9 @@ def simulate(
         bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
     ] = False,
 ) -> None:
-    """Simulate a scene and write its trajectory as NPZ: times, positions, velocities, the constraints' forces, and the
-    pressures of volumes that are kept."""
+    """Simulate a scene and write its trajectory as NPZ: times, positions, velocities, the constraints' forces, the
+    pressures of volumes that are kept, and what force sensors read (sensor_NAME_times, _forces, _torques); with a
+    recording also its markers as simulated, predicted_NAME.npz."""
     run(lambda console: _simulate(console, config, output, duration, recording, mesh, movie), json)
 
 
@@ -90,7 +98,7 @@ def _simulate(
         raise ConfigError("--duration", "must be positive", duration, "give s")
     with reading(path, ConfigError):
         study = load(path)
-        tasks = _tasks(study, duration, recording)
+        tasks = tasks_of(study, duration, recording)
     name = study.config.experiment.name
     folder = output if output is not None else Path("out") / name
     if mesh is not None and not any(task.scene.cloths for task in tasks):
@@ -108,7 +116,12 @@ def _simulate(
     return Outcome({"name": name, "simulated": done})
 
 
-def _tasks(study: Study, duration: float | None, recording: str | None) -> list[Task]:
+def tasks_of(study: Study, duration: float | None, recording: str | None) -> list[Task]:
+    """What a configuration asks to run: one task for each of its recordings, or its scene alone.
+
+    Raises:
+        ConfigError: the configuration has no recording of that name.
+    """
     experiments = [e for e in study.experiments if recording in (None, e.name)]
     if recording is not None and not experiments:
         known = ", ".join(e.name for e in study.experiments) or "none"
@@ -124,31 +137,40 @@ def _tasks(study: Study, duration: float | None, recording: str | None) -> list[
 
 def _task(e: Experiment, duration: float | None) -> Task:
     """Frames as often as the recording's, on the substep grid."""
+
+    def predicted() -> tuple[Recording, np.ndarray]:
+        return at_starting_values(e, duration)
+
     if e.static:
-        return Task(e.name, e.scene, e.solver, np.zeros(1), static=True)
+        return Task(e.name, e.scene, e.solver, np.zeros(1), static=True, predicted=predicted)
     frame = float(np.median(np.diff(e.recording.times)))
     frame = max(round(frame / e.solver.h), 1) * e.solver.h
     length = duration or float(e.recording.times[-1]) - e.t0
-    return Task(e.name, e.scene, e.solver, np.arange(0.0, length + frame / 2, frame), at_rest=e.start == "equilibrium")
+    times = np.arange(0.0, length + frame / 2, frame)
+    return Task(e.name, e.scene, e.solver, times, at_rest=e.start == "equilibrium", predicted=predicted, experiment=e)
 
 
 def _files(task: Task, folder: Path, mesh: MeshFormat | None) -> list[Path]:
     """What a task leaves in the folder."""
     meshes = [] if mesh is None else mesh_files(task.name, task.scene, len(task.times), folder, mesh)
-    return [folder / f"{task.name}.npz", *meshes]
+    markers = [] if task.predicted is None else [folder / file for file in predicted_files([task.name])]
+    return [folder / f"{task.name}.npz", *markers, *meshes]
 
 
 def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, movie: Path | None) -> dict[str, Any]:
-    motion = _motion(task)
+    motion = motion_of(task)
     path = folder / f"{task.name}.npz"
     arrays: dict[str, Any] = {f"force_{group}": values for group, values in motion.forces.items()}
     arrays |= {f"pressure_{name}": values for name, values in motion.pressures.items()}
+    arrays |= _readings(task)
     with written(path) as beside:
         np.savez_compressed(
             beside, times=motion.times, positions=motion.positions, velocities=motion.velocities, **arrays
         )
     moved = np.linalg.norm(motion.positions - motion.positions[0], axis=2)
     more = {} if mesh is None else {"meshes": write_meshes(task.name, task.scene, motion, folder, mesh)}
+    if task.predicted is not None:
+        more["markers"] = [str(folder / file) for file in save_predicted(*task.predicted(), task.name, folder)]
     if movie is not None:
         save_movie(Motion(task.scene, motion.times, motion.positions), movie, task.name)
         more["movie"] = [str(movie)]
@@ -178,7 +200,22 @@ def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, mo
     return summary
 
 
-def _motion(task: Task) -> Trajectory:
+def _readings(task: Task) -> dict[str, np.ndarray]:
+    """What the recording's force sensors read along the motion, at the times at which they recorded."""
+    e = task.experiment
+    found: dict[str, np.ndarray] = {}
+    if e is None:
+        return found
+    for sensor in e.forces:
+        until = e.t0 + float(task.times[-1])
+        times, read = sensor_readings(sensor, e.scene, e.solver, None, e.start, e.t0, until)
+        parts = {"times": times, "forces": read[:, :3], "torques": read[:, 3:]}
+        found |= {f"sensor_{sensor.name}_{key}": part for key, part in parts.items()}
+    return found
+
+
+def motion_of(task: Task) -> Trajectory:
+    """The motion; of a shape at rest one frame with its forces."""
     start = None
     if task.static or task.at_rest:
         rest = equilibrium(task.scene)

@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 
 from ..errors import ConfigError, InputError
-from ..textile import Curve, fit_pull, mean_curve, read_curves
+from ..textile import Curve, fit_pull, forecast_pull, mean_curve, read_curves
 from ..textile.units import quantity
 from ..whole import write_text
 from .folders import made
@@ -23,7 +23,7 @@ from .textile_report import report, to_dict, write_mean
 
 Test = Literal["tension", "shear", "bending"]
 Along = Literal["warp", "weft"]
-LawName = Literal["linear", "exponential", "sinh", "spline", "none"]
+LawName = Literal["linear", "exponential", "sinh", "spline", "limit", "two_regimes", "chosen", "none"]
 Way = Literal["loading", "unloading", "skeleton"]
 Form = Literal["png", "svg", "pdf", "none"]
 
@@ -53,6 +53,12 @@ def textile(
     ] = None,
     along: Annotated[Along, typer.Option(help="Direction of a pull.")] = "warp",
     law: Annotated[LawName, typer.Option(help="Fitted to a pull.")] = "exponential",
+    weights: Annotated[
+        str, typer.Option(help="Power by which smaller loads count less in the fit of a pull, or 'chosen'.")
+    ] = "0",
+    forecast: Annotated[
+        bool, typer.Option("--forecast", help="Carry a pull on to 1/0.6 times its strain, with an interval.")
+    ] = False,
     poisson: Annotated[float, typer.Option(help="sqrt(nu_uv nu_vu) of the fabric, where it is known.")] = 0.0,
     way: Annotated[Way, typer.Option(help="Which way of the loop the elastic law follows.")] = "loading",
     cycle: Annotated[int, typer.Option(help="Which one, from 0; -1 is the last.")] = 0,
@@ -85,8 +91,13 @@ def textile(
         check_targets("--output", folder, [folder / name for name in ("report.txt", "mean.csv", f"curves.{figures}")])
         made("--output", folder)
         fitted = test == "tension" and law != "none"
-        fit = fit_pull(curves, along, law, way=way, cycle=cycle, poisson=poisson) if fitted else None
-        text = report(curves, fit, cycle)
+        fit = (
+            fit_pull(curves, along, law, weights=_weights(weights), way=way, cycle=cycle, poisson=poisson)
+            if fitted
+            else None
+        )
+        further = forecast_pull(curves, way=way, cycle=cycle) if forecast else None
+        text = report(curves, fit, cycle) + ("" if further is None else f"\n{further}\n")
         console.print("\n" + text, soft_wrap=True, end="")
         write_text(folder / "report.txt", text)
         mean = mean_curve(curves, way, cycle=cycle)
@@ -96,6 +107,8 @@ def textile(
         console.print(f"\nwritten to {folder}: {', '.join(written)}", soft_wrap=True)
         unknown = fit is not None and all(e.verdict == "not identifiable" for e in fit.estimates)
         data = {"output": str(folder), "files": written} | to_dict(curves, fit, cycle)
+        if further is not None:
+            data["forecast"] = further.to_dict()
         return Outcome(data, Code.NOT_IDENTIFIABLE if unknown else Code.DONE)
 
     run(command, json)
@@ -109,6 +122,13 @@ def _pairs(option: str, given: Sequence[str] | None) -> dict[str, str]:
             raise ConfigError(option, "must be ROLE=VALUE", text, f"write it as {option} load=...")
         pairs[role] = value
     return pairs
+
+
+def _weights(given: str) -> float | str:
+    try:
+        return float(given)
+    except ValueError:
+        return given
 
 
 def _numbered(columns: Mapping[str, str]) -> dict[str, str | int]:

@@ -22,11 +22,14 @@ from ..scene import Scene
 from ..solver import Solver
 from . import schema
 from .cloth_markers import places_on_cloths
+from .cloth_schema import MarkerGrid
 from .errors import located
+from .forces import force_sensors
 from .moment import Moment
 from .rest import check_rest
 from .scene_schema import SceneSection
 from .scenes import Particles, build_scene
+from .tools import tools_of
 
 SUBSTEPS = 10
 OPTIONAL = ("cloth", "particles", "constraints", "point_mass", "force")
@@ -96,7 +99,8 @@ def build(config: schema.Config, folder: Path, finer: int = 1) -> Study:
 
 def scene_alone(config: schema.Config, folder: Path = Path()) -> tuple[Scene, Solver]:
     """The scene of a configuration without recordings, and its solver; files of meshes are relative to `folder`."""
-    scene, _ = build_scene(config.experiment.name, config.scene, None, {}, folder=folder)
+    tools = tools_of(config.scene, {}, None, 0.0, folder, "")
+    scene, _ = build_scene(config.experiment.name, config.scene, None, {}, folder=folder, tools=tools)
     _start_values(scene, config, {}, "")
     solver = solver_for(config.solver, None)
     solver.core(scene.compiled)  # raise or warn here, before any work starts
@@ -127,10 +131,12 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
     markers = config.marker if shared else section.marker
     where = "marker" if shared else f"{path}.marker"
     numbers = [_number(f"{where}[{k}].marker", m.marker, recording) for k, m in enumerate(markers)]
-    described = _without(config.scene, section.leave_out, path)
+    described = _with_grids(_without(config.scene, section.leave_out, path), section.grids, path)
+    tools = tools_of(described, section.tools, recording, t0, folder, path)
     scene, particles = build_scene(
-        recording.name, described, moment, _along(ropes, markers, numbers, recording), finer, ropes, folder
+        recording.name, described, moment, _along(ropes, markers, numbers, recording), finer, ropes, folder, tools
     )
+    forces = force_sensors(path, section.force, scene, particles, folder)
     _start_values(scene, config, section.values, path)
     if section.static or section.start == "equilibrium":
         check_rest(f"{path}.static" if section.static else f"{path}.start", described, scene)
@@ -138,7 +144,7 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
         recording.markers[n]: _place(f"{where}[{k}]", m, scene, particles)
         for k, (m, n) in enumerate(zip(markers, numbers, strict=True))
     }
-    places = places_on_cloths(config.scene.cloth, scene, recording) | places
+    places = places_on_cloths(described.cloth, scene, recording) | places
     plain = section.model_dump(
         include={
             "static",
@@ -162,6 +168,7 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
             fit=_window(section.fit),
             held_out=_window(section.held_out),
             solver=solver_for(config.solver, recording),
+            forces=forces,
             offsets={m: _offset(f"{path}.offsets.{m}", names, scene) for m, names in section.offsets.items()},
             **plain,
         )
@@ -227,6 +234,16 @@ def _without(scene: SceneSection, names: list[str], path: str) -> SceneSection:
     kept = {key: [part for part in getattr(scene, key) if part.name not in names] for key in OPTIONAL}
     quantities = {name: q for name, q in scene.quantities.items() if name not in names}
     return scene.model_copy(update={**kept, "quantities": quantities})
+
+
+def _with_grids(scene: SceneSection, grids: Mapping[str, MarkerGrid], path: str) -> SceneSection:
+    """The scene's description with a recording's own grids of markers."""
+    unknown = set(grids) - {cloth.name for cloth in scene.cloth}
+    if unknown:
+        fix = f"name some of: {', '.join(cloth.name for cloth in scene.cloth) or 'none'}"
+        raise ConfigError(f"{path}.grids", "name no cloth of the scene", sorted(unknown), fix)
+    cloths = [c.model_copy(update={"grid": grids[c.name]}) if c.name in grids else c for c in scene.cloth]
+    return scene.model_copy(update={"cloth": cloths})
 
 
 def _along(

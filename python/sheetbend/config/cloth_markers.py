@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..errors import ConfigError
+from ..errors import ConfigError, RecordingError
 from ..markers import Place, on_mesh
 from ..mesh import Places, TriangleMesh
 from ..recording import Recording
+from ..recording_checks import marker_indices
 from ..scene import Scene
 from . import cloth_schema as schema
 from .errors import located
@@ -19,7 +20,7 @@ Seat = tuple[str, Places]
 
 
 def places_on_cloths(sections: Sequence[schema.Cloth], scene: Scene, recording: Recording) -> dict[str, Place]:
-    """By marker, what the keys `markers`, `nearest_at` and `layout` of the scene's cloths say.
+    """By marker, what the keys `markers`, `grid`, `nearest_at` and `layout` of the scene's cloths say.
 
     Raises:
         ConfigError: as `seats`.
@@ -46,7 +47,9 @@ def seats(
     given: dict[str, Seat] = {}
     nearest: dict[str, tuple[float, Seat]] = {}
     by_number = dict(enumerate(recording.markers))  # numbers that are none are refused where the grip is made
-    moving = {m if isinstance(m, str) else by_number.get(m, "") for s in sections for g in s.grip for m in g.markers}
+    moving = {
+        m if isinstance(m, str) else by_number.get(m, "") for s in sections for g in s.grip for m in g.markers or ()
+    }
     for i, section in enumerate(sections):
         if section.name not in meshes:
             continue
@@ -63,6 +66,9 @@ def seats(
                 raise ConfigError(f"{path}.markers.{name}", "is no marker of the recording", recording.name, fix)
             with located(f"{path}.markers.{name}"):
                 given[name] = section.name, mesh.at([at])
+        if section.grid is not None:
+            on_grid = _on_grid(f"{path}.grid", section.grid, mesh, recording, moving | set(given))
+            given |= {name: (section.name, place) for name, place in on_grid.items()}
         if section.nearest_at is None:
             continue
         names, x = _seen(f"{path}.nearest_at", section.nearest_at, recording, moving | set(given))
@@ -76,6 +82,25 @@ def seats(
             found = (float(distances[k]), (section.name, _one(places, k)))
             nearest[name] = min(nearest.get(name, found), found, key=lambda pair: pair[0])
     return {name: seat for name, (_, seat) in nearest.items() if name not in moving} | given
+
+
+def _on_grid(
+    path: str, grid: schema.MarkerGrid, mesh: TriangleMesh, recording: Recording, others: set[str]
+) -> dict[str, Places]:
+    """Each place of a grid with its marker; by default those of the recording that have no place yet."""
+    left = [name for name in recording.markers if name not in others]
+    if grid.markers is not None:
+        try:
+            left = [recording.markers[k] for k in marker_indices("markers", grid.markers, recording.markers)]
+        except RecordingError as error:
+            raise ConfigError(f"{path}.markers", error.problem, error.got, error.fix) from error
+    at = grid.places()
+    if len(left) != len(at):
+        problem = f"has {len(at)} places, and the recording '{recording.name}' other free markers"
+        raise ConfigError(f"{path}.counts", problem, len(left), "name the markers of the grid, in its order")
+    with located(path):
+        places = mesh.at(at)
+    return {name: _one(places, k) for k, name in enumerate(left)}
 
 
 def _on_vertices(mesh: TriangleMesh, recording: Recording) -> dict[str, Places]:

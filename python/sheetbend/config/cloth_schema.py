@@ -6,7 +6,7 @@ from typing import Any, Literal, Self
 
 from pydantic import ValidationInfo, field_validator, model_validator
 
-from .section import MOST_CELLS, Finite, Name, Pair, Section, Vector, key
+from .section import MOST_CELLS, Counts, Finite, Name, Pair, Section, Vector, key
 
 MESH_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "grid": (("width", "height", "nx", "ny"), ("pattern", "warp")),
@@ -100,12 +100,50 @@ class VertexSet(Section):
 
 
 class Grip(Section):
-    """Vertices of a cloth that are moved with markers. A list: [[scene.cloth.grip]]; every vertex moves as the line
-    through the markers does where it is nearest to it, from where it is placed."""
+    """Vertices of a cloth that are moved with markers or a tool. A list: [[scene.cloth.grip]]; every vertex moves as
+    the line through the markers does where it is nearest to it, or rigidly with the tool, from where it is placed."""
 
     set: Name = key(..., "a set of vertices")
-    markers: list[str | int] = key(..., "one marker, or several in order along the line", min_length=1)
-    interpolation: Literal["cubic", "linear"] = key("cubic", "of the motion between frames")
+    markers: list[str | int] | None = key(None, "one marker, or several in order along the line", min_length=1)
+    tool: Name | None = key(None, "the [[scene.tool]] that holds them, instead of markers")
+    interpolation: Literal["cubic", "linear"] = key("cubic", "of the motion between frames; of a tool always cubic")
+
+    @model_validator(mode="after")
+    def _one_mover(self) -> Self:
+        if (self.markers is None) == (self.tool is None):
+            raise ValueError("must have one of markers and tool|give what moves the vertices")
+        return self
+
+
+class MarkerGrid(Section):
+    """[scene.cloth.grid], [recording.grids.NAME]: markers on an even grid of a cloth, rows along the warp one after
+    another."""
+
+    first: Pair = key(..., "material coordinates (along warp and weft) of the first marker", "m")
+    last: Pair = key(..., "and of the last one, at the opposite corner", "m")
+    counts: Counts = key(..., "how many markers along the warp, and how many along the weft")
+    markers: list[str | int] | None = key(
+        None,
+        "names or numbers, those of the first row first; all markers of the recording that move no grip, in its order, "
+        "when left out",
+        min_length=1,
+    )
+
+    @model_validator(mode="after")
+    def _one_each(self) -> Self:
+        nx, ny = self.counts
+        if self.markers is not None and len(self.markers) != nx * ny:
+            raise ValueError(f"has {len(self.markers)} markers for {nx} x {ny} places|give one for each place")
+        return self
+
+    def places(self) -> list[list[float]]:
+        """Material coordinates of every place, m."""
+        (u0, v0), (u1, v1), (nx, ny) = self.first, self.last, self.counts
+
+        def at(k: int, count: int, start: float, stop: float) -> float:
+            return start if count == 1 else start + (stop - start) * k / (count - 1)
+
+        return [[at(i, nx, u0, u1), at(j, ny, v0, v1)] for j in range(ny) for i in range(nx)]
 
 
 class ClothVolume(Section):
@@ -158,15 +196,21 @@ class Cloth(Section):
     origin: Vector = key([0.0, 0.0, 0.0], "where the mesh's origin is placed", "m")
     x_axis: Vector = key([1.0, 0.0, 0.0], "where the mesh's x axis points")
     y_axis: Vector = key([0.0, 1.0, 0.0], "where its y axis points, perpendicular to `x_axis`")
+    on_tool: Name | None = key(
+        None,
+        "a [[scene.tool]] in whose axes, as they are at the scene's start, the cloth is placed: the correction of the "
+        "tool's frame then moves all of it",
+    )
     set: list[VertexSet] = key([], "further sets of vertices")
     pinned: list[Name] = key([], "sets that are held where they are placed")
-    grip: list[Grip] = key([], "sets that are moved with markers")
+    grip: list[Grip] = key([], "sets that are moved with markers or a tool")
     markers: dict[str, Pair] | Literal["vertices"] = key(
         {},
         'material coordinates (along warp and weft) of markers, by name; or "vertices" of a mesh from a file: markers '
         "v0, v1, ... of a sequence of meshes sit on its vertices",
         "m",
     )
+    grid: MarkerGrid | None = key(None, "[scene.cloth.grid], markers on a grid; a recording may have its own")
     nearest_at: Finite | None = key(
         None,
         "time of a recording at which the cloth lies as placed: markers without another place, that move no grip, sit "

@@ -17,13 +17,15 @@ from ..mesh import Places, TriangleMesh
 from ..mesh.places import nearest
 from ..mesh.subdivide import subdivided
 from ..scene import Scene
+from ..tool import Tool
 from . import cloth_schema as schema
 from .errors import located
 from .moment import Moment
+from .tools import tool_named
 
 _ELSEWHERE = {
-    *("name", "mesh", "law", "origin", "x_axis", "y_axis", "set", "pinned", "grip"),
-    *("markers", "nearest_at", "layout", "shape"),
+    *("name", "mesh", "law", "origin", "x_axis", "y_axis", "on_tool", "set", "pinned", "grip"),
+    *("markers", "grid", "nearest_at", "layout", "shape"),
     *("air_normal", "air_tangential", "pressure", "volume"),
 }
 """Keys of a cloth that are not arguments of `add_cloth`, or not as they stand."""
@@ -37,12 +39,14 @@ def build_cloth(
     mesh: TriangleMesh,
     seated: Mapping[str, Places],
     moment: Moment | None,
+    tools: Mapping[str, Tool],
 ) -> Cloth:
     """Add a cloth with its pinned and driven vertices to a scene.
 
     Args:
         mesh: of `placed_mesh`.
         seated: by marker of the recording, its place on the mesh.
+        tools: of the scene, by name.
 
     Raises:
         ConfigError: anything inconsistent, with the path of the key.
@@ -59,16 +63,27 @@ def build_cloth(
         for vertices in pinned:
             scene.pin(cloth.particles[vertices])
         _press(scene, section, cloth)
+    base = None if section.on_tool is None else tools[section.on_tool]
     for i, (grip, vertices) in enumerate(zip(section.grip, gripped, strict=True)):
-        _drive(scene, f"{path}.grip[{i}]", grip, moment, cloth.particles[vertices], shape[vertices])
+        where, held_there = f"{path}.grip[{i}]", cloth.particles[vertices]
+        if grip.tool is None:
+            _drive(scene, where, grip, moment, held_there, shape[vertices])
+            continue
+        tool = tool_named(f"{where}.tool", grip.tool, tools)
+        points = tool.held((shape if base is None else mesh.vertices)[vertices])
+        with located(where):
+            tool.drive(scene, held_there, points)
+    if base is not None and section.shape == "placed":
+        base.frame.place(scene, cloth.particles)
     return cloth
 
 
-def placed_mesh(path: str, section: schema.Cloth, folder: Path, finer: int) -> TriangleMesh:
+def placed_mesh(path: str, section: schema.Cloth, folder: Path, finer: int, tools: Mapping[str, Tool]) -> TriangleMesh:
     """The mesh where the cloth is placed.
 
     Args:
         folder: files are relative to it.
+        tools: of the scene, by name.
         finer: multiplies its cells, rings or sides; a mesh from a file is split.
 
     Raises:
@@ -76,7 +91,10 @@ def placed_mesh(path: str, section: schema.Cloth, folder: Path, finer: int) -> T
     """
     with located(f"{path}.mesh"):
         mesh = _mesh(f"{path}.mesh", section.mesh, folder, finer)
-    return replace(mesh, vertices=np.array(section.origin) + mesh.vertices @ _axes(path, section))
+    placed = np.array(section.origin) + mesh.vertices @ _axes(path, section)
+    if section.on_tool is not None:
+        placed = tool_named(f"{path}.on_tool", section.on_tool, tools).placed(placed)
+    return replace(mesh, vertices=placed)
 
 
 def _recorded(path: str, mesh: TriangleMesh, seated: Mapping[str, Places], moment: Moment | None) -> np.ndarray:
@@ -206,6 +224,7 @@ def _drive(
     scene: Scene, path: str, grip: schema.Grip, moment: Moment | None, particles: np.ndarray, placed: np.ndarray
 ) -> None:
     """Let particles, placed at (k, 3) m, follow the line through a grip's markers."""
+    assert grip.markers is not None  # the schema's check
     line = _seen(f"{path}.markers", grip.markers, moment)
     assert moment is not None  # `_seen` needed it
     if moment.static:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import inspect
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field, field_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from ..gripped import fit_rope
 from .schema import ExperimentSection, OutputSection
 from .section import MOST_LINKS, Finite, Name, Pair, Section, Vector, key
 
-RungName = Literal["twist", "tilts", "rest", "yield", "varying"]
-RUNGS: tuple[RungName, ...] = ("twist", "tilts", "rest", "yield", "varying")
+RungName = Literal["twist", "tilts", "rest", "varying", "yield", "markers"]
+RUNGS: tuple[RungName, ...] = ("twist", "tilts", "rest", "varying", "yield", "markers")
 RECIPE = {name: option.default for name, option in inspect.signature(fit_rope).parameters.items()}
 
 
@@ -45,9 +45,22 @@ class GrippedRopeSection(Section):
     """[[gripped_rope]]: a rope between two grips, and how it is fitted. A list."""
 
     name: Name = key(..., "names the rope in results, and their folder")
-    density: Finite = key(..., "mass per length, weighed: motion tells stiffness over density only", "kg/m", gt=0)
+    density: Finite | None = key(
+        None,
+        "mass per length, weighed; when left out, what follows from motion alone is fitted and reported: stiffness and "
+        "drag over the density, such as EI/density in m^4/s^2",
+        "kg/m",
+        gt=0,
+    )
     density_sd: Finite | None = key(
         None, "relative standard deviation of the density, which then counts in the intervals (0.02 is 2 %)", gt=0
+    )
+    marker_mass: Finite | None = key(
+        None,
+        "mass of each free marker that was not weighed with the rope, 0 where they were; when left out, 8 % of the "
+        "density count in the intervals",
+        "kg",
+        ge=0,
     )
     train: str = key(..., "folder of the recordings to fit, relative to the configuration")
     eval: str | None = key(None, "folder of recordings that are only predicted, from their first frame")
@@ -55,6 +68,12 @@ class GrippedRopeSection(Section):
     units: Literal["m", "cm", "mm"] | None = key(None, "length unit of the files; their JSONs' when left out")
     clamped: list[str | int] | None = key(
         None, "names or numbers of the gripped markers, two or more at each end; the files' when left out"
+    )
+    reorder: dict[str, list[str | int]] = key(
+        {},
+        "order of the markers along the rope of single files, such as "
+        '{ "train/02" = [0, 1, 2, 3, 5, 4, 6, 7] } or with their names; all markers of the file, once each. Exchanged '
+        "markers of a grip need no entry: they are found and put back",
     )
     gravity: Vector = key(_default("gravity"), "in the axes of the recordings, where their JSONs do not tell", "m/s^2")
     nominal: Directions | None = key(
@@ -64,23 +83,24 @@ class GrippedRopeSection(Section):
     )
     rungs: list[RungName] = key(
         list(RUNGS),
-        "what the model gets, one after another: straight with twist, tilts of the grips, rest curvature, yield, a "
-        "stiffness that varies along the rope; a rung stays only if it predicts recordings better that it was not "
-        "fitted to, and no worse those that it was",
+        "what the model gets, one after another: straight with twist, tilts of the grips, rest curvature, a stiffness "
+        "that varies along the rope, yield, places of the markers along it; a rung stays only if it predicts most "
+        "recordings better that it was not fitted to, and no worse those that it was",
         min_length=1,
     )
     validate_share: Finite = key(
         _default("validate"),
-        "share of the recordings in `train` that decide whether a rung stays; the last fit sees all",
+        "share of the recordings in `train` that decide whether a rung stays; where that is none, the end of each "
+        "recording does, this share of its time; the last fit sees all",
         ge=0,
         lt=1,
     )
-    windows: list[Span] = key(
+    windows: Annotated[list[Span], Field(min_length=1)] | Literal["all"] = key(
         _default("windows"),
         "[length, total] of the pieces that a fit sees, each predicted open loop: short ones first, whose cost is "
-        "smooth",
+        'smooth; "all" = these defaults, but the last fit sees every window of all recordings, and says first how long '
+        "that takes",
         "s",
-        min_length=1,
     )
     bending_lengths: list[Positive] = key(
         _default("bending_lengths"), "of the starts, (EI/(density g))^(1/3); the best one wins", "m", min_length=1
@@ -95,11 +115,25 @@ class GrippedRopeSection(Section):
 
     @field_validator("rungs")
     @classmethod
-    def _in_order(cls, rungs: list[RungName]) -> list[RungName]:
-        if rungs != [rung for rung in RUNGS if rung in rungs] or rungs[0] != "twist":
+    def _each_once(cls, rungs: list[RungName]) -> list[RungName]:
+        if len(set(rungs)) < len(rungs) or rungs[0] != "twist":
             order = ", ".join(f'"{rung}"' for rung in RUNGS)
-            raise ValueError(f'must be in order, each once, "twist" first|leave out some of {order}')
+            raise ValueError(f'must be given each once, "twist" first|leave out some of {order}')
         return rungs
+
+    @model_validator(mode="after")
+    def _weighed(self) -> Self:
+        if self.density is None and self.density_sd is not None:
+            raise ValueError("density_sd needs a density|give density, or leave density_sd out")
+        return self
+
+    @field_validator("reorder")
+    @classmethod
+    def _of_a_folder(cls, reorder: dict[str, list[str | int]]) -> dict[str, list[str | int]]:
+        for name in reorder:
+            if name.partition("/")[0] not in ("train", "eval"):
+                raise ValueError(f'names {name!r}|write "train/NAME" or "eval/NAME"')
+        return reorder
 
 
 class GrippedFitSection(Section):

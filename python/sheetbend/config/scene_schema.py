@@ -7,7 +7,7 @@ from typing import Any, Literal, Self
 from pydantic import model_validator
 
 from .cloth_schema import Cloth, with_fabrics
-from .section import MOST_LINKS, Finite, Name, Reference, Section, Vector, key
+from .section import MOST_LINKS, Finite, Name, Quaternion, Reference, Section, Vector, key
 
 
 class Rope(Section):
@@ -61,13 +61,19 @@ class Pendulum(Section):
     """A point mass on a massless rigid arm, swinging in the x-z plane, `sb.add_pendulum`. A list:
     [[scene.pendulum]]."""
 
-    name: Name = key("pendulum", "prefix of its quantities: <name>_length, _mass, _angle, _rate, _hinge_viscosity")
+    name: Name = key(
+        "pendulum",
+        "prefix of its quantities: <name>_length, _mass, _angle, _rate, _hinge_viscosity, _friction, _drag",
+    )
     length: Finite = key(..., "from pivot to mass", "m", gt=0)
     mass: Finite = key(1.0, "of the point", "kg", gt=0)
     pivot: Vector | Name = key([0.0, 0.0, 0.0], "a fixed point, or the name of the arm whose end carries this one", "m")
     angle: Finite = key(0.0, "initial angle from straight down towards +x", "rad")
     rate: Finite = key(0.0, "initial rate of the angle", "rad/s")
     viscosity: Finite | None = key(None, "of the pivot: torque over rate", "N m s/rad", gt=0)
+    friction: Finite | None = key(None, "dry friction of the pivot: <name>_friction, Coulomb's torque", "N m", gt=0)
+    slip_angle: Finite = key(1e-3, "how far the pivot gives before it slides; small beside the swing", "rad", gt=0)
+    drag: Finite | None = key(None, "quadratic air drag: <name>_drag, torque over rate squared", "N m s^2/rad^2", ge=0)
 
 
 class Arm(Section):
@@ -76,7 +82,8 @@ class Arm(Section):
 
     name: Name = key(
         "arm",
-        "prefix of its quantities: <name>_mass, _first_moment, _inertia, _length, _angle, _rate, _hinge_viscosity",
+        "prefix of its quantities: <name>_mass, _first_moment, _inertia, _length, _angle, _rate, _hinge_viscosity, "
+        "_friction, _drag",
     )
     mass: Finite = key(..., "its mass", "kg", gt=0)
     first_moment: Finite = key(..., "mass times distance from pivot to center of mass", "kg m", gt=0)
@@ -87,6 +94,16 @@ class Arm(Section):
     rate: Finite = key(0.0, "initial rate of the angle", "rad/s")
     viscosity: Finite | None = key(
         None, "of the pivot: torque over the rate of the angle between the two arms", "N m s/rad", gt=0
+    )
+    friction: Finite | None = key(
+        None, "dry friction of the pivot between the two arms: <name>_friction, Coulomb's torque", "N m", gt=0
+    )
+    slip_angle: Finite = key(1e-3, "how far the pivot gives before it slides; small beside the swing", "rad", gt=0)
+    drag: Finite | None = key(
+        None,
+        "quadratic air drag on the arm's end: <name>_drag, torque over the rate squared when its pivot rests",
+        "N m s^2/rad^2",
+        ge=0,
     )
 
 
@@ -125,13 +142,60 @@ class Force(Section):
     factors: list[Finite] | None = key(None, "share of the force at each knot; 1 when left out")
 
 
+class Tool(Section):
+    """A tool whose poses were recorded, such as a robot's hand, `sb.Tool`. A list: [[scene.tool]]. Its poses are in a
+    frame of their own; the transform to the recording's frame is corrected by the quantities <name>_x, <name>_y,
+    <name>_z (m), <name>_turn_x, <name>_turn_y and <name>_turn_z (rad)."""
+
+    name: Name = key(..., "prefix of its six quantities, and what grips and drives call it")
+    file: str | None = key(
+        None,
+        "poses, a CSV (`time,x,y,z,qx,qy,qz,qw`) or NPZ (`times`, `positions`, `quaternions`), relative to the "
+        "configuration; a recording may have its own, see `tools`",
+    )
+    position: Vector = key([0.0, 0.0, 0.0], "origin of the poses' frame in the recording's frame, as calibrated", "m")
+    quaternion: Quaternion = key([0.0, 0.0, 0.0, 1.0], "(x, y, z, w), from its axes to the recording's, as calibrated")
+    about: Vector = key(
+        [0.0, 0.0, 0.0],
+        "a point of the recording's frame about which the correction turns: near the tool's places, shift and turn are "
+        "told apart best",
+        "m",
+    )
+    flex: Finite | None = key(
+        None,
+        "deflection of the rod that carries the grip per acceleration, 1/(2 pi f)^2 of its lowest frequency f; the "
+        "quantity <name>_flex; a stiff rod when left out",
+        "s^2",
+        ge=0,
+    )
+    rod: Vector | None = key(None, "direction of that rod in the tool's axes, along which it does not give")
+    shift_sd: Finite | None = key(
+        None, "how far off the calibration may be, a standard deviation: the three shifts are fitted", "m", gt=0
+    )
+    turn_sd: Finite | None = key(None, "the same of its turn: the three angles are fitted", "rad", gt=0)
+
+
 class Drive(Section):
-    """Particles that follow markers of the recording. A list: [[scene.drive]]."""
+    """Particles that follow markers of the recording, or ride on a tool. A list: [[scene.drive]]."""
 
     particles: list[Reference] = key(..., "the particles that are moved", min_length=1)
-    markers: list[str | int] = key(..., "the markers they follow, one each: names or numbers", min_length=1)
+    markers: list[str | int] | None = key(None, "the markers they follow, one each: names or numbers", min_length=1)
+    tool: Name | None = key(None, "the [[scene.tool]] that they ride on, instead of markers")
+    points: list[Vector] | None = key(
+        None, "of a tool: where they sit in its axes, one each; from where they are placed when left out", "m"
+    )
     offset: Vector = key([0.0, 0.0, 0.0], "from marker to particle", "m")
     interpolation: Literal["cubic", "linear"] = key("cubic", "of the motion between frames")
+
+    @model_validator(mode="after")
+    def _one_mover(self) -> Self:
+        if (self.markers is None) == (self.tool is None):
+            raise ValueError("must have one of markers and tool|give what moves the particles")
+        if self.points is not None and self.tool is None:
+            raise ValueError("has points and no tool|give the tool, or the offset from the markers")
+        if self.tool is not None and (any(self.offset) or self.interpolation == "linear"):
+            raise ValueError("has an offset from markers, or their interpolation, beside a tool|leave it out")
+        return self
 
 
 class Wind(Section):
@@ -180,7 +244,8 @@ class SceneSection(Section):
     constraints: list[Constraints] = key([], "constraint groups")
     point_mass: list[PointMass] = key([], "hung masses")
     force: list[Force] = key([], "forces over time")
-    drive: list[Drive] = key([], "motion taken from markers")
+    tool: list[Tool] = key([], "tools whose poses were recorded")
+    drive: list[Drive] = key([], "motion taken from markers, or from a tool")
     quantities: dict[Name, ExtraQuantity] = key({}, "further named numbers")
 
     @model_validator(mode="before")

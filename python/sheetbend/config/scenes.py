@@ -16,11 +16,13 @@ from ..mesh import TriangleMesh
 from ..quantities import product
 from ..rope import Rope, add_rope
 from ..scene import Scene
+from ..tool import Tool
 from . import scene_schema as schema
 from .cloth_markers import seats
 from .cloths import build_cloth, placed_mesh
 from .errors import located
 from .moment import Moment
+from .tools import tool_named
 from .winds import add_winds
 
 EARTH = (0.0, 0.0, -9.81)  # m/s^2
@@ -131,6 +133,7 @@ def build_scene(
     finer: int = 1,
     ropes: Sequence[str] | None = None,
     folder: Path = Path(),
+    tools: Mapping[str, Tool] | None = None,
 ) -> tuple[Scene, Particles]:
     """A scene and the meaning of its particle references.
 
@@ -140,10 +143,12 @@ def build_scene(
         finer: multiplies the segments of every rope and the cells of every cloth.
         ropes: names of the ropes to build; None = all.
         folder: files of meshes are relative to it.
+        tools: by name, on the scene's clock; none by default.
 
     Raises:
         ConfigError: anything inconsistent, with the path of the table.
     """
+    tools = tools or {}
     recorded = None if moment is None else moment.recording.gravity
     gravity = section.gravity if section.gravity is not None else EARTH if recorded is None else recorded
     scene, particles = Scene(name, gravity), Particles(finer)
@@ -151,17 +156,17 @@ def build_scene(
         if ropes is not None and rope.name not in ropes:
             continue
         _add_rope(scene, particles, f"scene.rope[{i}]", rope, moment, placed.get(rope.name, []), finer)
-    meshes = [placed_mesh(f"scene.cloth[{i}]", cloth, folder, finer) for i, cloth in enumerate(section.cloth)]
+    meshes = [placed_mesh(f"scene.cloth[{i}]", cloth, folder, finer, tools) for i, cloth in enumerate(section.cloth)]
     by_name = {cloth.name: mesh for cloth, mesh in zip(section.cloth, meshes, strict=True)}
     seated = {} if moment is None else seats(section.cloth, by_name, moment.whole)
     for i, (cloth, mesh) in enumerate(zip(section.cloth, meshes, strict=True)):
         path = f"scene.cloth[{i}]"
         particles.free_name(path, cloth.name)
         own = {marker: place for marker, (on, place) in seated.items() if on == cloth.name}
-        coarse = mesh if finer == 1 else placed_mesh(path, cloth, folder, 1)
+        coarse = mesh if finer == 1 else placed_mesh(path, cloth, folder, 1, tools)
         if cloth.markers == "vertices" and moment is not None:
             _check_sequence(f"{path}.markers", coarse, moment)
-        particles.add_cloth(build_cloth(scene, path, cloth, mesh, own, moment), coarse)
+        particles.add_cloth(build_cloth(scene, path, cloth, mesh, own, moment, tools), coarse)
     add_winds(scene, section)
     for i, some in enumerate(section.particles):
         path = f"scene.particles[{i}]"
@@ -191,7 +196,7 @@ def build_scene(
             scene.add_quantity(quantity, **extra.model_dump())
     _add_forces(scene, particles, section.force)
     for i, drive in enumerate(section.drive):
-        _add_drive(scene, particles, f"scene.drive[{i}]", drive, moment)
+        _add_drive(scene, particles, f"scene.drive[{i}]", drive, moment, tools)
     if section.pin:
         scene.pin([particles.find("scene.pin", r) for r in section.pin])
     return scene, particles
@@ -309,7 +314,20 @@ def _add_forces(scene: Scene, particles: Particles, forces: Sequence[schema.Forc
     scene.add_terms([product("force", 3 * (knot * loaded + w) + k, f, {q: "identity"}) for knot, w, k, f, q in terms])
 
 
-def _add_drive(scene: Scene, particles: Particles, path: str, drive: schema.Drive, moment: Moment | None) -> None:
+def _add_drive(
+    scene: Scene,
+    particles: Particles,
+    path: str,
+    drive: schema.Drive,
+    moment: Moment | None,
+    tools: Mapping[str, Tool],
+) -> None:
+    if drive.markers is None:
+        tool = tool_named(f"{path}.tool", drive.tool or "", tools)
+        riding = [particles.find(f"{path}.particles", r) for r in drive.particles]
+        with located(path):
+            tool.drive(scene, riding, drive.points)
+        return
     if moment is None:
         raise ConfigError(path, "needs a recording", drive.markers, "add a [[recording]], or pin the particles")
     which = [particles.find(f"{path}.particles", r) for r in drive.particles]

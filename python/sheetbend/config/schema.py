@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 from pydantic import field_validator, model_validator
 
 from ..errors import InputError
 from ..memory import in_bytes
+from .cloth_schema import MarkerGrid
 from .scene_schema import SceneSection
-from .section import AXES, Finite, Name, Pair, Reference, Section, Vector, Window, key
+from .section import AXES, Finite, Name, Pair, Quaternion, Reference, Section, Vector, Window, key
+from .tools import with_corrections
 
 
 class ExperimentSection(Section):
@@ -103,6 +105,38 @@ class Marker(Section):
         return self
 
 
+class ForceSection(Section):
+    """The forces that a sensor at a support measured. A list: [[recording.force]]."""
+
+    file: str = key(..., "CSV (time, fx, fy, fz, ...) or NPZ, relative to the configuration; in the sensor's axes")
+    at: list[str] = key(
+        ...,
+        'the support: ["ROPE:start"] or ["ROPE:end"] for the end of a rope with its grip, ["CLOTH:SET"] for a set of '
+        "vertices, or particles; all of them held; torques are taken at the first",
+        min_length=1,
+    )
+    name: Name | None = key(None, "its quantities begin with it; the file's when left out")
+    sigma: Finite = key(..., "expected error of a force", "N", gt=0)
+    torque_sigma: Finite | None = key(None, "expected error of a torque; torques do not count without", "N m", gt=0)
+    axes: str = key("xyz", "forces that count, in the sensor's axes", pattern=AXES)
+    torque_axes: str = key("xyz", "torques that count", pattern=AXES)
+    reads: Literal["support", "body"] = key(
+        "support", 'the force that the support puts on the body, or ("body") its opposite'
+    )
+    quaternion: Quaternion = key(
+        [0.0, 0.0, 0.0, 1.0],
+        "(x, y, z, w) from the sensor's axes to the world's, of one that does not turn; the file's count before it",
+    )
+    arm: Vector = key([0.0, 0.0, 0.0], "from the first particle to the point of the torques, sensor's axes", "m")
+    average: Finite = key(0.0, "time before each sample over which the sensor takes the mean", "s", ge=0)
+    bias: bool = key(False, "quantities NAME_bias_x, ... are added to what it reads")
+    torque_bias: bool = key(False, "quantities NAME_torque_bias_x, ... likewise")
+    tool: bool = key(False, "it also carries a tool: quantities NAME_tool_mass, NAME_tool_center_x, ...")
+    time_offset: str | bool | None = key(
+        None, "a quantity (s) that shifts its clock, or true for one of its own, NAME_time_offset"
+    )
+
+
 class RecordingSection(Section):
     """A recording. A list: [[recording]]; each gets a scene object of its own from the shared description."""
 
@@ -119,6 +153,7 @@ class RecordingSection(Section):
     )
     fit: Window | None = key(None, "[start, stop] in the recording's time: what the fit sees; all when left out", "s")
     held_out: Window | None = key(None, "[start, stop]: what is only predicted, from the same start", "s")
+    tools: dict[Name, str] = key({}, "poses of tools in this recording: files by tool, see `scene.tool.file`")
     start_time: Finite | None = key(
         None, "recording time at which the scene starts; the start of `fit` when left out", "s"
     )
@@ -149,11 +184,17 @@ class RecordingSection(Section):
     loss: Literal["squares", "soft_l1", "huber"] = key("squares", "robust loss")
     loss_scale: Finite = key(1.0, "where the robust loss sets in, in units of sigma", gt=0)
     marker: list[Marker] = key([], "places of this recording's markers; those of [[marker]] when left out")
+    grids: dict[Name, MarkerGrid] = key({}, "by cloth, markers on a grid in this recording, instead of the cloth's own")
     offsets: dict[str, list[str]] = key(
         {},
         'per marker [a, b, c]: quantities added to its offset along (tangent, normal, tangent x normal), "" for none',
     )
-    time_offset: str | None = key(None, "a quantity (s) that shifts the recording's clock")
+    time_offset: str | None = key(
+        None,
+        "a quantity (s) that is added to the recording's times to get the scene's: -0.3 belongs to a camera that is "
+        "0.3 s late (what its frame at 1 s shows happened at 0.7 s). Start the scene early enough: `start_time`",
+    )
+    force: list[ForceSection] = key([], "forces that were measured at its supports")
     values: dict[str, Finite] = key(
         {}, "quantities whose value is known to differ here; for private parameters the initial value"
     )
@@ -240,3 +281,8 @@ class Config(Section):
     published: dict[str, Finite | Window] = key(
         {}, "values by others, or [lowest, highest], shown beside the estimates"
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _tools_have_their_parameters(cls, given: Any) -> Any:
+        return with_corrections(given) if isinstance(given, dict) else given

@@ -11,6 +11,7 @@ from ..names import flaw
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Vector = Annotated[list[Finite], Field(min_length=3, max_length=3)]
+Counts = Annotated[list[Annotated[int, Field(ge=1, le=1000)]], Field(min_length=2, max_length=2)]
 Pair = Annotated[list[Finite], Field(min_length=2, max_length=2)]
 MOST_LINKS, MOST_CELLS = 100_000, 2_000
 """Of a rope, and of a cloth along one direction: more is a slip of the pen, which must not take all memory."""
@@ -30,6 +31,15 @@ Reference = Annotated[str, Field(pattern=REFERENCE)]
 """A particle: "NAME:INDEX" (negative ones count from the end), "NAME:start" and "NAME:end" of a rope, "NAME:pivot" and
 "NAME:end" of an arm or pendulum, "NAME:SET:INDEX" of a cloth (its mesh's corners are "NAME:corners:0" to
 "NAME:corners:3"), "NAME" of a single particle."""
+
+
+def _of_some_length(quaternion: list[float]) -> list[float]:
+    if not any(quaternion):
+        raise ValueError("has no length|give (x, y, z, w), such as [0, 0, 0, 1]")
+    return quaternion
+
+
+Quaternion = Annotated[list[Finite], Field(min_length=4, max_length=4), AfterValidator(_of_some_length)]
 
 
 def _ascending(pair: list[float]) -> list[float]:

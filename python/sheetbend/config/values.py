@@ -48,8 +48,11 @@ def write(config: Config, path: Path, folder: Path) -> None:
     """
     content: dict[str, Any] = config.model_dump(exclude_unset=True, exclude_none=True)
     meshes = [cloth["mesh"] for cloth in content["scene"].get("cloth", [])]
-    for table in [*content.get("recording", []), *(mesh for mesh in meshes if "file" in mesh)]:
-        table["file"] = Path(os.path.relpath(folder / table["file"], path.parent)).as_posix()
+    tools = content["scene"].get("tool", [])
+    with_files = [(table, "file") for table in (*content.get("recording", []), *meshes, *tools) if "file" in table]
+    with_files += [(r["tools"], name) for r in content.get("recording", []) for name in r.get("tools", {})]
+    for table, at in with_files:
+        table[at] = Path(os.path.relpath(folder / table[at], path.parent)).as_posix()
     write_text(path, require("tomli_w", "cli").dumps(content))
 
 

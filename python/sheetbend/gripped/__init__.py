@@ -1,11 +1,13 @@
 """Ropes held by two grips: from recordings to stiffness, twist, damping, rest shape and yield."""
 
+from .climb import Step
 from .evaluation import Evaluation, evaluate
 from .ladder import LADDER, Rung
 from .model import RopeModel
 from .motion import GrippedMotion
-from .recipe import RopeFit, Step, fit_rope
+from .recipe import RopeFit, fit_rope
 from .report import RopeReport
+from .screening import Screened, screened
 from .trades import trades
 from .without_twist import WITHOUT_TWIST
 
@@ -18,8 +20,10 @@ __all__ = [
     "RopeModel",
     "RopeReport",
     "Rung",
+    "Screened",
     "Step",
     "evaluate",
     "fit_rope",
+    "screened",
     "trades",
 ]

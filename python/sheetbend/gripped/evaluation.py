@@ -10,8 +10,9 @@ import numpy as np
 from ..recording import Recording
 from ..scores import Scores, scores
 from .model import NAME
-from .motion import Array, GrippedMotion, motions_of
+from .motion import Array, GrippedMotion
 from .recipe import RopeFit
+from .screening import screened
 
 
 @dataclass(frozen=True)
@@ -23,19 +24,25 @@ class Evaluation:
         predicted: of each (frames, markers, 3) m.
         scores: their errors beside the no-physics blend; None where nothing was predicted to its end.
         diverged: names of the recordings whose prediction was not finite, or went farther off than the rope is long.
+        notes: on recordings that were mended or left out.
     """
 
     recordings: tuple[Recording, ...]
     predicted: tuple[Array, ...]
     scores: Scores | None
     diverged: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
 
 def evaluate(found: RopeFit, recordings: Sequence[Recording | GrippedMotion]) -> Evaluation:
-    """Predict each recording open loop from its first frame, and score it (`sheetbend.scores`)."""
+    """Predict each recording open loop from its first frame, and score it (`sheetbend.scores`).
+
+    Recordings are screened first; motions are taken as they are.
+    """
+    usable = screened(recordings, found.model.smoothing)
     reach = found.values[f"{NAME}_length"]
     kept, predicted, diverged = [], [], []
-    for motion in motions_of(recordings, found.model.smoothing):
+    for motion in usable:
         recording, x = motion.recording, found.predict(motion)
         off = np.abs(x - recording.positions)[recording.mask]
         if (off <= reach).all():  # false where it is not a number
@@ -43,4 +50,5 @@ def evaluate(found: RopeFit, recordings: Sequence[Recording | GrippedMotion]) ->
             predicted.append(x)
         else:
             diverged.append(recording.name)
-    return Evaluation(tuple(kept), tuple(predicted), scores(kept, predicted) if kept else None, tuple(diverged))
+    scored = scores(kept, predicted) if kept else None
+    return Evaluation(tuple(kept), tuple(predicted), scored, tuple(diverged), usable.notes)

@@ -1,12 +1,21 @@
-"""The rungs of the recipe: what each adds to the model of a rope between two grips, and to its fit."""
+"""The rungs of the recipe: what each adds to the model of a rope between two grips, and to its fit.
+
+Fields along the rope (rest curvature, softness) are sums of modes cos(k pi s / length). Their priors are smooth: the
+standard deviation of mode k is that of mode 0 divided by 1 + k/2. So fall the modes of a field that has kinks and jumps
+at worst, and a fine mode has to be shown by the motion.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from ..parameters import Parameter
-from .model import NAME
+from .model import NAME, RopeModel
+from .motion import GrippedMotion
+
+TURN = 2.0 * math.pi
 
 
 @dataclass(frozen=True)
@@ -18,14 +27,45 @@ class Rung:
         options: what it adds to the model, fields of `RopeModel`.
         values: what it adds to the model's starting values.
         parameters: what it adds to the fit.
-        look_first: whether it is costly, so that a look at shorter windows decides whether it is fitted to long ones.
+        each_marker: what it adds to the fit for each free marker; `{}` in a name is the marker's number.
+        starts: other values to start from, by option; `EI` as a factor. The end that fits best is taken.
     """
 
     name: str
     options: Mapping[str, object] = field(default_factory=dict)
     values: Mapping[str, float] = field(default_factory=dict)
     parameters: tuple[Parameter, ...] = ()
-    look_first: bool = False
+    each_marker: tuple[Parameter, ...] = ()
+    starts: tuple[Mapping[str, float], ...] = ()
+
+    def added_to(self, model: RopeModel) -> RopeModel:
+        """The model with what the rung adds."""
+        return replace(model, **dict(self.options), values={**model.values, **self.values})  # type: ignore[arg-type]
+
+    def wanted(self, motion: GrippedMotion) -> tuple[Parameter, ...]:
+        """What it adds to the fit of motions with these markers."""
+        each = (replace(p, name=p.name.format(k)) for k in motion.free for p in self.each_marker)
+        return (*self.parameters, *each)
+
+
+AND = " and "
+
+
+def together(rungs: Sequence[Rung]) -> Rung:
+    """One rung of several."""
+    return Rung(
+        AND.join(rung.name for rung in rungs),
+        {key: value for rung in rungs for key, value in rung.options.items()},
+        {key: value for rung in rungs for key, value in rung.values.items()},
+        tuple(p for rung in rungs for p in rung.parameters),
+        tuple(p for rung in rungs for p in rung.each_marker),
+        tuple(start for rung in rungs for start in rung.starts),
+    )
+
+
+def smooth(first: float, k: int) -> float:
+    """Standard deviation of mode k of a field whose mode 0 has the standard deviation `first`."""
+    return first / (1.0 + 0.5 * k)
 
 
 def _log(name: str, initial: float, unit: str, sd: float | None = None) -> Parameter:
@@ -33,11 +73,14 @@ def _log(name: str, initial: float, unit: str, sd: float | None = None) -> Param
     return Parameter(name=f"{NAME}_{name}", initial=initial, log=True, unit=unit, prior=prior)
 
 
-def _plain(name: str, unit: str, sd: float, scale: float) -> Parameter:
-    return Parameter(name=f"{NAME}_{name}", initial=0.0, unit=unit, prior=(0.0, sd), scale=scale)
+def _plain(name: str, unit: str, sd: float, scale: float, most: float = math.inf) -> Parameter:
+    return Parameter(
+        name=f"{NAME}_{name}", initial=0.0, unit=unit, prior=(0.0, sd), scale=scale, lower=-most, upper=most
+    )
 
 
-MODES = (0, 1, 2, 3)
+CURVATURE_MODES = tuple(range(9))
+SOFTNESS_MODES = tuple(range(1, 7))  # mode 0 is EI itself
 TWIST = Rung(
     "straight, with twist",
     parameters=(
@@ -47,7 +90,7 @@ TWIST = Rung(
         Parameter(name=f"{NAME}_twist_damping", tied_to=f"{NAME}_bend_damping", unit="s"),
         _log("drag_linear", 0.01, "N s/m^2", sd=3.0),
         _log("length", 1.0, "m", sd=0.02),
-        _plain("roll", "rad", 1.0, 0.3),
+        _plain("roll", "rad", 1.0, 0.3, most=TURN),
     ),
 )
 TILTS = Rung(
@@ -57,21 +100,28 @@ TILTS = Rung(
 )
 REST = Rung(
     "rest curvature",
-    options={"curvature_modes": MODES},
-    parameters=tuple(_plain(f"curvature_{axis}_{k}", "1/m", 1.0, 1.0) for k in MODES for axis in (1, 2)),
+    options={"curvature_modes": CURVATURE_MODES},
+    parameters=tuple(
+        _plain(f"curvature_{axis}_{k}", "1/m", smooth(2.0, k), 1.0) for k in CURVATURE_MODES for axis in (1, 2)
+    ),
+)
+VARYING = Rung(
+    "stiffness along the rope",
+    options={"softness_modes": SOFTNESS_MODES},
+    parameters=tuple(_plain(f"softness_{k}", "", smooth(0.45, k), 0.3) for k in SOFTNESS_MODES),
 )
 YIELD = Rung(
     "yield",
     values={"yield_curvature": 3.0, "yield_share": 0.2},  # little yields at first
     parameters=(
         _log("yield_curvature", 3.0, "1/m", sd=1.0),
-        Parameter(name=f"{NAME}_yield_share", initial=0.2, lower=0.01, upper=0.95, prior=(0.2, 0.3)),
+        Parameter(name=f"{NAME}_yield_share", initial=0.2, lower=0.01, upper=0.95, prior=(0.2, 0.3), scale=0.2),
     ),
-    look_first=True,
+    starts=({"yield_curvature": 1.0, "yield_share": 0.5, "EI": 1.5},),
 )
-VARYING = Rung(
-    "stiffness along the rope",
-    options={"softness_modes": (1, 2)},
-    parameters=tuple(_plain(f"softness_{k}", "", 0.2, 0.3) for k in (1, 2)),
+MARKERS = Rung(
+    "places of the markers",
+    options={"places": True},
+    each_marker=(_plain("place_{}", "m", 0.005, 0.005),),
 )
-LADDER = (TWIST, TILTS, REST, YIELD, VARYING)
+LADDER = (TWIST, TILTS, REST, VARYING, YIELD, MARKERS)

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import InputError
 from ..experiment import Experiment, Window
 from ..markers import Place, on_rope
+from ..quantities import product
 from ..recording import Recording
 from ..rod import Rod, add_rod
 from ..scene import Scene
@@ -32,6 +33,10 @@ class RopeModel:
         values: starting values of quantities, as options of `add_rod` (EI, GJ, bend_damping, ...); None = without it.
         tilts, roll: nuisances of the grips, see `add_rod`.
         curvature_modes, softness_modes, density_modes: see `add_rod`.
+        places: let each free marker stand off from its measured place along the rope, by the quantity
+            `rope_place_<its number>`, m.
+        marker_mass: kg of each free marker, beside `density`; spread over the rope it does the same, so that no motion
+            tells it.
         segments: links between the grips.
         substeps: per frame.
         iterations: Newton iterations per substep.
@@ -47,6 +52,8 @@ class RopeModel:
     curvature_modes: Sequence[int] = ()
     softness_modes: Sequence[int] = ()
     density_modes: Sequence[int] = ()
+    places: bool = False
+    marker_mass: float = 0.0
     segments: int = 12
     substeps: int = 2
     iterations: int = 1
@@ -87,7 +94,20 @@ class RopeModel:
             density_modes=self.density_modes,
             **options,
         )
+        if self.places:
+            for k in motion.free:
+                scene.add_quantity(place_of(k), 0.0, "m", positive=False, scale=5e-3)
+        if self.marker_mass > 0.0:
+            self._weigh_markers(scene, motion)
         return scene
+
+    def _weigh_markers(self, scene: Scene, motion: GrippedMotion) -> None:
+        """Each free marker's mass, shared by the two nodes beside it."""
+        rod: Rod = scene.ropes[NAME]
+        for k in motion.free:
+            link, ahead = divmod(float(motion.fractions[k]) * self.segments, 1.0)
+            for node, near in ((int(link), 1.0 - ahead), (int(link) + 1, ahead)):
+                scene.add_terms([product("mass", int(rod.particles[node]), self.marker_mass * near, {})])
 
     def experiment(self, motion: GrippedMotion, window: Window | None = None) -> Experiment:
         """A window of a recording (all of it by default), predicted open loop from its first frame."""
@@ -100,12 +120,13 @@ class RopeModel:
             raise InputError("window", f"of {motion.recording.name} holds too few frames", window, fix)
         first, last = int(inside[0]), int(inside[-1])
         scene = self.scene(motion, first, last)
-        h = float(np.median(np.diff(times))) / self.substeps
+        h, names = float(np.median(np.diff(times))) / self.substeps, motion.recording.markers
         return Experiment(
             scene=scene,
             recording=motion.recording,
             name=f"{motion.recording.name} from {times[first]:.2f} s",
-            markers=self.places(motion, scene),
+            markers=self.marker_places(motion, scene),
+            offsets={names[k]: (place_of(k), None, None) for k in motion.free} if self.places else {},
             fit=(float(times[min(first + 1, last)]), float(times[last])),
             start_time=float(times[first]),
             solver=Solver(h=h, iterations=self.iterations),
@@ -113,13 +134,18 @@ class RopeModel:
         )
 
     @staticmethod
-    def places(motion: GrippedMotion, scene: Scene) -> list[Place | None]:
+    def marker_places(motion: GrippedMotion, scene: Scene) -> list[Place | None]:
         """The free markers on the rope, None for the gripped ones."""
         rod: Rod = scene.ropes[NAME]
         return [
             on_rope(rod, float(motion.fractions[k]) * rod.length) if k in motion.free else None
             for k in range(len(motion.recording.markers))
         ]
+
+
+def place_of(marker: int) -> str:
+    """Name of the quantity that moves a marker along the rope."""
+    return f"{NAME}_place_{marker}"
 
 
 def nominal_directions(motions: Sequence[GrippedMotion]) -> tuple[Array, Array]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -52,7 +52,7 @@ class GrippedMotion:
         if len(recording.times) < 3:
             problem = f"of {recording.name} are fewer than three frames"
             raise RecordingError("times", problem, len(recording.times), "leave the recording out, or record a motion")
-        inner = _inner(recording)
+        inner = gripped_ends(recording)
         check_order(recording, inner)
         recording, positions = _bridged(recording)
         x, v = smoothed(recording.times, positions, smoothing)
@@ -72,6 +72,16 @@ class GrippedMotion:
     def free(self) -> range:
         """Numbers of the markers between the grips."""
         return range(self.inner[0] + 1, self.inner[1])
+
+    @property
+    def seconds(self) -> float:
+        """How long it lasts."""
+        return float(self.recording.times[-1] - self.recording.times[0])
+
+    def frames(self, which: slice) -> GrippedMotion:
+        """A piece, smoothed as the whole was; places of markers and the length stay those of the whole."""
+        part = self.recording.frames(which)
+        return replace(self, recording=part, positions=self.positions[which], velocities=self.velocities[which])
 
     def directions(self, end: bool) -> Array:
         """(frames, 3) unit directions of a gripped piece, in the rope's direction of travel."""
@@ -174,7 +184,12 @@ def _curve(points: Array, s: Array) -> Array:
     return np.asarray(spline(np.linspace(s[0], s[-1], POLYLINE)))
 
 
-def _inner(recording: Recording) -> tuple[int, int]:
+def gripped_ends(recording: Recording) -> tuple[int, int]:
+    """Numbers of the two inner gripped markers.
+
+    Raises:
+        RecordingError: the first two and the last two markers or more are not the gripped ones.
+    """
     count, held = len(recording.markers), set(recording.clamped)
     first = next((k for k in range(count) if k not in held), count)
     last = next((k for k in reversed(range(count)) if k not in held), -1)

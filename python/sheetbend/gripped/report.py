@@ -11,9 +11,12 @@ from ..optional import require
 from ..result import FitResult
 from ..tables import Section, plain_section, rich_section
 from ..wording import short
+from .conclusion import spread_words
 from .evaluation import Evaluation
 from .model import NAME
+from .over_density import OVER, as_quantities, in_units, is_over_density
 from .recipe import RopeFit
+from .stiffness import stiffness_section, tangent_stiffness
 from .trades import trades
 
 if TYPE_CHECKING:
@@ -45,12 +48,13 @@ class RopeReport:
             for part, where in ((self.unseen, ""), (self.without_twist, " without twist"))
             for name in (part.diverged if part is not None else ())
         )
-        return replace(result, warnings=(*result.warnings, *self.found.warnings, *more))
+        notes = tuple(f"unseen recording {note}" for note in (self.unseen.notes if self.unseen is not None else ()))
+        return replace(result, warnings=(*result.warnings, *self.found.warnings, *notes, *more))
 
     def plain(self, width: int = 100) -> str:
         """As plain text."""
         lines = [f"{self.name}, a rope between two grips", "", report.plain(self.result, width)]
-        for section in self._sections():
+        for section in self.sections():
             lines += [*plain_section(section, width), ""]
         if self.unseen is not None and self.unseen.scores is not None:
             lines.append(self.unseen.scores.report(width))
@@ -63,7 +67,7 @@ class RopeReport:
             MissingExtraError: rich is not installed.
         """
         parts: list[object] = [report.rich_report(self.result)]
-        for section in self._sections():
+        for section in self.sections():
             parts += ["", *rich_section(section)]
         if self.unseen is not None and self.unseen.scores is not None:
             parts += ["", self.unseen.scores.rich_report()]
@@ -72,37 +76,71 @@ class RopeReport:
 
     def to_dict(self) -> dict[str, Any]:
         """Strict JSON values; what `FitResult.load` reads, and beside it the steps, the trades and the errors in m."""
-        steps = [{k: _finite(v) for k, v in asdict(step).items()} for step in self.found.steps]
+        EI = "EI" if self.found.weighed else f"EI{OVER}"
+        steps = [{EI if k == "EI" else k: _finite(v) for k, v in asdict(step).items()} for step in self.found.steps]
         return self.result.to_dict() | {
             "rope": self.name,
+            "weighed": self.found.weighed,
             "values": dict(self.found.values),
             "segments": self.found.model.segments,
+            "tangent_stiffness": tangent_stiffness(self.result),
+            "model_spread": dict(self.found.spread),
             "steps": steps,
             "trades": [f"{what}: {words}" for what, words in trades(self.result)],
             **errors(self.unseen, self.without_twist),
         }
 
-    def _sections(self) -> list[Section]:
+    @property
+    def _unit(self) -> str:
+        return "N m^2" if self.found.weighed else in_units("N m^2")
+
+    def sections(self) -> list[Section]:
         rows = [
-            (s.name, _mm(s.fitted), _mm(s.others), "mm", "yes" if s.stays else "no", f"{s.seconds:.1f}")
+            (
+                s.name,
+                _mm(s.fitted),
+                _mm(s.others),
+                "mm",
+                "" if s.ratio is None else short(s.ratio),
+                "" if s.ratio is None else f"{s.better} of {s.count}",
+                "" if s.EI is None else short(s.EI),
+                "yes" if s.stays else "no",
+                f"{s.seconds:.1f}",
+            )
             for s in self.found.steps
         ]
-        meaning = "mean absolute coordinate error of whole recordings, predicted from their first frame"
-        notes = (("fitted, others", f"{meaning}: those that the step was fitted to, and those that it was not"),)
-        headers = ("step", "fitted", "others", "unit", "stays", "seconds")
+        meaning = "median of the mean absolute coordinate errors of recordings, predicted from their first frame"
+        notes = (
+            ("fitted, others", f"{meaning}: those that the step was fitted to, and those that it was not"),
+            ("ratio", "median ratio of the errors of others with and without the step"),
+            ("better", "how many of the others (or of their pieces) it predicts better"),
+            ("EI", f"with the step, {self._unit}: it depends on what else the model has"),
+        )
+        headers = ("step", "fitted", "others", "unit", "ratio", "better", "EI", "stays", "seconds")
+        stiffness = stiffness_section(self.result)
         return [
+            *([] if stiffness is None else [stiffness]),
             Section("Steps", headers, tuple(rows), notes),
             Section("What trades against what", notes=trades(self.result)),
-            Section("What the intervals count", notes=counted(self.result)),
+            Section(
+                "What the intervals count",
+                notes=counted(self.result, spread_words(as_quantities(self.found.spread), self.found.values)),
+            ),
         ]
 
 
-def counted(result: FitResult) -> tuple[tuple[str, str], ...]:
-    """(counted or not, sentence) of what makes the intervals."""
+def counted(result: FitResult, spread: str = "") -> tuple[tuple[str, str], ...]:
+    """(counted or not, sentence) of what makes the intervals; `spread`: words on models that predict equally well."""
     refined = "".join(f", {made.name}" for made in result.refits)
     seen = "markers beside the rope by as much as the residuals show (systematic)"
-    unseen = "a roll of the grips that nothing shows, noise of the grips, the weight"
-    return (("counted", f"residuals that are alike over time{refined}, {seen}"), ("not counted", unseen))
+    model = f", {spread}" if spread else ""
+    density = next((p for p in result.premises if p.name == f"{NAME}_density" and p.sd and p.value), None)
+    unseen = "a roll of the grips that nothing shows, noise of the grips"
+    if density is not None and density.sd is not None and density.value is not None:
+        model += f", the density to {short(100 * density.sd / density.value, 2)} % (1 sd, unweighed markers included)"
+    elif not is_over_density(result):
+        unseen += ", the weight"
+    return (("counted", f"residuals that are alike over time{refined}, {seen}{model}"), ("not counted", unseen))
 
 
 def errors(unseen: Evaluation | None, without_twist: Evaluation | None) -> dict[str, Any]:
@@ -122,13 +160,16 @@ def overview(reports: list[RopeReport]) -> Section:
     """One line per rope: errors on unseen recordings, and the stiffness."""
     rows = []
     for r in reports:
-        told, values = errors(r.unseen, r.without_twist), r.found.values
+        told, values = errors(r.unseen, r.without_twist), as_quantities(r.found.values)
         EI, GJ = values[f"{NAME}_EI"], values[f"{NAME}_GJ"]
         numbers = (_mm(told[key]) for key in ("blend", "without_twist", "error"))
-        rows.append((r.name, *numbers, "mm", short(EI), short(GJ / EI)))
-    headers = ("rope", "blend", "without twist", "fitted", "unit", "EI [N m^2]", "GJ/EI")
-    note = "mean absolute coordinate error of recordings that were not fitted; blend: no physics"
-    return Section("Ropes", headers, tuple(rows), (("errors", note),))
+        unit = "N m^2" if r.found.weighed else in_units("N m^2")
+        rows.append((r.name, *numbers, "mm", short(EI), unit, short(GJ / EI)))
+    headers = ("rope", "blend", "without twist", "fitted", "unit", "EI", "unit", "GJ/EI")
+    notes = [("errors", "mean absolute coordinate error of recordings that were not fitted; blend: no physics")]
+    if not all(r.found.weighed for r in reports):
+        notes.append(("EI", f"in {in_units('N m^2')} it is that over the density, of ropes that were not weighed"))
+    return Section("Ropes", headers, tuple(rows), tuple(notes))
 
 
 def _mm(error: float | None) -> str:

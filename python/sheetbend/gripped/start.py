@@ -27,8 +27,8 @@ def whole(
     """A piece of a recording with everything that the rungs add to a started model, and all of their parameters."""
     wanted: list[Parameter] = []
     for rung in ladder:
-        model = replace(model, **dict(rung.options), values={**model.values, **rung.values})  # type: ignore[arg-type]
-        wanted += rung.parameters
+        model = rung.added_to(model)
+        wanted += rung.wanted(motion)
     times = motion.recording.times
     first = next((k for k in range(len(times)) if motion.shown(k)), 0)
     e = model.experiment(motion, (float(times[first]), min(float(times[first]) + seconds, float(times[-1]))))

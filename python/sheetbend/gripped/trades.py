@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from ..result import Estimate, FitResult
 from ..wording import short
 from .model import NAME
+from .over_density import as_quantities, in_units, is_over_density, quantity
 
 STRONG = 0.8  # correlation (absolute value) from which two parameters are said to trade
 LOOSE = 3.0  # upper end of an interval over the value from which a stiffness is not bounded from above
@@ -46,18 +47,21 @@ def trades(result: FitResult) -> tuple[tuple[str, str], ...]:
     Args:
         result: of the last fit of `fit_rope`.
     """
-    values = {name.removeprefix(f"{NAME}_"): value for name, value in result.values.items()}
-    seen = {frozenset((c.first, c.second)): c.value for c in result.correlations}
+    values = {name.removeprefix(f"{NAME}_"): value for name, value in as_quantities(result.values).items()}
+    seen = {frozenset((quantity(c.first), quantity(c.second))): c.value for c in result.correlations}
     notes = []
     for first, second, what, words in PAIRS:
         correlation = seen.get(frozenset((f"{NAME}_{first}", f"{NAME}_{second}")), 0.0)
         if abs(correlation) >= STRONG:
             notes.append((what, f"{words(values)} (correlation {correlation:+.2f})"))
-    GJ = next((e for e in result.estimates if e.name == f"{NAME}_GJ"), None)
+    GJ = next((e for e in result.estimates if quantity(e.name) == f"{NAME}_GJ"), None)
     if GJ is not None and GJ.verdict not in ("rough", "no minimum") and _open_above(GJ):
         least = "" if GJ.lower is None else f": at least {short(GJ.lower)} N m^2"
         notes.append(("GJ", f"bounded from below only{least}; a rope stiffer in twist would move alike"))
     notes.append(("EA", "not fitted: the rope is taken as inextensible, and motion would bound EA from below only"))
+    if is_over_density(result):
+        what = "not known: motion shows stiffness and drag over it only; weigh the rope for EI and GJ in N m^2"
+        return (*((about, in_units(words)) for about, words in notes), ("density", what))
     notes.append(("density", "given: stiffness and drag scale with it, 1 % in the weight is 1 % in EI, GJ and drag"))
     return tuple(notes)
 

@@ -32,6 +32,7 @@ from ..door import check_room
 from ..errors import RecordingError
 from ..recording import Recording
 from ..timeseries import Array
+from ..whole import written
 from . import clock, motive, vicon
 from .cells import Row, lines, number, refuse, split
 
@@ -67,7 +68,7 @@ def read(path: Path) -> Recording:
 def write(recording: Recording, path: Path) -> None:
     """Write the wide layout; numbers keep all their digits, markers not seen leave empty cells."""
     header = ["time", *(f"{marker}_{axis}" for marker in recording.markers for axis in _AXES)]
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with written(path) as beside, beside.open("w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(header)
         for time, frame in zip(recording.times.tolist(), recording.positions, strict=True):

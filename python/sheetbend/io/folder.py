@@ -10,7 +10,12 @@ from . import FORMATS
 from .natural import by_number
 
 
-def recordings(folder: str | Path, pattern: str = "*", units: str | None = None) -> list[Recording]:
+def recordings(
+    folder: str | Path,
+    pattern: str = "*",
+    units: str | None = None,
+    refused: dict[str, RecordingError] | None = None,
+) -> list[Recording]:
     """Every recording in a folder, in the order of the file names, numbers in them by size (9 before 10).
 
         train = sb.recordings("ropes/train")
@@ -20,13 +25,14 @@ def recordings(folder: str | Path, pattern: str = "*", units: str | None = None)
         folder: where the files lie. Files that no reader knows, such as the JSON beside a recording, are left out.
         pattern: which files, as for `Path.glob`; "*/*" looks one folder below.
         units: length unit of the files, as for `Recording.load`.
+        refused: where given, gets the errors of files that cannot be read, by file name, and the others are read.
 
     Returns:
         As `Recording.load` reads them, each name once.
 
     Raises:
         RecordingError: the folder does not exist or holds no recording of that pattern, two recordings have the same
-            name, or a file is refused (which is named).
+            name, or a file is refused (which is named): all of them where `refused` is given.
     """
     root = Path(folder)
     if not root.is_dir():
@@ -39,12 +45,20 @@ def recordings(folder: str | Path, pattern: str = "*", units: str | None = None)
     first: dict[str, Path] = {}
     found = []
     for file in files:
-        recording = _load(file, units)
+        try:
+            recording = _load(file, units)
+        except RecordingError as error:
+            if refused is None:
+                raise
+            refused[file.name] = error
+            continue
         other = first.setdefault(recording.name, file)
         if other is not file:
             fix = "narrow the pattern, or give one of them another name in its JSON"
             raise RecordingError(str(file), f"has the name of {other}", recording.name, fix)
         found.append(recording)
+    if not found and refused:
+        raise next(iter(refused.values()))
     return found
 
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 import zipfile
 import zlib
+from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from numpy.lib import format as npy
 from ..door import check_room
 from ..errors import RecordingError
 from ..recording import Recording
+from ..whole import written
 
 _REQUIRED = ("positions", "times")
 # What zipfile and NumPy raise on damaged archives and headers; what else they may is told by `reading`.
@@ -38,7 +40,8 @@ def read(path: Path) -> Recording:
         RecordingError: it is no NPZ archive, is damaged, lacks a key, holds more than `door.check_room` allows, or
             an array is not plain numbers.
     """
-    arrays = _arrays(path)
+    fix = "store positions (frames, markers, 3) and times (frames,) under these names"
+    arrays = plain_arrays(path, _REQUIRED, ("clamped",), fix)
     return Recording(
         positions=arrays["positions"],
         times=arrays["times"],
@@ -49,27 +52,33 @@ def read(path: Path) -> Recording:
 def write(recording: Recording, path: Path) -> None:
     """Write positions, times and clamped, compressed."""
     clamped = np.array(recording.clamped, dtype=np.int64)
-    with path.open("wb") as file:  # an open file keeps NumPy from appending a second suffix
+    with written(path) as beside, beside.open("wb") as file:  # an open file keeps NumPy from appending a second suffix
         np.savez_compressed(file, positions=recording.positions, times=recording.times, clamped=clamped)
 
 
-def _arrays(path: Path) -> dict[str, np.ndarray]:
+def plain_arrays(
+    path: Path, required: Sequence[str], optional: Sequence[str] = (), fix: str = "store it under this name"
+) -> dict[str, np.ndarray]:
+    """Arrays of an archive by name.
+
+    Raises:
+        RecordingError: as `read`; `fix` says what to do about one that is missing.
+    """
     with path.open("rb") as file:
         if file.read(len(npy.MAGIC_PREFIX)) == npy.MAGIC_PREFIX:
-            fix = "write the arrays by name with numpy.savez(path, positions=..., times=...)"
+            fix = "write the arrays by name with numpy.savez(path, " + ", ".join(f"{key}=..." for key in required) + ")"
             raise RecordingError(str(path), "is a single array (NPY), not an NPZ archive", path.name, fix)
     try:
         archive = zipfile.ZipFile(path)
     except _DAMAGE as error:
-        fix = "write it with numpy.savez or Recording.save"
-        raise RecordingError(str(path), "is no NPZ archive, or a damaged one", str(error), fix) from error
+        write_it = "write it with numpy.savez or Recording.save"
+        raise RecordingError(str(path), "is no NPZ archive, or a damaged one", str(error), write_it) from error
     with archive:
         members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
-        missing = [key for key in _REQUIRED if key not in members]
+        missing = [key for key in required if key not in members]
         if missing:
-            fix = "store positions (frames, markers, 3) and times (frames,) under these names"
             raise RecordingError(str(path), f"lacks {' and '.join(missing)}", sorted(members), fix)
-        wanted = {key: members[key] for key in (*_REQUIRED, "clamped") if key in members}
+        wanted = {key: members[key] for key in (*required, *optional) if key in members}
         unpacked = sum(info.file_size for info in wanted.values())
         check_room(path, f"arrays that unpack to {unpacked} bytes", unpacked)
         return {key: _array(archive, info, path, key) for key, info in wanted.items()}

@@ -11,6 +11,7 @@ from .curve import Curve, Cycle, MeanCurve, mean_curve
 from .curve_file import read_curves
 from .drape import Drape, DrapeState, drape, drape_scene, drape_state
 from .fabric_fit import FabricFit, Measured, fit_fabric
+from .forecast import PullForecast, forecast_pull
 from .kes import BendingLoop, ShearLoop, TensileLoop, bending_loop, shear_loop, tensile_loop
 from .picture_frame import PictureFrame, picture_frame
 from .pull import fit_pull, pulled, strains_under
@@ -31,6 +32,7 @@ __all__ = [
     "MeanCurve",
     "Measured",
     "PictureFrame",
+    "PullForecast",
     "Reading",
     "Shear",
     "ShearLoop",
@@ -44,6 +46,7 @@ __all__ = [
     "drape_state",
     "fit_fabric",
     "fit_pull",
+    "forecast_pull",
     "mean_curve",
     "picture_frame",
     "pulled",

@@ -28,6 +28,7 @@ _NORMAL = 1.959964  # two-sided 95 %
 _BLIND = (
     2.0 / 30.0
 )  # sigmas that a number moves all readings by, per e-fold or per scale: less, and they do not contain it
+_OPEN = math.log(1e3)  # of a number on a log scale: not known to this factor, it is open
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -172,7 +173,7 @@ def fit_fabric(measured: Sequence[Measured], start: Fabric, free: Sequence[str])
     solver = require("scipy.optimize", "fit").least_squares
     end = solver(evaluate.residuals, u, evaluate.jacobian, bounds=parameters.bounds(), xtol=1e-9, ftol=1e-9, gtol=1e-9)
     readings, r, jacobian = evaluate(end.x)
-    estimates, rank = _estimates(parameters, end.x, r, jacobian, measured)
+    estimates, rank = estimates_of(parameters, end.x, r, jacobian, measured)
     fabric = _with(start, parameters, end.x)
     return FabricFit(fabric, estimates, tuple(measured), readings, float(r @ r), len(r) - rank)
 
@@ -245,7 +246,7 @@ class _Evaluation:
         return self(u)[2]
 
 
-def _estimates(
+def estimates_of(
     parameters: Parameters, u: Array, r: Array, jacobian: Array, measured: Sequence[Measured]
 ) -> tuple[tuple[Estimate, ...], int]:
     """Of each free number, and how many combinations of them the readings determine."""
@@ -290,6 +291,8 @@ def _quantile(measured: Sequence[Measured]) -> float:
 def _estimate(p: Parameter, internal: float, reach: float, gauges: str) -> Estimate:
     """`reach`: half-width in the internal coordinate, infinite where the readings leave the number open."""
     value = p.to_physical(internal)
+    if p.log and _OPEN < reach < math.inf:
+        return open_estimate(p, value, "the readings leave it open by more than a factor of 1,000 either way")
     if math.isinf(reach):
         return open_estimate(p, value, gauges or "moves no reading: fix it, or measure what depends on it")
     lower, upper = p.to_physical(internal - reach), p.to_physical(internal + reach)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +15,10 @@ from ..fabric import Exponential, Fabric, Law, Linear, Sinh, Spline
 from .curve import Curve, chosen, mean_curve, same_test
 from .fabric_fit import FabricFit, Measured, fit_fabric
 from .flat import warp_angle
+from .locking import NUMBERS, fit_locking
 from .reading import Reading
+from .strip_fit import Levels, weigh
+from .strip_laws import STRIP_LAWS
 from .uniaxial import uniaxial
 
 LAWS = {
@@ -22,7 +26,13 @@ LAWS = {
     "exponential": ("stiffening",),
     "sinh": ("stiffening",),
     "spline": ("ratio_1", "ratio_2", "ratio_3", "ratio_4"),
+    **NUMBERS,
 }
+"""Numbers beside the stiffness, by the law's name; those of `locking.NUMBERS` are known to pulls alone."""
+
+WEIGHTS = (0.0, 1.0, 2.0, 3.0)
+"""Powers among which `fit_pull` chooses."""
+
 _SPECIMEN = (0.05, 0.2)  # m, length and width of KES-FB1, where curves do not tell theirs
 _LEVELS = 5
 _CLASS = 0.005  # class 0.5 of ISO 7500-1 and ISO 9513
@@ -59,7 +69,7 @@ def pulled(
             or slack where the first load is read off.
     """
     warp_angle(along)
-    _check(curves)
+    checked_pulls(curves)
     ways = {c.name: chosen(c, cycle).way(way) for c in curves}
     length, width = _specimen(curves)
     note, found = _left_out(curves, cycle, way), []
@@ -84,8 +94,9 @@ def pulled(
 def fit_pull(
     curves: Sequence[Curve],
     along: str = "warp",
-    law: str = "exponential",
+    law: str | Sequence[str] = "exponential",
     *,
+    weights: float | str = 0.0,
     way: str = "loading",
     cycle: int = 0,
     error: float = _CLASS,
@@ -101,22 +112,45 @@ def fit_pull(
 
     Args:
         curves, along, way, cycle, error: of `pulled`.
-        law: "linear", "exponential", "sinh" or "spline".
-        poisson: sqrt(nu_uv nu_vu) where it is known, as of `add_cloth`.
+        law: "linear", "exponential", "sinh", "spline", or one that locks, "limit" or "two_regimes" (`strip_laws`). No
+            scene has the last two: the fabric that is returned carries a spline through their fitted range. Of several
+            names, or of all but "spline" where it is "chosen", the one that the pull supports most is fitted, and the
+            report has the odds.
+        weights: power of (largest load / load) by which a reading's sigma grows: what a law, which is not the fabric's,
+            may miss at smaller loads. "chosen" takes the one of 0, 1, 2, 3 that, fitted to the lower two thirds of the
+            strain, foresees the rest best.
+        poisson: sqrt(nu_uv nu_vu) where it is known, as of `add_cloth`; 0 for a law that locks.
 
     Raises:
-        InputError: an unknown law, a `poisson` that is none, or what `pulled` raises.
+        InputError: an unknown law, weights or `poisson` that are none, or what `pulled` raises.
         NoEquilibriumError: the start comes to no rest.
         MissingExtraError: scipy is not installed.
     """
-    if law not in LAWS:
-        raise InputError("law", "is unknown", law, f"use one of {', '.join(LAWS)}")
-    if not (is_number(poisson) and -1 < poisson < 1):
-        raise InputError("poisson", "must lie between -1 and 1", poisson, "give sqrt(nu_uv nu_vu)")
-    levels = max(_LEVELS, 2 * len(LAWS[law]))
-    measured = pulled(curves, along, way, cycle=cycle, levels=levels, error=error)
+    offered = _offered(law, poisson)
+    _check_options(offered, weights, poisson)
+    checked_pulls(curves)
+    levels, told = None, ""
+    if len(offered) > 1 or weights == "chosen" or offered[0] in NUMBERS:
+        levels = Levels.of(curves, way, cycle, None)
+    if len(offered) > 1 and levels is not None:
+        shares = weigh(levels, offered).shares
+        told = "; law chosen by what the pulls support: " + ", ".join(f"{n} {s:.0%}" for n, s in shares.items())
+        offered = [max(shares, key=lambda name: shares[name])]
+    (name,) = offered
+    if isinstance(weights, str) and levels is not None:
+        errors = {power: levels.foreseen(name, power) for power in WEIGHTS}
+        weights = min(errors, key=lambda power: errors[power])
+        judged = ", ".join(f"{power:g} {error:.1%}" for power, error in errors.items())
+        told += f"; weights chosen: power {weights:g}; error of the load from 2/3 of the strain on, by power: {judged}"
+    count = max(_LEVELS, 2 * len(LAWS[name]))
+    measured = pulled(curves, along, way, cycle=cycle, levels=count, error=error)
     pretension = curves[0].pretension
-    loads = _loads(curves, cycle, way, levels) - pretension
+    loads = _loads(curves, cycle, way, count)
+    loose = (loads[-1] / loads) ** float(weights)
+    measured = [replace(m, sigma=m.sigma * x, note=m.note + told) for m, x in zip(measured, loose, strict=True)]
+    loads = loads - pretension
+    if name in NUMBERS and levels is not None:
+        return fit_locking(name, measured, loads, levels, along, measured[0].note)
     strains = np.array([m.value for m in measured]) / 100.0
     green = strains + strains**2 / 2.0
     secants = loads / (green * (1.0 + strains))  # of a free strip: k exp(b green^2), or k sinh(b green)/(b green)
@@ -131,8 +165,8 @@ def fit_pull(
         "spline": Spline((float(green[-1]) / 4.0,) * 3),
     }
     sizes = {"density": 0.1, "bending": 1e-5, "warp": stiffness, "weft": stiffness, "shear": stiffness / 2.0}
-    start = Fabric(**sizes, poisson=poisson, law=laws[law])
-    return fit_fabric(measured, start, [along, *(f"{along}_{name}" for name in LAWS[law])])
+    start = Fabric(**sizes, poisson=poisson, law=laws[name])
+    return fit_fabric(measured, start, [along, *(f"{along}_{number}" for number in LAWS[name])])
 
 
 def strains_under(
@@ -144,10 +178,32 @@ def strains_under(
         InputError: no curves, or curves of another test or of different widths or pretensions.
         NoEquilibriumError: a specimen comes to no rest.
     """
-    _check(curves)
+    checked_pulls(curves)
     length, width = _specimen(curves)
     beyond = np.atleast_1d(np.asarray(loads, dtype=float)) - curves[0].pretension
     return np.array([_test(along, float(load), width, length, cells)(fabric).value for load in beyond])
+
+
+def _offered(law: str | Sequence[str], poisson: float) -> list[str]:
+    """Laws to choose among; a law that locks knows no coupling."""
+    if law == "chosen":
+        return [name for name in STRIP_LAWS if not (poisson and name in NUMBERS)]
+    return [law] if isinstance(law, str) else list(law)
+
+
+def _check_options(offered: Sequence[str], weights: float | str, poisson: float) -> None:
+    unknown = [name for name in offered if name not in LAWS]
+    if unknown or not offered:
+        raise InputError("law", "is unknown", unknown or offered, f"use one of {', '.join(LAWS)}")
+    if "spline" in offered and (len(offered) > 1 or weights == "chosen"):
+        fix = "leave it out: a spline cannot foresee, so nothing can be chosen with it"
+        raise InputError("law", "is a spline", list(offered), fix)
+    if not (weights == "chosen" or (is_number(weights) and 0.0 <= float(weights) <= 10.0)):
+        raise InputError("weights", "must be a power from 0 to 10, or 'chosen'", weights, "give 0 for even weights")
+    if not (is_number(poisson) and -1 < poisson < 1):
+        raise InputError("poisson", "must lie between -1 and 1", poisson, "give sqrt(nu_uv nu_vu)")
+    if poisson and any(name in NUMBERS for name in offered):
+        raise InputError("poisson", "is of the simulation, which has no law that locks", poisson, "give 0")
 
 
 def _specimen(curves: Sequence[Curve]) -> tuple[float, float]:
@@ -156,7 +212,12 @@ def _specimen(curves: Sequence[Curve]) -> tuple[float, float]:
     return float(np.mean(lengths)) if lengths else _SPECIMEN[0], curves[0].width or _SPECIMEN[1]
 
 
-def _check(curves: Sequence[Curve]) -> None:
+def checked_pulls(curves: Sequence[Curve]) -> None:
+    """Refuse what is no set of pulls of one kind.
+
+    Raises:
+        InputError: no curves, curves of another test, of different widths or pretensions, or that share a name.
+    """
     if same_test(curves)[0].test != "tension":
         raise InputError("curves", "are no pulls", curves[0].test, "give curves of tension")
     alike = sorted({f"{c.width} m, {c.pretension} N/m" for c in curves})

@@ -10,7 +10,8 @@ from ..optional import require
 require("torch", "torch")
 
 from .equilibrium import Equilibrium, equilibrium  # noqa: E402
+from .forces import forces  # noqa: E402
 from .module import SceneModule  # noqa: E402
 from .simulate import Simulation, simulate  # noqa: E402
 
-__all__ = ["Equilibrium", "SceneModule", "Simulation", "equilibrium", "simulate"]
+__all__ = ["Equilibrium", "SceneModule", "Simulation", "equilibrium", "forces", "simulate"]

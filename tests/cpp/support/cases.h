@@ -110,6 +110,22 @@ inline Case case_of<Hinge>() {
           .parameter_sign = {1, 1, 1, -1}};
 }
 
+// Sliding: the angle from the set is about twelve times the yield angle.
+template <>
+inline Case case_of<FrictionHinge>() {
+  return {.x = {0, 0, 0, 0.1, 0.02, 0.01, 0.18, 0.08, -0.03, -0.1, 0, 0},
+          .p = {0.0, 0.6, 0.8, 0.06},
+          .compliance = 1.0,
+          .damping = 5e-4,
+          .under_rotation = UnderRotation::stays,
+          .normal = 0,
+          .degree = 0,
+          .parameter_degree = {0, 0, 0, 0},
+          .relabeling = {2, 1, 0, 3},
+          .sign = {-1},
+          .parameter_sign = {1, 1, 1, 1}};
+}
+
 template <>
 inline Case case_of<Attachment>() {
   return {.x = {0, 0, 0, 0.04, 0.02, -0.03},

@@ -68,7 +68,7 @@ struct SceneBuilder {
   template <class K>
   int add_stencil(int tail, bool damped) {
     const Case sample = case_of<K>();
-    constexpr int points = K::points, directors = std::min(2, K::arity - points);
+    constexpr int points = K::points, directors = K::arity - points - (Yields<K> ? 1 : 0);
     std::vector<int> nodes{tail};
     for (int k = 1; k < K::arity; ++k) {
       double at[3];

@@ -1,0 +1,77 @@
+"""sheetbend view: a recording, or the motion of a configuration's scene, as a page to look at."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from .. import __version__
+from ..config import load
+from ..door import reading
+from ..errors import ConfigError
+from ..optional import require
+from ..page import Shown, motion_page, of_recording, of_trajectory
+from ..recording import Recording
+from ..whole import write_text
+from .folders import made
+from .outcome import Outcome, run
+from .screen import heading
+from .simulate import motion_of, tasks_of
+from .targets import check_targets
+
+
+def view(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            help="A TOML configuration, whose scenes are simulated at their starting values, or a recording.",
+            show_default=False,
+        ),
+    ],
+    output: Annotated[
+        Path | None, typer.Option(help="The page; out/NAME.html when left out.", show_default=False)
+    ] = None,
+    units: Annotated[
+        str | None, typer.Option(help="Length unit of a recording: m, cm or mm.", show_default=False)
+    ] = None,
+    json: Annotated[
+        bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
+    ] = False,
+) -> None:
+    """Write one HTML file that shows a motion in space and opens without a network.
+
+    Example: sheetbend view take.csv --units mm
+    """
+    run(lambda console: _view(console, file, output, units), json)
+
+
+def _view(console: Console, file: Path, output: Path | None, units: str | None) -> Outcome:
+    require("jinja2", "cli")
+    simulated = file.suffix.lower() == ".toml"
+    if simulated and units is not None:
+        raise ConfigError("--units", "is for recordings", units, "leave it out")
+    with reading(file, ConfigError):
+        study = load(file) if simulated else None
+    if study is None:
+        recording = Recording.load(file, units)
+        name, about = recording.name, recording.summary()
+    else:
+        name, about = study.config.experiment.name, study.config.experiment.about
+    page = output if output is not None else Path("out") / f"{name}.html"
+    if page.suffix.lower() not in (".html", ".htm"):
+        raise ConfigError("--output", "is no HTML file", str(page), "give a file that ends in .html")
+    check_targets("--output", page.parent, [page])
+    made("--output", page.parent)
+    heading(console, name, "" if study is None else about)
+    motions: list[Shown]
+    if study is None:
+        motions = [of_recording(recording, name)]
+    else:
+        tasks = tasks_of(study, None, None)
+        motions = [of_trajectory(task.scene, motion_of(task), task.name) for task in tasks]
+    write_text(page, motion_page(motions, name, about, __version__))
+    console.print(f"written to {page}", soft_wrap=True)
+    return Outcome({"name": name, "page": str(page), "motions": [m.name for m in motions]})

@@ -1,0 +1,278 @@
+"""The way up the ladder: from several starts to one straight rope, then rung by rung to what the recordings support."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..errors import SheetbendError
+from ..experiment import Experiment
+from ..parameters import Parameter
+from .bounds import bounded
+from .descent import bearable, descend
+from .judging import EQUAL, Errors, Split, Verdict, errors_of, misfits, verdict
+from .ladder import Rung, together
+from .model import NAME, RopeModel
+from .motion import GrippedMotion
+from .pieces import experiments_of, problem_of
+from .start import started
+from .windows import Span
+
+SETTLED = 0.05  # relative change of EI at which links are short enough
+SEARCHED = 0.5  # of the total of long windows that the last fit sees: enough to decide on rungs
+ENOUGH = 2e-3  # of the cost: what a step must promise while searching
+SHORT, LONG = 12, 30  # iterations, at most, of a start, and of a fit to long windows
+
+Say = Callable[[str], None]
+Parts = tuple[Parameter, ...]
+
+
+@dataclass(frozen=True)
+class Step:
+    """How a rung did.
+
+    Attributes:
+        name: of the rung.
+        fitted, others: median of the mean absolute coordinate errors of whole recordings that it was fitted to, and of
+            those that it was not, m.
+        stays: whether it is part of the final model.
+        seconds: its time.
+        ratio: median ratio of the errors with and without it, on what it was not fitted to; None of the first.
+        better: number of recordings (or pieces of them) that it predicts better.
+        count: of how many.
+        EI: bending stiffness with it, N m^2.
+    """
+
+    name: str
+    fitted: float
+    others: float
+    stays: bool
+    seconds: float
+    ratio: float | None = None
+    better: int = 0
+    count: int = 0
+    EI: float | None = None
+
+
+@dataclass(frozen=True)
+class Rope:
+    """A model with its fitted values, what is free in it, and how it predicts."""
+
+    model: RopeModel
+    parameters: Parts
+    values: dict[str, float]
+    errors: Errors = field(default_factory=Errors.none)
+
+
+class Climb:
+    """A search on given recordings; `rope`, `steps` and `left_out` hold how far it has come.
+
+    Attributes:
+        split: what is fitted and judged; without what was left out.
+        left_out: sentences on recordings that are neither fitted nor judged.
+        equal: ropes of rungs that predict as well as the last one that stayed.
+    """
+
+    def __init__(
+        self, motions: Sequence[GrippedMotion], share: float, windows: Sequence[Span], threads: int, say: Say
+    ) -> None:
+        self.given = tuple(motions)
+        self.split = Split.of(motions, share)
+        self.windows, self.threads, self.say = windows, threads, say
+        length, total = windows[-1]
+        self.middle, self.longest = windows[min(1, len(windows) - 1)], (length, max(length, SEARCHED * total))
+        self.left_out: list[str] = []
+        self.steps: list[Step] = []
+        self.tried: list[Rope] = []
+        self.rope: Rope | None = None
+
+    def run(self, model: RopeModel, ladder: Sequence[Rung], bending_lengths: Sequence[float], most_links: int) -> None:
+        """Climb; Ctrl-C passes, and leaves what is finished."""
+        began = time.perf_counter()
+        self._keep(ladder[0], self._straight(model, ladder[0], bending_lengths, most_links), None, began)
+        stayed = [self._climbed(rung) for rung in ladder[1:]]
+        last = max((k for k, stays in enumerate(stayed) if stays), default=-1)
+        dropped = []
+        for k, (rung, stays) in enumerate(zip(ladder[1:], stayed, strict=True)):
+            # what helped nothing before may help beside what stayed later
+            if not stays and not (k < last and self._climbed(rung)):
+                dropped.append(rung)
+        if len(dropped) > 1:  # or only beside another: stiffness that varies looks like yield, and yield like it
+            self._climbed(together(dropped))
+
+    def _climbed(self, rung: Rung) -> bool:
+        """Try a rung; whether it stays."""
+        began = time.perf_counter()
+        assert self.rope is not None
+        found = self._tried(rung, self.rope)
+        self._keep(rung, found, None if found is None else verdict(found.errors, self.rope.errors), began)
+        return self.steps[-1].stays
+
+    @property
+    def whole(self) -> list[GrippedMotion]:
+        """All motions that belong, uncut."""
+        kept = {id(m) for m in self.split.motions}
+        return [m for m in self.given if self.split.cut or id(m) in kept]
+
+    def equal(self) -> list[Rope]:
+        """What was tried and predicts as well as the rope that was found."""
+        assert self.rope is not None
+        here = self._judged(self.rope).errors
+        others = [self._judged(rope) for rope in self.tried if rope.values is not self.rope.values]
+        return [rope for rope in others if abs(verdict(rope.errors, here).ratio - 1.0) <= EQUAL]
+
+    def _keep(self, rung: Rung, found: Rope | None, told: Verdict | None, began: float) -> None:
+        """Note a rung that was tried, and take it where it stays."""
+        first = self.rope is None
+        stays = found is not None and (first or (told is not None and told.stays))
+        fitted, others = (np.inf, np.inf) if found is None else found.errors.typical
+        if found is not None:
+            self.tried.append(found)
+            if stays:
+                self.rope = found
+        judged = {} if told is None else {"ratio": told.ratio, "better": told.better, "count": told.count}
+        EI = None if found is None else found.values[f"{NAME}_EI"]
+        step = Step(rung.name, fitted, others, stays, time.perf_counter() - began, EI=EI, **judged)  # type: ignore[arg-type]
+        self.steps.append(step)
+        self._tell(step)  # once it counts: who is told of a step may stop there
+        if stays and not first and self.rope is not None and self._leave_out(self.rope.errors.whole):
+            # the better the model, the clearer what does not belong; the next rung has to beat a fit without it
+            self.rope = self._judged(self._on(self.rope, self.longest))
+
+    def _tell(self, step: Step) -> None:
+        if not np.isfinite(step.others):
+            self.say(f"{step.name}: diverges, does not stay")
+            return
+        errors = f"{1e3 * step.fitted:.3g} mm, {1e3 * step.others:.3g} mm on others"
+        if step.ratio is not None:
+            errors += f", {step.ratio:.3g} times without it, better on {step.better} of {step.count}"
+        self.say(f"{step.name}: {errors}{'' if step.stays else ', does not stay'}")
+
+    def _straight(self, model: RopeModel, rung: Rung, bending_lengths: Sequence[float], most_links: int) -> Rope:
+        """The first rung, from the best start that gets to its end.
+
+        Raises:
+            SheetbendError: none does.
+        """
+        for start in self._started(model, rung, bending_lengths):
+            try:
+                return self._refined(start, most_links)
+            except SheetbendError as error:
+                self.say(f"from EI {start.values[f'{NAME}_EI']:.3g}: {error}; on to the next start")
+        raise SheetbendError("no start of a straight rope gives a motion that does not diverge")
+
+    def _started(self, model: RopeModel, rung: Rung, bending_lengths: Sequence[float]) -> list[Rope]:
+        """Starts fitted to short windows, best first: by the median error of predictions, then by the cost."""
+        ends = []
+        for length in bending_lengths:
+            candidate = started(model, self.split.motions, length)
+            own = rung.wanted(self.split.fitted[0])
+            found = self._descended(Rope(candidate, own, {}), self.windows[0], SHORT)
+            if found is None:
+                self.say(f"start at a bending length of {length:g} m: diverges")
+                continue
+            rope, cost = found
+            errors = errors_of(rope.model, rope.values, self.split, self.threads)
+            EI, middle = rope.values[f"{NAME}_EI"], float(np.median(errors.fitted))
+            self.say(f"start at a bending length of {length:g} m: EI {EI:.3g}, error {1e3 * middle:.3g} mm")
+            ends.append((middle, cost, replace(rope, errors=errors)))
+        ends.sort(key=lambda end: end[:2])
+        ropes = [rope for _, _, rope in ends]
+        if ropes:
+            least = np.min([rope.errors.whole for rope in ropes], axis=0)
+            self._leave_out(least)
+        return ropes
+
+    def _refined(self, rope: Rope, most_links: int) -> Rope:
+        """On longer windows, with the links doubled until EI moves by less than 5 %, and fitted to the longest; then
+        once more without recordings that do not belong to the others.
+
+        Raises:
+            SheetbendError: the motion diverges.
+        """
+        for window in [*self.windows[1:-1], self.middle]:
+            rope = self._on(rope, window)
+        moved = np.inf
+        while moved >= SETTLED and 2 * rope.model.segments <= most_links:
+            finer = self._on(replace(rope, model=replace(rope.model, segments=2 * rope.model.segments)), self.middle)
+            moved = abs(finer.values[f"{NAME}_EI"] / rope.values[f"{NAME}_EI"] - 1.0)
+            self.say(f"{rope.model.segments} to {finer.model.segments} links move EI by {100 * moved:.2g} %")
+            rope = finer
+        rope = self._judged(self._on(rope, self.longest))
+        if self._leave_out(rope.errors.whole):
+            rope = self._judged(self._on(rope, self.longest))
+        if not np.isfinite(rope.errors.typical).all():
+            raise SheetbendError("most predictions diverge")
+        return rope
+
+    def _tried(self, rung: Rung, rope: Rope) -> Rope | None:
+        """A rung fitted to middle windows from each of its starts, and the best of these to long ones; None where all
+        diverge."""
+        larger = rung.added_to(rope.model)
+        parameters = (*rope.parameters, *rung.wanted(self.split.fitted[0]))
+        ends = []
+        for start in ({}, *rung.starts):
+            shifted = {f"{NAME}_{k}": v for k, v in start.items() if k != "EI"}
+            shifted[f"{NAME}_EI"] = rope.values[f"{NAME}_EI"] * start.get("EI", 1.0)
+            found = self._descended(Rope(larger, parameters, {**rope.values, **shifted}), self.middle, SHORT)
+            if found is not None:
+                ends.append(found)
+        if not ends:
+            return None
+        best = min(ends, key=lambda end: end[1])[0]
+        try:
+            return self._judged(self._on(best, self.longest))
+        except SheetbendError as error:
+            self.say(f"{rung.name}: {error}")
+            return None
+
+    def _on(self, rope: Rope, window: Span) -> Rope:
+        """The rope fitted to such windows.
+
+        Raises:
+            SheetbendError: the motion diverges.
+        """
+        found = self._descended(rope, window)
+        if found is None:
+            raise SheetbendError(f"the motion diverges on windows of {window[0]:g} s")
+        return found[0]
+
+    def _descended(self, rope: Rope, window: Span, most: int = LONG) -> tuple[Rope, float] | None:
+        """A rope and its cost after a descent on the windows that do not diverge at first; None where most do."""
+        experiments = experiments_of(rope.model, self.split.fitted, window)
+        free = bounded(rope.parameters, rope.model, self.split.fitted, window[0])
+        end = descend(experiments, free, rope.values, most, self.threads, ENOUGH)
+        if not end.finite:
+            sound = self._sound(experiments, free, rope.values)
+            if 2 * len(sound) <= len(experiments):
+                return None
+            end = descend(sound, free, rope.values, most, self.threads, ENOUGH)
+        return (Rope(rope.model.at(end.values), rope.parameters, end.values), end.cost) if end.finite else None
+
+    def _sound(
+        self, experiments: Sequence[Experiment], parameters: Sequence[Parameter], values: Mapping[str, float]
+    ) -> list[Experiment]:
+        """Those that do not diverge at these values."""
+        problems = (problem_of([e], parameters, values) for e in experiments)
+        sound = [bearable(p, p.cost(p.parameters.initial())) for p in problems]
+        return [e for e, ok in zip(experiments, sound, strict=True) if ok]
+
+    def _judged(self, rope: Rope) -> Rope:
+        return replace(rope, errors=errors_of(rope.model, rope.values, self.split, self.threads))
+
+    def _leave_out(self, errors: np.ndarray) -> bool:
+        """Leave recordings out of fitting and judging that do not belong to the others; whether there were any."""
+        found = misfits(errors)
+        if len(found) == 0 or self.split.cut:
+            return False
+        smaller = self.split.without(found)
+        if not smaller.fitted or (self.split.judged and not smaller.judged):
+            return False
+        for k, why in found.items():
+            self.left_out.append(f"{self.split.motions[k].recording.name} is left out of the fit: {why}")
+            self.say(self.left_out[-1])
+        self.split = smaller
+        return True

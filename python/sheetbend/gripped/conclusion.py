@@ -1,0 +1,145 @@
+"""The fit that counts: the rope that was found, fitted to all recordings, with what its intervals rest on.
+
+How stiff a rope reads depends on what else its model has. So the intervals also count by how much the parameters of
+the straight rope differ between models that predict what they were not fitted to equally well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..discretization import Refinement
+from ..errors import SheetbendError
+from ..experiment import Experiment
+from ..fit import Fit, fit
+from ..parameters import Parameter
+from ..wording import short
+from .bounds import bounded
+from .climb import Climb, Rope
+from .descent import bearable, descend, negligible
+from .ladder import TWIST
+from .model import NAME
+from .motion import GrippedMotion
+from .offsets import offset_reach
+from .over_density import as_quantities
+from .pieces import experiments_of, problem_of, starting
+from .windows import Span, counted, places
+
+MOST = 30  # iterations, at most
+MANY = 12  # recordings: of a larger set the time of the last fit is told
+EVALUATIONS = 15  # with derivatives, of such a fit and its intervals, for an estimate of its time
+
+
+def conclude(
+    climb: Climb,
+    motions: Sequence[GrippedMotion],
+    window: Span,
+    given: Mapping[str, float],
+    interrupted: bool,
+) -> tuple[Fit, dict[str, float]]:
+    """The fit to windows of these motions, and the model term of its intervals, by parameter in its unit; after Ctrl-C
+    one iteration of it, which the intervals need.
+
+    Raises:
+        SheetbendError: the motion diverges.
+    """
+    rope, say, threads = climb.rope, climb.say, climb.threads
+    assert rope is not None
+    experiments = experiments_of(rope.model, motions, window)
+    parameters = bounded(rope.parameters, rope.model, motions, window[0])
+    say(f"the fit that counts, to {counted(motions, window)}")
+    if len(motions) > MANY:
+        say(f"which takes about {short(_seconds(rope, motions, window, threads), 1)} s")
+    values, spread = rope.values, dict[str, float]()
+    if not interrupted:
+        try:
+            spread = model_spread(rope, climb.equal())
+            values = _at_the_end(climb, experiments, parameters)
+        except KeyboardInterrupt:
+            interrupted = True
+            say("interrupted: the fit that counts did not get to its end")
+
+    def finer() -> list[Experiment]:
+        model = replace(rope.model, segments=2 * rope.model.segments)
+        return checked(experiments_of(model, motions, window), parameters, values, threads)
+
+    last = fit(
+        experiments,
+        parameters=starting(parameters, values),
+        refine=None if interrupted else Refinement(finer=finer, linear=True),
+        systematic=lambda problem, u: _together(offset_reach(problem, u), spread),
+        windows=(),
+        given=given,
+        threads=threads,
+        profiles=False,
+        max_iterations=1 if interrupted else MOST,
+        tolerance=negligible(problem_of(experiments, parameters, values, threads)),
+    )
+    for refit in last.result.refits:
+        moved = refit.moved[f"{NAME}_EI"] / last.values[f"{NAME}_EI"]
+        say(f"{refit.name} would move EI by {100 * moved:+.2g} %")
+    if not interrupted:
+        return last, spread
+    warning = "interrupted: later rungs were not tried, and the last fit did not get to its end"
+    return replace(last, result=replace(last.result, interrupted=True, converged=False, warnings=(warning,))), spread
+
+
+def _at_the_end(climb: Climb, experiments: Sequence[Experiment], parameters: Sequence[Parameter]) -> dict[str, float]:
+    """Values at the minimum.
+
+    Raises:
+        SheetbendError: the motion diverges.
+    """
+    assert climb.rope is not None
+    found = descend(experiments, parameters, climb.rope.values, MOST, climb.threads)
+    if not found.finite:
+        raise SheetbendError("the fit that counts diverges where the last rung ended")
+    climb.say(f"{'ended' if found.ended else 'not ended'} after {found.iterations} steps")
+    return found.values
+
+
+def checked(
+    experiments: list[Experiment], parameters: Sequence[Parameter], values: Mapping[str, float], threads: int
+) -> list[Experiment]:
+    """The experiments, whose motions at these values stay near the rope.
+
+    Raises:
+        SheetbendError: they do not, so that no step from there tells anything.
+    """
+    problem = problem_of(experiments, parameters, values, threads)
+    if not bearable(problem, problem.cost(problem.parameters.initial())):
+        raise SheetbendError("the motion diverges")
+    return experiments
+
+
+def model_spread(rope: Rope, equal: Sequence[Rope]) -> dict[str, float]:
+    """By how much parameters of the straight rope differ at most in models that predict equally well, in their unit."""
+    names = [p.name for p in TWIST.parameters if p.log and p.name != f"{NAME}_length"]
+    free = {p.name for p in rope.parameters if p.tied_to is None}
+    return {
+        name: max(abs(other.values[name] - rope.values[name]) for other in equal)
+        for name in names
+        if equal and name in free
+    }
+
+
+def spread_words(spread: Mapping[str, float], values: Mapping[str, float]) -> str:
+    """The model term in words; empty where there is none."""
+    EI = f"{NAME}_EI"
+    if EI not in spread:
+        return ""
+    part = short(100 * spread[EI] / as_quantities(values)[EI], 2)
+    return f"what else the model has (models that predict equally well differ in EI by up to {part} %)"
+
+
+def _together(offsets: Mapping[str, float], spread: Mapping[str, float]) -> dict[str, float]:
+    return {name: float(np.hypot(reach, spread.get(name, 0.0))) for name, reach in offsets.items()}
+
+
+def _seconds(rope: Rope, motions: Sequence[GrippedMotion], window: Span, threads: int) -> float:
+    one = problem_of(experiments_of(rope.model, motions[:1], (window[0], window[0])), rope.parameters, rope.values)
+    one.evaluate(one.parameters.initial())
+    return EVALUATIONS * one.seconds.get(True, 0.0) * len(places(motions, window)) / threads

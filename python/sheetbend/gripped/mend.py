@@ -1,0 +1,216 @@
+"""Mends a single recording of a gripped rope: exchanged neighbors, markers seen elsewhere, and tracking that froze.
+
+All three are found from the recording alone. Two neighbors are exchanged at a frame at which the direction from one to
+the other turns round, and throughout where the line through all markers is then shorter. A marker is elsewhere between
+two jumps that no rope makes, and frozen where its numbers repeat exactly although the frame before or after shows it
+moving.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..recording import Recording
+from ..timeseries import mean_position
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+TURNED = -0.5  # cosine of the angle by which two neighbors turn from frame to frame when they are exchanged
+STRETCHED = 2.0  # by which their distance changes at most in that
+FORGOTTEN = 0.1  # s, after which directions are not compared any more
+SHORTER, SHORTER_AT_END = 0.8, 0.98  # links beside two neighbors, exchanged over given, that exchange them throughout
+JUMP = 0.05  # of the rope's length, from one frame to the next beyond the usual way: no marker of a rope does that
+SUDDEN = 200.0  # m/s^2, the same for frames that are far apart in time
+REPEATS, LASTS = 5, 0.05  # frames and s of equal numbers that count as frozen
+STEP = 5e-3  # m, that a frozen marker goes at once before or after
+HELD = 10  # more such times: then the file was made from fewer frames, and nothing froze
+
+
+def mended(recording: Recording, inner: tuple[int, int]) -> tuple[Recording, tuple[str, ...]]:
+    """The recording with exchanged neighbors back in place and impossible samples not seen (NaN), and what was done.
+
+    Args:
+        recording: of a rope with its gripped markers named.
+        inner: numbers of the two inner gripped markers.
+
+    Returns:
+        The recording, the same object where nothing was wrong, and a sentence on each thing that was.
+    """
+    positions, words = _in_order(recording, inner)
+    times, tracks = recording.times, range(positions.shape[1])
+    frozen = np.stack([_frozen(times, positions[:, k]) for k in tracks], axis=1) & ~_resting(positions)[:, None]
+    positions[frozen] = np.nan
+    least = _least_jump(times, positions)
+    stray = np.stack([_elsewhere(times, positions[:, k], least) for k in tracks], axis=1)
+    positions[stray] = np.nan
+    words += _each(recording, frozen, "stood still although the rope moved")
+    words += _each(recording, stray, "jumped elsewhere")
+    if not words:
+        return recording, ()
+    return replace(recording, positions=positions), tuple(words)
+
+
+def _in_order(recording: Recording, inner: tuple[int, int]) -> tuple[Array, list[str]]:
+    """(frames, markers, 3) m with neighbors exchanged back, and words on each exchange."""
+    positions = recording.positions.copy()
+    pairs = range(positions.shape[1] - 1)
+    wrong = np.zeros((len(pairs), len(positions)), dtype=bool)
+    for k in pairs:
+        state = _turned(recording.times, positions[:, k + 1] - positions[:, k])
+        wrong[k] = state if 2 * state.sum() <= len(state) else ~state
+        _exchange(positions, k, wrong[k])
+    for k in _throughout(positions):
+        wrong[k] = ~wrong[k]
+    words = []
+    of = {inner[0] - 1: " of the first grip", inner[1]: " of the last grip"}
+    for k in np.flatnonzero(wrong.any(axis=1)).tolist():
+        names = f"{recording.markers[k]} and {recording.markers[k + 1]}{of.get(k, '')}"
+        words.append(f"{names} were exchanged {_when(recording, wrong[k])}, and are put back")
+    return positions, words
+
+
+def _turned(times: Array, along: Array) -> Mask:
+    """(frames,) whether two neighbors are the other way round than in the first frame, from one to the other (frames,
+    3)."""
+    seen = np.flatnonzero(np.isfinite(along[:, 0]))
+    distance = np.maximum(np.linalg.norm(along[seen], axis=1), np.finfo(float).tiny)
+    d = along[seen] / distance[:, None]
+    turned = np.zeros(len(times), dtype=int)
+    turned[seen[1:]] = (
+        ((d[1:] * d[:-1]).sum(axis=1) < TURNED)
+        & (np.abs(np.diff(np.log(distance))) < np.log(STRETCHED))
+        & (np.diff(times[seen]) <= FORGOTTEN)
+    )
+    return np.asarray(np.cumsum(turned) % 2 == 1)
+
+
+def _throughout(positions: Array) -> list[int]:
+    """Exchanges pairs of neighbors back that are so in all frames, by their first markers, as long as the line through
+    all markers becomes clearly shorter about them."""
+    distance = mean_position(np.linalg.norm(positions[:, :, None] - positions[:, None], axis=3))
+    order = list(range(positions.shape[1]))
+    done: list[int] = []
+
+    def gain(k: int) -> float:
+        """By how much the links beside a pair become shorter when it is exchanged; 0 where that is not clear."""
+        a, b = order[k], order[k + 1]
+        before, after = order[k - 1 : k] if k else [], order[k + 2 : k + 3]
+        given = sum(distance[c, a] for c in before) + sum(distance[b, c] for c in after)
+        exchanged = sum(distance[c, b] for c in before) + sum(distance[a, c] for c in after)
+        clear = exchanged < (SHORTER if before and after else SHORTER_AT_END) * given
+        return float(given - exchanged) if clear else 0.0
+
+    while True:
+        gains = [gain(k) for k in range(len(order) - 1)]
+        best = int(np.argmax(gains))
+        if gains[best] == 0.0:
+            return done
+        order[best], order[best + 1] = order[best + 1], order[best]
+        _exchange(positions, best, np.ones(len(positions), dtype=bool))
+        done.append(best)
+
+
+def _exchange(positions: Array, k: int, which: Mask) -> None:
+    """Exchange markers k and k + 1 in some frames."""
+    frames = np.flatnonzero(which)[:, None]
+    positions[frames, [k, k + 1]] = positions[frames, [k + 1, k]]
+
+
+def _frozen(times: Array, track: Array) -> Mask:
+    """(frames,) where the positions (frames, 3) of a moving marker repeat."""
+    step = np.linalg.norm(np.diff(track, axis=0), axis=1)
+    frozen, count = np.zeros(len(times), dtype=bool), 0
+    for first, last in _runs(step == 0.0):
+        around = step[[i for i in (first - 1, last) if 0 <= i < len(step)]]
+        long = last - first + 1 >= REPEATS and times[last] - times[first] >= LASTS
+        if long and (around > STEP).any():
+            frozen[first + 1 : last + 1] = True
+            count += 1
+    return frozen if count <= HELD else np.zeros_like(frozen)
+
+
+def _resting(positions: Array) -> Mask:
+    """(frames,) before and after the motion, in which every marker that is seen repeats."""
+    same = ((np.diff(positions, axis=0) == 0.0) | np.isnan(np.diff(positions, axis=0))).all(axis=(1, 2))
+    resting = np.zeros(len(positions), dtype=bool)
+    for first, last in _runs(same):
+        if first == 0 or last == len(positions) - 1:
+            resting[first : last + 1] = True
+    return resting
+
+
+def _least_jump(times: Array, positions: Array) -> float:
+    """m, between two frames, that no marker makes."""
+    chords = np.linalg.norm(np.diff(positions, axis=1), axis=2)
+    length = float(np.nansum(mean_position(chords)))
+    return max(JUMP * length, SUDDEN * float(np.median(np.diff(times))) ** 2)
+
+
+def _elsewhere(times: Array, track: Array, least: float) -> Mask:
+    """(frames,) where a marker (frames, 3) is not on the path that its longest stretch without jumps belongs to."""
+    seen = np.flatnonzero(np.isfinite(track[:, 0]))
+    stray = np.zeros(len(times), dtype=bool)
+    if len(seen) < 6:
+        return stray
+    x, t = track[seen], times[seen]
+    velocity = np.diff(x, axis=0) / np.diff(t)[:, None]
+    usual = np.median(np.lib.stride_tricks.sliding_window_view(np.pad(velocity, ((2, 2), (0, 0)), "edge"), 5, 0), -1)
+    jumps = np.linalg.norm(velocity - usual, axis=1) * np.diff(t) > least
+    bounds = [0, *(np.flatnonzero(jumps) + 1).tolist(), len(seen)]
+    stretches = list(pairwise(bounds))
+    best = max(range(len(stretches)), key=lambda i: stretches[i][1] - stretches[i][0])
+    fastest = float(np.linalg.norm(velocity[stretches[best][0] : stretches[best][1] - 1], axis=1).max(initial=0.0))
+
+    def reached(a: int, b: int) -> bool:
+        return bool(np.linalg.norm(x[a] - x[b]) <= least + fastest * abs(t[a] - t[b]))
+
+    first, last = stretches[best]
+    good = [stretches[best]]
+    for a, b in stretches[best + 1 :]:
+        if reached(last - 1, a):
+            last = b
+            good.append((a, b))
+    for a, b in reversed(stretches[:best]):
+        if reached(first, b - 1):
+            first = a
+            good.append((a, b))
+    stray[seen] = True
+    for a, b in good:
+        stray[seen[a:b]] = False
+    return stray
+
+
+def _runs(same: Mask) -> Iterator[tuple[int, int]]:
+    """(first, last) frames of each run of equal positions; `same` is of the steps between frames."""
+    edges = np.diff(np.concatenate([[0], same.astype(int), [0]]))
+    yield from zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True)
+
+
+def _each(recording: Recording, where: Mask, what: str) -> list[str]:
+    """Words on samples (frames, markers) that are not used; markers with the same frames share a sentence."""
+    names: dict[str, list[str]] = {}
+    for k in np.flatnonzero(where.any(axis=0)):
+        names.setdefault(_when(recording, where[:, k]), []).append(recording.markers[k])
+    return [f"{', '.join(those)} {what} {when}: not used there" for when, those in names.items()]
+
+
+def _when(recording: Recording, frames: Mask) -> str:
+    """Where frames are marked: a phrase."""
+    if frames.all():
+        return "throughout"
+    if frames.sum() == 1:
+        (only,) = np.flatnonzero(frames)
+        return f"in frame {only} ({recording.times[only]:.4g} s)"
+    edges = np.diff(np.concatenate([[0], frames.astype(int), [0]]))
+    first, end = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    start, stop = recording.times[first[0]], recording.times[end[-1] - 1]
+    if len(first) == 1 and end[0] == len(frames):
+        return f"from frame {first[0]} ({start:.4g} s) on"
+    times = "" if len(first) == 1 else f"{len(first)} times "
+    return f"{times}from frame {first[0]} to {end[-1] - 1} ({start:.4g} to {stop:.4g} s)"

@@ -1,0 +1,46 @@
+"""Pieces of recordings as experiments, and the least-squares problem of several of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..experiment import Experiment
+from ..parameters import Parameter, Parameters
+from ..problem import FitProblem
+from .model import RopeModel
+from .motion import GrippedMotion
+from .windows import Span, places
+
+
+def experiments_of(model: RopeModel, motions: Sequence[GrippedMotion], span: Span) -> list[Experiment]:
+    """The model on the windows of a span, each predicted open loop from its first frame."""
+    return [model.experiment(m, (start, start + span[0])) for m, start in places(motions, span)]
+
+
+def problem_of(
+    experiments: Sequence[Experiment],
+    parameters: Sequence[Parameter],
+    values: Mapping[str, float],
+    threads: int = 1,
+) -> FitProblem:
+    """Free parameters start at `values`; other quantities keep them."""
+    free = {p.name for p in parameters}
+    known = experiments[0].scene.quantities
+    start = {name: q.value for name, q in known.items()} | dict(values)
+    held = [
+        Parameter(name=name, initial=start[name], fixed=True) for name in known if name in values and name not in free
+    ]
+    return FitProblem(experiments, Parameters([*starting(parameters, start), *held]), threads=threads)
+
+
+def starting(parameters: Sequence[Parameter], values: Mapping[str, float]) -> list[Parameter]:
+    """The parameters with these initial values, inside their bounds."""
+    return [
+        replace(p, initial=float(np.clip(values[p.name], p.lower, p.upper)))
+        if p.tied_to is None and p.name in values
+        else p
+        for p in parameters
+    ]

@@ -1,0 +1,118 @@
+"""Which recordings of a set can be used: mended where that is possible, left out with a word where it is not.
+
+One bad file of many costs that file, not the fit. Left out is what no motion can be made of, and what is no recording
+of the same rope as most others: another number of markers, other distances between them, or another length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RecordingError
+from ..recording import Recording
+from .mend import mended
+from .motion import Array, GrippedMotion, gripped_ends
+
+FEWEST = 3  # recordings, from which one may be compared with the others
+OTHER = 0.02  # relative difference of length, and of marker places over the length, that another rope has at least
+SCATTERED = 6.0  # the same over the median difference of the others
+
+
+@dataclass(frozen=True, eq=False)
+class Screened(Sequence[GrippedMotion]):
+    """The motions that can be used, a sequence, with words on the others.
+
+    Attributes:
+        motions: in the given order.
+        notes: a sentence on each recording that was mended or left out.
+    """
+
+    motions: tuple[GrippedMotion, ...]
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.motions)
+
+    @overload
+    def __getitem__(self, index: int) -> GrippedMotion: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[GrippedMotion]: ...
+
+    def __getitem__(self, index: int | slice) -> GrippedMotion | Sequence[GrippedMotion]:
+        return self.motions[index]
+
+
+def screened(recordings: Sequence[Recording | GrippedMotion], smoothing: float) -> Screened:
+    """Mend recordings, smooth them over `smoothing` s, and leave out those that cannot be used.
+
+    Args:
+        recordings: of one rope. Motions stay as they are; what was screened already is returned.
+
+    Raises:
+        RecordingError: more than half of the recordings cannot be used: the first one's reason.
+    """
+    if isinstance(recordings, Screened):
+        return recordings
+    kept: list[GrippedMotion] = []
+    notes: list[str] = []
+    errors: list[RecordingError] = []
+    for recording in recordings:
+        if isinstance(recording, GrippedMotion):
+            kept.append(recording)
+            continue
+        words: tuple[str, ...] = ()
+        try:
+            sound, words = mended(recording, gripped_ends(recording))
+            kept.append(GrippedMotion.of(sound, smoothing))
+        except RecordingError as error:
+            reasons = "; ".join(words)
+            if words:
+                error = RecordingError(error.field, f"{error.problem} ({reasons})", error.got, error.fix)
+            errors.append(error)
+            notes.append(f"{recording.name} is left out: {reasons or f'{error.field} {error.problem}; {error.fix}'}")
+        else:
+            notes += [f"{recording.name}: {what}" for what in words]
+    if 2 * len(errors) > len(recordings):
+        raise errors[0]
+    same, others = _of_one_rope(kept)
+    return Screened(tuple(same), (*notes, *others))
+
+
+def _of_one_rope(motions: Sequence[GrippedMotion]) -> tuple[list[GrippedMotion], list[str]]:
+    """Those of the rope that most are of, and words on the others."""
+    if len(motions) < FEWEST:
+        return list(motions), []
+    counts = [len(m.fractions) for m in motions]
+    usual = max(set(counts), key=counts.count)
+    notes = [
+        f"{m.recording.name} is left out: it has {n} markers, most others {usual}"
+        for m, n in zip(motions, counts, strict=True)
+        if n != usual
+    ]
+    alike = [m for m, n in zip(motions, counts, strict=True) if n == usual]
+    length = float(np.median([m.length for m in alike]))
+    longer = np.array([abs(m.length / length - 1.0) for m in alike])
+    places = np.array([m.fractions[m.inner[0] : m.inner[1] + 1] for m in alike])
+    moved = np.abs(places - np.median(places, axis=0)).max(axis=1)
+    same = []
+    for m, by_length, by_place in zip(alike, _odd(longer), _odd(moved), strict=True):
+        if by_length:
+            what = f"its rope is {m.length:.3g} m long, that of the others {length:.3g} m"
+        elif by_place:
+            what = "its markers have other distances along the rope than the others'"
+        else:
+            same.append(m)
+            continue
+        notes.append(f"{m.recording.name} is left out: {what}")
+    return same, notes
+
+
+def _odd(differences: Array) -> NDArray[np.bool_]:
+    """Which are too large for the same rope."""
+    return np.asarray(differences > max(OTHER, SCATTERED * float(np.median(differences))))

@@ -1,0 +1,165 @@
+"""The report of a fit as one HTML file: the motion in space, residuals, and everything that the text report says."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+
+from ..errors import SheetbendError
+from ..fit import Fit
+from ..prediction import Comparison
+from ..report import headline, sections
+from ..result import UNSOUND, FitResult
+from ..tables import Section
+from ..wording import short
+from .packed import packed_motions
+from .render import compressed, render, table
+from .shown import Shown, fitted_motion
+
+MOST_MATRIX = 60  # parameters whose correlations are drawn; the table has the strongest of more
+_FIRST = ("Misfit", "Parameters", "What contradicts this fit", "Warnings")
+
+
+def fit_page(
+    found: Fit, title: str, *, about: str = "", configuration: str = "", command: str = "", version: str = ""
+) -> str:
+    """The page of a fit as HTML text. Each recording of a motion costs one simulation.
+
+    Args:
+        found: a fit, a failed one too.
+        title, about, configuration, command, version: see `result_page`.
+
+    Raises:
+        MissingExtraError: jinja2 is not installed.
+    """
+    motions, remarks = _motions(found)
+    return result_page(
+        found.result,
+        motions,
+        title,
+        remarks=remarks,
+        about=about,
+        configuration=configuration,
+        command=command,
+        version=version,
+    )
+
+
+def result_page(
+    result: FitResult,
+    motions: Sequence[Shown],
+    title: str,
+    *,
+    more: Sequence[Section] = (),
+    remarks: Sequence[str] = (),
+    about: str = "",
+    configuration: str = "",
+    command: str = "",
+    version: str = "",
+) -> str:
+    """The page of a result as HTML text.
+
+    Args:
+        result: of a fit.
+        motions: what is drawn.
+        title: of the page.
+        more: further sections of the report.
+        remarks: sentences below the motion.
+        about: what the experiment is, a sentence.
+        configuration: the TOML that the fit was made from; shown as it is.
+        command: what repeats the fit.
+        version: of sheetbend.
+
+    Raises:
+        MissingExtraError: jinja2 is not installed.
+    """
+    told = [table(section) for section in (*sections(result), *more)]
+    return render(
+        "fit.html",
+        title=title,
+        about=about,
+        headline=headline(result),
+        message=result.message,
+        tone=_tone(result),
+        counts=_counts(result),
+        first=[part for part in told if part["title"] in _FIRST],
+        rest=[part for part in told if part["title"] not in _FIRST],
+        starts=_starts(result),
+        data={
+            "motions": packed_motions(motions),
+            "correlations": _matrix(result),
+            "fit": compressed(json.dumps(result.to_dict(), indent=2, allow_nan=False)),
+        },
+        remarks=remarks,
+        configuration=configuration,
+        command=command,
+        version=version,
+        made=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        machine=f"Python {platform.python_version()}, NumPy {np.__version__}",
+    )
+
+
+def _motions(found: Fit) -> tuple[list[Shown], list[str]]:
+    """All recordings' motions; where one diverges at the fitted values, its markers alone, with a remark."""
+    motions, remarks = [], []
+    for c in found.comparisons:
+        try:
+            motions.append(fitted_motion(found, c))
+        except SheetbendError as error:
+            motions.append(_markers_alone(c))
+            remarks.append(f"{c.experiment.name}: only its markers are drawn. {error}")
+    return motions, remarks
+
+
+def _markers_alone(c: Comparison) -> Shown:
+    x = c.recording.positions[:1] if c.experiment.static else c.recording.positions
+    times = c.recording.times[: len(x)]
+    return Shown(c.experiment.name, times, markers=tuple(c.recording.markers), measured=x, held_out=c.held_out)
+
+
+def _tone(result: FitResult) -> str:
+    if not result.converged or result.interrupted or not result.sound:
+        return "bad"
+    return "good" if all(e.verdict == "identified" for e in result.estimates) else "mixed"
+
+
+def _counts(result: FitResult) -> list[tuple[str, int, bool]]:
+    """How often each verdict is given, and whether nothing should rest on it."""
+    verdicts = [e.verdict for e in result.estimates]
+    return [(verdict, verdicts.count(verdict), verdict in UNSOUND) for verdict in dict.fromkeys(verdicts)]
+
+
+def _starts(result: FitResult) -> dict[str, Any] | None:
+    """A table of the starts' ends, best first."""
+    if len(result.starts) < 2:
+        return None
+    names = list(result.starts[0].values)
+    rows = [
+        (
+            "diverged" if start.cost is None else short(start.cost, 6),
+            str(start.iterations),
+            "yes" if start.converged else "no",
+            *(short(start.values[name]) for name in names),
+        )
+        for start in result.starts
+    ]
+    headers = ("cost", "iterations", "converged", *names)
+    return {"title": "Starts", "headers": headers, "rows": rows, "left": [False] * len(headers), "notes": ()}
+
+
+def _matrix(result: FitResult) -> dict[str, Any] | None:
+    """Correlations as a full matrix of the determined parameters."""
+    names = list(dict.fromkeys(name for pair in result.correlations for name in (pair.first, pair.second)))
+    if not 2 <= len(names) <= MOST_MATRIX:
+        return None
+    place = {name: k for k, name in enumerate(names)}
+    matrix = np.eye(len(names))
+    for pair in result.correlations:
+        i, j = place[pair.first], place[pair.second]
+        matrix[i, j] = matrix[j, i] = round(pair.value, 3)
+    return {"names": names, "values": matrix.tolist()}

@@ -1,0 +1,150 @@
+"""What a page draws of one motion: ropes, cloths and markers over time, all in one frame of reference."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..equilibrium import equilibrium
+from ..fit import Fit
+from ..mesh import TriangleMesh
+from ..prediction import Comparison
+from ..recording import Recording
+from ..scene import Scene
+from ..simulate import Trajectory, simulate
+from ..strain import largest_strain
+
+Array = np.ndarray
+TICK = 0.02  # of the motion's extent: length of the mark that shows how a rod is twisted
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A cloth: triangles (m, 3) of its vertices, their positions (frames, vertices, 3) m, and each triangle's largest
+    strain (frames, m), 1."""
+
+    triangles: Array
+    positions: Array
+    strain: Array
+
+
+@dataclass(frozen=True)
+class Shown:
+    """One motion.
+
+    Attributes:
+        name: of the recording or the scene.
+        times: (frames,) s.
+        lines: ropes by name, (frames, nodes, 3) m.
+        ticks: of twisted rods by name, (frames, edges, 2, 3) m, from the edge's middle along its director.
+        sheets: cloths by name.
+        markers: names of the measured markers.
+        measured, simulated, baseline: (frames, markers, 3) m, NaN where there is nothing; None without.
+        held_out: (frames,) frames that the fit did not see.
+        up: (3,) against gravity; zeros without gravity.
+    """
+
+    name: str
+    times: Array
+    lines: Mapping[str, Array] = field(default_factory=dict)
+    ticks: Mapping[str, Array] = field(default_factory=dict)
+    sheets: Mapping[str, Sheet] = field(default_factory=dict)
+    markers: tuple[str, ...] = ()
+    measured: Array | None = None
+    simulated: Array | None = None
+    baseline: Array | None = None
+    held_out: Array | None = None
+    up: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+
+    @property
+    def points(self) -> list[Array]:
+        """Everything that has a place, (frames, n, 3) each."""
+        parts = [*self.lines.values(), *(sheet.positions for sheet in self.sheets.values())]
+        parts += [t.reshape(len(t), -1, 3) for t in self.ticks.values()]
+        return parts + [x for x in (self.measured, self.simulated, self.baseline) if x is not None]
+
+
+def fitted_motion(found: Fit, c: Comparison) -> Shown:
+    """A fitted motion beside its recording, at the substeps nearest to the recorded frames; a shape at rest is one
+    frame. Costs one simulation."""
+    e, values = c.experiment, found.values_of(c.experiment)
+    recorded = {
+        "markers": tuple(c.recording.markers),
+        "measured": c.recording.positions,
+        "simulated": c.simulated,
+        "baseline": c.baseline,
+        "held_out": c.held_out,
+    }
+    if e.static:
+        positions = equilibrium(e.scene, values=values).positions[None]
+        return _shown(e.name, e.scene, c.recording.times[:1], positions, recorded)
+    times = np.rint(np.maximum(c.recording.times - e.t0, 0.0) / e.solver.h) * e.solver.h
+    start = equilibrium(e.scene, values=values).positions if e.start == "equilibrium" else None
+    positions = simulate(e.scene, times, e.solver, values, start).positions
+    return _shown(e.name, e.scene, c.recording.times, positions, recorded)
+
+
+def predicted_motion(recording: Recording, predicted: Array) -> Shown:
+    """Markers along a rope beside their prediction, (frames, markers, 3) m, which a line joins."""
+    up = np.array([0.0, 0.0, 1.0]) if recording.gravity is None else -np.asarray(recording.gravity, dtype=float)
+    return Shown(
+        recording.name,
+        recording.times,
+        lines={"predicted": predicted},
+        markers=tuple(recording.markers),
+        measured=recording.positions,
+        simulated=predicted,
+        up=_unit(up),
+    )
+
+
+def of_trajectory(scene: Scene, motion: Trajectory, name: str = "") -> Shown:
+    """A simulated motion."""
+    return _shown(name or scene.name, scene, motion.times, motion.positions, {})
+
+
+def of_recording(recording: Recording, name: str) -> Shown:
+    """The markers of a recording."""
+    up = np.zeros(3) if recording.gravity is None else -np.asarray(recording.gravity, dtype=float)
+    x = recording.positions
+    return Shown(name, recording.times, markers=tuple(recording.markers), measured=x, up=_unit(up))
+
+
+def _shown(name: str, scene: Scene, times: Array, positions: Array, recorded: Mapping[str, object]) -> Shown:
+    lines = {rope.name: positions[:, rope.particles] for rope in scene.ropes.values()}
+    sheets = {c.name: _sheet(c.mesh, positions[:, c.particles]) for c in scene.cloths.values()}
+    if not lines and not sheets:  # a scene of bare particles and constraints: its links
+        lines = _links(scene, positions)
+    ticks = _ticks(scene, positions)
+    return Shown(name, times, lines, ticks, sheets, up=_unit(-scene.gravity), **recorded)  # type: ignore[arg-type]
+
+
+def _sheet(mesh: TriangleMesh, positions: Array) -> Sheet:
+    return Sheet(mesh.triangles, positions, np.stack([largest_strain(mesh, x) for x in positions]))
+
+
+def _links(scene: Scene, positions: Array) -> dict[str, Array]:
+    """Constraints between two particles as lines of their own."""
+    pairs = [pair for group in scene.groups for pair in group.particles.tolist() if len(pair) == 2]
+    points = [pair for pair in pairs if not set(pair) & set(scene.directors)]
+    return {f"link {a}-{b}": positions[:, [a, b]] for a, b in points}
+
+
+def _ticks(scene: Scene, positions: Array) -> dict[str, Array]:
+    """The directors across a rod's edges; a section's normal is none."""
+    nodes = [node for node, (_, _, normal) in scene.directors.items() if node != normal]
+    if not nodes:
+        return {}
+    ends = np.array([scene.directors[node][:2] for node in nodes])
+    middle = positions[:, ends].mean(axis=2)
+    d = positions[:, nodes]
+    along = d / np.linalg.norm(d, axis=2, keepdims=True)
+    size = TICK * np.ptp(positions[:, ends].reshape(-1, 3), axis=0).max()
+    return {"twist": np.stack([middle, middle + size * along], axis=2)}
+
+
+def _unit(v: Array) -> Array:
+    size = float(np.linalg.norm(v))
+    return v / size if size > 0 else v

@@ -1,0 +1,223 @@
+"""The way up the ladder: bounds, divergence, ends, and the spread between models that predict equally well."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from sheetbend.gripped import GrippedMotion, RopeModel, fit_rope
+from sheetbend.gripped.bounds import at_bounds, bounded
+from sheetbend.gripped.climb import Climb, Rope
+from sheetbend.gripped.conclusion import checked, model_spread, spread_words
+from sheetbend.gripped.descent import descend, negligible
+from sheetbend.gripped.judging import Errors, predict
+from sheetbend.gripped.ladder import LADDER, MARKERS, REST, TILTS, TWIST, VARYING, YIELD, Rung, smooth, together
+from sheetbend.gripped.model import place_of
+from sheetbend.gripped.pieces import experiments_of, problem_of
+from sheetbend.gripped.start import started, whole
+from sheetbend.optimizers import minimize
+from test_gripped_motion import carried_about, model_of
+
+MOTION = GrippedMotion.of(carried_about(), 0.0)
+MODEL = model_of(MOTION, smoothing=0.0)
+STIFFNESS = tuple(p for p in TWIST.parameters if p.name == "rope_EI")
+TRUE = {"rope_EI": 0.03}
+
+
+@cache
+def shown(name: str = "shown", **values: float) -> GrippedMotion:
+    """The rope as the model moves it with these quantities."""
+    model = replace(MODEL, places="rope_place_5" in values)
+    (x,) = predict(model, [MOTION], {**TRUE, **values})
+    return replace(MOTION, recording=replace(MOTION.recording, positions=x, name=name))
+
+
+def shaken(name: str) -> GrippedMotion:
+    """A recording whose last grip jumps away and back, which no rope follows."""
+    x = carried_about().positions.copy()
+    x[40:43, -2:] += [3.0, 0.0, 0.0]
+    return GrippedMotion.of(carried_about(positions=x, name=name), 0.0)
+
+
+class TestLadder:
+    def test_fine_modes_have_narrow_priors(self) -> None:
+        assert smooth(2.0, 0) == 2.0 and smooth(2.0, 2) == 1.0 and smooth(2.0, 8) == pytest.approx(0.4)
+        sds = {p.name: p.prior[1] for p in (*REST.parameters, *VARYING.parameters) if p.prior is not None}
+        assert len(REST.parameters) == 18 and len(VARYING.parameters) == 6
+        assert sds["rope_curvature_1_8"] == pytest.approx(sds["rope_curvature_1_0"] / 5.0)
+        assert sds["rope_softness_6"] < sds["rope_softness_1"]
+
+    def test_everything_that_the_rungs_add_has_its_derivative(self) -> None:
+        motion = MOTION.frames(slice(0, 31))
+        e, parameters = whole(started(MODEL, [motion], 0.25), LADDER, motion, 0.3)
+        problem = sb.problem.FitProblem([e], parameters)
+        u = problem.parameters.initial() + 0.01
+        _, _, J = problem.evaluate(u)
+        names = problem.parameters.free
+        for name in (place_of(4), "rope_curvature_2_8", "rope_softness_6", "rope_yield_share"):
+            k, h = names.index(name), 1e-5
+            step = h * (np.arange(len(u)) == k)
+            (_, above, _), (_, below, _) = (problem.evaluate(u + s, jacobian=False) for s in (step, -step))
+            slope = (above - below) / (2 * h)
+            assert np.abs(slope - J[:, k]).max() < 1e-4 * np.abs(J[:, k]).max(), name
+
+    def test_the_places_of_markers_come_back(self) -> None:
+        true = {place_of(5): 0.004, place_of(8): -0.003}
+        motion = shown(**true)
+        model = replace(MODEL.with_values(EI=TRUE["rope_EI"]), **MARKERS.options)
+        wanted = [replace(p, prior=None) for p in MARKERS.wanted(motion)]
+        assert [p.name for p in wanted] == [place_of(k) for k in motion.free]
+        end = descend(experiments_of(model, [motion], (1.0, 1.0)), wanted, {}, 20)
+        assert end.ended
+        for name, value in true.items():
+            assert end.values[name] == pytest.approx(value, rel=0.03), name
+
+
+class TestBounds:
+    def test_damping_stays_within_what_the_windows_show(self) -> None:
+        wide = replace(TWIST.parameters[2], initial=50.0, prior=None)
+        (p,) = bounded([wide], MODEL, [MOTION], 5.0)[:1]
+        assert (p.lower, p.upper) == pytest.approx((0.001, 10.0))
+        end = descend(experiments_of(MODEL, [shown()], (1.0, 1.0)), bounded([wide], MODEL, [MOTION], 1.0), {}, 3)
+        assert end.values["rope_bend_damping"] <= 2.0
+
+    def test_stiffness_and_damping_cannot_trade_without_end(self) -> None:
+        """EI times damping = 1 N m^2 s, once given as EI 5e-9 N m^2 and 4e7 s."""
+        lower = {p.name: p.lower for p in bounded(TWIST.parameters, MODEL, [MOTION], 5.0)}
+        assert lower["rope_EI"] == pytest.approx(0.06 * 9.80665 * (0.01 * MOTION.length) ** 3, rel=1e-3)
+
+    def test_roll_is_a_turn_at_most_either_way(self) -> None:
+        roll = next(p for p in TWIST.parameters if p.name == "rope_roll")
+        assert (roll.lower, roll.upper) == pytest.approx((-2 * np.pi, 2 * np.pi))
+
+    @pytest.mark.parametrize(
+        ("values", "words"),
+        [
+            ({"rope_bend_damping": 10.0}, "EI times damping at best"),
+            ({"rope_roll": -2 * np.pi}, "a fit beyond a turn"),
+            ({"rope_roll": 2 * np.pi}, "a fit beyond a turn"),
+        ],
+    )
+    def test_an_end_at_a_bound_is_a_doubt_in_words(self, values: dict[str, float], words: str) -> None:
+        (sentence,) = at_bounds(TWIST.parameters, values, MODEL, [MOTION], 5.0)
+        assert words in sentence and "ends at its bound" in sentence
+
+    def test_an_end_inside_is_none(self) -> None:
+        values = {"rope_EI": 0.02, "rope_bend_damping": 0.02, "rope_roll": 3.0, "rope_drag_linear": 0.01}
+        assert at_bounds(TWIST.parameters, values, MODEL, [MOTION], 5.0) == ()
+
+
+class TestDescent:
+    def test_it_ends_within_hundredths_of_the_intervals(self) -> None:
+        experiments = experiments_of(MODEL, [shown()], (1.0, 1.0))
+        found = descend(experiments, TWIST.parameters[:1], {"rope_EI": 0.3}, 30)
+        assert found.ended and found.values["rope_EI"] == pytest.approx(0.03, rel=1e-3) and found.iterations <= 10
+        problem = problem_of(experiments, TWIST.parameters[:1], {})
+        assert negligible(problem) == pytest.approx(0.03**2 * 20 / problem.core.data_rows)
+
+    def test_a_start_that_diverges_costs_infinitely_much(self) -> None:
+        end = descend(experiments_of(MODEL, [shaken("bad")], (1.0, 1.0)), STIFFNESS, {}, 5)
+        assert not end.finite and end.iterations == 0 and not end.ended
+
+
+class TestClimb:
+    def climbed(self, motions: list[GrippedMotion], *more: Rung) -> tuple[Climb, list[str]]:
+        said: list[str] = []
+        climb = Climb(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, said.append)
+        model = RopeModel(density=0.06, nominal=MODEL.nominal, values={}, smoothing=0.0)
+        twist = replace(TWIST, parameters=TWIST.parameters[:4])
+        climb.run(model, [twist, *more], (0.3,), 12)
+        return climb, said
+
+    def test_one_recording_that_flies_apart_is_left_out_with_a_word(self) -> None:
+        good = [shown(f"{k}") for k in range(5)]
+        climb, said = self.climbed([*good[:2], shaken("bad"), *good[2:]])
+        assert climb.rope is not None
+        assert climb.rope.values["rope_EI"] == pytest.approx(0.03, rel=0.15)
+        assert [m.recording.name for m in climb.whole] == ["0", "1", "2", "3", "4"]
+        (sentence,) = climb.left_out
+        assert sentence.startswith("bad is left out of the fit: its prediction diverges") and sentence in said
+
+    def test_from_one_recording_a_rung_is_judged_by_its_end(self) -> None:
+        """Once nothing was left to judge by, and every rung stayed."""
+        climb, _ = self.climbed([shown("only")], TILTS)
+        assert [m.recording.name for m in climb.whole] == ["only"] and climb.whole[0].seconds == 1.0
+        assert len(climb.split.fitted[0].recording.times) < 80
+        assert climb.steps[0].stays and (climb.steps[1].count, climb.steps[1].ratio is None) == (4, False)
+
+    def test_a_rung_is_tried_again_after_a_later_one_stayed(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        told: list[str] = []
+        # tilts, rest, yield, varying; tilts again; yield and varying came after what stayed, and are tried together
+        answers = iter([False, True, False, False, True, True])
+
+        def climbed(_: Climb, rung: Rung) -> bool:
+            told.append(rung.name)
+            return next(answers)
+
+        monkeypatch.setattr(Climb, "_climbed", climbed)
+        self.climbed([shown("only")], TILTS, REST, YIELD, VARYING)
+        names = [TILTS.name, REST.name, YIELD.name, VARYING.name, TILTS.name]
+        assert told == [*names, "yield and stiffness along the rope"]
+        both = together([YIELD, VARYING])
+        assert both.parameters == (*YIELD.parameters, *VARYING.parameters) and both.starts == YIELD.starts
+        assert both.options == VARYING.options and both.values == YIELD.values
+
+    def test_where_everything_diverges_it_says_so(self) -> None:
+        with pytest.raises(sb.SheetbendError, match="no start of a straight rope"):
+            self.climbed([shaken(f"{k}") for k in range(3)])
+
+    def test_a_rung_that_diverges_does_not_stay(self) -> None:
+        climb, said = self.climbed([shown(f"{k}") for k in range(4)])
+        before = climb.rope
+        assert before is not None
+        lost = replace(before, errors=Errors(np.full(3, np.inf), np.full((1, 4), np.inf)))
+        climb._keep(YIELD, lost, sb.gripped.judging.verdict(lost.errors, before.errors), 0.0)
+        climb._keep(YIELD, None, None, 0.0)
+        assert climb.rope is before and [s.stays for s in climb.steps] == [True, False, False]
+        assert said[-1] == "yield: diverges, does not stay"
+
+
+class TestConclusion:
+    def test_a_finer_rope_that_diverges_is_not_counted(self) -> None:
+        good, bad = (experiments_of(MODEL, [m], (1.0, 1.0)) for m in (shown(), shaken("bad")))
+        assert checked(good, STIFFNESS, {}, 1) is good
+        with pytest.raises(sb.SheetbendError, match="diverges"):
+            checked(bad, STIFFNESS, {}, 1)
+
+    def test_ctrl_c_in_the_last_fit_costs_no_result(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        def stopped(*_: object) -> dict[str, float]:
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr(sb.gripped.conclusion, "_at_the_end", stopped)
+        ladder, windows = [TWIST], [(1.0, 2.0)]
+        options = {"density": 0.06, "ladder": ladder, "windows": windows, "smoothing": 0.0, "validate": 0.0}
+        found = fit_rope([shown()], bending_lengths=(0.3,), max_segments=12, **options)
+        assert found.interrupted and not found.fit.result.converged and found.steps[0].stays
+        assert found.values["rope_EI"] == pytest.approx(0.03, rel=0.15)
+
+    def test_no_end_of_an_optimizer_has_a_negative_cost(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Ceres tells a cost of -1 where it cannot begin; that must not win over a real end."""
+        ceres = pytest.importorskip("sheetbend._ceres")
+        problem = problem_of(experiments_of(MODEL, [shown()], (1.0, 1.0)), STIFFNESS, {})
+        u = problem.parameters.initial()
+        failed = {"u": u, "cost": -1.0, "iterations": 0, "evaluations": 1, "jacobians": 1}
+        failed |= {"converged": False, "stopped": False, "message": "no derivatives"}
+        monkeypatch.setattr(ceres, "minimize", lambda **_: failed)
+        end, _ = minimize(problem, u, "ceres")
+        assert end.cost == problem.cost(u) and not end.converged
+
+
+class TestSpread:
+    def rope(self, EI: float) -> Rope:
+        return Rope(MODEL, STIFFNESS, {"rope_EI": EI, "rope_GJ": 1.0})
+
+    def test_it_is_the_largest_difference_between_equals(self) -> None:
+        spread = model_spread(self.rope(0.10), [self.rope(0.12), self.rope(0.09)])
+        assert spread == pytest.approx({"rope_EI": 0.02})  # GJ is not free here
+        assert "differ in EI by up to 20 %" in spread_words(spread, {"rope_EI": 0.10})
+
+    def test_one_model_alone_has_none(self) -> None:
+        assert model_spread(self.rope(0.1), []) == {} and spread_words({}, {"rope_EI": 0.1}) == ""

@@ -1,0 +1,165 @@
+"""Exchanged, stray and frozen markers of a gripped rope are found and mended, or cost one recording and not the fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from sheetbend.gripped import Screened, screened
+from sheetbend.gripped.mend import mended
+
+Array = np.ndarray
+TIMES = np.arange(300) / 100.0
+COUNT = 12
+INNER = (1, COUNT - 2)
+
+
+def moving(length: float = 0.9, turn: float = 0.0) -> Array:
+    """(frames, 12, 3) m with noise of 0.5 mm: an arc that bends, swings at up to 1.5 m/s, and goes straight on into
+    grips 3 cm long."""
+    s = length * np.linspace(-0.5, 0.5, COUNT - 2)
+    s = np.concatenate([[s[0] - 0.03], s, [s[-1] + 0.03]])
+    curvature = (2.0 + np.sin(4.0 * TIMES + turn))[:, None]
+    inside = np.clip(s, -length / 2, length / 2)
+    angle, beyond = curvature * inside, s - inside
+    x = np.sin(angle) / curvature + beyond * np.cos(angle)
+    z = (1.0 - np.cos(angle)) / curvature + beyond * np.sin(angle)
+    positions = np.stack([x, 0.3 * np.sin(5.0 * TIMES)[:, None] + 0.0 * x, z], axis=-1)
+    return positions + 5e-4 * np.random.default_rng(1).standard_normal(positions.shape)
+
+
+def recorded(positions: Array, name: str = "r") -> sb.Recording:
+    times = TIMES[: len(positions)]
+    n = positions.shape[1]
+    return sb.Recording(positions, times, clamped=(0, 1, n - 2, n - 1), name=name)
+
+
+def with_exchanged(positions: Array, pair: tuple[int, int], frames: slice) -> Array:
+    changed = positions.copy()
+    changed[frames, pair[0]], changed[frames, pair[1]] = positions[frames, pair[1]], positions[frames, pair[0]]
+    return changed
+
+
+class TestExchanged:
+    def test_a_sound_recording_is_returned_as_it_is(self) -> None:
+        recording = recorded(moving())
+        assert mended(recording, INNER) == (recording, ())
+
+    @pytest.mark.parametrize(
+        ("pair", "frames", "words"),
+        [
+            ((10, 11), slice(None), "m10 and m11 of the last grip were exchanged throughout, and are put back"),
+            ((10, 11), slice(257, None), "m10 and m11 of the last grip were exchanged from frame 257 (2.57 s) on"),
+            ((0, 1), slice(None, 250), "m0 and m1 of the first grip were exchanged from frame 0 to 249"),
+            ((0, 1), slice(100, 101), "m0 and m1 of the first grip were exchanged in frame 100 (1 s)"),
+            ((5, 6), slice(200, None), "m5 and m6 were exchanged from frame 200 (2 s) on, and are put back"),
+            ((5, 6), slice(None), "m5 and m6 were exchanged throughout, and are put back"),
+            ((1, 2), slice(90, None), "m1 and m2 were exchanged from frame 90 (0.9 s) on, and are put back"),
+        ],
+    )
+    def test_neighbors_are_put_back(self, pair: tuple[int, int], frames: slice, words: str) -> None:
+        positions = moving()
+        found, notes = mended(recorded(with_exchanged(positions, pair, frames)), INNER)
+        np.testing.assert_array_equal(found.positions, positions)
+        assert len(notes) == 1 and words in notes[0]
+
+    def test_both_grips_and_twice(self) -> None:
+        positions = moving()
+        changed = with_exchanged(with_exchanged(positions, (0, 1), slice(None)), (10, 11), slice(40, 90))
+        found, notes = mended(recorded(with_exchanged(changed, (10, 11), slice(200, 240))), INNER)
+        np.testing.assert_array_equal(found.positions, positions)
+        assert len(notes) == 2 and "2 times from frame 40 to 239" in notes[1]
+
+    def test_one_that_happens_while_a_marker_is_hidden_is_found(self) -> None:
+        positions = moving()
+        positions[100:104, 11] = np.nan
+        changed = with_exchanged(positions, (10, 11), slice(102, None))
+        found, notes = mended(recorded(changed), INNER)
+        np.testing.assert_array_equal(found.positions[104:], positions[104:])
+        assert len(notes) == 1
+
+
+class TestImpossible:
+    def test_a_grip_that_is_seen_elsewhere_for_a_moment_is_not_used_there(self) -> None:
+        positions = moving()
+        changed = positions.copy()
+        changed[120:126, :2] += (0.0, 1.5, 0.0)
+        found, (note,) = mended(recorded(changed), INNER)
+        assert np.isnan(found.positions[120:126, :2]).all() and np.isnan(found.positions).sum() == 36
+        assert "m0, m1 jumped elsewhere from frame 120 to 125" in note
+        (motion,) = screened([recorded(changed)], 0.0)
+        assert np.abs(motion.positions[:, :2] - positions[:, :2]).max() < 5e-3
+
+    def test_a_free_marker_that_is_lost_to_another_place_for_long_is_not_seen_there(self) -> None:
+        changed = moving()
+        changed[150:, 4] = changed[150:, 8] + 0.01
+        found, notes = mended(recorded(changed), INNER)
+        assert np.isnan(found.positions[150:, 4]).all() and np.isfinite(found.positions[:150, 4]).all() and notes
+
+    def test_frozen_tracking_is_not_used(self) -> None:
+        changed = moving()
+        changed[100:130, 5] = changed[100, 5]
+        found, (note,) = mended(recorded(changed), INNER)
+        assert np.isnan(found.positions[101:130, 5]).all() and np.isnan(found.positions).sum() == 3 * 29
+        assert "m5 stood still although the rope moved from frame 101 to 129" in note
+
+    def test_rest_and_repeated_frames_are_not_frozen(self) -> None:
+        clean = moving()
+        resting = np.concatenate([np.repeat(clean[:1], 50, axis=0), clean[:250]])
+        slow = np.repeat(clean[:50], 6, axis=0)
+        positions = np.round(resting, 3)
+        for x in (positions, np.where(np.arange(300)[:, None, None] < 50, positions[:1], positions), slow):
+            assert not any("stood still" in note for note in mended(recorded(x), INNER)[1])
+
+    def test_a_fast_swing_at_few_frames_is_possible(self) -> None:
+        times = np.arange(60) / 20.0
+        swing = 0.5 * np.sin(2 * np.pi * 1.2 * times)[:, None, None] * [0.0, 1.0, 0.0]
+        x = np.linspace(0.0, 0.9, COUNT)[:, None] * [1.0, 0.0, 0.0] + swing
+        recording = sb.Recording(x, times, clamped=(0, 1, 10, 11))
+        assert mended(recording, INNER) == (recording, ())
+
+
+class TestScreened:
+    def names(self, found: Screened) -> list[str]:
+        return [m.recording.name for m in found]
+
+    def test_one_bad_recording_of_many_is_left_out_with_its_reason(self) -> None:
+        frozen = moving()
+        frozen[100:200, :2] = frozen[100, :2]
+        free = [0, 1, 2, 5, 4, 3, *range(6, COUNT)]
+        good = [recorded(moving(turn=0.1 * k), f"{k}") for k in range(5)]
+        bad = [recorded(frozen, "frozen"), recorded(moving()[:, free], "order"), recorded(moving()[:, 1:], "fewer")]
+        found = screened([*good[:2], *bad, *good[2:], recorded(moving(1.0), "longer")], 0.08)
+        assert self.names(found) == ["0", "1", "2", "3", "4"]
+        assert [note.split(" is left out: ")[0] for note in found.notes] == ["frozen", "order", "fewer", "longer"]
+        reasons = "\n".join(found.notes)
+        for words in ("stood still", "not in order along the rope", "it has 11 markers, most others 12", "1 m long"):
+            assert words in reasons, reasons
+
+    def test_other_places_of_markers_are_another_rope(self) -> None:
+        places = np.concatenate([[0, 1], 1 + np.cumsum([1, 1.5, 0.5, 1, 1, 1, 1.5, 0.5, 1]), [11]])
+        x = moving()
+        k = np.clip(places.astype(int), 0, COUNT - 2)
+        other = x[:, k] + (places - k)[None, :, None] * (x[:, k + 1] - x[:, k])
+        found = screened([*(recorded(moving(turn=0.1 * n), f"{n}") for n in range(5)), recorded(other, "other")], 0.08)
+        assert self.names(found) == ["0", "1", "2", "3", "4"]
+        assert "other is left out: its markers have other distances" in found.notes[0]
+
+    def test_where_most_are_bad_the_first_reason_is_raised(self) -> None:
+        frozen = moving()
+        frozen[100:200, :2] = frozen[100, :2]
+        with pytest.raises(sb.RecordingError, match="stood still"):
+            screened([recorded(frozen, "a"), recorded(frozen, "b"), recorded(moving(), "c")], 0.08)
+
+    def test_motions_stay_and_what_was_screened_is_returned(self) -> None:
+        found = screened([recorded(moving())], 0.08)
+        assert screened(found, 0.2) is found
+        assert screened(list(found), 0.2)[0] is found[0]
+
+    @pytest.mark.parametrize("wrong", [lambda x: x[:, :3], lambda x: x[:2]], ids=["no two grips", "two frames"])
+    def test_a_single_recording_that_cannot_be_used_is_refused(self, wrong: Callable[[Array], Array]) -> None:
+        x = wrong(moving())
+        with pytest.raises(sb.RecordingError):
+            screened([sb.Recording(x, TIMES[: len(x)], clamped=(0, 1))], 0.08)

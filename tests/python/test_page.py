@@ -1,0 +1,231 @@
+"""The HTML pages of fits and motions: what they hold, that they need no network, and that a browser draws them."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from sheetbend.cli.app import app
+from sheetbend.mesh import grid
+from sheetbend.page import Shown, fit_page, motion_page, of_recording, of_trajectory
+from sheetbend.page.packed import MISSING, packed_motions
+from sheetbend.report import sections
+from sheetbend.result import Correlation, FitResult
+from typer.testing import CliRunner
+
+pytest.importorskip("jinja2")
+ROOT = Path(__file__).resolve().parents[2]
+VENDOR = ROOT / "python" / "sheetbend" / "page" / "vendor"
+LARGEST = 5_000_000  # bytes of a page
+
+
+def swinging(**changed: float) -> sb.Scene:
+    return sb.rope(0.4, 8, density=0.05, clamp_start=(1, 0, 0), **{"EI": 1e-3, "bend_damping": 3e-3, **changed})
+
+
+@pytest.fixture(scope="module")
+def fitted() -> sb.Fit:
+    times = np.arange(40) / 100
+    true = swinging()
+    seen = true.ropes["rope"].particles[3::2]
+    x = sb.simulate(true, times, sb.Solver(h=1 / 200)).positions[:, seen]
+    x += 1e-3 * np.random.default_rng(4).standard_normal(x.shape)
+    x[7, 1] = np.nan
+    return sb.fit(
+        swinging(EI=2e-3),
+        sb.Recording(x, times, name="take"),
+        {"rope_EI": {}, "rope_bend_damping": {}},
+        markers=[sb.on_particle(int(p)) for p in seen],
+        solver=sb.Solver(h=1 / 200),
+        fit=(0.0, 0.3),
+        held_out=(0.3, 0.4),
+    )
+
+
+def data_of(page: str) -> dict[str, Any]:
+    (content,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', page, re.S)
+    return json.loads(content)
+
+
+def places(motion: dict[str, Any], packed: str) -> np.ndarray:
+    """(frames, n, 3) m, as the page's script decodes it."""
+    numbers = np.frombuffer(base64.b64decode(packed), "<i2").reshape(motion["frames"], -1, 3).astype(float)
+    numbers[numbers == MISSING] = np.nan
+    return np.array(motion["middle"]) + motion["scale"] * numbers
+
+
+class TestFitPage:
+    def test_holds_the_report_and_the_result(self, fitted: sb.Fit) -> None:
+        page = fit_page(fitted, "swing", about="a rope", configuration="a = 1", command="sheetbend fit a.toml")
+        for section in sections(fitted.result):
+            assert f"<h2>{section.title.replace('<', '&lt;')}</h2>" in page
+        for estimate in fitted.result.estimates:
+            assert f'<td class="left">{estimate.name}</td>' in page
+        packed = base64.b64decode(data_of(page)["fit"])
+        assert FitResult.from_dict(json.loads(gzip.decompress(packed))) == fitted.result
+
+    def test_motion_and_markers_are_those_of_the_fit(self, fitted: sb.Fit) -> None:
+        (motion,) = data_of(fit_page(fitted, "swing"))["motions"]
+        (c,) = fitted.comparisons
+        exact = c.recording.positions
+        found = places(motion, motion["measured"])
+        np.testing.assert_array_equal(np.isnan(found), np.isnan(exact))
+        assert np.nanmax(np.abs(found - exact)) <= 0.51 * motion["scale"]
+        assert motion["scale"] < 1e-5 * np.ptp(exact[:, :, 2][np.isfinite(exact[:, :, 2])]) * 10
+        # the rope passes through the simulated markers, which are its own nodes
+        rope = places(motion, motion["lines"][0]["places"])
+        away = np.linalg.norm(rope[:, None] - c.simulated[:, :, None], axis=-1).min(axis=-1)
+        assert away.max() < 3 * motion["scale"]
+        assert motion["heldOut"] == c.held_out.astype(int).tolist()
+
+    def test_residuals_are_distances(self, fitted: sb.Fit) -> None:
+        (motion,) = data_of(fit_page(fitted, "swing"))["motions"]
+        (c,) = fitted.comparisons
+        numbers = np.frombuffer(base64.b64decode(motion["residual"]["distances"]), "<u2").reshape(40, -1)
+        exact = np.linalg.norm(c.recording.positions - c.simulated, axis=2)
+        assert (numbers == 65535).sum() == 1 and numbers[7, 1] == 65535
+        seen = np.isfinite(exact)
+        np.testing.assert_allclose(numbers[seen] / 65534 * motion["residual"]["largest"], exact[seen], atol=1e-7)
+
+    def test_texts_are_escaped(self, fitted: sb.Fit) -> None:
+        evil = "</script><script>alert(1)</script>"
+        page = fit_page(fitted, evil, about=evil, configuration=evil, command=evil)
+        assert "<script>alert(1)" not in page
+        shown = replace(of_recording(sb.Recording(np.zeros((2, 1, 3)), [0, 1]), evil), markers=(evil,))
+        assert "<script>alert(1)" not in motion_page([shown], evil, evil, evil)
+
+    def test_400_parameters_fit_into_it(self, fitted: sb.Fit) -> None:
+        one = fitted.result.estimates[0]
+        names = [f"cloth_stiffness_{k}" for k in range(400)]
+        pairs = tuple(Correlation(first=a, second=b, value=0.123) for i, a in enumerate(names) for b in names[:i])
+        result = replace(
+            fitted.result, estimates=tuple(replace(one, name=n) for n in names), correlations=pairs, premises=()
+        )
+        page = fit_page(replace(fitted, result=result), "many")
+        assert len(page.encode()) < LARGEST and names[-1] in page
+
+    def test_a_motion_that_diverges_leaves_its_markers(self, fitted: sb.Fit, monkeypatch: pytest.MonkeyPatch) -> None:
+        def diverges(*_: object) -> Shown:
+            raise sb.SheetbendError("the motion diverged")
+
+        monkeypatch.setattr("sheetbend.page.of_fit.fitted_motion", diverges)
+        page = fit_page(fitted, "lost")
+        (motion,) = data_of(page)["motions"]
+        assert motion["lines"] == [] and motion["measured"] and "only its markers are drawn" in page
+
+
+class TestMotionPage:
+    def test_a_cloth_has_its_strain(self) -> None:
+        scene = sb.Scene()
+        mesh = grid(0.2, 0.2, 4, 4)
+        sb.add_cloth(scene, mesh, density=0.1, warp=20.0, weft=20.0, shear=5.0, bending=1e-5, held=[0, 1, 2])
+        motion = sb.simulate(scene, np.arange(5) / 50, sb.Solver(h=1 / 200))
+        (packed,) = packed_motions([of_trajectory(scene, motion, "cloth")])
+        (sheet,) = packed["sheets"]
+        assert np.abs(places(packed, sheet["places"]) - motion.positions).max() <= 0.51 * packed["scale"]
+        triangles = np.frombuffer(base64.b64decode(sheet["triangles"]), "<u4").reshape(-1, 3)
+        np.testing.assert_array_equal(triangles, mesh.triangles)
+        strain = np.frombuffer(base64.b64decode(sheet["strain"]), "u1").reshape(5, -1)
+        assert strain[0].max() == 0 and strain.max() == 255 and sheet["largestStrain"] > 0
+
+    def test_a_twisted_rod_shows_its_directors(self) -> None:
+        scene = sb.rod(0.3, 6, density=0.05, EI=1e-3, GJ=1e-3, start=sb.Grip.fixed((0, 0, 0), (1, 0, 0)))
+        motion = sb.simulate(scene, [0.0, 0.05], sb.Solver(h=1 / 200))
+        shown = of_trajectory(scene, motion)
+        (ticks,) = shown.ticks.values()
+        rope = shown.lines["rod"]
+        np.testing.assert_allclose(ticks[:, -1, 0], rope[:, -2:].mean(axis=1), atol=1e-12)
+        along, across = rope[:, -1] - rope[:, -2], ticks[:, -1, 1] - ticks[:, -1, 0]
+        assert np.abs((along * across).sum(axis=1)).max() < 1e-3 * np.linalg.norm(along) * np.linalg.norm(across)
+
+    def test_56_long_recordings_fit_into_it(self) -> None:
+        rng = np.random.default_rng(0)
+        x = rng.standard_normal((500, 13, 3))
+        every = [
+            Shown(
+                f"take {k}", np.arange(500) / 100, {"rope": rng.standard_normal((500, 49, 3))}, measured=x, simulated=x
+            )
+            for k in range(56)
+        ]
+        page = motion_page([replace(s, markers=tuple(f"m{k}" for k in range(13))) for s in every], "all")
+        assert len(page.encode()) < LARGEST
+
+    def test_nothing_is_fetched(self) -> None:
+        page = motion_page([of_recording(sb.Recording(np.zeros((2, 1, 3)), [0, 1]), "still")], "still")
+        own = page.replace((VENDOR / "three.min.js").read_text(), "").replace((VENDOR / "uplot.min.js").read_text(), "")
+        assert len(own) < 0.2 * len(page)
+        assert not re.search(r"https?://|\bsrc=|<link|@import|url\(|fetch\(|XMLHttpRequest|import\(", own)
+
+
+class TestCommands:
+    def test_view_of_a_recording(self, tmp_path: Path) -> None:
+        sb.Recording(np.random.default_rng(1).standard_normal((5, 2, 3)), np.arange(5) / 10).save(tmp_path / "a.npz")
+        done = CliRunner().invoke(
+            app, ["view", str(tmp_path / "a.npz"), "--output", str(tmp_path / "a.html"), "--json"]
+        )
+        assert done.exit_code == 0, done.output
+        (motion,) = data_of((tmp_path / "a.html").read_text())["motions"]
+        assert motion["frames"] == 5 and len(motion["markers"]) == 2
+
+    @pytest.mark.parametrize(
+        ("arguments", "words"),
+        [
+            (["a.npz", "--output", "a.txt"], "is no HTML file"),
+            (["a.toml", "--units", "mm"], "is for recordings"),
+            (["b.npz"], "b.npz"),
+        ],
+    )
+    def test_bad_input(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], words: str) -> None:
+        monkeypatch.chdir(tmp_path)
+        sb.Recording(np.zeros((2, 1, 3)), [0, 1]).save("a.npz")
+        done = CliRunner().invoke(app, ["view", *arguments])
+        assert done.exit_code == 2 and words in done.output.replace("\n", " ")
+
+    def test_a_fit_without_jinja2_is_told_before_the_work(
+        self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        from sheetbend.cli import pages
+        from sheetbend.cli.screen import Screen
+
+        monkeypatch.setitem(sys.modules, "jinja2", None)
+        assert not pages.page_possible(Screen())
+        assert "no report.html will be written" in capsys.readouterr().out
+
+
+def test_vendored_scripts_are_as_they_were_made() -> None:
+    from hashlib import sha256
+
+    lines = (VENDOR / "SHA256SUMS").read_text().split("\n")[:-1]
+    assert len(lines) == 3
+    for line in lines:
+        digest, name = line.split()
+        assert sha256((VENDOR / name).read_bytes()).hexdigest() == digest, name
+    versions = json.loads((ROOT / "tools" / "page" / "package.json").read_text())["devDependencies"]
+    told = (ROOT / "licenses" / "README.md").read_text()
+    assert f"three.js {versions['three']}" in told and f"uPlot {versions['uplot']}" in told
+    assert all(
+        "Permission is hereby granted" in (ROOT / "licenses" / f"{n}-MIT.txt").read_text() for n in ("three", "uplot")
+    )
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="Chromium is not installed")
+def test_a_browser_draws_it_without_a_network(fitted: sb.Fit, tmp_path: Path) -> None:
+    (tmp_path / "report.html").write_text(fit_page(fitted, "swing"))
+    command = ["chromium", "--headless", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    command += ["--host-resolver-rules=MAP * ~NOTFOUND", "--window-size=1400,1000", f"--user-data-dir={tmp_path / 'u'}"]
+    command += ["--virtual-time-budget=3000", "--dump-dom", (tmp_path / "report.html").as_uri() + "#t=0.2"]
+    page = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+    assert "<title>swing \u2713</title>" in page  # set when all is drawn
+    assert re.search(r'<div id="space">\s*<canvas', page) and "0.200 s" in page
+    assert page.count('class="uplot') >= 4
