@@ -58,7 +58,7 @@ def data_of(page: str) -> dict[str, Any]:
     return json.loads(content)
 
 
-def places(motion: dict[str, Any], packed: str) -> np.ndarray:
+def places_of(motion: dict[str, Any], packed: str) -> np.ndarray:
     """(frames, n, 3) m, as the page's script decodes it."""
     numbers = np.frombuffer(base64.b64decode(packed), "<i2").reshape(motion["frames"], -1, 3).astype(float)
     numbers[numbers == MISSING] = np.nan
@@ -79,12 +79,12 @@ class TestFitPage:
         (motion,) = data_of(fit_page(fitted, "swing"))["motions"]
         (c,) = fitted.comparisons
         exact = c.recording.positions
-        found = places(motion, motion["measured"])
+        found = places_of(motion, motion["measured"])
         np.testing.assert_array_equal(np.isnan(found), np.isnan(exact))
         assert np.nanmax(np.abs(found - exact)) <= 0.51 * motion["scale"]
         assert motion["scale"] < 1e-5 * np.ptp(exact[:, :, 2][np.isfinite(exact[:, :, 2])]) * 10
         # the rope passes through the simulated markers, which are its own nodes
-        rope = places(motion, motion["lines"][0]["places"])
+        rope = places_of(motion, motion["lines"][0]["places"])
         away = np.linalg.norm(rope[:, None] - c.simulated[:, :, None], axis=-1).min(axis=-1)
         assert away.max() < 3 * motion["scale"]
         assert motion["heldOut"] == c.held_out.astype(int).tolist()
@@ -133,7 +133,7 @@ class TestMotionPage:
         motion = sb.simulate(scene, np.arange(5) / 50, sb.Solver(h=1 / 200))
         (packed,) = packed_motions([of_trajectory(scene, motion, "cloth")])
         (sheet,) = packed["sheets"]
-        assert np.abs(places(packed, sheet["places"]) - motion.positions).max() <= 0.51 * packed["scale"]
+        assert np.abs(places_of(packed, sheet["places"]) - motion.positions).max() <= 0.51 * packed["scale"]
         triangles = np.frombuffer(base64.b64decode(sheet["triangles"]), "<u4").reshape(-1, 3)
         np.testing.assert_array_equal(triangles, mesh.triangles)
         strain = np.frombuffer(base64.b64decode(sheet["strain"]), "u1").reshape(5, -1)
@@ -229,3 +229,21 @@ def test_a_browser_draws_it_without_a_network(fitted: sb.Fit, tmp_path: Path) ->
     assert "<title>swing \u2713</title>" in page  # set when all is drawn
     assert re.search(r'<div id="space">\s*<canvas', page) and "0.200 s" in page
     assert page.count('class="uplot') >= 4
+
+
+def test_a_late_camera_s_motion_is_drawn_where_its_markers_are() -> None:
+    times, late, solver = np.arange(30) / 100, 0.1, sb.Solver(h=1 / 200)
+    scene = swinging()
+    scene.add_quantity("clock", -late, "s", positive=False, scale=0.1)
+    seen = scene.ropes["rope"].particles[3::2]
+    x = sb.simulate(swinging(), np.arange(30) / 100, solver).positions[:, seen]
+    recording = sb.Recording(x, times + late, name="late")
+    places = [sb.on_particle(int(p)) for p in seen]
+    e = sb.Experiment(
+        scene=scene, recording=recording, markers=places, solver=solver, start_time=0.0, time_offset="clock"
+    )
+    found = sb.fit(e, parameters={"rope_EI": {}}, refine=False, profiles=False)
+    (motion,) = data_of(fit_page(found, "late"))["motions"]
+    rope, measured = (places_of(motion, part) for part in (motion["lines"][0]["places"], motion["measured"]))
+    away = np.linalg.norm(rope[:, None] - measured[:, :, None], axis=-1).min(axis=-1)
+    assert away.max() < 5 * motion["scale"]

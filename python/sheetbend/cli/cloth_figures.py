@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..cloth import Cloth
-from ..equilibrium import equilibrium
 from ..field_plot import Field, plot_fields
 from ..fit import Fit
+from ..fitted_motion import fitted_positions
 from ..mesh import Places
 from ..prediction import Comparison
-from ..simulate import simulate
 from ..strain import strain_fields
 
 if TYPE_CHECKING:
@@ -28,7 +27,8 @@ def cloth_figures(found: Fit, c: Comparison) -> dict[str, Figure]:
     if not e.scene.cloths:
         return {}
     values = found.values_of(e)
-    frame, positions = _state(c, values)
+    frame = 0 if e.static else _farthest(c)
+    (positions,) = fitted_positions(found, c, [frame])
     when = "at rest" if e.static else f"at {c.recording.times[frame]:.3g} s"
     rms = _residuals(c)
     figures = {}
@@ -53,18 +53,12 @@ def cloth_figures(found: Fit, c: Comparison) -> dict[str, Figure]:
     return figures
 
 
-def _state(c: Comparison, values: dict[str, float]) -> tuple[int, np.ndarray]:
-    """A frame of the comparison, and all particles (n, 3) there."""
-    e = c.experiment
-    if e.static:
-        return 0, equilibrium(e.scene, values=values).positions
+def _farthest(c: Comparison) -> int:
+    """The fitted frame in which the markers are farthest from their start."""
     x = np.where(c.held_out[:, None, None], np.nan, c.recording.positions)
     first = x[np.isfinite(x).any(axis=(1, 2)).argmax()]
     moved = np.nansum((x - first) ** 2, axis=(1, 2)) / np.maximum(np.isfinite(x).sum(axis=(1, 2)), 1)
-    frame = int(moved.argmax())
-    time = round(float(e.scene_times(c.recording.times[frame], values)) / e.solver.h) * e.solver.h
-    start = equilibrium(e.scene, values=values).positions if e.start == "equilibrium" else None
-    return frame, simulate(e.scene, [0.0, max(time, 0.0)], e.solver, values, start).positions[-1]
+    return int(moved.argmax())
 
 
 def _residuals(c: Comparison) -> np.ndarray:

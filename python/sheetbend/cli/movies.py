@@ -6,15 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
-from ..equilibrium import equilibrium
 from ..fit import Fit
+from ..fitted_motion import fitted_positions
 from ..movie import Motion, check_movie, movie_paths, save_movie
-from ..prediction import Comparison
 from ..scene import Scene
-from ..simulate import simulate
 from .folders import made
 
 OPTION = "--movie"
@@ -40,15 +37,7 @@ def write_movies(found: Fit, path: Path) -> list[str]:
     moving = [c for c in found.comparisons if not c.experiment.static]
     paths = movie_paths(path, [c.experiment.name for c in moving])
     for c in moving:
-        save_movie(_motion(found, c), paths[c.experiment.name], c.experiment.name)
+        x = c.recording
+        motion = Motion(c.experiment.scene, x.times, fitted_positions(found, c), x.positions, c.simulated)
+        save_movie(motion, paths[c.experiment.name], c.experiment.name)
     return [str(file) for file in paths.values()]
-
-
-def _motion(found: Fit, c: Comparison) -> Motion:
-    """The fitted motion at the substeps nearest to the recorded frames."""
-    e, values = c.experiment, found.values_of(c.experiment)
-    at = np.maximum(e.scene_times(c.recording.times, values), 0.0)
-    times, frames = np.unique(np.rint(at / e.solver.h) * e.solver.h, return_inverse=True)
-    start = equilibrium(e.scene, values=values).positions if e.start == "equilibrium" else None
-    positions = simulate(e.scene, times, e.solver, values, start).positions[frames]
-    return Motion(e.scene, c.recording.times, positions, c.recording.positions, c.simulated)

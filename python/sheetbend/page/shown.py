@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..equilibrium import equilibrium
 from ..fit import Fit
+from ..fitted_motion import fitted_positions
 from ..mesh import TriangleMesh
 from ..prediction import Comparison
 from ..recording import Recording
 from ..scene import Scene
-from ..simulate import Trajectory, simulate
+from ..simulate import Trajectory
 from ..strain import largest_strain
 
 Array = np.ndarray
@@ -69,7 +69,7 @@ class Shown:
 def fitted_motion(found: Fit, c: Comparison) -> Shown:
     """A fitted motion beside its recording, at the substeps nearest to the recorded frames; a shape at rest is one
     frame. Costs one simulation."""
-    e, values = c.experiment, found.values_of(c.experiment)
+    e = c.experiment
     recorded = {
         "markers": tuple(c.recording.markers),
         "measured": c.recording.positions,
@@ -77,18 +77,12 @@ def fitted_motion(found: Fit, c: Comparison) -> Shown:
         "baseline": c.baseline,
         "held_out": c.held_out,
     }
-    if e.static:
-        positions = equilibrium(e.scene, values=values).positions[None]
-        return _shown(e.name, e.scene, c.recording.times[:1], positions, recorded)
-    times = np.rint(np.maximum(c.recording.times - e.t0, 0.0) / e.solver.h) * e.solver.h
-    start = equilibrium(e.scene, values=values).positions if e.start == "equilibrium" else None
-    positions = simulate(e.scene, times, e.solver, values, start).positions
-    return _shown(e.name, e.scene, c.recording.times, positions, recorded)
+    positions = fitted_positions(found, c)
+    return _shown(e.name, e.scene, c.recording.times[: len(positions)], positions, recorded)
 
 
 def predicted_motion(recording: Recording, predicted: Array) -> Shown:
     """Markers along a rope beside their prediction, (frames, markers, 3) m, which a line joins."""
-    up = np.array([0.0, 0.0, 1.0]) if recording.gravity is None else -np.asarray(recording.gravity, dtype=float)
     return Shown(
         recording.name,
         recording.times,
@@ -96,7 +90,7 @@ def predicted_motion(recording: Recording, predicted: Array) -> Shown:
         markers=tuple(recording.markers),
         measured=recording.positions,
         simulated=predicted,
-        up=_unit(up),
+        up=_up(recording, np.array([0.0, 0.0, 1.0])),
     )
 
 
@@ -107,9 +101,8 @@ def of_trajectory(scene: Scene, motion: Trajectory, name: str = "") -> Shown:
 
 def of_recording(recording: Recording, name: str) -> Shown:
     """The markers of a recording."""
-    up = np.zeros(3) if recording.gravity is None else -np.asarray(recording.gravity, dtype=float)
-    x = recording.positions
-    return Shown(name, recording.times, markers=tuple(recording.markers), measured=x, up=_unit(up))
+    x, up = recording.positions, _up(recording, np.zeros(3))
+    return Shown(name, recording.times, markers=tuple(recording.markers), measured=x, up=up)
 
 
 def _shown(name: str, scene: Scene, times: Array, positions: Array, recorded: Mapping[str, object]) -> Shown:
@@ -143,6 +136,11 @@ def _ticks(scene: Scene, positions: Array) -> dict[str, Array]:
     along = d / np.linalg.norm(d, axis=2, keepdims=True)
     size = TICK * np.ptp(positions[:, ends].reshape(-1, 3), axis=0).max()
     return {"twist": np.stack([middle, middle + size * along], axis=2)}
+
+
+def _up(recording: Recording, unknown: Array) -> Array:
+    """Against the gravity that the recording tells; `unknown` where it tells none."""
+    return unknown if recording.gravity is None else _unit(-recording.gravity)
 
 
 def _unit(v: Array) -> Array:
