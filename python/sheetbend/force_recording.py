@@ -12,6 +12,7 @@ from .door import check_room, reading
 from .errors import RecordingError
 from .io import cells, clock, npz
 from .recording_checks import checked_times
+from .whole import written
 
 Array = np.ndarray
 FORCES, TORQUES, TURNS = ("fx", "fy", "fz"), ("tx", "ty", "tz"), ("qx", "qy", "qz", "qw")
@@ -81,9 +82,9 @@ class ForceRecording:
             raise RecordingError(str(path), "is of an unknown kind", path.suffix, "give a .csv or an .npz file")
 
     def save(self, path: str | Path) -> None:
-        """Write an NPZ archive that `load` reads."""
+        """Write an NPZ archive that `load` reads, whole or not at all."""
         arrays = {"times": self.times, "forces": self.forces, "torques": self.torques, "quaternions": self.quaternions}
-        with Path(path).open("wb") as file:
+        with written(path) as beside, beside.open("wb") as file:
             np.savez_compressed(file, **{key: a for key, a in arrays.items() if a is not None})  # type: ignore[arg-type]
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from .checks import finite, index_array, is_number
 from .errors import InputError
 from .force_recording import ForceRecording
+from .hand_eye import rotated
 from .quantities import Term, product
 from .scene import Scene
 
@@ -110,8 +111,9 @@ class ForceSensor:
         q = finite(f"{self.name}.quaternion", self.quaternion, (4,), InputError)
         if not np.linalg.norm(q) > 0:
             raise InputError(f"{self.name}.quaternion", "has no length", q.tolist(), "give (x, y, z, w)")
-        given = self.recording.quaternions
-        object.__setattr__(self, "_turns", rotations(q[None] if given is None else given))
+        turns = q[None] if self.recording.quaternions is None else self.recording.quaternions
+        units = turns / np.linalg.norm(turns, axis=1, keepdims=True)
+        object.__setattr__(self, "_turns", rotated(units[:, None], np.eye(3)).swapaxes(1, 2))
 
     @property
     def quantities(self) -> dict[str, str]:
@@ -231,18 +233,6 @@ class ForceSensor:
             if self.torque_sigma is not None and r.torques is not None and axis in self.torque_axes:
                 out[:, 3 + k] = r.torques[:, k]
         return out
-
-
-def rotations(quaternions: Array) -> Array:
-    """(k, 3, 3) matrices of unit quaternions (k, 4), (x, y, z, w)."""
-    q = np.asarray(quaternions, dtype=float)
-    x, y, z, w = np.moveaxis(q / np.linalg.norm(q, axis=1, keepdims=True), 1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
 
 
 def end_of_rope(scene: Scene, rope: str, end: str, path: str = "force") -> list[int]:
