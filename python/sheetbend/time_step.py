@@ -96,7 +96,7 @@ def _moved(problem: FitProblem, u: np.ndarray) -> Settled:
         if float(np.sum((J @ (onward - at)) ** 2)) <= THERE**2 * scatter:
             break
         before, at = after, onward
-    if refuted(problem, u, limit.evaluate(end, jacobian=False)[1]):
+    if refuted(problem, u, r):
         whole = Refit(name=TIME_STEP, to_limit=1.0, moved=moves(problem.parameters, u, end))
         told = words("short substeps", "at the same substep", "refine=False, or halve_step = false in a configuration,")
         return Settled(problem, u, refits=(whole,), warnings=(told,))
