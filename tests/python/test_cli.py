@@ -10,15 +10,13 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import sheetbend as sb
+from commands import last_line, run
 from sheetbend import cli
-from sheetbend.cli.app import app
 from sheetbend.gradients import GradientReport, GradientRow
-from typer.testing import CliRunner, Result
 
 ROPE = """\
 [experiment]
@@ -76,22 +74,11 @@ def config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return recorded(tmp_path, 6)
 
 
-def run(*arguments: object) -> Result:
-    return CliRunner().invoke(app, [str(a) for a in arguments])
-
-
 def edited(config: Path, old: str, new: str) -> Path:
     text = config.read_text()
     assert text.count(old) == 1
     config.write_text(text.replace(old, new))
     return config
-
-
-def last_line(result: Result) -> dict[str, Any]:
-    (line,) = result.stdout.splitlines()
-    found = json.loads(line)
-    assert isinstance(found, dict) and found["exit_code"] == result.exit_code
-    return found
 
 
 class TestFit:

@@ -16,13 +16,12 @@ from typing import Any
 import numpy as np
 import pytest
 import sheetbend as sb
+from commands import last_line, run
 from sheetbend.cli import gripped
-from sheetbend.cli.app import app
 from sheetbend.config import GrippedConfig, gripped_schema, parse, parse_any
 from sheetbend.gripped import LADDER, GrippedMotion, trades
 from sheetbend.gripped.ladder import MARKERS, REST, TILTS, TWIST, VARYING, YIELD
 from sheetbend.result import Correlation, Estimate, FitResult
-from typer.testing import CliRunner, Result
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "gripped_ropes"
 ROPE = """\
@@ -78,17 +77,6 @@ def edited(config: Path, *changes: tuple[str, str]) -> Path:
         text = text.replace(old, new)
     config.write_text(text)
     return config
-
-
-def run(*arguments: object) -> Result:
-    return CliRunner().invoke(app, [str(a) for a in arguments])
-
-
-def last_line(result: Result) -> dict[str, Any]:
-    (line,) = result.stdout.splitlines()
-    found = json.loads(line)
-    assert isinstance(found, dict) and found["exit_code"] == result.exit_code, result.stderr
-    return found
 
 
 class TestFit:

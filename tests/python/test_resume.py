@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 import pytest
 import sheetbend as sb
+from commands import last_line, run
 from sheetbend import optimizers
-from sheetbend.cli.app import app
 from sheetbend.optimizers import Progress, has_ceres
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 
 WRITTEN = {"fit.json", "report.txt", "report.html", "fitted.toml", "predicted_swing.npz", "predicted_swing.json"}
 ROPE = """\
@@ -79,17 +79,6 @@ def config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     record(1)
     Path("my.toml").write_text(ROPE)
     return Path("my.toml")
-
-
-def run(*arguments: object) -> Result:
-    return CliRunner().invoke(app, [str(a) for a in arguments])
-
-
-def last_line(result: Result) -> dict[str, Any]:
-    (line,) = result.stdout.splitlines()
-    found = json.loads(line)
-    assert isinstance(found, dict) and found["exit_code"] == result.exit_code, result.stderr
-    return found
 
 
 def results() -> dict[str, Any]:

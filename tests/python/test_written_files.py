@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend.cli.app import app
-from typer.testing import CliRunner, Result
+from commands import run
 
 ROPE = """\
 [experiment]
@@ -45,10 +44,6 @@ def config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     path = tmp_path / "my.toml"
     path.write_text(ROPE)
     return path
-
-
-def run(*arguments: object) -> Result:
-    return CliRunner().invoke(app, [str(a) for a in arguments])
 
 
 def refused(config: Path, *arguments: object) -> dict[str, Any]:
