@@ -9,8 +9,8 @@ import pytest
 import sheetbend as sb
 from sheetbend.baseline import no_physics
 from sheetbend.carried import carried_baselines
-from sheetbend.cli import cloth_figures
 from sheetbend.clock import lateness, outside, told_clocks
+from sheetbend.fitted_motion import fitted_positions
 from sheetbend.result import Estimate, RecordingFit
 
 Array = np.ndarray
@@ -217,12 +217,13 @@ def test_frames_outside_of_the_motion_are_told() -> None:
     assert "0.2 s behind the end" in words
 
 
-def test_a_figure_shows_the_cloth_at_the_shifted_time() -> None:
-    """Measured markers once lay beside a cloth that was drawn at the camera's time instead of the scene's."""
+def test_a_drawn_cloth_is_at_the_shifted_time() -> None:
+    """Figures once showed measured markers beside a cloth at the camera's time instead of the scene's."""
     e, _ = late_cloth(-LATE)
     found = sb.fit(e, parameters=["robot_turn_x"], refine=False)
     (c,) = found.comparisons
-    frame, positions = cloth_figures._state(c, found.values_of(e))
+    frame = len(c.recording.times) // 2
+    (positions,) = fitted_positions(found, c, [frame])
     drawn = positions[[place.particles[0] for place in e.compared_places]]
     assert np.abs(drawn - c.simulated[frame]).max() < 0.02  # half a substep; at the camera's time it is 0.3
     assert e.scene_times(np.array([0.5]), {}) == pytest.approx([0.4])
