@@ -61,7 +61,7 @@ Group build_group(const GroupSpec& spec, const Scene& scene) {
         if (nodes[a] == nodes[b])
           refuse(where + " uses particle " + std::to_string(nodes[a]) + " twice. Fix: use distinct particles");
     if (std::none_of(nodes.begin(), nodes.end(), [&](int n) { return scene.role[n] == Role::free; }))
-      refuse(where + " holds only pinned or driven particles. Fix: leave it out, nothing can move");
+      refuse(where + " holds only pinned or driven particles. Fix: leave it out, since nothing can move; of a cloth, pass the pinned or driven vertices as `held`");
   }
   return g;
 }

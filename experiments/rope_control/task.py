@@ -27,7 +27,7 @@ class Task:
     Attributes:
         frames: (frames,) s at which the loss looks.
         target: (3,) or (nodes, 3) m.
-        loss: of positions (frames, particles, 3), with its derivative by them.
+        loss: of positions (frames, particles, 3), with its derivative with respect to them.
         error: of the same, in m: how far the rope is from its target.
         speed: of the same, in m/s: that of the rope in the last two frames, where it is fastest or where it matters.
         reached: of an error and a speed.
@@ -56,7 +56,7 @@ class Task:
         return self._outcome(unknowns, self.loss(x)[0], x)
 
     def outcome_and_gradient(self, unknowns: Array) -> tuple[Outcome, Array]:
-        """The same, with the gradient of the cost by the unknowns."""
+        """The same, with the gradient of the cost with respect to the unknowns."""
         x, value, felt = self._rolled_back(unknowns)
         by_knot = np.array([felt.quantities[name] for name in self.control.scales])
         return self._outcome(unknowns, value, x), self.control.knots.T @ by_knot + 2.0 * self.effort * unknowns

@@ -2,7 +2,8 @@
 
 Their noise n moves the compared markers by A n, which is in the residuals r. The expected cost then holds half the
 expectation of |A n|^2 besides what the parameters u are to explain, and its minimum is where both together are least:
-to first order it is off by -(J'J)^-1 times the gradient by u of half that expectation (errors in variables; Fuller
+to first order it is off by -(J'J)^-1 times the gradient with respect to u of half that expectation (errors in
+variables; Fuller
 1987, Measurement Error Models, chapter 3). A few random directions stand for the expectation. Besides, A n differs from
 one recording to the next, of which residuals tell too little.
 """

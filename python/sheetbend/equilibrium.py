@@ -72,12 +72,12 @@ class Equilibrium:
         forces_bar: Mapping[str, ArrayLike] | None = None,
         pressures_bar: Mapping[str, float] | None = None,
     ) -> dict[str, float]:
-        """Gradient of a loss by every named quantity, by the implicit function theorem.
+        """Gradient of a loss with respect to every named quantity, by the implicit function theorem.
 
         Args:
-            positions_bar: (particles, 3), derivative of the loss by the positions.
-            forces_bar: per group (count, rows), derivative by `forces`.
-            pressures_bar: per volume, derivative by `pressures`.
+            positions_bar: (particles, 3), derivative of the loss with respect to the positions.
+            forces_bar: per group (count, rows), derivative with respect to `forces`.
+            pressures_bar: per volume, derivative with respect to `pressures`.
 
         Raises:
             SceneError: wrong shapes, no such group or volume.
@@ -110,7 +110,7 @@ class Equilibrium:
         return self.solution.vjp(x_bar, lambda_bar)
 
     def by_name(self, inputs_bar: np.ndarray) -> dict[str, float]:
-        """A gradient by the named quantities from one by the flat inputs."""
+        """A gradient with respect to the named quantities from one by the flat inputs."""
         compiled = self.scene.compiled
         return dict(zip(compiled.names, compiled.theta_bar(self.theta, inputs_bar).tolist(), strict=True))
 

@@ -166,7 +166,8 @@ class EmptyGradientError(SheetbendError, RuntimeError):
         names = ", ".join(self.names[:3]) + (f" and {len(self.names) - 3} more" if len(self.names) > 3 else "")
         if self.rounding == 0.0:
             return (
-                "the gradient is empty: the loss has no derivative by any position here, so it cannot feel "
+                "the gradient is empty: the loss has no derivative with respect to any position here, so it cannot "
+                "feel "
                 f"{names}. Fix: start where it has one, such as where a hinge is violated, or check its weights."
             )
         return (

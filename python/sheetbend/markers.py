@@ -137,7 +137,7 @@ def _places_for(
                 "markers",
                 "are not placed, and the scene has not exactly one rope",
                 len(scene.ropes),
-                "give their places",
+                "give a place per marker, markers=[sb.on_particle(0), ...], or sb.on_cloth(cloth, points) for a cloth",
             )
         (only,) = scene.ropes.values()
         return along_rope(only, len(names))

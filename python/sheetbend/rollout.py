@@ -88,7 +88,8 @@ class Rollout:
         self.positions: Array = states.reshape(len(self._steps), -1, 3)
 
     def gradient(self, positions_bar: ArrayLike) -> Gradient:
-        """The gradient of a loss whose derivative by the positions is `positions_bar`, (frames, particles, 3).
+        """The gradient of a loss whose derivative with respect to the positions is `positions_bar`, (frames,
+        particles, 3).
 
         May be called again, with other cotangents, and from several threads; where the tape dropped states they take
         turns.

@@ -52,7 +52,7 @@ def test_experiments_have_one_configuration_each() -> None:
     assert [f.name for f in folders if [t.name for t in f.glob("*.toml")] != [f"{f.name}.toml"]] == []
 
 
-def test_copied_recordings_keep_their_licence() -> None:
+def test_copied_recordings_keep_their_license() -> None:
     measured = [
         p for p in (ROOT / "experiments").rglob("*.npz") if "SYNTHETIC" not in p.with_suffix(".json").read_text()
     ]
@@ -62,7 +62,7 @@ def test_copied_recordings_keep_their_licence() -> None:
 
 TEXTS = [
     name
-    for pattern in ("*.md", "docs/*.md", "experiments/*/README.md", "adjoint/*.md")
+    for pattern in ("*.md", "docs/**/*.md", "experiments/*/README.md", "adjoint/*.md")
     for name in sorted(ROOT.glob(pattern))
 ]
 

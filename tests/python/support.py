@@ -121,7 +121,8 @@ def refitted(
 
 
 def slope_along(estimate: Callable[[Array], float], series: Array, series_dot: Array) -> float:
-    """d(estimate)/d(parameter) of an estimator of a series whose derivative by the parameter is `series_dot`.
+    """d(estimate)/d(parameter) of an estimator of a series whose derivative with respect to the parameter is
+    `series_dot`.
 
     Central differences along the known tangent, with one Richardson step; good to about 1e-9 relative.
     """

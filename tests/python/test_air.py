@@ -70,7 +70,8 @@ def test_falling_sheet_reaches_terminal_velocity():
 
 @pytest.mark.parametrize(("integrator", "order"), [("bdf1", 1), ("bdf2", 2)])
 def test_falling_broadside(integrator, order):
-    """Distance fallen and its derivative by the coefficient converge to the tanh law with the integrator's order."""
+    """Distance fallen and its derivative with respect to the coefficient converge to the tanh law with the
+    integrator's order."""
     end = 0.5
 
     def distance(coefficient):
@@ -203,7 +204,8 @@ def gusts(tail: float = 0.0) -> sb.Scene:
 
 
 def test_a_changing_wind_has_a_strength_and_a_number_per_knot():
-    """Of a product the derivative by the common factor is the sum of the numbers' own, each times its number."""
+    """Of a product the derivative with respect to the common factor is the sum of the numbers' own, each times its
+    number."""
     scene, s = gusts(), sb.Solver(h=1 / 200)
     named = {name: q.value for name, q in scene.quantities.items() if name.startswith("wind_")}
     assert list(named)[:5] == ["wind_strength", "wind_x_0", "wind_y_0", "wind_z_0", "wind_x_1"]

@@ -39,7 +39,7 @@ def hang(scene: sb.Scene, name: str, turn: float, **fabric: Any) -> None:
 
 
 def test_cuts_share_the_quantities_of_their_fabric() -> None:
-    """The derivative by one of them is the sum of those of the cuts alone."""
+    """The derivative with respect to one of them is the sum of those of the cuts alone."""
     cuts = {"along": 0.0, "bias": 0.7}
     both = sb.Scene("both")
     for name, turn in cuts.items():

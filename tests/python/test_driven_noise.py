@@ -84,7 +84,7 @@ def adjoint(e: sb.Experiment, theta: Array, moved: Array) -> tuple[Array, Array]
 
 
 def columns(e: sb.Experiment, theta: Array, moved: Array) -> Array:
-    """The residuals' derivative by every coordinate of the boundary, by plain tangents."""
+    """The residuals' derivative with respect to every coordinate of the boundary, by plain tangents."""
     compiled = e.scene.compiled
     inputs = compiled.inputs(theta)
     inputs[boundary_of(e)] += moved.ravel()
@@ -115,7 +115,7 @@ def test_a_correction_is_where_cost_and_prior_balance():
     of_b = bar[boundary_of(e)]
     left = of_b + b.ravel() / NOISE**2
     assert np.abs(left).max() < 1e-5 * np.abs(of_b).max()
-    # And the gradient by the parameters is that with the correction held.
+    # And the gradient with respect to the parameters is that with the correction held.
     by_theta = e.scene.compiled.theta_bar(theta, bar)
     by_u = [by_theta[e.scene.compiled.names.index(name)] for name in problem.parameters.free]
     assert J.T @ r == approx(by_u * problem.parameters.diagonal(u), rel=1e-5)

@@ -67,7 +67,7 @@ def test_motion_after_the_last_frame_is_refused():
 def test_a_loss_that_looks_nowhere_is_refused():
     error = refused(tip_at(PASSING, aside=0.0))
     assert error.rounding == 0.0
-    assert "no derivative by any position" in str(error)
+    assert "no derivative with respect to any position" in str(error)
 
 
 def test_many_names_are_shortened():
@@ -81,7 +81,8 @@ def test_unknown_names_are_refused():
 
 
 def test_a_check_does_not_judge_what_is_not_felt() -> None:
-    """A sheet that falls from rest stretches nowhere, so its gradients by stiffness are rounding, not errors."""
+    """A sheet that falls from rest stretches nowhere, so its gradients with respect to stiffness are rounding, not
+    errors."""
     scene = sb.Scene("falling")
     sheet = sb.mesh.grid(0.3, 0.2, 3, 2, pattern="one_way")
     sb.add_cloth(scene, sheet, density=0.2, warp=200, shear=20, bending=1e-4, drag_linear=0.3)

@@ -121,7 +121,7 @@ def test_a_search_that_ends_where_nothing_is_felt_says_so(scripts):
         bar[1, tip, 0] = -2.0 * missing
         return missing**2, bar
 
-    with pytest.raises(sb.EmptyGradientError, match="no derivative by any position"):
+    with pytest.raises(sb.EmptyGradientError, match="no derivative with respect to any position"):
         scripts.search.descend(replace(task, loss=flat, effort=0.0), LONG, most=30)
 
 

@@ -239,7 +239,8 @@ def test_gradients_of_everything(integrator, options):
     solver = sb.Solver(h=1 / 400, integrator=integrator)
     report = sb.check_gradients(everything(**options), np.arange(0, 41, 10) / 400, solver, values=SET)
     rows = {row.name: row for row in report.rows}
-    # The derivative by what holds a director, of which a roll is 1e7 times the torque, is good to rounding times that.
+    # The derivative with respect to what holds a director, of which a roll is 1e7 times the torque, is good to
+    # rounding times that.
     assert report.passed, str(report)
     assert rows["mass"].complex_step < 1e-6
     assert report.dot_product < 1e-11

@@ -326,7 +326,8 @@ def test_falling_sheet_and_rope_reach_terminal_velocity():
 @pytest.mark.parametrize(("integrator", "order"), [("bdf1", 1), ("bdf2", 2)])
 @pytest.mark.parametrize("law", ["linear", "quadratic"])
 def test_falling_against_air(integrator, order, law):
-    """Distance fallen and its derivative by the drag converge to the continuous law with the integrator's order."""
+    """Distance fallen and its derivative with respect to the drag converge to the continuous law with the
+    integrator's order."""
     mass, c, end = 0.2, 0.735, 0.5
 
     def distance(coefficient):

@@ -20,7 +20,8 @@ def balloon(subdivisions: int, pressure: float = PRESSURE, stretch: float = 1.0)
 
 
 def inflated(subdivisions: int) -> tuple[float, float]:
-    """Mean radius of a balloon at rest, and its derivative by the pressure, which that by the stiffness must match."""
+    """Mean radius of a balloon at rest, and its derivative with respect to the pressure, which that by the stiffness
+    must match."""
     scene, solver, end = balloon(subdivisions, stretch=1.19), sb.Solver(h=1 / 2000, method="newton"), 0.15
     x = sb.simulate(scene, [0.0, end - 1 / 2000, end], solver).positions
     assert x[-1] == approx(x[-2], abs=1e-8)

@@ -106,7 +106,7 @@ def test_michells_ring(ratio, degrees):
 def test_michells_ring_by_gradient(ratio):
     """A small flaw (the ends' half joints) grows like 1/(critical - twist), so that a/(da/dtwist) is what is missing.
 
-    The same from the derivatives by GJ and EI: the shape knows the twist times GJ/EI only.
+    The same from the derivatives with respect to GJ and EI: the shape knows the twist times GJ/EI only.
     """
     critical = rods.ring_critical_twist(ratio)
     angle = 0.98 * critical

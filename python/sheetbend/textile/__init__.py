@@ -1,6 +1,7 @@
 """The tests of a textile laboratory, as experiments in the computer.
 
-Each takes a `Fabric` and gives what the laboratory would read, in its unit and in SI, with the derivative by every
+Each takes a `Fabric` and gives what the laboratory would read, in its unit and in SI, with the derivative with
+respect to every
 number of the fabric, and the state of rest for pictures. Sizes are those of the standards. `fit_fabric` goes the other
 way, from what a laboratory has read to a fabric; `read_curves` reads what its machines have written.
 """

@@ -93,7 +93,7 @@ def bias_extension(
 
 def _shear_angle(rest: Equilibrium, triangles: Array) -> tuple[float, Array]:
     """Mean shear angle of the yarns in some triangles, rad, positive where the pulled diagonal grows, and its
-    derivative by the positions."""
+    derivative with respect to the positions."""
     cloth = rest.scene.cloths["cloth"]
     corners, nodes = cloth.mesh.corners[triangles], cloth.particles[cloth.mesh.triangles[triangles]]
     x = rest.positions[nodes]

@@ -102,7 +102,7 @@ def _scene(fabric: Fabric, along: str, length: float, width: float, cells: int) 
 
 
 def _chord(rest: Equilibrium) -> tuple[float, Array]:
-    """Angle of the chord below the horizontal, rad, and its derivative by the positions."""
+    """Angle of the chord below the horizontal, rad, and its derivative with respect to the positions."""
     cloth = rest.scene.cloths["cloth"]
     tip = cloth.particles[cloth.mesh.sets["right"]]
     x, _, z = rest.positions[tip].mean(axis=0)

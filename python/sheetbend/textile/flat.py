@@ -83,7 +83,7 @@ def flat_rest(scene: Scene, cloth: Cloth, start: ArrayLike, **settings: float) -
 
 
 def jaw_force(rest: Equilibrium, name: str, axis: int) -> tuple[float, dict[str, float]]:
-    """Force of a jaw on the cloth along an axis, N, and its derivative by every quantity."""
+    """Force of a jaw on the cloth along an axis, N, and its derivative with respect to every quantity."""
     bar = np.zeros_like(rest.forces[name])
     bar[:, axis] = 1.0
     return float(rest.forces[name][:, axis].sum()), rest.gradient(None, {name: bar})

@@ -1,4 +1,4 @@
-"""What a laboratory reads off a test, with its derivatives by the fabric's numbers."""
+"""What a laboratory reads off a test, with its derivatives with respect to the fabric's numbers."""
 
 from __future__ import annotations
 

@@ -26,7 +26,8 @@ def free_fall(steps: int, h: float, g: float, x0: float = 0.0, v0: float = 0.0, 
 
 
 def free_fall_dg(steps: int, h: float, order: int = 1) -> float:
-    """O-1: d(position)/dg [s^2] of `free_fall`. Exact. The derivative by v0 is steps * h, by x0 it is 1."""
+    """O-1: d(position)/dg [s^2] of `free_fall`. Exact. The derivative with respect to v0 is steps * h, by x0 it is
+    1."""
     _require_order(order)
     if order == 1:
         return 0.5 * steps * (steps + 1) * h * h
@@ -71,7 +72,7 @@ def spring_stretch(compliance: float, mass: float, h: float, steps: int, stretch
 def spring_stretch_dcompliance(compliance: float, mass: float, h: float, steps: int, stretch: float) -> float:
     """O-2: d(`spring_stretch`)/d(compliance) [N]: u_0 Re(-i h omega n z^(n+1) / (2 alpha)). Exact.
 
-    The derivative by mass is this times compliance/mass.
+    The derivative with respect to mass is this times compliance/mass.
     """
     omega = 1.0 / math.sqrt(compliance * mass)
     z = amplification(omega * h)
