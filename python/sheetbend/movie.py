@@ -1,4 +1,4 @@
-"""Moving pictures: cloths colored by strain and ropes as lines, with measured markers as dots, as a GIF."""
+"""Moving pictures: cloths colored by strain and ropes as lines, with measured markers as dots, as a GIF or MP4."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = np.ndarray
-SUFFIX = ".gif"
-MOST_FRAMES, RATE = 75, 25.0  # drawn at most; and per second at most
-_DPI = 80
+SUFFIXES = (".gif", ".mp4")
+MOST_FRAMES, RATE = {".gif": 75, ".mp4": 750}, 25.0  # drawn at most; and per second at most
+_DPI = {".gif": 100, ".mp4": 160}
 _WITH_EDGES = 1000  # triangles: plain edges of more would hide colors and markers
 
 
@@ -50,50 +50,67 @@ def check_movie(field: str, path: Path, scenes: Sequence[Scene]) -> None:
     """Everything that would stop `save_movie` after the work is done.
 
     Raises:
-        InputError: a file that is no GIF, or a scene without cloth or rope.
-        MissingExtraError: matplotlib or Pillow is not installed.
+        InputError: a file that is no GIF or MP4, or a scene without cloth or rope.
+        MissingExtraError: matplotlib, Pillow (GIF) or a program that encodes (MP4) is not installed.
     """
-    if path.suffix.lower() != SUFFIX:
-        raise InputError(field, "is no GIF", str(path), f"give a file that ends in {SUFFIX}")
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(field, "is no GIF or MP4", str(path), f"give a file that ends in {' or '.join(SUFFIXES)}")
     if path.is_dir():
         raise InputError(field, "is a folder", str(path), "give a file")
     bare = [scene.name for scene in scenes if not scene.cloths and not scene.ropes]
     if bare or not scenes:
         raise InputError(field, "needs a motion of a cloth or a rope", bare or "none", "leave it out")
-    require("matplotlib.animation", "plot")
-    require("PIL", "plot")
+    _writer(path, RATE)
+
+
+def _writer(path: Path, rate: float) -> Any:
+    """What turns drawn frames into a file: Pillow for a GIF; for an MP4 ffmpeg, or the one in imageio-ffmpeg."""
+    animation = require("matplotlib.animation", "plot")
+    if path.suffix.lower() == ".gif":
+        require("PIL", "plot")
+        return animation.PillowWriter(fps=rate)
+    if not animation.FFMpegWriter.isAvailable():
+        program = require("imageio_ffmpeg", "movie").get_ffmpeg_exe()
+        require("matplotlib", "plot").rcParams["animation.ffmpeg_path"] = program
+    return animation.FFMpegWriter(fps=rate, codec="libx264", extra_args=["-pix_fmt", "yuv420p"])
 
 
 def save_movie(motion: Motion, path: Path, title: str = "") -> int:
-    """Write a GIF in the motion's own time, as far as its frames allow; gives their number.
+    """Write a GIF or an MP4 in the motion's own time, as far as its frames allow.
+
+    An MP4 needs ffmpeg, or the extra `movie`.
+
+    Returns:
+        The number of frames.
 
     Raises:
         InputError: see `check_movie`.
     """
     check_movie("path", path, [motion.scene])
-    shown = _chosen(motion.times)
+    kind = path.suffix.lower()
+    shown = _chosen(motion.times, MOST_FRAMES[kind])
     seconds = float(motion.times[shown[-1]] - motion.times[shown[0]])
     rate = min((len(shown) - 1) / seconds, RATE) if seconds > 0 else 1.0
     figure, draw = _picture(motion, shown, title)
     path.parent.mkdir(parents=True, exist_ok=True)
-    writer = require("matplotlib.animation", "plot").PillowWriter(fps=rate)
-    with written(path) as beside, writer.saving(figure, str(beside), dpi=_DPI):
+    writer = _writer(path, rate)
+    with written(path) as beside, writer.saving(figure, str(beside), dpi=_DPI[kind]):
         for frame in shown:
             draw(frame)
             writer.grab_frame()
     return len(shown)
 
 
-def _chosen(times: Array) -> Array:
+def _chosen(times: Array, most: int) -> Array:
     """Equally spaced frames, no more than are worth drawing."""
     wanted = max(2, round((times[-1] - times[0]) * RATE) + 1)
-    return np.unique(np.linspace(0, len(times) - 1, min(wanted, MOST_FRAMES, len(times))).round().astype(int))
+    return np.unique(np.linspace(0, len(times) - 1, min(wanted, most, len(times))).round().astype(int))
 
 
 def _picture(motion: Motion, shown: Array, title: str) -> tuple[Figure, Any]:
     """The figure, and what draws a frame of it."""
     art = require("mpl_toolkits.mplot3d.art3d", "plot")
-    figure = new_figure(5.6, 4.6, title or " ")
+    figure = new_figure(7.2, 5.4, title or " ")
     panel: Any = figure.add_subplot(projection="3d", computed_zorder=False)  # what is measured stays in front
     cloths = motion.scene.cloths.values()
     strains = {

@@ -31,7 +31,9 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_every_public_name_has_its_place(site: Path) -> None:
-    shown = set(re.findall(r'<h2 id="sheetbend\.(\w+)"', "".join(p.read_text() for p in site.rglob("api/*/index.html"))))
+    shown = set(
+        re.findall(r'<h2 id="sheetbend\.(\w+)"', "".join(p.read_text() for p in site.rglob("api/*/index.html")))
+    )
     assert sorted(set(sb.__all__) - {"KINDS", "mesh"} - shown) == []
 
 
