@@ -14,10 +14,10 @@ from sheetbend.gripped.climb import Climb, Rope
 from sheetbend.gripped.conclusion import checked, model_spread, spread_words
 from sheetbend.gripped.descent import descend, negligible
 from sheetbend.gripped.judging import Errors, predict
-from sheetbend.gripped.ladder import LADDER, MARKERS, REST, TILTS, TWIST, VARYING, YIELD, Rung, smooth, together
+from sheetbend.gripped.ladder import LADDER, MARKERS, REST, SHIFTS, TILTS, TWIST, VARYING, YIELD, Rung, smooth, together
 from sheetbend.gripped.model import place_of
 from sheetbend.gripped.pieces import experiments_of, problem_of
-from sheetbend.gripped.start import started, whole
+from sheetbend.gripped.start import about, started, whole
 from sheetbend.optimizers import minimize
 from test_gripped_motion import carried_about, model_of
 
@@ -74,6 +74,25 @@ class TestLadder:
         assert end.ended
         for name, value in true.items():
             assert end.values[name] == pytest.approx(value, rel=0.03), name
+
+    def test_the_shifts_of_the_grips_come_back(self) -> None:
+        """Markers of grips sit beside the rope as others do."""
+        true = {"rope_start_shift_1": 0.004, "rope_end_shift_2": -0.005}
+        model = replace(MODEL.with_values(EI=TRUE["rope_EI"]), **SHIFTS.options)
+        (x,) = predict(model, [MOTION], {**TRUE, **true})
+        motion = replace(MOTION, recording=replace(MOTION.recording, positions=x))
+        wanted = [replace(p, prior=None) for p in SHIFTS.parameters if p.name in true]
+        end = descend(experiments_of(model, [motion], (1.0, 1.0)), wanted, {}, 20)
+        assert end.ended
+        for name, value in true.items():
+            assert end.values[name] == pytest.approx(value, rel=0.03), name
+
+    def test_the_prior_of_the_length_is_about_the_measured_one(self) -> None:
+        """Once 1 m for every rope."""
+        model = started(MODEL, [MOTION], 0.25)
+        (p,) = (p for p in about(TWIST.parameters, model) if p.name == "rope_length")
+        assert p.prior == (pytest.approx(MOTION.length), 0.02)
+        assert [q.name for q in about(TWIST.parameters, model)] == [q.name for q in TWIST.parameters]
 
 
 class TestBounds:

@@ -18,7 +18,7 @@ from .ladder import Rung, together
 from .model import NAME, RopeModel
 from .motion import GrippedMotion
 from .pieces import experiments_of, problem_of
-from .start import started
+from .start import about, started
 from .windows import Span
 
 SETTLED = 0.05  # relative change of EI at which links are short enough
@@ -169,7 +169,7 @@ class Climb:
         ends = []
         for length in bending_lengths:
             candidate = started(model, self.split.motions, length)
-            own = rung.wanted(self.split.fitted[0])
+            own = about(rung.wanted(self.split.fitted[0]), candidate)
             found = self._descended(Rope(candidate, own, {}), self.windows[0], SHORT)
             if found is None:
                 self.say(f"start at a bending length of {length:g} m: diverges")

@@ -119,9 +119,14 @@ YIELD = Rung(
     ),
     starts=({"yield_curvature": 1.0, "yield_share": 0.5, "EI": 1.5},),
 )
+SHIFTS = Rung(
+    "places of the grips",
+    options={"shifts": True},
+    parameters=tuple(_plain(f"{end}_shift_{k}", "m", 0.005, 0.005) for end in ("start", "end") for k in (1, 2, 3)),
+)
 MARKERS = Rung(
     "places of the markers",
     options={"places": True},
     each_marker=(_plain("place_{}", "m", 0.005, 0.005),),
 )
-LADDER = (TWIST, TILTS, REST, VARYING, YIELD, MARKERS)
+LADDER = (TWIST, TILTS, REST, VARYING, YIELD, SHIFTS, MARKERS)
