@@ -128,13 +128,17 @@ def of_beginnings(
     words: dict[str, str] = {}
     spread = _spread_of(problem, u)
     for b in found:
+        shift: Array | None = None
         for column, (step, reach) in _differences(spread, u, b, LEVEL / len(found)).items():
             name = problem.parameters.free[column]
             e = next(e for e in judged.estimates if e.name == name)
             if e.verdict not in CLAIMS or name in words:
                 continue
             least = max(reach, reach_of(problem.parameters[name], e))
-            if abs(step) > least and abs(step) > least + _shift(problem, u, b, refinement)[column]:
+            if abs(step) <= least:
+                continue
+            shift = _shift(problem, u, b, refinement) if shift is None else shift
+            if abs(step) > least + shift[column]:
                 words[name] = _words(problem, u, column, b, step, reach)
     return drawn_along(judged, words)
 

@@ -13,7 +13,8 @@ from ..experiment import Experiment
 from ..parameters import Parameter
 from .bounds import bounded
 from .descent import bearable, descend
-from .judging import EQUAL, Errors, Split, Verdict, errors_of, misfits, verdict
+from .first_order import first_order
+from .judging import BETTER, EQUAL, Errors, Split, Verdict, errors_of, misfits, verdict
 from .ladder import Rung, together
 from .model import NAME, RopeModel
 from .motion import GrippedMotion
@@ -37,10 +38,11 @@ class Step:
     Attributes:
         name: of the rung.
         fitted, others: median of the mean absolute coordinate errors of whole recordings that it was fitted to, and of
-            those that it was not, m.
+            those that it was not, m; without it where it was not tried, since one step promises nothing.
         stays: whether it is part of the final model.
         seconds: its time.
-        ratio: median ratio of the errors with and without it, on what it was not fitted to; None of the first.
+        ratio: median ratio of the errors with and without it, on what it was not fitted to; None of the first. To first
+            order where it was not tried.
         better: number of recordings (or pieces of them) that it predicts better.
         count: of how many.
         EI: bending stiffness with it, N m^2.
@@ -100,16 +102,38 @@ class Climb:
             # what helped nothing before may help beside what stayed later
             if not stays and not (k < last and self._climbed(rung)):
                 dropped.append(rung)
-        if len(dropped) > 1:  # or only beside another: stiffness that varies looks like yield, and yield like it
+        if len(dropped) > 1 and not all(rung.small for rung in dropped):
+            # or only beside another: stiffness that varies looks like yield, and yield like it
             self._climbed(together(dropped))
 
     def _climbed(self, rung: Rung) -> bool:
         """Try a rung; whether it stays."""
         began = time.perf_counter()
         assert self.rope is not None
+        if rung.small and (told := self._first(rung, self.rope)) is not None and told.ratio >= BETTER:
+            return self._skip(rung, told, began)
         found = self._tried(rung, self.rope)
         self._keep(rung, found, None if found is None else verdict(found.errors, self.rope.errors), began)
         return self.steps[-1].stays
+
+    def _first(self, rung: Rung, rope: Rope) -> Verdict | None:
+        """What one step with the rung would improve."""
+        larger, parameters = self._with(rung, rope)
+        free = bounded(parameters, larger, self.split.fitted, self.longest[0])
+        return first_order(larger, free, rope.values, self.split, self.longest, self.threads)
+
+    def _skip(self, rung: Rung, told: Verdict, began: float) -> bool:
+        """Note a rung that promises nothing; it does not stay."""
+        assert self.rope is not None
+        fitted, others = self.rope.errors.typical
+        seconds = time.perf_counter() - began
+        self.steps.append(Step(rung.name, fitted, others, False, seconds, told.ratio, told.better, told.count))
+        self.say(f"{rung.name}: one step promises {told.ratio:.3g} times the errors without it, does not stay")
+        return False
+
+    def _with(self, rung: Rung, rope: Rope) -> tuple[RopeModel, Parts]:
+        """The rope's model and parameters, with what a rung adds."""
+        return rung.added_to(rope.model), (*rope.parameters, *rung.wanted(self.split.fitted[0]))
 
     @property
     def whole(self) -> list[GrippedMotion]:
@@ -211,8 +235,7 @@ class Climb:
     def _tried(self, rung: Rung, rope: Rope) -> Rope | None:
         """A rung fitted to middle windows from each of its starts, and the best of these to long ones; None where all
         diverge."""
-        larger = rung.added_to(rope.model)
-        parameters = (*rope.parameters, *rung.wanted(self.split.fitted[0]))
+        larger, parameters = self._with(rung, rope)
         ends = []
         for start in ({}, *rung.starts):
             shifted = {f"{NAME}_{k}": v for k, v in start.items() if k != "EI"}

@@ -75,6 +75,7 @@ def conclude(
         given=given,
         threads=threads,
         profiles=False,
+        beginnings=False,  # the climb went from short windows to long ones
         max_iterations=1 if interrupted else MOST,
         tolerance=negligible(problem_of(experiments, parameters, values, threads)),
     )
