@@ -44,7 +44,7 @@ def judged(
     found = fit_rope(train, density=density, ladder=ladder, threads=threads, say=say)
     seconds = time.process_time() - processor
     evaluation = evaluate(found, unseen)
-    from_first_frame = 1e3 * float(np.mean(_missed(found.model, told, unseen)))
+    from_first_frame = 1e3 * float(np.mean(missed_from_first_frame(found.model, told, unseen)))
     out.write_text(RopeReport(what, found, evaluation).plain())
     scored = evaluation.scores
     error = None if scored is None or evaluation.diverged else 1e3 * scored.error
@@ -72,7 +72,7 @@ def _stiffness(found: RopeFit, told: dict[str, Any]) -> dict[str, Any]:
     return {name: e.value, "interval": [e.lower, e.upper], "true": true, "inside": inside, "verdict": e.verdict}
 
 
-def _missed(fitted: RopeModel, told: dict[str, Any], unseen: Screened) -> list[float]:
+def missed_from_first_frame(fitted: RopeModel, told: dict[str, Any], unseen: Screened) -> list[float]:
     """Mean errors of a coordinate, m, of the true values predicted from the first frames, with all that is in them."""
     model = fitted
     for rung in LADDER:

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend.gripped import GrippedMotion, RopeModel, fit_rope
+from sheetbend.gripped import GrippedMotion, RopeModel, descent, fit_rope
 from sheetbend.gripped.bounds import at_bounds, bounded
 from sheetbend.gripped.climb import Climb, Rope
 from sheetbend.gripped.conclusion import checked, model_spread, spread_words
@@ -137,6 +137,25 @@ class TestDescent:
         problem = problem_of(experiments, TWIST.parameters[:1], {})
         assert negligible(problem) == pytest.approx(0.1**2 * 20 / problem.core.data_rows)
 
+    def test_it_takes_fewer_derivatives_than_steps(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        names = ("rope_EI", "rope_bend_damping", "rope_length", "rope_roll")
+        wanted = [replace(p, prior=None) for p in TWIST.parameters if p.name in names]
+        motion = shown(rope_roll=0.4)
+        experiments, start = experiments_of(MODEL, [motion], (1.0, 1.0)), {"rope_EI": 0.06, "rope_bend_damping": 0.06}
+        ends, taken = [], []
+        for least in (np.inf, 0):
+            monkeypatch.setattr(descent, "DEAR", least)
+            problem = problem_of(experiments, wanted, start)
+            walk = descent.Sparing(problem, problem.parameters.initial())
+            ends.append(descend(experiments, wanted, start, 30))
+            while walk.cost > 1.001 * ends[-1].cost and walk.step():
+                pass
+            taken.append((walk.iterations, walk.computed))
+        assert all(end.ended for end in ends)
+        for name in names:
+            assert ends[1].values[name] == pytest.approx(ends[0].values[name], rel=2e-3), name
+        assert taken[0][0] == taken[0][1] and taken[1][1] < min(taken[1][0], taken[0][1])
+
     def test_a_start_that_diverges_costs_infinitely_much(self) -> None:
         end = descend(experiments_of(MODEL, [shaken("bad")], (1.0, 1.0)), STIFFNESS, {}, 5)
         assert not end.finite and end.iterations == 0 and not end.ended
@@ -183,6 +202,30 @@ class TestClimb:
         both = together([YIELD, VARYING])
         assert both.parameters == (*YIELD.parameters, *VARYING.parameters) and both.starts == YIELD.starts
         assert both.options == VARYING.options and both.values == YIELD.values
+
+    def test_what_promises_nothing_is_not_tried(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Places of markers once took as long as the fit itself, to be left out."""
+        x, rng, said = shown().recording.positions, np.random.default_rng(0), list[str]()
+        noisy = [replace(MOTION.recording, positions=x + 1e-3 * rng.standard_normal(x.shape)) for _ in range(5)]
+        motions = [replace(MOTION, recording=replace(r, name=f"{k}")) for k, r in enumerate(noisy)]
+        climb = Climb(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, said.append)
+        climb.rope = climb._judged(Rope(MODEL.at(TRUE), STIFFNESS, TRUE))
+        tried: list[str] = []
+        monkeypatch.setattr(Climb, "_tried", lambda self, rung, rope: tried.append(rung.name))
+        assert not climb._climbed(MARKERS) and tried == []
+        (step,) = climb.steps
+        assert not step.stays and step.ratio is not None and step.ratio > 0.99 and step.count == 4
+        assert "one step promises" in said[-1]
+
+    def test_what_promises_much_is_tried(self) -> None:
+        model = replace(MODEL, shifts=True)
+        moved = {"rope_start_shift_1": 0.006, "rope_end_shift_2": -0.006}
+        (x,) = predict(model, [MOTION], {**TRUE, **moved})
+        motions = [replace(MOTION, recording=replace(MOTION.recording, positions=x, name=f"{k}")) for k in range(5)]
+        rope = Rope(MODEL.at(TRUE), STIFFNESS, TRUE)
+        climb = Climb(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None)
+        told = climb._first(SHIFTS, rope)
+        assert told is not None and told.ratio < 0.3 and told.fitted < 0.3 and told.stays
 
     def test_where_everything_diverges_it_says_so(self) -> None:
         with pytest.raises(sb.SheetbendError, match="no start of a straight rope"):

@@ -57,12 +57,12 @@ class Sparing(Approach):
 
     Attributes:
         sure: whether the last step followed a derivative that was computed where it began.
-        computed: number of derivatives so far.
+        computed: number of such steps so far.
     """
 
     def __init__(self, problem: FitProblem, u: Array) -> None:
         super().__init__(problem, u)
-        self.sure, self.computed, self._corrected = True, 1, 0
+        self.sure, self.computed, self._corrected = True, 0, 0
         self._most = CORRECTIONS if len(self.u) >= DEAR else 0
 
     def step(self) -> bool:
@@ -79,13 +79,13 @@ class Sparing(Approach):
                 return False
             self._compute()
             return self.step()
-        if self._J is None and J is not None:
-            if self.near and self._corrected < self._most:
-                step = self.u - u
-                weighted = step / self._longest**2
-                self._J = J + np.outer(self._r - r - J @ step, weighted) / (weighted @ step)
-                self._corrected += 1
-        elif self._J is not None:
+        self.computed += self.sure
+        if J is not None and self.near and self._corrected < self._most:
+            step = self.u - u
+            weighted = step / self._longest**2
+            self._J = J + np.outer(self._r - r - J @ step, weighted) / (weighted @ step)
+            self._corrected += 1
+        elif self._J is not None:  # it came along with the residuals
             self._corrected = 0
         return True
 
@@ -95,7 +95,6 @@ class Sparing(Approach):
             self._J = None
 
     def _compute(self) -> None:
-        self.computed += 1
         _, self._r, self._J = self._evaluated(self.u, True)
         self._corrected = 0
 
@@ -124,7 +123,7 @@ def descend(
     """Down from `values`; a state that diverges costs infinitely much, so that the last finite one stays.
 
     Args:
-        most: derivatives.
+        most: steps that follow a derivative of their own.
         enough: share of the cost that a step must promise and take off, where that is more than `negligible`.
         followed: called with each step's number and cost.
     """
@@ -133,7 +132,7 @@ def descend(
     least, ended, first = max(enough, negligible(problem)), False, walk.cost
     if not bearable(problem, walk.cost):
         return Descent(problem.parameters.to_physical(walk.u), np.inf, 0, False)
-    while walk.computed <= most:
+    while walk.computed < most:
         if not walk.step():  # nothing left to promise, or no shorter step helps
             ended = walk.promised < max(least, STUCK) or walk.promised * walk.cost <= ROUNDING * first
             break
