@@ -23,8 +23,9 @@ from .start import about, started
 from .windows import Span
 
 SETTLED = 0.05  # relative change of EI at which links are short enough
+FINE = 24  # links, that hold all modes of the ladder: of two numbers that agree the smaller one is taken from here on
 SEARCHED = 0.5  # of the total of long windows that the last fit sees: enough to decide on rungs
-ENOUGH = 2e-3  # of the cost: what a step must promise while searching
+ENOUGH = 5e-3  # of the cost: what a step must promise while searching
 SHORT, LONG = 12, 30  # iterations, at most, of a start, and of a fit to long windows
 
 Say = Callable[[str], None]
@@ -224,6 +225,8 @@ class Climb:
             finer = self._on(replace(rope, model=replace(rope.model, segments=2 * rope.model.segments)), self.middle)
             moved = abs(finer.values[f"{NAME}_EI"] / rope.values[f"{NAME}_EI"] - 1.0)
             self.say(f"{rope.model.segments} to {finer.model.segments} links move EI by {100 * moved:.2g} %")
+            if moved < SETTLED and rope.model.segments >= FINE:
+                break  # the intervals count what the finer ones would move
             rope = finer
         rope = self._judged(self._on(rope, self.longest))
         if self._leave_out(rope.errors.whole):
@@ -233,9 +236,11 @@ class Climb:
         return rope
 
     def _tried(self, rung: Rung, rope: Rope) -> Rope | None:
-        """A rung fitted to middle windows from each of its starts, and the best of these to long ones; None where all
-        diverge."""
+        """A rung fitted to middle windows from each of its starts, and the best of these to long ones; a small one to
+        long ones at once. None where all diverge."""
         larger, parameters = self._with(rung, rope)
+        if rung.small:
+            return self._long(rung, Rope(larger, parameters, rope.values))
         ends = []
         for start in ({}, *rung.starts):
             shifted = {f"{NAME}_{k}": v for k, v in start.items() if k != "EI"}
@@ -245,9 +250,12 @@ class Climb:
                 ends.append(found)
         if not ends:
             return None
-        best = min(ends, key=lambda end: end[1])[0]
+        return self._long(rung, min(ends, key=lambda end: end[1])[0])
+
+    def _long(self, rung: Rung, rope: Rope) -> Rope | None:
+        """Fitted to long windows, and judged; None where it diverges."""
         try:
-            return self._judged(self._on(best, self.longest))
+            return self._judged(self._on(rope, self.longest))
         except SheetbendError as error:
             self.say(f"{rung.name}: {error}")
             return None
