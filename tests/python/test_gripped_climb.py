@@ -249,6 +249,15 @@ class TestConclusion:
         with pytest.raises(sb.SheetbendError, match="diverges"):
             checked(bad, STIFFNESS, {}, 1)
 
+    def test_the_time_of_many_windows_is_told_also_of_one_recording(self) -> None:
+        said: list[str] = []
+        windows = ((0.5, 1.0), (0.06, 0.96))
+        fit_rope(
+            [shown("only")], density=0.06, ladder=[TWIST], bending_lengths=(0.3,), windows=windows, say=said.append
+        )
+        (at,) = (k for k, text in enumerate(said) if text.startswith("the fit that counts, to 16 windows of 0.06 s"))
+        assert said[at + 1].startswith("which takes about ")
+
     def test_ctrl_c_in_the_last_fit_costs_no_result(self, monkeypatch: pytest.MonkeyPatch) -> None:
         def stopped(*_: object) -> dict[str, float]:
             raise KeyboardInterrupt

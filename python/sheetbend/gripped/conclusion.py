@@ -29,7 +29,7 @@ from .pieces import experiments_of, problem_of, starting
 from .windows import Span, counted, places
 
 MOST = 30  # iterations, at most
-MANY = 12  # recordings: of a larger set the time of the last fit is told
+MANY = 12  # windows: of more the time of the last fit is told
 EVALUATIONS = 15  # with derivatives, of such a fit and its intervals, for an estimate of its time
 
 
@@ -51,7 +51,7 @@ def conclude(
     experiments = experiments_of(rope.model, motions, window)
     parameters = bounded(rope.parameters, rope.model, motions, window[0])
     say(f"the fit that counts, to {counted(motions, window)}")
-    if len(motions) > MANY:
+    if len(experiments) > MANY:
         say(f"which takes about {short(_seconds(rope, motions, window, threads), 1)} s")
     values, spread = rope.values, dict[str, float]()
     if not interrupted:
