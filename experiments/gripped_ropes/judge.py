@@ -29,6 +29,7 @@ from sheetbend.gripped.ladder import LADDER, TWIST
 from sheetbend.scores import coordinate_error
 
 SMOOTHING = 0.08  # s
+LINKS = 48  # of predictions with the true values
 
 
 def judged(
@@ -79,7 +80,9 @@ def missed_from_first_frame(fitted: RopeModel, told: dict[str, Any], unseen: Scr
         model = rung.added_to(model)
     true = dict(told["true"])
     known = {f"rope_{k}": v for k, v in true.items() if k != "density"}
-    model = replace(model, density=true["density"], marker_mass=told["marker_mass"], places=False).at(known)
+    model = replace(model, density=true["density"], marker_mass=told["marker_mass"], places=False, segments=LINKS).at(
+        known
+    )
     pairs = zip(unseen, predict(model, unseen.motions, known), strict=True)
     return [coordinate_error(motion.recording, x) for motion, x in pairs]
 

@@ -26,7 +26,7 @@ SETTLED = 0.05  # relative change of EI at which links are short enough
 FINE = 24  # links, that hold all modes of the ladder: of two numbers that agree the smaller one is taken from here on
 SEARCHED = 0.5  # of the total of long windows that the last fit sees: enough to decide on rungs
 ENOUGH = 5e-3  # of the cost: what a step must promise while searching
-SHORT, LONG = 12, 30  # iterations, at most, of a start, and of a fit to long windows
+FEW, SHORT, LONG = 3, 12, 30  # derivatives, at most: of a rung that is nearly linear, of a start, and on long windows
 
 Say = Callable[[str], None]
 Parts = tuple[Parameter, ...]
@@ -240,7 +240,7 @@ class Climb:
         long ones at once. None where all diverge."""
         larger, parameters = self._with(rung, rope)
         if rung.small:
-            return self._long(rung, Rope(larger, parameters, rope.values))
+            return self._long(rung, Rope(larger, parameters, rope.values), FEW)
         ends = []
         for start in ({}, *rung.starts):
             shifted = {f"{NAME}_{k}": v for k, v in start.items() if k != "EI"}
@@ -252,21 +252,21 @@ class Climb:
             return None
         return self._long(rung, min(ends, key=lambda end: end[1])[0])
 
-    def _long(self, rung: Rung, rope: Rope) -> Rope | None:
+    def _long(self, rung: Rung, rope: Rope, most: int = LONG) -> Rope | None:
         """Fitted to long windows, and judged; None where it diverges."""
         try:
-            return self._judged(self._on(rope, self.longest))
+            return self._judged(self._on(rope, self.longest, most))
         except SheetbendError as error:
             self.say(f"{rung.name}: {error}")
             return None
 
-    def _on(self, rope: Rope, window: Span) -> Rope:
+    def _on(self, rope: Rope, window: Span, most: int = LONG) -> Rope:
         """The rope fitted to such windows.
 
         Raises:
             SheetbendError: the motion diverges.
         """
-        found = self._descended(rope, window)
+        found = self._descended(rope, window, most)
         if found is None:
             raise SheetbendError(f"the motion diverges on windows of {window[0]:g} s")
         return found[0]
