@@ -57,7 +57,10 @@ def conclude(
     if not interrupted:
         try:
             spread = model_spread(rope, climb.equal())
-            values = _at_the_end(climb, experiments, parameters)
+            few = climb.windows[-1]
+            if len(places(motions, few)) < len(experiments):  # most of the way at a part of the price
+                values = _at_the_end(climb, values, experiments_of(rope.model, motions, few), parameters)
+            values = _at_the_end(climb, values, experiments, parameters)
         except KeyboardInterrupt:
             interrupted = True
             say("interrupted: the fit that counts did not get to its end")
@@ -88,14 +91,15 @@ def conclude(
     return replace(last, result=replace(last.result, interrupted=True, converged=False, warnings=(warning,))), spread
 
 
-def _at_the_end(climb: Climb, experiments: Sequence[Experiment], parameters: Sequence[Parameter]) -> dict[str, float]:
+def _at_the_end(
+    climb: Climb, values: Mapping[str, float], experiments: Sequence[Experiment], parameters: Sequence[Parameter]
+) -> dict[str, float]:
     """Values at the minimum.
 
     Raises:
         SheetbendError: the motion diverges.
     """
-    assert climb.rope is not None
-    found = descend(experiments, parameters, climb.rope.values, MOST, climb.threads)
+    found = descend(experiments, parameters, values, MOST, climb.threads)
     if not found.finite:
         raise SheetbendError("the fit that counts diverges where the last rung ended")
     climb.say(f"{'ended' if found.ended else 'not ended'} after {found.iterations} steps")
