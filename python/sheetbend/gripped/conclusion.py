@@ -30,7 +30,7 @@ from .windows import Span, counted, places
 
 MOST = 30  # iterations, at most
 MANY = 12  # windows: of more the time of the last fit is told
-EVALUATIONS = 15  # with derivatives, of such a fit and its intervals, for an estimate of its time
+EVALUATIONS = 25  # with derivatives, of such a fit and its intervals, for an estimate of its time
 
 
 def conclude(
