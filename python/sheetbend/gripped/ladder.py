@@ -127,7 +127,8 @@ YIELD = Rung(
 SHIFTS = Rung(
     "places of the grips",
     options={"shifts": True},
-    parameters=tuple(_plain(f"{end}_shift_{k}", "m", 0.005, 0.005) for end in ("start", "end") for k in (1, 2, 3)),
+    # not along the rope: there the length and the places of the markers do the same
+    parameters=tuple(_plain(f"{end}_shift_{k}", "m", 0.005, 0.005) for end in ("start", "end") for k in (1, 2)),
     small=True,
 )
 MARKERS = Rung(
