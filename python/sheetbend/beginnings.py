@@ -12,8 +12,9 @@ Nothing is done where the residuals are white and as large as the given sigma.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -46,6 +47,9 @@ errors are alike over their whole length, differ by up to 1.5 % (measured)."""
 LOWER = 1e-3  # of the cost: an end that is lower by less is the same
 
 
+Spread = Callable[[tuple[int, ...]], Covariance]
+
+
 @dataclass(frozen=True)
 class Beginning:
     """A beginning of all motions, fitted by itself.
@@ -75,7 +79,8 @@ def checked(
         growths: of the motions at the best end.
     """
     found = beginnings(problem, ends[0], growths)
-    if not any(_differences(problem, ends[0].u, b, LEVEL / len(found)) for b in found):
+    spread = _spread_of(problem, ends[0].u)
+    if not any(_differences(spread, ends[0].u, b, LEVEL / len(found)) for b in found):
         return tuple(ends), found
     try:
         other = search.onward(problem, found[-1].u)
@@ -121,14 +126,19 @@ def of_beginnings(
         u: (free,) minimum of the whole, where the beginnings were fitted from.
     """
     words: dict[str, str] = {}
+    spread = _spread_of(problem, u)
     for b in found:
-        for column, (step, reach) in _differences(problem, u, b, LEVEL / len(found)).items():
+        shift: Array | None = None
+        for column, (step, reach) in _differences(spread, u, b, LEVEL / len(found)).items():
             name = problem.parameters.free[column]
             e = next(e for e in judged.estimates if e.name == name)
             if e.verdict not in CLAIMS or name in words:
                 continue
             least = max(reach, reach_of(problem.parameters[name], e))
-            if abs(step) > least and abs(step) > least + _shift(problem, u, b, refinement)[column]:
+            if abs(step) <= least:
+                continue
+            shift = _shift(problem, u, b, refinement) if shift is None else shift
+            if abs(step) > least + shift[column]:
                 words[name] = _words(problem, u, column, b, step, reach)
     return drawn_along(judged, words)
 
@@ -152,23 +162,24 @@ def _enough(part: FitProblem, length: float) -> bool:
     return min(frames, default=0) >= FRAMES and part.core.data_rows >= FEWEST * len(part.parameters.free)
 
 
-def _differences(problem: FitProblem, u: Array, b: Beginning, level: float) -> Mapping[int, tuple[float, float]]:
+def _differences(spread: Spread, u: Array, b: Beginning, level: float) -> Mapping[int, tuple[float, float]]:
     """By column, how far the beginning's minimum is from that of the whole, and the 95 % reach of the difference, where
     it is clearly farther; none at all where chance explains the differences of all columns together."""
-    names = list(problem.parameters.free)
-    log = [problem.parameters[name].log for name in names]
+    parameters = b.problem.parameters
+    names = list(parameters.free)
+    log = [parameters[name].log for name in names]
     _, _, J = b.problem.evaluate(b.u)
     if not np.isfinite(J).all():
         return {}
-    lower, upper = problem.parameters.limits()
+    lower, upper = parameters.limits()
     inside = [c for c in range(len(names)) if lower[c] < u[c] < upper[c] and lower[c] < b.u[c] < upper[c]]
     determined = null_space(J[:, inside], [names[c] for c in inside], [log[c] for c in inside]).determined
-    columns = [inside[i] for i in determined]
+    columns = tuple(inside[i] for i in determined)
     if not columns or b.problem.core.data_rows <= len(columns):
         return {}
-    own, whole = _spread(b.problem, b.u, columns), _spread(problem, u, columns)
+    own, whole = _spread_of(b.problem, b.u)(columns), spread(columns)
     V = short_of_frames(own, max(len(r.times) for r in b.problem.recordings)) * own.matrix + whole.matrix
-    step, sd = (b.u - u)[columns], np.sqrt(np.diag(V))
+    step, sd = (b.u - u)[list(columns)], np.sqrt(np.diag(V))
     degrees = max(float(np.median(own.degrees)), 1.0)
     score = float(step / sd @ np.linalg.lstsq(V / np.outer(sd, sd), step / sd, rcond=None)[0])
     special = require("scipy.special", "fit")
@@ -176,7 +187,7 @@ def _differences(problem: FitProblem, u: Array, b: Beginning, level: float) -> M
         return {}
     t = float(special.stdtrit(degrees, 0.975))
     found = {c: (float(d), t * float(s)) for c, d, s in zip(columns, step, sd, strict=True)}
-    size = {c: _size(problem, u, c) for c in columns}
+    size = {c: _size(b.problem, u, c) for c in columns}
     return {c: (d, s) for c, (d, s) in found.items() if abs(d) > max(s, CLEAR * size[c]) and s < KNOWN * size[c]}
 
 
@@ -186,10 +197,17 @@ def _size(problem: FitProblem, u: Array, column: int) -> float:
     return 1.0 if p.log else p.scale or abs(float(u[column]))
 
 
-def _spread(problem: FitProblem, u: Array, columns: Sequence[int]) -> Covariance:
-    _, r, J = problem.evaluate(u)
-    rows, behind = problem.prior_rows
-    return covariance(r[:rows], J[:rows, columns], problem.rows_layout(), J[rows:behind, columns])
+def _spread_of(problem: FitProblem, u: Array) -> Spread:
+    """The covariance of columns there, each set of them once."""
+
+    @cache
+    def spread(columns: tuple[int, ...]) -> Covariance:
+        _, r, J = problem.evaluate(u)
+        rows, behind = problem.prior_rows
+        mine = list(columns)
+        return covariance(r[:rows], J[:rows, mine], problem.rows_layout(), J[rows:behind, mine])
+
+    return spread
 
 
 def _shift(problem: FitProblem, u: Array, b: Beginning, refinement: Refinement) -> Array:

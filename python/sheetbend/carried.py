@@ -117,17 +117,16 @@ def _rigid(before: Array, after: Array, x: Array) -> Array:
     """Where the rigid motions of a grip take points: (frames, markers, 3).
 
     Args:
-        before, after: (points, 3) and (frames, points, 3), the grip.
-        x: (markers, 3) beside `before`.
+        before, after: (points, 3) or (frames, points, 3), the grip.
+        x: (markers, 3) or (frames, markers, 3) beside `before`.
     """
-    from_, to = before.mean(axis=0), after.mean(axis=1)
-    spread = np.einsum("pi,fpj->fij", before - from_, after - to[:, None])
-    size = np.linalg.norm(spread, axis=(1, 2), keepdims=True)
+    from_, to = before.mean(axis=-2, keepdims=True), after.mean(axis=-2, keepdims=True)
+    spread = np.swapaxes(before - from_, -1, -2) @ (after - to)
+    size = np.linalg.norm(spread, axis=(-2, -1), keepdims=True)
     u, _, vt = np.linalg.svd(spread + _NEAREST_TO_IDENTITY * np.where(size > 0, size, 1.0) * np.eye(3))
-    flip = np.ones((len(after), 3))
-    flip[:, 2] = np.sign(np.linalg.det(u @ vt))
-    turn = np.einsum("fij,fj,fjk->fik", u, flip, vt)
-    return np.asarray((x - from_) @ turn + to[:, None])
+    flip = np.ones((*spread.shape[:-2], 3))
+    flip[..., 2] = np.sign(np.linalg.det(u @ vt))
+    return np.asarray((x - from_) @ ((u * flip[..., None, :]) @ vt) + to)
 
 
 def _weights(x: Array, grips: Sequence[Array]) -> Array:
@@ -147,9 +146,5 @@ def _mean_in_grip(grip: Sequence[int], fitted: Sequence[Source], values: Values)
     brought back to that one; NaN for a marker that is never seen."""
     moving = [_motion(e, grip, r.times, values) for e, r in fitted]
     at = moving[0][0]
-    back = [
-        _rigid(points, at[None], x)
-        for motion, (_, r) in zip(moving, fitted, strict=True)
-        for points, x in zip(motion, r.positions, strict=True)
-    ]
+    back = [_rigid(motion, at, r.positions) for motion, (_, r) in zip(moving, fitted, strict=True)]
     return at, mean_position(np.concatenate(back))

@@ -107,6 +107,7 @@ def fit(
     given: Mapping[str, float] | None = None,
     leave_one_out: bool = False,
     profiles: bool = True,
+    beginnings: bool = True,
     max_iterations: int = 200,
     threads: int = 1,
     progress: Observer | None = None,
@@ -139,6 +140,8 @@ def fit(
         leave_one_out: also predict every recording that holds nothing out by a fit to the others.
         profiles: refit the others along the worst parameters for their intervals; without, intervals are the linear
             ones, which cost nothing beside the fit.
+        beginnings: also fit the beginnings of the motions by themselves, to doubt what they contradict and to search on
+            from there (`sheetbend.beginnings`). That costs about as much as the fit itself.
         max_iterations: per start and window.
         threads: over experiments and Jacobian columns; the result does not depend on it.
         progress: called after every iteration.
@@ -181,7 +184,7 @@ def fit(
     trouble = ceres_trouble() if optimizer == "auto" else ""
     fallback = (f"SciPy stands in for Ceres, which does not load: {trouble}",) if trouble else ()
     grown, begun = growths(problem, ends[0].u), tuple[Beginning, ...]()
-    if not interrupted:
+    if beginnings and not interrupted:
         try:
             ends, begun = checked(search, problem, ends, grown)
         except KeyboardInterrupt:

@@ -14,7 +14,7 @@ from .checks import check_positive, finite, is_number
 from .errors import SceneError
 from .grip import Grip, any_across, carried
 from .quantities import product
-from .rod_end import End, spread_roll
+from .rod_end import End, spread_roll, spread_shift
 from .rod_joints import Joints, shear, weigh
 from .rod_junction import STUB_MASS, Facing, Junction
 from .rod_shape import initial_frames, initial_shape
@@ -71,6 +71,7 @@ def add_rod(
     director: ArrayLike | None = None,
     turns: int = 0,
     tilts: bool = False,
+    shifts: bool = False,
     roll: bool = False,
     stretch_damping: float | None = None,
     bend_damping: float | None = None,
@@ -90,6 +91,7 @@ def add_rod(
     Quantities: `<name>_length` m, `<name>_density` kg/m, `_EI` and `_GJ` N m^2, and where given `_EA` and `_GA` N,
     `_EI2` N m^2, `_stretch_damping`, `_bend_damping`, `_twist_damping` and `_shear_damping` s, `_drag_linear` N s/m^2,
     `_drag_quadratic` N s^2/m^3, `_start_tilt_1`, `_start_tilt_2`, `_end_tilt_1`, `_end_tilt_2`, `_roll` rad,
+    `_start_shift_1` to `_3` and `_end_shift_1` to `_3` m,
     `_curvature_1_<k>`, `_curvature_2_<k>` and `_twist_<k>` 1/m, `_yield_curvature` 1/m, `_yield_share`,
     `_softness_<k>`, `_density_<k>`.
 
@@ -109,6 +111,8 @@ def add_rod(
         director: (3,) the first frame axis at a start without a grip; any by default.
         turns: whole turns by which the end's frame is ahead at the start, beside the part of a turn that grips give.
         tilts: add the four tilts: small angles by which the rod leaves a grip askew, about the frame's axes.
+        shifts: add the three shifts of each grip: how far beside the given place the rod leaves it, along the frame's
+            first and second axis and along the rod. The initial shape follows, less and less towards the other end.
         roll: add the roll of the end grip about the rod: the twist built in when the rod was gripped.
         stretch_damping, bend_damping, twist_damping, shear_damping: Kelvin-Voigt time constants s.
         drag_linear, drag_quadratic: air drag per length, isotropic.
@@ -154,8 +158,9 @@ def add_rod(
             fix = f"give {of}, or leave it out"
             raise SceneError(f"{name}.{label}_damping", f"needs a finite {of}", stiffness, fix)
     ends = End(name, "start", -1.0, start), End(name, "end", 1.0, end)
-    if tilts and ends[0].grip is None and ends[1].grip is None:
-        raise SceneError(f"{name}.tilts", "need a grip", tilts, "give start or end")
+    for nuisance, asked in (("tilts", tilts), ("shifts", shifts)):
+        if asked and ends[0].grip is None and ends[1].grip is None:
+            raise SceneError(f"{name}.{nuisance}", "need a grip", asked, "give start or end")
     if roll and ends[1].grip is None:
         raise SceneError(f"{name}.roll", "needs a grip at the end", roll, "give end")
     ring = _is_ring(name, ends, points, length)
@@ -202,7 +207,10 @@ def add_rod(
     for e, k, ghost, stub in zip(ends, (0, -1), ghosts, stubs, strict=True):
         if ghost is not None:
             normal = None if normals is None else int(normals[k])
-            e.hold(scene, int(nodes[k]), ghost, int(directors[k]), normal, stub, tilts, roll and k == -1)
+            e.hold(scene, int(nodes[k]), ghost, int(directors[k]), normal, stub, tilts, shifts, roll and k == -1)
+        if shifts and e.grip is not None:
+            share = np.linspace(float(k == 0), float(k == -1), len(nodes))
+            spread_shift(scene, e.grip, f"{name}_{e.label}", nodes[1:-1], share[1:-1])
     if roll:
         shares = np.linspace(0.0 if ends[0].held else 1.0, 1.0, len(directors))
         spread_roll(scene, f"{name}_roll", directors[:-1], shares[:-1])

@@ -77,6 +77,7 @@ class End:
         normal: int | None,
         stub: float,
         tilts: bool,
+        shifts: bool,
         roll: bool,
     ) -> None:
         """Give the end its pose, or join it to the other rods; the section of its stub stays across that."""
@@ -102,6 +103,12 @@ class End:
                 tilt = scene.add_quantity(f"{self.name}_{self.label}_tilt_{k}", 0.0, "rad", positive=False, scale=0.1)
                 for n, length in ((ghost, stub), *((n, 1.0) for n in section)):
                     _add_motion(scene, grip, n, length * axis, {tilt: "identity"})
+        if shifts:
+            for k, axis in enumerate((grip.director, second, grip.direction), start=1):
+                quantity = f"{self.name}_{self.label}_shift_{k}"
+                shift = scene.add_quantity(quantity, 0.0, "m", positive=False, scale=5e-3)
+                for n in (node, ghost):
+                    _add_motion(scene, grip, n, axis, {shift: "identity"})
         if roll:  # cos and sin of it instead of the given director
             quantity = scene.add_quantity(f"{self.name}_roll", 0.0, "rad", positive=False, scale=0.3)
             _add_motion(scene, grip, director, grip.director, {quantity: "cos"})
@@ -116,6 +123,20 @@ def _add_motion(scene: Scene, grip: Grip, node: int, by: Array, factors: dict[st
             scene.add_motion_term(node, coefficients, own)
     else:
         scene.add_terms([product("position", 3 * node + k, by[0, k], factors) for k in range(3)])
+
+
+def spread_shift(scene: Scene, grip: Grip, end: str, nodes: Array, shares: Array) -> None:
+    """Let nodes start shifted by shares of the shifts of a grip, so that no link is stretched in the first substep.
+
+    Args:
+        end: name of the rod and of its end, which the quantities have.
+        nodes, shares: (k,).
+    """
+    index = (3 * np.asarray(nodes)[:, None] + np.arange(3)).ravel()
+    direction, director = grip.direction[0], grip.director[0]
+    for k, axis in enumerate((director, np.cross(direction, director), direction), start=1):
+        factors = ((f"{end}_shift_{k}", "identity"),)
+        scene.add_terms([Term("position", index, (shares[:, None] * axis).ravel(), factors)])
 
 
 def spread_roll(scene: Scene, roll: str, directors: Array, shares: Array) -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import sheetbend as sb
+import sheetbend.beginnings as behind
 from pytest import approx
 from sheetbend.arm import add_arm
 from sheetbend.beginnings import beginnings, checked
@@ -83,6 +84,42 @@ def test_a_loss_that_the_model_lacks_is_found_by_the_beginning(damped: float, se
     EI = found["rope_EI"]
     assert EI.verdict == "doubtful" and "the model lacks something" in EI.words
     assert "s alone ask for" in EI.words and abs(EI.value - 2e-3) > EI.half_width
+
+
+def test_a_beginning_is_refined_and_weighed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not once for every parameter of it, and the whole not once for every beginning."""
+    told: list[tuple[str, float]] = []
+    shift, weighed, differences = behind._shift, behind.covariance, behind._differences
+
+    def shifted(problem: FitProblem, u: object, b: behind.Beginning, refinement: object) -> object:
+        told.append(("shift", b.length))
+        return shift(problem, u, b, refinement)
+
+    def covariance(residuals: np.ndarray, *rest: object) -> object:
+        told.append(("covariance", len(residuals)))
+        return weighed(residuals, *rest)
+
+    def differing(*given: object) -> object:
+        differences(*given)
+        return {0: (0.5, 1e-3), 1: (0.5, 1e-3)}
+
+    for name, instead in (("_shift", shifted), ("covariance", covariance), ("_differences", differing)):
+        monkeypatch.setattr(behind, name, instead)
+    e = rope(0.005, 1.5, {"drag_linear": 0.01})
+    sb.fit(e, parameters=["rope_EI", "rope_drag_linear"], profiles=False)
+    shifts = [length for what, length in told if what == "shift"]
+    assert shifts and len(shifts) == len(set(shifts))
+    rows = [count for what, count in told if what == "covariance"]
+    assert len(set(rows)) >= 3  # of two beginnings or more, and of the whole
+    assert rows.count(max(rows)) == 2  # when they are checked, and when they are told
+
+
+def test_a_fit_can_do_without_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    e = rope(0.005, 1.5, {"drag_linear": 0.01})
+    given = {"parameters": ["rope_EI", "rope_drag_linear"], "profiles": False, "refine": False}
+    found = sb.fit(e, **given, beginnings=False)
+    assert not any("s alone ask for" in p.words for p in found.result.estimates)
+    assert "s alone ask for" in sb.fit(e, **given)["rope_EI"].words
 
 
 def test_a_right_model_is_not_contradicted_by_its_beginnings() -> None:

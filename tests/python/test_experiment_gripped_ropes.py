@@ -15,6 +15,8 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.grip import Grip
+from sheetbend.gripped import RopeModel
+from sheetbend.gripped.start import started
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "gripped_ropes"
 SECONDS, FRAMES = 1.0, 100
@@ -162,6 +164,19 @@ class TestNasty:
         assert {f"softness_{k}" for k in range(1, 7)} <= names and {"yield_curvature", "yield_share"} <= names
         gaps = np.diff(told["marker_places"])
         assert gaps.max() > 1.2 * gaps.min() and told["marker_mass"] > 0.0
+
+    def test_the_judge_predicts_the_true_values_as_a_fit_does(self, folder: Path) -> None:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.syspath_prepend(str(FOLDER))
+            judge = importlib.import_module("judge")
+        told = truth(folder)
+        unseen = judge.screened(sb.recordings(folder / "rope_1" / "eval"), judge.SMOOTHING)
+        given = told["nominal_directions"]
+        nominal = np.array(given["start"]), np.array(given["end"])
+        model = RopeModel(density=0.04, nominal=nominal, values={}, segments=24)
+        start = started(model, unseen.motions, 0.25)
+        (error,) = judge.missed_from_first_frame(start, told, unseen)
+        assert error < 2.0 * told["missed_by_true_values"][0]
 
     def test_a_marker_weighs_what_the_file_says(self, script: ModuleType) -> None:
         rope = script.ropes(7, nasty=True)[0]

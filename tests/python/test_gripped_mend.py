@@ -105,6 +105,22 @@ class TestImpossible:
         assert np.isnan(found.positions[101:130, 5]).all() and np.isnan(found.positions).sum() == 3 * 29
         assert "m5 stood still although the rope moved from frame 101 to 129" in note
 
+    @pytest.mark.parametrize(("marker", "frames"), [(4, slice(100, 140)), (0, slice(250, 252)), (11, slice(0, 3))])
+    def test_zeros_are_no_places(self, marker: int, frames: slice) -> None:
+        """Once two neighbors were exchanged there, and frames before it were thrown away."""
+        positions = moving()
+        changed = positions.copy()
+        changed[frames, marker] = 0.0
+        found, (note,) = mended(recorded(changed), INNER)
+        positions[frames, marker] = np.nan
+        np.testing.assert_array_equal(found.positions, positions)
+        assert f"m{marker} lay exactly at the origin from frame {frames.start}" in note
+
+    def test_a_marker_may_rest_at_the_origin(self) -> None:
+        x = moving()
+        positions = np.concatenate([np.repeat(x[:1], 50, axis=0), x[:250]]) - x[0, 5]
+        assert not any("origin" in note for note in mended(recorded(positions), INNER)[1])
+
     def test_rest_and_repeated_frames_are_not_frozen(self) -> None:
         clean = moving()
         resting = np.concatenate([np.repeat(clean[:1], 50, axis=0), clean[:250]])
@@ -137,6 +153,33 @@ class TestScreened:
         reasons = "\n".join(found.notes)
         for words in ("stood still", "not in order along the rope", "it has 11 markers, most others 12", "1 m long"):
             assert words in reasons, reasons
+
+    @pytest.mark.parametrize(
+        ("marker", "lost", "used", "words"),
+        [
+            (0, slice(40, 80), slice(80, 300), "only 0.8 to 2.99 s are used, since clamped marker 'm0' is lost"),
+            (11, slice(230, 260), slice(0, 230), "only 0 to 2.29 s are used"),
+            (1, slice(0, 7), slice(7, 300), "only 0.07 to 2.99 s are used"),
+            (10, slice(290, 300), slice(0, 290), "only 0 to 2.89 s are used"),
+            (slice(2, 9), slice(0, 30), slice(30, 300), "only 0.3 to 2.99 s are used"),
+        ],
+        ids=["in the middle", "near the end", "at the start", "at the end", "free ones at the start"],
+    )
+    def test_a_grip_that_is_lost_costs_part_of_a_recording(
+        self, marker: int | slice, lost: slice, used: slice, words: str
+    ) -> None:
+        """Once it cost all of it, and where most had such gaps the fit."""
+        positions = moving()
+        positions[lost, marker] = np.nan
+        found = screened([recorded(positions, f"{k}") for k in range(3)], 0.08)
+        assert self.names(found) == ["0", "1", "2"] and words in found.notes[0] and len(found.notes) == 3
+        assert np.array_equal(found[0].recording.times, TIMES[used])
+
+    def test_times_that_jump_cost_part_of_a_recording(self) -> None:
+        late = np.where(np.arange(300) < 120, 0.0, 0.7) + TIMES
+        found = screened([sb.Recording(moving(), late, clamped=(0, 1, 10, 11), name="r")], 0.08)
+        assert np.array_equal(found[0].recording.times, late[120:])
+        assert "only 1.9 to 3.69 s are used, since times of r jump by 0.71 s" in found.notes[0]
 
     def test_other_places_of_markers_are_another_rope(self) -> None:
         places = np.concatenate([[0, 1], 1 + np.cumsum([1, 1.5, 0.5, 1, 1, 1, 1.5, 0.5, 1]), [11]])

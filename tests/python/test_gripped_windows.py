@@ -63,6 +63,8 @@ class TestWindows:
         motions = [motion(f"{k}") for k in range(56)]
         assert counted(motions, everything(motions, 5.0)) == "56 windows of 5 s from all 56 recordings"
         assert counted(motions, everything(motions, 2.0)) == "112 windows of 2 s from all 56 recordings"
+        short = [m.frames(slice(0, 250)) for m in motions]  # once 28 of them
+        assert len(places(short, everything(short, 5.0))) == 56
 
     def test_one_recording(self) -> None:
         assert counted([motion("a")], SPANS[-1]) == "1 window of 5 s from 1 recording"

@@ -121,7 +121,7 @@ def test_tilts_and_roll_at_an_end_that_moves():
     end = sb.Grip.from_poses(TIMES, np.add(PLACES, (0.3, 0, 0)), TURNS.as_quat())
     start = sb.Grip.fixed((0, 0, 0), (1, 0, 0), (0, 0, 1))
     points = [[0, 0, 0], [0.1, 0.1, 0], PLACES[0] + (0.3, 0, 0)]
-    options = {"density": 0.05, "EI": 1e-3, "GJ": 1e-3, "points": points, "tilts": True, "roll": True}
+    options = {"density": 0.05, "EI": 1e-3, "GJ": 1e-3, "points": points, "tilts": True, "shifts": True, "roll": True}
     scene = sb.rod(0.5, 6, start=start, end=end, **options)
     rod = scene.ropes["rod"]
     values = {"rod_end_tilt_1": 0.2, "rod_end_tilt_2": -0.1, "rod_roll": 0.7}
@@ -132,6 +132,14 @@ def test_tilts_and_roll_at_an_end_that_moves():
     assert units(leave) == approx(units(expected)[1:], abs=1e-9)
     rolled = np.cos(0.7) * end.director + np.sin(0.7) * second
     assert motion[:, rod.directors[-1]] == approx(rolled[1:], abs=1e-9)
+    moved = {"rod_end_shift_1": 4e-3, "rod_end_shift_2": -2e-3, "rod_end_shift_3": 3e-3}
+    shifted = sb.simulate(scene, TIMES, sb.Solver(h=0.02), values | moved).positions
+    expected = end.position + 4e-3 * end.director - 2e-3 * second + 3e-3 * end.direction
+    assert shifted[:, rod.particles[-1]] == approx(expected, abs=1e-12)
+    assert shifted[1:, rod.end_ghost] - shifted[1:, rod.particles[-1]] == approx(leave, abs=1e-12)
+    assert shifted[:, rod.particles[0]] == approx(0.0, abs=1e-15)
+    off = shifted[0, rod.particles] - sb.simulate(scene, [0.0], sb.Solver(h=0.02), values).positions[0, rod.particles]
+    assert off[3] == approx(0.5 * off[-1], abs=1e-12)  # of six links: the start follows along the rod
 
 
 def hanging(moves: bool, **options) -> sb.Scene:
@@ -197,6 +205,7 @@ def everything(**options: float) -> sb.Scene:
         start=start,
         end=end,
         tilts=True,
+        shifts=True,
         roll=True,
         stretch_damping=1e-3,
         bend_damping=0.02,
@@ -216,6 +225,9 @@ SET = {
     "rod_start_tilt_2": -0.05,
     "rod_end_tilt_1": 0.03,
     "rod_end_tilt_2": 0.08,
+    "rod_start_shift_1": 0.004,
+    "rod_start_shift_3": -0.003,
+    "rod_end_shift_2": 0.005,
     "rod_roll": 0.6,
     "rod_curvature_1_0": 2.0,
     "rod_curvature_2_0": -1.0,

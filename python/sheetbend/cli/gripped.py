@@ -14,7 +14,7 @@ from ..chain import unit_vector
 from ..config import GrippedConfig, GrippedRopeSection
 from ..errors import ConfigError, RecordingError, SceneError, SheetbendError
 from ..gripped import WITHOUT_TWIST, GrippedMotion, RopeFit, RopeReport, Rung, Screened, evaluate, fit_rope, screened
-from ..gripped.ladder import AND, MARKERS, REST, TILTS, TWIST, VARYING, YIELD
+from ..gripped.ladder import AND, MARKERS, REST, SHIFTS, TILTS, TWIST, VARYING, YIELD
 from ..gripped.model import NAME
 from ..gripped.report import overview
 from ..io.folder import recordings
@@ -34,6 +34,7 @@ RUNGS: dict[str, Rung] = {
     "rest": REST,
     "varying": VARYING,
     "yield": YIELD,
+    "shifts": SHIFTS,
     "markers": MARKERS,
 }
 

@@ -13,18 +13,20 @@ from ..experiment import Experiment
 from ..parameters import Parameter
 from .bounds import bounded
 from .descent import bearable, descend
-from .judging import EQUAL, Errors, Split, Verdict, errors_of, misfits, verdict
+from .first_order import first_order
+from .judging import BETTER, EQUAL, Errors, Split, Verdict, errors_of, misfits, verdict
 from .ladder import Rung, together
 from .model import NAME, RopeModel
 from .motion import GrippedMotion
 from .pieces import experiments_of, problem_of
-from .start import started
+from .start import about, started
 from .windows import Span
 
 SETTLED = 0.05  # relative change of EI at which links are short enough
+FINE = 24  # links, that hold all modes of the ladder: of two numbers that agree the smaller one is taken from here on
 SEARCHED = 0.5  # of the total of long windows that the last fit sees: enough to decide on rungs
-ENOUGH = 2e-3  # of the cost: what a step must promise while searching
-SHORT, LONG = 12, 30  # iterations, at most, of a start, and of a fit to long windows
+ENOUGH = 5e-3  # of the cost: what a step must promise while searching
+FEW, SHORT, LONG = 3, 12, 30  # derivatives, at most: of a rung that is nearly linear, of a start, and on long windows
 
 Say = Callable[[str], None]
 Parts = tuple[Parameter, ...]
@@ -37,10 +39,11 @@ class Step:
     Attributes:
         name: of the rung.
         fitted, others: median of the mean absolute coordinate errors of whole recordings that it was fitted to, and of
-            those that it was not, m.
+            those that it was not, m; without it where it was not tried, since one step promises nothing.
         stays: whether it is part of the final model.
         seconds: its time.
-        ratio: median ratio of the errors with and without it, on what it was not fitted to; None of the first.
+        ratio: median ratio of the errors with and without it, on what it was not fitted to; None of the first. To first
+            order where it was not tried.
         better: number of recordings (or pieces of them) that it predicts better.
         count: of how many.
         EI: bending stiffness with it, N m^2.
@@ -100,16 +103,38 @@ class Climb:
             # what helped nothing before may help beside what stayed later
             if not stays and not (k < last and self._climbed(rung)):
                 dropped.append(rung)
-        if len(dropped) > 1:  # or only beside another: stiffness that varies looks like yield, and yield like it
+        if len(dropped) > 1 and not all(rung.small for rung in dropped):
+            # or only beside another: stiffness that varies looks like yield, and yield like it
             self._climbed(together(dropped))
 
     def _climbed(self, rung: Rung) -> bool:
         """Try a rung; whether it stays."""
         began = time.perf_counter()
         assert self.rope is not None
+        if rung.small and (told := self._first(rung, self.rope)) is not None and told.ratio >= BETTER:
+            return self._skip(rung, told, began)
         found = self._tried(rung, self.rope)
         self._keep(rung, found, None if found is None else verdict(found.errors, self.rope.errors), began)
         return self.steps[-1].stays
+
+    def _first(self, rung: Rung, rope: Rope) -> Verdict | None:
+        """What one step with the rung would improve."""
+        larger, parameters = self._with(rung, rope)
+        free = bounded(parameters, larger, self.split.fitted, self.longest[0])
+        return first_order(larger, free, rope.values, self.split, self.longest, self.threads)
+
+    def _skip(self, rung: Rung, told: Verdict, began: float) -> bool:
+        """Note a rung that promises nothing; it does not stay."""
+        assert self.rope is not None
+        fitted, others = self.rope.errors.typical
+        seconds = time.perf_counter() - began
+        self.steps.append(Step(rung.name, fitted, others, False, seconds, told.ratio, told.better, told.count))
+        self.say(f"{rung.name}: one step promises {told.ratio:.3g} times the errors without it, does not stay")
+        return False
+
+    def _with(self, rung: Rung, rope: Rope) -> tuple[RopeModel, Parts]:
+        """The rope's model and parameters, with what a rung adds."""
+        return rung.added_to(rope.model), (*rope.parameters, *rung.wanted(self.split.fitted[0]))
 
     @property
     def whole(self) -> list[GrippedMotion]:
@@ -169,7 +194,7 @@ class Climb:
         ends = []
         for length in bending_lengths:
             candidate = started(model, self.split.motions, length)
-            own = rung.wanted(self.split.fitted[0])
+            own = about(rung.wanted(self.split.fitted[0]), candidate)
             found = self._descended(Rope(candidate, own, {}), self.windows[0], SHORT)
             if found is None:
                 self.say(f"start at a bending length of {length:g} m: diverges")
@@ -200,6 +225,8 @@ class Climb:
             finer = self._on(replace(rope, model=replace(rope.model, segments=2 * rope.model.segments)), self.middle)
             moved = abs(finer.values[f"{NAME}_EI"] / rope.values[f"{NAME}_EI"] - 1.0)
             self.say(f"{rope.model.segments} to {finer.model.segments} links move EI by {100 * moved:.2g} %")
+            if moved < SETTLED and rope.model.segments >= FINE:
+                break  # the intervals count what the finer ones would move
             rope = finer
         rope = self._judged(self._on(rope, self.longest))
         if self._leave_out(rope.errors.whole):
@@ -209,10 +236,11 @@ class Climb:
         return rope
 
     def _tried(self, rung: Rung, rope: Rope) -> Rope | None:
-        """A rung fitted to middle windows from each of its starts, and the best of these to long ones; None where all
-        diverge."""
-        larger = rung.added_to(rope.model)
-        parameters = (*rope.parameters, *rung.wanted(self.split.fitted[0]))
+        """A rung fitted to middle windows from each of its starts, and the best of these to long ones; a small one to
+        long ones at once. None where all diverge."""
+        larger, parameters = self._with(rung, rope)
+        if rung.small:
+            return self._long(rung, Rope(larger, parameters, rope.values), FEW)
         ends = []
         for start in ({}, *rung.starts):
             shifted = {f"{NAME}_{k}": v for k, v in start.items() if k != "EI"}
@@ -222,20 +250,23 @@ class Climb:
                 ends.append(found)
         if not ends:
             return None
-        best = min(ends, key=lambda end: end[1])[0]
+        return self._long(rung, min(ends, key=lambda end: end[1])[0])
+
+    def _long(self, rung: Rung, rope: Rope, most: int = LONG) -> Rope | None:
+        """Fitted to long windows, and judged; None where it diverges."""
         try:
-            return self._judged(self._on(best, self.longest))
+            return self._judged(self._on(rope, self.longest, most))
         except SheetbendError as error:
             self.say(f"{rung.name}: {error}")
             return None
 
-    def _on(self, rope: Rope, window: Span) -> Rope:
+    def _on(self, rope: Rope, window: Span, most: int = LONG) -> Rope:
         """The rope fitted to such windows.
 
         Raises:
             SheetbendError: the motion diverges.
         """
-        found = self._descended(rope, window)
+        found = self._descended(rope, window, most)
         if found is None:
             raise SheetbendError(f"the motion diverges on windows of {window[0]:g} s")
         return found[0]

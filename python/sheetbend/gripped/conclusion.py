@@ -29,8 +29,8 @@ from .pieces import experiments_of, problem_of, starting
 from .windows import Span, counted, places
 
 MOST = 30  # iterations, at most
-MANY = 12  # recordings: of a larger set the time of the last fit is told
-EVALUATIONS = 15  # with derivatives, of such a fit and its intervals, for an estimate of its time
+MANY = 12  # windows: of more the time of the last fit is told
+EVALUATIONS = 25  # with derivatives, of such a fit and its intervals, for an estimate of its time
 
 
 def conclude(
@@ -51,13 +51,16 @@ def conclude(
     experiments = experiments_of(rope.model, motions, window)
     parameters = bounded(rope.parameters, rope.model, motions, window[0])
     say(f"the fit that counts, to {counted(motions, window)}")
-    if len(motions) > MANY:
+    if len(experiments) > MANY:
         say(f"which takes about {short(_seconds(rope, motions, window, threads), 1)} s")
     values, spread = rope.values, dict[str, float]()
     if not interrupted:
         try:
             spread = model_spread(rope, climb.equal())
-            values = _at_the_end(climb, experiments, parameters)
+            few = climb.windows[-1]
+            if len(places(motions, few)) < len(experiments):  # most of the way at a part of the price
+                values = _at_the_end(climb, values, experiments_of(rope.model, motions, few), parameters)
+            values = _at_the_end(climb, values, experiments, parameters)
         except KeyboardInterrupt:
             interrupted = True
             say("interrupted: the fit that counts did not get to its end")
@@ -75,6 +78,7 @@ def conclude(
         given=given,
         threads=threads,
         profiles=False,
+        beginnings=False,  # the climb went from short windows to long ones
         max_iterations=1 if interrupted else MOST,
         tolerance=negligible(problem_of(experiments, parameters, values, threads)),
     )
@@ -87,14 +91,15 @@ def conclude(
     return replace(last, result=replace(last.result, interrupted=True, converged=False, warnings=(warning,))), spread
 
 
-def _at_the_end(climb: Climb, experiments: Sequence[Experiment], parameters: Sequence[Parameter]) -> dict[str, float]:
+def _at_the_end(
+    climb: Climb, values: Mapping[str, float], experiments: Sequence[Experiment], parameters: Sequence[Parameter]
+) -> dict[str, float]:
     """Values at the minimum.
 
     Raises:
         SheetbendError: the motion diverges.
     """
-    assert climb.rope is not None
-    found = descend(experiments, parameters, climb.rope.values, MOST, climb.threads)
+    found = descend(experiments, parameters, values, MOST, climb.threads)
     if not found.finite:
         raise SheetbendError("the fit that counts diverges where the last rung ended")
     climb.say(f"{'ended' if found.ended else 'not ended'} after {found.iterations} steps")

@@ -3,7 +3,7 @@
 The cost has long flat valleys (GJ against roll, damping against drag), where a relative change of the cost says little
 of what is left to go. A step that is right to first order lowers the cost by half the squared distance to the minimum
 in standard deviations, times the residual variance and the number of frames over which residuals are alike. So the
-descent ends where the next step promises less than a distance of a few hundredths.
+descent ends where the next step promises less than a tenth.
 """
 
 from __future__ import annotations
@@ -18,11 +18,14 @@ from ..experiment import Experiment
 from ..optimizers import ROUNDING, STUCK
 from ..parameters import Parameter
 from ..problem import FitProblem
+from ..timeseries import Array
 from .model import NAME
 from .pieces import problem_of
 
-DISTANCE = 0.03  # standard deviations to the minimum, of a parameter, at which a descent has ended
+DISTANCE = 0.1  # standard deviations to the minimum, of a parameter, at which a descent has ended
 ALIKE = 20.0  # frames over which residuals of a moving rope are alike, at least
+CORRECTIONS = 4  # of a derivative, until it is computed again
+DEAR = 15  # parameters, from which on that is worth it
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,55 @@ class Descent:
     def finite(self) -> bool:
         """Whether there is an answer."""
         return bool(np.isfinite(self.cost))
+
+
+class Sparing(Approach):
+    """A walk whose steps share derivatives: after a short step that kept its promise the last derivative is corrected
+    by what the step showed (Broyden 1965), in units of the longest steps. With forty parameters a derivative costs as
+    much as twenty simulations.
+
+    Attributes:
+        sure: whether the last step followed a derivative that was computed where it began.
+        computed: number of such steps so far.
+    """
+
+    def __init__(self, problem: FitProblem, u: Array) -> None:
+        super().__init__(problem, u)
+        self.sure, self.computed, self._corrected = True, 0, 0
+        self._most = CORRECTIONS if len(self.u) >= DEAR else 0
+
+    def step(self) -> bool:
+        """As `Approach.step`; a corrected derivative that shows no way down is computed first."""
+        if self._J is None:
+            self._compute()
+        u, r, J, radius = self.u, self._r, self._J, self._radius
+        self.sure = self._corrected == 0
+        moved = super().step()
+        if not self.sure:  # what held it up may be the derivative
+            self._radius = max(self._radius, radius)
+        if not moved:
+            if self.sure:
+                return False
+            self._compute()
+            return self.step()
+        self.computed += self.sure
+        if J is not None and self.near and self._corrected < self._most:
+            step = self.u - u
+            weighted = step / self._longest**2
+            self._J = J + np.outer(self._r - r - J @ step, weighted) / (weighted @ step)
+            self._corrected += 1
+        elif self._J is not None:  # it came along with the residuals
+            self._corrected = 0
+        return True
+
+    def renew(self) -> None:
+        """Let the next step compute its derivative."""
+        if self._corrected:
+            self._J = None
+
+    def _compute(self) -> None:
+        _, self._r, self._J = self._evaluated(self.u, True)
+        self._corrected = 0
 
 
 def negligible(problem: FitProblem) -> float:
@@ -71,21 +123,23 @@ def descend(
     """Down from `values`; a state that diverges costs infinitely much, so that the last finite one stays.
 
     Args:
-        most: steps.
+        most: steps that follow a derivative of their own.
         enough: share of the cost that a step must promise and take off, where that is more than `negligible`.
         followed: called with each step's number and cost.
     """
     problem = problem_of(experiments, parameters, values, threads)
-    walk = Approach(problem, problem.parameters.initial())
+    walk = Sparing(problem, problem.parameters.initial())
     least, ended, first = max(enough, negligible(problem)), False, walk.cost
     if not bearable(problem, walk.cost):
         return Descent(problem.parameters.to_physical(walk.u), np.inf, 0, False)
-    while walk.iterations < most:
+    while walk.computed < most:
         if not walk.step():  # nothing left to promise, or no shorter step helps
             ended = walk.promised < max(least, STUCK) or walk.promised * walk.cost <= ROUNDING * first
             break
         followed(walk.iterations, walk.cost)
         if walk.promised < least or walk.taken < enough:
-            ended = True
-            break
+            if walk.sure:
+                ended = True
+                break
+            walk.renew()
     return Descent(problem.parameters.to_physical(walk.u), walk.cost, walk.iterations, ended)

@@ -17,7 +17,7 @@ from ..errors import SheetbendError
 from .ladder import TWIST
 from .model import NAME, RopeModel
 from .motion import Array, GrippedMotion
-from .pieces import problem_of
+from .pieces import numbered, problem_of
 from .split import split
 
 BETTER = 0.99  # median ratio of errors on what was not fitted, below which a larger model stays
@@ -194,8 +194,7 @@ def predict(
     if not motions:
         return []
     experiments = [replace(model.experiment(m), fit=None) for m in motions]
-    named = [replace(e, name=f"{i}: {e.name}") for i, e in enumerate(experiments)]
-    problem = problem_of(named, (TWIST.parameters[0],), values)
+    problem = problem_of(numbered(experiments), (TWIST.parameters[0],), values)
     u = problem.parameters.initial()
 
     def one(k: int) -> Array:

@@ -28,6 +28,8 @@ class Rung:
         values: what it adds to the model's starting values.
         parameters: what it adds to the fit.
         each_marker: what it adds to the fit for each free marker; `{}` in a name is the marker's number.
+        small: whether its effect is nearly linear; then it is not tried where one step promises nothing
+            (`first_order`).
         starts: other values to start from, by option; `EI` as a factor. The end that fits best is taken.
     """
 
@@ -36,6 +38,7 @@ class Rung:
     values: Mapping[str, float] = field(default_factory=dict)
     parameters: tuple[Parameter, ...] = ()
     each_marker: tuple[Parameter, ...] = ()
+    small: bool = False
     starts: tuple[Mapping[str, float], ...] = ()
 
     def added_to(self, model: RopeModel) -> RopeModel:
@@ -59,6 +62,7 @@ def together(rungs: Sequence[Rung]) -> Rung:
         {key: value for rung in rungs for key, value in rung.values.items()},
         tuple(p for rung in rungs for p in rung.parameters),
         tuple(p for rung in rungs for p in rung.each_marker),
+        all(rung.small for rung in rungs),
         tuple(start for rung in rungs for start in rung.starts),
     )
 
@@ -97,6 +101,7 @@ TILTS = Rung(
     "tilts of the grips",
     options={"tilts": True},
     parameters=tuple(_plain(f"{end}_tilt_{k}", "rad", 0.1, 0.1) for end in ("start", "end") for k in (1, 2)),
+    small=True,
 )
 REST = Rung(
     "rest curvature",
@@ -119,9 +124,17 @@ YIELD = Rung(
     ),
     starts=({"yield_curvature": 1.0, "yield_share": 0.5, "EI": 1.5},),
 )
+SHIFTS = Rung(
+    "places of the grips",
+    options={"shifts": True},
+    # not along the rope: there the length and the places of the markers do the same
+    parameters=tuple(_plain(f"{end}_shift_{k}", "m", 0.005, 0.005) for end in ("start", "end") for k in (1, 2)),
+    small=True,
+)
 MARKERS = Rung(
     "places of the markers",
     options={"places": True},
     each_marker=(_plain("place_{}", "m", 0.005, 0.005),),
+    small=True,
 )
-LADDER = (TWIST, TILTS, REST, VARYING, YIELD, MARKERS)
+LADDER = (TWIST, TILTS, REST, VARYING, YIELD, SHIFTS, MARKERS)

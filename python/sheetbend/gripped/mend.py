@@ -1,6 +1,7 @@
-"""Mends a single recording of a gripped rope: exchanged neighbors, markers seen elsewhere, and tracking that froze.
+"""Mends a single recording of a gripped rope: exchanged neighbors, markers seen elsewhere, and tracking that froze or
+wrote zeros.
 
-All three are found from the recording alone. Two neighbors are exchanged at a frame at which the direction from one to
+All are found from the recording alone. Two neighbors are exchanged at a frame at which the direction from one to
 the other turns round, and throughout where the line through all markers is then shorter. A marker is elsewhere between
 two jumps that no rope makes, and frozen where its numbers repeat exactly although the frame before or after shows it
 moving.
@@ -42,11 +43,13 @@ def mended(recording: Recording, inner: tuple[int, int]) -> tuple[Recording, tup
     Returns:
         The recording, the same object where nothing was wrong, and a sentence on each thing that was.
     """
-    positions, words = _in_order(recording, inner)
-    times, tracks = recording.times, range(positions.shape[1])
+    times, tracks = recording.times, range(recording.positions.shape[1])
+    least = _least_jump(times, recording.positions)
+    lost = np.stack([_at_origin(recording.positions[:, k], least) for k in tracks], axis=1)
+    positions, words = _in_order(recording, np.where(lost[:, :, None], np.nan, recording.positions), inner)
+    words = _each(recording, lost, "lay exactly at the origin") + words
     frozen = np.stack([_frozen(times, positions[:, k]) for k in tracks], axis=1) & ~_resting(positions)[:, None]
     positions[frozen] = np.nan
-    least = _least_jump(times, positions)
     stray = np.stack([_elsewhere(times, positions[:, k], least) for k in tracks], axis=1)
     positions[stray] = np.nan
     words += _each(recording, frozen, "stood still although the rope moved")
@@ -56,9 +59,8 @@ def mended(recording: Recording, inner: tuple[int, int]) -> tuple[Recording, tup
     return replace(recording, positions=positions), tuple(words)
 
 
-def _in_order(recording: Recording, inner: tuple[int, int]) -> tuple[Array, list[str]]:
-    """(frames, markers, 3) m with neighbors exchanged back, and words on each exchange."""
-    positions = recording.positions.copy()
+def _in_order(recording: Recording, positions: Array, inner: tuple[int, int]) -> tuple[Array, list[str]]:
+    """Positions (frames, markers, 3) m with neighbors exchanged back in place, and words on each exchange."""
     pairs = range(positions.shape[1] - 1)
     wrong = np.zeros((len(pairs), len(positions)), dtype=bool)
     for k in pairs:
@@ -120,6 +122,17 @@ def _exchange(positions: Array, k: int, which: Mask) -> None:
     """Exchange markers k and k + 1 in some frames."""
     frames = np.flatnonzero(which)[:, None]
     positions[frames, [k, k + 1]] = positions[frames, [k + 1, k]]
+
+
+def _at_origin(track: Array, least: float) -> Mask:
+    """(frames,) where the positions (frames, 3) are zero and those beside far from it: how some software writes markers
+    that it does not see."""
+    zero = (track == 0.0).all(axis=1)
+    lost, far = np.zeros(len(track), dtype=bool), np.linalg.norm(track, axis=1) > least
+    edges = np.diff(np.concatenate([[0], zero.astype(int), [0]]))
+    for first, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
+        lost[first:end] = any(far[i] for i in (first - 1, end) if 0 <= i < len(track))
+    return lost
 
 
 def _frozen(times: Array, track: Array) -> Mask:

@@ -31,7 +31,7 @@ class RopeModel:
         nominal: directions (3,) of the start and the end grip from which their frames are carried; recordings that
             share them share their material frames.
         values: starting values of quantities, as options of `add_rod` (EI, GJ, bend_damping, ...); None = without it.
-        tilts, roll: nuisances of the grips, see `add_rod`.
+        tilts, shifts, roll: nuisances of the grips, see `add_rod`.
         curvature_modes, softness_modes, density_modes: see `add_rod`.
         places: let each free marker stand off from its measured place along the rope, by the quantity
             `rope_place_<its number>`, m.
@@ -48,6 +48,7 @@ class RopeModel:
     nominal: tuple[Array, Array]
     values: Mapping[str, float | None]
     tilts: bool = False
+    shifts: bool = False
     roll: bool = True
     curvature_modes: Sequence[int] = ()
     softness_modes: Sequence[int] = ()
@@ -88,6 +89,7 @@ class RopeModel:
             start=motion.grip(False, frames, self.nominal[0]),
             end=motion.grip(True, frames, self.nominal[1]),
             tilts=self.tilts,
+            shifts=self.shifts,
             roll=self.roll,
             curvature_modes=self.curvature_modes,
             softness_modes=self.softness_modes,

@@ -20,6 +20,11 @@ def experiments_of(model: RopeModel, motions: Sequence[GrippedMotion], span: Spa
     return [model.experiment(m, (start, start + span[0])) for m, start in places(motions, span)]
 
 
+def numbered(experiments: Sequence[Experiment]) -> list[Experiment]:
+    """The same with names that differ."""
+    return [replace(e, name=f"{i}: {e.name}") for i, e in enumerate(experiments)]
+
+
 def problem_of(
     experiments: Sequence[Experiment],
     parameters: Sequence[Parameter],

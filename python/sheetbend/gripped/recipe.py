@@ -115,7 +115,8 @@ def fit_rope(
         windows: (length, total) in s: each fit sees windows of this length, of about this total, the last one those of
             the last entry (half as many decide on rungs). "all" = the default ones, but the last fit sees every window
             of all recordings.
-        segments, max_segments: links at the start, and at most; they are doubled until EI moves by less than 5 %.
+        segments, max_segments: links at the start, and at most; they are doubled until EI moves by less than 5 %. Of
+            two numbers from 24 on that agree so the smaller one is taken.
         substeps: per frame.
         smoothing: s, of the recorded grips and starts.
         sigma: m, expected error of a marker.

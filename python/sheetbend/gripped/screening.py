@@ -1,6 +1,7 @@
 """Which recordings of a set can be used: mended where that is possible, left out with a word where it is not.
 
-One bad file of many costs that file, not the fit. Left out is what no motion can be made of, and what is no recording
+One bad file of many costs that file, not the fit, and a grip that is lost for a while costs part of a file. Left out is
+what no motion can be made of, and what is no recording
 of the same rope as most others: another number of markers, other distances between them, or another length.
 """
 
@@ -17,6 +18,7 @@ from ..errors import RecordingError
 from ..recording import Recording
 from .mend import mended
 from .motion import Array, GrippedMotion, gripped_ends
+from .stretch import longest_stretch
 
 FEWEST = 3  # recordings, from which one may be compared with the others
 OTHER = 0.02  # relative difference of length, and of marker places over the length, that another rope has at least
@@ -68,8 +70,10 @@ def screened(recordings: Sequence[Recording | GrippedMotion], smoothing: float) 
             continue
         words: tuple[str, ...] = ()
         try:
-            sound, words = mended(recording, gripped_ends(recording))
-            kept.append(GrippedMotion.of(sound, smoothing))
+            inner = gripped_ends(recording)
+            sound, words = mended(recording, inner)
+            motion, cut = _usable(sound, inner, smoothing)
+            kept.append(motion)
         except RecordingError as error:
             reasons = "; ".join(words)
             if words:
@@ -77,11 +81,28 @@ def screened(recordings: Sequence[Recording | GrippedMotion], smoothing: float) 
             errors.append(error)
             notes.append(f"{recording.name} is left out: {reasons or f'{error.field} {error.problem}; {error.fix}'}")
         else:
-            notes += [f"{recording.name}: {what}" for what in words]
+            notes += [f"{recording.name}: {what}" for what in (*words, *cut)]
     if 2 * len(errors) > len(recordings):
         raise errors[0]
     same, others = _of_one_rope(kept)
     return Screened(tuple(same), (*notes, *others))
+
+
+def _usable(recording: Recording, inner: tuple[int, int], smoothing: float) -> tuple[GrippedMotion, tuple[str, ...]]:
+    """A recording as a motion, or else its longest part that can be one, and words on that.
+
+    Raises:
+        RecordingError: no part can.
+    """
+    try:
+        return GrippedMotion.of(recording, smoothing), ()
+    except RecordingError as error:
+        part = longest_stretch(recording, inner)
+        if part is None:
+            raise
+        motion = GrippedMotion.of(recording.frames(part), smoothing)
+        first, last = motion.recording.times[[0, -1]]
+        return motion, (f"only {first:.4g} to {last:.4g} s are used, since {error.field} {error.problem}",)
 
 
 def _of_one_rope(motions: Sequence[GrippedMotion]) -> tuple[list[GrippedMotion], list[str]]:

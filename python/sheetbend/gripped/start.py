@@ -10,7 +10,7 @@ import numpy as np
 from ..experiment import Experiment
 from ..parameters import Parameter, Parameters
 from .ladder import Rung
-from .model import RopeModel
+from .model import NAME, RopeModel
 from .motion import GrippedMotion
 
 
@@ -19,6 +19,16 @@ def started(model: RopeModel, motions: Sequence[GrippedMotion], bending_length: 
     EI = model.density * 9.81 * bending_length**3
     start = {"EI": EI, "GJ": 0.7 * EI, "bend_damping": 0.03, "twist_damping": 0.03, "drag_linear": 0.02}
     return model.with_values(**start, length=float(np.mean([m.length for m in motions])))
+
+
+def about(parameters: Sequence[Parameter], model: RopeModel) -> tuple[Parameter, ...]:
+    """The parameters, with the prior of the length about that of a started model."""
+    measured = model.values["length"]
+    assert measured is not None
+    return tuple(
+        replace(p, initial=measured, prior=(measured, p.prior[1])) if p.name == f"{NAME}_length" and p.prior else p
+        for p in parameters
+    )
 
 
 def whole(

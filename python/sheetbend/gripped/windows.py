@@ -15,7 +15,12 @@ SPANS: tuple[Span, ...] = ((0.5, 8.0), (1.5, 15.0), (5.0, 60.0))
 
 def everything(motions: Sequence[GrippedMotion], length: float) -> Span:
     """The span that takes every window of this length, s."""
-    return length, max(length, sum(motion.seconds for motion in motions))
+    return length, length * sum(_held(motion, length) for motion in motions)
+
+
+def _held(motion: GrippedMotion, length: float) -> int:
+    """How many windows of this length, s, a motion holds; a shorter motion is one."""
+    return max(1, int(motion.seconds / length + 1e-9))
 
 
 def places(motions: Sequence[GrippedMotion], span: Span) -> list[tuple[GrippedMotion, float]]:
@@ -25,7 +30,7 @@ def places(motions: Sequence[GrippedMotion], span: Span) -> list[tuple[GrippedMo
     every = [
         (m, start)
         for m in motions
-        for start in (m.recording.times[0] + length * np.arange(max(1, int(m.seconds / length + 1e-9)))).tolist()
+        for start in (m.recording.times[0] + length * np.arange(_held(m, length))).tolist()
         if m.shown(int(np.searchsorted(m.recording.times, start - 1e-9)))
     ]
     count = max(1, min(len(every), round(total / length)))

@@ -1,0 +1,70 @@
+"""What a rung of small offsets would improve, to first order: a derivative instead of a descent.
+
+A rope's tilts and shifts in its grips and the places of its markers are small, and motions are nearly linear in them.
+One Gauss-Newton step then tells what they take off the errors of the recordings that are fitted, and of those that
+judge.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ..approach import RIDGE, inside, step_limits
+from ..parameters import Parameter
+from ..problem import FitProblem
+from .judging import Errors, Split, Verdict, verdict
+from .model import RopeModel
+from .motion import Array
+from .pieces import experiments_of, numbered, problem_of
+from .windows import Span
+
+
+def first_order(
+    larger: RopeModel,
+    parameters: Sequence[Parameter],
+    values: Mapping[str, float],
+    split: Split,
+    window: Span,
+    threads: int = 1,
+) -> Verdict | None:
+    """The verdict on one step of a model that starts where a smaller one is; None where there is nothing to judge by,
+    or no answer.
+
+    Args:
+        parameters: of the larger model.
+        values: of the smaller one.
+        window: of the fitted recordings.
+    """
+    if not split.judged:
+        return None
+    fitted = problem_of(experiments_of(larger, split.fitted, window), parameters, values, threads)
+    judged = problem_of(numbered([larger.experiment(m) for m in split.judged]), parameters, values, threads)
+    u = fitted.parameters.initial()
+    (ok, r, J), (answers, r2, J2) = fitted.evaluate(u), judged.evaluate(u)
+    if not (ok and answers and np.isfinite(J).all() and np.isfinite(J2).all()):
+        return None
+    longest, (lower, upper) = step_limits(fitted.parameters), fitted.parameters.limits()
+    ridge = math.sqrt(RIDGE * float(r @ r)) / longest
+    step = inside(J, r, ridge, np.maximum(lower - u, -longest), np.minimum(upper - u, longest))
+    smaller, stepped = (
+        Errors(
+            _errors(fitted, a, [0] * len(fitted.experiments), 1)[:, 0], _errors(judged, b, split.since, split.pieces)
+        )
+        for a, b in ((r, r2), (r + J @ step, r2 + J2 @ step))
+    )
+    return verdict(stepped, smaller)
+
+
+def _errors(problem: FitProblem, r: Array, since: Sequence[int], pieces: int) -> Array:
+    """(experiments, pieces) mean absolute residuals, from a frame of each on."""
+    layout, size = problem.rows_layout(), np.abs(r[: problem.core.data_rows])
+    found = []
+    for i, first in enumerate(since):
+        mine = (layout.recording == i) & (layout.frame >= first)
+        at = layout.frame[mine]
+        parts = np.array_split(np.arange(first, int(at.max()) + 1), pieces)
+        found.append([float(size[mine][np.isin(at, part)].mean()) for part in parts])
+    return np.array(found)
