@@ -239,14 +239,11 @@ def held_out_motion(
 ) -> dict[str, str]:
     """By parameter, the recording of which held-out motion is predicted worse than by "it does not move"."""
     found: dict[str, str] = {}
-    free = problem.parameters.free
     for c, row in zip(comparisons, rows, strict=True):
         noise = c.experiment.sigma * math.sqrt(len(c.experiment.axes)) / (c.experiment.radius or 1.0)
         if row.motion is None or row.held_out is None or not row.held_out > row.motion > SEEN * noise:
             continue
         error = f"{short(100 * row.held_out / row.motion)} % of the motion"
         words = f"held-out motion of {row.name} is missed by {error}: that nothing moves would predict it better"
-        mine = {*c.experiment.scene.quantities, *(f"{q}[{row.name}]" for q in c.experiment.scene.quantities)}
-        reached = {problem.parameters.roots[name][0] for name in mine if name in problem.parameters}
-        found |= {name: words for name in free if name in reached and name not in found}
+        found |= {name: words for name in problem.acting_on(c.experiment) if name not in found}
     return found

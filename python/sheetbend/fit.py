@@ -37,6 +37,7 @@ from .result import Estimate, FitResult, Given, MotionGrowth, Premise, Recording
 from .scene import Scene
 from .search import Search
 from .time_step import Settled
+from .unexplained import unexplained
 
 Systematic = Callable[[FitProblem, np.ndarray], Mapping[str, float]]
 
@@ -239,6 +240,7 @@ def fit(
         held_out_motion(problem, comparisons, errors)
         | elsewhere(problem, judged, best.cost, [*starts_elsewhere, *end.lower])
         | end.parts
+        | unexplained(problem, comparisons, judged.autocorrelation_time)
     )
     estimates, limit = at_the_limit(doubtful(judged.estimates, contradicted), at.refits, problem.parameters, at.u)
     values = end.values | problem.parameters.to_physical(limit)

@@ -150,10 +150,7 @@ class FitProblem:
         """The part that one free (expanded) parameter is tied to, through shared parameters; the rest of the minimum
         does not depend on it."""
         free = set(self.parameters.free)
-        free_of = [
-            {self.parameters.roots[key][0] for key in self._keys(e).values() if key in self.parameters} & free
-            for e in self.experiments
-        ]
+        free_of = [set(self.acting_on(e)) for e in self.experiments]
         names: set[str] = {name}
         chosen: list[int] = []
         while (reached := [i for i, mine in enumerate(free_of) if mine & names]) != chosen:
@@ -167,6 +164,12 @@ class FitProblem:
         return FitProblem(
             [self.experiments[i] for i in chosen], self.given, [self.recordings[i] for i in chosen], self.threads, part
         )
+
+    def acting_on(self, e: Experiment) -> tuple[str, ...]:
+        """The free (expanded) parameters that an experiment's motion depends on, in their order."""
+        roots = self.parameters.roots
+        mine = {roots[key][0] for key in self._keys(e).values() if key in self.parameters}
+        return tuple(name for name in self.parameters.free if name in mine)
 
     def values_of(self, e: Experiment, u: np.ndarray) -> dict[str, float]:
         """Physical values at u (free,) of the quantities of an experiment's scene that are parameters."""
