@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike
 from .checks import finite
 from .errors import SceneError
 from .hand_eye import HandEye, rotated, unit_quaternions
+from .rigid import rigid_motion
+from .smoothing import smoothed
 
 Array = np.ndarray
 
@@ -108,6 +110,45 @@ class Grip:
         from_ = _units("nominal", along.mean(axis=0) if nominal is None else nominal, (3,))
         q = any_across(from_) if director is None else finite("director", director, (3,), SceneError)
         return cls(t, a if end else b, along, carried(_across(from_, q), from_, along))
+
+    @classmethod
+    def from_body(
+        cls,
+        times: ArrayLike,
+        markers: ArrayLike,
+        position: ArrayLike,
+        direction: ArrayLike,
+        director: ArrayLike | None = None,
+    ) -> Grip:
+        """Three or more markers on the gripped piece or on the hand that holds it, which move as a rigid body.
+
+        Args:
+            times: (knots,) s.
+            markers: (knots, k, 3) m, not on one line; NaN where a marker was not seen.
+            position: (3,) m, where the rope enters the grip at the first knot.
+            direction: (3,) the rope's direction of travel there, at the first knot.
+            director: (3,) the frame's first axis at the first knot; any across the direction by default.
+
+        Raises:
+            SceneError: shapes, times that do not increase, fewer than three markers seen in a frame, markers on a line.
+        """
+        t = _knots(times)
+        x = np.asarray(markers, dtype=float)
+        if x.ndim != 3 or len(x) != len(t) or x.shape[1] < 3 or x.shape[2] != 3:
+            raise SceneError("markers", "have the wrong shape", x.shape, f"give ({len(t)}, 3 or more, 3) in m")
+        turns, centers, _ = rigid_motion(x)
+        d = _units("direction", direction, (3,))
+        q = any_across(d) if director is None else finite("director", director, (3,), SceneError)
+        arm = finite("position", position, (3,), SceneError) - centers[0]
+        return cls(t, centers + turns @ arm, turns @ d, turns @ _across(d, q))
+
+    def smoothed(self, width: float) -> Grip:
+        """The same grip, its motion smoothed over `width` s (`smoothing.smoothed`); one that stays stays as it is."""
+        if self.stays or width <= 0 or len(self.times) < 2:
+            return self
+        x, d, q = (smoothed(self.times, v, width)[0] for v in (self.position, self.direction, self.director))
+        along = d / np.linalg.norm(d, axis=1, keepdims=True)
+        return replace(self, position=x, direction=along, director=_across(along, q))
 
     @property
     def stays(self) -> bool:

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from .checks import finite, is_number
 from .errors import InputError, SceneError
+from .moving_clamp import clamped_ends
 from .parameters import Parameter
 from .quantities import Term
 
@@ -121,6 +122,11 @@ class HandEye:
             SceneError: as `Scene.drive`.
         """
         which = np.atleast_1d(np.asarray(particles))
+        if clamped_ends(scene, which.tolist()):
+            fix = "hold the end by a grip that has these poses: Grip.from_poses, [[scene.rope.grip]]"
+            raise SceneError(
+                "drive.particles", "are clamped ends, which a tool would have to turn", which.tolist(), fix
+            )
         scene.drive(which, times, motion)
         shifts = ~np.broadcast_to(np.asarray(vectors, dtype=bool), which.shape)
         arm = motion - np.where(shifts[:, None], self.about, 0.0)

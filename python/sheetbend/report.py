@@ -41,6 +41,7 @@ def sections(result: FitResult) -> list[Section]:
         _interval_parts(result),
         _refits(result),
         _premises(result),
+        Section("How ropes are held", notes=tuple(_labeled(sentence) for sentence in result.assumed)),
         _recordings(result),
         _forces(result),
         _held_out_motion(result),
@@ -51,6 +52,11 @@ def sections(result: FitResult) -> list[Section]:
         Section("Warnings", notes=tuple(("", warning) for warning in result.warnings)),
     ]
     return [part for part in parts if part.rows or part.notes]
+
+
+def _labeled(sentence: str) -> tuple[str, str]:
+    label, _, rest = sentence.partition(": ")
+    return label, rest
 
 
 def headline(result: FitResult) -> str:

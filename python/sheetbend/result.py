@@ -259,6 +259,7 @@ class FitResult:
         forces: errors per force sensor.
         premises: numbers that the fit took as given, and what an error in each moves.
         warnings: what a reader must know before using the numbers.
+        assumed: how the ends of ropes are held and what that assumes, in words, where a configuration says it.
     """
 
     estimates: tuple[Estimate, ...]
@@ -290,6 +291,7 @@ class FitResult:
     premises: tuple[Premise, ...] = ()
     not_counted: tuple[str, ...] = ()
     forces: tuple[ForceFit, ...] = ()
+    assumed: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of that name; KeyError names the ones there are."""

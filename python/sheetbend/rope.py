@@ -22,7 +22,9 @@ from .chain import (
 )
 from .checks import indices
 from .errors import SceneError
+from .grip import Grip
 from .quantities import Term, product
+from .rod_shape import initial_shape
 from .scene import Array, Scene
 
 GHOST = 0.01  # length of a clamp's ghost link over a rope's link; only its direction matters
@@ -75,6 +77,7 @@ def add_rope(
     start: ArrayLike = (0.0, 0.0, 0.0),
     direction: ArrayLike = (1.0, 0.0, 0.0),
     points: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
     stretch_damping: float | None = None,
     bend_damping: float | None = None,
     loss_factor: float | None = None,
@@ -84,6 +87,8 @@ def add_rope(
     clamp_start: ArrayLike | None = None,
     clamp_end: ArrayLike | None = None,
     clamp_angles: bool = False,
+    grip_start: Grip | None = None,
+    grip_end: Grip | None = None,
     plane: ArrayLike | None = None,
     set_modes: Sequence[int] = (),
 ) -> Rope:
@@ -100,6 +105,7 @@ def add_rope(
         EI: bending stiffness N m^2; None = no bending.
         start, direction: a straight initial shape.
         points: (k, 3) m, an initial shape instead, resampled to equal links.
+        velocity: (k, 3) m/s at `points`, which are then fitted to the length; at rest by default.
         stretch_damping, bend_damping: Kelvin-Voigt time constants s: the damping moment is EI times the constant times
             the rate of curvature.
         loss_factor: energy lost per radian of vibration over the energy stored, in stretching and bending alike, at
@@ -108,6 +114,8 @@ def add_rope(
         drag_linear, drag_quadratic: air drag per length, isotropic.
         clamp_start, clamp_end: the rope's direction of travel at an end, held by a ghost particle half a joint away;
             the end is pinned.
+        grip_start, grip_end: what holds an end and moves it: its place and its direction of travel. A rope has no
+            twist: the roll of a grip plays no part. The initial shape is fitted to the length between grips.
         clamp_angles: add `_start_angle` / `_end_angle`, rotations of the clamps about `plane`.
         plane: unit normal of the plane that the rope stays in; needed by clamp_angles and set_modes.
         set_modes: k of rest-curvature modes cos(k pi s / length) about `plane`; each amplitude starts at zero.
@@ -119,6 +127,12 @@ def add_rope(
         SceneError: wrong or missing values; the message names the field.
     """
     shape, length = straight_or_given(name, length, segments, start, direction, points)
+    grips = _grips(name, (grip_start, grip_end), (clamp_start, clamp_end))
+    speeds = None
+    if velocity is not None or any(grips):
+        held = [None if grip is None else (grip.position[0], grip.direction[0]) for grip in grips]
+        line = shape if points is None and grips[0] is None else points
+        shape, speeds = initial_shape(name, length, segments, line, velocity, held, EA is not None)
     for field, value in (
         ("density", density),
         ("EA", EA),
@@ -142,7 +156,7 @@ def add_rope(
     if len(set_modes) and EI is None:
         raise SceneError(f"{name}.set_modes", "need EI", EI, "give EI: a rest curvature acts through bending")
 
-    nodes = scene.add_particles(shape, 0.0)
+    nodes = scene.add_particles(shape, 0.0, speeds)
     link = length / segments
     arc = link * np.arange(segments + 1)
     scene.add_quantity(f"{name}_length", length, "m")
@@ -152,7 +166,12 @@ def add_rope(
     add_links(scene, name, nodes, link, EA, taus[0])
     ghosts = [
         _clamp(scene, name, end, clamp, nodes, shape, link, normal if clamp_angles else None)
-        for end, clamp in (("start", clamp_start), ("end", clamp_end))
+        if grip is None
+        else _hold(scene, grip, int(nodes[k]), reach * GHOST * link)
+        for end, clamp, grip, k, reach in (
+            ("start", clamp_start, grips[0], 0, -1.0),
+            ("end", clamp_end, grips[1], -1, 1.0),
+        )
     ]
     if EI is not None:
         _bending(scene, name, nodes, ghosts, arc, EI, taus[1], normal, set_modes)
@@ -160,6 +179,33 @@ def add_rope(
     built = Rope(name, nodes, arc, *ghosts)
     scene.ropes[name] = built
     return built
+
+
+def _grips(
+    name: str, grips: tuple[Grip | None, Grip | None], clamps: tuple[ArrayLike | None, ArrayLike | None]
+) -> tuple[Grip | None, Grip | None]:
+    for end, grip, clamp in zip(("start", "end"), grips, clamps, strict=True):
+        if grip is not None and not isinstance(grip, Grip):
+            fix = "give sb.Grip.fixed, from_poses, from_markers or from_body"
+            raise SceneError(f"{name}.grip_{end}", "is no grip", grip, fix)
+        if grip is not None and clamp is not None:
+            fix = "leave one of them out: a grip gives the direction"
+            raise SceneError(f"{name}.grip_{end}", f"stands beside clamp_{end}", clamp, fix)
+    return grips
+
+
+def _hold(scene: Scene, grip: Grip, node: int, reach: float) -> int:
+    """Give an end the place and the direction of a grip, by a ghost particle `reach` m along the rope from it."""
+    ghost = int(scene.add_particles([grip.position[0] + reach * grip.direction[0]], 1.0)[0])
+    if grip.stays:
+        scene.pin([node, ghost])
+        return ghost
+    motion = np.stack([grip.position, grip.position + reach * grip.direction], axis=1)
+    if grip.frame is None:
+        scene.drive([node, ghost], grip.times, motion)
+    else:
+        grip.frame.drive(scene, [node, ghost], grip.times, motion)
+    return ghost
 
 
 def _clamp(

@@ -19,6 +19,7 @@ from .forces import Forces
 from .frames import Frame, directors_of, normals_of
 from .group import Group, make_group
 from .kinds import KINDS, UNITS
+from .moving_clamp import clamped_ends, keep_direction, let_go
 from .quantities import ZERO_OR_MORE, Quantity, Term, product
 from .scene_checks import validate
 from .volume import Volumes
@@ -116,7 +117,7 @@ class Scene:
         self.pinned |= set(indices("pin", particles, self.particle_count))
 
     def drive(self, particles: ArrayLike, times: ArrayLike, positions: ArrayLike, interpolation: str = "cubic") -> None:
-        """Give particles a motion.
+        """Give particles a motion. An end of a rope that is clamped takes its clamp along, which keeps its direction.
 
         Args:
             particles: (k,) indices.
@@ -128,7 +129,13 @@ class Scene:
             SceneError: shapes, NaN, times that do not increase, or other knots than an earlier call's.
         """
         self._building()
-        self.boundary.drive(particles, times, positions, interpolation, self.particle_count)
+        which, ends = self._with_clamps("drive", particles)
+        x = np.asarray(positions)
+        if ends and x.ndim == 3 and x.shape[1] == len(which):
+            x = np.concatenate([x, x[:, [slot for slot, _ in ends]]], axis=1)
+            which = [*which, *(ghost for _, ghost in ends)]
+        self.boundary.drive(which, times, x, interpolation, self.particle_count)
+        keep_direction(self, which, ends)
 
     def follow(
         self,
@@ -141,7 +148,7 @@ class Scene:
         interpolation: str = "cubic",
     ) -> None:
         """Give particles the motion of recorded markers, so that a fit can allow for its noise
-        (`Experiment.driven_sigma`).
+        (`Experiment.driven_sigma`). Clamped ends of ropes take their clamp along, as in `drive`.
 
         Args:
             particles: (k,) indices.
@@ -158,7 +165,23 @@ class Scene:
                 repeated, particles that are driven already.
         """
         self._building()
-        self.boundary.follow(particles, times, motion, markers, weights, placed, interpolation, self.particle_count)
+        which, ends = self._with_clamps("follow", particles)
+        if ends:
+            slots = [slot for slot, _ in ends]
+            w = np.eye(len(which)) if weights is None else np.asarray(weights, dtype=float)
+            weights = np.concatenate([w, w[slots]])
+            if placed is not None:
+                placed = np.concatenate([np.asarray(placed, dtype=float), np.asarray(placed, dtype=float)[slots]])
+            which = [*which, *(ghost for _, ghost in ends)]
+        self.boundary.follow(which, times, motion, markers, weights, placed, interpolation, self.particle_count)
+        keep_direction(self, which, ends)
+
+    def _with_clamps(self, field: str, particles: ArrayLike) -> tuple[list[int], list[tuple[int, int]]]:
+        """Particles to be driven, and those of them that are clamped ends of ropes, which are let go."""
+        which = indices(field, particles, self.particle_count)
+        ends = clamped_ends(self, which)
+        let_go(self, which, ends)
+        return which, ends
 
     def add_motion_term(self, particle: ArrayLike, coefficients: ArrayLike, factors: Mapping[str, str]) -> None:
         """Add to a driven particle's motion (knots, 3) coefficients times a product of functions of quantities; to

@@ -22,7 +22,16 @@ WHOLE: dict[str, Any] = {
     "experiment": {"name": "all"},
     "solver": {},
     "scene": {
-        "rope": [{"density": 0.05}],
+        "rope": [{"density": 0.05, "grip": [{"at": "start", "markers": ["m0"]}]}],
+        "rod": [
+            {
+                "length": 1.0,
+                "density": 0.05,
+                "EI": 1e-3,
+                "GJ": 1e-3,
+                "grip": [{"at": "start", "markers": ["m0"]}],
+            }
+        ],
         "cloth": [
             {
                 "density": 0.1,

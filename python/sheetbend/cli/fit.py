@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -32,7 +33,7 @@ from .outcome import Code, Outcome, code_of, run
 from .pages import PAGE, page_possible, write_fit_page
 from .predicted import predicted_files, save_predicted
 from .progress import Iterations
-from .screen import heading, show
+from .screen import heading, listing, show
 from .targets import check_targets
 
 
@@ -121,9 +122,11 @@ def _fit_study(console: Console, study: Study, source: Path, folder: Path, movie
     fitted = [e for e in study.experiments if e.predict is None]
     problem = FitProblem(fitted, as_parameters(study.parameters, study.experiments))
     _check_starts(config, problem)
+    listing(console, study.assumptions)
     form, page = figures_form(console, config), page_possible(console)
     with Iterations(console, problem.parameters) as progress:
         found = run_fit(study.experiments, parameters=study.parameters, progress=progress, **study.options)
+    found = replace(found, result=replace(found.result, assumed=study.assumptions))
     show(console, lambda: rich_report(found.result), lambda: plain(found.result))
     files = _write(found, study, source, form, page, folder)
     console.print(f"\nwritten to {folder}: {', '.join(files)}", soft_wrap=True)

@@ -26,7 +26,7 @@ from ..recording import Recording
 from ..scene import Scene
 from .gripped import RopeData, load_ropes
 from .outcome import Outcome, run
-from .screen import heading
+from .screen import heading, listing
 
 PACKAGES = ("numpy", "scipy", "torch", "matplotlib", "pydantic", "rich", "typer")
 _MARKERS = 60  # shown of a recording
@@ -124,6 +124,7 @@ def _config(console: Console, path: Path) -> dict[str, Any]:
     scenes = [_recorded(e) for e in study.experiments] or [_counts(first)]
     for scene in scenes:
         console.print("  " + ", ".join(f"{name} {_text(value)}" for name, value in scene.items()), soft_wrap=True)
+    listing(console, study.assumptions)
     grown = [over_fit(e) for e in study.experiments if not e.static and e.predict is None]
     for g in grown:
         console.print(f"  {in_words(g)}", markup=False, soft_wrap=True)
@@ -134,6 +135,7 @@ def _config(console: Console, path: Path) -> dict[str, Any]:
     return {
         "name": config.experiment.name,
         "scenes": scenes,
+        "assumptions": list(study.assumptions),
         "quantities": {n: q.value for n, q in first.quantities.items()},
         "parameters": list(study.parameters),
         "growth": {g.name: g.to_dict() for g in grown},

@@ -36,6 +36,12 @@ def heading(console: Console, name: str, about: str, above: str = "") -> None:
     console.print(Text.assemble(above, (name, "bold"), "  ", about), soft_wrap=True)
 
 
+def listing(console: Console, sentences: Iterable[str]) -> None:
+    """Print what is assumed, a line each."""
+    for sentence in sentences:
+        console.print(f"  {sentence}", soft_wrap=True)
+
+
 def spelled(text: str) -> str:
     """A text whose control characters, other than the ends of lines, are written as escapes: \\x1b."""
     if not steering(text, "\n\t"):

@@ -25,8 +25,12 @@ from .cloth_markers import places_on_cloths
 from .cloth_schema import MarkerGrid
 from .errors import located
 from .forces import force_sensors
+from .held import assumptions
 from .moment import Moment
 from .rest import check_rest
+from .rope_points import Seats
+from .rope_schema import Rod, Rope
+from .ropes import check_markers
 from .scene_schema import SceneSection
 from .scenes import Particles, build_scene
 from .tools import tools_of
@@ -44,6 +48,11 @@ class Study:
     folder: Path
     experiments: tuple[Experiment, ...]
     parameters: Mapping[str, Mapping[str, Any]]
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What holds the ends of ropes, and what that assumes, in words."""
+        return assumptions(self.config.scene)
 
     @property
     def options(self) -> dict[str, Any]:
@@ -66,7 +75,7 @@ class Study:
     def _refinement(self) -> Refinement:
         """Whatever has a mesh can be made finer."""
         fit, scene = self.config.fit, self.config.scene
-        meshed = fit.double_segments is not False and bool(scene.rope or scene.cloth)
+        meshed = fit.double_segments is not False and bool(scene.strands or scene.cloth)
         finer = (lambda: build(self.config, self.folder, finer=2).experiments) if meshed else None
         return Refinement(halve_step=fit.halve_step, finer=finer, linear=fit.linear_refits or not fit.double_segments)
 
@@ -133,9 +142,8 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
     numbers = [_number(f"{where}[{k}].marker", m.marker, recording) for k, m in enumerate(markers)]
     described = _with_grids(_without(config.scene, section.leave_out, path), section.grids, path)
     tools = tools_of(described, section.tools, recording, t0, folder, path)
-    scene, particles = build_scene(
-        recording.name, described, moment, _along(ropes, markers, numbers, recording), finer, ropes, folder, tools
-    )
+    seats = _along(described, ropes, markers, numbers, recording)
+    scene, particles = build_scene(recording.name, described, moment, seats, finer, ropes, folder, tools)
     forces = force_sensors(path, section.force, scene, particles, folder)
     _start_values(scene, config, section.values, path)
     if section.static or section.start == "equilibrium":
@@ -144,7 +152,9 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
         recording.markers[n]: _place(f"{where}[{k}]", m, scene, particles)
         for k, (m, n) in enumerate(zip(markers, numbers, strict=True))
     }
-    places = places_on_cloths(described.cloth, scene, recording) | places
+    places = (
+        places_on_cloths(described.cloth, scene, recording) | _on_ropes(described, seats, scene, recording) | places
+    )
     plain = section.model_dump(
         include={
             "static",
@@ -215,7 +225,7 @@ def _number(path: str, marker: str | int, recording: Recording) -> int:
 
 def _shown(config: schema.Config, section: schema.RecordingSection, path: str) -> list[str]:
     """Names of the ropes that a recording shows."""
-    every = [rope.name for rope in config.scene.rope]
+    every = [rope.name for _, rope in config.scene.strands]
     unknown = [name for name in section.ropes or () if name not in every]
     if unknown:
         raise ConfigError(
@@ -247,20 +257,44 @@ def _with_grids(scene: SceneSection, grids: Mapping[str, MarkerGrid], path: str)
 
 
 def _along(
-    ropes: list[str], markers: list[schema.Marker], numbers: list[int], recording: Recording
-) -> dict[str, list[int]]:
-    """Per rope the markers on it, in order along it."""
-    if not markers:
-        return {name: list(range(len(recording.markers))) for name in ropes} if len(ropes) == 1 else {}
-    placed: dict[str, list[int]] = {}
-    for name in ropes:
-        mine = [
+    scene: SceneSection,
+    ropes: list[str],
+    markers: list[schema.Marker],
+    numbers: list[int],
+    recording: Recording,
+) -> dict[str, Seats]:
+    """Per rope or rod the markers on it, in order along it."""
+    strands = {rope.name: (at, rope) for at, rope in scene.strands if rope.name in ropes}
+    for at, rope in strands.values():
+        check_markers(at, rope, recording.markers)
+    if not markers and not any(rope.markers for _, rope in strands.values()):
+        return {name: _evenly(at, rope, recording) for name, (at, rope) in strands.items()} if len(strands) == 1 else {}
+    number = {marker: k for k, marker in enumerate(recording.markers)}
+    placed: dict[str, Seats] = {}
+    for name, (_, rope) in strands.items():
+        mine = [(arc, number[marker]) for marker, arc in (rope.markers or {}).items()]
+        mine += [
             (m.arc_length, n)
             for m, n in zip(markers, numbers, strict=True)
             if m.arc_length is not None and m.rope in (name, None)
         ]
-        placed[name] = [n for _, n in sorted(mine)]
+        placed[name] = sorted(mine)
     return placed
+
+
+def _evenly(path: str, rope: Rope | Rod, recording: Recording) -> Seats:
+    """All markers at equal distances from end to end; of a grip's, one or two, the inner one is the end's own."""
+    count = len(recording.markers)
+    moving: dict[str, list[int]] = {}
+    for i, grip in enumerate(rope.grip):
+        own = grip.markers or []
+        moving[grip.at] = [_number(f"{path}.grip[{i}].markers", m, recording) for m in own]
+        if len(own) != 1 and (len(own) != 2 or any(grip.offset)):
+            fix = f"give their arc lengths, such as markers = {{ {recording.markers[0]} = 0.1 }}"
+            raise ConfigError(f"{path}.markers", "is missing: the grip does not say where they begin", grip.at, fix)
+    held = {n for own in moving.values() for n in own}
+    first, last = moving.get("start", [])[-1:], moving.get("end", [])[:1]
+    return [(None, n) for n in (*first, *(k for k in range(count) if k not in held), *last)]
 
 
 def _place(path: str, marker: schema.Marker, scene: Scene, particles: Particles) -> Place:
@@ -289,6 +323,22 @@ def _place(path: str, marker: schema.Marker, scene: Scene, particles: Particles)
     with located(path):
         framed = place.with_offset(marker.offset or (0.0, 0.0, 0.0), marker.normal)
     return framed if marker.offset else replace(framed, offset=None)
+
+
+def _on_ropes(
+    described: SceneSection, seats: Mapping[str, Seats], scene: Scene, recording: Recording
+) -> dict[str, Place]:
+    """Places that ropes give their markers: by `markers`, or at equal distances beside the markers of grips."""
+    found: dict[str, Place] = {}
+    for path, section in described.strands:
+        if section.name not in scene.ropes or not (section.markers or section.grip):
+            continue
+        rope, own = scene.ropes[section.name], seats.get(section.name, [])
+        for k, (arc, number) in enumerate(own):
+            at = rope.length * k / max(len(own) - 1, 1) if arc is None else arc
+            with located(f"{path}.markers"):
+                found[recording.markers[number]] = on_rope(rope, at)
+    return found
 
 
 def _cloth(path: str, name: str | None, scene: Scene) -> Cloth:

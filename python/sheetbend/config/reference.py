@@ -12,14 +12,16 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
-from . import cloth_schema, gripped_schema, scene_schema, schema
+from . import cloth_schema, gripped_schema, rope_schema, scene_schema, schema
 from .section import AXES, NAME, REFERENCE, Section
 
 HEADERS: dict[str, type[Section]] = {
     "[experiment]": schema.ExperimentSection,
     "[solver]": schema.SolverSection,
     "[scene]": scene_schema.SceneSection,
-    "[[scene.rope]]": scene_schema.Rope,
+    "[[scene.rope]]": rope_schema.Rope,
+    "[[scene.rod]]": rope_schema.Rod,
+    "[[scene.rope.grip]], [[scene.rod.grip]]": rope_schema.RopeGrip,
     "[[scene.cloth]]": cloth_schema.Cloth,
     "[scene.cloth.mesh]": cloth_schema.ClothMesh,
     "[scene.cloth.law]": cloth_schema.ClothLaw,

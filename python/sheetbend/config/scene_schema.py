@@ -7,44 +7,8 @@ from typing import Any, Literal, Self
 from pydantic import model_validator
 
 from .cloth_schema import Cloth, with_fabrics
-from .section import MOST_LINKS, Finite, Name, Quaternion, Reference, Section, Vector, key
-
-
-class Rope(Section):
-    """A rope, `sb.add_rope`. A list of ropes: [[scene.rope]]."""
-
-    name: Name = key("rope", "prefix of its quantities: <name>_EI and so on")
-    length: Finite | None = key(None, "rest length; that of `points` when left out", "m", gt=0)
-    segments: int = key(40, "number of equal links", ge=1, le=MOST_LINKS)
-    density: Finite = key(..., "mass per length", "kg/m", gt=0)
-    EA: Finite | None = key(None, "axial stiffness; inextensible when left out", "N", gt=0)
-    EI: Finite | None = key(None, "bending stiffness; no bending when left out", "N m^2", gt=0)
-    start: Vector = key([0.0, 0.0, 0.0], "where a straight rope starts", "m")
-    direction: Vector = key([1.0, 0.0, 0.0], "where a straight rope points")
-    points: list[Vector] | Literal["recording"] | None = key(
-        None,
-        'initial shape as a polyline, or "recording": through the markers on it, as first measured '
-        "(their mean when static)",
-        "m",
-    )
-    stretch_damping: Finite | None = key(None, "Kelvin-Voigt time constant of stretching", "s", gt=0)
-    bend_damping: Finite | None = key(None, "Kelvin-Voigt time constant of bending", "s", gt=0)
-    loss_factor: Finite | None = key(
-        None,
-        "of stretching and bending, instead of the time constants: tau = loss_factor / (2 pi loss_frequency)",
-        gt=0,
-    )
-    loss_frequency: Finite | None = key(None, "frequency of the motion at which `loss_factor` holds", "Hz", gt=0)
-    drag_linear: Finite | None = key(None, "linear air drag per length", "N s/m^2", ge=0)
-    drag_quadratic: Finite | None = key(None, "quadratic air drag per length", "N s^2/m^3", ge=0)
-    clamp_start: Vector | None = key(None, "direction of travel at the start, held by a clamp there")
-    clamp_end: Vector | None = key(None, "direction of travel at the end, held by a clamp there")
-    clamp_angles: bool = key(
-        False, "adds <name>_start_angle and <name>_end_angle (rad), the clamps' rotations about `plane`"
-    )
-    plane: Vector | None = key(None, "unit normal of the plane that the rope stays in")
-    set_modes: list[int] = key([], "k of rest-curvature modes cos(k pi s / length), each adds <name>_set_<k> (1/m)")
-    pinned: list[int] = key([], "nodes that are held where they start; -1 is the last")
+from .rope_schema import Rod, Rope
+from .section import Finite, Name, Quaternion, Reference, Section, Vector, key
 
 
 class Particles(Section):
@@ -237,6 +201,7 @@ class SceneSection(Section):
     pin: list[Reference] = key([], "particles that are held where they start")
     wind: Wind | None = key(None, "[scene.wind]; still air when left out")
     rope: list[Rope] = key([], "ropes")
+    rod: list[Rod] = key([], "rods, which store twist")
     cloth: list[Cloth] = key([], "cloths")
     particles: list[Particles] = key([], "single particles")
     pendulum: list[Pendulum] = key([], "simple pendulums")
@@ -247,6 +212,12 @@ class SceneSection(Section):
     tool: list[Tool] = key([], "tools whose poses were recorded")
     drive: list[Drive] = key([], "motion taken from markers, or from a tool")
     quantities: dict[Name, ExtraQuantity] = key({}, "further named numbers")
+
+    @property
+    def strands(self) -> list[tuple[str, Rope | Rod]]:
+        """Ropes and rods with their paths."""
+        ropes = [(f"scene.rope[{i}]", rope) for i, rope in enumerate(self.rope)]
+        return [*ropes, *((f"scene.rod[{i}]", rod) for i, rod in enumerate(self.rod))]
 
     @model_validator(mode="before")
     @classmethod

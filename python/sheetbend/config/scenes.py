@@ -14,7 +14,7 @@ from ..cloth import Cloth
 from ..errors import ConfigError
 from ..mesh import TriangleMesh
 from ..quantities import product
-from ..rope import Rope, add_rope
+from ..rope import Rope
 from ..scene import Scene
 from ..tool import Tool
 from . import scene_schema as schema
@@ -22,11 +22,12 @@ from .cloth_markers import seats
 from .cloths import build_cloth, placed_mesh
 from .errors import located
 from .moment import Moment
+from .rope_points import Seats
+from .ropes import build_rope
 from .tools import tool_named
 from .winds import add_winds
 
 EARTH = (0.0, 0.0, -9.81)  # m/s^2
-LEAST_SPAN, MOST_SPAN = 0.02, 2.0  # of a rope's length: another unit's, beyond
 
 
 @dataclass
@@ -129,7 +130,7 @@ def build_scene(
     name: str,
     section: schema.SceneSection,
     moment: Moment | None,
-    placed: Mapping[str, list[int]],
+    placed: Mapping[str, Seats],
     finer: int = 1,
     ropes: Sequence[str] | None = None,
     folder: Path = Path(),
@@ -141,7 +142,7 @@ def build_scene(
         moment: the recording's part; None without a recording.
         placed: per rope the markers on it, in order along it, for `points = "recording"`.
         finer: multiplies the segments of every rope and the cells of every cloth.
-        ropes: names of the ropes to build; None = all.
+        ropes: names of the ropes and rods to build; None = all.
         folder: files of meshes are relative to it.
         tools: by name, on the scene's clock; none by default.
 
@@ -152,10 +153,13 @@ def build_scene(
     recorded = None if moment is None else moment.recording.gravity
     gravity = section.gravity if section.gravity is not None else EARTH if recorded is None else recorded
     scene, particles = Scene(name, gravity), Particles(finer)
-    for i, rope in enumerate(section.rope):
+    for path, rope in section.strands:
         if ropes is not None and rope.name not in ropes:
             continue
-        _add_rope(scene, particles, f"scene.rope[{i}]", rope, moment, placed.get(rope.name, []), finer)
+        particles.free_name(path, rope.name)
+        particles.add_rope(build_rope(scene, path, rope, moment, placed.get(rope.name, []), finer, tools))
+        if rope.pinned:
+            scene.pin(particles.nodes(f"{path}.pinned", rope.name, rope.pinned))
     meshes = [placed_mesh(f"scene.cloth[{i}]", cloth, folder, finer, tools) for i, cloth in enumerate(section.cloth)]
     by_name = {cloth.name: mesh for cloth, mesh in zip(section.cloth, meshes, strict=True)}
     seated = {} if moment is None else seats(section.cloth, by_name, moment.whole)
@@ -217,53 +221,6 @@ def _same_length(path: str, stencils: list[list[int]]) -> None:
             [len(one) for one in stencils],
             "give every constraint the same number",
         )
-
-
-def _add_rope(
-    scene: Scene,
-    particles: Particles,
-    path: str,
-    rope: schema.Rope,
-    moment: Moment | None,
-    placed: list[int],
-    finer: int,
-) -> None:
-    fields = rope.model_dump(exclude={"name", "pinned", "points", "segments"}, exclude_none=True)
-    points = _measured(f"{path}.points", moment, placed, rope.length) if rope.points == "recording" else rope.points
-    particles.free_name(path, rope.name)
-    with located(path, rope.name):
-        particles.add_rope(add_rope(scene, rope.name, points=points, segments=finer * rope.segments, **fields))
-    if rope.pinned:
-        scene.pin(particles.nodes(f"{path}.pinned", rope.name, rope.pinned))
-
-
-def _measured(path: str, moment: Moment | None, placed: list[int], length: float | None) -> np.ndarray:
-    """The markers on a rope at the start, those between its first and last that are not seen left out.
-
-    Raises:
-        ConfigError: there is no recording, an end is not seen, or the markers cannot be those of a rope so long.
-    """
-    if moment is None:
-        raise ConfigError(path, "needs a recording", "recording", "add a [[recording]], or give the points")
-    shape = moment.shape[placed]
-    seen = shape[~np.isnan(shape[:, 0])]
-    if len(seen) < 2:
-        raise ConfigError(
-            path,
-            "needs two markers on the rope that are seen at the start",
-            len(seen),
-            "place markers on it, or give the points",
-        )
-    ends = [moment.recording.markers[k] for k in (placed[0], placed[-1]) if np.isnan(shape[k, 0])]
-    if ends:
-        at = moment.recording.times[moment.recording.mask[:, [placed[0], placed[-1]]].all(axis=1)]
-        fix = f"start where both are seen, such as at {at[0]:g} s" if len(at) else "give the points"
-        raise ConfigError(path, "needs the first and the last marker on the rope, not seen at the start", ends, fix)
-    span = float(np.linalg.norm(np.diff(seen, axis=0), axis=1).sum())
-    if length is not None and not LEAST_SPAN * length < span < MOST_SPAN * length:
-        fix = "correct the length, or the `units` of the recording"
-        raise ConfigError(path, f"are {span:.3g} m long at the start, and the rope has a length of", length, fix)
-    return seen
 
 
 def _add_arm(scene: Scene, particles: Particles, path: str, arm: schema.Arm | schema.Pendulum) -> None:

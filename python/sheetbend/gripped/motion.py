@@ -12,6 +12,7 @@ from ..errors import RecordingError
 from ..grip import Grip
 from ..optional import require
 from ..recording import Recording
+from ..smoothing import smoothed
 from ..timeseries import mean_position
 from .plausible import check_order
 
@@ -119,26 +120,6 @@ class GrippedMotion:
 def motions_of(recordings: Sequence[Recording | GrippedMotion], smoothing: float) -> list[GrippedMotion]:
     """Motions of recordings, smoothed over so many s; those that are motions already stay as they are."""
     return [r if isinstance(r, GrippedMotion) else GrippedMotion.of(r, smoothing) for r in recordings]
-
-
-def smoothed(times: Array, positions: Array, width: float) -> tuple[Array, Array]:
-    """Values and slopes of the parabola fitted around each frame (Savitzky & Golay 1964), one-sided at the ends.
-
-    Args:
-        times: (frames,) s, increasing; the intervals need not be equal.
-        positions: (frames, ...) finite.
-        width: s; fewer than five frames leave the positions as they are, with central differences.
-    """
-    step = float(np.median(np.diff(times)))
-    frames = min(2 * round(width / step / 2) + 1, len(times) - (1 - len(times) % 2))
-    if frames < 5:
-        return positions, np.gradient(positions, times, axis=0)
-    first = np.clip(np.arange(len(times)) - frames // 2, 0, len(times) - frames)
-    unit = step * (frames // 2)
-    powers = ((times[first[:, None] + np.arange(frames)] - times[:, None]) / unit)[..., None] ** np.arange(3)
-    fit = np.linalg.pinv(powers)  # (frames, 3, window): value, slope and half the bend from the window's samples
-    value, slope = sum(np.einsum("nc,n...->cn...", fit[:, :2, k], positions[first + k]) for k in range(frames))
-    return value, slope / unit
 
 
 def _bridged(recording: Recording) -> tuple[Recording, Array]:

@@ -1,0 +1,42 @@
+"""Clamped ends of ropes that are driven: the clamp moves with the end and keeps its direction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+
+def clamped_ends(scene: Scene, particles: Sequence[int]) -> list[tuple[int, int]]:
+    """(slot, ghost) of those particles (k,) that are ends held by a clamp at rest, whose ghost gives them their
+    direction; ghosts that are among the particles themselves are left out."""
+    ghosts: dict[int, int] = {}
+    for rope in scene.ropes.values():
+        for node, ghost in ((rope.particles[0], rope.start_ghost), (rope.particles[-1], rope.end_ghost)):
+            if ghost is not None and ghost in scene.pinned and ghost not in particles:
+                ghosts[int(node)] = int(ghost)
+    return [(slot, ghosts[p]) for slot, p in enumerate(particles) if p in ghosts]
+
+
+def let_go(scene: Scene, particles: Sequence[int], ends: Sequence[tuple[int, int]]) -> None:
+    """Unpin ends of ropes and their ghosts before they are driven."""
+    scene.pinned -= {p for slot, ghost in ends for p in (particles[slot], ghost)}
+
+
+def keep_direction(scene: Scene, particles: Sequence[int], ends: Sequence[tuple[int, int]]) -> None:
+    """Hold ghosts that are driven with the motion of their ends where they stand off them, and let the angle of a clamp
+    turn them as before."""
+    start, knots = scene.positions, (len(scene.boundary.times), 1)
+    for slot, ghost in ends:
+        scene.add_motion_term(ghost, np.tile(start[ghost] - start[particles[slot]], knots), {})
+        for term in [t for t in scene.terms if t.array == "position"]:
+            at = np.atleast_1d(term.index) - 3 * ghost
+            own = (at >= 0) & (at < 3)
+            if own.any():
+                offset = np.zeros(3)
+                offset[at[own]] = np.broadcast_to(term.coefficient, at.shape)[own]
+                scene.add_motion_term(ghost, np.tile(offset, knots), dict(term.factors))
