@@ -5,7 +5,8 @@ to recordings, with intervals and words for what the data cannot tell.
 """
 
 from . import mesh
-from .arm import Arm, add_arm, add_pendulum
+from .arm import add_arm, add_pendulum
+from .arm_data import Arm
 from .balance import ForceBalance, force_balance
 from .baseline import no_physics
 from .cloth import Cloth, add_cloth
@@ -53,8 +54,7 @@ from .tape import TapePlan, tape_plan
 from .tethers import add_tethers
 from .tool import Tool
 from .values import constraint_values, elastic_energy, support_forces
-
-__version__ = "0.1.0"
+from .version import __version__ as __version__
 
 __all__ = [
     "KINDS",

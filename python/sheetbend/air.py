@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .checks import check_increasing, finite, per_item, triangle_array
 from .errors import SceneError
-from .quantities import ZERO_OR_MORE, Term
-
-if TYPE_CHECKING:
-    from .scene import Scene
+from .quantities import ZERO_OR_MORE, Builder, Term
 
 Array = np.ndarray
 WIND = ("wind_x", "wind_y", "wind_z")
@@ -39,7 +34,7 @@ class Air:
 
     def add(
         self,
-        scene: Scene,
+        scene: Builder,
         triangles: ArrayLike,
         normal: ArrayLike,
         tangential: ArrayLike,
@@ -57,7 +52,7 @@ class Air:
                 self._name(scene, name, f"air_{kind}", k, "kg/m^3")
         self._append(corners, values)
 
-    def press(self, scene: Scene, triangles: ArrayLike, pressure: ArrayLike, name: str) -> None:
+    def press(self, scene: Builder, triangles: ArrayLike, pressure: ArrayLike, name: str) -> None:
         """See `Scene.add_pressure`."""
         corners = triangle_array(f"{name}.pressure.triangles", triangles, scene.particle_count)
         p = per_item(f"{name}.pressure", pressure, len(corners))
@@ -72,7 +67,7 @@ class Air:
         coefficients = {"air_normal": self.normal, "air_tangential": self.tangential}
         return {"wind": self.wind, **coefficients, "pressure": self.pressure}
 
-    def _name(self, scene: Scene, name: str, array: str, values: Array, unit: str) -> None:
+    def _name(self, scene: Builder, name: str, array: str, values: Array, unit: str) -> None:
         """Let a quantity, `<name>_<array>`, stand for the one value of triangles that are about to be appended."""
         value = float(values[0])
         limits = None if value > 0 or array == "pressure" else ZERO_OR_MORE
@@ -86,7 +81,7 @@ class Air:
         for kind in ("normal", "tangential", "pressure"):
             setattr(self, kind, np.concatenate([getattr(self, kind), values.get(kind, np.zeros(len(corners)))]))
 
-    def _blow(self, scene: Scene, wind: ArrayLike | None, times: ArrayLike | None) -> None:
+    def _blow(self, scene: Builder, wind: ArrayLike | None, times: ArrayLike | None) -> None:
         """Set the wind, or check that it is the one that was set."""
         if wind is None:
             if times is not None:
@@ -113,13 +108,13 @@ class Air:
         self.wind[:] = 0.0
 
 
-def _name_wind(scene: Scene, place: int, quantity: str, velocity: float, *factors: tuple[str, str]) -> None:
+def _name_wind(scene: Builder, place: int, quantity: str, velocity: float, *factors: tuple[str, str]) -> None:
     """Let a quantity stand for one number of the wind."""
     scene.add_quantity(quantity, float(velocity), "m/s", positive=False, scale=1.0)
     scene.add_terms([Term("wind", place, 1.0, ((quantity, "identity"), *factors))])
 
 
-def _name_changing_wind(scene: Scene, wind: Array) -> None:
+def _name_changing_wind(scene: Builder, wind: Array) -> None:
     """One factor for all of it, `wind_strength`, and where the knots are few each of their numbers, `wind_x_0` ..."""
     strength = (scene.add_quantity(STRENGTH, 1.0, "", positive=True), "identity")
     if len(wind) > NAMED_KNOTS:

@@ -17,43 +17,19 @@ when the arm is added.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .arm_data import Arm
 from .checks import finite
 from .errors import SceneError
-from .markers import Place
 from .pivot import SLIP_ANGLE, add_resistance
 from .quantities import Term
-from .scene import Array, Scene
+from .scene import Scene
 
 Factors = tuple[tuple[str, str], ...]
-
-
-@dataclass(frozen=True)
-class Arm:
-    """An arm in a scene.
-
-    Attributes:
-        name: quantities are called `<name>_...`.
-        pivot, end: particles; the end carries the next arm.
-        particles: all that are the arm's own (the pivot too where it is fixed).
-        root: (3,) m, the fixed point that the linkage hangs from.
-        motion: terms of the end's position and velocity, counted from the root.
-    """
-
-    name: str
-    pivot: int
-    end: int
-    particles: tuple[int, ...]
-    root: Array
-    motion: tuple[Term, ...]
-
-    def place(self, radius: float) -> Place:
-        """A marker on the arm's line, `radius` m from the pivot whatever the arm's length is."""
-        return Place((self.pivot, self.end), (1.0, 0.0), (-1.0, 1.0)).with_offset((radius, 0.0, 0.0))
 
 
 def add_arm(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,17 +12,14 @@ from numpy.typing import ArrayLike
 from . import _core
 from .domain import Domain
 from .errors import SceneError, refusal
-from .extrapolation import kinks
+from .kinks import kinks
 from .quantities import FUNCTIONS, Term
-
-if TYPE_CHECKING:
-    from .scene import Scene
-
+from .scene_data import SceneData
 
 VECTORS = ("position", "velocity", "boundary", "force", "wind")
 
 
-def specification(scene: Scene) -> dict[str, Any]:
+def specification(scene: SceneData) -> dict[str, Any]:
     """The topology of a scene, as the compiled core is made from it."""
     return {
         "particles": scene.particle_count,
@@ -59,7 +56,7 @@ class CompiledScene:
         domain: which quantities and inputs make sense.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: SceneData) -> None:
         try:
             self.core = _core.Scene(**specification(scene))
         except ValueError as error:
@@ -78,7 +75,7 @@ class CompiledScene:
     def _map(self) -> _core.ParameterMap:
         return _core.ParameterMap(self.map())
 
-    def _pack(self, scene: Scene) -> np.ndarray:
+    def _pack(self, scene: SceneData) -> np.ndarray:
         base = np.zeros(self.core.inputs)
         for array, values in scene.base_arrays().items():
             offset, size = self.layout[array]

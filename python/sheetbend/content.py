@@ -16,6 +16,7 @@ import numpy as np
 
 from . import _core
 from .compiled import CompiledScene, specification
+from .version import __version__
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -54,8 +55,6 @@ def of_problem(
 def of_software() -> dict[str, str]:
     """What decides the bits of a result besides its input: versions, the compiled modules, the processor, the C
     library."""
-    from . import __version__
-
     found = {"Python": platform.python_version(), "processor": f"{_processor()}, {_core.instruction_set()}"}
     found["C library"] = " ".join(platform.libc_ver())
     found |= {"sheetbend": __version__, "NumPy": np.__version__, "SciPy": _scipy_version()}

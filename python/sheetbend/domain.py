@@ -7,15 +7,12 @@ every quantity and of every input, and finds the quantity behind an input that l
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .errors import SceneError
 from .kinds import KINDS, NEEDS_COMPLIANCE
-
-if TYPE_CHECKING:
-    from .scene import Scene
+from .scene_data import SceneData
 
 Array = np.ndarray
 HUGE = float(np.finfo(float).max)
@@ -44,7 +41,7 @@ class Domain:
         least, most: (inputs,) the range of each input, both ends allowed.
     """
 
-    def __init__(self, scene: Scene, layout: Mapping[str, tuple[int, int]]) -> None:
+    def __init__(self, scene: SceneData, layout: Mapping[str, tuple[int, int]]) -> None:
         self._scene, self._layout = scene, layout
         total = sum(size for _, size in layout.values())
         self.least, self.most = np.full(total, -HUGE), np.full(total, HUGE)

@@ -10,16 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
 from .errors import InputError
-
-if TYPE_CHECKING:
-    from .scene import Scene
 
 Array = np.ndarray
 ORDERS = {"bdf1": 1, "bdf2": 2}
@@ -32,21 +29,6 @@ def weights(integrator: str, runs: int) -> tuple[float, ...]:
     for order in range(ORDERS[integrator], ORDERS[integrator] + runs - 1):
         rows = [(2**order * finer - row) / (2**order - 1) for row, finer in pairwise(rows)]
     return tuple(rows[0].tolist())
-
-
-def kinks(scene: Scene) -> str:
-    """What makes motions of a scene not smooth in time, so that errors have no power series in h; empty if nothing.
-
-    Tethers, which act from one side only, need sweeps, and those are refused as such.
-    """
-    found = []
-    if any("yielding" in group.kind for group in scene.groups):
-        found.append("joints that yield")
-    if any(group.kind == "friction_hinge" for group in scene.groups):
-        found.append("joints with dry friction")
-    if scene.boundary.driven and scene.boundary.interpolation == "linear":
-        found.append("driven particles with linear knots, which kick them (use 'cubic')")
-    return " and ".join(found)
 
 
 @dataclass(frozen=True)

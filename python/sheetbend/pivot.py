@@ -13,17 +13,14 @@ amplitude falls by a good part. Dry friction is elastic up to a small slip angle
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .arm_data import Arm
 from .checks import is_number
 from .errors import SceneError
 from .quantities import ZERO_OR_MORE, Term
 from .scene import Scene
-
-if TYPE_CHECKING:
-    from .arm import Arm
 
 SLIP_ANGLE = 1e-3
 """How far a joint with dry friction gives before it slides unless told otherwise, rad."""

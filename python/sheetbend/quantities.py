@@ -9,8 +9,9 @@ have exponentials of weighted quantities among the factors. The map and its deri
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -62,6 +63,29 @@ class Term:
     def quantities(self) -> tuple[str, ...]:
         """Names of the quantities in it."""
         return tuple(name for name, _ in (*self.factors, *self.exponents))
+
+
+class Builder(Protocol):
+    """A scene under construction, as seen by what adds particles' loads and named numbers to it."""
+
+    @property
+    def particle_count(self) -> int: ...
+
+    @property
+    def positions(self) -> np.ndarray: ...
+
+    def add_quantity(
+        self,
+        name: str,
+        value: float,
+        unit: str,
+        positive: bool = True,
+        scale: float | None = None,
+        limits: tuple[float, float] | None = None,
+        shared: bool = False,
+    ) -> str: ...
+
+    def add_terms(self, terms: Sequence[Term]) -> None: ...
 
 
 def term(array: str, index: int, coefficient: float, **functions: str) -> Term:

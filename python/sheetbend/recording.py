@@ -3,36 +3,25 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from . import timeseries
+from . import io, timeseries
 from .errors import RecordingError
-from .names import checked_name
-from .recording_checks import (
-    check_seen,
-    checked_gravity,
-    checked_markers,
-    checked_metadata,
-    checked_positions,
-    checked_times,
-    choose_from,
-    marker_indices,
-)
+from .marker_data import MarkerData, read_only
+from .recording_checks import checked_times, choose_from, marker_indices
 from .timeseries import Array, Kind
 
-UNNAMED = "recording"
-"""The name of a recording that was given none; from a file it takes the file's."""
 _SAME_TIME = 1e-9  # s: decimal bounds such as 0.66 must find the frame stored as 0.6600000000000001
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class Recording(MarkerData):
     """Measured markers. Immutable: every method gives a new recording, and the arrays are read-only.
 
     Attributes:
@@ -50,28 +39,6 @@ class Recording:
             times that do not increase, names or indices that are repeated or out of range, or the name can be that
             of no file.
     """
-
-    positions: Array
-    times: Array
-    markers: tuple[str, ...] = ()
-    clamped: tuple[int, ...] = ()
-    name: str = UNNAMED
-    gravity: Array | None = None
-    metadata: Mapping[str, Any] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        positions = checked_positions(self.positions)
-        markers = checked_markers(self.markers, positions.shape[1])
-        check_seen(positions, markers)
-        self._set(
-            positions=_read_only(positions),
-            times=_read_only(checked_times(self.times, len(positions))),
-            markers=markers,
-            clamped=marker_indices("clamped", self.clamped, markers),
-            gravity=None if self.gravity is None else _read_only(checked_gravity(self.gravity)),
-            metadata=checked_metadata(self.metadata),
-        )
-        checked_name("name", self.name)
 
     def __repr__(self) -> str:
         frames, markers = self.mask.shape
@@ -91,9 +58,9 @@ class Recording:
         Raises:
             RecordingError: the file is missing, empty, corrupt, of an unknown kind or no valid recording.
         """
-        from . import io  # the readers build recordings, so they import this module
-
-        return io.read(Path(path), units)
+        recording = object.__new__(cls)
+        recording._set(**vars(io.read(Path(path), units)))  # which is checked
+        return recording
 
     def save(self, path: str | Path) -> None:
         """Write the recording in meters; the suffix picks the writer. A JSON of the same stem holds the rest.
@@ -101,20 +68,7 @@ class Recording:
         Raises:
             RecordingError: the suffix is unknown, the folder is missing, or the metadata are no JSON.
         """
-        from . import io
-
         io.write(self, Path(path))
-
-    @property
-    def mask(self) -> NDArray[np.bool_]:
-        """(frames, markers): True where the marker was seen."""
-        return ~np.isnan(self.positions[:, :, 0])
-
-    @property
-    def free(self) -> tuple[int, ...]:
-        """Indices of the markers that are not clamped: those that a simulation must explain."""
-        driven = set(self.clamped)
-        return tuple(i for i in range(len(self.markers)) if i not in driven)
 
     def piece(self, start: float | None = None, stop: float | None = None) -> Recording:
         """Frames with start <= time < stop (s; None = open), with their absolute times.
@@ -252,14 +206,10 @@ class Recording:
             lines.append(f"  source    {told['attribution']}")
         return "\n".join(lines)
 
-    def _set(self, **fields: Any) -> None:
-        for key, value in fields.items():
-            object.__setattr__(self, key, value)
-
     def _derive(self, **fields: Any) -> Recording:
         """A part of this recording, not checked again: a piece may hold a marker that it never sees."""
         other = copy.copy(self)
-        other._set(**{k: _read_only(v) if isinstance(v, np.ndarray) else v for k, v in fields.items()})
+        other._set(**{k: read_only(v) if isinstance(v, np.ndarray) else v for k, v in fields.items()})
         return other
 
     def _max_gap(self, max_gap: float | None) -> float:
@@ -289,9 +239,3 @@ class Recording:
             float(after - before),
             "cut a piece on one side of the gap, or give a larger max_gap if the motion there is smooth",
         )
-
-
-def _read_only(array: Array) -> Array:
-    array = np.array(array, dtype=np.float64, order="C")
-    array.setflags(write=False)
-    return array

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from .errors import SceneError
-
-if TYPE_CHECKING:
-    from .scene import Scene
+from .scene_data import SceneData
 
 
-def validate(scene: Scene) -> None:
+def validate(scene: SceneData) -> None:
     """Refuse a scene that cannot be simulated; see `Scene.freeze`."""
     if scene.particle_count == 0:
         raise SceneError(scene.name, "has no particles", 0, "add particles or a rope")

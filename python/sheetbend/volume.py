@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .checks import is_number, triangle_array
 from .errors import SceneError
 from .mesh.topology import half_edges
-from .quantities import Term
-
-if TYPE_CHECKING:
-    from .scene import Scene
+from .quantities import Builder, Term
 
 Array = np.ndarray
 
@@ -28,7 +23,7 @@ class Volumes:
     def __init__(self) -> None:
         self.triangles: dict[str, Array] = {}
 
-    def add(self, scene: Scene, triangles: ArrayLike, compliance: float, rest: float | None, name: str) -> None:
+    def add(self, scene: Builder, triangles: ArrayLike, compliance: float, rest: float | None, name: str) -> None:
         """See `Scene.add_volume`."""
         field = f"{name}.volume"
         if name in self.triangles:
@@ -55,7 +50,7 @@ class Volumes:
         none = np.zeros(len(self.triangles))
         return {"volume": none, "volume_compliance": none}
 
-    def _name(self, scene: Scene, quantity: str, array: str, at: int, value: float, unit: str) -> None:
+    def _name(self, scene: Builder, quantity: str, array: str, at: int, value: float, unit: str) -> None:
         scene.add_quantity(quantity, value, unit)
         scene.add_terms([Term(array, at, 1.0, ((quantity, "identity"),))])
 

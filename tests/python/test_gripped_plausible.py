@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.gripped import GrippedMotion
-from sheetbend.gripped.plausible import doubts, marker_order
+from sheetbend.gripped.order import marker_order
+from sheetbend.gripped.plausible import doubts
 
 Array = np.ndarray
 TIMES = np.arange(101) / 100.0

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__
 from ..rope import rope
 from ..solver import Solver
+from ..version import __version__
 from .machine import isa, machine
 from .measurement import LANES
 from .ropes import Ropes

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__
 from ..cloth import add_cloth
 from ..mesh import grid
 from ..scene import Scene
 from ..solver import Solver
+from ..version import __version__
 from .machine import isa, machine
 from .measurement import LANES
 from .ropes import Ropes

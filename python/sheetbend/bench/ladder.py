@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from .. import __version__
+from ..version import __version__
 from .machine import isa, machine
 from .measurement import LANES
 from .problem import Problem

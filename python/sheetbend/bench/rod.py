@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__
 from ..grip import Grip, carried
 from ..rod import rod
 from ..scene import Scene
 from ..solver import Solver
+from ..version import __version__
 from .machine import isa, machine
 from .measurement import LANES
 from .ropes import Ropes

@@ -12,7 +12,6 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from .. import __version__
 from ..config import GrippedConfig, build, parse_any, scene_alone
 from ..door import reading
 from ..errors import ConfigError
@@ -24,6 +23,7 @@ from ..kinds import KINDS
 from ..optimizers import ceres_trouble, has_ceres
 from ..recording import Recording
 from ..scene import Scene
+from ..version import __version__
 from .gripped import RopeData, load_ropes
 from .outcome import Outcome, run
 from .screen import heading, listing

@@ -8,13 +8,13 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from .. import __version__
 from ..config import load
 from ..door import reading
 from ..errors import ConfigError
 from ..optional import require
 from ..page import Shown, motion_page, of_recording, of_trajectory
 from ..recording import Recording
+from ..version import __version__
 from ..whole import write_text
 from .folders import made
 from .outcome import Outcome, run

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arm import Arm, add_arm, add_pendulum
+from ..arm import add_arm, add_pendulum
+from ..arm_data import Arm
 from ..cloth import Cloth
 from ..errors import ConfigError
 from ..mesh import TriangleMesh

@@ -14,7 +14,7 @@ from ..optional import require
 from ..recording import Recording
 from ..smoothing import smoothed
 from ..timeseries import mean_position
-from .plausible import check_order
+from .order import check_order
 
 Array = np.ndarray
 POLYLINE = 200  # points of the initial curve, which links are laid along

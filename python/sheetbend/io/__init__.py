@@ -1,4 +1,4 @@
-"""Files of recordings. A format is one module with `read(path) -> Recording` and, unless it is only read,
+"""Files of recordings. A format is one module with `read(path) -> MarkerData` and, unless it is only read,
 `write(recording, path)`.
 
 A reader takes the numbers as they stand in the file; length units, names and whatever else the JSON beside
@@ -15,7 +15,7 @@ from types import ModuleType
 
 from ..door import reading
 from ..errors import RecordingError
-from ..recording import Recording
+from ..marker_data import MarkerData
 from ..recording_checks import check_seen
 from ..whole import written
 from . import c3d, csv, deform, mesh_sequence, npz, sidecar
@@ -29,13 +29,13 @@ FORMATS: dict[str, ModuleType] = {
 }
 
 
-def read(path: Path, units: str | None = None) -> Recording:
+def read(path: Path, units: str | None = None) -> MarkerData:
     """Read the recording at path and the JSON beside it; see `Recording.load`."""
     with reading(path):
         return _read(path if path.name.strip(".") else path.resolve(), units)
 
 
-def _read(path: Path, units: str | None) -> Recording:
+def _read(path: Path, units: str | None) -> MarkerData:
     if path.is_dir() and path.suffix.lower() not in FORMATS:
         return sidecar.apply(mesh_sequence.read(path), path, units, mesh_sequence.ASSUMED)
     file_format = _format(path)
@@ -47,7 +47,7 @@ def _read(path: Path, units: str | None) -> Recording:
     return sidecar.apply(file_format.read(path), path, units, _assumed(file_format))
 
 
-def write(recording: Recording, path: Path) -> None:
+def write(recording: MarkerData, path: Path) -> None:
     """Write the recording and the JSON beside it; see `Recording.save`."""
     file_format = _format(path)
     if not hasattr(file_format, "write"):

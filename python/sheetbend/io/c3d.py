@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordingError
-from ..recording import Recording
-from .sidecar import METERS
+from ..marker_data import MarkerData
+from ..units import METERS
 
 Array = NDArray[np.float64]
 
@@ -48,7 +48,7 @@ class _Machine:
         return np.frombuffer(data, dtype=f"{self.order}f4").astype(np.float64)
 
 
-def read(path: Path) -> Recording:
+def read(path: Path) -> MarkerData:
     """Read the points of a file; their unit is passed on as metadata["units"].
 
     Raises:
@@ -67,7 +67,7 @@ def read(path: Path) -> Recording:
         raise RecordingError(str(path), "is damaged or cut off", f"{type(error).__name__}: {error}", fix) from error
 
 
-def _recording(path: Path, data: bytes, machine: _Machine, said: dict[tuple[str, str], Any]) -> Recording:
+def _recording(path: Path, data: bytes, machine: _Machine, said: dict[tuple[str, str], Any]) -> MarkerData:
     head = machine.words(data[:20]).astype(np.uint16)
     count, analog, first, last, start = (int(head[k]) for k in (1, 2, 3, 4, 8))
     (scale,) = machine.floats(data[12:16])
@@ -96,7 +96,7 @@ def _recording(path: Path, data: bytes, machine: _Machine, said: dict[tuple[str,
     if not keep:
         raise RecordingError(str(path), "holds no point that is ever seen", f"{count} points", "export the markers")
     markers = tuple(names[k] for k in keep)
-    return Recording(x[:, keep], np.arange(frames) / rate, markers, metadata={"units": units})
+    return MarkerData(x[:, keep], np.arange(frames) / rate, markers, metadata={"units": units})
 
 
 def _labels(said: dict[tuple[str, str], Any], count: int) -> list[str]:

@@ -30,7 +30,7 @@ import numpy as np
 
 from ..door import check_room
 from ..errors import RecordingError
-from ..recording import Recording
+from ..marker_data import MarkerData
 from ..timeseries import Array
 from ..whole import written
 from . import clock, motive, vicon
@@ -42,7 +42,7 @@ _COLUMNS = "name the columns of each marker <marker>_x, <marker>_y, <marker>_z"
 _AXIS = re.compile(r"(.*)[_. ]([xyz])", re.IGNORECASE | re.DOTALL)
 
 
-def read(path: Path) -> Recording:
+def read(path: Path) -> MarkerData:
     """Read any of the layouts.
 
     Raises:
@@ -65,7 +65,7 @@ def read(path: Path) -> Recording:
     return _read_wide(path, header, header_line, rows, times)
 
 
-def write(recording: Recording, path: Path) -> None:
+def write(recording: MarkerData, path: Path) -> None:
     """Write the wide layout; numbers keep all their digits, markers not seen leave empty cells."""
     header = ["time", *(f"{marker}_{axis}" for marker in recording.markers for axis in _AXES)]
     with written(path) as beside, beside.open("w", encoding="utf-8", newline="") as file:
@@ -94,7 +94,7 @@ def _delimiter(path: Path, number: int, header: str) -> str:
     raise RecordingError(f"{path}, line {number}", "must be a header whose first column is time", header, fix)
 
 
-def _read_wide(path: Path, header: list[str], header_line: int, rows: list[Row], times: Array) -> Recording:
+def _read_wide(path: Path, header: list[str], header_line: int, rows: list[Row], times: Array) -> MarkerData:
     markers = []
     for k, column in enumerate(header[1:]):
         match, axis = _AXIS.fullmatch(column), _AXES[k % 3]
@@ -106,10 +106,10 @@ def _read_wide(path: Path, header: list[str], header_line: int, rows: list[Row],
         refuse(path, header_line, "must have three columns x, y, z per marker", header[-1], _COLUMNS)
     _check_times(path, rows, times)
     table = np.array([[number(path, line, cell) for cell in cells[1:]] for line, cells in rows])
-    return Recording(table.reshape(len(rows), -1, 3), times, tuple(markers))
+    return MarkerData(table.reshape(len(rows), -1, 3), times, tuple(markers))
 
 
-def _read_long(path: Path, header: list[str], rows: list[Row], times: Array) -> Recording:
+def _read_long(path: Path, header: list[str], rows: list[Row], times: Array) -> MarkerData:
     column = {name: i for i, name in enumerate(header)}
     for (line, _), time in zip(rows, times, strict=True):
         if np.isnan(time):
@@ -128,7 +128,7 @@ def _read_long(path: Path, header: list[str], rows: list[Row], times: Array) -> 
         if earlier != line:
             refuse(path, line, f"repeats marker {marker!r} at the time of line {earlier}", cells[0])
         positions[frame, marker_of[marker]] = [number(path, line, cells[column[axis]]) for axis in _AXES]
-    return Recording(positions, frames, tuple(markers))
+    return MarkerData(positions, frames, tuple(markers))
 
 
 def _check_times(path: Path, rows: list[Row], times: Array) -> None:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ..door import check_room
 from ..errors import RecordingError
-from ..recording import Recording
+from ..marker_data import MarkerData
 from ..whole import written
 from . import plain_pickle
 
@@ -36,7 +36,7 @@ GRIPPED = 2
 """Markers in each grip."""
 
 
-def read(path: Path) -> Recording:
+def read(path: Path) -> MarkerData:
     """Read a pickle.
 
     Raises:
@@ -51,10 +51,10 @@ def read(path: Path) -> Recording:
     positions = _stacked(path, content)
     frames, markers, _ = positions.shape
     clamped = tuple(i for i in range(markers) if i < GRIPPED or i >= markers - GRIPPED)
-    return Recording(positions, np.arange(frames) / RATE, clamped=clamped)
+    return MarkerData(positions, np.arange(frames) / RATE, clamped=clamped)
 
 
-def write(recording: Recording, path: Path) -> None:
+def write(recording: MarkerData, path: Path) -> None:
     """Write a list of float64 arrays (3, markers), one per frame; markers not seen are NaN."""
     frames = [np.ascontiguousarray(frame.T) for frame in recording.positions]
     with written(path) as beside, beside.open("wb") as file:

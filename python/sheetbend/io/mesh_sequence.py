@@ -12,7 +12,7 @@ import numpy as np
 
 from ..door import check_room
 from ..errors import MeshError, RecordingError
-from ..recording import Recording
+from ..marker_data import MarkerData
 from . import sidecar
 from .natural import by_number
 
@@ -20,7 +20,7 @@ ASSUMED = ("times",)  # replaced by those of the rate, without which nothing is 
 SUFFIXES = (".obj", ".ply")
 
 
-def read(path: Path) -> Recording:
+def read(path: Path) -> MarkerData:
     """Read the frames of a folder.
 
     Raises:
@@ -53,4 +53,4 @@ def read(path: Path) -> Recording:
             problem = f"has not as many vertices as {files[0].name}, {len(frames[0])}"
             raise RecordingError(str(file), problem, len(frames[-1]), fix)
     names = tuple(f"v{k}" for k in range(len(frames[0])))
-    return Recording(np.array(frames), np.arange(len(frames), dtype=float), names)
+    return MarkerData(np.array(frames), np.arange(len(frames), dtype=float), names)

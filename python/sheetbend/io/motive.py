@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import RecordingError
-from ..recording import Recording
+from ..marker_data import MarkerData
 from .cells import number, points_seen, refuse, split
 
 _UNITS = {"Meters": "m", "Centimeters": "cm", "Millimeters": "mm"}
@@ -25,7 +25,7 @@ def wrote(text: list[tuple[int, str]]) -> bool:
     return text[0][1].startswith("Format Version,")
 
 
-def read(path: Path, text: list[tuple[int, str]]) -> Recording:
+def read(path: Path, text: list[tuple[int, str]]) -> MarkerData:
     """Read a take; its unit is passed on as metadata["units"].
 
     Raises:
@@ -62,4 +62,4 @@ def read(path: Path, text: list[tuple[int, str]]) -> Recording:
     times = np.array([number(path, row, cells[1]) for row, cells in frames])
     x, markers = points_seen(path, frames, names, first)
     metadata = {"units": _UNITS[about["Length Units"]], "take": about.get("Take Name", "")}
-    return Recording(x, times, markers, gravity=_DOWN, metadata=metadata)
+    return MarkerData(x, times, markers, gravity=_DOWN, metadata=metadata)

@@ -23,7 +23,7 @@ from numpy.lib import format as npy
 
 from ..door import check_room
 from ..errors import RecordingError
-from ..recording import Recording
+from ..marker_data import MarkerData
 from ..whole import written
 
 _REQUIRED = ("positions", "times")
@@ -33,7 +33,7 @@ _PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # as NumPy does; others ta
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
 
-def read(path: Path) -> Recording:
+def read(path: Path) -> MarkerData:
     """Read an archive.
 
     Raises:
@@ -42,14 +42,14 @@ def read(path: Path) -> Recording:
     """
     fix = "store positions (frames, markers, 3) and times (frames,) under these names"
     arrays = plain_arrays(path, _REQUIRED, ("clamped",), fix)
-    return Recording(
+    return MarkerData(
         positions=arrays["positions"],
         times=arrays["times"],
         clamped=np.atleast_1d(arrays.get("clamped", np.array([], dtype=np.int64))).tolist(),
     )
 
 
-def write(recording: Recording, path: Path) -> None:
+def write(recording: MarkerData, path: Path) -> None:
     """Write positions, times and clamped, compressed."""
     clamped = np.array(recording.clamped, dtype=np.int64)
     with written(path) as beside, beside.open("wb") as file:  # an open file keeps NumPy from appending a second suffix

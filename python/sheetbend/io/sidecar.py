@@ -23,19 +23,19 @@ import numpy as np
 from ..door import note
 from ..errors import RecordingError
 from ..json_file import check_depth, json_content
+from ..marker_data import UNNAMED, MarkerData
 from ..names import checked_name
-from ..recording import UNNAMED, Recording
 from ..recording_checks import checked_markers, default_markers, marker_indices
 from ..timeseries import Array
+from ..units import METERS
 from ..whole import write_text
 
-METERS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 _RESERVED = ("units", "name", "markers", "clamped", "gravity", "arrays")
 _SAME_FRAME = 1e-6  # frame intervals
 _FASTEST = 1e15  # Hz: beyond it times of frames coincide
 
 
-def apply(recording: Recording, path: Path, units: str | None, assumed: tuple[str, ...] = ()) -> Recording:
+def apply(recording: MarkerData, path: Path, units: str | None, assumed: tuple[str, ...] = ()) -> MarkerData:
     """The recording as read from `path`, in meters, with what the JSON beside it adds.
 
     Args:
@@ -51,7 +51,7 @@ def apply(recording: Recording, path: Path, units: str | None, assumed: tuple[st
     said = beside(path)
     scale = _meters(_units(recording.metadata.get("units"), units, said))
     markers = _markers(recording, said)
-    return Recording(
+    return MarkerData(
         positions=recording.positions * scale,
         times=_times(recording, said) if "times" in assumed else recording.times,
         markers=markers,
@@ -62,7 +62,7 @@ def apply(recording: Recording, path: Path, units: str | None, assumed: tuple[st
     )
 
 
-def write(recording: Recording, path: Path, assumed: tuple[str, ...] = ()) -> None:
+def write(recording: MarkerData, path: Path, assumed: tuple[str, ...] = ()) -> None:
     """Write the JSON beside `path`; `assumed` as in `apply`.
 
     Raises:
@@ -142,7 +142,7 @@ def _meters(units: Any) -> float:
     return METERS[length]
 
 
-def _times(recording: Recording, beside: dict[str, Any]) -> Array:
+def _times(recording: MarkerData, beside: dict[str, Any]) -> Array:
     if "rate" not in beside:
         return recording.times
     rate = beside["rate"]
@@ -151,7 +151,7 @@ def _times(recording: Recording, beside: dict[str, Any]) -> Array:
     return np.arange(len(recording.times)) / rate
 
 
-def _rate(recording: Recording) -> float:
+def _rate(recording: MarkerData) -> float:
     """Frames per second, Hz; 1 for a single frame."""
     times, last = recording.times, float(recording.times[-1])
     rate = float(f"{(len(times) - 1) / last:.12g}") if len(times) > 1 and last > 0 else 1.0
@@ -162,7 +162,7 @@ def _rate(recording: Recording) -> float:
     return rate
 
 
-def _markers(recording: Recording, beside: dict[str, Any]) -> tuple[str, ...]:
+def _markers(recording: MarkerData, beside: dict[str, Any]) -> tuple[str, ...]:
     named = beside.get("markers", [])
     if isinstance(named, str) or not named:
         return recording.markers
@@ -174,7 +174,7 @@ def _markers(recording: Recording, beside: dict[str, Any]) -> tuple[str, ...]:
     return names
 
 
-def _clamped(recording: Recording, beside: dict[str, Any], markers: tuple[str, ...], assumed: bool) -> tuple[int, ...]:
+def _clamped(recording: MarkerData, beside: dict[str, Any], markers: tuple[str, ...], assumed: bool) -> tuple[int, ...]:
     said = beside.get("clamped")
     if said is None or isinstance(said, str) or (said == [] and not assumed):
         return recording.clamped

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import RecordingError
-from ..recording import Recording
+from ..marker_data import MarkerData
+from ..units import METERS
 from .cells import number, points_seen, refuse, split
-from .sidecar import METERS
 
 _SECTIONS = ("Devices", "Joints", "Model Outputs", "Segments", "Trajectories")
 _AXES = ["X", "Y", "Z"]
@@ -24,7 +24,7 @@ def wrote(text: list[tuple[int, str]]) -> bool:
     return _title(first) in _SECTIONS
 
 
-def read(path: Path, text: list[tuple[int, str]]) -> Recording:
+def read(path: Path, text: list[tuple[int, str]]) -> MarkerData:
     """Read a trial; its unit is passed on as metadata["units"]. The first frame is at 0 s.
 
     Raises:
@@ -58,7 +58,7 @@ def read(path: Path, text: list[tuple[int, str]]) -> Recording:
             refuse(path, row, f"must have {width} cells, like the header", len(cells))
     count = np.array([number(path, row, cells[0]) for row, cells in frames])
     x, markers = points_seen(path, frames, names, first)
-    return Recording(x, (count - count[0]) / hertz, markers, metadata={"units": told.pop()})
+    return MarkerData(x, (count - count[0]) / hertz, markers, metadata={"units": told.pop()})
 
 
 def _title(line: str) -> str:

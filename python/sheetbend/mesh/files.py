@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..checks import finite
 from ..door import note, reading
 from ..errors import MeshError
-from ..io.sidecar import METERS
 from ..optional import require
+from ..units import METERS
 from .triangle_mesh import TriangleMesh
 from .unfold import unfold
 from .validate import checked_triangles, refuse_broken, signed_areas

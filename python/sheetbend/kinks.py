@@ -1,0 +1,20 @@
+"""What makes the motions of a scene not smooth in time."""
+
+from __future__ import annotations
+
+from .scene_data import SceneData
+
+
+def kinks(scene: SceneData) -> str:
+    """What makes motions of a scene not smooth in time, so that errors have no power series in h; empty if nothing.
+
+    Tethers, which act from one side only, need sweeps, and those are refused as such.
+    """
+    found = []
+    if any("yielding" in group.kind for group in scene.groups):
+        found.append("joints that yield")
+    if any(group.kind == "friction_hinge" for group in scene.groups):
+        found.append("joints with dry friction")
+    if scene.boundary.driven and scene.boundary.interpolation == "linear":
+        found.append("driven particles with linear knots, which kick them (use 'cubic')")
+    return " and ".join(found)
