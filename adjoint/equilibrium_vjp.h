@@ -3,7 +3,7 @@
 //   tangents:    A (x_dot, lambda_dot) = -(dr/dp) p_dot           r = (r_x, r_l) of residual.h, x of the fixed nodes being inputs
 //   cotangents:  A (u, v) = (x_bar, lambda_bar),  p_bar = -(dr/dp)^T (u, v)
 //
-// No derivative of a constraint is typed: tangents are the residual on duals; for cotangents (dr/dp)^T (u, v) is the gradient by p of
+// No derivative of a constraint is typed: tangents are the residual on duals; for cotangents (dr/dp)^T (u, v) is the gradient with respect to p of
 // sum_j lambda_j u . grad C_j + v_j C_j, one evaluation of each constraint on duals with 1 + parameters directions.
 #pragma once
 

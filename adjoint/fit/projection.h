@@ -4,7 +4,7 @@
 //   b(theta) = argmin |r(theta, b)|^2 + |b|^2,      X = -(A^T A + 1)^-1 A^T J_theta,
 //
 // and the optimizer sees the residuals [r(theta, b(theta)); b(theta)] with the Jacobian [J_theta + A X; X] (Kaufman 1975). A takes many rollouts, while the
-// gradient by all of b takes one adjoint. So b is made stationary by the adjoint, with steps that an A of an earlier theta only guides, the gradient by
+// gradient with respect to all of b takes one adjoint. So b is made stationary by the adjoint, with steps that an A of an earlier theta only guides, the gradient by
 // theta is corrected to J_theta^T r, which it then is, and `relinearize` makes A exact for intervals.
 #pragma once
 

@@ -62,7 +62,7 @@ void add_to_particles(T* rows, const int* nodes, [[maybe_unused]] int members, c
   }
 }
 
-// Row `j` of a member's gradient by one particle.
+// Row `j` of a member's gradient with respect to one particle.
 template <class T>
 void store_gradient(T* rows, const int* place, int j, const Wide<T>* J) {
   T* to = rows + sheetbend_blocks::row * j;

@@ -25,7 +25,7 @@
 //     what a projection makes of J without writing it down: matrix(w, A), add_times(v, y) and transpose_times(y, out), as in
 //     core/element/linearization.h. See membrane.h.
 //   template <class T> static void reverse(x, p, dl, y, a, b, x_bar, p_bar): of sum_j (v_j . J_j - y_j C_j) with v_j = dl_j a - y_j b, where dl, y (rows)
-//     and a, b (dofs) do not vary, the derivatives by J's x, Hess(C_j) v_j, and by p, added to x_bar and p_bar: what
+//     and a, b (dofs) do not vary, the derivatives with respect to J's x, Hess(C_j) v_j, and by p, added to x_bar and p_bar: what
 //     dual numbers otherwise find with a direction for each row and parameter. See membrane.h.
 //   template <class T> static void add_hessian(x, p, lambda, H): adds sum_j lambda_j Hess(C_j), its lower triangle row after row, to H: what dual
 //     numbers otherwise find with a direction per coordinate (core/element/second_order.h).

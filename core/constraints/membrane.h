@@ -203,7 +203,7 @@ struct Membrane : OnPoints<3> {
     }
   };
 
-  // slope D - Y f of one component: strain_bar is its derivative by the strain in the slope, and the coefficients get theirs.
+  // slope D - Y f of one component: strain_bar is its derivative with respect to the strain in the slope, and the coefficients get theirs.
   template <class T>
   struct Component {
     T f, slope, strain_bar;

@@ -53,7 +53,7 @@ inline void pressure_hessian(const std::array<Vec3<double>, 3>& at, double p, do
   std::fill_n(H, 81, 0.0);
   for (int a = 0; a < 3; ++a) {
     const int b = (a + 1) % 3;
-    // the gradient by corner a is (b x c)/6, and v x c = -[c] v
+    // the gradient with respect to corner a is (b x c)/6, and v x c = -[c] v
     const Vec3<double> c = p / 6.0 * at[(a + 2) % 3];
     const double by_b[3][3] = {{0.0, c.z, -c.y}, {-c.z, 0.0, c.x}, {c.y, -c.x, 0.0}};
     for (int i = 0; i < 3; ++i)

@@ -82,7 +82,7 @@ inline std::vector<double> compliances(const Scene& scene, const Inputs<const do
   return alpha;
 }
 
-// The volume's C, and its gradient by the volume's nodes.
+// The volume's C, and its gradient with respect to the volume's nodes.
 template <class T>
 T kept_volume(const Scene& scene, const Inputs<const T>& in, int i, const T* x, std::vector<Vec3<T>>& gradient) {
   const Volume& volume = scene.volumes[i];

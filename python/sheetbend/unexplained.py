@@ -23,8 +23,8 @@ Mask = NDArray[np.bool_]
 
 MOST = 0.5
 """Of the motion's variance beyond noise: a fit that leaves more of it does not explain the motion. The fits of the
-shipped experiments leave 0.0001 to 20 %; those that were built to mislead, without a loss that the motion has, leave
-100 to 800 %."""
+shipped experiments leave at most about 20 %, by their logged reports; those that were built to mislead, without a loss
+that the motion has, leave 106 to 2,400 %."""
 NOISY = 4.0  # of the noise's variance: what is left is none
 WORSE = 0.02  # of the motion's variance: by so much a prediction that nothing moves must be better
 CHANCE = 4.0  # standard deviations

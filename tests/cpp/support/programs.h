@@ -55,7 +55,7 @@ T loss(const Program& p, const std::vector<T>& inputs) {
   return sum;
 }
 
-// The loss's gradient by all inputs, by reverse.
+// The loss's gradient with respect to all inputs, by reverse.
 template <class T>
 std::vector<T> gradient(const Program& p, const std::vector<T>& inputs, Recorded<T>& recorded) {
   std::vector<T> x_bar, inputs_bar(inputs.size());
