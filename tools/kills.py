@@ -29,9 +29,9 @@ from typing import Any
 
 import numpy as np
 import sheetbend as sb
-from sheetbend import journal
 from sheetbend.gripped import RopeReport, fit_rope
 from sheetbend.gripped.ladder import TILTS, TWIST
+from sheetbend.minimum import journal
 
 ROPES = Path(__file__).resolve().parents[1] / "experiments" / "gripped_ropes"
 WANTED = ("rope_EI", "rope_bend_damping", "rope_drag_linear")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import sheetbend as sb
 from sheetbend.config import load
-from sheetbend.quantities import product
+from sheetbend.quantities.quantities import product
 
 CONFIG = Path(__file__).with_name("beam.toml")
 SIDE, POISSON = 0.03, 0.5  # m, of the square section; silicone

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 from sheetbend.bench import cloth
-from sheetbend.scene import Scene
-from sheetbend.solver import Solver
+from sheetbend.motion.solver import Solver
+from sheetbend.scene.scene import Scene
 
 KINDS = ("strain", "dihedral")
 

@@ -9,7 +9,8 @@ from functools import cache
 import numpy as np
 import sheetbend as sb
 from sheetbend import textile
-from sheetbend.problem import FitProblem, as_parameters
+from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.result.result import Estimate
 
 SIGMA = 3e-3  # m
 ALIKE = 0.8  # correlation of neighboring frames
@@ -29,7 +30,7 @@ class Case:
 
     about: str
     truth: Mapping[str, float]
-    fit: Callable[[int], Mapping[str, sb.result.Estimate]]
+    fit: Callable[[int], Mapping[str, Estimate]]
     least: int = 182
     most: int = 198
     beside: str = ""
@@ -106,11 +107,11 @@ def of_motion(
     truth: Mapping[str, float],
     noise: Callable[[tuple[int, ...], int], np.ndarray] = white,
     refine: str | None = None,
-) -> Callable[[int], Mapping[str, sb.result.Estimate]]:
+) -> Callable[[int], Mapping[str, Estimate]]:
     """A fit that starts at 1.3 times the truth; `refine` counts its "step", or "mesh" and step, or nothing."""
     known = cache(clean)
 
-    def fit(seed: int) -> Mapping[str, sb.result.Estimate]:
+    def fit(seed: int) -> Mapping[str, Estimate]:
         e = make(size, share=1.3)
         recording = replace(e.recording, positions=known() + noise(known().shape, seed))
         finer = sb.Refinement(finer=lambda: [replace(make(2 * size), recording=recording)], linear=True)
@@ -126,7 +127,7 @@ SCATTER = 0.03  # of each point of a pull, relative
 STRAINS = np.linspace(0.0, 0.05, 41)
 
 
-def pull(seed: int) -> Mapping[str, sb.result.Estimate]:
+def pull(seed: int) -> Mapping[str, Estimate]:
     """Five specimens of an exponential fabric, whose readings scatter by 3 % independently at every level."""
     clean = pulled_loads()
     rng = np.random.default_rng(seed)

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import sheetbend as sb
-from sheetbend.markers import on_rope
-from sheetbend.rod import add_rod
+from sheetbend.objects.markers import on_rope
+from sheetbend.objects.rod import add_rod
 
 LENGTH, DENSITY = 0.5, 0.06
 LINKS, H, RATE, SECONDS = 33, 2e-3, 100, 2.0

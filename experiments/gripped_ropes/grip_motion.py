@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from sheetbend.grip import Grip, any_across, carried
+from sheetbend.objects.grip import Grip, any_across, carried
 from true_ropes import Array, Rope
 
 KNOTS = 400  # Hz

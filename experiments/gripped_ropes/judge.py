@@ -26,7 +26,7 @@ import sheetbend as sb
 from sheetbend.gripped import RopeFit, RopeModel, RopeReport, Rung, Screened, evaluate, fit_rope, screened
 from sheetbend.gripped.judging import predict
 from sheetbend.gripped.ladder import LADDER, TWIST
-from sheetbend.scores import coordinate_error
+from sheetbend.report.scores import coordinate_error
 
 SMOOTHING = 0.08  # s
 LINKS = 48  # of predictions with the true values

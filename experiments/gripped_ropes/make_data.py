@@ -23,10 +23,10 @@ import sheetbend as sb
 from grip_motion import KNOTS, NOMINAL, UP, motion
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
-from sheetbend.grip import Grip
 from sheetbend.gripped import GrippedMotion
-from sheetbend.quantities import product
-from sheetbend.scores import coordinate_error
+from sheetbend.objects.grip import Grip
+from sheetbend.quantities.quantities import product
+from sheetbend.report.scores import coordinate_error
 from spoil import BELONGS, SPOILED
 from true_ropes import GRAVITY, GRIPPED, Array, Rope, ropes
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import sheetbend as sb
 from dic import CELLS, COLUMNS, HEIGHT, REST, ROWS, STILLS, experiment
-from sheetbend.quantities import Term
+from sheetbend.quantities.quantities import Term
 from study import FIXED, OUT, RATIOS, carried_on, errors, predicted, stretch
 
 FITTED = (8, 10, 12, 14, 16)

@@ -9,7 +9,7 @@ import numpy as np
 import sheetbend as sb
 from motion import Array
 from search import Search
-from sheetbend.drawing import ACCENT, INK, WARM, clean, key, new_figure
+from sheetbend.pictures.drawing import ACCENT, INK, WARM, clean, key, new_figure
 from task import Task
 
 SHAPES = 9  # of the rope over time, in one picture

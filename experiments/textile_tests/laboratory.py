@@ -10,8 +10,8 @@ import sys
 import numpy as np
 import sheetbend as sb
 from sheetbend import textile
-from sheetbend.drawing import ACCENT, GRAY, INK, WARM, new_figure
-from sheetbend.plotting import save
+from sheetbend.pictures.drawing import ACCENT, GRAY, INK, WARM, new_figure
+from sheetbend.pictures.plotting import save
 from sheetbend.textile.shadow import shadow
 
 # Wang, O'Brien, Ramamoorthi 2011, as shipped with ARCSim: stiffness at small strain, rigidity at low curvature along

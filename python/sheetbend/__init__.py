@@ -5,13 +5,6 @@ to recordings, with intervals and words for what the data cannot tell.
 """
 
 from . import mesh
-from .arm import add_arm, add_pendulum
-from .arm_data import Arm
-from .balance import ForceBalance, force_balance
-from .baseline import no_physics
-from .cloth import Cloth, add_cloth
-from .discretization import Refinement
-from .equilibrium import Equilibrium, NoEquilibriumError, equilibria, equilibrium
 from .errors import (
     ConfigError,
     DivergenceError,
@@ -24,36 +17,43 @@ from .errors import (
     UnbalancedError,
     UnconvergedError,
 )
-from .experiment import Experiment
-from .fabric import Exponential, Fabric, Linear, Sinh, Spline
-from .fit import Fit, fit
-from .force_readings import simulate_forces
-from .force_recording import ForceRecording
-from .force_sensor import ForceSensor
-from .gradients import GradientReport, check_gradients
-from .grip import Grip
-from .hand_eye import HandEye
-from .io.folder import recordings
-from .kinds import KINDS
-from .markers import Place, along_rope, between, on_cloth, on_particle, on_rope
+from .experiment.experiment import Experiment
+from .experiment.force_readings import simulate_forces
+from .experiment.force_sensor import ForceSensor
+from .fitting.fit import Fit, fit
 from .mesh import TriangleMesh, read_mesh
-from .parameters import Parameter, Parameters
-from .recording import Recording
-from .redundancy import RedundantConstraintsWarning
-from .result import FitResult
-from .rod import Rod, add_rod, rod
-from .rod_junction import Junction
-from .rollout import Gradient, Rollout, rollout
-from .rope import Rope, add_rope, rope
-from .scene import Scene
-from .scene_file import load_scene, save_scene
-from .scores import Score, Scores, coordinate_error, scores
-from .simulate import Trajectory, simulate
-from .solver import Solver
-from .tape import TapePlan, tape_plan
-from .tethers import add_tethers
-from .tool import Tool
-from .values import constraint_values, elastic_energy, support_forces
+from .minimum.discretization import Refinement
+from .motion.balance import ForceBalance, force_balance
+from .motion.equilibrium import Equilibrium, NoEquilibriumError, equilibria, equilibrium
+from .motion.gradients import GradientReport, check_gradients
+from .motion.redundancy import RedundantConstraintsWarning
+from .motion.rollout import Gradient, Rollout, rollout
+from .motion.simulate import Trajectory, simulate
+from .motion.solver import Solver
+from .motion.tape import TapePlan, tape_plan
+from .motion.values import constraint_values, elastic_energy, support_forces
+from .objects.arm import add_arm, add_pendulum
+from .objects.arm_data import Arm
+from .objects.cloth import Cloth, add_cloth
+from .objects.fabric import Exponential, Fabric, Linear, Sinh, Spline
+from .objects.grip import Grip
+from .objects.hand_eye import HandEye
+from .objects.markers import Place, along_rope, between, on_cloth, on_particle, on_rope
+from .objects.rod import Rod, add_rod, rod
+from .objects.rod_junction import Junction
+from .objects.rope import Rope, add_rope, rope
+from .objects.tethers import add_tethers
+from .objects.tool import Tool
+from .quantities.kinds import KINDS
+from .quantities.parameters import Parameter, Parameters
+from .recording.baseline import no_physics
+from .recording.force_recording import ForceRecording
+from .recording.io.folder import recordings
+from .recording.recording import Recording
+from .report.fit_result import FitResult
+from .report.scores import Score, Scores, coordinate_error, scores
+from .scene.scene import Scene
+from .scene.scene_file import load_scene, save_scene
 from .version import __version__ as __version__
 
 __all__ = [

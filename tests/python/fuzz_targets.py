@@ -16,10 +16,12 @@ import test_config_cloth
 import test_motion_capture
 import test_written_files
 from mutations import json_tree, mutated, packed, toml_tree
-from sheetbend import config, result
+from sheetbend import config
 from sheetbend.cli.gripped import load_ropes
-from sheetbend.door import reading
-from sheetbend.names import flaw
+from sheetbend.files.door import reading
+from sheetbend.files.names import flaw
+from sheetbend.report.fit_result import FitResult
+from sheetbend.result import result
 from sheetbend.textile import read_curves
 
 EXPERIMENTS = Path(__file__).resolve().parents[2] / "experiments"
@@ -112,7 +114,7 @@ def _fits(folder: Path) -> list[Files]:
         name="EI", value=1e-3, unit="N m^2", lower=9e-4, upper=None, half_width=None, statistical=None,
         discretization=0.0, verdict="one-sided", words="bounded",
     )  # fmt: skip
-    found = result.FitResult(
+    found = FitResult(
         estimates=(estimate,),
         recordings=(result.RecordingFit(name="a", rows=9, rms=1e-3, held_out=2e-3, baseline=3e-3, motion=1e-2),),
         given=(result.Given(name="EA", value=1.0, unit="N", words="fixed"),),

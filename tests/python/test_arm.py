@@ -9,7 +9,8 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 from scipy.integrate import solve_ivp
-from sheetbend.arm import Arm, add_arm, add_pendulum
+from sheetbend.objects.arm import add_arm, add_pendulum
+from sheetbend.objects.arm_data import Arm
 from support import period
 
 G = 9.81

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend.equilibrium import NoEquilibriumError
+from sheetbend.motion.equilibrium import NoEquilibriumError
+from sheetbend.quantities.quantities import term
 
 NAN, INF = math.nan, math.inf
 
@@ -163,7 +164,7 @@ SCENE = {
     "quantity not positive": ("q", lambda: three().add_quantity("q", 0.0, "m")),
     "term of an unknown quantity": (
         "terms",
-        lambda: three().add_terms([sb.quantities.term("mass", 0, 1.0, q="identity")]),
+        lambda: three().add_terms([term("mass", 0, 1.0, q="identity")]),
     ),
     "point mass beyond": ("add_point_mass.particle", lambda: three().add_point_mass(9, 1.0, "p")),
     "negative point mass": ("p_mass", lambda: three().add_point_mass(1, -1.0, "p")),

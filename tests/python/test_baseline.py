@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sheetbend.baseline import blend_baseline, hold_baseline, no_physics, rest_baseline, rms_about
 from sheetbend.errors import RecordingError
-from sheetbend.recording import Recording
+from sheetbend.recording.baseline import blend_baseline, hold_baseline, no_physics, rest_baseline, rms_about
+from sheetbend.recording.recording import Recording
 
 NAN = np.nan
 T = np.linspace(0, 1, 21)

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import sheetbend as sb
-import sheetbend.beginnings as behind
+import sheetbend.doubts.beginnings as behind
 from pytest import approx
-from sheetbend.arm import add_arm
-from sheetbend.beginnings import beginnings, checked
-from sheetbend.growth import growths
-from sheetbend.optimizers import Minimum, minimize
-from sheetbend.problem import FitProblem, as_parameters
-from sheetbend.search import Search
+from sheetbend.doubts.beginnings import beginnings, checked
+from sheetbend.minimum.growth import growths
+from sheetbend.minimum.optimizers import Minimum, minimize
+from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.minimum.search import Search
+from sheetbend.objects.arm import add_arm
 
 SOLVER = sb.Solver(h=1 / 400)
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from pytest import approx
-from sheetbend.blocks import Split, contradiction
-from sheetbend.contradictions import splits
-from sheetbend.covariance import Layout
-from sheetbend.problem import FitProblem, as_parameters
+from sheetbend.doubts.contradictions import splits
+from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.statistics.blocks import Split, contradiction
+from sheetbend.statistics.covariance import Layout
 from test_identifiability import design, errors
 
 FRAMES, CHANNELS = 100, 4

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sheetbend.errors import RecordingError
-from sheetbend.recording import Recording
+from sheetbend.recording.recording import Recording
 
 INTEL, DEC, MIPS = 84, 85, 86
 BLOCK = 512

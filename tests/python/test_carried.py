@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend.baseline import no_physics
-from sheetbend.carried import carried_baselines
-from sheetbend.clock import lateness, outside, told_clocks
-from sheetbend.fitted_motion import fitted_positions
-from sheetbend.result import Estimate, RecordingFit
+from sheetbend.experiment.carried import carried_baselines
+from sheetbend.experiment.clock import lateness, outside, told_clocks
+from sheetbend.fitting.fitted_motion import fitted_positions
+from sheetbend.recording.baseline import no_physics
+from sheetbend.result.result import Estimate, RecordingFit
 
 Array = np.ndarray
 T = np.linspace(0.0, 1.0, 41)

@@ -16,7 +16,7 @@ import pytest
 import sheetbend as sb
 from commands import last_line, run
 from sheetbend import cli
-from sheetbend.gradients import GradientReport, GradientRow
+from sheetbend.motion.gradients import GradientReport, GradientRow
 
 ROPE = """\
 [experiment]
@@ -258,7 +258,7 @@ class TestCheck:
     def test_a_wrong_jacobian_exits_5(
         self, config: Path, monkeypatch: pytest.MonkeyPatch, wrong: Callable, static: bool
     ) -> None:
-        from sheetbend.problem import FitProblem
+        from sheetbend.minimum.problem import FitProblem
 
         exact = FitProblem.evaluate
         if static:  # bent by its own weight, so that its shape depends on EI

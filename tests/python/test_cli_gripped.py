@@ -21,7 +21,8 @@ from sheetbend.cli import gripped
 from sheetbend.config import GrippedConfig, gripped_schema, parse, parse_any
 from sheetbend.gripped import LADDER, GrippedMotion, trades
 from sheetbend.gripped.ladder import MARKERS, REST, SHIFTS, TILTS, TWIST, VARYING, YIELD
-from sheetbend.result import Correlation, Estimate, FitResult
+from sheetbend.report.fit_result import FitResult
+from sheetbend.result.result import Correlation, Estimate
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "gripped_ropes"
 ROPE = """\

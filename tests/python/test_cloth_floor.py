@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from pytest import approx
-from sheetbend.floors import solver_floors
-from sheetbend.problem import as_parameters
+from sheetbend.doubts.floors import solver_floors
+from sheetbend.minimum.problem import as_parameters
 
 G, SIZE, DENSITY, SWEEPS = 9.81, 0.3, 0.2, 10
 

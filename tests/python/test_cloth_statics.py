@@ -9,7 +9,7 @@ import sheetbend as sb
 from pytest import approx
 from scipy.integrate import quad
 from scipy.optimize import brentq
-from sheetbend.problem import FitProblem, as_parameters
+from sheetbend.minimum.problem import FitProblem, as_parameters
 from support import static_sensitivity, twice
 
 WARP, SHEAR = 1000.0, 50.0

@@ -265,7 +265,7 @@ class TestBuild:
         second = '\n[[recording]]\nfile = "swing.npz"\nname = "again"\nvalues = { rope_EI = 5e-3 }\n'
         text = ROPE.replace("[parameters.rope_EI]", f"{second}\n[parameters.rope_EI]\nprivate = true")
         study = load(written(folder, text))
-        from sheetbend.problem import FitProblem, as_parameters
+        from sheetbend.minimum.problem import FitProblem, as_parameters
 
         problem = FitProblem(study.experiments, as_parameters(study.parameters, study.experiments))
         values = problem.parameters.to_physical(problem.parameters.initial())

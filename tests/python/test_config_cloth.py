@@ -11,6 +11,7 @@ import sheetbend as sb
 from sheetbend.cli.app import app
 from sheetbend.config import load, parse, scene_alone
 from sheetbend.config.values import with_values, write
+from sheetbend.pictures.strain import green_strain
 from typer.testing import CliRunner
 
 CLOTH = """\
@@ -338,7 +339,7 @@ class TestCommands:
         np.testing.assert_allclose(sb.read_mesh(frames[-1]).vertices, last, atol=1e-9)
         (ply,) = run("simulate", path, "--mesh", "ply")["simulated"]["sheet"]["meshes"]
         raw = trimesh.load_mesh(ply, process=False).metadata["_ply_raw"]["face"]["data"]
-        shear = sb.strain.green_strain(scene(15.0)[1].mesh, last)[:, 2]
+        shear = green_strain(scene(15.0)[1].mesh, last)[:, 2]
         np.testing.assert_allclose(np.ravel(raw["strain_shear"]), shear, atol=1e-12)
 
     def test_meshes_need_a_cloth(self, folder: Path) -> None:

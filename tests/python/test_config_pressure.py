@@ -10,7 +10,7 @@ import pytest
 import sheetbend as sb
 from sheetbend.cli.app import app
 from sheetbend.config import load, parse, scene_alone
-from sheetbend.volume import enclosed_volume
+from sheetbend.scene.volume import enclosed_volume
 from typer.testing import CliRunner
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*warp direction jumps")  # as on every sphere

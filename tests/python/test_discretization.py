@@ -9,14 +9,15 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 from sheetbend.mesh import grid
-from sheetbend.problem import FitProblem, as_parameters
+from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.result.result import Estimate
 
 TRUE = {"warp": 60.0, "weft": 40.0, "shear": 12.0}
 WANTED = ["cloth_warp", "cloth_shear", "cloth_bending", "cloth_drag_linear"]
 SEEN = np.array([(x, y) for x in np.linspace(0.0, 0.2, 4)[1:] for y in np.linspace(0.0, 0.2, 4)])
 
 
-def swatch(cells: int = 4, share: float = 1.0) -> tuple[sb.Scene, list[sb.markers.Place]]:
+def swatch(cells: int = 4, share: float = 1.0) -> tuple[sb.Scene, list[sb.Place]]:
     """A sheet of 0.2 m held along one side, level, with stiffness off by a share; and places of its markers."""
     scene, mesh = sb.Scene("swatch"), grid(0.2, 0.2, cells, cells, "one_way")
     stiffness = {name: share * value for name, value in TRUE.items()} | {"weft": TRUE["weft"]}
@@ -49,7 +50,7 @@ def watched(recording: sb.Recording, cells: int = 4, method: str = "newton", **s
     )
 
 
-def off(e: sb.result.Estimate, truth: float) -> float:
+def off(e: Estimate, truth: float) -> float:
     """Distance from the truth in half-widths."""
     return abs(e.value - truth) / e.half_width
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend.parameters import Parameter
+from sheetbend.quantities.parameters import Parameter
 
 SOLVER = sb.Solver(h=1 / 400)
 TIMES = np.array([0.0, 0.01, 0.02])
@@ -118,7 +118,7 @@ def test_a_fit_refuses_such_a_start(rod: sb.Scene) -> None:
 
 
 def test_a_fit_does_not_step_there(rod: sb.Scene) -> None:
-    from sheetbend.problem import FitProblem, as_parameters
+    from sheetbend.minimum.problem import FitProblem, as_parameters
 
     e = sb.Experiment(scene=rod, recording=recording(rod), solver=SOLVER)
     problem = FitProblem([e], as_parameters(["rod_density_1"], [e]))

@@ -13,9 +13,9 @@ import sheetbend as sb
 from pytest import approx
 from sheetbend.cli.app import app
 from sheetbend.config import Study, build, parse
-from sheetbend.driven_noise import driven_noises
-from sheetbend.optimizers import Progress, minimize
-from sheetbend.problem import FitProblem, as_parameters
+from sheetbend.doubts.driven_noise import driven_noises
+from sheetbend.minimum.optimizers import Progress, minimize
+from sheetbend.minimum.problem import FitProblem, as_parameters
 from typer.testing import CliRunner
 
 Array = np.ndarray

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.config import load
-from sheetbend.fit import Fit
-from sheetbend.prediction import Comparison
-from sheetbend.result import RecordingFit
+from sheetbend.doubts.prediction import Comparison
+from sheetbend.fitting.fit import Fit
+from sheetbend.result.result import RecordingFit
 
 BEAM = Path(__file__).resolve().parents[2] / "experiments" / "beam" / "beam.toml"
 SECOND_MOMENT = 0.03**4 / 12  # of the section, m^4

@@ -11,7 +11,7 @@ from types import ModuleType
 import pytest
 from pytest import approx
 from sheetbend.config import load
-from sheetbend.fit import Fit
+from sheetbend.fitting.fit import Fit
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "beam"
 

@@ -14,9 +14,9 @@ from types import ModuleType
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend.grip import Grip
 from sheetbend.gripped import RopeModel
 from sheetbend.gripped.start import started
+from sheetbend.objects.grip import Grip
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "gripped_ropes"
 SECONDS, FRAMES = 1.0, 100

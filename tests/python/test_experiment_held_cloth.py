@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.config import build, parse
-from sheetbend.problem import FitProblem, as_parameters
+from sheetbend.minimum.problem import FitProblem, as_parameters
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "held_cloth"
 sys.path.insert(0, str(FOLDER))

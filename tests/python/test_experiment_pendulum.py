@@ -11,8 +11,8 @@ import pytest
 import sheetbend as sb
 from sheetbend.config import build, parse
 from sheetbend.config.build import Study
-from sheetbend.gauge import null_space
-from sheetbend.problem import FitProblem, as_parameters
+from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.statistics.gauge import null_space
 
 EXPERIMENTS = Path(__file__).resolve().parents[2] / "experiments"
 AUTHORS_LENGTH = 0.1527591  # a + I/(m a), m

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from pytest import approx
-from sheetbend.arm import add_pendulum
-from sheetbend.extrapolation import weights
-from sheetbend.problem import FitProblem, as_parameters
+from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.motion.extrapolation import weights
+from sheetbend.objects.arm import add_pendulum
 
 FRAMES = np.arange(5) * 0.25
 

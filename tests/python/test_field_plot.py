@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend.field_plot import Field, plot_fields
-from sheetbend.plotting import save
-from sheetbend.strain import green_strain, strain_fields
+from sheetbend.pictures.field_plot import Field, plot_fields
+from sheetbend.pictures.plotting import save
+from sheetbend.pictures.strain import green_strain, strain_fields
 
 MESH = sb.mesh.grid(0.2, 0.1, 4, 2)
 

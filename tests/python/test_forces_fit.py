@@ -9,10 +9,10 @@ import sheetbend as sb
 from pytest import approx
 from sheetbend.cli.app import app
 from sheetbend.config import load
-from sheetbend.covariance import Layout, covariance
-from sheetbend.force_plot import plot_forces
-from sheetbend.jacobian_check import check_jacobian
-from sheetbend.problem import FitProblem, as_parameters
+from sheetbend.minimum.jacobian_check import check_jacobian
+from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.pictures.force_plot import plot_forces
+from sheetbend.statistics.covariance import Layout, covariance
 from typer.testing import CliRunner
 
 TRUTH = {"rod_density": 0.12, "rod_EI": 6e-3}

@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend import config, io
+from sheetbend import config
 from sheetbend.errors import ConfigError, InputError, RecordingError
+from sheetbend.recording import io
 from sheetbend.textile import read_curves
 from test_c3d import parameter, words
 from test_c3d import written as c3d_file

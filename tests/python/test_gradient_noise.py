@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend.compiled import CompiledScene
-from sheetbend.gradients import GradientReport
 from sheetbend.mesh import icosphere
+from sheetbend.motion.gradients import GradientReport
+from sheetbend.scene.compiled import CompiledScene
 
 SOLVER = sb.Solver(h=1 / 400, method="gauss_seidel")
 TIMES = np.arange(5) / 400

@@ -18,7 +18,8 @@ from sheetbend.gripped.ladder import LADDER, MARKERS, REST, SHIFTS, TILTS, TWIST
 from sheetbend.gripped.model import place_of
 from sheetbend.gripped.pieces import experiments_of, problem_of
 from sheetbend.gripped.start import about, started, whole
-from sheetbend.optimizers import minimize
+from sheetbend.minimum.optimizers import minimize
+from sheetbend.minimum.problem import FitProblem
 from test_gripped_motion import carried_about, model_of
 
 MOTION = GrippedMotion.of(carried_about(), 0.0)
@@ -53,7 +54,7 @@ class TestLadder:
     def test_everything_that_the_rungs_add_has_its_derivative(self) -> None:
         motion = MOTION.frames(slice(0, 31))
         e, parameters = whole(started(MODEL, [motion], 0.25), LADDER, motion, 0.3)
-        problem = sb.problem.FitProblem([e], parameters)
+        problem = FitProblem([e], parameters)
         u = problem.parameters.initial() + 0.01
         _, _, J = problem.evaluate(u)
         names = problem.parameters.free

@@ -8,9 +8,9 @@ import numpy as np
 from sheetbend.gripped import GrippedMotion
 from sheetbend.gripped.judging import predict
 from sheetbend.gripped.offsets import offset_reach
-from sheetbend.optimizers import minimize
-from sheetbend.parameters import Parameter, Parameters
-from sheetbend.problem import FitProblem
+from sheetbend.minimum.optimizers import minimize
+from sheetbend.minimum.problem import FitProblem
+from sheetbend.quantities.parameters import Parameter, Parameters
 from test_gripped_motion import carried_about, model_of
 
 NOISE, OFFSET = 2e-4, 1e-3  # m

@@ -11,7 +11,8 @@ import sheetbend as sb
 from sheetbend.gripped import GrippedMotion, fit_rope
 from sheetbend.gripped.judging import predict
 from sheetbend.gripped.stiffness import stiffness_section, tangent_stiffness
-from sheetbend.result import Correlation, Estimate, FitResult
+from sheetbend.report.fit_result import FitResult
+from sheetbend.result.result import Correlation, Estimate
 from test_cli_gripped import result_of
 from test_gripped_motion import carried_about, model_of
 

@@ -7,7 +7,7 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 from scipy.spatial.transform import Rotation
-from sheetbend.grip import carried
+from sheetbend.objects.grip import carried
 
 TIMES = np.linspace(0.0, 0.4, 21)
 TURNS = Rotation.from_rotvec(np.stack([0.8 * np.sin(5 * TIMES), 0.5 * TIMES, 1.1 * np.cos(3 * TIMES)], axis=1))

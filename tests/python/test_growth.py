@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend.arm import add_arm
-from sheetbend.growth import ROUGH, Growth, growth, growths
-from sheetbend.problem import FitProblem, as_parameters
+from sheetbend.minimum.growth import ROUGH, Growth, growth, growths
+from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.objects.arm import add_arm
 
 
 def experiment(scene: sb.Scene, end: float, h: float, **fields: object) -> sb.Experiment:

@@ -9,9 +9,9 @@ import pytest
 import sheetbend as sb
 from commands import last_line, run
 from pytest import approx
+from sheetbend.arrays.rigid import rigid_motion
 from sheetbend.config import build, parse
-from sheetbend.moving_clamp import clamped_ends
-from sheetbend.rigid import rigid_motion
+from sheetbend.scene.moving_clamp import clamped_ends
 
 Array = np.ndarray
 TIMES = np.arange(31) / 60

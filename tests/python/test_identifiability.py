@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 from scipy import signal, special
-from sheetbend.covariance import Layout, covariance
 from sheetbend.errors import InputError
-from sheetbend.gauge import null_space
-from sheetbend.identifiability import identify
-from sheetbend.judge import Floor
-from sheetbend.parameters import Parameter, Parameters
-from sheetbend.profile import profile_interval
+from sheetbend.quantities.parameters import Parameter, Parameters
+from sheetbend.statistics.covariance import Layout, covariance
+from sheetbend.statistics.gauge import null_space
+from sheetbend.statistics.identifiability import identify
+from sheetbend.statistics.judge import Floor
+from sheetbend.statistics.profile import profile_interval
 
 SEEDS = 400
 

@@ -11,8 +11,9 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 from scipy.integrate import solve_ivp
-from sheetbend.problem import FitProblem, as_parameters
-from sheetbend.report import plain
+from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.quantities.quantities import term
+from sheetbend.report.report import plain
 from support import observed_orders
 
 G = 9.81
@@ -259,8 +260,8 @@ def pendulum_with_free_length() -> sb.Scene:
     scene.add_constraints("distance", [[0, 1]], name="arm", rest=1.0)
     scene.pin([0])
     scene.add_quantity("excess", 0.0, "m", positive=False, scale=1.0)
-    scene.add_terms([sb.quantities.term("rest", 0, 1.0, excess="identity")])
-    scene.add_terms([sb.quantities.term("position", 3 + k, float(start[k]), excess="identity") for k in (0, 2)])
+    scene.add_terms([term("rest", 0, 1.0, excess="identity")])
+    scene.add_terms([term("position", 3 + k, float(start[k]), excess="identity") for k in (0, 2)])
     return scene
 
 

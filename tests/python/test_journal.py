@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend import _core, content, journal
-from sheetbend.journal import Journal
-from sheetbend.optimizers import Progress, has_ceres, minimize
-from sheetbend.problem import FitProblem, as_parameters
+from sheetbend import _core
+from sheetbend.minimum import content, journal
+from sheetbend.minimum.journal import Journal
+from sheetbend.minimum.optimizers import Progress, has_ceres, minimize
+from sheetbend.minimum.problem import FitProblem, as_parameters
 
 WANTED = ("rope_EI", "rope_bend_damping")
 OPTIMIZERS = ["scipy", *(["ceres"] if has_ceres() else [])]
@@ -334,7 +335,7 @@ class TestRefusals:
         assert path.read_text() == "notes " * 1000
 
     def test_a_journal_in_use(self, path: Path) -> None:
-        code = f"from sheetbend.journal import Journal; Journal({str(path)!r})"
+        code = f"from sheetbend.minimum.journal import Journal; Journal({str(path)!r})"
         with Journal(path):
             done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
         assert "InputError" in done.stderr and "locked" in done.stderr

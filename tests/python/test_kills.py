@@ -7,7 +7,7 @@ import importlib
 from pathlib import Path
 
 import pytest
-from sheetbend.optimizers import has_ceres
+from sheetbend.minimum.optimizers import has_ceres
 
 TOOLS = Path(__file__).resolve().parents[2] / "tools"
 

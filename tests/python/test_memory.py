@@ -14,7 +14,7 @@ import pytest
 import sheetbend as sb
 from sheetbend import _core
 from sheetbend.errors import InputError
-from sheetbend.memory import in_bytes, in_words, least_in_words
+from sheetbend.files.memory import in_bytes, in_words, least_in_words
 
 STEPS = 120
 TIMES = [0.03, 0.12]
@@ -280,13 +280,13 @@ def test_without_a_budget_half_of_the_free_memory_is_used_and_told(monkeypatch, 
     expected = sb.rollout(scene, TIMES, solver)
     assert expected.plan.budget is None and "fits in half of the free memory" in str(expected.plan) and not caplog.text
     free = 2 * budgets(scene, solver)[2]
-    monkeypatch.setattr("sheetbend.solver.free_memory", lambda: free)
+    monkeypatch.setattr("sheetbend.motion.solver.free_memory", lambda: free)
     found = sb.rollout(scene, TIMES, solver)
     assert found.plan.policy == "binomial" and found.plan.total <= found.plan.budget == free // 2
     assert "solver.memory is not given" in caplog.text and str(found.plan) in caplog.text
     bar = np.ones_like(expected.positions)
     assert found.gradient(bar).quantities == expected.gradient(bar).quantities
-    monkeypatch.setattr("sheetbend.solver.free_memory", lambda: 1000)
+    monkeypatch.setattr("sheetbend.motion.solver.free_memory", lambda: 1000)
     with pytest.raises(InputError, match=r"half of the free memory by default, and too small.*fewer frames"):
         sb.rollout(scene, TIMES, solver)
 
@@ -302,7 +302,7 @@ def test_ten_million_substeps_are_planned_within_the_free_memory():
 
 
 def test_what_does_not_fit_is_refused_before_it_runs(monkeypatch):
-    monkeypatch.setattr("sheetbend.memory.free_memory", lambda: 10**9)
+    monkeypatch.setattr("sheetbend.files.memory.free_memory", lambda: 10**9)
     scene, solver = wide(), sb.Solver(h=1e-3, memory="3 GB")
     times = np.broadcast_to(np.float64(1.0), 10**5)
     with pytest.raises(InputError, match=r"times: needs .* GB of memory, of which 1.00 GB are free.*fewer"):

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend.misread import _better, misread
-from sheetbend.problem import FitProblem, as_parameters
+from sheetbend.doubts.misread import _better, misread
+from sheetbend.minimum.problem import FitProblem, as_parameters
 
 SOLVER, SIGMA = sb.Solver(h=1 / 400), 3e-4
 TRUE = {"rope_EI": 2e-3, "rope_bend_damping": 0.01, "rope_drag_linear": 5e-3}

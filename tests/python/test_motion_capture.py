@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sheetbend.errors import RecordingError
-from sheetbend.recording import Recording
+from sheetbend.recording.recording import Recording
 
 FRAMES = 5
 GRIPPER = np.array([300.0, 1200.0, -50.0]) + np.arange(FRAMES)[:, None]  # mm, y up

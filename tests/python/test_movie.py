@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sheetbend as sb
-import sheetbend.movie as movie
+import sheetbend.pictures.movie as movie
 from sheetbend.cli.app import app
-from sheetbend.drawing import ACCENT, INK, WARM
-from sheetbend.movie import Motion, movie_paths, save_movie
+from sheetbend.pictures.drawing import ACCENT, INK, WARM
+from sheetbend.pictures.movie import Motion, movie_paths, save_movie
 from typer.testing import CliRunner
 
 pytest.importorskip("matplotlib")

@@ -9,14 +9,15 @@ import signal
 import numpy as np
 import pytest
 import sheetbend as sb
-import sheetbend.search as search
+import sheetbend.minimum.search as search
 from pytest import approx
-from sheetbend import conclude, discretization, optimizers
-from sheetbend.discretization import Refinement
-from sheetbend.optimizers import Progress, has_ceres, minimize
-from sheetbend.problem import FitProblem, as_parameters
+from sheetbend.doubts import conclude
+from sheetbend.minimum import discretization, optimizers
+from sheetbend.minimum.discretization import Refinement
+from sheetbend.minimum.optimizers import Progress, has_ceres, minimize
+from sheetbend.minimum.problem import FitProblem, as_parameters
 
-fitting = importlib.import_module("sheetbend.fit")  # the name in the package is the function
+fitting = importlib.import_module("sheetbend.fitting.fit")  # the name in the package is the function
 
 SOLVER = sb.Solver(h=1 / 400)
 WANTED = {"rope_EI": {"initial": 3e-3}, "rope_bend_damping": {"initial": 0.03}, "rope_density": {"prior": (0.05, 0.1)}}

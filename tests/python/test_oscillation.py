@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from sheetbend.oscillation import along, dominant_direction, first_frequency
+from sheetbend.recording.oscillation import along, dominant_direction, first_frequency
 
 TIMES = np.arange(100) / 100.0
 

@@ -20,8 +20,9 @@ from sheetbend.cli.app import app
 from sheetbend.mesh import grid
 from sheetbend.page import Shown, fit_page, motion_page, of_recording, of_trajectory
 from sheetbend.page.packed import MISSING, packed_motions
-from sheetbend.report import sections
-from sheetbend.result import Correlation, FitResult
+from sheetbend.report.fit_result import FitResult
+from sheetbend.report.report import sections
+from sheetbend.result.result import Correlation
 from typer.testing import CliRunner
 
 pytest.importorskip("jinja2")

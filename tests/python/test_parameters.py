@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from sheetbend.errors import InputError
-from sheetbend.parameters import Parameter, Parameters
+from sheetbend.quantities.parameters import Parameter, Parameters
 
 
 def mixed() -> Parameters:

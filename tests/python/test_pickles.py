@@ -18,8 +18,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sheetbend.errors import RecordingError
-from sheetbend.io import plain_pickle
-from sheetbend.recording import Recording
+from sheetbend.recording.io import plain_pickle
+from sheetbend.recording.recording import Recording
 
 RNG = np.random.default_rng(7)
 FRAMES = [RNG.normal(size=(3, 6)) for _ in range(5)]

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from pytest import approx
-from sheetbend.arm import Arm, add_arm, add_pendulum
+from sheetbend.objects.arm import add_arm, add_pendulum
+from sheetbend.objects.arm_data import Arm
 
 G, LENGTH, MASS = 9.81, 0.25, 0.4
 WEIGHT = MASS * G * LENGTH  # N m, restoring torque over the sine of the angle

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from sheetbend import io
 from sheetbend.errors import RecordingError
-from sheetbend.names import flaw
-from sheetbend.recording import Recording
+from sheetbend.files.names import flaw
+from sheetbend.recording import io
+from sheetbend.recording.recording import Recording
 
 in_one_folder = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 coordinates = st.floats(-1e6, 1e6)

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sheetbend.errors import DivergenceError, InputError, RecordingError, SheetbendError
-from sheetbend.recording import Recording
+from sheetbend.recording.recording import Recording
 
 NAN = np.nan
 
@@ -364,7 +364,7 @@ def test_summary_says_what_matters() -> None:
 
 def test_recordings_need_numpy_alone() -> None:
     program = (
-        "import sys, sheetbend.recording, sheetbend.io, sheetbend.baseline;"
+        "import sys, sheetbend.recording.recording, sheetbend.recording.io, sheetbend.recording.baseline;"
         "print([m for m in ('scipy', 'torch', 'pandas', 'matplotlib') if m in sys.modules])"
     )
     loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)

@@ -16,9 +16,10 @@ import pytest
 from rich.console import Console
 from sheetbend.errors import InputError
 from sheetbend.optional import MissingExtraError, require
-from sheetbend.report import figures, plain, rich_report
-from sheetbend.result import Correlation, Estimate, FitResult, Given, RecordingFit, Start
-from sheetbend.wording import short
+from sheetbend.quantities.wording import short
+from sheetbend.report.fit_result import FitResult
+from sheetbend.report.report import figures, plain, rich_report
+from sheetbend.result.result import Correlation, Estimate, Given, RecordingFit, Start
 
 GAUGE = "rope_density^+1 * rope_EA^+1 stays free: only the ratio rope_EA/rope_density is known"
 
@@ -178,14 +179,14 @@ def test_missing_extras_are_named() -> None:
 
 def test_import_loads_numpy_only() -> None:
     code = "import sys\n"
-    code += "import sheetbend.parameters\n"
-    code += "import sheetbend.covariance\n"
-    code += "import sheetbend.gauge\n"
-    code += "import sheetbend.profile\n"
-    code += "import sheetbend.identifiability\n"
-    code += "import sheetbend.result\n"
-    code += "import sheetbend.report\n"
-    code += "import sheetbend.plotting\n"
+    code += "import sheetbend.quantities.parameters\n"
+    code += "import sheetbend.statistics.covariance\n"
+    code += "import sheetbend.statistics.gauge\n"
+    code += "import sheetbend.statistics.profile\n"
+    code += "import sheetbend.statistics.identifiability\n"
+    code += "import sheetbend.result.result\n"
+    code += "import sheetbend.report.report\n"
+    code += "import sheetbend.pictures.plotting\n"
     code += "print([m for m in ('scipy', 'rich', 'matplotlib', 'torch') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
@@ -203,7 +204,7 @@ def motion() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def test_trajectory_figure(motion: tuple[np.ndarray, ...], tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
-    from sheetbend.plotting import plot_residuals, plot_trajectories, save
+    from sheetbend.pictures.plotting import plot_residuals, plot_trajectories, save
 
     measured, simulated, times = motion
     figure = plot_trajectories(measured, simulated, times, held_out=(0.5, 1.0))
@@ -226,7 +227,7 @@ def test_trajectory_figure(motion: tuple[np.ndarray, ...], tmp_path: Path) -> No
 
 def test_motions_share_a_figure() -> None:
     pytest.importorskip("matplotlib")
-    from sheetbend.plotting import Motion, plot_motions
+    from sheetbend.pictures.plotting import Motion, plot_motions
 
     times = np.linspace(0, 1, 50)
     figure = plot_motions(
@@ -240,7 +241,7 @@ def test_motions_share_a_figure() -> None:
 
 def test_shape_and_estimate_figures(result: FitResult) -> None:
     pytest.importorskip("matplotlib")
-    from sheetbend.plotting import plot_estimates, plot_shapes
+    from sheetbend.pictures.plotting import plot_estimates, plot_shapes
 
     line = np.column_stack([np.linspace(0, 1, 20), np.zeros(20), np.linspace(0, 1, 20) ** 2])
     figure = plot_shapes([line] * 4, [line] * 4, names=list("abcd"))
@@ -259,7 +260,7 @@ def test_shape_and_estimate_figures(result: FitResult) -> None:
 def test_numbers_of_a_wide_estimate_stand_apart(lower: float, upper: float) -> None:
     """Over one to a few decades: no two labels of the axis overlap."""
     pytest.importorskip("matplotlib")
-    from sheetbend.plotting import plot_estimates
+    from sheetbend.pictures.plotting import plot_estimates
 
     wide = dataclasses.replace(estimate("cloth_warp", 50.0, 20.0, "weak", ""), lower=lower, upper=upper)
     figure = plot_estimates([wide])

@@ -21,8 +21,9 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from commands import last_line, run
-from sheetbend import optimizers
-from sheetbend.optimizers import Progress, has_ceres
+from sheetbend.minimum import optimizers
+from sheetbend.minimum.journal import Journal
+from sheetbend.minimum.optimizers import Progress, has_ceres
 from typer.testing import Result
 
 WRITTEN = {"fit.json", "report.txt", "report.html", "fitted.toml", "predicted_swing.npz", "predicted_swing.json"}
@@ -245,13 +246,13 @@ class TestFolder:
         assert "No space left on device; the earlier file is kept" in error["problem"]
         assert (OUT / "fit.json").read_bytes() == earlier and (OUT / "journal.sqlite").exists()
         evaluated: list[bool] = []
-        evaluate = sb.journal.Journal._keep
+        evaluate = Journal._keep
 
         def counted(self: Any, *arguments: Any) -> None:
             evaluated.append(True)
             evaluate(self, *arguments)
 
-        monkeypatch.setattr(sb.journal.Journal, "_keep", counted)
+        monkeypatch.setattr(Journal, "_keep", counted)
         assert run("fit", config, "--resume").exit_code == 0
         assert not evaluated and results() == whole  # all of the work was read
 

@@ -135,7 +135,7 @@ def test_what_holds_a_director_is_no_friction(monkeypatch, shear):
     """What keeps twist well posed resists a roll like the step times HOLD; halved and doubled it moves nothing."""
     motions = []
     for share in (0.5, 1.0, 2.0):
-        monkeypatch.setattr(import_module("sheetbend.rod"), "HOLD", share * 1e-4)
+        monkeypatch.setattr(import_module("sheetbend.objects.rod"), "HOLD", share * 1e-4)
         motions.append(sb.simulate(swinging(20, **shear), [0.0, 0.5, 1.0], sb.Solver(h=1 / 400)).positions)
     for other in (motions[0], motions[2]):
         assert np.abs(other - motions[1]).max() < 1e-4 * LENGTH

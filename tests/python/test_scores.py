@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from rich.console import Console
-from sheetbend.baseline import rms_about
+from sheetbend.recording.baseline import rms_about
 
 NAN = np.nan
 

@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from pytest import approx
-from sheetbend.approach import LOG_STEP, Approach, inside, step_limits
 from sheetbend.errors import InputError, SheetbendError
-from sheetbend.growth import Growth
-from sheetbend.optimizers import has_ceres, minimize
-from sheetbend.parameters import DEFAULT_RANGE, Parameter, Parameters
-from sheetbend.problem import FitProblem, as_parameters
-from sheetbend.report import plain
-from sheetbend.result import FitResult
-from sheetbend.search import Search
-from sheetbend.windows import chosen, cut
+from sheetbend.minimum.approach import LOG_STEP, Approach, inside, step_limits
+from sheetbend.minimum.growth import Growth
+from sheetbend.minimum.optimizers import has_ceres, minimize
+from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.minimum.search import Search
+from sheetbend.minimum.windows import chosen, cut
+from sheetbend.quantities.parameters import DEFAULT_RANGE, Parameter, Parameters
+from sheetbend.report.fit_result import FitResult
+from sheetbend.report.report import plain
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "far_starts"
 sys.path.insert(0, str(FOLDER))

@@ -10,7 +10,7 @@ import sheetbend as sb
 from pytest import approx
 from sheetbend.cli.app import app
 from sheetbend.config import build, parse, scene_alone
-from sheetbend.tool import accelerations
+from sheetbend.objects.tool import accelerations
 from typer.testing import CliRunner
 
 Array = np.ndarray

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import sheetbend as sb
-from sheetbend.problem import FitProblem
-from sheetbend.unexplained import shares, unexplained
+from sheetbend.doubts.unexplained import shares, unexplained
+from sheetbend.minimum.problem import FitProblem
 
 SIGMA = 3e-4
 

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from pytest import approx
-from sheetbend.arm import add_arm
 from sheetbend.cli.outcome import Code, code_of
-from sheetbend.conclude import Elsewhere, judged_parameters, without_verdict
-from sheetbend.contradictions import elsewhere, held_out_motion
-from sheetbend.identifiability import Identifiability
-from sheetbend.optimizers import Minimum
-from sheetbend.problem import FitProblem, as_parameters
-from sheetbend.result import UNSOUND
-from sheetbend.stationary import no_minimum
+from sheetbend.doubts.conclude import Elsewhere, judged_parameters, without_verdict
+from sheetbend.doubts.contradictions import elsewhere, held_out_motion
+from sheetbend.doubts.stationary import no_minimum
+from sheetbend.minimum.optimizers import Minimum
+from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.objects.arm import add_arm
+from sheetbend.result.result import UNSOUND
+from sheetbend.statistics.identifiability import Identifiability
 
 SOLVER = sb.Solver(h=1 / 400)
 WANTED = {"rope_EI": {"initial": 3e-3}, "rope_bend_damping": {"initial": 0.03}}

@@ -9,7 +9,7 @@ import sheetbend as sb
 from balloons import PRESSURE, RADIUS, SHEAR, STRETCH, YOUNG, expect_bits_of_a_loop, skin
 from pytest import approx
 from sheetbend.mesh import icosphere
-from sheetbend.volume import enclosed_volume
+from sheetbend.scene.volume import enclosed_volume
 from support import observed_orders, refitted, sensitivity, steps
 
 SPHERE = icosphere(RADIUS, 1)

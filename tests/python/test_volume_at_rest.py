@@ -9,7 +9,7 @@ import sheetbend as sb
 from balloons import POISSON, PRESSURE, RADIUS, SHEAR, STRETCH, YOUNG, held, skin
 from pytest import approx
 from sheetbend.mesh import icosphere
-from sheetbend.volume import enclosed_volume
+from sheetbend.scene.volume import enclosed_volume
 from support import observed_orders, static_sensitivity, twice
 
 Array = np.ndarray

@@ -9,7 +9,7 @@ import sheetbend as sb
 from balloons import RADIUS, STRETCH, expect_bits_of_a_loop, held, skin
 from pytest import approx
 from sheetbend.mesh import icosphere
-from sheetbend.volume import enclosed_volume
+from sheetbend.scene.volume import enclosed_volume
 from support import observed_orders, refitted, steps
 
 SPHERE = icosphere(RADIUS, 1)

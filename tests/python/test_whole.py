@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend.whole import UnwrittenError, write_text, written
+from sheetbend.files.whole import UnwrittenError, write_text, written
 
 
 def names(folder: Path) -> list[str]:
@@ -51,7 +51,7 @@ def test_the_earlier_file_stays_when_the_disk_is_full(tmp_path: Path) -> None:
     """A limit on the size of files stands for the disk."""
     code = """
     import resource, sheetbend as sb
-    from sheetbend.whole import write_text
+    from sheetbend.files.whole import write_text
     write_text("report.txt", "earlier")
     resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
     try:
@@ -68,7 +68,7 @@ def test_the_earlier_file_stays_when_the_disk_is_full(tmp_path: Path) -> None:
 def test_a_killed_process_leaves_the_earlier_file(tmp_path: Path) -> None:
     code = """
     import os, signal
-    from sheetbend.whole import write_text, written
+    from sheetbend.files.whole import write_text, written
     write_text("fit.json", "earlier")
     with written("fit.json") as beside:
         beside.write_text("ha")
@@ -128,7 +128,7 @@ def test_a_recording_that_cannot_be_written_keeps_the_earlier_one(
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("sheetbend.whole._on_disk", full)
+    monkeypatch.setattr("sheetbend.files.whole._on_disk", full)
     with pytest.raises(UnwrittenError, match="the earlier file is kept"):
         recording.save(path)
     assert path.read_bytes() == before and not [name for name in names(tmp_path) if name.startswith(".")]

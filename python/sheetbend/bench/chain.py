@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ..rope import rope
-from ..solver import Solver
+from ..motion.solver import Solver
+from ..objects.rope import rope
 from ..version import __version__
 from .machine import isa, machine
 from .measurement import LANES

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from ..cloth import add_cloth
 from ..mesh import grid
-from ..scene import Scene
-from ..solver import Solver
+from ..motion.solver import Solver
+from ..objects.cloth import add_cloth
+from ..scene.scene import Scene
 from ..version import __version__
 from .machine import isa, machine
 from .measurement import LANES

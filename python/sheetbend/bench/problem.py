@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..scene import Scene
-from ..solver import Solver
+from ..motion.solver import Solver
+from ..scene.scene import Scene
 from .workloads import GRAVITY, Array, Workload, colors, direction, pinned, projections, start
 
 REFERENCE_FACTORS = np.array([2.0, 0.5, 1.2])  # of stretch, bend and mass

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from ..grip import Grip, carried
-from ..rod import rod
-from ..scene import Scene
-from ..solver import Solver
+from ..motion.solver import Solver
+from ..objects.grip import Grip, carried
+from ..objects.rod import rod
+from ..scene.scene import Scene
 from ..version import __version__
 from .machine import isa, machine
 from .measurement import LANES

@@ -7,8 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from ..compiled import CompiledScene
-from ..solver import Solver
+from ..motion.solver import Solver
+from ..scene.compiled import CompiledScene
 from .timing import timed
 from .workloads import Array
 

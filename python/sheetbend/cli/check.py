@@ -10,19 +10,19 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from ..chain import unit_vector
 from ..config import GrippedConfig, Study, load, parse_any, scene_alone
-from ..experiment import Experiment
-from ..gradients import GradientReport, check_gradients
+from ..experiment.experiment import Experiment
 from ..gripped.model import RopeModel, nominal_directions
 from ..gripped.over_density import UNIT
 from ..gripped.start import started, whole
 from ..gripped.windows import SPANS
-from ..growth import in_words, over_fit
-from ..jacobian_check import JacobianReport, check_jacobian
-from ..parameters import Parameters
-from ..problem import FitProblem, as_parameters
-from ..solver import Solver
+from ..minimum.growth import in_words, over_fit
+from ..minimum.jacobian_check import JacobianReport, check_jacobian
+from ..minimum.problem import FitProblem, as_parameters
+from ..motion.gradients import GradientReport, check_gradients
+from ..motion.solver import Solver
+from ..objects.chain import unit_vector
+from ..quantities.parameters import Parameters
 from .gripped import RUNGS, RopeData, load_ropes
 from .outcome import Code, Outcome, run
 

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..cloth import Cloth
-from ..field_plot import Field, plot_fields
-from ..fit import Fit
-from ..fitted_motion import fitted_positions
+from ..doubts.prediction import Comparison
+from ..fitting.fit import Fit
+from ..fitting.fitted_motion import fitted_positions
 from ..mesh import Places
-from ..prediction import Comparison
-from ..strain import strain_fields
+from ..objects.cloth import Cloth
+from ..pictures.field_plot import Field, plot_fields
+from ..pictures.strain import strain_fields
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

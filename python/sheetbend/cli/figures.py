@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.console import Console
 
-from .. import plotting
 from ..config import Config, GrippedConfig
-from ..equilibrium import equilibrium
-from ..experiment import Experiment
-from ..fit import Fit
-from ..force_plot import plot_forces
+from ..doubts.prediction import Comparison
+from ..experiment.experiment import Experiment
+from ..fitting.fit import Fit
+from ..motion.equilibrium import equilibrium
 from ..optional import require
-from ..prediction import Comparison
+from ..pictures import plotting
+from ..pictures.force_plot import plot_forces
 from .cloth_figures import cloth_figures
 
 if TYPE_CHECKING:

@@ -13,17 +13,17 @@ from rich.console import Console
 
 from ..config import Config, GrippedConfig, Study, build, parse_any
 from ..config.values import with_values, write
-from ..door import reading
 from ..errors import ConfigError
-from ..fit import Fit
-from ..fit import fit as run_fit
-from ..journal import Journal
-from ..movie import movie_paths
-from ..problem import FitProblem, as_parameters
-from ..recording import Recording
-from ..report import plain, rich_report
-from ..result import FitResult
-from ..whole import write_text
+from ..files.door import reading
+from ..files.whole import write_text
+from ..fitting.fit import Fit
+from ..fitting.fit import fit as run_fit
+from ..minimum.journal import Journal
+from ..minimum.problem import FitProblem, as_parameters
+from ..pictures.movie import movie_paths
+from ..recording.recording import Recording
+from ..report.fit_result import FitResult
+from ..report.report import plain, rich_report
 from .figures import figure_files, figures_form, write_figures
 from .folders import alone, made
 from .gripped import fit_ropes, load_ropes, rope_files

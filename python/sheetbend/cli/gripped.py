@@ -10,18 +10,18 @@ from pathlib import Path
 
 from rich.console import Console
 
-from ..chain import unit_vector
 from ..config import GrippedConfig, GrippedRopeSection
 from ..errors import ConfigError, RecordingError, SceneError, SheetbendError
+from ..files.whole import write_text
 from ..gripped import WITHOUT_TWIST, GrippedMotion, RopeFit, RopeReport, Rung, Screened, evaluate, fit_rope, screened
 from ..gripped.ladder import AND, MARKERS, REST, SHIFTS, TILTS, TWIST, VARYING, YIELD
 from ..gripped.model import NAME
 from ..gripped.report import overview
-from ..io.folder import recordings
-from ..recording import Recording
-from ..recording_checks import marker_indices
-from ..tables import plain_section
-from ..whole import write_text
+from ..objects.chain import unit_vector
+from ..recording.io.folder import recordings
+from ..recording.recording import Recording
+from ..recording.recording_checks import marker_indices
+from ..report.tables import plain_section
 from .figures import figures_form
 from .gripped_figure import write_figure
 from .outcome import Code, Outcome, code_of

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from .. import plotting
-from ..baseline import blend_baseline
 from ..gripped.evaluation import Evaluation
 from ..gripped.report import RopeReport
-from ..wording import short
+from ..pictures import plotting
+from ..quantities.wording import short
+from ..recording.baseline import blend_baseline
 
 
 def write_figure(report: RopeReport, drawn: Evaluation, form: str, folder: Path) -> list[str]:

@@ -13,16 +13,16 @@ from rich.console import Console
 from rich.table import Table
 
 from ..config import GrippedConfig, build, parse_any, scene_alone
-from ..door import reading
 from ..errors import ConfigError
-from ..experiment import Experiment
+from ..experiment.experiment import Experiment
+from ..files.door import reading
 from ..gripped.plausible import doubts
-from ..growth import in_words, over_fit
-from ..io import FORMATS
-from ..kinds import KINDS
-from ..optimizers import ceres_trouble, has_ceres
-from ..recording import Recording
-from ..scene import Scene
+from ..minimum.growth import in_words, over_fit
+from ..minimum.optimizers import ceres_trouble, has_ceres
+from ..quantities.kinds import KINDS
+from ..recording.io import FORMATS
+from ..recording.recording import Recording
+from ..scene.scene import Scene
 from ..version import __version__
 from .gripped import RopeData, load_ropes
 from .outcome import Outcome, run

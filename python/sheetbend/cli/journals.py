@@ -8,10 +8,10 @@ from dataclasses import fields
 from pathlib import Path
 
 from ..config import Config, GrippedConfig
-from ..content import digest
 from ..errors import ConfigError, InputError
-from ..journal import Journal, remove
-from ..recording import Recording
+from ..minimum.content import digest
+from ..minimum.journal import Journal, remove
+from ..recording.recording import Recording
 
 NAME = "journal.sqlite"
 OPTION = "--resume"

@@ -9,9 +9,9 @@ import numpy as np
 
 from ..mesh import write_obj_sequence, write_ply, write_ply_sequence
 from ..mesh.export import frame_files
-from ..scene import Scene
-from ..simulate import Trajectory
-from ..strain import strain_fields
+from ..motion.simulate import Trajectory
+from ..pictures.strain import strain_fields
+from ..scene.scene import Scene
 
 
 class MeshFormat(StrEnum):

@@ -8,10 +8,10 @@ from typing import Annotated
 
 import typer
 
-from ..fit import Fit
-from ..fitted_motion import fitted_positions
-from ..movie import Motion, check_movie, movie_paths, save_movie
-from ..scene import Scene
+from ..fitting.fit import Fit
+from ..fitting.fitted_motion import fitted_positions
+from ..pictures.movie import Motion, check_movie, movie_paths, save_movie
+from ..scene.scene import Scene
 from .folders import made
 
 OPTION = "--movie"

@@ -14,10 +14,10 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
-from ..door import noting
 from ..errors import InputError, SheetbendError
+from ..files.door import noting
 from ..optional import MissingExtraError
-from ..result import FitResult
+from ..report.fit_result import FitResult
 from .screen import Screen
 from .stopping import Stopping
 

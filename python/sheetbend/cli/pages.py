@@ -8,12 +8,12 @@ from pathlib import Path
 from rich.console import Console
 
 from ..config import Config
-from ..fit import Fit
+from ..files.whole import write_text
+from ..fitting.fit import Fit
 from ..gripped import Evaluation, RopeReport
 from ..optional import require
 from ..page import fit_page, predicted_motion, result_page
 from ..version import __version__
-from ..whole import write_text
 
 PAGE = "report.html"
 

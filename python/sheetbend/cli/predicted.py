@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from .. import _core
-from ..experiment import Experiment
-from ..problem import NOTHING
-from ..recording import Recording
-from ..simulate import divergence
+from ..experiment.experiment import Experiment
+from ..minimum.problem import NOTHING
+from ..motion.simulate import divergence
+from ..recording.recording import Recording
 
 PREDICTED = "predicted_"
 

@@ -9,8 +9,8 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from ..optimizers import Progress
-from ..parameters import Parameters
+from ..minimum.optimizers import Progress
+from ..quantities.parameters import Parameters
 
 SHOWN = 4  # parameters on the line
 

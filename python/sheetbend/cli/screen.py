@@ -9,7 +9,7 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.text import Text
 
-from ..names import steering
+from ..files.names import steering
 
 REPORT_WIDTH = 100
 

@@ -12,18 +12,18 @@ import typer
 from rich.console import Console
 
 from ..config import Study, load, scene_alone
-from ..door import reading
-from ..equilibrium import equilibrium
 from ..errors import ConfigError
-from ..experiment import Experiment
-from ..force_readings import sensor_readings
-from ..movie import Motion, movie_paths, save_movie
-from ..recording import Recording
-from ..scene import Scene
-from ..simulate import Trajectory
-from ..simulate import simulate as run_simulation
-from ..solver import Solver
-from ..whole import written
+from ..experiment.experiment import Experiment
+from ..experiment.force_readings import sensor_readings
+from ..files.door import reading
+from ..files.whole import written
+from ..motion.equilibrium import equilibrium
+from ..motion.simulate import Trajectory
+from ..motion.simulate import simulate as run_simulation
+from ..motion.solver import Solver
+from ..pictures.movie import Motion, movie_paths, save_movie
+from ..recording.recording import Recording
+from ..scene.scene import Scene
 from .folders import made
 from .meshes import MeshFormat, mesh_files, write_meshes
 from .movies import OPTION, MoviePath, check_before

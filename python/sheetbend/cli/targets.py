@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from ..door import noted
 from ..errors import ConfigError
-from ..names import folded
+from ..files.door import noted
+from ..files.names import folded
 
 
 def check_targets(option: str, folder: Path, files: Iterable[Path]) -> None:

@@ -12,9 +12,9 @@ import typer
 from rich.console import Console
 
 from ..errors import ConfigError, InputError
+from ..files.whole import write_text
 from ..textile import Curve, fit_pull, forecast_pull, mean_curve, read_curves
 from ..textile.units import quantity
-from ..whole import write_text
 from .folders import made
 from .outcome import Code, Outcome, run
 from .targets import check_targets

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import plotting
-from ..drawing import ACCENT, GRAY, PALE, WARM, clean, key, new_figure
+from ..pictures import plotting
+from ..pictures.drawing import ACCENT, GRAY, PALE, WARM, clean, key, new_figure
 from ..textile import Curve, FabricFit, MeanCurve, strains_under
 
 _AXES = {

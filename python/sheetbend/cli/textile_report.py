@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from ..tables import Section, plain_section
+from ..arrays.timeseries import Array
+from ..files.whole import written
+from ..quantities.wording import short
+from ..report.tables import Section, plain_section
 from ..textile import Curve, FabricFit, MeanCurve, Reading, bending_loop, shear_loop, tensile_loop
-from ..timeseries import Array
-from ..whole import written
-from ..wording import short
 
 _COLUMNS = {
     "tension": "strain (mm/mm),force (N/m),scatter (N/m)",

@@ -9,13 +9,13 @@ import typer
 from rich.console import Console
 
 from ..config import load
-from ..door import reading
 from ..errors import ConfigError
+from ..files.door import reading
+from ..files.whole import write_text
 from ..optional import require
 from ..page import Shown, motion_page, of_recording, of_trajectory
-from ..recording import Recording
+from ..recording.recording import Recording
 from ..version import __version__
-from ..whole import write_text
 from .folders import made
 from .outcome import Outcome, run
 from .screen import heading

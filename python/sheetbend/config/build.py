@@ -10,16 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from ..cloth import Cloth
-from ..discretization import Refinement
 from ..errors import ConfigError, RecordingError
-from ..experiment import Experiment
-from ..markers import Place, between, on_cloth, on_particle, on_rope
-from ..problem import as_parameters
-from ..recording import Recording
-from ..recording_checks import marker_indices
-from ..scene import Scene
-from ..solver import Solver
+from ..experiment.experiment import Experiment
+from ..minimum.discretization import Refinement
+from ..minimum.problem import as_parameters
+from ..motion.solver import Solver
+from ..objects.cloth import Cloth
+from ..objects.markers import Place, between, on_cloth, on_particle, on_rope
+from ..recording.recording import Recording
+from ..recording.recording_checks import marker_indices
+from ..scene.scene import Scene
 from . import schema
 from .cloth_markers import places_on_cloths
 from .cloth_schema import MarkerGrid

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..errors import ConfigError, RecordingError
-from ..markers import Place, on_mesh
 from ..mesh import Places, TriangleMesh
-from ..recording import Recording
-from ..recording_checks import marker_indices
-from ..scene import Scene
+from ..objects.markers import Place, on_mesh
+from ..recording.recording import Recording
+from ..recording.recording_checks import marker_indices
+from ..scene.scene import Scene
 from . import cloth_schema as schema
 from .errors import located
 

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from .. import mesh as meshes
-from ..cloth import Cloth, add_cloth
 from ..errors import ConfigError
-from ..fabric import COMPONENTS, Exponential, Law, Sinh, Spline
 from ..mesh import Places, TriangleMesh
 from ..mesh.places import nearest
 from ..mesh.subdivide import subdivided
-from ..scene import Scene
-from ..tool import Tool
+from ..objects.cloth import Cloth, add_cloth
+from ..objects.fabric import COMPONENTS, Exponential, Law, Sinh, Spline
+from ..objects.tool import Tool
+from ..scene.scene import Scene
 from . import cloth_schema as schema
 from .errors import located
 from .moment import Moment

@@ -9,10 +9,10 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ..door import bounded_bytes, reading
 from ..errors import ConfigError
-from ..json_file import check_depth
-from ..names import steering
+from ..files.door import bounded_bytes, reading
+from ..files.json_file import check_depth
+from ..files.names import steering
 from .build import Study, build
 from .errors import from_validation
 from .gripped_schema import GrippedConfig

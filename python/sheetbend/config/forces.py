@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import ConfigError, RecordingError
-from ..force_recording import ForceRecording
-from ..force_sensor import ForceSensor, end_of_rope
-from ..scene import Scene
+from ..experiment.force_sensor import ForceSensor, end_of_rope
+from ..recording.force_recording import ForceRecording
+from ..scene.scene import Scene
 from . import schema
 from .errors import located
 from .scenes import Particles

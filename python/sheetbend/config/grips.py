@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays.smoothing import smoothed
 from ..errors import ConfigError
-from ..grip import Grip
-from ..rope import Rope
-from ..scene import Scene
-from ..smoothing import smoothed
-from ..tool import Tool
+from ..objects.grip import Grip
+from ..objects.rope import Rope
+from ..objects.tool import Tool
+from ..scene.scene import Scene
 from . import rope_schema as schema
 from .errors import located
 from .moment import Moment

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..recording import Recording
-from ..timeseries import mean_position
+from ..arrays.timeseries import mean_position
+from ..recording.recording import Recording
 
 
 @dataclass(frozen=True)

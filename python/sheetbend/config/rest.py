@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import ConfigError
-from ..scene import Scene
+from ..scene.scene import Scene
 from .cloth_schema import Cloth
 from .scene_schema import SceneSection
 

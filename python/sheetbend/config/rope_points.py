@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ..arrays.smoothing import state_at
+from ..arrays.timeseries import interpolate
 from ..errors import ConfigError
-from ..smoothing import state_at
-from ..timeseries import interpolate
 from .moment import Moment
 from .rope_schema import Rod, Rope
 

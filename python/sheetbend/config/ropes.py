@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import ConfigError
-from ..grip import Grip
-from ..rod import add_rod
-from ..rod_shape import initial_shape
-from ..rope import Rope, add_rope
-from ..scene import Scene
-from ..tool import Tool
+from ..objects.grip import Grip
+from ..objects.rod import add_rod
+from ..objects.rod_shape import initial_shape
+from ..objects.rope import Rope, add_rope
+from ..objects.tool import Tool
+from ..scene.scene import Scene
 from . import rope_schema as schema
 from .errors import located
 from .grips import Led, held_end, hold_led

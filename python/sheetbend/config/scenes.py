@@ -9,15 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arm import add_arm, add_pendulum
-from ..arm_data import Arm
-from ..cloth import Cloth
 from ..errors import ConfigError
 from ..mesh import TriangleMesh
-from ..quantities import product
-from ..rope import Rope
-from ..scene import Scene
-from ..tool import Tool
+from ..objects.arm import add_arm, add_pendulum
+from ..objects.arm_data import Arm
+from ..objects.cloth import Cloth
+from ..objects.rope import Rope
+from ..objects.tool import Tool
+from ..quantities.quantities import product
+from ..scene.scene import Scene
 from . import scene_schema as schema
 from .cloth_markers import seats
 from .cloths import build_cloth, placed_mesh

@@ -7,7 +7,7 @@ from typing import Any, Literal, Self
 from pydantic import field_validator, model_validator
 
 from ..errors import InputError
-from ..memory import in_bytes
+from ..files.memory import in_bytes
 from .cloth_schema import MarkerGrid
 from .scene_schema import SceneSection
 from .section import AXES, Finite, Name, Pair, Quaternion, Reference, Section, Vector, Window, key

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import ConfigError
-from ..hand_eye import HandEye
-from ..recording import Recording
-from ..tool import Tool
+from ..objects.hand_eye import HandEye
+from ..objects.tool import Tool
+from ..recording.recording import Recording
 from . import scene_schema as schema
 from .errors import located
 

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ..files.whole import write_text
 from ..optional import require
-from ..whole import write_text
 from .schema import Config, ParameterSection
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..scene import Scene
+from ..scene.scene import Scene
 from .errors import located
 from .scene_schema import SceneSection
 

@@ -13,8 +13,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..parameters import Parameter
-from ..wording import short
+from ..quantities.parameters import Parameter
+from ..quantities.wording import short
 from .model import GRAVITY, NAME, RopeModel
 from .motion import GrippedMotion
 

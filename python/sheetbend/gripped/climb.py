@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..errors import SheetbendError
-from ..experiment import Experiment
-from ..parameters import Parameter
+from ..experiment.experiment import Experiment
+from ..quantities.parameters import Parameter
 from .bounds import bounded
 from .descent import bearable, descend
 from .first_order import first_order

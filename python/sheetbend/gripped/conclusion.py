@@ -11,12 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..discretization import Refinement
 from ..errors import SheetbendError
-from ..experiment import Experiment
-from ..fit import Fit, fit
-from ..parameters import Parameter
-from ..wording import short
+from ..experiment.experiment import Experiment
+from ..fitting.fit import Fit, fit
+from ..minimum.discretization import Refinement
+from ..quantities.parameters import Parameter
+from ..quantities.wording import short
 from .bounds import bounded
 from .climb import Climb, Rope
 from .descent import bearable, descend, negligible

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..approach import Approach
-from ..experiment import Experiment
-from ..optimizers import ROUNDING, STUCK
-from ..parameters import Parameter
-from ..problem import FitProblem
-from ..timeseries import Array
+from ..arrays.timeseries import Array
+from ..experiment.experiment import Experiment
+from ..minimum.approach import Approach
+from ..minimum.optimizers import ROUNDING, STUCK
+from ..minimum.problem import FitProblem
+from ..quantities.parameters import Parameter
 from .model import NAME
 from .pieces import problem_of
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..recording import Recording
-from ..scores import Scores, scores
+from ..recording.recording import Recording
+from ..report.scores import Scores, scores
 from .model import NAME
 from .motion import Array, GrippedMotion
 from .recipe import RopeFit

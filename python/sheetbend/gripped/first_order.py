@@ -12,9 +12,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..approach import RIDGE, inside, step_limits
-from ..parameters import Parameter
-from ..problem import FitProblem
+from ..minimum.approach import RIDGE, inside, step_limits
+from ..minimum.problem import FitProblem
+from ..quantities.parameters import Parameter
 from .judging import Errors, Split, Verdict, verdict
 from .model import RopeModel
 from .motion import Array

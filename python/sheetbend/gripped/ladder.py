@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from ..parameters import Parameter
+from ..quantities.parameters import Parameter
 from .model import NAME, RopeModel
 from .motion import GrippedMotion
 

@@ -16,8 +16,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..recording import Recording
-from ..timeseries import mean_position
+from ..arrays.timeseries import mean_position
+from ..recording.recording import Recording
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

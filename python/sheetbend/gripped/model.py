@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..experiment import Experiment, Window
-from ..markers import Place, on_rope
-from ..quantities import product
-from ..recording import Recording
-from ..rod import Rod, add_rod
-from ..scene import Scene
-from ..solver import Solver
+from ..experiment.experiment import Experiment, Window
+from ..motion.solver import Solver
+from ..objects.markers import Place, on_rope
+from ..objects.rod import Rod, add_rod
+from ..quantities.quantities import product
+from ..recording.recording import Recording
+from ..scene.scene import Scene
 from .motion import Array, GrippedMotion
 
 NAME = "rope"

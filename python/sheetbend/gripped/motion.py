@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .. import timeseries
+from ..arrays import timeseries
+from ..arrays.smoothing import smoothed
+from ..arrays.timeseries import mean_position
 from ..errors import RecordingError
-from ..grip import Grip
+from ..objects.grip import Grip
 from ..optional import require
-from ..recording import Recording
-from ..smoothing import smoothed
-from ..timeseries import mean_position
+from ..recording.recording import Recording
 from .order import check_order
 
 Array = np.ndarray

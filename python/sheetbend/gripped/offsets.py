@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..experiment import Experiment
-from ..markers import Place
+from ..experiment.experiment import Experiment
+from ..minimum.problem import FitProblem
+from ..motion.simulate import simulate
+from ..objects.markers import Place
+from ..objects.rod import Rod
 from ..optional import require
-from ..problem import FitProblem
-from ..recording import Recording
-from ..rod import Rod
-from ..simulate import simulate
+from ..recording.recording import Recording
 from .model import NAME
 from .motion import Array
 

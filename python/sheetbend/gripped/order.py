@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..arrays.timeseries import Array, mean_position
 from ..errors import RecordingError
-from ..recording import Recording
-from ..timeseries import Array, mean_position
+from ..recording.recording import Recording
 
 MOST_FRAMES = 200  # of a recording, that its order is judged by
 SHORTER, STEADIER = 0.8, 0.85  # of two links' lengths and of how much these vary: links that are taken instead

@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..result import FitResult
+from ..report.fit_result import FitResult
 from .model import NAME
 
 UNIT = 1.0  # kg/m

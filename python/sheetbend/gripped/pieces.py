@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..experiment import Experiment
-from ..parameters import Parameter, Parameters
-from ..problem import FitProblem
+from ..experiment.experiment import Experiment
+from ..minimum.problem import FitProblem
+from ..quantities.parameters import Parameter, Parameters
 from .model import RopeModel
 from .motion import GrippedMotion
 from .windows import Span, places

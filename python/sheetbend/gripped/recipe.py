@@ -17,11 +17,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..chain import unit_vector
 from ..errors import InputError
-from ..fit import Fit
-from ..journal import journaled
-from ..recording import Recording
+from ..fitting.fit import Fit
+from ..minimum.journal import journaled
+from ..objects.chain import unit_vector
+from ..recording.recording import Recording
 from .bounds import at_bounds
 from .climb import Climb, Say, Step
 from .conclusion import conclude

@@ -6,11 +6,11 @@ import math
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from .. import report
 from ..optional import require
-from ..result import FitResult
-from ..tables import Section, plain_section, rich_section
-from ..wording import short
+from ..quantities.wording import short
+from ..report import report
+from ..report.fit_result import FitResult
+from ..report.tables import Section, plain_section, rich_section
 from .conclusion import spread_words
 from .evaluation import Evaluation
 from .model import NAME

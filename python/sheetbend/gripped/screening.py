@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordingError
-from ..recording import Recording
+from ..recording.recording import Recording
 from .mend import mended
 from .motion import Array, GrippedMotion, gripped_ends
 from .stretch import longest_stretch

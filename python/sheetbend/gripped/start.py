@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..experiment import Experiment
-from ..parameters import Parameter, Parameters
+from ..experiment.experiment import Experiment
+from ..quantities.parameters import Parameter, Parameters
 from .ladder import Rung
 from .model import NAME, RopeModel
 from .motion import GrippedMotion

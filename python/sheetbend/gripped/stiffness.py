@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 
-from ..result import Estimate, FitResult
-from ..tables import Section
-from ..wording import short
+from ..quantities.wording import short
+from ..report.fit_result import FitResult
+from ..report.tables import Section
+from ..result.result import Estimate
 from .model import NAME
 from .over_density import quantity
 

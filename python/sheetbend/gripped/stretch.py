@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from .. import timeseries
-from ..recording import Recording
+from ..arrays import timeseries
+from ..recording.recording import Recording
 from .motion import BRIDGED
 
 LEAST = 1.5  # s: shorter parts show little of a motion

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from ..result import Estimate, FitResult
-from ..wording import short
+from ..quantities.wording import short
+from ..report.fit_result import FitResult
+from ..result.result import Estimate
 from .model import NAME
 from .over_density import as_quantities, in_units, is_over_density, quantity
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..parameters import Parameter
+from ..quantities.parameters import Parameter
 from .ladder import TWIST, Rung
 from .model import NAME
 

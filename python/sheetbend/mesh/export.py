@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import finite
+from ..arrays.checks import finite
 from ..errors import MeshError
-from ..whole import write_text, written
+from ..files.whole import write_text, written
 from .triangle_mesh import TriangleMesh
 
 Array = NDArray[np.float64]

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import finite
-from ..door import note, reading
+from ..arrays.checks import finite
 from ..errors import MeshError
+from ..files.door import note, reading
+from ..files.units import METERS
 from ..optional import require
-from ..units import METERS
 from .triangle_mesh import TriangleMesh
 from .unfold import unfold
 from .validate import checked_triangles, refuse_broken, signed_areas

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import finite
+from ..arrays.checks import finite
 from ..errors import MeshError
 
 Array = NDArray[np.float64]

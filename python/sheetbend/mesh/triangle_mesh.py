@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import finite
+from ..arrays.checks import finite
 from ..errors import MeshError
 from . import bending_ratio, doubts, places, topology, validate
 from .places import Places

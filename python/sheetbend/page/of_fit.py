@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from ..doubts.prediction import Comparison
 from ..errors import SheetbendError
-from ..fit import Fit
-from ..prediction import Comparison
-from ..report import headline, sections
-from ..result import UNSOUND, FitResult
-from ..tables import Section
-from ..wording import short
+from ..fitting.fit import Fit
+from ..quantities.wording import short
+from ..report.fit_result import FitResult
+from ..report.report import headline, sections
+from ..report.tables import Section
+from ..result.result import UNSOUND
 from .packed import packed_motions
 from .render import compressed, render, table
 from .shown import Shown, fitted_motion

@@ -9,7 +9,7 @@ from importlib.resources import files
 from typing import Any
 
 from ..optional import require
-from ..tables import Section, flush_left
+from ..report.tables import Section, flush_left
 
 _PARTS = files(__package__)
 

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..fit import Fit
-from ..fitted_motion import fitted_positions
+from ..doubts.prediction import Comparison
+from ..fitting.fit import Fit
+from ..fitting.fitted_motion import fitted_positions
 from ..mesh import TriangleMesh
-from ..prediction import Comparison
-from ..recording import Recording
-from ..scene import Scene
-from ..simulate import Trajectory
-from ..strain import largest_strain
+from ..motion.simulate import Trajectory
+from ..pictures.strain import largest_strain
+from ..recording.recording import Recording
+from ..scene.scene import Scene
 
 Array = np.ndarray
 TICK = 0.02  # of the motion's extent: length of the mark that shows how a rod is twisted

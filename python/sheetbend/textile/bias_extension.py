@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..equilibrium import Equilibrium
 from ..errors import InputError
-from ..fabric import Fabric
 from ..mesh import grid
-from ..scene import Array
+from ..motion.equilibrium import Equilibrium
+from ..objects.fabric import Fabric
+from ..scene.scene import Array
 from .flat import flat_rest, jaw, jaw_force, specimen, travel, turned
 from .reading import GRAM_FORCE, Reading, combined
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import check_positive
-from ..cloth import add_cloth
-from ..equilibrium import Equilibrium, equilibrium
-from ..fabric import Fabric
+from ..arrays.checks import check_positive
 from ..mesh import grid
-from ..scene import Array, Scene
+from ..motion.equilibrium import Equilibrium, equilibrium
+from ..objects.cloth import add_cloth
+from ..objects.fabric import Fabric
+from ..scene.scene import Array, Scene
 from .flat import turned, warp_angle
 from .reading import Reading, combined
 from .root import root

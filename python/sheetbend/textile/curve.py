@@ -8,9 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..checks import finite
+from ..arrays.checks import finite
+from ..arrays.timeseries import Array
 from ..errors import InputError
-from ..timeseries import Array
 
 TESTS = ("tension", "shear", "bending")
 _TURN = 0.05  # of the whole range: what a specimen must go back by before it counts as unloading

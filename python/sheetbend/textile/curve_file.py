@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..door import reading
+from ..arrays.timeseries import Array
 from ..errors import InputError, RecordingError
-from ..names import checked_name
-from ..timeseries import Array
+from ..files.door import reading
+from ..files.names import checked_name
 from .curve import TESTS, Curve
 from .table_columns import Choice, Column, find_columns, in_order, needed_columns
 from .table_text import TextTable, read_tables

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..cloth import add_cloth
-from ..equilibrium import Equilibrium, NoEquilibriumError, equilibrium
 from ..errors import MeshError
-from ..fabric import Fabric
 from ..mesh import TriangleMesh, disk
-from ..scene import Array, Scene
+from ..motion.equilibrium import Equilibrium, NoEquilibriumError, equilibrium
+from ..objects.cloth import add_cloth
+from ..objects.fabric import Fabric
+from ..scene.scene import Array, Scene
 from .reading import Reading
 from .shadow import Shadow, shadow
 

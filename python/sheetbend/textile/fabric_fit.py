@@ -8,17 +8,17 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..equilibrium import NoEquilibriumError
+from ..arrays.timeseries import Array
 from ..errors import InputError
-from ..fabric import Fabric, Spline, Stiffening
-from ..gauge import null_space
-from ..intervals import known, open_estimate
+from ..motion.equilibrium import NoEquilibriumError
+from ..objects.fabric import Fabric, Spline, Stiffening
 from ..optional import require
-from ..parameters import Parameter, Parameters
-from ..result import Estimate
-from ..tables import Section, plain_section
-from ..timeseries import Array
-from ..wording import figures, short
+from ..quantities.parameters import Parameter, Parameters
+from ..quantities.wording import figures, short
+from ..report.tables import Section, plain_section
+from ..result.result import Estimate
+from ..statistics.gauge import null_space
+from ..statistics.intervals import known, open_estimate
 from .reading import Reading
 
 _UNITS = {"density": "kg/m^2", "warp": "N/m", "weft": "N/m", "shear": "N/m", "poisson": ""} | dict.fromkeys(

@@ -11,13 +11,13 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..cloth import Cloth, add_cloth
-from ..equilibrium import Equilibrium, equilibrium
 from ..errors import InputError
-from ..fabric import Fabric, Stiffening
 from ..mesh import TriangleMesh
-from ..quantities import Term
-from ..scene import Array, Scene
+from ..motion.equilibrium import Equilibrium, equilibrium
+from ..objects.cloth import Cloth, add_cloth
+from ..objects.fabric import Fabric, Stiffening
+from ..quantities.quantities import Term
+from ..scene.scene import Array, Scene
 
 _HALVINGS = 40
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite
+from ..arrays.checks import finite
+from ..arrays.timeseries import Array
 from ..errors import InputError
-from ..tables import Section, plain_section
-from ..timeseries import Array
-from ..wording import short
+from ..quantities.wording import short
+from ..report.tables import Section, plain_section
 from .curve import Curve
 from .pull import checked_pulls
 from .strip_fit import Levels, Weighed, weigh

@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..fabric import Fabric, Spline
+from ..arrays.timeseries import Array
+from ..objects.fabric import Fabric, Spline
 from ..optional import require
-from ..parameters import Parameter, Parameters
-from ..timeseries import Array
+from ..quantities.parameters import Parameter, Parameters
 from .fabric_fit import FabricFit, Measured, estimates_of
 from .reading import Reading
 from .strip_fit import Levels, best_numbers

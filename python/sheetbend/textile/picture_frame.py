@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import check_positive
-from ..cloth import Cloth
-from ..equilibrium import Equilibrium
-from ..fabric import Fabric
+from ..arrays.checks import check_positive
 from ..mesh import grid
-from ..quantities import Term
-from ..scene import Array, Scene
+from ..motion.equilibrium import Equilibrium
+from ..objects.cloth import Cloth
+from ..objects.fabric import Fabric
+from ..quantities.quantities import Term
+from ..scene.scene import Array, Scene
 from .flat import flat_rest, jaw, specimen
 from .reading import Reading, combined
 

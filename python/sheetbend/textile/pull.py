@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import is_number
+from ..arrays.checks import is_number
 from ..errors import InputError
-from ..fabric import Exponential, Fabric, Law, Linear, Sinh, Spline
+from ..objects.fabric import Exponential, Fabric, Law, Linear, Sinh, Spline
 from .curve import Curve, chosen, mean_curve, same_test
 from .fabric_fit import FabricFit, Measured, fit_fabric
 from .flat import warp_angle

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..arrays.timeseries import Array
 from ..errors import InputError
 from ..optional import require
-from ..timeseries import Array
 from .curve import Curve, chosen, mean_curve
 from .strip_laws import STRIP_LAWS, StripLaw
 

@@ -9,8 +9,8 @@ from typing import NoReturn
 
 import numpy as np
 
+from ..arrays.timeseries import Array
 from ..errors import InputError, RecordingError
-from ..timeseries import Array
 from .table_text import TextTable
 from .units import EXAMPLES, Unit, unit
 

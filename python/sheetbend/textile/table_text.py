@@ -17,8 +17,8 @@ from typing import NoReturn
 
 import numpy as np
 
-from ..door import bounded_bytes
 from ..errors import InputError, RecordingError
+from ..files.door import bounded_bytes
 from .units import unit
 
 LARGEST = 2**25

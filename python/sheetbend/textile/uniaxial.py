@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..checks import check_positive
-from ..equilibrium import Equilibrium
-from ..fabric import Fabric
+from ..arrays.checks import check_positive
 from ..mesh import grid
-from ..values import elastic_energy, elastic_energy_gradient
+from ..motion.equilibrium import Equilibrium
+from ..motion.values import elastic_energy, elastic_energy_gradient
+from ..objects.fabric import Fabric
 from .flat import flat_rest, jaw, jaw_force, specimen, strip_strain, travel, turned, warp_angle
 from .reading import GRAM_FORCE, Reading, combined
 from .root import root

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import pi
 
 from ..errors import InputError
-from ..units import METERS
+from ..files.units import METERS
 from .reading import GRAM_FORCE
 
 _INCH, _POUND = 0.0254, 4.4482216152605

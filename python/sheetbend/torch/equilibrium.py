@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from .. import _core
-from ..checks import finite
-from ..equilibrium import NoEquilibriumError
+from ..arrays.checks import finite
 from ..errors import SceneError
-from ..scene import Scene
-from ..simulate import forces_by_group, pressures_by_volume
+from ..motion.equilibrium import NoEquilibriumError
+from ..motion.simulate import forces_by_group, pressures_by_volume
+from ..scene.scene import Scene
 from .function import respond
 from .inputs import InputMap
 

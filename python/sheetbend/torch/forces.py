@@ -12,10 +12,10 @@ from torch import Tensor
 
 from .. import _core
 from ..errors import InputError
-from ..force_readings import read_at, readings_problem
-from ..scene import Scene
-from ..simulate import divergence
-from ..solver import Solver
+from ..experiment.force_readings import read_at, readings_problem
+from ..motion.simulate import divergence
+from ..motion.solver import Solver
+from ..scene.scene import Scene
 
 
 def forces(

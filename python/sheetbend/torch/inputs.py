@@ -12,8 +12,8 @@ from torch import Tensor
 from torch.autograd import Function
 
 from ..errors import InputError
-from ..quantities import FUNCTIONS
-from ..scene import Scene
+from ..quantities.quantities import FUNCTIONS
+from ..scene.scene import Scene
 
 _TORCH: Mapping[str, Callable[[Tensor], Tensor]] = {
     "identity": lambda x: x,

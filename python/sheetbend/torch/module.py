@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
 from ..errors import InputError
-from ..scene import Scene
-from ..solver import Solver
+from ..motion.solver import Solver
+from ..scene.scene import Scene
 from .simulate import Simulation
 
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..scene import Scene
-from ..simulate import divergence
-from ..solver import Solver
-from ..tape import budget
+from ..motion.simulate import divergence
+from ..motion.solver import Solver
+from ..motion.tape import budget
+from ..scene.scene import Scene
 
 Array = np.ndarray
 

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from ..errors import InputError
-from ..scene import Scene
-from ..simulate import substeps
-from ..solver import Solver
+from ..motion.simulate import substeps
+from ..motion.solver import Solver
+from ..scene.scene import Scene
 from .function import respond
 from .inputs import InputMap
 from .rollouts import Rollouts

@@ -1,0 +1,94 @@
+"""Checks of arrays that come from users: clear errors instead of broadcasting surprises."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import InputError, SceneError
+
+
+def finite(field: str, values: ArrayLike, shape: tuple[int, ...] | None, error: type[InputError]) -> np.ndarray:
+    """values as float64 of the given shape, without NaN or infinity."""
+    try:
+        array = np.array(values, dtype=float)
+    except (TypeError, ValueError) as problem:
+        raise error(field, "is not an array of numbers", type(values).__name__, "give numbers") from problem
+    if shape is not None and array.shape != shape:
+        raise error(field, "has the wrong shape", array.shape, f"give {shape}")
+    if not np.isfinite(array).all():
+        where = np.argwhere(~np.isfinite(np.atleast_1d(array)))[0].tolist()
+        raise error(
+            field,
+            f"is not finite at index {where}",
+            float(array.ravel()[~np.isfinite(array.ravel())][0]),
+            "give finite numbers",
+        )
+    return array
+
+
+def check_increasing(field: str, times: np.ndarray) -> None:
+    """Knot times (knots,): at least one, and each later than the one before."""
+    if len(times) == 0 or (np.diff(times) <= 0).any():
+        raise SceneError(field, "must increase", times[:5].tolist(), "sort the knots and drop repeated ones")
+
+
+def is_number(value: object) -> bool:
+    """Whether a value is a finite real number."""
+    return isinstance(value, int | float | np.integer | np.floating) and bool(np.isfinite(value))
+
+
+def check_positive(name: str, required: Mapping[str, float], optional: Mapping[str, float | None]) -> None:
+    """Numbers of a rod or a cloth, by argument; None leaves an optional one out."""
+    for field, value in ({**required, **optional}).items():
+        if not (is_number(value) and value > 0) and not (value is None and field in optional):  # type: ignore[operator]
+            fix = "give a positive number" + (", or leave it out" if field in optional else "")
+            raise SceneError(f"{name}.{field}", "must be positive", value, fix)
+
+
+def points(field: str, values: ArrayLike) -> np.ndarray:
+    """(n, 3) positions, n >= 1."""
+    array = finite(field, values, None, SceneError)
+    if array.ndim != 2 or array.shape[1] != 3 or len(array) == 0:
+        raise SceneError(field, "have the wrong shape", array.shape, "give (n, 3) with n at least 1")
+    return array
+
+
+def per_item(field: str, values: ArrayLike, count: int) -> np.ndarray:
+    """One number for all or (count,), as a new array (count,)."""
+    array = finite(field, values, None, SceneError)
+    if array.ndim > 1 or (array.ndim == 1 and array.shape != (count,)):
+        raise SceneError(field, "has the wrong shape", array.shape, f"give one number or ({count},)")
+    return np.broadcast_to(array, (count,)).copy()
+
+
+def indices(field: str, values: ArrayLike, count: int) -> list[int]:
+    """Particle indices in range; negative ones count from the end."""
+    found: list[int] = index_array(field, values, count).tolist()
+    return found
+
+
+def index_array(field: str, values: ArrayLike, count: int) -> np.ndarray:
+    """The same as one array."""
+    array = np.atleast_1d(np.array(values))
+    if array.size == 0 or not np.issubdtype(array.dtype, np.integer):
+        raise SceneError(field, "must be particle indices", values, "give whole numbers")
+    bad = array[(array < -count) | (array >= count)]
+    if bad.size:
+        raise SceneError(field, "name particles that do not exist", bad[:5].tolist(), f"use 0 to {count - 1}")
+    return array.ravel().astype(np.int64) % count
+
+
+def triangle_array(field: str, values: ArrayLike, count: int) -> np.ndarray:
+    """Triangles (n, 3) of three distinct particles each."""
+    flat = index_array(field, values, count)
+    if np.ndim(values) != 2 or np.shape(values)[1] != 3:
+        raise SceneError(field, "have the wrong shape", np.shape(values), "give (count, 3) particles")
+    corners = flat.reshape(-1, 3)
+    twice = (corners == np.roll(corners, 1, axis=1)).any(axis=1)
+    if twice.any():
+        bad = corners[int(np.argmax(twice))].tolist()
+        raise SceneError(field, "use a particle twice", bad, "give three distinct particles each")
+    return corners

@@ -1,0 +1,249 @@
+"""What contradicts a minimum: separate parts of the data, another start, and motion that was held out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays.timeseries import Array, mean_position
+from ..experiment.experiment import Experiment
+from ..minimum.discretization import Refinement
+from ..minimum.problem import FitProblem
+from ..minimum.time_step import SECOND_ORDER, halved
+from ..quantities.parameters import Parameter
+from ..quantities.wording import figures, short
+from ..result.result import UNSOUND, Estimate, RecordingFit
+from ..statistics.blocks import Difference, Split, contradiction
+from ..statistics.identifiability import Identifiability
+from ..statistics.profile import FARTHEST
+from .conclude import NOISELESS, Elsewhere
+from .prediction import Comparison
+
+CLAIMS = ("identified", "weak", "one-sided")  # verdicts that can be contradicted
+ORDINALS = ("first", "second", "third")
+MOST_RECORDINGS = 8  # each of them is compared with the others; more are compared by halves
+FEWEST_MARKERS = 4  # that are compared by halves
+SEEN = 3.0  # times sigma: a motion that can be told from noise
+TRADES = 0.3  # correlation from which on a parameter shares the error of another
+APART = 2.0  # half-widths from the estimate: another minimum
+
+
+def doubtful(estimates: Sequence[Estimate], doubts: Mapping[str, str]) -> tuple[Estimate, ...]:
+    """The estimates, "doubtful" in place of a claim where there is a doubt, with its words."""
+    return tuple(
+        replace(e, verdict="doubtful", words=f"{doubts[e.name]} (else {e.verdict}, {e.words})")
+        if e.name in doubts and e.verdict in CLAIMS
+        else e
+        for e in estimates
+    )
+
+
+def between_parts(
+    problem: FitProblem, u: Array, judged: Identifiability, refinement: Refinement | None = None
+) -> dict[str, str]:
+    """By parameter, that separate parts of the data (time, markers, recordings) ask for different values.
+
+    All parameters together must differ between the parts by more than chance explains at the 1 % level. Those are named
+    of which a part differs from the others by more than its 95 % interval, and from the estimate by more than the
+    estimate's, what the discretization moves in that part counted. No simulation is needed beyond the last Jacobian,
+    unless parts differ.
+
+    Args:
+        refinement: of the discretization; where parts differ, one simulation each tells what it explains of that.
+    """
+    words = _between(problem, u, judged, [])
+    shifts = _residual_shifts(problem, u, refinement) if words and refinement is not None else []
+    return _between(problem, u, judged, shifts) if shifts else words
+
+
+def _between(problem: FitProblem, u: Array, judged: Identifiability, shifts: Sequence[Array]) -> dict[str, str]:
+    _, r, J = problem.evaluate(u)
+    rows, names = problem.core.data_rows, problem.parameters.free
+    estimates = {e.name: e for e in judged.estimates}
+    lower, upper = problem.parameters.bounds()
+    used = [
+        column
+        for column, name in enumerate(names)
+        if estimates[name].verdict not in UNSOUND and lower[column] < u[column] < upper[column]
+    ]
+    if not used or not np.isfinite(J[:, used]).all() or float(r[:rows] @ r[:rows]) < NOISELESS * rows:
+        return {}
+    found = contradiction(
+        r,
+        J[:, used],
+        splits(problem, J[:rows, used]),
+        layout=problem.rows_layout(),
+        within=_private(problem, J[:rows, used]),
+        shifts=np.column_stack(shifts) if shifts else None,
+        taken=sum(map(problem.core.absorbed, range(len(problem.experiments)))),
+    )
+    if found is None:
+        return {}
+    words = {}
+    for d in found.differences:
+        name, column = names[used[d.column]], used[d.column]
+        reach = reach_of(problem.parameters[name], estimates[name]) + SECOND_ORDER * d.shift
+        if abs(d.steps[0] - d.steps[1]) > d.reach + SECOND_ORDER * d.shift and abs(d.steps[0]) > reach:
+            words[name] = _difference_words(problem.parameters[name], u[column], d)
+    return drawn_along(judged, words)
+
+
+def drawn_along(judged: Identifiability, words: Mapping[str, str]) -> dict[str, str]:
+    """The doubts with those of the parameters that trade with the doubtful ones, whose errors they share."""
+    along: dict[str, str] = {}
+    for pair in sorted(judged.correlations, key=lambda pair: -abs(pair.value)):
+        for one, other in ((pair.first, pair.second), (pair.second, pair.first)):
+            if abs(pair.value) >= TRADES and other in words and one not in words:
+                why = f"trades with {other} (correlation {pair.value:+.2f}), about which parts of the data disagree"
+                along.setdefault(one, why)
+    return {**along, **words}
+
+
+def reach_of(parameter: Parameter, e: Estimate) -> float:
+    """Half-width in the internal coordinate, of the narrower side where these differ; infinite without an interval."""
+    at = parameter.to_internal(e.value)
+    return min(
+        (abs(parameter.to_internal(end) - at) for end in (e.lower, e.upper) if end is not None), default=math.inf
+    )
+
+
+def finer_experiments(problem: FitProblem, refinement: Refinement) -> list[Sequence[Experiment]]:
+    """The fitted experiments at half the step and on a finer mesh, where these are asked for."""
+    finer: list[Sequence[Experiment]] = []
+    if refinement.halve_step and any(not e.static for e in problem.experiments):
+        finer.append(halved(problem.experiments))
+    if refinement.finer is not None:
+        finer.append([e for e in refinement.finer() if e.predict is None])
+    return finer
+
+
+def _residual_shifts(problem: FitProblem, u: Array, refinement: Refinement) -> list[Array]:
+    """(rows,) what the data's residuals change at half the step and on a finer mesh, where these are asked for. One
+    that has no answer there is left out."""
+    _, r, _ = problem.evaluate(u)
+    shifts, rows = [], problem.core.data_rows
+    for experiments in finer_experiments(problem, refinement):
+        ok, there, _ = FitProblem(experiments, problem.given, threads=problem.threads).evaluate(u, jacobian=False)
+        if ok:
+            shifts.append(there[:rows] - r[:rows])
+    return shifts
+
+
+def _difference_words(p: Parameter, at: float, found: Difference) -> str:
+    said = [value_words(p, at, step, reach) for step, reach in zip(found.steps, found.reaches, strict=True)]
+    return (
+        f"parts of the data contradict each other: {found.name} asks for {said[0]}, the rest for {said[1]} (to first "
+        "order); the model lacks something, or this is not its lowest minimum"
+    )
+
+
+def value_words(p: Parameter, at: float, step: float, reach: float) -> str:
+    """The value an internal step away from a point, with its half-width."""
+    center, reach = (min(max(x, -FARTHEST), FARTHEST) for x in (step, reach)) if p.log else (step, reach)
+    value = p.to_physical(at + center)
+    half = (p.to_physical(at + center + reach) - p.to_physical(at + center - reach)) / 2
+    number, width = figures((value, half), half)
+    return f"{number} +/- {width} {p.unit}".rstrip()
+
+
+def _private(problem: FitProblem, jacobian: Array) -> list[tuple[slice, list[int]]]:
+    """Rows of each experiment and the columns that only it has, where there are several."""
+    first, count = problem.core.first_rows, len(problem.experiments)
+    if count < 2:
+        return []
+    parts = [slice(first[i], first[i + 1]) for i in range(count)]
+    has = np.array([jacobian[part].any(axis=0) for part in parts])
+    return [
+        (part, np.flatnonzero(mine & (has.sum(axis=0) == 1)).tolist()) for part, mine in zip(parts, has, strict=True)
+    ]
+
+
+def splits(problem: FitProblem, jacobian: Array) -> list[Split]:
+    """The data by time (halves, thirds, quarters), by place of the markers (halves of the same weight in the Jacobian)
+    and by recording."""
+    layout, count, when = problem.rows_layout(), len(problem.experiments), problem.row_times()
+    size = np.maximum(np.linalg.norm(jacobian, axis=0), np.finfo(float).tiny)
+    weight = ((jacobian / size) ** 2).sum(axis=1)
+    time, place = np.full(len(weight), -1.0), np.full(len(weight), -1)
+    for i, (e, recording) in enumerate(zip(problem.experiments, problem.recordings, strict=True)):
+        mine = layout.recording == i
+        if not e.static:
+            at = when[mine]
+            at = at - at.min()
+            time[mine] = at / (np.ptp(at) * (1 + 1e-9) + np.finfo(float).tiny)
+        mine &= layout.clocks == 0  # where sensors are is no place among the markers
+        marker = layout.frame[mine] if e.static else layout.channel[mine] // len(e.axes)
+        along = _along(recording.positions)
+        if np.isfinite(along[marker]).all() and len(set(marker.tolist())) >= FEWEST_MARKERS:
+            place[mine] = _half(along[marker], weight[mine])
+    made = []
+    for parts, name in ((2, "half"), (3, "third"), (4, "quarter")):
+        part = np.where(time < 0, -1, (parts * time).astype(int))
+        order = (*ORDINALS[: parts - 1], "last")
+        made.append(Split(part, tuple(f"the {which} {name} of the time" for which in order)))
+    made.append(Split(place, ("one side's markers", "the other side's markers")))
+    names = [e.name for e in problem.experiments]
+    if 2 <= count <= MOST_RECORDINGS:
+        made.append(Split(layout.recording, tuple(names)))
+    elif count > MOST_RECORDINGS:
+        half = count // 2
+        parts_of = (f"the recordings up to {names[half - 1]}", f"the recordings from {names[half]} on")
+        made.append(Split((layout.recording >= half).astype(int), parts_of))
+    return made
+
+
+def _half(order: Array, weight: Array) -> Array:
+    """(rows,) bool, those that come behind the point where half of the weight has come."""
+    _, index = np.unique(order, return_inverse=True)
+    sums = np.cumsum(np.bincount(index, weights=weight))
+    return np.asarray((sums > 0.5 * sums[-1])[index] & (index > 0))
+
+
+def _along(positions: Array) -> Array:
+    """(markers,) places of the markers' means along the direction in which they lie apart most."""
+    mean = mean_position(positions)
+    seen = np.isfinite(mean).all(axis=-1)
+    centered = mean - mean[seen].mean(axis=0)
+    direction = np.linalg.svd(centered[seen], full_matrices=False)[2][0]
+    return np.asarray(centered @ direction)
+
+
+def elsewhere(problem: FitProblem, judged: Identifiability, cost: float, others: Sequence[Elsewhere]) -> dict[str, str]:
+    """By parameter, where another search ended lower, or as low as chance allows, far from the estimate."""
+    rows = problem.core.data_rows
+    chance = 4 * cost / max(rows - len(problem.parameters.free), 1) * judged.autocorrelation_time
+    found: dict[str, str] = {}
+    for other in sorted(others, key=lambda o: o.rise):
+        if other.rise > chance or cost <= 0:
+            continue
+        for e in judged.estimates:
+            if e.verdict not in CLAIMS or e.name in found or not _outside(e, other.values[e.name]):
+                continue
+            lower = f"{short(-100 * other.rise / cost, 2)} % lower" if other.rise < 0 else "as low"
+            value = f"{short(other.values[e.name])} {e.unit}".rstrip()
+            found[e.name] = f"{other.how} ended {lower} at {value}, far outside the interval"
+    return found
+
+
+def _outside(e: Estimate, value: float) -> bool:
+    low = -math.inf if e.lower is None else e.value - APART * (e.value - e.lower)
+    high = math.inf if e.upper is None else e.value + APART * (e.upper - e.value)
+    return not low <= value <= high
+
+
+def held_out_motion(
+    problem: FitProblem, comparisons: Sequence[Comparison], rows: Sequence[RecordingFit]
+) -> dict[str, str]:
+    """By parameter, the recording of which held-out motion is predicted worse than by "it does not move"."""
+    found: dict[str, str] = {}
+    for c, row in zip(comparisons, rows, strict=True):
+        noise = c.experiment.sigma * math.sqrt(len(c.experiment.axes)) / (c.experiment.radius or 1.0)
+        if row.motion is None or row.held_out is None or not row.held_out > row.motion > SEEN * noise:
+            continue
+        error = f"{short(100 * row.held_out / row.motion)} % of the motion"
+        words = f"held-out motion of {row.name} is missed by {error}: that nothing moves would predict it better"
+        found |= {name: words for name in problem.acting_on(c.experiment) if name not in found}
+    return found

@@ -1,0 +1,389 @@
+"""One recording and the scene that is to explain it, as a fit takes it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..arrays.checks import is_number
+from ..errors import InputError, RecordingError
+from ..motion.solver import Solver
+from ..objects.markers import Place, places_for
+from ..quantities.quantities import Term, product
+from ..recording.recording import Recording
+from ..scene.scene import Scene
+from .correction import Correction, recorded_noise
+from .force_sensor import INPUTS, ForceSensor
+
+Window = tuple[float, float]
+NO_SHARE = 1e-9  # interpolation weights below this are zero
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """A recording, its scene, and which parts of the recording are fitted and which only predicted.
+
+    Attributes:
+        scene: frozen by the fit.
+        recording: times may start anywhere; see `start_time`.
+        name: the recording's by default.
+        markers: places of the markers (see `places_for`).
+        fit: (start, stop) in s of the recording's own time, the part that the fit sees; all of it by default.
+        held_out: the part that is only predicted, from the same start; None = none.
+        solver: substep and method of the motion; must suit the recording (h well below the frame interval).
+        static: the recording shows an equilibrium; its frames in the window are averaged into one.
+        start: "given" (the scene's initial state) or "equilibrium" (of the scene at the start, forces included), for
+            motions.
+        start_time: recording time at which the scene starts, s; the start of the fit window by default.
+        time_offset: name of a quantity [s] that is added to the recording's times to get the scene's, or None. It is
+            negative for a camera that is late: what its frame at 1 s shows happened at 0.7 s of the scene where it is
+            -0.3 s.
+        offsets: per marker name, names of quantities that are added to its offset (tangent, normal, tangent x normal),
+            None for none.
+        sigma: expected error of a marker, m: scales residuals against priors and between experiments.
+        driven_sigma: noise of the markers that the scene follows (`Scene.follow`), m per coordinate, or "estimate"
+            (from the recording itself): the fit then estimates their true motion along with the parameters, one
+            correction for every frame and axis with this prior, and its intervals allow for it. `sigma` must be as
+            honest, since the two are weighed against each other. For an equilibrium it is the noise of the places that
+            hold it, in m. None = what is recorded of them is taken for the truth.
+        axes: coordinates that count, such as "xz".
+        radius: distance of the markers from a pivot, m: errors are then reported as angles in rad, rms
+            distance/radius; None = in m.
+        loss: "squares", "soft_l1" or "huber", with loss_scale in units of sigma.
+        forces: sensors whose recorded forces are residuals too, beside those of the markers; for motions.
+        predict: None takes part in the fit. Otherwise the recording is only predicted, with the shared parameters as
+            fitted on the others and its private ones either fitted to its own fit window ("window": initial states,
+            offsets) or set to the mean of the others' ("mean").
+    """
+
+    scene: Scene
+    recording: Recording
+    name: str = ""
+    markers: Mapping[str, Place] | Sequence[Place | None] | None = None
+    fit: Window | None = None
+    held_out: Window | None = None
+    solver: Solver = field(default_factory=Solver)
+    static: bool = False
+    start: str = "given"
+    start_time: float | None = None
+    time_offset: str | None = None
+    offsets: Mapping[str, tuple[str | None, str | None, str | None]] = field(default_factory=dict)
+    sigma: float = 1e-3
+    driven_sigma: float | str | None = None
+    axes: str = "xyz"
+    radius: float | None = None
+    loss: str = "squares"
+    loss_scale: float = 1.0
+    predict: str | None = None
+    forces: Sequence[ForceSensor] = ()
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.recording, Recording):
+            raise InputError("recording", "is no Recording", self.recording, "read the file: sb.Recording.load(path)")
+        if not self.name:
+            object.__setattr__(self, "name", self.recording.name)
+        if not (math.isfinite(self.sigma) and self.sigma > 0):
+            raise InputError(
+                f"{self.name}.sigma", "must be positive", self.sigma, "give the expected error of a marker in m"
+            )
+        self._check_driven_sigma()
+        self._check_forces()
+        if not self.axes or set(self.axes) - set("xyz") or len(set(self.axes)) != len(self.axes):
+            raise InputError(f"{self.name}.axes", "must be some of x, y, z", self.axes, "give such as 'xz'")
+        if self.radius is not None and not (math.isfinite(self.radius) and self.radius > 0):
+            raise InputError(
+                f"{self.name}.radius",
+                "must be positive",
+                self.radius,
+                "give the markers' distance from their pivot in m",
+            )
+        if self.start not in ("given", "equilibrium"):
+            raise InputError(f"{self.name}.start", "is unknown", self.start, "use 'given' or 'equilibrium'")
+        if self.loss not in ("squares", "soft_l1", "huber"):
+            raise InputError(f"{self.name}.loss", "is unknown", self.loss, "use 'squares', 'soft_l1' or 'huber'")
+        if not (math.isfinite(self.loss_scale) and self.loss_scale > 0):
+            raise InputError(
+                f"{self.name}.loss_scale", "must be positive", self.loss_scale, "give it in units of sigma"
+            )
+        if self.predict not in (None, "window", "mean"):
+            raise InputError(
+                f"{self.name}.predict", "is unknown", self.predict, "use 'window' or 'mean', or leave it out"
+            )
+        if self.start_time is not None and not math.isfinite(self.start_time):
+            raise InputError(
+                f"{self.name}.start_time", "must be finite", self.start_time, "give a time of the recording in s"
+            )
+        for part, window in (("fit", self.fit), ("held_out", self.held_out)):
+            if window is not None and len(window) != 2:
+                raise InputError(
+                    f"{self.name}.{part}", "must be (start, stop)", window, "give two times of the recording in s"
+                )
+        if (
+            self.fit is not None
+            and self.held_out is not None
+            and max(self.fit[0], self.held_out[0]) < min(self.fit[1], self.held_out[1])
+        ):
+            raise InputError(
+                f"{self.name}.held_out",
+                "overlaps the fitted part",
+                self.held_out,
+                "hold out frames that the fit does not see",
+            )
+        if self.static and self.held_out is not None:
+            raise InputError(
+                f"{self.name}.held_out",
+                "makes no sense for an equilibrium",
+                self.held_out,
+                "hold out whole recordings: predict = 'mean'",
+            )
+
+    def _check_driven_sigma(self) -> None:
+        field, given = f"{self.name}.driven_sigma", self.driven_sigma
+        if given is None:
+            return
+        if given != "estimate" and not (is_number(given) and given > 0):  # type: ignore[operator]
+            fix = "give the noise of the driven markers in m, or 'estimate'"
+            raise InputError(field, "must be positive", given, fix)
+        if not self.scene.boundary.following:
+            fix = "let particles follow markers (Scene.follow, [[scene.drive]], [[scene.cloth.grip]]), or leave it out"
+            raise InputError(field, "has no driven marker to correct", given, fix)
+        assert self.driven_noise is not None
+
+    def _check_forces(self) -> None:
+        names = [sensor.name for sensor in self.forces]
+        if len(set(names)) != len(names):
+            raise InputError(f"{self.name}.forces", "share a name", names, "give each sensor a name of its own")
+        if self.forces and self.static:
+            fix = "give a motion, or fit a still load by its shape alone"
+            raise InputError(f"{self.name}.forces", "are compared along motions, not at rest", names, fix)
+        if self.forces and self.driven_sigma is not None:
+            fix = "leave out driven_sigma, or the forces"
+            raise InputError(f"{self.name}.forces", "do not go with a correction of driven markers", names, fix)
+        for i, sensor in enumerate(self.forces):
+            sensor.check(self.scene, f"{self.name}.force[{i}]")
+
+    @cached_property
+    def driven_noise(self) -> float | None:
+        """Noise of the markers that the scene follows, m: `driven_sigma`, "estimate" carried out; None without one.
+
+        Raises:
+            InputError: the recording shows too little of the markers that are followed to estimate from.
+        """
+        if self.driven_sigma != "estimate":
+            return None if self.driven_sigma is None else float(self.driven_sigma)
+        found = self.recorded_noise()
+        if not found:
+            fix = "give it in m"
+            raise InputError(f"{self.name}.driven_sigma", "cannot be estimated from the recording", found, fix)
+        return found
+
+    def recorded_noise(self) -> float | None:
+        """Noise that the markers show which the scene follows, m per coordinate; None where there are none, or the
+        recording shows too little of them."""
+        markers = tuple(dict.fromkeys(m for part in self.scene.boundary.following for m in part.markers))
+        return None if self.static else recorded_noise(self.recording.piece(self.t0, None), markers)
+
+    @cached_property
+    def places(self) -> tuple[Place | None, ...]:
+        """The markers' places, None where not compared."""
+        return places_for(self.scene, self.markers, self.recording.markers)
+
+    @property
+    def compared_places(self) -> list[Place]:
+        """Places of the compared markers."""
+        return [place for i in self.compared if (place := self.places[i]) is not None]
+
+    @cached_property
+    def compared(self) -> tuple[int, ...]:
+        """Indices of the markers that are compared: placed, and not on particles whose motion is given."""
+        held = self.scene.pinned | set(self.scene.boundary.driven)
+        chosen = tuple(i for i, p in enumerate(self.places) if p is not None and not self._depends_on(i, p) <= held)
+        if not chosen:
+            raise RecordingError(
+                f"{self.name}.markers",
+                "leave nothing to compare",
+                len(self.places),
+                "place markers on particles that move",
+            )
+        return chosen
+
+    def _depends_on(self, i: int, place: Place) -> set[int]:
+        """Particles that move a marker: weights of a node right at its place are rounding errors elsewhere."""
+        turns = place.offset is not None or self.recording.markers[i] in self.offsets
+        shares = zip(place.particles, place.weights, place.tangent, strict=True)
+        return {p for p, weight, tangent in shares if abs(weight) > NO_SHARE or (turns and tangent != 0.0)}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the compared markers."""
+        return tuple(self.recording.markers[i] for i in self.compared)
+
+    def fitted(self) -> Recording:
+        """The part of the recording that the fit sees, compared markers only; one mean frame for an equilibrium."""
+        return self._part(self.fit)
+
+    def held(self) -> Recording | None:
+        """The part that is only predicted."""
+        return None if self.held_out is None else self._part(self.held_out)
+
+    def _part(self, window: Window | None) -> Recording:
+        part = self.recording if window is None else self.recording.piece(*window)
+        positions = part.positions[:, list(self.compared)]
+        times = part.times
+        if self.static and len(times) > 1:
+            positions, times = np.nanmean(positions, axis=0, keepdims=True), times[:1]
+        return replace(part, positions=positions, times=times, markers=self.names, clamped=(), name=self.name)
+
+    @property
+    def t0(self) -> float:
+        """Recording time of the scene's start, s."""
+        if self.start_time is not None:
+            return self.start_time
+        return float(self.recording.times[0] if self.fit is None else self.fit[0])
+
+    def scene_times(self, times: np.ndarray, values: Mapping[str, float]) -> np.ndarray:
+        """Times (frames,) s of the recording on the scene's clock, which starts at zero.
+
+        Args:
+            values: of quantities of the scene, for the clock's offset; as the scene has it by default.
+        """
+        name = self.time_offset
+        offset = 0.0 if name is None else values.get(name, self.scene.quantities[name].value)
+        return np.asarray(times - self.t0 + offset)
+
+    def observed(self, recording: Recording) -> dict[str, Any]:
+        """Observations for the compiled core; the scene's clock starts at 0."""
+        times = np.zeros(1) if self.static else recording.times - self.t0
+        if not self.static and times[0] < -1e-9:
+            raise RecordingError(
+                f"{self.name}.start_time", "lies after the first frame that is compared", self.t0, "start earlier"
+            )
+        measured = np.where(recording.mask[..., None], recording.positions, np.nan)
+        return {
+            "times": np.maximum(times, 0.0),
+            "measured": np.ascontiguousarray(measured),
+            "sigma": np.full(measured.shape[:2], self.sigma),
+            "axes": ["xyz".index(a) for a in self.axes],
+            "loss": self.loss,
+            "loss_scale": self.loss_scale,
+            "markers": [place.core() for place in self.compared_places],
+        }
+
+    def extra_terms(self) -> list[Term]:
+        """Terms of the inputs that belong to the observation: marker offsets (3 each), then the time offset."""
+        self._check_names()
+        terms: list[Term] = []
+        for m, i in enumerate(self.compared):
+            wanted = self.offsets.get(self.recording.markers[i], (None, None, None))
+            terms += [
+                product("extra", 3 * m + k, 1.0, {name: "identity"})
+                for k, name in enumerate(wanted)
+                if name is not None
+            ]
+        if self.time_offset is not None:
+            terms.append(product("extra", 3 * len(self.compared), 1.0, {self.time_offset: "identity"}))
+        return terms
+
+    def sensor_terms(self) -> list[Term]:
+        """Terms of the inputs of the force sensors, which follow the time offset."""
+        first = 3 * len(self.compared) + 1
+        return [term for k, sensor in enumerate(self.forces) for term in sensor.terms(first + INPUTS * k)]
+
+    def sensed(self, recording: Recording) -> list[dict[str, Any]]:
+        """The force sensors for the compiled core, with the samples that (part of) the recording spans."""
+        span = (float(recording.times[0]), float(recording.times[-1]))
+        return [sensor.core(self.scene, self.t0, span, self.solver.h) for sensor in self.forces]
+
+    def _check_names(self) -> None:
+        known = self.scene.quantities
+        for marker, wanted in self.offsets.items():
+            if marker not in self.recording.markers:
+                raise InputError(
+                    f"{self.name}.offsets",
+                    "name no marker",
+                    marker,
+                    f"use some of: {', '.join(self.recording.markers)}",
+                )
+            unknown = [name for name in wanted if name is not None and name not in known]
+            if unknown or len(wanted) != 3:
+                fix = f"give three, each None or one of: {', '.join(known)}"
+                raise InputError(
+                    f"{self.name}.offsets", f"of '{marker}' are not three quantities of the scene", wanted, fix
+                )
+        if self.time_offset is not None and self.time_offset not in known:
+            raise InputError(
+                f"{self.name}.time_offset",
+                "names no quantity of the scene",
+                self.time_offset,
+                f"use one of: {', '.join(known)}",
+            )
+
+    def correction(self, recording: Recording) -> Correction | None:
+        """Of the markers that the scene follows, as far as (part of) the recording feels it; None without any."""
+        until = None if self.static else float(recording.times[-1]) - self.t0
+        if until not in self._corrections:
+            self._corrections[until] = Correction.of(self.scene, until)
+        return self._corrections[until]
+
+    @cached_property
+    def _corrections(self) -> dict[float | None, Correction | None]:
+        """By what they are made from, which no problem on the frozen scene changes."""
+        return {}
+
+    @cached_property
+    def _can_step(self) -> bool:
+        """Asked once, so that what the solver refuses or warns of is told before any fit."""
+        self.solver.core(self.scene.compiled)
+        return True
+
+    def core(self, recording: Recording, corrected: np.ndarray | None = None) -> dict[str, Any]:
+        """The experiment on (part of) its recording, for the compiled core.
+
+        Args:
+            corrected: (knots, markers, 3) m, a known correction of the markers that the scene follows; by default the
+                fit finds it where there is a `driven_sigma`, and otherwise it is zero.
+        """
+        compiled = self.scene.compiled
+        if not self.static:
+            self.solver.check_smooth(compiled)
+        offsets = [place.offset or (0.0, 0.0, 0.0) for place in self.compared_places]
+        observed = self.observed(recording)
+        for marker, m in zip(observed["markers"], self.compared, strict=True):
+            marker["carries_offset"] = marker["carries_offset"] or self.recording.markers[m] in self.offsets
+        extra = 3 * len(offsets) + 1 + INPUTS * len(self.forces)
+        map_ = compiled.map(extra, [*self.extra_terms(), *self.sensor_terms()])
+        map_["base"][compiled.core.inputs : compiled.core.inputs + 3 * len(offsets)] = np.ravel(offsets)
+        correction = self.correction(recording)
+        _ = self.static or self._can_step
+        sigma = 0.0 if corrected is not None else self.driven_noise or 0.0
+        if sigma > 0.0 and self.solver.extrapolate > 1 and not self.static:
+            fix = "leave one of the two out"
+            raise InputError(f"{self.name}.driven_sigma", "does not go with runs that are extrapolated", sigma, fix)
+        return {
+            "name": self.name,
+            "scene": compiled.core,
+            "h": self.solver.h,
+            "finer": [] if self.static else list(self.solver.runs[1:]),
+            "integrator": self.solver.integrator,
+            "partition": self.solver.method,
+            "iterations": self.solver.sweeps,
+            "force_tolerance": self.solver.force_tolerance,
+            "cg_tolerance": self.solver.cg_tolerance,
+            "cg_iterations": self.solver.cg_iterations,
+            "map": map_,
+            "least": compiled.domain.least,
+            "most": compiled.domain.most,
+            "observed": observed,
+            "sensors": self.sensed(recording),
+            "correction": None
+            if correction is None
+            else correction.core(compiled.layout["boundary"][0], sigma, corrected),
+            "is_static": self.static,
+            "starts_at_equilibrium": self.start == "equilibrium",
+            "t0": 0.0,
+        }

@@ -1,0 +1,1 @@
+"""The fit as users call it, and the motion of what was fitted."""

@@ -1,0 +1,383 @@
+"""Fitting physical parameters of scenes to recordings."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..doubts.beginnings import Beginning, checked, of_beginnings
+from ..doubts.conclude import Elsewhere, judged_parameters, misfit, warnings_of, without_verdict
+from ..doubts.contradictions import between_parts, doubtful, elsewhere, held_out_motion
+from ..doubts.driven_noise import doubts
+from ..doubts.floors import at_floor_of_sweeps
+from ..doubts.given import check_given, half_widths, premises
+from ..doubts.leave_one_out import MEANING, companions, each_left_out
+from ..doubts.losses import loss_doubts
+from ..doubts.misread import misread
+from ..doubts.prediction import Comparison, compare, predicted_values
+from ..doubts.unexplained import unexplained
+from ..errors import InputError
+from ..experiment.clock import outside, told_clocks
+from ..experiment.experiment import Experiment
+from ..minimum.discretization import Refinement, settled, to_the_limit, wanted_refinement
+from ..minimum.fine_meshes import at_the_limit
+from ..minimum.growth import Growth, growths
+from ..minimum.journal import journaled
+from ..minimum.optimizers import Observer, ceres_trouble
+from ..minimum.problem import FitProblem, ParameterLike, as_parameters
+from ..minimum.search import Search
+from ..minimum.time_step import Settled
+from ..optional import require
+from ..quantities.parameters import Parameter, Parameters
+from ..recording.recording import Recording
+from ..report.fit_result import FitResult
+from ..result.result import Estimate, Given, MotionGrowth, Premise, RecordingFit, Start
+from ..scene.scene import Scene
+from ..statistics.identifiability import Identifiability
+
+Systematic = Callable[[FitProblem, np.ndarray], Mapping[str, float]]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A finished fit: the result (estimates, verdicts, errors) and what it was made from.
+
+    Attributes:
+        result: see `FitResult`; `result.report()` is the text.
+        comparisons: measured against simulated, per experiment.
+        parameters: as given, private ones not expanded.
+        corrections: by experiment with a `driven_sigma`, (knots, markers, 3) m, what the fit added to the markers that
+            the scene follows, up to the end of the fitted part.
+        on_mesh: values that explain the recordings on the mesh of the experiments, of which `comparisons` tells;
+            `values` are those at the limit of fine meshes, where these were counted.
+    """
+
+    result: FitResult
+    comparisons: tuple[Comparison, ...]
+    parameters: Parameters
+    corrections: Mapping[str, np.ndarray] = field(default_factory=dict)
+    on_mesh: Mapping[str, float] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Estimate:
+        return self.result[name]
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C ended it."""
+        return self.result.interrupted
+
+    @property
+    def values(self) -> dict[str, float]:
+        """All parameters' values by (expanded) name."""
+        return self.result.values
+
+    def values_of(self, experiment: Experiment) -> dict[str, float]:
+        """Every quantity of an experiment's scene, to simulate it with: as fitted on its mesh, the private ones its
+        own; else as the scene has it."""
+        values = {**self.values, **self.on_mesh}
+        return {
+            name: values.get(f"{name}[{experiment.name}]", values.get(name, quantity.value))
+            for name, quantity in experiment.scene.quantities.items()
+        }
+
+    def report(self) -> str:
+        """The report as plain text."""
+        return self.result.report()
+
+    def save(self, path: str | Path) -> None:
+        """Write the result as JSON."""
+        self.result.save(path)
+
+
+@journaled
+def fit(
+    scene: Scene | Experiment | Sequence[Experiment],
+    recording: Recording | None = None,
+    parameters: Mapping[str, ParameterLike] | Iterable[str | Parameter] = (),
+    *,
+    optimizer: str = "auto",
+    starts: Sequence[Mapping[str, float]] = (),
+    windows: Sequence[float] | str = "auto",
+    tolerance: float = 1e-10,
+    refine: Refinement | str | bool | None = "auto",
+    systematic: Systematic | None = None,
+    given: Mapping[str, float] | None = None,
+    leave_one_out: bool = False,
+    profiles: bool = True,
+    beginnings: bool = True,
+    max_iterations: int = 200,
+    threads: int = 1,
+    progress: Observer | None = None,
+    journal: str | Path | None = None,
+    **experiment: Any,
+) -> Fit:
+    """Fit quantities of scenes to recordings.
+
+    Args:
+        scene: a scene with its `recording` (and any field of `Experiment` as keyword), or one or several experiments.
+        parameters: what to fit: names of quantities, `Parameter`s, or a mapping from name to fields of `Parameter`.
+        optimizer: "ceres", "scipy", or "auto" (Ceres where it was built).
+        starts: further starting values by name; the best end wins, all are reported.
+        windows: s, increasing: so much of every motion from its scene's start on is fitted first, one after another,
+            each from where the one before ended. "auto" chooses the lengths, and none where the first step on the whole
+            motion keeps what it promises; () for none.
+        tolerance: relative change of the cost that counts as none.
+        refine: "auto" moves the estimates to the limit of short substeps and counts what that leaves open in the
+            intervals, at the cost of some three evaluations with tangents. A `Refinement` says more, above all how to
+            make the same experiments on a finer mesh, to whose limit the estimates are moved as well; "auto" does not
+            know how, and "mesh not counted" stands in the table then. Where the data speak against a limit, as those
+            of a recording do that was simulated at the same substep, the estimate stays, and all that it would move
+            counts. False (or None) counts nothing.
+        systematic: (problem, internal minimum) -> half-widths of what else the intervals are to count, by parameter, in
+            its unit.
+        given: standard deviations of numbers that the fit takes as given, by name; they then count in the intervals. Of
+            quantities that must be positive it is relative (`{"rope_density": 0.02}` is 2 %), of others in their unit;
+            "gravity" (its direction) and "clamp_direction" are in rad, "clamps" and "markers" (their places) in m. What
+            each of these numbers moves is in `FitResult.premises` in any case.
+        leave_one_out: also predict every recording that holds nothing out by a fit to the others.
+        profiles: refit the others along the worst parameters for their intervals; without, intervals are the linear
+            ones, which cost nothing beside the fit.
+        beginnings: also fit the beginnings of the motions by themselves, to doubt what they contradict and to search on
+            from there (`sheetbend.doubts.beginnings`). That costs about as much as the fit itself.
+        max_iterations: per start and window.
+        threads: over experiments and Jacobian columns; the result does not depend on it.
+        progress: called after every iteration.
+        journal: file that keeps every evaluation until the fit is done (see `sheetbend.minimum.journal`). After a kill,
+            the same call with the same file goes on from there and gives the same bits; with another recording, scene
+            or version it is refused.
+
+    Returns:
+        Fit. On Ctrl-C it holds the best point so far, marked `interrupted`, with linear intervals: whatever needs a
+        refit is left out.
+
+    Raises:
+        InputError: anything inconsistent, named, before work starts.
+        SheetbendError: the start itself diverges or has no equilibrium.
+    """
+    experiments = _experiments(scene, recording, experiment)
+    wanted = as_parameters(parameters, experiments)
+    if threads < 1:
+        raise InputError("threads", "must be positive", threads, "give at least 1")
+    require("scipy.special", "fit")  # of intervals, behind all the work
+    refinement = wanted_refinement(refine)
+    search = Search(optimizer, starts, windows, max_iterations, tolerance, progress)
+    began = time.perf_counter()
+    fitted = [e for e in experiments if e.predict is None]
+    if not fitted:
+        raise InputError(
+            "experiments",
+            "leave nothing to fit: all are only predicted",
+            len(experiments),
+            "set predict to None for at least one",
+        )
+    if leave_one_out:
+        for e in fitted:
+            companions(e, fitted, wanted)
+    problem = FitProblem(fitted, wanted, threads=threads)
+    problem.check_start()
+    check_given(given or {}, problem)
+    found = search.run(problem)
+    ends, name, interrupted = found.ends, found.optimizer, found.interrupted
+    trouble = ceres_trouble() if optimizer == "auto" else ""
+    fallback = (f"SciPy stands in for Ceres, which does not load: {trouble}",) if trouble else ()
+    grown, begun = growths(problem, ends[0].u), tuple[Beginning, ...]()
+    if beginnings and not interrupted:
+        try:
+            ends, begun = checked(search, problem, ends, grown)
+        except KeyboardInterrupt:
+            interrupted = True
+    if ends[0] is not found.ends[0]:
+        grown = growths(problem, ends[0].u)
+    best = ends[0]
+    lost = without_verdict(problem, best, grown)
+    if len(lost) == len(problem.parameters.free):  # then no refit tells anything
+        refinement, systematic = wanted_refinement(False), None
+
+    def conclude(refitter: str | None) -> _Conclusion:
+        at, every = settled(refinement, experiments, problem, best, refitter)
+        values = problem.parameters.to_physical(at.u)
+        rests_on, unknown = ((), ()) if refitter is None or lost else premises(at.problem, at.u, given or {})
+        more = dict(half_widths(rests_on, problem.parameters.free))
+        for parameter, reach in ({} if systematic is None else systematic(at.problem, at.u)).items():
+            more[parameter] = more.get(parameter, 0.0) + reach
+        refined = to_the_limit(at.refits, problem.parameters, values)
+        judged, lower = judged_parameters(
+            at.problem, at.u, refined, more, refitter if profiles else None, lost, (problem, best.u)
+        )
+        judged = at_floor_of_sweeps(_moved(judged, at.moved), at.refits)
+        predicted = predicted_values(every, wanted, values, refitter, threads)
+        doubted: tuple[str, ...] = ()
+        parts: dict[str, str] = {}
+        if refitter is not None:
+            parts = of_beginnings(problem, best.u, judged, begun, refinement)
+            parts |= between_parts(at.problem, at.u, judged, refinement)
+            if not lost:
+                doubted = doubts(at.problem, at.u, judged) + loss_doubts(at.problem, at.u, judged)
+        return _Conclusion(at, tuple(every), judged, lower, *predicted, doubted + unknown, rests_on, parts)
+
+    left_out: dict[str, Comparison] = {}
+    try:
+        end = conclude(None if interrupted else name)
+        if leave_one_out and not interrupted:
+            left_out = each_left_out(fitted, wanted, end.values, name, threads)
+    except KeyboardInterrupt:
+        interrupted = True
+        end = conclude(None)
+    at, judged = end.at, end.judged
+    corrected = at.problem.corrections(at.u) | end.corrected
+    comparisons = compare(end.experiments, wanted, end.values, threads, corrected)
+    rows = problem.core.first_rows
+    count = {e.name: rows[i + 1] - rows[i] for i, e in enumerate(fitted)}
+    errors = tuple(_errors(c, count, left_out, corrected) for c in comparisons)
+    starts_elsewhere = [
+        Elsewhere(m.cost - best.cost, problem.parameters.to_physical(m.u), "another start") for m in ends[1:]
+    ]
+    contradicted = (
+        held_out_motion(problem, comparisons, errors)
+        | elsewhere(problem, judged, best.cost, [*starts_elsewhere, *end.lower])
+        | end.parts
+        | unexplained(problem, comparisons, judged.autocorrelation_time)
+    )
+    estimates, limit = at_the_limit(doubtful(judged.estimates, contradicted), at.refits, problem.parameters, at.u)
+    values = end.values | problem.parameters.to_physical(limit)
+    errors = told_clocks(errors, end.experiments, end.values, estimates)
+    shifted = tuple(outside(end.experiments, end.values))
+    result = FitResult(
+        estimates=estimates,
+        recordings=errors,
+        cost=best.cost if at.problem is problem else at.cost,
+        first_cost=best.first,
+        jacobian_seconds=problem.seconds.get(True),
+        rows=problem.core.data_rows,
+        optimizer=name,
+        iterations=best.iterations,
+        seconds=time.perf_counter() - began,
+        converged=best.converged,
+        interrupted=interrupted,
+        message=best.message,
+        given=_given(problem.parameters, values) + end.given,
+        correlations=judged.correlations,
+        gauges=tuple(g.words for g in judged.gauges),
+        baseline="; ".join(
+            dict.fromkeys(c.baseline_words for c in (*comparisons, *left_out.values()) if c.baseline_words)
+        ),
+        held_out_is=MEANING if left_out else "",
+        autocorrelation_time=judged.autocorrelation_time,
+        starts=tuple(
+            Start(
+                cost=m.cost if np.isfinite(m.cost) else None,
+                iterations=m.iterations,
+                converged=m.converged,
+                values=problem.parameters.to_physical(m.u),
+            )
+            for m in ends
+        ),
+        refits=at.refits,
+        not_counted=at.not_counted,
+        premises=end.premises,
+        misfit=misfit(at.problem, at.u),
+        forces=tuple(row for c in comparisons for one in c.forces for row in one.fits()),
+        growth=_growth(found.growths, grown),
+        windows=best.windows,
+        evaluations=sum(m.evaluations for m in ends),
+        jacobians=sum(m.jacobians for m in ends),
+        warnings=warnings_of(ends, interrupted, problem, estimates)
+        + end.doubts
+        + at.warnings
+        + shifted
+        + fallback
+        + (() if interrupted else misread(problem, best.u)),
+    )
+    return Fit(result, tuple(comparisons), wanted, corrected, end.values)
+
+
+@dataclass(frozen=True)
+class _Conclusion:
+    """What follows from a minimum."""
+
+    at: Settled
+    experiments: tuple[Experiment, ...]  # as they are compared
+    judged: Identifiability
+    lower: tuple[Elsewhere, ...]  # where profiles ended
+    values: dict[str, float]  # of all experiments
+    given: tuple[Given, ...]
+    corrected: dict[str, np.ndarray]  # of experiments that are only predicted
+    doubts: tuple[str, ...]
+    premises: tuple[Premise, ...]
+    parts: dict[str, str]  # by parameter, of which parts of the data ask for different values
+
+
+def _experiments(
+    scene: Scene | Experiment | Sequence[Experiment], recording: Recording | None, fields: Mapping[str, Any]
+) -> list[Experiment]:
+    if isinstance(scene, Scene):
+        if recording is None:
+            raise InputError("recording", "is missing", None, "give the recording that the scene is to explain")
+        return [Experiment(scene=scene, recording=recording, **fields)]
+    if recording is not None or fields:
+        raise InputError(
+            "recording",
+            "goes with a single scene",
+            sorted(fields) or "recording",
+            "put everything into the experiments",
+        )
+    experiments = [scene] if isinstance(scene, Experiment) else list(scene)
+    if not experiments:
+        raise InputError("experiments", "are empty", 0, "give at least one")
+    return experiments
+
+
+def _moved(judged: Identifiability, by: Mapping[str, float]) -> Identifiability:
+    """With how far each estimate was moved to the limit of short substeps."""
+    return replace(judged, estimates=tuple(replace(e, moved=by.get(e.name, 0.0)) for e in judged.estimates))
+
+
+def _errors(
+    c: Comparison, rows: Mapping[str, int], left_out: Mapping[str, Comparison], corrected: Mapping[str, np.ndarray]
+) -> RecordingFit:
+    found = c.errors(rows.get(c.experiment.name, 0))
+    if c.experiment.name in corrected:
+        by = float(np.sqrt(np.mean(corrected[c.experiment.name] ** 2)))
+        found = replace(found, driven_sigma=c.experiment.driven_noise, corrected_by=by)
+    if c.experiment.name not in left_out:
+        return found
+    other = left_out[c.experiment.name].errors(0)
+    return replace(
+        other, rows=found.rows, rms=found.rms, driven_sigma=found.driven_sigma, corrected_by=found.corrected_by
+    )
+
+
+def _growth(start: Sequence[Growth], end: Sequence[Growth]) -> tuple[MotionGrowth, ...]:
+    return tuple(
+        MotionGrowth(
+            name=first.name,
+            largest=(_finite(first.largest), _finite(last.largest)),
+            rate=(first.rate, last.rate),
+            until=(first.until, last.until),
+        )
+        for first, last in zip(start, end, strict=True)
+    )
+
+
+def _finite(number: float) -> float | None:
+    return number if np.isfinite(number) else None
+
+
+def _given(parameters: Parameters, values: Mapping[str, float]) -> tuple[Given, ...]:
+    rows = []
+    for name, p in parameters.items():
+        if not p.free:
+            words = (
+                "fixed"
+                if p.tied_to is None
+                else f"{p.factor:g} times {p.tied_to}"
+                if p.factor != 1.0
+                else f"equal to {p.tied_to}"
+            )
+            rows.append(Given(name=name, value=values[name], unit=p.unit, words=words))
+    return tuple(rows)

@@ -1,0 +1,53 @@
+"""One Gauss-Newton step with the Jacobian of a fit: a refit to first order in what the residuals change."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InputError, SheetbendError
+from ..quantities.parameters import Parameters
+from ..statistics.gauge import RANK_TOLERANCE
+from ..statistics.profile import FARTHEST
+from .problem import FitProblem
+
+
+def one_step(problem: FitProblem, finer: FitProblem, u: np.ndarray) -> np.ndarray:
+    """Where the minimum goes to first order with the residuals of a finer problem; parameters at a bound stay there.
+
+    Raises:
+        SheetbendError: the finer problem has no answer at u, or other rows.
+    """
+    _, r, J = problem.evaluate(u)
+    ok, there, _ = finer.evaluate(u, jacobian=False)
+    if not ok:
+        raise SheetbendError(f"the refinement cannot start: {finer.failure}")
+    if there.shape != r.shape:
+        fix = "make them of the same recordings, with the same markers"
+        raise InputError("refine.finer", "makes experiments with other residuals", (len(there), len(r)), fix)
+    return gauss_newton(problem.parameters, u, J, there - r)
+
+
+def gauss_newton(parameters: Parameters, u: np.ndarray, J: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """u moved by the least-squares answer to a change of the residuals, inside the bounds; what is at one stays.
+
+    So does a logarithmic parameter that would have to move by a factor of more than a million: the residuals hardly
+    know it.
+    """
+    lower, upper = parameters.bounds()
+    log = np.array([parameters[name].log for name in parameters.free], dtype=bool)
+    free = (u > lower) & (u < upper)
+    while True:
+        columns = J[:, free]
+        size = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
+        step = np.zeros(len(u))
+        step[free] = np.linalg.lstsq(columns / size, -change, rcond=RANK_TOLERANCE)[0] / size
+        far = log & (np.abs(step) > FARTHEST)
+        if not far.any():
+            return np.clip(u + step, lower, upper)
+        free &= ~far
+
+
+def moves(parameters: Parameters, start: np.ndarray, end: np.ndarray) -> dict[str, float]:
+    """From one internal point to another, of the free parameters, in their units."""
+    here, there = parameters.to_physical(start), parameters.to_physical(end)
+    return {name: there[name] - here[name] for name in parameters.free}

@@ -1,0 +1,305 @@
+"""Levenberg-Marquardt on a compiled problem: Ceres where it was built in, SciPy's trust region otherwise. Both see the
+same function."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, SheetbendError
+from ..optional import require
+from ..quantities.wording import short
+from ..statistics.gauge import RANK_TOLERANCE
+from .approach import step_limits
+from .problem import FitProblem
+
+OPTIMIZERS = ("auto", "ceres", "scipy")
+LOST = 0.1  # of the cost: a slope that promises so much is no end
+STUCK = 1e-5  # of the cost: a third of a standard error where residuals are ten thousand
+ROUNDING = 1e-12  # of the first cost: residuals of data without noise end as rounding errors, which have any slope
+
+
+@dataclass(frozen=True)
+class Progress:
+    """One iteration: its number, the cost (half the sum of squares), the internal point, and the length [s] of the
+    window that is fitted first, if one is."""
+
+    iteration: int
+    cost: float
+    u: np.ndarray
+    window: float | None = None
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """Where an optimizer ended; `interrupted` by Ctrl-C, with its best so far. `first` is the cost where it began,
+    `doubt` says what speaks against its being a minimum. `evaluations` simulated all experiments, `jacobians` of these
+    with derivatives; `windows` [s] were fitted before."""
+
+    u: np.ndarray
+    cost: float
+    iterations: int
+    evaluations: int
+    converged: bool
+    interrupted: bool
+    message: str
+    first: float | None = None
+    doubt: str = ""
+    jacobians: int = 0
+    windows: tuple[float, ...] = ()
+
+
+Observer = Callable[[Progress], None]
+
+
+def has_ceres() -> bool:
+    """Whether the Ceres module was built, and loads."""
+    return importlib.util.find_spec("sheetbend._ceres") is not None and not ceres_trouble()
+
+
+@cache
+def ceres_trouble() -> str:
+    """Why a Ceres module that was built does not load, as where its library is of another version; else empty."""
+    try:
+        importlib.import_module("sheetbend._ceres")
+    except ModuleNotFoundError:
+        return ""
+    except ImportError as error:
+        return str(error)
+    return ""
+
+
+def named(optimizer: str) -> str:
+    """The optimizer that a name stands for.
+
+    Raises:
+        InputError: unknown, or Ceres asked for and not built.
+    """
+    if optimizer not in OPTIMIZERS:
+        raise InputError("optimizer", "is unknown", optimizer, f"use one of: {', '.join(OPTIMIZERS)}")
+    if optimizer == "ceres" and not has_ceres():
+        raise InputError(
+            "optimizer",
+            f"does not load: {ceres_trouble()}" if ceres_trouble() else "was not built into this installation",
+            "ceres",
+            "install Ceres (libceres-dev) and rebuild, or use 'scipy'",
+        )
+    return optimizer if optimizer != "auto" else "ceres" if has_ceres() else "scipy"
+
+
+def minimize(
+    problem: FitProblem,
+    u: np.ndarray,
+    optimizer: str = "auto",
+    max_iterations: int = 200,
+    tolerance: float = 1e-10,
+    observe: Observer | None = None,
+    first: float | None = None,
+) -> tuple[Minimum, str]:
+    """Minimize half the sum of squared residuals from u (free,), inside the parameters' limits, no step longer than
+    `approach.step_limits`; also returns the optimizer's name.
+
+    Args:
+        first: the cost at u, where it is known.
+
+    Raises:
+        InputError: see `named`.
+        SheetbendError: the start itself has no answer (divergence, no equilibrium).
+    """
+    name = named(optimizer)
+    if first is None:
+        ok, r, _ = problem.evaluate(u, jacobian=False)
+        if not ok:
+            raise SheetbendError(f"the fit cannot start: {problem.failure}")
+        first = 0.5 * float(r @ r)
+    run = _ceres if name == "ceres" else _scipy
+    end = run(problem, np.array(u, dtype=float), max_iterations, tolerance, _Best(observe, u, first))
+    return replace(end, first=first), name
+
+
+def judged(problem: FitProblem, end: Minimum, first: float) -> Minimum:
+    """An optimizer's end after a first cost: in doubt where the cost has still a slope, and no convergence where that
+    promises a good part of the cost. Optimizers also stop where steps are small and take little off, as they are
+    wherever no step lowers the cost: at a kink, or where gradients are off."""
+    if not end.converged:
+        return end
+    left = promised(problem, end.u)
+    if left <= STUCK or left * end.cost <= ROUNDING * first:
+        return end
+    words = f"no step lowers the cost, though its slope promises {short(100 * left, 2)} % less (a kink, a rough motion)"
+    return replace(end, converged=left < LOST, message=f"{words}: {end.message}", doubt=words)
+
+
+def promised(problem: FitProblem, u: np.ndarray) -> float:
+    """Share of the cost that a Gauss-Newton step from u inside the bounds would take off, were the residuals linear."""
+    ok, r, J = problem.evaluate(u)
+    lower, upper = problem.parameters.limits()
+    slope, size = J.T @ r, np.linalg.norm(J, axis=0)
+    free = (size > RANK_TOLERANCE * np.linalg.norm(r)) & ~((u <= lower) & (slope > 0)) & ~((u >= upper) & (slope < 0))
+    if not ok or not free.any() or not r.any():
+        return 0.0
+    columns = J[:, free] / size[free]
+    step = np.linalg.lstsq(columns, r, rcond=RANK_TOLERANCE)[0]
+    return float(np.sum((columns @ step) ** 2) / (r @ r))
+
+
+def refit(
+    problem: FitProblem, u: np.ndarray, optimizer: str, max_iterations: int = 200, tolerance: float = 1e-10
+) -> Minimum:
+    """`minimize` for a step of larger work (a profile, a refinement), which Ctrl-C ends as a whole.
+
+    Raises:
+        KeyboardInterrupt: an interrupted end is worth nothing to the caller.
+    """
+    end, _ = minimize(problem, u, optimizer, max_iterations, tolerance)
+    if end.interrupted:
+        raise KeyboardInterrupt
+    return end
+
+
+class _Best:
+    """Keeps the best point seen and passes progress on."""
+
+    def __init__(self, observe: Observer | None, u: np.ndarray, cost: float) -> None:
+        self.observe, self.u, self.cost = observe, np.array(u, dtype=float), cost
+
+    def __call__(self, iteration: int, cost: float, u: Sequence[float] | np.ndarray) -> None:
+        if cost <= self.cost:
+            self.u, self.cost = np.array(u, dtype=float), cost
+        if self.observe is not None:
+            self.observe(Progress(iteration, cost, np.array(u, dtype=float)))
+
+
+def _ceres(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: float, best: _Best) -> Minimum:
+    """Ceres, with parameters that rest at a limit held there: it searches along every step that it projects."""
+    lower, upper = problem.parameters.limits()
+    u = np.clip(u, lower, upper)
+    held = _resting(problem, u)
+    end = _ceres_holding(problem, u, held, max_iterations, tolerance, best)
+    if end.interrupted or not held or _resting(problem, end.u) >= held:
+        return end
+    again = _ceres_holding(problem, end.u, frozenset(), max_iterations, tolerance, best)
+    return replace(
+        again,
+        iterations=end.iterations + again.iterations,
+        evaluations=end.evaluations + again.evaluations,
+        jacobians=end.jacobians + again.jacobians,
+    )
+
+
+def _resting(problem: FitProblem, u: np.ndarray) -> frozenset[int]:
+    """Parameters that lie at a limit and would go beyond it; not all of them."""
+    lower, upper = problem.parameters.limits()
+    if not ((u <= lower) | (u >= upper)).any():
+        return frozenset()
+    ok, r, J = problem.evaluate(u)
+    if not ok:
+        return frozenset()
+    slope = J.T @ r
+    resting = np.flatnonzero(((u <= lower) & (slope > 0.0)) | ((u >= upper) & (slope < 0.0)))
+    return frozenset(resting.tolist()) if len(resting) < len(u) else frozenset()
+
+
+def _ceres_holding(
+    problem: FitProblem, u: np.ndarray, held: frozenset[int], max_iterations: int, tolerance: float, best: _Best
+) -> Minimum:
+    from .. import _ceres as ceres
+
+    lower, upper = problem.parameters.limits()
+    interrupted = False
+
+    def observe(iteration: int, cost: float, step: float, gradient: float, at: list[float]) -> bool:
+        best(iteration, cost, at)
+        return True
+
+    out: dict[str, Any] = {}
+    try:
+        out = ceres.minimize(
+            evaluation=problem.evaluator.capsule(),
+            u=u,
+            lower=lower,
+            upper=upper,
+            longest_step=step_limits(problem.parameters),
+            held=sorted(held),
+            max_iterations=max_iterations,
+            tolerance=tolerance,
+            observe=observe,
+        )
+    except KeyboardInterrupt:
+        interrupted = True
+    if interrupted or out["stopped"]:
+        return Minimum(
+            best.u,
+            best.cost,
+            out.get("iterations", 0),
+            out.get("evaluations", 0),
+            False,
+            True,
+            "interrupted: the best point so far",
+            jacobians=out.get("jacobians", 0),
+        )
+    if not 0.0 <= out["cost"] < np.inf:  # Ceres tells a cost of -1 where its first point has no derivatives
+        counts = out["iterations"], out["evaluations"]
+        return Minimum(best.u, best.cost, *counts, False, False, out["message"], jacobians=out["jacobians"])
+    return Minimum(
+        np.array(out["u"]),
+        out["cost"],
+        out["iterations"],
+        out["evaluations"],
+        out["converged"],
+        False,
+        out["message"],
+        jacobians=out["jacobians"],
+    )
+
+
+def _scipy(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: float, best: _Best) -> Minimum:
+    optimize = require("scipy.optimize", "fit")
+    lower, upper = problem.parameters.bounds()
+    limits, longest = problem.parameters.limits(), step_limits(problem.parameters)
+    last: dict[str, Any] = {"u": None}
+    left: np.ndarray | None = None  # where the step began
+    count = jacobians = 0
+
+    def evaluated(at: np.ndarray, jacobian: bool) -> dict[str, Any]:
+        nonlocal count, jacobians, left
+        too_far = left is not None and bool((np.abs(at - left) > longest).any())
+        if not jacobian and (too_far or (at < limits[0]).any() or (at > limits[1]).any()):
+            return {"r": np.full(problem.core.rows, np.inf), "J": None}  # SciPy shortens its step
+        if jacobian:
+            left = at.copy()
+        if last["u"] is None or not np.array_equal(last["u"], at) or (jacobian and last["J"] is None):
+            count += 1
+            jacobian |= problem.cheap_jacobian  # most steps are taken, and then it is needed anyway
+            jacobians += jacobian
+            ok, r, J = problem.evaluate(at, jacobian)
+            last.update(
+                u=at.copy(), r=r if ok else np.full(problem.core.rows, np.inf), J=J if jacobian and ok else None
+            )
+            if ok:
+                best(count, 0.5 * float(r @ r), at)
+        return last
+
+    try:
+        out = optimize.least_squares(
+            lambda at: evaluated(at, False)["r"],
+            np.clip(u, *limits),
+            jac=lambda at: evaluated(at, True)["J"],
+            bounds=(lower, upper),
+            x_scale="jac",
+            ftol=max(tolerance, 1e-15),
+            xtol=max(tolerance, 1e-15),
+            gtol=max(tolerance, 1e-15),
+            max_nfev=max_iterations,
+        )
+    except KeyboardInterrupt:
+        words = "interrupted: the best point so far"
+        return Minimum(best.u, best.cost, count, count, False, True, words, jacobians=jacobians)
+    found = (out.x, float(out.cost), int(out.njev), count, out.status > 0, False, out.message)
+    return Minimum(*found, jacobians=jacobians)

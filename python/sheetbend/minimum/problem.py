@@ -1,0 +1,357 @@
+"""From experiments and parameters to the compiled least-squares problem."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..errors import InputError, refusal
+from ..experiment.experiment import Experiment
+from ..motion.equilibrium import no_rest
+from ..motion.simulate import divergence
+from ..quantities.parameters import Parameter, Parameters
+from ..quantities.quantities import Quantity
+from ..recording.recording import Recording
+from ..statistics.covariance import Layout
+from . import content
+from .journal import Evaluator
+
+ParameterLike = Parameter | Mapping[str, Any] | None
+NOTHING = np.zeros((0, 1, 3))  # no correction at any knot
+CHEAP = 3.0  # times the residuals: a Jacobian that costs less is made with them
+
+
+def quantities_of(experiments: Sequence[Experiment]) -> dict[str, Quantity]:
+    """Every named quantity of the experiments' scenes, the first scene's value first."""
+    found: dict[str, Quantity] = {}
+    for e in experiments:
+        for name, quantity in e.scene.quantities.items():
+            found.setdefault(name, quantity)
+    return found
+
+
+def as_parameters(
+    wanted: Mapping[str, ParameterLike] | Iterable[str | Parameter], experiments: Sequence[Experiment]
+) -> Parameters:
+    """Complete what a user wrote: initial value, unit, log scale and natural scale come from the scenes' quantities.
+
+    Args:
+        wanted: names, `Parameter`s, or a mapping from name to `Parameter`, to a mapping of its fields, or to None.
+
+    Raises:
+        InputError: a name that no scene has; the message lists the known ones.
+    """
+    known = quantities_of(experiments)
+    items = (
+        wanted.items()
+        if isinstance(wanted, Mapping)
+        else [(p.name, p) if isinstance(p, Parameter) else (p, None) for p in wanted]
+    )
+    complete = []
+    for name, given in items:
+        if name not in known:
+            raise InputError("parameters", "name no quantity of the scenes", name, f"name some of: {', '.join(known)}")
+        if isinstance(given, Parameter):
+            complete.append(given)
+            continue
+        fields: dict[str, Any] = dict(given or {})
+        unknown = set(fields) - set(Parameter.__dataclass_fields__)
+        if unknown:
+            raise InputError(
+                f"parameters.{name}",
+                "has unknown fields",
+                sorted(unknown),
+                f"use: {', '.join(Parameter.__dataclass_fields__)}",
+            )
+        q = known[name]
+        if "tied_to" not in fields and not fields.get("private"):
+            fields.setdefault("initial", q.value)
+        defaults: dict[str, Any] = {"unit": q.unit, "log": q.positive, "scale": q.scale}
+        if q.limits is not None and "tied_to" not in fields:
+            defaults |= {"lower": q.limits[0], "upper": q.limits[1]}
+        merged = defaults | fields
+        if q.positive and not merged["log"]:
+            merged.setdefault("lower", 0.0)
+        complete.append(Parameter(name=name, **merged))
+    return Parameters(complete)
+
+
+class FitProblem:
+    """Experiments with shared and private parameters, compiled for one set of recordings' parts.
+
+    Attributes:
+        experiments: in order.
+        parameters: with private ones expanded to one per experiment that has them.
+        core: the compiled problem.
+        evaluator: evaluates it, through the journal that was open when it was made.
+        seconds: that the last evaluation from here took, with (True) and without a Jacobian.
+    """
+
+    def __init__(
+        self,
+        experiments: Sequence[Experiment],
+        parameters: Parameters,
+        recordings: Sequence[Recording] | None = None,
+        threads: int = 1,
+        expanded: Parameters | None = None,
+        corrected: Mapping[str, np.ndarray] | None = None,
+    ) -> None:
+        """With `corrected`, by experiment (knots, markers, 3) m, no experiment estimates a correction of its own."""
+        self.experiments = tuple(experiments)
+        self.given, self.threads = parameters, threads
+        self._last: tuple[np.ndarray, tuple[bool, np.ndarray, np.ndarray]] | None = None
+        self.seconds: dict[bool, float] = {}
+        self.recordings = tuple(recordings if recordings is not None else (e.fitted() for e in experiments))
+        names = [e.name for e in experiments]
+        if len(set(names)) != len(names):
+            raise InputError("experiments", "share a name", names, "give each a name of its own")
+        self.parameters = self._expanded(parameters) if expanded is None else expanded
+        theta, slots, slot_of = self._slots()
+        held = [None if corrected is None else corrected.get(e.name, NOTHING) for e in self.experiments]
+        cores = [e.core(r, b) for e, r, b in zip(self.experiments, self.recordings, held, strict=True)]
+        free = self._free(slot_of)
+        self.sensed = [core["sensors"] for core in cores]
+        try:
+            self.core = _core.Problem(experiments=cores, theta=theta, slots=slots, free=free, threads=threads)
+        except ValueError as error:
+            raise refusal(error, InputError, [len(r.times) for r in self.recordings]) from error
+        scenes = [e.scene for e in self.experiments]
+        self.evaluator = Evaluator(self.core, lambda: content.of_problem(scenes, cores, theta, slots, free))
+
+    def known(self, u: np.ndarray) -> tuple[np.ndarray, list[list[int]], dict[int, tuple[str, float]]]:
+        """All values at u, where each experiment's quantities are among them, and by place the parameter that is there:
+        the one that carries its value, and the factor to it."""
+        _, slots, slot_of = self._slots()
+        return self.core.physical(u), slots, {slot: self.parameters.roots[name] for name, slot in slot_of.items()}
+
+    def check_start(self) -> None:
+        """Refuse starting values that make a stiffness, mass or length negative.
+
+        Raises:
+            SceneError: names the quantities.
+        """
+        theta, slots, _ = self.known(self.parameters.initial())
+        for e, mine in zip(self.experiments, slots, strict=True):
+            e.scene.compiled.domain.check_quantities(theta[None, mine])
+            e.scene.compiled.inputs(theta[mine])
+
+    def holding(self, name: str, value: float) -> FitProblem:
+        """The same problem with one (expanded) parameter held at a value."""
+        held = self.parameters.replace(name, fixed=True, initial=value, prior=None, lower=-np.inf, upper=np.inf)
+        return FitProblem(self.experiments, self.given, self.recordings, self.threads, held)
+
+    def uncorrected(self, recordings: Sequence[Recording]) -> FitProblem:
+        """The same problem on (parts of) the recordings, with the markers that scenes follow taken for the truth."""
+        return FitProblem(self.experiments, self.given, recordings, self.threads, self.parameters, corrected={})
+
+    def around(self, name: str) -> FitProblem:
+        """The part that one free (expanded) parameter is tied to, through shared parameters; the rest of the minimum
+        does not depend on it."""
+        free = set(self.parameters.free)
+        free_of = [set(self.acting_on(e)) for e in self.experiments]
+        names: set[str] = {name}
+        chosen: list[int] = []
+        while (reached := [i for i, mine in enumerate(free_of) if mine & names]) != chosen:
+            chosen = reached
+            names |= set().union(*(free_of[i] for i in chosen))
+        part = Parameters(
+            p
+            for key, p in self.parameters.items()
+            if self.parameters.roots[key][0] in names | (set(self.parameters) - free)
+        )
+        return FitProblem(
+            [self.experiments[i] for i in chosen], self.given, [self.recordings[i] for i in chosen], self.threads, part
+        )
+
+    def acting_on(self, e: Experiment) -> tuple[str, ...]:
+        """The free (expanded) parameters that an experiment's motion depends on, in their order."""
+        roots = self.parameters.roots
+        mine = {roots[key][0] for key in self._keys(e).values() if key in self.parameters}
+        return tuple(name for name in self.parameters.free if name in mine)
+
+    def values_of(self, e: Experiment, u: np.ndarray) -> dict[str, float]:
+        """Physical values at u (free,) of the quantities of an experiment's scene that are parameters."""
+        values = self.parameters.to_physical(u)
+        return {name: values[key] for name, key in self._keys(e).items() if key in values}
+
+    def _keys(self, e: Experiment) -> dict[str, str]:
+        """Expanded parameter name of each quantity of an experiment, whether or not it is a parameter."""
+        private = {p.name for p in self.given.values() if p.private}
+        return {name: f"{name}[{e.name}]" if name in private else name for name in e.scene.quantities}
+
+    def _expanded(self, parameters: Parameters) -> Parameters:
+        has = {f"{name}[{e.name}]": q.value for e in self.experiments for name, q in e.scene.quantities.items()}
+        every = parameters.expand([e.name for e in self.experiments], has)
+        private = {f"{p.name}[{e.name}]" for p in parameters.values() if p.private for e in self.experiments}
+        return Parameters(p for name, p in every.items() if name not in private or name in has)
+
+    def _slots(self) -> tuple[list[float], list[list[int]], dict[str, int]]:
+        """theta, per experiment the place of each of its quantities in it, and the place of each expanded parameter."""
+        values = dict(self.parameters)
+        theta: list[float] = []
+        slot_of: dict[str, int] = {}
+        slots = []
+        for e in self.experiments:
+            mine = []
+            for name, key in self._keys(e).items():
+                quantity = e.scene.quantities[name]
+                if key in values and key in slot_of:
+                    mine.append(slot_of[key])
+                    continue
+                mine.append(len(theta))
+                initial = values[key].initial if key in values else quantity.value
+                theta.append(quantity.value if initial is None else initial)
+                if key in values:
+                    slot_of[key] = mine[-1]
+            slots.append(mine)
+        return theta, slots, slot_of
+
+    def _free(self, slot_of: Mapping[str, int]) -> list[dict[str, Any]]:
+        chain = {name: (root, factor) for name, (root, factor) in self.parameters.roots.items() if name in slot_of}
+        lists = []
+        for name in self.parameters.free:
+            p = self.parameters[name]
+            tied = [(slot_of[other], factor) for other, (root, factor) in chain.items() if root == name]
+            prior = None if p.prior is None else (p.to_internal(p.prior[0]), p.prior[1])
+            lists.append(
+                {
+                    "name": name,
+                    "log": p.log,
+                    "slots": [s for s, _ in tied],
+                    "factors": [f for _, f in tied],
+                    "prior": prior,
+                }
+            )
+        return lists
+
+    def evaluate(self, u: np.ndarray, jacobian: bool = True) -> tuple[bool, np.ndarray, np.ndarray]:
+        """(ok, residuals (rows,), Jacobian (rows, free)); rows of data first, then those of the parameters' priors and
+        of corrections'. Not ok where the physics has no answer. The last Jacobian is kept: everything that is told of
+        a minimum asks for it."""
+        if jacobian and self._last is not None and np.array_equal(self._last[0], u):
+            return self._last[1]
+        found, seconds = self.evaluator(u, jacobian)
+        if found[0] and seconds is not None:
+            self.seconds[jacobian] = seconds
+        if jacobian:
+            self._last = np.array(u, dtype=float), found
+        return found
+
+    def cost(self, u: np.ndarray) -> float:
+        """Half the sum of squares at u (free,); infinite where the physics has no answer."""
+        ok, r, _ = self.evaluate(u, jacobian=False)
+        return 0.5 * float(r @ r) if ok else np.inf
+
+    @property
+    def failure(self) -> str:
+        """Why the last evaluation was not ok."""
+        return self.core.failure or "a residual is not finite"
+
+    def evaluate_exactly(self, u: np.ndarray) -> tuple[bool, np.ndarray, np.ndarray]:
+        """`evaluate` with corrections linearized at u itself, as intervals need it; a fit's own steps may use an
+        earlier linearization, which leaves the gradient exact."""
+        if self.estimates_corrections:
+            self.core.relinearize()
+            self._last = None
+        return self.evaluate(u)
+
+    @property
+    def estimates_corrections(self) -> bool:
+        """Whether an experiment corrects the markers that its scene follows."""
+        return self.core.rows > self.prior_rows[1]
+
+    @property
+    def prior_rows(self) -> tuple[int, int]:
+        """First row of the parameters' priors, and one past the last; those of corrections follow."""
+        first = self.core.data_rows
+        return first, first + len(self.parameters.prior_residuals(self.parameters.initial()))
+
+    def corrections(self, u: np.ndarray) -> dict[str, np.ndarray]:
+        """(knots, markers, 3) m by name of experiment, what is added at u to the markers that its scene follows; of
+        those that estimate it."""
+        found: dict[str, np.ndarray] = {}
+        if not self.estimates_corrections:
+            return found
+        rows = self.evaluate(u)[1][self.prior_rows[1] :]
+        for e, r in zip(self.experiments, self.recordings, strict=True):
+            correction = e.correction(r)
+            if correction is not None and e.driven_noise is not None:
+                count = int(np.prod(correction.shape))
+                found[e.name] = e.driven_noise * rows[:count].reshape(correction.shape)
+                rows = rows[count:]
+        return found
+
+    @property
+    def cheap_jacobian(self) -> bool:
+        """Whether a Jacobian costs little more than the residuals alone, as where both share the factors of a cloth, or
+        is always made along, as where corrections go on from the last evaluation: no last digit hangs on a clock."""
+        if self.estimates_corrections:
+            return True
+        return True in self.seconds and self.seconds[True] < CHEAP * self.seconds.get(False, 0.0)
+
+    def simulate(self, u: np.ndarray) -> list[np.ndarray]:
+        """Simulated markers (frames, markers, 3) of every experiment."""
+        return [self.simulate_one(i, u) for i in range(len(self.recordings))]
+
+    def simulate_one(self, experiment: int, u: np.ndarray) -> np.ndarray:
+        """The same of one; threads may call it at the same time.
+
+        Raises:
+            DivergenceError, NoEquilibriumError: the physics has no answer.
+            InputError: a stiffness, mass or length is negative.
+        """
+        scene = self.experiments[experiment].scene
+        try:
+            with divergence(scene):
+                markers = self.core.simulate(experiment, u)
+        except _core.NoEquilibrium as error:
+            raise no_rest(scene, str(error), scene.positions) from error
+        except ValueError as error:
+            raise refusal(error, InputError, self.parameters.to_physical(u)) from error
+        return markers.reshape(self.recordings[experiment].positions.shape)
+
+    def readings(self, experiment: int, u: np.ndarray) -> list[np.ndarray]:
+        """What the force sensors of one experiment read at u: (samples, 6) of each, N and N m in its axes."""
+        with divergence(self.experiments[experiment].scene):
+            every = self.core.readings(experiment, u)
+        ends = np.cumsum([len(sensor["measured"]) for sensor in self.sensed[experiment]])
+        return np.split(every, ends[:-1]) if len(ends) else []
+
+    def rows_layout(self) -> Layout:
+        """Where each data row comes from, for the covariance. Markers are on clock 0, force sensors on clocks of their
+        own; each axis of either is a kind of its own, but along a static shape all are one."""
+        recording, channel, frame, kind, clock = [], [], [], [], []
+        for i, (e, r) in enumerate(zip(self.experiments, self.recordings, strict=True)):
+            seen_frame, seen_marker = np.nonzero(r.mask)
+            axes = np.tile(np.arange(len(e.axes)), len(seen_frame))
+            frames, markers = np.repeat(seen_frame, len(e.axes)), np.repeat(seen_marker, len(e.axes))
+            recording.append(np.full(len(axes), i))
+            # Along a static shape the points are the series.
+            channel.append(axes if e.static else markers * len(e.axes) + axes)
+            frame.append(markers if e.static else frames)
+            kind.append(0 * axes if e.static else axes)
+            clock.append(np.zeros(len(axes), dtype=int))
+            for k, sensor in enumerate(self.sensed[i], start=1):
+                sample, reads = np.nonzero(~np.isnan(sensor["measured"]))
+                recording.append(np.full(len(sample), i))
+                channel.append(reads)
+                frame.append(sample)
+                kind.append(3 + reads)
+                clock.append(np.full(len(sample), k))
+        return Layout(*(np.concatenate(part) for part in (recording, channel, frame, kind, clock)))
+
+    def row_times(self) -> np.ndarray:
+        """(rows,) s, when each data row was recorded; of an equilibrium NaN."""
+        times = []
+        for e, r, sensed in zip(self.experiments, self.recordings, self.sensed, strict=True):
+            seen_frame, _ = np.nonzero(r.mask)
+            when = np.full(len(seen_frame), np.nan) if e.static else r.times[seen_frame]
+            times.append(np.repeat(when, len(e.axes)))
+            for force, sensor in zip(e.forces, sensed, strict=True):
+                span = (float(r.times[0]), float(r.times[-1]))
+                at = force.recording.times[force.kept(e.t0, span)]
+                times.append(at[np.nonzero(~np.isnan(sensor["measured"]))[0]])
+        return np.concatenate(times)

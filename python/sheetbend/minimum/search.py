@@ -1,0 +1,265 @@
+"""How a fit finds its minimum: from every start, through short windows first where they help (`windows`), by steps that
+are limited for each parameter (`approach`), and by Ceres or SciPy once it is near.
+
+Corrections of driven markers come last: far from the minimum they would explain away what the parameters have to.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..errors import InputError, SheetbendError
+from .approach import Approach, Tally
+from .growth import Growth, growths
+from .optimizers import Minimum, Observer, Progress, judged, minimize, named
+from .problem import FitProblem
+from .windows import chosen, cut, holds_frames
+
+AUTO = "auto"
+WINDOW_TOLERANCE = 1e-2  # of the cost: a window's minimum is only a start
+WINDOW_STEPS = 40
+NEAR_TOLERANCE = 1e-3  # of the cost: what is left is for the optimizer
+MUCH, DONE = 0.25, 1e-3  # of the cost: what a first step promises where the start is near, and at the minimum
+NOISE = 2.0  # sigmas: a start whose residuals are no larger is near, too
+BACK = 0.1  # of the length: where windows so little longer diverge, there is no way on
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search found.
+
+    Attributes:
+        ends: of all starts, best first; those that diverged last, with an infinite cost.
+        optimizer: name of the one that ended the search.
+        interrupted: whether Ctrl-C did.
+        growths: of the motions at the first start.
+    """
+
+    ends: tuple[Minimum, ...]
+    optimizer: str
+    interrupted: bool
+    growths: tuple[Growth, ...]
+
+
+@dataclass(frozen=True)
+class Search:
+    """What `fit` was asked for, see there."""
+
+    optimizer: str = "auto"
+    starts: Sequence[Mapping[str, float]] = ()
+    windows: Sequence[float] | str = AUTO
+    max_iterations: int = 200
+    tolerance: float = 1e-10
+    progress: Observer | None = None
+
+    def __post_init__(self) -> None:
+        if self.max_iterations < 1:
+            raise InputError("max_iterations", "must be positive", self.max_iterations, "give at least 1")
+        if not 0 < self.tolerance < 1:
+            raise InputError("tolerance", "must lie between 0 and 1", self.tolerance, "give a relative change of cost")
+        if isinstance(self.windows, str):
+            if self.windows != AUTO:
+                raise InputError("windows", "are unknown", self.windows, "give lengths in s, [] for none, or 'auto'")
+            return
+        w = np.array(self.windows, dtype=float)
+        if not (np.isfinite(w).all() and (np.diff(w, prepend=0.0) > 0).all()):
+            raise InputError("windows", "must be positive and increase", list(self.windows), "give lengths in s")
+
+    def run(self, problem: FitProblem) -> Found:
+        """Search from every start.
+
+        Raises:
+            InputError: starts of what is not fitted, or windows that hold no frame.
+            SheetbendError: no start has an answer.
+        """
+        name = named(self.optimizer)
+        points = self._points(problem)
+        for length in () if self.windows == AUTO else self.windows:
+            cut(problem, float(length))
+        ends: list[Minimum] = []
+        began: tuple[Growth, ...] = ()
+        for u in points:
+            way = _Way(self, problem, name)
+            try:
+                grown = growths(problem, u) if not ends or self.windows == AUTO else ()
+                began = began or grown
+                ends.append(way.end(u, grown))
+            except KeyboardInterrupt:
+                end = way.interrupted()
+                if end is None and not ends:  # before the first point of the first start
+                    raise
+                return Found(_best_first(ends if end is None else [*ends, end]), name, True, began)
+            except SheetbendError as error:
+                ends.append(way.diverged(u, str(error)))
+            if ends[-1].interrupted:
+                return Found(_best_first(ends), name, True, began)
+        if not any(np.isfinite(end.cost) for end in ends):
+            raise SheetbendError(ends[0].message)
+        return Found(_best_first(ends), name, False, began)
+
+    def onward(self, problem: FitProblem, u: np.ndarray) -> Minimum:
+        """Search on the whole motion from a point that came out of its windows. Ctrl-C passes through.
+
+        Raises:
+            SheetbendError: the motion has no answer there.
+        """
+        return _Way(replace(self, windows=()), problem, named(self.optimizer)).end(u, ())
+
+    def _points(self, problem: FitProblem) -> list[np.ndarray]:
+        first = problem.parameters.to_physical(problem.parameters.initial())
+        points = [problem.parameters.initial()]
+        for changes in self.starts:
+            unknown = set(changes) - set(problem.parameters.free)
+            if unknown:
+                raise InputError(
+                    "starts", "name no free parameter", sorted(unknown), f"use: {', '.join(problem.parameters.free)}"
+                )
+            points.append(problem.parameters.to_internal(first | dict(changes)))
+        return points
+
+
+def _best_first(ends: Sequence[Minimum]) -> tuple[Minimum, ...]:
+    return tuple(sorted(ends, key=lambda m: m.cost))
+
+
+def fitted_window(part: FitProblem, u: np.ndarray, tolerance: float) -> Approach:
+    """At a minimum of a window, searched from u; its cost is infinite where the window has no answer there."""
+    walk = Approach(part, u)
+    while walk.iterations < WINDOW_STEPS and walk.step():
+        if walk.promised < tolerance or walk.taken < tolerance:
+            break
+    return walk
+
+
+@dataclass
+class _Way:
+    """From one start to its end: what it went through, and where it is."""
+
+    search: Search
+    problem: FitProblem
+    optimizer: str
+    windows: list[float] = field(default_factory=list)  # s, that were fitted
+    taken: Tally = field(default_factory=Tally)
+    first: float | None = None  # cost of the whole motion at the start
+    u: np.ndarray | None = None  # the best point of what was fitted last
+
+    def end(self, u: np.ndarray, grown: Sequence[Growth]) -> Minimum:
+        """Raises SheetbendError where the whole motion diverges at the start and after every window."""
+        most = self.search.max_iterations
+        whole = (
+            self.problem.uncorrected(self.problem.recordings) if self.problem.estimates_corrections else self.problem
+        )
+        given = [] if isinstance(self.search.windows, str) else [float(length) for length in self.search.windows]
+        if given:
+            self._began(u, whole.cost(u))
+            self.taken.evaluations += 1
+            walk = self._through(whole, given, u)
+        else:
+            walk = Approach(whole, u, self.taken)
+            self._began(walk.u, walk.cost)
+        if self.search.windows == AUTO:
+            lengths = chosen(self.problem, grown)
+            if (lengths or not np.isfinite(walk.cost)) and not self._starts_near(walk):
+                walk = self._through(whole, lengths, u)
+        if not np.isfinite(walk.cost):
+            raise SheetbendError(f"the fit cannot start: {whole.failure}")
+        self._walk(walk, NEAR_TOLERANCE, most - 1, None)
+        if whole is not self.problem:
+            walk = Approach(self.problem, walk.u, self.taken)
+            self._walk(walk, NEAR_TOLERANCE, most - 1, None)
+        before = self.taken.iterations
+        end, _ = minimize(
+            self.problem,
+            walk.u,
+            self.optimizer,
+            max(1, most - walk.iterations),
+            self.search.tolerance,
+            self._observer(None, before),
+            first=walk.cost if np.isfinite(walk.cost) else None,
+        )
+        try:
+            end = judged(self.problem, end, end.cost if self.first is None else self.first)
+        except KeyboardInterrupt:
+            end = replace(end, interrupted=True)
+        return self._counted(end)
+
+    def _began(self, u: np.ndarray, cost: float) -> None:
+        if np.isfinite(cost):
+            self.first, self.u = cost, u
+
+    def interrupted(self) -> Minimum | None:
+        """The best point so far, after Ctrl-C; None before the first, or where the whole motion diverges there."""
+        if self.u is None:
+            return None
+        cost = self.problem.cost(self.u)
+        if not np.isfinite(cost):
+            return None
+        return self._counted(Minimum(self.u, cost, 0, 1, False, True, "interrupted: the best point so far"))
+
+    def diverged(self, u: np.ndarray, words: str) -> Minimum:
+        """The row of a start that has no answer."""
+        return self._counted(Minimum(u, math.inf, 0, 0, False, False, words))
+
+    def _starts_near(self, walk: Approach) -> bool:
+        """Whether the first step on the whole motion promises much of the cost (or nothing is left to promise), keeps
+        it, and is short of every limit. Far off, the slope of a long motion promises little."""
+        if np.isfinite(walk.cost) and walk.step():
+            self._arrived(walk, None)
+        noise = walk.cost < 0.5 * NOISE**2 * self.problem.core.data_rows
+        if walk.promised < DONE:
+            return noise or walk.free
+        return walk.free and (noise or walk.promised > MUCH)
+
+    def _through(self, whole: FitProblem, lengths: Sequence[float], u: np.ndarray) -> Approach:
+        """Fit window after window; where one diverges at the values of the one before, one in between comes first.
+        Gives the whole motion at the end of the last."""
+        longest = max(float(r.times[-1]) - e.t0 for e, r in zip(whole.experiments, whole.recordings, strict=True))
+        ahead, reached = [*lengths, math.inf], 0.0
+        while True:
+            part = whole if math.isinf(ahead[0]) else cut(whole, ahead[0])
+            walk = Approach(part, u, self.taken)
+            if math.isfinite(walk.cost):
+                if part is whole:
+                    return walk
+                self._walk(walk, WINDOW_TOLERANCE, min(WINDOW_STEPS, self.search.max_iterations), ahead[0])
+                u, reached = walk.u, ahead.pop(0)
+                self.windows.append(reached)
+                continue
+            upto = min(ahead[0], longest)
+            between = 0.5 * (reached + upto)
+            if upto - reached < BACK * upto or not holds_frames(whole, between):
+                return Approach(whole, u, self.taken)
+            ahead.insert(0, between)
+
+    def _walk(self, walk: Approach, tolerance: float, most: int, window: float | None) -> None:
+        """Steps until the next promises little, and on the whole motion until it is near."""
+        while walk.iterations < most and not (window is None and walk.near) and walk.step():
+            self._arrived(walk, window)
+            if walk.promised < tolerance or walk.taken < tolerance:
+                break
+
+    def _arrived(self, walk: Approach, window: float | None) -> None:
+        self.u = walk.u
+        observe = self._observer(window, 0)
+        if observe is not None:
+            observe(Progress(self.taken.iterations, walk.cost, walk.u.copy()))
+
+    def _observer(self, window: float | None, before: int) -> Observer | None:
+        observe = self.search.progress
+        if observe is None:
+            return None
+        return lambda p: observe(replace(p, iteration=before + p.iteration, window=window))
+
+    def _counted(self, end: Minimum) -> Minimum:
+        return replace(
+            end,
+            first=self.first,
+            iterations=self.taken.iterations + end.iterations,
+            evaluations=self.taken.evaluations + end.evaluations,
+            jacobians=self.taken.jacobians + end.jacobians,
+            windows=tuple(self.windows),
+        )

@@ -1,0 +1,124 @@
+"""Moves an estimate to the limit of short substeps, once, at the end of a fit.
+
+Runs at h and h/2 are combined (see `extrapolation`), and Gauss-Newton steps go to the minimum of the combination's
+residuals. What the combination of h/2 and h/4 would move it further is the uncertainty of that limit. Where the runs
+cannot be combined, the estimate stays, and all that half the substep moves counts in its interval.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..errors import SheetbendError
+from ..experiment.experiment import Experiment
+from ..result.result import Refit
+from .linear_step import gauss_newton, moves, one_step
+from .problem import FitProblem
+from .refuted import refuted, words
+
+TIME_STEP, SWEEPS = "time step", "twice the sweeps"
+TANGENTS = 3  # evaluations with tangents at most
+THERE = 0.1  # standard errors of the residuals' scatter: a step shorter than this has arrived
+SECOND_ORDER, THIRD_ORDER = 4.0 / 3.0, 8.0 / 7.0  # from what a halving moves to the limit
+
+
+@dataclass(frozen=True)
+class Settled:
+    """Where a fit's estimate stands once the time step is counted.
+
+    Attributes:
+        problem: of which u is the minimum: with runs combined, or as it was fitted.
+        u: internal.
+        moved: by how much, of each free parameter, in its unit; empty where nothing was moved.
+        refits: what of the time step is left to count.
+        not_counted: why nothing of it is, where it is not.
+        warnings: where the data speak against a limit.
+    """
+
+    problem: FitProblem
+    u: np.ndarray
+    moved: Mapping[str, float] = field(default_factory=dict)
+    refits: tuple[Refit, ...] = ()
+    not_counted: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def cost(self) -> float:
+        """Half the sum of squares at u."""
+        return 0.5 * float(np.sum(self.problem.evaluate(self.u)[1] ** 2))
+
+
+def settle(problem: FitProblem, u: np.ndarray) -> Settled:
+    """Count the time step of a fit at its minimum u. Ctrl-C passes through."""
+    try:
+        if not all(map(can_be_combined, problem.experiments)):
+            return _counted_whole(problem, u)
+        return _moved(problem, u)
+    except SheetbendError as error:
+        return Settled(problem, u, not_counted=(f"{TIME_STEP} not counted: {error}",))
+
+
+def can_be_combined(e: Experiment) -> bool:
+    """Whether runs at several substeps give a limit: no kinks in time, iterations that converge, and one run so far."""
+    solver = e.solver
+    smooth = not e.scene.compiled.kinks and solver.method != "gauss_seidel" and e.driven_noise is None
+    return e.static or (smooth and solver.extrapolate == 1)
+
+
+def combined(experiments: Sequence[Experiment]) -> list[Experiment]:
+    """With runs at h and h/2, where they can be combined."""
+    return [
+        e if e.static or not can_be_combined(e) else replace(e, solver=replace(e.solver, extrapolate=2))
+        for e in experiments
+    ]
+
+
+def _at(problem: FitProblem, experiments: Sequence[Experiment]) -> FitProblem:
+    return FitProblem(experiments, problem.given, problem.recordings, problem.threads, problem.parameters)
+
+
+def _moved(problem: FitProblem, u: np.ndarray) -> Settled:
+    limit = _at(problem, combined(problem.experiments))
+    first = one_step(problem, limit, u)  # raises where the combination has no answer at u
+    before = float(np.sum(limit.evaluate(u, jacobian=False)[1] ** 2))
+    at = first
+    for _ in range(TANGENTS):
+        ok, r, J = limit.evaluate(at)
+        after = float(np.sum(r**2)) if ok else np.inf
+        if not after <= before:
+            whole = Refit(name=TIME_STEP, to_limit=1.0, moved=moves(problem.parameters, u, first))
+            return Settled(problem, u, refits=(whole,))
+        end, onward = at, gauss_newton(problem.parameters, at, J, r)
+        scatter = after / max(len(r) - len(u), 1)
+        if float(np.sum((J @ (onward - at)) ** 2)) <= THERE**2 * scatter:
+            break
+        before, at = after, onward
+    if refuted(problem, u, r):
+        whole = Refit(name=TIME_STEP, to_limit=1.0, moved=moves(problem.parameters, u, end))
+        told = words("short substeps", "at the same substep", "refine=False, or halve_step = false in a configuration,")
+        return Settled(problem, u, refits=(whole,), warnings=(told,))
+    finest = _at(problem, combined(halved(problem.experiments)))
+    left = np.abs(THIRD_ORDER * (one_step(limit, finest, end) - end)) + np.abs(onward - end)
+    rest = Refit(name=TIME_STEP, to_limit=1.0, moved=moves(problem.parameters, end, end + left))
+    return Settled(limit, end, moves(problem.parameters, u, end), (rest,))
+
+
+def _counted_whole(problem: FitProblem, u: np.ndarray) -> Settled:
+    halves = _at(problem, halved(problem.experiments))
+    made = moves(problem.parameters, u, one_step(problem, halves, u))
+    whole = Refit(name=TIME_STEP, to_limit=to_limit_of_steps(problem.experiments), moved=made)
+    return Settled(problem, u, refits=(whole,))
+
+
+def halved(experiments: Sequence[Experiment]) -> list[Experiment]:
+    """The same at half the substep."""
+    return [replace(e, solver=e.solver.with_h(e.solver.h / 2)) for e in experiments]
+
+
+def to_limit_of_steps(experiments: Iterable[Experiment]) -> float:
+    """Factor from what half the substep moves to the limit of short ones."""
+    first_order = any(e.solver.integrator == "bdf1" for e in experiments if not e.static)
+    return 2.0 if first_order else SECOND_ORDER

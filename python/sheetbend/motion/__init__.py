@@ -1,0 +1,1 @@
+"""Motion and rest: simulation, gradients through it, memory that they take, equilibrium, energies and forces."""

@@ -1,0 +1,69 @@
+"""What force every Newton step of an implicit substep leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..scene.scene import Array, Scene
+from .simulate import divergence, substeps
+from .solver import Solver
+
+
+@dataclass(frozen=True)
+class ForceBalance:
+    """The largest force that does not balance, over the largest force, at the start of a substep and after each of its
+    Newton steps.
+
+    Attributes:
+        times: (substeps,) s, at their ends.
+        left: (substeps, blocks, 1 + most Newton steps); NaN after a block's last one. Blocks are the scene's connected
+            parts.
+    """
+
+    times: Array
+    left: Array
+
+    @property
+    def newton_steps(self) -> Array:
+        """(substeps, blocks) after the first, which starts from the state before."""
+        return np.isfinite(self.left).sum(axis=2) - 1
+
+    def report(self) -> str:
+        """A line for each substep: of its slowest block."""
+        lines = ["substep  t [s]     force that is left, of the largest"]
+        for k, (time, blocks) in enumerate(zip(self.times, self.left, strict=True), start=1):
+            slowest = blocks[np.isfinite(blocks).sum(axis=1).argmax()]
+            lines.append(f"{k:7d}  {time:<8.5g}  " + " ".join(f"{left:.0e}" for left in slowest[np.isfinite(slowest)]))
+        return "\n".join(lines)
+
+
+def force_balance(scene: Scene, end: float, solver: Solver, values: Mapping[str, float] | None = None) -> ForceBalance:
+    """How the forces of a scene's motion came into balance.
+
+    Args:
+        scene: is frozen by this.
+        end: s, of the motion; on the substep grid.
+        solver: of the method "implicit".
+        values: quantities to change, by name.
+
+    Raises:
+        InputError: another method, an end off the grid.
+        UnbalancedError, DivergenceError: as `simulate`.
+    """
+    if solver.method != "implicit":
+        fix = "use 'implicit': the others end after their iterations"
+        raise InputError("solver.method", "balances no forces", solver.method, fix)
+    compiled = scene.compiled
+    count = substeps([end], solver.h)[0]
+    with divergence(scene):
+        found = solver.core(compiled).force_balance(compiled.inputs(compiled.values(values)), count, 0.0)
+    most = max((len(block) for blocks in found for block in blocks), default=0)
+    left = np.full((count, max(map(len, found), default=0), most), np.nan)
+    for k, blocks in enumerate(found):
+        for b, block in enumerate(blocks):
+            left[k, b, : len(block)] = block
+    return ForceBalance(solver.h * np.arange(1, count + 1), left)

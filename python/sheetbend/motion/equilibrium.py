@@ -1,0 +1,174 @@
+"""Static equilibrium of scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import _core
+from ..arrays.checks import finite
+from ..errors import SceneError, SheetbendError
+from ..scene.scene import Scene
+from .redundancy import warn_redundant
+from .simulate import forces_by_group, pressures_by_volume
+
+_FLAT = 1e-9  # of its extent: a sheet this near to a plane has no side to which it buckles
+
+
+class NoEquilibriumError(SheetbendError, RuntimeError):
+    """The solver did not reach an equilibrium from the given start."""
+
+
+def no_rest(scene: Scene, problem: str, positions: np.ndarray) -> NoEquilibriumError:
+    """What the core says ("problem. Fix: what to do") of a start (particles, 3) m that leads to no rest."""
+    flat = [name for name, cloth in scene.cloths.items() if _flat(positions[cloth.particles])]
+    if flat:
+        problem = (
+            f"{problem.partition('. Fix: ')[0]}. Fix: start with {', '.join(flat)} bent a little. Exactly flat, and "
+            "pressed together in its plane, nothing tells a sheet to which side it buckles. add_cloth takes such "
+            "positions (mesh.through leads them through markers), and so do equilibrium (start=) and a configuration "
+            '(shape = "recording"); or hold its supports as far apart as the sheet is wide'
+        )
+    return NoEquilibriumError(f"{scene.name}: {problem}")
+
+
+def _flat(positions: np.ndarray) -> bool:
+    sizes = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
+    return bool(sizes[2] <= _FLAT * sizes[0])
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A state of rest.
+
+    Attributes:
+        positions: (particles, 3) m.
+        forces: per group the multipliers (count, rows): minus the tension in N of a distance, minus the moment in N m
+            of bending.
+        energy: of weight, forces and strain, J; of several equilibria the lowest is the most stable one.
+        unstable_modes: negative eigenvalues of the energy's Hessian; 0 = stable.
+        residual: relative force imbalance.
+        iterations: Newton matrices used.
+        pressures: per volume that is kept its multiplier, Pa, inside above outside.
+    """
+
+    positions: np.ndarray
+    forces: Mapping[str, np.ndarray]
+    energy: float
+    unstable_modes: int
+    residual: float
+    iterations: int
+    solution: _core.EquilibriumSolution = field(repr=False)
+    scene: Scene = field(repr=False)
+    theta: np.ndarray = field(repr=False)
+    pressures: Mapping[str, float] = field(default_factory=dict)
+
+    def gradient(
+        self,
+        positions_bar: ArrayLike | None = None,
+        forces_bar: Mapping[str, ArrayLike] | None = None,
+        pressures_bar: Mapping[str, float] | None = None,
+    ) -> dict[str, float]:
+        """Gradient of a loss with respect to every named quantity, by the implicit function theorem.
+
+        Args:
+            positions_bar: (particles, 3), derivative of the loss with respect to the positions.
+            forces_bar: per group (count, rows), derivative with respect to `forces`.
+            pressures_bar: per volume, derivative with respect to `pressures`.
+
+        Raises:
+            SceneError: wrong shapes, no such group or volume.
+        """
+        return self.by_name(self.input_gradient(positions_bar, forces_bar, pressures_bar))
+
+    def input_gradient(
+        self,
+        positions_bar: ArrayLike | None = None,
+        forces_bar: Mapping[str, ArrayLike] | None = None,
+        pressures_bar: Mapping[str, float] | None = None,
+    ) -> np.ndarray:
+        """The same by the flat inputs (`CompiledScene.inputs`), places and rest geometry among them."""
+        x_bar = (
+            None
+            if positions_bar is None
+            else finite("positions_bar", positions_bar, self.positions.shape, SceneError).ravel()
+        )
+        if forces_bar is None and pressures_bar is None:
+            return self.solution.vjp(x_bar, None)
+        lambda_bar = np.zeros(len(self.solution.multipliers))
+        forces, pressures = forces_by_group(self.scene, lambda_bar), pressures_by_volume(self.scene, lambda_bar)
+        for name, bar in (forces_bar or {}).items():
+            self.scene.group(name)
+            forces[name][...] = finite(f"forces_bar.{name}", bar, forces[name].shape, SceneError)
+        for name, given in (pressures_bar or {}).items():
+            if name not in pressures:
+                raise SceneError(f"pressures_bar.{name}", "is no volume", name, f"use one of {sorted(pressures)}")
+            pressures[name][...] = finite(f"pressures_bar.{name}", given, (), SceneError)
+        return self.solution.vjp(x_bar, lambda_bar)
+
+    def by_name(self, inputs_bar: np.ndarray) -> dict[str, float]:
+        """A gradient with respect to the named quantities from one by the flat inputs."""
+        compiled = self.scene.compiled
+        return dict(zip(compiled.names, compiled.theta_bar(self.theta, inputs_bar).tolist(), strict=True))
+
+
+def equilibrium(
+    scene: Scene, start: ArrayLike | None = None, values: Mapping[str, float] | None = None, stable: bool = True
+) -> Equilibrium:
+    """The equilibrium that a start leads to.
+
+    Args:
+        scene: is frozen by this.
+        start: (particles, 3) m; the scene's initial positions by default.
+        values: quantities to change, by name.
+        stable: leave saddles; False goes to the nearest equilibrium whatever its stability.
+
+    Raises:
+        SceneError: the start has the wrong shape.
+        ValueError: air blows on triangles at the start; still air leaves a scene at rest as it is.
+        NoEquilibriumError: not converged; says how far it came and what to try.
+
+    Warns:
+        RedundantConstraintsWarning: some rigid constraints follow from others at rest.
+    """
+    compiled = scene.compiled
+    x = None if start is None else finite("start", start, (scene.particle_count, 3), SceneError).ravel()
+    theta = compiled.values(values)
+    out = _core.equilibrium(compiled.core, compiled.inputs(theta), x, stable)
+    if not out.converged:
+        raise no_rest(scene, out.message, scene.positions if x is None else x.reshape(-1, 3))
+    warn_redundant(scene.name, out.redundant)
+    return Equilibrium(
+        out.positions.reshape(-1, 3),
+        forces_by_group(scene, out.multipliers),
+        out.energy,
+        out.unstable_modes,
+        out.residual,
+        out.iterations,
+        solution=out,
+        scene=scene,
+        theta=theta,
+        pressures={name: float(p) for name, p in pressures_by_volume(scene, out.multipliers).items()},
+    )
+
+
+def equilibria(
+    scene: Scene, starts: Iterable[ArrayLike], values: Mapping[str, float] | None = None, tolerance: float = 1e-6
+) -> list[Equilibrium]:
+    """The distinct equilibria that several starts lead to, lowest energy first. Starts that lead nowhere are left out.
+
+    Args:
+        tolerance: m; states nearer than this everywhere are one.
+    """
+    found: list[Equilibrium] = []
+    for start in starts:
+        try:
+            e = equilibrium(scene, start, values)
+        except NoEquilibriumError:
+            continue
+        if all(np.abs(e.positions - other.positions).max() > tolerance for other in found):
+            found.append(e)
+    return sorted(found, key=lambda e: e.energy)

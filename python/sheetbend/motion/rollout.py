@@ -1,0 +1,137 @@
+"""A rollout that can be differentiated, in NumPy."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import _core
+from ..arrays.checks import finite
+from ..errors import EmptyGradientError, InputError
+from ..scene.scene import Scene
+from .simulate import divergence, substeps
+from .solver import Solver
+from .tape import TapePlan, planned
+
+Array = np.ndarray
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Gradient:
+    """Derivatives of a number by everything that a rollout depends on.
+
+    Attributes:
+        quantities: by named quantity.
+        inputs: by input array, in its shape: "position", "velocity" (particles, 3), "mass" (particles,), "compliance",
+            "damping" (constraints,), "rest" (all rest parameters,), "boundary", "force" (knots times particles, 3),
+            "gravity" (3,), "drag_linear", "drag_quadratic" (particles,), "wind" (knots, 3), "air_normal",
+            "air_tangential", "pressure" (triangles in air,), "volume", "volume_compliance" (volumes,).
+        recomputed: substeps that the forward program ran again: as planned, or more where the same rollout was
+            differentiated before and its tape no longer holds what it held.
+        tape: bytes of the tape.
+        rounding: what the loss may change by when positions are rounded in the last bit of the largest of them.
+    """
+
+    quantities: Mapping[str, float]
+    inputs: Mapping[str, Array]
+    recomputed: int
+    tape: int
+    rounding: float
+
+    def require(self, scales: Mapping[str, float]) -> None:
+        """Refuse a gradient that is empty for some named quantities: one that no optimizer can go along.
+
+        Args:
+            scales: by name, in the quantity's unit, how far it is likely to move.
+
+        Raises:
+            InputError: a name that is no quantity of the scene.
+            EmptyGradientError: to the first order none of these moves changes the loss by more than `rounding`.
+        """
+        unknown = [name for name in scales if name not in self.quantities]
+        if unknown:
+            fix = f"name some of: {', '.join(self.quantities)}"
+            raise InputError("scales", "name no quantity of the scene", unknown[0], fix)
+        change = max((abs(self.quantities[name] * scale) for name, scale in scales.items()), default=0.0)
+        if not change > self.rounding:
+            raise EmptyGradientError(tuple(scales), change, self.rounding)
+
+
+class Rollout:
+    """What `rollout` gives: positions now, gradients when asked.
+
+    Attributes:
+        times: (frames,) s.
+        positions: (frames, particles, 3) m.
+        plan: what the gradient costs.
+    """
+
+    def __init__(self, scene: Scene, times: ArrayLike, solver: Solver, values: Mapping[str, float] | None) -> None:
+        self._scene, self._solver, self._compiled = scene, solver, scene.compiled
+        self._core = solver.core(self._compiled)
+        self._steps = substeps(times, solver.h)
+        self._theta = self._compiled.values(values)
+        self._inputs = self._compiled.inputs(self._theta)
+        allowed = solver.budget
+        self.plan: TapePlan = planned(self._core, self._steps, solver, allowed)
+        if solver.memory is None and self.plan.policy != "every boundary":
+            log.warning("%s: solver.memory is not given, so half of the free memory is used. %s", scene.name, self.plan)
+        self._tape: _core.Tape
+        with divergence(scene):
+            states, self._tape = self._core.record(self._inputs, self._steps, 0.0, allowed)
+        self.times: Array = np.array(self._steps) * solver.h
+        self.positions: Array = states.reshape(len(self._steps), -1, 3)
+
+    def gradient(self, positions_bar: ArrayLike) -> Gradient:
+        """The gradient of a loss whose derivative with respect to the positions is `positions_bar`, (frames,
+        particles, 3).
+
+        May be called again, with other cotangents, and from several threads; where the tape dropped states they take
+        turns.
+
+        Raises:
+            InputError: wrong shape, NaN.
+            DivergenceError: the gradient grew by more than 1/eps on its way back through the motion.
+            UnconvergedError: as `rollout`.
+        """
+        bar = np.asarray(positions_bar, dtype=float)
+        if bar.shape != self.positions.shape or not np.isfinite(bar).all():
+            bar = finite("positions_bar", positions_bar, self.positions.shape, InputError)
+        with divergence(self._scene):
+            inputs_bar, recomputed = self._core.reverse(self._inputs, self._tape, self._steps, bar, 0.0)
+        by_quantity = self._compiled.theta_bar(self._theta, inputs_bar)
+        return Gradient(
+            dict(zip(self._compiled.names, by_quantity.tolist(), strict=True)),
+            self._compiled.unpack(inputs_bar),
+            recomputed,
+            self._tape.bytes,
+            float(np.finfo(float).eps * np.abs(self.positions).max() * np.abs(bar).sum()),
+        )
+
+
+def rollout(
+    scene: Scene, times: ArrayLike, solver: Solver | None = None, values: Mapping[str, float] | None = None
+) -> Rollout:
+    """Simulate a scene and keep what its gradient needs, within `solver.memory`, by default half of the free memory.
+
+    Where that default makes the gradient compute states again, a warning of the logger "sheetbend.motion.rollout" says
+    what it costs.
+
+    Args:
+        scene: is frozen by this.
+        times: (frames,) s on the substep grid, where the loss looks; memory grows with their number, so give no more.
+        solver: `Solver()` by default.
+        values: quantities to change for this run, by name.
+
+    Raises:
+        InputError: times off the grid, unknown quantities, a budget below the least that works or above what is free.
+        DivergenceError: a state became infinite, or nothing put into the scene explains it; says when and where.
+        UnconvergedError: method "newton_cg" ran out of iterations, here or in a gradient.
+        UnbalancedError: method "implicit" did not bring a substep's forces into balance.
+    """
+    return Rollout(scene, times, solver or Solver(), values)

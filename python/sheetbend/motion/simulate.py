@@ -1,0 +1,135 @@
+"""Forward simulation: trajectories of scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import _core
+from ..arrays.checks import finite
+from ..errors import DivergenceError, InputError, UnbalancedError, UnconvergedError
+from ..files.memory import expect_room
+from ..quantities.kinds import KINDS
+from ..scene.scene import Scene
+from .solver import Solver
+
+MOST_SUBSTEPS = 2**31 - 1  # that the core counts
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """What a rollout gives.
+
+    Attributes:
+        times: (frames,) s.
+        positions: (frames, particles, 3) m.
+        velocities: (frames, particles, 3) m/s; zero for directors, which are directions.
+        forces: per group the constraints' multipliers (frames, count, rows) in units of force (distance: minus the
+            tension in N; bend and hinge: minus the moment in N m), zero at the initial frame.
+        pressures: per volume (frames,) its multiplier, Pa, inside above outside; zero at the initial frame.
+    """
+
+    times: np.ndarray
+    positions: np.ndarray
+    velocities: np.ndarray
+    forces: Mapping[str, np.ndarray]
+    pressures: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+
+def simulate(
+    scene: Scene,
+    times: ArrayLike,
+    solver: Solver | None = None,
+    values: Mapping[str, float] | None = None,
+    start: ArrayLike | None = None,
+) -> Trajectory:
+    """Simulate a scene from its initial state.
+
+    Args:
+        scene: is frozen by this.
+        times: (frames,) s, not decreasing, starting at or after 0; each must lie on the substep grid.
+        solver: `Solver()` by default.
+        values: quantities to change for this run, by name.
+        start: (particles, 3) m, positions to start from instead of the scene's, such as an equilibrium's.
+
+    Raises:
+        InputError: times off the grid, unknown quantities, more frames than fit in the free memory.
+        DivergenceError: a state became infinite, or nothing put into the scene explains it; says when and where.
+        UnconvergedError: method "newton_cg" ran out of iterations.
+        UnbalancedError: method "implicit" did not bring a substep's forces into balance; says when and where.
+    """
+    solver = solver or Solver()
+    compiled = scene.compiled
+    steps = substeps(times, solver.h)
+    inputs = compiled.inputs(compiled.values(values))
+    if start is not None:
+        offset, size = compiled.layout["position"]
+        inputs[offset : offset + size] = finite("start", start, (scene.particle_count, 3), InputError).ravel()
+    frames = len(steps)
+    numbers = 2 * compiled.core.dofs + compiled.core.rows + len(scene.volumes.triangles)
+    expect_room("times", 8 * frames * numbers, f"ask for fewer than {frames} frames at a time")
+    with divergence(scene):
+        out = solver.core(compiled).simulate(inputs, steps, 0.0)
+    velocities = out["velocities"].reshape(frames, -1, 3)
+    velocities[:, list(scene.directors)] = 0.0
+    return Trajectory(
+        np.array(steps) * solver.h,
+        out["positions"].reshape(frames, -1, 3),
+        velocities,
+        forces_by_group(scene, out["multipliers"]),
+        pressures_by_volume(scene, out["multipliers"]),
+    )
+
+
+def substeps(times: ArrayLike, h: float) -> list[int]:
+    """Substep numbers of times; raises InputError where a time lies off the grid."""
+    t = finite("times", times, None, InputError).ravel()
+    if len(t) == 0 or (t < 0).any() or (np.diff(t) < 0).any():
+        raise InputError("times", "must be ascending from 0 or later", t[:5].tolist(), "give frame times in s")
+    steps = np.rint(t / h)
+    off = np.abs(t / h - steps) > 1e-6 * np.maximum(steps, 1.0)
+    if off.any():
+        raise InputError(
+            "times",
+            f"do not lie on the grid of substeps of {h:g} s",
+            float(t[off][0]),
+            "choose h so that it divides the frame interval",
+        )
+    if steps[-1] > MOST_SUBSTEPS:
+        raise InputError("times", f"take more than {MOST_SUBSTEPS} substeps of {h:g} s", float(t[-1]), "end earlier")
+    return steps.astype(int).tolist()
+
+
+def forces_by_group(scene: Scene, multipliers: np.ndarray) -> dict[str, np.ndarray]:
+    """Multipliers (..., rows) by group, (..., count, rows)."""
+    forces, row = {}, 0
+    for g in scene.groups:
+        rows = KINDS[g.kind]["rows"]
+        part = multipliers[..., row : row + rows * len(g.particles)]
+        forces[g.name] = part.reshape(*part.shape[:-1], len(g.particles), rows)
+        row += rows * len(g.particles)
+    return forces
+
+
+def pressures_by_volume(scene: Scene, multipliers: np.ndarray) -> dict[str, np.ndarray]:
+    """Multipliers (...,) by volume, which follow those of the groups."""
+    first = scene.compiled.core.rows
+    return {name: multipliers[..., first + v] for v, name in enumerate(scene.volumes.triangles)}
+
+
+@contextmanager
+def divergence(scene: Scene) -> Iterator[None]:
+    """Turns what stops the core's rollouts into the package's errors."""
+    try:
+        yield
+    except _core.Diverged as error:
+        raise DivergenceError(error.substep, error.time, error.particle, scene.name, error.seen) from error
+    except _core.Unbalanced as error:
+        when = (error.substep, error.time, error.particle)
+        raise UnbalancedError(error.problem, error.fix, *when, error.residual, scene.name) from error
+    except _core.Unconverged as error:
+        raise UnconvergedError(error.iterations, error.residual, scene.name) from error

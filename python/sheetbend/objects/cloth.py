@@ -1,0 +1,227 @@
+"""Cloth: triangle meshes with membrane and bending stiffness, given and fitted by numbers of the fabric that do not
+depend on the mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays.checks import check_positive, finite, indices, is_number
+from ..errors import SceneError
+from ..mesh import TriangleMesh
+from ..quantities.quantities import Term
+from ..scene.scene import Array, Scene
+from .elastic_group import add_elastic_group
+from .fabric import Law, Linear
+from .hinges import Hinges
+from .sheet_bending import SheetCurvature
+
+MODELS = ("curvature", "dihedral", "isometric_bending")
+
+
+@dataclass(frozen=True)
+class Cloth:
+    """A cloth in a scene.
+
+    Attributes:
+        mesh: as given.
+        particles: of its vertices.
+        fabric: prefix of its fabric's quantities.
+        numbers: of its fabric as given, those left out too.
+    """
+
+    name: str
+    mesh: TriangleMesh
+    particles: Array
+    fabric: str
+    numbers: Mapping[str, Any]
+
+
+def add_cloth(
+    scene: Scene,
+    mesh: TriangleMesh,
+    name: str = "cloth",
+    *,
+    fabric: str = "",
+    density: float,
+    warp: float,
+    weft: float | None = None,
+    shear: float,
+    poisson: float = 0.0,
+    law: Law | None = None,
+    bending: float | None = None,
+    bending_weft: float | None = None,
+    bending_twist: float | None = None,
+    bending_model: str = "curvature",
+    curved: bool = False,
+    held: ArrayLike = (),
+    positions: ArrayLike | None = None,
+    membrane_damping: float | None = None,
+    bend_damping: float | None = None,
+    drag_linear: float | None = None,
+    drag_quadratic: float | None = None,
+) -> Cloth:
+    """Add a cloth to a scene.
+
+    Quantities: `<fabric>_density` kg/m^2, `_warp`, `_weft`, `_shear` N/m, `_poisson`, the law's coefficients (see
+    `sheetbend.objects.fabric`) such as `_warp_stiffening`, and where given `_bending`, `_bending_weft`,
+    `_bending_twist` N m, `_membrane_damping` s,
+    `_bend_damping` s, `_drag_linear` N s/m^3, `_drag_quadratic` N s^2/m^4.
+
+    The membrane's energy per area is Y_warp f(E_uu)^2 + 2 n sqrt(Y_warp Y_weft) f(E_uu) f(E_vv) + Y_weft f(E_vv)^2,
+    over 2 (1 - n^2), plus G f(2 E_uv)^2/2, in Green strain (core/constraints/membrane.h).
+
+    Args:
+        mesh: with material coordinates along warp and weft.
+        fabric: prefix of the quantities, `name` by default. Cuts of one fabric share them and have the same values.
+        density: mass per area, kg/m^2.
+        warp, weft: tension stiffness at rest, N/m, of a strip with free sides; weft = warp by default.
+        shear: G, N/m; an isotropic fabric has warp/(2 (1 + poisson)).
+        poisson: n = sqrt(nu_uv nu_vu), between -1 and 1. A strip pulled along the warp narrows by
+            nu_uv = n sqrt(warp/weft) times its strain.
+        law: how tension grows with strain; Linear() by default.
+        bending: rigidity B, N m, along the warp and, where nothing else is given, in all directions; None = no bending.
+        bending_weft, bending_twist: rigidities along the weft and against twist, N m, of the curvature model.
+        bending_model: "curvature" (of triangles: right on meshes whose inner vertices have six neighbors), "dihedral"
+            (angles between triangles: what a mesh makes of B depends on its pattern) or "isometric_bending" (the
+            quadratic form of that, flat at rest).
+        curved: the mesh's vertices are the shape at rest of the bending; flat by default.
+        held: vertices that will be pinned or driven: triangles and hinges among them alone are left out. To clamp a
+            sheet with the curvature model hold two rows or more: the clamp then acts in the middle between the last row
+            and the one before it. A single row is a hinge line.
+        positions: (vertices, 3) m, the initial shape; the mesh's vertices by default.
+        membrane_damping, bend_damping: Kelvin-Voigt time constants, s.
+        drag_linear, drag_quadratic: air drag per area, isotropic.
+
+    Raises:
+        SceneError: wrong or missing values, or others than those of a cut before; a mesh whose diagonals bias bending.
+    """
+    needed = {"density": density, "warp": warp, "shear": shear}
+    optional = {
+        "weft": weft,
+        "bending": bending,
+        "bending_weft": bending_weft,
+        "bending_twist": bending_twist,
+        "membrane_damping": membrane_damping,
+        "bend_damping": bend_damping,
+        "drag_linear": drag_linear,
+        "drag_quadratic": drag_quadratic,
+    }
+    check_positive(name, needed, optional)
+    fabric = fabric or name
+    numbers = needed | optional | {"poisson": poisson, "law": law or Linear(), "bending_model": bending_model}
+    _check_cut(scene, name, fabric, numbers)
+    if not (is_number(poisson) and -1 < poisson < 1):
+        raise SceneError(f"{name}.poisson", "must lie between -1 and 1", poisson, "give sqrt(nu_uv nu_vu)")
+    if bending_model not in MODELS:
+        raise SceneError(f"{name}.bending_model", "is unknown", bending_model, f"use one of: {', '.join(MODELS)}")
+    if bend_damping is not None and bending is None:
+        raise SceneError(f"{name}.bend_damping", "needs bending", bend_damping, "give bending, or leave it out")
+    for field, value in (("bending_weft", bending_weft), ("bending_twist", bending_twist)):
+        if value is not None and (bending is None or bending_model != "curvature"):
+            fix = "give bending and keep bending_model = 'curvature', or leave it out"
+            raise SceneError(f"{name}.{field}", "belongs to the curvature model", value, fix)
+    shape = (
+        mesh.vertices if positions is None else finite(f"{name}.positions", positions, mesh.vertices.shape, SceneError)
+    )
+    free = np.ones(len(shape), dtype=bool)
+    if np.size(held):
+        free[indices(f"{name}.held", held, len(shape))] = False
+
+    particles = scene.add_particles(shape, 0.0)
+    _weigh(scene, mesh, fabric, particles, density, drag_linear, drag_quadratic)
+    _membrane(
+        scene, mesh, name, fabric, particles, free, (warp, weft, shear, poisson), law or Linear(), membrane_damping
+    )
+    if bending is not None:
+        if bending_model == "curvature":
+            sheet = SheetCurvature(mesh, free)
+            sheet.add(scene, name, fabric, particles, bending, bending_weft, bending_twist, curved, bend_damping)
+        else:
+            Hinges(mesh, free).add(scene, name, fabric, particles, bending, bending_model, curved, bend_damping)
+    built = Cloth(name, mesh, particles, fabric, numbers)
+    scene.cloths[name] = built
+    return built
+
+
+def _check_cut(scene: Scene, name: str, fabric: str, numbers: Mapping[str, Any]) -> None:
+    """Cuts of one fabric have the same numbers."""
+    for other in scene.cloths.values():
+        if other.fabric == fabric and other.numbers != numbers:
+            differing = [key for key, value in numbers.items() if other.numbers[key] != value]
+            fix = f"give what {other.name} has, or another fabric"
+            raise SceneError(
+                f"{name}.{differing[0]}", f"is not that of its fabric, {fabric}", numbers[differing[0]], fix
+            )
+
+
+def _weigh(
+    scene: Scene,
+    mesh: TriangleMesh,
+    fabric: str,
+    particles: Array,
+    density: float,
+    linear: float | None,
+    quadratic: float | None,
+) -> None:
+    """Masses and drag: every vertex has a third of its triangles."""
+    share = np.bincount(mesh.triangles.ravel(), np.repeat(mesh.areas / 3.0, 3), len(mesh.vertices))
+    scene.add_quantity(f"{fabric}_density", density, "kg/m^2", shared=True)
+    scene.add_terms([Term("mass", particles, share, ((f"{fabric}_density", "identity"),))])
+    for kind, value, unit in (("linear", linear, "N s/m^3"), ("quadratic", quadratic, "N s^2/m^4")):
+        if value is not None:
+            scene.has_drag = True
+            quantity = scene.add_quantity(f"{fabric}_drag_{kind}", value, unit, shared=True)
+            scene.add_terms([Term(f"drag_{kind}", particles, share, ((quantity, "identity"),))])
+
+
+def _membrane(
+    scene: Scene,
+    mesh: TriangleMesh,
+    name: str,
+    fabric: str,
+    particles: Array,
+    free: Array,
+    stiffness: tuple[float, float | None, float, float],
+    law: Law,
+    damping: float | None,
+) -> None:
+    warp, weft, shear, poisson = stiffness
+    kept = np.flatnonzero(free[mesh.triangles].any(axis=1))
+    corners, areas = mesh.corners[kept], mesh.areas[kept]
+    count = len(kept)
+    coefficients = list(law.coefficients())
+    rest = np.zeros((count, 7 + len(coefficients)))
+    rest[:, :4] = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)).reshape(count, 4)
+    if weft is None:
+        rest[:, 5] = 1.0
+    values = add_elastic_group(
+        scene,
+        law.kind,
+        particles[mesh.triangles[kept]],
+        name=f"{name}_membrane",
+        rest=rest,
+        scale=areas,
+        stiffness=(f"{fabric}_warp", warp, "N/m"),
+        damping=(f"{fabric}_membrane_damping", damping),
+    )
+    terms = []
+    over_warp = (f"{fabric}_warp", "inverse_sqrt")
+    for place, label, value in ((5, "weft", weft), (6, "shear", shear)):
+        if value is not None:
+            scene.add_quantity(f"{fabric}_{label}", value, "N/m", shared=True)
+            terms.append(Term("rest", values + place, 1.0, ((f"{fabric}_{label}", "sqrt"), over_warp)))
+    scene.add_quantity(f"{fabric}_poisson", poisson, "", positive=False, scale=0.1, limits=(-1.0, 1.0), shared=True)
+    terms.append(Term("rest", values + 4, 1.0, ((f"{fabric}_poisson", "identity"),)))
+    own = scene.groups[-1].rest
+    for place, (label, value, fittable) in enumerate(coefficients, start=7):
+        if fittable:
+            scene.add_quantity(f"{fabric}_{label}", value, "", shared=True)
+            terms.append(Term("rest", values + place, 1.0, ((f"{fabric}_{label}", "identity"),)))
+        else:
+            own[:, place] = value
+    scene.add_terms(terms)

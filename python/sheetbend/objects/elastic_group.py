@@ -1,0 +1,55 @@
+"""A group of a cloth's constraints that share one stiffness and one time constant."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..quantities.quantities import Term
+from ..scene.scene import Array, Scene
+from .chain import first_value
+
+
+def add_elastic_group(
+    scene: Scene,
+    kind: str,
+    stencils: Array,
+    *,
+    name: str,
+    rest: Array,
+    scale: Array,
+    stiffness: tuple[str, float, str],
+    damping: tuple[str, float | None],
+) -> Array:
+    """Add constraints of compliance 1/(scale stiffness), damped by stiffness times a Kelvin-Voigt time constant.
+
+    Args:
+        stencils: (count, arity) particles.
+        name: of the group.
+        rest: (count,) or (count, parameters), see `Scene.add_constraints`.
+        scale: (count,) what the stiffness counts in each, such as areas.
+        stiffness: name, value and unit of its quantity, which groups of equal value share.
+        damping: name and value, s, of the time constant's, likewise; None = undamped.
+
+    Returns:
+        (count,) where each constraint's own parameters start in the input array "rest".
+    """
+    count = len(stencils)
+    quantity, value, unit = stiffness
+    label, constant = damping
+    scene.add_constraints(
+        kind,
+        stencils,
+        name=name,
+        compliance=np.zeros(count),
+        damping=None if constant is None else np.zeros(count),
+        rest=rest,
+    )
+    group, first, _ = scene.group(name)
+    at = first + np.arange(count)
+    scene.add_quantity(quantity, value, unit, shared=True)
+    scene.add_terms([Term("compliance", at, 1.0 / scale, ((quantity, "inverse"),))])
+    if constant is not None:
+        scene.add_quantity(label, constant, "s", shared=True)
+        scene.add_terms([Term("damping", at, scale, ((label, "identity"), (quantity, "identity")))])
+    values: Array = first_value(scene, name) + group.rest.shape[1] * np.arange(count)
+    return values

@@ -1,0 +1,166 @@
+"""Where a recording's markers sit on a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import prod
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays.checks import finite
+from ..errors import SceneError
+from ..mesh import Places
+from ..scene.scene import Scene
+from .cloth import Cloth
+from .rope import Rope
+
+
+@dataclass(frozen=True)
+class Place:
+    """A material point: weights on up to four particles, weights of its tangent, and an offset in the frame (t, n, t x
+    n).
+
+    t is the rope's direction there, n the given normal made perpendicular to it. Offset components that are texts name
+    quantities.
+    """
+
+    particles: tuple[int, ...]
+    weights: tuple[float, ...]
+    tangent: tuple[float, ...]
+    offset: tuple[float, float, float] | None = None
+    normal: tuple[float, float, float] = (0.0, 1.0, 0.0)
+
+    def with_offset(self, offset: ArrayLike, normal: ArrayLike = (0.0, 1.0, 0.0)) -> Place:
+        """The same place, standing off by `offset` (3,) m along (tangent, normal, tangent x normal)."""
+        off = finite("offset", offset, (3,), SceneError)
+        n = finite("normal", normal, (3,), SceneError)
+        if not n.any():
+            raise SceneError("normal", "has no length", n.tolist(), "give the normal of the plane of motion")
+        return replace(self, offset=tuple(off.tolist()), normal=tuple((n / np.linalg.norm(n)).tolist()))
+
+    def core(self) -> dict[str, Any]:
+        """As the compiled core takes it: four coordinates' places, padded with zero weights."""
+        pad = 4 - len(self.particles)
+        return {
+            "dof": [3 * p for p in self.particles] + [3 * self.particles[-1]] * pad,
+            "weight": [*self.weights, *[0.0] * pad],
+            "tangent": [*self.tangent, *[0.0] * pad],
+            "normal": list(self.normal),
+            "carries_offset": self.offset is not None,
+        }
+
+
+def on_particle(particle: int) -> Place:
+    """A marker on a particle."""
+    return Place((int(particle),), (1.0,), (0.0,))
+
+
+def between(first: int, second: int, fraction: float) -> Place:
+    """A marker on the line through two particles, `fraction` of the way (beyond them for fractions outside 0 to 1)."""
+    f = float(fraction)
+    return Place((int(first), int(second)), (1.0 - f, f), (-1.0, 1.0))
+
+
+def on_rope(rope: Rope, arc_length: float, interpolation: str = "cubic") -> Place:
+    """A marker at a material coordinate [m] of a rope.
+
+    Args:
+        interpolation: "cubic" through the four nearest nodes (for ropes that bend smoothly), or "linear".
+
+    Raises:
+        SceneError: beyond the ends, or an unknown interpolation.
+    """
+    s, nodes = rope.arc_length, rope.particles
+    if not -1e-9 * s[-1] <= arc_length <= s[-1] * (1.0 + 1e-9):
+        raise SceneError("arc_length", f"lies beyond the rope '{rope.name}'", arc_length, f"use 0 to {s[-1]:g} m")
+    if interpolation not in ("cubic", "linear"):
+        raise SceneError("interpolation", "is unknown", interpolation, "use 'cubic' or 'linear'")
+    width = 4 if interpolation == "cubic" and len(nodes) >= 4 else 2
+    link = int(np.clip(np.searchsorted(s, arc_length, side="right") - 1, 0, len(s) - 2))
+    first = int(np.clip(link - (width // 2 - 1), 0, len(s) - width))
+    knots = s[first : first + width]
+    weights, slopes = _lagrange(knots.tolist(), float(arc_length))
+    return Place(tuple(int(n) for n in nodes[first : first + width]), tuple(weights), tuple(slopes))
+
+
+def along_rope(rope: Rope, count: int, interpolation: str = "cubic") -> tuple[Place, ...]:
+    """`count` markers at equal arc lengths from end to end."""
+    return tuple(on_rope(rope, s, interpolation) for s in np.linspace(0.0, rope.length, count))
+
+
+def on_cloth(cloth: Cloth, points: ArrayLike) -> tuple[Place, ...]:
+    """Markers at material coordinates of a cloth, (k, 2) m along warp and weft.
+
+    Raises:
+        MeshError: a point lies outside of the cloth.
+    """
+    return on_mesh(cloth, cloth.mesh.at(points))
+
+
+def on_mesh(cloth: Cloth, places: Places) -> tuple[Place, ...]:
+    """Markers at places of a cloth's mesh, such as `cloth.mesh.project` finds for points in space."""
+    return tuple(
+        Place(tuple(cloth.particles[vertices].tolist()), tuple(weights.tolist()), (0.0, 0.0, 0.0))
+        for vertices, weights in zip(places.vertices, places.weights, strict=True)
+    )
+
+
+def places_for(
+    scene: Scene, markers: Mapping[str, Place] | Sequence[Place | None] | None, names: Sequence[str]
+) -> tuple[Place | None, ...]:
+    """One place per marker of a recording, None for markers that are not compared.
+
+    Args:
+        markers: by marker name, in the recording's order, or None: equally spaced along the only rope.
+
+    Raises:
+        SceneError: unknown names, a wrong number, particles that do not exist, or no rope (or several) to spread
+            markers along.
+    """
+    places = _places_for(scene, markers, names)
+    for name, place in zip(names, places, strict=True):
+        if place is not None and not all(0 <= p < scene.particle_count for p in place.particles):
+            fix = f"use particles 0 to {scene.particle_count - 1}"
+            raise SceneError("markers", f"put '{name}' on particles that do not exist", place.particles, fix)
+    return places
+
+
+def _places_for(
+    scene: Scene, markers: Mapping[str, Place] | Sequence[Place | None] | None, names: Sequence[str]
+) -> tuple[Place | None, ...]:
+    if markers is None:
+        if len(scene.ropes) != 1:
+            raise SceneError(
+                "markers",
+                "are not placed, and the scene has not exactly one rope",
+                len(scene.ropes),
+                "give a place per marker, markers=[sb.on_particle(0), ...], or sb.on_cloth(cloth, points) for a cloth",
+            )
+        (only,) = scene.ropes.values()
+        return along_rope(only, len(names))
+    if isinstance(markers, Mapping):
+        unknown = [name for name in markers if name not in names]
+        if unknown:
+            raise SceneError("markers", "are not in the recording", unknown, f"name some of: {', '.join(names)}")
+        return tuple(markers.get(name) for name in names)
+    if len(markers) != len(names):
+        raise SceneError(
+            "markers", "do not match the recording's", len(markers), f"give {len(names)} places, or a mapping by name"
+        )
+    return tuple(markers)
+
+
+def _lagrange(knots: list[float], x: float) -> tuple[list[float], list[float]]:
+    """Lagrange weights at x and their derivatives."""
+    weights, slopes = [], []
+    for i in range(len(knots)):
+        others = [k for j, k in enumerate(knots) if j != i]
+        scale = prod(knots[i] - k for k in others)
+        weights.append(prod(x - k for k in others) / scale)
+        slopes.append(
+            sum(prod(x - k for j, k in enumerate(others) if j != skip) for skip in range(len(others))) / scale
+        )
+    return weights, slopes

@@ -1,0 +1,100 @@
+"""What slows an arm down: viscous and dry friction in its pivot, and the drag of the air.
+
+On a fixed pivot the torque against the motion is
+
+    friction sign(rate) + viscosity rate + drag |rate| rate.
+
+Swings shrink linearly in time from the first (by 4 friction/stiffness per period, stiffness the restoring torque over
+the angle), exponentially from the second, and as 1/(t + const) from the third; a recording tells them apart where the
+amplitude falls by a good part. Dry friction is elastic up to a small slip angle and constant beyond
+(core/constraints/friction_hinge.h), so that the joint can come to rest off its balance, as real ones do.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..arrays.checks import is_number
+from ..errors import SceneError
+from ..quantities.quantities import ZERO_OR_MORE, Term
+from ..scene.scene import Scene
+from .arm_data import Arm
+
+SLIP_ANGLE = 1e-3
+"""How far a joint with dry friction gives before it slides unless told otherwise, rad."""
+
+
+def add_resistance(
+    scene: Scene,
+    arm: Arm,
+    carrier: Arm | None,
+    *,
+    viscosity: float | None,
+    friction: float | None,
+    slip_angle: float,
+    drag: float | None,
+) -> None:
+    """Add what resists an arm's turning against the arm that carries it, or against a fixed direction.
+
+    Raises:
+        SceneError: friction or slip angle that are not positive, or a negative drag.
+    """
+    if viscosity is not None or friction is not None:
+        before = carrier.pivot if carrier else _fixed_above(scene, arm)
+        if viscosity is not None:
+            _viscous(scene, arm, before, viscosity)
+        if friction is not None:
+            _dry(scene, arm, carrier, before, friction, slip_angle)
+    if drag is not None:
+        _air(scene, arm, drag)
+
+
+def _fixed_above(scene: Scene, arm: Arm) -> int:
+    """A fixed particle straight above the pivot, from which the hinge counts its angle."""
+    before = int(scene.add_particles([np.add(arm.root, (0.0, 0.0, 1.0))], 0.0)[0])
+    scene.pin([before])
+    return before
+
+
+def _viscous(scene: Scene, arm: Arm, before: int, viscosity: float) -> None:
+    stencil = (before, arm.pivot, arm.end)
+    scene.add_constraints("hinge", [stencil], name=f"{arm.name}_hinge", viscosity=viscosity, normal=(0.0, 1.0, 0.0))
+
+
+def _dry(scene: Scene, arm: Arm, carrier: Arm | None, before: int, friction: float, slip_angle: float) -> None:
+    """A hinge that sticks at the initial angle between the two arms; about -y that angle grows as the arm's does."""
+    for field, value in (("friction", friction), ("slip_angle", slip_angle)):
+        if not (is_number(value) and math.isfinite(value) and value > 0.0):
+            raise SceneError(
+                f"{arm.name}.{field}", "must be positive", value, "give a positive number, or leave it out"
+            )
+    (stuck,) = scene.add_particles(np.zeros((1, 3)), 1.0)
+    scene.pin([stuck])
+    angles = [(1.0, arm)] if carrier is None else [(1.0, arm), (-1.0, carrier)]
+    scene.add_terms([Term("position", 3 * int(stuck), sign, ((f"{a.name}_angle", "identity"),)) for sign, a in angles])
+    quantity, group = scene.add_quantity(f"{arm.name}_friction", friction, "N m"), f"{arm.name}_friction_hinge"
+    scene.add_constraints(
+        "friction_hinge",
+        [(before, arm.pivot, arm.end, stuck)],
+        name=group,
+        compliance=np.ones(1),
+        rest=[slip_angle],
+        normal=(0.0, -1.0, 0.0),
+    )
+    scene.groups[-1].compliance[:] = 0.0
+    _, first, _ = scene.group(group)
+    scene.add_terms([Term("compliance", first, slip_angle, ((quantity, "inverse"),))])
+
+
+def _air(scene: Scene, arm: Arm, drag: float) -> None:
+    """Quadratic drag on the arm's end: on a fixed pivot its torque is `drag` times the square of the rate."""
+    if not (is_number(drag) and math.isfinite(drag) and drag >= 0.0):
+        raise SceneError(f"{arm.name}.drag", "must be zero or more", drag, "give a number in N m s^2/rad^2")
+    scene.has_drag = True
+    limits = None if drag > 0.0 else ZERO_OR_MORE
+    quantity = scene.add_quantity(f"{arm.name}_drag", drag, "N m s^2/rad^2", positive=drag > 0.0, limits=limits)
+    per_length = (f"{arm.name}_length", "inverse")
+    factors = ((quantity, "identity"), per_length, per_length, per_length)
+    scene.add_terms([Term("drag_quadratic", arm.end, 1.0, factors)])

@@ -1,0 +1,252 @@
+"""Rods: ropes that store twist. Every edge has a material frame, so that bending can differ by direction, a rest shape
+turns with the rod, and what a grip rolls the rod feels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays.checks import check_positive, finite, is_number
+from ..errors import SceneError
+from ..quantities.quantities import product
+from ..scene.scene import Array, Scene
+from .chain import add_drag, add_links, add_masses
+from .grip import Grip, any_across, carried
+from .rod_end import End, spread_roll, spread_shift
+from .rod_joints import Joints, shear, weigh
+from .rod_junction import STUB_MASS, Facing, Junction
+from .rod_shape import initial_frames, initial_shape
+from .rope import Rope
+
+# Torque per angle that holds a director where it was going, over GJ/length: keeps twist well posed and moves nothing.
+# That of a section's normal is over EI/length.
+HOLD = 1e-4
+
+
+@dataclass(frozen=True)
+class Rod(Rope):
+    """A rope with material frames: `directors` are those of its edges, with the grips' own first and last; so are
+    `normals`, those of sections that shear."""
+
+    directors: Array = field(default_factory=lambda: np.zeros(0, dtype=int))
+    normals: Array = field(default_factory=lambda: np.zeros(0, dtype=int))
+
+
+def rod(
+    length: float,
+    segments: int = 40,
+    *,
+    density: float,
+    EI: float,
+    GJ: float,
+    name: str = "rod",
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+    **options: object,
+) -> Scene:
+    """A scene with one rod; see `add_rod` for the options."""
+    scene = Scene(name, gravity)
+    add_rod(scene, name, length=length, segments=segments, density=density, EI=EI, GJ=GJ, **options)  # type: ignore[arg-type]
+    return scene
+
+
+def add_rod(
+    scene: Scene,
+    name: str = "rod",
+    *,
+    length: float,
+    segments: int = 40,
+    density: float,
+    EI: float,
+    GJ: float,
+    EA: float | None = None,
+    GA: float | None = None,
+    EI2: float | None = None,
+    points: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
+    start: Grip | Junction | Facing | None = None,
+    end: Grip | Junction | Facing | None = None,
+    director: ArrayLike | None = None,
+    turns: int = 0,
+    tilts: bool = False,
+    shifts: bool = False,
+    roll: bool = False,
+    stretch_damping: float | None = None,
+    bend_damping: float | None = None,
+    twist_damping: float | None = None,
+    shear_damping: float | None = None,
+    drag_linear: float | None = None,
+    drag_quadratic: float | None = None,
+    yield_curvature: float | None = None,
+    yield_share: float | None = None,
+    curvature_modes: Sequence[int] = (),
+    twist_modes: Sequence[int] = (),
+    softness_modes: Sequence[int] = (),
+    density_modes: Sequence[int] = (),
+) -> Rod:
+    """Add a discrete elastic rod of `segments` equal links to a scene (Bergou et al. 2008, 2010).
+
+    Quantities: `<name>_length` m, `<name>_density` kg/m, `_EI` and `_GJ` N m^2, and where given `_EA` and `_GA` N,
+    `_EI2` N m^2, `_stretch_damping`, `_bend_damping`, `_twist_damping` and `_shear_damping` s, `_drag_linear` N s/m^2,
+    `_drag_quadratic` N s^2/m^3, `_start_tilt_1`, `_start_tilt_2`, `_end_tilt_1`, `_end_tilt_2`, `_roll` rad,
+    `_start_shift_1` to `_3` and `_end_shift_1` to `_3` m,
+    `_curvature_1_<k>`, `_curvature_2_<k>` and `_twist_<k>` 1/m, `_yield_curvature` 1/m, `_yield_share`,
+    `_softness_<k>`, `_density_<k>`.
+
+    Args:
+        length: m, between the grips.
+        density: kg/m; nodes carry it by their Voronoi length.
+        EI, GJ: bending and torsional stiffness N m^2. For a section with two stiffnesses EI acts on the curvature about
+            the frame's second axis, and EI2 about the first.
+        EA: axial stiffness N; None = inextensible.
+        GA: shear stiffness N, shear coefficient times G times the section's area (5/6 G A for a rectangle: Timoshenko);
+            None = sections stay across the rod. A grip holds the section, and the link next to it may lean against it.
+        points: (k, 3) m, the initial shape, resampled to equal links and fitted to the length; straight from the start
+            otherwise.
+        velocity: (k, 3) m/s at `points`; at rest by default.
+        start, end: how the ends are held; None = free. A `Junction` holds the ends of several rods, or both of one, to
+            each other.
+        director: (3,) the first frame axis at a start without a grip; any by default.
+        turns: whole turns by which the end's frame is ahead at the start, beside the part of a turn that grips give.
+        tilts: add the four tilts: small angles by which the rod leaves a grip askew, about the frame's axes.
+        shifts: add the three shifts of each grip: how far beside the given place the rod leaves it, along the frame's
+            first and second axis and along the rod. The initial shape follows, less and less towards the other end.
+        roll: add the roll of the end grip about the rod: the twist built in when the rod was gripped.
+        stretch_damping, bend_damping, twist_damping, shear_damping: Kelvin-Voigt time constants s.
+        drag_linear, drag_quadratic: air drag per length, isotropic.
+        yield_curvature: 1/m, the elastic curvature beyond which internal friction slides (in the frame's two axes; with
+            EI2 the second one counts by sqrt(EI2/EI)); None = elastic. The set starts at zero.
+        yield_share: the part of the bending stiffness that slides, between 0 and 1: beyond yield (1 - share) EI is
+            left. Small motion shows EI.
+        curvature_modes: k of rest-curvature modes cos(k pi s / length), about both frame axes; each starts at zero.
+        twist_modes: the same of the rest twist per length.
+        softness_modes: the same of the logarithm of the bending compliance over length/EI: a rod that is stiffer in
+            places. The compliance is length/EI exp(sum of modes), so it stays positive.
+        density_modes: the same of the density, relative to it: a rod that is heavier in places; from k = 1 on they
+            leave its weight as it is. Values that make a mass negative are refused.
+
+    Returns:
+        Rod, also kept as `scene.ropes[name]`.
+
+    Raises:
+        SceneError: wrong or missing values; the message names the field.
+    """
+    check_positive(
+        name,
+        {"length": length, "density": density, "EI": EI, "GJ": GJ},
+        {
+            "EA": EA,
+            "GA": GA,
+            "EI2": EI2,
+            "stretch_damping": stretch_damping,
+            "bend_damping": bend_damping,
+            "twist_damping": twist_damping,
+            "shear_damping": shear_damping,
+            "yield_curvature": yield_curvature,
+        },
+    )
+    _check_yield(name, yield_curvature, yield_share)
+    for option, value, least in (("segments", segments, 2), ("turns", turns, None)):
+        if not isinstance(value, int | np.integer) or (least is not None and value < least):
+            wanted = "must be a whole number" + ("" if least is None else f" from {least} on")
+            fix = "give whole turns; grips give the rest" if least is None else f"give at least {least}"
+            raise SceneError(f"{name}.{option}", wanted, value, fix)
+    for label, damping, of, stiffness in (("stretch", stretch_damping, "EA", EA), ("shear", shear_damping, "GA", GA)):
+        if damping is not None and stiffness is None:
+            fix = f"give {of}, or leave it out"
+            raise SceneError(f"{name}.{label}_damping", f"needs a finite {of}", stiffness, fix)
+    ends = End(name, "start", -1.0, start), End(name, "end", 1.0, end)
+    for nuisance, asked in (("tilts", tilts), ("shifts", shifts)):
+        if asked and ends[0].grip is None and ends[1].grip is None:
+            raise SceneError(f"{name}.{nuisance}", "need a grip", asked, "give start or end")
+    if roll and ends[1].grip is None:
+        raise SceneError(f"{name}.roll", "needs a grip at the end", roll, "give end")
+    ring = _is_ring(name, ends, points, length)
+
+    link = length / segments
+    places = [e.place(scene) for e in ends]
+    shared = [e.shared_node(scene) for e in ends]
+    shape, speeds = initial_shape(name, length, segments, points, velocity, places, EA is not None)
+    own = np.arange(int(shared[0] is not None), segments + int(shared[1] is None and not ring))
+    nodes = np.full(segments + 1, -1)
+    nodes[own] = scene.add_particles(shape[own], 0.0, None if speeds is None else speeds[own])
+    nodes[[0, -1]] = [nodes[k] if node is None else node for k, node in zip((0, -1), shared, strict=True)]
+    if ring:
+        nodes[-1] = nodes[0]
+    scene.add_quantity(f"{name}_length", length, "m")
+    scene.add_quantity(f"{name}_density", density, "kg/m")
+    add_masses(scene, name, nodes, segments)
+    weigh(scene, name, nodes, segments, density_modes)
+    stretch = None
+    if stretch_damping is not None:
+        stretch = (1.0, {scene.add_quantity(f"{name}_stretch_damping", stretch_damping, "s"): "identity"})
+    add_links(scene, name, nodes, link, EA, stretch)
+
+    along = [e.along(edge) for e, edge in zip(ends, (shape[1] - shape[0], shape[-1] - shape[-2]), strict=True)]
+    stubs = [e.stub(link) for e in ends]
+    ghosts = [
+        None if way is None else int(scene.add_particles([at + stub * way], STUB_MASS * density * link)[0])
+        for way, at, stub in zip(along, (shape[0], shape[-1]), stubs, strict=True)
+    ]
+    chain = np.array([*(g for g in ghosts[:1] if g is not None), *nodes, *(g for g in ghosts[1:] if g is not None)])
+    first, last = (e.director(scene, way) for e, way in zip(ends, along, strict=True))
+    if first is None and director is not None:
+        first = finite(f"{name}.director", director, (3,), SceneError)
+    if ring and last is None and along[0] is not None and along[1] is not None:
+        first = any_across(along[0]) if first is None else first
+        last = carried(first - (first @ along[0]) * along[0], along[0], along[1][None])[0]
+    edges = np.stack([chain[:-1], chain[1:]], axis=1)
+    frames = initial_frames(name, scene.positions[chain], first, last, turns)
+    normals = None if GA is None else scene.add_normals(edges)
+    directors = scene.add_directors(edges, frames, normals)
+    scene.add_quantity(f"{name}_GJ", GJ, "N m^2")
+    hold = {f"{name}_GJ": "identity", f"{name}_length": "inverse"}
+    scene.add_terms([product("mass", d, HOLD, hold) for d in directors])
+    for e, k, ghost, stub in zip(ends, (0, -1), ghosts, stubs, strict=True):
+        if ghost is not None:
+            normal = None if normals is None else int(normals[k])
+            e.hold(scene, int(nodes[k]), ghost, int(directors[k]), normal, stub, tilts, shifts, roll and k == -1)
+        if shifts and e.grip is not None:
+            share = np.linspace(float(k == 0), float(k == -1), len(nodes))
+            spread_shift(scene, e.grip, f"{name}_{e.label}", nodes[1:-1], share[1:-1])
+    if roll:
+        shares = np.linspace(0.0 if ends[0].held else 1.0, 1.0, len(directors))
+        spread_roll(scene, f"{name}_roll", directors[:-1], shares[:-1])
+
+    at = np.arange(1, len(chain) - 1)
+    axes = [chain[at - 1], chain[at], chain[at + 1]] if normals is None else [normals[at - 1], normals[at]]
+    before = int(ghosts[0] is not None)
+    joints = Joints(scene, name, np.stack([*axes, directors[at - 1], directors[at]], axis=1), at - before, segments)
+    joints.bend(EI, EI2, bend_damping, yield_curvature, yield_share, softness_modes)
+    if normals is not None and GA is not None:
+        hold = {f"{name}_EI": "identity", f"{name}_length": "inverse"}
+        scene.add_terms([product("mass", n, HOLD, hold) for n in normals])
+        links = slice(before, before + segments)
+        shear(scene, name, np.column_stack([edges[links], normals[links], directors[links]]), GA, shear_damping)
+    joints.twist(twist_damping)
+    joints.rest(curvature_modes, twist_modes)
+    add_drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
+    sections = np.zeros(0, dtype=int) if normals is None else normals
+    built = Rod(name, nodes, link * np.arange(segments + 1), ghosts[0], ghosts[1], directors, sections)
+    scene.ropes[name] = built
+    return built
+
+
+def _check_yield(name: str, curvature: float | None, share: float | None) -> None:
+    if (curvature is None) != (share is None):
+        fix = "give yield_curvature and yield_share, or neither"
+        raise SceneError(f"{name}.yield_share", "and yield_curvature belong together", share, fix)
+    if share is not None and not (is_number(share) and 0 < share < 1):
+        raise SceneError(f"{name}.yield_share", "must lie between 0 and 1", share, "give a part of EI")
+
+
+def _is_ring(name: str, ends: tuple[End, End], points: ArrayLike | None, length: float) -> bool:
+    """Whether both ends lie in one junction; the shape has to be a loop then."""
+    first, last = (e.way for e in ends)
+    if first is None or last is None or first.junction is not last.junction:
+        return False
+    if points is None or np.linalg.norm(np.subtract(*np.asarray(points, dtype=float)[[0, -1]])) > 1e-9 * length:
+        raise SceneError(f"{name}.points", "do not return to their first place", points, "give the points of a loop")
+    return True

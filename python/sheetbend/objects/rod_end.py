@@ -1,0 +1,160 @@
+"""An end of a rod: free, in a grip, or in a junction with other rods."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..errors import SceneError
+from ..quantities.quantities import Term, product
+from ..scene.scene import Array, Scene
+from .grip import Grip
+from .rod_junction import STUB, Facing, Junction
+from .rope import GHOST
+
+SERIES = 9  # powers of the roll in a start's frames: at half a turn they are off by 0.03 rad
+
+
+class End:
+    """What holds one end of a rod called `name`; `side` is -1 at its start and 1 at its end.
+
+    Raises:
+        SceneError: it is neither a grip nor a junction.
+    """
+
+    def __init__(self, name: str, label: str, side: float, given: Grip | Junction | Facing | None) -> None:
+        if given is not None and not isinstance(given, Grip | Junction | Facing):
+            fix = "give sb.Grip.fixed, from_poses or from_markers, or a junction"
+            raise SceneError(f"{name}.{label}", "is no grip", given, fix)
+        self.name, self.label, self.side = name, label, side
+        self.grip = given if isinstance(given, Grip) else None
+        self.way = Facing(given) if isinstance(given, Junction) else given if isinstance(given, Facing) else None
+
+    @property
+    def held(self) -> bool:
+        return self.grip is not None or self.way is not None
+
+    def shared_node(self, scene: Scene) -> int | None:
+        """The junction's particle; None where this is its first rod, or no junction."""
+        return None if self.way is None else self.way.junction.node_in(scene, f"{self.name}.{self.label}")
+
+    def place(self, scene: Scene) -> tuple[Array, Array] | None:
+        """Place and direction (3,) that a grip or a junction's earlier rods give."""
+        if self.grip is not None:
+            return self.grip.position[0], self.grip.direction[0]
+        node = self.shared_node(scene)
+        if self.way is None or node is None:
+            return None
+        return scene.positions[node], self.way.junction.direction if self.way.direction is None else self.way.direction
+
+    def along(self, link: Array) -> Array | None:
+        """The direction (3,) in which a held end goes on: the grip's, the junction's, or that of its link (3,)."""
+        if self.grip is not None:
+            return np.asarray(self.grip.direction[0])
+        if self.way is None:
+            return None
+        return np.asarray(link / np.linalg.norm(link)) if self.way.direction is None else self.way.direction
+
+    def stub(self, link: float) -> float:
+        """How far, m, along the rod the particle lies that holds the direction; negative before the start."""
+        return self.side * (GHOST if self.way is None else STUB) * link
+
+    def director(self, scene: Scene, along: Array | None) -> Array | None:
+        """The frame axis (3,) that a grip or a junction's earlier rods give."""
+        if self.grip is not None:
+            return np.asarray(self.grip.director[0])
+        if self.way is None or along is None or self.shared_node(scene) is None:
+            return None
+        return self.way.junction.carried(along)
+
+    def hold(
+        self,
+        scene: Scene,
+        node: int,
+        ghost: int,
+        director: int,
+        normal: int | None,
+        stub: float,
+        tilts: bool,
+        shifts: bool,
+        roll: bool,
+    ) -> None:
+        """Give the end its pose, or join it to the other rods; the section of its stub stays across that."""
+        if self.way is not None:
+            self.way.junction.join(scene, f"{self.name}_{self.label}", node, ghost, director, normal, stub > 0)
+        if self.grip is None:
+            return
+        grip = self.grip
+        section = [] if normal is None else [normal]
+        if grip.stays:
+            scene.pin([node, ghost, director, *section])
+        else:
+            poses = [grip.position, grip.position + stub * grip.direction, grip.director]
+            motion = np.stack(poses + [grip.direction for _ in section], axis=1)
+            nodes = [node, ghost, director, *section]
+            if grip.frame is None:
+                scene.drive(nodes, grip.times, motion)
+            else:
+                grip.frame.drive(scene, nodes, grip.times, motion, vectors=[n in scene.directors for n in nodes])
+        second = np.cross(grip.direction, grip.director)
+        if tilts:
+            for k, axis in ((1, grip.director), (2, second)):
+                tilt = scene.add_quantity(f"{self.name}_{self.label}_tilt_{k}", 0.0, "rad", positive=False, scale=0.1)
+                for n, length in ((ghost, stub), *((n, 1.0) for n in section)):
+                    _add_motion(scene, grip, n, length * axis, {tilt: "identity"})
+        if shifts:
+            for k, axis in enumerate((grip.director, second, grip.direction), start=1):
+                quantity = f"{self.name}_{self.label}_shift_{k}"
+                shift = scene.add_quantity(quantity, 0.0, "m", positive=False, scale=5e-3)
+                for n in (node, ghost):
+                    _add_motion(scene, grip, n, axis, {shift: "identity"})
+        if roll:  # cos and sin of it instead of the given director
+            quantity = scene.add_quantity(f"{self.name}_roll", 0.0, "rad", positive=False, scale=0.3)
+            _add_motion(scene, grip, director, grip.director, {quantity: "cos"})
+            _add_motion(scene, grip, director, second, {quantity: "sin"})
+            _add_motion(scene, grip, director, -grip.director, {})
+
+
+def _add_motion(scene: Scene, grip: Grip, node: int, by: Array, factors: dict[str, str]) -> None:
+    if not grip.stays:
+        terms = [(factors, by)] if grip.frame is None else grip.frame.turned(by, factors)
+        for own, coefficients in terms:
+            scene.add_motion_term(node, coefficients, own)
+    else:
+        scene.add_terms([product("position", 3 * node + k, by[0, k], factors) for k in range(3)])
+
+
+def spread_shift(scene: Scene, grip: Grip, end: str, nodes: Array, shares: Array) -> None:
+    """Let nodes start shifted by shares of the shifts of a grip, so that no link is stretched in the first substep.
+
+    Args:
+        end: name of the rod and of its end, which the quantities have.
+        nodes, shares: (k,).
+    """
+    index = (3 * np.asarray(nodes)[:, None] + np.arange(3)).ravel()
+    direction, director = grip.direction[0], grip.director[0]
+    for k, axis in enumerate((director, np.cross(direction, director), direction), start=1):
+        factors = ((f"{end}_shift_{k}", "identity"),)
+        scene.add_terms([Term("position", index, (shares[:, None] * axis).ravel(), factors)])
+
+
+def spread_roll(scene: Scene, roll: str, directors: Array, shares: Array) -> None:
+    """Turn frames about their edges by shares of a roll, by the series of sine and cosine.
+
+    Without it the first substep would turn them, and the damping of the bent joints would make a kick of that.
+
+    Args:
+        directors: (k,) at their places without roll.
+        shares: (k,) of the quantity `roll`.
+    """
+    edges = np.array([scene.directors[int(d)][:2] for d in directors])
+    x = scene.positions
+    along = x[edges[:, 1]] - x[edges[:, 0]]
+    first, second = x[directors], np.cross(along / np.linalg.norm(along, axis=1, keepdims=True), x[directors])
+    index = (3 * np.asarray(directors)[:, None] + np.arange(3)).ravel()
+    for power in range(1, SERIES + 1):
+        weight = (-1) ** (power // 2) / math.factorial(power) * shares**power
+        axis = second if power % 2 else first
+        factors = ((roll, "identity"),) * (power % 2) + ((roll, "square"),) * (power // 2)
+        scene.add_terms([Term("position", index, (weight[:, None] * axis).ravel(), factors)])

@@ -1,0 +1,180 @@
+"""The joints of a rod: bending with or without yield, twist, and what they are at rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import SceneError
+from ..quantities.quantities import Term
+from ..scene.scene import Array, Scene
+from .chain import first_value, voronoi_shares
+
+Factors = tuple[tuple[str, str], ...]
+Exponents = tuple[tuple[str, Array], ...]
+_INVERSE = {"identity": "inverse", "inverse": "identity"}
+
+
+class Joints:
+    """Adds a rod's joints to a scene, group by group; alpha = Voronoi length / stiffness.
+
+    Args:
+        stencils: (joints, 5) three points and two directors; or (joints, 4) two normals and two directors of sections
+            that shear.
+        place: (joints,) node numbers along the rod; a gripped end is a joint that counts the rod's own half link.
+    """
+
+    def __init__(self, scene: Scene, name: str, stencils: Array, place: Array, segments: int) -> None:
+        self._scene, self._name, self._stencils = scene, name, stencils
+        self._sections = stencils.shape[1] == 4
+        self._share, self._s = voronoi_shares(segments)[place], place / segments
+        self._length = f"{name}_length"
+        self._ratio: Factors = ()
+        self._rest_of_bend = 0
+
+    def bend(
+        self,
+        EI: float,
+        EI2: float | None,
+        damping: float | None,
+        yield_curvature: float | None,
+        yield_share: float | None,
+        softness_modes: Sequence[int],
+    ) -> None:
+        """Material curvatures; with a set per joint where they yield. Compliance length/EI exp(sum of modes): each mode
+        starts at zero, and no value of one makes a stiffness negative."""
+        scene, name = self._scene, self._name
+        scene.add_quantity(f"{name}_EI", EI, "N m^2")
+        softness = mode_quantities(scene, name, "softness", softness_modes, self._s)
+        stencils, kind = self._stencils, "section_curvature" if self._sections else "material_curvature"
+        if yield_curvature is not None:
+            sets = scene.add_particles(np.zeros((len(stencils), 3)), 1.0)
+            scene.pin(sets)
+            kind = "section_yielding_curvature" if self._sections else "yielding_curvature"
+            stencils = np.column_stack([stencils, sets])
+        self._group("bend", kind, f"{name}_EI", stencils, damping, tuple(softness))
+        start, width = first_value(scene, f"{name}_bend"), 3 if yield_curvature is None else 5
+        first = start + width * np.arange(len(stencils))
+        self._rest_of_bend = width - 2
+        rest = scene.group(f"{name}_bend")[0].rest
+        if EI2 is not None:
+            scene.add_quantity(f"{name}_EI2", EI2, "N m^2")
+            self._ratio = ((f"{name}_EI2", "sqrt"), (f"{name}_EI", "inverse_sqrt"))
+            rest[:, 0] = 0.0
+            scene.add_terms([Term("rest", first, 1.0, self._ratio)])
+        if yield_curvature is not None and yield_share is not None:
+            scene.add_quantity(f"{name}_yield_share", yield_share, "")
+            scene.add_quantity(f"{name}_yield_curvature", yield_curvature, "1/m")
+            rest[:, 1:3] = 0.0
+            scene.add_terms(
+                [
+                    Term("rest", first + 1, 1.0, ((f"{name}_yield_share", "identity"),)),
+                    Term(
+                        "rest",
+                        first + 2,
+                        self._share,
+                        ((f"{name}_yield_curvature", "identity"), (self._length, "identity")),
+                    ),
+                ]
+            )
+
+    def twist(self, damping: float | None) -> None:
+        """Twist between neighboring edges; the quantity GJ is there already."""
+        kind = "section_twist" if self._sections else "twist"
+        self._group("twist", kind, f"{self._name}_GJ", self._stencils, damping, ())
+
+    def rest(self, curvature_modes: Sequence[int], twist_modes: Sequence[int]) -> None:
+        """Rest curvature and twist in modes cos(k pi s/length)."""
+        bend, twist = (first_value(self._scene, f"{self._name}_{label}") for label in ("bend", "twist"))
+        joints = np.arange(len(self._stencils))
+        curvature = bend + (self._rest_of_bend + 2) * joints + self._rest_of_bend
+        targets: list[tuple[str, Sequence[int], Array, Factors]] = [
+            ("curvature_1", curvature_modes, curvature, ()),
+            ("curvature_2", curvature_modes, curvature + 1, self._ratio),
+            ("twist", twist_modes, twist + joints, ()),
+        ]
+        for label, modes, index, factors in targets:
+            for mode, weights in mode_quantities(self._scene, self._name, label, modes, self._s, "1/m"):
+                own: Factors = ((mode, "identity"), (self._length, "identity"), *factors)
+                self._scene.add_terms([Term("rest", index, self._share * weights, own)])
+
+    def _group(
+        self, label: str, kind: str, stiffness: str, stencils: Array, damping: float | None, softness: Exponents
+    ) -> None:
+        compliance = self._share, (self._length, "identity")
+        _add_elastic(self._scene, f"{self._name}_{label}", kind, stencils, compliance, stiffness, damping, softness)
+
+
+def shear(scene: Scene, name: str, stencils: Array, GA: float, damping: float | None) -> None:
+    """Let the sections of a rod's links lean against them; alpha = 1 / (GA link).
+
+    Args:
+        stencils: (links, 4) the two ends, the section's normal and its director.
+    """
+    scene.add_quantity(f"{name}_GA", GA, "N")
+    compliance = float(len(stencils)), (f"{name}_length", "inverse")
+    _add_elastic(scene, f"{name}_shear", "shear", stencils, compliance, f"{name}_GA", damping)
+
+
+def _add_elastic(
+    scene: Scene,
+    group: str,
+    kind: str,
+    stencils: Array,
+    compliance: tuple[Array | float, tuple[str, str]],
+    stiffness: str,
+    damping: float | None,
+    softness: Exponents = (),
+) -> None:
+    """Add constraints of compliance coefficient length^(+-1) / stiffness exp(softness), damped by a Kelvin-Voigt time
+    constant.
+
+    Args:
+        compliance: the coefficient, and the quantity of the length with its function.
+        stiffness: its quantity.
+        damping: s, of the new quantity `<group>_damping`; None = undamped.
+        softness: quantities and their weights in each constraint.
+    """
+    coefficient, (length, power) = compliance
+    zero = np.zeros(len(stencils))
+    scene.add_constraints(kind, stencils, name=group, compliance=zero, damping=None if damping is None else zero)
+    first = scene.group(group)[1] + np.arange(len(stencils))
+    scene.add_terms([Term("compliance", first, coefficient, ((length, power), (stiffness, "inverse")), softness)])
+    if damping is not None:
+        tau = scene.add_quantity(f"{group}_damping", damping, "s")
+        factors: Factors = ((tau, "identity"), (stiffness, "identity"), (length, _INVERSE[power]))
+        scene.add_terms([Term("damping", first, 1.0 / coefficient, factors)])
+
+
+def weigh(scene: Scene, name: str, nodes: Array, segments: int, modes: Sequence[int]) -> None:
+    """Density (1 + sum of modes), each mode starting at zero; the whole weight stays."""
+    share, s = voronoi_shares(segments), np.arange(segments + 1) / segments
+    for mode, weights in mode_quantities(scene, name, "density", modes, s):
+        factors: Factors = ((mode, "identity"), (f"{name}_density", "identity"), (f"{name}_length", "identity"))
+        for part in (slice(None, -1), slice(-1, None)):  # a ring's last node is its first
+            scene.add_terms([Term("mass", nodes[part], (share * weights)[part], factors)])
+
+
+def mode_quantities(
+    scene: Scene, name: str, label: str, modes: Sequence[int], s: Array, unit: str = ""
+) -> list[tuple[str, Array]]:
+    """A new quantity `<name>_<label>_<k>` per mode k, and its weights cos(k pi s) at shares s of the rod's length."""
+    field = f"{name}.{label.removesuffix('_1').removesuffix('_2')}_modes"
+    scale = 1.0 if unit else 0.3
+    return [
+        (
+            scene.add_quantity(f"{name}_{label}_{k}", 0.0, unit, positive=False, scale=scale),
+            np.cos(k * np.pi * s),
+        )
+        for k in _checked(field, modes)
+    ]
+
+
+def _checked(field: str, modes: Sequence[int]) -> tuple[int, ...]:
+    """The modes: whole numbers from 0 on, each once."""
+    given = list(modes) if np.iterable(modes) else [None]
+    bad = [k for k in given if not isinstance(k, int | np.integer) or k < 0]
+    if bad or len(set(given)) < len(given):
+        raise SceneError(field, "must be whole numbers from 0 on, each once", modes, "give such as (0, 1)")
+    return tuple(int(k) for k in modes)

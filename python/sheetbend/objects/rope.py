@@ -1,0 +1,294 @@
+"""Ropes: chains of particles with axial and bending stiffness, given and fitted by physical parameters that do not
+depend on the mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays.checks import indices
+from ..errors import SceneError
+from ..quantities.quantities import Term, product
+from ..scene.scene import Array, Scene
+from .chain import (
+    TimeConstant,
+    add_drag,
+    add_links,
+    add_masses,
+    first_value,
+    straight_or_given,
+    time_constants,
+    unit_vector,
+    voronoi_shares,
+)
+from .grip import Grip
+from .rod_shape import initial_shape
+
+GHOST = 0.01  # length of a clamp's ghost link over a rope's link; only its direction matters
+
+
+@dataclass(frozen=True)
+class Rope:
+    """A rope in a scene: particles in order, material coordinates [m], and the ghosts that give clamps a direction."""
+
+    name: str
+    particles: Array
+    arc_length: Array
+    start_ghost: int | None = None
+    end_ghost: int | None = None
+
+    @property
+    def length(self) -> float:
+        return float(self.arc_length[-1])
+
+
+def rope(
+    length: float | None = None,
+    segments: int = 40,
+    *,
+    density: float,
+    EA: float | None = None,
+    EI: float | None = None,
+    name: str = "rope",
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+    pinned: Sequence[int] = (0,),
+    **options: object,
+) -> Scene:
+    """A scene with one rope; see `add_rope` for the options. `pinned` holds node numbers along the rope (-1 = last)."""
+    scene = Scene(name, gravity)
+    built = add_rope(scene, name, length=length, segments=segments, density=density, EA=EA, EI=EI, **options)  # type: ignore[arg-type]
+    if len(pinned):
+        scene.pin(built.particles[indices("rope.pinned", pinned, len(built.particles))])
+    return scene
+
+
+def add_rope(
+    scene: Scene,
+    name: str = "rope",
+    *,
+    length: float | None = None,
+    segments: int = 40,
+    density: float,
+    EA: float | None = None,
+    EI: float | None = None,
+    start: ArrayLike = (0.0, 0.0, 0.0),
+    direction: ArrayLike = (1.0, 0.0, 0.0),
+    points: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
+    stretch_damping: float | None = None,
+    bend_damping: float | None = None,
+    loss_factor: float | None = None,
+    loss_frequency: float | None = None,
+    drag_linear: float | None = None,
+    drag_quadratic: float | None = None,
+    clamp_start: ArrayLike | None = None,
+    clamp_end: ArrayLike | None = None,
+    clamp_angles: bool = False,
+    grip_start: Grip | None = None,
+    grip_end: Grip | None = None,
+    plane: ArrayLike | None = None,
+    set_modes: Sequence[int] = (),
+) -> Rope:
+    """Add a rope of `segments` equal links to a scene.
+
+    Quantities: `<name>_length` m, `<name>_density` kg/m, and where given `_EA` N, `_EI` N m^2, `_stretch_damping` s,
+    `_bend_damping` s, `_loss_factor`, `_loss_frequency` Hz, `_drag_linear` N s/m^2, `_drag_quadratic` N s^2/m^3,
+    `_start_angle` and `_end_angle` rad, `_set_<k>` 1/m.
+
+    Args:
+        length: m; the length of `points` by default.
+        density: kg/m; nodes carry it by their Voronoi length.
+        EA: axial stiffness N; None = inextensible.
+        EI: bending stiffness N m^2; None = no bending.
+        start, direction: a straight initial shape.
+        points: (k, 3) m, an initial shape instead, resampled to equal links.
+        velocity: (k, 3) m/s at `points`, which are then fitted to the length; at rest by default.
+        stretch_damping, bend_damping: Kelvin-Voigt time constants s: the damping moment is EI times the constant times
+            the rate of curvature.
+        loss_factor: energy lost per radian of vibration over the energy stored, in stretching and bending alike, at
+            loss_frequency (Hz); instead of the two time constants: tau = loss_factor / (2 pi loss_frequency). In
+            rubbers it varies less with frequency than tau.
+        drag_linear, drag_quadratic: air drag per length, isotropic.
+        clamp_start, clamp_end: the rope's direction of travel at an end, held by a ghost particle half a joint away;
+            the end is pinned.
+        grip_start, grip_end: what holds an end and moves it: its place and its direction of travel. A rope has no
+            twist: the roll of a grip plays no part. The initial shape is fitted to the length between grips.
+        clamp_angles: add `_start_angle` / `_end_angle`, rotations of the clamps about `plane`.
+        plane: unit normal of the plane that the rope stays in; needed by clamp_angles and set_modes.
+        set_modes: k of rest-curvature modes cos(k pi s / length) about `plane`; each amplitude starts at zero.
+
+    Returns:
+        Rope, also kept as `scene.ropes[name]`.
+
+    Raises:
+        SceneError: wrong or missing values; the message names the field.
+    """
+    shape, length = straight_or_given(name, length, segments, start, direction, points)
+    grips = _grips(name, (grip_start, grip_end), (clamp_start, clamp_end))
+    speeds = None
+    if velocity is not None or any(grips):
+        held = [None if grip is None else (grip.position[0], grip.direction[0]) for grip in grips]
+        line = shape if points is None and grips[0] is None else points
+        shape, speeds = initial_shape(name, length, segments, line, velocity, held, EA is not None)
+    for field, value in (
+        ("density", density),
+        ("EA", EA),
+        ("EI", EI),
+        ("stretch_damping", stretch_damping),
+        ("bend_damping", bend_damping),
+    ):
+        if value is not None and not value > 0:
+            raise SceneError(f"{name}.{field}", "must be positive", value, "give a positive number, or leave it out")
+    if stretch_damping is not None and EA is None:
+        raise SceneError(f"{name}.stretch_damping", "needs a finite EA", EA, "give EA, or leave it out")
+    if bend_damping is not None and EI is None:
+        raise SceneError(f"{name}.bend_damping", "needs EI", EI, "give EI, or leave it out")
+    normal = None if plane is None else unit_vector(f"{name}.plane", plane)
+    if normal is None and (clamp_angles or len(set_modes)):
+        raise SceneError(
+            f"{name}.plane", "is missing", None, "give the unit normal that the clamp angles or the set turn about"
+        )
+    if any(k != int(k) or k < 0 for k in set_modes):
+        raise SceneError(f"{name}.set_modes", "must be whole numbers from 0 on", set_modes, "give such as (0, 1)")
+    if len(set_modes) and EI is None:
+        raise SceneError(f"{name}.set_modes", "need EI", EI, "give EI: a rest curvature acts through bending")
+
+    nodes = scene.add_particles(shape, 0.0, speeds)
+    link = length / segments
+    arc = link * np.arange(segments + 1)
+    scene.add_quantity(f"{name}_length", length, "m")
+    scene.add_quantity(f"{name}_density", density, "kg/m")
+    taus = time_constants(scene, name, loss_factor, loss_frequency, EA, EI, stretch_damping, bend_damping)
+    add_masses(scene, name, nodes, segments)
+    add_links(scene, name, nodes, link, EA, taus[0])
+    ghosts = [
+        _clamp(scene, name, end, clamp, nodes, shape, link, normal if clamp_angles else None)
+        if grip is None
+        else _hold(scene, grip, int(nodes[k]), reach * GHOST * link)
+        for end, clamp, grip, k, reach in (
+            ("start", clamp_start, grips[0], 0, -1.0),
+            ("end", clamp_end, grips[1], -1, 1.0),
+        )
+    ]
+    if EI is not None:
+        _bending(scene, name, nodes, ghosts, arc, EI, taus[1], normal, set_modes)
+    add_drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
+    built = Rope(name, nodes, arc, *ghosts)
+    scene.ropes[name] = built
+    return built
+
+
+def _grips(
+    name: str, grips: tuple[Grip | None, Grip | None], clamps: tuple[ArrayLike | None, ArrayLike | None]
+) -> tuple[Grip | None, Grip | None]:
+    for end, grip, clamp in zip(("start", "end"), grips, clamps, strict=True):
+        if grip is not None and not isinstance(grip, Grip):
+            fix = "give sb.Grip.fixed, from_poses, from_markers or from_body"
+            raise SceneError(f"{name}.grip_{end}", "is no grip", grip, fix)
+        if grip is not None and clamp is not None:
+            fix = "leave one of them out: a grip gives the direction"
+            raise SceneError(f"{name}.grip_{end}", f"stands beside clamp_{end}", clamp, fix)
+    return grips
+
+
+def _hold(scene: Scene, grip: Grip, node: int, reach: float) -> int:
+    """Give an end the place and the direction of a grip, by a ghost particle `reach` m along the rope from it."""
+    ghost = int(scene.add_particles([grip.position[0] + reach * grip.direction[0]], 1.0)[0])
+    if grip.stays:
+        scene.pin([node, ghost])
+        return ghost
+    motion = np.stack([grip.position, grip.position + reach * grip.direction], axis=1)
+    if grip.frame is None:
+        scene.drive([node, ghost], grip.times, motion)
+    else:
+        grip.frame.drive(scene, [node, ghost], grip.times, motion)
+    return ghost
+
+
+def _clamp(
+    scene: Scene,
+    name: str,
+    end: str,
+    clamp: ArrayLike | None,
+    nodes: Array,
+    shape: Array,
+    link: float,
+    normal: Array | None,
+) -> int | None:
+    """Pin an end and hold its direction of travel by a ghost particle behind the start or beyond the end."""
+    if clamp is None:
+        return None
+    along = unit_vector(f"{name}.clamp_{end}", clamp)
+    node, place, sign = (nodes[0], shape[0], -1.0) if end == "start" else (nodes[-1], shape[-1], 1.0)
+    reach = sign * GHOST * link
+    ghost = int(scene.add_particles([place + reach * along], 1.0)[0])
+    scene.pin([node, ghost])
+    if normal is None:
+        return ghost
+    angle = scene.add_quantity(f"{name}_{end}_angle", 0.0, "rad", positive=False, scale=0.1)
+    across = np.cross(normal, along)
+    scene.add_terms(
+        [product("position", 3 * ghost + k, reach * along[k], {angle: "cos"}) for k in range(3)]
+        + [product("position", 3 * ghost + k, reach * across[k], {angle: "sin"}) for k in range(3)]
+    )
+    scene.shift_base(ghost, -reach * along)
+    return ghost
+
+
+def _bending(
+    scene: Scene,
+    name: str,
+    nodes: Array,
+    ghosts: list[int | None],
+    arc: Array,
+    EI: float,
+    damping: TimeConstant | None,
+    normal: Array | None,
+    set_modes: Sequence[int],
+) -> None:
+    """Joints at the inner nodes and at clamped ends; alpha = Voronoi length / EI. A clamped end counts the rope's own
+    half link."""
+    chain = [*([] if ghosts[0] is None else [ghosts[0]]), *nodes, *([] if ghosts[1] is None else [ghosts[1]])]
+    share = voronoi_shares(len(nodes) - 1)
+    at = list(range(1, len(nodes) - 1))
+    at = ([0] if ghosts[0] is not None else []) + at + ([len(nodes) - 1] if ghosts[1] is not None else [])
+    if not at:
+        raise SceneError(f"{name}.segments", "leave no joint to bend", len(nodes) - 1, "use at least 2 segments")
+    triples = np.array([chain[i : i + 3] for i in range(len(chain) - 2)])
+    group, length = f"{name}_bend", f"{name}_length"
+    ones = np.ones(len(at))
+    scene.add_constraints(
+        "planar_bend" if len(set_modes) else "bend",
+        triples,
+        name=group,
+        compliance=ones,
+        damping=None if damping is None else 0.0 * ones,
+        normal=normal if len(set_modes) else None,
+    )
+    scene.groups[-1].compliance[:] = 0.0
+    _, first, _ = scene.group(group)
+    stiffness = scene.add_quantity(f"{name}_EI", EI, "N m^2")
+    terms: list[Term] = [
+        product("compliance", first + i, share[node], {length: "identity", stiffness: "inverse"})
+        for i, node in enumerate(at)
+    ]
+    if damping is not None:
+        scale, tau = damping
+        factors = {**tau, stiffness: "identity", length: "inverse"}
+        terms += [product("damping", first + i, scale / share[node], factors) for i, node in enumerate(at)]
+    offset = first_value(scene, group)
+    for k in set_modes:
+        mode = scene.add_quantity(f"{name}_set_{k}", 0.0, "1/m", positive=False, scale=1.0 / arc[-1])
+        terms += [
+            product(
+                "rest",
+                offset + 4 * i + 3,
+                share[node] * np.cos(k * np.pi * arc[node] / arc[-1]),
+                {length: "identity", mode: "identity"},
+            )
+            for i, node in enumerate(at)
+        ]
+    scene.add_terms(terms)

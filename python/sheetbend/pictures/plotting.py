@@ -1,0 +1,309 @@
+"""Figures of a fit: measured against simulated, residuals, and estimates with their intervals.
+
+Every function returns a matplotlib figure that belongs to no window and changes no global state; `save`
+writes it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..arrays.timeseries import Array
+from ..errors import InputError
+from ..files.whole import written
+from ..optional import require
+from ..result.result import Estimate
+from .drawing import ACCENT, GRAY, INK, PALE, WARM, clean, key, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+_MOST_PANELS = 6
+_AXES = "xyz"
+
+
+def save(figure: Figure, path: str | Path) -> None:
+    """Write a figure, whole or not at all; the format follows from the name (png, svg, pdf)."""
+    with written(path) as beside:
+        figure.savefig(beside, dpi=160, facecolor="white")
+
+
+def plot_trajectories(
+    measured: Array,
+    simulated: Array,
+    times: Array,
+    *,
+    markers: Sequence[str] = (),
+    axis: int | None = None,
+    baseline: Array | None = None,
+    held_out: tuple[float, float] | None = None,
+    title: str = "",
+) -> Figure:
+    """One coordinate of each marker over time, measured (dots) against simulated (line).
+
+    Args:
+        measured: (frames, markers, 3) m, NaN in gaps.
+        simulated: (frames, markers, 3) m.
+        times: (frames,) s.
+        markers: their names; of more than six, six spread evenly are drawn.
+        axis: 0, 1 or 2; the one that moves most when left out.
+        baseline: (frames, markers, 3) m, a prediction without physics, drawn thin beside.
+        held_out: (first, last) s of the part that the fit did not see; it is shaded.
+        title: above the figure.
+    """
+    _same_shape(measured, simulated, times)
+    names = list(markers) or [f"m{index}" for index in range(measured.shape[1])]
+    shown = np.unique(np.linspace(0, measured.shape[1] - 1, min(_MOST_PANELS, measured.shape[1])).astype(int))
+    axis = _liveliest(measured) if axis is None else axis
+    figure = new_figure(7.2, 1.1 + 1.15 * len(shown), title)
+    panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
+    for panel, marker in zip(panels, shown, strict=True):
+        clean(panel)
+        panel.plot(times, 1e3 * measured[:, marker, axis], ".", color=GRAY, markersize=3.6, markeredgewidth=0)
+        if baseline is not None:
+            panel.plot(times, 1e3 * baseline[:, marker, axis], color=WARM, linewidth=0.9)
+        panel.plot(times, 1e3 * simulated[:, marker, axis], color=ACCENT, linewidth=1.3)
+        panel.margins(x=0)
+        panel.text(1.01, 0.5, names[marker], transform=panel.transAxes, va="center", color=INK)
+        _shade(panel, held_out)
+    _name_shade(panels[0], held_out)
+    without = [("without physics", WARM)] if baseline is not None else []
+    key(panels[0], [("measured", GRAY), ("simulated", ACCENT), *without])
+    panels[-1].set_xlabel("time [s]")
+    figure.supylabel(f"{_AXES[axis]} [mm]", color=INK, fontsize=9)
+    return figure
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One coordinate of one recording over time: its name, times (frames,) s, measured and simulated (frames,) m,
+    held-out span s."""
+
+    name: str
+    times: Array
+    measured: Array
+    simulated: Array
+    held_out: tuple[float, float] | None = None
+
+
+def plot_motions(motions: Sequence[Motion], *, title: str = "") -> Figure:
+    """One coordinate of each of several recordings, measured (dots) against simulated (line), one panel each."""
+    if not motions:
+        raise InputError("motions", "are empty", 0, "give at least one")
+    figure = new_figure(7.2, 0.6 + 1.75 * len(motions), title or " ")
+    for panel, motion in zip(figure.subplots(len(motions), 1, squeeze=False)[:, 0], motions, strict=True):
+        clean(panel)
+        panel.plot(motion.times, 1e3 * motion.measured, ".", color=GRAY, markersize=4, markeredgewidth=0)
+        panel.plot(motion.times, 1e3 * motion.simulated, color=ACCENT, linewidth=1.3)
+        panel.margins(x=0)
+        panel.set_title(motion.name, fontsize=9, color=INK, loc="left", pad=4)
+        panel.set_ylabel("[mm]")
+        _shade(panel, motion.held_out)
+    panel.set_xlabel("time [s]")
+    shaded = [("shaded: held out", INK)] if any(motion.held_out for motion in motions) else []
+    key(figure, [("measured", GRAY), ("simulated", ACCENT), *shaded])
+    return figure
+
+
+def plot_shapes(
+    measured: Sequence[Array],
+    simulated: Sequence[Array],
+    *,
+    rings: Sequence[Array] = (),
+    names: Sequence[str] = (),
+    plane: tuple[int, int] = (0, 2),
+    title: str = "",
+) -> Figure:
+    """Static shapes in a plane: measured points and the simulated line, one panel each, equal axes.
+
+    Args:
+        measured: of each shape (points, 3) m.
+        simulated: of each shape (nodes, 3) m, in order along the line.
+        rings: of each shape the simulated markers (points, 3) m, where they do not lie on the line; none when left out.
+        names: of the shapes.
+        plane: the two axes that are drawn, 0 to 2.
+        title: above the figure.
+    """
+    if not measured or len(measured) != len(simulated):
+        got = (len(measured), len(simulated))
+        raise InputError("measured", "must hold one shape per simulated one, at least one", got, "pair them up")
+    columns = min(3, len(measured))
+    rows = -(-len(measured) // columns)
+    width, height = np.ptp(_finite(np.vstack([*measured, *simulated])[:, plane]), axis=0)
+    cell = 7.6 / columns
+    ratio = min(max(height / max(width, 1e-9), 0.2), 1.5)
+    figure = new_figure(7.6, 0.75 + rows * ((cell - 0.35) * ratio + 0.3), title or " ")
+    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    for panel in panels[len(measured) :]:
+        panel.set_visible(False)
+    labels = list(names) or [f"shape {index}" for index in range(len(measured))]
+    for panel, points, line, label in zip(panels, measured, simulated, labels, strict=False):
+        clean(panel)
+        panel.plot(*(1e3 * points[:, plane]).T, "o", color=GRAY, markersize=3.2, markeredgewidth=0)
+        panel.plot(*(1e3 * line[:, plane]).T, color=ACCENT, linewidth=1.4)
+        panel.set_title(label, fontsize=9, color=INK, loc="left", pad=4)
+        panel.set_aspect("equal", adjustable="box")
+    for panel, ring in zip(panels, rings, strict=False):
+        panel.plot(*(1e3 * ring[:, plane]).T, "o", color=ACCENT, markersize=7, markerfacecolor="none")
+    for index, panel in enumerate(panels[: len(measured)]):
+        if index % columns == 0:
+            panel.set_ylabel(f"{_AXES[plane[1]]} [mm]")
+        if index + columns >= len(measured):
+            panel.set_xlabel(f"{_AXES[plane[0]]} [mm]")
+            panel.tick_params(labelbottom=True)
+    key(figure, [("measured", GRAY), ("simulated", ACCENT)])
+    return figure
+
+
+def plot_residuals(
+    measured: Array,
+    simulated: Array,
+    times: Array,
+    *,
+    markers: Sequence[str] = (),
+    held_out: tuple[float, float] | None = None,
+    title: str = "",
+) -> Figure:
+    """Distance between measured and simulated markers over time: each marker thin, their rms heavy.
+
+    The marker that is worst on the whole is drawn in the warm color and named. Arguments as in
+    `plot_trajectories`.
+    """
+    _same_shape(measured, simulated, times)
+    names = list(markers) or [f"m{index}" for index in range(measured.shape[1])]
+    gap = 1e3 * np.linalg.norm(measured - simulated, axis=2)
+    seen = np.isfinite(gap)
+    squares = np.where(seen, gap, 0.0) ** 2
+    mean = np.sqrt(squares.sum(1) / np.maximum(seen.sum(1), 1))
+    mean[~seen.any(1)] = np.nan
+    worst = int(np.argmax(squares.sum(0) / np.maximum(seen.sum(0), 1)))
+    figure = new_figure(7.2, 3.0, title)
+    panel = figure.subplots()
+    clean(panel)
+    panel.plot(times, gap, color=GRAY, linewidth=0.5, alpha=0.5)
+    panel.plot(times, gap[:, worst], color=WARM, linewidth=0.9)
+    panel.plot(times, mean, color=ACCENT, linewidth=1.8)
+    _shade(panel, held_out)
+    _name_shade(panel, held_out)
+    panel.set_ylim(bottom=0)
+    panel.margins(x=0)
+    panel.set_xlabel("time [s]")
+    panel.set_ylabel("distance [mm]")
+    key(panel, [("each marker", GRAY), (f"worst marker: {names[worst]}", WARM), ("all markers, rms", ACCENT)])
+    return figure
+
+
+def plot_estimates(
+    estimates: Sequence[Estimate],
+    *,
+    published: Mapping[str, float | tuple[float, float]] | None = None,
+    title: str = "",
+) -> Figure:
+    """Values with 95 % intervals, parameters of one unit on one axis, published values as marks.
+
+    Args:
+        estimates: of a `FitResult`, or of several.
+        published: value, or (lowest, highest), by parameter.
+        title: above the figure.
+    """
+    if not estimates:
+        raise InputError("estimates", "are empty", [], "give at least one estimate")
+    published = published or {}
+    groups: dict[str, list[Estimate]] = {}
+    for estimate in estimates:
+        groups.setdefault(estimate.unit, []).append(estimate)
+    sizes = [len(group) for group in groups.values()]
+    figure = new_figure(7.2, 0.55 + 0.3 * sum(sizes) + 0.55 * len(groups), title or " ")
+    panels = figure.subplots(len(groups), 1, squeeze=False, height_ratios=[size + 0.6 for size in sizes])[:, 0]
+    for panel, (unit, group) in zip(panels, groups.items(), strict=True):
+        _estimates_panel(panel, group, published)
+        panel.set_xlabel(f"[{unit or '1'}]", labelpad=2)
+    entries = [("value and 95 % interval", ACCENT)]
+    if any(estimate.name in published for estimate in estimates):
+        entries.append(("published", WARM))
+    key(figure, entries)
+    return figure
+
+
+def _estimates_panel(
+    panel: Axes, group: Sequence[Estimate], published: Mapping[str, float | tuple[float, float]]
+) -> None:
+    clean(panel)
+    panel.spines["left"].set_visible(False)
+    ends = [end for e in group for end in (e.lower, e.upper, e.value) if end is not None]
+    ends += [end for e in group if e.name in published for end in np.atleast_1d(published[e.name])]
+    log = min(ends) > 0 and max(ends) > 20 * min(ends)
+    if log:
+        panel.set_xscale("log")
+    else:
+        panel.ticklabel_format(axis="x", useOffset=False)
+    low, high = (min(ends) / 1.5, max(ends) * 1.5) if log else _padded(min(ends), max(ends))
+    panel.set_xlim(low, high)
+    if log:
+        _label_decades(panel, high / low)
+    for row, estimate in enumerate(group):
+        known = estimate.verdict == "identified"
+        color = ACCENT if known else GRAY
+        left = low if estimate.lower is None else estimate.lower
+        right = high if estimate.upper is None else estimate.upper
+        if estimate.lower is not None or estimate.upper is not None:
+            panel.plot([left, right], [row, row], color=color, linewidth=2, solid_capstyle="butt")
+        face = color if known else "white"
+        panel.plot(estimate.value, row, "o", color=color, markersize=5, markerfacecolor=face)
+        if not known:
+            panel.text(1.01, row, estimate.verdict, transform=panel.get_yaxis_transform(), va="center", color=GRAY)
+        if estimate.name in published:
+            marks = np.atleast_1d(published[estimate.name])
+            panel.plot(marks, np.full(len(marks), row), "|", color=WARM, markersize=11, markeredgewidth=1.6, zorder=3)
+            panel.plot(marks, np.full(len(marks), row), color=WARM, linewidth=0.8, zorder=3)
+    panel.set_yticks(range(len(group)), [estimate.name for estimate in group])
+    panel.tick_params(axis="y", length=0)
+    panel.set_ylim(len(group) - 0.4, -0.6)
+
+
+def _label_decades(panel: Axes, span: float) -> None:
+    """Numbers at 1, 2 and 5 of each decade, of more than three decades at 1 alone."""
+    ticker = require("matplotlib.ticker", "plot")
+    panel.xaxis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0) if span < 1e3 else (1.0,)))
+    panel.xaxis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
+    panel.xaxis.set_minor_formatter(ticker.NullFormatter())
+
+
+def _padded(low: float, high: float) -> tuple[float, float]:
+    room = 0.08 * (high - low) or 0.1 * max(abs(high), 1e-12)
+    return low - room, high + room
+
+
+def _shade(panel: Axes, span: tuple[float, float] | None) -> None:
+    if span is not None:
+        panel.axvspan(*span, color=PALE, zorder=0, linewidth=0)
+
+
+def _name_shade(panel: Axes, span: tuple[float, float] | None) -> None:
+    if span is not None:
+        place = ("data", "axes fraction")
+        style: dict[str, Any] = {"va": "top", "fontsize": 8, "color": GRAY}  # inside: above stands the key
+        panel.annotate("held out", (span[0], 1), (3, -3), xycoords=place, textcoords="offset points", **style)
+
+
+def _liveliest(measured: Array) -> int:
+    return int(np.argmax(np.nansum(np.nanvar(measured, axis=0), axis=0)))
+
+
+def _finite(points: Array) -> Array:
+    return points[np.isfinite(points).all(axis=1)]
+
+
+def _same_shape(measured: Array, simulated: Array, times: Array) -> None:
+    if measured.ndim != 3 or measured.shape[2] != 3 or measured.shape != simulated.shape:
+        shapes = (measured.shape, simulated.shape)
+        raise InputError("measured", "must match simulated", shapes, "give both as (frames, markers, 3)")
+    if times.shape != measured.shape[:1]:
+        raise InputError("times", "must match the frames", times.shape, f"give shape ({measured.shape[0]},)")

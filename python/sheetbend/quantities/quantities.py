@@ -1,0 +1,98 @@
+"""Named physical quantities of a scene and how the solver's inputs are made of them.
+
+An input (a compliance, a mass, a rest length, a coordinate) is a sum of terms, each a coefficient times a product of
+simple functions of named quantities: a link's compliance is `length/segments * 1/EA`. Fields that must stay positive
+have exponentials of weighted quantities among the factors. The map and its derivative are compiled
+(adjoint/parameter_map.h).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ..errors import SceneError
+
+FUNCTIONS = {"identity": 0, "inverse": 1, "square": 2, "sin": 3, "cos": 4, "sqrt": 5, "inverse_sqrt": 6, "exp": 7}
+ZERO_OR_MORE = (0.0, math.inf)  # limits of a quantity that starts at zero and cannot be negative
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A named physical number of a scene, differentiable and fittable.
+
+    Attributes:
+        name: `<group>_<quantity>`.
+        value: in `unit`.
+        unit: SI.
+        positive: whether only positive values make sense (such are fitted on a log scale by default).
+        scale: a natural size in `unit` where zero is a sensible value (angles, offsets), else None.
+        limits: least and largest value that make sense, where that is not just positive.
+    """
+
+    name: str
+    value: float
+    unit: str
+    positive: bool = True
+    scale: float | None = None
+    limits: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.value):
+            raise SceneError(self.name, "must be a finite number", self.value, f"give a value in {self.unit}")
+        if self.positive and not self.value > 0.0:
+            raise SceneError(self.name, "must be positive", self.value, f"give a positive value in {self.unit}")
+
+
+@dataclass(frozen=True)
+class Term:
+    """coefficient * prod f(quantity) * exp(sum weight * quantity), added to entry `index` of the input array `array`;
+    or to several entries, with index (k,), each distinct, and one coefficient (and weight) for all or (k,)."""
+
+    array: str
+    index: int | np.ndarray
+    coefficient: float | np.ndarray
+    factors: tuple[tuple[str, str], ...]  # (quantity, function)
+    exponents: tuple[tuple[str, float | np.ndarray], ...] = ()  # (quantity, weight)
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of the quantities in it."""
+        return tuple(name for name, _ in (*self.factors, *self.exponents))
+
+
+class Builder(Protocol):
+    """A scene under construction, as seen by what adds particles' loads and named numbers to it."""
+
+    @property
+    def particle_count(self) -> int: ...
+
+    @property
+    def positions(self) -> np.ndarray: ...
+
+    def add_quantity(
+        self,
+        name: str,
+        value: float,
+        unit: str,
+        positive: bool = True,
+        scale: float | None = None,
+        limits: tuple[float, float] | None = None,
+        shared: bool = False,
+    ) -> str: ...
+
+    def add_terms(self, terms: Sequence[Term]) -> None: ...
+
+
+def term(array: str, index: int, coefficient: float, **functions: str) -> Term:
+    """A term with functions by quantity, such as `term("compliance", 3, 0.02, rope_EA="inverse")`."""
+    return product(array, index, coefficient, functions)
+
+
+def product(array: str, index: int, coefficient: float, functions: Mapping[str, str]) -> Term:
+    """The same, for quantity names held in a mapping."""
+    return Term(array, int(index), float(coefficient), tuple(functions.items()))

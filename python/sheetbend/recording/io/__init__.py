@@ -1,0 +1,75 @@
+"""Files of recordings. A format is one module with `read(path) -> MarkerData` and, unless it is only read,
+`write(recording, path)`.
+
+A reader takes the numbers as they stand in the file; length units, names and whatever else the JSON beside
+the file tells (`sidecar`) are applied here, the same for every format. A reader whose files name their length
+unit gives it as metadata["units"]. To add a format, write its module and add its line to `FORMATS`. A format whose
+files do not say times or driven markers names those in `ASSUMED`: ("times",), ("clamped",) or both; its reader
+assumes them, and the JSON may replace them. A folder of meshes, a frame each, is read by `mesh_sequence`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import ModuleType
+
+from ...errors import RecordingError
+from ...files.door import reading
+from ...files.whole import written
+from ..marker_data import MarkerData
+from ..recording_checks import check_seen
+from . import c3d, csv, deform, mesh_sequence, npz, sidecar
+
+FORMATS: dict[str, ModuleType] = {
+    ".npz": npz,
+    ".csv": csv,
+    ".c3d": c3d,
+    ".pkl": deform,
+    ".pickle": deform,
+}
+
+
+def read(path: Path, units: str | None = None) -> MarkerData:
+    """Read the recording at path and the JSON beside it; see `Recording.load`."""
+    with reading(path):
+        return _read(path if path.name.strip(".") else path.resolve(), units)
+
+
+def _read(path: Path, units: str | None) -> MarkerData:
+    if path.is_dir() and path.suffix.lower() not in FORMATS:
+        return sidecar.apply(mesh_sequence.read(path), path, units, mesh_sequence.ASSUMED)
+    file_format = _format(path)
+    if not path.is_file():
+        fix = "check the path; relative paths start at the working directory"
+        raise RecordingError("path", "is no file", str(path), fix)
+    if path.stat().st_size == 0:
+        raise RecordingError(str(path), "is empty", "0 bytes", "export the recording again")
+    return sidecar.apply(file_format.read(path), path, units, _assumed(file_format))
+
+
+def write(recording: MarkerData, path: Path) -> None:
+    """Write the recording and the JSON beside it; see `Recording.save`."""
+    file_format = _format(path)
+    if not hasattr(file_format, "write"):
+        raise RecordingError("path", "ends in what is only read", str(path), "save it as .npz or .csv")
+    if not path.parent.is_dir():
+        fix = "make the folder first"
+        raise RecordingError("path", "lies in a folder that does not exist", str(path), fix)
+    check_seen(recording.positions, recording.markers)  # a piece may lack a marker; a file may not
+    sidecar.write(recording, path, _assumed(file_format))
+    with written(path) as beside:
+        file_format.write(recording, beside)
+
+
+def _format(path: Path) -> ModuleType:
+    try:
+        return FORMATS[path.suffix.lower()]
+    except KeyError:
+        known = " or ".join(FORMATS)
+        fix = f"use a file that ends in {known}"
+        raise RecordingError("path", "has a suffix that no reader knows", str(path), fix) from None
+
+
+def _assumed(file_format: ModuleType) -> tuple[str, ...]:
+    assumed: tuple[str, ...] = getattr(file_format, "ASSUMED", ())
+    return assumed

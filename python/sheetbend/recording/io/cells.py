@@ -1,0 +1,65 @@
+"""Cells of text files of recordings: lines, numbers, and refusals that name the line."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+
+from ...arrays.timeseries import Array
+from ...errors import RecordingError
+
+Row = tuple[int, list[str]]  # line number in the file, from 1, and the cells
+
+
+def lines(path: Path) -> list[tuple[int, str]]:
+    """The lines of a text file with their numbers from 1.
+
+    Raises:
+        RecordingError: it is no UTF-8.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise RecordingError(str(path), "is no UTF-8 text", str(error), "save it as a UTF-8 CSV") from error
+    return list(enumerate(text.split("\n"), start=1))
+
+
+def split(path: Path, number: int, line: str, delimiter: str) -> list[str]:
+    """The stripped cells of a line."""
+    try:
+        (found,) = csv.reader([line], delimiter=delimiter, strict=True)
+    except csv.Error as error:
+        place = f"{path}, line {number}"
+        raise RecordingError(place, f"is malformed, {error}", line, "mend its quotes") from error
+    return [cell.strip() for cell in found]
+
+
+def number(path: Path, line: int, cell: str) -> float:
+    """A cell as a number; NaN where it is empty."""
+    if not cell:
+        return np.nan
+    try:
+        found = float(cell.replace("_", "?"))  # Python would read 1_0 as ten
+    except ValueError:
+        fix = "write a point as decimal mark, and an empty cell or nan for a marker not seen"
+        refuse(path, line, "holds a cell that is no number", cell, fix)
+    if np.isinf(found):
+        refuse(path, line, "holds an infinite number; leave the cell empty for a marker not seen", cell)
+    return found
+
+
+def points_seen(
+    path: Path, rows: Sequence[Row], names: Sequence[str], first: Sequence[int]
+) -> tuple[Array, tuple[str, ...]]:
+    """Points (rows, k, 3) whose x, y, z stand from columns `first` on, and their names, without those never seen."""
+    x = np.array([[[number(path, row, cells[k + axis]) for axis in range(3)] for k in first] for row, cells in rows])
+    seen = ~np.isnan(x[:, :, 0]).all(axis=0)
+    return x[:, seen], tuple(names[k] for k, ever in zip(first, seen, strict=True) if ever)
+
+
+def refuse(path: Path, line: int, problem: str, got: object, fix: str = "correct that line") -> NoReturn:
+    raise RecordingError(f"{path}, line {line}", problem, got, fix)

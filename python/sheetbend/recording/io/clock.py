@@ -1,0 +1,55 @@
+"""The time column of a text file: what it is called, and its unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+
+import numpy as np
+
+from ...arrays.timeseries import Array
+from .cells import Row, number, refuse
+
+_NAME = re.compile(r"(%time)|(?:time|timestamp)[\s_]*[(\[]?\s*(s|sec|seconds|ms|us|ns)?\s*[)\]]?", re.IGNORECASE)
+_LONGEST = 40  # characters: blanks of a longer one would be matched in ever more ways
+_PER_SECOND = {"ms": 10**3, "us": 10**6, "ns": 10**9}
+_LATEST = 1e11  # s: later than any clock that counts seconds
+
+
+def unit(name: str) -> str | None:
+    """ "s", "ms", "us" or "ns", of a column called `time`, `time_ns`, `Time (s)`, `timestamp_ms` or so; None where
+    the name is not that of a time. ROS's `%time` is in ns."""
+    match = _NAME.fullmatch(name) if len(name) <= _LONGEST else None
+    if match is None:
+        return None
+    told = "ns" if match[1] else (match[2] or "s").lower()
+    return told if told in _PER_SECOND else "s"
+
+
+def times(path: Path, rows: Sequence[Row], unit: str) -> Array:
+    """(rows,) s, of the first cells. Those of finer units count from the earliest, so that stamps keep their digits.
+
+    Raises:
+        RecordingError: a cell is no number, or its seconds are no time.
+    """
+    if unit == "s":
+        found = np.array([number(path, line, cells[0]) for line, cells in rows])
+        for (line, cells), time in zip(rows, found.tolist(), strict=True):
+            if abs(time) > _LATEST:
+                fix = "name the column time_ns, time_us or time_ms"
+                refuse(path, line, "has a time that cannot be in s", cells[0], fix)
+        return found
+    exact = [_exact(path, line, cells[0]) for line, cells in rows]
+    first = min((time for time in exact if time is not None), default=Decimal(0))
+    return np.array([np.nan if t is None else float((t - first) / _PER_SECOND[unit]) for t in exact])
+
+
+def _exact(path: Path, line: int, cell: str) -> Decimal | None:
+    if np.isnan(number(path, line, cell)):
+        return None
+    try:
+        return Decimal(cell)
+    except InvalidOperation:  # what Python's float reads beyond it
+        return Decimal(float(cell))

@@ -1,0 +1,392 @@
+"""The report of a fit, as plain text and for rich terminals, both from the same sections."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from ..optional import require
+from ..quantities.wording import figures, short
+from ..result.result import UNSOUND, Estimate, FitData, Given, MotionGrowth, Premise, RecordingFit
+from .report_driven import driven_sections
+from .tables import Section, plain_section, rich_section
+
+if TYPE_CHECKING:
+    from rich.console import Group
+
+CORRELATION_SHOWN = 0.3
+"""Smallest correlation (absolute value) that the report lists."""
+CORRELATIONS_SHOWN = 15
+"""Number of correlations that the report lists at most; fit.json has them all."""
+GROWTH_SHOWN = 10.0
+"""Growth of small displacements from which on the report tells it."""
+
+PREMISES_SHOWN = 8
+"""Number of given values that the report lists at most, those with the strongest effects; fit.json has them all."""
+PREMISE_COLUMNS = 4
+"""Number of parameters above which a given value is listed with the one that it moves most."""
+_FELT = 0.02  # of a half-width: given values that move every parameter by less are not listed
+
+_SAME_MINIMUM = 0.01  # starts that end within 1 % of the best cost found the same minimum
+
+
+def sections(result: FitData) -> list[Section]:
+    """The report as data, empty sections left out."""
+    parts = [
+        _misfit(result),
+        _parameters(result),
+        _unsound(result),
+        _interval_parts(result),
+        _refits(result),
+        _premises(result),
+        Section("How ropes are held", notes=tuple(_labeled(sentence) for sentence in result.assumed)),
+        _recordings(result),
+        _forces(result),
+        _held_out_motion(result),
+        *driven_sections(result),
+        _unknown(result),
+        _correlations(result),
+        _course(result),
+        Section("Warnings", notes=tuple(("", warning) for warning in result.warnings)),
+    ]
+    return [part for part in parts if part.rows or part.notes]
+
+
+def _labeled(sentence: str) -> tuple[str, str]:
+    label, _, rest = sentence.partition(": ")
+    return label, rest
+
+
+def headline(result: FitData) -> str:
+    """How the fit ended, in one sentence."""
+    if result.interrupted:
+        end = "converged, then interrupted," if result.converged else "interrupted, best point so far,"
+    else:
+        end = "converged" if result.converged else "did NOT converge"
+    turns = f"{result.iterations} iteration{'' if result.iterations == 1 else 's'}"
+    return f"{end} after {turns}, {result.seconds:.3g} s, {result.optimizer}"
+
+
+def plain(result: FitData, width: int = 100) -> str:
+    """The report as plain text, at most `width` columns where the names allow it."""
+    lines = [f"Fit {headline(result)}"]
+    if result.message:
+        lines += textwrap.wrap(result.message, width, initial_indent="  ", subsequent_indent="  ")
+    for section in sections(result):
+        lines += ["", *plain_section(section, width)]
+    return "\n".join(lines) + "\n"
+
+
+def rich_report(result: FitData) -> Group:
+    """The report as a rich renderable: `rich.print(rich_report(result))`.
+
+    Raises:
+        MissingExtraError: rich is not installed.
+    """
+    console = require("rich.console", "cli")
+    text = require("rich.text", "cli").Text
+    good = result.converged and not result.interrupted
+    parts: list[object] = [text(f"Fit {headline(result)}", style="bold green" if good else "bold red")]
+    if result.message:
+        parts.append(text(result.message, style="dim"))
+    for section in sections(result):
+        parts += ["", *rich_section(section)]
+    group: Group = console.Group(*parts)
+    return group
+
+
+def _misfit(result: FitData) -> Section:
+    m = result.misfit
+    if m is None:
+        return Section("Misfit")
+    told = [short(1e3 * sigma) for sigma in (m.smallest_sigma, m.largest_sigma)]
+    sigma = f"{told[0]} mm" if told[0] == told[1] else f"{told[0]} to {told[1]} mm"
+    beyond = f"{short(1e3 * m.model_error)} mm in each coordinate" if m.model_error > 0 else "residuals are below sigma"
+    notes = (
+        ("reduced chi-square", f"{short(m.reduced_chi_square)}, against the given sigma of {sigma}"),
+        ("model error beyond sigma", beyond),
+    )
+    return Section("Misfit", notes=notes)
+
+
+def _unsound(result: FitData) -> Section:
+    """What speaks against the fit, once for all parameters that it is true of."""
+    words: dict[str, list[Estimate]] = {}
+    for estimate in result.estimates:
+        if estimate.verdict in UNSOUND:
+            words.setdefault(estimate.words, []).append(estimate)
+    notes = [(f"{', '.join(e.name for e in of)} ({of[0].verdict})", said) for said, of in words.items()]
+    return Section("What contradicts this fit", notes=tuple(notes))
+
+
+def _parameters(result: FitData) -> Section:
+    rows = [_estimate_row(estimate) for estimate in result.estimates]
+    rows += [_given_row(given) for given in result.given]
+    headers = ("parameter", "value", "+/-", "95 % interval", "unit", "verdict")
+    return Section("Parameters", headers, tuple(rows), tuple(("intervals", words) for words in result.not_counted))
+
+
+def _estimate_row(estimate: Estimate) -> tuple[str, ...]:
+    ends = (estimate.lower, estimate.upper)
+    numbers = (estimate.value, estimate.half_width, *ends)
+    if _lopsided(*ends):
+        value, half, lower, upper = ("" if number is None else short(number) for number in numbers)
+    else:
+        value, half, lower, upper = figures(numbers, estimate.half_width)
+    interval = "" if estimate.lower is None and estimate.upper is None else f"[{lower or '-'}, {upper or '-'}]"
+    return (estimate.name, value, half, interval, estimate.unit, estimate.verdict)
+
+
+def _lopsided(lower: float | None, upper: float | None) -> bool:
+    """Whether the ends are so far apart, or one of them so open, that no common digits suit them."""
+    return lower is None or upper is None or 0 < 3 * lower < upper
+
+
+def _given_row(given: Given) -> tuple[str, ...]:
+    return (given.name, short(given.value, 6), "", "", given.unit, given.words)
+
+
+def _interval_parts(result: FitData) -> Section:
+    rows = []
+    counted = any(e.systematic > 0 for e in result.estimates)
+    moved = any(e.moved != 0 for e in result.estimates)
+    for e in result.estimates:
+        if e.discretization + e.systematic > 0 and e.half_width is not None:
+            parts = (e.half_width, e.statistical, e.discretization, *([e.systematic] if counted else []))
+            parts += (e.moved,) if moved else ()
+            rows.append((e.name, *figures(parts, e.half_width), e.unit))
+    more = (["systematic"] if counted else []) + (["value moved by"] if moved else [])
+    headers = ("parameter", "+/-", "statistical", "discretization", *more, "unit")
+    meshes = " and of fine meshes" if any(refit.left for refit in result.refits) else ""
+    note = f"values are moved to the limit of short substeps{meshes}, and what that leaves open is counted"
+    return Section(
+        "Where the intervals come from", headers, tuple(rows), (("discretization", note),) if moved and rows else ()
+    )
+
+
+def _refits(result: FitData) -> Section:
+    rows = []
+    for e in result.estimates if result.refits else ():
+        moved = [refit.moved.get(e.name) for refit in result.refits]
+        if e.half_width is not None:
+            rows.append((e.name, *figures(moved, e.half_width / 10), e.unit))
+    headers = ("parameter", *(refit.name for refit in result.refits), "unit")
+    return Section("What refits on a finer discretization move", headers, tuple(rows))
+
+
+def _recordings(result: FitData) -> Section:
+    rows = [_recording_row(recording) for recording in result.recordings]
+    headers: tuple[str, ...] = (
+        "recording",
+        "rows",
+        "fitted rms",
+        "held-out rms",
+        "baseline rms",
+        "held-out/baseline",
+        "unit",
+    )
+    if all(recording.held_out is None for recording in result.recordings):
+        headers, rows = headers[:3] + headers[-1:], [row[:3] + row[-1:] for row in rows]
+    notes = tuple(
+        (label, words)
+        for label, words in (
+            ("held out", result.held_out_is),
+            ("baseline (no physics)", result.baseline),
+            *((recording.name, _corrected(recording)) for recording in result.recordings),
+        )
+        if words
+    )
+    return Section("Recordings", headers, tuple(rows), notes)
+
+
+def _forces(result: FitData) -> Section:
+    rows = [
+        (f.recording, f.sensor, str(f.rows), *("" if x is None else short(x) for x in (f.rms, f.held_out, f.baseline)))
+        for f in result.forces
+    ]
+    units = [(f.unit,) for f in result.forces]
+    headers: tuple[str, ...] = ("recording", "sensor", "rows", "fitted rms", "held-out rms", "constant", "unit")
+    every = [(*row, *unit) for row, unit in zip(rows, units, strict=True)]
+    if all(f.held_out is None for f in result.forces):
+        headers, every = headers[:4] + headers[5:], [row[:4] + row[5:] for row in every]
+    note = ("constant", "rms of the prediction that the force stays at its mean over the fitted part")
+    return Section("Forces", headers, tuple(every), (note,) if every else ())
+
+
+def _corrected(recording: RecordingFit) -> str:
+    if recording.corrected_by is None or recording.driven_sigma is None:
+        return ""
+    found, prior = (short(1e3 * size, 2) for size in (recording.corrected_by, recording.driven_sigma))
+    return (
+        f"its driven markers are moved by {found} mm in each coordinate (root mean square); driven_sigma is {prior} mm"
+    )
+
+
+def _recording_row(recording: RecordingFit) -> tuple[str, ...]:
+    factor, unit = _readable(recording)
+
+    def number(value: float | None) -> str:
+        return "" if value is None else short(value * factor)
+
+    ratio = ""
+    if recording.held_out is not None and recording.baseline:
+        ratio = f"{100 * recording.held_out / recording.baseline:.3g} %"
+    errors = (number(recording.rms), number(recording.held_out), number(recording.baseline))
+    return (recording.name, f"{recording.rows:,}", *errors, ratio, unit)
+
+
+def _held_out_motion(result: FitData) -> Section:
+    """How much of the motion that the fit did not see is predicted, and its rhythm."""
+    rows = [_motion_row(recording) for recording in result.recordings if recording.motion]
+    headers = ("recording", "motion rms", "unit", "held-out/motion", "frequency measured", "simulated", "difference")
+    note = (
+        "of the measured markers about their mean over the held-out part; "
+        "frequencies in Hz, from the highest peak there"
+    )
+    return Section("Held-out motion", headers, tuple(rows), (("motion", note),) if rows else ())
+
+
+def _motion_row(recording: RecordingFit) -> tuple[str, ...]:
+    factor, unit = _readable(recording)
+    motion, error = recording.motion or 0.0, recording.held_out
+    share = "" if error is None else f"{100 * error / motion:.3g} %"
+    measured, simulated = recording.measured_frequency, recording.simulated_frequency
+    rhythm = ["" if f is None else f"{f:.2f}" for f in (measured, simulated)]
+    difference = f"{100 * (simulated / measured - 1):+.2g} %" if measured and simulated else ""
+    return (recording.name, short(motion * factor), unit, share, *rhythm, difference)
+
+
+def _readable(recording: RecordingFit) -> tuple[float, str]:
+    sizes = (recording.rms or 0.0, recording.held_out or 0.0, recording.baseline or 0.0)
+    return (1e3, "mm") if recording.unit == "m" and max(sizes) < 1 else (1.0, recording.unit)
+
+
+def _unknown(result: FitData) -> Section:
+    notes = []
+    for gauge in result.gauges:
+        members = [e.name for e in result.estimates if gauge in e.words]
+        notes.append((" and ".join(members), f"{gauge}; fix one of them or give it a prior"))
+    for estimate in result.estimates:
+        if estimate.verdict not in ("identified", *UNSOUND) and not any(
+            gauge in estimate.words for gauge in result.gauges
+        ):
+            notes.append((estimate.name, estimate.words))
+    if any(e.verdict == "at its floor" for e in result.estimates):
+        others = [e.name for e in result.estimates if e.verdict in ("identified", "weak")]
+        if others:
+            notes.append((", ".join(others), "doubtful too: a solver that makes up one number shifts those beside it"))
+    return Section("What the data cannot tell", notes=tuple(notes))
+
+
+def _correlations(result: FitData) -> Section:
+    strong = [pair for pair in result.correlations if abs(pair.value) >= CORRELATION_SHOWN]
+    strong.sort(key=lambda pair: -abs(pair.value))
+    rows = tuple((pair.first, pair.second, f"{pair.value:+.2f}") for pair in strong[:CORRELATIONS_SHOWN])
+    left_out = f"those below {CORRELATION_SHOWN:g} are left out"
+    if len(strong) > len(rows):
+        left_out = f"the {len(rows)} strongest of {len(strong)} above {CORRELATION_SHOWN:g}"
+    return Section(f"Correlations ({left_out})", ("parameter", "with", "correlation"), rows)
+
+
+def _grown(growth: MotionGrowth) -> str:
+    """Of small displacements along one motion, at the end of the fit."""
+    largest = growth.largest[1]
+    size = "without limit" if largest is None else f"{largest:.2g} times"
+    until = "" if growth.until[1] is None else f"; beyond {growth.until[1]:.3g} s nothing can be derived from it"
+    return f"small displacements grow {size}{until}"
+
+
+def _course(result: FitData) -> Section:
+    notes = [("cost", f"{result.cost:.6g} over {result.rows:,} residuals, {len(result.estimates)} free parameters")]
+    if result.first_cost is not None:
+        fell = f", {result.first_cost / result.cost:,.3g} times the end's" if result.cost > 0 else ""
+        notes.append(("at the start", f"{result.first_cost:.6g}{fell}"))
+    if result.evaluations:
+        notes.append(("simulations", f"{result.evaluations:,}, {result.jacobians:,} of them with a Jacobian"))
+    if result.windows:
+        notes.append(("windows fitted first", ", ".join(f"{length:.3g}" for length in result.windows) + " s"))
+    notes += [(f"growth in {g.name}", _grown(g)) for g in result.growth if (g.largest[1] or math.inf) > GROWTH_SHOWN]
+    if result.jacobian_seconds is not None:
+        notes.append(("a Jacobian took", f"{result.jacobian_seconds:.3g} s"))
+    if result.autocorrelation_time > 1.05:
+        time = result.autocorrelation_time
+        words = f"one in {time:.3g} counts as independent; the intervals allow for it"
+        notes.append(("neighboring residuals are alike", words))
+    if len(result.starts) > 1:
+        costs = [start.cost for start in result.starts if start.cost is not None]
+        same = sum(cost <= min(costs) * (1 + _SAME_MINIMUM) for cost in costs)
+        words = f"{same} of {len(result.starts)} ended within 1 % of the best cost; the worst at {max(costs):.4g}"
+        if len(costs) < len(result.starts):
+            words += f"; {len(result.starts) - len(costs)} diverged"
+        notes.append(("starts", words))
+    return Section("Course", notes=tuple(notes))
+
+
+def _premises(result: FitData) -> Section:
+    """What the fit took as given: how far an error of each moves the parameters, the strongest first."""
+    every_one = [e for e in result.estimates if e.half_width]
+    closed = [e for e in every_one if not e.name.endswith("]")] or every_one  # those of one recording: see fit.json
+
+    def strength(premise: Premise, e: Estimate) -> float:
+        return abs(premise.moved.get(e.name, 0.0)) / (e.half_width or 1.0)
+
+    every = [p for p in result.premises if any(strength(p, e) > _FELT for e in closed)]
+    every.sort(key=lambda p: -max(strength(p, e) for e in closed))
+    counted = any(p.sd for p in every)
+    listed = []
+    for p in every[:PREMISES_SHOWN]:
+        value = "" if p.value is None else f"{short(p.value, 4)} {p.unit}".rstrip()
+        sd = "" if p.sd is None else f"{short(p.sd, 2)} {p.unit}".rstrip()
+        listed.append(((p.name, value, p.words), p, (sd,) if counted else ()))
+    ends = ("sd counted",) if counted else ()
+    headers = ("given", "value", "if off by", *(e.name for e in closed), *ends)
+    rows = [(*before, *(_moved(p, e) for e in closed), *after) for before, p, after in listed]
+    if len(closed) > PREMISE_COLUMNS or _wide((headers, *rows)):
+        most = [max(closed, key=lambda e, p=p: strength(p, e)) for _, p, _ in listed]  # type: ignore[misc]
+        headers = ("given", "value", "if off by", "moves most", "half-widths", *ends)
+        rows = [
+            (*before, f"{e.name} {_moved(p, e)}", short(strength(p, e), 2), *after)
+            for (before, p, after), e in zip(listed, most, strict=True)
+        ]
+    return Section("What the result rests on", headers, tuple(rows), _rests_on(every, closed, strength) if rows else ())
+
+
+def _wide(lines: Sequence[tuple[str, ...]]) -> bool:
+    """Whether a table does not fit a report."""
+    return sum(2 + max(map(len, column)) for column in zip(*lines, strict=True)) > 100
+
+
+def _moved(premise: Premise, e: Estimate) -> str:
+    moved = premise.moved.get(e.name)
+    if moved is None:
+        return ""
+    if abs(moved) < 1e-3 * (e.half_width or 0.0):
+        return "0"
+    sign = "" if premise.name == "markers" else "+"
+    if e.half_width is not None and abs(e.value) > e.half_width:
+        return f"{100 * moved / abs(e.value):{sign}.2g} %"
+    return f"{moved:{sign}.2g} {e.unit}".rstrip()
+
+
+def _rests_on(
+    premises: Sequence[Premise], closed: Sequence[Estimate], strength: Callable[[Premise, Estimate], float]
+) -> tuple[tuple[str, str], ...]:
+    """What the reader is to make of the table."""
+    notes = []
+    left = len(premises) - PREMISES_SHOWN
+    if left > 0:
+        notes.append(("not listed", f"{left} given values with weaker effects"))
+    exact = [p for p in premises if p.sd is None]
+    if exact:
+        strongest = max(closed, key=lambda e: strength(exact[0], e))
+        times = strength(exact[0], strongest)
+        words = "The intervals take these values as exact"
+        if len(exact) < len(premises):
+            words = "The intervals take the values without a standard deviation as exact"
+        if times > 1:
+            far = f"an error of {exact[0].words} in {exact[0].name} would move {strongest.name}"
+            words += f", but {far} by {short(times, 2)} half-widths"
+        notes.append(("", f"{words}. Standard deviations (given = ...) make them count"))
+    return tuple(notes)

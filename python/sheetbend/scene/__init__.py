@@ -1,0 +1,1 @@
+"""Scenes: what they hold, how they are built, compiled and saved."""

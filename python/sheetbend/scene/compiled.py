@@ -1,0 +1,179 @@
+"""A frozen scene as the compiled core sees it: topology, the flat layout of its inputs, the map from quantities."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import _core
+from ..errors import SceneError, refusal
+from ..quantities.quantities import FUNCTIONS, Term
+from .domain import Domain
+from .kinks import kinks
+from .scene_data import SceneData
+
+VECTORS = ("position", "velocity", "boundary", "force", "wind")
+
+
+def specification(scene: SceneData) -> dict[str, Any]:
+    """The topology of a scene, as the compiled core is made from it."""
+    return {
+        "particles": scene.particle_count,
+        "directors": [(d, *edge) for d, edge in scene.directors.items()],
+        "pinned": sorted(scene.pinned),
+        "driven": list(scene.boundary.driven),
+        "boundary_times": [] if not scene.boundary.driven else list(scene.boundary.times),
+        "boundary_interpolation": scene.boundary.interpolation,
+        "loaded": list(scene.forces.particles),
+        "force_times": scene.forces.times.tolist(),
+        "has_drag": scene.has_drag,
+        "air": scene.air.triangles.tolist(),
+        "wind_times": scene.air.times.tolist(),
+        "groups": [
+            {"name": g.name, "kind": g.kind, "damped": g.damped, "stencil": g.particles.ravel()} for g in scene.groups
+        ],
+        "volumes": [
+            {"name": name, "triangles": triangles.tolist()} for name, triangles in scene.volumes.triangles.items()
+        ],
+    }
+
+
+class CompiledScene:
+    """Built once by `Scene.compiled`.
+
+    Attributes:
+        core: the compiled topology.
+        layout: input array name -> (offset, size) in the flat input vector.
+        name: of the scene.
+        kinds: of its constraints.
+        names: quantity names in the order of theta.
+        theta: their values.
+        kinks: what makes its motions not smooth in time, in words; empty if nothing.
+        domain: which quantities and inputs make sense.
+    """
+
+    def __init__(self, scene: SceneData) -> None:
+        try:
+            self.core = _core.Scene(**specification(scene))
+        except ValueError as error:
+            raise refusal(error, SceneError, scene.name) from error
+        self.layout: dict[str, tuple[int, int]] = self.core.layout
+        self.name = scene.name
+        self.kinds = frozenset(g.kind for g in scene.groups)
+        self.names = tuple(scene.quantities)
+        self.theta = np.array([q.value for q in scene.quantities.values()], dtype=float)
+        self.kinks = kinks(scene)
+        self.domain = Domain(scene, self.layout)
+        self._base = self._pack(scene)
+        self._terms = [*scene.terms, *scene.boundary.terms()]
+
+    @cached_property
+    def _map(self) -> _core.ParameterMap:
+        return _core.ParameterMap(self.map())
+
+    def _pack(self, scene: SceneData) -> np.ndarray:
+        base = np.zeros(self.core.inputs)
+        for array, values in scene.base_arrays().items():
+            offset, size = self.layout[array]
+            base[offset : offset + size] = np.ravel(values)
+        return base
+
+    def map(self, extra: int = 0, terms: Sequence[Term] = (), names: Sequence[str] | None = None) -> dict[str, Any]:
+        """The parameter map as plain arrays, one entry per term and input that it goes to; `extra` more inputs (array
+        "extra") may follow the scene's, with their own terms."""
+        order = {name: i for i, name in enumerate(self.names if names is None else names)}
+        offsets = {array: offset for array, (offset, _) in self.layout.items()} | {"extra": self.core.inputs}
+        every = [*self._terms, *terms]
+        entries = np.array([np.size(t.index) for t in every], dtype=int)
+        lengths = np.array([len(t.quantities) for t in every], dtype=int)
+        parameter = np.array([order[name] for t in every for name in t.quantities], dtype=int)
+        functions = [(*(f for _, f in t.factors), *("exp" for _ in t.exponents)) for t in every]
+        function = np.array([FUNCTIONS[f] for own in functions for f in own], dtype=int)
+        # Every entry of a term has all of its factors: where they stand in the two lists above.
+        length = np.repeat(lengths, entries)
+        first_factor = np.concatenate([[0], np.cumsum(length)])
+        first = np.repeat(np.cumsum(lengths) - lengths, entries)
+        place = np.repeat(first - first_factor[:-1], length) + np.arange(first_factor[-1])
+        coefficients = [_spread(t.coefficient, k) for t, k in zip(every, entries, strict=True)]
+        weight = np.ones(len(place))  # of a quantity in an exponential
+        for t, k, start in zip(every, entries, first_factor[np.cumsum(entries) - entries], strict=True):
+            for e, (_, own) in enumerate(t.exponents, start=len(t.factors)):
+                width = len(t.quantities)
+                weight[start + e : start + k * width : width] = own
+        return {
+            "base": np.concatenate([self._base, np.zeros(extra)]) if extra else self._base,
+            "target": _joined([offsets[t.array] + np.ravel(t.index) for t in every]),
+            "coefficient": _joined(coefficients).astype(float),
+            "first_factor": first_factor,
+            "parameter": parameter[place],
+            "function": function[place],
+            "weight": weight,
+        }
+
+    def values(self, changes: Mapping[str, float] | None = None) -> np.ndarray:
+        """theta with some quantities changed, shape (quantities,).
+
+        Raises:
+            SceneError: an unknown name, no finite number, or one outside the range of its quantity.
+        """
+        theta = self.theta.copy()
+        for name, value in (changes or {}).items():
+            if name not in self.names:
+                raise SceneError(
+                    "values", "name no quantity of the scene", name, f"name one of: {', '.join(self.names)}"
+                )
+            k = self.names.index(name)
+            try:
+                theta[k] = value
+            except (TypeError, ValueError):
+                theta[k] = np.nan
+        self.domain.check_quantities(theta[None])
+        return theta
+
+    def inputs(self, theta: np.ndarray | None = None) -> np.ndarray:
+        """Flat inputs, shape (core.inputs,).
+
+        Raises:
+            SceneError: some are not finite, or negative where that makes no sense; names the quantities.
+        """
+        theta = self.theta if theta is None else theta
+        found = self._map.inputs(theta)
+        self.domain.check_inputs(found[None], theta)
+        return found
+
+    def inputs_dot(self, theta: np.ndarray, theta_dot: np.ndarray) -> np.ndarray:
+        """Tangent of the inputs along theta_dot."""
+        return self._map.inputs_dot(theta, theta_dot)
+
+    def theta_bar(self, theta: np.ndarray, inputs_bar: np.ndarray) -> np.ndarray:
+        """Cotangent of the quantities from that of the inputs."""
+        return self._map.theta_bar(theta, inputs_bar)
+
+    def theta_bar_dot(
+        self, theta: np.ndarray, theta_dot: np.ndarray, inputs_bar: np.ndarray, inputs_bar_dot: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Derivative of `theta_bar` along (theta_dot, inputs_bar_dot), with its value."""
+        return self._map.theta_bar_dot(theta, theta_dot, inputs_bar, inputs_bar_dot)
+
+    def unpack(self, flat: np.ndarray) -> dict[str, np.ndarray]:
+        """A flat vector of inputs (or their cotangents) by array name; vectors per particle come as (n, 3)."""
+        shaped: dict[str, np.ndarray] = {}
+        for array, (offset, size) in self.layout.items():
+            part = flat[offset : offset + size]
+            shaped[array] = part.reshape(-1, 3) if array in VECTORS else part
+        return shaped
+
+
+def _spread(coefficient: ArrayLike, entries: int) -> np.ndarray:
+    """One coefficient per entry; `broadcast_to` takes most of the time of a map with many small terms."""
+    given = np.ravel(coefficient)
+    return given if len(given) == entries else np.full(entries, *given)
+
+
+def _joined(parts: Sequence[np.ndarray]) -> np.ndarray:
+    """Whole numbers or coefficients, one array after the other."""
+    return np.concatenate(parts) if parts else np.zeros(0, dtype=int)

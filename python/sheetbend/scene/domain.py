@@ -1,0 +1,174 @@
+"""Which numbers a scene can be simulated with: no stiffness, mass or length may be negative.
+
+A compiled scene has one vector of inputs, made from its quantities. `Domain` knows the least and the largest value of
+every quantity and of every input, and finds the quantity behind an input that lies outside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+import numpy as np
+
+from ..errors import SceneError
+from ..quantities.kinds import KINDS, NEEDS_COMPLIANCE
+from .scene_data import SceneData
+
+Array = np.ndarray
+HUGE = float(np.finfo(float).max)
+TINY = float(np.nextafter(0.0, 1.0))
+INSIDE = float(np.nextafter(1.0, 0.0))
+NOT_NEGATIVE = (
+    *("mass", "compliance", "damping", "drag_linear", "drag_quadratic", "air_normal", "air_tangential"),
+    "volume_compliance",
+)
+POSITIVE = ("volume",)
+# Parameters inside constraints, by kind and name or by name alone.
+REST: Mapping[str, tuple[float, float]] = {
+    "distance.rest_length": (TINY, HUGE),
+    "tether.length": (TINY, HUGE),
+    "area.rest": (TINY, HUGE),
+    "coupling": (-INSIDE, INSIDE),
+    "share": (0.0, INSIDE),
+    "yield": (TINY, HUGE),
+}
+
+
+class Domain:
+    """The ranges of a scene's quantities and inputs.
+
+    Attributes:
+        least, most: (inputs,) the range of each input, both ends allowed.
+    """
+
+    def __init__(self, scene: SceneData, layout: Mapping[str, tuple[int, int]]) -> None:
+        self._scene, self._layout = scene, layout
+        total = sum(size for _, size in layout.values())
+        self.least, self.most = np.full(total, -HUGE), np.full(total, HUGE)
+        for arrays, least in ((NOT_NEGATIVE, 0.0), (POSITIVE, TINY)):
+            for array in arrays:
+                self._part(self.least, array)[:] = least
+        self._part(self.least, "mass")[scene.free] = TINY
+        if not scene.has_drag:
+            for array in ("drag_linear", "drag_quadratic"):
+                self._part(self.most, array)[:] = 0.0
+        first = value = 0
+        for g in scene.groups:
+            mine = slice(first, first + len(g.particles))
+            if g.kind in NEEDS_COMPLIANCE:
+                self._part(self.least, "compliance")[mine] = TINY
+            if not g.damped:
+                self._part(self.most, "damping")[mine] = 0.0
+            names = KINDS[g.kind]["parameters"]
+            for k, name in enumerate(names):
+                wanted = REST.get(f"{g.kind}.{name}", REST.get(name))
+                if wanted is not None:
+                    for ends, end in ((self.least, wanted[0]), (self.most, wanted[1])):
+                        self._part(ends, "rest")[value + k : value + g.rest.size : len(names)] = end
+            first, value = mine.stop, value + g.rest.size
+
+    def _part(self, flat: Array, array: str) -> Array:
+        offset, size = self._layout[array]
+        return flat[offset : offset + size]
+
+    def check_quantities(self, theta: Array) -> None:
+        """Refuse values (scenes, quantities) that are not finite or outside the range of their quantity.
+
+        Raises:
+            SceneError: names the quantity, and the scene of a batch.
+        """
+        quantities = list(self._scene.quantities.values())
+        ends = [(0.0, HUGE) if q.positive else q.limits or (-HUGE, HUGE) for q in quantities]
+        least, most = np.clip(np.reshape(ends, (-1, 2)).T, -HUGE, HUGE)
+        bad = np.argwhere(~((theta >= least) & (theta <= most)))
+        if len(bad) == 0:
+            return
+        row, k = bad[0].tolist()
+        q, value = quantities[k], float(theta[row, k])
+        wanted = "a finite number"
+        if np.isfinite(value):
+            wanted = "a positive number" if q.positive else f"between {least[k]:g} and {most[k]:g}"
+            if not q.positive and most[k] == HUGE:
+                wanted = "zero or more"
+        where = f" in scene {row} of the batch" if len(theta) > 1 else ""
+        raise SceneError(f"values.{q.name}", f"must be {wanted}{where}", value, f"give it in {q.unit or 'its range'}")
+
+    def check_inputs(self, inputs: Array, theta: Array | None = None, replaced: Collection[str] = ()) -> None:
+        """Refuse inputs (scenes, inputs) that are not finite or outside their range.
+
+        Args:
+            theta: (quantities,) that the inputs were made from, where they are known.
+            replaced: names of arrays that a user gave as they are.
+
+        Raises:
+            SceneError: names the quantities, or the array and its entry, and the scene of a batch.
+        """
+        inside = (inputs >= self.least) & (inputs <= self.most)
+        if inside.all():
+            return
+        row, column = np.argwhere(~inside)[0].tolist()
+        array = next(name for name, (offset, size) in self._layout.items() if offset <= column < offset + size)
+        i = column - self._layout[array][0]
+        value = float(inputs[row, column])
+        state = self._state(value, float(self.least[column]), float(self.most[column]))
+        where = f" in scene {row} of the batch" if len(inputs) > 1 else ""
+        makers = {} if array in replaced else self._makers(column, theta)
+        if not makers:
+            field = f"inputs.{array}" if array in replaced else array
+            raise SceneError(field, f"is {state} at {self._entry(array, i)}{where}", value, self._fix(array, state))
+        field, verb = (f"values.{next(iter(makers))}", "makes") if len(makers) == 1 else ("values", "make")
+        problem = f"{verb} the {array} of {self._entry(array, i)} {state}{where}"
+        if theta is None:
+            got: object = value
+            problem += "" if len(makers) == 1 else f" by {', '.join(makers)}"
+        else:
+            got = next(iter(makers.values())) if len(makers) == 1 else makers
+        raise SceneError(field, problem, got, "give values that leave it positive")
+
+    @staticmethod
+    def _state(value: float, least: float, most: float) -> str:
+        if not np.isfinite(value):
+            return "not finite"
+        if most == 0.0 and value > 0.0:
+            return "without effect"
+        if least < 0.0 or (value > most and most < HUGE):
+            return "outside its range"
+        return "zero" if value == 0.0 else "negative"
+
+    @staticmethod
+    def _fix(array: str, state: str) -> str:
+        if state == "without effect":
+            return "give zero there, or add the group with damping (0 will do)"
+        return f"check the {array} given"
+
+    def _makers(self, column: int, theta: Array | None) -> dict[str, float]:
+        """The quantities that an input is made from: those that are zero, else those of either sign, else all."""
+        names: dict[str, None] = {}
+        for t in (*self._scene.terms, *self._scene.boundary.terms()):
+            if (np.ravel(t.index) + self._layout[t.array][0] == column).any():
+                names |= dict.fromkeys(t.quantities)
+        quantities = self._scene.quantities
+        values = {n: quantities[n].value for n in names}
+        if theta is not None:
+            values = {n: float(v) for n, v in zip(quantities, theta, strict=True) if n in names}
+        zero = {n: v for n, v in values.items() if quantities[n].positive and v == 0.0}
+        return zero or {n: v for n, v in values.items() if not quantities[n].positive} or values
+
+    def _entry(self, array: str, i: int) -> str:
+        """Which number of an array, in words."""
+        if array in ("position", "velocity"):
+            return f"particle {i // 3}"
+        if array in ("mass", "drag_linear", "drag_quadratic"):
+            return f"particle {i}"
+        if array.startswith("volume"):
+            return f"'{list(self._scene.volumes.triangles)[i]}'"
+        if array not in ("compliance", "damping", "rest"):
+            return f"entry {i}"
+        for g in self._scene.groups:
+            count = g.rest.size if array == "rest" else len(g.particles)
+            if i < count:
+                width = g.rest.shape[1] if array == "rest" and g.rest.ndim > 1 else 1
+                part = f"'{KINDS[g.kind]['parameters'][i % width]}' of " if array == "rest" else ""
+                return f"{part}constraint {i // width} of group '{g.name}'"
+            i -= count
+        raise IndexError(i)

@@ -1,0 +1,40 @@
+"""What a whole scene must have before it is simulated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import SceneError
+from .scene_data import SceneData
+
+
+def validate(scene: SceneData) -> None:
+    """Refuse a scene that cannot be simulated; see `Scene.freeze`."""
+    if scene.particle_count == 0:
+        raise SceneError(scene.name, "has no particles", 0, "add particles or a rope")
+    free = scene.free
+    if len(free) == 0:
+        raise SceneError(
+            scene.name,
+            "has nothing that can move: every particle is pinned or driven",
+            scene.particle_count,
+            "release at least one",
+        )
+    heavy = scene.base_arrays()["mass"] > 0
+    for t in scene.terms:
+        if t.array == "mass":
+            heavy[t.index] = True
+    light = free[~heavy[free]]
+    if light.size:
+        raise SceneError("mass", "is zero for free particles", light[:5].tolist(), "give them a mass, or pin them")
+    if scene.groups:
+        used = np.zeros(scene.particle_count, dtype=bool)
+        for particles in (*(g.particles for g in scene.groups), *scene.volumes.triangles.values()):
+            used[particles] = True
+        loose = free[~used[free]]
+        if loose.size:
+            fix = "constrain them, pin them or leave them out"
+            raise SceneError("particles", "are connected to nothing", loose[:5].tolist(), fix)
+    held = scene.pinned & set(scene.boundary.driven)
+    if held:
+        raise SceneError("drive.particles", "are pinned too", sorted(held), "either pin or drive a particle")

@@ -1,0 +1,156 @@
+"""What a scene holds: particles, groups of constraints, motion, forces, air, and the quantities that they depend on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays.checks import finite
+from ..arrays.column import Column
+from ..errors import SceneError
+from ..quantities.kinds import KINDS
+from ..quantities.quantities import Quantity, Term
+from .air import Air
+from .boundary import Boundary
+from .forces import Forces
+from .frames import Frame
+from .group import Group
+from .volume import Volumes
+
+Array = np.ndarray
+
+
+class SceneData:
+    """The content of a `Scene`, which adds to it and simulates it. SI units, z up."""
+
+    def __init__(self, name: str = "scene", gravity: ArrayLike = (0.0, 0.0, -9.81)) -> None:
+        self.name = name
+        self.quantities: dict[str, Quantity] = {}
+        self.terms: list[Term] = []
+        self.groups: list[Group] = []
+        self.pinned: set[int] = set()
+        self.directors: dict[int, Frame] = {}  # and the normals of sections
+        self.boundary = Boundary()
+        self.forces = Forces()
+        self.has_drag = False
+        self.air = Air()
+        self.volumes = Volumes()
+        self.ropes: dict[str, Any] = {}
+        self.cloths: dict[str, Any] = {}
+        self._positions, self._velocities, self._mass = Column(3), Column(3), Column()
+        self._frozen = False
+        self._drag: dict[str, Array] = {}
+        self._gravity = finite("gravity", gravity, (3,), SceneError)
+
+    def add_quantity(
+        self,
+        name: str,
+        value: float,
+        unit: str,
+        positive: bool = True,
+        scale: float | None = None,
+        limits: tuple[float, float] | None = None,
+        shared: bool = False,
+    ) -> str:
+        """Declare a named quantity; `add_terms` says what it makes.
+
+        Args:
+            shared: it may be there already, with the same value.
+
+        Raises:
+            SceneError: the name is taken, or the value is not finite (or not positive where it must be).
+        """
+        self._building()
+        quantity = Quantity(name, float(value), unit, positive, scale, limits)
+        before = self.quantities.setdefault(name, quantity)
+        if before is quantity or (shared and before == quantity):
+            return name
+        if shared:
+            raise SceneError(name, f"is {before.value:g} already", value, "give what shares it the same value")
+        raise SceneError(name, "is a quantity already", value, "give another name")
+
+    def add_terms(self, terms: Sequence[Term]) -> None:
+        """Add terms to the inputs (array names and order as in `CompiledScene.layout`)."""
+        self._building()
+        for t in terms:
+            missing = [q for q in t.quantities if q not in self.quantities]
+            if missing:
+                raise SceneError("terms", "use unknown quantities", missing, "declare them with add_quantity")
+        self.terms += terms
+
+    @property
+    def frozen(self) -> bool:
+        return self._frozen
+
+    @property
+    def particle_count(self) -> int:
+        return len(self._positions)
+
+    @property
+    def positions(self) -> Array:
+        """Initial positions as given, (n, 3) m."""
+        return self._positions.values.copy()
+
+    @property
+    def gravity(self) -> Array:
+        """(3,) m/s^2."""
+        return self._gravity.copy()
+
+    @property
+    def free(self) -> Array:
+        """Indices of the particles that can move."""
+        held = np.zeros(self.particle_count, dtype=bool)
+        held[[*self.pinned, *self.boundary.driven]] = True
+        return np.flatnonzero(~held)
+
+    def group(self, name: str) -> tuple[Group, int, int]:
+        """A group with its first constraint and its first multiplier row.
+
+        Raises:
+            SceneError: no such group.
+        """
+        constraint = row = 0
+        for g in self.groups:
+            if g.name == name:
+                return g, constraint, row
+            constraint += len(g.particles)
+            row += len(g.particles) * KINDS[g.kind]["rows"]
+        raise SceneError("group", "does not exist", name, f"name one of: {', '.join(g.name for g in self.groups)}")
+
+    def base_arrays(self) -> dict[str, Array]:
+        """The plain parts of all input arrays, to which the quantities' terms are added."""
+        return {
+            "position": self.positions,
+            "velocity": self._velocities.values.copy(),
+            "mass": self._mass.values.copy(),
+            "compliance": self._concatenated("compliance"),
+            "damping": self._concatenated("damping"),
+            "rest": self._concatenated("rest"),
+            "boundary": self.boundary.values,
+            "force": self.forces.values,
+            "gravity": self._gravity,
+            "drag_linear": self._drag_of("linear"),
+            "drag_quadratic": self._drag_of("quadratic"),
+            **self.air.arrays(),
+            **self.volumes.arrays(),
+        }
+
+    def _building(self) -> None:
+        if self._frozen:
+            raise SceneError(
+                self.name,
+                "is frozen, it has been simulated or compiled",
+                "frozen",
+                "add everything first, or build a new scene",
+            )
+
+    def _concatenated(self, field: str) -> Array:
+        return np.concatenate([np.ravel(getattr(g, field)) for g in self.groups]) if self.groups else np.zeros(0)
+
+    def _drag_of(self, field: str) -> Array:
+        """Zero for particles that came after the drag was set."""
+        given = self._drag.get(field, np.zeros(0))
+        return np.concatenate([given, np.zeros(self.particle_count - len(given))])

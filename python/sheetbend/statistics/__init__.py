@@ -1,0 +1,1 @@
+"""Statistics of estimates: covariance, gauges, profiles, intervals, verdicts."""

@@ -1,0 +1,218 @@
+"""Whether separate parts of the data agree about the parameters.
+
+A model that lacks something fits its parameters to what is missing, and the parts of a recording that show it most then
+ask for other values than the rest. What each part asks for follows to first order from the residuals and the Jacobian
+of the fit, without a simulation: parameters u + d_k in part k, with sum d_k = 0, have the columns [J, J s_1, ...], and
+their least-squares step gives all d_k at once. With a right model d is zero but for noise, so d' V^-1 d is compared
+with an F distribution (Hotelling); V is the covariance of all estimates (`covariance`), which knows that residuals are
+alike over time and between channels. A joint test sees what no single parameter shows: where several of them trade,
+each one's own interval is wide.
+
+Priors hold for u, and tell nothing of d. Parameters that a single recording has are solved for within it, not compared.
+What is known to be wrong with the residuals (their change on a finer mesh or step) takes columns of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays.timeseries import Array
+from ..optional import require
+from .covariance import Covariance, Integers, Layout, covariance
+from .gauge import RANK_TOLERANCE, null_space
+
+LEVEL = 0.01
+"""Chance that a right model is contradicted, whatever the number of splits."""
+FEWEST = 8  # rows of each part, for each parameter: fewer tell nothing
+MOST_COLUMNS = 64  # of parameters times parts
+_SHORT = 3.0  # of the share of frames that are alike: by so much standard deviations come out too small (measured)
+_FLAT = 1e-8  # of the largest: variances of directions that parts do not tell
+
+
+@dataclass(frozen=True)
+class Split:
+    """Parts of the data.
+
+    Attributes:
+        part: (rows,) number of the part that a row belongs to, -1 for none.
+        names: of the parts, in words.
+    """
+
+    part: Integers
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Difference:
+    """What one part asks for, of one parameter.
+
+    Attributes:
+        column: of the parameter.
+        name: of the part that differs most from the others, against its standard deviation.
+        steps: internal, by which that part alone and the others together would move the parameter.
+        reaches: 95 % half-widths of these.
+        reach: 95 % half-width of the difference of the two.
+        shift: by which the known errors of the residuals would move the first step.
+    """
+
+    column: int
+    name: str
+    steps: tuple[float, float]
+    reaches: tuple[float, float]
+    reach: float
+    shift: float
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """Parts of the data that ask for different parameters.
+
+    Attributes:
+        chance: that a right model shows such a difference, before counting the splits that were tried.
+        differences: of each parameter that was compared.
+    """
+
+    chance: float
+    differences: tuple[Difference, ...]
+
+
+def contradiction(
+    residuals: Array,
+    jacobian: Array,
+    splits: Sequence[Split],
+    *,
+    layout: Layout | None = None,
+    within: Sequence[tuple[slice, Sequence[int]]] = (),
+    shifts: Array | None = None,
+    taken: float = 0.0,
+) -> Contradiction | None:
+    """The least likely disagreement between parts of the data, if it is less likely than `LEVEL`.
+
+    Args:
+        residuals: (rows + others,) weighted residuals at the minimum: those of the data, then those of priors and of
+            what unknowns left that were solved for at every point.
+        jacobian: (rows + others, p) their derivative in internal coordinates.
+        splits: of the rows into parts; those whose parts are too small are left out.
+        layout: where each of the data's rows comes from; by default all are data, of one series.
+        within: rows of a recording and the columns of parameters that it alone has.
+        shifts: (rows, directions) known errors of the residuals of unknown size.
+        taken: degrees of freedom of the data's residuals that unknowns took which were solved for at every point.
+
+    Raises:
+        MissingExtraError: scipy is not installed.
+    """
+    layout = Layout.series(len(residuals)) if layout is None else layout
+    rows = len(layout.frame)
+    known = np.zeros((len(residuals), 0 if shifts is None else shifts.shape[1]))
+    if shifts is not None:
+        known[:rows] = shifts
+    compared = [
+        found for split in splits if (found := _compared(residuals, jacobian, split, layout, within, known, taken))
+    ]
+    least = min(compared, key=lambda found: found.chance, default=None)
+    return least if least is not None and least.chance < LEVEL / len(compared) else None
+
+
+def _compared(
+    residuals: Array,
+    jacobian: Array,
+    split: Split,
+    layout: Layout,
+    within: Sequence[tuple[slice, Sequence[int]]],
+    known: Array,
+    taken: float,
+) -> Contradiction | None:
+    """None where a part is too small, or where the parts have nothing to compare."""
+    rows, parts = len(layout.frame), len(split.names)
+    private = {column for _, columns in within for column in columns}
+    shared = [column for column in range(jacobian.shape[1]) if column not in private]
+    count = len(shared)
+    sizes = np.bincount(split.part[split.part >= 0], minlength=parts)
+    if count == 0 or count * parts > MOST_COLUMNS or sizes.min() < FEWEST * count:
+        return None
+    coding = np.vstack([np.eye(parts - 1), -np.ones(parts - 1), np.zeros(parts - 1)])[split.part]  # -1: the last row
+    coding = np.vstack([coding, np.zeros((len(residuals) - rows, parts - 1))])
+    opposed = [jacobian[:, shared] * coding[:, [k]] for k in range(parts - 1)]
+    every, left = _solved_within(jacobian, within, np.hstack([jacobian[:, shared], *opposed, known]), residuals, rows)
+    used = _independent(every)
+    compared = [i for i, c in enumerate(used) if count <= c < count * parts]
+    if not compared:
+        return None
+    size = np.linalg.norm(every[:, used], axis=0)
+    step = -np.linalg.lstsq(every[:, used] / size, left, rcond=None)[0] / size
+    left = left + every[:, used] @ step
+    spread = covariance(left[:rows], every[:rows, used], layout, every[rows:, used], taken + len(private))
+    V = short_of_frames(spread, int(np.ptp(layout.frame)) + 1) * spread.matrix
+    degrees = max(float(np.median((spread.degrees / (2 - 1 / spread.inflation))[compared])), 1.0)
+    sd = np.sqrt(np.diag(V))
+    values, turn = np.linalg.eigh((V / np.outer(sd, sd))[np.ix_(compared, compared)])
+    told = values > _FLAT * values[-1]
+    scores = (turn.T @ (step / sd)[compared])[told] / np.sqrt(values[told])
+    chance = float(require("scipy.special", "fit").fdtrc(len(scores), degrees, scores @ scores / len(scores)))
+    physical = [c for c in used if c < count * parts]
+    moved = np.zeros((every.shape[1], known.shape[1]))
+    scale = np.linalg.norm(every[:, physical], axis=0)
+    moved[physical] = np.linalg.lstsq(every[:, physical] / scale, known, rcond=None)[0] / scale[:, None]
+    full, whole = np.zeros(every.shape[1]), np.zeros((every.shape[1], every.shape[1]))
+    full[used], whole[np.ix_(used, used)] = step, V
+    return _told(
+        chance, split, shared, full, whole, moved, float(require("scipy.special", "fit").stdtrit(degrees, 0.975))
+    )
+
+
+def short_of_frames(spread: Covariance, frames: int) -> float:
+    """Factor of variances that few frames, many of them alike, make too small."""
+    return float((1 + _SHORT * (spread.autocorrelation_time - 1) / frames) ** 2)
+
+
+def _independent(every: Array) -> list[int]:
+    """Columns that have a unique answer once the others are held."""
+    names = [str(i) for i in range(every.shape[1])]
+    pivots = null_space(every, names, [False] * len(names)).pivots
+    return [c for c in range(len(names)) if c not in pivots]
+
+
+def _told(
+    chance: float, split: Split, shared: list[int], step: Array, V: Array, moved: Array, t: float
+) -> Contradiction:
+    """In terms of single parameters: each one's part that differs most from the others."""
+    count, parts = len(shared), len(split.names)
+    coding = np.vstack([np.eye(parts - 1), -np.ones(parts - 1)])
+
+    def difference(j: int, k: int) -> Difference:
+        """Of u + d_k and the mean of the others, u - d_k/(parts - 1)."""
+        common, d = np.zeros(len(step)), np.zeros(len(step))
+        common[j] = 1.0
+        d[[count * (m + 1) + j for m in range(parts - 1)]] = coding[k]
+        rows = (common + d, common - d / (parts - 1), d * parts / (parts - 1))
+        reaches = [t * math.sqrt(max(float(row @ V @ row), 0.0)) for row in rows]
+        steps = (float(rows[0] @ step), float(rows[1] @ step))
+        shift = float(np.abs(rows[0] @ moved).sum())
+        return Difference(shared[j], split.names[k], steps, (reaches[0], reaches[1]), reaches[2], shift)
+
+    def clear(found: Difference) -> float:
+        return abs(found.steps[0] - found.steps[1]) / found.reach if found.reach > 0 else 0.0
+
+    return Contradiction(chance, tuple(max((difference(j, k) for k in range(parts)), key=clear) for j in range(count)))
+
+
+def _solved_within(
+    jacobian: Array, within: Sequence[tuple[slice, Sequence[int]]], every: Array, residuals: Array, rows: int
+) -> tuple[Array, Array]:
+    """Columns and residuals less what the parameters of single recordings can explain of them."""
+    residuals = residuals.copy()
+    for part, columns in within:
+        own_columns = np.array(columns, dtype=int)
+        others = rows + np.flatnonzero(jacobian[rows:, own_columns].any(axis=1))
+        mine = np.append(np.arange(rows)[part], others)
+        own = jacobian[np.ix_(mine, own_columns)]
+        size = np.linalg.norm(own, axis=0)
+        basis, values, _ = np.linalg.svd(own[:, size > 0] / size[size > 0], full_matrices=False)
+        basis = basis[:, values > RANK_TOLERANCE * values.max(initial=0.0)]
+        every[mine] -= basis @ (basis.T @ every[mine])
+        residuals[mine] -= basis @ (basis.T @ residuals[mine])
+    return every, residuals

@@ -1,0 +1,114 @@
+"""What a fit may claim: intervals, correlations, gauges, and one verdict for each parameter.
+
+The statistics are linear at the minimum, in internal coordinates, so that an interval on a log scale is
+asymmetric in physical units and never crosses zero. Where an interval is wide and the cost at its ends is not
+what the linear picture says, the profile of the cost decides: the interval then holds the values at which a
+refit of all other parameters costs little more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays.timeseries import Array
+from ..errors import InputError
+from ..quantities.parameters import Parameters
+from ..result.result import Correlation, Estimate
+from .covariance import Layout
+from .gauge import RANK_TOLERANCE, Gauge
+from .judge import Floor, Judge, Nuisance
+
+
+@dataclass(frozen=True)
+class Identifiability:
+    """What the data tell about the free parameters, in their order.
+
+    Attributes:
+        estimates: value, interval and verdict of each.
+        correlations: of every pair that has an interval.
+        rank: directions in parameter space that data and priors determine.
+        singular_values: of the column-scaled Jacobian, descending.
+        gauges: combinations that stay free, in words.
+        autocorrelation_time: frames of residual that count as one.
+    """
+
+    estimates: tuple[Estimate, ...]
+    correlations: tuple[Correlation, ...]
+    rank: int
+    singular_values: Array
+    gauges: tuple[Gauge, ...]
+    autocorrelation_time: float
+
+
+def identify(
+    parameters: Parameters,
+    internal: Array,
+    residuals: Array,
+    jacobian: Array,
+    *,
+    layout: Layout | None = None,
+    floors: Mapping[str, Floor] | None = None,
+    discretization: Mapping[str, float] | None = None,
+    systematic: Mapping[str, float] | None = None,
+    profile: Callable[[str, float], float] | None = None,
+    cost: Callable[[Array], float] | None = None,
+    nuisance: Nuisance | None = None,
+    rank_tolerance: float = RANK_TOLERANCE,
+) -> Identifiability:
+    """Judge every free parameter of a finished fit.
+
+    Args:
+        parameters: with private ones expanded.
+        internal: (free,) minimum in internal coordinates.
+        residuals: (rows,) data residuals there, weighted as in the cost.
+        jacobian: (rows, free) their derivative in internal coordinates.
+        layout: where each row comes from; one series by default.
+        floors: what the solver makes up, by parameter.
+        discretization: what refits at half the step and twice the nodes move, by parameter, in its unit.
+        systematic: half-widths of what else the intervals count, by parameter, in its unit.
+        profile: (name, physical value) -> cost (half the sum of squares with priors) with all others
+            refitted; it is asked about weak parameters only.
+        cost: (internal point) -> cost there, infinite where it has none; where it rises towards both linear
+            ends of a parameter as the linear picture says, no profile is needed.
+        nuisance: what unknowns left that were solved for at every point.
+        rank_tolerance: see `gauge.RANK_TOLERANCE`.
+
+    Raises:
+        InputError: shapes disagree, numbers are not finite, or a name is unknown.
+        MissingExtraError: scipy is not installed.
+    """
+    floors, discretization, systematic = floors or {}, discretization or {}, systematic or {}
+    _check(parameters, internal, residuals, jacobian, {*floors, *discretization, *systematic})
+    nuisance = nuisance or Nuisance(np.zeros((0, len(parameters.free))), 0.0)
+    judge = Judge(parameters, internal, residuals, jacobian, layout, rank_tolerance, profile, cost, nuisance)
+    estimates = tuple(
+        judge.estimate(column, floors.get(name), (discretization.get(name, 0.0), systematic.get(name, 0.0)))
+        for column, name in enumerate(parameters.free)
+    )
+    space = judge.space
+    return Identifiability(
+        estimates,
+        judge.correlations(),
+        space.rank,
+        space.singular_values,
+        space.gauges,
+        judge.spread.autocorrelation_time,
+    )
+
+
+def _check(parameters: Parameters, internal: Array, residuals: Array, jacobian: Array, named: set[str]) -> None:
+    count = len(parameters.free)
+    if jacobian.shape != (len(residuals), count) or internal.shape != (count,):
+        shapes = (residuals.shape, jacobian.shape, internal.shape)
+        fix = f"give (rows,), (rows, {count}) and ({count},)"
+        raise InputError("jacobian", "disagrees with the residuals or the free parameters", shapes, fix)
+    for label, array in (("internal", internal), ("residuals", residuals), ("jacobian", jacobian)):
+        if not np.all(np.isfinite(array)):
+            bad = int((~np.isfinite(array)).sum())
+            raise InputError(label, "must be finite", f"{bad} that are not", "leave gaps out of the residual rows")
+    unknown = sorted(named - set(parameters.free))
+    if unknown:
+        raise InputError("floors", "name no free parameter", unknown, f"use names of: {', '.join(parameters.free)}")
