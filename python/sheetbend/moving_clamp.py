@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from .scene import Scene
+from .scene_data import SceneData
 
 
-def clamped_ends(scene: Scene, particles: Sequence[int]) -> list[tuple[int, int]]:
+def clamped_ends(scene: SceneData, particles: Sequence[int]) -> list[tuple[int, int]]:
     """(slot, ghost) of those particles (k,) that are ends held by a clamp at rest, whose ghost gives them their
     direction; ghosts that are among the particles themselves are left out."""
     ghosts: dict[int, int] = {}
@@ -22,21 +20,21 @@ def clamped_ends(scene: Scene, particles: Sequence[int]) -> list[tuple[int, int]
     return [(slot, ghosts[p]) for slot, p in enumerate(particles) if p in ghosts]
 
 
-def let_go(scene: Scene, particles: Sequence[int], ends: Sequence[tuple[int, int]]) -> None:
+def let_go(scene: SceneData, particles: Sequence[int], ends: Sequence[tuple[int, int]]) -> None:
     """Unpin ends of ropes and their ghosts before they are driven."""
     scene.pinned -= {p for slot, ghost in ends for p in (particles[slot], ghost)}
 
 
-def keep_direction(scene: Scene, particles: Sequence[int], ends: Sequence[tuple[int, int]]) -> None:
+def keep_direction(scene: SceneData, particles: Sequence[int], ends: Sequence[tuple[int, int]]) -> None:
     """Hold ghosts that are driven with the motion of their ends where they stand off them, and let the angle of a clamp
     turn them as before."""
     start, knots = scene.positions, (len(scene.boundary.times), 1)
     for slot, ghost in ends:
-        scene.add_motion_term(ghost, np.tile(start[ghost] - start[particles[slot]], knots), {})
+        scene.boundary.add_term(ghost, np.tile(start[ghost] - start[particles[slot]], knots), {}, scene.quantities)
         for term in [t for t in scene.terms if t.array == "position"]:
             at = np.atleast_1d(term.index) - 3 * ghost
             own = (at >= 0) & (at < 3)
             if own.any():
                 offset = np.zeros(3)
                 offset[at[own]] = np.broadcast_to(term.coefficient, at.shape)[own]
-                scene.add_motion_term(ghost, np.tile(offset, knots), dict(term.factors))
+                scene.boundary.add_term(ghost, np.tile(offset, knots), dict(term.factors), scene.quantities)
