@@ -177,15 +177,17 @@ def test_missing_extras_are_named() -> None:
 
 
 def test_import_loads_numpy_only() -> None:
-    code = "import sys\n"
-    code += "import sheetbend.parameters\n"
-    code += "import sheetbend.covariance\n"
-    code += "import sheetbend.gauge\n"
-    code += "import sheetbend.profile\n"
-    code += "import sheetbend.identifiability\n"
-    code += "import sheetbend.result\n"
-    code += "import sheetbend.report\n"
-    code += "import sheetbend.plotting\n"
+    modules = (
+        "parameters",
+        "covariance",
+        "gauge",
+        "profile",
+        "identifiability",
+        "result",
+        "report",
+        "plotting",
+    )
+    code = "import sys\n" + "".join(f"import sheetbend.{module}\n" for module in modules)
     code += "print([m for m in ('scipy', 'rich', 'matplotlib', 'torch') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
