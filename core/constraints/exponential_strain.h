@@ -3,7 +3,7 @@
 // Its exact force comes from f = e sqrt((exp(b e^2) - 1)/(b e^2)), which is smooth at rest.
 //
 // A projection leaves out f f'' against f'^2, as XPBD does with all curvature of C. With t = b e^2 its matrix holds (t exp(t)/(exp(t) - 1))/(1 + 2 t)
-// of the true stiffness, from 1 at rest to 1/2; docs/decisions.md says how far sweeps converge. Newton's method for equilibria takes all of it.
+// of the true stiffness, from 1 at rest to 1/2; docs/decisions says how far sweeps converge. Newton's method for equilibria takes all of it.
 // Infinite beyond b e^2 = 709.
 #pragma once
 

@@ -4,7 +4,7 @@
 // With weft = sqrt(B_weft/B_warp), twist = sqrt(2 B_twist/B_warp) and alpha = 1/(A B_warp) [1/(N m^3)] the energy is
 //   A/2 (B_warp kappa_uu^2 + B_weft kappa_vv^2 + 2 B_twist kappa_uv^2),
 // that of a plate without Poisson's effect where the three are equal. On meshes whose inner vertices have six neighbors a bent sheet resists with
-// these numbers in every direction, one-way diagonals included (docs/decisions.md); the element of Onate & Zarate (2000) is near it.
+// these numbers in every direction, one-way diagonals included (docs/decisions); the element of Onate & Zarate (2000) is near it.
 // Degenerate: a triangle without area, an angle of half a turn.
 #pragma once
 

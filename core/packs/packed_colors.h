@@ -89,7 +89,7 @@ struct PackPlan {
 
 PackPlan pack_colors(const Scene& scene, const std::vector<Color>& colors);
 
-// Bytes: what may be recorded as a whole, and what a section may take otherwise. Measured: docs/decisions.md.
+// Bytes: what may be recorded as a whole, and what a section may take otherwise. Measured: docs/decisions.
 inline constexpr std::size_t whole_record = 8 << 20, section_record = 2 << 20;
 template <class T>
 Sections sections_of(const PackPlan& plan, int sweeps, std::size_t whole = whole_record,

@@ -106,7 +106,7 @@ def test_bend_damping_does_not_resist_a_turn_in_the_plane_of_the_bend(damping):
 
 
 def test_bend_damping_resists_a_turn_out_of_the_plane_of_the_bend():
-    """A limit of the vector C = kappa b (docs/decisions.md): turned at a rate omega it changes by omega x C, which
+    """A limit of the vector C = kappa b (docs/decisions): turned at a rate omega it changes by omega x C, which
     beta opposes.
 
     The torque about a unit axis n is omega times the sum of beta |n x C|^2 over the joints.

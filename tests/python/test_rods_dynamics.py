@@ -179,7 +179,7 @@ def test_steps_converge_to_the_second_order_where_no_frame_rolls():
 
 
 def test_steps_converge_where_frames_roll():
-    """To the first order: a substep's first iteration sees the frames of the substep before (docs/decisions.md has
+    """To the first order: a substep's first iteration sees the frames of the substep before (docs/decisions has
     multipliers start from zero), and what it turns the forces by is not undone."""
     scene, ends = swinging(12), []
     start = sb.equilibrium(scene).positions
