@@ -9,8 +9,12 @@ namespace sheetbend {
 
 struct Area : OnPoints<3> {
   static constexpr const char* name = "area";
+  static constexpr const char* about = "the area of a triangle less a rest area";
+  static constexpr Unit unit = units::square_meters;
+  static constexpr Compliance compliance{"area / area modulus"};
+  static constexpr bool hot = true;
   static constexpr int rows = 1;
-  static constexpr std::array<const char*, 1> parameters{"rest"};
+  static constexpr std::array parameters{Parameter{"rest", units::square_meters, ranges::positive, defaults::measured}};
   static constexpr int offsets = 1;
 
   template <class T>

@@ -10,8 +10,14 @@ namespace sheetbend {
 
 struct Attachment : OnPoints<2> {
   static constexpr const char* name = "attachment";
+  static constexpr const char* about = "the way from the second particle to the first, less an offset";
+  static constexpr Unit unit = units::meters;
+  static constexpr Compliance compliance{"displacement / force"};
+  static constexpr bool hot = true;
   static constexpr int rows = 3;
-  static constexpr std::array<const char*, 3> parameters{"offset_x", "offset_y", "offset_z"};
+  static constexpr std::array parameters{Parameter{"offset_x", units::meters, ranges::any, defaults::usually(0.0)},
+                                         Parameter{"offset_y", units::meters, ranges::any, defaults::usually(0.0)},
+                                         Parameter{"offset_z", units::meters, ranges::any, defaults::usually(0.0)}};
   static constexpr int offsets = 3;
 
   template <class T>

@@ -10,8 +10,14 @@ namespace sheetbend {
 
 struct Bend : OnPoints<3> {
   static constexpr const char* name = "bend";
+  static constexpr const char* about = "the curvature binormal at the middle of three particles, straight at rest";
+  static constexpr Unit unit = units::none;
+  static constexpr Compliance compliance{"Voronoi length / EI", Compliance::scalar,
+                                         "a straight rigid joint has a singular projection (rank 2 of 3)"};
+  static constexpr bool hot = true;
+  static constexpr const char* instead_of_rest = "use planar_bend with a plane normal, or a rod for a curve in space";
   static constexpr int rows = 3;
-  static constexpr std::array<const char*, 0> parameters{};
+  static constexpr std::array<Parameter, 0> parameters{};
 
   template <class T>
   static void evaluate(const T* x, const T*, T* C, T* J) {

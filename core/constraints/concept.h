@@ -3,14 +3,18 @@
 //
 //   struct Distance : OnPoints<2> {                                 the stencil: how many particles, in order
 //     static constexpr const char* name = "distance";
+//     static constexpr const char* about = "the distance ...";      in one line, for lists
+//     static constexpr Unit unit = units::meters;                   of C; the units of compliance and damping follow
+//     static constexpr Compliance compliance{"link length / EA"};   what makes it, scalar or matrix, whether it may be zero
 //     static constexpr int rows = 1;                                how many scalar constraints
-//     static constexpr std::array parameters{"rest_length"};        values inside C that differ per constraint
+//     static constexpr std::array parameters{...};                  values inside C that differ per constraint: name, unit, range, default (parameter.h)
 //     template <class T> static void evaluate(const T* x, const T* p, T* C, T* J);
 //   };
 //
 // x holds the stencil's coordinates one node after the other (dofs of them), J is row-major (rows x dofs) and fully written.
 // `points` of the stencil are points; those after them are directors (of a rod's edges) or internal variables (see yield.h).
 // `unilateral = true` (one row): C >= 0, a constraint that pushes and never pulls. Its multiplier stays lambda >= 0.
+// `hot = true`: its kernels are inlined as a whole, which costs compile time and bytes and pays where the kind decides how long a simulation takes.
 // `periodic = true` says that C is an angle: differences of it (rate damping) are taken the short way round.
 //
 // Shortcuts make hot constraints cheaper; a constraint without them works the same, and tests compare the two routes:
@@ -34,6 +38,7 @@
 #include <algorithm>
 #include <array>
 
+#include "core/constraints/parameter.h"
 #include "core/scalar/vec3.h"
 
 namespace sheetbend {
@@ -47,6 +52,9 @@ struct OnPoints {
   static constexpr bool periodic = false;
   static constexpr bool unilateral = false;
   static constexpr bool unit_gradients = false;
+  static constexpr bool hot = false;
+  static constexpr const char* instead_of_rest =
+      nullptr;  // what to use where somebody gives values that the kind does not have
 };
 
 template <class K>

@@ -10,8 +10,12 @@ namespace sheetbend {
 
 struct Dihedral : OnPoints<4> {
   static constexpr const char* name = "dihedral";
+  static constexpr const char* about = "the angle between two triangles less a rest angle";
+  static constexpr Unit unit = units::radians;
+  static constexpr Compliance compliance{"(area + area) / (edge^2 B)"};
+  static constexpr bool hot = true;
   static constexpr int rows = 1;
-  static constexpr std::array<const char*, 1> parameters{"rest"};
+  static constexpr std::array parameters{Parameter{"rest", units::radians, ranges::any, defaults::usually(0.0)}};
   static constexpr int offsets = 1;
   static constexpr bool periodic = true;
 

@@ -10,8 +10,12 @@ namespace sheetbend {
 
 struct Distance : OnPoints<2> {
   static constexpr const char* name = "distance";
+  static constexpr const char* about = "the distance of two particles less a rest length";
+  static constexpr Unit unit = units::meters;
+  static constexpr Compliance compliance{"link length / EA"};
+  static constexpr bool hot = true;
   static constexpr int rows = 1;
-  static constexpr std::array<const char*, 1> parameters{"rest_length"};
+  static constexpr std::array parameters{Parameter{"rest_length", units::meters, ranges::positive, defaults::measured}};
   static constexpr bool unit_gradients = true;
 
   // The direction and the length of the edge; Hess(C) = (I - n n^T) / length between its ends.

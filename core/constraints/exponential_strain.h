@@ -24,8 +24,20 @@ struct ExponentialLaw {
 
 struct ExponentialStrain : Membrane<ExponentialLaw> {
   static constexpr const char* name = "exponential_strain";
-  static constexpr std::array<const char*, 10> parameters{
-      "N1_u", "N1_v", "N2_u", "N2_v", "coupling", "weft", "shear", "stiffening_u", "stiffening_v", "stiffening_shear"};
+  static constexpr const char* about = "the strains of a triangle, its stiffness exponential in their squares";
+  static constexpr Unit unit = units::none;
+  static constexpr Compliance compliance{"1 / (area warp stiffness)", Compliance::matrix};
+  static constexpr std::array parameters{
+      Parameter{"N1_u", units::per_meter, ranges::any, defaults::given},
+      Parameter{"N1_v", units::per_meter, ranges::any, defaults::given},
+      Parameter{"N2_u", units::per_meter, ranges::any, defaults::given},
+      Parameter{"N2_v", units::per_meter, ranges::any, defaults::given},
+      Parameter{"coupling", units::none, ranges::between_minus_one_and_one, defaults::given},
+      Parameter{"weft", units::none, ranges::any, defaults::given},
+      Parameter{"shear", units::none, ranges::any, defaults::given},
+      Parameter{"stiffening_u", units::none, ranges::any, defaults::given},
+      Parameter{"stiffening_v", units::none, ranges::any, defaults::given},
+      Parameter{"stiffening_shear", units::none, ranges::any, defaults::given}};
 };
 
 }  // namespace sheetbend

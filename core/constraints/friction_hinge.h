@@ -19,7 +19,10 @@ namespace sheetbend {
 struct AngleFromSet : OnPoints<4> {
   static constexpr int points = 3;
   static constexpr int rows = 1;
-  static constexpr std::array<const char*, 4> parameters{"normal_x", "normal_y", "normal_z", "yield"};
+  static constexpr std::array parameters{Parameter{"normal_x", units::none, ranges::any, defaults::normal},
+                                         Parameter{"normal_y", units::none, ranges::any, defaults::normal},
+                                         Parameter{"normal_z", units::none, ranges::any, defaults::normal},
+                                         Parameter{"yield", units::radians, ranges::positive, defaults::given}};
 
   template <class T>
   static void evaluate(const T* x, const T* p, T* C, T* J) {
@@ -32,6 +35,11 @@ struct AngleFromSet : OnPoints<4> {
 
 struct FrictionHinge : AngleFromSet {
   static constexpr const char* name = "friction_hinge";
+  static constexpr const char* about =
+      "the angle of a hinge from the one it slid to, which is the x of the last particle (pinned)";
+  static constexpr Unit unit = units::radians;
+  static constexpr Compliance compliance{"yield angle / torque", Compliance::scalar, "would never slide"};
+  static constexpr bool hot = true;
   static constexpr int yield_parameter = 3;
   using Slider = AngleFromSet;
 

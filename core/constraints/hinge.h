@@ -10,8 +10,15 @@ namespace sheetbend {
 
 struct Hinge : OnPoints<3> {
   static constexpr const char* name = "hinge";
+  static constexpr const char* about = "the angle between two edges about a fixed normal, less a rest angle";
+  static constexpr Unit unit = units::radians;
+  static constexpr Compliance compliance{"angle / torque"};
+  static constexpr bool hot = true;
   static constexpr int rows = 1;
-  static constexpr std::array<const char*, 4> parameters{"normal_x", "normal_y", "normal_z", "rest"};
+  static constexpr std::array parameters{Parameter{"normal_x", units::none, ranges::any, defaults::normal},
+                                         Parameter{"normal_y", units::none, ranges::any, defaults::normal},
+                                         Parameter{"normal_z", units::none, ranges::any, defaults::normal},
+                                         Parameter{"rest", units::radians, ranges::any, defaults::usually(0.0)}};
   static constexpr bool periodic = true;
 
   template <class T>

@@ -11,8 +11,14 @@ namespace sheetbend {
 
 struct IsometricBending : OnPoints<4> {
   static constexpr const char* name = "isometric_bending";
+  static constexpr const char* about = "the mean curvature of a flat sheet at an edge, quadratic in the positions";
+  static constexpr Unit unit = units::none;
+  static constexpr Compliance compliance{"1 / B"};
+  static constexpr bool hot = true;
   static constexpr int rows = 3;
-  static constexpr std::array<const char*, 3> parameters{"c1", "ca", "cb"};
+  static constexpr std::array parameters{Parameter{"c1", units::per_meter, ranges::any, defaults::given},
+                                         Parameter{"ca", units::per_meter, ranges::any, defaults::given},
+                                         Parameter{"cb", units::per_meter, ranges::any, defaults::given}};
 
   // J is c_k times the unit matrix.
   template <class T>

@@ -12,8 +12,12 @@ namespace sheetbend {
 
 template <class Stencil>
 struct CurvatureInFrames : Stencil {
+  static constexpr Unit unit = units::none;
+  static constexpr Compliance compliance{"Voronoi length / EI", Compliance::matrix};
   static constexpr int rows = 2;
-  static constexpr std::array<const char*, 3> parameters{"ratio", "rest_1", "rest_2"};
+  static constexpr std::array parameters{Parameter{"ratio", units::none, ranges::any, defaults::preset(1.0)},
+                                         Parameter{"rest_1", units::none, ranges::any, defaults::usually(0.0)},
+                                         Parameter{"rest_2", units::none, ranges::any, defaults::usually(0.0)}};
   static constexpr int offsets = 2, factors = 1;
 
   template <class T>
@@ -46,10 +50,13 @@ struct CurvatureInFrames : Stencil {
 
 struct MaterialCurvature : CurvatureInFrames<OnJoint> {
   static constexpr const char* name = "material_curvature";
+  static constexpr const char* about = "the curvatures of a rod at a joint, in its material frame, less those at rest";
+  static constexpr bool hot = true;
 };
 
 struct SectionCurvature : CurvatureInFrames<OnSections> {
   static constexpr const char* name = "section_curvature";
+  static constexpr const char* about = "the curvatures between two sections of a rod that shears, less those at rest";
 };
 
 }  // namespace sheetbend

@@ -11,8 +11,15 @@ namespace sheetbend {
 
 struct PlanarBend : OnPoints<3> {
   static constexpr const char* name = "planar_bend";
+  static constexpr const char* about = "the curvature binormal less a rest curvature in a plane";
+  static constexpr Unit unit = units::none;
+  static constexpr Compliance compliance{"Voronoi length / EI", Compliance::scalar,
+                                         "a straight rigid joint has a singular projection (rank 2 of 3)"};
   static constexpr int rows = 3;
-  static constexpr std::array<const char*, 4> parameters{"normal_x", "normal_y", "normal_z", "rest"};
+  static constexpr std::array parameters{Parameter{"normal_x", units::none, ranges::any, defaults::normal},
+                                         Parameter{"normal_y", units::none, ranges::any, defaults::normal},
+                                         Parameter{"normal_z", units::none, ranges::any, defaults::normal},
+                                         Parameter{"rest", units::none, ranges::any, defaults::usually(0.0)}};
 
   template <class T>
   static void evaluate(const T* x, const T* p, T* C, T* J) {

@@ -11,9 +11,12 @@ namespace sheetbend {
 
 struct Shear : OnPoints<4> {
   static constexpr const char* name = "shear";
+  static constexpr const char* about = "the sines of the angles by which an edge leans against its section";
+  static constexpr Unit unit = units::none;
+  static constexpr Compliance compliance{"1 / (GA link length)"};
   static constexpr int points = 2;
   static constexpr int rows = 2;
-  static constexpr std::array<const char*, 0> parameters{};
+  static constexpr std::array<Parameter, 0> parameters{};
 
   template <class T>
   static void evaluate(const T* x, const T*, T* C, T* J) {

@@ -15,10 +15,25 @@ namespace sheetbend {
 
 struct SheetCurvature : OnPoints<6> {
   static constexpr const char* name = "sheet_curvature";
+  static constexpr const char* about = "the curvatures of a triangle in its material axes less those at rest";
+  static constexpr Unit unit = units::per_meter;
+  static constexpr Compliance compliance{"1 / (area B_warp)", Compliance::matrix};
+  static constexpr bool hot = true;
   static constexpr int rows = 3;
-  static constexpr std::array<const char*, 14> parameters{"uu_0",  "uu_1",   "uu_2",   "vv_0",  "vv_1",
-                                                          "vv_2",  "uv_0",   "uv_1",   "uv_2",  "weft",
-                                                          "twist", "rest_0", "rest_1", "rest_2"};
+  static constexpr std::array parameters{Parameter{"uu_0", units::per_meter, ranges::any, defaults::given},
+                                         Parameter{"uu_1", units::per_meter, ranges::any, defaults::given},
+                                         Parameter{"uu_2", units::per_meter, ranges::any, defaults::given},
+                                         Parameter{"vv_0", units::per_meter, ranges::any, defaults::given},
+                                         Parameter{"vv_1", units::per_meter, ranges::any, defaults::given},
+                                         Parameter{"vv_2", units::per_meter, ranges::any, defaults::given},
+                                         Parameter{"uv_0", units::per_meter, ranges::any, defaults::given},
+                                         Parameter{"uv_1", units::per_meter, ranges::any, defaults::given},
+                                         Parameter{"uv_2", units::per_meter, ranges::any, defaults::given},
+                                         Parameter{"weft", units::none, ranges::any, defaults::given},
+                                         Parameter{"twist", units::none, ranges::any, defaults::given},
+                                         Parameter{"rest_0", units::radians, ranges::any, defaults::given},
+                                         Parameter{"rest_1", units::radians, ranges::any, defaults::given},
+                                         Parameter{"rest_2", units::radians, ranges::any, defaults::given}};
 
   // J is the 3 x 3 matrix of `factor` times the gradients of the angles, each on four of the six particles.
   template <class T>

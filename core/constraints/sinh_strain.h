@@ -26,7 +26,10 @@ struct SinhLaw {
 
 struct SinhStrain : Membrane<SinhLaw> {
   static constexpr const char* name = "sinh_strain";
-  static constexpr std::array<const char*, 10> parameters = ExponentialStrain::parameters;
+  static constexpr const char* about = "the strains of a triangle, its stiffness exponential in them";
+  static constexpr Unit unit = units::none;
+  static constexpr Compliance compliance{"1 / (area warp stiffness)", Compliance::matrix};
+  static constexpr auto parameters = ExponentialStrain::parameters;
 };
 
 }  // namespace sheetbend

@@ -36,11 +36,32 @@ struct SplineLaw {
 
 struct SplineStrain : Membrane<SplineLaw> {
   static constexpr const char* name = "spline_strain";
-  static constexpr std::array<const char*, 22> parameters{
-      "N1_u",          "N1_v",          "N2_u",          "N2_v",         "coupling",  "weft",
-      "shear",         "spacing_u",     "ratio_u_1",     "ratio_u_2",    "ratio_u_3", "ratio_u_4",
-      "spacing_v",     "ratio_v_1",     "ratio_v_2",     "ratio_v_3",    "ratio_v_4", "spacing_shear",
-      "ratio_shear_1", "ratio_shear_2", "ratio_shear_3", "ratio_shear_4"};
+  static constexpr const char* about = "the strains of a triangle, its stiffness a curve of each";
+  static constexpr Unit unit = units::none;
+  static constexpr Compliance compliance{"1 / (area warp stiffness)", Compliance::matrix};
+  static constexpr std::array parameters{
+      Parameter{"N1_u", units::per_meter, ranges::any, defaults::given},
+      Parameter{"N1_v", units::per_meter, ranges::any, defaults::given},
+      Parameter{"N2_u", units::per_meter, ranges::any, defaults::given},
+      Parameter{"N2_v", units::per_meter, ranges::any, defaults::given},
+      Parameter{"coupling", units::none, ranges::between_minus_one_and_one, defaults::given},
+      Parameter{"weft", units::none, ranges::any, defaults::given},
+      Parameter{"shear", units::none, ranges::any, defaults::given},
+      Parameter{"spacing_u", units::none, ranges::any, defaults::given},
+      Parameter{"ratio_u_1", units::none, ranges::any, defaults::given},
+      Parameter{"ratio_u_2", units::none, ranges::any, defaults::given},
+      Parameter{"ratio_u_3", units::none, ranges::any, defaults::given},
+      Parameter{"ratio_u_4", units::none, ranges::any, defaults::given},
+      Parameter{"spacing_v", units::none, ranges::any, defaults::given},
+      Parameter{"ratio_v_1", units::none, ranges::any, defaults::given},
+      Parameter{"ratio_v_2", units::none, ranges::any, defaults::given},
+      Parameter{"ratio_v_3", units::none, ranges::any, defaults::given},
+      Parameter{"ratio_v_4", units::none, ranges::any, defaults::given},
+      Parameter{"spacing_shear", units::none, ranges::any, defaults::given},
+      Parameter{"ratio_shear_1", units::none, ranges::any, defaults::given},
+      Parameter{"ratio_shear_2", units::none, ranges::any, defaults::given},
+      Parameter{"ratio_shear_3", units::none, ranges::any, defaults::given},
+      Parameter{"ratio_shear_4", units::none, ranges::any, defaults::given}};
 };
 
 }  // namespace sheetbend

@@ -15,7 +15,18 @@ struct LinearLaw {
 
 struct Strain : Membrane<LinearLaw> {
   static constexpr const char* name = "strain";
-  static constexpr std::array<const char*, 7> parameters{"N1_u", "N1_v", "N2_u", "N2_v", "coupling", "weft", "shear"};
+  static constexpr const char* about = "the strains of a triangle, orthotropic and linear";
+  static constexpr Unit unit = units::none;
+  static constexpr Compliance compliance{"1 / (area warp stiffness)", Compliance::matrix};
+  static constexpr bool hot = true;
+  static constexpr std::array parameters{
+      Parameter{"N1_u", units::per_meter, ranges::any, defaults::given},
+      Parameter{"N1_v", units::per_meter, ranges::any, defaults::given},
+      Parameter{"N2_u", units::per_meter, ranges::any, defaults::given},
+      Parameter{"N2_v", units::per_meter, ranges::any, defaults::given},
+      Parameter{"coupling", units::none, ranges::between_minus_one_and_one, defaults::given},
+      Parameter{"weft", units::none, ranges::any, defaults::given},
+      Parameter{"shear", units::none, ranges::any, defaults::given}};
 };
 
 }  // namespace sheetbend

@@ -11,8 +11,12 @@ namespace sheetbend {
 
 struct Tether : OnPoints<2> {
   static constexpr const char* name = "tether";
+  static constexpr const char* about = "a length less the distance of two particles, never negative";
+  static constexpr Unit unit = units::meters;
+  static constexpr Compliance compliance{"displacement / force, usually 0"};
+  static constexpr bool hot = true;
   static constexpr int rows = 1;
-  static constexpr std::array<const char*, 1> parameters{"length"};
+  static constexpr std::array parameters{Parameter{"length", units::meters, ranges::positive, defaults::measured}};
   static constexpr bool unilateral = true;
   static constexpr bool unit_gradients = true;
 
@@ -26,6 +30,14 @@ struct Tether : OnPoints<2> {
     const Vec3<T> n = select(apart, T(1.0) / length, zero) * e;
     n.store(J);
     (-n).store(J + 3);
+  }
+
+  // Taut at the first positions: C falls with the distance, so that -C(0) is measured.
+  static void measure(const double* x, double* p) {
+    const double none = 0.0;
+    double C, J[dofs];
+    evaluate(x, &none, &C, J);
+    p[0] = -C;
   }
 };
 

@@ -10,8 +10,10 @@ namespace sheetbend {
 
 template <class Stencil>
 struct TwistOfFrames : Stencil {
+  static constexpr Unit unit = units::radians;
+  static constexpr Compliance compliance{"Voronoi length / GJ"};
   static constexpr int rows = 1;
-  static constexpr std::array<const char*, 1> parameters{"rest"};
+  static constexpr std::array parameters{Parameter{"rest", units::radians, ranges::any, defaults::usually(0.0)}};
   static constexpr int offsets = 1;
   static constexpr bool periodic = true;
 
@@ -27,10 +29,14 @@ struct TwistOfFrames : Stencil {
 
 struct Twist : TwistOfFrames<OnJoint> {
   static constexpr const char* name = "twist";
+  static constexpr const char* about = "the angle of twist between two edges of a rod, less a rest angle";
+  static constexpr bool hot = true;
 };
 
 struct SectionTwist : TwistOfFrames<OnSections> {
   static constexpr const char* name = "section_twist";
+  static constexpr const char* about =
+      "the angle of twist between two sections of a rod that shears, less a rest angle";
 };
 
 }  // namespace sheetbend

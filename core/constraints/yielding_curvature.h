@@ -13,8 +13,14 @@ namespace sheetbend {
 template <class Elastic>
 struct YieldingInFrames : OnPoints<Elastic::arity + 1> {
   static constexpr int points = Elastic::points;
+  static constexpr Unit unit = units::none;
+  static constexpr Compliance compliance{"Voronoi length / EI", Compliance::matrix};
   static constexpr int rows = 2, dofs = Elastic::dofs + 3;
-  static constexpr std::array<const char*, 5> parameters{"ratio", "share", "yield", "rest_1", "rest_2"};
+  static constexpr std::array parameters{Parameter{"ratio", units::none, ranges::any, defaults::preset(1.0)},
+                                         Parameter{"share", units::none, ranges::from_zero_below_one, defaults::given},
+                                         Parameter{"yield", units::none, ranges::positive, defaults::given},
+                                         Parameter{"rest_1", units::none, ranges::any, defaults::usually(0.0)},
+                                         Parameter{"rest_2", units::none, ranges::any, defaults::usually(0.0)}};
   static constexpr int offsets = 2;
   static constexpr int share_parameter = 1, yield_parameter = 2;
 
@@ -34,10 +40,12 @@ struct YieldingInFrames : OnPoints<Elastic::arity + 1> {
 
 struct YieldingCurvature : YieldingInFrames<MaterialCurvature> {
   static constexpr const char* name = "yielding_curvature";
+  static constexpr const char* about = "material_curvature where a share of the stiffness yields";
 };
 
 struct SectionYieldingCurvature : YieldingInFrames<SectionCurvature> {
   static constexpr const char* name = "section_yielding_curvature";
+  static constexpr const char* about = "section_curvature where a share of the stiffness yields";
 };
 
 }  // namespace sheetbend

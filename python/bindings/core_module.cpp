@@ -3,29 +3,8 @@
 
 #include "adjoint/equilibrium_tangents.h"
 #include "adjoint/tape_plan.h"
-#include "core/constraints/registry.h"
 #include "core/solver/rollout.h"
 #include "python/bindings/interrupt.h"
-
-namespace sheetbend::bindings {
-
-// The registry as Python sees it: {name: {arity, points, rows, parameters, periodic, unilateral}}.
-py::dict constraint_kinds() {
-  py::dict kinds;
-  for_each_kind([&]<class K>(K) {
-    py::dict kind;
-    kind["arity"] = K::arity;
-    kind["points"] = K::points;
-    kind["rows"] = K::rows;
-    kind["parameters"] = std::vector<std::string>(K::parameters.begin(), K::parameters.end());
-    kind["periodic"] = K::periodic;
-    kind["unilateral"] = K::unilateral;
-    kinds[K::name] = kind;
-  });
-  return kinds;
-}
-
-}  // namespace sheetbend::bindings
 
 PYBIND11_MODULE(_core, m) {
   using namespace sheetbend;
@@ -33,7 +12,6 @@ PYBIND11_MODULE(_core, m) {
   m.doc() =
       "Compiled core of sheetbend. Use the package's Python functions; this module's shapes are flat and unchecked "
       "beyond sizes.";
-  m.def("constraint_kinds", &constraint_kinds);
   m.def("instruction_set", [] { return pack_kernels().name; });
   static py::exception<Diverged> diverged(m, "Diverged", PyExc_RuntimeError);
   static py::exception<Unconverged> unconverged(m, "Unconverged", PyExc_RuntimeError);
@@ -75,6 +53,7 @@ PYBIND11_MODULE(_core, m) {
       PyErr_SetNone(PyExc_KeyboardInterrupt);
     }
   });
+  bind_kinds(m);
   bind_map(m);
   bind_scene(m);
   bind_rollout(m);

@@ -8,6 +8,7 @@ namespace sheetbend::bindings {
 
 ParameterMap make_map(const py::dict& d);
 
+void bind_kinds(py::module_& m);
 void bind_map(py::module_& m);
 void bind_scene(py::module_& m);
 void bind_rollout(py::module_& m);

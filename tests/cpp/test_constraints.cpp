@@ -1,4 +1,5 @@
 // First and second rung of the derivative ladder, and the physics of C, for every registered constraint.
+#include "core/constraints/rest_values.h"
 #include "core/scalar/complex.h"
 #include "core/scalar/dual.h"
 #include "tests/cpp/support/cases.h"
@@ -118,7 +119,7 @@ TYPED_TEST(Constraint, RowOfCasesFits) {
   using K = TypeParam;
   const Case c = case_of<K>();
   EXPECT_EQ(c.x.size(), std::size_t{K::dofs});
-  for (const std::size_t size : {c.p.size(), c.parameter_degree.size(), c.parameter_sign.size()})
+  for (const std::size_t size : {c.p.size(), c.parameter_sign.size()})
     EXPECT_EQ(size, static_cast<std::size_t>(parameter_count<K>));
   EXPECT_EQ(c.relabeling.size(), std::size_t{K::arity});
   EXPECT_EQ(c.sign.size(), std::size_t{K::rows});
@@ -181,11 +182,11 @@ TYPED_TEST(Constraint, ParameterDerivativesMatchComplexStep) {
       const auto found = dual_along<K>(z, e), oracle = complex_step_along(evaluate_joined<K, Complex>, z, e);
       if constexpr (requires { K::share_parameter; })
         if (k == K::yield_parameter) continue;  // acts in yield() alone
-      EXPECT_GT(largest(std::span(oracle).first(K::rows)), 0.0) << K::parameters[k];
+      EXPECT_GT(largest(std::span(oracle).first(K::rows)), 0.0) << K::parameters[k].name;
       EXPECT_LE(relative_error(std::span(found).first(K::rows), std::span(oracle).first(K::rows)), 1e-13)
-          << K::parameters[k];
+          << K::parameters[k].name;
       EXPECT_LE(relative_error(std::span(found).subspan(K::rows), std::span(oracle).subspan(K::rows)), 1e-13)
-          << K::parameters[k];
+          << K::parameters[k].name;
     }
   }
 }
@@ -239,18 +240,17 @@ TYPED_TEST(Constraint, RotationTurnsOrKeepsC) {
   }
 }
 
+// C(s x) = s^meters C(x) when each parameter is scaled by s to the meters in its own unit: the header's units are right.
 TYPED_TEST(Constraint, ScalesWithTheUnitOfLength) {
   using K = TypeParam;
-  const Case row = case_of<K>();
   for (const double scale : {1e-3, 7.0, 1e3}) {
     const Stencil s = jittered<K>(4);
     std::vector<double> x = s.x, p = s.p;
     for (int d = 0; d < spatial<K>; ++d) x[d] *= scale;
-    for (std::size_t k = 0; k < p.size(); ++k) p[k] *= std::pow(scale, row.parameter_degree[k]);
+    for (std::size_t k = 0; k < p.size(); ++k) p[k] *= std::pow(scale, K::parameters[k].unit.meters);
     std::vector<double> expected = evaluate<K>(s.x, s.p);
     for (int i = 0; i < static_cast<int>(expected.size()); ++i)
-      expected[i] *=
-          std::pow(scale, i < K::rows || (i - K::rows) % K::dofs >= spatial<K> ? row.degree : row.degree - 1);
+      expected[i] *= std::pow(scale, K::unit.meters - (i < K::rows || (i - K::rows) % K::dofs >= spatial<K> ? 0 : 1));
     const auto found = evaluate<K>(x, p);
     EXPECT_LE(relative_error(std::span(found).first(K::rows), std::span(expected).first(K::rows)), 1e-13);
     EXPECT_LE(relative_error(std::span(found).subspan(K::rows), std::span(expected).subspan(K::rows)), 1e-13);
@@ -276,6 +276,31 @@ TYPED_TEST(Constraint, RelabelingGivesTheSameConstraint) {
           sign(d) * row.sign[j] * before[K::rows + j * K::dofs + 3 * row.relabeling[d / 3] + d % 3];
   }
   EXPECT_LE(relative_error(after, expected), 1e-14);
+}
+
+// What is measured leaves no strain; what has to be given is not a number, and so never zero unnoticed.
+TYPED_TEST(Constraint, RestValuesAreMeasuredOrSaid) {
+  using K = TypeParam;
+  const Stencil s = jittered<K>(6);
+  std::vector<double> p(parameter_count<K>), strained(K::rows), J(K::rows * K::dofs);
+  rest_values<K>(s.x.data(), p.data());
+  bool measured = false;
+  for (int k = 0; k < parameter_count<K>; ++k) {
+    const Default& otherwise = K::parameters[k].otherwise;
+    const bool said = otherwise.source == Source::usual || otherwise.source == Source::preset;
+    if (said) {
+      EXPECT_EQ(p[k], otherwise.value) << K::parameters[k].name;
+    }
+    if (otherwise.source == Source::measured) {
+      measured = true;
+      EXPECT_TRUE(p[k] >= K::parameters[k].range.least && p[k] <= K::parameters[k].range.most) << K::parameters[k].name;
+    } else if (!said) {
+      EXPECT_TRUE(std::isnan(p[k])) << K::parameters[k].name;
+    }
+  }
+  if (!measured || std::ranges::any_of(p, [](double v) { return std::isnan(v); })) return;
+  K::evaluate(s.x.data(), p.data(), strained.data(), J.data());
+  for (int j = 0; j < K::rows; ++j) EXPECT_EQ(strained[j], 0.0);
 }
 
 TEST(Registry, NamesAreDistinctAndKnown) {

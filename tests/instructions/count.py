@@ -52,12 +52,19 @@ def per_projection(totals: dict[tuple[int, int, int], int]) -> float:
 
 
 def compare(found: Counts, recorded: Counts) -> list[str]:
-    """Prints a table; what is off by more than the margin, or recorded on one side only."""
+    """Prints a table; what is off by more than the margin, or recorded and not found. A new kind is only told of."""
     wrong = []
     for isa in sorted({*found, *recorded}):
         ours, theirs = found.get(isa, {}), recorded.get(isa, {})
         for name in sorted({*ours, *theirs}):
             got, wanted = ours.get(name), theirs.get(name)
+            if (
+                got is not None
+                and wanted is None
+                and not any(known.startswith(f"{name.split()[0]} ") for known in theirs)
+            ):
+                print(f"{isa}  {name:28s} {got!s:>8}   new: --update records it")
+                continue
             fine = got is not None and wanted is not None and abs(got / wanted - 1) <= MARGIN
             print(f"{isa}  {name:28s} {got!s:>8} {wanted!s:>8}{'' if fine else '  <- off'}")
             wrong += [] if fine else [f"{isa} {name}"]

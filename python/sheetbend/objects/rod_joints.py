@@ -53,7 +53,10 @@ class Joints:
             scene.pin(sets)
             kind = "section_yielding_curvature" if self._sections else "yielding_curvature"
             stencils = np.column_stack([stencils, sets])
-        self._group("bend", kind, f"{name}_EI", stencils, damping, tuple(softness))
+        own = None
+        if yield_curvature is not None and yield_share is not None:
+            own = np.tile([yield_share, yield_curvature, 0.0, 0.0], (len(stencils), 1))
+        self._group("bend", kind, f"{name}_EI", stencils, damping, tuple(softness), own)
         start, width = first_value(scene, f"{name}_bend"), 3 if yield_curvature is None else 5
         first = start + width * np.arange(len(stencils))
         self._rest_of_bend = width - 2
@@ -100,10 +103,17 @@ class Joints:
                 self._scene.add_terms([Term("rest", index, self._share * weights, own)])
 
     def _group(
-        self, label: str, kind: str, stiffness: str, stencils: Array, damping: float | None, softness: Exponents
+        self,
+        label: str,
+        kind: str,
+        stiffness: str,
+        stencils: Array,
+        damping: float | None,
+        softness: Exponents,
+        rest: Array | None = None,
     ) -> None:
-        compliance = self._share, (self._length, "identity")
-        _add_elastic(self._scene, f"{self._name}_{label}", kind, stencils, compliance, stiffness, damping, softness)
+        group, compliance = f"{self._name}_{label}", (self._share, (self._length, "identity"))
+        _add_elastic(self._scene, group, kind, stencils, compliance, stiffness, damping, softness, rest)
 
 
 def shear(scene: Scene, name: str, stencils: Array, GA: float, damping: float | None) -> None:
@@ -126,6 +136,7 @@ def _add_elastic(
     stiffness: str,
     damping: float | None,
     softness: Exponents = (),
+    rest: Array | None = None,
 ) -> None:
     """Add constraints of compliance coefficient length^(+-1) / stiffness exp(softness), damped by a Kelvin-Voigt time
     constant.
@@ -135,10 +146,12 @@ def _add_elastic(
         stiffness: its quantity.
         damping: s, of the new quantity `<group>_damping`; None = undamped.
         softness: quantities and their weights in each constraint.
+        rest: as in `Scene.add_constraints`.
     """
     coefficient, (length, power) = compliance
     zero = np.zeros(len(stencils))
-    scene.add_constraints(kind, stencils, name=group, compliance=zero, damping=None if damping is None else zero)
+    damped = None if damping is None else zero
+    scene.add_constraints(kind, stencils, name=group, compliance=zero, damping=damped, rest=rest)
     first = scene.group(group)[1] + np.arange(len(stencils))
     scene.add_terms([Term("compliance", first, coefficient, ((length, power), (stiffness, "inverse")), softness)])
     if damping is not None:

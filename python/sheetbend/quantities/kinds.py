@@ -1,44 +1,49 @@
-"""The kinds of constraints: what the core knows of each, and their units."""
+"""The kinds of constraints, as their C++ headers describe them."""
 
 from __future__ import annotations
 
+import math
+import sys
 from collections.abc import Mapping
 from typing import Any
 
 from .. import _core
 
 KINDS: Mapping[str, Mapping[str, Any]] = _core.constraint_kinds()
-# Kinds that have no rigid form, and why.
-_SINGULAR = "is rigid, and a straight rigid joint has a singular projection (rank 2 of 3)"
-NEEDS_COMPLIANCE: Mapping[str, tuple[str, str]] = {
-    "bend": (_SINGULAR, "give a positive compliance, Voronoi length / EI"),
-    "planar_bend": (_SINGULAR, "give a positive compliance, Voronoi length / EI"),
-    "friction_hinge": ("is rigid, and would never slide", "give a positive compliance, yield angle / torque"),
-}
+"""What is known of each kind, by name:
+
+    about          one line
+    arity          particles of one constraint
+    points         how many of them are points in space; the others are directors or internal variables
+    rows           scalar constraints
+    unit           of C
+    compliance     its unit, what it is made_of, its form ("scalar" or "matrix") and why it is never_zero (or None)
+    damping        its unit
+    parameters     by name: unit, least, most, source and value, see below
+    periodic       whether C is an angle
+    unilateral     whether it pushes only
+
+A parameter's source is "given" (by `rest`; there is no other value), "measured" (by `rest`, else on the initial
+positions), "usual" (by `rest`, else `value`), "normal" (by `normal`) or "preset" (`value`, until a quantity makes
+it)."""
+IN_REST = ("given", "measured", "usual")
+"""The sources of parameters that `rest` holds, in the order of `parameters`."""
 # A damping-only element keeps the product of compliance and damping while the compliance grows: what is left of its
 # stiffness.
 VISCOUS_COMPLIANCE = 1e12
-UNITS: Mapping[str, Mapping[str, str]] = {
-    "distance": {"compliance": "m/N", "damping": "N s/m"},
-    "attachment": {"compliance": "m/N", "damping": "N s/m"},
-    "bend": {"compliance": "1/(N m)", "damping": "N m s"},
-    "planar_bend": {"compliance": "1/(N m)", "damping": "N m s"},
-    "hinge": {"compliance": "rad/(N m)", "damping": "N m s/rad"},
-    "material_curvature": {"compliance": "1/(N m)", "damping": "N m s"},
-    "yielding_curvature": {"compliance": "1/(N m)", "damping": "N m s"},
-    "twist": {"compliance": "rad/(N m)", "damping": "N m s/rad"},
-    "shear": {"compliance": "1/(N m)", "damping": "N m s"},
-    "section_curvature": {"compliance": "1/(N m)", "damping": "N m s"},
-    "section_yielding_curvature": {"compliance": "1/(N m)", "damping": "N m s"},
-    "section_twist": {"compliance": "rad/(N m)", "damping": "N m s/rad"},
-    "strain": {"compliance": "1/(N m)", "damping": "N m s"},
-    "exponential_strain": {"compliance": "1/(N m)", "damping": "N m s"},
-    "sinh_strain": {"compliance": "1/(N m)", "damping": "N m s"},
-    "spline_strain": {"compliance": "1/(N m)", "damping": "N m s"},
-    "dihedral": {"compliance": "rad/(N m)", "damping": "N m s/rad"},
-    "isometric_bending": {"compliance": "1/(N m)", "damping": "N m s"},
-    "sheet_curvature": {"compliance": "1/(N m^3)", "damping": "N m^3 s"},
-    "area": {"compliance": "m^3/N", "damping": "N s/m^3"},
-    "friction_hinge": {"compliance": "rad/(N m)", "damping": "N m s/rad"},
-    "tether": {"compliance": "m/N", "damping": "N s/m"},
-}
+
+
+def parameters_in_rest(kind: str) -> dict[str, Mapping[str, Any]]:
+    """The parameters that `rest` holds, in the order of its columns."""
+    return {name: p for name, p in KINDS[kind]["parameters"].items() if p["source"] in IN_REST}
+
+
+def range_in_words(parameter: Mapping[str, Any]) -> str:
+    """Such as "positive" or "between -1 and 1"; empty where all numbers are allowed."""
+    least, most = parameter["least"], parameter["most"]
+    unbounded = sys.float_info.max
+    if (least, most) == (-unbounded, unbounded):
+        return ""
+    if most == unbounded:
+        return "positive" if 0.0 < least <= math.nextafter(0.0, 1.0) else f"at least {least:g}"
+    return f"between {least:g} and {most:g}"

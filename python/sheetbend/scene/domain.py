@@ -11,27 +11,17 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from ..errors import SceneError
-from ..quantities.kinds import KINDS, NEEDS_COMPLIANCE
+from ..quantities.kinds import KINDS
 from .scene_data import SceneData
 
 Array = np.ndarray
 HUGE = float(np.finfo(float).max)
 TINY = float(np.nextafter(0.0, 1.0))
-INSIDE = float(np.nextafter(1.0, 0.0))
 NOT_NEGATIVE = (
     *("mass", "compliance", "damping", "drag_linear", "drag_quadratic", "air_normal", "air_tangential"),
     "volume_compliance",
 )
 POSITIVE = ("volume",)
-# Parameters inside constraints, by kind and name or by name alone.
-REST: Mapping[str, tuple[float, float]] = {
-    "distance.rest_length": (TINY, HUGE),
-    "tether.length": (TINY, HUGE),
-    "area.rest": (TINY, HUGE),
-    "coupling": (-INSIDE, INSIDE),
-    "share": (0.0, INSIDE),
-    "yield": (TINY, HUGE),
-}
 
 
 class Domain:
@@ -55,16 +45,14 @@ class Domain:
         first = value = 0
         for g in scene.groups:
             mine = slice(first, first + len(g.particles))
-            if g.kind in NEEDS_COMPLIANCE:
+            if KINDS[g.kind]["compliance"]["never_zero"]:
                 self._part(self.least, "compliance")[mine] = TINY
             if not g.damped:
                 self._part(self.most, "damping")[mine] = 0.0
-            names = KINDS[g.kind]["parameters"]
-            for k, name in enumerate(names):
-                wanted = REST.get(f"{g.kind}.{name}", REST.get(name))
-                if wanted is not None:
-                    for ends, end in ((self.least, wanted[0]), (self.most, wanted[1])):
-                        self._part(ends, "rest")[value + k : value + g.rest.size : len(names)] = end
+            parameters = KINDS[g.kind]["parameters"]
+            for k, about in enumerate(parameters.values()):
+                for ends, end in ((self.least, about["least"]), (self.most, about["most"])):
+                    self._part(ends, "rest")[value + k : value + g.rest.size : len(parameters)] = end
             first, value = mine.stop, value + g.rest.size
 
     def _part(self, flat: Array, array: str) -> Array:
@@ -168,7 +156,7 @@ class Domain:
             count = g.rest.size if array == "rest" else len(g.particles)
             if i < count:
                 width = g.rest.shape[1] if array == "rest" and g.rest.ndim > 1 else 1
-                part = f"'{KINDS[g.kind]['parameters'][i % width]}' of " if array == "rest" else ""
+                part = f"'{list(KINDS[g.kind]['parameters'])[i % width]}' of " if array == "rest" else ""
                 return f"{part}constraint {i // width} of group '{g.name}'"
             i -= count
         raise IndexError(i)

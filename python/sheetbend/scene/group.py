@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays.checks import index_array, per_item
 from ..errors import SceneError
-from ..quantities.kinds import KINDS, NEEDS_COMPLIANCE, VISCOUS_COMPLIANCE
+from ..quantities.kinds import KINDS, VISCOUS_COMPLIANCE
 from .rest_values import rest_values
 
 Array = np.ndarray
@@ -63,8 +63,9 @@ def make_group(
     for field, values in (("compliance", alpha), (label, beta)):
         if (values < 0).any():
             raise SceneError(f"{name}.{field}", "must not be negative", float(values.min()), "give zero or more")
-    if kind in NEEDS_COMPLIANCE and not (alpha > 0).all():
-        why, fix = NEEDS_COMPLIANCE[kind]
-        raise SceneError(f"{name}.compliance", why, float(alpha.min()), fix)
-    inside = rest_values(name, kind, KINDS[kind]["parameters"], positions[stencil], rest, normal)
+    about = KINDS[kind]["compliance"]
+    if about["never_zero"] and not (alpha > 0).all():
+        fix = f"give a positive compliance, {about['made_of']}"
+        raise SceneError(f"{name}.compliance", f"is rigid, and {about['never_zero']}", float(alpha.min()), fix)
+    inside = rest_values(name, kind, positions[stencil], rest, normal)
     return Group(name, kind, stencil, alpha, beta, damping is not None, inside)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays.checks import finite, indices, per_item, points
 from ..errors import SceneError
-from ..quantities.kinds import KINDS, UNITS
+from ..quantities.kinds import KINDS
 from ..quantities.quantities import ZERO_OR_MORE, Term, product
 from .compiled import CompiledScene
 from .frames import Frame, directors_of, normals_of
@@ -197,31 +197,19 @@ class Scene(SceneData):
         constraint (their gradients are in the input arrays).
 
         Args:
-            kind: a name in sheetbend.KINDS: "distance", "attachment"; of ropes "bend", "planar_bend", "hinge",
-                "friction_hinge"; of rods
-                "material_curvature", "yielding_curvature", "twist", "shear" and, between sections, "section_curvature",
-                "section_yielding_curvature", "section_twist"; of cloth "strain", "exponential_strain",
-                "sinh_strain", "spline_strain", "sheet_curvature", "dihedral", "isometric_bending", "area", "tether".
+            kind: a name in `sheetbend.KINDS`, which holds what follows of each kind; docs/constraints.md lists them.
             particles: (count, arity) indices.
             name: of the group; the kind by default.
-            compliance: 0 = rigid; distance, attachment, tether m/N; bend, planar_bend 1/(N m) (Voronoi length / EI);
-                hinge rad/(N m); friction_hinge rad/(N m) (yield angle / torque); material_curvature 1/(N m), twist
-                rad/(N m) (Voronoi length / EI or GJ), shear 1/(N m) (1/(GA length)); strains 1/(N m) (1/(area warp
-                stiffness)); dihedral rad/(N m); isometric_bending 1/(N m) (1/B); sheet_curvature 1/(N m^3)
-                (1/(area B)); area m^3/N.
+            compliance: 0 = rigid, in the kind's unit; what it is made of is in KINDS, such as "Voronoi length / EI".
             damping: beta of the Rayleigh dissipation (Macklin et al. 2016, eq. 26): force per rate of C.
-            viscosity: the element resists the rate of C only: distance N s/m, hinge N m s/rad; excludes compliance and
-                damping.
-            rest: (count,) rest length m, of a tether its greatest length (the initial length by default), planar rest
-                (natural curvature times Voronoi length), angle rad (zero by default), area m^2 (the initial one); of
-                friction_hinge (count,) the yield angle rad (its last particle is pinned, and its x the angle rad at
-                which the joint is unstrained); of material_curvature (count, 2), of twist (count,) rad, of attachment
-                (count, 3) m the offset of the first particle from the second; of strains, isometric_bending and
-                sheet_curvature all parameters of KINDS, (count, parameters).
-            normal: unit plane normal, (3,) or (count, 3), of planar kinds.
+            viscosity: the element resists the rate of C only, in the unit of damping; excludes compliance and damping.
+            rest: (count, parameters) those of KINDS whose source is "given", "measured" or "usual", in that order; also
+                (count,) or one number where there is one, such as a rest length. Left out, a measured parameter is what
+                the initial positions make it, and a usual one has its usual value.
+            normal: unit plane normal, (3,) or (count, 3), of kinds with parameters whose source is "normal".
 
         Raises:
-            SceneError: unknown kind, wrong shapes, negative or missing values, zero lengths, constraints that nothing
+            SceneError: unknown kind, wrong shapes, values that are missing or out of range, constraints that nothing
                 can move.
         """
         self._building()
@@ -371,7 +359,7 @@ class Scene(SceneData):
 
     def _scalar(self, quantity: str, array: str, first: int, values: Array, kind: str) -> None:
         """Move one value shared by a whole group into a quantity."""
-        unit = UNITS[kind][array]
+        unit = KINDS[kind][array]["unit"]
         value = float(values[0])
         self.add_quantity(quantity, value, unit, positive=value > 0.0, limits=None if value > 0.0 else ZERO_OR_MORE)
         self.add_terms([Term(array, first + np.arange(len(values)), 1.0, ((quantity, "identity"),))])

@@ -23,8 +23,6 @@ struct Case {
       damping;  // of a size at which a and g matter for particles of about 20 g and substeps of about 4 ms
   UnderRotation under_rotation;
   int normal = -1;  // first of the three parameters that are a direction; then C only has to be symmetric about it
-  int degree;       // C(s x) = s^degree C(x) when each parameter is scaled by s^its degree
-  std::vector<int> parameter_degree;
   std::vector<int> relabeling;  // of the stencil, under which C becomes sign C, row by row, ...
   std::vector<int> sign;
   std::vector<int> parameter_sign;             // ... when the parameters take these signs
@@ -45,8 +43,6 @@ inline Case case_of<Distance>() {
           .compliance = 3e-4,
           .damping = 3.0,
           .under_rotation = UnderRotation::stays,
-          .degree = 1,
-          .parameter_degree = {1},
           .relabeling = {1, 0},
           .sign = {1},
           .parameter_sign = {1}};
@@ -59,8 +55,6 @@ inline Case case_of<Tether>() {
           .compliance = 3e-4,
           .damping = 3.0,
           .under_rotation = UnderRotation::stays,
-          .degree = 1,
-          .parameter_degree = {1},
           .relabeling = {1, 0},
           .sign = {1},
           .parameter_sign = {1}};
@@ -73,8 +67,6 @@ inline Case case_of<Bend>() {
           .compliance = 2.0,
           .damping = 5e-4,
           .under_rotation = UnderRotation::turns,
-          .degree = 0,
-          .parameter_degree = {},
           .relabeling = {2, 1, 0},
           .sign = {-1, -1, -1},
           .parameter_sign = {}};
@@ -88,8 +80,6 @@ inline Case case_of<PlanarBend>() {
           .damping = 5e-4,
           .under_rotation = UnderRotation::turns,
           .normal = 0,
-          .degree = 0,
-          .parameter_degree = {0, 0, 0, 0},
           .relabeling = {2, 1, 0},
           .sign = {-1, -1, -1},
           .parameter_sign = {1, 1, 1, -1}};
@@ -103,8 +93,6 @@ inline Case case_of<Hinge>() {
           .damping = 5e-4,
           .under_rotation = UnderRotation::stays,
           .normal = 0,
-          .degree = 0,
-          .parameter_degree = {0, 0, 0, 0},
           .relabeling = {2, 1, 0},
           .sign = {-1},
           .parameter_sign = {1, 1, 1, -1}};
@@ -119,8 +107,6 @@ inline Case case_of<FrictionHinge>() {
           .damping = 5e-4,
           .under_rotation = UnderRotation::stays,
           .normal = 0,
-          .degree = 0,
-          .parameter_degree = {0, 0, 0, 0},
           .relabeling = {2, 1, 0, 3},
           .sign = {-1},
           .parameter_sign = {1, 1, 1, 1}};
@@ -134,8 +120,6 @@ inline Case case_of<Attachment>() {
           .damping = 3.0,
           .under_rotation = UnderRotation::turns,
           .normal = 0,
-          .degree = 1,
-          .parameter_degree = {1, 1, 1},
           .relabeling = {1, 0},
           .sign = {-1, -1, -1},
           .parameter_sign = {-1, -1, -1},
@@ -153,8 +137,6 @@ inline Case case_of<MaterialCurvature>() {
           .compliance = 2.0,
           .damping = 5e-4,
           .under_rotation = UnderRotation::stays,
-          .degree = 0,
-          .parameter_degree = {0, 0, 0},
           .relabeling = {2, 1, 0, 4, 3},
           .sign = {1, -1},
           .parameter_sign = {1, 1, -1}};
@@ -169,8 +151,6 @@ inline Case case_of<YieldingCurvature>() {
           .compliance = 2.0,
           .damping = 5e-4,
           .under_rotation = UnderRotation::stays,
-          .degree = 0,
-          .parameter_degree = {0, 0, 0, 0, 0},
           .relabeling = {2, 1, 0, 4, 3, 5},
           .sign = {1, -1},
           .parameter_sign = {1, 1, 1, 1, -1}};
@@ -183,8 +163,6 @@ inline Case case_of<Twist>() {
           .compliance = 4.0,
           .damping = 5e-4,
           .under_rotation = UnderRotation::stays,
-          .degree = 0,
-          .parameter_degree = {0},
           .relabeling = {2, 1, 0, 4, 3},
           .sign = {1},
           .parameter_sign = {1}};
@@ -200,8 +178,6 @@ inline Case case_of<Shear>() {
           .compliance = 2.0,
           .damping = 5e-4,
           .under_rotation = UnderRotation::stays,
-          .degree = 0,
-          .parameter_degree = {},
           .relabeling = {1, 0, 2, 3},
           .sign = {-1, -1},
           .parameter_sign = {}};
@@ -214,8 +190,6 @@ inline Case case_of<SectionCurvature>() {
           .compliance = 2.0,
           .damping = 5e-4,
           .under_rotation = UnderRotation::stays,
-          .degree = 0,
-          .parameter_degree = {0, 0, 0},
           .relabeling = {1, 0, 3, 2},
           .sign = {-1, -1},
           .parameter_sign = {1, -1, -1}};
@@ -230,8 +204,6 @@ inline Case case_of<SectionYieldingCurvature>() {
           .compliance = 2.0,
           .damping = 5e-4,
           .under_rotation = UnderRotation::stays,
-          .degree = 0,
-          .parameter_degree = {0, 0, 0, 0, 0},
           .relabeling = {1, 0, 3, 2, 4},
           .sign = {-1, -1},
           .parameter_sign = {1, 1, 1, -1, -1}};
@@ -244,8 +216,6 @@ inline Case case_of<SectionTwist>() {
           .compliance = 4.0,
           .damping = 5e-4,
           .under_rotation = UnderRotation::stays,
-          .degree = 0,
-          .parameter_degree = {0},
           .relabeling = {1, 0, 3, 2},
           .sign = {-1},
           .parameter_sign = {-1}};
@@ -261,8 +231,6 @@ inline Case case_of<Strain>() {
           .compliance = 0.2,
           .damping = 0.02,
           .under_rotation = UnderRotation::stays,
-          .degree = 0,
-          .parameter_degree = {-1, -1, -1, -1, 0, 0, 0},
           .relabeling = {0, 2, 1},
           .sign = {1, 1, 1},
           .parameter_sign = {1, 1, 1, 1, 1, 1, 1},
@@ -276,8 +244,6 @@ inline Case case_of<ExponentialStrain>() {
           .compliance = 0.2,
           .damping = 0.02,
           .under_rotation = UnderRotation::stays,
-          .degree = 0,
-          .parameter_degree = {-1, -1, -1, -1, 0, 0, 0, 0, 0, 0},
           .relabeling = {0, 2, 1},
           .sign = {1, 1, 1},
           .parameter_sign = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1},
@@ -295,7 +261,6 @@ inline Case case_of<SplineStrain>() {
   row.x = {0, 0, 0, 0.3, 0.58, 0.04, -0.23, 0.47, -0.08};  // beyond the last knot of each component
   row.p = {3.33, 1.83, -3.33, 1.83, 0.3, 0.8, 0.5};
   for (const double spacing : {0.24, 0.27, 0.18}) row.p.insert(row.p.end(), {spacing, 1.5, 2.0, 4.0, 3.0});
-  row.parameter_degree.resize(row.p.size(), 0);
   row.parameter_sign.resize(row.p.size(), 1);
   for (int k = 7; k < 22; ++k) row.parameter_relabeling.push_back(k);
   return row;
@@ -308,8 +273,6 @@ inline Case case_of<Dihedral>() {
           .compliance = 1.0,
           .damping = 5e-4,
           .under_rotation = UnderRotation::stays,
-          .degree = 0,
-          .parameter_degree = {0},
           .relabeling = {0, 1, 3, 2},
           .sign = {-1},
           .parameter_sign = {-1}};
@@ -322,8 +285,6 @@ inline Case case_of<IsometricBending>() {
           .compliance = 7e-3,
           .damping = 0.1,
           .under_rotation = UnderRotation::turns,
-          .degree = 1,
-          .parameter_degree = {0, 0, 0},
           .relabeling = {0, 1, 3, 2},
           .sign = {1, 1, 1},
           .parameter_sign = {1, 1, 1},
@@ -338,8 +299,6 @@ inline Case case_of<SheetCurvature>() {
           .compliance = 30.0,
           .damping = 2e-5,
           .under_rotation = UnderRotation::stays,
-          .degree = 0,
-          .parameter_degree = std::vector<int>(14, 0),
           .relabeling = {1, 2, 0, 4, 5, 3},
           .sign = {1, 1, 1},
           .parameter_sign = std::vector<int>(14, 1),
@@ -353,8 +312,6 @@ inline Case case_of<Area>() {
           .compliance = 6e-6,
           .damping = 600.0,
           .under_rotation = UnderRotation::stays,
-          .degree = 2,
-          .parameter_degree = {2},
           .relabeling = {0, 2, 1},
           .sign = {1},
           .parameter_sign = {1}};
