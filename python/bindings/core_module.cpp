@@ -4,7 +4,7 @@
 #include "adjoint/equilibrium_tangents.h"
 #include "adjoint/tape_plan.h"
 #include "core/constraints/registry.h"
-#include "core/solver/rollout.h"
+#include "core/rollout/rollout.h"
 #include "python/bindings/interrupt.h"
 
 namespace sheetbend::bindings {
