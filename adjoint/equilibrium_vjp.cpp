@@ -1,6 +1,6 @@
 #include "adjoint/equilibrium_vjp.h"
 
-#include "adjoint/substep_vjp.h"
+#include "adjoint/step/substep.h"
 
 namespace sheetbend {
 

@@ -11,7 +11,7 @@
 #include "adjoint/force_sensor.h"
 #include "adjoint/markers.h"
 #include "adjoint/parameter_map.h"
-#include "core/solver/rollout.h"
+#include "core/rollout/rollout.h"
 
 namespace sheetbend {
 

@@ -4,13 +4,13 @@
 #include <optional>
 
 #include "adjoint/growth.h"
-#include "adjoint/substep_vjp.h"
+#include "adjoint/step/substep.h"
 #include "adjoint/tape.h"
 
 namespace sheetbend {
 
 // Cotangents of the states at n+1, n and n-1, and the reverse of the substep between the first two.
-template <class T>
+template <class T, class List = Substep>
 class StateReverse {
  public:
   std::vector<T> x_next_bar, v_next_bar;
@@ -35,9 +35,9 @@ class StateReverse {
     if (!x_next_.empty()) states.x_next = x_next_.data();
     seed(n, x_bar_.data());
     try {
-      correct(scene_, plan_, in, bdf, t_next, states, q_.data(), record_);
-      substep_vjp(scene_, plan_, in, bdf, t_next, states, record_, q_.data(), x_next_bar.data(), v_next_bar.data(),
-                  scratch_, {x_bar_.data(), x_before_bar_.data(), v_bar_.data(), v_before_bar_.data()}, in_bar);
+      const Step<T> step{scene_, plan_, in, bdf, t_next, states};
+      substep_vjp(step, q_.data(), x_next_bar.data(), v_next_bar.data(), record_, scratch_,
+                  {x_bar_.data(), x_before_bar_.data(), v_bar_.data(), v_before_bar_.data()}, in_bar);
     } catch (const Unbalanced& e) {
       throw Unbalanced(e, n + 1, t_next);
     }
@@ -47,14 +47,12 @@ class StateReverse {
   }
 
   void finish(const Inputs<const T>& in, const Inputs<T>& in_bar) {
-    if constexpr (in_packs<T>) sheetbend::finish(scene_, plan_.packs, in, in_bar, scratch_.packs);
-    for (std::size_t b = 0; b < plan_.blocks.size(); ++b)
-      finish_block(scene_, plan_.blocks[b], in, in_bar, scratch_.blocks[b]);
+    finish_substeps(scene_, plan_, in, scratch_, in_bar);
   }
 
  private:
-  static SubstepRecord<T> whole(const Scene& scene, const Plan& plan) {
-    SubstepRecord<T> record;
+  static SubstepRecord<T, List> whole(const Scene& scene, const Plan& plan) {
+    SubstepRecord<T, List> record;
     record.resize(scene, plan, true);
     return record;
   }
@@ -70,8 +68,8 @@ class StateReverse {
   const Plan& plan_;
   std::vector<T> x_bar_, v_bar_, x_before_bar_, v_before_bar_, q_;
   std::vector<T> x_next_;  // where the step to be reversed ends; empty where it is recomputed
-  SubstepRecord<T> record_;
-  ReverseScratch<T> scratch_;
+  SubstepRecord<T, List> record_;
+  SubstepScratch<T, List> scratch_;
 };
 
 // Cotangents of the initial state to those of the inputs: driven nodes started on their boundary.
@@ -93,7 +91,7 @@ void initial_state_vjp(const Scene& scene, double t0, const T* x_bar, const T* v
 // inputs_bar (layout.total()) receives, added, the gradient with respect to every input. Returns how many substeps were advanced again. Cost: one forward substep
 // and its reverse per substep, and a forward substep for each that the tape's schedule advances again. Throws Diverged where cotangents grow
 // beyond meaning.
-template <class T, class Seed>
+template <class T, class List = Substep, class Seed>
 long rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t0, Tape<T>& tape, Seed&& seed,
                  const CotangentGrowth<T>& growth, T* inputs_bar, Interrupt* interrupt = nullptr) {
   const auto turn = tape.turn(interrupt);
@@ -108,9 +106,9 @@ long rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t
     tape.velocity(n - 1, v0, v_before.data());
     return {tape.x(n), tape.x(n - 1), v.data(), v_before.data(), n};
   };
-  std::optional<Rollout<T>> forward;
+  std::optional<Rollout<T, List>> forward;
   if (tape.states() < tape.steps()) forward.emplace(scene, plan, inputs, t0);
-  StateReverse<T> reverse(scene, plan);
+  StateReverse<T, List> reverse(scene, plan);
   long recomputed = 0;
   const auto advance = [&](const Advance& a) {
     if (tape.holds(a.keep, a.to)) return;

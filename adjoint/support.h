@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/equilibrium/residual.h"
-#include "core/solver/air.h"
+#include "core/step/apply_air_forces.h"
 
 namespace sheetbend {
 

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "adjoint/checkpoints.h"
-#include "core/solver/rollout.h"
+#include "core/rollout/rollout.h"
 
 namespace sheetbend {
 

@@ -15,6 +15,15 @@ void PackCotangents<T>::resize(const PackPlan& plan) {
 }
 
 template <class T>
+std::size_t PackCotangents<T>::bytes(const PackPlan& plan) {
+  std::size_t sum = Rows<T>::bytes(plan.rows());
+  for (const PackedColor& color : plan.colors)
+    sum += sizeof(Pack) * color.packs<T>() * (2 + color.parameters + color.rows * (color.damped ? 2 : 1)) +
+           sizeof(ColorNumbers<T>);
+  return sum;
+}
+
+template <class T>
 void begin_sweeps_vjp(const Scene& scene, const PackPlan& plan, int threads, const Inputs<const T>& in,
                       const PackState<T>& state, const Inputs<T>& in_bar, PackCotangents<T>& bar) {
   if (bar.eta != state.eta) finish(scene, plan, in, in_bar, bar);

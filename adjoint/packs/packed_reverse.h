@@ -13,6 +13,7 @@ struct PackCotangents {
   double eta = 0.0;
 
   void resize(const PackPlan& plan);
+  static std::size_t bytes(const PackPlan& plan);  // that resize() allocates
 };
 
 // Before the iterations that `state` recorded are reversed, the last one first. The nodes' rows of `bar` hold the cotangents of the coordinates

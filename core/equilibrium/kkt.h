@@ -20,7 +20,7 @@
 #include <vector>
 
 #include "core/scene/scene.h"
-#include "core/solver/redundant_rows.h"
+#include "core/rollout/redundant_rows.h"
 
 namespace sheetbend {
 

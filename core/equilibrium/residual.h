@@ -14,7 +14,7 @@
 #include <algorithm>
 
 #include "core/equilibrium/pressure.h"
-#include "core/solver/substep.h"
+#include "core/step/substep.h"
 
 namespace sheetbend {
 

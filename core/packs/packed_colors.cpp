@@ -127,6 +127,18 @@ void PackState<T>::resize(const PackPlan& plan, const Sections& of) {
 }
 
 template <class T>
+std::size_t PackState<T>::bytes(const PackPlan& plan, const Sections& sections) {
+  const std::size_t begun = std::max(1, sections.count());  // the sweeps as they go, and where sections begin
+  std::size_t sum = begun * Rows<T>::bytes(plan.rows()) + (begun - 1) * sizeof(Rows<T>);
+  for (const PackedColor& color : plan.colors) {
+    const std::size_t each = color.value_count() + color.rows * (begun + (color.damped ? 1 : 0));
+    sum += sizeof(Pack) * (color.packs<T>() * each + sections.length * color.record_packs<T>()) + sizeof(ColorState) +
+           sections.length * sizeof(Numbers<Pack>) + (begun - 1) * sizeof(Numbers<T>);
+  }
+  return sum;
+}
+
+template <class T>
 void begin_sweeps(const Scene& scene, const PackPlan& plan, const Inputs<const T>& in, double eta, const T* w,
                   const T* C_r, PackState<T>& state, [[maybe_unused]] const T* q) {
   const bool fresh = state.eta != eta;

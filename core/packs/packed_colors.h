@@ -39,6 +39,7 @@ decltype(auto) entry(Numbers<T>& v, int i, int parts, int part) {
 template <class T>
 struct Rows : Numbers<T> {
   void assign(int count) { Numbers<T>::assign(sheetbend_packs::row * static_cast<std::size_t>(count)); }
+  static std::size_t bytes(int count) { return sizeof(T) * sheetbend_packs::row * static_cast<std::size_t>(count); }
   auto* at(int row) { return this->data() + sheetbend_packs::row * static_cast<long>(row); }
 };
 
@@ -123,6 +124,7 @@ struct PackState {
   double eta = 0.0;  // of `values`; 0 where they are not filled yet
 
   void resize(const PackPlan& plan, const Sections& sections);
+  static std::size_t bytes(const PackPlan& plan, const Sections& sections);  // that resize() allocates; double, Pack
 };
 
 // Fills values for eta (nothing to do when they are there and no drag changes w: one state serves one vector of inputs), weights from w

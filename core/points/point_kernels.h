@@ -57,7 +57,7 @@ struct PointKernels {
     return p.extrapolate_now * load(now, i) + p.extrapolate_before * load(before, i);
   }
 
-  static void weigh(const Points& p, int begin, int end) {
+  static void effective_masses(const Points& p, int begin, int end) {
     for (long n = begin; n < end; ++n) {
       if (!p.inertial[n]) continue;
       const auto v = [&](int d) { return extrapolated(p, p.v, p.v_before, 3 * n + d); };
@@ -85,7 +85,7 @@ struct PointKernels {
       }
   }
 
-  static bool read_off(const Points& p, int begin, int end) {
+  static bool update_velocities(const Points& p, int begin, int end) {
     const double rate = 1.0 / p.eta;
     S difference(0.0);  // q - q, which only what is finite has as zero
     for (long n = begin; n < end; ++n)
@@ -117,7 +117,7 @@ struct PointKernels {
     }
   }
 
-  static constexpr sheetbend_points::Kernels all{&weigh, &predict, &read_off, &retract, &interpolate};
+  static constexpr sheetbend_points::Kernels all{&effective_masses, &predict, &update_velocities, &retract, &interpolate};
 };
 
 }  // namespace sheetbend

@@ -51,6 +51,8 @@ struct Inputs {
   const Layout& layout;
   T* data;
   T* of(Quantity q) const { return data + layout.of(q); }
+  // Behind the quantities: parameters of stages that a program adds to the substep, if it gives a longer vector.
+  T* beyond() const { return data + layout.total(); }
 };
 
 }  // namespace sheetbend

@@ -4,7 +4,10 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <vector>
+
+#include "core/scalar/vec3.h"
 
 namespace sheetbend {
 
@@ -21,5 +24,14 @@ struct Knots {
   Interpolation interpolation = Interpolation::cubic;
   KnotWeights at(double t) const;
 };
+
+// Value of something given at knots, (knots, slots, 3), for one slot.
+template <class T>
+Vec3<T> at_knots(const KnotWeights& k, const T* values, int slots, int slot) {
+  Vec3<T> sum;
+  for (int i = 0; i < k.count; ++i)
+    sum = sum + k.weight[i] * Vec3<T>(values + 3 * ((static_cast<std::size_t>(k.first) + i) * slots + slot));
+  return sum;
+}
 
 }  // namespace sheetbend

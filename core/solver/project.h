@@ -4,6 +4,7 @@
 
 #include "core/solver/placed.h"
 #include "core/solver/plan.h"
+#include "core/solver/states.h"
 #include "core/threads/pool.h"
 
 namespace sheetbend {
@@ -18,7 +19,32 @@ struct IterationRecord {
     lambda.resize(scene.rows);
     dl.resize(scene.rows);
   }
+  static std::size_t bytes(const Scene& scene) { return sizeof(T) * (scene.stencil_coordinates + 2 * scene.rows); }
 };
+
+// C_r = C(x_n) for BDF1, (4 C(x_n) - C(x_{n-1}))/3 for BDF2 (angles kept on one branch).
+template <class T>
+void damping_references(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, const SubstepStates<T>& s,
+                        T* C_r) {
+  for (const Group& group : scene.groups) {
+    if (!group.damped) continue;
+    with_kind(group.kind, [&]<class K>(K) {
+      for (int i = 0; i < group.count; ++i) {
+        T x[K::dofs], x_before[K::dofs];
+        const int* nodes = group.stencil.data() + static_cast<std::size_t>(i) * K::arity;
+        for (int k = 0; k < K::arity; ++k) {
+          std::copy_n(s.x + scene.first_dof[nodes[k]], 3, x + 3 * k);
+          std::copy_n(s.x_before + scene.first_dof[nodes[k]], 3, x_before + 3 * k);
+        }
+        const T* p = in.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(i) * parameter_count<K>;
+        const Evaluation<K, T> now(x, p), before(x_before, p);
+        for (int j = 0; j < K::rows; ++j)
+          C_r[group.first_row + i * K::rows + j] =
+              bdf.before == 0.0 ? now.C[j] : now.C[j] - T(bdf.before) * difference<K>(now.C[j], before.C[j]);
+      }
+    });
+  }
+}
 
 // x' = x + W push on one stencil. Fixed nodes are not written at all: constraints that run in parallel may share them.
 template <class K, class T>

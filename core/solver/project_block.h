@@ -11,7 +11,7 @@
 #include "core/solver/implicit_block.h"
 #include "core/solver/placed.h"
 #include "core/solver/plan.h"
-#include "core/solver/predict.h"
+#include "core/solver/states.h"
 
 namespace sheetbend {
 
@@ -62,6 +62,7 @@ struct BlockState {
   double eta = 0.0;                     // of `values` and `diagonal`; 0 where they are not filled yet
 
   void resize(const Scene& scene, const DirectBlock& block, int kept_iterations);
+  static std::size_t bytes(const Scene& scene, const DirectBlock& block, int kept_iterations);
   Numbers<T>& at(std::vector<Numbers<T>>& states, int iteration) { return states[states.size() == 1 ? 0 : iteration]; }
   Iteration& at(int iteration) { return iterations[iterations.size() == 1 ? 0 : iteration]; }
 };
@@ -109,6 +110,29 @@ void BlockState<T>::resize(const Scene& scene, const DirectBlock& block, int kep
   value_directions.clear();
   if constexpr (carries_tangents<T>)
     for (Numbers<T>& v : values) value_directions.push_back(v.directions());
+}
+
+// What resize() allocates.
+template <class T>
+std::size_t BlockState<T>::bytes(const Scene& scene, const DirectBlock& block, int kept_iterations) {
+  const std::size_t rows = right_side<T>(block), iterations = std::max(1, kept_iterations);
+  const auto of = [](std::size_t count) { return sizeof(Numbers<T>) + Numbers<Plain<T>>::bytes(count); };
+  const std::size_t particles = of(sheetbend_blocks::row * block.particles.size());
+  std::size_t factor = sizeof(Factor<T>) + sizeof(CondensedSolver<T>) + Factor<T>::bytes(block.structure);
+  if (block.condensation && !block.implicit)
+    factor += CondensedSolver<T>::bytes(*block.condensation, block.movable, block.size(), block.volumes.size());
+  std::size_t sum = 2 * of(block.size()) + (block.damped ? 2 * (particles + of(block.size())) : 0) +
+                    iterations * (of(sheetbend_blocks::row * block.window_rows.size()) + of(rows) + particles + factor) +
+                    (kept_iterations + 1) * (particles + of(block.size()));
+  if (block.implicit) sum += scenes_of<T> * ImplicitBlock::bytes(scene, block);
+  for (const MemberRun& run : block.runs) {
+    const Group& group = scene.groups[run.group];
+    sum += of(run.items.size() * sheetbend_blocks::value_count(group.damped, group.parameters));
+    sum += sizeof(sheetbend_blocks::Run);
+  }
+  for (const BlockVolume& volume : block.volumes)
+    sum += sizeof(BlockVolumeState<T>) + 2 * sizeof(Vec3<T>) * volume.particles.size();
+  return sum;
 }
 
 // What does not change while eta does not: coefficients and the constraints' own parameters.
@@ -256,7 +280,7 @@ void solve_sparse(const DirectBlock& block, BlockState<T>& state, int iteration,
 
 // The damping references; `before` is that of Bdf. One of the two states was looked at in the substep before, or in the one after on the way back.
 template <class T>
-void refer_block(const SubstepState<T>& s, const DirectBlock& block, const sheetbend_packs::KernelTable& table,
+void damping_references(const SubstepState<T>& s, const DirectBlock& block, const sheetbend_packs::KernelTable& table,
                  double before, const SubstepStates<T>& states, BlockState<T>& state) {
   if (!block.damped) return;
   const auto& runs = runs_of(s, block, state);

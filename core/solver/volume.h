@@ -33,6 +33,10 @@ struct VolumeState {
     for (VolumeRecord<T>& record : iterations) record.x.resize(volume.nodes.size());
     gradient.resize(volume.nodes.size());
   }
+  static std::size_t bytes(const Volume& volume, int kept_iterations) {
+    const std::size_t records = std::max(1, kept_iterations);
+    return records * sizeof(VolumeRecord<T>) + (records + 1) * sizeof(Vec3<T>) * volume.nodes.size();
+  }
   VolumeRecord<T>& record(int iteration) { return iterations[iterations.size() == 1 ? 0 : iteration]; }
 };
 

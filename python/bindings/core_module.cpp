@@ -3,7 +3,7 @@
 
 #include "adjoint/equilibrium_tangents.h"
 #include "adjoint/tape_plan.h"
-#include "core/solver/rollout.h"
+#include "core/rollout/rollout.h"
 #include "python/bindings/interrupt.h"
 
 PYBIND11_MODULE(_core, m) {

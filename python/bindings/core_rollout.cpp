@@ -4,7 +4,7 @@
 #include <numeric>
 
 #include "adjoint/rollout.h"
-#include "core/solver/redundant_rows.h"
+#include "core/rollout/redundant_rows.h"
 #include "python/bindings/solver.h"
 
 namespace sheetbend::bindings {

@@ -1,5 +1,5 @@
 // The air's force on one triangle against its formula, and its reverse against complex step.
-#include "adjoint/air_vjp.h"
+#include "adjoint/step/apply_air_forces.h"
 #include "core/scalar/complex.h"
 #include "tests/cpp/support/compare.h"
 

@@ -29,8 +29,13 @@ std::vector<double> recomputed(const Program& p, const Tape<double>& tape, const
   for (int n = 0; n < p.steps; ++n) {
     tape.velocity(n, in.of(Quantity::velocity), v.data());
     tape.velocity(n - 1, in.of(Quantity::velocity), v_before.data());
-    substep(p.scene, p.plan, in, Bdf::at(p.plan.options, n), p.t0 + (n + 1) * p.plan.options.h,
-            {tape.x(n), tape.x(n - 1), v.data(), v_before.data()}, q.data(), v_out.data(), kept);
+    const Step<double> step{p.scene,
+                            p.plan,
+                            in,
+                            Bdf::at(p.plan.options, n),
+                            p.t0 + (n + 1) * p.plan.options.h,
+                            {tape.x(n), tape.x(n - 1), v.data(), v_before.data()}};
+    substep(step, q.data(), v_out.data(), kept);
     all.insert(all.end(), q.begin(), q.end());
   }
   return all;

@@ -43,9 +43,9 @@ std::vector<T> run(const sheetbend_points::Kernels& kernels, const std::vector<T
   p.stride = stride;
   p.x_next = to(2 * points + stride * points);
   p.v_next = to(2 * points + 2 * stride * points);
-  kernels.weigh(p, 0, points);
+  kernels.effective_masses(p, 0, points);
   kernels.predict(p, 0, points);
-  EXPECT_TRUE(kernels.read_off(p, 0, points));
+  EXPECT_TRUE(kernels.update_velocities(p, 0, points));
   kernels.retract(frames, std::size(frames), p.x_next);
   const double weight[] = {0.25, 1.5, -0.75};
   kernels.interpolate(p.x, 3, weight, std::size(weight), to(2 * points + 3 * stride * points));
@@ -116,12 +116,12 @@ TEST_P(PointsOfASubstep, TellWhatIsNotFinite) {
   p.x_next = reinterpret_cast<double*>(out.data());
   p.v_next = reinterpret_cast<double*>(out.data() + inputs);
   for (const auto* kernels : available_kernels()) {
-    EXPECT_TRUE(kernels->points->lanes.read_off(p, 0, points)) << kernels->name;
+    EXPECT_TRUE(kernels->points->lanes.update_velocities(p, 0, points)) << kernels->name;
     for (const double bad : {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()})
       for (int lane = 0; lane < Pack::lanes; ++lane) {
         Pack& last = packed[p.stride * (points - 1) + 2];
         last.set(lane, bad);
-        EXPECT_FALSE(kernels->points->lanes.read_off(p, 0, points)) << kernels->name << ", lane " << lane;
+        EXPECT_FALSE(kernels->points->lanes.update_velocities(p, 0, points)) << kernels->name << ", lane " << lane;
         last.set(lane, 1.0);
       }
   }

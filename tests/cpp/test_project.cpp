@@ -310,7 +310,7 @@ TEST_P(CoupledBlocks, DampingReferencesHaveTheSameBitsOnEveryInstructionSet) {
     BlockState<double> state;
     state.resize(p.scene, block, 0);
     begin_block(run.state, block, state);
-    refer_block(run.state, block, kernels, -1.0 / 3.0, {x.data(), x_before.data(), nullptr, nullptr}, state);
+    damping_references(run.state, block, kernels, -1.0 / 3.0, {x.data(), x_before.data(), nullptr, nullptr}, state);
     return std::vector<double>(state.C_r.data(), state.C_r.data() + block.size());
   };
   for (const DirectBlock& block : p.plan.blocks)

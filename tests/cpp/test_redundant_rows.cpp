@@ -1,6 +1,6 @@
 // Rigid constraints that follow from others: a flat net of squares with both diagonals moves as without the redundant ones, has the derivatives of
 // that motion in every scalar, and its redundant rows are named.
-#include "core/solver/redundant_rows.h"
+#include "core/rollout/redundant_rows.h"
 
 #include "core/scalar/dual.h"
 #include "core/scalar/pack.h"

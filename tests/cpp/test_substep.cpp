@@ -1,8 +1,59 @@
 // Fourth rung: one substep, theta = (x, x_before, v, v_before, inputs) -> (x, v), its reverse against complex
-// step.
-#include "adjoint/substep_vjp.h"
+// step. Also of a substep with a stage more than ours, as CONTRIBUTING.md describes it.
+#include "adjoint/footprint.h"
+#include "adjoint/rollout_vjp.h"
+#include "adjoint/step/substep.h"
 #include "core/scalar/complex.h"
 #include "tests/cpp/support/programs.h"
+
+namespace sheetbend {
+
+// The stage of this test: a constant force along x on everything that has inertia. Its parameter, the force, stands behind the scene's inputs. It
+// keeps the displacements that it has given, of which the record's bytes are.
+struct PushAlongX {
+  static constexpr bool repeated = true;
+
+  template <class T>
+  struct Record {
+    std::vector<T> moved;
+    void resize(const Scene& scene, const Plan&, bool) { moved.resize(scene.nodes()); }
+    static std::size_t bytes(const Scene& scene, const Plan&, bool) { return sizeof(T) * scene.nodes(); }
+  };
+
+  template <class T>
+  static void forward(const Step<T>& step, Work<T>& work, Record<T>& record) {
+    const T eta(step.bdf.eta);
+    for (int n = 0; n < step.scene.nodes(); ++n) {
+      if (!step.scene.inertial[n]) continue;
+      record.moved[n] = eta * eta * work.masses.w[n] * *step.in.beyond();
+      *work.q.of(n) += record.moved[n];
+    }
+  }
+};
+
+template <>
+struct ReverseOf<PushAlongX> {
+  template <class T>
+  using Scratch = Nothing;
+
+  template <class T>
+  static void run(const Step<T>& step, const Work<T>& work, PushAlongX::Record<T>&, Nothing&,
+                  const StepCotangents<T>& bar) {
+    const T eta(step.bdf.eta);
+    for (int n = 0; n < step.scene.nodes(); ++n) {
+      if (!step.scene.inertial[n]) continue;
+      const T along = eta * eta * *bar.q.of(n);
+      *bar.in.beyond() += work.masses.w[n] * along;
+      bar.w.of(n) += *step.in.beyond() * along;
+    }
+  }
+};
+
+using PushedSubstep =
+    Stages<ComputeEffectiveMasses, Predict, ApplyForces, PushAlongX, ApplyAirForces, ProjectBlocks, SweepColors,
+           UpdateVelocities, RetractDirectors, Yield>;
+
+}  // namespace sheetbend
 
 namespace sheetbend::testing {
 namespace {
@@ -15,38 +66,39 @@ struct OneSubstep {
 };
 
 template <class T>
-struct SubstepRun {
-  Bdf bdf;
-  Inputs<const T> in;
-  SubstepStates<T> states;
-  std::vector<T> out;
-  SubstepRecord<T> record;
+Step<T> step_of(const OneSubstep& one, const std::vector<T>& theta) {
+  const std::size_t dofs = one.scene.dofs();
+  return {one.scene,
+          one.plan,
+          {one.scene.layout, theta.data() + 4 * dofs},
+          Bdf::at(one.plan.options, one.number),
+          one.t_next,
+          {theta.data(), theta.data() + dofs, theta.data() + 2 * dofs, theta.data() + 3 * dofs}};
+}
 
-  SubstepRun(const OneSubstep& one, const std::vector<T>& theta)
-      : bdf(Bdf::at(one.plan.options, one.number)),
-        in{one.scene.layout, theta.data() + 4 * one.scene.dofs()},
-        out(2 * one.scene.dofs()) {
-    const std::size_t dofs = one.scene.dofs();
-    states = {theta.data(), theta.data() + dofs, theta.data() + 2 * dofs, theta.data() + 3 * dofs};
-    record.resize(one.scene, one.plan, true);
-    substep(one.scene, one.plan, in, bdf, one.t_next, states, out.data(), out.data() + dofs, record);
-  }
-};
+template <class T, class List = Substep>
+std::vector<T> forward(const OneSubstep& one, const std::vector<T>& theta) {
+  const std::size_t dofs = one.scene.dofs();
+  std::vector<T> out(2 * dofs);
+  SubstepRecord<T, List> record;
+  record.resize(one.scene, one.plan, true);
+  substep(step_of(one, theta), out.data(), out.data() + dofs, record);
+  return out;
+}
 
+template <class List = Substep>
 std::vector<double> reverse(const OneSubstep& one, const std::vector<double>& theta,
                             const std::vector<double>& out_bar) {
-  SubstepRun<double> run(one, theta);
+  const Step<double> step = step_of(one, theta);
   const int dofs = one.scene.dofs();
   std::vector<double> bar(theta.size()), next_bar = out_bar, q(dofs);
-  ReverseScratch<double> scratch(one.scene, one.plan);
-  correct(one.scene, one.plan, run.in, run.bdf, one.t_next, run.states, q.data(), run.record);
-  substep_vjp(one.scene, one.plan, run.in, run.bdf, one.t_next, run.states, run.record, q.data(), next_bar.data(),
-              next_bar.data() + dofs, scratch, {&bar[0], &bar[dofs], &bar[2 * dofs], &bar[3 * dofs]},
-              {one.scene.layout, &bar[4 * dofs]});
+  SubstepRecord<double, List> record;
+  record.resize(one.scene, one.plan, true);
+  SubstepScratch<double, List> scratch(one.scene, one.plan);
   const Inputs<double> in_bar{one.scene.layout, &bar[4 * dofs]};
-  finish(one.scene, one.plan.packs, run.in, in_bar, scratch.packs);
-  for (std::size_t b = 0; b < one.plan.blocks.size(); ++b)
-    finish_block(one.scene, one.plan.blocks[b], run.in, in_bar, scratch.blocks[b]);
+  substep_vjp(step, q.data(), next_bar.data(), next_bar.data() + dofs, record, scratch,
+              {&bar[0], &bar[dofs], &bar[2 * dofs], &bar[3 * dofs]}, in_bar);
+  finish_substeps(one.scene, one.plan, step.in, scratch, in_bar);
   return bar;
 }
 
@@ -76,7 +128,7 @@ TEST_P(Substep, ReverseMatchesComplexStep) {
     const auto out_bar = random.vector(2 * scene.dofs());
     const auto oracle = complex_step_gradient(
         [&](const std::vector<Complex>& z) {
-          const auto out = SubstepRun<Complex>(one, z).out;
+          const auto out = forward(one, z);
           Complex sum(0.0);
           for (std::size_t i = 0; i < out.size(); ++i) sum += Complex(out_bar[i]) * out[i];
           return sum;
@@ -102,6 +154,92 @@ TEST_P(Substep, ReverseMatchesComplexStep) {
       record_error(quantity_names[q], error);
     }
   }
+}
+
+// The gradient of a rollout in substeps of a list, with a tape that keeps a few states only.
+template <class List>
+std::vector<double> rollout_gradient(const Program& p, const std::vector<double>& inputs, int kept) {
+  Rollout<double, List> rollout(p.scene, p.plan, inputs.data(), p.t0);
+  Tape<double> tape(p.scene, p.plan, p.steps, kept);
+  std::vector<char> keep(p.steps + 1, 0);
+  keep[0] = 1;
+  if (tape.keeps_end()) keep[p.steps] = 1;
+  Schedule schedule = tape.schedule();
+  for (auto action = schedule.next(); action && std::holds_alternative<Advance>(*action); action = schedule.next()) {
+    const Advance& advance = std::get<Advance>(*action);
+    std::fill(keep.begin() + advance.keep, keep.begin() + advance.to + 1, 1);
+  }
+  std::vector<double> end, bar(inputs.size());
+  rollout.run(p.steps, [&](int step, const double* x, const double*) {
+    if (keep[step]) tape.record(step, x);
+    if (step == p.steps) end.assign(x, x + p.scene.dofs());
+  });
+  CotangentGrowth<double> growth;
+  const auto seed = [&](int step, double* x_bar) {
+    if (step != p.steps) return;
+    std::vector<double> of_end(end.size());
+    for (std::size_t i = 0; i < end.size(); ++i) of_end[i] = 2.0 * weight(step, static_cast<int>(i)) * end[i];
+    growth.seed(of_end.data(), of_end.size());
+    for (std::size_t i = 0; i < end.size(); ++i) x_bar[i] += of_end[i];
+  };
+  rollout_vjp<double, List>(p.scene, p.plan, inputs.data(), p.t0, tape, seed, growth, bar.data());
+  return bar;
+}
+
+TEST_P(Substep, TakesAStageMore) {
+  const Sample sample = random_scene(42, GetParam().shape());
+  const Scene& scene = sample.scene;
+  const OneSubstep one{scene, make_plan(scene, GetParam().options(2)), 1};
+  Random random(42);
+  auto theta = random_theta(sample, random);
+  theta.push_back(0.7);  // N
+  const auto out_bar = random.vector(2 * scene.dofs());
+  const auto along = random.vector(theta.size());
+  std::vector<Complex> z(theta.begin(), theta.end());
+  const auto slope = [&](const std::vector<Complex>& at) {
+    const auto out = forward<Complex, PushedSubstep>(one, at);
+    double sum = 0.0;
+    for (std::size_t i = 0; i < out.size(); ++i) sum += out_bar[i] * out[i].im / complex_step;
+    return sum;
+  };
+  const auto bar = reverse<PushedSubstep>(one, theta, out_bar);
+  z.back().im = complex_step;
+  const double by_force = slope(z);
+  EXPECT_GT(std::abs(by_force), 1e-6);
+  EXPECT_NEAR(bar.back(), by_force, 1e-10 * std::abs(by_force));
+  // With respect to the masses, which reach the stage through w.
+  const std::size_t masses = 4 * scene.dofs() + scene.layout.of(Quantity::mass);
+  double found = 0.0;
+  z.back().im = 0.0;
+  for (std::size_t i = masses; i < masses + scene.layout.count(Quantity::mass); ++i) {
+    z[i].im = complex_step * along[i];
+    found += bar[i] * along[i];
+  }
+  const double expected = slope(z);
+  EXPECT_NEAR(found, expected, 1e-10 * std::abs(expected));
+  // A stage is counted without being named elsewhere.
+  EXPECT_EQ((reverse_bytes<double, PushedSubstep>(scene, one.plan)),
+            reverse_bytes<double>(scene, one.plan) + sizeof(double) * scene.nodes());
+}
+
+TEST(ASubstepWithAStageMore, GivesRolloutsWithTheirGradient) {
+  const Sample sample = random_scene(43);
+  const Program p{sample.scene, make_plan(sample.scene, {.h = 4e-3, .integrator = Integrator::bdf2, .iterations = 2}),
+                  10};
+  std::vector<double> inputs = sample.inputs;
+  inputs.push_back(0.7);
+  std::vector<Complex> z(inputs.begin(), inputs.end());
+  z.back().im = complex_step;
+  Rollout<Complex, PushedSubstep> rollout(p.scene, p.plan, z.data());
+  Complex loss(0.0);
+  rollout.run(p.steps, [&](int step, const Complex* x, const Complex*) {
+    if (step != p.steps) return;
+    for (int i = 0; i < p.scene.dofs(); ++i) loss += Complex(weight(step, i)) * x[i] * x[i];
+  });
+  const double expected = loss.im / complex_step;
+  const auto whole = rollout_gradient<PushedSubstep>(p, inputs, every_state);
+  EXPECT_NEAR(whole.back(), expected, 1e-9 * std::abs(expected));
+  EXPECT_TRUE(same_bits(whole, rollout_gradient<PushedSubstep>(p, inputs, Tape<double>::window(p.plan) + 2)));
 }
 
 // At rest in still air no speed has a direction; their slopes are taken as zero, and nothing becomes NaN.

@@ -2,7 +2,7 @@
 #include "adjoint/force_sensor.h"
 #include "core/scalar/complex.h"
 #include "core/scalar/dual.h"
-#include "core/solver/rollout.h"
+#include "core/rollout/rollout.h"
 #include "tests/cpp/support/programs.h"
 
 namespace sheetbend::testing {

@@ -3,8 +3,8 @@
 // color, or direct.
 #pragma once
 
-#include "adjoint/project_block_vjp.h"
-#include "adjoint/project_vjp.h"
+#include "adjoint/solver/project_block_vjp.h"
+#include "adjoint/solver/project_vjp.h"
 #include "core/solver/project.h"
 #include "tests/cpp/support/random_scene.h"
 

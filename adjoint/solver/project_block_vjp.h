@@ -3,7 +3,7 @@
 
 #include "adjoint/blocks/block_reverse.h"
 #include "adjoint/element/rates_vjp.h"
-#include "adjoint/volume_vjp.h"
+#include "adjoint/solver/volume_vjp.h"
 #include "core/solver/project_block.h"
 
 namespace sheetbend {
@@ -40,6 +40,17 @@ struct BlockCotangents {
       values[r].assign(block.runs[r].items.size() * (2 + scene.groups[block.runs[r].group].parameters));
     volumes.resize(block.volumes.size());
     for (std::size_t v = 0; v < volumes.size(); ++v) volumes[v].v.resize(block.volumes[v].particles.size());
+  }
+  // What resize() allocates, and what project_implicit_vjp() does.
+  static std::size_t bytes(const Scene& scene, const DirectBlock& block) {
+    const auto of = [](std::size_t count) { return sizeof(Numbers<T>) + Numbers<T>::bytes(count); };
+    const std::size_t particles = of(sheetbend_blocks::row * block.particles.size());
+    std::size_t sum = (block.damped ? 4 : 2) * particles + of(right_side<T>(block)) + 2 * of(block.size());
+    for (const MemberRun& run : block.runs) sum += of(run.items.size() * (2 + scene.groups[run.group].parameters));
+    for (const BlockVolume& volume : block.volumes)
+      sum += sizeof(VolumeValues) + sizeof(Vec3<T>) * volume.particles.size();
+    if (block.implicit) sum += 2 * sizeof(T) * 3 * block.movable;  // p and what it gathers
+    return sum;
   }
 };
 
@@ -148,9 +159,9 @@ void add_particles(const Scene& scene, const DirectBlock& block, std::size_t beg
     Vec3<T>(rows.data() + sheetbend_blocks::row * p).add_to(x_bar + scene.first_dof[block.particles[p]]);
 }
 
-// The reverse of refer_block(): adds to the cotangents of the states at n and n-1, for movable nodes.
+// The reverse of damping_references(): adds to the cotangents of the states at n and n-1, for movable nodes.
 template <class T>
-void refer_block_vjp(const SubstepState<T>& s, const DirectBlock& block, const sheetbend_packs::KernelTable& table,
+void damping_references_vjp(const SubstepState<T>& s, const DirectBlock& block, const sheetbend_packs::KernelTable& table,
                      double before, BlockState<T>& state, T* x_bar, T* x_before_bar, BlockCotangents<T>& bar) {
   if (!block.damped) return;
   const auto& runs = runs_of(s, block, state, &bar.values);

@@ -1,10 +1,10 @@
-#include "core/solver/redundant_rows.h"
+#include "core/rollout/redundant_rows.h"
 
 #include <algorithm>
 #include <cmath>
 #include <sstream>
 
-#include "core/solver/rollout.h"
+#include "core/rollout/rollout.h"
 
 namespace sheetbend {
 namespace {
@@ -125,11 +125,11 @@ std::vector<RedundantRow> redundant_rows(const Scene& scene, const Plan& plan, c
   const Bdf bdf = Bdf::at(plan.options, 0);
   std::vector<double> x(scene.dofs()), v(scene.dofs());
   Rollout<double>::initial_state(scene, in, t0, x.data(), v.data());
-  Weights<double> weights;
-  weights.w.resize(scene.nodes());
-  if (scene.has_drag) weights.kept.resize(scene.nodes());
-  weigh(scene, in, bdf, {x.data(), x.data(), v.data(), v.data()}, weights);
-  return redundant_rows(scene, plan, inputs, x.data(), weights.w.data(), bdf.eta);
+  InverseMasses<double> masses;
+  masses.resize(scene, plan, false);
+  const Step<double> step{scene, plan, in, bdf, t0 + plan.options.h, {x.data(), x.data(), v.data(), v.data()}};
+  ComputeEffectiveMasses::compute(step, masses);
+  return redundant_rows(scene, plan, inputs, x.data(), masses.w.data(), bdf.eta);
 }
 
 std::string describe(const Scene& scene, const std::vector<RedundantRow>& rows, const double* x) {

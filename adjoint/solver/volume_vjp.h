@@ -1,7 +1,8 @@
 // The reverse of the volumes' projections.
 #pragma once
 
-#include "adjoint/predict_vjp.h"
+#include "adjoint/solver/cotangents.h"
+#include "core/solver/states.h"
 #include "core/solver/volume.h"
 
 namespace sheetbend {
@@ -10,6 +11,9 @@ template <class T>
 struct VolumeCotangents {
   std::vector<Vec3<T>> v;  // of dV/dx
   T lambda{};
+
+  void resize(const Volume& volume) { v.resize(volume.nodes.size()); }
+  static std::size_t bytes(const Volume& volume) { return sizeof(Vec3<T>) * volume.nodes.size(); }
 };
 
 // Reverse of project_volumes(): q_bar goes from the cotangent of the coordinates after an iteration to that of those before, w_bar and in_bar are

@@ -1,17 +1,17 @@
-// Air on triangles. What blows at one, u = wind - its own velocity, parts into u_n along the unit normal and u_t across it; with area A
+// Air on triangles. The relative velocity u = wind - the triangle's own is split into u_n along the unit normal and u_t across it; with area A
 //
 //   f = A (k_n |u_n| u_n + k_t |u_t| u_t + p n),   k = air density * drag coefficient / 2  [kg/m^3],
 //
 // a third to each vertex. Which side the normal n points to matters to the pressure p alone: it pushes along (x1 - x0) x (x2 - x0).
 #pragma once
 
-#include "core/solver/predict.h"
+#include "core/step/stages.h"
 
 namespace sheetbend {
 
 template <class T>
 struct AirTriangle {
-  Vec3<T> e1, e2, u;     // edges, what blows
+  Vec3<T> e1, e2, u;     // edges, relative velocity of the air
   T normal, tangential;  // k_n, k_t
   T pressure;
 };
@@ -42,50 +42,49 @@ struct AirForce {
 // BDF2 keeps its order; taken at n, or at the history of x, it would be first order.
 template <class T>
 struct Airflow {
-  const Scene& scene;
-  const Inputs<const T>& in;
-  const Bdf& bdf;
-  const SubstepStates<T>& s;
+  const Step<T>& step;
   KnotWeights knots;
   Vec3<T> wind;
 
-  Airflow(const Scene& scene_, const Inputs<const T>& in_, const Bdf& bdf_, double t_next, const SubstepStates<T>& s_)
-      : scene(scene_),
-        in(in_),
-        bdf(bdf_),
-        s(s_),
-        knots(scene_.wind.at(t_next)),
-        wind(at_knots(knots, in_.of(Quantity::wind), 1, 0)) {}
+  explicit Airflow(const Step<T>& step_)
+      : step(step_), knots(step_.scene.wind.at(step_.t_next)), wind(at_knots(knots, step_.in.of(Quantity::wind), 1, 0)) {}
 
   AirTriangle<T> at(int triangle) const {
+    const SubstepStates<T>& s = step.from;
     Vec3<T> x[3], v[3];
     for (int k = 0; k < 3; ++k) {
-      const int dof = scene.first_dof[scene.air[triangle][k]];
-      x[k] = extrapolated(bdf, s.x + dof, s.x_before + dof);
-      v[k] = extrapolated(bdf, s.v + dof, s.v_before + dof);
+      const int dof = step.scene.first_dof[step.scene.air[triangle][k]];
+      x[k] = extrapolated(step.bdf, s.x + dof, s.x_before + dof);
+      v[k] = extrapolated(step.bdf, s.v + dof, s.v_before + dof);
     }
     return {x[1] - x[0],
             x[2] - x[0],
             wind - T(1.0 / 3.0) * (v[0] + v[1] + v[2]),
-            in.of(Quantity::air_normal)[triangle],
-            in.of(Quantity::air_tangential)[triangle],
-            in.of(Quantity::pressure)[triangle]};
+            step.in.of(Quantity::air_normal)[triangle],
+            step.in.of(Quantity::air_tangential)[triangle],
+            step.in.of(Quantity::pressure)[triangle]};
   }
 };
 
-// Adds the air's w eta f to the predicted velocities, so eta times that to the predicted q. One thread works, so bits do not depend on
-// their number.
-template <class T>
-void blow(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, double t_next, const SubstepStates<T>& s,
-          const Weights<T>& weights, const Coordinates<T>& q) {
-  if (scene.air.empty()) return;
-  const Airflow<T> air(scene, in, bdf, t_next, s);
-  const T eta(bdf.eta), share(bdf.eta / 3.0);
-  for (int i = 0; i < static_cast<int>(scene.air.size()); ++i) {
-    const Vec3<T> impulse = share * AirForce<T>(air.at(i)).f;
-    for (const int n : scene.air[i])
-      if (scene.inertial[n]) (eta * (weights.w[n] * impulse)).add_to(q.of(n));
+// Adds the air's w eta f to the predicted velocities, so eta times that to the predicted coordinates. One thread works, so bits do not depend
+// on their number.
+struct ApplyAirForces {
+  static constexpr bool repeated = true;
+  template <class T>
+  using Record = Nothing;
+
+  template <class T>
+  static void forward(const Step<T>& step, Work<T>& work, Nothing&) {
+    const Scene& scene = step.scene;
+    if (scene.air.empty()) return;
+    const Airflow<T> air(step);
+    const T eta(step.bdf.eta), share(step.bdf.eta / 3.0);
+    for (int i = 0; i < static_cast<int>(scene.air.size()); ++i) {
+      const Vec3<T> impulse = share * AirForce<T>(air.at(i)).f;
+      for (const int n : scene.air[i])
+        if (scene.inertial[n]) (eta * (work.masses.w[n] * impulse)).add_to(work.q.of(n));
+    }
   }
-}
+};
 
 }  // namespace sheetbend

@@ -6,12 +6,12 @@
 #include "core/scalar/dual.h"
 #include "core/solver/divergence.h"
 #include "core/solver/interrupt.h"
-#include "core/solver/substep.h"
+#include "core/step/substep.h"
 
 namespace sheetbend {
 
-// T: double, Pack, Complex, Dual<double, 1>, Dual<double, 4> or Dual<double, 8>.
-template <class T>
+// T: double, Pack, Complex, Dual<double, 1>, Dual<double, 4> or Dual<double, 8>. List: the stages of a substep.
+template <class T, class List = Substep>
 class Rollout {
  public:
   Rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0 = 0.0);
@@ -60,11 +60,12 @@ class Rollout {
   double t0_;
   int step_ = 0;
   std::vector<T> x_, x_before_, x_next_, v_, v_before_, v_next_;
-  SubstepRecord<T> record_;
+  std::vector<T> multipliers_;
+  SubstepRecord<T, List> record_;
 };
 
-template <class T>
-Rollout<T>::Rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0)
+template <class T, class List>
+Rollout<T, List>::Rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0)
     : scene_(scene), plan_(plan), in_{scene.layout, inputs}, t0_(t0) {
   for (auto* buffer : {&x_, &x_before_, &x_next_, &v_, &v_before_, &v_next_}) buffer->resize(scene.dofs());
   record_.resize(scene, plan, false);
@@ -73,11 +74,11 @@ Rollout<T>::Rollout(const Scene& scene, const Plan& plan, const T* inputs, doubl
   v_before_ = v_;
 }
 
-template <class T>
-Rollout<T>::~Rollout() = default;
+template <class T, class List>
+Rollout<T, List>::~Rollout() = default;
 
-template <class T>
-void Rollout<T>::initial_state(const Scene& scene, const Inputs<const T>& in, double t0, T* x, T* v) {
+template <class T, class List>
+void Rollout<T, List>::initial_state(const Scene& scene, const Inputs<const T>& in, double t0, T* x, T* v) {
   std::copy_n(in.of(Quantity::position), scene.dofs(), x);
   std::copy_n(in.of(Quantity::velocity), scene.dofs(), v);
   if (scene.driven.empty()) return;
@@ -87,14 +88,13 @@ void Rollout<T>::initial_state(const Scene& scene, const Inputs<const T>& in, do
         .store(x + scene.first_dof[scene.driven[i]]);
 }
 
-template <class T>
-void Rollout<T>::advance() {
+template <class T, class List>
+void Rollout<T, List>::advance() {
   const Bdf bdf = Bdf::at(plan_.options, step_);
   bool finite;
   try {
-    finite = substep(scene_, plan_, in_, bdf, time(step_ + 1),
-                     {x_.data(), x_before_.data(), v_.data(), v_before_.data(), step_}, x_next_.data(), v_next_.data(),
-                     record_);
+    const Step<T> step{scene_, plan_, in_, bdf, time(step_ + 1), state()};
+    finite = substep(step, x_next_.data(), v_next_.data(), record_);
   } catch (const Unbalanced& e) {
     throw Unbalanced(e, step_ + 1, time(step_ + 1));
   }
@@ -106,8 +106,8 @@ void Rollout<T>::advance() {
   if (!finite) throw_diverged();
 }
 
-template <class T>
-void Rollout<T>::restart(int step, const SubstepStates<T>& s) {
+template <class T, class List>
+void Rollout<T, List>::restart(int step, const SubstepStates<T>& s) {
   step_ = step;
   std::copy_n(s.x, x_.size(), x_.data());
   std::copy_n(s.x_before, x_.size(), x_before_.data());
@@ -115,34 +115,24 @@ void Rollout<T>::restart(int step, const SubstepStates<T>& s) {
   std::copy_n(s.v_before, v_.size(), v_before_.data());
 }
 
-template <class T>
-const T* Rollout<T>::multipliers() {
-  record_.lambda.resize(scene_.multipliers());
-  if constexpr (in_packs<T>)
-    if (!plan_.colors.empty()) unpack_multipliers(scene_, plan_.packs, record_.packs, record_.lambda.data());
-  for (std::size_t b = 0; b < plan_.blocks.size(); ++b) {
-    BlockState<T>& block = record_.blocks[b];
-    if constexpr (carries_tangents<T>)
-      if (plan_.blocks[b].implicit)
-        carry_multipliers(SubstepState<T>{scene_, in_, block.eta, nullptr, nullptr, nullptr, nullptr},
-                          plan_.blocks[b], block);
-    unpack_multipliers(plan_.blocks[b], block, record_.lambda.data());
-  }
-  for (std::size_t v = 0; v < record_.volumes.size(); ++v)
-    record_.lambda[scene_.rows + v] = record_.volumes[v].lambda;
-  return record_.lambda.data();
+template <class T, class List>
+const T* Rollout<T, List>::multipliers() {
+  multipliers_.resize(scene_.multipliers());
+  SweepColors::multipliers(scene_, plan_, record_.template of<SweepColors>(), multipliers_.data());
+  ProjectBlocks::multipliers(scene_, plan_, in_, record_.template of<ProjectBlocks>(), multipliers_.data());
+  return multipliers_.data();
 }
 
-template <class T>
-std::vector<std::vector<double>> Rollout<T>::balance() const {
+template <class T, class List>
+std::vector<std::vector<double>> Rollout<T, List>::balance() const {
   std::vector<std::vector<double>> all;
-  for (const BlockState<T>& block : record_.blocks)
+  for (const BlockState<T>& block : record_.template of<ProjectBlocks>().blocks)
     for (const ImplicitBlock& scene : block.implicit) all.push_back(scene.balance());
   return all;
 }
 
-template <class T>
-void Rollout<T>::throw_diverged() const {
+template <class T, class List>
+void Rollout<T, List>::throw_diverged() const {
   for (int n = 0; n < scene_.nodes(); ++n)
     for (int d = 0; d < scene_.dim[n]; ++d)
       if (!all_finite(x_[scene_.first_dof[n] + d])) throw Diverged(step_, n, time(step_));

@@ -7,7 +7,7 @@
 // of scalars that carry one.
 #pragma once
 
-#include "adjoint/project_block_vjp.h"
+#include "adjoint/solver/project_block_vjp.h"
 #include "core/solver/project_implicit.h"
 
 namespace sheetbend {

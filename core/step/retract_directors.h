@@ -1,11 +1,12 @@
 // Directors at the end of a substep: made perpendicular to their frames' axes again and of length one,  q -> across/|across|,
 // across = q - (q.t) t; normals of sections keep length one. The constraints see the directions alone, so this moves nothing; it keeps the
-// coordinates well scaled and carries a frame along as its axis turns. Those that are held stay as given. And the reverse.
+// coordinates well scaled and carries a frame along as its axis turns. Those that are held stay as given.
 #pragma once
 
 #include "core/points/kernels.h"
 #include "core/scalar/across.h"
 #include "core/scene/scene.h"
+#include "core/step/stages.h"
 
 namespace sheetbend {
 
@@ -38,30 +39,28 @@ inline std::vector<sheetbend_points::Frame> frames_of(const Scene& scene) {
   return frames;
 }
 
-// q(node) gives the coordinates before. x_bar (dofs) goes in as the cotangent of those after, and comes out as theirs. What a director
-// gives to its normal, it gives to the normal before retraction, whose own cotangent stands there already.
-template <class T, class At>
-void retract_directors_vjp(const Scene& scene, At&& q, T* x_bar) {
-  for (const Director& d : scene.directors) {
-    if (scene.role[d.node] != Role::free) continue;
-    T* director_bar = x_bar + scene.first_dof[d.node];
-    const Vec3<T> unit_bar(director_bar);
-    if (d.is_normal()) {
-      const Vec3<T> n(q(d.node));
-      const T inverse = T(1.0) / norm(n);
-      const Vec3<T> unit = inverse * n;
-      (inverse * (unit_bar - dot(unit_bar, unit) * unit)).store(director_bar);
-      continue;
+struct RetractDirectors {
+  static constexpr bool repeated = false;
+  template <class T>
+  struct Record {
+    std::vector<sheetbend_points::Frame> frames;  // that the kernels retract
+
+    void resize(const Scene& scene, const Plan&, bool) {
+      if constexpr (!std::is_same_v<T, double>) frames = frames_of(scene);
     }
-    const Across<T> r = across_axis<T>(d, q);
-    const Vec3<T> across_bar = r.inverse * (unit_bar - dot(unit_bar, r.m1) * r.m1);
-    const T along_bar = -dot(across_bar, r.t);
-    (across_bar + along_bar * r.t).store(director_bar);
-    const Vec3<T> t_bar = along_bar * Vec3<T>(q(d.node)) - r.along * across_bar;
-    const Vec3<T> axis_bar = r.inverse_length * (t_bar - dot(t_bar, r.t) * r.t);
-    axis_bar.add_to(x_bar + scene.first_dof[d.normal < 0 ? d.head : d.normal]);
-    if (d.normal < 0) (-axis_bar).add_to(x_bar + scene.first_dof[d.tail]);
+    static std::size_t bytes(const Scene& scene, const Plan&, bool) {
+      return std::is_same_v<T, double> ? 0 : sizeof(sheetbend_points::Frame) * scene.directors.size();
+    }
+  };
+
+  template <class T>
+  static void forward(const Step<T>& step, Work<T>& work, Record<T>& record) {
+    if constexpr (std::is_same_v<T, double>)
+      retract_directors(step.scene, work.x_next);
+    else
+      point_kernels<T>().retract(record.frames.data(), static_cast<int>(record.frames.size()),
+                                 reinterpret_cast<double*>(work.x_next));
   }
-}
+};
 
 }  // namespace sheetbend

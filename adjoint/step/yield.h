@@ -1,28 +1,28 @@
-// The reverse of yield() on the state that it found:  with b = set'_bar,
+// The reverse of Yield on the state that it found:  with b = set'_bar,
 //   e_bar = f b + (y/|e|^3) (e.b) e,   y_bar = -(e.b)/|e|,   set_bar = b - e_bar,   x_bar = J^T e_bar.
 #pragma once
 
 #include "adjoint/element/constraint_vjp.h"
-#include "core/solver/predict.h"
-#include "core/solver/retract.h"
-#include "core/solver/yield.h"
+#include "adjoint/step/stages.h"
+#include "core/step/retract_directors.h"
+#include "core/step/yield.h"
 
 namespace sheetbend {
 
-// The state that yield() saw, from the corrected coordinates.
+// The state that Yield found, from the corrected coordinates.
 template <class T>
-void read_carried(const Scene& scene, const Coordinates<T>& corrected, T* state) {
+void read_found(const Scene& scene, const Coordinates<T>& corrected, T* state) {
   for (int n = 0; n < scene.nodes(); ++n) Vec3<T>(corrected.of(n)).store(state + scene.first_dof[n]);
   retract_directors(scene, state);
 }
 
 // x_bar (dofs) goes in as the cotangent of the state after, and comes out as that of the state before. No two constraints share a set.
 template <class T>
-void yield_vjp(const Scene& scene, const Inputs<const T>& in, const T* state, T* x_bar, const Inputs<T>& in_bar) {
+void let_slide_vjp(const Scene& scene, const Inputs<const T>& in, const T* state, T* x_bar, const Inputs<T>& in_bar) {
   for_each_yielding(scene, [&]<class K>(K, const Group& group, int item, std::size_t value) {
     const T* p = in.of(Quantity::rest) + value;
     T* p_bar = in_bar.of(Quantity::rest) + value;
-    const Yield<K, T> at(scene, group, item, p, state);
+    const SlidingSpring<K, T> at(scene, group, item, p, state);
     const auto nodes = group.nodes(item);
     T* set_bar = x_bar + scene.first_dof[nodes[K::arity - 1]];
     T along(0.0), e_bar[K::rows];
@@ -41,5 +41,26 @@ void yield_vjp(const Scene& scene, const Inputs<const T>& in, const T* state, T*
     for (int k = 0; k < parameter_count<K>; ++k) p_bar[k] += by_p[k];
   });
 }
+
+template <>
+struct ReverseOf<Yield> {
+  template <class T>
+  struct Scratch {
+    std::vector<T> found;  // the state before what yields has yielded
+
+    void resize(const Scene& scene, const Plan&) {
+      if (scene.yields) found.resize(scene.dofs());
+    }
+    static std::size_t bytes(const Scene& scene, const Plan&) { return scene.yields ? sizeof(T) * scene.dofs() : 0; }
+  };
+
+  template <class T>
+  static void run(const Step<T>& step, const Work<T>& work, Nothing&, Scratch<T>& scratch,
+                  const StepCotangents<T>& bar) {
+    if (!step.scene.yields) return;
+    read_found(step.scene, work.q, scratch.found.data());
+    let_slide_vjp(step.scene, step.in, scratch.found.data(), bar.x_next, bar.in);
+  }
+};
 
 }  // namespace sheetbend

@@ -9,6 +9,7 @@
 #include "core/constraints/registry.h"
 #include "core/scalar/dual.h"
 #include "core/scene/scene.h"
+#include "core/step/stages.h"
 
 namespace sheetbend {
 
@@ -30,18 +31,18 @@ template <class K>
 inline constexpr bool shares_load = requires { K::share_parameter; };
 
 template <class K, class T>
-struct Yield {
+struct SlidingSpring {
   static constexpr int set = K::dofs - 3;
   T x[K::dofs], C[K::rows], J[K::rows * K::dofs], e[K::rows];
   decltype(T() > T()) slides;  // per lane
   T f, y_over_length, inverse_length;
 
-  Yield(const Scene& scene, const Group& group, int item, const T* p, const T* state)
-      : Yield([&](int d) -> const T& { return state[scene.first_dof[group.nodes(item)[d / 3]] + d % 3]; }, p) {}
+  SlidingSpring(const Scene& scene, const Group& group, int item, const T* p, const T* state)
+      : SlidingSpring([&](int d) -> const T& { return state[scene.first_dof[group.nodes(item)[d / 3]] + d % 3]; }, p) {}
 
   // at(d): coordinate d of the stencil.
   template <class At>
-  Yield(At&& at, const T* p) {
+  SlidingSpring(At&& at, const T* p) {
     for (int d = 0; d < K::dofs; ++d) x[d] = at(d);
     Slider<K>::evaluate(x, p, C, J);
     const T one(1.0), y = p[K::yield_parameter];
@@ -70,10 +71,10 @@ void for_each_yielding(const Scene& scene, F&& f) {
 }
 
 template <class T>
-void yield(const Scene& scene, const Inputs<const T>& in, T* state) {
+void let_slide(const Scene& scene, const Inputs<const T>& in, T* state) {
   if (!scene.yields) return;
   for_each_yielding(scene, [&]<class K>(K, const Group& group, int item, std::size_t value) {
-    const Yield<K, T> at(scene, group, item, in.of(Quantity::rest) + value, state);
+    const SlidingSpring<K, T> at(scene, group, item, in.of(Quantity::rest) + value, state);
     T* set = state + scene.first_dof[group.nodes(item)[K::arity - 1]];
     for (int j = 0; j < K::rows; ++j) set[j] += at.f * at.e[j];
   });
@@ -81,7 +82,7 @@ void yield(const Scene& scene, const Inputs<const T>& in, T* state) {
 
 // Along N directions, where it slides: those of coordinates go through the gradient, those of parameters inside C through duals.
 template <int N>
-void yield(const Scene& scene, const Inputs<const Dual<double, N>>& in, Dual<double, N>* state) {
+void let_slide(const Scene& scene, const Inputs<const Dual<double, N>>& in, Dual<double, N>* state) {
   using Directed = Dual<double, N>;
   if (!scene.yields) return;
   for_each_yielding(scene, [&]<class K>(K, const Group& group, int item, std::size_t value) {
@@ -92,7 +93,7 @@ void yield(const Scene& scene, const Inputs<const Dual<double, N>>& in, Dual<dou
     const auto at = [&](int d) -> Directed& { return state[scene.first_dof[nodes[d / 3]] + d % 3]; };
     double own[P];
     for (int k = 0; k < P; ++k) own[k] = p[k].v;
-    const Yield<K, double> values([&](int d) { return at(d).v; }, own);
+    const SlidingSpring<K, double> values([&](int d) { return at(d).v; }, own);
     if (!values.slides) return;
 
     using ByParameter = Dual<double, inside>;
@@ -114,10 +115,21 @@ void yield(const Scene& scene, const Inputs<const Dual<double, N>>& in, Dual<dou
       if constexpr (shares_load<K>) e[j] -= (Directed(1.0) - p[K::share_parameter]) * at(set + j);
       length2 += e[j] * e[j];
     }
-    // in the order of Yield, so that the values have its bits
+    // in the order of SlidingSpring, so that the values have its bits
     const Directed f = Directed(1.0) - p[K::yield_parameter] * (Directed(1.0) / sqrt(length2));
     for (int j = 0; j < K::rows; ++j) at(set + j) += f * e[j];
   });
 }
+
+struct Yield {
+  static constexpr bool repeated = false;
+  template <class T>
+  using Record = Nothing;
+
+  template <class T>
+  static void forward(const Step<T>& step, Work<T>& work, Nothing&) {
+    let_slide(step.scene, step.in, work.x_next);
+  }
+};
 
 }  // namespace sheetbend

@@ -1,0 +1,61 @@
+// The reverse of ProjectBlocks.
+#pragma once
+
+#include "adjoint/solver/project_implicit_vjp.h"
+#include "adjoint/step/stages.h"
+#include "core/step/project_blocks.h"
+
+namespace sheetbend {
+
+template <>
+struct ReverseOf<ProjectBlocks> {
+  template <class T>
+  struct Scratch {
+    std::vector<BlockCotangents<T>> blocks;
+
+    void resize(const Scene& scene, const Plan& plan) {
+      blocks.resize(plan.blocks.size());
+      for (std::size_t b = 0; b < blocks.size(); ++b) blocks[b].resize(scene, plan.blocks[b]);
+    }
+    static std::size_t bytes(const Scene& scene, const Plan& plan) {
+      std::size_t sum = 0;
+      for (const DirectBlock& block : plan.blocks)
+        sum += sizeof(BlockCotangents<T>) + BlockCotangents<T>::bytes(scene, block);
+      return sum;
+    }
+  };
+
+  template <class T>
+  static void run(const Step<T>& step, const Work<T>& work, ProjectBlocks::Record<T>& record, Scratch<T>& scratch,
+                  const StepCotangents<T>& bar) {
+    const Plan& plan = step.plan;
+    const SubstepState<T> state = ProjectBlocks::state_of<T>(step, work.masses, nullptr);
+    parallel_for(static_cast<int>(plan.blocks.size()), step.threads(), 1, [&](int begin, int end) {
+      for (int b = begin; b < end; ++b) {
+        const DirectBlock& block = plan.blocks[b];
+        BlockCotangents<T>& block_bar = scratch.blocks[b];
+        begin_block_vjp<T>(state, block, bar.q.data, nullptr, bar.in, block_bar);
+        if (block.implicit)
+          project_implicit_vjp(state, block, pack_kernels(), record.blocks[b], block_bar);
+        else
+          for (int iteration = plan.options.iterations - 1; iteration >= 0; --iteration)
+            project_block_vjp(state, block, pack_kernels(), record.blocks[b], iteration, block_bar);
+        end_block_vjp(state, block, bar.q.data, bar.w.data, block_bar);
+        damping_references_vjp(state, block, pack_kernels(), step.bdf.before, record.blocks[b], bar.from.x,
+                               bar.from.x_before, block_bar);
+      }
+    });
+    for (std::size_t b = 0; b < plan.blocks.size(); ++b)
+      add_fixed(step.scene, plan.blocks[b], scratch.blocks[b], bar.q.data, bar.from.x, bar.from.x_before);
+  }
+
+  // What gathered of the constraints' own values.
+  template <class T>
+  static void finish(const Scene& scene, const Plan& plan, const Inputs<const T>& in, Scratch<T>& scratch,
+                     const Inputs<T>& in_bar) {
+    for (std::size_t b = 0; b < plan.blocks.size(); ++b)
+      finish_block(scene, plan.blocks[b], in, in_bar, scratch.blocks[b]);
+  }
+};
+
+}  // namespace sheetbend

@@ -1,0 +1,122 @@
+// The reverse of SweepColors: sweeps in reverse order, then the damping references.
+#pragma once
+
+#include "adjoint/packs/packed_reverse.h"
+#include "adjoint/solver/project_vjp.h"
+#include "adjoint/solver/volume_vjp.h"
+#include "adjoint/step/stages.h"
+#include "core/step/sweep_colors.h"
+
+namespace sheetbend {
+
+template <>
+struct ReverseOf<SweepColors> {
+  template <class T>
+  struct Scratch {
+    PackCotangents<std::conditional_t<in_packs<T>, T, double>> packs;  // of colors that go through the kernels
+    std::vector<T> fixed, lambda;                                      // of others
+    std::vector<T> C_r;
+    std::vector<VolumeCotangents<T>> volumes;
+
+    void resize(const Scene& scene, const Plan& plan) {
+      volumes.resize(swept_volumes(scene, plan).size());
+      for (std::size_t v = 0; v < volumes.size(); ++v) volumes[v].resize(scene.volumes[v]);
+      if (plan.colors.empty()) return;
+      C_r.resize(damped_rows(scene));
+      if constexpr (in_packs<T>) {
+        packs.resize(plan.packs);
+      } else {
+        fixed.resize(scene.stencil_coordinates);
+        lambda.resize(scene.rows);
+      }
+    }
+    static std::size_t bytes(const Scene& scene, const Plan& plan) {
+      std::size_t sum = 0;
+      for (const Volume& volume : swept_volumes(scene, plan))
+        sum += sizeof(VolumeCotangents<T>) + VolumeCotangents<T>::bytes(volume);
+      if (plan.colors.empty()) return sum;
+      sum += sizeof(T) * damped_rows(scene);
+      if constexpr (in_packs<T>)
+        return sum + PackCotangents<T>::bytes(plan.packs);
+      else
+        return sum + sizeof(T) * (scene.stencil_coordinates + scene.rows);
+    }
+
+    // Where the cotangents of the coordinates and of the inverse masses are: in the kernels' rows, or in q and w.
+    Coordinates<T> of_coordinates(const Plan& plan, T* q) {
+      if constexpr (in_packs<T>)
+        if (sweeps_packs<T>(plan)) return {packs.rows.at(0), sheetbend_packs::row};
+      return {q, 3};
+    }
+    Strided<T> of_inverse_masses(const Plan& plan, T* w) {
+      if constexpr (in_packs<T>)
+        if (sweeps_packs<T>(plan)) return {packs.rows.at(0) + 3, sheetbend_packs::row};
+      return {w, 1};
+    }
+  };
+
+  template <class T>
+  static void run(const Step<T>& step, const Work<T>& work, SweepColors::Record<T>& record, Scratch<T>& scratch,
+                  const StepCotangents<T>& bar) {
+    const SolverOptions& o = step.plan.options;
+    const bool swept = !step.plan.colors.empty();
+    for (auto* buffer : {&scratch.C_r, &scratch.fixed, &scratch.lambda})
+      std::fill(buffer->begin(), buffer->end(), T(0.0));
+    if constexpr (in_packs<T>)
+      if (swept)
+        begin_sweeps_vjp(step.scene, step.plan.packs, o.threads, step.in, record.packs, bar.in, scratch.packs);
+    for (int iteration = o.iterations - 1; iteration >= 0; --iteration) {
+      const bool last = iteration == o.iterations - 1;
+      project_volumes_vjp(step.scene, step.in, step.bdf.eta, work.masses.w.data(), iteration, last, record.volumes,
+                          bar.q, bar.w, bar.in, scratch.volumes);
+      sweep(step, work, iteration, last, record, scratch, bar);
+    }
+    if (!swept) return;
+    end(step, scratch, bar);
+    damping_references_vjp(step.scene, step.in, step.bdf, step.from, scratch.C_r.data(), bar.from, bar.in);
+  }
+
+  // What gathered of the constraints' own values.
+  template <class T>
+  static void finish(const Scene& scene, const Plan& plan, const Inputs<const T>& in, Scratch<T>& scratch,
+                     const Inputs<T>& in_bar) {
+    if constexpr (in_packs<T>) sheetbend::finish(scene, plan.packs, in, in_bar, scratch.packs);
+  }
+
+ private:
+  template <class T>
+  static void sweep(const Step<T>& step, const Work<T>& work, int iteration, bool last, SweepColors::Record<T>& record,
+                    Scratch<T>& scratch, const StepCotangents<T>& bar) {
+    const Plan& plan = step.plan;
+    const SolverOptions& o = plan.options;
+    if constexpr (in_packs<T>) {
+      sweep_vjp(plan.packs, pack_kernels(), o.threads, o.grain, iteration, last, record.packs, scratch.packs);
+    } else {
+      const SubstepState<T> state = SweepColors::state_of<T>(step, work.masses, nullptr, record);
+      const SubstepCotangent<T> cotangent{bar.q.data, scratch.fixed.data(), scratch.lambda.data(),
+                                          bar.w.data, scratch.C_r.data(),   bar.in};
+      for (auto color = plan.colors.rbegin(); color != plan.colors.rend(); ++color)
+        project_color_vjp(state, o, *color, record.iterations[iteration], cotangent);
+    }
+  }
+
+  // Adds what fixed nodes received, per stencil, to their own.
+  template <class T>
+  static void end(const Step<T>& step, Scratch<T>& scratch, [[maybe_unused]] const StepCotangents<T>& bar) {
+    const Scene& scene = step.scene;
+    if constexpr (in_packs<T>) {
+      end_sweeps_vjp(scene, step.plan.packs, scratch.packs, scratch.C_r.data());
+    } else {
+      for (const Group& group : scene.groups)
+        for (int i = 0; i < group.count; ++i)
+          for (int k = 0; k < group.arity; ++k) {
+            const int node = group.nodes(i)[k];
+            if (scene.role[node] == Role::free) continue;
+            const std::size_t from = group.first_coordinate + (static_cast<std::size_t>(i) * group.arity + k) * 3;
+            Vec3<T>(&scratch.fixed[from]).add_to(bar.q.of(node));
+          }
+    }
+  }
+};
+
+}  // namespace sheetbend

@@ -1,0 +1,67 @@
+// Where a substep starts: the positions that free motion would give,
+//
+//   x* = history(x) + eta v*,   v* = m w (history(v) + eta gravity),   w = 1/(m + eta c).
+//
+// Directors go on as they turned, pinned nodes stay, driven ones go where their boundary is at the substep's end.
+#pragma once
+
+#include "core/step/stages.h"
+
+namespace sheetbend {
+
+struct Predict {
+  static constexpr bool repeated = true;
+  template <class T>
+  using Record = Nothing;
+
+  template <class T>
+  static void forward(const Step<T>& step, Work<T>& work, Nothing&) {
+    if constexpr (std::is_same_v<T, double>)
+      free_motion(step, work);
+    else
+      parallel_for(
+          step.scene.nodes(), step.threads(), points_per_thread,
+          [points = points_of(step, work.masses, &work)](int begin, int end) { point_kernels<T>().predict(points, begin, end); });
+    fixed_nodes(step, work);
+  }
+
+ private:
+  // Loops over particles capture by value: a store may go anywhere, so what a reference leads to would be loaded again for each.
+  static void free_motion(const Step<double>& step, Work<double>& work) {
+    const Scene& scene = step.scene;
+    const double eta = step.bdf.eta, *g = step.in.of(Quantity::gravity);
+    const double gravity[4] = {eta * g[0], eta * g[1], eta * g[2], 0.0};
+    const double* kept = scene.has_drag ? work.masses.kept.data() : nullptr;
+    const int* first_dof = scene.first_dof.data();
+    const Coordinates<double> q = work.q;
+    const Bdf bdf = step.bdf;
+    const SubstepStates<double> s = step.from;
+    parallel_for(scene.nodes(), step.threads(), points_per_thread, [=](int begin, int end) {
+      for_each_point<double>(begin, end, [=](int n, auto how) {
+        const int dof = first_dof[n];
+        auto v = history(bdf, how, s.v + dof, s.v_before + dof) + how.load(gravity);
+        if (kept) v = scaled(kept[n], v);
+        how.store(q.of(n), history(bdf, how, s.x + dof, s.x_before + dof) + scaled(eta, v));
+      });
+    });
+    for (const Director& d : scene.directors) {
+      const int dof = scene.first_dof[d.node];
+      extrapolated(bdf, s.x + dof, s.x_before + dof).store(q.of(d.node));
+    }
+  }
+
+  template <class T>
+  static void fixed_nodes(const Step<T>& step, Work<T>& work) {
+    const Scene& scene = step.scene;
+    for (const int n : scene.pinned) Vec3<T>(step.from.x + scene.first_dof[n]).store(work.q.of(n));
+    if (scene.driven.empty()) return;
+    const KnotWeights boundary = scene.boundary.at(step.t_next);
+    const std::size_t slots = scene.driven.size();
+    const T* values = step.in.of(Quantity::boundary) + 3 * slots * boundary.first;
+    for (std::size_t i = 0; i < slots; ++i)
+      point_kernels<T>().interpolate(reinterpret_cast<const double*>(values + 3 * i), 3 * slots, boundary.weight.data(),
+                                     boundary.count, reinterpret_cast<double*>(work.q.of(scene.driven[i])));
+  }
+};
+
+}  // namespace sheetbend

@@ -1,0 +1,46 @@
+// One substep, in the words of the paper (Macklin et al. 2016, algorithm 1): predict, project, and read the velocities off the positions.
+// stages.h says what a stage is; adjoint/step has their reverses.
+#pragma once
+
+#include "core/step/apply_air_forces.h"
+#include "core/step/apply_forces.h"
+#include "core/step/effective_masses.h"
+#include "core/step/predict.h"
+#include "core/step/project_blocks.h"
+#include "core/step/retract_directors.h"
+#include "core/step/sweep_colors.h"
+#include "core/step/update_velocities.h"
+#include "core/step/yield.h"
+
+namespace sheetbend {
+
+using Substep = Stages<ComputeEffectiveMasses,  // w = 1/(m + eta c), c the implicit drag
+                       Predict,                 // x* = history(x) + eta v*,  v* = m w (history(v) + eta gravity)
+                       ApplyForces,             // x* += eta^2 w f(t)
+                       ApplyAirForces,          // x* += eta^2 w f of the wind and the pressure on triangles
+                       ProjectBlocks,           // direct blocks: x <- x + W J^T dlambda, or until their forces balance
+                       SweepColors,             // the same for one constraint after the other, and for kept volumes
+                       UpdateVelocities,        // v = (x - history(x))/eta
+                       RetractDirectors,        // rods: frames are made orthonormal again
+                       Yield                    // joints that slide: their set follows
+                       >;
+
+template <class T, class List = Substep>
+using SubstepRecord = Records<T, List>;
+
+// What the stages share. Where coordinates are corrected elsewhere than in the kernels' rows, it is in x_next.
+template <class T, class List>
+Work<T> work_of(const Plan& plan, Records<T, List>& record, T* x_next, T* v_next) {
+  return {record.template of<ComputeEffectiveMasses>(),
+          record.template of<SweepColors>().coordinates(plan, x_next), x_next, v_next};
+}
+
+// Steps from n to n+1, writing x_next and v_next. Says whether the state is finite.
+template <class T, class List>
+bool substep(const Step<T>& step, T* x_next, T* v_next, Records<T, List>& record) {
+  Work<T> work = work_of(step.plan, record, x_next, v_next);
+  List::forward([&]<class Stage>(Stage) { Stage::forward(step, work, record.template of<Stage>()); });
+  return work.finite;
+}
+
+}  // namespace sheetbend
