@@ -26,7 +26,7 @@ def libraries() -> set[str]:
     ]
     found = {name for p in sources for name in re.findall(r"#include <([\w.]+)/", p.read_text())}
     assert len(sources) > 50 and "Eigen" in found
-    return found
+    return found - {"sheetbend"}  # the library's own public headers
 
 
 def test_every_library_has_its_texts() -> None:

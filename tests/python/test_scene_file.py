@@ -125,69 +125,69 @@ def change(path: str, value: object) -> Callable[[dict[str, Any]], object]:
     return apply
 
 
-@pytest.mark.parametrize(
-    ("path", "value"),
-    [
-        ("name", 7),
-        ("name", "a\nb"),
-        ("name", "x" * 1000),
-        ("groups", {}),
-        ("groups.0", "link"),
-        ("groups.0.kind", "no such kind"),
-        ("groups.0.kind", "bend"),
-        ("groups.0.count", -1),
-        ("groups.0.count", 10**30),
-        ("groups.0.damped", 1),
-        ("groups.0.name", None),
-        ("quantities.0.value", "1"),
-        ("quantities.0.value", -1.0),
-        ("quantities.0.value", 1e999),
-        ("quantities.0.name", "link_damping"),
-        ("quantities.0.limits", [1]),
-        ("quantities.0.positive", None),
-        ("interpolation", "quintic"),
-        ("has_drag", "no"),
-        ("layout.position", [0, 10**9]),
-        ("layout.position", [0, "3"]),
-        ("layout.mass", [0, 1]),
-        ("arrays", []),
-        ("arrays.base.shape", [10**12]),
-        ("arrays.base.shape", [-1]),
-        ("arrays.base.shape", [True]),
-        ("arrays.base.shape", [10, 10]),
-        ("arrays.base.offset", -8),
-        ("arrays.base.offset", 10**15),
-        ("arrays.base.type", "f4"),
-        ("arrays.air.shape", [10**9, 3]),
-        ("following", [{"markers": ["a"], "from_placed": True}]),
-        ("volumes", [{"name": "v", "triangles": 3}]),
-    ],
-)
+FORGED_HEADERS: list[tuple[str, Any]] = [
+    ("name", 7),
+    ("name", "a\nb"),
+    ("name", "x" * 1000),
+    ("groups", {}),
+    ("groups.0", "link"),
+    ("groups.0.kind", "no such kind"),
+    ("groups.0.kind", "bend"),
+    ("groups.0.count", -1),
+    ("groups.0.count", 10**30),
+    ("groups.0.damped", 1),
+    ("groups.0.name", None),
+    ("quantities.0.value", "1"),
+    ("quantities.0.value", -1.0),
+    ("quantities.0.value", 1e999),
+    ("quantities.0.name", "link_damping"),
+    ("quantities.0.limits", [1]),
+    ("quantities.0.positive", None),
+    ("interpolation", "quintic"),
+    ("has_drag", "no"),
+    ("layout.position", [0, 10**9]),
+    ("layout.position", [0, "3"]),
+    ("layout.mass", [0, 1]),
+    ("arrays", []),
+    ("arrays.base.shape", [10**12]),
+    ("arrays.base.shape", [-1]),
+    ("arrays.base.shape", [True]),
+    ("arrays.base.shape", [10, 10]),
+    ("arrays.base.offset", -8),
+    ("arrays.base.offset", 10**15),
+    ("arrays.base.type", "f4"),
+    ("arrays.air.shape", [10**9, 3]),
+    ("following", [{"markers": ["a"], "from_placed": True}]),
+    ("volumes", [{"name": "v", "triangles": 3}]),
+]
+
+
+@pytest.mark.parametrize(("path", "value"), FORGED_HEADERS)
 def test_forged_headers_are_refused(whole: bytes, tmp_path: Path, path: str, value: object) -> None:
     refused(forged(whole, change(path, value)), tmp_path / "x.scene")
 
 
-@pytest.mark.parametrize(
-    ("array", "values"),
-    [
-        ("base", np.full(10, np.nan)),
-        ("base", np.full(1000, -1.0)),
-        ("pinned", np.array([36])),
-        ("pinned", np.array([-1])),
-        ("driven", np.array([0])),
-        ("boundary_times", np.array([0.2, 0.1])),
-        ("stencil_0", np.array([0, 0])),
-        ("stencil_0", np.array([0, 2**31 - 1])),
-        ("loaded", np.array([99])),
-        ("target", np.array([-1])),
-        ("target", np.array([2**31 - 1])),
-        ("first_factor", np.array([1])),
-        ("first_factor", np.array([0, 5, 2])),
-        ("parameter", np.array([50])),
-        ("function", np.array([8])),
-        ("coefficient", np.array([np.inf])),
-    ],
-)
+FORGED_ARRAYS: list[tuple[str, Any]] = [
+    ("base", np.full(10, np.nan)),
+    ("base", np.full(1000, -1.0)),
+    ("pinned", np.array([36])),
+    ("pinned", np.array([-1])),
+    ("driven", np.array([0])),
+    ("boundary_times", np.array([0.2, 0.1])),
+    ("stencil_0", np.array([0, 0])),
+    ("stencil_0", np.array([0, 2**31 - 1])),
+    ("loaded", np.array([99])),
+    ("target", np.array([-1])),
+    ("target", np.array([2**31 - 1])),
+    ("first_factor", np.array([1])),
+    ("first_factor", np.array([0, 5, 2])),
+    ("parameter", np.array([50])),
+    ("function", np.array([8])),
+    ("coefficient", np.array([np.inf])),
+]
+
+
+@pytest.mark.parametrize(("array", "values"), FORGED_ARRAYS)
 def test_forged_arrays_are_refused(whole: bytes, tmp_path: Path, array: str, values: np.ndarray) -> None:
     refused(altered(whole, array, values), tmp_path / "x.scene")
 

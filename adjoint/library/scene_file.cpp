@@ -1,0 +1,212 @@
+#include "adjoint/library/scene_file.h"
+
+#include <algorithm>
+#include <limits>
+#include <set>
+
+#include "adjoint/library/file_parts.h"
+#include "adjoint/library/ranges.h"
+#include "adjoint/library/validate.h"
+#include "core/constraints/registry.h"
+
+namespace sheetbend::library {
+namespace {
+
+using v0::InputError;
+using v0::Model;
+
+class SceneReader {
+ public:
+  explicit SceneReader(const std::filesystem::path& path) : file_(path), header_(file_.header()) {}
+
+  Model model() {
+    Model m;
+    m.name = file_.name(header_, "name");
+    m.quantities = quantities();
+    try {
+      m.topology = build_scene(topology());
+    } catch (const std::invalid_argument& e) {
+      const InputError error = v0::refusal(e.what());
+      file_.fail(error.field(), error.problem(), error.fix());
+    }
+    follow(m.topology);
+    check_layout(m.topology.layout);
+    m.map = map(m.topology.layout, m.quantities.size());
+    check_base(m.topology.layout, m.map);
+    if (const auto fault = fault_of(m.topology, m.map)) file_.fail(fault->field, fault->problem, fault->fix);
+    m.complete();
+    return m;
+  }
+
+ private:
+  // The records of a list, with the words that name each.
+  template <class F>
+  void for_each_record(const char* key, F&& f) {
+    const auto& list = file_.part<JsonArray>(header_, key);
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      const std::string where = std::string(key) + "[" + std::to_string(i) + "]";
+      if (!list[i].as<JsonObject>()) file_.fail(where, "is no object");
+      f(list[i], std::to_string(i), where + ".");
+    }
+  }
+
+  static const Json* given(const Json& record, const char* key) {
+    const Json* found = record.find(key);
+    return found && !found->as<std::nullptr_t>() ? found : nullptr;
+  }
+
+  std::vector<v0::Quantity> quantities() {
+    constexpr double huge = std::numeric_limits<double>::max();
+    std::vector<v0::Quantity> found;
+    std::set<std::string> names;
+    for_each_record("quantities", [&](const Json& q, const std::string&, const std::string& where) {
+      v0::Quantity quantity{file_.name(q, "name", where), file_.number(q, "value", where), file_.name(q, "unit", where),
+                            file_.part<bool>(q, "positive", where), 0.0, -huge, huge};
+      if (given(q, "scale")) quantity.scale = file_.number(q, "scale", where);
+      if (given(q, "limits")) {
+        const auto& limits = file_.part<JsonArray>(q, "limits", where);
+        if (limits.size() != 2) file_.fail(where + "limits", "must be two");
+        const auto limit = [&](const Json& at, double open) {
+          return at.as<std::nullptr_t>() ? open : file_.number({JsonObject{{"limit", at}}}, "limit", where);
+        };
+        quantity.least = limit(limits[0], -huge), quantity.most = limit(limits[1], huge);
+      }
+      if (quantity.positive) quantity.least = 0.0, quantity.most = huge;
+      if (quantity.positive && !(quantity.value > 0.0)) file_.fail(where + "value", "must be positive");
+      if (!names.insert(quantity.name).second) file_.fail(where + "name", "is there twice");
+      found.push_back(std::move(quantity));
+    });
+    return found;
+  }
+
+  std::vector<std::array<int, 3>> triangles(const std::string& name, std::optional<long long> count = {}) {
+    const std::vector<int> flat = file_.whole_numbers(name, 3, count);
+    std::vector<std::array<int, 3>> found(flat.size() / 3);
+    for (std::size_t i = 0; i < flat.size(); ++i) found[i / 3][i % 3] = flat[i];
+    return found;
+  }
+
+  SceneSpec topology() {
+    SceneSpec spec;
+    const Json layout{file_.part<JsonObject>(header_, "layout")};
+    const auto& position = file_.part<JsonArray>(layout, "position", "layout.");
+    const auto* size = position.size() == 2 ? position[1].as<long long>() : nullptr;
+    base_ = file_.numbers("base");
+    if (!size || *size <= 0 || *size > static_cast<long long>(base_.size()) || *size % 3 != 0 ||
+        *size > std::numeric_limits<int>::max())
+      file_.fail("layout.position", "is no place");
+    spec.particles = static_cast<int>(*size / 3);
+    const std::vector<int> directors = file_.whole_numbers("directors", 4);
+    for (std::size_t i = 0; i < directors.size(); i += 4)
+      spec.directors.push_back({directors[i], directors[i + 1], directors[i + 2], directors[i + 3]});
+    spec.pinned = file_.whole_numbers("pinned");
+    spec.driven = file_.whole_numbers("driven");
+    for (const int n : spec.driven)  // the built scene only knows that it is driven
+      if (std::ranges::find(spec.pinned, n) != spec.pinned.end())
+        file_.fail("driven", "particle " + std::to_string(n) + " is pinned too", "either pin or drive a particle");
+    spec.loaded = file_.whole_numbers("loaded");
+    spec.has_drag = file_.part<bool>(header_, "has_drag");
+    const auto& interpolation = file_.part<std::string>(header_, "interpolation");
+    if (interpolation != "cubic" && interpolation != "linear")
+      file_.fail("interpolation", "is unknown", "use 'cubic' or 'linear'");
+    spec.boundary = {file_.numbers("boundary_times"),
+                     interpolation == "cubic" ? Interpolation::cubic : Interpolation::linear};
+    spec.force = {file_.numbers("force_times"), Interpolation::linear};
+    spec.wind = {file_.numbers("wind_times"), Interpolation::linear};
+    spec.air = triangles("air");
+    std::set<std::string> names;
+    for_each_record("groups", [&](const Json& g, const std::string& i, const std::string& where) {
+      GroupSpec group{file_.name(g, "name", where), file_.part<std::string>(g, "kind", where),
+                      file_.part<bool>(g, "damped", where), {}};
+      int arity = 0;
+      with_kind(kind_of(group.kind), [&]<class K>(K) { arity = K::arity; });
+      group.stencil = file_.whole_numbers("stencil_" + i, arity, file_.part<long long>(g, "count", where));
+      spec.groups.push_back(std::move(group));
+    });
+    for_each_record("volumes", [&](const Json& v, const std::string& i, const std::string& where) {
+      const std::string name = file_.name(v, "name", where);
+      if (!names.insert(name).second) file_.fail(where + "name", "is there twice");
+      spec.volumes.push_back({name, triangles("volume_" + i, file_.part<long long>(v, "triangles", where))});
+    });
+    return spec;
+  }
+
+  // Driven particles that follow recorded markers: checked, and otherwise of no use here.
+  void follow(const Scene& scene) {
+    for_each_record("following", [&](const Json& f, const std::string& i, const std::string& where) {
+      const auto& markers = file_.part<JsonArray>(f, "markers", where);
+      for (const Json& marker : markers)
+        if (!file_.is_name(marker)) file_.fail(where + "markers", "are no names");
+      file_.part<bool>(f, "from_placed", where);
+      const std::vector<int> slots = file_.whole_numbers("following_" + i);
+      for (const int slot : slots)
+        if (slot < 0 || slot >= static_cast<int>(scene.driven.size()))
+          file_.fail("following_" + i, "names particles that are not driven");
+      if (!markers.empty())
+        file_.numbers("weights_" + i, static_cast<int>(markers.size()), static_cast<long long>(slots.size()));
+    });
+  }
+
+  void check_layout(const Layout& layout) {
+    const Json& given = *header_.find("layout");  // an object: topology() read it
+    bool fits = given.as<JsonObject>()->size() == quantity_count;
+    for (int q = 0; q < quantity_count && fits; ++q) {
+      const Json* place = given.find(quantity_names[q]);
+      const auto* pair = place ? place->as<JsonArray>() : nullptr;
+      fits = pair && pair->size() == 2;
+      for (int k = 0; k < 2 && fits; ++k) {
+        const auto* n = (*pair)[k].as<long long>();
+        fits = n && *n == static_cast<long long>(k == 0 ? layout.offset[q] : layout.size[q]);
+      }
+    }
+    if (!fits) file_.fail("layout", "is not the one of this scene");
+    if (base_.size() != layout.total()) file_.fail("base", "does not fit the scene's inputs");
+  }
+
+  ParameterMap map(const Layout& layout, std::size_t quantities) {
+    ParameterMap m;
+    m.base = base_;
+    m.target = file_.whole_numbers("target");
+    const auto entries = static_cast<long long>(m.target.size());
+    m.coefficient = file_.numbers("coefficient", 0, entries);
+    m.first_factor = file_.whole_numbers("first_factor", 0, entries + 1);
+    if (m.first_factor[0] != 0 || !std::ranges::is_sorted(m.first_factor))
+      file_.fail("first_factor", "must start at 0 and not decrease");
+    const long long factors = m.first_factor.back();
+    m.parameter = file_.whole_numbers("parameter", 0, factors);
+    const std::vector<int> function = file_.whole_numbers("function", 0, factors);
+    m.weight = file_.numbers("weight", 0, factors);
+    const auto within = [&](const char* name, const std::vector<int>& values, std::size_t limit) {
+      for (const int v : values)
+        if (v < 0 || static_cast<std::size_t>(v) >= limit)
+          file_.fail(name, "must lie in 0 to " + std::to_string(static_cast<long long>(limit) - 1));
+    };
+    within("target", m.target, layout.total());
+    within("parameter", m.parameter, quantities);
+    within("function", function, static_cast<std::size_t>(Factor1d::exponential) + 1);
+    for (const int f : function) m.function.push_back(static_cast<Factor1d>(f));
+    return m;
+  }
+
+  void check_base(const Layout& layout, const ParameterMap& map) {
+    for (int q = 0; q < quantity_count; ++q) {
+      const auto array = static_cast<Quantity>(q);
+      const double *first = map.base.data() + layout.offset[q], *last = first + layout.size[q];
+      if (not_negative(array) && std::any_of(first, last, [](double v) { return v < 0.0; }))
+        file_.fail(std::string("base.") + quantity_names[q], "must not be negative");
+      if ((array == Quantity::volume || array == Quantity::volume_compliance) &&
+          std::any_of(first, last, [](double v) { return v != 0.0; }))
+        file_.fail(std::string("base.") + quantity_names[q], "must be zero, quantities make it");
+    }
+  }
+
+  FileParts file_;
+  const Json& header_;
+  std::vector<double> base_;
+};
+
+}  // namespace
+
+v0::Model read_scene_file(const std::filesystem::path& path) { return SceneReader(path).model(); }
+
+}  // namespace sheetbend::library
