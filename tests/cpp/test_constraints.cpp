@@ -288,7 +288,9 @@ TYPED_TEST(Constraint, RestValuesAreMeasuredOrSaid) {
   for (int k = 0; k < parameter_count<K>; ++k) {
     const Default& otherwise = K::parameters[k].otherwise;
     const bool said = otherwise.source == Source::usual || otherwise.source == Source::preset;
-    if (said) EXPECT_EQ(p[k], otherwise.value) << K::parameters[k].name;
+    if (said) {
+      EXPECT_EQ(p[k], otherwise.value) << K::parameters[k].name;
+    }
     if (otherwise.source == Source::measured) {
       measured = true;
       EXPECT_TRUE(p[k] >= K::parameters[k].range.least && p[k] <= K::parameters[k].range.most) << K::parameters[k].name;
