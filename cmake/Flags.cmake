@@ -12,6 +12,14 @@ add_compile_options(-ffp-contract=off -fno-math-errno -Wall -Wextra)
 # GCC notes that packs as wide as a vector register have no stable calling convention; none crosses a public interface.
 add_compile_options(-Wno-psabi)
 
+option(SHEETBEND_WERROR "Warnings in our own files are errors" OFF)
+if(SHEETBEND_WERROR)
+  add_compile_options(-Werror)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    add_compile_options(-Wno-error=maybe-uninitialized)  # gcc 12 says so of Eigen's matrices, and of arrays without elements
+  endif()
+endif()
+
 if(SHEETBEND_SANITIZE)
   add_compile_options(-fsanitize=${SHEETBEND_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${SHEETBEND_SANITIZE})

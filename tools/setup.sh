@@ -127,7 +127,9 @@ install_sheetbend() {
   mapfile -t -O "${#tools[@]}" tools < <(build_requirements)
   pip install -q "${tools[@]}"
   say "building and installing sheetbend[$extras] (minutes the first time)"
-  pip install -q --no-build-isolation --config-settings build-dir="$ROOT/build/wheel" "${ROOT}[$extras]"
+  local settings=(--config-settings build-dir="$ROOT/build/wheel")
+  [[ -z ${CI:-} ]] || settings+=(--config-settings cmake.define.SHEETBEND_WERROR=ON)
+  pip install -q --no-build-isolation "${settings[@]}" "${ROOT}[$extras]"
   echo "$found $extras" >"$STAMP"
 }
 

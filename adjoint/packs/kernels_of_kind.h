@@ -1,12 +1,16 @@
-// The kernels of one kind in colors, for explicit instantiation: `where` is empty or `extern`.
+// Included where the kernels of one kind in colors are compiled: `template struct PackKernels<K>;`.
 #pragma once
 
+#include "adjoint/packs/kind_kernels.h"
 #include "adjoint/packs/project_packs_vjp.h"
 #include "core/packs/project_tangents.h"
 
-#define SHEETBEND_PACK_KERNELS(where, K)                                                                              \
-  where template void project_packs<K, sheetbend_packs::across_color>(const sheetbend_packs::Forward&, int, int);     \
-  where template void project_packs<K, sheetbend_packs::across_scenes>(const sheetbend_packs::Forward&, int, int);    \
-  where template void project_tangents<K>(const sheetbend_packs::Tangents&, int, int);                                \
-  where template void project_packs_vjp<K, sheetbend_packs::across_color>(const sheetbend_packs::Reverse&, int, int); \
-  where template void project_packs_vjp<K, sheetbend_packs::across_scenes>(const sheetbend_packs::Reverse&, int, int);
+namespace sheetbend {
+
+template <class K>
+constinit const sheetbend_packs::KindKernels PackKernels<K>::all{
+    {&project_packs<K, sheetbend_packs::across_color>, &project_packs<K, sheetbend_packs::across_scenes>},
+    &project_tangents<K>,
+    {&project_packs_vjp<K, sheetbend_packs::across_color>, &project_packs_vjp<K, sheetbend_packs::across_scenes>}};
+
+}  // namespace sheetbend

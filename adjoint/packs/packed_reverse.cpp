@@ -54,7 +54,7 @@ void sweep_vjp(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels
                                            own.values.numbers(),
                                            own.lambda.numbers(),
                                            color.damped ? own.C_r.numbers() : nullptr};
-    run_kernel(kernels.project_vjp[layout_of<T>][color.kind], reverse, color.packs<T>(), threads, grain);
+    run_kernel(kernels.kinds[color.kind]->project_vjp[layout_of<T>], reverse, color.packs<T>(), threads, grain);
   }
 }
 

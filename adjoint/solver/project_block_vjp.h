@@ -2,6 +2,7 @@
 #pragma once
 
 #include "adjoint/blocks/block_reverse.h"
+#include "adjoint/blocks/every_kind.h"
 #include "adjoint/element/rates_vjp.h"
 #include "adjoint/solver/volume_vjp.h"
 #include "core/solver/project_block.h"
@@ -13,7 +14,7 @@ const sheetbend_blocks::Reverse& reverse_kernels(const sheetbend_packs::KernelTa
   if constexpr (has_compiled_kernels<T>)
     return (std::is_same_v<T, Pack> ? kernels.blocks->many : kernels.blocks->one).reverse;
   else
-    return ReverseKernels<T>::all;
+    return ReverseKernels<T, ReverseOfEveryKind<T>>::all;
 }
 
 // Cotangents in the block's order. Those of the constraints' values gather over substeps of one eta; finish_block() hands them on.

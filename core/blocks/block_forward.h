@@ -1,61 +1,11 @@
-// The forward kernels of a direct block over a scalar T.
+// The forward kernels of a direct block over a scalar T. Kinds::of(kind) gives what a kind adds (sheetbend_blocks::ForwardOfKind).
 #pragma once
-
-#include <array>
-#include <tuple>
 
 #include "core/blocks/fours.h"
 #include "core/blocks/supernodes.h"
 #include "core/blocks/wide.h"
-#include "core/constraints/registry.h"
 
 namespace sheetbend {
-
-template <class K, class T>
-void evaluate_run(const sheetbend_blocks::Block& b, const sheetbend_blocks::Run& r) {
-  for (int n = 0; n < elements<T>(r); ++n) {
-    const int* rows = indices_of<T>(r.first_row, 1, n);
-    const int* gradients = indices_of<T>(r.gradients, K::arity, n);
-    const auto e = load_element<K, T>(b.x, r, indices_of<T>(r.nodes, K::arity, n), n);
-    const Evaluation<K, Wide<T>> value(e.x, e.p);
-    Wide<T> lambda[K::rows], C_r[K::rows];
-    for (int j = 0; j < K::rows; ++j) {
-      lambda[j] = gather(numbers_of<T>(b.lambda), rows, j);
-      if (r.damped) C_r[j] = gather(numbers_of<T>(b.C_r), rows, j);
-    }
-    for (int j = 0; j < K::rows; ++j) {
-      scatter(numbers_of<T>(b.dl), rows, j,
-              -(e.residual(value.C, lambda, r.damped ? C_r : nullptr, j) * e.rates.scale));
-      for (int k = 0; k < K::arity; ++k)
-        store_gradient(numbers_of<T>(b.gradients), gradients + k * Pack::lanes, j, value.J + j * K::dofs + 3 * k);
-    }
-  }
-}
-
-template <class K, class T>
-void values_of_run(const sheetbend_blocks::Values& b, const sheetbend_blocks::Run& r) {
-  using W = Wide<T>;
-  for (int n = 0; n < elements<T>(r); ++n) {
-    const int* nodes = indices_of<T>(r.nodes, K::arity, n);
-    W x[K::dofs], unused;
-    for (int k = 0; k < K::arity; ++k) load_particle(numbers_of<T>(b.x), nodes + k * Pack::lanes, x + 3 * k, unused);
-    const Evaluation<K, W> value(x, parameters_of<K, T>(r, n));
-    for (int j = 0; j < K::rows; ++j) scatter(numbers_of<T>(b.C), indices_of<T>(r.first_row, 1, n), j, value.C[j]);
-  }
-}
-
-template <class K, class T>
-void refer_run(const sheetbend_blocks::References& b, const sheetbend_blocks::Run& r) {
-  for (int n = 0; n < elements<T>(r); ++n) {
-    const int* rows = indices_of<T>(r.first_row, 1, n);
-    for (int j = 0; j < K::rows; ++j) {
-      const Wide<T> now = gather(numbers_of<T>(b.C), rows, j);
-      const Wide<T> before = gather(numbers_of<T>(b.C_before), rows, j);
-      scatter(numbers_of<T>(b.C_r), rows, j,
-              b.before == 0.0 ? now : now - Wide<T>(b.before) * difference<K>(now, before));
-    }
-  }
-}
 
 // A += w G G^T of one particle's `count` gradient rows G, which follow one another from `column` on.
 template <class T>
@@ -78,12 +28,12 @@ Vec3<T> transpose_times_at(const sheetbend_blocks::Block& block, int particle, c
   return sum;
 }
 
-template <class T>
+template <class T, class Kinds>
 struct ForwardKernels {
   using Block = sheetbend_blocks::Block;
 
   static void evaluate(const Block& b) {
-    for (int r = 0; r < b.run_count; ++r) evaluate_of[b.runs[r].kind](b, b.runs[r]);
+    for (int r = 0; r < b.run_count; ++r) Kinds::of(b.runs[r].kind).evaluate(b, b.runs[r]);
   }
 
   static void factor(const Block& b) {
@@ -137,30 +87,18 @@ struct ForwardKernels {
 
   static void values(const sheetbend_blocks::Values& b) {
     for (int r = 0; r < b.run_count; ++r)
-      if (b.runs[r].damped) values_of[b.runs[r].kind](b, b.runs[r]);
+      if (b.runs[r].damped) Kinds::of(b.runs[r].kind).values(b, b.runs[r]);
   }
 
   static void refer(const sheetbend_blocks::References& b) {
     for (int r = 0; r < b.run_count; ++r)
-      if (b.runs[r].damped) refer_of[b.runs[r].kind](b, b.runs[r]);
+      if (b.runs[r].damped) Kinds::of(b.runs[r].kind).refer(b, b.runs[r]);
   }
 
   static void factor_supernodes(const sheetbend_blocks::Supernodes& s, double* panels, double* inverse, double* work,
                                 int* place) {
     SupernodalFactor<T>{s, numbers_of<T>(panels), numbers_of<T>(inverse), numbers_of<T>(work), place}.factorize();
   }
-
-  static constexpr auto evaluate_of = []<class... K>(std::tuple<K...>*) {
-    return std::array{&evaluate_run<K, T>...};
-  }(static_cast<Registry*>(nullptr));
-
-  static constexpr auto values_of = []<class... K>(std::tuple<K...>*) {
-    return std::array{&values_of_run<K, T>...};
-  }(static_cast<Registry*>(nullptr));
-
-  static constexpr auto refer_of = []<class... K>(std::tuple<K...>*) {
-    return std::array{&refer_run<K, T>...};
-  }(static_cast<Registry*>(nullptr));
 
   static constexpr sheetbend_blocks::Forward all{&evaluate, &factor,           &solve, &push, &values,
                                                  &refer,    &factor_supernodes};

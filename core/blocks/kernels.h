@@ -140,6 +140,21 @@ struct Kernels {
   Reverse reverse;
 };
 
+// What one kind of constraint adds to the kernels above: its own runs.
+struct ForwardOfKind {
+  void (*evaluate)(const Block&, const Run&);
+  void (*values)(const Values&, const Run&);
+  void (*refer)(const References&, const Run&);
+};
+struct ReverseOfKind {
+  void (*pull_back)(const Block&, const Run&);
+  void (*values)(const Values&, const Run&);
+};
+struct TangentsOfKind {
+  void (*right_side)(const Block&, const Tangents&, int run);
+  void (*values)(const Values&, const ValueTangents&, int run);
+};
+
 struct Table {
   Kernels one;              // of one scene
   Kernels many;             // of eight

@@ -24,4 +24,19 @@ struct PotentialKernels {
                    double* Ez);  // Ez += E z over elements found before, (particles, 4)
 };
 
+// What one kind adds to them; all null where an implicit block does not take the kind.
+struct PotentialOfKind {
+  double (*evaluate)(const Potential&, const Run&);
+  void (*find_elements)(const Potential&, const Run&, double* elements);
+  void (*multiply)(const Run&, const double* elements, const double* z, double* Ez);
+};
+
+// All kernels of one kind in direct and implicit blocks.
+struct KindKernels {
+  ForwardOfKind forward, forward_of_lanes;
+  ReverseOfKind reverse, reverse_of_lanes;
+  TangentsOfKind tangents;
+  PotentialOfKind potential;
+};
+
 }  // namespace sheetbend_blocks

@@ -1,5 +1,5 @@
 // Kernels of eight constraints at a time, as plain arrays see them: one per kind of constraint and layout, compiled once per instruction set
-// and chosen at run time. This namespace is the only one that the compiled variants share; see kernel_table.cpp.
+// and chosen at run time. This namespace is the only one that the compiled variants share; see adjoint/packs/kernel_table.cpp.
 #pragma once
 
 namespace sheetbend_blocks {
@@ -14,7 +14,6 @@ namespace sheetbend_packs {
 
 inline constexpr int lanes = 8;
 inline constexpr int row = 4;  // numbers per particle: three coordinates and one to spare, so that one load brings all
-inline constexpr int max_kinds = 32;
 
 // Where the eight lanes come from.
 enum Layout : int {
@@ -63,11 +62,16 @@ struct Tangents {
   double *rows, *values, *lambda, *C_r;
 };
 
+// Of one kind.
+struct KindKernels {
+  void (*project[layouts])(const Forward&, int begin, int end);
+  void (*project_tangents)(const Tangents&, int begin, int end);
+  void (*project_vjp[layouts])(const Reverse&, int begin, int end);
+};
+
 struct KernelTable {
   const char* name;
-  void (*project[layouts][max_kinds])(const Forward&, int begin, int end);
-  void (*project_tangents[max_kinds])(const Tangents&, int begin, int end);
-  void (*project_vjp[layouts][max_kinds])(const Reverse&, int begin, int end);
+  const KindKernels* const* kinds;  // by number
   const sheetbend_blocks::Table* blocks;
   const sheetbend_blocks::PotentialKernels* potential;
   const sheetbend_points::Table* points;

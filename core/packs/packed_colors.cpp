@@ -199,9 +199,9 @@ void sweep(const PackPlan& plan, const sheetbend_packs::KernelTable& kernels, in
                                                own.values.directions(),
                                                own.lambda.directions(),
                                                color.damped ? own.C_r.directions() : nullptr};
-      run_kernel(kernels.project_tangents[color.kind], tangents, color.packs<T>(), threads, grain);
+      run_kernel(kernels.kinds[color.kind]->project_tangents, tangents, color.packs<T>(), threads, grain);
     }
-    run_kernel(kernels.project[layout_of<T>][color.kind], forward, color.packs<T>(), threads, grain);
+    run_kernel(kernels.kinds[color.kind]->project[layout_of<T>], forward, color.packs<T>(), threads, grain);
   }
 }
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/blocks/block_forward.h"
+#include "core/blocks/every_kind.h"
 #include "core/scalar/numbers.h"
 #include "core/solver/block_tangents.h"
 #include "core/solver/block_volume.h"
@@ -24,7 +25,7 @@ const sheetbend_blocks::Forward& forward_kernels(const sheetbend_packs::KernelTa
   if constexpr (has_compiled_kernels<T>)
     return (std::is_same_v<T, Pack> ? kernels.blocks->many : kernels.blocks->one).forward;
   else
-    return ForwardKernels<T>::all;
+    return ForwardKernels<T, ForwardOfEveryKind<T>>::all;
 }
 
 // Where number `part` of `parts` of a run's member stands: in a lane of a pack of members, or with its member's others.

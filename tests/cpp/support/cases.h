@@ -324,7 +324,11 @@ template <class... K>
 struct AsTypes<std::tuple<K...>> {
   using type = ::testing::Types<K...>;
 };
+#ifdef SHEETBEND_TEST_KIND  // alone, as tests/meta/test_new_kind.py does
+using RegistryTypes = ::testing::Types<SHEETBEND_TEST_KIND>;
+#else
 using RegistryTypes = AsTypes<Registry>::type;
+#endif
 
 struct KindName {
   template <class K>
