@@ -239,3 +239,21 @@ def test_a_fit_prints_what_it_assumes(tmp_path: Path) -> None:
     assert held in fitted.stdout.replace("\n", " ")
     assert "How ropes are held" in (tmp_path / "out" / "report.txt").read_text()
     assert held in " ".join((tmp_path / "out" / "fit.json").read_text().split())
+
+
+@pytest.mark.parametrize("clamp", ["clamp_start", "clamp_end"])
+@pytest.mark.parametrize("kind", ["rope", "rod"])
+def test_a_straight_one_points_where_its_clamp_does(tmp_path: Path, clamp: str, kind: str) -> None:
+    """It had pointed along x, and so began with a bend at its clamp."""
+    take(tmp_path)
+    file = config(tmp_path, "", kind, f"{clamp} = [0, 0, -1]")
+    file.write_text(file.read_text().replace('points = "recording"\n', ""))
+    scene = build(parse(file), tmp_path).experiments[0].scene
+    x = scene.positions[scene.ropes["rope"].particles]
+    assert x - x[0] == approx(np.outer(np.linspace(0.0, LENGTH, 13), [0.0, 0.0, -1.0]), abs=1e-12)
+
+
+def test_a_straight_rope_can_leave_its_clamp_at_an_angle() -> None:
+    scene = sb.Scene("angle")
+    rope = sb.add_rope(scene, length=1.0, density=0.1, EI=1e-3, clamp_start=(0, 0, -1), direction=(0, 1, 0))
+    assert scene.positions[rope.particles][-1] == approx([0.0, 1.0, 0.0])

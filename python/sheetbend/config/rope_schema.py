@@ -67,7 +67,9 @@ class Strand(Section):
     density: Finite = key(..., "mass per length", "kg/m", gt=0)
     EA: Finite | None = key(None, "axial stiffness; inextensible when left out", "N", gt=0)
     start: Vector = key([0.0, 0.0, 0.0], "where a straight one starts; at the marker of a grip there", "m")
-    direction: Vector = key([1.0, 0.0, 0.0], "where a straight one points")
+    direction: Vector | None = key(
+        None, "where a straight one points; as clamp_start, or else clamp_end, or along x, when left out"
+    )
     points: list[Vector] | Literal["recording"] | None = key(
         None,
         'initial shape as a polyline, or "recording": through the markers on it, as first measured '

@@ -43,6 +43,11 @@ def straight_or_given(
     return origin + np.linspace(0.0, length, segments + 1)[:, None] * along, float(length)
 
 
+def first_given(*values: ArrayLike | None) -> ArrayLike:
+    """The first of these that is not None."""
+    return next(value for value in values if value is not None)
+
+
 def unit_vector(field: str, vector: ArrayLike) -> Array:
     v = finite(field, vector, (3,), SceneError)
     size = np.linalg.norm(v)

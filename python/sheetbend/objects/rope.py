@@ -18,6 +18,7 @@ from .chain import (
     add_drag,
     add_links,
     add_masses,
+    first_given,
     first_value,
     straight_or_given,
     time_constants,
@@ -75,7 +76,7 @@ def add_rope(
     EA: float | None = None,
     EI: float | None = None,
     start: ArrayLike = (0.0, 0.0, 0.0),
-    direction: ArrayLike = (1.0, 0.0, 0.0),
+    direction: ArrayLike | None = None,
     points: ArrayLike | None = None,
     velocity: ArrayLike | None = None,
     stretch_damping: float | None = None,
@@ -103,7 +104,8 @@ def add_rope(
         density: kg/m; nodes carry it by their Voronoi length.
         EA: axial stiffness N; None = inextensible.
         EI: bending stiffness N m^2; None = no bending.
-        start, direction: a straight initial shape.
+        start, direction: a straight initial shape. By default it points as `clamp_start`, or else `clamp_end`, or
+            along x.
         points: (k, 3) m, an initial shape instead, resampled to equal links.
         velocity: (k, 3) m/s at `points`, which are then fitted to the length; at rest by default.
         stretch_damping, bend_damping: Kelvin-Voigt time constants s: the damping moment is EI times the constant times
@@ -126,7 +128,8 @@ def add_rope(
     Raises:
         SceneError: wrong or missing values; the message names the field.
     """
-    shape, length = straight_or_given(name, length, segments, start, direction, points)
+    along = first_given(direction, clamp_start, clamp_end, (1.0, 0.0, 0.0))
+    shape, length = straight_or_given(name, length, segments, start, along, points)
     grips = _grips(name, (grip_start, grip_end), (clamp_start, clamp_end))
     speeds = None
     if velocity is not None or any(grips):
