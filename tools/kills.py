@@ -116,7 +116,13 @@ def fitted(kind: str, seed: int, folder: Path, path: str | None, size: int) -> d
 
 
 ATTEMPTS = 12
-TIMED = ("seconds", "jacobian_seconds", "evaluations", "jacobians")  # optimizers choose by time how often to ask
+TIMED = (
+    "seconds",
+    "jacobian_seconds",
+    "evaluations",
+    "jacobians",
+    "judging",
+)  # optimizers choose by time how often to ask
 
 
 def without_times(value: Any) -> Any:
