@@ -116,7 +116,8 @@ def fitted(kind: str, seed: int, folder: Path, path: str | None, size: int) -> d
 
 
 ATTEMPTS = 12
-TIMED = ("seconds", "jacobian_seconds", "evaluations", "jacobians")  # optimizers choose by time how often to ask
+# Optimizers choose by time how often to ask.
+TIMED = ("seconds", "jacobian_seconds", "evaluations", "jacobians", "judging")
 
 
 def without_times(value: Any) -> Any:

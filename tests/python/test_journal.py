@@ -41,7 +41,8 @@ def problem_of(*experiments: sb.Experiment) -> FitProblem:
     return FitProblem(experiments, as_parameters(WANTED, experiments))
 
 
-TIMED = ("seconds", "jacobian_seconds", "evaluations", "jacobians")  # optimizers choose by time how often to ask
+# Optimizers choose by time how often to ask.
+TIMED = ("seconds", "jacobian_seconds", "evaluations", "jacobians", "judging")
 
 
 def bits(fit: sb.Fit) -> str:

@@ -64,7 +64,8 @@ upper = 1.0
 """
 OUT = Path("out/swing")
 
-TIMED = ("seconds", "jacobian_seconds", "evaluations", "jacobians")  # optimizers choose by time how often to ask
+# Optimizers choose by time how often to ask.
+TIMED = ("seconds", "jacobian_seconds", "evaluations", "jacobians", "judging")
 
 
 def record(seed: int) -> None:

@@ -41,6 +41,15 @@ def doubtful(estimates: Sequence[Estimate], doubts: Mapping[str, str]) -> tuple[
     )
 
 
+def together(*doubts: Mapping[str, str]) -> dict[str, str]:
+    """By parameter, all that speaks against it, the first doubt first."""
+    words: dict[str, list[str]] = {}
+    for each in doubts:
+        for name, why in each.items():
+            words.setdefault(name, []).append(why)
+    return {name: "; and ".join(why) for name, why in words.items()}
+
+
 def between_parts(
     problem: FitProblem, u: Array, judged: Identifiability, refinement: Refinement | None = None
 ) -> dict[str, str]:

@@ -12,18 +12,20 @@ import numpy as np
 
 from ..doubts.beginnings import Beginning, checked, of_beginnings
 from ..doubts.conclude import Elsewhere, judged_parameters, misfit, warnings_of, without_verdict
-from ..doubts.contradictions import between_parts, doubtful, elsewhere, held_out_motion
+from ..doubts.contradictions import between_parts, doubtful, elsewhere, held_out_motion, together
 from ..doubts.driven_noise import doubts
 from ..doubts.floors import at_floor_of_sweeps
 from ..doubts.given import check_given, half_widths, premises
 from ..doubts.leave_one_out import MEANING, companions, each_left_out
 from ..doubts.losses import loss_doubts
 from ..doubts.misread import misread
+from ..doubts.missing_loss import missing_loss
 from ..doubts.prediction import Comparison, compare, predicted_values
 from ..doubts.unexplained import unexplained
 from ..errors import InputError
 from ..experiment.clock import outside, told_clocks
 from ..experiment.experiment import Experiment
+from ..minimum.counts import counted
 from ..minimum.discretization import Refinement, settled, to_the_limit, wanted_refinement
 from ..minimum.fine_meshes import at_the_limit
 from ..minimum.growth import Growth, growths
@@ -166,7 +168,7 @@ def fit(
     require("scipy.special", "fit")  # of intervals, behind all the work
     refinement = wanted_refinement(refine)
     search = Search(optimizer, starts, windows, max_iterations, tolerance, progress)
-    began = time.perf_counter()
+    began, before = time.perf_counter(), counted()
     fitted = [e for e in experiments if e.predict is None]
     if not fitted:
         raise InputError(
@@ -217,6 +219,7 @@ def fit(
             parts = of_beginnings(problem, best.u, judged, begun, refinement)
             parts |= between_parts(at.problem, at.u, judged, refinement)
             if not lost:
+                parts = together(missing_loss(at.problem, at.u, (problem, best.u)), parts)
                 doubted = doubts(at.problem, at.u, judged) + loss_doubts(at.problem, at.u, judged)
         return _Conclusion(at, tuple(every), judged, lower, *predicted, doubted + unknown, rests_on, parts)
 
@@ -247,6 +250,7 @@ def fit(
     values = end.values | problem.parameters.to_physical(limit)
     errors = told_clocks(errors, end.experiments, end.values, estimates)
     shifted = tuple(outside(end.experiments, end.values))
+    evaluations, jacobians = sum(m.evaluations for m in ends), sum(m.jacobians for m in ends)
     result = FitResult(
         estimates=estimates,
         recordings=errors,
@@ -284,8 +288,9 @@ def fit(
         forces=tuple(row for c in comparisons for one in c.forces for row in one.fits()),
         growth=_growth(found.growths, grown),
         windows=best.windows,
-        evaluations=sum(m.evaluations for m in ends),
-        jacobians=sum(m.jacobians for m in ends),
+        evaluations=evaluations,
+        jacobians=jacobians,
+        judging=(counted()[0] - before[0] - evaluations, counted()[1] - before[1] - jacobians),
         warnings=warnings_of(ends, interrupted, problem, estimates)
         + end.doubts
         + at.warnings

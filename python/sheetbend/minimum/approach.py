@@ -17,6 +17,7 @@ import numpy as np
 
 from ..arrays.timeseries import Array
 from ..quantities.parameters import Parameters
+from .counts import counted
 from .problem import FitProblem
 
 LOG_STEP = math.log(10.0)
@@ -71,9 +72,11 @@ class Approach:
         self.cost, self._r, self._J = self._evaluated(self.u, True)
 
     def _evaluated(self, u: Array, jacobian: bool) -> tuple[float, Array, Array | None]:
+        before = counted()
         ok, r, J = self.problem.evaluate(u, jacobian)
-        self._tally.evaluations += 1
-        self._tally.jacobians += jacobian
+        made = counted()
+        self._tally.evaluations += made[0] - before[0]
+        self._tally.jacobians += made[1] - before[1]
         cost = 0.5 * float(r @ r) if ok else math.inf
         return (cost, r, J if jacobian else None) if math.isfinite(cost) else (math.inf, r, None)
 

@@ -17,6 +17,7 @@ from ..optional import require
 from ..quantities.wording import short
 from ..statistics.gauge import RANK_TOLERANCE
 from .approach import step_limits
+from .counts import count, counted
 from .problem import FitProblem
 
 OPTIMIZERS = ("auto", "ceres", "scipy")
@@ -233,6 +234,7 @@ def _ceres_holding(
         )
     except KeyboardInterrupt:
         interrupted = True
+    count(out.get("evaluations", 0), out.get("jacobians", 0))  # which do not come through the problem
     if interrupted or out["stopped"]:
         return Minimum(
             best.u,
@@ -265,25 +267,24 @@ def _scipy(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: f
     limits, longest = problem.parameters.limits(), step_limits(problem.parameters)
     last: dict[str, Any] = {"u": None}
     left: np.ndarray | None = None  # where the step began
-    count = jacobians = 0
+    tried, before = 0, counted()
 
     def evaluated(at: np.ndarray, jacobian: bool) -> dict[str, Any]:
-        nonlocal count, jacobians, left
+        nonlocal tried, left
         too_far = left is not None and bool((np.abs(at - left) > longest).any())
         if not jacobian and (too_far or (at < limits[0]).any() or (at > limits[1]).any()):
             return {"r": np.full(problem.core.rows, np.inf), "J": None}  # SciPy shortens its step
         if jacobian:
             left = at.copy()
         if last["u"] is None or not np.array_equal(last["u"], at) or (jacobian and last["J"] is None):
-            count += 1
+            tried += 1
             jacobian |= problem.cheap_jacobian  # most steps are taken, and then it is needed anyway
-            jacobians += jacobian
             ok, r, J = problem.evaluate(at, jacobian)
             last.update(
                 u=at.copy(), r=r if ok else np.full(problem.core.rows, np.inf), J=J if jacobian and ok else None
             )
             if ok:
-                best(count, 0.5 * float(r @ r), at)
+                best(tried, 0.5 * float(r @ r), at)
         return last
 
     try:
@@ -299,7 +300,9 @@ def _scipy(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: f
             max_nfev=max_iterations,
         )
     except KeyboardInterrupt:
-        words = "interrupted: the best point so far"
-        return Minimum(best.u, best.cost, count, count, False, True, words, jacobians=jacobians)
-    found = (out.x, float(out.cost), int(out.njev), count, out.status > 0, False, out.message)
-    return Minimum(*found, jacobians=jacobians)
+        made, words = counted(), "interrupted: the best point so far"
+        counts = tried, made[0] - before[0]
+        return Minimum(best.u, best.cost, *counts, False, True, words, jacobians=made[1] - before[1])
+    made = counted()
+    found = (out.x, float(out.cost), int(out.njev), made[0] - before[0], out.status > 0, False, out.message)
+    return Minimum(*found, jacobians=made[1] - before[1])

@@ -17,6 +17,7 @@ from ..quantities.quantities import Quantity
 from ..recording.recording import Recording
 from ..statistics.covariance import Layout
 from . import content
+from .counts import count
 from .journal import Evaluator
 
 ParameterLike = Parameter | Mapping[str, Any] | None
@@ -234,6 +235,7 @@ class FitProblem:
         if jacobian and self._last is not None and np.array_equal(self._last[0], u):
             return self._last[1]
         found, seconds = self.evaluator(u, jacobian)
+        count(1, int(jacobian))
         if found[0] and seconds is not None:
             self.seconds[jacobian] = seconds
         if jacobian:
@@ -273,15 +275,22 @@ class FitProblem:
         """(knots, markers, 3) m by name of experiment, what is added at u to the markers that its scene follows; of
         those that estimate it."""
         found: dict[str, np.ndarray] = {}
-        if not self.estimates_corrections:
-            return found
-        rows = self.evaluate(u)[1][self.prior_rows[1] :]
-        for e, r in zip(self.experiments, self.recordings, strict=True):
-            correction = e.correction(r)
+        for i, own in self.correction_rows.items():
+            e, correction = self.experiments[i], self.experiments[i].correction(self.recordings[i])
             if correction is not None and e.driven_noise is not None:
-                count = int(np.prod(correction.shape))
-                found[e.name] = e.driven_noise * rows[:count].reshape(correction.shape)
-                rows = rows[count:]
+                found[e.name] = e.driven_noise * self.evaluate(u)[1][own].reshape(correction.shape)
+        return found
+
+    @property
+    def correction_rows(self) -> dict[int, slice]:
+        """The rows that corrections leave, by the place of their experiment."""
+        found: dict[int, slice] = {}
+        end = self.prior_rows[1]
+        if self.estimates_corrections:
+            for i, (e, r) in enumerate(zip(self.experiments, self.recordings, strict=True)):
+                correction = e.correction(r)
+                if correction is not None and e.driven_noise is not None:
+                    found[i] = slice(end, end := end + int(np.prod(correction.shape)))
         return found
 
     @property

@@ -50,6 +50,8 @@ class FitResult(FitData):
         windows: s, the lengths that were fitted first, as given or chosen.
         evaluations, jacobians: how often all experiments were simulated, and how often of these with a Jacobian, over
             all starts and windows, up to the minimum.
+        judging: how often all experiments, or some of them, were simulated besides, and how often of these with a
+            Jacobian: for beginnings, limits, refits, profiles and doubts.
         forces: errors per force sensor.
         premises: numbers that the fit took as given, and what an error in each moves.
         warnings: what a reader must know before using the numbers.

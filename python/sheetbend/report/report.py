@@ -305,6 +305,9 @@ def _course(result: FitData) -> Section:
         notes.append(("at the start", f"{result.first_cost:.6g}{fell}"))
     if result.evaluations:
         notes.append(("simulations", f"{result.evaluations:,}, {result.jacobians:,} of them with a Jacobian"))
+    if result.judging[0] > 0:
+        more = f"{result.judging[0]:,}, {result.judging[1]:,} of them with a Jacobian"
+        notes.append(("besides, for intervals and doubts", more))
     if result.windows:
         notes.append(("windows fitted first", ", ".join(f"{length:.3g}" for length in result.windows) + " s"))
     notes += [(f"growth in {g.name}", _grown(g)) for g in result.growth if (g.largest[1] or math.inf) > GROWTH_SHOWN]

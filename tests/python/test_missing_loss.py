@@ -1,0 +1,169 @@
+"""Fits whose model lacks a loss of the recording, or has one too many."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from sheetbend.doubts.missing_loss import EXPLAINS, LEVEL, asked_for, of_more_loss
+from sheetbend.minimum.problem import FitProblem, as_parameters
+
+SIGMA = 3e-4
+SOLVER = sb.Solver(h=1 / 400)
+AT = [2, 4, 6, 8]
+
+
+def rope(**losses: float) -> sb.Scene:
+    return sb.rope(0.5, 8, density=0.05, EI=2e-3, clamp_start=(1, 0, 0), **losses)
+
+
+def fall(model: sb.Scene, **losses: float) -> sb.Experiment:
+    """A model and the recording of a clamped rope that falls for 1.5 s, with noise."""
+    times = np.arange(151) / 100
+    x = sb.simulate(rope(**losses), times, SOLVER).positions[:, AT]
+    x = x + SIGMA * np.random.default_rng(0).standard_normal(x.shape)
+    recording = sb.Recording(positions=x, times=times, name="fall")
+    places = [sb.on_particle(i) for i in AT]
+    return sb.Experiment(scene=model, recording=recording, markers=places, solver=SOLVER, sigma=SIGMA)
+
+
+def fitted(e: sb.Experiment | list[sb.Experiment], *names: str) -> sb.Fit:
+    return sb.fit(e, parameters=names, profiles=False, beginnings=False)
+
+
+@pytest.mark.parametrize("told", [SIGMA, 0.01])
+def test_a_model_without_a_damping_of_its_recording_is_doubtful(told: float) -> None:
+    """EI was "identified", 1.5 half-widths off, at a reduced chi-square of 357. What was told of the noise does not
+    matter."""
+    e = replace(fall(rope(drag_linear=0.01), drag_linear=0.005, bend_damping=0.003), sigma=told)
+    found = fitted(e, "rope_EI", "rope_drag_linear")
+    EI = found["rope_EI"]
+    assert EI.half_width is not None and abs(EI.value - 2e-3) > EI.half_width
+    for one in found.result.estimates:
+        assert one.verdict == "doubtful" and "fall loses energy that the model does not" in one.words
+        assert "a damping would explain 63 % of what the fit leaves" in one.words
+
+
+def test_a_model_that_loses_more_than_its_recording_is_doubtful() -> None:
+    """Backward Euler damps the model by itself."""
+    e = fall(rope(drag_linear=0.01), drag_linear=0.005)
+    found = fitted(replace(e, solver=replace(SOLVER, integrator="bdf1")), "rope_EI")
+    EI = found["rope_EI"]
+    assert EI.verdict == "doubtful" and "the model loses more energy than fall" in EI.words
+
+
+@pytest.mark.parametrize("losses", [{}, {"bend_damping": 0.01}])
+def test_a_model_with_the_losses_of_its_recording_is_not(losses: dict[str, float]) -> None:
+    e = fall(rope(drag_linear=0.01, **losses), drag_linear=0.005, **losses)
+    found = fitted(e, "rope_EI", "rope_drag_linear")
+    assert [one.verdict for one in found.result.estimates] == ["identified", "identified"]
+
+
+def test_another_error_of_the_model_is_not_taken_for_a_loss() -> None:
+    """A clamp that is turned by 6 degrees leaves more than a missing damping does, but not in its direction."""
+    e = fall(rope(drag_linear=0.01, bend_damping=0.01), drag_linear=0.005, bend_damping=0.01)
+    turned = sb.rope(0.5, 8, density=0.05, EI=2e-3, clamp_start=(1, 0, 0.1), drag_linear=0.01, bend_damping=0.01)
+    found = fitted(replace(e, scene=turned), "rope_EI", "rope_drag_linear")
+    assert found.result.misfit is not None and found.result.misfit.reduced_chi_square > 100
+    assert not any("energy" in one.words for one in found.result.estimates)
+
+
+def test_what_stands_still_loses_nothing() -> None:
+    """Static experiments beside a motion are left alone, and a fit of them only is not tested."""
+    scene = rope(drag_linear=0.01)
+    hangs = sb.equilibrium(scene).positions[AT]
+    rest = sb.Experiment(
+        scene=scene,
+        recording=sb.Recording(positions=hangs[None] + 1e-3, times=[0.0], name="rest"),
+        markers=[sb.on_particle(i) for i in AT],
+        solver=SOLVER,
+        sigma=SIGMA,
+        static=True,
+    )
+    alone = fitted(rest, "rope_EI")
+    assert "energy" not in alone["rope_EI"].words
+    both = fitted([rest, fall(scene, drag_linear=0.005, bend_damping=0.003)], "rope_EI", "rope_drag_linear")
+    assert "fall loses energy" in both["rope_EI"].words
+
+
+def two(first: float, second: float, held: float) -> list[sb.Experiment]:
+    """Two falls with bend damping; the model of the first has none, that of the second holds a given one."""
+    models = rope(drag_linear=0.01), rope(drag_linear=0.01, bend_damping=held)
+    one, other = (fall(m, drag_linear=0.005, bend_damping=d) for m, d in zip(models, (first, second), strict=True))
+    return [one, replace(other, name="again")]
+
+
+def test_motions_that_share_a_parameter_lack_a_loss_together_or_not_at_all() -> None:
+    """Where one asks for more of it and the other for less, something else is wrong. Each is judged apart too."""
+    e = two(0.003, 0.002, 0.006)
+    shared = fitted(e, "rope_EI", "rope_drag_linear")
+    assert not any("energy" in one.words for one in shared.result.estimates)
+    private = {name: {"private": True} for name in ("rope_EI", "rope_drag_linear")}
+    apart = sb.fit(e, parameters=private, profiles=False, beginnings=False)
+    assert "fall loses energy" in apart["rope_EI[fall]"].words and apart["rope_EI[again]"].verdict == "identified"
+
+
+def shaken(model: dict[str, float], **given: float) -> sb.Experiment:
+    """A rope that hangs from a recorded hand, whose noise the fit corrects."""
+    times = np.arange(61) / 100
+    hand = 0.03 * np.minimum(times / 0.2, 1.0)[:, None] * np.sin(np.outer(2 * np.pi * times, (1.4, 2.1, 1.1)))
+    hand -= hand[0]
+
+    def hung(motion: np.ndarray, losses: dict[str, float]) -> sb.Scene:
+        scene, line = sb.Scene("rope"), [[0, 0, 0], [0, 0, -0.4]]
+        made = sb.add_rope(scene, "rope", points=line, segments=8, density=0.05, EI=2e-3, **losses)
+        scene.follow(made.particles[:1], times, motion[:, None], ["hand"])
+        return scene
+
+    true = sb.simulate(hung(hand, given), times, SOLVER).positions[:, AT]
+    positions = np.concatenate([hand[:, None], true], axis=1)
+    positions += SIGMA * np.random.default_rng(0).standard_normal(positions.shape)
+    names = ("hand", *(f"m{i}" for i in AT))
+    recording = sb.Recording(positions=positions, times=times, markers=names, name="shaken")
+    scene = hung(positions[:, 0], model)
+    at = [None, *(sb.on_particle(int(scene.ropes["rope"].particles[i])) for i in AT)]
+    return sb.Experiment(scene=scene, recording=recording, markers=at, solver=SOLVER, sigma=SIGMA, driven_sigma=SIGMA)
+
+
+def test_corrected_driven_markers_do_not_hide_a_missing_loss() -> None:
+    """What corrections of the hand could take up of a loss is no evidence of it; the rest is."""
+    lacking = fitted(shaken({"drag_linear": 0.005}, drag_linear=0.005, bend_damping=0.003), "rope_EI")
+    assert lacking["rope_EI"].verdict == "doubtful" and "shaken loses energy" in lacking["rope_EI"].words
+    whole = {"drag_linear": 0.005, "bend_damping": 0.003}
+    assert fitted(shaken(whole, **whole), "rope_EI")["rope_EI"].verdict == "identified"
+
+
+def test_its_simulation_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    e = fall(rope(drag_linear=0.01), drag_linear=0.005)
+    with_it = fitted(e, "rope_EI").result
+    monkeypatch.setattr("sheetbend.fitting.fit.missing_loss", lambda *given: {})
+    without = fitted(e, "rope_EI").result
+    assert with_it.judging == (without.judging[0] + 1, without.judging[1])
+    assert f"besides, for intervals and doubts: {with_it.judging[0]}, " in with_it.report()
+
+
+def test_noise_is_hardly_ever_taken_for_a_loss() -> None:
+    """White and correlated (0.8) residuals of a right model: at most 1 of 100 each."""
+    times = np.arange(151) / 100
+    scene, places = rope(drag_linear=0.005), [sb.on_particle(i) for i in AT]
+    x = sb.simulate(scene, times, SOLVER).positions[:, AT]
+    e = sb.Experiment(scene=scene, recording=sb.Recording(positions=x, times=times), markers=places, solver=SOLVER)
+    problem = FitProblem([e], as_parameters(["rope_EI", "rope_drag_linear"], [e]))
+    u = problem.parameters.initial()
+    J, column, layout = problem.evaluate(u)[2], of_more_loss(problem, u), problem.rows_layout()
+    assert column is not None
+    q, _ = np.linalg.qr(J)
+    every, noise = np.ones(len(column), dtype=bool), np.random.default_rng(0)
+    for rho in (0.0, 0.8):
+        found = []
+        for _ in range(100):
+            errors = noise.standard_normal(x.shape)
+            for k in range(1, len(errors)):
+                errors[k] = rho * errors[k - 1] + np.sqrt(1 - rho**2) * errors[k]
+            left = errors.ravel() - q @ (q.T @ errors.ravel())
+            asked = asked_for(left, J, column, every, layout)
+            found.append((1.0, 0.0) if asked is None else (asked.chance, asked.explained))
+        assert np.mean([chance < 0.05 for chance, _ in found]) < 0.1
+        assert sum(chance < LEVEL and explained > EXPLAINS for chance, explained in found) <= 1
