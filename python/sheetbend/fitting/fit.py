@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..doubts.beginnings import Beginning, checked, of_beginnings
-from ..doubts.conclude import Elsewhere, judged_parameters, misfit, warnings_of, without_verdict
+from ..doubts.conclude import judged_parameters, misfit, warnings_of, without_verdict
 from ..doubts.contradictions import between_parts, doubtful, elsewhere, held_out_motion
 from ..doubts.driven_noise import doubts
 from ..doubts.floors import at_floor_of_sweeps
@@ -20,6 +20,7 @@ from ..doubts.leave_one_out import MEANING, companions, each_left_out
 from ..doubts.losses import loss_doubts
 from ..doubts.misread import misread
 from ..doubts.prediction import Comparison, compare, predicted_values
+from ..doubts.profiles import Elsewhere
 from ..doubts.unexplained import unexplained
 from ..errors import InputError
 from ..experiment.clock import outside, told_clocks
