@@ -10,8 +10,9 @@ import pytest
 import sheetbend as sb
 from pytest import approx
 from sheetbend.cli.outcome import Code, code_of
-from sheetbend.doubts.conclude import Elsewhere, judged_parameters, without_verdict
+from sheetbend.doubts.conclude import judged_parameters, without_verdict
 from sheetbend.doubts.contradictions import elsewhere, held_out_motion
+from sheetbend.doubts.profiles import Elsewhere
 from sheetbend.doubts.stationary import no_minimum
 from sheetbend.minimum.optimizers import Minimum
 from sheetbend.minimum.problem import FitProblem, as_parameters

@@ -2,47 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ..arrays.timeseries import Array
-from ..errors import SheetbendError
 from ..minimum.growth import Growth
-from ..minimum.optimizers import Minimum, refit
+from ..minimum.optimizers import Minimum
 from ..minimum.problem import FitProblem
 from ..quantities.parameters import Parameters
 from ..quantities.wording import short
 from ..result.result import UNSOUND, Estimate, Misfit
-from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.identifiability import Identifiability, identify
 from ..statistics.intervals import open_estimate, ran_off
 from ..statistics.judge import Nuisance
 from .floors import solver_floors
+from .profiles import Elsewhere, Profiles
 from .roughness import rough_parameters
 from .stationary import no_minimum
 
-PROFILE_TOLERANCE = 0.02
-"""Of the cost of one row: what an interval's end rises by is a hundred times that. A relative tolerance of all rows
-together would waste steps on few rows, and stop too early on many."""
-NOISELESS = 1e-18  # of sigma squared: data without noise, whose residuals are rounding errors
 INACCURATE = 0.5  # a start whose cost exceeds the best by this share ended elsewhere
-
-
-@dataclass(frozen=True)
-class Elsewhere:
-    """Where another search of the same minimum ended.
-
-    Attributes:
-        rise: of the cost there over that at the estimate.
-        values: of all parameters.
-        how: which search it was, in words.
-    """
-
-    rise: float
-    values: Mapping[str, float]
-    how: str
 
 
 def without_verdict(problem: FitProblem, end: Minimum, growth: Sequence[Growth] = ()) -> dict[str, Estimate]:
@@ -89,8 +69,7 @@ def judged_parameters(
     _, r, J = problem.evaluate_exactly(u)
     rows, behind = problem.prior_rows
     asked, end = fitted or (problem, u)
-    moved, (lower, upper) = u - end, asked.parameters.bounds()
-    profiles = None if refitter is None or len(u) == 1 else _Profiles(asked, end, refitter)
+    profiles = None if refitter is None or len(u) == 1 else Profiles(asked, end, refitter, u - end)
     judged = identify(
         problem.parameters,
         u,
@@ -100,8 +79,8 @@ def judged_parameters(
         floors=solver_floors(problem.experiments, problem.parameters),
         discretization=refined,
         systematic=systematic,
-        profile=None if profiles is None else _shifted(profiles, asked.parameters, moved),
-        cost=lambda at: asked.cost(np.clip(at - moved, lower, upper)),
+        profile=profiles,
+        path=None if profiles is None else profiles.path,
         nuisance=Nuisance(J[behind:], sum(map(problem.core.absorbed, range(len(problem.experiments))))),
     )
     return judged, () if profiles is None else tuple(profiles.lower)
@@ -152,79 +131,6 @@ def misfit(problem: FitProblem, u: Array) -> Misfit:
         largest_sigma=float(sigma.max()),
         model_error=float(np.sqrt(max(beyond, 0.0))),
     )
-
-
-def _shifted(
-    profile: Callable[[str, float], float], parameters: Parameters, moved: Array
-) -> Callable[[str, float], float]:
-    """The profile around an estimate that was moved, internally."""
-
-    def cost(name: str, value: float) -> float:
-        parameter, by = parameters[name], moved[parameters.free.index(name)]
-        before = value if by == 0.0 else parameter.to_physical(parameter.to_internal(value) - by)
-        return profile(name, float(np.clip(before, parameter.lower, parameter.upper)))
-
-    return cost
-
-
-class _Profiles:
-    """(name, value) -> cost with that parameter held and the others refitted, of the experiments that it reaches;
-    infinite where these have no answer."""
-
-    def __init__(self, problem: FitProblem, u: Array, refitter: str) -> None:
-        self.problem, self.refitter = problem, refitter
-        self.values = problem.parameters.to_physical(u)
-        self.ends: dict[str, dict[float, Array]] = {}  # by name and value held: where the others ended, all internal
-        self.here: dict[str, tuple[float, float]] = {}  # cost of the part at the estimate, and what is lower than that
-        self.lower: list[Elsewhere] = []
-
-    def __call__(self, name: str, value: float) -> float:
-        part, parameter = self.problem.around(name), self.problem.parameters[name]
-        if part.parameters.free == (name,):
-            return part.cost(part.parameters.to_internal({name: value}))
-        held = part.holding(name, value)
-        mean, sd = parameter.prior or (value, 1.0)
-        pull = (parameter.to_internal(value) - parameter.to_internal(mean)) / sd
-        at = parameter.to_internal(value)
-        start = {parameter.to_internal(self.values[name]): held.parameters.to_internal(self.values)}
-        known = self.ends.setdefault(name, start)
-        start_at, cost = self._nearest(held, part, name, at)
-        if not np.isfinite(cost):
-            return np.inf
-        try:
-            end = refit(held, start_at, self.refitter, 50, min(PROFILE_TOLERANCE / part.core.data_rows, 1e-5))
-        except SheetbendError:
-            return np.inf
-        known[at] = end.u
-        cost = end.cost + 0.5 * pull**2
-        self._compare(name, value, part, held.parameters.to_physical(end.u), cost)
-        return cost
-
-    def _nearest(self, held: FitProblem, part: FitProblem, name: str, at: float) -> tuple[Array, float]:
-        """Where to begin with a parameter held at an internal value, and the cost there: where the others ended at the
-        nearest value known, or on the line through two of these (of the linear picture, where there is but one)."""
-        known = self.ends[name]
-        near, *others = sorted(known, key=lambda other: abs(other - at))
-        if others:
-            slope = (known[others[0]] - known[near]) / (others[0] - near)
-        else:
-            _, _, J = part.evaluate(part.parameters.to_internal(self.values))
-            column = part.parameters.free.index(name)
-            rest = np.delete(J, column, axis=1)
-            size = np.maximum(np.linalg.norm(rest, axis=0), np.finfo(float).tiny)
-            slope = -np.linalg.lstsq(rest / size, J[:, column], rcond=RANK_TOLERANCE)[0] / size
-        ahead = np.clip(known[near] + (at - near) * slope, *held.parameters.limits())
-        return min(((u, held.cost(u)) for u in (ahead, known[near])), key=lambda pair: pair[1])
-
-    def _compare(self, name: str, value: float, part: FitProblem, there: Mapping[str, float], cost: float) -> None:
-        """Keep an end that is lower than the estimate by more than its residual variance."""
-        if name not in self.here:
-            here = part.cost(part.parameters.to_internal(self.values))
-            self.here[name] = (here, here / max(part.core.data_rows - len(part.parameters.free), 1))
-        here, variance = self.here[name]
-        if cost < here - variance and variance > NOISELESS:
-            whole = {**self.values, **there, name: value}
-            self.lower.append(Elsewhere(cost - here, whole, f"a fit with {name} held"))
 
 
 def warnings_of(

@@ -19,8 +19,8 @@ from ..result.result import UNSOUND, Estimate, RecordingFit
 from ..statistics.blocks import Difference, Split, contradiction
 from ..statistics.identifiability import Identifiability
 from ..statistics.profile import FARTHEST
-from .conclude import NOISELESS, Elsewhere
 from .prediction import Comparison
+from .profiles import NOISELESS, Elsewhere
 
 CLAIMS = ("identified", "weak", "one-sided")  # verdicts that can be contradicted
 ORDINALS = ("first", "second", "third")

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..doubts.beginnings import Beginning, checked, of_beginnings
-from ..doubts.conclude import Elsewhere, judged_parameters, misfit, warnings_of, without_verdict
+from ..doubts.conclude import judged_parameters, misfit, warnings_of, without_verdict
 from ..doubts.contradictions import between_parts, doubtful, elsewhere, held_out_motion, together
 from ..doubts.driven_noise import doubts
 from ..doubts.floors import at_floor_of_sweeps
@@ -21,6 +21,7 @@ from ..doubts.losses import loss_doubts
 from ..doubts.misread import misread
 from ..doubts.missing_loss import missing_loss
 from ..doubts.prediction import Comparison, compare, predicted_values
+from ..doubts.profiles import Elsewhere
 from ..doubts.unexplained import unexplained
 from ..errors import InputError
 from ..experiment.clock import outside, told_clocks

@@ -184,6 +184,18 @@ def autocorrelation(residuals: Array, layout: Layout, lags: int = _MAX_ORDER) ->
     return np.asarray(sums[1:] / sums[0])
 
 
+@dataclass(frozen=True)
+class _Part:
+    """The channels of one kind in one recording: where they are among all, p columns of rows as (frames, p, channels),
+    zero where there is no row, and the mask (frames, 1, channels) of rows."""
+
+    recording: int
+    kind: int
+    channels: Integers
+    columns: Array
+    mask: Array
+
+
 class _Grid:
     """Rows laid out as (frames, channels) arrays, zero where there is no row."""
 
@@ -217,6 +229,23 @@ class _Grid:
         array = np.zeros((self.frames, len(self.recordings)))
         array[self._frame, self._channel] = column
         return array
+
+    def parts(self, columns: Array, kinds: Integers) -> list[_Part]:
+        """(rows, p) by recording and kind of channel."""
+        owner, index = np.unique(np.stack([self.recordings, kinds]), axis=1, return_inverse=True)
+        part_of, place, found = np.ravel(index), np.zeros(len(kinds), dtype=int), []
+        order = np.argsort(part_of[self._channel], kind="stable")
+        ends = np.searchsorted(part_of[self._channel][order], np.arange(owner.shape[1] + 1))
+        frames = np.zeros(owner[0].max() + 1, dtype=int)
+        np.maximum.at(frames, self._recording, self._frame + 1)
+        for number, (recording, kind) in enumerate(owner.T.tolist()):
+            channels, rows = np.flatnonzero(part_of == number), order[ends[number] : ends[number + 1]]
+            place[channels] = np.arange(len(channels))
+            made = np.zeros((frames[recording], columns.shape[1], len(channels)))
+            made[self._frame[rows], :, place[self._channel[rows]]] = columns[rows]
+            mask = self.mask[: len(made), None, channels]
+            found.append(_Part(recording, kind, channels, made, mask))
+        return found
 
     def scores(self, influence: Array) -> list[Array]:
         """Per recording (frames, p): what each frame adds to the estimate, summed over channels."""
@@ -252,7 +281,7 @@ def _root(rows: Array) -> Array:
 def _spectral(grid: _Grid, jacobian: Array, root: Array, kinds: Integers) -> tuple[Array, float]:
     """B J' Omega J B with B = root root', Omega = C (x) rho with one rho for each kind of channel, (channels,), and the
     autocorrelation time of the first rho in frames."""
-    columns = [grid.dense(column) for column in (jacobian @ root).T]  # H = Q Q' takes Omega to cov(residuals)
+    parts = grid.parts(jacobian @ root, kinds)  # H = Q Q' takes Omega to cov(residuals)
     mixing = grid.channel_covariance(kinds)
     most = min(_MAX_ORDER, int(10 * np.log10(grid.frames)), grid.frames // 4)
     own = [kinds == kind for kind in range(int(kinds.max()) + 1)]
@@ -261,8 +290,8 @@ def _spectral(grid: _Grid, jacobian: Array, root: Array, kinds: Integers) -> tup
     orders, observed = [], []
     for mine, count in zip(own, rows, strict=True):
         recursion = _levinson(grid.lags(power[:, mine].sum(1), most) / count)
-        part = mixing[np.ix_(mine, mine)]
-        worth = count * np.trace(part) ** 2 / (len(part) * (part**2).sum())  # rows that are worth an independent one
+        alike = mixing[np.ix_(mine, mine)]
+        worth = count * np.trace(alike) ** 2 / (len(alike) * (alike**2).sum())  # rows that are worth an independent one
         price = np.log(worth) if len(own) == 1 else 2.0  # a slow part under white noise takes many coefficients
         criteria = [worth * np.log(noise) + price * len(a) for a, noise in recursion]
         orders.append(int(np.argmin(criteria)))
@@ -271,10 +300,12 @@ def _spectral(grid: _Grid, jacobian: Array, root: Array, kinds: Integers) -> tup
     pairs = [grid.lags(seen[:, mine] @ np.diag(mixing)[mine], most) for mine in own]
     spectra = observed
     for step in range(_CORRECTIONS + 1):
-        spread = [_colored(grid, column, spectra, own, mixing) for column in columns]
-        inner = np.array([[(q * a).sum() for a in spread] for q in columns])
+        spread = [_colored(part, parts, spectra, grid.length, mixing) for part in parts]
+        inner = np.zeros_like(root)
+        for part, a in zip(parts, spread, strict=True):
+            inner += np.tensordot(part.columns, a, ([0, 2], [0, 2]))
         if step < _CORRECTIONS:
-            expected = _expected_lags(grid, spectra, own, pairs, columns, spread, inner)
+            expected = _expected_lags(grid, spectra, pairs, parts, spread, inner)
             spectra = [
                 spectrum * first / _spectrum(*_levinson(lags / count)[order], grid.length)
                 for spectrum, first, lags, count, order in zip(spectra, observed, expected, rows, orders, strict=True)
@@ -283,23 +314,27 @@ def _spectral(grid: _Grid, jacobian: Array, root: Array, kinds: Integers) -> tup
     return root @ (inner + inner.T) @ root.T / 2, time
 
 
-def _colored(grid: _Grid, column: Array, spectra: list[Array], own: list[Any], mixing: Array) -> Array:
-    """Omega times a (frames, channels) array; between kinds with the geometric mean of their spectra."""
-    transformed, found = grid.transform(column), np.zeros_like(column)
-    for mine, spectrum in zip(own, spectra, strict=True):
-        for others, other in zip(own, spectra, strict=True):
-            shared = (spectrum if other is spectrum else np.sqrt(spectrum * other))[:, None]
-            filtered = np.fft.irfft(transformed[:, others] * shared, grid.length, axis=0)[: grid.frames]
-            found[:, mine] += filtered @ mixing[np.ix_(others, mine)]
-    return grid.mask * found
+def _colored(part: _Part, parts: list[_Part], spectra: list[Array], length: int, mixing: Array) -> Array:
+    """That part of Omega times the columns; between kinds with the geometric mean of their spectra of that length."""
+    frames = len(part.columns)
+    padded = 2 << (frames - 1).bit_length()
+    total = np.zeros((padded // 2 + 1, *part.columns.shape[1:]), dtype=complex)
+    for other in parts:
+        if other.recording != part.recording:
+            continue
+        mine, its = spectra[part.kind], spectra[other.kind]
+        kernel = np.fft.irfft(mine if its is mine else np.sqrt(mine * its), length)[:frames]
+        around = np.concatenate([kernel, np.zeros(padded - 2 * frames + 1), kernel[:0:-1]])
+        mixed = other.columns @ mixing[np.ix_(other.channels, part.channels)]
+        total += np.fft.rfft(mixed, padded, axis=0) * np.fft.rfft(around).real[:, None, None]
+    return np.asarray(part.mask * np.fft.irfft(total, padded, axis=0)[:frames])
 
 
 def _expected_lags(
     grid: _Grid,
     spectra: list[Array],
-    own: list[Any],
     pairs: list[Array],
-    columns: list[Array],
+    parts: list[_Part],
     spread: list[Array],
     inner: Array,
 ) -> list[Array]:
@@ -307,16 +342,18 @@ def _expected_lags(
 
     (1 - H) Omega (1 - H)' = Omega - Q A' - A Q' + Q G Q', A = Omega Q, G = Q' A, summed along its diagonals.
     """
-    gains, turn = np.linalg.eigh((inner + inner.T) / 2)
-    power = np.zeros((len(spectra[0]), len(grid.recordings)))
-    for gain, weights in zip(gains, turn.T, strict=True):
-        q = grid.transform(sum(w * column for w, column in zip(weights, columns, strict=True)))
-        a = grid.transform(sum(w * column for w, column in zip(weights, spread, strict=True)))
-        power += gain * np.abs(q) ** 2 - 2 * (q.conj() * a).real
-    return [
-        known * grid.lags(spectrum, len(known) - 1) + grid.lags(power[:, mine].sum(1), len(known) - 1)
-        for known, spectrum, mine in zip(pairs, spectra, own, strict=True)
-    ]
+    lags = [known * grid.lags(spectrum, len(known) - 1) for known, spectrum in zip(pairs, spectra, strict=True)]
+    for part, a in zip(parts, spread, strict=True):
+        q, count = part.columns, len(lags[part.kind])
+        lags[part.kind] += _lagged((inner + inner.T) / 2 @ q - a, q, count) - _lagged(q, a, count)
+    return lags
+
+
+def _lagged(first: Array, second: Array, count: int) -> Array:
+    """(count,) sums of products of (frames, ...) arrays, the second one 0, 1, ... frames later."""
+    frames = len(first)
+    x, y = np.ascontiguousarray(first).reshape(frames, -1), np.ascontiguousarray(second).reshape(frames, -1)
+    return np.array([np.vdot(x[: frames - lag], y[lag:]) if lag < frames else 0.0 for lag in range(count)])
 
 
 def _levinson(lags: Array) -> list[tuple[Array, float]]:

@@ -54,7 +54,7 @@ def identify(
     discretization: Mapping[str, float] | None = None,
     systematic: Mapping[str, float] | None = None,
     profile: Callable[[str, float], float] | None = None,
-    cost: Callable[[Array], float] | None = None,
+    path: Callable[[str, float, float], tuple[float, float]] | None = None,
     nuisance: Nuisance | None = None,
     rank_tolerance: float = RANK_TOLERANCE,
 ) -> Identifiability:
@@ -71,8 +71,9 @@ def identify(
         systematic: half-widths of what else the intervals count, by parameter, in its unit.
         profile: (name, physical value) -> cost (half the sum of squares with priors) with all others
             refitted; it is asked about weak parameters only.
-        cost: (internal point) -> cost there, infinite where it has none; where it rises towards both linear
-            ends of a parameter as the linear picture says, no profile is needed.
+        path: (name, rise of the cost, internal half-width of the linear interval) -> internal distances from the
+            estimate at which the profile has risen so far; that half-width on both sides where the cost confirms it,
+            infinite on a side where it never rises so far, NaN on one that is left to `profile`.
         nuisance: what unknowns left that were solved for at every point.
         rank_tolerance: see `gauge.RANK_TOLERANCE`.
 
@@ -83,7 +84,7 @@ def identify(
     floors, discretization, systematic = floors or {}, discretization or {}, systematic or {}
     _check(parameters, internal, residuals, jacobian, {*floors, *discretization, *systematic})
     nuisance = nuisance or Nuisance(np.zeros((0, len(parameters.free))), 0.0)
-    judge = Judge(parameters, internal, residuals, jacobian, layout, rank_tolerance, profile, cost, nuisance)
+    judge = Judge(parameters, internal, residuals, jacobian, layout, rank_tolerance, profile, path, nuisance)
     estimates = tuple(
         judge.estimate(column, floors.get(name), (discretization.get(name, 0.0), systematic.get(name, 0.0)))
         for column, name in enumerate(parameters.free)

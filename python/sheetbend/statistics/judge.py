@@ -35,7 +35,6 @@ _AT_BOUND = 1e-6
 _ROUNDING = 1e-14
 _LARGEST = 700.0  # exponent of a number that a computer can hold
 _OPEN = 30.0  # natural scales: data that leave more of a parameter open, all others known, do not contain it
-_LINEAR = 0.2  # a rise of the cost that differs by less from the linear picture's confirms it
 
 
 @dataclass(frozen=True)
@@ -78,10 +77,10 @@ class Judge:
         layout: Layout | None,
         tolerance: float,
         profile: Callable[[str, float], float] | None,
-        cost: Callable[[Array], float] | None,
+        path: Callable[[str, float, float], tuple[float, float]] | None,
         nuisance: Nuisance,
     ) -> None:
-        self.parameters, self.internal, self.profile, self.cost = parameters, internal, profile, cost
+        self.parameters, self.internal, self.profile, self.path = parameters, internal, profile, path
         self.quantile = require("scipy.special", "fit").stdtrit
         names, log = parameters.free, [parameters[name].log for name in parameters.free]
         data = np.vstack([jacobian, nuisance.jacobian])
@@ -136,18 +135,8 @@ class Judge:
             ends = clipped(parameter, ends)
         elif self.profile is not None and not is_precise(parameter, value, ends, sum(more)):
             rise = t**2 * spread.residual_variance * float(spread.inflation[index]) / 2
-            if rise > 0 and not self._confirmed(column, reach):
-                step = min(reach, 1.0) if parameter.log else reach
-                found = profile_interval(
-                    partial(self.profile, parameter.name),
-                    value,
-                    rise,
-                    step=step,
-                    lower=parameter.lower,
-                    upper=parameter.upper,
-                    log=parameter.log,
-                )
-                ends, diverged = _with_answers(found, ends)
+            if rise > 0:
+                ends, diverged = _with_answers(self._profiled(column, self.profile, reach, rise), ends)
                 note += diverged
         return self._judged(column, parameter, value, ends, more, floor, note)
 
@@ -194,25 +183,29 @@ class Judge:
             words=words,
         )
 
-    def _confirmed(self, column: int, reach: float) -> bool:
-        """Whether the cost at both ends, the others moved along as the linear picture has it, is what it predicts."""
-        if self.cost is None or column not in self.columns:
-            return False
-        index = self.columns.index(column)
-        size = np.linalg.norm(self.rows[:, self.columns], axis=0)
-        _, R = np.linalg.qr(self.rows[:, self.columns] / size)
-        inverse = np.linalg.solve(R, np.linalg.solve(R.T, np.eye(len(size))[index])) / (size * size[index])
-        direction = np.zeros(len(self.internal))
-        direction[self.columns] = inverse / inverse[index]
-        expected = reach**2 / (2 * inverse[index])
-        lower, upper = self.parameters.bounds()
-        here = self.cost(self.internal)
-        for end in (self.internal - reach * direction, self.internal + reach * direction):
-            if (end < lower).any() or (end > upper).any():
-                return False
-            if not abs(self.cost(end) - here - expected) <= _LINEAR * expected:
-                return False
-        return True
+    def _profiled(self, column: int, profile: Callable[[str, float], float], reach: float, rise: float) -> Ends:
+        """Both ends from the path along the profile, and from refits on the sides where it does not settle."""
+        parameter = self.parameters[self.parameters.free[column]]
+        first, at = min(reach, 1.0) if parameter.log else reach, float(self.internal[column])
+        told = (math.nan, math.nan) if self.path is None else self.path(parameter.name, rise, first)
+        left = tuple(side for side, by in zip((-1.0, 1.0), told, strict=True) if math.isnan(by))
+        refitted: Ends = (None, None)
+        if left:
+            refitted = profile_interval(
+                partial(profile, parameter.name),
+                parameter.to_physical(at),
+                rise,
+                step=first,
+                lower=parameter.lower,
+                upper=parameter.upper,
+                log=parameter.log,
+                sides=left,
+            )
+        ends = [
+            other if math.isnan(by) else None if math.isinf(by) else parameter.to_physical(at + by)
+            for by, other in zip(told, refitted, strict=True)
+        ]
+        return ends[0], ends[1]
 
     def correlations(self) -> tuple[Correlation, ...]:
         """Of every pair of parameters that has an interval."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 from ..errors import InputError
 from ..quantities.parameters import Parameter
@@ -28,6 +28,7 @@ def profile_interval(
     lower: float = -math.inf,
     upper: float = math.inf,
     log: bool = False,
+    sides: Collection[float] = (-1.0, 1.0),
 ) -> Ends:
     """Likelihood interval: where the profile of the cost rises by `rise` above its minimum.
 
@@ -40,6 +41,7 @@ def profile_interval(
             good one.
         lower, upper: physical bounds.
         log: search on the log scale.
+        sides: on which an end is wanted; on the other it is None.
 
     Returns:
         The two ends; None on a side where the cost never rises that far up to the bound, or within
@@ -60,7 +62,7 @@ def profile_interval(
     farthest = FARTHEST if log else step * 2.0**_DOUBLINGS
     nearest = max(here.to_internal(lower), start - farthest), min(here.to_internal(upper), start + farthest)
     for sign, bound in zip((-1.0, 1.0), nearest, strict=True):
-        crossing = _crossing(height, start, sign * step, bound)
+        crossing = _crossing(height, start, sign * step, bound) if sign in sides else None
         ends.append(None if crossing is None else here.to_physical(crossing))
     return ends[0], ends[1]
 

@@ -1,0 +1,45 @@
+"""What the covariance makes of correlated rows by transforms, against the same by matrices."""
+
+from __future__ import annotations
+
+import numpy as np
+from pytest import approx
+from sheetbend.statistics.covariance import Layout, _colored, _expected_lags, _Grid, _lagged
+
+
+def uneven() -> tuple[Layout, np.random.Generator]:
+    """Two recordings of 40 and 23 frames, the first with two kinds of channels and with gaps."""
+    rng = np.random.default_rng(5)
+    series = [(0, 0, 0, 40), (0, 1, 0, 40), (0, 2, 1, 40), (1, 0, 0, 23), (1, 1, 1, 23)]
+    rows = [(r, c, f, k) for r, c, k, frames in series for f in range(frames) if rng.random() > 0.2 or f == frames - 1]
+    recording, channel, frame, kind = np.array(rows).T
+    return Layout(recording, channel, frame, kind), rng
+
+
+def test_the_covariance_of_rows_and_of_what_a_fit_leaves_of_them() -> None:
+    layout, rng = uneven()
+    rows, p, lags = len(layout.frame), 3, 6
+    grid = _Grid(layout, rng.standard_normal(rows))
+    Q = np.linalg.qr(rng.standard_normal((rows, p)))[0]
+    mixing = grid.channel_covariance(grid.kinds)
+    spectra = [1.0 / np.abs(1 - a * np.exp(-2j * np.pi * np.fft.rfftfreq(grid.length))) ** 2 for a in (0.8, -0.3)]
+    channel, frame, kind = grid._channel, grid._frame, grid.kinds[grid._channel]
+    omega = np.zeros((rows, rows))
+    for i in range(rows):
+        for j in range(rows):
+            shared = np.fft.irfft(np.sqrt(spectra[kind[i]] * spectra[kind[j]]), grid.length)
+            omega[i, j] = mixing[channel[i], channel[j]] * shared[abs(frame[i] - frame[j])]
+    parts = grid.parts(Q, grid.kinds)
+    spread = [_colored(part, parts, spectra, grid.length, mixing) for part in parts]
+    found = sum(np.tensordot(part.columns, a, ([0, 2], [0, 2])) for part, a in zip(parts, spread, strict=True))
+    assert found == approx(Q.T @ omega @ Q, rel=1e-10, abs=1e-10)
+    pairs = [
+        _lagged(grid.mask[:, grid.kinds == k] * np.diag(mixing)[grid.kinds == k], grid.mask[:, grid.kinds == k], lags)
+        for k in (0, 1)
+    ]
+    expected = _expected_lags(grid, spectra, pairs, parts, spread, np.asarray(found))
+    left = (np.eye(rows) - Q @ Q.T) @ omega @ (np.eye(rows) - Q @ Q.T)
+    for k in (0, 1):
+        for lag in range(lags):
+            pair = (channel[:, None] == channel) & (kind[:, None] == k) & (frame[:, None] + lag == frame)
+            assert expected[k][lag] == approx(float(left[pair].sum()), rel=1e-9, abs=1e-9)
