@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..errors import ConfigError, RecordingError
 from ..experiment.experiment import Experiment
 from ..minimum.discretization import Refinement
@@ -33,9 +31,9 @@ from .rope_schema import Rod, Rope
 from .ropes import check_markers
 from .scene_schema import SceneSection
 from .scenes import Particles, build_scene
+from .solver_schema import solver_for
 from .tools import tools_of
 
-SUBSTEPS = 10
 OPTIONAL = ("cloth", "particles", "constraints", "point_mass", "force")
 """Lists of the scene that a recording can leave out by name."""
 
@@ -114,16 +112,6 @@ def scene_alone(config: schema.Config, folder: Path = Path()) -> tuple[Scene, So
     solver = solver_for(config.solver, None)
     solver.core(scene.compiled)  # raise or warn here, before any work starts
     return scene, solver
-
-
-def solver_for(section: schema.SolverSection, recording: Recording | None) -> Solver:
-    """The solver, its substep taken from the recording's median frame interval where `h` is not given."""
-    fields = section.model_dump(exclude={"h", "substeps"}, exclude_none=True)
-    if section.h is not None:
-        return Solver(h=section.h, **fields)
-    if recording is None or len(recording.times) < 2:
-        return Solver(**fields)
-    return Solver(h=float(np.median(np.diff(recording.times))) / (section.substeps or SUBSTEPS), **fields)
 
 
 def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Experiment:
