@@ -25,13 +25,13 @@ class Solver:
 
     Attributes:
         h: substep, s. Constant within a rollout.
-        integrator: "bdf2" (second order) or "bdf1" (backward Euler: damps like zeta = omega h/2).
-        method: "direct" (each connected part is one block, solved for the multipliers of its constraints: for ropes),
-            "newton" (the same blocks, solved for their particles: for cloth; every compliance must be positive),
-            "newton_cg" (the same by conjugate gradients on two levels: for cloth of more than some 20,000 vertices, in
-            half the memory), "implicit" (each substep is solved until its forces balance: for fabrics that stiffen
-            strongly; no rods, no rigid constraints) or "gauss_seidel" (colored sweeps; unconverged ones add about
-            0.9 h^2/(m sweeps) of compliance per link).
+        integrator: "bdf2" (second order, the default) or "bdf1" (backward Euler: damps like zeta = omega h/2).
+        method: "direct" (each connected part is one block, solved for the multipliers of its constraints: for ropes;
+            the default), "newton" (the same blocks, solved for their particles: for cloth; every compliance must be
+            positive), "newton_cg" (the same by conjugate gradients on two levels: for cloth of more than some 20,000
+            vertices, in half the memory), "implicit" (each substep is solved until its forces balance: for fabrics
+            that stiffen strongly; no rods, no rigid constraints) or "gauss_seidel" (colored sweeps; unconverged ones
+            add about 0.9 h^2/(m sweeps) of compliance per link).
         iterations: Newton iterations of a block (2 by default), sweeps (10 by default), or the Newton matrices that an
             "implicit" substep may take (100 by default): to need more is an error.
         threads: of one rollout; results do not depend on it.
@@ -43,7 +43,7 @@ class Solver:
         memory: budget of a gradient through a rollout, such as "2 GB" or a number of bytes: what does not fit on the
             tape is computed again, with the same result. By default half of the memory that is free when it is
             recorded. `tape_plan` tells what a budget costs. Tangents (`fit`, forward mode) keep no tape.
-        extrapolate: number of runs that are combined at the frames: 1 (off); 2, at h and h/2, third order with "bdf2";
+        extrapolate: number of runs that are combined at the frames: 1 (off, the default); 2, at h and h/2, third order with "bdf2";
             3, at h, h/2 and h/4, fourth order, in seven times the substeps of one run. For smooth motions: scenes with
             joints that yield or with linear knots of driven particles are refused, and so is "gauss_seidel" (and with
             it tethers), whose error comes from sweeps.
