@@ -43,10 +43,10 @@ class Solver:
         memory: budget of a gradient through a rollout, such as "2 GB" or a number of bytes: what does not fit on the
             tape is computed again, with the same result. By default half of the memory that is free when it is
             recorded. `tape_plan` tells what a budget costs. Tangents (`fit`, forward mode) keep no tape.
-        extrapolate: number of runs that are combined at the frames: 1 (off, the default); 2, at h and h/2, third order with "bdf2";
-            3, at h, h/2 and h/4, fourth order, in seven times the substeps of one run. For smooth motions: scenes with
-            joints that yield or with linear knots of driven particles are refused, and so is "gauss_seidel" (and with
-            it tethers), whose error comes from sweeps.
+        extrapolate: number of runs that are combined at the frames: 1 (off, the default); 2, at h and h/2, third order
+            with "bdf2"; 3, at h, h/2 and h/4, fourth order, in seven times the substeps of one run. For smooth motions:
+            scenes with joints that yield or with linear knots of driven particles are refused, and so is "gauss_seidel"
+            (and with it tethers), whose error comes from sweeps.
     """
 
     h: float = option(1e-3, "time", "s", above=0)
