@@ -19,7 +19,7 @@ LAYERS = (
     ("minimum", "report", "torch"),
     ("doubts", "textile"),
     ("fitting", "pictures"),
-    ("", "bench", "gripped", "page"),
+    ("", "gripped", "page"),
     ("config",),
     ("cli",),
 )
