@@ -27,10 +27,10 @@ import numpy as np
 import plain
 import plain_cloth
 import table
-from sheetbend.bench import WORKLOADS, workload
-from sheetbend.bench.machine import machine
-from sheetbend.bench.problem import Problem
-from sheetbend.bench.reference import shipped
+from sheetbend_bench import WORKLOADS, workload
+from sheetbend_bench.machine import machine
+from sheetbend_bench.problem import Problem
+from sheetbend_bench.reference import shipped
 
 HERE = Path(__file__).resolve().parent
 PEERS = ("numba", "jax", "warp", "torch", "taichi")
@@ -145,13 +145,13 @@ def _figures(name: str, found: Mapping[str, Any], more: Mapping[str, Any]) -> di
 
 
 def ours(name: str, repeats: int, cores: Sequence[int]) -> dict[str, Any]:
-    """sheetbend bench on these cores, one thread each."""
-    command = [sys.executable, "-m", "sheetbend", "bench", name, "--json"]
+    """measure.py on these cores, one thread each."""
+    command = [sys.executable, str(HERE / "measure.py"), name, "--json"]
     return _run([*command, "--repeats", str(repeats), "--threads", str(len(cores))], cores)
 
 
 def plain_sheet(folder: Path, repeats: int, cores: Sequence[int]) -> dict[str, Any]:
-    """The smallest sheet of `sheetbend bench cloth` as a plain loop, ns per projection."""
+    """The smallest sheet of `measure.py cloth` as a plain loop, ns per projection."""
     program = plain.build(folder / "plain", "-march=native", name="plain_cloth")
     with tempfile.TemporaryDirectory() as scratch:
         sheet = Path(scratch) / "sheet.txt"

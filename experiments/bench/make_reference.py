@@ -1,4 +1,4 @@
-"""Makes python/sheetbend/bench/reference.json: the reference gradients of the workloads, by complex step in plain.cpp.
+"""Makes sheetbend_bench/reference.json: the reference gradients of the workloads, by complex step in plain.cpp.
 
 Run: python experiments/bench/make_reference.py
 """
@@ -11,7 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 
 import plain
-from sheetbend.bench import WORKLOADS
+from sheetbend_bench import WORKLOADS
 
 ABOUT = (
     "Loss gradients of the benchmark workloads by stretch compliance, bend compliance, mass and along the direction "
@@ -31,7 +31,7 @@ def main() -> None:
             }
             print(w.name, gradients[w.name]["0"], flush=True)
     text = json.dumps({"about": ABOUT, "gradients": gradients}, indent=2)
-    files("sheetbend.bench").joinpath("reference.json").write_text(text + "\n")
+    files("sheetbend_bench").joinpath("reference.json").write_text(text + "\n")
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 // source of its reference gradients.
 //   plain WORKLOAD [REPEATS]                            seconds of each forward run after a warm-up, JSON
 //   plain WORKLOAD --reference STRETCH BEND MASS        loss and four derivatives at these parameters, JSON
-// WORKLOAD is W1, W1s or W2; what they are is told in python/sheetbend/bench/workloads.py.
+// WORKLOAD is W1, W1s or W2; what they are is told in sheetbend_bench/workloads.py.
 #include <algorithm>
 #include <chrono>
 #include <cmath>

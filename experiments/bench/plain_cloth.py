@@ -1,4 +1,4 @@
-"""The sheet of `sheetbend bench cloth` for plain_cloth.cpp: the same constraints in the same order, as text."""
+"""The sheet of `measure.py cloth` for plain_cloth.cpp: the same constraints in the same order, as text."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
-from sheetbend.bench import cloth
 from sheetbend.motion.solver import Solver
 from sheetbend.scene.scene import Scene
+from sheetbend_bench import cloth
 
 KINDS = ("strain", "dihedral")
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from sheetbend.bench.figure import draw_ladder
+from sheetbend_bench.figure import draw_ladder
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 QUIET = 1.1  # clock over processor time, below which a machine counts as quiet

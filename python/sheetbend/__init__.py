@@ -32,6 +32,7 @@ from .motion.simulate import Trajectory, simulate
 from .motion.solver import Solver
 from .motion.tape import TapePlan, tape_plan
 from .motion.values import constraint_values, elastic_energy, support_forces
+from .moved import keep_old_modules
 from .objects.arm import add_arm, add_pendulum
 from .objects.arm_data import Arm
 from .objects.cloth import Cloth, add_cloth
@@ -55,6 +56,8 @@ from .report.scores import Score, Scores, coordinate_error, scores
 from .scene.scene import Scene
 from .scene.scene_file import load_scene, save_scene
 from .version import __version__ as __version__
+
+keep_old_modules()
 
 __all__ = [
     "KINDS",

@@ -10,7 +10,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2] / "python/sheetbend"
 # Lowest first; a package imports from layers below its own. "" is the package's __init__.py.
 LAYERS = (
-    ("errors", "version", "_core", "_ceres"),
+    ("errors", "moved", "version", "_core", "_ceres"),
     ("arrays", "files", "optional"),
     ("mesh", "quantities", "result"),
     ("recording", "scene", "statistics"),
@@ -19,7 +19,7 @@ LAYERS = (
     ("minimum", "report", "torch"),
     ("doubts", "textile"),
     ("fitting", "pictures"),
-    ("", "bench", "gripped", "page"),
+    ("", "gripped", "page"),
     ("config",),
     ("cli",),
 )

@@ -1,4 +1,4 @@
-"""The benchmark workloads are what they are said to be, their gradients are right, and `sheetbend bench` tells them.
+"""The benchmark workloads are what they are said to be, their gradients are right, and `measure.py` tells them.
 No time is asserted anywhere."""
 
 from __future__ import annotations
@@ -11,19 +11,19 @@ from typing import Any
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend.bench import WORKLOADS, measure, workload
-from sheetbend.bench import ladder as ladder_module
-from sheetbend.bench.chain import gradient_error, measure_chain
-from sheetbend.bench.cloth import measure_cloth
-from sheetbend.bench.ladder import measure_ladder, rung
-from sheetbend.bench.machine import LEVELS, machine
-from sheetbend.bench.problem import Problem
-from sheetbend.bench.reference import largest_error, reference, shipped
-from sheetbend.bench.rod import measure_rod
-from sheetbend.bench.timing import in_fresh_process, peak_mb, timed
-from sheetbend.bench.workloads import colors, direction, pinned, projections, start
-from sheetbend.cli.app import app
+from measure import app
 from sheetbend.errors import SheetbendError
+from sheetbend_bench import WORKLOADS, measure, workload
+from sheetbend_bench import ladder as ladder_module
+from sheetbend_bench.chain import gradient_error, measure_chain
+from sheetbend_bench.cloth import measure_cloth
+from sheetbend_bench.ladder import measure_ladder, rung
+from sheetbend_bench.machine import LEVELS, machine
+from sheetbend_bench.problem import Problem
+from sheetbend_bench.reference import largest_error, reference, shipped
+from sheetbend_bench.rod import measure_rod
+from sheetbend_bench.timing import in_fresh_process, peak_mb, timed
+from sheetbend_bench.workloads import colors, direction, pinned, projections, start
 from typer.testing import CliRunner, Result
 
 KEYS = {
@@ -50,7 +50,7 @@ KEYS = {
 
 
 def run(*arguments: object) -> Result:
-    return CliRunner().invoke(app, ["bench", *map(str, arguments)])
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def last_line(result: Result) -> dict[str, Any]:
@@ -238,7 +238,7 @@ class TestCommand:
         assert "W1, W1s, W2, W5, chain, rod, cloth, ladder" in last_line(run("sheet", "--json"))["error"]["fix"]
 
     def test_a_wrong_gradient_exits_5(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr("sheetbend.bench.measurement.largest_error", lambda problem, found: 1e-3)
+        monkeypatch.setattr("sheetbend_bench.measurement.largest_error", lambda problem, found: 1e-3)
         result = run("W1", "--frames", 1, "--repeats", 1)
         assert result.exit_code == 5 and "<- fails" in result.stdout
 
@@ -266,7 +266,7 @@ class TestChainAndLadder:
 
     def test_ladder(self, tmp_path: Path) -> None:
         pytest.importorskip("matplotlib")
-        from sheetbend.bench.figure import draw_ladder, sweep_bytes
+        from sheetbend_bench.figure import draw_ladder, sweep_bytes
 
         seen: list[dict[str, Any]] = []
         found = measure_ladder(repeats=1, sides=(21, 90), particle_substeps=8_000, progress=seen.append)

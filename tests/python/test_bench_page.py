@@ -10,7 +10,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from sheetbend.bench.reference import shipped
+from sheetbend_bench.reference import shipped
 
 ROOT = Path(__file__).resolve().parents[2]
 BENCH = ROOT / "experiments" / "bench"
@@ -105,7 +105,7 @@ def test_the_plain_sheet_is_the_package_s(scripts: None, tmp_path: Path) -> None
     """Value and gradient of a sheet with strain and hinges, by a program that shares no code with the package."""
     import plain
     import plain_cloth
-    from sheetbend.bench import cloth
+    from sheetbend_bench import cloth
 
     if plain.compiler() is None:
         pytest.skip("there is no C++ compiler")

@@ -420,3 +420,9 @@ class TestInstallation:
             [sys.executable, "-m", "sheetbend", "--version"], capture_output=True, text=True, check=True
         )
         assert version.stdout.strip() == f"sheetbend {sb.__version__}"
+
+
+def test_bench_says_where_it_went() -> None:
+    found = run("bench", "W2", "--threads", 2, "--json")
+    assert found.exit_code == 2
+    assert "python experiments/bench/measure.py W2 --threads 2" in last_line(found)["error"]["fix"]

@@ -149,7 +149,7 @@ def test_rigid_constraints_are_refused(method: str) -> None:
         ({"cg_tolerance": 0.0}, "solver.cg_tolerance: must be a relative residual"),
         ({"cg_tolerance": 2.0}, "such as 1e-12"),
         ({"cg_tolerance": float("nan")}, "solver.cg_tolerance"),
-        ({"cg_iterations": 0}, "solver.cg_iterations: must be a positive whole number"),
+        ({"cg_iterations": 0}, "solver.cg_iterations: must be a whole number of at least 1"),
     ],
 )
 def test_bad_options_are_named(given: dict[str, float], said: str) -> None:

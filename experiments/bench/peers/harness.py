@@ -15,11 +15,11 @@ from types import SimpleNamespace
 
 import numpy as np
 
-BUDGET = 60.0  # s after which no further repeat starts, as in sheetbend bench
+BUDGET = 60.0  # s after which no further repeat starts, as in sheetbend_bench
 
 
 def load() -> tuple[SimpleNamespace, int]:
-    """The arrays of the problem (sheetbend.bench.problem.Problem.export tells what they are), and the repeats."""
+    """The arrays of the problem (sheetbend_bench.problem.Problem.export tells what they are), and the repeats."""
     with np.load(sys.argv[1]) as saved:
         p = SimpleNamespace(**{name: saved[name] for name in saved.files})
     for name in ("columns", "frames", "substeps", "iterations"):

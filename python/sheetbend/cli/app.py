@@ -42,5 +42,6 @@ def options(
     """Simulate ropes, beams and cloth, and find their physical parameters from recordings, with error bars."""
 
 
-for command in (simulate, fit, view, check, info, textile, bench):
+for command in (simulate, fit, view, check, info, textile):
     app.command()(command)
+app.command(hidden=True, context_settings={"ignore_unknown_options": True})(bench)

@@ -12,12 +12,12 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
-from . import cloth_schema, gripped_schema, rope_schema, scene_schema, schema
+from . import cloth_schema, gripped_schema, rope_schema, scene_schema, schema, solver_schema
 from .section import AXES, NAME, REFERENCE, Section
 
 HEADERS: dict[str, type[Section]] = {
     "[experiment]": schema.ExperimentSection,
-    "[solver]": schema.SolverSection,
+    "[solver]": solver_schema.SolverSection,
     "[scene]": scene_schema.SceneSection,
     "[[scene.rope]]": rope_schema.Rope,
     "[[scene.rod]]": rope_schema.Rod,

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import Any, Literal, Self
 
-from pydantic import field_validator, model_validator
+from pydantic import model_validator
 
-from ..errors import InputError
-from ..files.memory import in_bytes
 from .cloth_schema import MarkerGrid
 from .scene_schema import SceneSection
 from .section import AXES, Finite, Name, Pair, Quaternion, Reference, Section, Vector, Window, key
+from .solver_schema import SolverSection
 from .tools import with_corrections
 
 
@@ -19,60 +18,6 @@ class ExperimentSection(Section):
 
     name: Name = key(..., "names the results and their folder")
     about: str = key("", "a sentence for the report")
-
-
-class SolverSection(Section):
-    """[solver]: how motions are stepped."""
-
-    substeps: int | None = key(
-        None, "substeps per frame interval of each recording (its median); 10 when h is left out too", ge=1
-    )
-    h: Finite | None = key(None, "the substep itself, instead of `substeps`", "s", gt=0)
-    integrator: Literal["bdf1", "bdf2"] = key("bdf2", "second order, or backward Euler (which damps)")
-    method: Literal["direct", "newton", "newton_cg", "implicit", "gauss_seidel"] = key(
-        "direct",
-        "each rope one block; each cloth one block through its vertices (no rigid parts), factored or, for more than"
-        " some 20,000 of them, by conjugate gradients; the same with every substep solved until forces balance, for"
-        " fabrics that stiffen strongly; or colored sweeps",
-    )
-    iterations: int | None = key(
-        None,
-        "Newton iterations of a block (2), at most so many matrices of an implicit one (100), or sweeps (10)",
-        ge=1,
-    )
-    force_tolerance: Finite = key(
-        1e-10, "what `implicit` may leave of the forces on a particle, of the largest", gt=0, le=1e-3
-    )
-    cg_tolerance: Finite = key(1e-12, "relative residual at which conjugate gradients stop", gt=0, le=1e-3)
-    cg_iterations: int = key(10_000, "conjugate gradients until there; more are an error", ge=1)
-    memory: str | int | None = key(
-        None,
-        'budget of an adjoint gradient (`check`), such as "2 GB" or a number of bytes: what does not fit is computed '
-        "again; a fit carries tangents forward and keeps no tape",
-    )
-    extrapolate: int = key(
-        1,
-        "runs at h, h/2 and h/4 that are combined at the frames: 1 (off), 2 (third order) or 3 (fourth order, seven"
-        " times the substeps); for smooth motions",
-        ge=1,
-        le=3,
-    )
-
-    @field_validator("memory")
-    @classmethod
-    def _amount(cls, memory: str | int | None) -> str | int | None:
-        if memory is not None:
-            try:
-                in_bytes("memory", memory)
-            except InputError as error:
-                raise ValueError(f"{error.problem}|{error.fix}") from error
-        return memory
-
-    @model_validator(mode="after")
-    def _one_of_both(self) -> Self:
-        if self.h is not None and self.substeps is not None:
-            raise ValueError("has both h and substeps|give one of them")
-        return self
 
 
 class Marker(Section):

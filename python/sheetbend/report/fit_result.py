@@ -14,11 +14,7 @@ from ..files.door import reading
 from ..files.json_file import json_content
 from ..files.typed import as_dataclass, listed, mapping
 from ..files.whole import write_text
-from ..result.result import (
-    Estimate,
-    FitData,
-    RecordingFit,
-)
+from ..result.result import Estimate, FitData, RecordingFit
 from .report import plain
 
 FORMAT = "sheetbend fit 1"
@@ -26,37 +22,7 @@ FORMAT = "sheetbend fit 1"
 
 @dataclass(frozen=True, kw_only=True)
 class FitResult(FitData):
-    """A finished (or interrupted) fit.
-
-    Attributes:
-        estimates: one per free parameter, in the order of the parameters.
-        given: the parameters that were not fitted.
-        correlations: of every pair of determined estimates.
-        gauges: combinations of parameters that the data leave free, in words.
-        recordings: errors per recording.
-        baseline: what the no-physics baseline predicts, in words.
-        held_out_is: what was held out, in words, where it is not a part of each recording.
-        cost: half the sum of squared residuals, priors included.
-        first_cost: that of the best start's first point; None where the motion diverges there.
-        jacobian_seconds: what one Jacobian took at the end; None where none was made from Python.
-        rows: number of data residuals.
-        autocorrelation_time: frames of residual that count as one, 1 when they are independent.
-        starts: the ends of all starts, best first.
-        refits: on finer discretizations, of which `Estimate.discretization` is made.
-        not_counted: what of the discretization the intervals leave out, such as "mesh not counted", and why.
-        misfit: residuals against the sigma that was told; None in files of earlier versions.
-        optimizer, iterations, seconds, converged, interrupted, message: how it went.
-        growth: of every fitted motion.
-        windows: s, the lengths that were fitted first, as given or chosen.
-        evaluations, jacobians: how often all experiments were simulated, and how often of these with a Jacobian, over
-            all starts and windows, up to the minimum.
-        judging: how often all experiments, or some of them, were simulated besides, and how often of these with a
-            Jacobian: for beginnings, limits, refits, profiles and doubts.
-        forces: errors per force sensor.
-        premises: numbers that the fit took as given, and what an error in each moves.
-        warnings: what a reader must know before using the numbers.
-        assumed: how the ends of ropes are held and what that assumes, in words, where a configuration says it.
-    """
+    """A finished (or interrupted) fit: its attributes are those of `FitData`; it saves, loads and reports them."""
 
     def to_dict(self) -> dict[str, Any]:
         """Strict JSON values: no NaN and no infinity, None in their place."""

@@ -222,7 +222,7 @@ class MotionGrowth:
 
 @dataclass(frozen=True, kw_only=True)
 class FitData:
-    """The content of a `FitResult`.
+    """What a fit found; `sheetbend.FitResult` saves, loads and reports it.
 
     Attributes:
         estimates: one per free parameter, in the order of the parameters.

@@ -175,7 +175,8 @@ def _best(levels: Levels, law: StripLaw) -> tuple[Array, float]:
 
 
 def _descended(levels: Levels, law: StripLaw, start: Array, wander: float) -> tuple[Array, float, Array]:
-    """Numbers of the best fit near a start, half the sum of its squares, and its Jacobian by central differences."""
+    """Numbers of the best fit near a start, half the sum of its squares, and its Jacobian, computed with central
+    differences."""
 
     def jacobian(u: Array) -> Array:
         steps = _STEP * np.eye(len(u))

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from sheetbend.motion.solver import Solver
+from sheetbend.objects.rope import rope
+from sheetbend.version import __version__
 
-from ..motion.solver import Solver
-from ..objects.rope import rope
-from ..version import __version__
 from .machine import isa, machine
 from .measurement import LANES
 from .ropes import Ropes

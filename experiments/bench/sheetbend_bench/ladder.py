@@ -10,7 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from ..version import __version__
+from sheetbend.version import __version__
+
 from .machine import isa, machine
 from .measurement import LANES
 from .problem import Problem

@@ -12,12 +12,12 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from sheetbend.motion.solver import Solver
+from sheetbend.objects.grip import Grip, carried
+from sheetbend.objects.rod import rod
+from sheetbend.scene.scene import Scene
+from sheetbend.version import __version__
 
-from ..motion.solver import Solver
-from ..objects.grip import Grip, carried
-from ..objects.rod import rod
-from ..scene.scene import Scene
-from ..version import __version__
 from .machine import isa, machine
 from .measurement import LANES
 from .ropes import Ropes

@@ -1,4 +1,4 @@
-"""Benchmarks: workloads that other simulators can be given too, and what they cost here (`sheetbend bench`)."""
+"""Benchmarks: workloads that other simulators can be given too, and what they cost here (`measure.py`)."""
 
 from .measurement import measure
 from .workloads import WORKLOADS, Workload, workload

@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import ParamSpec, TypeVar
 
 import numpy as np
-
-from ..errors import SheetbendError
+from sheetbend.errors import SheetbendError
 
 BUDGET = 60.0  # s after which no further repeat starts
 

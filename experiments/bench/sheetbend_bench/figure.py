@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..optional import require
-from ..pictures.drawing import ACCENT, GRAY, INK, clean, key, new_figure
+from sheetbend.optional import require
+from sheetbend.pictures.drawing import ACCENT, GRAY, INK, clean, key, new_figure
 
 BYTES_PER_PARTICLE = 32  # coordinates and inverse mass
 BYTES_PER_CONSTRAINT = 32  # two particles' places, compliance, rest length, multiplier

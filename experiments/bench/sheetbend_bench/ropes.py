@@ -6,9 +6,9 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
+from sheetbend.motion.solver import Solver
+from sheetbend.scene.compiled import CompiledScene
 
-from ..motion.solver import Solver
-from ..scene.compiled import CompiledScene
 from .timing import timed
 from .workloads import Array
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from sheetbend.motion.solver import Solver
+from sheetbend.scene.scene import Scene
 
-from ..motion.solver import Solver
-from ..scene.scene import Scene
 from .workloads import GRAVITY, Array, Workload, colors, direction, pinned, projections, start
 
 REFERENCE_FACTORS = np.array([2.0, 0.5, 1.2])  # of stretch, bend and mass

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..version import __version__
+from sheetbend.version import __version__
+
 from .machine import isa, machine
 from .problem import Problem
 from .reference import largest_error

@@ -7,7 +7,7 @@ import platform
 from pathlib import Path
 from typing import Any
 
-from .. import _core
+from sheetbend import _core
 
 LEVELS = {
     "x86-64-v4": {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"},

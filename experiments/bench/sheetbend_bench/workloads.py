@@ -13,8 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from ..errors import InputError
+from sheetbend.errors import InputError
 
 Array = np.ndarray
 

@@ -13,12 +13,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from sheetbend.mesh import grid
+from sheetbend.motion.solver import Solver
+from sheetbend.objects.cloth import add_cloth
+from sheetbend.scene.scene import Scene
+from sheetbend.version import __version__
 
-from ..mesh import grid
-from ..motion.solver import Solver
-from ..objects.cloth import add_cloth
-from ..scene.scene import Scene
-from ..version import __version__
 from .machine import isa, machine
 from .measurement import LANES
 from .ropes import Ropes

@@ -1,0 +1,111 @@
+"""A recording of a configuration: its file read, and its keys given to who owns them."""
+
+from __future__ import annotations
+
+import inspect
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ..errors import ConfigError, RecordingError
+from ..experiment.experiment import Experiment
+from ..recording.recording import Recording
+from ..scene.scene import Scene
+from .schema import RecordingSection
+
+TAKEN = (
+    {"file", "name", "frames", "fit", "held_out"}  # the recording
+    | {"ropes", "leave_out", "tools", "values", "force"}  # its scene
+    | {"marker", "grids", "offsets"}  # the places of its markers
+)
+"""Keys of [[recording]] that the configuration itself turns into something. Every other goes under its own name to the
+reader or to `Experiment`, so that none is forgotten."""
+OF_READER = set(inspect.signature(Recording.load).parameters) - {"path"}
+
+
+def read(section: RecordingSection, folder: Path, path: str) -> Recording:
+    """The recording, its file read with the keys that the reader takes, and its frames chosen.
+
+    Raises:
+        ConfigError: the file does not exist, cannot be read, or does not hold the frames.
+    """
+    file = folder / section.file
+    if not file.exists():
+        raise ConfigError(
+            f"{path}.file", "does not exist", str(file), "give a file relative to the configuration's folder"
+        )
+    try:
+        recording = Recording.load(file, **section.model_dump(include=OF_READER))
+        if section.frames is not None:
+            recording = recording.frames(slice(*section.frames))
+    except RecordingError as error:
+        raise ConfigError(f"{path}.{error.field}", error.problem, error.got, error.fix) from error
+    return replace(recording, name=section.name or recording.name)
+
+
+def fields_of_experiment(section: RecordingSection) -> dict[str, Any]:
+    """The fields of `Experiment` that the keys of a recording give as they stand, and its windows."""
+    plain = section.model_dump(exclude=TAKEN | OF_READER)
+    return {**plain, "fit": _window(section.fit), "held_out": _window(section.held_out)}
+
+
+def start_time(section: RecordingSection, recording: Recording) -> float:
+    """Recording time at which the scene starts, s."""
+    if section.start_time is not None:
+        return section.start_time
+    return section.fit[0] if section.fit is not None else float(recording.times[0])
+
+
+def check_windows(path: str, section: RecordingSection, recording: Recording) -> None:
+    """Windows hold frames of the recording.
+
+    Raises:
+        ConfigError: one does not.
+    """
+    for name in ("fit", "held_out"):
+        window = getattr(section, name)
+        if window is not None:
+            try:
+                recording.piece(*window)
+            except RecordingError as error:
+                raise ConfigError(f"{path}.{name}", error.problem, window, error.fix) from error
+
+
+def offset_names(
+    path: str, section: RecordingSection, scene: Scene
+) -> dict[str, tuple[str | None, str | None, str | None]]:
+    """Per marker the quantities that are added to its offset, None for none.
+
+    Raises:
+        ConfigError: they are not three, or one is no quantity of the scene.
+    """
+    return {marker: _three(f"{path}.offsets.{marker}", names, scene) for marker, names in section.offsets.items()}
+
+
+def check_names_used(path: str, section: RecordingSection, experiment: Experiment) -> None:
+    """Names that a recording uses exist.
+
+    Raises:
+        ConfigError: a marker with offsets, or the quantity of the clock, does not.
+    """
+    for marker in section.offsets:
+        if marker not in experiment.recording.markers:
+            fix = f"name some of: {', '.join(experiment.recording.markers)}"
+            raise ConfigError(f"{path}.offsets.{marker}", "is no marker of the recording", marker, fix)
+    if section.time_offset is not None and section.time_offset not in experiment.scene.quantities:
+        fix = f'declare [scene.quantities.{section.time_offset}] with unit = "s"'
+        raise ConfigError(f"{path}.time_offset", "names no quantity", section.time_offset, fix)
+
+
+def _three(path: str, names: list[str], scene: Scene) -> tuple[str | None, str | None, str | None]:
+    if len(names) != 3:
+        raise ConfigError(path, "must be three names", names, 'give [tangent, normal, tangent x normal], "" for none')
+    for name in names:
+        if name and name not in scene.quantities:
+            raise ConfigError(path, "names no quantity", name, f"declare [scene.quantities.{name}]")
+    a, b, c = (name or None for name in names)
+    return a, b, c
+
+
+def _window(given: list[float] | None) -> tuple[float, float] | None:
+    return None if given is None else (given[0], given[1])
