@@ -39,7 +39,6 @@ def new(
     units: Annotated[
         str | None, typer.Option(help="Length unit of the files: m, cm or mm.", show_default=False)
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Write over a configuration that is there.")] = False,
     json: Annotated[
         bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
     ] = False,
@@ -49,11 +48,11 @@ def new(
 
     Example: sheetbend new take.csv --density 0.05
     """
-    run(lambda console: _new(console, files, output, density, units, force), json)
+    run(lambda console: _new(console, files, output, density, units), json)
 
 
 def _new(
-    console: Console, files: list[Path], output: Path | None, density: float | None, units: str | None, force: bool
+    console: Console, files: list[Path], output: Path | None, density: float | None, units: str | None
 ) -> Outcome:
     if density is not None and not 0 < density < float("inf"):
         raise ConfigError("--density", "must be positive", density, "give kg/m of a rope, kg/m^2 of a cloth")
@@ -66,8 +65,8 @@ def _new(
     if target.suffix.lower() != ".toml":
         raise ConfigError("--output", "is no configuration", str(target), "give a file that ends in .toml")
     check_targets("--output", target.parent, [target])
-    if target.exists() and not force:
-        raise ConfigError("--output", "is there already", str(target), "give --force, or another file with --output")
+    if target.exists():
+        raise ConfigError("--output", "is there already", str(target), "name another file with --output")
     made("--output", target.parent)
     takes = [
         Take(seen(recording), Path(os.path.relpath(file, target.parent)).as_posix(), unit)

@@ -23,26 +23,28 @@ def describe(takes: Sequence[Take], density: float | None) -> Description | None
     """A beam that is clamped at a group of markers and seen at its other end; None for other recordings."""
     s = takes[0].seen
     r = s.recording
-    if len(takes) > 1 or len(s.still) < 2 or not len(s.loose) + sum(map(len, s.bodies)) or len(s.bodies) > 1:
+    if len(takes) > 1 or len(s.bodies) != 1:
         return None
-    tip = s.bodies[0] if s.bodies else ()
-    if not tip or s.loose:
+    tip = s.bodies[0]
+    base = tuple(sorted({*s.still, *(k for k in s.loose if k in r.clamped)}))
+    if len(base) < 2 or len(base) + len(tip) < len(r.markers):
         return None
     x = r.positions
     direction = dominant_direction(x[:, list(tip)])
     swing = along(x[:, list(tip)], direction)
-    frequency = first_frequency(r.times, swing)
+    start = _turning(r.times, swing)
+    free = r.times >= start  # before it the beam is held, and a step hides the frequency
+    frequency = first_frequency(r.times[free], swing[free])
     if frequency is None:
         return None
-    start = _turning(r.times, swing, frequency)
     last = float(r.times[-1])
     if start + (PERIODS_FITTED + 1) / frequency > last:
         return None
-    base = np.nanmean(mean_position(x)[list(s.still)], axis=0)
+    clamp = np.nanmean(mean_position(x)[list(base)], axis=0)
     rest = mean_position(x[r.times > last - max(2.0 / frequency, 0.2 * (last - start))])[list(tip)]
     end = rest.mean(axis=0)
-    length = float(np.linalg.norm(end - base))
-    way = (end - base) / length
+    length = float(np.linalg.norm(end - clamp))
+    way = (end - clamp) / length
     weight = density if density is not None else 1.0
     down = s.gravity / np.linalg.norm(s.gravity)
     normal = np.cross(way, direction.mean(axis=0))
@@ -50,7 +52,7 @@ def describe(takes: Sequence[Take], density: float | None) -> Description | None
     normal /= np.linalg.norm(normal)
     EI = weight * (2 * np.pi * frequency) ** 2 * length**4 / 1.8751**4
     notes = [
-        f"{joined(r.markers[k] for k in s.still)} stay in place, {joined(r.markers[k] for k in tip)} move as one body",
+        f"{joined(r.markers[k] for k in base)} stay in place, {joined(r.markers[k] for k in tip)} move as one body",
         f"they swing at {frequency:.4g} Hz, from a turning point at {start:.4g} s",
     ]
     unknown = [
@@ -63,7 +65,7 @@ def describe(takes: Sequence[Take], density: float | None) -> Description | None
     lines = [] if r.gravity is not None else table("[scene]", {"gravity": s.gravity.tolist()})
     lines += table("[solver]", {"substeps": max(1, int(np.ceil(np.median(np.diff(r.times)) * 40 * frequency)))})
     rope: dict[str, Any] = {"name": "beam", "length": length, "segments": 10, "density": weight, "EI": EI}
-    rope |= {"start": base.tolist(), "direction": way.tolist(), "clamp_start": way.tolist(), "clamp_angles": True}
+    rope |= {"start": clamp.tolist(), "direction": way.tolist(), "clamp_start": way.tolist(), "clamp_angles": True}
     rope |= {"plane": normal.tolist(), "loss_factor": 0.1, "loss_frequency": frequency}
     lines += table("[[scene.rope]]", rope, {"EI": "of a uniform beam of this frequency"})
     load = np.nan_to_num(x[int(np.searchsorted(r.times, start)), list(tip)].mean(axis=0) - end)
@@ -97,7 +99,7 @@ def describe(takes: Sequence[Take], density: float | None) -> Description | None
     return "a beam clamped at one end", notes, unknown, lines
 
 
-def _turning(times: Array, swing: Array, frequency: float) -> float:
+def _turning(times: Array, swing: Array) -> float:
     """s, of the first turning point after the largest speed: there a motion starts from a shape at rest."""
     speed = np.gradient(swing, times)
     fastest = int(np.argmax(np.abs(speed)))

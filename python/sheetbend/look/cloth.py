@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import RecordingError
 from ..timeseries import default_max_gap
 from .seen import NEAR, Seen
 from .text import joined, table
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 Array = np.ndarray
 Description = tuple[str, list[str], list[str], list[str]]
 CELLS = 10  # along the longer side
+WHOLE = 0.8  # share of the markers that must hang together as one sheet
 QUIET = 0.1  # of the motion of all: how little the upper row moves where the edge above it is held
 FITTED, LONGEST = 2 / 3, 1.5  # share of the time that is fitted, and s at most
 
@@ -28,6 +30,13 @@ def describe(takes: Sequence[Take], density: float | None) -> Description | None
         return None
     r = s.recording
     own = _connected(s)
+    if len(own) < WHOLE * len(r.markers):
+        raise RecordingError(
+            "markers",
+            f"do not hang together as one sheet: {len(own)} of them do, the others are on grips or on further cloths",
+            joined(r.markers),
+            "give a recording with the markers of one cloth and of what holds it, or write the configuration by hand",
+        )
     flat = _flattened(s.apart[np.ix_(own, own)])
     start = int(np.argmax(r.mask[:, own].sum(axis=1)))
     up = -s.gravity / np.linalg.norm(s.gravity)

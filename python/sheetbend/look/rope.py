@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import RecordingError
 from ..timeseries import mean_position
 from .seen import Seen, chain
 from .text import joined, table
@@ -21,8 +22,9 @@ HELD_NAMES = ("hand", "grip", "wrist", "clamp", "robot", "holder", "finger")
 SUBSTEP = 1 / 500  # s, at most
 SMOOTHING = 0.06  # s, of recorded grips
 BENDING = 0.15  # of the length: bending length (EI/(density g))^(1/3) at the start
+BRANCHED = 1.1  # times the shortest tree: how much longer the line through all markers of a branched cable is
 FITTED, LONGEST = 2 / 3, 3.0  # share of the time that is fitted, and s at most; the next third is predicted
-STIFF = 0.5  # how much less than the next chord the end's direction must vary in a clamp
+STIFF = 0.75  # of the next chord's: how much the direction at an end varies at most in a clamp; a pin has 1 or more
 
 
 def describe(takes: Sequence[Take], density: float | None) -> Description | None:
@@ -32,6 +34,7 @@ def describe(takes: Sequence[Take], density: float | None) -> Description | None
     body, order = _parts(first)
     if len(order) < 3:
         return None
+    _unbranched(first, order)
     names = r.markers
     arc = _arcs(takes, order)
     length, said_length = _length(first, float(arc[-1]))
@@ -77,6 +80,28 @@ def _parts(s: Seen) -> tuple[tuple[int, ...], tuple[int, ...]]:
     hands = [b for b in s.bodies if named & set(b)] or ([b for b in s.bodies if count - len(b) >= 3][:1])
     hand = hands[0] if hands else ()
     return hand, chain(s.apart, tuple(k for k in range(count) if k not in hand))
+
+
+def _unbranched(s: Seen, order: tuple[int, ...]) -> None:
+    """Refuse markers whose shortest tree has a node with three arms of two or more, and is much shorter than any line
+    through them: a branched cable."""
+    tree: dict[int, set[int]] = {order[0]: set()}
+    total = 0.0
+    while len(tree) < len(order):
+        pairs = [(float(s.apart[a, b]), a, b) for a in tree for b in order if b not in tree]
+        distance, a, b = min(pairs)
+        tree[a].add(b)
+        tree[b] = {a}
+        total += distance
+    forks = [k for k, near in tree.items() if sum(len(tree[j]) > 1 for j in near) >= 3]
+    line = sum(float(s.apart[a, b]) for a, b in pairwise(order))
+    if forks and line > BRANCHED * total:
+        raise RecordingError(
+            "markers",
+            "lie along a cable that branches, and one rope cannot go through all of them",
+            f"branches near {joined(s.recording.markers[k] for k in forks)}",
+            "give a recording of one branch, or write one [[scene.rod]] for each, see docs/configuration.md",
+        )
 
 
 def _arcs(takes: Sequence[Take], order: tuple[int, ...]) -> Array:
