@@ -77,7 +77,7 @@ def describe(takes: Sequence[Take], density: float | None) -> Description | None
         "force": np.where(np.eye(3)[axis] > 0, force, 0.0).tolist(),
     }
     lines += table("[[scene.force]]", pull | {"times": [0.0, 1e-6], "factors": [1.0, 0.0]})
-    frame = np.stack([way, normal, np.cross(way, normal)])
+    frame: Array = np.stack([way, normal, np.cross(way, normal)])
     places: list[dict[str, Any]] = [
         {
             "marker": r.markers[k],

@@ -61,7 +61,7 @@ def describe(takes: Sequence[Take], density: float | None) -> Description | None
         lines += table("[[scene.arm]]", _arm("upper", radii[0], pivot))
         lines += table("[[scene.arm]]", _arm("lower", 2.2 * radii[1], "upper", 1.5 * radii[1]))
         parameters = {
-            f"{arm}_{key}": {}
+            f"{arm}_{key}": dict[str, Any]()
             for arm, keys in (("upper", ("first_moment",)), ("lower", ("first_moment", "inertia")))
             for key in keys
         } | {"upper_friction": {}, "lower_friction": {}, "lower_drag": {}}

@@ -22,6 +22,7 @@ HELD_NAMES = ("hand", "grip", "wrist", "clamp", "robot", "holder", "finger")
 SUBSTEP = 1 / 500  # s, at most
 SMOOTHING = 0.06  # s, of recorded grips
 BENDING = 0.15  # of the length: bending length (EI/(density g))^(1/3) at the start
+EARLY = 0.1  # s, in which the speed at the first frame is looked for
 BRANCHED = 1.1  # times the shortest tree: how much longer the line through all markers of a branched cable is
 FITTED, LONGEST = 2 / 3, 3.0  # share of the time that is fitted, and s at most; the next third is predicted
 STIFF = 0.75  # of the next chord's: how much the direction at an end varies at most in a clamp; a pin has 1 or more
@@ -38,6 +39,9 @@ def describe(takes: Sequence[Take], density: float | None) -> Description | None
     names = r.markers
     arc = _arcs(takes, order)
     length, said_length = _length(first, float(arc[-1]))
+    if not first.static and _even(arc, first.noise):
+        arc = np.median(np.diff(arc)) * np.arange(len(arc))
+        length = max(length, float(arc[-1])) if "length_m" in r.metadata else float(arc[-1])
     arc = np.minimum(arc, length)
     weight, said_density = _density(first, density)
     notes = [f"a rope through {joined(names[k] for k in order)}, {float(arc[-1]):.4g} m from the first to the last"]
@@ -53,7 +57,9 @@ def describe(takes: Sequence[Take], density: float | None) -> Description | None
     why = {"EI": "a guess to start from", "markers": "arc lengths in m"}
     if not static:
         rope |= {"bend_damping": 0.01, "drag_linear": 0.1 * weight}
-        if not first.rest:
+        if _lets_go(first, order):
+            notes.append("at the first frame it moves no faster than its noise tells: it starts from rest")
+        elif not first.rest:
             rope["velocity"] = "recording"
     if static and flat is not None:
         rope |= {"clamp_angles": True, "plane": flat, "set_modes": [1]}
@@ -113,6 +119,26 @@ def _arcs(takes: Sequence[Take], order: tuple[int, ...]) -> Array:
         return np.concatenate([[0.0], np.cumsum(chords)])
     # 98 % of the frames: that is two standard deviations above the true chord where the rope is straight
     return np.concatenate([[0.0], np.cumsum(np.maximum(chords - 2.0 * np.sqrt(2.0) * noise, 0.5 * chords))])
+
+
+def _even(arc: Array, noise: float) -> bool:
+    """Whether all markers are as far from the next one, to twice the noise: then their median distance is closer."""
+    gaps = np.diff(arc)
+    return bool(len(gaps) >= 4 and np.all(np.abs(gaps - np.median(gaps)) < 2.0 * noise))
+
+
+def _lets_go(s: Seen, order: tuple[int, ...]) -> bool:
+    """Whether the speeds at the first frame are within what noise makes of none: the rope is let go there. The slope
+    of a parabola through N frames in the time T has the standard deviation sigma sqrt(192 / N) / T at its end."""
+    r = s.recording
+    t = r.times - r.times[0]
+    early = np.flatnonzero(t <= EARLY)
+    x = r.positions[np.ix_(early, order)]
+    x = x[:, np.isfinite(x).all(axis=(0, 2))]
+    if len(early) < 6 or not x.shape[1] or not s.noise:
+        return False
+    slope = np.linalg.lstsq(np.vander(t[early], 3, increasing=True), x.reshape(len(early), -1), rcond=None)[0][1]
+    return bool(np.abs(slope).max() < 4.0 * s.noise * np.sqrt(192 / len(early)) / t[early[-1]])
 
 
 def _length(s: Seen, last: float) -> tuple[float, str]:
