@@ -51,9 +51,7 @@ def new(
     run(lambda console: _new(console, files, output, density, units), json)
 
 
-def _new(
-    console: Console, files: list[Path], output: Path | None, density: float | None, units: str | None
-) -> Outcome:
+def _new(console: Console, files: list[Path], output: Path | None, density: float | None, units: str | None) -> Outcome:
     if density is not None and not 0 < density < float("inf"):
         raise ConfigError("--density", "must be positive", density, "give kg/m of a rope, kg/m^2 of a cloth")
     recordings = [_read(file, units) for file in files]

@@ -22,7 +22,7 @@ HELD_NAMES = ("hand", "grip", "wrist", "clamp", "robot", "holder", "finger")
 SUBSTEP = 1 / 500  # s, at most
 SMOOTHING = 0.06  # s, of recorded grips
 BENDING = 0.15  # of the length: bending length (EI/(density g))^(1/3) at the start
-EARLY = 0.1  # s, in which the speed at the first frame is looked for
+EARLY = 0.05  # s, in which the speed at the first frame is looked for
 BRANCHED = 1.1  # times the shortest tree: how much longer the line through all markers of a branched cable is
 FITTED, LONGEST = 2 / 3, 3.0  # share of the time that is fitted, and s at most; the next third is predicted
 STIFF = 0.75  # of the next chord's: how much the direction at an end varies at most in a clamp; a pin has 1 or more
@@ -58,6 +58,11 @@ def describe(takes: Sequence[Take], density: float | None) -> Description | None
     if not static:
         rope |= {"bend_damping": 0.01, "drag_linear": 0.1 * weight}
         if _lets_go(first, order):
+            way = _straight(first, order)
+            if way is not None:
+                del rope["points"]
+                rope |= {"start": np.nan_to_num(mean_position(r.positions)[order[0]]).tolist(), "direction": way}
+                notes.append("at the first frame it is straight, as far as its noise tells")
             notes.append("at the first frame it moves no faster than its noise tells: it starts from rest")
         elif not first.rest:
             rope["velocity"] = "recording"
@@ -139,6 +144,17 @@ def _lets_go(s: Seen, order: tuple[int, ...]) -> bool:
         return False
     slope = np.linalg.lstsq(np.vander(t[early], 3, increasing=True), x.reshape(len(early), -1), rcond=None)[0][1]
     return bool(np.abs(slope).max() < 4.0 * s.noise * np.sqrt(192 / len(early)) / t[early[-1]])
+
+
+def _straight(s: Seen, order: tuple[int, ...]) -> list[float] | None:
+    """The direction from the first marker, if it stays in place, along a rope that is straight at the first frame."""
+    x = s.recording.positions[0, list(order)]
+    if order[0] not in s.still or np.isnan(x).any():
+        return None
+    off = x - mean_position(s.recording.positions)[order[0]]
+    way = np.linalg.svd(off, full_matrices=False)[2][0]
+    way *= np.sign(way @ off[-1])
+    return _snapped(way) if np.abs(off - np.outer(off @ way, way)).max() < 4.0 * s.noise else None
 
 
 def _length(s: Seen, last: float) -> tuple[float, str]:
