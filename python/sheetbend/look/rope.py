@@ -138,7 +138,7 @@ def _lets_go(s: Seen, order: tuple[int, ...]) -> bool:
     r = s.recording
     t = r.times - r.times[0]
     early = np.flatnonzero(t <= EARLY)
-    x = r.positions[np.ix_(early, order)]
+    x = r.positions[early][:, list(order)]
     x = x[:, np.isfinite(x).all(axis=(0, 2))]
     if len(early) < 6 or not x.shape[1] or not s.noise:
         return False
