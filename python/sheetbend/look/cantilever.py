@@ -89,7 +89,12 @@ def describe(takes: Sequence[Take], density: float | None) -> Description | None
     ]
     period = 1.0 / frequency
     stop = start + PERIODS_FITTED * period
-    swings: dict[str, Any] = {"file": takes[0].file, "units": takes[0].units, "start": "equilibrium", "start_time": start}
+    swings: dict[str, Any] = {
+        "file": takes[0].file,
+        "units": takes[0].units,
+        "start": "equilibrium",
+        "start_time": start,
+    }
     swings |= {"fit": [start, stop], "held_out": [stop, min(stop + PERIODS_PREDICTED * period, last)]}
     lines += table("[[recording]]", swings | {"sigma": max(s.noise, 1e-3 * length), "marker": places})
     parameters: dict[str, dict[str, Any]] = {"beam_EI": {}, "beam_loss_factor": {}, f"pull_{'xyz'[axis]}": {}}
