@@ -10,6 +10,7 @@ from .bench import bench
 from .check import check
 from .fit import fit
 from .info import info
+from .new import new
 from .simulate import simulate
 from .textile import textile
 from .view import view
@@ -42,5 +43,5 @@ def options(
     """Simulate ropes, beams and cloth, and find their physical parameters from recordings, with error bars."""
 
 
-for command in (simulate, fit, view, check, info, textile, bench):
+for command in (new, fit, simulate, view, check, info, textile, bench):
     app.command()(command)
