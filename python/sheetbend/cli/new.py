@@ -10,13 +10,13 @@ import typer
 from rich.console import Console
 
 from ..config import build, parse
-from ..door import reading
+from ..files.door import reading
 from ..errors import ConfigError
 from ..look.draft import Take, draft
 from ..look.seen import seen, unit_doubt
-from ..names import flaw
-from ..recording import Recording
-from ..whole import write_text
+from ..files.names import flaw
+from ..recording.recording import Recording
+from ..files.whole import write_text
 from .folders import made
 from .outcome import Outcome, run
 from .screen import heading, listing

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..oscillation import along, dominant_direction, first_frequency
-from ..timeseries import mean_position
+from ..recording.oscillation import along, dominant_direction, first_frequency
+from ..arrays.timeseries import mean_position
 from .text import joined, table
 
 if TYPE_CHECKING:

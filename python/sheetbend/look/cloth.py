@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import RecordingError
-from ..timeseries import default_max_gap
+from ..arrays.timeseries import default_max_gap
 from .seen import NEAR, Seen
 from .text import joined, table
 

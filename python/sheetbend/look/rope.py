@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import RecordingError
-from ..timeseries import mean_position
+from ..arrays.timeseries import mean_position
 from .seen import Seen, chain
 from .text import joined, table
 

@@ -7,9 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..recording import Recording
-from ..smoothing import smoothed
-from ..timeseries import default_max_gap, interpolate, mean_position
+from ..recording.recording import Recording
+from ..arrays.smoothing import smoothed
+from ..arrays.timeseries import default_max_gap, interpolate, mean_position
 
 Array = np.ndarray
 EARTH = 9.81
