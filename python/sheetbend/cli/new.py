@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 
-from ..config import build, parse
-from ..files.door import reading
-from ..errors import ConfigError
-from ..look.draft import Take, draft
-from ..look.seen import seen, unit_doubt
+from ..config import GrippedConfig, build, parse_any
+from ..errors import ConfigError, RecordingError, SheetbendError
 from ..files.names import flaw
-from ..recording.recording import Recording
 from ..files.whole import write_text
+from ..look.draft import Draft, draft
+from ..look.seen import seen, unit_doubt
+from ..look.take import Measured, Take
+from ..recording.recording import Recording
 from .folders import made
+from .gripped import load_ropes
 from .outcome import Outcome, run
 from .screen import heading, listing
 from .targets import check_targets
@@ -34,8 +35,9 @@ def new(
     ] = None,
     density: Annotated[
         float | None,
-        typer.Option(help="As weighed: kg/m of a rope, kg/m^2 of a cloth.", show_default=False),
+        typer.Option(help="As weighed: kg/m of a rope or beam, kg/m^2 of a cloth.", show_default=False),
     ] = None,
+    length: Annotated[float | None, typer.Option(help="As measured: m, of a rope or beam.", show_default=False)] = None,
     units: Annotated[
         str | None, typer.Option(help="Length unit of the files: m, cm or mm.", show_default=False)
     ] = None,
@@ -48,50 +50,74 @@ def new(
 
     Example: sheetbend new take.csv --density 0.05
     """
-    run(lambda console: _new(console, files, output, density, units), json)
+    measured = Measured(density, length)
+    run(lambda console: _new(console, files, output, measured, units), json)
 
 
-def _new(console: Console, files: list[Path], output: Path | None, density: float | None, units: str | None) -> Outcome:
-    if density is not None and not 0 < density < float("inf"):
-        raise ConfigError("--density", "must be positive", density, "give kg/m of a rope, kg/m^2 of a cloth")
+def _new(console: Console, files: list[Path], output: Path | None, measured: Measured, units: str | None) -> Outcome:
+    for option, given, fix in (
+        ("--density", measured.density, "give kg/m of a rope, kg/m^2 of a cloth"),
+        ("--length", measured.length, "give m"),
+    ):
+        if given is not None and not 0 < given < float("inf"):
+            raise ConfigError(option, "must be positive", given, fix)
     recordings = [_read(file, units) for file in files]
-    name = recordings[0][0].name
-    if flaw(name) is not None or not name[:1].isascii() or not name[:1].isalpha():
-        name = f"take_{name}"
-    name = "".join(c if c.isascii() and (c.isalnum() or c in "_.-") else "_" for c in name)
+    name = _name(recordings[0][0].name)
     target = output if output is not None else Path(f"{name}.toml")
     if target.suffix.lower() != ".toml":
         raise ConfigError("--output", "is no configuration", str(target), "give a file that ends in .toml")
     check_targets("--output", target.parent, [target])
     if target.exists():
         raise ConfigError("--output", "is there already", str(target), "name another file with --output")
-    made("--output", target.parent)
     takes = [
         Take(seen(recording), Path(os.path.relpath(file, target.parent)).as_posix(), unit)
         for file, (recording, unit) in zip(files, recordings, strict=True)
     ]
-    found = draft(takes, name, density)
+    try:
+        found = draft(takes, name, measured)
+    except RecordingError as error:
+        if error.field == "length":
+            raise ConfigError("--length", error.problem, error.got, error.fix) from error
+        raise
+    made("--output", target.parent)
     write_text(target, found.text)
-    with reading(target, ConfigError):
-        study = build(parse(target), target.parent)
     heading(console, name, f"looks like {found.kind}")
     console.print("seen:")
     listing(console, found.seen)
     console.print("not known from the recording:")
     listing(console, found.unknown)
-    console.print("how it is held:" if study.assumptions else "", end="\n" if study.assumptions else "")
-    listing(console, study.assumptions)
+    try:
+        data = _built(console, target)
+    except SheetbendError:
+        console.print(f"written to {target}, but it does not run as it is:", soft_wrap=True)
+        raise
     console.print(f"written to {target}; next: sheetbend fit {target}", soft_wrap=True)
-    return Outcome(
-        {
-            "name": name,
-            "config": str(target),
-            "kind": found.kind,
-            "seen": list(found.seen),
-            "unknown": list(found.unknown),
-            "parameters": list(study.parameters),
-        }
-    )
+    return Outcome({"name": name, "config": str(target)} | _said(found) | data)
+
+
+def _built(console: Console, target: Path) -> dict[str, Any]:
+    """Build what the configuration describes, and show what it assumes."""
+    config = parse_any(target)
+    if isinstance(config, GrippedConfig):
+        ropes = load_ropes(config, target.parent)
+        listing(console, (note for rope in ropes for note in rope.train.notes))
+        return {"parameters": []}
+    study = build(config, target.parent)
+    if study.assumptions:
+        console.print("how it is held:")
+        listing(console, study.assumptions)
+    return {"parameters": list(study.parameters)}
+
+
+def _said(found: Draft) -> dict[str, Any]:
+    return {"kind": found.kind, "seen": list(found.seen), "unknown": list(found.unknown)}
+
+
+def _name(recording: str) -> str:
+    """A name for the experiment, from that of its first recording."""
+    if flaw(recording) is not None or not recording[:1].isascii() or not recording[:1].isalpha():
+        recording = f"take_{recording}"
+    return "".join(c if c.isascii() and (c.isalnum() or c in "_.-") else "_" for c in recording)
 
 
 def _read(file: Path, units: str | None) -> tuple[Recording, str | None]:

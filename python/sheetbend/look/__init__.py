@@ -2,5 +2,6 @@
 
 from .draft import Draft, draft
 from .seen import Seen, seen
+from .take import Measured, Take
 
-__all__ = ["Draft", "Seen", "draft", "seen"]
+__all__ = ["Draft", "Measured", "Seen", "Take", "draft", "seen"]

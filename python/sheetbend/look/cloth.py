@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ..errors import RecordingError
 from ..arrays.timeseries import default_max_gap
+from ..errors import RecordingError
 from .seen import NEAR, Seen
+from .take import Description, Measured, Take
 from .text import joined, table
 
-if TYPE_CHECKING:
-    from .draft import Take
-
 Array = np.ndarray
-Description = tuple[str, list[str], list[str], list[str]]
 CELLS = 10  # along the longer side
 WHOLE = 0.8  # share of the markers that must hang together as one sheet
 QUIET = 0.1  # of the motion of all: how little the upper row moves where the edge above it is held
 FITTED, LONGEST = 2 / 3, 1.5  # share of the time that is fitted, and s at most
 
 
-def describe(takes: Sequence[Take], density: float | None) -> Description | None:
+def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     """A cloth through the markers that lie on a sheet; None where they do not."""
     s = takes[0].seen
     if not s.sheet:
@@ -61,12 +58,16 @@ def describe(takes: Sequence[Take], density: float | None) -> Description | None
         "the stiffness in tension: a cloth that hangs hardly shows it. warp and shear are kept, not fitted",
         "a wind: the air is taken to stand still",
         "the density"
-        + (": 0.2 kg/m^2 is taken, and stiffness and drag go with it" if density is None else " of the markers"),
+        + (
+            ": 0.2 kg/m^2 is taken, and stiffness and drag go with it"
+            if measured.density is None
+            else " of the markers"
+        ),
     ]
     others = [k for k in range(len(r.markers)) if k not in set(own)]
     if others:
         unknown.append(f"what {joined(r.markers[k] for k in others)} are on: they are left out")
-    weight = 0.2 if density is None else density
+    weight = 0.2 if measured.density is None else measured.density
     lines = [] if r.gravity is not None else table("[scene]", {"gravity": s.gravity.tolist()})
     step = float(np.median(np.diff(r.times))) if len(r.times) > 1 else 0.0
     solver: dict[str, Any] = {"method": "newton"}
@@ -100,7 +101,7 @@ def describe(takes: Sequence[Take], density: float | None) -> Description | None
     lines += table(
         "[fit]", {"profiles": False, "double_segments": False}, {"double_segments": "true for the intervals"}
     )
-    return "a cloth" + (" at rest" if s.static else ""), notes, unknown, lines
+    return Description("a cloth" + (" at rest" if s.static else ""), notes, unknown, lines)
 
 
 def _spacing(apart: Array) -> float:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import RecordingError
-from . import cantilever, cloth, pendulum, rope
-from .seen import Seen, seen
-from .text import comment, joined, table, value
+from . import cantilever, cloth, gripped, pendulum, rope
+from .take import Measured, Take
+from .text import comment, joined, table
 
 
 @dataclass(frozen=True)
@@ -30,20 +30,8 @@ class Draft:
     text: str
 
 
-@dataclass(frozen=True)
-class Take:
-    """A recording for a draft: what it shows, and how the configuration calls its file."""
-
-    seen: Seen
-    file: str
-    units: str | None = None
-
-
-def draft(takes: Sequence[Take], name: str, density: float | None = None) -> Draft:
+def draft(takes: Sequence[Take], name: str, measured: Measured | None = None) -> Draft:
     """A configuration for one recording, or for several of the same thing.
-
-    Args:
-        density: kg/m of a rope, kg/m^2 of a cloth, where it was weighed.
 
     Raises:
         RecordingError: recordings of different markers, or one that shows nothing that a model is for.
@@ -53,21 +41,20 @@ def draft(takes: Sequence[Take], name: str, density: float | None = None) -> Dra
         if take.seen.recording.markers != first.recording.markers:
             fix = "give recordings of the same markers, or make one configuration for each"
             raise RecordingError("markers", f"of {take.file} differ from the first file's", take.file, fix)
-    for model in (pendulum, cantilever, cloth, rope):
-        found = model.describe(takes, density)
+    for model in (pendulum, cantilever, cloth, gripped, rope):
+        found = model.describe(takes, measured or Measured())
         if found is not None:
             break
     else:
         got = joined(first.recording.markers)
         fix = "write a configuration by hand, see docs/configuration.md"
-        raise RecordingError("markers", "move like no rope, cloth or pendulum", got, fix)
-    kind, notes, unknown, body = found
-    told = (*_told(takes), *notes)
-    lines = comment(f"Written by `sheetbend new` from {joined(t.file for t in takes)}. It shows {kind}.")
+        raise RecordingError("markers", "move like no rope, beam, cloth or pendulum", got, fix)
+    told = (*_told(takes), *found.notes)
+    lines = comment(f"Written by `sheetbend new` from {joined(t.file for t in takes)}. It shows {found.kind}.")
     lines += ["#", "# Seen:", *(line for s in told for line in _item(s))]
-    lines += ["#", "# Not known from the recording:", *(line for s in unknown for line in _item(s))]
-    lines += table("[experiment]", {"name": name, "about": f"{kind}, as `sheetbend new` sees it"})
-    return Draft(kind, told, tuple(unknown), "\n".join([*lines, *body]) + "\n")
+    lines += ["#", "# Not known from the recording:", *(line for s in found.unknown for line in _item(s))]
+    lines += table("[experiment]", {"name": name, "about": f"{found.kind}, as `sheetbend new` sees it"})
+    return Draft(found.kind, told, tuple(found.unknown), "\n".join([*lines, *found.lines]) + "\n")
 
 
 def _item(sentence: str) -> list[str]:
@@ -93,12 +80,14 @@ def _told(takes: Sequence[Take]) -> list[str]:
     x = first.recording.positions
     box = np.nanmax(x, axis=(0, 1)) - np.nanmin(x, axis=(0, 1))
     said.append(f"the markers fill a box of {' x '.join(f'{v:.3g}' for v in box)} m")
+    if first.speed > 0:
+        said.append(f"the fastest marker moves at {first.speed:.2g} m/s")
     if takes[0].units is not None:
-        said.append(f"lengths are taken as {takes[0].units}: in m the markers would be {1e3 * box.max():.3g} m apart")
+        said.append(f"lengths are taken as {takes[0].units}")
     if not first.told:
         axis = "xyz"[first.up]
         said.append(f"{axis} is taken as up, the file does not say it: change `gravity` if another axis is")
     return said
 
 
-__all__ = ["Draft", "Take", "draft", "seen", "value"]
+__all__ = ["Draft", "draft"]

@@ -4,25 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from .seen import Seen
+from .take import Description, Measured, Take
 from .text import table
 
-if TYPE_CHECKING:
-    from .draft import Take
-
 Array = np.ndarray
-Description = tuple[str, list[str], list[str], list[str]]
 FLAT, STRAIGHT = 0.02, 0.01  # of an arm: how far it may leave its plane, and how much its length may change
 PIECE, FITTED, PREDICTED = 3.0, 4, 4  # s of a fitted piece, and how many pieces are fitted and predicted
 LEAD = 0.1  # s, at the beginning of a predicted piece, that its start is fitted to
 SUBSTEP = 1 / 1600  # s, at most
 
 
-def describe(takes: Sequence[Take], density: float | None) -> Description | None:
+def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     """One or two arms; None where the markers are not those of a pendulum."""
     s = takes[0].seen
     joints = _joints(s)
@@ -85,7 +82,7 @@ def describe(takes: Sequence[Take], density: float | None) -> Description | None
         parameters |= {f"{arm}_angle": {"private": True}, f"{arm}_rate": {"private": True}}
     for name, entries in parameters.items():
         lines += table(f"[parameters.{name}]", entries)
-    return f"a {'double ' * (len(arms) == 2)}pendulum", notes, unknown, lines
+    return Description(f"a {'double ' * (len(arms) == 2)}pendulum", notes, unknown, lines)
 
 
 def _joints(s: Seen) -> list[int] | None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
-from ..recording.recording import Recording
 from ..arrays.smoothing import smoothed
 from ..arrays.timeseries import default_max_gap, interpolate, mean_position
+from ..recording.recording import Recording
+from .line import chain
 
 Array = np.ndarray
 EARTH = 9.81
@@ -20,7 +20,7 @@ REST = 0.15  # s that a recording must begin at rest to be called so
 NEAR = 1.9  # times the nearest neighbor's distance: markers of a sheet have more than two others so near
 SHARP, TURNS = 0.15, 3  # share of markers at which the shortest way through those of a sheet turns back, and how many
 SHEET, FEWEST_OF_SHEET = 2.7, 8  # others so near, on average, of a sheet; markers that make one
-PLAUSIBLE = (0.02, 20.0)  # m, extents of what is recorded in meters
+LONGEST = 20.0  # m, of what is recorded in meters
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,8 @@ class Seen:
         apart: (markers, markers) m, the largest distance of every two markers over time (98 % of the frames).
         noise: m per coordinate; 0 where the recording is too short to tell.
         rest: s, for how long nothing moves at the beginning.
-        up: 0, 1 or 2, the axis along which gravity points down; None where neither the file nor the motion tells.
+        speed: m/s, of the fastest marker, smoothed; 99 % of the frames are slower.
+        up: 0, 1 or 2, the axis along which gravity points down.
         told: whether the file says it.
         sheet: whether the loose markers lie on a sheet rather than along a line.
     """
@@ -47,6 +48,7 @@ class Seen:
     apart: Array
     noise: float
     rest: float
+    speed: float
     up: int
     told: bool
     sheet: bool
@@ -61,7 +63,7 @@ class Seen:
         """(3,) m/s^2, the recording's own, or that along `up`."""
         if self.recording.gravity is not None:
             return np.asarray(self.recording.gravity)
-        return -EARTH * np.eye(3)[self.up]
+        return np.where(np.arange(3) == self.up, -EARTH, 0.0)
 
 
 def seen(recording: Recording) -> Seen:
@@ -74,14 +76,13 @@ def seen(recording: Recording) -> Seen:
     extent = float(np.linalg.norm(np.nanmax(x, axis=(0, 1)) - np.nanmin(x, axis=(0, 1))))
     moved = np.sqrt(np.nanmean(np.sum((x - center) ** 2, axis=2), axis=0)) if len(t) > 1 else np.zeros(count)
     still = moved <= max(STILL * noise, SILENT * extent)
-    distance = np.linalg.norm(x[:, :, None] - x[:, None], axis=3) if count <= 120 else _thinned(x)
+    distance = _distances(x)
     apart = np.nanquantile(distance, 0.98, axis=0)
     change = np.nanstd(distance, axis=0)
     bodies = [] if len(t) < 3 else _bodies(change <= np.maximum(RIGID * noise, 1e-3 * apart), apart, still)
     in_bodies = {k for body in bodies for k in body}
     loose = tuple(k for k in range(count) if not still[k] and k not in in_bodies)
-    chosen = tuple(range(count))
-    up, told = _up(recording, chosen, still, extent)
+    up, told = _up(recording)
     return Seen(
         recording=recording,
         still=tuple(int(k) for k in np.flatnonzero(still)),
@@ -90,15 +91,18 @@ def seen(recording: Recording) -> Seen:
         apart=apart,
         noise=noise,
         rest=_rest(recording, max(noise, 1e-4 * extent)),
+        speed=_speed(recording),
         up=up,
         told=told,
-        sheet=_is_sheet(x, apart, chosen),
+        sheet=_is_sheet(x, apart),
     )
 
 
-def _thinned(x: Array) -> Array:
-    some = x[np.linspace(0, len(x) - 1, min(len(x), 60)).astype(int)]
-    return np.linalg.norm(some[:, :, None] - some[:, None], axis=3)
+def _distances(x: Array) -> Array:
+    """(frames, markers, markers) m, of so many frames that the array stays small."""
+    most = max(60, 4_000_000 // x.shape[1] ** 2)
+    some = x[np.linspace(0, len(x) - 1, min(len(x), most)).astype(int)]
+    return np.asarray(np.linalg.norm(some[:, :, None] - some[:, None], axis=3))
 
 
 def _bodies(rigid: Array, apart: Array, still: Array) -> list[tuple[int, ...]]:
@@ -132,61 +136,56 @@ def _rest(recording: Recording, noise: float) -> float:
     t = recording.times - recording.times[0]
     if len(t) < 8 or not (t <= REST).sum() >= 4:
         return 0.0
-    x = recording.positions
-    filled = interpolate(recording.times, x, recording.times, "linear", default_max_gap(recording.times))
-    smooth = np.where(np.isnan(filled), 0.0, filled)
-    smooth, _ = smoothed(recording.times, smooth, REST / 2)
+    filled = _filled(recording)
+    smooth, _ = smoothed(recording.times, np.nan_to_num(filled), REST / 2)
     first = np.median(smooth[t <= REST / 2], axis=0)
     off = np.where(np.isnan(filled), 0.0, smooth - first)
     gone = np.flatnonzero((np.linalg.norm(off, axis=2) > CALM * noise).any(axis=1))
     return float(t[gone[0]] if len(gone) else t[-1])
 
 
-def _up(recording: Recording, chosen: tuple[int, ...], still: Array, extent: float) -> tuple[int, bool]:
+def _speed(recording: Recording) -> float:
+    """m/s; 0 for recordings that are too short to tell."""
+    if len(recording.times) < 8:
+        return 0.0
+    filled = _filled(recording)
+    _, rate = smoothed(recording.times, np.nan_to_num(filled), REST / 2)
+    size = np.where(np.isnan(filled[..., 0]), 0.0, np.linalg.norm(rate, axis=2))
+    return float(np.quantile(size.max(axis=1), 0.99))
+
+
+def _filled(recording: Recording) -> Array:
+    """Positions with short gaps closed."""
+    t = recording.times
+    return interpolate(t, recording.positions, t, "linear", default_max_gap(t))
+
+
+def _up(recording: Recording) -> tuple[int, bool]:
     if recording.gravity is not None:
         return int(np.argmax(np.abs(recording.gravity))), True
-    x = recording.positions[:, list(chosen)]
-    spread = np.nanmax(mean_position(x), axis=0) - np.nanmin(mean_position(x), axis=0)
+    center = mean_position(recording.positions)
+    spread = np.nanmax(center, axis=0) - np.nanmin(center, axis=0)
     # what hangs is long along the vertical; motion capture has y or z there
     return (1 if spread[1] > 1.5 * spread[2] else 2), False
 
 
-def _is_sheet(x: Array, apart: Array, chosen: tuple[int, ...]) -> bool:
-    if len(chosen) < FEWEST_OF_SHEET:
+def _is_sheet(x: Array, apart: Array) -> bool:
+    """Whether the markers have neighbors on all sides, or the shortest way through them turns back again and again."""
+    if len(apart) < FEWEST_OF_SHEET:
         return False
-    d = apart[np.ix_(chosen, chosen)] + np.where(np.eye(len(chosen), dtype=bool), np.inf, 0.0)
+    d = apart + np.where(np.eye(len(apart), dtype=bool), np.inf, 0.0)
     nearest = np.median(d.min(axis=1))
     if (d < NEAR * nearest).sum(axis=1).mean() > SHEET:
         return True
-    way = np.diff(x[int(np.argmax((~np.isnan(x[:, :, 0])).sum(axis=1))), list(chain(apart, chosen))], axis=0)
+    fullest = int(np.argmax((~np.isnan(x[:, :, 0])).sum(axis=1)))
+    way = np.diff(x[fullest, list(chain(apart, tuple(range(len(apart)))))], axis=0)
     back = np.sum(way[1:] * way[:-1], axis=1) < 0.0
     return bool(back.sum() >= TURNS and back.mean() > SHARP)
 
 
-def chain(apart: Array, markers: tuple[int, ...]) -> tuple[int, ...]:
-    """Markers in order along a line: the file's order, unless another one is a tenth shorter."""
-    if len(markers) < 3:
-        return markers
-
-    def length(order: tuple[int, ...]) -> float:
-        return float(sum(apart[a, b] for a, b in pairwise(order)))
-
-    best = markers
-    for first in markers:
-        order, left = [first], set(markers) - {first}
-        while left:
-            order.append(min(left, key=lambda k: apart[order[-1], k]))
-            left.remove(order[-1])
-        if length(tuple(order)) < 0.9 * length(best):
-            best = tuple(order)
-    return best
-
-
 def unit_doubt(recording: Recording) -> str | None:
-    """The unit that a recording is more plausible in than in the one that was read, "mm" or "cm"; None where it is
+    """The unit in which a recording is more plausible than in the one that was read, "mm" or "cm"; None where it is
     plausible as it is: nothing that hangs in a hand is 700 m long."""
     x = recording.positions
     extent = float(np.linalg.norm(np.nanmax(x, axis=(0, 1)) - np.nanmin(x, axis=(0, 1))))
-    if extent <= PLAUSIBLE[1]:
-        return None
-    return "cm" if extent < 1e2 * PLAUSIBLE[1] / 10 else "mm"
+    return None if extent <= LONGEST else "cm" if extent <= 100 * LONGEST / 10 else "mm"

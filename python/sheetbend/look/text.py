@@ -37,6 +37,9 @@ def table(header: str, entries: Mapping[str, Any], notes: Mapping[str, str] | No
     for name, given in entries.items():
         if given is None:
             continue
+        if isinstance(given, list) and given and all(isinstance(v, Mapping) for v in given):
+            lines += [f"{key(name)} = [", *(f"  {value(v)}," for v in given), "]"]
+            continue
         line, note = f"{key(name)} = {value(given)}", (notes or {}).get(name, "")
         if note and len(line) + len(note) + 4 > WIDTH:
             lines += [*comment(note), line]
