@@ -154,12 +154,16 @@ def _lines(take: Take, tip: tuple[int, ...], beam: Beam, measured: Measured) -> 
         lines += table(f"[scene.quantities.{name}]", {"scale": 1e-3}, {"scale": "m, of all markers' offsets"})
     lines += table("[[recording]]", {"name": "swing"} | _swing(take, beam) | _seen(take, tip, beam))
     if beam.resting is not None:
-        still = {"name": "rest", "file": take.file, "units": take.units, "leave_out": ["pull"], "static": True}
+        still: dict[str, Any] = {
+            "name": "rest",
+            "file": take.file,
+            "units": take.units,
+            "leave_out": ["pull"],
+            "static": True,
+        }
         still["fit"] = [beam.resting, float(r.times[-1]) + 1e-4]
         own = _seen(take, tip, beam)
-        own["sigma"] /= np.sqrt(
-            max(1, int(FITTED / beam.frequency / step))
-        )  # weighs as much as the frames of the swing
+        own["sigma"] /= np.sqrt(max(1.0, FITTED / beam.frequency / step))  # it weighs as much as the swing's frames
         lines += table("[[recording]]", still | own, {"static": "the mean of the last frames"})
     spread = {"prior": [0.0, 0.1 * length]}
     parameters: dict[str, dict[str, Any]] = {

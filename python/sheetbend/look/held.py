@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from ..arrays.timeseries import mean_position
-from .line import chain, snapped, tangent
+from .line import chain, plane, snapped, tangent
 from .seen import Seen
 from .text import joined
 
@@ -16,6 +17,7 @@ Array = np.ndarray
 NAMES = ("hand", "grip", "wrist", "clamp", "robot", "holder", "finger")
 SMOOTHING = 0.06  # s, of recorded grips
 STIFF = 0.75  # of the next chord's: how much the direction at an end varies at most in a clamp; a pin has 1 or more
+NEAR = 1.5  # times the distance of neighbors on the rope: how near its first marker is to the second
 HIGHER = 0.1  # of the distance of the ends: so much higher is the one that holds the rope, where neither stays
 
 
@@ -27,12 +29,14 @@ class Held:
         order: markers on the rope, from its start to its end; of a grip of two markers the inner one alone.
         rope: keys of the rope.
         grips: tables of its grips.
+        angles: ends whose clamps may turn by an angle that is fitted.
         notes, unknown: sentences about what is seen, and what is not known.
     """
 
     order: tuple[int, ...]
     rope: dict[str, Any] = field(default_factory=dict)
     grips: list[dict[str, Any]] = field(default_factory=list)
+    angles: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     unknown: list[str] = field(default_factory=list)
 
@@ -43,7 +47,23 @@ def parts(s: Seen) -> tuple[tuple[int, ...], tuple[int, ...]]:
     known = named(s)
     hands = [b for b in s.bodies if known & set(b)] or [b for b in s.bodies if count - len(b) >= 3]
     hand = hands[0] if hands else ()
-    return hand, chain(s.apart, tuple(k for k in range(count) if k not in hand))
+    order = chain(s.apart, tuple(k for k in range(count) if k not in hand))
+    if len(hand) <= 3 or len(order) < 3:
+        return hand, order
+    # the rope's own first marker keeps its place in the hand too
+    near = NEAR * float(np.median([s.apart[a, b] for a, b in pairwise(order)]))
+    pairs = [(at, k) for at in (0, -1) for k in hand if s.apart[order[at], k] <= near]
+    if pairs:
+        at, own = min(pairs, key=lambda pair: _slack(s, order[pair[0]], pair[1]))
+        hand = tuple(k for k in hand if k != own)
+        order = (own, *order) if at == 0 else (*order, own)
+    return hand, order
+
+
+def _slack(s: Seen, a: int, b: int) -> float:
+    """How much the distance of two markers varies, relative to itself."""
+    d = np.linalg.norm(s.recording.positions[:, a] - s.recording.positions[:, b], axis=1)
+    return float(np.nanstd(d) / np.nanmean(d))
 
 
 def named(s: Seen) -> set[int]:
@@ -64,7 +84,8 @@ def held(s: Seen, hand: tuple[int, ...], order: tuple[int, ...]) -> Held:
     ends = {"start": order[0], "end": order[-1]}
     taken = [at for at, k in ends.items() if k in still or k in clamped]
     if hand:
-        taken = [at for at in taken if at != _of_hand(s, hand, found)]
+        by_hand = _of_hand(s, hand, found)
+        taken = [at for at in taken if at != by_hand]
     elif not taken:
         taken = [_guessed(s, found)]
     for at in taken:
@@ -101,7 +122,21 @@ def held(s: Seen, hand: tuple[int, ...], order: tuple[int, ...]) -> Held:
                     "freely. If it is gripped firmly, record a second marker in the hand, and name both in `markers`"
                 )
             found.grips.append(grip)
+    _clamp_angles(s, found)
     return found
+
+
+def _clamp_angles(s: Seen, found: Held) -> None:
+    """Let clamps turn in the plane of the motion, where it has one: three markers show their direction poorly."""
+    clamped = [at for at in ("start", "end") if f"clamp_{at}" in found.rope]
+    order = list(found.order)
+    flat = plane(s.recording.positions[:, order], float(s.apart[np.ix_(order, order)].max())) if clamped else None
+    if flat is not None:
+        found.rope |= {"clamp_angles": True, "plane": flat}
+        found.angles += clamped
+    if clamped:
+        kept = "the mean over time is taken" if flat is None else "it is fitted, as an angle in the plane of the motion"
+        found.unknown.append(f"the exact direction of the clamp, which the first markers show poorly: {kept}")
 
 
 def _of_hand(s: Seen, hand: tuple[int, ...], found: Held) -> str:

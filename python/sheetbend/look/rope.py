@@ -22,6 +22,7 @@ BENDING = 0.15  # of the length: bending length (EI/(density g))^(1/3) at the st
 EARLY = 0.05  # s, in which the speed at the first frame is looked for
 BRANCHED = 1.1  # times the shortest tree: how much longer the line through all markers of a branched cable is
 FITTED, LONGEST = 2 / 3, 3.0  # share of the time that is fitted, and s at most; the next third is predicted
+CLAMP_SD = 0.2  # rad, of the direction of a clamp, read off the first markers
 LENGTH_SD = 0.01  # relative, of a length that is a sum of distances between markers
 
 
@@ -70,6 +71,8 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         lines += table("[[recording]]", _recording(take, flat), {"held_out": "predicted, not fitted"})
     for name, limits in _parameters(s.static, density, length, flat is not None).items():
         lines += table(f"[parameters.{name}]", limits)
+    for at in found.angles:
+        lines += table(f"[parameters.rope_{at}_angle]", {"prior": [0.0, CLAMP_SD]}, {"prior": "rad"})
     if not measured_length:
         prior = {"prior": [length, LENGTH_SD]}
         # a motion shows the length of a rope far better than a sum of distances; a shape at rest does not
@@ -164,6 +167,8 @@ def _beginning(s: Seen, found: Held, rope: dict[str, Any]) -> list[str]:
     if way is not None:
         del rope["points"]
         rope |= {"start": mean_position(s.recording.positions)[found.order[0]].tolist(), "direction": way}
+        if "clamp_start" in found.rope:
+            found.rope["clamp_start"] = way
         notes.append("at the first frame it is straight, as far as its noise tells")
     return notes
 

@@ -94,7 +94,7 @@ def seen(recording: Recording) -> Seen:
         speed=_speed(recording),
         up=up,
         told=told,
-        sheet=_is_sheet(x, apart),
+        sheet=_is_sheet(x, apart, in_bodies),
     )
 
 
@@ -169,8 +169,12 @@ def _up(recording: Recording) -> tuple[int, bool]:
     return (1 if spread[1] > 1.5 * spread[2] else 2), False
 
 
-def _is_sheet(x: Array, apart: Array) -> bool:
-    """Whether the markers have neighbors on all sides, or the shortest way through them turns back again and again."""
+def _is_sheet(x: Array, apart: Array, in_bodies: set[int]) -> bool:
+    """Whether the markers have neighbors on all sides, or the shortest way through them turns back again and again.
+    Those of a hand's body do not count."""
+    if 2 * len(in_bodies) <= len(apart):
+        own = [k for k in range(len(apart)) if k not in in_bodies]
+        x, apart = x[:, own], apart[np.ix_(own, own)]
     if len(apart) < FEWEST_OF_SHEET:
         return False
     d = apart + np.where(np.eye(len(apart), dtype=bool), np.inf, 0.0)
