@@ -14,7 +14,7 @@ LAYERS = (
     ("arrays", "files", "optional"),
     ("mesh", "quantities", "result"),
     ("recording", "scene", "statistics"),
-    ("motion", "objects"),
+    ("look", "motion", "objects"),
     ("experiment",),
     ("minimum", "report", "torch"),
     ("doubts", "textile"),

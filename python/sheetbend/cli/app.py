@@ -10,6 +10,7 @@ from .bench import bench
 from .check import check
 from .fit import fit
 from .info import info
+from .new import new
 from .simulate import simulate
 from .textile import textile
 from .view import view
@@ -42,6 +43,6 @@ def options(
     """Simulate ropes, beams and cloth, and find their physical parameters from recordings, with error bars."""
 
 
-for command in (simulate, fit, view, check, info, textile):
+for command in (new, fit, simulate, view, check, info, textile):
     app.command()(command)
 app.command(hidden=True, context_settings={"ignore_unknown_options": True})(bench)

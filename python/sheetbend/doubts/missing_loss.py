@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -33,7 +34,7 @@ EXPLAINS = 1 / 3
 of their recordings (0.3 to 30 ms); a finer mesh looks like a loss by up to 21 %, a turned clamp by 16 %, a wrong length
 by 4 %, and noise by any part of next to nothing, which is why chance is asked too (measured)."""
 LEVEL = 1e-3  # chance that a right model is contradicted
-OTHER = {"bdf1": "bdf2", "bdf2": "bdf1"}
+OTHER: dict[str, Literal["bdf1", "bdf2"]] = {"bdf1": "bdf2", "bdf2": "bdf1"}
 
 
 @dataclass(frozen=True)

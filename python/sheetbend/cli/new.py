@@ -1,0 +1,127 @@
+"""sheetbend new: a configuration for a recording that nobody has described yet."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from ..config import GrippedConfig, build, parse_any
+from ..errors import ConfigError, RecordingError, SheetbendError
+from ..files.names import flaw
+from ..files.whole import write_text
+from ..look.draft import Draft, draft
+from ..look.seen import seen, unit_doubt
+from ..look.take import Measured, Take
+from ..recording.recording import Recording
+from .folders import made
+from .gripped import load_ropes
+from .outcome import Outcome, run
+from .screen import heading, listing
+from .targets import check_targets
+
+
+def new(
+    files: Annotated[
+        list[Path],
+        typer.Argument(help="A recording, or several of the same rope or cloth.", show_default=False),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(help="The configuration; NAME.toml in the working directory when left out.", show_default=False),
+    ] = None,
+    density: Annotated[
+        float | None,
+        typer.Option(help="As weighed: kg/m of a rope or beam, kg/m^2 of a cloth.", show_default=False),
+    ] = None,
+    length: Annotated[float | None, typer.Option(help="As measured: m, of a rope or beam.", show_default=False)] = None,
+    units: Annotated[
+        str | None, typer.Option(help="Length unit of the files: m, cm or mm.", show_default=False)
+    ] = None,
+    json: Annotated[
+        bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
+    ] = False,
+) -> None:
+    """Look at a recording and write a configuration that `sheetbend fit` runs, with comments on what is seen in it and
+    what cannot be known.
+
+    Example: sheetbend new take.csv --density 0.05
+    """
+    measured = Measured(density, length)
+    run(lambda console: _new(console, files, output, measured, units), json)
+
+
+def _new(console: Console, files: list[Path], output: Path | None, measured: Measured, units: str | None) -> Outcome:
+    for option, given, fix in (
+        ("--density", measured.density, "give kg/m of a rope, kg/m^2 of a cloth"),
+        ("--length", measured.length, "give m"),
+    ):
+        if given is not None and not 0 < given < float("inf"):
+            raise ConfigError(option, "must be positive", given, fix)
+    recordings = [_read(file, units) for file in files]
+    name = _name(recordings[0][0].name)
+    target = output if output is not None else Path(f"{name}.toml")
+    if target.suffix.lower() != ".toml":
+        raise ConfigError("--output", "is no configuration", str(target), "give a file that ends in .toml")
+    check_targets("--output", target.parent, [target])
+    if target.exists():
+        raise ConfigError("--output", "is there already", str(target), "name another file with --output")
+    takes = [
+        Take(seen(recording), Path(os.path.relpath(file, target.parent)).as_posix(), unit)
+        for file, (recording, unit) in zip(files, recordings, strict=True)
+    ]
+    try:
+        found = draft(takes, name, measured)
+    except RecordingError as error:
+        if error.field == "length":
+            raise ConfigError("--length", error.problem, error.got, error.fix) from error
+        raise
+    made("--output", target.parent)
+    write_text(target, found.text)
+    heading(console, name, f"looks like {found.kind}")
+    console.print("seen:")
+    listing(console, found.seen)
+    console.print("not known from the recording:")
+    listing(console, found.unknown)
+    try:
+        data = _built(console, target)
+    except SheetbendError:
+        console.print(f"written to {target}, but it does not run as it is:", soft_wrap=True)
+        raise
+    console.print(f"written to {target}; next: sheetbend fit {target}", soft_wrap=True)
+    return Outcome({"name": name, "config": str(target)} | _said(found) | data)
+
+
+def _built(console: Console, target: Path) -> dict[str, Any]:
+    """Build what the configuration describes, and show what it assumes."""
+    config = parse_any(target)
+    if isinstance(config, GrippedConfig):
+        ropes = load_ropes(config, target.parent)
+        listing(console, (note for rope in ropes for note in rope.train.notes))
+        return {"parameters": []}
+    study = build(config, target.parent)
+    if study.assumptions:
+        console.print("how it is held:")
+        listing(console, study.assumptions)
+    return {"parameters": list(study.parameters)}
+
+
+def _said(found: Draft) -> dict[str, Any]:
+    return {"kind": found.kind, "seen": list(found.seen), "unknown": list(found.unknown)}
+
+
+def _name(recording: str) -> str:
+    """A name for the experiment, from that of its first recording."""
+    if flaw(recording) is not None or not recording[:1].isascii() or not recording[:1].isalpha():
+        recording = f"take_{recording}"
+    return "".join(c if c.isascii() and (c.isalnum() or c in "_.-") else "_" for c in recording)
+
+
+def _read(file: Path, units: str | None) -> tuple[Recording, str | None]:
+    """A recording in m, and the unit that the configuration must name: the one that is given, or one told by doubt."""
+    recording = Recording.load(file, units)
+    doubt = None if units is not None else unit_doubt(recording)
+    return (recording, units) if doubt is None else (Recording.load(file, doubt), doubt)

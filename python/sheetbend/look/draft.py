@@ -1,0 +1,93 @@
+"""From what recordings show to the text of a configuration: which model, what is seen, and what cannot be known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import RecordingError
+from . import cantilever, cloth, gripped, pendulum, rope
+from .take import Measured, Take
+from .text import comment, joined, table
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A configuration to begin with.
+
+    Attributes:
+        kind: what it takes the recording for, in words.
+        seen: sentences about what the recording shows.
+        unknown: sentences about what it cannot tell, and what stands in its place.
+        text: the whole file.
+    """
+
+    kind: str
+    seen: tuple[str, ...]
+    unknown: tuple[str, ...]
+    text: str
+
+
+def draft(takes: Sequence[Take], name: str, measured: Measured | None = None) -> Draft:
+    """A configuration for one recording, or for several of the same thing.
+
+    Raises:
+        RecordingError: recordings of different markers, or one that shows nothing that a model is for.
+    """
+    first = takes[0].seen
+    for take in takes[1:]:
+        if take.seen.recording.markers != first.recording.markers:
+            fix = "give recordings of the same markers, or make one configuration for each"
+            raise RecordingError("markers", f"of {take.file} differ from the first file's", take.file, fix)
+    for model in (pendulum, cantilever, cloth, gripped, rope):
+        found = model.describe(takes, measured or Measured())
+        if found is not None:
+            break
+    else:
+        got = joined(first.recording.markers)
+        fix = "write a configuration by hand, see docs/configuration.md"
+        raise RecordingError("markers", "move like no rope, beam, cloth or pendulum", got, fix)
+    told = (*_told(takes), *found.notes)
+    lines = comment(f"Written by `sheetbend new` from {joined(t.file for t in takes)}. It shows {found.kind}.")
+    lines += ["#", "# Seen:", *(line for s in told for line in _item(s))]
+    lines += ["#", "# Not known from the recording:", *(line for s in found.unknown for line in _item(s))]
+    lines += table("[experiment]", {"name": name, "about": f"{found.kind}, as `sheetbend new` sees it"})
+    return Draft(found.kind, told, tuple(found.unknown), "\n".join([*lines, *found.lines]) + "\n")
+
+
+def _item(sentence: str) -> list[str]:
+    first, *rest = comment(f"- {sentence}")
+    return [first, *(line.replace("# ", "#   ", 1) for line in rest)]
+
+
+def _told(takes: Sequence[Take]) -> list[str]:
+    """About the files themselves."""
+    said = []
+    for take in takes:
+        r = take.seen.recording
+        frames, markers = r.mask.shape
+        step = float(np.median(np.diff(r.times))) if frames > 1 else 0.0
+        time = f"{r.times[-1] - r.times[0]:.3g} s at {1 / step:.4g} Hz" if step else "one frame"
+        lost = float(np.mean(~r.mask))
+        said.append(
+            f"{take.file}: {markers} markers, {time}"
+            + (f", {lost:.2%} of the samples not seen" if lost else "")
+            + (f", noise {1e3 * take.seen.noise:.2g} mm in each coordinate" if take.seen.noise else "")
+        )
+    first = takes[0].seen
+    x = first.recording.positions
+    box = np.nanmax(x, axis=(0, 1)) - np.nanmin(x, axis=(0, 1))
+    said.append(f"the markers fill a box of {' x '.join(f'{v:.3g}' for v in box)} m")
+    if first.speed > 0:
+        said.append(f"the fastest marker moves at {first.speed:.2g} m/s")
+    if takes[0].units is not None:
+        said.append(f"lengths are taken as {takes[0].units}")
+    if not first.told:
+        axis = "xyz"[first.up]
+        said.append(f"{axis} is taken as up, the file does not say it: change `gravity` if another axis is")
+    return said
+
+
+__all__ = ["Draft", "draft"]

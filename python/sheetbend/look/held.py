@@ -1,0 +1,188 @@
+"""What holds a rope in a recording: ends that stay, markers that move one, a hand's rigid body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ..arrays.timeseries import mean_position
+from .line import chain, plane, snapped, tangent
+from .seen import Seen
+from .text import joined
+
+Array = np.ndarray
+NAMES = ("hand", "grip", "wrist", "clamp", "robot", "holder", "finger")
+SMOOTHING = 0.06  # s, of recorded grips
+STIFF = 0.75  # of the next chord's: how much the direction at an end varies at most in a clamp; a pin has 1 or more
+NEAR = 1.5  # times the distance of neighbors on the rope: how near its first marker is to the second
+HIGHER = 0.1  # of the distance of the ends: so much higher is the one that holds the rope, where neither stays
+
+
+@dataclass
+class Held:
+    """How the ends of a rope are held.
+
+    Attributes:
+        order: markers on the rope, from its start to its end; of a grip of two markers the inner one alone.
+        rope: keys of the rope.
+        grips: tables of its grips.
+        angles: ends whose clamps may turn by an angle that is fitted.
+        notes, unknown: sentences about what is seen, and what is not known.
+    """
+
+    order: tuple[int, ...]
+    rope: dict[str, Any] = field(default_factory=dict)
+    grips: list[dict[str, Any]] = field(default_factory=list)
+    angles: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    unknown: list[str] = field(default_factory=list)
+
+
+def parts(s: Seen) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Markers of the hand's rigid body, and those of the rope in order."""
+    count = len(s.recording.markers)
+    known = named(s)
+    hands = [b for b in s.bodies if known & set(b)] or [b for b in s.bodies if count - len(b) >= 3]
+    hand = hands[0] if hands else ()
+    order = chain(s.apart, tuple(k for k in range(count) if k not in hand))
+    if len(hand) <= 3 or len(order) < 3:
+        return hand, order
+    # the rope's own first marker keeps its place in the hand too
+    near = NEAR * float(np.median([s.apart[a, b] for a, b in pairwise(order)]))
+    pairs = [(at, k) for at in (0, -1) for k in hand if s.apart[order[at], k] <= near]
+    if pairs:
+        at, own = min(pairs, key=lambda pair: _slack(s, order[pair[0]], pair[1]))
+        hand = tuple(k for k in hand if k != own)
+        order = (own, *order) if at == 0 else (*order, own)
+    return hand, order
+
+
+def _slack(s: Seen, a: int, b: int) -> float:
+    """How much the distance of two markers varies, relative to itself."""
+    d = np.linalg.norm(s.recording.positions[:, a] - s.recording.positions[:, b], axis=1)
+    return float(np.nanstd(d) / np.nanmean(d))
+
+
+def named(s: Seen) -> set[int]:
+    """Markers whose names say that they are on what holds the rope."""
+    return {k for k, n in enumerate(s.recording.markers) if any(word in n.lower() for word in NAMES)}
+
+
+def gripping(s: Seen) -> set[int]:
+    """Markers that hold something, by their names or by the file."""
+    return named(s) | set(s.recording.clamped)
+
+
+def held(s: Seen, hand: tuple[int, ...], order: tuple[int, ...]) -> Held:
+    """What holds a rope that moves, whose markers are given in order."""
+    r = s.recording
+    names, still, clamped = r.markers, set(s.still), gripping(s)
+    found = Held(order)
+    ends = {"start": order[0], "end": order[-1]}
+    taken = [at for at, k in ends.items() if k in still or k in clamped]
+    if hand:
+        by_hand = _of_hand(s, hand, found)
+        taken = [at for at in taken if at != by_hand]
+    elif not taken:
+        taken = [_guessed(s, found)]
+    for at in taken:
+        k, way = ends[at], order if at == "start" else order[::-1]
+        stays, along = _direction_stays(r.positions, way)
+        direction = snapped(along if at == "start" else -along)
+        if k in still:
+            if stays:
+                found.rope[f"clamp_{at}"] = direction
+                found.notes.append(f"{names[k]} stays in place and the rope keeps its direction there: a clamp")
+            else:
+                found.rope.setdefault("pinned", []).append(0 if at == "start" else -1)
+                found.notes.append(f"{names[k]} stays in place and the rope turns there: it is pinned")
+        elif way[1] in clamped:
+            pair = [names[j] for j in (way[:2] if at == "start" else way[1::-1])]
+            found.grips.append({"at": at, "markers": pair, "smoothing": SMOOTHING})
+            found.order = tuple(j for j in found.order if j != k)
+            found.notes.append(
+                f"{pair[0]} and {pair[1]} are gripped: they give the place and the direction, and the rope is free "
+                f"from {names[way[1]]} on"
+            )
+            found.unknown.append(f"whether the rope runs through {pair[0]} and {pair[1]}, as it is taken to do")
+        else:
+            grip: dict[str, Any] = {"at": at, "markers": [names[k]], "smoothing": SMOOTHING}
+            if stays:
+                grip["direction"] = direction
+                found.notes.append(
+                    f"{names[k]} moves the rope, which keeps its direction there: the hand does not turn"
+                )
+            else:
+                found.notes.append(f"{names[k]} moves the rope, which turns there")
+                found.unknown.append(
+                    f"whether the hand turns the rope at {names[k]}: one marker gives no direction, so the end turns "
+                    "freely. If it is gripped firmly, record a second marker in the hand, and name both in `markers`"
+                )
+            found.grips.append(grip)
+    _clamp_angles(s, found)
+    return found
+
+
+def _clamp_angles(s: Seen, found: Held) -> None:
+    """Let clamps turn in the plane of the motion, where it has one: three markers show their direction poorly."""
+    clamped = [at for at in ("start", "end") if f"clamp_{at}" in found.rope]
+    order = list(found.order)
+    flat = plane(s.recording.positions[:, order], float(s.apart[np.ix_(order, order)].max())) if clamped else None
+    if flat is not None:
+        found.rope |= {"clamp_angles": True, "plane": flat}
+        found.angles += clamped
+    if clamped:
+        kept = "the mean over time is taken" if flat is None else "it is fitted, as an angle in the plane of the motion"
+        found.unknown.append(f"the exact direction of the clamp, which the first markers show poorly: {kept}")
+
+
+def _of_hand(s: Seen, hand: tuple[int, ...], found: Held) -> str:
+    """Add the grip of a hand's body; returns the end that it holds."""
+    r, order = s.recording, found.order
+    center = np.nanmean(r.positions[:, list(hand)], axis=1)
+    reach = [float(np.nanmean(np.linalg.norm(r.positions[:, k] - center, axis=1))) for k in (order[0], order[-1])]
+    at, k = ("start", order[0]) if reach[0] <= reach[1] else ("end", order[-1])
+    place = r.positions[0, k]
+    found.notes.append(
+        f"{joined(r.markers[j] for j in hand)} move as one rigid body, which holds the rope near {r.markers[k]}"
+    )
+    found.unknown.append(
+        f"in which direction the rope leaves the hand, and where: that of its first markers, at {r.markers[k]}"
+    )
+    entry = None if np.isnan(place).any() else place.tolist()
+    found.grips.append({"at": at, "markers": [r.markers[j] for j in hand], "position": entry, "smoothing": SMOOTHING})
+    return at
+
+
+def _guessed(s: Seen, found: Held) -> str:
+    """The end that is taken as the held one where none stays: the upper one, or the one that moves less."""
+    r, (first, last) = s.recording, (found.order[0], found.order[-1])
+    height = mean_position(r.positions) @ (-s.gravity / np.linalg.norm(s.gravity))
+    rise = height[first] - height[last]
+    if abs(rise) > HIGHER * float(s.apart[first, last]):
+        at, why = ("start" if rise > 0 else "end"), "the upper end"
+    else:
+        spread = np.nanvar(r.positions, axis=0).sum(axis=1)
+        at, why = ("start" if spread[first] < spread[last] else "end"), "the end that moves less"
+    k = first if at == "start" else last
+    found.unknown.append(
+        f"what holds the rope: no marker stays or has a name such as hand or grip, so {r.markers[k]}, {why}, is taken"
+    )
+    return at
+
+
+def _direction_stays(x: Array, order: tuple[int, ...]) -> tuple[bool, Array]:
+    """Whether the direction at an end varies much less than that of the first chord, and its mean."""
+    some = x[np.linspace(0, len(x) - 1, min(len(x), 80)).astype(int)]
+    ways = np.array([tangent(frame, order) for frame in some if np.isfinite(frame[list(order[:3])]).all()])
+    if not len(ways):
+        return False, np.eye(3)[0]
+    chord = some[:, order[1]] - some[:, order[0]]
+    chord = chord[np.isfinite(chord[:, 0])]
+    chord = chord / np.linalg.norm(chord, axis=1, keepdims=True)
+    mean = ways.mean(axis=0)
+    spread = [float(np.sqrt(v.var(axis=0).sum())) for v in (ways, chord)]
+    return spread[0] < STIFF * spread[1], mean / max(float(np.linalg.norm(mean)), 1e-12)

@@ -1,0 +1,149 @@
+"""A pendulum in a recording: one or two arms on a pivot that stays, swinging in the plane of x and z."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from .seen import Seen
+from .take import Description, Measured, Take
+from .text import table
+
+Array = np.ndarray
+FLAT, STRAIGHT = 0.02, 0.01  # of an arm: how far it may leave its plane, and how much its length may change
+PIECE, FITTED, PREDICTED = 3.0, 4, 4  # s of a fitted piece, and how many pieces are fitted and predicted
+LEAD = 0.1  # s, at the beginning of a predicted piece, that its start is fitted to
+SUBSTEP = 1 / 1600  # s, at most
+
+
+def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
+    """One or two arms; None where the markers are not those of a pendulum."""
+    s = takes[0].seen
+    joints = _joints(s)
+    if joints is None or len(takes) > 1:
+        return None
+    r = s.recording
+    x = r.positions
+    arms = ["arm"] if len(joints) == 2 else ["upper", "lower"]
+    radii = [float(np.nanmean(_distance(x, a, b))) for a, b in pairwise(joints)]
+    names = [r.markers[k] for k in joints]
+    notes = [
+        f"{names[k + 1]} stays {radius:.6g} m from {names[k]}{', which does not move' * (k == 0)}: an arm"
+        for k, radius in enumerate(radii)
+    ]
+    unknown = ["masses: motion tells ratios only. One of them is 1 kg (or 1 kg m^2), and all others are in its unit"]
+    pivot = np.nanmean(x[:, joints[0]], axis=0).tolist()
+    lines = [] if r.gravity is not None else table("[scene]", {"gravity": s.gravity.tolist()})
+    step = float(np.median(np.diff(r.times)))
+    lines += table("[solver]", {"substeps": max(1, int(np.ceil(step / SUBSTEP - 1e-9)))})
+    if len(arms) == 1:
+        single: dict[str, Any] = {
+            "name": "arm",
+            "length": radii[0],
+            "mass": 1.0,
+            "pivot": pivot,
+            "friction": 1e-3,
+            "drag": 1e-4,
+        }
+        lines += table("[[scene.pendulum]]", single, {"length": "of a point mass on a massless arm that swings alike"})
+        parameters: dict[str, dict[str, Any]] = {
+            "arm_length": {"lower": 0.2 * radii[0], "upper": 5.0 * radii[0]},
+            "arm_friction": {},
+            "arm_drag": {},
+        }
+    else:
+        lines += table("[[scene.arm]]", _arm("upper", radii[0], pivot))
+        lines += table("[[scene.arm]]", _arm("lower", 2.2 * radii[1], "upper", 1.5 * radii[1]))
+        parameters = {
+            f"{arm}_{key}": dict[str, Any]()
+            for arm, keys in (("upper", ("first_moment",)), ("lower", ("first_moment", "inertia")))
+            for key in keys
+        } | {"upper_friction": {}, "lower_friction": {}, "lower_drag": {}}
+    for arm in arms:
+        lines += table(f"[scene.quantities.{arm}_zero]", {"scale": 1e-3}, {"scale": "m, of the marker's offset across"})
+        parameters[f"{arm}_zero"] = {}
+    for arm, name, radius in zip(arms, names[1:], radii, strict=True):
+        lines += table("[[marker]]", {"marker": name, "arm": arm, "radius": radius})
+    angles, rates = _states(x, r.times, joints)
+    sigma = max(s.noise, 1e-4)
+    for entries, start in _pieces(s, takes[0]):
+        frame = int(np.searchsorted(r.times, start))
+        values = {f"{arm}_angle": float(angles[k, frame]) for k, arm in enumerate(arms)}
+        values |= {f"{arm}_rate": float(rates[k, frame]) for k, arm in enumerate(arms)}
+        offsets = {name: ["", "", f"{arm}_zero"] for arm, name in zip(arms, names[1:], strict=True)}
+        shown = {"radius": radii[0]} if len(arms) == 1 else {}
+        lines += table(
+            "[[recording]]", entries | {"sigma": sigma, "axes": "xz"} | shown | {"offsets": offsets, "values": values}
+        )
+    for arm in arms:
+        parameters |= {f"{arm}_angle": {"private": True}, f"{arm}_rate": {"private": True}}
+    for name, entries in parameters.items():
+        lines += table(f"[parameters.{name}]", entries)
+    return Description(f"a {'double ' * (len(arms) == 2)}pendulum", notes, unknown, lines)
+
+
+def _joints(s: Seen) -> list[int] | None:
+    """The pivot and the ends of the arms, in order."""
+    x, count = s.recording.positions, len(s.recording.markers)
+    if not 2 <= count <= 3 or len(s.still) != 1 or len(s.recording.times) < 20:
+        return None
+    if int(np.argmax(np.abs(s.gravity))) != 2:
+        return None
+    order, left = [s.still[0]], set(range(count)) - set(s.still)
+    while left:
+        steady = [k for k in left if np.nanstd(_distance(x, order[-1], k)) < STRAIGHT * s.apart[order[-1], k]]
+        if len(steady) != 1:
+            return None
+        order.append(steady[0])
+        left.remove(steady[0])
+    off = np.nanmax(np.abs(x[:, order, 1] - np.nanmean(x[:, order[0], 1])))
+    return order if off < FLAT * s.apart[order[0], order[1]] else None
+
+
+def _distance(x: Array, a: int, b: int) -> Array:
+    return np.asarray(np.linalg.norm(x[:, a] - x[:, b], axis=1))
+
+
+def _arm(name: str, length: float, pivot: list[float] | str, inertia_length: float | None = None) -> dict[str, Any]:
+    """A uniform one of 1 kg."""
+    size = inertia_length or length
+    own = {
+        "name": name,
+        "mass": 1.0,
+        "first_moment": size / 2,
+        "inertia": size**2 / 3,
+        "length": length,
+        "pivot": pivot,
+    }
+    return own | {"friction": 1e-3} | ({"drag": 1e-4} if name == "lower" else {})
+
+
+def _states(x: Array, times: Array, joints: list[int]) -> tuple[Array, Array]:
+    """Angles rad from straight down towards +x, and their rates rad/s, (arms, frames)."""
+    d = x[:, joints[1:]] - x[:, joints[:-1]]
+    angles = np.unwrap(np.arctan2(d[:, :, 0], -d[:, :, 2]), axis=0)
+    rates = np.gradient(angles, times, axis=0)
+    turns = 2.0 * np.pi * np.round(angles / (2.0 * np.pi))
+    return (angles - turns).T, rates.T
+
+
+def _pieces(s: Seen, take: Take) -> list[tuple[dict[str, Any], float]]:
+    """Recordings cut from one: the first part is fitted, in pieces; the rest is predicted from its first moments."""
+    t = s.recording.times
+    start, stop = float(t[0]), float(t[-1])
+    length = min(PIECE, (stop - start) / (FITTED + 2))
+    found: list[tuple[dict[str, Any], float]] = []
+    for k in range(FITTED):
+        a = start + k * length
+        found.append(({"file": take.file, "name": f"fitted_{k}", "fit": [a, a + length]}, a))
+    rest = start + FITTED * length
+    each = (stop - rest) / PREDICTED
+    for k in range(PREDICTED):
+        a = round(rest + k * each, 4)
+        held = [a + LEAD + 1e-3, min(a + min(each, 5.0), stop)]
+        entries = {"file": take.file, "name": f"predicted_{k}", "predict": "window", "fit": [a, a + LEAD]}
+        found.append((entries | {"held_out": held}, a))
+    return found

@@ -1,0 +1,233 @@
+"""A rope in a recording: its markers in order, what holds it, and how it is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ..arrays.timeseries import mean_position
+from ..errors import RecordingError
+from .held import Held, gripping, held, parts
+from .line import forks, plane, snapped, tangent
+from .seen import Seen
+from .take import Description, Measured, Take
+from .text import joined, table
+
+Array = np.ndarray
+SUBSTEP = 1 / 500  # s, at most
+BENDING = 0.15  # of the length: bending length (EI/(density g))^(1/3) at the start
+EARLY = 0.05  # s, in which the speed at the first frame is looked for
+BRANCHED = 1.1  # times the shortest tree: how much longer the line through all markers of a branched cable is
+FITTED, LONGEST = 2 / 3, 3.0  # share of the time that is fitted, and s at most; the next third is predicted
+CLAMP_SD = 0.2  # rad, of the direction of a clamp, read off the first markers
+LENGTH_SD = 0.01  # relative, of a length that is a sum of distances between markers
+
+
+def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
+    """A rope; None where fewer than three markers are in a line."""
+    s = takes[0].seen
+    r = s.recording
+    hand, order = parts(s)
+    if len(order) < 3:
+        return None
+    _unbranched(s, order)
+    found = _at_rest(s, order) if s.static else held(s, hand, order)
+    if len(found.order) < 3:
+        return None
+    arc = _arcs(takes, found.order)
+    length, measured_length, said_length = _length(s, found, float(arc[-1]), measured)
+    arc = np.minimum(arc, length)
+    density, said_density = _density(s, measured)
+    names = r.markers
+    notes = [f"a rope through {joined(names[k] for k in order)}; {arc[-1]:.4g} m of it are free"]
+    if s.static:
+        notes = [f"a rope through {joined(names[k] for k in order)}, {arc[-1]:.4g} m from the first to the last"]
+    unknown = [said_length, said_density, *found.unknown]
+    flat = plane(r.positions[:, list(order)], length) if s.static else None
+    segments = int(min(max(40, 2 * (len(order) - 1)), 100))
+    rope: dict[str, Any] = {"name": "rope", "length": length, "segments": segments, "density": density}
+    rope |= {"EI": density * 9.81 * (BENDING * length) ** 3, "points": "recording"}
+    why = {"EI": "a guess to start from"} | ({} if measured_length else {"length": "not known well: see above"})
+    why["density"] = "kg/m" if measured.density is not None else "kg/m, not known: see above"
+    if s.static:
+        rope |= {} if flat is None else {"clamp_angles": True, "plane": flat, "set_modes": [1]}
+    else:
+        rope |= {"bend_damping": 0.01, "drag_linear": 0.1 * density}
+        notes += _beginning(s, found, rope)
+    lines = [] if r.gravity is not None else table("[scene]", {"gravity": s.gravity.tolist()})
+    if not s.static:
+        step = float(np.median(np.diff(r.times)))
+        lines += table("[solver]", {"substeps": max(1, int(np.ceil(step / SUBSTEP - 1e-9)))}, {"substeps": "per frame"})
+    lines += table("[[scene.rope]]", rope | found.rope, why)
+    lines += table(
+        "[scene.rope.markers]  # arc lengths in m", dict(zip((names[k] for k in found.order), arc, strict=True))
+    )
+    for grip in found.grips:
+        lines += table("[[scene.rope.grip]]", grip)
+    for take in takes:
+        lines += table("[[recording]]", _recording(take, flat), {"held_out": "predicted, not fitted"})
+    for name, limits in _parameters(s.static, density, length, flat is not None).items():
+        lines += table(f"[parameters.{name}]", limits)
+    for at in found.angles:
+        lines += table(f"[parameters.rope_{at}_angle]", {"prior": [0.0, CLAMP_SD]}, {"prior": "rad"})
+    if not measured_length:
+        prior = {"prior": [length, LENGTH_SD]}
+        # a motion shows the length of a rope far better than a sum of distances; a shape at rest does not
+        lines += (
+            table("[given.rope_length]", {"sd": LENGTH_SD}) if s.static else table("[parameters.rope_length]", prior)
+        )
+    if s.static and len(takes) > 1:
+        lines += table("[fit]", {"leave_one_out": True}, {"leave_one_out": "predicts each shape from the others"})
+    return Description("a rope" + (" at rest" if s.static else ""), [*notes, *found.notes], unknown, lines)
+
+
+def _unbranched(s: Seen, order: tuple[int, ...]) -> None:
+    """Refuse markers of a branched cable: their shortest tree forks, and is much shorter than any line through them."""
+    at, longer = forks(s.apart, order)
+    if at and longer > BRANCHED:
+        raise RecordingError(
+            "markers",
+            "lie along a cable that branches, and one rope cannot go through all of them",
+            f"branches near {joined(s.recording.markers[k] for k in at)}",
+            "give a recording of one branch, or write one [[scene.rod]] for each, see docs/configuration.md",
+        )
+
+
+def _at_rest(s: Seen, order: tuple[int, ...]) -> Held:
+    """Both ends of a shape at rest in clamps."""
+    mean = mean_position(s.recording.positions)
+    clamps = {"clamp_start": snapped(tangent(mean, order)), "clamp_end": snapped(-tangent(mean, order[::-1]))}
+    unknown = ["how the ends are held: both are taken as clamps at the first and last marker, whose angles are fitted"]
+    return Held(order, clamps, notes=["nothing moves: a shape at rest"], unknown=unknown)
+
+
+def _arcs(takes: Sequence[Take], order: tuple[int, ...]) -> Array:
+    """(markers,) m along the rope. No chord is longer than its arc, so the longest ones count, less what their noise
+    adds: 98 % of the frames are two standard deviations above the true chord where the rope is straight."""
+    pairs = list(pairwise(order))
+    chords = np.max([[take.seen.apart[a, b] for a, b in pairs] for take in takes], axis=0)
+    noise = max(take.seen.noise for take in takes)
+    if not takes[0].seen.static:
+        chords = np.maximum(chords - 2.0 * np.sqrt(2.0) * noise, 0.5 * chords)
+        even = float(np.median(chords))
+        if len(chords) >= 4 and np.all(np.abs(chords - even) < 2.0 * noise):
+            chords = np.full(len(chords), even)  # all alike within their noise: the median is closer
+    return np.concatenate([[0.0], np.cumsum(chords)])
+
+
+def _length(s: Seen, found: Held, last: float, measured: Measured) -> tuple[float, bool, str]:
+    """m, whether it was measured, and what is said of it."""
+    if measured.length is not None:
+        if measured.length < 0.8 * last:
+            problem = f"is shorter than the {last:.4g} m from the first to the last marker"
+            raise RecordingError("length", problem, measured.length, "give the length of the whole rope in m")
+        return measured.length, True, "where the markers are along the rope: the first one is taken to be at its start"
+    told = s.recording.metadata.get("length_m")
+    if isinstance(told, int | float) and told >= 0.8 * last:
+        return float(told), True, "whether the length that the file tells runs from the first to the last marker"
+    a, b = (s.recording.markers[k] for k in (found.order[0], found.order[-1]))
+    return (
+        last,
+        False,
+        f"the length: the sum of the distances from {a} to {b}, which noise makes too long and bends too short, so it "
+        "is fitted too. What hangs beyond these markers is not seen: the rope is taken to end there. Measure it, and "
+        "give --length"
+        if not s.static
+        else f"the length: the sum of the distances from {a} to {b}, to 1 %. Measure it, and give --length",
+    )
+
+
+def _density(s: Seen, measured: Measured) -> tuple[float, str]:
+    told = s.recording.metadata.get("linear_density_kg_per_m")
+    if measured.density is not None:
+        return (
+            measured.density,
+            "the mass of the markers: weigh the rope with them, or hang them on as [[scene.point_mass]]",
+        )
+    if isinstance(told, int | float):
+        return float(told), "the mass of the markers; the density is the file's"
+    return 1.0, (
+        "the density: motion alone tells stiffness and drag over density. It is 1 kg/m here, so rope_EI is EI/density "
+        "in m^4/s^2; weigh the rope and give --density"
+    )
+
+
+def _beginning(s: Seen, found: Held, rope: dict[str, Any]) -> list[str]:
+    """Set how a motion begins; returns what is said of it."""
+    if s.rest:
+        return [f"it rests for the first {s.rest:.2g} s"]
+    if not _lets_go(s, found.order):
+        rope["velocity"] = "recording"
+        return ["it moves at the first frame: place and speed at the start are those of the markers"]
+    notes = ["at the first frame it moves no faster than its noise tells: it starts from rest"]
+    way = _straight(s, found.order)
+    if way is not None:
+        del rope["points"]
+        rope |= {"start": mean_position(s.recording.positions)[found.order[0]].tolist(), "direction": way}
+        if "clamp_start" in found.rope:
+            found.rope["clamp_start"] = way
+        notes.append("at the first frame it is straight, as far as its noise tells")
+    return notes
+
+
+def _lets_go(s: Seen, order: tuple[int, ...]) -> bool:
+    """Whether the speeds at the first frame are within what noise makes of none: the rope is let go there. The slope
+    of a parabola through N frames in the time T has the standard deviation sigma sqrt(192 / N) / T at its end."""
+    r = s.recording
+    t = r.times - r.times[0]
+    early = np.flatnonzero(t <= EARLY)
+    x = r.positions[early][:, list(order)]
+    x = x[:, np.isfinite(x).all(axis=(0, 2))]
+    if len(early) < 6 or not x.shape[1] or not s.noise:
+        return False
+    slope = np.linalg.lstsq(np.vander(t[early], 3, increasing=True), x.reshape(len(early), -1), rcond=None)[0][1]
+    return bool(np.abs(slope).max() < 4.0 * s.noise * np.sqrt(192 / len(early)) / t[early[-1]])
+
+
+def _straight(s: Seen, order: tuple[int, ...]) -> list[float] | None:
+    """The direction from the first marker, if it stays in place, along a rope that is straight at the first frame."""
+    x = s.recording.positions[0, list(order)]
+    if order[0] not in s.still or np.isnan(x).any():
+        return None
+    off = x - mean_position(s.recording.positions)[order[0]]
+    way = np.linalg.svd(off, full_matrices=False)[2][0]
+    way *= np.sign(way @ off[-1])
+    return snapped(way) if np.abs(off - np.outer(off @ way, way)).max() < 4.0 * s.noise else None
+
+
+def _recording(take: Take, flat: list[float] | None) -> dict[str, Any]:
+    s, r = take.seen, take.seen.recording
+    entries: dict[str, Any] = {"file": take.file, "units": take.units}
+    if s.static:
+        axes = "".join(axis for k, axis in enumerate("xyz") if flat is None or abs(flat[k]) < 0.99)
+        return entries | {"static": True, "sigma": max(s.noise, 0.007 * float(np.nanmax(s.apart))), "axes": axes}
+    start, stop = float(r.times[0]), float(r.times[-1])
+    if s.rest:
+        entries["start"] = "equilibrium"
+    last = round(start + s.rest + min(FITTED * (stop - start - s.rest), LONGEST), 4)
+    entries["fit"] = [start, last]
+    entries["held_out"] = [last, round(min(stop, last + 0.5 * (last - start)), 4) + 1e-3]
+    return entries | {"sigma": max(s.noise, 1e-4)}
+
+
+def _parameters(static: bool, density: float, length: float, angles: bool) -> dict[str, dict[str, Any]]:
+    scale = density * 9.81 * length**3
+    found: dict[str, dict[str, Any]] = {"rope_EI": {"lower": 1e-7 * scale, "upper": 10.0 * scale}}
+    if not static:
+        found["rope_bend_damping"] = {"lower": 1e-5, "upper": 1.0}
+        found["rope_drag_linear"] = {"lower": 1e-4 * density, "upper": 10.0 * density}
+    if angles:
+        found["rope_set_1"] = {"prior": [0.0, 10.0]}
+        for end in ("start", "end"):
+            found[f"rope_{end}_angle"] = {"private": True, "lower": -0.785, "upper": 0.785, "prior": [0.0, 0.1745]}
+    return found
+
+
+def between_grips(s: Seen) -> bool:
+    """Whether two or more markers hold a rope at each end."""
+    _, order = parts(s)
+    held_by = gripping(s) - set(s.still)
+    return len(order) >= 7 and {*order[:2], *order[-2:]} <= held_by

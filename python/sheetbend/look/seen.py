@@ -1,0 +1,195 @@
+"""What a recording shows before anything is fitted: what stays, what moves together, and how markers hang together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays.smoothing import smoothed
+from ..arrays.timeseries import default_max_gap, interpolate, mean_position
+from ..recording.recording import Recording
+from .line import chain
+
+Array = np.ndarray
+EARTH = 9.81
+STILL, CALM = 6.0, 4.0  # times the noise, by which a marker that stays may move; by which one at rest may
+SILENT = 2e-3  # of the extent: how little a marker moves that stays, where no noise is known
+RIGID = 1.8  # times the noise, the standard deviation of the distance of two markers of one body: sqrt(2) is expected
+REST = 0.15  # s that a recording must begin at rest to be called so
+NEAR = 1.9  # times the nearest neighbor's distance: markers of a sheet have more than two others so near
+SHARP, TURNS = 0.15, 3  # share of markers at which the shortest way through those of a sheet turns back, and how many
+SHEET, FEWEST_OF_SHEET = 2.7, 8  # others so near, on average, of a sheet; markers that make one
+LONGEST = 20.0  # m, of what is recorded in meters
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What a recording shows.
+
+    Attributes:
+        recording: with lengths in m.
+        still: numbers of the markers that do not move.
+        bodies: groups of three or more markers that keep their distances, on no rope of their own.
+        loose: the other markers, those that move and belong to no body, in the order of the file.
+        apart: (markers, markers) m, the largest distance of every two markers over time (98 % of the frames).
+        noise: m per coordinate; 0 where the recording is too short to tell.
+        rest: s, for how long nothing moves at the beginning.
+        speed: m/s, of the fastest marker, smoothed; 99 % of the frames are slower.
+        up: 0, 1 or 2, the axis along which gravity points down.
+        told: whether the file says it.
+        sheet: whether the loose markers lie on a sheet rather than along a line.
+    """
+
+    recording: Recording
+    still: tuple[int, ...]
+    bodies: tuple[tuple[int, ...], ...]
+    loose: tuple[int, ...]
+    apart: Array
+    noise: float
+    rest: float
+    speed: float
+    up: int
+    told: bool
+    sheet: bool
+
+    @property
+    def static(self) -> bool:
+        """Whether nothing moves at all: shapes at rest."""
+        return len(self.still) == len(self.recording.markers)
+
+    @property
+    def gravity(self) -> Array:
+        """(3,) m/s^2, the recording's own, or that along `up`."""
+        if self.recording.gravity is not None:
+            return np.asarray(self.recording.gravity)
+        return np.where(np.arange(3) == self.up, -EARTH, 0.0)
+
+
+def seen(recording: Recording) -> Seen:
+    """Look at a recording."""
+    x, t = recording.positions, recording.times
+    count = len(recording.markers)
+    found = recording.noise()
+    noise = float(np.nanmedian(found)) if np.isfinite(found).any() else 0.0
+    center = mean_position(x)
+    extent = float(np.linalg.norm(np.nanmax(x, axis=(0, 1)) - np.nanmin(x, axis=(0, 1))))
+    moved = np.sqrt(np.nanmean(np.sum((x - center) ** 2, axis=2), axis=0)) if len(t) > 1 else np.zeros(count)
+    still = moved <= max(STILL * noise, SILENT * extent)
+    distance = _distances(x)
+    apart = np.nanquantile(distance, 0.98, axis=0)
+    change = np.nanstd(distance, axis=0)
+    bodies = [] if len(t) < 3 else _bodies(change <= np.maximum(RIGID * noise, 1e-3 * apart), apart, still)
+    in_bodies = {k for body in bodies for k in body}
+    loose = tuple(k for k in range(count) if not still[k] and k not in in_bodies)
+    up, told = _up(recording)
+    return Seen(
+        recording=recording,
+        still=tuple(int(k) for k in np.flatnonzero(still)),
+        bodies=tuple(bodies),
+        loose=loose,
+        apart=apart,
+        noise=noise,
+        rest=_rest(recording, max(noise, 1e-4 * extent)),
+        speed=_speed(recording),
+        up=up,
+        told=told,
+        sheet=_is_sheet(x, apart, in_bodies),
+    )
+
+
+def _distances(x: Array) -> Array:
+    """(frames, markers, markers) m, of so many frames that the array stays small."""
+    most = max(60, 4_000_000 // x.shape[1] ** 2)
+    some = x[np.linspace(0, len(x) - 1, min(len(x), most)).astype(int)]
+    return np.asarray(np.linalg.norm(some[:, :, None] - some[:, None], axis=3))
+
+
+def _bodies(rigid: Array, apart: Array, still: Array) -> list[tuple[int, ...]]:
+    """Largest groups of three or more moving markers of which every two keep their distance, and that lie close
+    together: a straight piece of rope is no body."""
+    left = set(np.flatnonzero(~still).tolist())
+    found = []
+    for first in sorted(left):
+        if first not in left:
+            continue
+        group = [first]
+        for other in sorted(left - {first}, key=lambda k: apart[first, k]):
+            if all(rigid[other, k] for k in group):
+                group.append(other)
+        if len(group) >= 3 and not _in_line(apart[np.ix_(group, group)]):
+            found.append(tuple(sorted(group)))
+            left -= set(group)
+    return found
+
+
+def _in_line(apart: Array) -> bool:
+    """Whether three or more points with these distances are on one line, or almost: classical scaling."""
+    n = len(apart)
+    centered = np.eye(n) - 1.0 / n
+    spread = np.sort(np.linalg.eigvalsh(-0.5 * centered @ apart**2 @ centered))[::-1]
+    return bool(spread[1] < 0.01 * spread[0])
+
+
+def _rest(recording: Recording, noise: float) -> float:
+    """s, until a marker leaves where it was in the first frames."""
+    t = recording.times - recording.times[0]
+    if len(t) < 8 or not (t <= REST).sum() >= 4:
+        return 0.0
+    filled = _filled(recording)
+    smooth, _ = smoothed(recording.times, np.nan_to_num(filled), REST / 2)
+    first = np.median(smooth[t <= REST / 2], axis=0)
+    off = np.where(np.isnan(filled), 0.0, smooth - first)
+    gone = np.flatnonzero((np.linalg.norm(off, axis=2) > CALM * noise).any(axis=1))
+    return float(t[gone[0]] if len(gone) else t[-1])
+
+
+def _speed(recording: Recording) -> float:
+    """m/s; 0 for recordings that are too short to tell."""
+    if len(recording.times) < 8:
+        return 0.0
+    filled = _filled(recording)
+    _, rate = smoothed(recording.times, np.nan_to_num(filled), REST / 2)
+    size = np.where(np.isnan(filled[..., 0]), 0.0, np.linalg.norm(rate, axis=2))
+    return float(np.quantile(size.max(axis=1), 0.99))
+
+
+def _filled(recording: Recording) -> Array:
+    """Positions with short gaps closed."""
+    t = recording.times
+    return interpolate(t, recording.positions, t, "linear", default_max_gap(t))
+
+
+def _up(recording: Recording) -> tuple[int, bool]:
+    if recording.gravity is not None:
+        return int(np.argmax(np.abs(recording.gravity))), True
+    center = mean_position(recording.positions)
+    spread = np.nanmax(center, axis=0) - np.nanmin(center, axis=0)
+    # what hangs is long along the vertical; motion capture has y or z there
+    return (1 if spread[1] > 1.5 * spread[2] else 2), False
+
+
+def _is_sheet(x: Array, apart: Array, in_bodies: set[int]) -> bool:
+    """Whether the markers have neighbors on all sides, or the shortest way through them turns back again and again.
+    Those of a hand's body do not count."""
+    if 2 * len(in_bodies) <= len(apart):
+        own = [k for k in range(len(apart)) if k not in in_bodies]
+        x, apart = x[:, own], apart[np.ix_(own, own)]
+    if len(apart) < FEWEST_OF_SHEET:
+        return False
+    d = apart + np.where(np.eye(len(apart), dtype=bool), np.inf, 0.0)
+    nearest = np.median(d.min(axis=1))
+    if (d < NEAR * nearest).sum(axis=1).mean() > SHEET:
+        return True
+    fullest = int(np.argmax((~np.isnan(x[:, :, 0])).sum(axis=1)))
+    way = np.diff(x[fullest, list(chain(apart, tuple(range(len(apart)))))], axis=0)
+    back = np.sum(way[1:] * way[:-1], axis=1) < 0.0
+    return bool(back.sum() >= TURNS and back.mean() > SHARP)
+
+
+def unit_doubt(recording: Recording) -> str | None:
+    """The unit in which a recording is more plausible than in the one that was read, "mm" or "cm"; None where it is
+    plausible as it is: nothing that hangs in a hand is 700 m long."""
+    x = recording.positions
+    extent = float(np.linalg.norm(np.nanmax(x, axis=(0, 1)) - np.nanmin(x, axis=(0, 1))))
+    return None if extent <= LONGEST else "cm" if extent <= 100 * LONGEST / 10 else "mm"

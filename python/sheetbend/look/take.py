@@ -1,0 +1,46 @@
+"""A recording for a draft, and what a model makes of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from .seen import Seen
+
+
+@dataclass(frozen=True)
+class Take:
+    """A recording for a draft: what it shows, and how the configuration calls its file and its unit."""
+
+    seen: Seen
+    file: str
+    units: str | None = None
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What was measured beside the recording; None where it was not.
+
+    Attributes:
+        density: kg/m of a rope or beam, kg/m^2 of a cloth.
+        length: m, of a rope or beam.
+    """
+
+    density: float | None = None
+    length: float | None = None
+
+
+class Description(NamedTuple):
+    """A model for a recording.
+
+    Attributes:
+        kind: what the recording is taken for, in words.
+        notes: sentences about what is seen.
+        unknown: sentences about what is not known, and what stands in its place.
+        lines: of the configuration, without its head.
+    """
+
+    kind: str
+    notes: list[str]
+    unknown: list[str]
+    lines: list[str]

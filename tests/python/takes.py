@@ -1,0 +1,123 @@
+"""Recordings of ropes, beams and cloth with known truth, for `sheetbend new`: markers with noise, and nothing beside
+them that says how the thing is held."""
+
+from __future__ import annotations
+
+import numpy as np
+import sheetbend as sb
+
+Array = np.ndarray
+DENSITY, EI, DAMPING, DRAG, LENGTH = 0.05, 4e-4, 0.01, 5e-3, 0.7
+NOISE, SEGMENTS, RATE = 5e-4, 96, 100
+MARKERS = 9
+OF_HAND = np.array([[0.0, 0.05, 0.02], [0.02, -0.05, 0.01], [-0.04, 0.0, 0.05]])  # m, in the hand's axes
+
+
+def hand(seconds: float, turning: bool = True) -> tuple[Array, Array, Array]:
+    """Times (frames,) s, rotations (frames, 3, 3) and places (frames, 3) m of a hand that rests for 0.3 s and then
+    swings, about 1 m above the ground."""
+    t = np.arange(round(seconds * RATE) + 1) / RATE
+    since = np.maximum(t - 0.3, 0.0)
+    ease = 1.0 - np.exp(-((since / 0.3) ** 2))
+    place = np.stack([0.12 * np.sin(5.0 * since), 0.05 * np.sin(3.3 * since), 0.06 * np.sin(4.1 * since)], axis=1)
+    angle = 0.5 * ease * np.sin(4.0 * since) if turning else np.zeros_like(t)
+    c, s, one, zero = np.cos(angle), np.sin(angle), np.ones_like(t), np.zeros_like(t)
+    turns = np.moveaxis(np.array([[c, zero, s], [zero, one, zero], [-s, zero, c]]), 2, 0)
+    return t, turns, [0.3, 0.2, 1.0] + ease[:, None] * place
+
+
+def noisy(x: Array, seed: int) -> Array:
+    return x + NOISE * np.random.default_rng(seed).standard_normal(x.shape)
+
+
+def rope_in_hand(held: str, seconds: float = 2.5) -> sb.Recording:
+    """A rope that hangs from a hand, which moves it.
+
+    Args:
+        held: "one" marker at the end, about which it turns; "two" in the hand, the second of which is where the rope
+            becomes free; "body", three beside the rope.
+    """
+    t, turns, place = hand(seconds, turning=held != "one")
+    scene = sb.Scene("take")
+    points = place[0] + np.linspace(0.0, LENGTH, 5)[:, None] * np.array([0.0, 0.0, -1.0])
+    down = turns @ np.array([0.0, 0.0, -1.0])
+    grip = None if held == "one" else sb.Grip(t, place, down, turns @ np.array([1.0, 0.0, 0.0]))
+    rope = sb.add_rope(
+        scene,
+        length=LENGTH,
+        segments=SEGMENTS,
+        density=DENSITY,
+        EI=EI,
+        bend_damping=DAMPING,
+        drag_linear=DRAG,
+        points=points,
+        grip_start=grip,
+    )
+    if grip is None:
+        scene.drive(rope.particles[:1], t, place[:, None])
+    x = sb.simulate(scene, t, sb.Solver(h=1 / 1000)).positions[:, rope.particles[:: SEGMENTS // (MARKERS - 1)]]
+    names = [f"r{k}" for k in range(MARKERS)]
+    if held == "two":
+        x, names = np.concatenate([(place - 0.06 * down)[:, None], x], axis=1), ["hand_back", "hand_front", *names[1:]]
+    if held == "body":
+        x = np.concatenate([place[:, None] + np.einsum("fab,kb->fka", turns, OF_HAND), x], axis=1)
+        names = ["a", "b", "c", *names]
+    return sb.Recording(noisy(x, 1), t, tuple(names), name=f"hand_{held}")
+
+
+def let_go(clamped: bool, seconds: float = 1.5) -> sb.Recording:
+    """A straight level rope that is let go, held in a clamp or by a pin."""
+    t = np.arange(round(seconds * RATE) + 1) / RATE
+    clamp = {"clamp_start": (1, 0, 0)} if clamped else {}
+    stiff = 5 * EI if clamped else EI
+    scene = sb.rope(
+        LENGTH, SEGMENTS, density=DENSITY, EI=stiff, bend_damping=DAMPING, drag_linear=DRAG, pinned=(0,), **clamp
+    )
+    nodes = scene.ropes["rope"].particles[:: SEGMENTS // (MARKERS - 1)]
+    return sb.Recording(noisy(sb.simulate(scene, t, sb.Solver(h=1 / 1000)).positions[:, nodes], 2), t, name="let_go")
+
+
+BEAM = {"length": 0.3, "density": 0.4, "EI": 0.1655, "loss_factor": 0.12, "loss_frequency": 4.0}  # 4 Hz
+
+
+def beam(seconds: float = 3.0) -> sb.Recording:
+    """A beam in a clamp that points up by 0.2 rad, bent by a force and let go: three markers on the clamp, three on
+    its end."""
+    t = np.arange(round(seconds * 200) + 1) / 200
+    way = np.array([np.cos(0.2), 0.0, np.sin(0.2)])
+    start = np.array([0.02, 0.03, 0.5])
+    scene = sb.Scene("beam")
+    rope = sb.add_rope(scene, "beam", segments=40, start=start, direction=way, clamp_start=way, **BEAM)
+    scene.pin(rope.particles[:1])
+    knots = np.array([0.0, 0.3, 0.301])
+    scene.add_force(rope.particles[-1:], np.array([1.0, 1.0, 0.0])[:, None, None] * [[[0.0, 0.0, -1.0]]], knots)
+    x = sb.simulate(scene, t, sb.Solver(h=1 / 2000), start=sb.equilibrium(scene).positions).positions
+    end, inner = x[:, rope.particles[-1]], x[:, rope.particles[-2]]
+    along = (end - inner) / np.linalg.norm(end - inner, axis=1, keepdims=True)
+    across = np.array([0.0, 1.0, 0.0])
+    upward = np.cross(along, across)
+    tips = [end + a * along + b * across + c * upward for a, b, c in ((0, 0.02, 0.01), (0, -0.02, 0.0), (0, 0, -0.015))]
+    base = start + np.array([[0.0, 0.02, 0.015], [0.0, -0.02, 0.015], [0.0, 0.0, -0.03]])
+    markers = np.concatenate([np.broadcast_to(base, (len(t), 3, 3)), np.stack(tips, axis=1)], axis=1)
+    x = markers + 2e-5 * np.random.default_rng(3).standard_normal(markers.shape)
+    return sb.Recording(x, t, ("b0", "b1", "b2", "t0", "t1", "t2"), name="beam", gravity=(0, 0, -9.81))
+
+
+CLOTH = {"density": 0.2, "warp": 80.0, "shear": 15.0, "bending": 2e-4, "bend_damping": 0.02, "drag_linear": 0.2}
+
+
+def cloth(seconds: float = 1.5, wind: float = 0.0) -> sb.Recording:
+    """A cloth that hangs by its upper edge, and swings from a tilt; or in a wind (m/s), in which it comes to rest."""
+    t = np.arange(round(seconds * 60) + 1) / 60
+    mesh = sb.mesh.grid(0.4, 0.4, 10, 10, pattern="one_way")
+    scene = sb.Scene("cloth")
+    tilt = 0.3 if not wind else 0.0
+    down = [0.0, -np.sin(tilt), np.cos(tilt)]
+    places = mesh.vertices @ np.array([[1.0, 0.0, 0.0], down, np.cross([1.0, 0.0, 0.0], down)]) + [0, 0, 0.6]
+    sheet = sb.add_cloth(scene, mesh, positions=places, **CLOTH)
+    scene.pin(sheet.particles[mesh.sets["top"]])
+    if wind:
+        scene.add_air(sheet.particles[mesh.triangles], 0.5, 0.05, wind=(0.0, wind, 0.0))
+    x = sb.simulate(scene, t, sb.Solver(h=1 / 240, method="newton")).positions
+    inner = [11 * row + column for row in range(1, 10, 2) for column in range(1, 10, 2)]
+    return sb.Recording(noisy(x[:, sheet.particles[inner]], 4), t, name="cloth", gravity=(0, 0, -9.81))
