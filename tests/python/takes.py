@@ -87,9 +87,7 @@ def beam(seconds: float = 3.0) -> sb.Recording:
     way = np.array([np.cos(0.2), 0.0, np.sin(0.2)])
     start = np.array([0.02, 0.03, 0.5])
     scene = sb.Scene("beam")
-    rope = sb.add_rope(
-        scene, "beam", segments=40, start=start, direction=way, clamp_start=way, **BEAM
-    )
+    rope = sb.add_rope(scene, "beam", segments=40, start=start, direction=way, clamp_start=way, **BEAM)
     scene.pin(rope.particles[:1])
     knots = np.array([0.0, 0.3, 0.301])
     scene.add_force(rope.particles[-1:], np.array([1.0, 1.0, 0.0])[:, None, None] * [[[0.0, 0.0, -1.0]]], knots)
