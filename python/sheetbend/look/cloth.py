@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..arrays.timeseries import default_max_gap
 from ..errors import RecordingError
-from .seen import NEAR, Seen
+from .seen import Seen
+from .sheet import connected, flattened, placed, spacing
 from .take import Description, Measured, Take
 from .text import joined, table
 
@@ -17,7 +19,35 @@ Array = np.ndarray
 CELLS = 10  # along the longer side
 WHOLE = 0.8  # share of the markers that must hang together as one sheet
 QUIET = 0.1  # of the motion of all: how little the upper row moves where the edge above it is held
+ASKEW = 0.15  # slope at which a cloth hangs that a wind blows on
+AIR = 0.7  # kg/m^3, of a plate across the wind: half the density of air times a drag coefficient of 1.2
+SUBSTEP = 1 / 250  # s, at most
 FITTED, LONGEST = 2 / 3, 1.5  # share of the time that is fitted, and s at most
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A cloth as its markers show it.
+
+    Attributes:
+        own: its markers.
+        flat: (markers, 2) m, where they lie on the fabric.
+        width, height: m.
+        origin, axes: (3,) m and (2, 3), where the fabric lies best.
+        row: the upper row of markers.
+        pinned: whether that row hardly moves.
+        wind: (3,) m/s, a guess, where the cloth hangs askew and hardly moves; None elsewhere.
+    """
+
+    own: list[int]
+    flat: Array
+    width: float
+    height: float
+    origin: Array
+    axes: Array
+    row: list[int]
+    pinned: bool
+    wind: Array | None
 
 
 def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
@@ -25,139 +55,112 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     s = takes[0].seen
     if not s.sheet:
         return None
-    r = s.recording
-    own = _connected(s)
-    if len(own) < WHOLE * len(r.markers):
+    names = s.recording.markers
+    density = 0.2 if measured.density is None else measured.density
+    own = connected(s.apart)
+    if len(own) < WHOLE * len(names):
         raise RecordingError(
             "markers",
             f"do not hang together as one sheet: {len(own)} of them do, the others are on grips or on further cloths",
-            joined(r.markers),
+            joined(names),
             "give a recording with the markers of one cloth and of what holds it, or write the configuration by hand",
         )
-    flat = _flattened(s.apart[np.ix_(own, own)])
-    start = int(np.argmax(r.mask[:, own].sum(axis=1)))
-    up = -s.gravity / np.linalg.norm(s.gravity)
-    place, axes, flat = _placed(flat, r.positions[start, own], up)
-    spacing = _spacing(s.apart[np.ix_(own, own)])
-    size = np.ptp(flat, axis=0)
-    row = [own[k] for k in np.argsort(flat[:, 0]) if flat[k, 1] > size[1] - 0.5 * spacing]
-    pinned = s.static or _motion(r.positions[:, row]) < QUIET * _motion(r.positions[:, own])
-    margin = np.array([[0.5, 0.5], [0.5, 0.5 if pinned else 0.0]]) * spacing  # left and bottom; right and top
-    width, height = (size + margin.sum(axis=0)).tolist()
-    origin = place - axes.T @ margin[0]
-    names = [r.markers[k] for k in own]
+    sheet = _looked_at(s, own, density)
+    apart = spacing(s.apart[np.ix_(own, own)])
+    edge = "moves: it is taken for what holds the cloth"
+    if sheet.pinned:
+        edge = "hardly moves: the edge above it is held"
     notes = [
-        f"{len(own)} markers lie on a sheet, some {1e3 * spacing:.3g} mm apart: a cloth of {width:.3g} x "
-        f"{height:.3g} m with half of that beyond the outer ones",
+        f"{len(own)} markers lie on a sheet, some {1e3 * apart:.3g} mm apart: a cloth of {sheet.width:.3g} x "
+        f"{sheet.height:.3g} m with half of that beyond the outer ones",
+        f"the upper row of markers, {joined(names[k] for k in sheet.row)}, {edge}",
     ]
-    edge = "hardly moves: the edge above it is held" if pinned else "moves: it is taken for what holds the cloth"
-    notes.append(f"the upper row of markers, {joined(r.markers[k] for k in row)}, {edge}")
+    if sheet.wind is not None:
+        notes.append("it hangs askew, and hardly moves: a wind blows, or another axis points up")
     unknown = [
         "what holds the cloth: the whole upper edge is taken. Change the set, or give a grip with the holder's markers",
         "the edges of the fabric and which way its warp runs: measure them and correct mesh, origin and markers",
         "the stiffness in tension: a cloth that hangs hardly shows it. warp and shear are kept, not fitted",
-        "a wind: the air is taken to stand still",
+        "the wind: the air is taken to stand still"
+        if sheet.wind is None
+        else "how strongly the air acts: `air_normal` is that of a plate, and the wind's speed goes with its root",
         "the density"
-        + (
-            ": 0.2 kg/m^2 is taken, and stiffness and drag go with it"
-            if measured.density is None
-            else " of the markers"
-        ),
+        + (": 0.2 kg/m^2 is taken, and all else goes with it" if measured.density is None else " of the markers"),
     ]
-    others = [k for k in range(len(r.markers)) if k not in set(own)]
+    if not sheet.pinned:
+        unknown.append(
+            "the true motion of the holder: the noise of the upper row goes into the motion. Give the holder's own "
+            "markers, or its poses as a [[scene.tool]]"
+        )
+    others = [k for k in range(len(names)) if k not in set(own)]
     if others:
-        unknown.append(f"what {joined(r.markers[k] for k in others)} are on: they are left out")
-    weight = 0.2 if measured.density is None else measured.density
+        unknown.append(f"what {joined(names[k] for k in others)} are on: they are left out")
+    return Description("a cloth" + (" at rest" if s.static else ""), notes, unknown, _lines(takes, sheet, density))
+
+
+def _looked_at(s: Seen, own: list[int], density: float) -> Sheet:
+    r = s.recording
+    flat = flattened(s.apart[np.ix_(own, own)])
+    start = int(np.argmax(r.mask[:, own].sum(axis=1)))
+    up = -s.gravity / np.linalg.norm(s.gravity)
+    place, axes, flat = placed(flat, r.positions[start, own], up)
+    apart = spacing(s.apart[np.ix_(own, own)])
+    size = np.ptp(flat, axis=0)
+    row = [own[k] for k in np.argsort(flat[:, 0]) if flat[k, 1] > size[1] - 0.5 * apart]
+    pinned = s.static or _motion(r.positions[:, row]) < QUIET * max(_motion(r.positions[:, own]), float(apart))
+    margin = np.array([[0.5, 0.5], [0.5, 0.5 if pinned else 0.0]]) * apart  # left and bottom; right and top
+    width, height = (size + margin.sum(axis=0)).tolist()
+    wind = _wind(s, own, row, up, density) if pinned and not s.static else None
+    return Sheet(own, flat + margin[0], width, height, place - axes.T @ margin[0], axes, row, pinned, wind)
+
+
+def _wind(s: Seen, own: list[int], row: list[int], up: Array, density: float) -> Array | None:
+    """m/s, of a wind that balances the weight of a cloth that leans by as much on average, about half of the time."""
+    x = s.recording.positions[len(s.recording.times) // 2 :]
+    lean = np.nanmean(x[:, own], axis=(0, 1)) - np.nanmean(x[:, row], axis=(0, 1))
+    drop = float(-lean @ up)
+    across = lean + drop * up
+    slope = float(np.linalg.norm(across)) / max(drop, 1e-9)
+    if drop <= 0 or slope < ASKEW:
+        return None
+    speed = np.sqrt(density * float(np.linalg.norm(s.gravity)) * slope / AIR)
+    return np.asarray(speed * across / np.linalg.norm(across))
+
+
+def _lines(takes: Sequence[Take], sheet: Sheet, density: float) -> list[str]:
+    s, r = takes[0].seen, takes[0].seen.recording
     lines = [] if r.gravity is not None else table("[scene]", {"gravity": s.gravity.tolist()})
-    step = float(np.median(np.diff(r.times))) if len(r.times) > 1 else 0.0
     solver: dict[str, Any] = {"method": "newton"}
     if not s.static:
-        solver["substeps"] = max(1, int(np.ceil(step / 0.004 - 1e-9)))
+        solver["substeps"] = max(1, int(np.ceil(float(np.median(np.diff(r.times))) / SUBSTEP - 1e-9)))
     lines += table("[solver]", solver)
-    cloth: dict[str, Any] = {
-        "density": weight,
-        "warp": 500.0 * weight,
-        "shear": 100.0 * weight,
-        "bending": 1e-4 * weight,
-    }
-    cloth |= {"membrane_damping": 5e-3, "bend_damping": 2e-2, "drag_linear": 0.5 * weight}
-    cloth |= {"origin": origin.tolist(), "x_axis": axes[0].tolist(), "y_axis": axes[1].tolist()}
-    whole = r.mask[0, own].all()
-    cloth["shape"] = "recording" if whole or s.static else None
-    cloth["pinned"] = ["top"] if pinned else None
+    if sheet.wind is not None:
+        lines += table("[scene.wind]", {"velocity": sheet.wind.tolist()}, {"velocity": "m/s, a guess to start from"})
+    cloth: dict[str, Any] = {"density": density, "warp": 500.0 * density, "shear": 100.0 * density}
+    cloth |= {"bending": 1e-4 * density, "membrane_damping": 5e-3, "bend_damping": 2e-2}
+    cloth |= {"drag_linear": 0.5 * density} if sheet.wind is None else {"air_normal": AIR, "air_tangential": 0.02}
+    cloth |= {"origin": sheet.origin.tolist(), "x_axis": sheet.axes[0].tolist(), "y_axis": sheet.axes[1].tolist()}
+    cloth["shape"] = "recording" if r.mask[0, sheet.own].all() or s.static else None
+    cloth["pinned"] = ["top"] if sheet.pinned else None
     lines += table("[[scene.cloth]]", cloth, {"density": "kg/m^2", "bending": "N m, a guess to start from"})
-    cells = [max(2, round(CELLS * side / max(width, height))) for side in (width, height)]
-    mesh = {"kind": "grid", "width": width, "height": height, "nx": cells[0], "ny": cells[1]}
+    cells = [max(2, round(CELLS * side / max(sheet.width, sheet.height))) for side in (sheet.width, sheet.height)]
+    mesh = {"kind": "grid", "width": sheet.width, "height": sheet.height, "nx": cells[0], "ny": cells[1]}
     lines += table("[scene.cloth.mesh]", mesh)
-    if not pinned:
-        lines += table("[[scene.cloth.grip]]", {"set": "top", "markers": _seen_through(s, row)})
-    places = dict(zip(names, (flat + margin[0]).tolist(), strict=True))
-    lines += table("[scene.cloth.markers]", places)
+    if not sheet.pinned:
+        lines += table("[[scene.cloth.grip]]", {"set": "top", "markers": _seen_through(s, sheet.row)})
+    lines += table(
+        "[scene.cloth.markers]", {r.markers[k]: at.tolist() for k, at in zip(sheet.own, sheet.flat, strict=True)}
+    )
     for take in takes:
         lines += table("[[recording]]", _recording(take))
-    lines += table("[parameters.cloth_bending]", {"lower": 1e-7 * weight, "upper": 1.0 * weight})
-    if not s.static:
-        lines += table("[parameters.cloth_drag_linear]", {"lower": 1e-3 * weight, "upper": 1e2 * weight})
-    lines += table(
-        "[fit]", {"profiles": False, "double_segments": False}, {"double_segments": "true for the intervals"}
-    )
-    return Description("a cloth" + (" at rest" if s.static else ""), notes, unknown, lines)
-
-
-def _spacing(apart: Array) -> float:
-    return float(np.median((apart + np.where(np.eye(len(apart)) > 0, np.inf, 0.0)).min(axis=1)))
-
-
-def _connected(s: Seen) -> list[int]:
-    """The largest set of markers that hang together by near neighbors."""
-    near = s.apart < 1.2 * NEAR * _spacing(s.apart)
-    left, best = set(range(len(near))), list[int]()
-    while left:
-        group, border = set[int](), [min(left)]
-        while border:
-            k = border.pop()
-            if k in left:
-                left.remove(k)
-                group.add(k)
-                border += [int(j) for j in np.flatnonzero(near[k])]
-        if len(group) > len(best):
-            best = sorted(group)
-    return best
-
-
-def _flattened(apart: Array) -> Array:
-    """(markers, 2) m on the flat fabric: distances along the fabric by shortest paths (Tenenbaum, de Silva & Langford
-    2000, Science 290, 2319), and classical scaling of these."""
-    path = np.where(apart < 1.2 * NEAR * _spacing(apart), apart, np.inf)
-    np.fill_diagonal(path, 0.0)
-    for k in range(len(path)):
-        path = np.minimum(path, path[:, [k]] + path[[k]])
-    # a straight way over the fabric is never shorter than what was seen between two markers, nor much longer
-    path = np.maximum(apart, np.minimum(path, 1.1 * apart))
-    n = len(path)
-    centered = np.eye(n) - 1.0 / n
-    values, vectors = np.linalg.eigh(-0.5 * centered @ path**2 @ centered)
-    flat = vectors[:, -2:] * np.sqrt(np.maximum(values[-2:], 0.0))
-    angles = np.linspace(0.0, np.pi / 2, 91)[:-1]
-    turns = [np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]]) for a in angles]
-    best = min(turns, key=lambda turn: float(np.prod(np.ptp(flat @ turn, axis=0))))
-    return np.asarray(flat @ best)
-
-
-def _placed(flat: Array, x: Array, up: Array) -> tuple[Array, Array, Array]:
-    """Where the flat fabric lies best on the markers (k, 3): the place of its lower left corner, its axes (2, 3), and
-    the layout (k, 2) turned so that its y axis points up, from that corner."""
-    seen = ~np.isnan(x[:, 0])
-    for turn in range(4):
-        c, s = [(1, 0), (0, 1), (-1, 0), (0, -1)][turn]
-        turned = flat @ np.array([[c, -s], [s, c]])
-        mean, center = turned[seen].mean(axis=0), x[seen].mean(axis=0)
-        u, _, vt = np.linalg.svd((turned[seen] - mean).T @ (x[seen] - center), full_matrices=False)
-        axes = u @ vt
-        if axes[1] @ up >= abs(axes[0] @ up) - 1e-9:
-            break
-    corner = turned.min(axis=0)
-    return center + axes.T @ (corner - mean), axes, turned - corner
+    lines += table("[parameters.cloth_bending]", {"lower": 1e-7 * density, "upper": 1.0 * density})
+    if sheet.wind is not None:
+        for k in np.flatnonzero(np.arange(3) != s.up):
+            lines += table(f"[parameters.wind_{'xyz'[k]}]", {"lower": -20.0, "upper": 20.0})
+    elif not s.static:
+        lines += table("[parameters.cloth_drag_linear]", {"lower": 1e-3 * density, "upper": 1e2 * density})
+    fit = {"profiles": False, "double_segments": False}
+    return lines + table("[fit]", fit, {"double_segments": "true counts the mesh in the intervals, and takes longer"})
 
 
 def _motion(x: Array) -> float:

@@ -16,6 +16,7 @@ EARTH = 9.81
 STILL, CALM = 6.0, 4.0  # times the noise, by which a marker that stays may move; by which one at rest may
 SILENT = 2e-3  # of the extent: how little a marker moves that stays, where no noise is known
 RIGID = 1.8  # times the noise, the standard deviation of the distance of two markers of one body: sqrt(2) is expected
+MANY, ABOVE = 50, 2.9  # frames from which on 98 % of the distances are 2.05 sqrt(2) times the noise above the true one
 REST = 0.15  # s that a recording must begin at rest to be called so
 NEAR = 1.9  # times the nearest neighbor's distance: markers of a sheet have more than two others so near
 SHARP, TURNS = 0.15, 3  # share of markers at which the shortest way through those of a sheet turns back, and how many
@@ -32,7 +33,8 @@ class Seen:
         still: numbers of the markers that do not move.
         bodies: groups of three or more markers that keep their distances, on no rope of their own.
         loose: the other markers, those that move and belong to no body, in the order of the file.
-        apart: (markers, markers) m, the largest distance of every two markers over time (98 % of the frames).
+        apart: (markers, markers) m, the largest distance of every two markers over time: 98 % of the frames are below,
+            less what their noise adds where the distance hardly changes.
         noise: m per coordinate; 0 where the recording is too short to tell.
         rest: s, for how long nothing moves at the beginning.
         speed: m/s, of the fastest marker, smoothed; 99 % of the frames are slower.
@@ -78,6 +80,8 @@ def seen(recording: Recording) -> Seen:
     still = moved <= max(STILL * noise, SILENT * extent)
     distance = _distances(x)
     apart = np.nanquantile(distance, 0.98, axis=0)
+    if len(t) >= MANY:
+        apart = np.maximum(apart - ABOVE * noise, 0.5 * apart)
     change = np.nanstd(distance, axis=0)
     bodies = [] if len(t) < 3 else _bodies(change <= np.maximum(RIGID * noise, 1e-3 * apart), apart, still)
     in_bodies = {k for body in bodies for k in body}
