@@ -74,7 +74,7 @@ ALLOWED = {
         "adjoint/step",
     },
     "adjoint/fit": {"adjoint", "core/scalar", "core/threads", "core/solver"},
-    "adjoint/library": {"adjoint", "core/constraints", "core/scene", "core/solver"},
+    "adjoint/library": {"adjoint", "core/constraints", "core/rollout", "core/scene", "core/solver"},
     "adjoint/library/sheetbend": set(),  # public headers, which know nothing else of the library
 }
 Sources = Mapping[str, str]  # text by path

@@ -35,7 +35,8 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
         if shutil.which(tool) is None:
             pytest.skip(f"there is no {tool}")
     copy = tmp_path_factory.mktemp("tree")
-    shutil.copy(ROOT / "CMakeLists.txt", copy)
+    for file in ("CMakeLists.txt", "pyproject.toml"):
+        shutil.copy(ROOT / file, copy)
     for folder in (
         "core",
         "adjoint",

@@ -18,7 +18,6 @@ from .chain import (
     add_drag,
     add_links,
     add_masses,
-    first_given,
     first_value,
     straight_or_given,
     time_constants,
@@ -128,8 +127,11 @@ def add_rope(
     Raises:
         SceneError: wrong or missing values; the message names the field.
     """
-    along = first_given(direction, clamp_start, clamp_end, (1.0, 0.0, 0.0))
-    shape, length = straight_or_given(name, length, segments, start, along, points)
+    for field, clamp in (("clamp_start", clamp_start), ("clamp_end", clamp_end), ("direction", (1.0, 0.0, 0.0))):
+        if direction is None and clamp is not None:
+            direction = unit_vector(f"{name}.{field}", clamp)
+    assert direction is not None
+    shape, length = straight_or_given(name, length, segments, start, direction, points)
     grips = _grips(name, (grip_start, grip_end), (clamp_start, clamp_end))
     speeds = None
     if velocity is not None or any(grips):
