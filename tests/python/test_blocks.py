@@ -76,6 +76,21 @@ def test_known_errors_of_the_residuals_are_no_contradiction() -> None:
     assert contradiction(r, J, SPLITS, layout=LAYOUT, shifts=shift[:, None]) is None
 
 
+def test_rows_of_no_part_do_not_make_parts_differ() -> None:
+    """Both halves of a motion ask for 0.5, the first clearly; a static experiment beside them knows 0. Were the halves'
+    mean held at 0, the second would seem to ask for -0.5."""
+    rng, half = np.random.default_rng(5), 200
+    layout = Layout(np.repeat([0, 1], [2 * half, 50]), np.zeros(450, dtype=int), np.r_[np.arange(400), np.arange(50)])
+    motion = rng.standard_normal((2 * half, 2)) * np.repeat([[1.0, 1.0], [1.0, 0.5]], half, axis=0)
+    J = np.vstack([motion, 50.0 * rng.standard_normal((50, 2))])
+    asked = np.r_[motion[:, 1] * 0.5, np.zeros(50)] + 0.1 * rng.standard_normal(450)
+    halves = Split(np.repeat([0, 1, -1], [half, half, 50]), ("early", "late"))
+    assert contradiction(fitted(J, -asked), J, [halves], layout=layout) is None
+    asked[half : 2 * half] -= motion[half:, 1]  # now the second half does
+    found = contradiction(fitted(J, -asked), J, [halves], layout=layout)
+    assert found is not None and sorted(found.differences[1].steps) == approx([-0.5, 0.5], abs=0.1)
+
+
 def test_a_prior_is_no_part_of_the_data() -> None:
     """Parts agree about what data tell; the prior pulls the parameter off all of them."""
     rng, J = np.random.default_rng(5), np.ones((200, 1))

@@ -6,6 +6,10 @@ lacks, which adds up from period to period. A beginning has seen few periods. Fi
 it finds its own minimum, and if that is far from the estimate then one of the two has happened. A search that goes on
 from there to the whole motion tells which: a wrong minimum is left for a lower one.
 
+Errors that change as slowly as a beginning is long go into its minimum without a trace. So what errors like those of
+the other stretches would move in it counts in the comparison, as far as the given sigma allows for their size
+(`stretches`).
+
 Nothing is done where the residuals are white and as large as the given sigma.
 """
 
@@ -34,6 +38,7 @@ from ..statistics.blocks import FEWEST, LEVEL, short_of_frames
 from ..statistics.covariance import Covariance, autocorrelation, covariance
 from ..statistics.gauge import null_space
 from ..statistics.identifiability import Identifiability
+from ..statistics.stretches import scatter, within_sigma
 from .contradictions import CLAIMS, drawn_along, finer_experiments, reach_of, value_words
 
 FRAMES = 12  # of every motion: fewer do not tell how residuals correlate
@@ -45,9 +50,6 @@ CLEAR = 0.03
 """Part of a value, or of its scale, by which a beginning must differ: short beginnings of good real recordings, whose
 errors are alike over their whole length, differ by up to 1.5 % (measured)."""
 LOWER = 1e-3  # of the cost: an end that is lower by less is the same
-
-
-Spread = Callable[[tuple[int, ...]], Covariance]
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,28 @@ class Beginning:
     before: float
 
 
+class Whole:
+    """The end that beginnings are compared with.
+
+    Attributes:
+        problem: of the whole motions.
+        u: (free,) its minimum.
+    """
+
+    def __init__(self, problem: FitProblem, u: Array) -> None:
+        self.problem, self.u = problem, u
+        self.spread = _spread_of(problem, u)
+
+    def scatter(self, b: Beginning, columns: Sequence[int]) -> Array:
+        """(columns, columns) mean square by which errors like those of the other stretches would move a beginning's
+        minimum, as far as the given sigma allows for their size."""
+        layout, part = self.problem.rows_layout(), b.problem.rows_layout()
+        still = np.array([e.static for e in self.problem.experiments])
+        r = within_sigma(self.problem.evaluate(self.u)[1][: self.problem.core.data_rows], layout)
+        J = b.problem.evaluate(b.u)[2][:, list(columns)]
+        return scatter(np.where(still[layout.recording], 0.0, r), layout, part, J)
+
+
 def checked(
     search: Search, problem: FitProblem, ends: Sequence[Minimum], growths: Sequence[Growth]
 ) -> tuple[tuple[Minimum, ...], tuple[Beginning, ...]]:
@@ -79,8 +103,8 @@ def checked(
         growths: of the motions at the best end.
     """
     found = beginnings(problem, ends[0], growths)
-    spread = _spread_of(problem, ends[0].u)
-    if not any(_differences(spread, ends[0].u, b, LEVEL / len(found)) for b in found):
+    whole = Whole(problem, ends[0].u)
+    if not any(_differences(whole, b, LEVEL / len(found)) for b in found):
         return tuple(ends), found
     try:
         other = search.onward(problem, found[-1].u)
@@ -126,10 +150,10 @@ def of_beginnings(
         u: (free,) minimum of the whole, where the beginnings were fitted from.
     """
     words: dict[str, str] = {}
-    spread = _spread_of(problem, u)
+    whole = Whole(problem, u)
     for b in found:
         shift: Array | None = None
-        for column, (step, reach) in _differences(spread, u, b, LEVEL / len(found)).items():
+        for column, (step, reach) in _differences(whole, b, LEVEL / len(found)).items():
             name = problem.parameters.free[column]
             e = next(e for e in judged.estimates if e.name == name)
             if e.verdict not in CLAIMS or name in words:
@@ -162,10 +186,10 @@ def _enough(part: FitProblem, length: float) -> bool:
     return min(frames, default=0) >= FRAMES and part.core.data_rows >= FEWEST * len(part.parameters.free)
 
 
-def _differences(spread: Spread, u: Array, b: Beginning, level: float) -> Mapping[int, tuple[float, float]]:
+def _differences(end: Whole, b: Beginning, level: float) -> Mapping[int, tuple[float, float]]:
     """By column, how far the beginning's minimum is from that of the whole, and the 95 % reach of the difference, where
     it is clearly farther; none at all where chance explains the differences of all columns together."""
-    parameters = b.problem.parameters
+    parameters, u = b.problem.parameters, end.u
     names = list(parameters.free)
     log = [parameters[name].log for name in names]
     _, _, J = b.problem.evaluate(b.u)
@@ -177,8 +201,9 @@ def _differences(spread: Spread, u: Array, b: Beginning, level: float) -> Mappin
     columns = tuple(inside[i] for i in determined)
     if not columns or b.problem.core.data_rows <= len(columns):
         return {}
-    own, whole = _spread_of(b.problem, b.u)(columns), spread(columns)
+    own, whole = _spread_of(b.problem, b.u)(columns), end.spread(columns)
     V = short_of_frames(own, max(len(r.times) for r in b.problem.recordings)) * own.matrix + whole.matrix
+    V += end.scatter(b, columns)
     step, sd = (b.u - u)[list(columns)], np.sqrt(np.diag(V))
     degrees = max(float(np.median(own.degrees)), 1.0)
     score = float(step / sd @ np.linalg.lstsq(V / np.outer(sd, sd), step / sd, rcond=None)[0])
@@ -197,7 +222,7 @@ def _size(problem: FitProblem, u: Array, column: int) -> float:
     return 1.0 if p.log else p.scale or abs(float(u[column]))
 
 
-def _spread_of(problem: FitProblem, u: Array) -> Spread:
+def _spread_of(problem: FitProblem, u: Array) -> Callable[[tuple[int, ...]], Covariance]:
     """The covariance of columns there, each set of them once."""
 
     @cache

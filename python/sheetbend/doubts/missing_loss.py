@@ -28,6 +28,7 @@ from ..quantities.wording import short
 from ..statistics.blocks import short_of_frames
 from ..statistics.covariance import Layout, covariance
 from ..statistics.gauge import RANK_TOLERANCE
+from ..statistics.white_noise import white_noise
 
 EXPLAINS = 1 / 3
 """Of what a fit leaves beyond noise: the part that a loss must explain. It is 50 to 78 % for ropes without the damping
@@ -156,18 +157,9 @@ def _tied(problem: FitProblem) -> list[list[int]]:
 
 
 def _noise(r: Array, layout: Layout, mine: Array) -> float:
-    """Sum of squares of the noise in some residuals, each recording's apart: of white noise that would make their
-    second differences, and no more than was told."""
-    total = 0.0
-    for recording in np.unique(layout.recording[mine]):
-        own = np.flatnonzero(mine & (layout.recording == recording))
-        own = own[np.lexsort((layout.frame[own], layout.channel[own], layout.clocks[own]))]
-        series = np.stack([layout.clocks[own], layout.channel[own]])
-        next_to = (np.diff(series) == 0).all(axis=0) & (np.diff(layout.frame[own]) == 1)
-        three = next_to[:-1] & next_to[1:]
-        bends = (r[own][:-2] - 2 * r[own][1:-1] + r[own][2:])[three]
-        total += len(own) * min(1.0, float(np.mean(bends**2)) / 6.0 if bends.size else 1.0)
-    return total
+    """Sum of squares of the white noise in some residuals, each recording's apart."""
+    counts = np.bincount(layout.recording[mine])
+    return sum(float(counts[i]) * white_noise(r, layout, i) for i in np.flatnonzero(counts).tolist())
 
 
 def _words(names: list[str], asked: Asked) -> str:

@@ -8,7 +8,9 @@ with an F distribution (Hotelling); V is the covariance of all estimates (`covar
 alike over time and between channels. A joint test sees what no single parameter shows: where several of them trade,
 each one's own interval is wide.
 
-Priors hold for u, and tell nothing of d. Parameters that a single recording has are solved for within it, not compared.
+Priors hold for u, and tell nothing of d. Rows of no part, such as a static experiment's where times are compared, do
+not count: they would hold the mean of the parts at their own value, and what contradicts that would look like a
+difference between parts. Parameters that a single recording has are solved for within it, not compared.
 What is known to be wrong with the residuals (their change on a finer mesh or step) takes columns of its own.
 """
 
@@ -127,6 +129,12 @@ def _compared(
     taken: float,
 ) -> Contradiction | None:
     """None where a part is too small, or where the parts have nothing to compare."""
+    if (split.part < 0).any():
+        mine = split.part >= 0
+        kept = np.append(mine, np.ones(len(residuals) - len(mine), dtype=bool))
+        own = [(slice(int(mine[: k.start].sum()), int(mine[: k.stop].sum())), columns) for k, columns in within]
+        rest = Split(split.part[mine], split.names)
+        return _compared(residuals[kept], jacobian[kept], rest, layout.of(mine), own, known[kept], taken)
     rows, parts = len(layout.frame), len(split.names)
     private = {column for _, columns in within for column in columns}
     shared = [column for column in range(jacobian.shape[1]) if column not in private]
@@ -134,7 +142,7 @@ def _compared(
     sizes = np.bincount(split.part[split.part >= 0], minlength=parts)
     if count == 0 or count * parts > MOST_COLUMNS or sizes.min() < FEWEST * count:
         return None
-    coding = np.vstack([np.eye(parts - 1), -np.ones(parts - 1), np.zeros(parts - 1)])[split.part]  # -1: the last row
+    coding = np.vstack([np.eye(parts - 1), -np.ones(parts - 1)])[split.part]
     coding = np.vstack([coding, np.zeros((len(residuals) - rows, parts - 1))])
     opposed = [jacobian[:, shared] * coding[:, [k]] for k in range(parts - 1)]
     every, left = _solved_within(jacobian, within, np.hstack([jacobian[:, shared], *opposed, known]), residuals, rows)

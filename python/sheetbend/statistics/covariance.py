@@ -88,6 +88,11 @@ class Layout:
         """(rows,) `clock`, also where none was given."""
         return np.zeros_like(self.frame) if self.clock is None else self.clock
 
+    def of(self, rows: NDArray[Any]) -> Layout:
+        """That of some rows: (rows,) bool or numbers."""
+        places = (self.recording, self.channel, self.frame, self.kinds, self.clocks)
+        return Layout(*(place[rows] for place in places))
+
     @staticmethod
     def series(rows: int) -> Layout:
         """One series of `rows` equally spaced samples."""
