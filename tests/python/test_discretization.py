@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import sheetbend as sb
 from pytest import approx
 from sheetbend.mesh import grid
+from sheetbend.minimum import time_step
+from sheetbend.minimum.linear_step import gauss_newton
 from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.quantities.parameters import Parameter, Parameters
 from sheetbend.result.result import Estimate
 
 TRUE = {"warp": 60.0, "weft": 40.0, "shear": 12.0}
@@ -207,3 +211,31 @@ def test_what_refine_may_be():
         assert result["rope_EI"].discretization == 0 and result["rope_EI"].moved == 0
     with pytest.raises(sb.InputError, match="refine"):
         sb.fit(coarse, parameters=["rope_EI"], refine="finer")
+
+
+class Bent:
+    """A problem of two numbers whose Gauss-Newton steps in the second go too far, since its residuals are large and
+    bend; the first moves by `shift` from one discretization to the next."""
+
+    def __init__(self, shift: float) -> None:
+        self.shift, self.parameters = shift, Parameters([Parameter(name=n, initial=0.0) for n in ("moved", "bent")])
+        self.experiments, self.core, self.jacobians = (), SimpleNamespace(data_rows=3), 0
+
+    def evaluate(self, u: np.ndarray, jacobian: bool = True) -> tuple[bool, np.ndarray, np.ndarray]:
+        self.jacobians += jacobian
+        r = np.array([u[0] - self.shift, u[1], 10.0 + 0.075 * u[1] ** 2])
+        return True, r, np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.15 * u[1]]])
+
+
+def test_a_step_in_vain_does_not_throw_the_limit_away(monkeypatch: pytest.MonkeyPatch):
+    """The first step takes off all that the limit has to give, the second raises the cost by a tenth."""
+    problem, limit, finest = Bent(0.0), Bent(5.0), Bent(5.5)
+    given = iter([limit, finest])
+    monkeypatch.setattr(time_step, "_at", lambda problem, experiments: next(given))
+    start = np.array([0.0, 2.0])
+    found = time_step.settle(problem, start)
+    assert found.problem is limit and limit.jacobians <= 2
+    assert found.u == approx([5.0, 2.0]) and found.moved == approx({"moved": 5.0, "bent": 0.0})
+    (left,) = found.refits
+    step = gauss_newton(limit.parameters, found.u, *limit.evaluate(found.u)[:0:-1])
+    assert left.moved == approx({"moved": 8 / 7 * 0.5, "bent": abs(step[1] - 2.0)})

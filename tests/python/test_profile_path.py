@@ -120,12 +120,13 @@ def test_ends_that_the_cost_confirms_take_two_evaluations_and_stay() -> None:
     assert np.ptp(np.array(m.asked)[:, 1]) == approx(2 * first)
 
 
-def test_an_end_beyond_the_limit_is_open() -> None:
+@pytest.mark.parametrize("share", [0.5, 0.93, 0.99])
+def test_an_end_beyond_the_limit_is_open(share: float) -> None:
     m = model(decay, np.array([0.0, -0.5, 0.2]), 0.09)
     u = m.fitted(np.array([0.0, -0.5, 0.2]))
     first = reach(m.jacobian(u), 1)
-    exact = m.exact(u, 1, -1.0, 8 * first)
-    m.upper[1] = u[1] + 0.5 * first
+    exact, beyond = (m.exact(u, 1, side, 8 * first) for side in (-1.0, 1.0))
+    m.upper[1] = u[1] + share * beyond
     lower, upper = m.path(u, 1).ends(first)
     assert upper == math.inf and lower == approx(exact, rel=0.04)
     assert max(at[1] for at in m.asked) <= m.upper[1]

@@ -3,11 +3,11 @@ Statistics 37, 87).
 
 The profile of a parameter is the cost with that parameter held and all others at their best. A refit at each value that
 is tried costs several Jacobians; residuals alone cost a tenth of one. With residuals r + J d, J made once at the
-estimate, the others follow the held parameter along a line, and the square root of the rise of the cost is proportional
-to the distance t. What the residuals at a point near the profile say beyond that is its shape: how far the height is
-from proportional to t, and, from the least-squares step of the others that J predicts there, how the line bends. Both
-are smooth in t. Interpolated between the points that were evaluated, on both sides of the estimate, they place the next
-point, and at last the end.
+estimate, the others follow the held parameter along a line, and the height (the square root of the rise of the cost) is
+proportional to the distance t. What the residuals at a point near the profile say beyond that is its shape: how far the
+height is from proportional to t, and, from the least-squares step of the others that J predicts there, how the line
+bends. Interpolated between the points that were evaluated (`profile_shape`), on both sides of the estimate, they place
+the next point, and at last the end.
 
 J need not be exact for that: it only has to show how much the others' step would still take off (`Point.slack`), and
 the error of that is of second order. Where its change is as large as J itself, it is made again.
@@ -24,42 +24,19 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..statistics.gauge import RANK_TOLERANCE
 from .approach import inside
+from .profile_shape import FAR_OFF, SAME, Point, bend, end, telling
 
 MOST = 7  # evaluations for one end, before it is left to refits
 JACOBIANS = 2  # for one end
 CONFIRMED = 0.2  # of a rise: both linear ends stand where the cost rises as the linear picture has it, to this part
 CLOSE = 0.15  # of the height at an end: from so near it is interpolated
 SLACK = 0.05  # of the rise: what the others may leave there, which shifts an end by half of that
-FAR_OFF = 1.0  # of the rise: where the others leave more, they move first
 CURVED = 0.6  # of the way of the residuals: where they are so far from r + J d, J is made again
 STRIDE = 2.5  # times the farthest distance so far
-SAME = 0.1  # of a distance: nearer points on one side tell no slope
 WEAK = 0.01  # of the rise: what the others' longest steps must promise to be worth taking
-LEAST = 0.05  # of the linear height: an interpolation below this is none
 
 Evaluate = Callable[[Array, bool], tuple[bool, Array, Array]]
 """(u (p,), whether with a Jacobian) -> ok, residuals (rows,), Jacobian (rows, p), those of priors included."""
-
-
-@dataclass(frozen=True)
-class Point:
-    """A point near the profile.
-
-    Attributes:
-        t: distance of the held parameter from the estimate, internal.
-        u: (p,) all parameters.
-        r: (rows,) residuals.
-        height: square root of the profile's rise there, over that at the end of the interval.
-        slack: what the others' step would take off the cost, of the rise at the end.
-        bend: (p,) how far the others are from the line of the linear picture behind that step, over t^2.
-    """
-
-    t: float
-    u: Array
-    r: Array
-    height: float
-    slack: float
-    bend: Array
 
 
 class Others:
@@ -151,20 +128,20 @@ class ProfilePath:
         for _ in range(MOST):
             last = self._nearest(side)
             if last is not None:
-                if self._arrived(last, side) and (made or not self._curved(last)):
-                    return self._root(side)
                 if last.slack <= SLACK and last.height < 1.0 and abs(last.t) >= self._room[side]:
                     return side * math.inf
+                if self._arrived(last, side) and (made or not self._curved(last)):
+                    return self._found(side)
                 if self._arrived(last, side) or (before is not None and _stalls(before, last)):
                     if made == JACOBIANS or (last := self._made_again(last, side)) is None:
                         return math.nan
                     made += 1
                     if self._arrived(last, side):
-                        return self._root(side)
+                        return self._found(side)
                     before = None
                 else:
                     before = last
-            aim = self._root(side) if last is None or last.slack <= FAR_OFF else last.t
+            aim = self._aim(side) if last is None or last.slack <= FAR_OFF else last.t
             if self._evaluated(aim, side) is None:
                 return math.nan
         return math.nan
@@ -172,7 +149,11 @@ class ProfilePath:
     def _arrived(self, at: Point, side: float) -> bool:
         """Whether the end is known from that point, about as many parts of the way off as the height is."""
         near = at.slack <= SLACK and abs(at.height - 1.0) <= CLOSE
-        return near and abs(self._root(side) - at.t) <= 2.0 * CLOSE * abs(at.t)
+        return near and abs(end(self.points, side, self._reach) - abs(at.t)) <= 2.0 * CLOSE * abs(at.t)
+
+    def _found(self, side: float) -> float:
+        away = end(self.points, side, self._reach)
+        return side * (away if away <= self._room[side] else math.inf)
 
     def _curved(self, at: Point) -> bool:
         """Whether the residuals say that the Jacobian there is another one."""
@@ -196,8 +177,8 @@ class ProfilePath:
         t = side * min(abs(t), self._room[side])
         if t == 0.0:
             return None
-        bend = 0.0 if straight else t**2 * self._bend(t, side)
-        u = np.clip(self.u + t * self._line + bend, *self.limits)
+        off = 0.0 if straight else t**2 * bend(self.points, side, t)
+        u = np.clip(self.u + t * self._line + off, *self.limits)
         ok, r, _ = self.evaluate(u, False)
         if not ok or not np.isfinite(r).all():
             return None
@@ -206,52 +187,21 @@ class ProfilePath:
     def _point(self, t: float, u: Array, r: Array, side: float) -> Point:
         s, promised = self._others[side].step(u, r)
         rose = 0.5 * float(r @ r) - self._cost - promised
-        bend = (u + s - self.u - t * self._line) / t**2
-        return Point(t, u, r, math.sqrt(max(rose, 0.0) / self.rise), promised / self.rise, bend)
+        off = u + s - self.u - t * self._line
+        return Point(t, u, r, math.sqrt(max(rose, 0.0) / self.rise), promised / self.rise, off / t**2)
 
     def _keep(self, at: Point) -> Point:
         self.points = [other for other in self.points if abs(other.t - at.t) > SAME * abs(at.t)]
         self.points.append(at)
         return at
 
-    def _mine(self, side: float) -> list[Point]:
-        """Points of one side, those that tell most of its end first."""
-        return sorted((at for at in self.points if at.t * side > 0), key=lambda at: abs(at.height - 1.0) + at.slack)
-
     def _nearest(self, side: float) -> Point | None:
-        return next(iter(self._mine(side)), None)
+        return next(iter(telling(self.points, side)), None)
 
-    def _two(self, side: float) -> list[Point]:
-        """The points that tell the profile's shape there."""
-        every = self._mine(side) + self._mine(-side)
-        return every[:1] + [at for at in every[1:] if at.slack <= FAR_OFF][:1]
-
-    def _bend(self, t: float, side: float) -> Array:
-        near = self._two(side)
-        if not near:
-            return np.zeros(len(self.u))
-        if len(near) == 1:
-            return near[0].bend
-        one, other = near
-        return one.bend + (other.bend - one.bend) * ((t - one.t) / (other.t - one.t))
-
-    def _root(self, side: float) -> float:
-        """Where the height reaches 1 by interpolation, at most a stride farther than any point.
-
-        With a sign z for the side, the height over that of the linear picture is a smooth function of z, 1 at z = 0.
-        """
-        near, factor = self._two(side), 1.0
-        z = [math.copysign(at.height, side * at.t) for at in near]
-        slopes = [
-            (at.height * self._reach / abs(at.t) - 1.0) / max(x, LEAST, key=abs) for x, at in zip(z, near, strict=True)
-        ]
-        if near:
-            factor += slopes[0]
-        if len(near) == 2 and abs(z[1] - z[0]) > SAME:
-            factor += (1.0 - z[0]) * (slopes[1] - slopes[0]) / (z[1] - z[0])
-        reached = max((abs(at.t) for at in self._mine(side)), default=self._reach)
-        ahead = self._reach / factor if factor > LEAST else math.inf
-        return side * min(ahead, STRIDE * reached, self._room[side])
+    def _aim(self, side: float) -> float:
+        """The end as far as it is known, no farther than the limit and a stride beyond the points."""
+        reached = max((abs(at.t) for at in telling(self.points, side)), default=self._reach)
+        return side * min(end(self.points, side, self._reach), STRIDE * reached, self._room[side])
 
 
 def _stalls(before: Point, last: Point) -> bool:

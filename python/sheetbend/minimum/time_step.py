@@ -21,7 +21,7 @@ from .refuted import refuted, words
 
 TIME_STEP, SWEEPS = "time step", "twice the sweeps"
 TANGENTS = 3  # evaluations with tangents at most
-THERE = 0.1  # standard errors of the residuals' scatter: a step shorter than this has arrived
+THERE = 0.1  # standard errors, in the mean of all parameters: a step shorter than this has arrived
 SECOND_ORDER, THIRD_ORDER = 4.0 / 3.0, 8.0 / 7.0  # from what a halving moves to the limit
 
 
@@ -84,18 +84,21 @@ def _moved(problem: FitProblem, u: np.ndarray) -> Settled:
     limit = _at(problem, combined(problem.experiments))
     first = one_step(problem, limit, u)  # raises where the combination has no answer at u
     before = float(np.sum(limit.evaluate(u, jacobian=False)[1] ** 2))
-    at = first
+    ok, there, _ = limit.evaluate(first, jacobian=False)
+    if not (ok and float(np.sum(there**2)) <= before):
+        whole = Refit(name=TIME_STEP, to_limit=1.0, moved=moves(problem.parameters, u, first))
+        return Settled(problem, u, refits=(whole,))
+    onward = first
     for _ in range(TANGENTS):
-        ok, r, J = limit.evaluate(at)
-        after = float(np.sum(r**2)) if ok else np.inf
-        if not after <= before:
-            whole = Refit(name=TIME_STEP, to_limit=1.0, moved=moves(problem.parameters, u, first))
-            return Settled(problem, u, refits=(whole,))
-        end, onward = at, gauss_newton(problem.parameters, at, J, r)
+        end = onward
+        _, r, J = limit.evaluate(end)
+        after, onward = float(np.sum(r**2)), gauss_newton(problem.parameters, end, J, r)
         scatter = after / max(len(r) - len(u), 1)
-        if float(np.sum((J @ (onward - at)) ** 2)) <= THERE**2 * scatter:
+        if float(np.sum((J @ (onward - end)) ** 2)) <= THERE**2 * len(u) * scatter:
             break
-        before, at = after, onward
+        ok, there, _ = limit.evaluate(onward, jacobian=False)
+        if not (ok and float(np.sum(there**2)) <= after):
+            break  # what that step would move counts as open
     if refuted(problem, u, r):
         whole = Refit(name=TIME_STEP, to_limit=1.0, moved=moves(problem.parameters, u, end))
         told = words("short substeps", "at the same substep", "refine=False, or halve_step = false in a configuration,")
