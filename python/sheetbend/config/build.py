@@ -19,6 +19,7 @@ from ..objects.cloth import Cloth
 from ..objects.markers import Place, between, on_cloth, on_particle, on_rope
 from ..recording.recording import Recording
 from ..recording.recording_checks import marker_indices
+from ..recording.unit_doubt import extent, unit_doubt
 from ..scene.scene import Scene
 from . import schema
 from .cloth_markers import places_on_cloths
@@ -134,7 +135,7 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
         for key in ("fit", "held_out"):
             _check_window(f"{path}.{key}", getattr(section, key), recording)
         part = recording.piece(*(section.fit if section.static and section.fit else (t0, None)))
-    moment = Moment(part, recording, t0, section.static)
+    moment = Moment(part, recording, t0, section.static, section.max_gap)
     ropes = _shown(config, section, path)
     shared = not section.marker
     markers = config.marker if shared else section.marker
@@ -203,6 +204,10 @@ def _read(section: schema.RecordingSection, folder: Path, path: str) -> Recordin
             recording = recording.frames(slice(*section.frames))
     except RecordingError as error:
         raise ConfigError(f"{path}.{error.field}", error.problem, error.got, error.fix) from error
+    doubt = unit_doubt(recording) if section.units is None else None
+    if doubt is not None:
+        problem = f"are not said, and in the unit that was read the markers are {extent(recording):.4g} m apart"
+        raise ConfigError(f"{path}.units", problem, None, f'give units = "{doubt}", or "m" if it is so')
     return replace(recording, name=section.name or recording.name)
 
 
