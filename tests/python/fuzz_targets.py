@@ -14,6 +14,7 @@ import sheetbend as sb
 import test_c3d
 import test_config_cloth
 import test_motion_capture
+import test_readers
 import test_written_files
 from mutations import json_tree, mutated, packed, toml_tree
 from sheetbend import config
@@ -63,6 +64,10 @@ def _mocap(folder: Path) -> list[Files]:
         test_motion_capture.vicon(folder),
     )
     return [{"take.csv": path.read_bytes()} for path in written]
+
+
+def _trc(folder: Path) -> list[Files]:
+    return [{"take.trc": test_readers.TRC.encode()}]
 
 
 def _npz(folder: Path) -> list[Files]:
@@ -204,6 +209,7 @@ def _curve(path: Path) -> None:
 TARGETS: dict[str, Target] = {
     "csv": Target(_csv, _recording, mutated),
     "mocap": Target(_mocap, _recording, mutated),
+    "trc": Target(_trc, _recording, mutated),
     "npz": Target(_npz, _recording, packed),
     "pickle": Target(_pickles, _recording, mutated),
     "c3d": Target(_c3d, _recording, mutated),

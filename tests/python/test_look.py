@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,9 @@ import sheetbend as sb
 import takes
 from commands import last_line, run
 from pytest import approx
-from sheetbend.look.seen import seen, unit_doubt
+from sheetbend import config
+from sheetbend.look.seen import seen
+from sheetbend.recording.unit_doubt import unit_doubt
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -41,15 +44,15 @@ def fitted(folder: Path, file: str, *options: str) -> sb.FitResult:
 @pytest.mark.parametrize("held", ["one", "two", "body"])
 def test_a_rope_in_a_hand(tmp_path: Path, held: str) -> None:
     said, text = drafted(tmp_path, takes.rope_in_hand(held, seconds=1.0))
-    config = tomllib.loads(text)
-    (rope,) = config["scene"]["rope"]
+    draft = tomllib.loads(text)
+    (rope,) = draft["scene"]["rope"]
     (grip,) = rope["grip"]
     assert grip["at"] == "start"
     assert grip["markers"] == {"one": ["r0"], "two": ["hand_back", "hand_front"], "body": ["a", "b", "c"]}[held]
     # the free length alone: from the inner of two markers in the hand, and from where the rope leaves a body
     assert rope["length"] == approx(takes.LENGTH, rel=5e-3)  # half the standard deviation that the draft gives it
     assert list(rope["markers"])[-1] == "r8" and len(rope["markers"]) == takes.MARKERS
-    assert config["recording"][0]["start"] == "equilibrium"  # the hand rests for 0.3 s
+    assert draft["recording"][0]["start"] == "equilibrium"  # the hand rests for 0.3 s
     assert said["kind"] == "a rope"
     assert ("direction" in " ".join(said["unknown"])) == (held != "two")
     told = " ".join(said["unknown"])
@@ -70,12 +73,12 @@ def test_a_beam(tmp_path: Path) -> None:
     truth = takes.BEAM
     measured = ("--length", str(truth["length"]), "--density", str(truth["density"]))
     said, text = drafted(tmp_path, takes.beam(), *measured, bare=False)
-    config = tomllib.loads(text)
-    (beam,) = config["scene"]["rope"]
+    draft = tomllib.loads(text)
+    (beam,) = draft["scene"]["rope"]
     assert said["kind"] == "a beam clamped at one end"
     assert beam["EI"] == approx(truth["EI"], rel=0.03)  # from its frequency alone
     assert beam["clamp_start"] == approx([np.cos(0.2), 0.0, np.sin(0.2)], abs=0.03)
-    assert [r["name"] for r in config["recording"]] == ["swing", "rest"]
+    assert [r["name"] for r in draft["recording"]] == ["swing", "rest"]
 
 
 def test_the_length_of_a_beam_that_was_not_measured_counts(tmp_path: Path) -> None:
@@ -109,9 +112,9 @@ def test_a_rope_between_two_grips_gets_the_recipe(tmp_path: Path) -> None:
 
 def test_a_shape_at_rest(tmp_path: Path) -> None:
     said, text = drafted(tmp_path, sb.Recording.load(ROOT / "experiments/wires/data/white_0.npz"), bare=False)
-    config = tomllib.loads(text)
-    assert said["kind"] == "a rope at rest" and config["recording"][0]["axes"] == "xz"
-    assert config["scene"]["rope"][0]["length"] == 1.5  # the file tells it
+    draft = tomllib.loads(text)
+    assert said["kind"] == "a rope at rest" and draft["recording"][0]["axes"] == "xz"
+    assert draft["scene"]["rope"][0]["length"] == 1.5  # the file tells it
 
 
 def test_units_and_the_axis_that_points_up(tmp_path: Path) -> None:
@@ -119,12 +122,47 @@ def test_units_and_the_axis_that_points_up(tmp_path: Path) -> None:
     take = takes.rope_in_hand("one", seconds=1.0)
     turned = 1e3 * take.positions[..., [0, 2, 1]] * [1, 1, -1]
     said, text = drafted(tmp_path, sb.Recording(turned, take.times, take.markers, name="mm"))
-    config = tomllib.loads(text)
-    assert config["scene"]["gravity"] == [0, -9.81, 0] and config["recording"][0]["units"] == "mm"
-    assert config["scene"]["rope"][0]["length"] == approx(takes.LENGTH, rel=5e-3)
+    draft = tomllib.loads(text)
+    assert draft["scene"]["gravity"] == [0, -9.81, 0] and draft["recording"][0]["units"] == "mm"
+    assert draft["scene"]["rope"][0]["length"] == approx(takes.LENGTH, rel=5e-3)
     assert any("mm" in line for line in said["seen"]) and any(
         line.startswith("y is taken as up") for line in said["seen"]
     )
+
+
+def test_a_rope_of_700_m_is_refused_with_its_unit(tmp_path: Path) -> None:
+    """It was fitted as it stood, or failed somewhere in the simulation."""
+    take = takes.let_go(False, 0.2)
+    sb.Recording(1e3 * take.positions, take.times, take.markers).save(tmp_path / "take.csv")
+    text = """
+[experiment]
+name = "long"
+[[scene.rope]]
+length = 0.7
+density = 0.05
+EI = 1e-3
+pinned = [0]
+[[recording]]
+file = "take.csv"
+"""
+    (tmp_path / "long.toml").write_text(text)
+    with pytest.raises(sb.ConfigError, match=r'recording\[0\].units: .* 7\d\d.* m apart .*give units = "mm"'):
+        config.load(tmp_path / "long.toml")
+    (tmp_path / "long.toml").write_text(text + 'units = "m"\n')
+    assert config.load(tmp_path / "long.toml").experiments  # where it is so
+
+
+def test_a_gap_of_a_grip_may_be_closed_by_the_configuration(tmp_path: Path) -> None:
+    """The error names `max_gap`, which only Python had."""
+    take = takes.rope_in_hand("one", seconds=0.6)
+    x = take.positions.copy()
+    x[20:28, 0] = np.nan
+    sb.Recording(x, take.times, take.markers, name="take").save(tmp_path / "take.csv")
+    result = run("new", tmp_path / "take.csv", "--output", tmp_path / "draft.toml")
+    assert result.exit_code == 2 and "max_gap" in result.stderr and "does not run as it is" in result.stdout
+    text = (tmp_path / "draft.toml").read_text()
+    (tmp_path / "draft.toml").write_text(text.replace("\n[[recording]]", "\n[[recording]]\nmax_gap = 0.1"))
+    assert config.load(tmp_path / "draft.toml").experiments
 
 
 def test_what_is_seen() -> None:
@@ -199,3 +237,21 @@ def test_a_draft_of_the_beam_predicts_what_the_shipped_configuration_does(tmp_pa
     fit = fitted(tmp_path, "beam/data/beam_gravity_b.npz", "--density", "0.963", "--length", "0.1")
     assert fit["beam_EI"].value == approx(0.0183, rel=0.05)  # of the shipped configuration
     assert fit.recordings[0].held_out < 0.14e-3
+
+
+def test_the_tutorial_runs_as_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its script, its commands, what it shows of their output, and its table."""
+    text = (ROOT / "docs/tutorials/one_hand.md").read_text()
+    blocks = dict(re.findall(r"```(python|sh|text)\n(.*?)```", text, re.S))
+    monkeypatch.chdir(tmp_path)
+    exec(compile(blocks["python"], "tutorial", "exec"), {})
+    new, fit = (line.split()[1:] for line in blocks["sh"].splitlines())
+    seen_there = run(*new)
+    assert seen_there.exit_code == 0 and blocks["text"] in seen_there.stdout
+    result = run(*fit)
+    assert result.exit_code == 0, result.output
+    found = sb.FitResult.load("out/take/fit.json")
+    shown = {"rope_EI": (4.14e-4, 0.15e-4), "rope_drag_linear": (4.8e-3, 0.2e-3), "rope_bend_damping": (0.0126, 0.0012)}
+    for name, (value, half) in shown.items():
+        assert found[name].value == approx(value, abs=0.5 * half), name
+    assert found.recordings[0].held_out == approx(1.24e-3, rel=0.05)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+import sheetbend as sb
+from sheetbend import config
 from sheetbend.errors import RecordingError
 from sheetbend.recording.recording import Recording
 
@@ -86,6 +89,64 @@ def test_the_json_beside_a_take_tells_the_rest(tmp_path: Path) -> None:
 def test_a_damaged_take_is_refused(tmp_path: Path, header: str, changed: dict, words: str) -> None:
     with pytest.raises(RecordingError, match=words):
         Recording.load(motive(tmp_path / "take.csv", header, **changed))
+
+
+def turned_by(path: Path, quaternion: str) -> None:
+    """Give the body of a take a rotation."""
+    zeros = r"(\n\d+,[\d.]+)" + 4 * ",0\\.000000"
+    path.write_text(re.sub(zeros, rf"\1,{quaternion}", path.read_text(encoding="utf-8")), encoding="utf-8")
+
+
+def test_the_pose_of_a_rigid_body(tmp_path: Path) -> None:
+    """The rotations of a take were not read: a rope in a hand with a body needed its markers."""
+    quaternion = np.array([0.6, 0.0, 0.0, 0.8])
+    path = motive(tmp_path / "take.csv")
+    turned_by(path, "0.6,0.0,0.0,0.8")
+    for tool in (sb.Tool.load(path), sb.Tool.load(path, body="gripper")):
+        assert tool.times == pytest.approx(np.arange(FRAMES) / 120, abs=1e-6)
+        assert tool.positions == pytest.approx(1e-3 * GRIPPER)
+        assert tool.quaternions == pytest.approx(np.tile(quaternion, (FRAMES, 1)))
+    with pytest.raises(RecordingError, match="name one of: gripper"):
+        sb.Tool.load(path, body="hand")
+    turned = motive(tmp_path / "euler.csv", **{",W": ",E"})
+    with pytest.raises(RecordingError, match="rotations as quaternions"):
+        sb.Tool.load(turned)
+
+
+def test_a_rope_in_a_rigid_body_of_a_take(tmp_path: Path) -> None:
+    """Its end follows the body, 5 cm beside its pivot."""
+    path = motive(tmp_path / "take.csv")
+    turned_by(path, "0,0,0,1")
+    (tmp_path / "rope.toml").write_text(
+        """
+[experiment]
+name = "held"
+[[scene.tool]]
+name = "hand"
+file = "take.csv"
+body = "gripper"
+[[scene.rope]]
+length = 0.2
+segments = 4
+density = 0.05
+EI = 1e-3
+start = [0.35, 1.2, -0.05]
+direction = [0, -1, 0]
+markers = { "towel:1" = 0.1, "Unlabeled 1000" = 0.2 }
+[[scene.rope.grip]]
+at = "start"
+tool = "hand"
+position = [0.05, 0.0, 0.0]
+[[recording]]
+file = "take.csv"
+"""
+    )
+    study = config.load(tmp_path / "rope.toml")
+    experiment = study.experiments[0]
+    times = 8 * experiment.solver.h * np.arange(4)
+    motion = sb.simulate(experiment.scene, times, experiment.solver)
+    start = motion.positions[:, experiment.scene.ropes["rope"].particles[0]]
+    assert start == pytest.approx(1e-3 * GRIPPER[0] + [0.05, 0.0, 0.0] + 0.12 * times[:, None], abs=1e-5)
 
 
 VICON = (

@@ -124,7 +124,7 @@ def test_long_csv_columns_go_by_name(tmp_path: Path) -> None:
     ("text", "words"),
     [
         ("0,1,2,3\n", "line 1: must be a header whose first column is time"),
-        ("t,a_x,a_y,a_z\n0,1,2,3\n", "line 1: must be a header"),
+        ("when,a_x,a_y,a_z\n0,1,2,3\n", "line 1: must be a header"),
         ("time a_x a_y a_z\n0 1 2 3\n", "line 1: must be a header"),
         ("# nothing\n\n", "holds no header"),
         ("time,a_x,a_y,a_z\n", "no rows"),
@@ -261,13 +261,73 @@ def test_missing_and_empty_files_are_refused(tmp_path: Path, suffix: str) -> Non
 
 
 def test_unknown_suffix_and_folder_are_refused(tmp_path: Path) -> None:
-    for name in ("motion.trc", "motion"):
+    for name in ("motion.xyz", "motion"):
         with pytest.raises(RecordingError, match=r"suffix that no reader knows .*\.npz or \.csv"):
             Recording.load(tmp_path / name)
         with pytest.raises(RecordingError, match="suffix"):
             Recording(X, T).save(tmp_path / name)
     with pytest.raises(RecordingError, match="folder that does not exist"):
         Recording(X, T).save(tmp_path / "none" / "motion.npz")
+
+
+@pytest.mark.parametrize("between", [":", ".", "_", " "])
+@pytest.mark.parametrize("begin", ["t", "frame,time", "Frame,Time (s)", "Frame#,t"])
+def test_headers_as_motion_capture_writes_them(tmp_path: Path, between: str, begin: str) -> None:
+    """`M01:X`, a column of frames before the time, and `t` were refused."""
+    names = [f"arm:M0{k}{between}{axis}" for k in (1, 2) for axis in "XYZ"]
+    count = begin.count(",")
+    rows = [",".join([*["7"] * count, f"0.{k}", *(f"{k}.{c}" for c in range(6))]) for k in range(3)]
+    (tmp_path / "take.csv").write_text("\n".join([",".join([begin, *names]), *rows]))
+    got = Recording.load(tmp_path / "take.csv")
+    assert got.markers == ("arm:M01", "arm:M02") and got.times.tolist() == [0.0, 0.1, 0.2]
+    assert got.positions[1].ravel().tolist() == [1.0, 1.1, 1.2, 1.3, 1.4, 1.5]
+
+
+def test_frames_without_a_time_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "take.csv").write_text("frame,a_x,a_y,a_z\n0,1,2,3\n")
+    with pytest.raises(RecordingError, match="first column is time"):
+        Recording.load(tmp_path / "take.csv")
+
+
+TRC = (
+    "PathFileType\t4\t(X/Y/Z)\ttake.trc\t\r\n"
+    "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames\r\n"
+    "100.00\t100.00\t3\t2\tmm\t100.00\t1\t3\r\n"
+    "Frame#\tTime\thand\t\t\ttip\t\t\r\n"
+    "\t\tX1\tY1\tZ1\tX2\tY2\tZ2\r\n"
+    "\r\n"
+    "1\t0.00\t1\t2\t3\t4\t5\t6\t\r\n"
+    "2\t0.01\t1.5\t2\t3\r\n"
+    "3\t0.02\t2\t2\t3\t4\t5\t7\r\n"
+)
+
+
+def test_a_trc_file(tmp_path: Path) -> None:
+    (tmp_path / "take.trc").write_text(TRC, newline="")
+    got = Recording.load(tmp_path / "take.trc")
+    assert got.markers == ("hand", "tip") and got.times.tolist() == [0.0, 0.01, 0.02] and got.gravity is None
+    assert got.positions[2].tolist() == [[0.002, 0.002, 0.003], [0.004, 0.005, 0.007]]
+    assert got.mask.tolist() == [[True, True], [True, False], [True, True]]
+    with pytest.raises(RecordingError, match="differ from the file's, mm"):
+        Recording.load(tmp_path / "take.trc", units="m")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("PathFileType", "Path", "is no TRC file"),
+        ("\tmm\t", "\tinch\t", "line 3: names no length unit"),
+        ("Frame#", "Index", "line 4: must begin with Frame#"),
+        ("hand\t\t\ttip", "hand\t\ttip\t", "line 4: must name a marker in every third column"),
+        ("X2\tY2", "Y2\tX2", "line 5: must name the axes"),
+        ("1.5", "1,5", "line 8: holds a cell that is no number"),
+        ("5\t7", "5\t7\t8", "line 9: must have at most 8 cells"),
+    ],
+)
+def test_a_damaged_trc_file_is_refused(tmp_path: Path, old: str, new: str, words: str) -> None:
+    (tmp_path / "take.trc").write_text(TRC.replace(old, new), newline="")
+    with pytest.raises(RecordingError, match=words):
+        Recording.load(tmp_path / "take.trc")
 
 
 def test_a_format_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

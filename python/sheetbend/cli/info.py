@@ -22,6 +22,7 @@ from ..minimum.optimizers import ceres_trouble, has_ceres
 from ..quantities.kinds import KINDS
 from ..recording.io import FORMATS
 from ..recording.recording import Recording
+from ..recording.unit_doubt import extent, unit_doubt
 from ..scene.scene import Scene
 from ..version import __version__
 from .gripped import RopeData, load_ropes
@@ -93,6 +94,12 @@ def _recording(console: Console, recording: Recording) -> dict[str, Any]:
     first = recording.mask.argmax(axis=0)
     at = recording.positions[first, np.arange(len(first))]
     console.print("\n" + recording.summary(), soft_wrap=True)
+    doubt = unit_doubt(recording)
+    if doubt is not None:
+        said = (
+            f"the markers are {extent(recording):.4g} m apart: say units = {doubt} in a configuration, or in the JSON"
+        )
+        console.print(said, soft_wrap=True)
     table = Table("marker", "first seen [s]", "x [m]", "y [m]", "z [m]", "lost", box=None, pad_edge=False)
     lost = 1.0 - recording.mask.mean(axis=0)
     for k, marker in enumerate(recording.markers[:_MARKERS]):

@@ -14,9 +14,10 @@ from ..errors import ConfigError, RecordingError, SheetbendError
 from ..files.names import flaw
 from ..files.whole import write_text
 from ..look.draft import Draft, draft
-from ..look.seen import seen, unit_doubt
+from ..look.seen import seen
 from ..look.take import Measured, Take
 from ..recording.recording import Recording
+from ..recording.unit_doubt import unit_doubt
 from .folders import made
 from .gripped import load_ropes
 from .outcome import Outcome, run

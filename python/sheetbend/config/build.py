@@ -111,7 +111,7 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
         t0 = start_time(section, recording)
         check_windows(path, section, recording)
         part = recording.piece(*(section.fit if section.static and section.fit else (t0, None)))
-    moment = Moment(part, recording, t0, section.static)
+    moment = Moment(part, recording, t0, section.static, section.max_gap)
     ropes = ropes_shown(config, section, path)
     listed = Listed.of(config, section, path, recording)
     described = with_grids(without(config.scene, section.leave_out, path), section.grids, path)

@@ -13,12 +13,14 @@ from ..recording.recording import Recording
 
 @dataclass(frozen=True)
 class Moment:
-    """The frames of a recording from the scene's start on, the shape there, and the whole recording."""
+    """The frames of a recording from the scene's start on, the shape there, and the whole recording; `max_gap`, s, is
+    the longest time for which a marker that drives something may be lost."""
 
     recording: Recording
     whole: Recording
     t0: float
     static: bool
+    max_gap: float | None = None
 
     @property
     def shape(self) -> np.ndarray:
@@ -36,5 +38,5 @@ class Moment:
         chosen = self.recording.select(markers)
         if self.static:
             return np.zeros(1), replace(self, recording=chosen).shape[None], chosen.markers
-        chosen = replace(chosen, clamped=tuple(range(len(markers)))).filled()
+        chosen = replace(chosen, clamped=tuple(range(len(markers)))).filled(self.max_gap)
         return chosen.times - self.t0, chosen.positions, chosen.markers

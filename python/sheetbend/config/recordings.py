@@ -10,12 +10,13 @@ from typing import Any
 from ..errors import ConfigError, RecordingError
 from ..experiment.experiment import Experiment
 from ..recording.recording import Recording
+from ..recording.unit_doubt import extent, unit_doubt
 from ..scene.scene import Scene
 from .schema import RecordingSection
 
 TAKEN = (
     {"file", "name", "frames", "fit", "held_out"}  # the recording
-    | {"ropes", "leave_out", "tools", "values", "force"}  # its scene
+    | {"ropes", "leave_out", "tools", "values", "force", "max_gap"}  # its scene
     | {"marker", "grids", "offsets"}  # the places of its markers
 )
 """Keys of [[recording]] that the configuration itself turns into something. Every other goes under its own name to the
@@ -27,7 +28,7 @@ def read(section: RecordingSection, folder: Path, path: str) -> Recording:
     """The recording, its file read with the keys that the reader takes, and its frames chosen.
 
     Raises:
-        ConfigError: the file does not exist, cannot be read, or does not hold the frames.
+        ConfigError: the file does not exist, cannot be read, or does not hold the frames; or its unit is in doubt.
     """
     file = folder / section.file
     if not file.exists():
@@ -40,6 +41,10 @@ def read(section: RecordingSection, folder: Path, path: str) -> Recording:
             recording = recording.frames(slice(*section.frames))
     except RecordingError as error:
         raise ConfigError(f"{path}.{error.field}", error.problem, error.got, error.fix) from error
+    doubt = unit_doubt(recording) if section.units is None else None
+    if doubt is not None:
+        problem = f"are not said, and in the unit that was read the markers are {extent(recording):.4g} m apart"
+        raise ConfigError(f"{path}.units", problem, None, f'give units = "{doubt}", or "m" if it is so')
     return replace(recording, name=section.name or recording.name)
 
 

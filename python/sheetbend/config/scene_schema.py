@@ -114,8 +114,11 @@ class Tool(Section):
     name: Name = key(..., "prefix of its six quantities, and what grips and drives call it")
     file: str | None = key(
         None,
-        "poses, a CSV (`time,x,y,z,qx,qy,qz,qw`) or NPZ (`times`, `positions`, `quaternions`), relative to the "
-        "configuration; a recording may have its own, see `tools`",
+        "poses, a CSV (`time,x,y,z,qx,qy,qz,qw`, or of Motive with rigid bodies) or NPZ (`times`, `positions`, "
+        "`quaternions`), relative to the configuration; a recording may have its own, see `tools`",
+    )
+    body: str | None = key(
+        None, "name of the rigid body, where the file is a CSV of Motive; not needed where it has one alone"
     )
     position: Vector = key([0.0, 0.0, 0.0], "origin of the poses' frame in the recording's frame, as calibrated", "m")
     quaternion: Quaternion = key([0.0, 0.0, 0.0, 1.0], "(x, y, z, w), from its axes to the recording's, as calibrated")

@@ -96,6 +96,13 @@ class RecordingSection(Section):
     frames: list[int] | None = key(
         None, "[first, stop] or [first, stop, step]: use these frames only", min_length=2, max_length=3
     )
+    max_gap: Finite | None = key(
+        None,
+        "longest time for which a marker that drives something may be lost: its motion is then closed by a cubic; "
+        "3.5 frame intervals when left out",
+        "s",
+        ge=0,
+    )
     fit: Window | None = key(None, "[start, stop] in the recording's time: what the fit sees; all when left out", "s")
     held_out: Window | None = key(None, "[start, stop]: what is only predicted, from the same start", "s")
     tools: dict[Name, str] = key({}, "poses of tools in this recording: files by tool, see `scene.tool.file`")

@@ -53,7 +53,7 @@ def tools_of(
             raise ConfigError(where, "is missing", None, f"give it here or in tools of {path or 'the recording'}")
         with located(where):
             frame = HandEye(tool.name, tool.position, tool.quaternion, tool.about)
-            poses = Tool.load(folder / file, frame, tool.flex, tool.rod).shifted(t0)
+            poses = Tool.load(folder / file, frame, tool.flex, tool.rod, tool.body).shifted(t0)
             if recording is None:
                 found[tool.name] = poses
                 continue

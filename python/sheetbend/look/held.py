@@ -15,7 +15,7 @@ from .text import joined
 
 Array = np.ndarray
 NAMES = ("hand", "grip", "wrist", "clamp", "robot", "holder", "finger")
-SMOOTHING = 0.06  # s, of recorded grips
+SMOOTHING, ALONE = 0.06, 0.12  # s, of recorded grips; of one that has one marker
 STIFF = 0.75  # of the next chord's: how much the direction at an end varies at most in a clamp; a pin has 1 or more
 NEAR = 1.5  # times the distance of neighbors on the rope: how near its first marker is to the second
 HIGHER = 0.1  # of the distance of the ends: so much higher is the one that holds the rope, where neither stays
@@ -109,7 +109,7 @@ def held(s: Seen, hand: tuple[int, ...], order: tuple[int, ...]) -> Held:
             )
             found.unknown.append(f"whether the rope runs through {pair[0]} and {pair[1]}, as it is taken to do")
         else:
-            grip: dict[str, Any] = {"at": at, "markers": [names[k]], "smoothing": SMOOTHING}
+            grip: dict[str, Any] = {"at": at, "markers": [names[k]], "smoothing": ALONE}
             if stays:
                 grip["direction"] = direction
                 found.notes.append(
@@ -117,6 +117,10 @@ def held(s: Seen, hand: tuple[int, ...], order: tuple[int, ...]) -> Held:
                 )
             else:
                 found.notes.append(f"{names[k]} moves the rope, which turns there")
+                found.unknown.append(
+                    f"the true motion of {names[k]}: its noise shakes the rope, which looks like damping. It is "
+                    "smoothed; `smoothing = 0` with `driven_sigma` in [[recording]] estimates it, which takes longer"
+                )
                 found.unknown.append(
                     f"whether the hand turns the rope at {names[k]}: one marker gives no direction, so the end turns "
                     "freely. If it is gripped firmly, record a second marker in the hand, and name both in `markers`"

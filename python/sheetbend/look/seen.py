@@ -21,7 +21,6 @@ REST = 0.15  # s that a recording must begin at rest to be called so
 NEAR = 1.9  # times the nearest neighbor's distance: markers of a sheet have more than two others so near
 SHARP, TURNS = 0.15, 3  # share of markers at which the shortest way through those of a sheet turns back, and how many
 SHEET, FEWEST_OF_SHEET = 2.7, 8  # others so near, on average, of a sheet; markers that make one
-LONGEST = 20.0  # m, of what is recorded in meters
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,11 +188,3 @@ def _is_sheet(x: Array, apart: Array, in_bodies: set[int]) -> bool:
     way = np.diff(x[fullest, list(chain(apart, tuple(range(len(apart)))))], axis=0)
     back = np.sum(way[1:] * way[:-1], axis=1) < 0.0
     return bool(back.sum() >= TURNS and back.mean() > SHARP)
-
-
-def unit_doubt(recording: Recording) -> str | None:
-    """The unit in which a recording is more plausible than in the one that was read, "mm" or "cm"; None where it is
-    plausible as it is: nothing that hangs in a hand is 700 m long."""
-    x = recording.positions
-    extent = float(np.linalg.norm(np.nanmax(x, axis=(0, 1)) - np.nanmin(x, axis=(0, 1))))
-    return None if extent <= LONGEST else "cm" if extent <= 100 * LONGEST / 10 else "mm"

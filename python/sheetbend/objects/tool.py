@@ -65,14 +65,19 @@ class Tool:
 
     @classmethod
     def load(
-        cls, path: str | Path, frame: HandEye | None = None, flex: float | None = None, rod: ArrayLike | None = None
+        cls,
+        path: str | Path,
+        frame: HandEye | None = None,
+        flex: float | None = None,
+        rod: ArrayLike | None = None,
+        body: str | None = None,
     ) -> Tool:
-        """Read poses from a CSV or NPZ file, see `sheetbend.recording.io.poses`.
+        """Read poses from a CSV or NPZ file, see `sheetbend.recording.io.poses`; of a take of Motive those of `body`.
 
         Raises:
             RecordingError: the file is missing, damaged, or holds no poses.
         """
-        poses = read_poses(Path(path))
+        poses = read_poses(Path(path), body)
         return cls(*poses, HandEye("tool") if frame is None else frame, flex, rod)
 
     def shifted(self, t0: float) -> Tool:

@@ -18,12 +18,13 @@ from ...files.door import reading
 from ...files.whole import written
 from ..marker_data import MarkerData
 from ..recording_checks import check_seen
-from . import c3d, csv, deform, mesh_sequence, npz, sidecar
+from . import c3d, csv, deform, mesh_sequence, npz, sidecar, trc
 
 FORMATS: dict[str, ModuleType] = {
     ".npz": npz,
     ".csv": csv,
     ".c3d": c3d,
+    ".trc": trc,
     ".pkl": deform,
     ".pickle": deform,
 }

@@ -12,14 +12,14 @@ import numpy as np
 from ...arrays.timeseries import Array
 from .cells import Row, number, refuse
 
-_NAME = re.compile(r"(%time)|(?:time|timestamp)[\s_]*[(\[]?\s*(s|sec|seconds|ms|us|ns)?\s*[)\]]?", re.IGNORECASE)
+_NAME = re.compile(r"(%time)|(?:time|timestamp|t)[\s_]*[(\[]?\s*(s|sec|seconds|ms|us|ns)?\s*[)\]]?", re.IGNORECASE)
 _LONGEST = 40  # characters: blanks of a longer one would be matched in ever more ways
 _PER_SECOND = {"ms": 10**3, "us": 10**6, "ns": 10**9}
 _LATEST = 1e11  # s: later than any clock that counts seconds
 
 
 def unit(name: str) -> str | None:
-    """ "s", "ms", "us" or "ns", of a column called `time`, `time_ns`, `Time (s)`, `timestamp_ms` or so; None where
+    """ "s", "ms", "us" or "ns", of a column called `t`, `time`, `time_ns`, `Time (s)`, `timestamp_ms` or so; None where
     the name is not that of a time. ROS's `%time` is in ns."""
     match = _NAME.fullmatch(name) if len(name) <= _LONGEST else None
     if match is None:

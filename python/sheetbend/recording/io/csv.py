@@ -13,8 +13,9 @@ Long, one row per marker and frame, in any order; a missing row means not seen:
     0.00,tip,0.10,0.0,-0.02
     0.00,base,0.0,0.0,0.0
 
-The header is required and starts with `time` (s), `time_ms`, `time_us` or `time_ns`; the last three count from the
-first row. Between marker and axis stands an underscore, a point or a blank. Cells are separated by commas, semicolons
+The header is required and starts with `time` or `t` (s), `time_ms`, `time_us` or `time_ns`; the last three count from
+the first row. A column `frame` before it is not read. Between marker and axis stands an underscore, a point, a colon or
+a blank. Cells are separated by commas, semicolons
 or tabs, with a point as decimal mark. An empty cell or `nan` is a marker not seen. Lines that start with # are
 comments.
 Coordinates are in the length unit of the JSON beside the file, meters without one.
@@ -39,7 +40,8 @@ from .cells import Row, lines, number, refuse, split
 _DELIMITERS = (",", ";", "\t")
 _AXES = ("x", "y", "z")
 _COLUMNS = "name the columns of each marker <marker>_x, <marker>_y, <marker>_z"
-_AXIS = re.compile(r"(.*)[_. ]([xyz])", re.IGNORECASE | re.DOTALL)
+_FRAME = re.compile(r"frames?|frame[_ ]?(?:#|no|nr|number|index|id)?", re.IGNORECASE)
+_AXIS = re.compile(r"(.*)[_.: ]([xyz])", re.IGNORECASE | re.DOTALL)
 
 
 def read(path: Path) -> MarkerData:
@@ -82,13 +84,17 @@ def _rows(path: Path, text: list[tuple[int, str]]) -> list[Row]:
         fix = "start with a header, time,<marker>_x,..."
         raise RecordingError(str(path), "holds no header", "only blank lines and comments", fix)
     delimiter = _delimiter(path, *kept[0])
-    return [(number, split(path, number, line, delimiter)) for number, line in kept]
+    rows = [(number, split(path, number, line, delimiter)) for number, line in kept]
+    if _FRAME.fullmatch(rows[0][1][0]):
+        return [(number, cells[1:]) for number, cells in rows]
+    return rows
 
 
 def _delimiter(path: Path, number: int, header: str) -> str:
-    """The one after which the header's first cell is the name of a time."""
+    """The one with which the header begins with the name of a time, or with a frame and a time."""
     for delimiter in _DELIMITERS:
-        if delimiter in header and clock.unit(split(path, number, header, delimiter)[0]) is not None:
+        cells = split(path, number, header, delimiter) if delimiter in header else [""]
+        if clock.unit(cells[1 if _FRAME.fullmatch(cells[0]) else 0]) is not None:
             return delimiter
     fix = "start with time,<marker>_x,<marker>_y,<marker>_z,... or time,marker,x,y,z"
     raise RecordingError(f"{path}, line {number}", "must be a header whose first column is time", header, fix)

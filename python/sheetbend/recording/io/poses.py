@@ -2,7 +2,8 @@
 
 CSV, a row per pose: `time,x,y,z,qx,qy,qz,qw` in any order of columns, in s, m and (x, y, z, w); further columns are not
 read. `time_ms`, `time_us` and `time_ns` are taken as such, on the file's own clock: they do not count from its first
-row. NPZ: `times` (poses,), `positions` (poses, 3), `quaternions` (poses, 4).
+row. The rigid bodies of a CSV of OptiTrack's Motive are poses too.
+NPZ: `times` (poses,), `positions` (poses, 3), `quaternions` (poses, 4).
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ import numpy as np
 from ...arrays.timeseries import Array
 from ...errors import RecordingError
 from ...files.door import check_room, reading
+from . import motive
+from .cells import lines
 from .npz import plain_arrays
 
 SECONDS = {"time": 1.0, "t": 1.0, "time_s": 1.0, "time_ms": 1e-3, "time_us": 1e-6, "time_ns": 1e-9}
@@ -22,19 +25,27 @@ COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw")
 ARRAYS = ("times", "positions", "quaternions")
 
 
-def read_poses(path: Path) -> tuple[Array, Array, Array]:
+def read_poses(path: Path, body: str | None = None) -> tuple[Array, Array, Array]:
     """Times (poses,) s, positions (poses, 3) m and quaternions (poses, 4) of a file.
 
+    Args:
+        body: name of the rigid body, of a take of Motive; not needed where it has one alone.
+
     Raises:
-        RecordingError: the file is missing, of an unknown kind, damaged, or lacks a column or an array.
+        RecordingError: the file is missing, of an unknown kind, damaged, or lacks a column, an array or the body.
     """
     if not path.is_file():
         raise RecordingError(str(path), "does not exist", path.name, "give a CSV or NPZ file of poses")
     with reading(path):
-        return _read(path)
+        return _read(path, body)
 
 
-def _read(path: Path) -> tuple[Array, Array, Array]:
+def _read(path: Path, body: str | None) -> tuple[Array, Array, Array]:
+    if path.suffix.lower() == ".csv" and motive.wrote(text := lines(path)):
+        return motive.read_body(path, text, body)
+    if body is not None:
+        fix = "leave it out: a file of poses has one body alone"
+        raise RecordingError("body", f"is given, and {path.name} is no take of Motive", body, fix)
     if path.suffix.lower() == ".npz":
         fix = "store times (poses,), positions (poses, 3) and quaternions (poses, 4) under these names"
         arrays = plain_arrays(path, ARRAYS, fix=fix)

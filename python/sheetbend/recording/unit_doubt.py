@@ -1,0 +1,22 @@
+"""Whether a recording's lengths can be in meters."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .recording import Recording
+
+LONGEST = 20.0  # m, of what is recorded in meters: nothing that hangs in a hand is 700 m long
+
+
+def extent(recording: Recording) -> float:
+    """m, the diagonal of the box that all markers stay in."""
+    x = recording.positions
+    return float(np.linalg.norm(np.nanmax(x, axis=(0, 1)) - np.nanmin(x, axis=(0, 1))))
+
+
+def unit_doubt(recording: Recording) -> str | None:
+    """The unit, "mm" or "cm", in which a recording is more plausible than in the one that was read; None where it is
+    plausible as it is."""
+    size = extent(recording)
+    return None if size <= LONGEST else "cm" if size <= 10 * LONGEST else "mm"
