@@ -82,7 +82,7 @@ def driven(seed: int) -> sb.Experiment:
 
 def gripped(seed: int, folder: Path, path: str | None) -> dict[str, Any]:
     """The recipe, two rungs of it, on a synthetic rope between two grips."""
-    recordings = sb.recordings(folder / "rope_1" / "train")
+    recordings = sb.read_recordings(folder / "rope_1" / "train")
     options: dict[str, Any] = {"windows": [(0.4, 1.2), (0.8, 2.0)], "bending_lengths": (0.25, 0.12)}
     found = fit_rope(recordings, density=0.045, ladder=[TWIST, TILTS], max_segments=24, journal=path, **options)
     return RopeReport("rope", found).to_dict()

@@ -89,7 +89,7 @@ def missed_from_first_frame(fitted: RopeModel, told: dict[str, Any], unseen: Scr
 
 def main(folder: Path, rope: str, fits: Sequence[str], threads: int) -> None:
     told = json.loads((folder / f"{rope}.json").read_text())
-    train, unseen = (screened(sb.recordings(folder / rope / part), SMOOTHING) for part in ("train", "eval"))
+    train, unseen = (screened(sb.read_recordings(folder / rope / part), SMOOTHING) for part in ("train", "eval"))
     for note in train.notes:
         print(f"  {note}")
 

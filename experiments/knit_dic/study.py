@@ -25,7 +25,7 @@ PULLED = {"knit_weft": 0.45, "knit_shear": 0.16, "knit_poisson": 0.33}
 
 
 def fitted(stills=FITTED, parameters=None, law=None, cells=CELLS, refine=False):
-    law = law or sb.Linear()
+    law = law or sb.laws.Linear()
 
     def built(count):
         return [experiment(k, law, count) for k in stills]
@@ -36,7 +36,7 @@ def fitted(stills=FITTED, parameters=None, law=None, cells=CELLS, refine=False):
 
 def predicted(still, values, law=None, cells=CELLS, rest=1, change=None):
     """Points inside at given values, (points, 3) px."""
-    e = experiment(still, law or sb.Linear(), cells, rest, change)
+    e = experiment(still, law or sb.laws.Linear(), cells, rest, change)
     known = {name: value for name, value in values.items() if name in e.scene.quantities}
     x = sb.equilibrium(e.scene, values=known).positions
     points = [np.array(place.weights) @ x[list(place.particles)] for place in e.places]
@@ -120,7 +120,7 @@ def main():
         print(f"{name}: " + ", ".join(f"{key} {value:.1f}" for key, value in row.items()))
 
     bounds = {f"knit_{c}_stiffening": {"lower": 0.01, "upper": 100.0} for c in ("warp", "weft")}
-    stiffening = fitted(COARSE, RATIOS | FIXED | bounds, sb.Exponential(1.0, 1.0, 1.0))
+    stiffening = fitted(COARSE, RATIOS | FIXED | bounds, sb.laws.Exponential(1.0, 1.0, 1.0))
     tables["exponential"] = {"cost": stiffening.result.cost, "estimates": summary(stiffening)}
     tables["linear, same stills"] = {"cost": fitted(COARSE).result.cost}
     print(stiffening.report())

@@ -34,7 +34,7 @@ class Model:
     along: int = 0
     across: int = 0
     slip: bool = False
-    law: object = sb.Linear()
+    law: object = sb.laws.Linear()
 
     def modes(self):
         return [(i, j) for i in range(self.along + 1) for j in range(self.across + 1) if i + j]
@@ -43,7 +43,7 @@ class Model:
         field = {f"field_{i}_{j}": {"prior": (0.0, SPREAD / np.hypot(i, j))} for i, j in self.modes()}
         slips = {f"slip_{end}": {"prior": (0.0, 0.1)} for end in ("top", "bottom")} if self.slip else {}
         stiffening = {f"knit_{c}_stiffening": {"lower": 0.01, "upper": 100.0} for c in ("warp", "weft")}
-        return RATIOS | FIXED | field | slips | (stiffening if isinstance(self.law, sb.Exponential) else {})
+        return RATIOS | FIXED | field | slips | (stiffening if isinstance(self.law, sb.laws.Exponential) else {})
 
     def change(self, still):
         """What is added to the scene of a still."""
@@ -102,7 +102,7 @@ MODELS = {
     "settled": Model(rest=SETTLED),
     "settled, slip of each clamp": Model(rest=SETTLED, slip=True),
     "settled, stiffness along the strip": Model(rest=SETTLED, along=4),
-    "settled, stiffening": Model(rest=SETTLED, law=sb.Exponential(1.0, 1.0, 1.0)),
+    "settled, stiffening": Model(rest=SETTLED, law=sb.laws.Exponential(1.0, 1.0, 1.0)),
     "settled, stiffness over the sheet": Model(rest=SETTLED, along=3, across=6),
     "settled, both": Model(rest=SETTLED, along=3, across=6, slip=True),
 }

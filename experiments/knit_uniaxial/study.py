@@ -41,14 +41,14 @@ CARRIED_ON = ("weighted", "sinh")
 
 def law_of(name, pulls):
     if name == "linear":
-        return sb.Linear()
+        return sb.laws.Linear()
     if name in ("exponential", "weighted"):
-        return sb.Exponential(warp=1.0, weft=1.0, shear=1.0)
+        return sb.laws.Exponential(warp=1.0, weft=1.0, shear=1.0)
     if name == "sinh":
-        return sb.Sinh(warp=1.0, weft=1.0, shear=1.0)
+        return sb.laws.Sinh(warp=1.0, weft=1.0, shear=1.0)
     # Four pieces up to the largest Green strain that is fitted.
     along = [((1 + p.fitted) ** 2 - 1) / 2 for p in pulls]
-    return sb.Spline(spacing=(along[0] / 4, along[1] / 4, 0.25))
+    return sb.laws.Spline(spacing=(along[0] / 4, along[1] / 4, 0.25))
 
 
 def fitted(knit, law, cells=CELLS, refine=False, share=SHARE, weights=EVEN):
@@ -64,7 +64,7 @@ def fitted(knit, law, cells=CELLS, refine=False, share=SHARE, weights=EVEN):
 
 def alone(knit, along):
     """What one direction by itself tells of the linear law."""
-    return sb.fit(experiments(read(knit, along), sb.Linear()), parameters=STIFFNESS, profiles=False)
+    return sb.fit(experiments(read(knit, along), sb.laws.Linear()), parameters=STIFFNESS, profiles=False)
 
 
 def curve(pull, law, values, cells=CELLS):

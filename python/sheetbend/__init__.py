@@ -4,6 +4,8 @@ Ropes and cloth with exact gradients in double precision: simulate, differentiat
 to recordings, with intervals and words for what the data cannot tell.
 """
 
+from typing import TYPE_CHECKING, Any
+
 from . import mesh
 from .errors import (
     ConfigError,
@@ -32,11 +34,12 @@ from .motion.simulate import Trajectory, simulate
 from .motion.solver import Solver
 from .motion.tape import TapePlan, tape_plan
 from .motion.values import constraint_values, elastic_energy, support_forces
-from .moved import keep_old_modules
+from .moved import keep_old_modules, renamed
+from .objects import laws
 from .objects.arm import add_arm, add_pendulum
 from .objects.arm_data import Arm
-from .objects.cloth import Cloth, add_cloth
-from .objects.fabric import Exponential, Fabric, Linear, Sinh, Spline
+from .objects.cloth import Cloth, add_cloth, cloth
+from .objects.fabric import Fabric
 from .objects.grip import Grip
 from .objects.hand_eye import HandEye
 from .objects.markers import Place, along_rope, between, on_cloth, on_particle, on_rope
@@ -47,9 +50,9 @@ from .objects.tethers import add_tethers
 from .objects.tool import Tool
 from .quantities.kinds import KINDS
 from .quantities.parameters import Parameter, Parameters
-from .recording.baseline import no_physics
+from .recording.baseline import baseline
 from .recording.force_recording import ForceRecording
-from .recording.io.folder import recordings
+from .recording.io.folder import read_recordings
 from .recording.recording import Recording
 from .report.fit_result import FitResult
 from .report.scores import Score, Scores, coordinate_error, scores
@@ -57,7 +60,19 @@ from .scene.scene import Scene
 from .scene.scene_file import load_scene, save_scene
 from .version import __version__ as __version__
 
+if TYPE_CHECKING:
+    from .gripped.recipe import fit_rope
+
 keep_old_modules()
+
+
+def __getattr__(name: str) -> Any:
+    if name == "fit_rope":  # with the recipe's modules, which an import of sheetbend need not pay for
+        from .gripped.recipe import fit_rope
+
+        return fit_rope
+    return renamed(name)
+
 
 __all__ = [
     "KINDS",
@@ -68,7 +83,6 @@ __all__ = [
     "EmptyGradientError",
     "Equilibrium",
     "Experiment",
-    "Exponential",
     "Fabric",
     "Fit",
     "FitResult",
@@ -81,7 +95,6 @@ __all__ = [
     "HandEye",
     "InputError",
     "Junction",
-    "Linear",
     "MeshError",
     "NoEquilibriumError",
     "Parameter",
@@ -99,9 +112,7 @@ __all__ = [
     "Score",
     "Scores",
     "SheetbendError",
-    "Sinh",
     "Solver",
-    "Spline",
     "TapePlan",
     "Tool",
     "Trajectory",
@@ -115,23 +126,26 @@ __all__ = [
     "add_rope",
     "add_tethers",
     "along_rope",
+    "baseline",
     "between",
     "check_gradients",
+    "cloth",
     "constraint_values",
     "coordinate_error",
     "elastic_energy",
     "equilibria",
     "equilibrium",
     "fit",
+    "fit_rope",
     "force_balance",
+    "laws",
     "load_scene",
     "mesh",
-    "no_physics",
     "on_cloth",
     "on_particle",
     "on_rope",
     "read_mesh",
-    "recordings",
+    "read_recordings",
     "rod",
     "rollout",
     "rope",

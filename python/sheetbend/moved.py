@@ -74,6 +74,16 @@ CONTENTS = {
 }
 """What modules held that have the name of a package now, by the module where it is."""
 
+RENAMED = {
+    "Exponential": "laws.Exponential",
+    "Linear": "laws.Linear",
+    "Sinh": "laws.Sinh",
+    "Spline": "laws.Spline",
+    "no_physics": "baseline",
+    "recordings": "read_recordings",
+}
+"""Names of `sheetbend` itself that have another now."""
+
 
 class _Moved(ModuleType):
     """What stands under the old name of a module, and imports the new one when it is asked for something."""
@@ -109,10 +119,28 @@ def old_contents(package: str) -> Callable[[str], Any]:
     return getattr_
 
 
+def renamed(name: str, level: int = 3) -> Any:
+    """What `sheetbend` offered under a name of `RENAMED`.
+
+    Raises:
+        AttributeError: the name is none of those.
+    """
+    if name not in RENAMED:
+        raise AttributeError(f"module 'sheetbend' has no attribute {name!r}")
+    found: Any = import_module("sheetbend")
+    for part in RENAMED[name].split("."):
+        found = getattr(found, part)
+    message = f"sheetbend.{name} goes in version 0.2: use sheetbend.{RENAMED[name]}"
+    warnings.warn(message, DeprecationWarning, stacklevel=level)
+    return found
+
+
 def _found(old: str, new: str, name: str) -> Any:
     try:
         found = getattr(import_module(new), name)
     except AttributeError:
+        if name in RENAMED:
+            return renamed(name, 4)
         raise AttributeError(f"module {old!r}, now {new!r}, has no attribute {name!r}") from None
     public = getattr(sys.modules["sheetbend"], name, None) is found
     use = f"from sheetbend import {name}" if public else f"use {new}.{name}"

@@ -19,8 +19,8 @@ LAYERS = (
     ("minimum", "report", "torch"),
     ("doubts", "textile"),
     ("fitting", "pictures"),
-    ("", "gripped", "page"),
-    ("config",),
+    ("gripped", "page"),
+    ("", "config"),
     ("cli",),
 )
 Sources = Mapping[str, str]  # text by path below the package

@@ -111,3 +111,12 @@ def test_links_lead_somewhere(text: Path) -> None:
         if not re.match(r"https?://|#", link)
     ]
     assert [link for link in links if not (text.parent / link).exists()] == []
+
+
+def test_the_glossary_tells_how_every_function_is_named() -> None:
+    """The table of patterns names each function of sheetbend, and nothing that is not there."""
+    _, table = (ROOT / "docs/glossary.md").read_text().split("## How names are made")
+    told = {name for name in re.findall(r"`([a-z_]+)`", table) if not name.endswith("_")}
+    functions = {name for name in sb.__all__ if name[0].islower()} - {"laws", "mesh"}
+    assert functions - told == set()
+    assert {name for name in told - functions if not hasattr(sb.Scene, name)} == set()

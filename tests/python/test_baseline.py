@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sheetbend.errors import RecordingError
-from sheetbend.recording.baseline import blend_baseline, hold_baseline, no_physics, rest_baseline, rms_about
+from sheetbend.recording.baseline import baseline, blend_baseline, hold_baseline, rest_baseline, rms_about
 from sheetbend.recording.recording import Recording
 
 NAN = np.nan
@@ -102,7 +102,7 @@ def test_blend_takes_several_driven_markers_at_an_end(clamped: list[int]) -> Non
     x = np.random.default_rng(3).normal(size=(len(T), 7, 3))
     wild = Recording(x, T, clamped=clamped)
     assert np.array_equal(blend_baseline(wild)[:, sorted(clamped)], x[:, sorted(clamped)])
-    assert no_physics(wild.piece(0, 0.5), wild.piece(0.5)).errors.keys() == {"rest", "hold", "blend"}
+    assert baseline(wild.piece(0, 0.5), wild.piece(0.5)).errors.keys() == {"rest", "hold", "blend"}
 
 
 def test_blend_follows_the_driven_markers_next_to_the_free_ones() -> None:
@@ -172,7 +172,7 @@ def swinging(frames: int = 400, clamped: tuple[int, ...] = (0,)) -> Recording:
 
 def test_a_swing_is_predicted_by_its_mean() -> None:
     recording = swinging()
-    found = no_physics(recording.piece(0, 4 * np.pi / 5), recording.piece(2 * np.pi))
+    found = baseline(recording.piece(0, 4 * np.pi / 5), recording.piece(2 * np.pi))
     assert found.kind == "rest"
     assert found.rms == pytest.approx(0.1 / np.sqrt(2), rel=0.05)
     assert (
@@ -185,12 +185,12 @@ def test_a_creep_is_predicted_by_its_start() -> None:
     x = np.zeros((101, 2, 3))
     x[:, 1, 2] = -0.1 * t
     recording = Recording(x, t, clamped=[0])
-    assert no_physics(recording.piece(0, 8), recording.piece(8)).kind == "hold"
+    assert baseline(recording.piece(0, 8), recording.piece(8)).kind == "hold"
 
 
 def test_a_driven_rope_is_predicted_by_its_ends() -> None:
     recording = rope(*ends(), UNEVEN)
-    found = no_physics(recording.piece(0, 0.4), recording.piece(0.4))
+    found = baseline(recording.piece(0, 0.4), recording.piece(0.4))
     assert found.kind == "blend" and found.rms < 1e-15
     assert found.positions.shape == recording.piece(0.4).positions.shape
 
@@ -198,7 +198,7 @@ def test_a_driven_rope_is_predicted_by_its_ends() -> None:
 def test_what_a_baseline_is_given_is_not_scored() -> None:
     recording = swinging()
     held_out = recording.piece(5)
-    found = no_physics(recording.piece(0, 5), held_out)
+    found = baseline(recording.piece(0, 5), held_out)
     assert not found.scored[0].any() and found.scored[1:, 1].all() and not found.scored[:, 0].any()
     assert found.rms == rms_about(held_out, found.positions, found.scored)
     for prediction in (hold_baseline(held_out), rest_baseline(recording.piece(0, 5))):
@@ -208,7 +208,7 @@ def test_what_a_baseline_is_given_is_not_scored() -> None:
 def test_a_static_shape_is_predicted_by_the_other_ones() -> None:
     """One frame: holding it would be no prediction, so the mean of the other rehangings is taken."""
     shapes = [Recording(np.full((1, 3, 3), value), [0.0], clamped=[0, 2]) for value in (1.0, 3.0, 4.0)]
-    found = no_physics(shapes[:2], shapes[2])
+    found = baseline(shapes[:2], shapes[2])
     assert found.kind == "rest" and found.rms == pytest.approx(2 * np.sqrt(3))
     assert found.scored.tolist() == [[False, True, False]]
     assert list(found.errors) == ["rest"]
@@ -220,9 +220,9 @@ def test_nothing_to_predict_from_is_an_error() -> None:
     x[200:, 1] = NAN
     lost = Recording(x, fitted.times, clamped=[0])
     with pytest.raises(RecordingError, match="no baseline"):
-        no_physics(lost.piece(6), fitted.frames(slice(7, 8)))
-    assert no_physics(lost.piece(6), fitted.piece(2)).kind == "hold"
+        baseline(lost.piece(6), fitted.frames(slice(7, 8)))
+    assert baseline(lost.piece(6), fitted.piece(2)).kind == "hold"
     with pytest.raises(RecordingError, match="differ"):
-        no_physics(fitted, fitted.select([1]))
+        baseline(fitted, fitted.select([1]))
     with pytest.raises(RecordingError, match="nothing to compare"):
-        no_physics(fitted, lost.piece(6))
+        baseline(fitted, lost.piece(6))

@@ -10,7 +10,7 @@ import sheetbend as sb
 from sheetbend.experiment.carried import carried_baselines
 from sheetbend.experiment.clock import lateness, outside, told_clocks
 from sheetbend.fitting.fitted_motion import fitted_positions
-from sheetbend.recording.baseline import no_physics
+from sheetbend.recording.baseline import baseline
 from sheetbend.result.result import Estimate, RecordingFit
 
 Array = np.ndarray
@@ -102,8 +102,8 @@ def test_the_report_takes_the_harder_baseline() -> None:
     e = experiment(scene, placed(x, *motion) + 1e-3 * noise, [8, 13, 19])
     held = e.held()
     assert held is not None
-    alone = no_physics([e.fitted()], held)
-    found = no_physics([e.fitted()], held, predicted(e))
+    alone = baseline([e.fitted()], held)
+    found = baseline([e.fitted()], held, predicted(e))
     assert found.kind == "carried shape" and found.rms < 2.5e-3 < 0.05 < alone.rms
     assert found.words == "carried shape: the mean shape of the fitted data moves rigidly with the grips"
     assert {*alone.errors, "carried", "carried shape"} == set(found.errors)

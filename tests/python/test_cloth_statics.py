@@ -2,6 +2,7 @@
 adjoint."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -109,15 +110,15 @@ def tangent(ratios: tuple[float, ...], spacing: float, e: float) -> float:
 RATIOS = (2.0, 5.0, 9.0, 12.0)
 LAWS = {
     "exponential": (
-        sb.Exponential(30.0, 30.0, 5.0),
+        sb.laws.Exponential(30.0, 30.0, 5.0),
         lambda e: WARP * e * math.exp(30.0 * e * e),
     ),
     "sinh": (
-        sb.Sinh(12.0, 12.0, 5.0),
+        sb.laws.Sinh(12.0, 12.0, 5.0),
         lambda e: WARP * math.sinh(12.0 * e) / 12.0,
     ),
     "spline": (
-        sb.Spline((0.06, 0.06, 0.1), RATIOS, RATIOS),
+        sb.laws.Spline((0.06, 0.06, 0.1), RATIOS, RATIOS),
         lambda e: WARP * quad(lambda s: tangent(RATIOS, 0.06, s), 0.0, e, points=[0.06, 0.12, 0.18, 0.24])[0],
     ),
 }
@@ -134,7 +135,10 @@ def test_a_strip_of_a_stiffening_fabric(name, tension):
 
 @pytest.mark.parametrize(
     ("law", "b", "stress"),
-    [(sb.Exponential, 30.0, lambda b, e: e * math.exp(b * e * e)), (sb.Sinh, 12.0, lambda b, e: math.sinh(b * e) / b)],
+    [
+        (sb.laws.Exponential, 30.0, lambda b, e: e * math.exp(b * e * e)),
+        (sb.laws.Sinh, 12.0, lambda b, e: math.sinh(b * e) / b),
+    ],
 )
 def test_derivative_by_a_stiffening(law, b, stress):
     scene = pulled(strip(), 300.0, warp=WARP, shear=SHEAR, law=law(b, b, 5.0))
@@ -201,7 +205,7 @@ def test_simple_shear():
 def test_a_trial_value_that_makes_the_start_infinite_has_no_answer():
     mesh = strip()
     positions = mesh.vertices * [1.5, 1.0, 1.0]
-    options = {"warp": WARP, "shear": SHEAR, "law": sb.Exponential(2.0, 2.0, 2.0), "bending_model": "dihedral"}
+    options = {"warp": WARP, "shear": SHEAR, "law": sb.laws.Exponential(2.0, 2.0, 2.0), "bending_model": "dihedral"}
     scene = sb.Scene("strip", gravity=(0, 0, 0))
     ends = np.concatenate([mesh.sets["left"], mesh.sets["right"]])
     cloth = sb.add_cloth(scene, mesh, density=0.2, bending=BENDING, held=ends, positions=positions, **options)
@@ -213,3 +217,18 @@ def test_a_trial_value_that_makes_the_start_infinite_has_no_answer():
     assert problem.evaluate(np.log([2.0]))[0]
     assert not problem.evaluate(np.log([1e5]))[0]  # exp(b e^2) overflows
     assert "not finite" in problem.core.failure
+
+
+def test_a_scene_with_one_cloth() -> None:
+    """As `rope` and `rod`: the scene, with the options of `add_cloth` and pinned vertices."""
+    mesh = sb.mesh.equilateral(0.3, 0.3, 3)
+    top = mesh.sets["corners"][2:]
+    made = sb.cloth(mesh, density=0.2, warp=60, shear=4, bending=3e-5, name="towel", pinned=top)
+    by_hand = sb.Scene("towel")
+    added = sb.add_cloth(by_hand, mesh, "towel", density=0.2, warp=60, shear=4, bending=3e-5, held=top)
+    by_hand.pin(added.particles[top])
+    assert made.quantities == by_hand.quantities and made.pinned == by_hand.pinned
+    assert np.array_equal(made.compiled.inputs(), by_hand.compiled.inputs())
+    assert list(made.cloths) == ["towel"]
+    with pytest.raises(sb.SceneError, match=re.escape("cloth.pinned")):
+        sb.cloth(mesh, density=0.2, warp=60, shear=4, pinned=[10_000])

@@ -19,7 +19,7 @@ FABRIC: dict[str, Any] = {
     "weft": 60.0,
     "shear": 15.0,
     "poisson": 0.2,
-    "law": sb.Exponential(warp=2.0, weft=1.0, shear=0.5),
+    "law": sb.laws.Exponential(warp=2.0, weft=1.0, shear=0.5),
     "bending": 1e-3,
     "bending_weft": 5e-4,
     "membrane_damping": 4e-3,
@@ -132,7 +132,7 @@ def test_a_configuration_of_cuts(file: Path, tmp_path: Path) -> None:
     scene = built(file)
     assert {cloth.fabric for cloth in scene.cloths.values()} == {"cloth"}
     assert {name.partition("_")[0] for name in scene.quantities} == {"cloth"}
-    assert scene.cloths["weft"].numbers["law"] == sb.Exponential(warp=2.0, weft=1.0, shear=0.5)
+    assert scene.cloths["weft"].numbers["law"] == sb.laws.Exponential(warp=2.0, weft=1.0, shear=0.5)
     write(with_values(parse(file), {}), tmp_path / "again.toml", tmp_path)
     assert built(tmp_path / "again.toml").quantities == scene.quantities
 

@@ -54,7 +54,7 @@ def test_a_fabric_that_stiffens_by_powers_of_ten(growth, weight):
         weft=500.0,
         shear=60.0,
         bending=1e-5,
-        law=sb.Exponential(b, b, b),
+        law=sb.laws.Exponential(b, b, b),
         positions=mesh.vertices * [longer, 1.0, 1.0],
     )
     scene.pin(cloth.particles[mesh.sets["left"]])

@@ -170,7 +170,7 @@ class TestNasty:
             patch.syspath_prepend(str(FOLDER))
             judge = importlib.import_module("judge")
         told = truth(folder)
-        unseen = judge.screened(sb.recordings(folder / "rope_1" / "eval"), judge.SMOOTHING)
+        unseen = judge.screened(sb.read_recordings(folder / "rope_1" / "eval"), judge.SMOOTHING)
         given = told["nominal_directions"]
         nominal = np.array(given["start"]), np.array(given["end"])
         model = RopeModel(density=0.04, nominal=nominal, values={}, segments=24)

@@ -69,7 +69,7 @@ def test_a_repeat_rises_from_its_pretension(pulled):
 
 def test_clamps_carry_the_load_and_the_middle_carries_nothing(pulled):
     pull = pulled.knits.read("garter", "y")
-    sheet = pulled.knits.Sheet(pull, 5.0, sb.Linear())
+    sheet = pulled.knits.Sheet(pull, 5.0, sb.laws.Linear())
     rest = sb.equilibrium(sheet.scene)
     ends = {name: rest.forces[name].reshape(-1, 3).sum(axis=0) for name in ("clamp_low", "clamp_high")}
     assert np.abs(ends["clamp_high"]) == approx([0, 5.0, 0], abs=1e-9)
@@ -128,7 +128,7 @@ def test_they_were_chosen_within_the_range(pulled):
 def test_weights_loosen_small_loads_and_side_pins(pulled):
     pull = pulled.knits.read("garter", "x")
     sigmas = {
-        weights: [e.sigma for e in pulled.knits.experiments(pull, sb.Linear(), weights=weights)]
+        weights: [e.sigma for e in pulled.knits.experiments(pull, sb.laws.Linear(), weights=weights)]
         for weights in (pulled.knits.EVEN, pulled.knits.Weights(2.0, 4.0))
     }
     even, loose = (np.array(s, dtype=float).reshape(-1, 2) for s in sigmas.values())  # loads, length and width

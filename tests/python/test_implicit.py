@@ -21,7 +21,7 @@ def strip(stiffening: float, end: float = 0.5, **fabric: float) -> sb.Scene:
     """A strip pulled along its warp to a Green strain of 0.15, where b e^2 is `stiffening`, under its weight."""
     mesh = sb.mesh.equilateral(LENGTH, WIDTH, 8)
     fabric = {"density": 0.2, "warp": 600.0, "weft": 500.0, "shear": 60.0, "poisson": 0.2, "bending": 1e-5} | fabric
-    law = sb.Exponential(*3 * (stiffening / STRAIN**2,)) if stiffening else sb.Linear()
+    law = sb.laws.Exponential(*3 * (stiffening / STRAIN**2,)) if stiffening else sb.laws.Linear()
     scene = sb.Scene("strip")
     cloth = sb.add_cloth(scene, mesh, law=law, **fabric)
     scene.pin(cloth.particles[mesh.sets["left"]])

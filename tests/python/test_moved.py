@@ -11,13 +11,14 @@ import sys
 import warnings
 from collections.abc import Iterator
 from importlib import import_module
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend.moved import CONTENTS, MODULES
+from sheetbend.moved import CONTENTS, MODULES, RENAMED
 from sheetbend.result.result import Estimate, RecordingFit
 
 NOW = {f"sheetbend.{n}": f"sheetbend.{package}.{n}" for package, names in MODULES.items() for n in names.split()}
@@ -132,6 +133,23 @@ def test_what_an_old_module_never_held_is_an_error() -> None:
         import_module("sheetbend.never")
 
 
+@pytest.mark.parametrize("name", RENAMED)
+def test_a_renamed_name_warns_and_is_the_same(name: str) -> None:
+    assert name not in sb.__all__
+    with pytest.warns(DeprecationWarning, match=re.escape(f"use sheetbend.{RENAMED[name]}")) as told:
+        found = getattr(sb, name)
+    assert found is attrgetter(RENAMED[name])(sb) and told[0].filename == __file__
+    assert RENAMED[name].partition(".")[0] in sb.__all__
+
+
+def test_a_function_that_is_renamed_is_found_in_its_old_module() -> None:
+    with pytest.warns(DeprecationWarning, match="use sheetbend.baseline"):
+        from sheetbend.baseline import no_physics  # type: ignore[import-not-found]
+    assert no_physics is sb.baseline
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = sb.nothing
+
+
 def names_of(path: Path) -> Iterator[str]:
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.ImportFrom) and node.module and not node.level:
@@ -145,6 +163,10 @@ def test_nothing_here_uses_an_old_name() -> None:
     files = [p for top in ("experiments", "tests", "tools") for p in (root / top).rglob("*.py") if p != Path(__file__)]
     assert len(files) > 100
     assert [(p.name, name) for p in files for name in names_of(p) if name in NOW] == []
+    texts = [*files, *root.glob("*.md"), *(root / "docs").rglob("*.md"), *(root / "experiments").rglob("*.md")]
+    told = re.compile(rf"\b(sb|sheetbend)\.({'|'.join(RENAMED)})\b")
+    here = [(p.name, m[0]) for p in texts if p.name != "CHANGELOG.md" for m in told.finditer(p.read_text())]
+    assert here == []
     with warnings.catch_warnings():
         warnings.simplefilter("error", DeprecationWarning)
         subprocess.run([sys.executable, "-W", "error", "-c", "import sheetbend, sheetbend.config"], check=True)

@@ -150,7 +150,8 @@ def recorded(fabric: sb.Fabric, along: str, name: str = "strip", share: float = 
     return Curve(name, "tension", strain, np.array([0.0, *loads]), length=0.2, width=0.05)
 
 
-FABRIC = sb.Fabric(density=0.1, warp=1200.0, weft=500.0, shear=50.0, bending=1e-5, law=sb.Exponential(300.0, 40.0, 1.0))
+FUNG = sb.laws.Exponential(300.0, 40.0, 1.0)
+FABRIC = sb.Fabric(density=0.1, warp=1200.0, weft=500.0, shear=50.0, bending=1e-5, law=FUNG)
 
 
 @pytest.mark.parametrize("along", ["warp", "weft"])
@@ -166,7 +167,7 @@ def test_a_fabric_from_its_pulls(along):
 
 def test_a_law_that_stiffens_fast_reaches_its_load():
     """60 N/m on 148 N/m: half of the linear strain would be a tension of e^67."""
-    stiff = replace(FABRIC, warp=148.0, law=sb.Exponential(1400.0, 1400.0, 1400.0))
+    stiff = replace(FABRIC, warp=148.0, law=sb.laws.Exponential(1400.0, 1400.0, 1400.0))
     strain = textile.uniaxial(stiff, load=60.0, width=0.05, gauge=0.2).extension.value
     green = strain + strain**2 / 2
     assert 148.0 * green * math.exp(1400.0 * green**2) * (1 + strain) == approx(60.0, rel=1e-9)
@@ -181,7 +182,7 @@ def test_a_spline_from_pulls():
 @pytest.mark.slow
 def test_poisson_is_what_jaws_hide():
     """A wide specimen reads warp/(1 - poisson^2); told the number, the pull gives the warp."""
-    coupled = replace(FABRIC, law=sb.Linear(), poisson=0.4)
+    coupled = replace(FABRIC, law=sb.laws.Linear(), poisson=0.4)
     curve = recorded(coupled, "warp")
     alone, told = (textile.fit_pull([curve], "warp", "linear", poisson=nu).fabric.warp for nu in (0.0, 0.4))
     assert told == approx(coupled.warp, rel=0.01)
@@ -191,7 +192,7 @@ def test_poisson_is_what_jaws_hide():
 @pytest.mark.slow
 def test_the_scatter_of_specimens_is_in_the_interval():
     """Strains of 0.97, 1 and 1.03: whatever the number of loads, three specimens are three."""
-    plain = replace(FABRIC, law=sb.Linear())
+    plain = replace(FABRIC, law=sb.laws.Linear())
     curves = [recorded(plain, "warp", f"strip {k}", 1 + 0.03 * k) for k in (-1, 0, 1)]
     (estimate,) = textile.fit_pull(curves, "warp", "linear", error=1e-4).estimates
     reach = float(stdtrit(2, 0.975)) * 0.03 / math.sqrt(3)

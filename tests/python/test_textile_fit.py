@@ -101,11 +101,11 @@ def test_readings_that_contradict_widen_the_intervals():
 @pytest.mark.parametrize(
     ("law", "name", "other"),
     [
-        (sb.Exponential(200.0, 100.0, 5.0), "warp_stiffening", sb.Exponential(50.0, 100.0, 5.0)),
+        (sb.laws.Exponential(200.0, 100.0, 5.0), "warp_stiffening", sb.laws.Exponential(50.0, 100.0, 5.0)),
         (
-            sb.Spline((0.02, 0.02, 0.1), warp=(2.0, 3.0, 4.0, 5.0)),
+            sb.laws.Spline((0.02, 0.02, 0.1), warp=(2.0, 3.0, 4.0, 5.0)),
             "warp_ratio_2",
-            sb.Spline((0.02, 0.02, 0.1), warp=(2.0, 1.0, 4.0, 5.0)),
+            sb.laws.Spline((0.02, 0.02, 0.1), warp=(2.0, 1.0, 4.0, 5.0)),
         ),
     ],
 )

@@ -48,7 +48,7 @@ def test_shear_cannot_be_seen_in_a_pull_along_the_yarns():
 
 
 def test_a_stiffening_fabric_at_500_gram_force_per_cm():
-    law = sb.Exponential(200.0, 200.0, 5.0)
+    law = sb.laws.Exponential(200.0, 200.0, 5.0)
     fabric = sb.Fabric(density=0.2, warp=1000.0, shear=50.0, bending=1e-5, law=law)
     test = textile.uniaxial(fabric)
     load = 490.3325

@@ -45,7 +45,7 @@ def locked(law: str, end: float = REACH, gains: tuple[float, ...] = (0.97, 1.0, 
 def test_a_strip_law_is_the_simulations(law):
     """Where Poisson's ratio is zero a specimen between jaws is an even strip."""
     b = 30.0
-    laws = {"linear": sb.Linear(), "exponential": sb.Exponential(b, b, b), "sinh": sb.Sinh(b, b, b)}
+    laws = {"linear": sb.laws.Linear(), "exponential": sb.laws.Exponential(b, b, b), "sinh": sb.laws.Sinh(b, b, b)}
     fabric = sb.Fabric(density=0.1, warp=STIFFNESS, shear=20.0, bending=1e-5, law=laws[law])
     strain = textile.uniaxial(fabric, load=9.0, width=0.05, gauge=0.2, cells=2).extension.value
     power = {"linear": 0, "exponential": 2, "sinh": 1}[law]

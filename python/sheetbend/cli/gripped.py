@@ -18,7 +18,7 @@ from ..gripped.ladder import AND, MARKERS, REST, SHIFTS, TILTS, TWIST, VARYING, 
 from ..gripped.model import NAME
 from ..gripped.report import overview
 from ..objects.chain import unit_vector
-from ..recording.io.folder import recordings
+from ..recording.io.folder import read_recordings
 from ..recording.recording import Recording
 from ..recording.recording_checks import marker_indices
 from ..report.tables import plain_section
@@ -66,7 +66,7 @@ def load_ropes(config: GrippedConfig, folder: Path) -> list[RopeData]:
 def _load(section: GrippedRopeSection, where: str, part: str, folder: Path) -> Screened:
     refused: dict[str, RecordingError] = {}
     try:
-        found = recordings(folder, section.pattern, section.units, refused)
+        found = read_recordings(folder, section.pattern, section.units, refused)
         found = _reordered(found, section.reorder, f"{where}.reorder", part)
         if section.clamped is not None:
             found = [replace(r, clamped=marker_indices("clamped", section.clamped, r.markers)) for r in found]

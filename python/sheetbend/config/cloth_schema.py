@@ -55,7 +55,7 @@ class ClothMesh(Section):
 
 
 class ClothLaw(Section):
-    """[scene.cloth.law]: how tension grows with strain, `sb.Exponential`, `sb.Sinh` or `sb.Spline`; linear when left
+    """[scene.cloth.law]: how tension grows with strain, `sb.laws.Exponential`, `Sinh` or `Spline`; linear when left
     out."""
 
     kind: Literal["exponential", "sinh", "spline"] = key(..., "which of them")

@@ -15,7 +15,7 @@ from ..mesh import Places, TriangleMesh
 from ..mesh.places import nearest
 from ..mesh.subdivide import subdivided
 from ..objects.cloth import Cloth, add_cloth
-from ..objects.fabric import COMPONENTS, Exponential, Law, Sinh, Spline
+from ..objects.laws import COMPONENTS, Exponential, Law, Sinh, Spline
 from ..objects.tool import Tool
 from ..scene.scene import Scene
 from . import cloth_schema as schema

@@ -14,7 +14,7 @@ from ..experiment.experiment import Experiment
 from ..minimum.optimizers import refit
 from ..minimum.problem import FitProblem
 from ..quantities.parameters import Parameters
-from ..recording.baseline import no_physics
+from ..recording.baseline import baseline
 from ..recording.oscillation import along, dominant_direction, first_frequency
 from ..recording.recording import Recording
 from ..result.result import Given, RecordingFit
@@ -198,7 +198,7 @@ def _with_baseline(
         return c
     if not sources or target is None:
         return c
-    guess = no_physics([r for _, r in sources], target, carried_baselines(e, sources, target, values))
+    guess = baseline([r for _, r in sources], target, carried_baselines(e, sources, target, values))
     if e.scene.boundary.driven:
         # in the row of the report what a prediction is given counts as no error
         share = np.sqrt(guess.scored.sum() / target.mask.sum())

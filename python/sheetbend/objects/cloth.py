@@ -16,8 +16,8 @@ from ..mesh import TriangleMesh
 from ..quantities.quantities import Term
 from ..scene.scene import Array, Scene
 from .elastic_group import add_elastic_group
-from .fabric import Law, Linear
 from .hinges import Hinges
+from .laws import Law, Linear
 from .sheet_bending import SheetCurvature
 
 MODELS = ("curvature", "dihedral", "isometric_bending")
@@ -39,6 +39,27 @@ class Cloth:
     particles: Array
     fabric: str
     numbers: Mapping[str, Any]
+
+
+def cloth(
+    mesh: TriangleMesh,
+    *,
+    density: float,
+    warp: float,
+    shear: float,
+    name: str = "cloth",
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+    pinned: ArrayLike = (),
+    **options: object,
+) -> Scene:
+    """A scene with one cloth; see `add_cloth` for the options. `pinned` holds vertices, such as
+    `mesh.sets["corners"]`; they are its `held` ones where no others are given."""
+    scene = Scene(name, gravity)
+    still = indices("cloth.pinned", pinned, len(mesh.vertices)) if np.size(pinned) else []
+    given = {"held": still, **options}
+    built = add_cloth(scene, mesh, name, density=density, warp=warp, shear=shear, **given)  # type: ignore[arg-type]
+    scene.pin(built.particles[still])
+    return scene
 
 
 def add_cloth(
@@ -68,7 +89,7 @@ def add_cloth(
     """Add a cloth to a scene.
 
     Quantities: `<fabric>_density` kg/m^2, `_warp`, `_weft`, `_shear` N/m, `_poisson`, the law's coefficients (see
-    `sheetbend.objects.fabric`) such as `_warp_stiffening`, and where given `_bending`, `_bending_weft`,
+    `sheetbend.laws`) such as `_warp_stiffening`, and where given `_bending`, `_bending_weft`,
     `_bending_twist` N m, `_membrane_damping` s,
     `_bend_damping` s, `_drag_linear` N s/m^3, `_drag_quadratic` N s^2/m^4.
 

@@ -172,7 +172,7 @@ def rms_about(recording: Recording, reference: ArrayLike, scored: NDArray[np.boo
     return float(np.sqrt(np.mean(np.sum(distance**2, axis=-1))))
 
 
-def no_physics(
+def baseline(
     fitted: Recording | Sequence[Recording], held_out: Recording, more: Mapping[str, Array] | None = None
 ) -> NoPhysics:
     """The strongest baseline for a held-out piece: of those that apply, the one with the smallest error.

@@ -11,7 +11,8 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..errors import InputError
 from ..motion.equilibrium import NoEquilibriumError
-from ..objects.fabric import Fabric, Spline, Stiffening
+from ..objects.fabric import Fabric
+from ..objects.laws import Spline, Stiffening
 from ..optional import require
 from ..quantities.parameters import Parameter, Parameters
 from ..quantities.wording import figures, short

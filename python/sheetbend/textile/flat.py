@@ -15,7 +15,8 @@ from ..errors import InputError
 from ..mesh import TriangleMesh
 from ..motion.equilibrium import Equilibrium, equilibrium
 from ..objects.cloth import Cloth, add_cloth
-from ..objects.fabric import Fabric, Stiffening
+from ..objects.fabric import Fabric
+from ..objects.laws import Stiffening
 from ..quantities.quantities import Term
 from ..scene.scene import Array, Scene
 

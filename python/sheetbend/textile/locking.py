@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays.timeseries import Array
-from ..objects.fabric import Fabric, Spline
+from ..objects.fabric import Fabric
+from ..objects.laws import Spline
 from ..optional import require
 from ..quantities.parameters import Parameter, Parameters
 from .fabric_fit import FabricFit, Measured, estimates_of

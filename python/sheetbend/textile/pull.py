@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from ..arrays.checks import is_number
 from ..errors import InputError
-from ..objects.fabric import Exponential, Fabric, Law, Linear, Sinh, Spline
+from ..objects.fabric import Fabric
+from ..objects.laws import Exponential, Law, Linear, Sinh, Spline
 from .curve import Curve, chosen, mean_curve, same_test
 from .fabric_fit import FabricFit, Measured, fit_fabric
 from .flat import warp_angle

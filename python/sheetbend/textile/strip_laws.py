@@ -71,7 +71,7 @@ class LinearStrip(StripLaw):
 
 
 class ExponentialStrip(StripLaw):
-    """`fabric.Exponential`; x = log(b reach^2), of the Green strain."""
+    """`laws.Exponential`; x = log(b reach^2), of the Green strain."""
 
     name = "exponential"
     words = "grows as exp(b strain^2)"
@@ -84,7 +84,7 @@ class ExponentialStrip(StripLaw):
 
 
 class SinhStrip(StripLaw):
-    """`fabric.Sinh`; x = log(b reach), of the Green strain."""
+    """`laws.Sinh`; x = log(b reach), of the Green strain."""
 
     name = "sinh"
     words = "grows as exp(b strain)"

@@ -10,7 +10,7 @@ from . import FORMATS
 from .natural import by_number
 
 
-def recordings(
+def read_recordings(
     folder: str | Path,
     pattern: str = "*",
     units: str | None = None,
@@ -18,8 +18,8 @@ def recordings(
 ) -> list[Recording]:
     """Every recording in a folder, in the order of the file names, numbers in them by size (9 before 10).
 
-        train = sb.recordings("ropes/train")
-        unseen = sb.recordings("ropes/eval", "*.pkl")
+        train = sb.read_recordings("ropes/train")
+        unseen = sb.read_recordings("ropes/eval", "*.pkl")
 
     Args:
         folder: where the files lie. Files that no reader knows, such as the JSON beside a recording, are left out.
