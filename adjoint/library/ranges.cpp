@@ -1,9 +1,7 @@
 #include "adjoint/library/ranges.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
-#include <string_view>
 
 #include "core/constraints/registry.h"
 
@@ -11,26 +9,6 @@ namespace sheetbend::library {
 namespace {
 
 constexpr double huge = std::numeric_limits<double>::max(), tiny = std::numeric_limits<double>::denorm_min();
-const double inside = std::nextafter(1.0, 0.0);
-
-struct Ends {
-  double least, most;
-};
-
-// Of a constraint's own parameter, by kind and name or by name alone.
-Ends ends_of(std::string_view kind, std::string_view parameter) {
-  if ((kind == "distance" && parameter == "rest_length") || (kind == "tether" && parameter == "length") ||
-      (kind == "area" && parameter == "rest") || parameter == "yield")
-    return {tiny, huge};
-  if (parameter == "coupling") return {-inside, inside};
-  if (parameter == "share") return {0.0, inside};
-  return {-huge, huge};
-}
-
-// Kinds that have no rigid form.
-bool needs_compliance(std::string_view kind) {
-  return kind == "bend" || kind == "planar_bend" || kind == "friction_hinge";
-}
 
 }  // namespace
 
@@ -56,12 +34,11 @@ Ranges ranges_of(const Scene& scene) {
   for (const sheetbend::Group& g : scene.groups)
     with_kind(g.kind, [&]<class K>(K) {
       for (int i = 0; i < g.count; ++i) {
-        if (needs_compliance(K::name)) r.least[layout.of(Quantity::compliance) + g.first + i] = tiny;
+        if (K::compliance.never_zero) r.least[layout.of(Quantity::compliance) + g.first + i] = tiny;
         if (!g.damped) r.most[layout.of(Quantity::damping) + g.first + i] = 0.0;
         for (int k = 0; k < g.parameters; ++k) {
           const std::size_t at = layout.of(Quantity::rest) + g.first_value + static_cast<std::size_t>(i) * g.parameters + k;
-          const Ends ends = ends_of(K::name, K::parameters[k]);
-          r.least[at] = ends.least, r.most[at] = ends.most;
+          r.least[at] = K::parameters[k].range.least, r.most[at] = K::parameters[k].range.most;
         }
       }
     });

@@ -15,7 +15,7 @@ int main(int count, char** arguments) {
     for (int frame = 0; frame <= 60; ++frame) times.push_back(frame / 60.0);
     const sheetbend::Rollout rollout(scene, times, {.h = 1.0 / 600.0});
 
-    // The loss is the mean height of the last frame: its derivative by every z is 1/particles.
+    // The loss is the mean height of the last frame: its derivative with respect to every z is 1/particles.
     std::vector<double> positions_bar(rollout.positions().size());
     double height = 0.0;
     const std::size_t last = positions_bar.size() - 3 * scene.particles();
