@@ -43,6 +43,7 @@ missing_packages() {
   has_header eigen3/Eigen/Core || echo libeigen3-dev
   has_header ceres/ceres.h || echo libceres-dev
   has_header gtest/gtest.h || echo libgtest-dev
+  has_header nlohmann/json.hpp || echo nlohmann-json3-dev
   has_command valgrind || echo valgrind
 }
 
@@ -66,11 +67,11 @@ install_system_packages() {
   fi
   say "not on this machine, and not installable from here: $missing"
   echo "    Debian, Ubuntu: sudo apt-get install $missing"
-  echo "    Elsewhere: a C++20 compiler, Python >= 3.11 with headers and venv, CMake >= 3.25, Ninja, Eigen 3.4, Ceres 2.1, GoogleTest, Valgrind."
+  echo "    Elsewhere: a C++20 compiler, Python >= 3.11 with headers and venv, CMake >= 3.25, Ninja, Eigen 3.4, Ceres 2.1, GoogleTest, nlohmann-json, Valgrind."
   has_command c++ || fail "without a C++ compiler (g++) sheetbend cannot be built."
   has_venv || fail "without Python >= 3.11 and its venv module (python3-venv) no environment can be made."
   has_python_headers || fail "without Python's headers (python3-dev) the module cannot be built."
-  echo "    Going on without: CMake, Ninja and Eigen come from PyPI, without Ceres SciPy fits, without GoogleTest no C++ tests, without Valgrind no instruction counts."
+  echo "    Going on without: CMake, Ninja and Eigen come from PyPI, without Ceres SciPy fits, without GoogleTest no C++ tests, without nlohmann-json no C++ library, without Valgrind no instruction counts."
 }
 
 make_environment() {

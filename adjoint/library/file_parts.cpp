@@ -9,6 +9,7 @@
 #include <cstring>
 #include <fstream>
 #include <limits>
+#include <stdexcept>
 #include <system_error>
 
 namespace sheetbend::library {
@@ -20,6 +21,7 @@ constexpr std::string_view magic = "SBSCENE\n";
 constexpr std::uint32_t version = 1;
 constexpr std::size_t prefix = 24, longest_header = 16u << 20;
 constexpr long longest_name = 200;
+constexpr int deepest = 64;
 constexpr const char* damaged = "the file is damaged or was not written by save_scene: write it again";
 
 // CRC-32 as in zlib (polynomial 0xEDB88320, reflected).
@@ -35,6 +37,25 @@ std::uint32_t crc32(const char* data, std::size_t size) {
   std::uint32_t c = 0xFFFFFFFFu;
   for (std::size_t i = 0; i < size; ++i) c = table[(c ^ static_cast<unsigned char>(data[i])) & 0xFF] ^ (c >> 8);
   return ~c;
+}
+
+// A header without depth limit could be a million lists in each other. Of a key that is there twice the last one counts, as in Python.
+Json parsed(const char* begin, const char* end) {
+  return Json::parse(begin, end, [](int depth, Json::parse_event_t, const Json&) {
+    if (depth > deepest) throw std::length_error("too many levels");
+    return true;
+  });
+}
+
+// The code points of a text in UTF-8, or -1 where it holds control characters (U+0000 to U+001F, U+007F to U+009F).
+long printable_length(const std::string& text) {
+  long count = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto c = static_cast<unsigned char>(text[i]);
+    if (c < 0x20 || c == 0x7F || (c == 0xC2 && i + 1 < text.size() && static_cast<unsigned char>(text[i + 1]) < 0xA0)) return -1;
+    count += (c & 0xC0) != 0x80;  // not the bytes that continue a code point
+  }
+  return count;
 }
 
 template <class T>
@@ -72,11 +93,15 @@ FileParts::FileParts(const std::filesystem::path& path) : path_(path.string()) {
       crc32(body_.data(), body_.size()) != read_as<std::uint32_t>(head + 12))
     fail("file", "is damaged: its check sum differs");
   try {
-    header_ = parse_json({body_.data(), length});
-  } catch (const NoJson& e) {
-    fail("header", std::string("is no JSON: ") + e.what());
+    header_ = parsed(body_.data(), body_.data() + length);
+  } catch (const Json::parse_error& e) {  // its words may repeat bytes that are no text
+    fail("header", "is no JSON at byte " + std::to_string(e.byte));
+  } catch (const Json::out_of_range&) {
+    fail("header", "holds a number out of range");
+  } catch (const std::length_error& e) {
+    fail("header", std::string("has ") + e.what());
   }
-  if (!header_.as<JsonObject>()) fail("header", "is no object");
+  if (!header_.is_object()) fail("header", "is no object");
   first_ = length;
   left_ = body_.size() - length;
 }
@@ -85,44 +110,73 @@ void FileParts::fail(const std::string& field, const std::string& problem, const
   throw v0::InputError(path_ + ": " + field, problem, fix.empty() ? damaged : fix);
 }
 
+const Json& FileParts::member(const Json& parent, const std::string& key, const std::string& where) const {
+  const auto found = parent.find(key);
+  if (found == parent.end()) fail(where + key, "is missing");
+  return *found;
+}
+
+const Json& FileParts::object(const Json& parent, const std::string& key, const std::string& where) const {
+  const Json& found = member(parent, key, where);
+  if (!found.is_object()) fail(where + key, "is no object");
+  return found;
+}
+
+const Json& FileParts::list(const Json& parent, const std::string& key, const std::string& where) const {
+  const Json& found = member(parent, key, where);
+  if (!found.is_array()) fail(where + key, "is no list");
+  return found;
+}
+
+const std::string& FileParts::text(const Json& parent, const std::string& key, const std::string& where) const {
+  const Json& found = member(parent, key, where);
+  if (!found.is_string()) fail(where + key, "is no text");
+  return found.get_ref<const std::string&>();
+}
+
+bool FileParts::flag(const Json& parent, const std::string& key, const std::string& where) const {
+  const Json& found = member(parent, key, where);
+  if (!found.is_boolean()) fail(where + key, "is neither true nor false");
+  return found.get<bool>();
+}
+
+long long FileParts::whole(const Json& parent, const std::string& key, const std::string& where) const {
+  const Json& found = member(parent, key, where);
+  if (!found.is_number_integer()) fail(where + key, "is no whole number");
+  return found.get<long long>();
+}
+
 double FileParts::number(const Json& parent, const std::string& key, const std::string& where) const {
-  const Json* found = parent.find(key);
-  if (!found) fail(where + key, "is missing");
-  const auto *integer = found->as<long long>();
-  const auto *real = found->as<double>();
-  const double value = integer ? static_cast<double>(*integer) : real ? *real : std::nan("");
+  const Json& found = member(parent, key, where);
+  const double value = found.is_number() ? found.get<double>() : std::nan("");
   if (!(std::abs(value) < 1e300)) fail(where + key, "must be a finite number");
   return value;
 }
 
 bool FileParts::is_name(const Json& value) const {
-  const auto* text = value.as<std::string>();
-  const long length = text ? printable_length(*text) : -1;
+  const long length = value.is_string() ? printable_length(value.get_ref<const std::string&>()) : -1;
   return length >= 0 && length <= longest_name;
 }
 
 std::string FileParts::name(const Json& parent, const std::string& key, const std::string& where) const {
-  const auto& text = part<std::string>(parent, key, where);
-  if (!is_name({text})) fail(where + key, "is no name");
-  return text;
+  if (!is_name(member(parent, key, where))) fail(where + key, "is no name");
+  return text(parent, key, where);
 }
 
 const char* FileParts::place(const std::string& name, const char* type, std::size_t width, int columns,
                              std::optional<long long> rows, std::size_t& count) {
-  const Json* arrays = header_.find("arrays");
-  if (!arrays || !arrays->as<JsonObject>()) fail("arrays", "are missing");
-  const Json about{part<JsonObject>(*arrays, name, "arrays.")};
-  const auto& shape = part<JsonArray>(about, "shape", name + ".");
-  if (part<std::string>(about, "type", name + ".") != type || shape.size() != (columns == 0 ? 1 : 2))
+  const Json& about = object(object(header_, "arrays"), name, "arrays.");
+  const Json& shape = list(about, "shape", name + ".");
+  if (text(about, "type", name + ".") != type || shape.size() != (columns == 0 ? 1 : 2))
     fail(name, std::string("must be of type ") + type + (columns == 0 ? " with one dimension" : " with two dimensions"));
   const auto length = [&](std::size_t i) {
-    const auto* n = shape[i].as<long long>();
-    if (!n || *n < 0) fail(name + ".shape", "must be whole numbers from 0 on");
-    return *n;
+    const auto n = shape[i].is_number_integer() ? shape[i].get<long long>() : -1;
+    if (n < 0) fail(name + ".shape", "must be whole numbers from 0 on");
+    return n;
   };
   const long long own_rows = length(0), own_columns = columns == 0 ? 1 : length(1);
   if ((rows && own_rows != *rows) || (columns > 0 && own_columns != columns)) fail(name, "has another shape");
-  const long long offset = part<long long>(about, "offset", name + ".");
+  const long long offset = whole(about, "offset", name + ".");
   const std::size_t data = body_.size() - first_;
   const std::size_t most = own_columns > 0 ? left_ / width / static_cast<std::size_t>(own_columns) : left_;
   if (static_cast<std::size_t>(own_rows) > most) fail(name, "lies outside the file, or on another array");

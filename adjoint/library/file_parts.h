@@ -3,14 +3,14 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <map>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "adjoint/library/json.h"
-
 namespace sheetbend::library {
+
+using Json = nlohmann::json;
 
 class FileParts {
  public:
@@ -21,15 +21,12 @@ class FileParts {
 
   [[noreturn]] void fail(const std::string& field, const std::string& problem, const std::string& fix = {}) const;
 
-  // A member of an object, of the given type.
-  template <class T>
-  const T& part(const Json& parent, const std::string& key, const std::string& where = "") const {
-    const Json* found = parent.find(key);
-    if (!found) fail(where + key, "is missing");
-    const T* value = found->as<T>();
-    if (!value) fail(where + key, "is of another type");
-    return *value;
-  }
+  // A member of an object, of the type that the name says. `where` stands before the key in errors.
+  const Json& object(const Json& parent, const std::string& key, const std::string& where = "") const;
+  const Json& list(const Json& parent, const std::string& key, const std::string& where = "") const;
+  const std::string& text(const Json& parent, const std::string& key, const std::string& where = "") const;
+  bool flag(const Json& parent, const std::string& key, const std::string& where = "") const;
+  long long whole(const Json& parent, const std::string& key, const std::string& where = "") const;
   double number(const Json& parent, const std::string& key, const std::string& where = "") const;  // finite
   std::string name(const Json& parent, const std::string& key, const std::string& where = "") const;
   bool is_name(const Json& value) const;
@@ -39,6 +36,8 @@ class FileParts {
   std::vector<double> numbers(const std::string& name, int columns = 0, std::optional<long long> rows = {});
 
  private:
+  const Json& member(const Json& parent, const std::string& key, const std::string& where) const;
+
   // Where the bytes of an array are, and how many numbers it has.
   const char* place(const std::string& name, const char* type, std::size_t width, int columns,
                     std::optional<long long> rows, std::size_t& count);

@@ -24,6 +24,9 @@ struct Model {
 
   // Fills what follows from the rest, once it is complete.
   void complete();
+
+  // What is behind a scene.
+  static const std::shared_ptr<const Model>& of(const Scene& scene) { return scene.model_; }
 };
 
 // Of values that were checked, or the scene's own where there are none. Throws InputError.

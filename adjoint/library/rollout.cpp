@@ -37,11 +37,11 @@ struct Rollout::Parts {
   std::vector<double> theta, inputs, times, positions;
   std::optional<Tape<double>> tape;
 
-  const Model& model() const { return scene.model(); }
+  const Model& model() const { return *Model::of(scene); }
 };
 
 Rollout::Rollout(const Scene& scene, std::span<const double> times, const Solver& solver, std::span<const double> values)
-    : parts_(new Parts{scene, plan_of(scene.model(), solver), {}, {}, {}, {}, {}, {}}) {
+    : parts_(new Parts{scene, plan_of(*Model::of(scene), solver), {}, {}, {}, {}, {}, {}}) {
   Parts& p = *parts_;
   const Model& model = p.model();
   p.steps = substeps(times, solver.h);
@@ -107,7 +107,7 @@ std::vector<double> Rollout::tangent(std::span<const double> values_dot) const {
 }
 
 std::string redundant_constraints(const Scene& scene, const Solver& solver) {
-  const Model& model = scene.model();
+  const Model& model = *Model::of(scene);
   const std::vector<double> inputs = checked_inputs(model, {});
   const Plan plan = plan_of(model, solver);
   return translated([&] {

@@ -32,6 +32,7 @@ std::size_t Scene::inputs() const { return model_->topology.layout.total(); }
 std::span<const Quantity> Scene::quantities() const { return model_->quantities; }
 std::span<const Group> Scene::groups() const { return model_->groups; }
 std::span<const Array> Scene::arrays() const { return model_->arrays; }
+std::span<const int> Scene::driven() const { return model_->topology.driven; }
 
 std::size_t Scene::quantity(std::string_view name) const {
   return place_of(model_->quantities, name, "quantity", "quantity");

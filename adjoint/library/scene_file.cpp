@@ -42,17 +42,16 @@ class SceneReader {
   // The records of a list, with the words that name each.
   template <class F>
   void for_each_record(const char* key, F&& f) {
-    const auto& list = file_.part<JsonArray>(header_, key);
+    const auto& list = file_.list(header_, key);
     for (std::size_t i = 0; i < list.size(); ++i) {
       const std::string where = std::string(key) + "[" + std::to_string(i) + "]";
-      if (!list[i].as<JsonObject>()) file_.fail(where, "is no object");
+      if (!list[i].is_object()) file_.fail(where, "is no object");
       f(list[i], std::to_string(i), where + ".");
     }
   }
 
-  static const Json* given(const Json& record, const char* key) {
-    const Json* found = record.find(key);
-    return found && !found->as<std::nullptr_t>() ? found : nullptr;
+  static bool given(const Json& record, const char* key) {
+    return record.contains(key) && !record[key].is_null();
   }
 
   std::vector<v0::Quantity> quantities() {
@@ -61,13 +60,13 @@ class SceneReader {
     std::set<std::string> names;
     for_each_record("quantities", [&](const Json& q, const std::string&, const std::string& where) {
       v0::Quantity quantity{file_.name(q, "name", where), file_.number(q, "value", where), file_.name(q, "unit", where),
-                            file_.part<bool>(q, "positive", where), 0.0, -huge, huge};
+                            file_.flag(q, "positive", where), 0.0, -huge, huge};
       if (given(q, "scale")) quantity.scale = file_.number(q, "scale", where);
       if (given(q, "limits")) {
-        const auto& limits = file_.part<JsonArray>(q, "limits", where);
+        const auto& limits = file_.list(q, "limits", where);
         if (limits.size() != 2) file_.fail(where + "limits", "must be two");
         const auto limit = [&](const Json& at, double open) {
-          return at.as<std::nullptr_t>() ? open : file_.number({JsonObject{{"limit", at}}}, "limit", where);
+          return at.is_null() ? open : file_.number(Json::object({{"limit", at}}), "limit", where);
         };
         quantity.least = limit(limits[0], -huge), quantity.most = limit(limits[1], huge);
       }
@@ -88,14 +87,13 @@ class SceneReader {
 
   SceneSpec topology() {
     SceneSpec spec;
-    const Json layout{file_.part<JsonObject>(header_, "layout")};
-    const auto& position = file_.part<JsonArray>(layout, "position", "layout.");
-    const auto* size = position.size() == 2 ? position[1].as<long long>() : nullptr;
+    const Json& layout = file_.object(header_, "layout");
+    const auto& position = file_.list(layout, "position", "layout.");
+    const long long size = position.size() == 2 && position[1].is_number_integer() ? position[1].get<long long>() : 0;
     base_ = file_.numbers("base");
-    if (!size || *size <= 0 || *size > static_cast<long long>(base_.size()) || *size % 3 != 0 ||
-        *size > std::numeric_limits<int>::max())
+    if (size <= 0 || size > static_cast<long long>(base_.size()) || size % 3 != 0 || size > std::numeric_limits<int>::max())
       file_.fail("layout.position", "is no place");
-    spec.particles = static_cast<int>(*size / 3);
+    spec.particles = static_cast<int>(size / 3);
     const std::vector<int> directors = file_.whole_numbers("directors", 4);
     for (std::size_t i = 0; i < directors.size(); i += 4)
       spec.directors.push_back({directors[i], directors[i + 1], directors[i + 2], directors[i + 3]});
@@ -105,8 +103,8 @@ class SceneReader {
       if (std::ranges::find(spec.pinned, n) != spec.pinned.end())
         file_.fail("driven", "particle " + std::to_string(n) + " is pinned too", "either pin or drive a particle");
     spec.loaded = file_.whole_numbers("loaded");
-    spec.has_drag = file_.part<bool>(header_, "has_drag");
-    const auto& interpolation = file_.part<std::string>(header_, "interpolation");
+    spec.has_drag = file_.flag(header_, "has_drag");
+    const auto& interpolation = file_.text(header_, "interpolation");
     if (interpolation != "cubic" && interpolation != "linear")
       file_.fail("interpolation", "is unknown", "use 'cubic' or 'linear'");
     spec.boundary = {file_.numbers("boundary_times"),
@@ -116,17 +114,17 @@ class SceneReader {
     spec.air = triangles("air");
     std::set<std::string> names;
     for_each_record("groups", [&](const Json& g, const std::string& i, const std::string& where) {
-      GroupSpec group{file_.name(g, "name", where), file_.part<std::string>(g, "kind", where),
-                      file_.part<bool>(g, "damped", where), {}};
+      GroupSpec group{file_.name(g, "name", where), file_.name(g, "kind", where),
+                      file_.flag(g, "damped", where), {}};
       int arity = 0;
       with_kind(kind_of(group.kind), [&]<class K>(K) { arity = K::arity; });
-      group.stencil = file_.whole_numbers("stencil_" + i, arity, file_.part<long long>(g, "count", where));
+      group.stencil = file_.whole_numbers("stencil_" + i, arity, file_.whole(g, "count", where));
       spec.groups.push_back(std::move(group));
     });
     for_each_record("volumes", [&](const Json& v, const std::string& i, const std::string& where) {
       const std::string name = file_.name(v, "name", where);
       if (!names.insert(name).second) file_.fail(where + "name", "is there twice");
-      spec.volumes.push_back({name, triangles("volume_" + i, file_.part<long long>(v, "triangles", where))});
+      spec.volumes.push_back({name, triangles("volume_" + i, file_.whole(v, "triangles", where))});
     });
     return spec;
   }
@@ -134,10 +132,10 @@ class SceneReader {
   // Driven particles that follow recorded markers: checked, and otherwise of no use here.
   void follow(const Scene& scene) {
     for_each_record("following", [&](const Json& f, const std::string& i, const std::string& where) {
-      const auto& markers = file_.part<JsonArray>(f, "markers", where);
+      const auto& markers = file_.list(f, "markers", where);
       for (const Json& marker : markers)
         if (!file_.is_name(marker)) file_.fail(where + "markers", "are no names");
-      file_.part<bool>(f, "from_placed", where);
+      file_.flag(f, "from_placed", where);
       const std::vector<int> slots = file_.whole_numbers("following_" + i);
       for (const int slot : slots)
         if (slot < 0 || slot >= static_cast<int>(scene.driven.size()))
@@ -148,18 +146,9 @@ class SceneReader {
   }
 
   void check_layout(const Layout& layout) {
-    const Json& given = *header_.find("layout");  // an object: topology() read it
-    bool fits = given.as<JsonObject>()->size() == quantity_count;
-    for (int q = 0; q < quantity_count && fits; ++q) {
-      const Json* place = given.find(quantity_names[q]);
-      const auto* pair = place ? place->as<JsonArray>() : nullptr;
-      fits = pair && pair->size() == 2;
-      for (int k = 0; k < 2 && fits; ++k) {
-        const auto* n = (*pair)[k].as<long long>();
-        fits = n && *n == static_cast<long long>(k == 0 ? layout.offset[q] : layout.size[q]);
-      }
-    }
-    if (!fits) file_.fail("layout", "is not the one of this scene");
+    Json own = Json::object();
+    for (int q = 0; q < quantity_count; ++q) own[quantity_names[q]] = {layout.offset[q], layout.size[q]};
+    if (header_["layout"] != own) file_.fail("layout", "is not the one of this scene");
     if (base_.size() != layout.total()) file_.fail("base", "does not fit the scene's inputs");
   }
 

@@ -22,7 +22,7 @@ class Rollout {
 
   void advance();
 
-  // Goes on from another state, at `step`.
+  // Goes on from another state, at `step`, which need not be one of this rollout's own.
   void restart(int step, const SubstepStates<T>& s);
 
   const T* x() const { return x_.data(); }
@@ -113,6 +113,7 @@ void Rollout<T, List>::restart(int step, const SubstepStates<T>& s) {
   std::copy_n(s.x_before, x_.size(), x_before_.data());
   std::copy_n(s.v, v_.size(), v_.data());
   std::copy_n(s.v_before, v_.size(), v_before_.data());
+  for (BlockState<T>& block : record_.template of<ProjectBlocks>().blocks) block.now.step = block.before.step = -1;
 }
 
 template <class T, class List>

@@ -16,6 +16,7 @@ TEXTS = {
     "pybind11": {"pybind11-BSD-3-Clause.txt": "Redistribution and use in source and binary forms"},
     "ceres": {"ceres-BSD-3-Clause.txt": "Google Inc. All rights reserved"},
     "glog": {"glog-BSD-3-Clause.txt": "Google Inc."},
+    "nlohmann": {"nlohmann-json-MIT.txt": "THE SOFTWARE IS PROVIDED"},
 }
 
 

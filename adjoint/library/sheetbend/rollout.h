@@ -12,11 +12,11 @@
 
 namespace sheetbend::SHEETBEND_INLINE v0 {
 
-/// Derivatives of one number by everything that a motion or an equilibrium depends on.
+/// Derivatives of one number with respect to everything that a motion or an equilibrium depends on.
 struct SHEETBEND_API Gradient {
   Scene scene;
-  std::vector<double> quantities;  ///< by quantity, in the order of Scene::quantities
-  std::vector<double> inputs;      ///< by input, in the order of the flat inputs
+  std::vector<double> quantities;  ///< with respect to each quantity, in the order of Scene::quantities
+  std::vector<double> inputs;      ///< with respect to each input, in the order of the flat inputs
   long recomputed = 0;             ///< substeps that were computed again, where the tape could not hold all states
 
   /// The derivative with respect to one quantity. @throws InputError  there is none of that name.
@@ -50,8 +50,8 @@ class SHEETBEND_API Rollout {
   /// The positions of one frame, (particles, 3).
   std::span<const double> frame(std::size_t i) const;
 
-  /// The gradient of a loss whose derivatives with respect to the positions are positions_bar (frames, particles, 3): one reverse
-  /// pass, whatever the number of inputs.
+  /// The gradient of a loss whose derivatives with respect to the positions are positions_bar (frames, particles, 3): one
+  /// reverse pass, whatever the number of inputs.
   /// @throws InputError  a wrong size, or numbers that are not finite.
   /// @throws DivergenceError  the gradient grew so much on its way back that rounding decides it.
   Gradient gradient(std::span<const double> positions_bar) const;

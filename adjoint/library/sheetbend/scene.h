@@ -17,7 +17,7 @@
 
 namespace sheetbend::SHEETBEND_INLINE v0 {
 
-struct Model;  // not public: what is compiled of a scene
+struct Model;
 
 /// A named physical number of a scene, such as "rope_EI".
 struct Quantity {
@@ -59,6 +59,9 @@ class SHEETBEND_API Scene {
   std::span<const Group> groups() const;
   std::span<const Array> arrays() const;
 
+  /// The particles whose motion is given, in the order of the array "boundary".
+  std::span<const int> driven() const;
+
   /// The place of a quantity in values. @throws InputError  there is none of that name.
   std::size_t quantity(std::string_view name) const;
   /// An input array. @throws InputError  there is none of that name.
@@ -72,10 +75,10 @@ class SHEETBEND_API Scene {
   /// @throws InputError  some are not finite, or negative where that makes no sense; names what is at fault.
   std::vector<double> inputs_of(std::span<const double> values = {}) const;
 
-  explicit Scene(std::shared_ptr<const Model> model);
-  const Model& model() const { return *model_; }  ///< for the library itself
-
  private:
+  friend struct Model;
+  explicit Scene(std::shared_ptr<const Model> model);
+
   std::shared_ptr<const Model> model_;
 };
 
