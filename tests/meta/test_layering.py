@@ -78,7 +78,12 @@ ALLOWED = {
     "adjoint/library/sheetbend": set(),  # public headers, which know nothing else of the library
 }
 Sources = Mapping[str, str]  # text by path
-FOREIGN = {"pybind11": set(), "Python.h": set(), "torch": set(), "ceres": {"adjoint/fit/ceres_fit.cpp", "adjoint/library/sheetbend/residuals.h"}}
+FOREIGN = {
+    "pybind11": set(),
+    "Python.h": set(),
+    "torch": set(),
+    "ceres": {"adjoint/fit/ceres_fit.cpp", "adjoint/library/sheetbend/residuals.h"},
+}
 """Libraries that core and adjoint do not know, and the files that may."""
 
 
