@@ -246,7 +246,7 @@ def fit(
         held_out_motion(problem, comparisons, errors)
         | elsewhere(problem, judged, best.cost, [*starts_elsewhere, *end.lower])
         | end.parts
-        | unexplained(problem, comparisons, judged.autocorrelation_time)
+        | unexplained(problem, comparisons, judged.autocorrelation_time, at.u)
         | stopped
     )
     estimates, limit = at_the_limit(doubtful(judged.estimates, contradicted), at.refits, problem.parameters, at.u)
