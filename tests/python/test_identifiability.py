@@ -6,12 +6,14 @@ import math
 
 import numpy as np
 import pytest
+from pytest import approx
 from scipy import signal, special
 from sheetbend.errors import InputError
 from sheetbend.quantities.parameters import Parameter, Parameters
 from sheetbend.statistics.covariance import Layout, covariance
 from sheetbend.statistics.gauge import null_space
 from sheetbend.statistics.identifiability import identify
+from sheetbend.statistics.intervals import widened
 from sheetbend.statistics.judge import Floor
 from sheetbend.statistics.profile import profile_interval
 
@@ -445,3 +447,13 @@ def test_an_axis_without_residuals_has_no_spectrum_of_its_own() -> None:
     errors[axis == 1] = 0.0
     found = covariance(errors, np.ones((120, 1)), layout)
     assert np.isfinite(found.matrix).all() and found.matrix[0, 0] > 0
+
+
+def test_what_widens_an_interval_keeps_to_the_bounds():
+    """Poisson's number of 0.45 +- 0.1 with 0.2 of discretization ended at 0.75, where 0.5 is the most."""
+    number = Parameter(name="nu", initial=0.3, lower=-0.5, upper=0.5)
+    assert widened(number, 0.45, (0.35, 0.48), 0.2) == approx((0.15, 0.5))
+    assert widened(number, -0.45, (-0.48, None), 0.2) == (approx(-0.5), None)
+    stiff = Parameter(name="k", initial=10.0, log=True, lower=9.0, upper=1e3)
+    assert widened(stiff, 10.0, (9.5, 11.0), 5.0) == approx((9.0, 16.5))
+    assert widened(stiff, 8.0, (7.0, 9.5), 0.0) == approx((8.0, 9.5))  # one that was moved out holds its own value

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import sheetbend as sb
+from pytest import approx
 from sheetbend.doubts.unexplained import shares, unexplained
 from sheetbend.minimum.problem import FitProblem
 
@@ -80,3 +81,45 @@ def test_what_a_fit_leaves_is_compared_with_the_motion_beyond_the_noise() -> Non
     assert "64 % of the variance" in words
     loud = mean + 10 * SIGMA * np.random.default_rng(1).standard_normal(measured.shape)
     assert doubts(np.broadcast_to(mean, measured.shape), loud) == {}
+
+
+def carried() -> sb.Fit:
+    """A rope that hangs from a hand, which goes to and fro by 0.2 m."""
+    times, solver = np.arange(61) / 30, sb.Solver(h=1 / 240)
+    hand = np.zeros((61, 1, 3))
+    hand[:, 0, 0] = 0.1 * (1 - np.cos(np.pi * times))
+    scene = sb.Scene("hand")
+    line = [[0, 0, 0], [0, 0, -0.4]]
+    rope = sb.add_rope(
+        scene, "rope", points=line, segments=6, density=0.05, EI=0.01, bend_damping=0.05, drag_linear=0.1
+    )
+    scene.follow(rope.particles[:1], times, hand, ["hand"])
+    at = [int(rope.particles[i]) for i in (2, 4, 6)]
+    x = sb.simulate(scene, times, solver).positions[:, at]
+    x = np.concatenate([hand, x + SIGMA * np.random.default_rng(0).standard_normal(x.shape)], axis=1)
+    recording = sb.Recording(positions=x, times=times, markers=("hand", "a", "b", "c"), name="carried")
+    places = [None, *map(sb.on_particle, at)]
+    return sb.fit(scene, recording, parameters=["rope_EI"], markers=places, solver=solver, sigma=SIGMA, refine=False)
+
+
+def test_what_driven_markers_carry_along_is_no_motion_that_a_fit_explains() -> None:
+    """A model that is but carried along leaves 10 % of the variance that the markers have, and all of what they move
+    beside the hand."""
+    found = carried()
+    assert found["rope_EI"].verdict != "doubtful"
+    (c,) = found.comparisons
+    problem = FitProblem([c.experiment], found.parameters)
+    measured = c.recording.positions
+    with_hand = measured[:1] + c.experiment.recording.positions[:, :1] - c.experiment.recording.positions[:1, :1]
+
+    def doubts(simulated: np.ndarray) -> dict[str, str]:
+        return unexplained(problem, [replace(c, simulated=simulated)], 1.0, problem.parameters.initial())
+
+    s = shares(replace(c, simulated=with_hand))
+    assert s is not None and s.carried and s.left == approx(s.moved, rel=0.2)
+    own = measured - with_hand
+    assert doubts(c.simulated) == {} and doubts(with_hand + 0.5 * own) == {}
+    assert "beside that of its grips, so it does not explain" in doubts(with_hand + 0.1 * own)["rope_EI"]
+    assert "a motion with the grips alone would explain it better" in doubts(with_hand - 0.5 * own)["rope_EI"]
+    everything = float(((measured - measured.mean(axis=0)) ** 2).sum(axis=-1).mean())
+    assert s.moved < 0.3 * everything

@@ -38,8 +38,9 @@ from ..statistics.blocks import FEWEST, LEVEL, short_of_frames
 from ..statistics.covariance import Covariance, autocorrelation, covariance
 from ..statistics.gauge import null_space
 from ..statistics.identifiability import Identifiability
+from ..statistics.intervals import reach_of
 from ..statistics.stretches import scatter, within_sigma
-from .contradictions import CLAIMS, drawn_along, finer_experiments, reach_of, value_words
+from .contradictions import CLAIMS, drawn_along, finer_experiments, value_words
 
 FRAMES = 12  # of every motion: fewer do not tell how residuals correlate
 LARGE = 4.0  # of the residuals' mean square, in sigma squared

@@ -134,7 +134,7 @@ def misfit(problem: FitProblem, u: Array) -> Misfit:
 
 
 def warnings_of(
-    ends: Sequence[Minimum], interrupted: bool, problem: FitProblem, estimates: Sequence[Estimate]
+    ends: Sequence[Minimum], interrupted: bool, problem: FitProblem, estimates: Sequence[Estimate], ahead: str = ""
 ) -> tuple[str, ...]:
     """What a reader must know before using the numbers.
 
@@ -142,6 +142,7 @@ def warnings_of(
         ends: of all starts, best first.
         interrupted: by Ctrl-C, then or later.
         estimates: as concluded.
+        ahead: what a step that was not taken would move (`stationary.unfinished`).
     """
     warnings, best = [], ends[0]
     for verdict in UNSOUND:
@@ -162,6 +163,7 @@ def warnings_of(
     if interrupted:
         warnings.append(
             "interrupted: intervals are the linear ones, without profiles and without refits on a finer discretization"
+            + (f"; {ahead}" if ahead else "")
         )
     elsewhere = [m for m in ends if best.cost * (1.0 + INACCURATE) < m.cost < np.inf]
     if elsewhere:
@@ -170,5 +172,5 @@ def warnings_of(
     if without:
         warnings.append(f"{len(without)} of {len(ends)} starts led nowhere: {without[0].message}")
     if not best.converged and not best.interrupted:
-        warnings.append(f"the fit did not converge: {best.message}")
+        warnings.append(f"the fit did not converge: {best.message.rstrip('.')}" + (f"; {ahead}" if ahead else ""))
     return tuple(warnings)

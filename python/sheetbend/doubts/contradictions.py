@@ -18,6 +18,7 @@ from ..quantities.wording import figures, short
 from ..result.result import UNSOUND, Estimate, RecordingFit
 from ..statistics.blocks import Difference, Split, contradiction
 from ..statistics.identifiability import Identifiability
+from ..statistics.intervals import reach_of
 from ..statistics.profile import FARTHEST
 from .prediction import Comparison
 from .profiles import NOISELESS, Elsewhere
@@ -109,14 +110,6 @@ def drawn_along(judged: Identifiability, words: Mapping[str, str]) -> dict[str, 
                 why = f"trades with {other} (correlation {pair.value:+.2f}), about which parts of the data disagree"
                 along.setdefault(one, why)
     return {**along, **words}
-
-
-def reach_of(parameter: Parameter, e: Estimate) -> float:
-    """Half-width in the internal coordinate, of the narrower side where these differ; infinite without an interval."""
-    at = parameter.to_internal(e.value)
-    return min(
-        (abs(parameter.to_internal(end) - at) for end in (e.lower, e.upper) if end is not None), default=math.inf
-    )
 
 
 def finer_experiments(problem: FitProblem, refinement: Refinement) -> list[Sequence[Experiment]]:

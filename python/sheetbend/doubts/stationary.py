@@ -5,14 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays.timeseries import Array
+from ..minimum.linear_step import gauss_newton
 from ..minimum.optimizers import ROUNDING, Minimum, promised
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
+from ..statistics.identifiability import Identifiability
+from ..statistics.intervals import reach_of
 
 FAR = 1e-3
 """Share of the cost that a step may still promise where an optimizer was stopped: a few standard errors."""
 HARDLY = 0.5  # of the first cost: an optimizer that took less off may never have moved
 MISSED = 9.0  # times sigma squared: residuals for which ending near the start is suspicious
+MOVES = 0.25
+"""Half-widths: an interval that is off by so much holds the truth in 92 instead of 95 of 100 cases."""
 NEARBY = 0.1  # of a parameter, or of its scale: where the cost must not be lower than at the end
 
 
@@ -36,6 +41,42 @@ def no_minimum(problem: FitProblem, end: Minimum) -> str:
     if end.first is None or end.cost <= HARDLY * end.first or 2 * end.cost <= MISSED * rows:
         return ""
     return _lower_nearby(problem, end)
+
+
+def unfinished(problem: FitProblem, end: Minimum, judged: Identifiability) -> tuple[dict[str, str], str]:
+    """What a step that was not taken would move, in half-widths: the doubts of parameters that it moves by a good part
+    of one, and a warning where it moves none so far; both empty at a minimum that an optimizer has found.
+
+    A share of the cost does not tell: with many residuals a thousandth of it is many standard errors.
+
+    Args:
+        end: of the search; it is none of those that `no_minimum` finds.
+    """
+    if end.converged:
+        return {}, ""
+    ok, r, J = problem.evaluate(end.u)
+    if not ok or not np.isfinite(J).all():
+        return {}, ""
+    step = np.abs(gauss_newton(problem.parameters, end.u, J, r) - end.u)
+    moved: dict[str, float] = {}
+    for e in judged.estimates:
+        reach = reach_of(problem.parameters[e.name], e)
+        if 0.0 < reach < np.inf:
+            moved[e.name] = float(step[problem.parameters.free.index(e.name)]) / reach
+    how = (
+        "the fit was interrupted"
+        if end.interrupted
+        else f"the optimizer stopped before its end ({end.message.rstrip('.')})"
+    )
+    found = {
+        name: f"{how}, where its next step would move it by {short(by, 2)} half-widths"
+        for name, by in moved.items()
+        if by > MOVES
+    }
+    if found or not moved:
+        return found, ""
+    most = max(moved, key=lambda name: moved[name])
+    return {}, f"the next step would move no parameter by more than {short(moved[most], 2)} half-widths ({most})"
 
 
 def _rounding(decrease: float, end: Minimum) -> bool:

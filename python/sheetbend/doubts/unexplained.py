@@ -4,17 +4,21 @@ Intervals take what a fit leaves for noise. Where it leaves most of the motion, 
 parameters: a model that rings where the recording has come to rest is pulled toward whatever rings least. So the
 variance over time that is left is compared with that of the measured motion, marker by marker. Constant offsets count
 in neither, since a shape that is missed is no motion that is missed.
+
+Where markers drive a scene, most of the motion is carried along by them, and a model of any stiffness has that. What is
+to be explained is then the motion beside that of markers which move rigidly with the grips (`experiment.carried`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays.timeseries import Array, mean_position
+from ..experiment.carried import Values, carried_baselines
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
 from .prediction import Comparison
@@ -28,6 +32,7 @@ that the motion has, leave 106 to 2,400 %."""
 NOISY = 4.0  # of the noise's variance: what is left is none
 WORSE = 0.02  # of the motion's variance: by so much a prediction that nothing moves must be better
 CHANCE = 4.0  # standard deviations
+REST = "that nothing moves"
 NOISELESS = 1e-6  # of sigma squared: residuals that are as good as none
 
 
@@ -37,7 +42,8 @@ class Shares:
 
     Attributes:
         left: of measured minus simulated markers.
-        moved: of measured markers.
+        moved: of measured markers, or of these minus where the grips would carry them, if that is less.
+        carried: whether it is.
         noise: of their noise: as told, or as second differences show it where that is more.
         samples: number of them, times the axes.
     """
@@ -46,25 +52,34 @@ class Shares:
     moved: float
     noise: float
     samples: int
+    carried: bool = False
 
 
-def unexplained(problem: FitProblem, comparisons: Sequence[Comparison], alike: float) -> dict[str, str]:
+def unexplained(
+    problem: FitProblem, comparisons: Sequence[Comparison], alike: float, u: Array | None = None
+) -> dict[str, str]:
     """By free parameter, the fitted motion that it acts on and that the fit does not explain.
 
     Args:
         comparisons: of all experiments, at the values of the fit.
         alike: frames of residual that count as one.
+        u: (free,) the values of the fit, for where the grips are; as the scenes have them by default.
     """
+    known = {} if u is None else {e.name: problem.values_of(e, u) for e in problem.experiments}
     found: dict[str, str] = {}
     for c in comparisons:
-        words = "" if c.experiment.static or c.experiment.predict is not None else _words(c, alike)
+        words = "" if c.experiment.static or c.experiment.predict is not None else _words(c, alike, known)
         if words:
             found |= {name: words for name in problem.acting_on(c.experiment) if name not in found}
     return found
 
 
-def shares(c: Comparison) -> Shares | None:
-    """Of the fitted part of a comparison; None where it holds no motion."""
+def shares(c: Comparison, values: Values | None = None) -> Shares | None:
+    """Of the fitted part of a comparison; None where it holds no motion.
+
+    Args:
+        values: see `carried_baselines`.
+    """
     axes = ["xyz".index(a) for a in c.experiment.axes]
     fitted = ~c.held_out
     measured, seen = c.recording.positions[fitted][..., axes], c.recording.mask[fitted]
@@ -73,7 +88,12 @@ def shares(c: Comparison) -> Shares | None:
     told = c.experiment.sigma**2 * len(axes)
     residual = np.where(seen[..., None], c.simulated[fitted][..., axes] - measured, np.nan)
     left, moved = (_variance(x, seen, c.experiment.loss) for x in (residual, measured))
-    return Shares(left, moved, max(told, _noise(measured, seen)), int(seen.sum()) * len(axes))
+    part = replace(c.recording, positions=c.recording.positions[fitted], times=c.recording.times[fitted])
+    carried = carried_baselines(c.experiment, [(c.experiment, part)], part, values)
+    beside = [_variance(measured - x[..., axes], seen, c.experiment.loss) for x in carried.values()]
+    least = min(beside, default=np.inf)
+    noise = max(told, _noise(measured, seen))
+    return Shares(left, min(moved, least), noise, int(seen.sum()) * len(axes), least < moved)
 
 
 def _variance(x: Array, seen: Mask, loss: str) -> float:
@@ -91,9 +111,9 @@ def _noise(x: Array, seen: Mask) -> float:
     return float(bends.mean()) / 6.0 if bends.size else 0.0
 
 
-def _words(c: Comparison, alike: float) -> str:
+def _words(c: Comparison, alike: float, values: Values) -> str:
     """Why the motion counts as unexplained; empty where it does not."""
-    s = shares(c)
+    s = shares(c, values)
     if s is None or s.left <= NOISELESS * c.experiment.sigma**2:
         return ""
     name, axes = c.experiment.name, len(c.experiment.axes)
@@ -101,14 +121,17 @@ def _words(c: Comparison, alike: float) -> str:
     if s.left - s.moved > max(WORSE * s.moved, by_chance):
         more = short(100 * (s.left / s.moved - 1), 2) if s.moved > 0 else ""
         how = f" {more} % more variance over time than" if more else " more than"
+        beside, better = (" beside that of its grips", "a motion with the grips alone") if s.carried else ("", REST)
         return (
-            f"the fit leaves{how} the measured motion of {name} has: that nothing moves would explain it better. The "
+            f"the fit leaves{how} the measured motion of {name} has{beside}: {better} would explain it better. The "
             "model moves where the recording does not, as without a loss that the recording shows"
         )
-    if s.left > NOISY * s.noise and s.left - s.noise > MOST * (s.moved - s.noise):
-        missed = short(100 * (s.left - s.noise) / (s.moved - s.noise), 2)
+    beyond = s.moved - s.noise
+    if s.left > NOISY * s.noise and s.left - s.noise > MOST * beyond > 0:
+        missed = short(100 * (s.left - s.noise) / beyond, 2)
+        beside = " beside that of its grips" if s.carried else ""
         return (
-            f"the fit leaves {missed} % of the variance over time of the motion of {name}, so it does not explain that "
-            "motion; the model lacks something, such as a loss, or this is not its lowest minimum"
+            f"the fit leaves {missed} % of the variance over time of the motion of {name}{beside}, so it does not "
+            "explain that motion; the model lacks something, such as a loss, or this is not its lowest minimum"
         )
     return ""

@@ -22,6 +22,7 @@ from ..doubts.misread import misread
 from ..doubts.missing_loss import missing_loss
 from ..doubts.prediction import Comparison, compare, predicted_values
 from ..doubts.profiles import Elsewhere
+from ..doubts.stationary import unfinished
 from ..doubts.unexplained import unexplained
 from ..errors import InputError
 from ..experiment.clock import outside, told_clocks
@@ -241,11 +242,13 @@ def fit(
     starts_elsewhere = [
         Elsewhere(m.cost - best.cost, problem.parameters.to_physical(m.u), "another start") for m in ends[1:]
     ]
+    stopped, ahead = unfinished(problem, best, judged)
     contradicted = (
         held_out_motion(problem, comparisons, errors)
         | elsewhere(problem, judged, best.cost, [*starts_elsewhere, *end.lower])
         | end.parts
-        | unexplained(problem, comparisons, judged.autocorrelation_time)
+        | unexplained(problem, comparisons, judged.autocorrelation_time, at.u)
+        | stopped
     )
     estimates, limit = at_the_limit(doubtful(judged.estimates, contradicted), at.refits, problem.parameters, at.u)
     values = end.values | problem.parameters.to_physical(limit)
@@ -292,7 +295,7 @@ def fit(
         evaluations=evaluations,
         jacobians=jacobians,
         judging=(counted()[0] - before[0] - evaluations, counted()[1] - before[1] - jacobians),
-        warnings=warnings_of(ends, interrupted, problem, estimates)
+        warnings=warnings_of(ends, interrupted, problem, estimates, ahead)
         + end.doubts
         + at.warnings
         + shifted

@@ -18,13 +18,22 @@ def one_step(problem: FitProblem, finer: FitProblem, u: np.ndarray) -> np.ndarra
         SheetbendError: the finer problem has no answer at u, or other rows.
     """
     _, r, J = problem.evaluate(u)
+    return gauss_newton(problem.parameters, u, J, residuals_there(problem, finer, u) - r)
+
+
+def residuals_there(problem: FitProblem, finer: FitProblem, u: np.ndarray) -> np.ndarray:
+    """(rows,) residuals of a finer problem.
+
+    Raises:
+        SheetbendError: it has no answer at u, or other rows.
+    """
     ok, there, _ = finer.evaluate(u, jacobian=False)
     if not ok:
         raise SheetbendError(f"the refinement cannot start: {finer.failure}")
-    if there.shape != r.shape:
+    if len(there) != problem.core.rows:
         fix = "make them of the same recordings, with the same markers"
-        raise InputError("refine.finer", "makes experiments with other residuals", (len(there), len(r)), fix)
-    return gauss_newton(problem.parameters, u, J, there - r)
+        raise InputError("refine.finer", "makes experiments with other residuals", (len(there), problem.core.rows), fix)
+    return there
 
 
 def gauss_newton(parameters: Parameters, u: np.ndarray, J: np.ndarray, change: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
 from ..result.result import Refit
-from .linear_step import gauss_newton, moves, one_step
+from .linear_step import gauss_newton, moves, one_step, residuals_there
 from .problem import FitProblem
 from .refuted import refuted, words
 
@@ -82,8 +82,10 @@ def _at(problem: FitProblem, experiments: Sequence[Experiment]) -> FitProblem:
 
 def _moved(problem: FitProblem, u: np.ndarray) -> Settled:
     limit = _at(problem, combined(problem.experiments))
-    first = one_step(problem, limit, u)  # raises where the combination has no answer at u
-    before = float(np.sum(limit.evaluate(u, jacobian=False)[1] ** 2))
+    there = residuals_there(problem, limit, u)  # raises where the combination has no answer at u
+    _, r, J = problem.evaluate(u)
+    first = gauss_newton(problem.parameters, u, J, there - r)
+    before = float(np.sum(there**2))
     ok, there, _ = limit.evaluate(first, jacobian=False)
     if not (ok and float(np.sum(there**2)) <= before):
         whole = Refit(name=TIME_STEP, to_limit=1.0, moved=moves(problem.parameters, u, first))

@@ -84,18 +84,27 @@ def clipped(parameter: Parameter, ends: Ends) -> Ends:
 
 
 def widened(parameter: Parameter, value: float, ends: Ends, more: float) -> Ends:
-    """Both ends moved out by the other parts; a factor on a log scale keeps them positive."""
+    """Both ends moved out by the other parts, up to the parameter's bounds; a factor on a log scale keeps them
+    positive."""
     lower, upper = ends
     factor, shift = (1 + more / value, 0.0) if parameter.log else (1.0, more)
     return (
-        None if lower is None else lower / factor - shift,
-        None if upper is None else upper * factor + shift,
+        None if lower is None else max(lower / factor - shift, min(parameter.lower, value)),
+        None if upper is None else min(upper * factor + shift, max(parameter.upper, value)),
     )
 
 
 def half_width(ends: Ends) -> float | None:
     lower, upper = ends
     return None if lower is None or upper is None else (upper - lower) / 2
+
+
+def reach_of(parameter: Parameter, e: Estimate) -> float:
+    """Half-width in the internal coordinate, of the narrower side where these differ; infinite without an interval."""
+    at = parameter.to_internal(e.value)
+    return min(
+        (abs(parameter.to_internal(end) - at) for end in (e.lower, e.upper) if end is not None), default=math.inf
+    )
 
 
 def is_precise(parameter: Parameter, value: float, ends: Ends, more: float = 0.0) -> bool:
