@@ -201,10 +201,11 @@ class Judge:
                 log=parameter.log,
                 sides=left,
             )
-        ends = [
+        found = [
             other if math.isnan(by) else None if math.isinf(by) else parameter.to_physical(at + by)
             for by, other in zip(told, refitted, strict=True)
         ]
+        ends = [end if end is None else min(max(end, parameter.lower), parameter.upper) for end in found]
         return ends[0], ends[1]
 
     def correlations(self) -> tuple[Correlation, ...]:
