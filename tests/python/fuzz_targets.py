@@ -63,7 +63,8 @@ def _mocap(folder: Path) -> list[Files]:
         test_motion_capture.motive(folder / "code.csv", timecode=True),
         test_motion_capture.vicon(folder),
     )
-    return [{"take.csv": path.read_bytes()} for path in written]
+    texts = [*(path.read_bytes() for path in written), test_motion_capture.ROWS.encode()]
+    return [{"take.csv": text} for text in texts]
 
 
 def _trc(folder: Path) -> list[Files]:

@@ -102,3 +102,21 @@ def test_what_is_wrong(told, message, tmp_path):
     done = run(strip(tmp_path / "a.csv"), *told, "--output", str(tmp_path / "out"))
     assert done.exit_code == 2
     assert message in " ".join(done.stderr.split())
+
+
+@pytest.mark.parametrize(
+    ("text", "given", "wanted"),
+    [
+        ("Ext (mm);Strain (%);Load (N)\n0;0;0\n1;1;1\n2;2;2\n", [], "--column deformation=..."),
+        ("Time (s),Ext (mm)\n0,0\n1,1\n2,2\n", [], "--unit load=..."),
+        ("Ext (mm);Load (N)\n0;0\n1;1\n2;2\n", ["--column", "load=Kraft"], "--column: name no column"),
+        ("Ext (mm);Load (N)\n0;0\n1;1\n2;2\n", ["--decimal", "x"], "--decimal: must be"),
+    ],
+)
+def test_errors_name_options(tmp_path: Path, text: str, given: list[str], wanted: str) -> None:
+    """They named the arguments of Python's read_curves, columns={'load': ...}."""
+    file = tmp_path / "pull.csv"
+    file.write_text(text)
+    result = run(str(file), "--length", "20 cm", "--width", "5 cm", "--output", str(tmp_path / "out"), *given)
+    assert result.exit_code == 2 and wanted in result.stderr, result.stderr
+    assert "={" not in result.stderr

@@ -198,7 +198,13 @@ def test_what_no_draft_is_for_is_refused_in_a_sentence(tmp_path: Path, file: str
 
 def test_options_are_named_as_they_are_given(tmp_path: Path) -> None:
     takes.let_go(False, 0.3).save(tmp_path / "take.csv")
-    for options in (("--density", "-1"), ("--length", "0"), ("--length", "0.1"), ("--output", "draft.txt")):
+    for options in (
+        ("--density", "-1"),
+        ("--length", "0"),
+        ("--length", "0.1"),
+        ("--output", "draft.txt"),
+        ("--units", "inch"),
+    ):
         result = run("new", tmp_path / "take.csv", *options)
         assert result.exit_code == 2 and options[0] in result.stderr, result.output
 

@@ -149,6 +149,45 @@ file = "take.csv"
     assert start == pytest.approx(1e-3 * GRIPPER[0] + [0.05, 0.0, 0.0] + 0.12 * times[:, None], abs=1e-5)
 
 
+ROWS = (
+    'comment,"OptiTrack Export Data"\r\ncomment,rows\r\nrighthanded\r\ninfo,version,1.1\r\ninfo,framecount,3\r\n'
+    'info,rigidbodycount,1\r\nrigidbody,"hand",1,3,0,0,0\r\n'
+    'frame,0,0.0,1,1,0.1,0.2,0.3,0,0,0,1,0,0,0,2,1,2,3,4,"tip",5,6,7,9,""\r\n'
+    'rigidbody,0,0.0,"hand",1,0,3,0,0,0\r\n'
+    'frame,1,0.01,0,2,1.5,2,3,4,"tip",-1.#IND,-1.#IND,-1.#IND,9,""\r\n'
+    'frame,2,0.02,1,1,0.2,0.2,0.3,0,0,0,1,0,0,0,1,5,6,8,9,""\r\n'
+)
+
+
+def test_a_take_of_the_first_motive(tmp_path: Path) -> None:
+    path = tmp_path / "take.csv"
+    path.write_text(ROWS, newline="")
+    take = Recording.load(path)
+    assert take.markers == ("hand", "tip", "marker 9") and take.times.tolist() == [0.0, 0.01, 0.02]
+    assert take.mask.tolist() == [[True, True, True], [False, True, False], [True, False, True]]
+    assert take.positions[0].tolist() == [[0.1, 0.2, 0.3], [1, 2, 3], [5, 6, 7]]
+    assert take.gravity.tolist() == [0.0, -9.81, 0.0]
+    path.write_text(ROWS.replace("righthanded", "lefthanded"), newline="")
+    assert Recording.load(path).positions[0].tolist() == [[0.1, 0.2, -0.3], [1, 2, -3], [5, 6, -7]]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (',9,""\r\nrigidbody', "\r\nrigidbody", "line 8: is cut off"),
+        ("0,0.0,1,1", "0,0.0,1.5,1", "line 8: must hold a whole number"),
+        ("1.5,2", "x,2", "line 10: .*no number"),
+        ("frame,2,0.02", "frame,2,0.01", "line 11: must have a time later"),
+        ('5,6,7,9,""', '5,6,7,9,"tip"', "line 8: repeats a marker"),
+    ],
+)
+def test_a_damaged_take_of_the_first_motive_is_refused(tmp_path: Path, old: str, new: str, words: str) -> None:
+    assert old in ROWS
+    (tmp_path / "take.csv").write_text(ROWS.replace(old, new), newline="")
+    with pytest.raises(RecordingError, match=words):
+        Recording.load(tmp_path / "take.csv")
+
+
 VICON = (
     "Segments\r\n100\r\n,,arm:hand,,,,,\r\nFrame,Sub Frame,RX,RY,RZ,TX,TY,TZ\r\n,,deg,deg,deg,mm,mm,mm\r\n"
     "11,0,1,2,3,4,5,6\r\n\r\n"

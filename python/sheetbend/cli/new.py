@@ -22,6 +22,7 @@ from .folders import made
 from .gripped import load_ropes
 from .outcome import Outcome, run
 from .screen import heading, listing
+from .spelling import options
 from .targets import check_targets
 
 
@@ -62,7 +63,8 @@ def _new(console: Console, files: list[Path], output: Path | None, measured: Mea
     ):
         if given is not None and not 0 < given < float("inf"):
             raise ConfigError(option, "must be positive", given, fix)
-    recordings = [_read(file, units) for file in files]
+    with options(units="--units"):
+        recordings = [_read(file, units) for file in files]
     name = _name(recordings[0][0].name)
     target = output if output is not None else Path(f"{name}.toml")
     if target.suffix.lower() != ".toml":

@@ -17,6 +17,7 @@ from ..textile import Curve, fit_pull, forecast_pull, mean_curve, read_curves
 from ..textile.units import quantity
 from .folders import made
 from .outcome import Code, Outcome, run
+from .spelling import options
 from .targets import check_targets
 from .textile_figure import write_figure
 from .textile_report import report, to_dict, write_mean
@@ -76,13 +77,14 @@ def textile(
     def command(console: Console) -> Outcome:
         columns, units = _pairs("--column", column), _pairs("--unit", unit)
         at, across = _size("--length", length), _size("--width", width)
-        curves = [
-            curve
-            for file in files
-            for curve in read_curves(
-                file, test=test, length=at, width=across, columns=_numbered(columns), units=units, decimal=decimal
-            )
-        ]
+        with options(columns="--column", units="--unit", decimal="--decimal", length="--length", width="--width"):
+            curves = [
+                curve
+                for file in files
+                for curve in read_curves(
+                    file, test=test, length=at, width=across, columns=_numbered(columns), units=units, decimal=decimal
+                )
+            ]
         if pretension is not None:
             curves = [c.from_pretension(_pretension(pretension, c)) for c in curves]
         if len({c.name for c in curves}) < len(curves):

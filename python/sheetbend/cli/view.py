@@ -20,6 +20,7 @@ from .folders import made
 from .outcome import Outcome, run
 from .screen import heading
 from .simulate import motion_of, tasks_of
+from .spelling import options
 from .targets import check_targets
 
 
@@ -56,7 +57,8 @@ def _view(console: Console, file: Path, output: Path | None, units: str | None) 
     with reading(file, ConfigError):
         study = load(file) if simulated else None
     if study is None:
-        recording = Recording.load(file, units)
+        with options(units="--units"):
+            recording = Recording.load(file, units)
         name, about = recording.name, recording.summary()
     else:
         name, about = study.config.experiment.name, study.config.experiment.about

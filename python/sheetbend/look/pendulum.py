@@ -14,7 +14,8 @@ from .text import table
 
 Array = np.ndarray
 FLAT, STRAIGHT = 0.02, 0.01  # of an arm: how far it may leave its plane, and how much its length may change
-PIECE, FITTED, PREDICTED = 3.0, 4, 4  # s of a fitted piece, and how many pieces are fitted and predicted
+PIECES = {1: (3.0, 5.0), 2: (2.0, 2.0)}  # s that are fitted and predicted at most, by the number of arms: two diverge
+FITTED, PREDICTED = 4, 4  # pieces
 LEAD = 0.1  # s, at the beginning of a predicted piece, that its start is fitted to
 SUBSTEP = 1 / 1600  # s, at most
 
@@ -69,7 +70,7 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         lines += table("[[marker]]", {"marker": name, "arm": arm, "radius": radius})
     angles, rates = _states(x, r.times, joints)
     sigma = max(s.noise, 1e-4)
-    for entries, start in _pieces(s, takes[0]):
+    for entries, start in _pieces(s, takes[0], len(arms)):
         frame = int(np.searchsorted(r.times, start))
         values = {f"{arm}_angle": float(angles[k, frame]) for k, arm in enumerate(arms)}
         values |= {f"{arm}_rate": float(rates[k, frame]) for k, arm in enumerate(arms)}
@@ -130,11 +131,12 @@ def _states(x: Array, times: Array, joints: list[int]) -> tuple[Array, Array]:
     return (angles - turns).T, rates.T
 
 
-def _pieces(s: Seen, take: Take) -> list[tuple[dict[str, Any], float]]:
+def _pieces(s: Seen, take: Take, arms: int) -> list[tuple[dict[str, Any], float]]:
     """Recordings cut from one: the first part is fitted, in pieces; the rest is predicted from its first moments."""
     t = s.recording.times
     start, stop = float(t[0]), float(t[-1])
-    length = min(PIECE, (stop - start) / (FITTED + 2))
+    longest, most = PIECES[arms]
+    length = min(longest, (stop - start) / (FITTED + 2))
     found: list[tuple[dict[str, Any], float]] = []
     for k in range(FITTED):
         a = start + k * length
@@ -143,7 +145,7 @@ def _pieces(s: Seen, take: Take) -> list[tuple[dict[str, Any], float]]:
     each = (stop - rest) / PREDICTED
     for k in range(PREDICTED):
         a = round(rest + k * each, 4)
-        held = [a + LEAD + 1e-3, min(a + min(each, 5.0), stop)]
+        held = [a + LEAD + 1e-3, min(a + min(each, most), stop)]
         entries = {"file": take.file, "name": f"predicted_{k}", "predict": "window", "fit": [a, a + LEAD]}
         found.append((entries | {"held_out": held}, a))
     return found

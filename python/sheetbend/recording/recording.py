@@ -224,7 +224,7 @@ class Recording(MarkerData):
         seen = np.flatnonzero(self.mask[:, marker])
         label = f"clamped marker {self.markers[marker]!r}"
         if len(seen) == 0:
-            raise RecordingError(label, "is never seen", 0, "drop it with select, or leave it free")
+            raise RecordingError(label, "is never seen", 0, "leave it out, or leave it free")
         first, last = self.times[seen[0]], self.times[seen[-1]]
         if not first < self.times[frame] < last:
             raise RecordingError(

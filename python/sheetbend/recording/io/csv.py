@@ -1,5 +1,5 @@
-"""Recordings as text tables: exports of motion capture systems (`motive`, `vicon`), or one of two layouts, told apart
-by the header.
+"""Recordings as text tables: exports of motion capture systems (`motive`, `motive_rows`, `vicon`), or one of two
+layouts, told apart by the header.
 
 Wide, one row per frame, three columns per marker:
 
@@ -34,7 +34,7 @@ from ...errors import RecordingError
 from ...files.door import check_room
 from ...files.whole import written
 from ..marker_data import MarkerData
-from . import clock, motive, vicon
+from . import clock, motive, motive_rows, vicon
 from .cells import Row, lines, number, refuse, split
 
 _DELIMITERS = (",", ";", "\t")
@@ -52,7 +52,7 @@ def read(path: Path) -> MarkerData:
             markers at many times would make a table larger than `door.check_room` allows.
     """
     text = lines(path)
-    for system in (motive, vicon):
+    for system in (motive, motive_rows, vicon):
         if system.wrote(text):
             return system.read(path, text)
     (header_line, header), *rows = _rows(path, text)

@@ -137,7 +137,7 @@ def _meters(units: Any) -> float:
     length = units.split(",")[0].strip() if isinstance(units, str) else None
     if length not in METERS:
         known = ", ".join(METERS)
-        fix = f"start with one of {known}, in the JSON beside the file or as load(path, units=...)"
+        fix = f"start with one of {known}, in the JSON beside the file or by units="
         raise RecordingError("units", "names no known length unit", units, fix)
     return METERS[length]
 
