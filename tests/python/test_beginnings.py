@@ -47,6 +47,7 @@ ARMS = {
 }
 
 
+@pytest.mark.slow
 def test_a_wrong_minimum_over_many_periods_is_left_for_the_lower_one() -> None:
     """Without windows the search ends 5.5 % and 19 half-widths off, "identified", with residuals of 3.3 sigma."""
     e = small_swings()

@@ -15,7 +15,7 @@ from measure import app
 from sheetbend.errors import SheetbendError
 from sheetbend_bench import WORKLOADS, measure, workload
 from sheetbend_bench import ladder as ladder_module
-from sheetbend_bench.chain import gradient_error, measure_chain
+from sheetbend_bench.chain import gradient_error, lengths, measure_chain
 from sheetbend_bench.cloth import measure_cloth
 from sheetbend_bench.ladder import measure_ladder, rung
 from sheetbend_bench.machine import LEVELS, machine
@@ -251,9 +251,12 @@ class TestChainAndLadder:
         assert all(found[f"{name}_ns"] > 0 for name in ways)
 
     def test_chain(self) -> None:
-        found = {**measure_chain(repeats=1, work=600), "exit_code": 0}
+        assert [length.segments for length in lengths()] == [20, 50, 200, 1000, 5000, 20000]
+        assert [length.substeps for length in lengths(60_000)] == [3000, 1200, 300, 60, 12, 3]
+        found = {**measure_chain(repeats=1, work=600, segments=(20, 50, 300)), "exit_code": 0}
         expect_figures(found)
-        assert [row["segments"] for row in found["rows"]] == [20, 50, 200, 1000, 5000, 20000]
+        assert [(row["segments"], row["substeps"]) for row in found["rows"]] == [(20, 30), (50, 12), (300, 3)]
+        assert found["particles"] == 301 and found["projections"] == 900
         assert found["batch"]["ropes"] == 64 and found["batch"]["gradient_speedup"] > 0
 
     @pytest.mark.slow

@@ -81,6 +81,7 @@ def edited(config: Path, *changes: tuple[str, str]) -> Path:
 
 
 class TestFit:
+    @pytest.mark.slow
     def test_a_small_set_is_predicted_far_better_than_without_physics(self, config: Path, data: Path) -> None:
         edited(config, ("without_twist = false", "without_twist = true"), ('"none"', '"png"'))
         result = run("fit", config, "--json")
@@ -170,6 +171,7 @@ class TestFit:
         run("fit", config, "--json")
         assert given == [(([2, 0, -2], [1, 0, 1]), {"rope_density": 0.02})]
 
+    @pytest.mark.slow
     def test_without_eval_there_is_nothing_to_score(self, config: Path) -> None:
         edited(config, ('eval = "rope_1/eval"\n', ""), ('["twist", "tilts"]', '["twist"]'))
         result = run("fit", config, "--json", "--output", "there")
@@ -471,6 +473,7 @@ class TestNotWeighed:
         rope = last_line(run("fit", config, "--json", "--output", "unknown"))["ropes"]["rope_1"]
         return known, rope, Path("unknown/rope_1/report.txt").read_text() + Path("unknown/report.txt").read_text()
 
+    @pytest.mark.slow
     def test_stiffness_and_drag_are_over_the_density(self, told: tuple[dict[str, Any], dict[str, Any], str]) -> None:
         known, rope, report = told
         assert known["weighed"] and not rope["weighed"]

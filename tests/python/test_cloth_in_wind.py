@@ -45,6 +45,7 @@ def small(folder: Path, made: ModuleType, **options: object) -> sb.Fit:
     return sb.fit(study.experiments, parameters=study.parameters, **(study.options | options))
 
 
+@pytest.mark.slow
 def test_six_numbers_are_found_from_far(tmp_path: Path, made: ModuleType) -> None:
     found = small(tmp_path, made, refine=sb.Refinement())  # of the recording's own mesh: only the time step counts
     assert found.result.converged and found.result.first_cost > 1e3 * found.result.cost
@@ -55,6 +56,7 @@ def test_six_numbers_are_found_from_far(tmp_path: Path, made: ModuleType) -> Non
     assert "a Jacobian took" in found.report() and "at the start" in found.report()
 
 
+@pytest.mark.slow
 def test_a_stiffness_that_does_not_show_is_named(tmp_path: Path, made: ModuleType) -> None:
     """Of a fabric that hardly gives the recording tells a least stiffness; the other five are as before."""
     made.TRUE["cloth_warp"] = 4000.0

@@ -172,6 +172,7 @@ def test_a_finer_mesh_is_counted_where_it_can_be_made_and_named_where_not(tmp_pa
     assert step.name == "finer mesh" and 0 < step.left["rope_EI"] < 0.3 * abs(step.to_limit * step.moved["rope_EI"])
 
 
+@pytest.mark.slow
 def test_a_sheet_on_a_mesh_three_times_too_coarse_is_not_identified():
     """6 cells fitted to 18: drag comes out 32 % too low, four half-widths of an interval without the mesh."""
     recording = recorded(1 / 480, cells=18, noise=1e-4)

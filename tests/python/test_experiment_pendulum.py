@@ -14,6 +14,8 @@ from sheetbend.config.build import Study
 from sheetbend.minimum.problem import FitProblem, as_parameters
 from sheetbend.statistics.gauge import null_space
 
+pytestmark = pytest.mark.slow
+
 EXPERIMENTS = Path(__file__).resolve().parents[2] / "experiments"
 AUTHORS_LENGTH = 0.1527591  # a + I/(m a), m
 

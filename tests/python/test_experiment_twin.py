@@ -11,6 +11,8 @@ import sheetbend as sb
 from sheetbend.config import build, parse
 from sheetbend.config.build import Study
 
+pytestmark = pytest.mark.slow
+
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "twin"
 
 

@@ -250,6 +250,7 @@ class TestConclusion:
         with pytest.raises(sb.SheetbendError, match="diverges"):
             checked(bad, STIFFNESS, {}, 1)
 
+    @pytest.mark.slow
     def test_the_time_of_many_windows_is_told_also_of_one_recording(self) -> None:
         said: list[str] = []
         windows = ((0.5, 1.0), (0.06, 0.96))
@@ -259,6 +260,7 @@ class TestConclusion:
         (at,) = (k for k, text in enumerate(said) if text.startswith("the fit that counts, to 16 windows of 0.06 s"))
         assert said[at + 1].startswith("which takes about ")
 
+    @pytest.mark.slow
     def test_every_window_is_fitted_after_some(self) -> None:
         """Eighteen steps on 56 windows once took three times as long as all before."""
         said: list[str] = []

@@ -408,6 +408,7 @@ def test_recordings_of_different_lengths_and_gaps() -> None:
     np.testing.assert_allclose(covariance(residuals, np.ones((44, 1)), shifted).matrix, single.matrix)
 
 
+@pytest.mark.slow
 def test_loud_white_channels_do_not_hide_slow_quiet_ones() -> None:
     """A depth camera: along its view large white noise, across it small noise that is slow. What is fitted to the quiet
     channels alone must cover its truth; one autocorrelation for all channels gave 70 %."""

@@ -7,6 +7,7 @@ adjoint.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,14 +48,17 @@ def chains(length: Length, threads: int, count: int = 1) -> Ropes:
     return Ropes(scene, np.tile(scene.inputs(), (count, 1)), Solver(h=H, threads=threads), length.substeps)
 
 
-def lengths(work: int = WORK) -> list[Length]:
+def lengths(work: int = WORK, segments: Sequence[int] = SEGMENTS) -> list[Length]:
     """The ropes, at least three substeps each."""
-    return [Length(n, max(3, work // n)) for n in SEGMENTS]
+    return [Length(n, max(3, work // n)) for n in segments]
 
 
-def measure_chain(threads: int = 1, repeats: int = 5, work: int = WORK) -> dict[str, Any]:
+def measure_chain(
+    threads: int = 1, repeats: int = 5, work: int = WORK, segments: Sequence[int] = SEGMENTS
+) -> dict[str, Any]:
     """Rows of ns per segment and substep, and the batch against one rope at a time."""
-    rows = [_row(length, threads, repeats) for length in lengths(work)]
+    ropes = lengths(work, segments)
+    rows = [_row(length, threads, repeats) for length in ropes]
     longest = rows[-1]
     return {
         "workload": "chain",
@@ -69,7 +73,7 @@ def measure_chain(threads: int = 1, repeats: int = 5, work: int = WORK) -> dict[
         "batch": _batch(threads, repeats, max(2, BATCH_SUBSTEPS * work // WORK)),
         "gradient_error": gradient_error(),
         "gradient_error_bound": BOUND,
-        "peak_mb": in_fresh_process(_peak_mb, lengths(work)[-1], threads),
+        "peak_mb": in_fresh_process(_peak_mb, ropes[-1], threads),
         "sheetbend": __version__,
         "machine": machine(),
     }
