@@ -15,7 +15,8 @@ struct Equilibrium::Parts {
 };
 
 Equilibrium::Equilibrium(const Scene& scene, std::span<const double> values, std::span<const double> start)
-    : parts_(new Parts{scene, checked_values(*Model::of(scene), values), checked_inputs(*Model::of(scene), values), {}}) {
+    : parts_(
+          new Parts{scene, checked_values(*Model::of(scene), values), checked_inputs(*Model::of(scene), values), {}}) {
   const sheetbend::Scene& topology = parts_->model().topology;
   if (!start.empty()) check_size("start", start.size(), static_cast<std::size_t>(topology.dofs()));
   check_finite("start", start);

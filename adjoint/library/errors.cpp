@@ -12,7 +12,8 @@ InputError::InputError(std::string field, std::string problem, std::string fix)
 
 InputError refusal(const std::string& message, const std::string& field) {
   const std::size_t colon = message.find(": "), fix = message.find(". Fix: ");
-  if (colon == message.npos || fix == message.npos || fix < colon) return {field.empty() ? "input" : field, message, "see above"};
+  if (colon == message.npos || fix == message.npos || fix < colon)
+    return {field.empty() ? "input" : field, message, "see above"};
   const std::string where = message.substr(0, colon);
   return {field.empty() ? where : field + ": " + where, message.substr(colon + 2, fix - colon - 2),
           message.substr(fix + 7)};

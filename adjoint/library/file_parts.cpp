@@ -39,7 +39,8 @@ std::uint32_t crc32(const char* data, std::size_t size) {
   return ~c;
 }
 
-// A header without depth limit could be a million lists in each other. Of a key that is there twice the last one counts, as in Python.
+// A header without depth limit could be a million lists in each other. Of a key that is there twice the last one
+// counts, as in Python.
 Json parsed(const char* begin, const char* end) {
   return Json::parse(begin, end, [](int depth, Json::parse_event_t, const Json&) {
     if (depth > deepest) throw std::length_error("too many levels");
@@ -52,7 +53,8 @@ long printable_length(const std::string& text) {
   long count = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {
     const auto c = static_cast<unsigned char>(text[i]);
-    if (c < 0x20 || c == 0x7F || (c == 0xC2 && i + 1 < text.size() && static_cast<unsigned char>(text[i + 1]) < 0xA0)) return -1;
+    if (c < 0x20 || c == 0x7F || (c == 0xC2 && i + 1 < text.size() && static_cast<unsigned char>(text[i + 1]) < 0xA0))
+      return -1;
     count += (c & 0xC0) != 0x80;  // not the bytes that continue a code point
   }
   return count;
@@ -83,7 +85,8 @@ FileParts::FileParts(const std::filesystem::path& path) : path_(path.string()) {
   if (size < prefix || !file.read(head, prefix) || std::string_view(head, magic.size()) != magic)
     fail("file", "is no scene file", own);
   if (const auto found = read_as<std::uint32_t>(head + 8); found != version)
-    fail("version", "is " + std::to_string(found), "write it again with this version, which reads " + std::to_string(version));
+    fail("version", "is " + std::to_string(found),
+         "write it again with this version, which reads " + std::to_string(version));
   if (size > free_memory() / 2) fail("file", "does not fit in the free memory", "use a larger machine");
   const auto length = read_as<std::uint64_t>(head + 16);
   if (length > longest_header || length > size - prefix) fail("header", "is longer than the file or than any header");
@@ -168,7 +171,8 @@ const char* FileParts::place(const std::string& name, const char* type, std::siz
   const Json& about = object(object(header_, "arrays"), name, "arrays.");
   const Json& shape = list(about, "shape", name + ".");
   if (text(about, "type", name + ".") != type || shape.size() != (columns == 0 ? 1 : 2))
-    fail(name, std::string("must be of type ") + type + (columns == 0 ? " with one dimension" : " with two dimensions"));
+    fail(name,
+         std::string("must be of type ") + type + (columns == 0 ? " with one dimension" : " with two dimensions"));
   const auto length = [&](std::size_t i) {
     const auto n = shape[i].is_number_integer() ? shape[i].get<long long>() : -1;
     if (n < 0) fail(name + ".shape", "must be whole numbers from 0 on");

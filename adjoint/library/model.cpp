@@ -38,7 +38,8 @@ std::vector<double> checked_inputs(const Model& model, std::span<const double> v
   model.map.apply(theta.data(), inputs.data());
   for (std::size_t i = 0; i < inputs.size(); ++i)
     if (!(inputs[i] >= model.least[i] && inputs[i] <= model.most[i]))
-      throw InputError("values", "make the " + library::describe_input(model.topology, i) + " " + std::to_string(inputs[i]),
+      throw InputError("values",
+                       "make the " + library::describe_input(model.topology, i) + " " + std::to_string(inputs[i]),
                        "give values that leave it in its range");
   return inputs;
 }
@@ -47,8 +48,10 @@ SolverOptions options_of(const Solver& s) {
   const auto refuse_unless = [](bool ok, const char* field, const char* problem, const char* fix) {
     if (!ok) throw InputError(field, problem, fix);
   };
-  refuse_unless(std::isfinite(s.h) && s.h > 0.0, "solver.h", "must be a positive time in s", "give the substep, such as 1/600");
-  refuse_unless(s.iterations >= 0, "solver.iterations", "must not be negative", "give at least 1, or 0 for the method's own");
+  refuse_unless(std::isfinite(s.h) && s.h > 0.0, "solver.h", "must be a positive time in s",
+                "give the substep, such as 1/600");
+  refuse_unless(s.iterations >= 0, "solver.iterations", "must not be negative",
+                "give at least 1, or 0 for the method's own");
   refuse_unless(s.threads >= 1 && s.grain >= 1 && s.cg_iterations >= 1, "solver.threads, grain, cg_iterations",
                 "must be positive", "give at least 1");
   for (const double tolerance : {s.force_tolerance, s.cg_tolerance})
@@ -86,8 +89,7 @@ Plan plan_of(const Model& model, const Solver& solver) {
   }
   if (solver.method == Method::direct && options.iterations == 1 &&
       std::ranges::any_of(model.groups, [](const Group& g) { return g.kind == "shear"; }))
-    throw InputError("solver.iterations", "1 loses up to half of the digits of gradients of rods that shear",
-                     "use 2");
+    throw InputError("solver.iterations", "1 loses up to half of the digits of gradients of rods that shear", "use 2");
   return translated([&] { return make_plan(model.topology, options); });
 }
 

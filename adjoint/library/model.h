@@ -1,4 +1,5 @@
-// What stands behind the public types: a scene with the map from its quantities, and how the library's own errors become public ones.
+// What stands behind the public types: a scene with the map from its quantities, and how the library's own errors
+// become public ones.
 #pragma once
 
 #include <sheetbend/scene.h>

@@ -13,8 +13,9 @@ constexpr double huge = std::numeric_limits<double>::max(), tiny = std::numeric_
 }  // namespace
 
 bool not_negative(Quantity array) {
-  constexpr Quantity all[]{Quantity::mass,           Quantity::compliance, Quantity::damping,       Quantity::drag_linear,
-                           Quantity::drag_quadratic, Quantity::air_normal, Quantity::air_tangential, Quantity::volume_compliance};
+  constexpr Quantity all[]{Quantity::mass,           Quantity::compliance,       Quantity::damping,
+                           Quantity::drag_linear,    Quantity::drag_quadratic,   Quantity::air_normal,
+                           Quantity::air_tangential, Quantity::volume_compliance};
   return std::ranges::find(all, array) != std::end(all);
 }
 
@@ -37,7 +38,8 @@ Ranges ranges_of(const Scene& scene) {
         if (K::compliance.never_zero) r.least[layout.of(Quantity::compliance) + g.first + i] = tiny;
         if (!g.damped) r.most[layout.of(Quantity::damping) + g.first + i] = 0.0;
         for (int k = 0; k < g.parameters; ++k) {
-          const std::size_t at = layout.of(Quantity::rest) + g.first_value + static_cast<std::size_t>(i) * g.parameters + k;
+          const std::size_t at =
+              layout.of(Quantity::rest) + g.first_value + static_cast<std::size_t>(i) * g.parameters + k;
           r.least[at] = K::parameters[k].range.least, r.most[at] = K::parameters[k].range.most;
         }
       }
@@ -61,12 +63,14 @@ std::string describe_input(const Scene& scene, std::size_t input) {
     case Quantity::damping:
       for (const sheetbend::Group& g : scene.groups)
         if (static_cast<int>(i) < g.first + g.count)
-          return array + " of constraint " + std::to_string(static_cast<int>(i) - g.first) + " of group '" + g.name + "'";
+          return array + " of constraint " + std::to_string(static_cast<int>(i) - g.first) + " of group '" + g.name +
+                 "'";
       break;
     case Quantity::rest:
       for (const sheetbend::Group& g : scene.groups)
         if (i < g.first_value + static_cast<std::size_t>(g.count) * g.parameters)
-          return array + " of constraint " + std::to_string((i - g.first_value) / g.parameters) + " of group '" + g.name + "'";
+          return array + " of constraint " + std::to_string((i - g.first_value) / g.parameters) + " of group '" +
+                 g.name + "'";
       break;
     default: break;
   }

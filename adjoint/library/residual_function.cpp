@@ -16,7 +16,8 @@ void check(const Observations& o, const sheetbend::Scene& scene) {
   if (o.times.front() < 0.0 || !std::ranges::is_sorted(o.times))
     throw InputError("observed.times", "must be ascending from 0 or later", "give s on the scene's clock");
   if (o.at_rest && o.times.size() != 1)
-    throw InputError("observed.times", "are several, and an equilibrium has one frame", "give each shape as a recording of its own");
+    throw InputError("observed.times", "are several, and an equilibrium has one frame",
+                     "give each shape as a recording of its own");
   check_size("observed.positions", o.positions.size(), 3 * o.times.size() * o.markers.size());
   for (std::size_t i = 0; i < o.positions.size(); i += 3) {
     const auto here = std::span(o.positions).subspan(i, 3);

@@ -16,7 +16,8 @@ std::vector<int> substeps(std::span<const double> times, double h) {
   std::vector<int> steps;
   double before = 0.0;
   for (const double t : times) {
-    if (!(t >= before) || !std::isfinite(t)) throw InputError("times", "must be ascending from 0 or later", "sort them");
+    if (!(t >= before) || !std::isfinite(t))
+      throw InputError("times", "must be ascending from 0 or later", "sort them");
     before = t;
     const double step = std::nearbyint(t / h);
     if (std::abs(t / h - step) > 1e-6 * std::max(step, 1.0))
@@ -40,7 +41,8 @@ struct Rollout::Parts {
   const Model& model() const { return *Model::of(scene); }
 };
 
-Rollout::Rollout(const Scene& scene, std::span<const double> times, const Solver& solver, std::span<const double> values)
+Rollout::Rollout(const Scene& scene, std::span<const double> times, const Solver& solver,
+                 std::span<const double> values)
     : parts_(new Parts{scene, plan_of(*Model::of(scene), solver), {}, {}, {}, {}, {}, {}}) {
   Parts& p = *parts_;
   const Model& model = p.model();
@@ -51,8 +53,8 @@ Rollout::Rollout(const Scene& scene, std::span<const double> times, const Solver
   p.positions.resize(p.steps.size() * static_cast<std::size_t>(model.topology.dofs()));
   translated([&] {
     const TapePlan plan = plan_tape<double>(model.topology, p.plan, p.steps.back(), p.steps.size(), 1, solver.memory);
-    p.tape.emplace(record_rollout(model.topology, p.plan, p.inputs.data(), 0.0, p.steps, p.positions.data(), plan.states,
-                                  nullptr));
+    p.tape.emplace(record_rollout(model.topology, p.plan, p.inputs.data(), 0.0, p.steps, p.positions.data(),
+                                  plan.states, nullptr));
   });
 }
 
@@ -65,7 +67,8 @@ std::span<const double> Rollout::positions() const { return parts_->positions; }
 
 std::span<const double> Rollout::frame(std::size_t i) const {
   if (i >= parts_->times.size())
-    throw InputError("frame", std::to_string(i) + " does not exist", "give less than " + std::to_string(parts_->times.size()));
+    throw InputError("frame", std::to_string(i) + " does not exist",
+                     "give less than " + std::to_string(parts_->times.size()));
   const auto dofs = static_cast<std::size_t>(parts_->model().topology.dofs());
   return positions().subspan(i * dofs, dofs);
 }

@@ -50,17 +50,20 @@ class SceneReader {
     }
   }
 
-  static bool given(const Json& record, const char* key) {
-    return record.contains(key) && !record[key].is_null();
-  }
+  static bool given(const Json& record, const char* key) { return record.contains(key) && !record[key].is_null(); }
 
   std::vector<v0::Quantity> quantities() {
     constexpr double huge = std::numeric_limits<double>::max();
     std::vector<v0::Quantity> found;
     std::set<std::string> names;
     for_each_record("quantities", [&](const Json& q, const std::string&, const std::string& where) {
-      v0::Quantity quantity{file_.name(q, "name", where), file_.number(q, "value", where), file_.name(q, "unit", where),
-                            file_.flag(q, "positive", where), 0.0, -huge, huge};
+      v0::Quantity quantity{file_.name(q, "name", where),
+                            file_.number(q, "value", where),
+                            file_.name(q, "unit", where),
+                            file_.flag(q, "positive", where),
+                            0.0,
+                            -huge,
+                            huge};
       if (given(q, "scale")) quantity.scale = file_.number(q, "scale", where);
       if (given(q, "limits")) {
         const auto& limits = file_.list(q, "limits", where);
@@ -91,7 +94,8 @@ class SceneReader {
     const auto& position = file_.list(layout, "position", "layout.");
     const long long size = position.size() == 2 && position[1].is_number_integer() ? position[1].get<long long>() : 0;
     base_ = file_.numbers("base");
-    if (size <= 0 || size > static_cast<long long>(base_.size()) || size % 3 != 0 || size > std::numeric_limits<int>::max())
+    if (size <= 0 || size > static_cast<long long>(base_.size()) || size % 3 != 0 ||
+        size > std::numeric_limits<int>::max())
       file_.fail("layout.position", "is no place");
     spec.particles = static_cast<int>(size / 3);
     const std::vector<int> directors = file_.whole_numbers("directors", 4);
@@ -114,8 +118,7 @@ class SceneReader {
     spec.air = triangles("air");
     std::set<std::string> names;
     for_each_record("groups", [&](const Json& g, const std::string& i, const std::string& where) {
-      GroupSpec group{file_.name(g, "name", where), file_.name(g, "kind", where),
-                      file_.flag(g, "damped", where), {}};
+      GroupSpec group{file_.name(g, "name", where), file_.name(g, "kind", where), file_.flag(g, "damped", where), {}};
       int arity = 0;
       with_kind(kind_of(group.kind), [&]<class K>(K) { arity = K::arity; });
       group.stencil = file_.whole_numbers("stencil_" + i, arity, file_.whole(g, "count", where));

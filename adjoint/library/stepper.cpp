@@ -46,7 +46,8 @@ void Stepper::step(std::span<const double> driven) {
   check_finite("driven", driven);
   // One knot holds at all times; its values are the first ones of the array.
   if (!driven.empty()) p.topology.boundary.times.resize(1);
-  std::ranges::copy(driven, p.inputs.begin() + static_cast<std::ptrdiff_t>(p.topology.layout.of(sheetbend::Quantity::boundary)));
+  std::ranges::copy(
+      driven, p.inputs.begin() + static_cast<std::ptrdiff_t>(p.topology.layout.of(sheetbend::Quantity::boundary)));
   step();
 }
 
@@ -61,7 +62,8 @@ std::span<double> Stepper::input(std::string_view name) {
     throw InputError("input", "'" + std::string(name) + "' cannot change between steps",
                      "change force, gravity, wind or pressure, or make another stepper");
   if (a.size == 0)
-    throw InputError("input", "the scene has no " + std::string(name), "make the scene with it, such as a force of zero");
+    throw InputError("input", "the scene has no " + std::string(name),
+                     "make the scene with it, such as a force of zero");
   return std::span(parts_->inputs).subspan(a.offset, a.size);
 }
 

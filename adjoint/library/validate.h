@@ -13,7 +13,8 @@ struct Fault {
   std::string field, problem, fix;
 };
 
-// The first thing that is wrong, if anything: nothing that can move, massless particles, particles connected to nothing.
+// The first thing that is wrong, if anything: nothing that can move, massless particles, particles connected to
+// nothing.
 std::optional<Fault> fault_of(const Scene& scene, const ParameterMap& map);
 
 }  // namespace sheetbend::library

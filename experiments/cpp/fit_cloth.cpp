@@ -8,7 +8,7 @@
 #include <fstream>
 #include <sstream>
 
-// A table "time,12_x,12_y,12_z,40_x,...": markers by the particle that they sit on; cells are empty where one was not seen.
+// A table "time,12_x,12_y,12_z,40_x,...": markers by the particle that they sit on, empty cells where one was not seen.
 sheetbend::Observations read_table(const char* path) {
   sheetbend::Observations observed;
   std::ifstream file(path);
@@ -43,7 +43,8 @@ int main(int count, char** arguments) {
     ceres::Problem problem;  // owns the residuals
     problem.AddResidualBlock(residuals, nullptr, blocks);
     ceres::Solver::Options options;
-    options.function_tolerance = options.gradient_tolerance = options.parameter_tolerance = 1e-16;  // to the last digits
+    // To the last digits.
+    options.function_tolerance = options.gradient_tolerance = options.parameter_tolerance = 1e-16;
     ceres::Solver::Summary summary;
     ceres::Solve(options, &problem, &summary);
 

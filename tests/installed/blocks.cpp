@@ -1,4 +1,5 @@
-// Residuals as blocks of a problem of Ceres: gradients of two recordings alone and together, a constant block, a point without an answer.
+// Residuals as blocks of a problem of Ceres: gradients of two recordings alone and together, a constant block, a point
+// without an answer.
 #include <ceres/ceres.h>
 #include <sheetbend/residuals.h>
 
@@ -9,7 +10,8 @@ int main(int, char** arguments) {
   return shown([&] {
     const Scene scene = Scene::load(arguments[1]);
     const auto residuals = [&](double x) {
-      const Observations observed{.times = {0.02, 0.05}, .markers = {Marker::on(4)}, .positions = {x, 0.0, 0.1, x, 0.1, 0.1}};
+      const Observations observed{
+          .times = {0.02, 0.05}, .markers = {Marker::on(4)}, .positions = {x, 0.0, 0.1, x, 0.1, 0.1}};
       return new Residuals(scene, observed, {.h = 1e-3}, {"rope_EI", "rope_density"});
     };
     double EI = 2e-3, density = 0.04;
@@ -31,6 +33,7 @@ int main(int, char** arguments) {
     const bool found = block->Evaluate(at, r, all) && block->Evaluate(at, r, second) && block->Evaluate(at, r, nullptr);
     std::printf("untouched %d\n", found && std::equal(part, part + 6, whole[1]));
     EI = -1.0;
-    std::printf("refused %d\n", !block->Evaluate(at, r, nullptr) && block->function().failure().find("compliance") != std::string::npos);
+    std::printf("refused %d\n", !block->Evaluate(at, r, nullptr) &&
+                                    block->function().failure().find("compliance") != std::string::npos);
   });
 }

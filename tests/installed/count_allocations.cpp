@@ -1,4 +1,5 @@
-// Counts every allocation of a program, and says at its end how many there were. Eigen and the C library allocate without operator new.
+// Counts every allocation of a program, and says at its end how many there were. Eigen and the C library allocate
+// without operator new.
 #include <atomic>
 #include <cstddef>
 #include <cstdio>
@@ -15,8 +16,9 @@ struct AtEnd {
 
 void* counted(std::size_t size, std::size_t alignment = alignof(std::max_align_t)) {
   ++allocations;
-  void* p = alignment <= alignof(std::max_align_t) ? std::malloc(size)
-                                                   : std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
+  void* p = alignment <= alignof(std::max_align_t)
+                ? std::malloc(size)
+                : std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
   if (!p) throw std::bad_alloc();
   return p;
 }

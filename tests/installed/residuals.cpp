@@ -1,5 +1,6 @@
-// Residuals, Jacobian and simulated markers at the scene's own values and 5 % above: residuals SCENE OBSERVED [loss=...] [rest] [hanging] [linear]
-// [key=value...] QUANTITY... OBSERVED: numbers of frames and markers, per marker two particles and a fraction, times, positions.
+// Residuals, Jacobian and simulated markers at the scene's own values and 5 % above: residuals SCENE OBSERVED
+// [loss=...] [rest] [hanging] [linear] [key=value...] QUANTITY... OBSERVED: numbers of frames and markers, per marker
+// two particles and a fraction, times, positions.
 #include <cmath>
 #include <fstream>
 
@@ -29,12 +30,18 @@ int main(int count, char** arguments) {
     Scale scale = Scale::logarithmic;
     for (int i = 3; i < count; ++i) {
       const std::string argument = arguments[i];
-      if (argument == "loss=huber") observed.loss = Loss::huber, observed.loss_scale = 1.5;
-      else if (argument == "loss=soft_l1") observed.loss = Loss::soft_l1, observed.loss_scale = 1.5;
-      else if (argument == "rest") observed.at_rest = true;
-      else if (argument == "hanging") observed.starts_at_rest = true;
-      else if (argument == "linear") scale = Scale::linear;
-      else if (argument.find('=') == argument.npos) parameters.emplace_back(argument, scale);
+      if (argument == "loss=huber")
+        observed.loss = Loss::huber, observed.loss_scale = 1.5;
+      else if (argument == "loss=soft_l1")
+        observed.loss = Loss::soft_l1, observed.loss_scale = 1.5;
+      else if (argument == "rest")
+        observed.at_rest = true;
+      else if (argument == "hanging")
+        observed.starts_at_rest = true;
+      else if (argument == "linear")
+        scale = Scale::linear;
+      else if (argument.find('=') == argument.npos)
+        parameters.emplace_back(argument, scale);
     }
     const ResidualFunction function(scene, observed, solver_of(count, arguments), parameters);
     std::vector<double> u = function.start();
@@ -50,7 +57,8 @@ int main(int count, char** arguments) {
       print("jacobian" + at, jacobian);
       print("simulated" + at, function.simulate(u));
     }
-    std::vector<double> nowhere(u.size(), scale == Scale::linear ? -1.0 : 800.0), residual(static_cast<std::size_t>(function.rows()));
+    std::vector<double> nowhere(u.size(), scale == Scale::linear ? -1.0 : 800.0),
+        residual(static_cast<std::size_t>(function.rows()));
     const bool ok = function.evaluate(nowhere, residual.data());
     std::printf("nowhere %d %s\n", ok, function.failure().c_str());
   });

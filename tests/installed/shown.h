@@ -1,4 +1,5 @@
-// What the programs of the tests have in common: bits of numbers on standard output, solvers from arguments, errors part by part.
+// What the programs of the tests have in common: bits of numbers on standard output, solvers from arguments, errors
+// part by part.
 #pragma once
 
 #include <sheetbend/sheetbend.h>
@@ -12,7 +13,8 @@
 
 inline void print(const std::string& name, std::span<const double> numbers) {
   std::printf("%s", name.c_str());
-  for (const double x : numbers) std::printf(" %016llx", static_cast<unsigned long long>(std::bit_cast<std::uint64_t>(x)));
+  for (const double x : numbers)
+    std::printf(" %016llx", static_cast<unsigned long long>(std::bit_cast<std::uint64_t>(x)));
   std::printf("\n");
 }
 

@@ -1,5 +1,6 @@
-// Steps a scene that has a knot of its driven motion and of its forces at every substep, with these numbers written from outside, and once more from a
-// state on the way: stepping SCENE STEPS [own] [key=value...]. With `own` the scene's own motion and forces act.
+// Steps a scene that has a knot of its driven motion and of its forces at every substep, with these numbers written
+// from outside, and once more from a state on the way: stepping SCENE STEPS [own] [key=value...]. With `own` the
+// scene's own motion and forces act.
 #include <utility>
 
 #include "shown.h"
@@ -16,7 +17,8 @@ int main(int count, char** arguments) {
       const Array a = scene.array(name);
       return std::span(inputs).subspan(a.offset + 3 * columns * static_cast<std::size_t>(n), 3 * columns);
     };
-    const std::size_t driven = scene.driven().size(), loaded = scene.array("force").size / 3 / (static_cast<std::size_t>(steps) + 1);
+    const std::size_t driven = scene.driven().size(),
+                      loaded = scene.array("force").size / 3 / (static_cast<std::size_t>(steps) + 1);
     const auto step = [&] {
       if (own) return stepper.step();
       const int next = stepper.substep() + 1;

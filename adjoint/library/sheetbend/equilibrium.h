@@ -26,8 +26,8 @@ class SHEETBEND_API Equilibrium {
   double energy() const;                      ///< elastic, and of weight and forces [J]
   int unstable_modes() const;                 ///< negative eigenvalues of the energy's Hessian; 0 where it is stable
 
-  /// The gradient of a loss whose derivatives with respect to the positions are positions_bar (particles, 3), found with
-  /// the implicit function theorem. @throws ConvergenceError  at a fold, or where a part moves freely.
+  /// The gradient of a loss whose derivatives with respect to the positions are positions_bar (particles, 3), found
+  /// with the implicit function theorem. @throws ConvergenceError  at a fold, or where a part moves freely.
   Gradient gradient(std::span<const double> positions_bar) const;
 
   /// How the positions (particles, 3) change when the values change by values_dot.
@@ -38,4 +38,4 @@ class SHEETBEND_API Equilibrium {
   std::unique_ptr<Parts> parts_;
 };
 
-}  // namespace sheetbend::SHEETBEND_INLINE v0
+}  // namespace sheetbend::inline v0

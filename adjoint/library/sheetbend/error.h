@@ -50,4 +50,4 @@ class SHEETBEND_API ConvergenceError : public Error {
   using Error::Error;
 };
 
-}  // namespace sheetbend::SHEETBEND_INLINE v0
+}  // namespace sheetbend::inline v0

@@ -22,13 +22,13 @@ struct Marker {
   }
 };
 
-/// Robust losses of a marker's distance, in units of sigma times loss_scale: squares, Huber's loss (1964), and its smooth
-/// form soft L1. They count marker by marker, where a ceres::LossFunction counts a residual block as a whole.
+/// Robust losses of a marker's distance, in units of sigma times loss_scale: squares, Huber's loss (1964), and its
+/// smooth form soft L1. They count marker by marker, where a ceres::LossFunction counts a residual block as a whole.
 enum class Loss { squares, soft_l1, huber };
 
 /// A recording of markers.
 struct Observations {
-  std::vector<double> times;      ///< (frames) [s], ascending; on the scene's clock, which starts at 0, off the substeps too
+  std::vector<double> times;      ///< (frames) [s], ascending; on the scene's clock from 0 on, off the substeps too
   std::vector<Marker> markers;    ///< where they sit on the scene
   std::vector<double> positions;  ///< (frames, markers, 3) [m], row by row; three NaN where a marker was not seen
   double sigma = 1e-3;            ///< expected error of a marker [m], by which residuals are divided
@@ -38,4 +38,4 @@ struct Observations {
   bool starts_at_rest = false;  ///< the motion starts from the scene's equilibrium
 };
 
-}  // namespace sheetbend::SHEETBEND_INLINE v0
+}  // namespace sheetbend::inline v0

@@ -32,8 +32,8 @@ class SHEETBEND_API ResidualFunction {
  public:
   /// @param scene       stays alive for as long as this function
   /// @param observed    the recording
-  /// @param solver      how the motion is stepped; its threads share the columns of the Jacobian, and its `memory` has no
-  ///                    meaning, since tangents keep no tape
+  /// @param solver      how the motion is stepped; its threads share the columns of the Jacobian, and its `memory` has
+  ///                    no meaning, since tangents keep no tape
   /// @param parameters  in the order in which they enter
   /// @throws InputError  unknown parameters, a logarithm of what need not be positive, sizes that do not fit, nothing
   ///   observed.
@@ -52,8 +52,8 @@ class SHEETBEND_API ResidualFunction {
   /// @param u         (parameters), on their scales
   /// @param residual  frame by frame, in it marker by marker, x, y and z
   /// @param jacobian  or null
-  /// @return false where the physics has no answer at u: divergence, no equilibrium, a negative stiffness; `failure` then
-  ///   says why.
+  /// @return false where the physics has no answer at u: divergence, no equilibrium, a negative stiffness; `failure`
+  ///   then says why.
   /// @throws InputError  u has a wrong size.
   bool evaluate(std::span<const double> u, double* residual, double* jacobian = nullptr) const;
 
@@ -72,4 +72,4 @@ class SHEETBEND_API ResidualFunction {
   std::unique_ptr<Parts> parts_;
 };
 
-}  // namespace sheetbend::SHEETBEND_INLINE v0
+}  // namespace sheetbend::inline v0

@@ -31,7 +31,8 @@ class Residuals : public ceres::CostFunction {
 
   /// The residuals, and the Jacobian's column of each block that wants it.
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    const auto rows = static_cast<std::size_t>(function_.rows()), columns = static_cast<std::size_t>(function_.parameters());
+    const auto rows = static_cast<std::size_t>(function_.rows()),
+               columns = static_cast<std::size_t>(function_.parameters());
     std::vector<double> u(columns), jacobian(jacobians ? rows * columns : 0);
     for (std::size_t k = 0; k < columns; ++k) u[k] = *parameters[k];
     if (!function_.evaluate(u, residuals, jacobians ? jacobian.data() : nullptr)) return false;
@@ -47,4 +48,4 @@ class Residuals : public ceres::CostFunction {
   ResidualFunction function_;
 };
 
-}  // namespace sheetbend::SHEETBEND_INLINE v0
+}  // namespace sheetbend::inline v0

@@ -50,8 +50,8 @@ class SHEETBEND_API Rollout {
   /// The positions of one frame, (particles, 3).
   std::span<const double> frame(std::size_t i) const;
 
-  /// The gradient of a loss whose derivatives with respect to the positions are positions_bar (frames, particles, 3): one
-  /// reverse pass, whatever the number of inputs.
+  /// The gradient of a loss whose derivatives with respect to the positions are positions_bar (frames, particles, 3):
+  /// one reverse pass, whatever the number of inputs.
   /// @throws InputError  a wrong size, or numbers that are not finite.
   /// @throws DivergenceError  the gradient grew so much on its way back that rounding decides it.
   Gradient gradient(std::span<const double> positions_bar) const;
@@ -68,4 +68,4 @@ class SHEETBEND_API Rollout {
 /// leaves them out, and their multipliers are not unique.
 SHEETBEND_API std::string redundant_constraints(const Scene& scene, const Solver& solver = {});
 
-}  // namespace sheetbend::SHEETBEND_INLINE v0
+}  // namespace sheetbend::inline v0

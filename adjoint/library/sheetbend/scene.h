@@ -43,11 +43,12 @@ struct Array {
   std::size_t offset, size;
 };
 
-/// A scene that is ready to be simulated. It cannot be changed; copies share it, and threads may use it at the same time.
+/// A scene that is ready to be simulated. It cannot be changed; copies share it, and threads may use it at the same
+/// time.
 class SHEETBEND_API Scene {
  public:
-  /// Reads the file that `sheetbend.save_scene` of the Python package writes (docs/scene_file.md). Every part of the file
-  /// is checked, and no more memory is taken than in proportion to its size.
+  /// Reads the file that `sheetbend.save_scene` of the Python package writes (docs/scene_file.md). Every part of the
+  /// file is checked, and no more memory is taken than in proportion to its size.
   /// @throws InputError  the file cannot be read, is damaged or of another version, or holds an inconsistent scene.
   static Scene load(const std::filesystem::path& path);
 
@@ -82,4 +83,4 @@ class SHEETBEND_API Scene {
   std::shared_ptr<const Model> model_;
 };
 
-}  // namespace sheetbend::SHEETBEND_INLINE v0
+}  // namespace sheetbend::inline v0

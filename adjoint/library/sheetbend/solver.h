@@ -38,4 +38,4 @@ struct Solver {
   std::size_t memory = std::numeric_limits<std::size_t>::max();
 };
 
-}  // namespace sheetbend::SHEETBEND_INLINE v0
+}  // namespace sheetbend::inline v0

@@ -24,8 +24,8 @@ struct State {
 /// Steps a scene from its initial state. The same substeps as those of a Rollout, bit by bit, while its inputs are left
 /// as they are.
 ///
-/// Memory is taken when a stepper is made. With one thread and the methods `direct` or `gauss_seidel` a step takes none,
-/// and neither does `restore`, nor `save` to a State that was saved to before.
+/// Memory is taken when a stepper is made. With one thread and the methods `direct` or `gauss_seidel` a step takes
+/// none, and neither does `restore`, nor `save` to a State that was saved to before.
 class SHEETBEND_API Stepper {
  public:
   /// @param scene   stays alive for as long as the stepper
@@ -60,8 +60,8 @@ class SHEETBEND_API Stepper {
   std::span<double> input(std::string_view array);
 
   void save(State& state) const;
-  /// Goes on from a state that a stepper of the same scene saved; the same bits follow. What was written to `input`, and
-  /// where driven particles were put last, stays.
+  /// Goes on from a state that a stepper of the same scene saved; the same bits follow. What was written to `input`,
+  /// and where driven particles were put last, stays.
   /// @throws InputError  sizes of another scene, or numbers that are not finite.
   void restore(const State& state);
 
@@ -70,4 +70,4 @@ class SHEETBEND_API Stepper {
   std::unique_ptr<Parts> parts_;
 };
 
-}  // namespace sheetbend::SHEETBEND_INLINE v0
+}  // namespace sheetbend::inline v0
