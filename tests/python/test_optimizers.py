@@ -11,7 +11,7 @@ import pytest
 import sheetbend as sb
 import sheetbend.minimum.search as search
 from pytest import approx
-from sheetbend.doubts import conclude
+from sheetbend.doubts import profiles
 from sheetbend.minimum import discretization, optimizers
 from sheetbend.minimum.discretization import Refinement
 from sheetbend.minimum.optimizers import Progress, has_ceres, minimize
@@ -151,7 +151,8 @@ def test_an_interrupted_fit_refits_nothing(optimizer, monkeypatch):
     def never(*_: object, **__: object) -> None:
         raise AssertionError("a refit after Ctrl-C")
 
-    monkeypatch.setattr(conclude, "refit", never)
+    monkeypatch.setattr(profiles, "refit", never)
+    monkeypatch.setattr(profiles, "ProfilePath", never)
     monkeypatch.setattr(discretization, "refined_estimates", never)
     monkeypatch.setattr(discretization, "settle", never)
     found = sb.fit([swinging()], parameters=WANTED, optimizer=optimizer, progress=interrupt_at(2))

@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 
 from ..arrays.timeseries import Array
 from ..errors import InputError
+from .autoregression import levinson, spectrum_of
 
 Integers = NDArray[np.integer[Any]]
 
@@ -294,13 +295,13 @@ def _spectral(grid: _Grid, jacobian: Array, root: Array, kinds: Integers) -> tup
     power = np.abs(grid.transform(grid.residuals)) ** 2
     orders, observed = [], []
     for mine, count in zip(own, rows, strict=True):
-        recursion = _levinson(grid.lags(power[:, mine].sum(1), most) / count)
+        recursion = levinson(grid.lags(power[:, mine].sum(1), most) / count)
         alike = mixing[np.ix_(mine, mine)]
         worth = count * np.trace(alike) ** 2 / (len(alike) * (alike**2).sum())  # rows that are worth an independent one
         price = np.log(worth) if len(own) == 1 else 2.0  # a slow part under white noise takes many coefficients
         criteria = [worth * np.log(noise) + price * len(a) for a, noise in recursion]
         orders.append(int(np.argmin(criteria)))
-        observed.append(_spectrum(*recursion[orders[-1]], grid.length))
+        observed.append(spectrum_of(*recursion[orders[-1]], grid.length))
     seen = np.abs(grid.transform(grid.mask)) ** 2
     pairs = [grid.lags(seen[:, mine] @ np.diag(mixing)[mine], most) for mine in own]
     spectra = observed
@@ -312,7 +313,7 @@ def _spectral(grid: _Grid, jacobian: Array, root: Array, kinds: Integers) -> tup
         if step < _CORRECTIONS:
             expected = _expected_lags(grid, spectra, pairs, parts, spread, inner)
             spectra = [
-                spectrum * first / _spectrum(*_levinson(lags / count)[order], grid.length)
+                spectrum * first / spectrum_of(*levinson(lags / count)[order], grid.length)
                 for spectrum, first, lags, count, order in zip(spectra, observed, expected, rows, orders, strict=True)
             ]
     time = max(float(spectra[0][0] / np.fft.irfft(spectra[0], grid.length)[0]), 1.0)
@@ -359,24 +360,6 @@ def _lagged(first: Array, second: Array, count: int) -> Array:
     frames = len(first)
     x, y = np.ascontiguousarray(first).reshape(frames, -1), np.ascontiguousarray(second).reshape(frames, -1)
     return np.array([np.vdot(x[: frames - lag], y[lag:]) if lag < frames else 0.0 for lag in range(count)])
-
-
-def _levinson(lags: Array) -> list[tuple[Array, float]]:
-    """Autoregressive coefficients and innovation variance of every order from 0 (Levinson's recursion)."""
-    coefficients, noise = np.zeros(0), float(lags[0])
-    fits = [(coefficients, noise)]
-    for order in range(1, len(lags)):
-        reflection = (lags[order] - coefficients @ lags[order - 1 : 0 : -1]) / noise
-        coefficients = np.append(coefficients - reflection * coefficients[::-1], reflection)
-        noise *= max(1 - reflection**2, 1e-12)
-        fits.append((coefficients, noise))
-    return fits
-
-
-def _spectrum(coefficients: Array, noise: float, length: int) -> Array:
-    """Power at the frequencies of a real transform of `length` samples."""
-    power: Array = noise / np.abs(np.fft.rfft(np.append(1.0, -coefficients), length)) ** 2
-    return power
 
 
 def _newey_west(grid: _Grid, influence: Array) -> Array:
