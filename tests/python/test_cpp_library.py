@@ -385,17 +385,25 @@ def test_the_controller_reaches_its_target(examples: Path, tmp_path: Path) -> No
     assert text.startswith("after 10.000 s") and np.abs(np.array([x, y, z], float) - target).max() < 1e-3
 
 
+def allocations(*command: object) -> int:
+    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=True)
+    assert done.stderr.startswith("allocations ")
+    return int(done.stderr.split()[1])
+
+
 def test_the_controllers_loop_allocates_nothing(programs: Path, tmp_path: Path) -> None:
     """As many allocations in ten substeps as in six hundred."""
-    path = saved(carried(), tmp_path)
+    command = [programs / "counted_controller", saved(carried(), tmp_path), 12, 0.1, 0.05, -0.1]
+    assert allocations(*command, 1 / 60) == allocations(*command, 1.0) > 100
 
-    def allocations(seconds: float) -> int:
-        command = [programs / "counted_controller", path, 12, 0.1, 0.05, -0.1, seconds]
-        done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=True)
-        assert done.stderr.startswith("allocations ")
-        return int(done.stderr.split()[1])
 
-    assert allocations(1 / 60) == allocations(1.0) > 100
+@pytest.mark.parametrize(("make", "method"), [(net, "direct"), *STEPPED])
+def test_no_method_allocates_in_a_step(
+    programs: Path, tmp_path: Path, make: Callable[[], sb.Scene], method: str
+) -> None:
+    """Nor do saving to a state and restoring it."""
+    command = [programs / "counted_loop", saved(make(), tmp_path)]
+    assert allocations(*command, 5, f"method={method}") == allocations(*command, 50, f"method={method}") > 100
 
 
 # Residuals.

@@ -24,8 +24,8 @@ struct State {
 /// Steps a scene from its initial state. The same substeps as those of a Rollout, bit by bit, while its inputs are left
 /// as they are.
 ///
-/// Memory is taken when a stepper is made. With one thread and the methods `direct` or `gauss_seidel` a step takes
-/// none, and neither does `restore`, nor `save` to a State that was saved to before.
+/// Memory is taken when a stepper is made. With one thread a step takes none, and neither does `restore`, nor `save` to
+/// a State that was saved to before.
 class SHEETBEND_API Stepper {
  public:
   /// @param scene   stays alive for as long as the stepper
