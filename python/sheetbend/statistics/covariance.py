@@ -107,7 +107,7 @@ class Covariance:
 
     Attributes:
         matrix: (p, p) covariance.
-        degrees: (p,) effective degrees of freedom: rows/inflation - p, at least 1.
+        degrees: (p,) effective degrees of freedom: (rows - p)/inflation, at least 1.
         inflation: (p,) variance relative to that for white residuals of the same size, at least 1.
         residual_variance: sum of squares/(rows - p).
         autocorrelation_time: frames that count as one, 1 for white residuals.
@@ -178,7 +178,7 @@ def covariance(
         stretch[told] = np.sqrt((inflation * white / np.diag(from_data))[told])
         from_data = from_data * np.outer(stretch, stretch)
     matrix = (from_data + from_prior) / np.outer(size, size)
-    return Covariance(matrix, np.maximum(rows / inflation - absorbed, 1.0), inflation, variance, time)
+    return Covariance(matrix, np.maximum((rows - absorbed) / inflation, 1.0), inflation, variance, time)
 
 
 def autocorrelation(residuals: Array, layout: Layout, lags: int = _MAX_ORDER) -> Array:
