@@ -148,20 +148,25 @@ file = "take.csv"
     (tmp_path / "long.toml").write_text(text)
     with pytest.raises(sb.ConfigError, match=r'recording\[0\].units: .* 7\d\d.* m apart .*give units = "mm"'):
         config.load(tmp_path / "long.toml")
+    assert "say units = mm" in run("info", tmp_path / "take.csv").stdout
     (tmp_path / "long.toml").write_text(text + 'units = "m"\n')
     assert config.load(tmp_path / "long.toml").experiments  # where it is so
 
 
 def test_a_gap_of_a_grip_may_be_closed_by_the_configuration(tmp_path: Path) -> None:
-    """The error names `max_gap`, which only Python had."""
+    """The error names `max_gap`, which only Python had. A draft closes 0.1 s by itself."""
     take = takes.rope_in_hand("one", seconds=0.6)
     x = take.positions.copy()
-    x[20:28, 0] = np.nan
+    x[10:15, 0] = np.nan
+    _, text = drafted(tmp_path, sb.Recording(x, take.times, take.markers, name="short"))
+    assert tomllib.loads(text)["recording"][0]["max_gap"] == approx(0.06, abs=2e-3)
+    (tmp_path / "draft.toml").unlink()
+    x[20:35, 0] = np.nan
     sb.Recording(x, take.times, take.markers, name="take").save(tmp_path / "take.csv")
     result = run("new", tmp_path / "take.csv", "--output", tmp_path / "draft.toml")
     assert result.exit_code == 2 and "max_gap" in result.stderr and "does not run as it is" in result.stdout
     text = (tmp_path / "draft.toml").read_text()
-    (tmp_path / "draft.toml").write_text(text.replace("\n[[recording]]", "\n[[recording]]\nmax_gap = 0.1"))
+    (tmp_path / "draft.toml").write_text(text.replace("\n[[recording]]", "\n[[recording]]\nmax_gap = 0.2"))
     assert config.load(tmp_path / "draft.toml").experiments
 
 

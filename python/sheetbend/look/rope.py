@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.timeseries import mean_position
+from ..arrays.timeseries import default_max_gap, mean_position
 from ..errors import RecordingError
 from .held import Held, gripping, held, parts
 from .line import forks, plane, snapped, tangent
@@ -19,6 +19,7 @@ from .text import joined, table
 Array = np.ndarray
 SUBSTEP = 1 / 500  # s, at most
 BENDING = 0.15  # of the length: bending length (EI/(density g))^(1/3) at the start
+GAP = 0.1  # s, for which a marker of a grip may be lost
 EARLY = 0.05  # s, in which the speed at the first frame is looked for
 BRANCHED = 1.1  # times the shortest tree: how much longer the line through all markers of a branched cable is
 FITTED, LONGEST = 2 / 3, 3.0  # share of the time that is fitted, and s at most; the next third is predicted
@@ -68,7 +69,12 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     for grip in found.grips:
         lines += table("[[scene.rope.grip]]", grip)
     for take in takes:
-        lines += table("[[recording]]", _recording(take, flat), {"held_out": "predicted, not fitted"})
+        own = _recording(take, flat) | {"max_gap": _max_gap(take, found)}
+        why = {
+            "held_out": "predicted, not fitted",
+            "max_gap": "s, for which a marker of a grip is lost: closed by a cubic",
+        }
+        lines += table("[[recording]]", own, why)
     for name, limits in _parameters(s.static, density, length, flat is not None).items():
         lines += table(f"[parameters.{name}]", limits)
     for at in found.angles:
@@ -209,6 +215,14 @@ def _recording(take: Take, flat: list[float] | None) -> dict[str, Any]:
     entries["fit"] = [start, last]
     entries["held_out"] = [last, round(min(stop, last + 0.5 * (last - start)), 4) + 1e-3]
     return entries | {"sigma": max(s.noise, 1e-4)}
+
+
+def _max_gap(take: Take, found: Held) -> float | None:
+    """s, where a marker of a grip is lost for longer than is closed by default, and not for too long."""
+    r = take.seen.recording
+    markers = [r.markers.index(name) for grip in found.grips for name in grip["markers"]]
+    longest = max((float(np.diff(r.times[r.mask[:, k]], prepend=r.times[0]).max()) for k in markers), default=0.0)
+    return round(longest + 1e-3, 4) if default_max_gap(r.times) < longest <= GAP else None
 
 
 def _parameters(static: bool, density: float, length: float, angles: bool) -> dict[str, dict[str, Any]]:
