@@ -83,7 +83,9 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         "the stiffness in tension: a cloth that hangs hardly shows it. warp and shear are kept, not fitted",
         "the wind: the air is taken to stand still"
         if sheet.wind is None
-        else "how strongly the air acts: `air_normal` is that of a plate, and the wind's speed goes with its root",
+        else "how strongly the air acts: `air_normal` is that of a plate, and the wind's speed goes with its root; "
+        "`air_tangential` is a guess, and the wind along the cloth is as wrong as it. Believe neither until warp and "
+        "shear are right too",
         "the density"
         + (": 0.2 kg/m^2 is taken, and all else goes with it" if measured.density is None else " of the markers"),
     ]
