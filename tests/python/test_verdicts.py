@@ -209,6 +209,9 @@ def test_held_out_motion_that_is_missed_by_more_than_itself_is_a_doubt() -> None
     # at rest there is no motion to miss: what is left is noise
     rows = [replace(row, motion=2 * SIGMA, held_out=3 * SIGMA) for row in wrong.result.recordings]
     assert held_out_motion(problem_of(e), wrong.comparisons, rows) == {}
+    # a model that moves where the recording hardly does: a cloth in a wind of the wrong sign was "identified"
+    rows = [replace(row, motion=2 * SIGMA, held_out=30 * SIGMA) for row in rows]
+    assert "missed by 1500 % of the motion" in held_out_motion(problem_of(e), wrong.comparisons, rows)["rope_EI"]
 
 
 def test_a_file_of_an_earlier_version_still_loads(tmp_path) -> None:

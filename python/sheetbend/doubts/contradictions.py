@@ -27,7 +27,7 @@ CLAIMS = ("identified", "weak", "one-sided")  # verdicts that can be contradicte
 ORDINALS = ("first", "second", "third")
 MOST_RECORDINGS = 8  # each of them is compared with the others; more are compared by halves
 FEWEST_MARKERS = 4  # that are compared by halves
-SEEN = 3.0  # times sigma: a motion that can be told from noise
+SEEN = 3.0  # times sigma: an error that can be told from noise
 TRADES = 0.3  # correlation from which on a parameter shares the error of another
 APART = 2.0  # half-widths from the estimate: another minimum
 
@@ -243,7 +243,7 @@ def held_out_motion(
     found: dict[str, str] = {}
     for c, row in zip(comparisons, rows, strict=True):
         noise = c.experiment.sigma * math.sqrt(len(c.experiment.axes)) / (c.experiment.radius or 1.0)
-        if row.motion is None or row.held_out is None or not row.held_out > row.motion > SEEN * noise:
+        if row.motion is None or row.held_out is None or not row.held_out > max(row.motion, SEEN * noise):
             continue
         error = f"{short(100 * row.held_out / row.motion)} % of the motion"
         words = f"held-out motion of {row.name} is missed by {error}: that nothing moves would predict it better"
