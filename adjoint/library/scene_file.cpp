@@ -149,9 +149,12 @@ class SceneReader {
 
   void check_layout(const Layout& layout) {
     const Json& given = *header_.find("layout");  // an object: topology() read it
-    bool fits = given.as<JsonObject>()->size() == quantity_count;
+    bool fits = true;
+    std::size_t known = 0;
     for (int q = 0; q < quantity_count && fits; ++q) {
       const Json* place = given.find(quantity_names[q]);
+      if (!place && q >= oldest_quantity_count && layout.size[q] == 0) continue;
+      ++known;
       const auto* pair = place ? place->as<JsonArray>() : nullptr;
       fits = pair && pair->size() == 2;
       for (int k = 0; k < 2 && fits; ++k) {
@@ -159,7 +162,7 @@ class SceneReader {
         fits = n && *n == static_cast<long long>(k == 0 ? layout.offset[q] : layout.size[q]);
       }
     }
-    if (!fits) file_.fail("layout", "is not the one of this scene");
+    if (!fits || given.as<JsonObject>()->size() != known) file_.fail("layout", "is not the one of this scene");
     if (base_.size() != layout.total()) file_.fail("base", "does not fit the scene's inputs");
   }
 

@@ -52,6 +52,7 @@ from .recording.io.folder import recordings
 from .recording.recording import Recording
 from .report.fit_result import FitResult
 from .report.scores import Score, Scores, coordinate_error, scores
+from .scene.colliders import Box, Capsule, Plane, Sphere
 from .scene.scene import Scene
 from .scene.scene_file import load_scene, save_scene
 from .version import __version__ as __version__
@@ -59,6 +60,8 @@ from .version import __version__ as __version__
 __all__ = [
     "KINDS",
     "Arm",
+    "Box",
+    "Capsule",
     "Cloth",
     "ConfigError",
     "DivergenceError",
@@ -84,6 +87,7 @@ __all__ = [
     "Parameter",
     "Parameters",
     "Place",
+    "Plane",
     "Recording",
     "RecordingError",
     "RedundantConstraintsWarning",
@@ -98,6 +102,7 @@ __all__ = [
     "SheetbendError",
     "Sinh",
     "Solver",
+    "Sphere",
     "Spline",
     "TapePlan",
     "Tool",

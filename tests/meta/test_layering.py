@@ -14,7 +14,8 @@ ALLOWED = {
     "core/scalar": set(),
     "core/threads": set(),
     "core/constraints": {"core/scalar"},
-    "core/scene": {"core/scalar", "core/constraints"},
+    "core/contact": {"core/scalar"},
+    "core/scene": {"core/scalar", "core/constraints", "core/contact"},
     "core/element": {"core/scalar", "core/constraints"},
     "core/packs": {"core/scalar", "core/constraints", "core/scene", "core/element", "core/threads"},
     "core/blocks": {"core/scalar", "core/constraints", "core/element", "core/packs"},
@@ -22,6 +23,7 @@ ALLOWED = {
     "core/solver": {
         "core/scalar",
         "core/constraints",
+        "core/contact",
         "core/scene",
         "core/element",
         "core/packs",
@@ -32,6 +34,7 @@ ALLOWED = {
     "core/step": {
         "core/scalar",
         "core/constraints",
+        "core/contact",
         "core/scene",
         "core/packs",
         "core/points",
@@ -51,7 +54,8 @@ ALLOWED = {
     "adjoint/element": {"core/scalar", "core/scene", "core/element"},
     "adjoint/packs": {"core/constraints", "core/scene", "core/packs", "core/threads", "adjoint/element"},
     "adjoint/blocks": {"core/constraints", "core/blocks", "adjoint/element"},
-    "adjoint/solver": {"core/solver", "adjoint/element", "adjoint/blocks"},
+    "adjoint/contact": {"core/contact"},
+    "adjoint/solver": {"core/solver", "adjoint/element", "adjoint/blocks", "adjoint/contact"},
     "adjoint/step": {"core/step", "adjoint/element", "adjoint/packs", "adjoint/solver"},
     "adjoint": {
         "core/scalar",
