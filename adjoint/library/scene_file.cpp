@@ -149,9 +149,13 @@ class SceneReader {
   }
 
   void check_layout(const Layout& layout) {
+    const Json& given = header_["layout"];
     Json own = Json::object();
-    for (int q = 0; q < quantity_count; ++q) own[quantity_names[q]] = {layout.offset[q], layout.size[q]};
-    if (header_["layout"] != own) file_.fail("layout", "is not the one of this scene");
+    for (int q = 0; q < quantity_count; ++q) {
+      const bool newer = q >= oldest_quantity_count && layout.size[q] == 0;  // than the file, which then lacks it
+      if (!newer || given.contains(quantity_names[q])) own[quantity_names[q]] = {layout.offset[q], layout.size[q]};
+    }
+    if (given != own) file_.fail("layout", "is not the one of this scene");
     if (base_.size() != layout.total()) file_.fail("base", "does not fit the scene's inputs");
   }
 

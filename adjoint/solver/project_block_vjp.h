@@ -4,6 +4,7 @@
 #include "adjoint/blocks/block_reverse.h"
 #include "adjoint/blocks/every_kind.h"
 #include "adjoint/element/rates_vjp.h"
+#include "adjoint/solver/block_contacts_vjp.h"
 #include "adjoint/solver/volume_vjp.h"
 #include "core/solver/project_block.h"
 
@@ -28,6 +29,7 @@ struct BlockCotangents {
     std::vector<Vec3<T>> v;  // of dV/dx
   };
   std::vector<VolumeValues> volumes;
+  std::vector<BlockContactCotangents<Single<T>>> contacts;  // per scene, of implicit blocks
   double eta = 0.0;
 
   void resize(const Scene& scene, const DirectBlock& block) {
@@ -41,6 +43,8 @@ struct BlockCotangents {
       values[r].assign(block.runs[r].items.size() * (2 + scene.groups[block.runs[r].group].parameters));
     volumes.resize(block.volumes.size());
     for (std::size_t v = 0; v < volumes.size(); ++v) volumes[v].v.resize(block.volumes[v].particles.size());
+    contacts.resize(block.implicit ? scenes_of<T> : 0);
+    for (auto& scene_ : contacts) scene_.resize(scene, block);
   }
   // What resize() allocates, and what project_implicit_vjp() does.
   static std::size_t bytes(const Scene& scene, const DirectBlock& block) {
@@ -50,7 +54,10 @@ struct BlockCotangents {
     for (const MemberRun& run : block.runs) sum += of(run.items.size() * (2 + scene.groups[run.group].parameters));
     for (const BlockVolume& volume : block.volumes)
       sum += sizeof(VolumeValues) + sizeof(Vec3<T>) * volume.particles.size();
-    if (block.implicit) sum += 2 * sizeof(T) * 3 * block.movable;  // p and what it gathers
+    if (block.implicit)
+      sum += 2 * sizeof(T) * 3 * block.movable +  // p and what it gathers
+             scenes_of<T> * (sizeof(BlockContactCotangents<Single<T>>) +
+                             BlockContactCotangents<Single<T>>::bytes(scene, block));
     return sum;
   }
 };

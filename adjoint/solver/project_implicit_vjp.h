@@ -1,10 +1,11 @@
-// The reverse of an implicit step (core/solver/project_implicit.h), by the implicit function theorem: K p = x'_bar, then
+// The reverse of an implicit step (core/solver/project_implicit.h), by the implicit function theorem: K^T p = x'_bar, then
 //
-//   z = W^-1 p (of the predicted coordinates)     y = D^-1 J p     w_bar_i = (J^T lambda)_i . z_i
+//   z = W^-1 p (of the predicted coordinates)     y = D^-1 J p     w_bar_i = (J^T lambda + F)_i . z_i
 //
+// F: the forces of contacts,
 // and everything else as for a projection (element/element_vjp.h) with dl = lambda and v_j = lambda_j W z. Both y and v are linear in p, and what the
-// elements send to the coordinates is what K p leaves of x'_bar: a second pass on that refines p, and brings the first order
-// of scalars that carry one.
+// elements and contacts send to the coordinates is what K^T p leaves of x'_bar: a second pass on that refines p, and brings the first order
+// of scalars that carry one. K is not symmetric where contacts slide.
 #pragma once
 
 #include "adjoint/solver/project_block_vjp.h"
@@ -12,19 +13,48 @@
 
 namespace sheetbend {
 
-// z = K^-1 z of every scene.
+// z = K^-T z of every scene.
 template <class T>
 void solve_implicit(const DirectBlock& block, const BlockState<T>& state, std::vector<T>& z) {
   if constexpr (std::is_same_v<T, Pack>) {
     std::vector<double> own(z.size());
     for (int scene = 0; scene < Pack::lanes; ++scene) {
       for (std::size_t i = 0; i < z.size(); ++i) own[i] = z[i][scene];
-      state.implicit[scene].solve(block, own.data());
+      state.implicit[scene].solve_transposed(block, own.data());
       for (std::size_t i = 0; i < z.size(); ++i) z[i].set(scene, own[i]);
     }
   } else {
-    state.implicit[0].solve(block, z.data());
+    state.implicit[0].solve_transposed(block, z.data());
   }
+}
+
+// The contacts' share along p: to the coordinates of their particles, and gathered for spread_contacts().
+template <class T>
+void pull_back_contacts(const DirectBlock& block, BlockState<T>& state, const std::vector<T>& p,
+                        BlockCotangents<T>& bar) {
+  for (int scene = 0; scene < static_cast<int>(state.contacts.size()); ++scene)
+    for (int i = 0; i < static_cast<int>(block.contacts.size()); ++i) {
+      const int particle = block.contacts[i].particle;
+      const std::size_t at = sheetbend_blocks::row * static_cast<std::size_t>(particle);
+      const auto read = [&](const T* from) {
+        if constexpr (std::is_same_v<T, Pack>)
+          return Vec3<double>(from[0][scene], from[1][scene], from[2][scene]);
+        else
+          return Vec3<T>(from);
+      };
+      Single<T> along;
+      const auto x_bar = bar.contacts[scene].pull_back(block, state.contacts[scene], i, read(&state.x[0][at]),
+                                                       read(&p[3 * particle]), along);
+      Single<T> by[4];
+      x_bar.store(by);
+      if constexpr (std::is_same_v<T, Pack>) {
+        by[3] = along / state.x[0][at + 3][scene];
+        for (int d = 0; d < 4; ++d) bar.x[at + d].set(scene, bar.x[at + d][scene] + by[d]);
+      } else {
+        by[3] = along / state.x[0][at + 3];
+        for (int d = 0; d < 4; ++d) bar.x[at + d] += by[d];
+      }
+    }
 }
 
 template <class T>
@@ -32,6 +62,7 @@ void project_implicit_vjp(const SubstepState<T>& s, const DirectBlock& block, co
                           BlockState<T>& state, BlockCotangents<T>& bar) {
   constexpr int passes = 2;
   for (ImplicitBlock& scene : state.implicit) scene.factorize(s.scene, block);
+  for (auto& scene : bar.contacts) scene.clear();
   auto& own = state.at(0);
   state.lambda[0].clear();  // all of it is dl
   own.u.clear();            // J stands in no linearized row
@@ -64,6 +95,7 @@ void project_implicit_vjp(const SubstepState<T>& s, const DirectBlock& block, co
       left.store(&bar.x[at]);
     }
     reverse_kernels<T>(table).pull_back(arrays);
+    pull_back_contacts(block, state, p, bar);
   }
   for (std::size_t i = 0; i < p.size(); ++i) bar.x[sheetbend_blocks::row * (i / 3) + i % 3] = x_bar[i];
 }

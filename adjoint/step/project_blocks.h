@@ -45,8 +45,14 @@ struct ReverseOf<ProjectBlocks> {
                                bar.from.x_before, block_bar);
       }
     });
-    for (std::size_t b = 0; b < plan.blocks.size(); ++b)
+    for (std::size_t b = 0; b < plan.blocks.size(); ++b) {
       add_fixed(step.scene, plan.blocks[b], scratch.blocks[b], bar.q.data, bar.from.x, bar.from.x_before);
+      auto& contacts = scratch.blocks[b].contacts;
+      for (std::size_t lane = 0; lane < contacts.size(); ++lane)
+        spread_contacts(
+            contact_source(step, work.masses, static_cast<int>(lane)), plan.blocks[b], record.blocks[b].contacts[lane],
+            contacts[lane], bar.from, bar.in, [&](int node) -> T& { return bar.w.of(node); });
+    }
   }
 
   // What gathered of the constraints' own values.

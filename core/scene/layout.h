@@ -26,12 +26,19 @@ enum class Quantity : int {
   pressure,           // per triangle in air, along (x1 - x0) x (x2 - x0)  [Pa]
   volume,             // per closed surface: the one that it keeps  [m^3]
   volume_compliance,  // likewise  [m^3/Pa]
+  friction,           // per contact: Coulomb's coefficient  [-]
+  contact_radius,     // per contact: of its particles, from their center to where they touch  [m]
+  contact_stiffness,  // per contact that is not rigid  [N/m]
+  collider_pose,      // per collider and knot: position [m] and rotation vector [rad] of its frame (2 x 3)
+  collider_size,      // per collider: the lengths of its shape  [m]
 };
-inline constexpr int quantity_count = 17;
+inline constexpr int quantity_count = 22;
+inline constexpr int oldest_quantity_count = 17;  // those after it are left out of saved scenes that have none of them
 inline constexpr std::array<const char*, quantity_count> quantity_names{
-    "position",   "velocity",       "mass",     "compliance",  "damping",          "rest",
-    "boundary",   "force",          "gravity",  "drag_linear", "drag_quadratic",   "wind",
-    "air_normal", "air_tangential", "pressure", "volume",      "volume_compliance"};
+    "position",      "velocity",         "mass",           "compliance",        "damping",       "rest",
+    "boundary",      "force",            "gravity",        "drag_linear",       "drag_quadratic", "wind",
+    "air_normal",    "air_tangential",   "pressure",       "volume",            "volume_compliance", "friction",
+    "contact_radius", "contact_stiffness", "collider_pose", "collider_size"};
 
 struct Layout {
   std::array<std::size_t, quantity_count> size{};

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "core/constraints/registry.h"
+#include "core/contact/shapes.h"
 
 namespace sheetbend {
 namespace {
@@ -108,6 +109,42 @@ Volume build_volume(const VolumeSpec& spec, const Scene& scene) {
   return v;
 }
 
+void check_contact(const ContactSpec& spec, const Scene& scene, std::vector<char>& carries) {
+  check_nodes(spec.name, spec.particles, scene.nodes());
+  check_nodes(spec.name + ".carried", spec.carried, scene.nodes());
+  if (spec.collider < 0 || spec.collider >= static_cast<int>(scene.colliders.size()))
+    refuse(spec.name + ": collider " + std::to_string(spec.collider) + " does not exist. Fix: add it first");
+  if (spec.particles.empty()) refuse(spec.name + ": no particles. Fix: give those that may touch");
+  if (spec.carried.size() != spec.particles.size())
+    refuse(spec.name + ".carried: " + std::to_string(spec.carried.size()) + " nodes. Fix: give one for each particle");
+  slots(spec.particles, scene.nodes(), spec.name);
+  for (const int n : spec.particles)
+    if (scene.is_director[n])
+      refuse(spec.name + ": node " + std::to_string(n) + " is a director. Fix: use particles");
+  for (const int n : spec.carried) {
+    if (carries[n] || scene.role[n] != Role::pinned)
+      refuse(spec.name + ".carried: node " + std::to_string(n) + ". Fix: give each particle a pinned node of its own");
+    carries[n] = true;
+  }
+}
+
+// Colliders and contacts; returns how many numbers there are of each of their quantities.
+std::array<std::size_t, 5> add_contacts(const SceneSpec& spec, Scene& s) {
+  std::size_t poses = 0, sizes = 0, soft = 0;
+  for (const ColliderSpec& c : spec.colliders) {
+    check_knots(c.name + ".times", c.motion, true);
+    s.colliders.push_back({c.name, shape_of(c.shape), c.motion, poses, sizes});
+    poses += 6 * c.motion.times.size();
+    with_shape(s.colliders.back().shape, [&]<class S>(S) { sizes += size_count<S>; });
+  }
+  std::vector<char> carries(s.nodes(), false);
+  for (const ContactSpec& c : spec.contacts) {
+    check_contact(c, s, carries);
+    s.contacts.push_back({c.name, c.collider, c.particles, c.carried, c.rigid ? -1 : static_cast<int>(soft++)});
+  }
+  return {s.contacts.size(), s.contacts.size(), soft, poses, sizes};
+}
+
 }  // namespace
 
 int kind_of(const std::string& name) {
@@ -186,6 +223,8 @@ Scene build_scene(const SceneSpec& spec) {
 
   for (const VolumeSpec& v : spec.volumes) s.volumes.push_back(build_volume(v, s));
 
+  const auto [frictions, radii, stiffnesses, poses, sizes] = add_contacts(spec, s);
+
   const std::size_t dofs = s.dofs(), nodes = s.nodes(), m = s.constraints;
   s.layout.size = {dofs,
                    dofs,
@@ -203,7 +242,12 @@ Scene build_scene(const SceneSpec& spec) {
                    s.air.size(),
                    s.air.size(),
                    s.volumes.size(),
-                   s.volumes.size()};
+                   s.volumes.size(),
+                   frictions,
+                   radii,
+                   stiffnesses,
+                   poses,
+                   sizes};
   s.layout.close();
   return s;
 }

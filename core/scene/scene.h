@@ -52,6 +52,24 @@ struct Volume {
   std::vector<std::array<int, 3>> triangles;  // places in `nodes`, counterclockwise from outside
 };
 
+// A closed shape that stands, or moves as its poses say.
+struct Collider {
+  std::string name;
+  int shape;                            // in core/contact/shapes.h
+  Knots motion;                         // when it has its poses; one knot for a shape that stands
+  std::size_t first_pose, first_size;   // into Quantity::collider_pose and collider_size
+};
+
+// Particles that may touch a collider. The tangential force that a particle is held by is carried from substep to substep [N], in the collider's
+// frame: it stands in the state as a pinned node that the substep moves (core/step/carry_friction.h).
+struct Contact {
+  std::string name;
+  int collider;
+  std::vector<int> particles;
+  std::vector<int> carried;  // per particle: that node
+  int stiffness;             // place in Quantity::contact_stiffness, -1 where it is rigid
+};
+
 struct Scene {
   Fields fields;
   std::vector<int> first_dof, dim;  // per node
@@ -69,6 +87,8 @@ struct Scene {
   Knots boundary, force, wind;
   std::vector<Group> groups;
   std::vector<Volume> volumes;
+  std::vector<Collider> colliders;
+  std::vector<Contact> contacts;
   int constraints = 0, rows = 0;
   std::size_t stencil_coordinates = 0, gradient_entries = 0;
   Layout layout;
@@ -90,6 +110,18 @@ struct VolumeSpec {
   std::vector<std::array<int, 3>> triangles;  // nodes
 };
 
+struct ColliderSpec {
+  std::string name, shape;
+  Knots motion;
+};
+
+struct ContactSpec {
+  std::string name;
+  int collider;
+  std::vector<int> particles, carried;  // as in Contact; those that carry are pinned
+  bool rigid = true;
+};
+
 struct SceneSpec {
   int particles = 0;  // nodes, directors among them
   std::vector<Director> directors;
@@ -99,6 +131,8 @@ struct SceneSpec {
   Knots boundary, force, wind;
   std::vector<GroupSpec> groups;
   std::vector<VolumeSpec> volumes;
+  std::vector<ColliderSpec> colliders;
+  std::vector<ContactSpec> contacts;
 };
 
 // Rows whose damping needs a reference: all of them, or none.

@@ -72,11 +72,30 @@ bool ImplicitBlock::slow() const {
   return k > 1 && balance_[k - 1] > 0.5 * balance_[k - 2];
 }
 
-// The matrix of a Newton step from x_, and the step.
+// The matrix of a Newton step from x_, where the potential was looked at last.
 void ImplicitBlock::factorize_newton(const Scene& scene, const DirectBlock& block) {
   ++matrices_;
   matrix_.find(block, potential, x_);
-  convexity_ = matrix_.factorize_convex_enough(scene, block);
+  if (!potential.rubs()) {
+    convexity_ = matrix_.factorize_convex_enough(scene, block);
+    return;
+  }
+  convexity_ = 0.0;
+  if (matrix_.symmetric() && matrix_.factorize(scene, block, 0.0)) return;
+  if (!matrix_.factorize_unsymmetric(scene, block, 0.0)) matrix_.factorize_unsymmetric(scene, block, 1.0);
+}
+
+// The Newton step.
+void ImplicitBlock::take_direction(const DirectBlock& block) {
+  for (std::size_t i = 0; i < d_.size(); ++i) d_[i] = -potential.R()[i];
+  matrix_.solve(block, d_.data());
+}
+
+// The point that the potential was looked at last is x_.
+void ImplicitBlock::accept(double phi) {
+  phi_ = phi;
+  merit_ = potential.merit();
+  rubs_ = potential.rubs();
 }
 
 // One Newton step from the guess, to the first order in where fixed particles go; or the state at n with those moved, where Phi is lower.
@@ -101,29 +120,49 @@ void ImplicitBlock::take_first_step(const Scene& scene, const DirectBlock& block
   for (Numbers<double>* rows : {&x_, &trial_})
     std::copy(potential.target.data() + row * block.movable, potential.target.data() + row * block.particles.size(),
               rows->data() + row * block.movable);
-  phi_ = potential.evaluate(block, x_);
-  if (const double there = potential.evaluate(block, trial_); there < phi_ || !std::isfinite(phi_)) {
+  accept(potential.evaluate(block, x_));
+  const double there = potential.evaluate(block, trial_);
+  const bool falls = rubs_ || potential.rubs() ? potential.merit() < merit_ : there < phi_;
+  if (falls || !std::isfinite(phi_)) {
     std::swap(x_, trial_);
-    phi_ = there;
+    accept(there);
   } else {
     potential.evaluate(block, x_);
   }
 }
 
-// Goes along d_ as far as Phi falls enough; R and the forces are those of the new x_. False where it does not fall.
+// Goes along d_ as far as Phi falls enough, or the merit where friction acts; R and the forces are those of the new x_. False where it does not fall.
 bool ImplicitBlock::search_line(const DirectBlock& block) {
   const double slope = product(potential.R(), d_);
   double t = 1.0;
   for (int halving = 0; halving < most_halvings; ++halving, t *= 0.5) {
     move(x_, t, d_, trial_);
     const double there = potential.evaluate(block, trial_);
-    const bool falls = there <= phi_ + sufficient * t * slope;
-    // Near the minimum rounding hides what Phi does, not what its slope does (Hager & Zhang 2005).
-    const bool levels = there <= phi_ + flat * phi_ && std::abs(product(potential.R(), d_)) <= 0.5 * std::abs(slope);
-    if (!falls && !levels) continue;
+    if (rubs_ || potential.rubs()) {
+      const bool falls = potential.merit() <= (1.0 - 2.0 * sufficient * t) * merit_;
+      if (!falls && potential.largest() > potential.rounding()) continue;
+    } else {
+      const bool falls = there <= phi_ + sufficient * t * slope;
+      // Near the minimum rounding hides what Phi does, not what its slope does (Hager & Zhang 2005).
+      const bool levels = there <= phi_ + flat * phi_ && std::abs(product(potential.R(), d_)) <= 0.5 * std::abs(slope);
+      if (!falls && !levels) continue;
+    }
     std::swap(x_, trial_);
-    phi_ = there;
+    accept(there);
     return true;
+  }
+  return false;
+}
+
+// Where the Newton step does not lower the merit, those of more convex matrices may.
+bool ImplicitBlock::search_where_it_rubs(const Scene& scene, const DirectBlock& block) {
+  if (block.contacts.empty()) return false;
+  for (const double convexity : {1.0 / 8.0, 1.0}) {
+    potential.evaluate(block, x_);
+    ++matrices_;
+    if (!matrix_.factorize_unsymmetric(scene, block, convexity)) continue;
+    take_direction(block);
+    if (search_line(block)) return true;
   }
   return false;
 }
@@ -182,7 +221,7 @@ bool ImplicitBlock::descend(const DirectBlock& block, double curvature) {
     return false;
   }
   for (double farther; (farther = phi_at(2.0 * t)) < found; t *= 2.0) found = farther;
-  phi_ = phi_at(t);
+  accept(phi_at(t));
   std::swap(x_, trial_);
   return true;
 }
@@ -225,9 +264,8 @@ void ImplicitBlock::solve(const Scene& scene, const DirectBlock& block, const So
     // Past a saddle the way is long with a matrix that was made convex.
     if (was_convex && convexity_ > 0.0 && slow() && balance_.back() < near_saddle && leave_saddle(scene, block))
       continue;
-    for (std::size_t i = 0; i < d_.size(); ++i) d_[i] = -potential.R()[i];
-    matrix_.solve(block, d_.data());
-    if (!search_line(block)) {
+    take_direction(block);
+    if (!search_line(block) && !search_where_it_rubs(scene, block)) {
       potential.evaluate(block, x_);
       give_up(block);
     }
@@ -240,9 +278,10 @@ void ImplicitBlock::take_guess(const DirectBlock& block) {
 }
 
 void ImplicitBlock::factorize(const Scene& scene, const DirectBlock& block) {
-  matrix_.find(block, potential, x_);
-  if (matrix_.factorize(scene, block, 0.0)) return;
+  matrix_.find(block, potential, x_, true);
+  if (matrix_.symmetric() && matrix_.factorize(scene, block, 0.0)) return;
   potential.evaluate(block, x_);
+  if ((potential.rubs() || !matrix_.symmetric()) && matrix_.factorize_unsymmetric(scene, block, 0.0)) return;
   throw Unbalanced(
       "forces balance where they have no stiffness against some motion, at the point of buckling: no derivative",
       "use a smaller substep, or an imperfection that says which way", matrices_, potential.balance(),

@@ -1,6 +1,8 @@
 // A direct block whose substep is solved until its forces balance: the implicit step of BDF1 or BDF2 itself, where a projection is one
 // linearized iteration of it. The coordinates of the movable particles go to a minimum of the incremental potential by Newton's method
-// with a line search. A saddle, such as a flat sheet that is pressed in its plane, is left along a direction of negative curvature.
+// with a line search. A saddle, such as a flat sheet that is pressed in its plane, is left along a direction of negative curvature. Where friction acts
+// there is no potential: the same Newton method with the whole unsymmetric matrix goes down in the merit sum w |R|^2, for which its steps always are a
+// direction of descent.
 #pragma once
 
 #include <stdexcept>
@@ -39,18 +41,26 @@ class ImplicitBlock {
   // The largest |R| over the largest force, at the start and after each Newton step of the last solve.
   const std::vector<double>& balance() const { return balance_; }
 
-  // K at the solution, for derivatives. Throws Unbalanced where it is not positive definite.
+  // K at the solution, for derivatives: with the curvature of colliders. Throws Unbalanced where it is not positive definite, or has no inverse
+  // where friction acts.
   void factorize(const Scene& scene, const DirectBlock& block);
-  // z = K^-1 z, three numbers per movable particle; z may be over a larger scalar.
+  // z = K^-1 z or K^-T z, three numbers per movable particle; z may be over a larger scalar.
   template <class U>
   void solve(const DirectBlock& block, U* z) const {
     matrix_.solve(block, z);
+  }
+  template <class U>
+  void solve_transposed(const DirectBlock& block, U* z) const {
+    matrix_.solve_transposed(block, z);
   }
 
  private:
   void take_first_step(const Scene& scene, const DirectBlock& block);
   void factorize_newton(const Scene& scene, const DirectBlock& block);
+  void take_direction(const DirectBlock& block);
   bool search_line(const DirectBlock& block);
+  bool search_where_it_rubs(const Scene& scene, const DirectBlock& block);
+  void accept(double phi);
   bool leave_saddle(const Scene& scene, const DirectBlock& block);
   double curvature(const DirectBlock& block);
   bool descend(const DirectBlock& block, double curvature);
@@ -61,7 +71,8 @@ class ImplicitBlock {
   NewtonMatrix matrix_;
   Numbers<double> x_, trial_, z_, Kz_;
   std::vector<double> d_, balance_;
-  double phi_ = 0.0;        // at x_
+  double phi_ = 0.0, merit_ = 0.0;  // at x_
+  bool rubs_ = false;               // likewise, whether friction acts
   double convexity_ = 0.0;  // of the last matrix: 0 for K, 1 where no constraint's share has negative eigenvalues
   int matrices_ = 0;
 };

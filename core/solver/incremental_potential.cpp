@@ -16,6 +16,7 @@ void IncrementalPotential::resize(const Scene& scene, const DirectBlock& block) 
   for (auto* a : {&target, &push_, &magnitude_, &stiffness_}) a->assign(row * block.particles.size());
   C_r.assign(block.size());
   R_.assign(3 * block.movable, 0.0);
+  contacts.resize(block);
   eta = 0.0;
   values.resize(block.runs.size());
   runs_.clear();
@@ -31,7 +32,7 @@ void IncrementalPotential::resize(const Scene& scene, const DirectBlock& block) 
 
 std::size_t IncrementalPotential::bytes(const Scene& scene, const DirectBlock& block) {
   std::size_t bytes = Numbers<double>::bytes(block.size()) + 4 * Numbers<double>::bytes(row * block.particles.size()) +
-                      sizeof(double) * 3 * block.movable;
+                      sizeof(double) * 3 * block.movable + BlockContacts<double>::bytes(scene, block);
   for (const MemberRun& run : block.runs) {
     const Group& group = scene.groups[run.group];
     bytes += sizeof(sheetbend_blocks::Run) + sizeof(Numbers<double>) +
@@ -53,12 +54,35 @@ sheetbend_blocks::Potential IncrementalPotential::arrays(const DirectBlock& bloc
   return b;
 }
 
+// What contacts add to Phi, to the pushes, and to what those are judged by.
+double IncrementalPotential::add_contacts(const DirectBlock& block, const double* x) {
+  double energy = 0.0;
+  for (int i = 0; i < static_cast<int>(block.contacts.size()); ++i) {
+    const int at = row * block.contacts[i].particle;
+    const Touch<double> touch = contacts.at(block, i, Vec3<double>(x + at));
+    if (!touch.pushes) continue;
+    const double kappa = contacts.numbers[i].kappa;
+    energy += 0.5 * touch.normal * touch.normal / kappa;
+    rubs_ |= touch.rubs;
+    double force[3];
+    contacts.pose(block, i).turned(touch.force).store(force);
+    for (int d = 0; d < 3; ++d) {
+      push_[at + d] += force[d];
+      magnitude_[at + d] += std::abs(force[d]);
+      stiffness_[at + d] += kappa;
+    }
+  }
+  return energy;
+}
+
 double IncrementalPotential::evaluate(const DirectBlock& block, Numbers<double>& at) {
-  const double elastic = pack_kernels().potential->evaluate(arrays(block, at));
+  double elastic = pack_kernels().potential->evaluate(arrays(block, at));
+  rubs_ = false;
+  if (!block.contacts.empty()) elastic += add_contacts(block, at.data());
   double inertial = 0.0, stiffest = 0.0, farthest = 0.0, lightest = std::numeric_limits<double>::infinity();
   const double *x = at.data(), *predicted = target.data();
   const double *push = push_.data(), *magnitude = magnitude_.data(), *stiffness = stiffness_.data();
-  largest_ = force_ = 0.0;
+  largest_ = force_ = merit_ = 0.0;
   for (int p = 0; p < block.movable; ++p) {
     const double mass = 1.0 / x[row * p + 3];
     lightest = std::min(lightest, mass);
@@ -66,6 +90,7 @@ double IncrementalPotential::evaluate(const DirectBlock& block, Numbers<double>&
       const double away = x[i] - predicted[i];
       R_[d] = mass * away - push[i];
       inertial += mass * away * away;
+      merit_ += R_[d] * R_[d] * x[row * p + 3];
       largest_ = std::max(largest_, std::abs(R_[d]));
       force_ = std::max(force_, mass * std::abs(away) + magnitude[i]);
       stiffest = std::max(stiffest, mass + stiffness[i]);

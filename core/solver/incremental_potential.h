@@ -3,13 +3,15 @@
 //   Phi = sum |x - x~|^2/(2 w) + sum (C + g (C - C_r))^2/(2 a (1+g))         x~: predicted, w: inverse mass
 //   R = dPhi/dx = (x - x~)/w - J^T lambda                                    lambda = -(C + g (C - C_r))/a
 //
-// R is the force that does not balance, times eta^2.
+// R is the force that does not balance, times eta^2. Contacts add lambda_n^2/(2 kappa) to Phi and their forces to R (core/contact/law.h). Friction has no
+// potential: where it acts, Phi says nothing, and what is to fall is the merit sum w |R|^2.
 #pragma once
 
 #include <vector>
 
 #include "core/blocks/potential_kernels.h"
 #include "core/scalar/numbers.h"
+#include "core/solver/block_contacts.h"
 #include "core/solver/plan.h"
 
 namespace sheetbend {
@@ -20,6 +22,7 @@ class IncrementalPotential {
   Numbers<double> target;  // predicted, where fixed particles are at n+1
   Numbers<double> C_r;
   std::vector<Numbers<double>> values;
+  BlockContacts<double> contacts;
   double eta = 0.0;  // of `values`; 0 where they are not filled yet
 
   void resize(const Scene& scene, const DirectBlock& block);
@@ -32,16 +35,21 @@ class IncrementalPotential {
   double force() const { return force_; }        // the largest sum of forces' magnitudes
   double rounding() const { return rounding_; }  // of R, from that of the coordinates
   double balance() const { return force_ > 0.0 ? largest_ / force_ : 0.0; }
+  double merit() const { return merit_; }
+  bool rubs() const { return rubs_; }  // whether friction acts anywhere
   int worst_node(const DirectBlock& block) const;
 
   // The constraints' runs at `at`, as the kernels take them.
   sheetbend_blocks::Potential arrays(const DirectBlock& block, Numbers<double>& at);
 
  private:
+  double add_contacts(const DirectBlock& block, const double* x);
+
   std::vector<sheetbend_blocks::Run> runs_;
   Numbers<double> push_, magnitude_, stiffness_;
   std::vector<double> R_;
-  double largest_ = 0.0, force_ = 0.0, rounding_ = 0.0;
+  double largest_ = 0.0, force_ = 0.0, rounding_ = 0.0, merit_ = 0.0;
+  bool rubs_ = false;
 };
 
 }  // namespace sheetbend

@@ -2,6 +2,8 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "core/constraints/registry.h"
 
@@ -20,6 +22,17 @@ using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowM
 // Numbers of a run's elements.
 std::size_t numbers_of(const Scene& scene, const MemberRun& run) {
   return run.items.size() * triangle(3 * scene.groups[run.group].arity);
+}
+
+// Whether what differs between M (3, 3) and its transpose is rounding.
+bool is_symmetric(const double* M) {
+  double largest = 0.0, apart = 0.0;
+  for (int a = 0; a < 3; ++a)
+    for (int b = 0; b < 3; ++b) {
+      largest = std::max(largest, std::abs(M[3 * a + b]));
+      apart = std::max(apart, std::abs(M[3 * a + b] - M[3 * b + a]));
+    }
+  return apart <= 16.0 * std::numeric_limits<double>::epsilon() * largest;
 }
 
 }  // namespace
@@ -41,22 +54,46 @@ void NewtonMatrix::resize(const Scene& scene, const DirectBlock& block) {
   element_numbers_.reserve(elements_.size());
   for (auto& run : elements_) element_numbers_.push_back(run.numbers());
   factor_.reset(pattern_of(block).structure);
+  contacts_.assign(9 * block.contacts.size(), 0.0);
+  if (const auto& unsymmetric = pattern_of(block).unsymmetric) lu_.resize(*unsymmetric);
 }
 
 std::size_t NewtonMatrix::bytes(const Scene& scene, const DirectBlock& block) {
   const FactorStructure& structure = pattern_of(block).structure;
   std::size_t bytes = sizeof(double) * (block.movable + structure.size()) + Factor<double>::bytes(structure);
+  bytes += sizeof(double) * 9 * block.contacts.size();
+  if (const auto& unsymmetric = pattern_of(block).unsymmetric) bytes += UnsymmetricFactor::bytes(*unsymmetric);
   for (const MemberRun& run : block.runs)
     bytes += 2 * (sizeof(Numbers<double>) + Numbers<double>::bytes(numbers_of(scene, run))) + sizeof(double*);
   return bytes;
 }
 
-void NewtonMatrix::find(const DirectBlock& block, IncrementalPotential& potential, Numbers<double>& at) {
+void NewtonMatrix::find(const DirectBlock& block, IncrementalPotential& potential, Numbers<double>& at, bool curved) {
   for (int p = 0; p < block.movable; ++p) masses_[p] = 1.0 / at[row * p + 3];
   arrays_ = potential.arrays(block, at);
   arrays_.elements = element_numbers_.data();
   pack_kernels().potential->find_elements(arrays_);
   convex_found_ = false;
+  find_contacts(block, potential.contacts, at.data(), curved);
+}
+
+void NewtonMatrix::find_contacts(const DirectBlock& block, const BlockContacts<double>& contacts, const double* x,
+                                 bool curved) {
+  symmetric_ = true;
+  for (int i = 0; i < static_cast<int>(block.contacts.size()); ++i) {
+    const Pose<double>& pose = contacts.pose(block, i);
+    const Vec3<double> z = pose.in_frame(Vec3<double>(x + row * block.contacts[i].particle));
+    double A[9], AR[9], *M = &contacts_[9 * i];
+    std::fill_n(M, 9, 0.0);
+    if (!touch_matrix(block.contacts[i].shape, z, contacts.numbers[i], curved, A).pushes) continue;
+    const double* R = pose.turn;  // M = R A R^T
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 3; ++b)
+        AR[3 * a + b] = A[3 * a] * R[3 * b] + A[3 * a + 1] * R[3 * b + 1] + A[3 * a + 2] * R[3 * b + 2];
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 3; ++b) M[3 * a + b] = R[3 * a] * AR[b] + R[3 * a + 1] * AR[3 + b] + R[3 * a + 2] * AR[6 + b];
+    symmetric_ = symmetric_ && is_symmetric(M);
+  }
 }
 
 void NewtonMatrix::find_convex(const Scene& scene, const DirectBlock& block) {
@@ -76,7 +113,8 @@ void NewtonMatrix::find_convex(const Scene& scene, const DirectBlock& block) {
   }
 }
 
-bool NewtonMatrix::factorize(const Scene& scene, const DirectBlock& block, double convexity) {
+// Masses and constraints, to the values of the symmetric factor.
+void NewtonMatrix::assemble(const Scene& scene, const DirectBlock& block, double convexity) {
   const CondensedPattern& pattern = pattern_of(block);
   factor_.reset(pattern.structure);
   for (int p = 0; p < block.movable; ++p)
@@ -90,9 +128,31 @@ bool NewtonMatrix::factorize(const Scene& scene, const DirectBlock& block, doubl
     for (std::size_t e = 0; e < entries.size(); ++e)
       if (entries[e] >= 0) values[entries[e]] += convexity > 0.0 ? E[e] + convexity * (convex[e] - E[e]) : E[e];
   }
+}
+
+bool NewtonMatrix::factorize(const Scene& scene, const DirectBlock& block, double convexity) {
+  const CondensedPattern& pattern = pattern_of(block);
+  assemble(scene, block, convexity);
+  as_lu_ = false;
+  for (std::size_t i = 0; i < block.contacts.size(); ++i) {
+    const int dof = pattern.dof_of[block.contacts[i].particle];
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b <= a; ++b)
+        factor_.values[pattern.structure.position(dof + a, dof + b)] += contacts_[9 * i + 3 * a + b];
+  }
   factor_.factorize(pattern.structure, pack_kernels().blocks->one.forward.factor_supernodes);
   // A pivot that is not positive has zero for its inverse.
   return std::all_of(factor_.inverse.begin(), factor_.inverse.end(), [](double p) { return p > 0.0; });
+}
+
+bool NewtonMatrix::factorize_unsymmetric(const Scene& scene, const DirectBlock& block, double convexity) {
+  const CondensedPattern& pattern = pattern_of(block);
+  assemble(scene, block, convexity);
+  as_lu_ = true;
+  lu_.load(*pattern.unsymmetric, factor_.values.data());
+  for (std::size_t i = 0; i < block.contacts.size(); ++i)
+    lu_.add(pattern.dof_of[block.contacts[i].particle] / 3, &contacts_[9 * i]);
+  return lu_.factorize(*pattern.unsymmetric);
 }
 
 double NewtonMatrix::factorize_convex_enough(const Scene& scene, const DirectBlock& block) {
@@ -107,6 +167,11 @@ void NewtonMatrix::multiply(const DirectBlock& block, Numbers<double>& z, Number
   for (int p = 0; p < block.movable; ++p)
     for (int d = row * p; d < row * p + 3; ++d) Kz[d] = masses_[p] * z[d];
   pack_kernels().potential->multiply(arrays_, z.numbers(), Kz.numbers());
+  for (std::size_t i = 0; i < block.contacts.size(); ++i) {
+    const int at = row * block.contacts[i].particle;
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 3; ++b) Kz[at + a] += contacts_[9 * i + 3 * a + b] * z[at + b];
+  }
 }
 
 bool NewtonMatrix::find_negative_direction(const DirectBlock& block, double* d) {

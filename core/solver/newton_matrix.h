@@ -3,7 +3,8 @@
 //   K = W^-1 + J^T D^-1 J - sum lambda Hess(C)         D = a/(1+g)
 //
 // as the sum of masses and one symmetric matrix per constraint, and its factors. Where K is not positive definite, a part of the way to the matrix in
-// which no constraint's share has negative eigenvalues (Teran et al. 2005; on demand: Longva et al. 2023) is.
+// which no constraint's share has negative eigenvalues (Teran et al. 2005; on demand: Longva et al. 2023) is. Contacts add a 3 x 3 matrix to their
+// particle. Those that slide are not symmetric, and K is factored as LU then.
 #pragma once
 
 #include <vector>
@@ -20,23 +21,33 @@ class NewtonMatrix {
   void resize(const Scene& scene, const DirectBlock& block);
   static std::size_t bytes(const Scene& scene, const DirectBlock& block);
 
-  // K at `at`.
-  void find(const DirectBlock& block, IncrementalPotential& potential, Numbers<double>& at);
+  // K at `at`; Newton's method does without the curvature of colliders, derivatives do not.
+  void find(const DirectBlock& block, IncrementalPotential& potential, Numbers<double>& at, bool curved = false);
+  bool symmetric() const { return symmetric_; }
 
   // Factors K so much of the way to the convex matrix, from 0 for K itself to 1. Says whether that is positive definite.
   bool factorize(const Scene& scene, const DirectBlock& block, double convexity);
   // The first of a few shares at which it is; returns it.
   double factorize_convex_enough(const Scene& scene, const DirectBlock& block);
+  // The same as LU, whether it is symmetric and positive definite or not. Says whether it has an inverse. Of blocks with contacts.
+  bool factorize_unsymmetric(const Scene& scene, const DirectBlock& block, double convexity);
 
-  // z = K^-1 z with what was factored, three numbers per movable particle; z may be over a larger scalar.
+  // z = K^-1 z or z = K^-T z with what was factored, three numbers per movable particle; z may be over a larger scalar.
   template <class U>
   void solve(const DirectBlock& block, U* z) const {
-    const CondensedPattern& pattern = pattern_of(block);
-    thread_local std::vector<U> room;
-    room.resize(pattern.structure.size());
-    for (std::size_t p = 0; p < pattern.dof_of.size(); ++p) std::copy_n(z + 3 * p, 3, &room[pattern.dof_of[p]]);
-    factor_.solve(pattern.structure, room.data());
-    for (std::size_t p = 0; p < pattern.dof_of.size(); ++p) std::copy_n(&room[pattern.dof_of[p]], 3, z + 3 * p);
+    in_places(block, z, [&](const CondensedPattern& pattern, U* room) {
+      if (as_lu_)
+        lu_.solve(*pattern.unsymmetric, room);
+      else
+        factor_.solve(pattern.structure, room);
+    });
+  }
+  template <class U>
+  void solve_transposed(const DirectBlock& block, U* z) const {
+    if (!as_lu_) return solve(block, z);
+    in_places(block, z, [&](const CondensedPattern& pattern, U* room) {
+      lu_.solve_transposed(*pattern.unsymmetric, room);
+    });
   }
 
   // Kz = K z on rows of four; of fixed particles what the constraints alone make of it.
@@ -49,14 +60,27 @@ class NewtonMatrix {
   static const CondensedPattern& pattern_of(const DirectBlock& block) {
     return std::get<CondensedPattern>(*block.condensation);
   }
+  template <class U, class F>
+  static void in_places(const DirectBlock& block, U* z, F&& solve) {
+    const CondensedPattern& pattern = pattern_of(block);
+    thread_local std::vector<U> room;
+    room.resize(pattern.structure.size());
+    for (std::size_t p = 0; p < pattern.dof_of.size(); ++p) std::copy_n(z + 3 * p, 3, &room[pattern.dof_of[p]]);
+    solve(pattern, room.data());
+    for (std::size_t p = 0; p < pattern.dof_of.size(); ++p) std::copy_n(&room[pattern.dof_of[p]], 3, z + 3 * p);
+  }
   void find_convex(const Scene& scene, const DirectBlock& block);
+  void find_contacts(const DirectBlock& block, const BlockContacts<double>& contacts, const double* x, bool curved);
+  void assemble(const Scene& scene, const DirectBlock& block, double convexity);
 
   sheetbend_blocks::Potential arrays_{};            // of the last find()
   std::vector<double> masses_;                      // per movable particle
   std::vector<Numbers<double>> elements_, convex_;  // per run: (packs, triangle(dofs), 8)
   std::vector<double*> element_numbers_;
-  bool convex_found_ = false;
+  std::vector<double> contacts_;  // per contact: its matrix (3, 3)
+  bool convex_found_ = false, symmetric_ = true, as_lu_ = false;
   Factor<double> factor_;
+  UnsymmetricFactor lu_;
 };
 
 }  // namespace sheetbend

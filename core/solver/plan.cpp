@@ -168,6 +168,32 @@ void place_matrices(const Scene& scene, const CondensedPattern& c, DirectBlock& 
   }
 }
 
+// The contacts of the block's movable particles.
+std::vector<BlockContact> contacts_of(const Scene& scene, const std::map<int, int>& particle_of) {
+  std::vector<BlockContact> contacts;
+  for (int c = 0; c < static_cast<int>(scene.contacts.size()); ++c) {
+    const Contact& contact = scene.contacts[c];
+    for (int i = 0; i < static_cast<int>(contact.particles.size()); ++i)
+      if (const auto at = particle_of.find(contact.particles[i]); at != particle_of.end())
+        contacts.push_back({c, i, contact.collider, scene.colliders[contact.collider].shape, at->second});
+  }
+  std::stable_sort(contacts.begin(), contacts.end(),
+                   [](const BlockContact& a, const BlockContact& b) { return a.particle < b.particle; });
+  return contacts;
+}
+
+// The movable particles of contacts that are in none of these blocks.
+std::vector<int> loose_in_contact(const Scene& scene, const std::vector<DirectBlock>& blocks) {
+  std::vector<char> known(scene.nodes(), false);
+  for (const DirectBlock& block : blocks)
+    for (int p = 0; p < block.movable; ++p) known[block.particles[p]] = true;
+  std::vector<int> loose;
+  for (const Contact& contact : scene.contacts)
+    for (const int node : contact.particles)
+      if (scene.role[node] == Role::free && !std::exchange(known[node], true)) loose.push_back(node);
+  return loose;
+}
+
 // Where they stand in its factor.
 CondensedPattern factored(const Scene& scene, const DirectBlock& block, const std::map<int, int>& particle_of) {
   CondensedPattern c;
@@ -187,7 +213,15 @@ CondensedPattern factored(const Scene& scene, const DirectBlock& block, const st
       for (int b = 0; b < 3; ++b)
         if (dofs[k] + b <= dofs[i] + a) entries.emplace_back(dofs[i] + a, dofs[k] + b);
   });
+  for (const BlockContact& contact : block.contacts)
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b <= a; ++b) entries.emplace_back(c.dof_of[contact.particle] + a, c.dof_of[contact.particle] + b);
   c.structure = FactorStructure(3 * block.movable, entries, false);
+  if (!block.contacts.empty()) {
+    std::vector<std::pair<int, int>> pairs;
+    c.shares.for_each_pair([&](const auto&, int i, int k) { pairs.emplace_back(dofs[i] / 3, dofs[k] / 3); });
+    c.unsymmetric.emplace(block.movable, std::move(pairs), c.structure);
+  }
   if (block.implicit) {
     c.shares = {};  // implicit blocks add matrices of their own
     return c;
@@ -211,10 +245,13 @@ CondensedIteration iterated(const Scene& scene, const DirectBlock& block, const 
           Aggregation(block.movable, shares_of(scene, block, particle_of, dof_of))};
 }
 
-DirectBlock make_block(const Scene& scene, std::vector<Member> members, const SolverOptions& options) {
+// The block of constraints, and of particles that none holds (`loose`).
+DirectBlock make_block(const Scene& scene, std::vector<Member> members, const SolverOptions& options,
+                       const std::vector<int>& loose = {}) {
   const bool condensed = options.partition != Partition::direct;
   std::vector<BlockVolume> volumes = volumes_around(scene, members);
   Users users = number_rows(scene, members, volumes);
+  for (const int node : loose) users.push_back({node, {}});
   FactorStructure structure = condensed ? FactorStructure(0, {}) : structure_of(scene, members, volumes, users);
   if (!condensed && !structure.banded()) {
     order_for_low_fill(scene, members);
@@ -243,6 +280,7 @@ DirectBlock make_block(const Scene& scene, std::vector<Member> members, const So
   }
   for (const int g : groups) block.runs.push_back(make_run(scene, g, particle_of, block));
   add_volumes(scene, particle_of, block);
+  block.contacts = contacts_of(scene, particle_of);
   if (options.partition == Partition::newton || block.implicit)
     block.condensation = factored(scene, block, particle_of);
   if (block.implicit) place_matrices(scene, std::get<CondensedPattern>(*block.condensation), block);
@@ -282,6 +320,21 @@ void expect_no_volume(const Scene& scene) {
                                 "or gauss_seidel, or give a pressure instead");
 }
 
+// Contact stands in the balance of forces, which only implicit substeps find.
+void expect_no_contact(const Scene& scene) {
+  if (!scene.contacts.empty())
+    throw std::invalid_argument("solver.method: particles of " + scene.contacts.front().name +
+                                " may touch a collider, which needs substeps whose forces balance. Fix: use implicit");
+}
+
+// The first substeps of a contact are BDF1's.
+void expect_one_step(const Scene& scene, const SolverOptions& options) {
+  if (!scene.contacts.empty() && options.integrator != Integrator::bdf1)
+    throw std::invalid_argument("solver.integrator: particles of " + scene.contacts.front().name +
+                                " may touch a collider, and a second-order step goes through an impact as if nothing "
+                                "had happened. Fix: use bdf1");
+}
+
 // Blocks are made of constraints and what they join.
 void expect_constraints_around_volumes(const Scene& scene) {
   if (scene.volumes.empty()) return;
@@ -314,6 +367,9 @@ Plan make_plan(const Scene& scene, const SolverOptions& options) {
   if (options.partition == Partition::implicit) {
     expect_points(scene);
     expect_no_volume(scene);
+    expect_one_step(scene, options);
+  } else {
+    expect_no_contact(scene);
   }
   Plan plan{options, {}, {}, {}};
   if (options.partition == Partition::gauss_seidel) {
@@ -321,6 +377,8 @@ Plan make_plan(const Scene& scene, const SolverOptions& options) {
     plan.packs = pack_colors(scene, plan.colors);
   } else
     for (auto& members : connected_chains(scene)) plan.blocks.push_back(make_block(scene, std::move(members), options));
+  if (const std::vector<int> loose = loose_in_contact(scene, plan.blocks); !loose.empty())
+    plan.blocks.push_back(make_block(scene, {}, options, loose));
   return plan;
 }
 

@@ -37,6 +37,13 @@ struct BlockVolume {
   std::vector<int> gradients;  // likewise, its gradient row
 };
 
+// A particle of an implicit block that may touch a collider.
+struct BlockContact {
+  int contact, item;  // in the scene
+  int collider, shape;
+  int particle;  // in the block's order
+};
+
 struct DirectBlock {
   std::vector<Member> members;  // in elimination order
   std::vector<MemberRun> runs;  // the same by group
@@ -52,6 +59,7 @@ struct DirectBlock {
   FactorStructure structure;  // of its constraints' matrix; empty where it is condensed
   std::optional<Condensation> condensation = {};
   std::vector<BlockVolume> volumes = {};
+  std::vector<BlockContact> contacts = {};  // by particle
 
   int size() const { return static_cast<int>(multipliers.size()); }
   bool banded() const { return !condensation && structure.banded(); }

@@ -47,6 +47,11 @@ void load_implicit(const SubstepState<T>& s, const DirectBlock& block, const Sub
   }
   if (block.damped)
     for (int j = 0; j < block.size(); ++j) potential.C_r[j] = number_of<T>(state.C_r[j], scene);
+  if (block.contacts.empty()) return;
+  if constexpr (is_plain<T>)
+    potential.contacts = state.contacts[scene];
+  else
+    potential.contacts = values_of(state.contacts[scene]);
 }
 
 // The particle, in the block's order, of place k of a run's constraint.
@@ -98,6 +103,18 @@ void subtract_elastic_forces(const SubstepState<T>& s, const DirectBlock& block,
       });
 }
 
+// Likewise what contacts push with.
+template <class T>
+void subtract_contact_forces(const DirectBlock& block, const BlockState<T>& state, const std::vector<T>& x,
+                             std::vector<T>& R) {
+  const BlockContacts<T>& contacts = state.contacts[0];
+  for (int i = 0; i < static_cast<int>(block.contacts.size()); ++i) {
+    const std::size_t at = 3 * static_cast<std::size_t>(block.contacts[i].particle);
+    const Touch<T> touch = contacts.at(block, i, Vec3<T>(&x[at]));
+    if (touch.pushes) (-contacts.pose(block, i).turned(touch.force)).add_to(&R[at]);
+  }
+}
+
 // The multipliers of scalars that carry tangents, which the solution comes without.
 template <class T>
 void carry_multipliers(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state) {
@@ -121,6 +138,7 @@ void carry_first_order(const SubstepState<T>& s, const DirectBlock& block, Block
       for (int d = 0; d < 3; ++d) R[3 * p + d] = (x[3 * p + d] - T(state.x[0][at + d])) / T(state.x[0][at + 3]);
     }
     subtract_elastic_forces(s, block, state, x, R);
+    subtract_contact_forces(block, state, x, R);
     for (T& r : R) r = r - T(value_of(r));
     state.implicit[0].solve(block, R.data());
     for (std::size_t i = 0; i < R.size(); ++i) x[i] = x[i] - R[i];

@@ -7,6 +7,7 @@
 #include "core/points/point_kernels.h"
 #include "core/scalar/point.h"
 #include "core/scene/scene.h"
+#include "core/solver/contact_source.h"
 #include "core/solver/plan.h"
 #include "core/solver/states.h"
 
@@ -49,6 +50,12 @@ struct Work {
   T *x_next, *v_next;  // (dofs); the repetition for a reverse has no v_next
   bool finite = true;  // whether all of x_next is
 };
+
+// What the contacts of a scene of T read of a substep.
+template <class T>
+ContactSource<T> contact_source(const Step<T>& step, const InverseMasses<T>& masses, int lane) {
+  return {step.scene, step.in, step.bdf, step.t_next, step.plan.options.h, step.from, masses.w.data(), lane};
+}
 
 // now y_n + before y_{n-1}, from which a backward difference formula starts.
 template <class T, class How>

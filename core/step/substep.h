@@ -4,6 +4,7 @@
 
 #include "core/step/apply_air_forces.h"
 #include "core/step/apply_forces.h"
+#include "core/step/carry_friction.h"
 #include "core/step/effective_masses.h"
 #include "core/step/predict.h"
 #include "core/step/project_blocks.h"
@@ -22,7 +23,8 @@ using Substep = Stages<ComputeEffectiveMasses,  // w = 1/(m + eta c), c the impl
                        SweepColors,             // the same for one constraint after the other, and for kept volumes
                        UpdateVelocities,        // v = (x - history(x))/eta
                        RetractDirectors,        // rods: frames are made orthonormal again
-                       Yield                    // joints that slide: their set follows
+                       Yield,                   // joints that slide: their set follows
+                       CarryFriction            // contacts: their tangential forces go on to the next substep
                        >;
 
 template <class T, class List = Substep>

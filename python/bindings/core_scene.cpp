@@ -4,6 +4,8 @@
 #include <memory>
 
 #include "core/constraints/registry.h"
+#include "core/contact/shapes.h"
+#include "core/scene/contact_gaps.h"
 #include "python/bindings/core_module.h"
 
 namespace sheetbend::bindings {
@@ -38,6 +40,12 @@ std::shared_ptr<Scene> make_scene(const py::kwargs& given) {
                            whole_numbers(g["stencil"])});
   for (const py::handle v : given["volumes"])
     spec.volumes.push_back({v["name"].cast<std::string>(), v["triangles"].cast<Triangles>()});
+  for (const py::handle c : given["colliders"])
+    spec.colliders.push_back({c["name"].cast<std::string>(), c["shape"].cast<std::string>(),
+                              {c["times"].cast<std::vector<double>>(), interpolation_of(c["interpolation"].cast<std::string>())}});
+  for (const py::handle c : given["contacts"])
+    spec.contacts.push_back({c["name"].cast<std::string>(), c["collider"].cast<int>(), whole_numbers(c["particles"]),
+                             whole_numbers(c["carried"]), c["rigid"].cast<bool>()});
   return std::make_shared<Scene>(build_scene(spec));
 }
 
@@ -61,16 +69,34 @@ py::dict arguments_of(const Scene& s) {
       for (int& n : t) n = v.nodes[n];
     volumes.append(py::dict("name"_a = v.name, "triangles"_a = triangles));
   }
+  py::list colliders, contacts;
+  for (const Collider& c : s.colliders)
+    with_shape(c.shape, [&]<class S>(S) {
+      colliders.append(py::dict("name"_a = c.name, "shape"_a = S::name, "times"_a = c.motion.times,
+                                "interpolation"_a = c.motion.interpolation == Interpolation::cubic ? "cubic" : "linear"));
+    });
+  for (const Contact& c : s.contacts)
+    contacts.append(py::dict("name"_a = c.name, "collider"_a = c.collider, "particles"_a = py::array_t<int>(py::cast(c.particles)),
+                             "carried"_a = py::array_t<int>(py::cast(c.carried)), "rigid"_a = c.stiffness < 0));
   const bool cubic = s.boundary.interpolation == Interpolation::cubic;
   return py::dict("particles"_a = s.nodes(), "directors"_a = directors, "pinned"_a = s.pinned, "driven"_a = s.driven,
                   "boundary_times"_a = s.boundary.times, "boundary_interpolation"_a = cubic ? "cubic" : "linear",
                   "loaded"_a = s.loaded, "force_times"_a = s.force.times, "has_drag"_a = s.has_drag, "air"_a = s.air,
-                  "wind_times"_a = s.wind.times, "groups"_a = groups, "volumes"_a = volumes);
+                  "wind_times"_a = s.wind.times, "groups"_a = groups, "volumes"_a = volumes,
+                  "colliders"_a = colliders, "contacts"_a = contacts);
 }
 
 }  // namespace
 
 void bind_scene(py::module_& m) {
+  py::dict shapes;  // by name: what it is, and the names of its sizes
+  for (int shape = 0; shape < shape_count; ++shape)
+    with_shape(shape, [&]<class S>(S) {
+      py::list sizes;
+      for (const char* size : S::sizes) sizes.append(size);
+      shapes[S::name] = py::make_tuple(S::about, sizes);
+    });
+  m.attr("SHAPES") = shapes;
   py::class_<Scene, std::shared_ptr<Scene>>(m, "Scene")
       .def(py::init(&make_scene))
       .def(py::pickle(&arguments_of, [](const py::dict& given) { return make_scene(py::kwargs(given)); }))
@@ -84,7 +110,14 @@ void bind_scene(py::module_& m) {
       .def_property_readonly("inputs", [](const Scene& s) { return s.layout.total(); })
       .def_property_readonly("constraints", [](const Scene& s) { return s.constraints; })
       .def_property_readonly("rows", [](const Scene& s) { return s.rows; })
-      .def_property_readonly("dofs", &Scene::dofs);
+      .def_property_readonly("dofs", &Scene::dofs)
+      .def("contact_gaps", [](const Scene& s, const Array& inputs, double t, int contact) {
+        const Inputs<const double> in{s.layout, inputs.data()};
+        const auto gaps = contact_gaps(s, in, in.of(Quantity::position), t, contact);
+        py::array_t<double> out({static_cast<py::ssize_t>(gaps.size()), static_cast<py::ssize_t>(4)});
+        for (std::size_t i = 0; i < gaps.size(); ++i) std::copy(gaps[i].begin(), gaps[i].end(), out.mutable_data() + 4 * i);
+        return out;
+      });
 }
 
 }  // namespace sheetbend::bindings

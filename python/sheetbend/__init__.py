@@ -56,6 +56,7 @@ from .recording.io.folder import read_recordings
 from .recording.recording import Recording
 from .report.fit_result import FitResult
 from .report.scores import Score, Scores, coordinate_error, scores
+from .scene.colliders import Box, Capsule, Plane, Sphere
 from .scene.scene import Scene
 from .scene.scene_file import load_scene, save_scene
 from .version import __version__ as __version__
@@ -77,6 +78,8 @@ def __getattr__(name: str) -> Any:
 __all__ = [
     "KINDS",
     "Arm",
+    "Box",
+    "Capsule",
     "Cloth",
     "ConfigError",
     "DivergenceError",
@@ -100,6 +103,7 @@ __all__ = [
     "Parameter",
     "Parameters",
     "Place",
+    "Plane",
     "Recording",
     "RecordingError",
     "RedundantConstraintsWarning",
@@ -113,6 +117,7 @@ __all__ = [
     "Scores",
     "SheetbendError",
     "Solver",
+    "Sphere",
     "TapePlan",
     "Tool",
     "Trajectory",

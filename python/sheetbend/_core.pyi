@@ -60,6 +60,8 @@ class Scene:
         wind_times: Sequence[float],
         groups: Sequence[Mapping[str, Any]],
         volumes: Sequence[Mapping[str, Any]],
+        colliders: Sequence[Mapping[str, Any]],
+        contacts: Sequence[Mapping[str, Any]],
     ) -> None: ...
     @property
     def layout(self) -> dict[str, tuple[int, int]]: ...  # array name -> (offset, size) in the flat inputs
@@ -71,6 +73,8 @@ class Scene:
     def rows(self) -> int: ...
     @property
     def dofs(self) -> int: ...
+    # (particles, 4): gap and normal of a contact's particles at their initial positions
+    def contact_gaps(self, inputs: Array, t: float, contact: int) -> Array: ...
 
 class Tape:
     @property

@@ -17,7 +17,8 @@ ALLOWED = {
     "core/scalar": set(),
     "core/threads": set(),
     "core/constraints": {"core/scalar"},
-    "core/scene": {"core/scalar", "core/constraints"},
+    "core/contact": {"core/scalar"},
+    "core/scene": {"core/scalar", "core/constraints", "core/contact"},
     "core/element": {"core/scalar", "core/constraints"},
     "core/packs": {"core/scalar", "core/constraints", "core/scene", "core/element", "core/threads"},
     "core/blocks": {"core/scalar", "core/constraints", "core/element", "core/packs"},
@@ -25,6 +26,7 @@ ALLOWED = {
     "core/solver": {
         "core/scalar",
         "core/constraints",
+        "core/contact",
         "core/scene",
         "core/element",
         "core/packs",
@@ -35,6 +37,7 @@ ALLOWED = {
     "core/step": {
         "core/scalar",
         "core/constraints",
+        "core/contact",
         "core/scene",
         "core/packs",
         "core/points",
@@ -54,7 +57,8 @@ ALLOWED = {
     "adjoint/element": {"core/scalar", "core/scene", "core/element"},
     "adjoint/packs": {"core/constraints", "core/scene", "core/packs", "core/threads", "adjoint/element"},
     "adjoint/blocks": {"core/constraints", "core/blocks", "adjoint/element"},
-    "adjoint/solver": {"core/solver", "adjoint/element", "adjoint/blocks"},
+    "adjoint/contact": {"core/contact"},
+    "adjoint/solver": {"core/solver", "adjoint/element", "adjoint/blocks", "adjoint/contact"},
     "adjoint/step": {"core/step", "adjoint/element", "adjoint/packs", "adjoint/solver"},
     "adjoint": {
         "core/scalar",

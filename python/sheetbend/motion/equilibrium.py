@@ -127,7 +127,7 @@ def equilibrium(
         stable: leave saddles; False goes to the nearest equilibrium whatever its stability.
 
     Raises:
-        SceneError: the start has the wrong shape.
+        SceneError: the start has the wrong shape, or particles may touch colliders.
         ValueError: air blows on triangles at the start; still air leaves a scene at rest as it is.
         NoEquilibriumError: not converged; says how far it came and what to try.
 
@@ -135,6 +135,9 @@ def equilibrium(
         RedundantConstraintsWarning: some rigid constraints follow from others at rest.
     """
     compiled = scene.compiled
+    if compiled.contacts:
+        fix = "let it come to rest in a simulation, or leave its contacts out"
+        raise SceneError(scene.name, "has contacts, which equilibria do not know", list(compiled.contacts), fix)
     x = None if start is None else finite("start", start, (scene.particle_count, 3), SceneError).ravel()
     theta = compiled.values(values)
     out = _core.equilibrium(compiled.core, compiled.inputs(theta), x, stable)

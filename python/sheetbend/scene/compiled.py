@@ -16,7 +16,7 @@ from .domain import Domain
 from .kinks import kinks
 from .scene_data import SceneData
 
-VECTORS = ("position", "velocity", "boundary", "force", "wind")
+VECTORS = ("position", "velocity", "boundary", "force", "wind", "collider_pose")
 
 
 def specification(scene: SceneData) -> dict[str, Any]:
@@ -39,6 +39,7 @@ def specification(scene: SceneData) -> dict[str, Any]:
         "volumes": [
             {"name": name, "triangles": triangles.tolist()} for name, triangles in scene.volumes.triangles.items()
         ],
+        **scene.contacts.specification(),
     }
 
 
@@ -52,6 +53,7 @@ class CompiledScene:
         kinds: of its constraints.
         names: quantity names in the order of theta.
         theta: their values.
+        contacts: names of those that particles may have with colliders.
         kinks: what makes its motions not smooth in time, in words; empty if nothing.
         domain: which quantities and inputs make sense.
     """
@@ -70,6 +72,15 @@ class CompiledScene:
         self.domain = Domain(scene, self.layout)
         self._base = self._pack(scene)
         self._terms = [*scene.terms, *scene.boundary.terms()]
+        self.contacts = tuple(c.name for c in scene.contacts.contacts)
+        if self.contacts:
+            self._expect_apart(scene)
+
+    def _expect_apart(self, scene: SceneData) -> None:
+        inputs = self.inputs()
+        offset, size = self.layout["mass"]
+        held = {*scene.pinned, *scene.boundary.driven}
+        scene.contacts.expect_apart(self.core, inputs, inputs[offset : offset + size], scene.gravity, held)
 
     @cached_property
     def _map(self) -> _core.ParameterMap:

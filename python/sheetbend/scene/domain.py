@@ -19,9 +19,9 @@ HUGE = float(np.finfo(float).max)
 TINY = float(np.nextafter(0.0, 1.0))
 NOT_NEGATIVE = (
     *("mass", "compliance", "damping", "drag_linear", "drag_quadratic", "air_normal", "air_tangential"),
-    "volume_compliance",
+    *("volume_compliance", "friction", "contact_radius"),
 )
-POSITIVE = ("volume",)
+POSITIVE = ("volume", "contact_stiffness", "collider_size")
 
 
 class Domain:
@@ -150,6 +150,8 @@ class Domain:
             return f"particle {i}"
         if array.startswith("volume"):
             return f"'{list(self._scene.volumes.triangles)[i]}'"
+        if array in ("friction", "contact_radius"):
+            return f"'{self._scene.contacts.contacts[i].name}'"
         if array not in ("compliance", "damping", "rest"):
             return f"entry {i}"
         for g in self._scene.groups:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +13,7 @@ from ..arrays.checks import finite, indices, per_item, points
 from ..errors import SceneError
 from ..quantities.kinds import KINDS
 from ..quantities.quantities import ZERO_OR_MORE, Term, product
+from .colliders import Collider
 from .compiled import CompiledScene
 from .frames import Frame, directors_of, normals_of
 from .group import make_group
@@ -20,6 +22,14 @@ from .scene_checks import validate
 from .scene_data import SceneData
 
 Array = np.ndarray
+
+
+@runtime_checkable
+class HasParticles(Protocol):
+    """A rope, a cloth, or anything else that knows its particles."""
+
+    @property
+    def particles(self) -> Array: ...
 
 
 class Scene(SceneData):
@@ -336,6 +346,48 @@ class Scene(SceneData):
         """
         self._building()
         self.volumes.add(self, triangles, compliance, rest, name)
+
+    def contact(
+        self,
+        what: ArrayLike | HasParticles,
+        collider: Collider,
+        *,
+        friction: float,
+        radius: float = 0.0,
+        stiffness: float | None = None,
+        name: str | None = None,
+    ) -> str:
+        """Let particles touch a shape, and return the contact's name. docs/contact.md has the law and its limits.
+
+        Particles are pushed out along the normal and held by Coulomb friction; links and triangles between them are
+        not. Needs method "implicit" with integrator "bdf1". The numbers are the quantities `<name>_friction`, unless
+        zero `<name>_contact_radius` m, where given `<name>_contact_stiffness` N/m, and of the collider `<collider>_x`,
+        `_y`, `_z` m (how far it is from where it was given) and its lengths, such as `<collider>_radius` m.
+
+        Args:
+            what: a rope, a cloth, or particles (n,).
+            collider: `Plane`, `Sphere`, `Capsule` or `Box`; one object may serve several contacts.
+            friction: Coulomb's coefficient; 0 is smooth.
+            radius: m, of a rope, or half the thickness of cloth: particles touch at this distance.
+            stiffness: N/m per particle. By default contacts are rigid: 1,000 times as stiff as a particle's inertia in
+                a substep, so that it lies h^2 g/1000 deep.
+            name: by default that of the collider.
+
+        Raises:
+            SceneError: unknown or repeated particles, negative numbers, names that are taken. A start inside the
+                collider is refused when the scene is compiled.
+        """
+        self._building()
+        if not isinstance(collider, Collider):
+            raise SceneError("contact.collider", "is no shape", collider, "give a Plane, Sphere, Capsule or Box")
+        particles = what.particles if isinstance(what, HasParticles) else what
+        name = name or collider.name or collider.shape
+        which = self.contacts.check(particles, self.particle_count, friction, radius, stiffness, name)
+        _, place = self.contacts.collider(self, collider)
+        carried = self.add_particles(np.zeros((len(which), 3)), 1.0)
+        self.pin(carried)
+        self.contacts.add(self, place, which, carried, friction, radius, stiffness, name)
+        return name
 
     def freeze(self) -> Scene:
         """End the construction: validates the whole scene and returns it. Later additions raise.

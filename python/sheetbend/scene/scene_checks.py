@@ -28,8 +28,9 @@ def validate(scene: SceneData) -> None:
     if light.size:
         raise SceneError("mass", "is zero for free particles", light[:5].tolist(), "give them a mass, or pin them")
     if scene.groups:
+        touching = (c.particles for c in scene.contacts.contacts)
         used = np.zeros(scene.particle_count, dtype=bool)
-        for particles in (*(g.particles for g in scene.groups), *scene.volumes.triangles.values()):
+        for particles in (*(g.particles for g in scene.groups), *scene.volumes.triangles.values(), *touching):
             used[particles] = True
         loose = free[~used[free]]
         if loose.size:

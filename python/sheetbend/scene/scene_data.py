@@ -15,6 +15,7 @@ from ..quantities.kinds import KINDS
 from ..quantities.quantities import Quantity, Term
 from .air import Air
 from .boundary import Boundary
+from .contacts import Contacts
 from .forces import Forces
 from .frames import Frame
 from .group import Group
@@ -38,6 +39,7 @@ class SceneData:
         self.has_drag = False
         self.air = Air()
         self.volumes = Volumes()
+        self.contacts = Contacts()
         self.ropes: dict[str, Any] = {}
         self.cloths: dict[str, Any] = {}
         self._positions, self._velocities, self._mass = Column(3), Column(3), Column()
@@ -136,6 +138,7 @@ class SceneData:
             "drag_quadratic": self._drag_of("quadratic"),
             **self.air.arrays(),
             **self.volumes.arrays(),
+            **self.contacts.arrays(),
         }
 
     def _building(self) -> None:

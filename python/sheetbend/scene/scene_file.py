@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import SceneError
 from ..files.whole import written
+from .contacts import ARRAYS as CONTACT_ARRAYS
 from .scene import Scene
 from .scene_reader import LONGEST_HEADER, LONGEST_NAME, MAGIC, NUMBERS, PREFIX, VERSION, SceneReader, is_name
 
@@ -31,9 +32,12 @@ def save_scene(scene: Scene, path: str | Path) -> None:
         path: is replaced only once the file is whole.
 
     Raises:
-        SceneError: a name that no file can hold.
+        SceneError: a name that no file can hold, or contacts, which files do not hold.
         UnwrittenError: the path cannot be written.
     """
+    if scene.contacts.contacts:
+        fix = "build it again where it is needed, or leave its contacts out"
+        raise SceneError(scene.name, "has contacts, which scene files do not hold", len(scene.contacts.contacts), fix)
     header, arrays = _header(scene), _arrays(scene)
     offset = 0
     header["arrays"] = {}
@@ -92,7 +96,7 @@ def _header(scene: Scene) -> dict[str, Any]:
         **named,
         "interpolation": scene.boundary.interpolation,
         "has_drag": bool(scene.has_drag),
-        "layout": {name: list(place) for name, place in scene.compiled.layout.items()},
+        "layout": {name: list(place) for name, place in scene.compiled.layout.items() if name not in CONTACT_ARRAYS},
     }
 
 

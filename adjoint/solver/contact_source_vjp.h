@@ -1,0 +1,72 @@
+// The reverse of ContactSource: cotangents of what a contact reads go to the states at n and n-1, to the inputs and to the inverse mass.
+#pragma once
+
+#include "adjoint/contact/touch_vjp.h"
+#include "adjoint/solver/cotangents.h"
+#include "core/solver/contact_source.h"
+
+namespace sheetbend {
+
+// Cotangents of the poses of all colliders, zero.
+template <class T>
+ColliderPoses<Single<T>> no_pose_cotangents(const ContactSource<T>& source) {
+  const std::vector<Pose<Single<T>>> none(source.scene.colliders.size(), Pose<Single<T>>{});
+  return {none, none, source.bdf.before == 0.0 ? std::vector<Pose<Single<T>>>{} : none};
+}
+
+// Reverse of ContactSource::numbers. Returns the cotangent of the particle's inverse mass.
+template <class T>
+Single<T> numbers_vjp(const ContactSource<T>& source, const ColliderPoses<Single<T>>& poses, int contact, int item,
+                      const ContactNumbers<Single<T>>& bar, ColliderPoses<Single<T>>& poses_bar,
+                      const StateCotangents<T>& from_bar, const Inputs<T>& in_bar) {
+  using S = Single<T>;
+  const Scene& scene = source.scene;
+  const Contact& c = scene.contacts[contact];
+  const Collider& collider = scene.colliders[c.collider];
+  const int node = c.particles[item], dof = scene.first_dof[node];
+  const auto history = [&](double weight, const std::vector<Pose<S>>& pose, std::vector<Pose<S>>& pose_bar, const T* x,
+                           T* x_bar) {
+    source.add(in_frame_vjp(pose[c.collider], source.at(x, node), S(weight) * bar.from, pose_bar[c.collider]),
+               x_bar + dof);
+  };
+  history(source.bdf.now, poses.now, poses_bar.now, source.from.x, from_bar.x);
+  if (source.bdf.before != 0.0)
+    history(source.bdf.before, poses.before, poses_bar.before, source.from.x_before, from_bar.x_before);
+  const S eta2(source.bdf.eta * source.bdf.eta);
+  source.add(eta2 * bar.carried, from_bar.x + scene.first_dof[c.carried[item]]);
+  source.add(bar.friction, in_bar.of(Quantity::friction)[contact]);
+  source.add(bar.radius, in_bar.of(Quantity::contact_radius)[contact]);
+  with_shape(collider.shape, [&]<class Shape>(Shape) {
+    for (int k = 0; k < size_count<Shape>; ++k)
+      source.add(bar.size[k], in_bar.of(Quantity::collider_size)[collider.first_size + k]);
+  });
+  if (c.stiffness >= 0) {
+    source.add(eta2 * bar.kappa, in_bar.of(Quantity::contact_stiffness)[c.stiffness]);
+    return S(0.0);
+  }
+  const S w = source.read(source.w[node]);
+  return -(S(rigidity) * bar.kappa / (w * w));
+}
+
+// Reverse of ContactSource::poses.
+template <class T>
+void poses_vjp(const ContactSource<T>& source, const ColliderPoses<Single<T>>& bar, const Inputs<T>& in_bar) {
+  using S = Single<T>;
+  const auto back = [&](double t, const std::vector<Pose<S>>& own) {
+    for (std::size_t c = 0; c < own.size(); ++c) {
+      const Collider& collider = source.scene.colliders[c];
+      const KnotWeights k = collider.motion.at(t);
+      const Vec3<S> rotation_bar = turn_by_vjp(source.pose_part(collider, t, 1), own[c].turn);
+      for (int i = 0; i < k.count; ++i) {
+        T* knot = in_bar.of(Quantity::collider_pose) + collider.first_pose + 6 * static_cast<std::size_t>(k.first + i);
+        source.add(S(k.weight[i]) * own[c].position, knot);
+        source.add(S(k.weight[i]) * rotation_bar, knot + 3);
+      }
+    }
+  };
+  back(source.t_next, bar.next);
+  back(source.t_next - source.h, bar.now);
+  if (!bar.before.empty()) back(source.t_next - 2.0 * source.h, bar.before);
+}
+
+}  // namespace sheetbend

@@ -1,0 +1,54 @@
+// The reverse of CarryFriction: the cotangents of the forces that a substep leaves go through the law of contact to the state that it has found, to the one
+// before and to the inputs.
+#pragma once
+
+#include "adjoint/solver/contact_source_vjp.h"
+#include "adjoint/step/stages.h"
+#include "core/step/carry_friction.h"
+
+namespace sheetbend {
+
+template <>
+struct ReverseOf<CarryFriction> {
+  template <class T>
+  using Scratch = Nothing;
+
+  template <class T>
+  static void run(const Step<T>& step, const Work<T>& work, Nothing&, Nothing&, const StepCotangents<T>& bar) {
+    using S = Single<T>;
+    const Scene& scene = step.scene;
+    if (scene.contacts.empty()) return;
+    const S rate(1.0 / (step.bdf.eta * step.bdf.eta));
+    const Vec3<S> none(S(0.0), S(0.0), S(0.0));
+    ColliderPoses<S> poses_bar;
+    int lane = -1;
+    std::optional<ContactSource<T>> last;
+    for_each_contact(step, work.masses, [&](const ContactSource<T>& source, const auto& poses, int c, int i) {
+      if (source.lane != lane) {
+        if (last) poses_vjp(*last, poses_bar, bar.in);
+        last.emplace(source);
+        poses_bar = no_pose_cotangents(source);
+        lane = source.lane;
+      }
+      const Contact& contact = scene.contacts[c];
+      const int shape = scene.colliders[contact.collider].shape, dof = scene.first_dof[contact.particles[i]];
+      const Vec3<S> tangential_bar = rate * source.at(bar.x_next, contact.carried[i]);
+      const Vec3<S> x = source.read(Vec3<T>(work.q.of(contact.particles[i])));
+      const ContactNumbers<S> numbers = source.numbers(poses, c, i);
+      ContactNumbers<S> numbers_bar{};
+      const Vec3<S> z_bar = touch_vjp(shape, poses.next[contact.collider].in_frame(x), numbers, none, tangential_bar, numbers_bar);
+      source.add(in_frame_vjp(poses.next[contact.collider], x, z_bar, poses_bar.next[contact.collider]),
+                 bar.x_next + dof);
+      source.add(numbers_vjp(source, poses, c, i, numbers_bar, poses_bar, bar.from, bar.in),
+                 bar.w.of(contact.particles[i]));
+    });
+    if (last) poses_vjp(*last, poses_bar, bar.in);
+    // They were written, whatever they were before.
+    for (const Contact& contact : scene.contacts)
+      for (std::size_t i = 0; i < contact.particles.size(); ++i)
+        if (scene.role[contact.particles[i]] == Role::free)
+          std::fill_n(bar.x_next + scene.first_dof[contact.carried[i]], 3, T(0.0));
+  }
+};
+
+}  // namespace sheetbend

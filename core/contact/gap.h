@@ -1,0 +1,38 @@
+// The contract of a closed shape that particles may touch. An author writes the distance from its surface and the distance's gradient once, over any
+// scalar; the law of contact, its derivatives, the motion of colliders and the tests follow from that.
+//
+//   struct Sphere {
+//     static constexpr const char* name = "sphere";
+//     static constexpr const char* about = "all points ...";   in one line, for lists
+//     static constexpr std::array sizes{"radius"};             its lengths [m], positive; std::array<const char*, 0>{} where it has none
+//     template <class T> static void evaluate(const T* z, const T* size, T& distance, T* n);
+//   };
+//
+// z (3) is a point in the shape's own frame [m], `distance` its distance from the surface [m], negative inside, and n (3) the gradient of the distance with respect to z,
+// a unit vector. Where the distance has a kink, n is that of one side. No number may be divided by zero: a shape says in its header what it does
+// where there is no direction. T is never a pack, so branches may look at value_of(). shapes.h lists all shapes.
+#pragma once
+
+#include <array>
+
+#include "core/scalar/vec3.h"
+
+namespace sheetbend {
+
+template <class S>
+inline constexpr int size_count = static_cast<int>(S::sizes.size());
+
+// v over its length, and the length; `otherwise` where it has none.
+template <class T>
+T normalize(const Vec3<T>& v, const Vec3<T>& otherwise, T* n) {
+  const T squared = dot(v, v);
+  if (!(value_of(squared) > 0.0)) {
+    otherwise.store(n);
+    return T(0.0);
+  }
+  const T length = sqrt(squared);
+  ((T(1.0) / length) * v).store(n);
+  return length;
+}
+
+}  // namespace sheetbend

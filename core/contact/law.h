@@ -1,0 +1,44 @@
+// The law of one contact: a stiff force along the normal that pushes and never pulls, and Coulomb friction by a return mapping (Simo & Hughes 1998,
+// sec. 5) of a tangential force that is carried from substep to substep, so that what sticks does not creep:
+//
+//   lambda_n = kappa max(0, -gap)
+//   tau      = P (f - kappa u)                        P = I - n n^T,  u: slip over the substep,  f: tangential force before
+//   lambda_t = tau min(1, mu lambda_n/|tau|)          sticks, or slides along tau
+//
+// in multipliers, force times eta^2. lambda_t is what the next substep begins with; a contact that ends forgets it. Contact, sticking and sliding follow
+// from the signs here and are decided nowhere else. All vectors are in the collider's frame, which turns what is carried along with it.
+#pragma once
+
+#include "core/scalar/vec3.h"
+
+namespace sheetbend {
+
+// kappa of a rigid contact, over the particle's mass. It is as deep as g eta^2/rigidity under its own weight.
+inline constexpr double rigidity = 1e3;
+
+template <class T>
+struct ContactForce {
+  T normal{};          // lambda_n
+  Vec3<T> tangential;  // lambda_t
+  bool pushes = false, slides = false, rubs = false;  // rubs: pushes, and friction may act
+};
+
+// T is never a pack.
+template <class T>
+ContactForce<T> contact_force(const T& gap, const Vec3<T>& n, const Vec3<T>& slip, const Vec3<T>& carried,
+                              const T& friction, const T& kappa) {
+  ContactForce<T> c;
+  if (!(value_of(gap) < 0.0)) return c;
+  c.pushes = true;
+  c.normal = -(kappa * gap);
+  const T limit = friction * c.normal;
+  c.rubs = value_of(limit) > 0.0;
+  const Vec3<T> trial = carried - kappa * slip;
+  const Vec3<T> tau = trial - dot(n, trial) * n;
+  const T squared = dot(tau, tau);
+  c.slides = value_of(squared) > value_of(limit) * value_of(limit);
+  c.tangential = c.slides ? (limit / sqrt(squared)) * tau : tau;
+  return c;
+}
+
+}  // namespace sheetbend

@@ -1,0 +1,58 @@
+// Every shape that the program knows, one line each. Shapes are numbered in this order.
+#pragma once
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+#include <tuple>
+
+#include "core/contact/capsule.h"
+#include "core/contact/plane.h"
+#include "core/contact/rounded_box.h"
+#include "core/contact/sphere.h"
+
+namespace sheetbend {
+
+using Shapes = std::tuple<  //
+    Plane,                  //
+    Sphere,                 //
+    Capsule,                //
+    RoundedBox>;
+
+inline constexpr int shape_count = std::tuple_size_v<Shapes>;
+inline constexpr int most_sizes = []<class... S>(std::tuple<S...>*) {
+  return std::max({size_count<S>...});
+}(static_cast<Shapes*>(nullptr));
+
+// Calls f with an object of the shape type that `shape` numbers.
+template <int I = 0, class F>
+void with_shape(int shape, F&& f) {
+  if constexpr (I < shape_count) {
+    if (shape == I) return f(std::tuple_element_t<I, Shapes>{});
+    with_shape<I + 1>(shape, f);
+  } else {
+    throw std::logic_error("shape " + std::to_string(shape) + " is not in the list");
+  }
+}
+
+// The number of a shape's name; throws std::invalid_argument that lists the known ones.
+inline int shape_of(const std::string& name) {
+  int found = -1;
+  std::string known;
+  for (int shape = 0; shape < shape_count; ++shape)
+    with_shape(shape, [&]<class S>(S) {
+      if (name == S::name) found = shape;
+      known += (shape ? ", " : "") + std::string(S::name);
+    });
+  if (found < 0)
+    throw std::invalid_argument("colliders: no shape is called '" + name + "'. Fix: use one of " + known);
+  return found;
+}
+
+// The distance from the surface and its gradient, as in gap.h.
+template <class T>
+void distance_from(int shape, const T* z, const T* size, T& distance, T* n) {
+  with_shape(shape, [&]<class S>(S) { S::evaluate(z, size, distance, n); });
+}
+
+}  // namespace sheetbend

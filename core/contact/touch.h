@@ -1,0 +1,74 @@
+// One particle against one collider: the law of contact at a point of the collider's frame, and its derivative with respect to that point.
+#pragma once
+
+#include "core/contact/law.h"
+#include "core/contact/shapes.h"
+#include "core/scalar/dual.h"
+
+namespace sheetbend {
+
+// What the law reads besides the point, in the collider's frame and in multipliers.
+template <class T>
+struct ContactNumbers {
+  Vec3<T> from;     // history of the point, as for Bdf: slip is counted from there
+  Vec3<T> carried;  // tangential force before
+  T friction, radius, kappa;
+  T size[most_sizes];
+};
+
+template <class T>
+struct Touch : ContactForce<T> {
+  Vec3<T> force;  // on the particle
+};
+
+template <class T>
+Touch<T> touch(const T& distance, const Vec3<T>& n, const Vec3<T>& z, const ContactNumbers<T>& c) {
+  Touch<T> t{contact_force(distance - c.radius, n, z - c.from, c.carried, c.friction, c.kappa), {}};
+  if (t.pushes) t.force = t.normal * n + t.tangential;
+  return t;
+}
+
+template <class T>
+Touch<T> touch(int shape, const Vec3<T>& z, const ContactNumbers<T>& c) {
+  T at[3], distance, n[3];
+  z.store(at);
+  distance_from(shape, at, c.size, distance, n);
+  return touch(distance, Vec3<T>(n), z, c);
+}
+
+// The same numbers over a larger scalar.
+template <class U, class T>
+ContactNumbers<U> constants(const ContactNumbers<T>& c) {
+  const auto vector = [](const Vec3<T>& v) { return Vec3<U>(U(v.x), U(v.y), U(v.z)); };
+  ContactNumbers<U> u{vector(c.from), vector(c.carried), U(c.friction), U(c.radius), U(c.kappa), {}};
+  for (int k = 0; k < most_sizes; ++k) u.size[k] = U(c.size[k]);
+  return u;
+}
+
+// A = -d force/dz, row by row, with or without the curvature of the shape: without it the normal stays, as Newton's method may have it. Returns
+// what acts.
+inline Touch<double> touch_matrix(int shape, const Vec3<double>& z, const ContactNumbers<double>& c, bool curved,
+                                  double* A) {
+  using D = Dual<double, 3>;
+  double at[3], distance, n[3];
+  z.store(at);
+  distance_from(shape, at, c.size, distance, n);
+  const Touch<double> plain = touch(distance, Vec3<double>(n), z, c);
+  std::fill_n(A, 9, 0.0);
+  if (!plain.pushes) return plain;
+  D zd[3], distance_d(distance), nd[3] = {n[0], n[1], n[2]};
+  for (int d = 0; d < 3; ++d) {
+    zd[d] = D(at[d]);
+    zd[d].d[d] = 1.0;
+    distance_d.d[d] = n[d];
+  }
+  const ContactNumbers<D> cd = constants<D>(c);
+  if (curved) distance_from(shape, zd, cd.size, distance_d, nd);
+  D force[3];
+  touch(distance_d, Vec3<D>(nd), Vec3<D>(zd), cd).force.store(force);
+  for (int a = 0; a < 3; ++a)
+    for (int b = 0; b < 3; ++b) A[3 * a + b] = -force[a].d[b];
+  return plain;
+}
+
+}  // namespace sheetbend

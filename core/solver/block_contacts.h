@@ -1,0 +1,54 @@
+// The contacts of an implicit block in one substep, of one scene.
+#pragma once
+
+#include "core/solver/contact_source.h"
+#include "core/solver/plan.h"
+
+namespace sheetbend {
+
+template <class S>
+struct BlockContacts {
+  ColliderPoses<S> poses;
+  std::vector<ContactNumbers<S>> numbers;  // per contact of the block
+
+  void resize(const DirectBlock& block) { numbers.resize(block.contacts.size()); }
+  static std::size_t bytes(const Scene& scene, const DirectBlock& block) {
+    if (block.contacts.empty()) return 0;
+    return sizeof(ContactNumbers<S>) * block.contacts.size() + 3 * sizeof(Pose<S>) * scene.colliders.size();
+  }
+
+  template <class T>
+  void load(const ContactSource<T>& source, const DirectBlock& block) {
+    if (block.contacts.empty()) return;
+    poses = source.poses();
+    for (std::size_t i = 0; i < numbers.size(); ++i)
+      numbers[i] = source.numbers(poses, block.contacts[i].contact, block.contacts[i].item);
+  }
+
+  // Of contact i: what acts on its particle at x, in the collider's frame; `pose` turns it.
+  const Pose<S>& pose(const DirectBlock& block, int i) const { return poses.next[block.contacts[i].collider]; }
+  Touch<S> at(const DirectBlock& block, int i, const Vec3<S>& x) const {
+    return touch(block.contacts[i].shape, pose(block, i).in_frame(x), numbers[i]);
+  }
+};
+
+// The values of what a scalar carries more than a value of.
+template <class S>
+BlockContacts<double> values_of(const BlockContacts<S>& c) {
+  const auto vector = [](const Vec3<S>& v) { return Vec3<double>(value_of(v.x), value_of(v.y), value_of(v.z)); };
+  BlockContacts<double> all;
+  for (const Pose<S>& pose : c.poses.next) {
+    Pose<double>& to = all.poses.next.emplace_back();
+    to.position = vector(pose.position);
+    for (int k = 0; k < 9; ++k) to.turn[k] = value_of(pose.turn[k]);
+  }
+  for (const ContactNumbers<S>& n : c.numbers) {
+    ContactNumbers<double>& to = all.numbers.emplace_back();
+    to.from = vector(n.from), to.carried = vector(n.carried);
+    to.friction = value_of(n.friction), to.radius = value_of(n.radius), to.kappa = value_of(n.kappa);
+    for (int k = 0; k < most_sizes; ++k) to.size[k] = value_of(n.size[k]);
+  }
+  return all;
+}
+
+}  // namespace sheetbend

@@ -1,0 +1,101 @@
+// Where the numbers of contacts come from: the poses of colliders around a substep, and what the law reads of a particle and a collider. Contacts
+// of a pack's scenes are looked at one after the other.
+#pragma once
+
+#include <type_traits>
+
+#include "core/contact/pose.h"
+#include "core/contact/touch.h"
+#include "core/scalar/pack.h"
+#include "core/scene/scene.h"
+#include "core/solver/options.h"
+#include "core/solver/states.h"
+
+namespace sheetbend {
+
+// A number of one scene of T.
+template <class T>
+using Single = std::conditional_t<std::is_same_v<T, Pack>, double, T>;
+
+template <class S>
+struct ColliderPoses {
+  std::vector<Pose<S>> next, now, before;  // per collider, at n+1, n and n-1 (empty where it is not asked for)
+};
+
+template <class T>
+struct ContactSource {
+  using S = Single<T>;
+  const Scene& scene;
+  Inputs<const T> in;
+  Bdf bdf;
+  double t_next, h;
+  SubstepStates<T> from;
+  const T* w;  // effective inverse masses, per node
+  int lane;    // of a pack
+
+  S read(const T& a) const {
+    if constexpr (std::is_same_v<T, Pack>)
+      return a[lane];
+    else
+      return a;
+  }
+  Vec3<S> read(const Vec3<T>& a) const { return {read(a.x), read(a.y), read(a.z)}; }
+  Vec3<S> at(const T* state, int node) const { return read(Vec3<T>(state + scene.first_dof[node])); }
+
+  void write(const Vec3<S>& v, T* to) const {
+    if constexpr (std::is_same_v<T, Pack>)
+      to[0].set(lane, v.x), to[1].set(lane, v.y), to[2].set(lane, v.z);
+    else
+      v.store(to);
+  }
+  void add(const S& a, T& to) const {
+    if constexpr (std::is_same_v<T, Pack>)
+      to.set(lane, to[lane] + a);
+    else
+      to += a;
+  }
+  void add(const Vec3<S>& v, T* to) const { add(v.x, to[0]), add(v.y, to[1]), add(v.z, to[2]); }
+
+  // The rotation vector (slot 1) or the position (slot 0) of a collider.
+  Vec3<S> pose_part(const Collider& c, double t, int slot) const {
+    return read(at_knots(c.motion.at(t), in.of(Quantity::collider_pose) + c.first_pose, 2, slot));
+  }
+
+  ColliderPoses<S> poses() const {
+    ColliderPoses<S> all;
+    const auto find = [&](double t, std::vector<Pose<S>>& to) {
+      to.resize(scene.colliders.size());
+      for (std::size_t c = 0; c < to.size(); ++c) {
+        to[c].position = pose_part(scene.colliders[c], t, 0);
+        turn_by(pose_part(scene.colliders[c], t, 1), to[c].turn);
+      }
+    };
+    find(t_next, all.next);
+    find(t_next - h, all.now);
+    if (bdf.before != 0.0) find(t_next - 2.0 * h, all.before);
+    return all;
+  }
+
+  ContactNumbers<S> numbers(const ColliderPoses<S>& poses, int contact, int item) const {
+    const Contact& c = scene.contacts[contact];
+    const Collider& collider = scene.colliders[c.collider];
+    const int node = c.particles[item];
+    ContactNumbers<S> numbers{};
+    numbers.from = S(bdf.now) * poses.now[c.collider].in_frame(at(from.x, node));
+    if (bdf.before != 0.0)
+      numbers.from = numbers.from + S(bdf.before) * poses.before[c.collider].in_frame(at(from.x_before, node));
+    const S eta2(bdf.eta * bdf.eta);
+    numbers.carried = eta2 * at(from.x, c.carried[item]);
+    numbers.friction = read(in.of(Quantity::friction)[contact]);
+    numbers.radius = read(in.of(Quantity::contact_radius)[contact]);
+    numbers.kappa = c.stiffness < 0 ? S(rigidity) / read(w[node])
+                                    : eta2 * read(in.of(Quantity::contact_stiffness)[c.stiffness]);
+    with_shape(collider.shape, [&]<class Shape>(Shape) {
+      for (int k = 0; k < size_count<Shape>; ++k)
+        numbers.size[k] = read(in.of(Quantity::collider_size)[collider.first_size + k]);
+    });
+    return numbers;
+  }
+};
+
+}  // namespace sheetbend

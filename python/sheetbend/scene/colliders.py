@@ -1,0 +1,247 @@
+"""Closed shapes that ropes and cloth touch: planes, spheres, capsules and boxes, standing or moving as given."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays.checks import check_increasing, check_positive, finite
+from ..errors import SceneError
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Where a collider's frame is at knots.
+
+    Attributes:
+        times: (knots,) s.
+        positions: (knots, 3) m, of the frame's origin.
+        rotations: (knots, 3) rad, vectors along the axis of rotation that are as long as its angle.
+        interpolation: "cubic" or "linear".
+    """
+
+    times: Array
+    positions: Array
+    rotations: Array
+    interpolation: str = "cubic"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Collider:
+    """What the shapes have in common: a name, and a motion or none."""
+
+    shape: ClassVar[str]
+    name: str = ""
+    motion: Motion | None = field(default=None, repr=False)
+
+    def moving(
+        self,
+        times: ArrayLike,
+        displacements: ArrayLike,
+        rotations: ArrayLike | None = None,
+        interpolation: str = "cubic",
+    ) -> Self:
+        """The same shape with a motion, given from where it stands.
+
+        Args:
+            times: (knots,) s, increasing; before the first and after the last one it stands.
+            displacements: (knots, 3) m, of its origin: the point of a plane, the center of any other shape.
+            rotations: (knots, 3) rad, about its origin, as vectors along the axis that are as long as the angle;
+                none by default. Turns beyond half a turn are followed where neighboring knots are less than that apart.
+            interpolation: "cubic" (C1) or "linear" (kicks at every knot).
+
+        Raises:
+            SceneError: shapes, NaN, or times that do not increase.
+        """
+        where = f"{self.name or self.shape}.moving"
+        t = finite(f"{where}.times", times, None, SceneError).ravel()
+        check_increasing(f"{where}.times", t)
+        shape = (len(t), 3)
+        moved = finite(f"{where}.displacements", displacements, shape, SceneError)
+        turned = np.zeros(shape) if rotations is None else finite(f"{where}.rotations", rotations, shape, SceneError)
+        if interpolation not in ("cubic", "linear"):
+            raise SceneError(f"{where}.interpolation", "is unknown", interpolation, "use 'cubic' or 'linear'")
+        position, rotation = self._placed()
+        return replace(self, motion=Motion(t, position + moved, _composed(turned, rotation), interpolation))
+
+    @property
+    def poses(self) -> Motion:
+        """Its motion; of one that stands a single knot."""
+        if self.motion is not None:
+            return self.motion
+        position, rotation = self._placed()
+        return Motion(np.zeros(1), position[None], rotation[None])
+
+    @property
+    def sizes(self) -> Mapping[str, float]:
+        """Its lengths, m, in the order that the core knows them in."""
+        raise NotImplementedError
+
+    def _placed(self) -> tuple[Array, Array]:
+        raise NotImplementedError
+
+    def _vector(self, part: str, values: ArrayLike) -> Array:
+        return finite(f"{self.name or self.shape}.{part}", values, (3,), SceneError)
+
+    def _positive(self, **lengths: float) -> None:
+        check_positive(self.name or self.shape, lengths, {})
+
+
+@dataclass(frozen=True)
+class Plane(Collider):
+    """A half space: all below a plane is inside.
+
+    Args:
+        point: (3,) m, on the plane.
+        normal: (3,) of any length, to the side that is free.
+    """
+
+    shape: ClassVar[str] = "plane"
+    point: ArrayLike = (0.0, 0.0, 0.0)
+    normal: ArrayLike = (0.0, 0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        self._placed()
+
+    @property
+    def sizes(self) -> Mapping[str, float]:
+        return {}
+
+    def _placed(self) -> tuple[Array, Array]:
+        return self._vector("point", self.point), _turn_to(
+            f"{self.name or self.shape}.normal", self._vector("normal", self.normal)
+        )
+
+
+@dataclass(frozen=True)
+class Sphere(Collider):
+    """A ball.
+
+    Args:
+        center: (3,) m.
+        radius: m, the quantity `<name>_radius`.
+    """
+
+    shape: ClassVar[str] = "sphere"
+    center: ArrayLike
+    radius: float
+
+    def __post_init__(self) -> None:
+        self._positive(radius=self.radius)
+        self._placed()
+
+    @property
+    def sizes(self) -> Mapping[str, float]:
+        return {"radius": float(self.radius)}
+
+    def _placed(self) -> tuple[Array, Array]:
+        return self._vector("center", self.center), np.zeros(3)
+
+
+@dataclass(frozen=True)
+class Capsule(Collider):
+    """All points within a radius of a segment; a long one serves as a cylinder.
+
+    Args:
+        start, end: (3,) m, of the segment.
+        radius: m, the quantity `<name>_radius`.
+    """
+
+    shape: ClassVar[str] = "capsule"
+    start: ArrayLike
+    end: ArrayLike
+    radius: float
+
+    def __post_init__(self) -> None:
+        self._positive(radius=self.radius)
+        self._placed()
+
+    @property
+    def sizes(self) -> Mapping[str, float]:
+        along = self._vector("end", self.end) - self._vector("start", self.start)
+        return {"radius": float(self.radius), "half_length": 0.5 * float(np.linalg.norm(along))}
+
+    def _placed(self) -> tuple[Array, Array]:
+        start, end = self._vector("start", self.start), self._vector("end", self.end)
+        return 0.5 * (start + end), _turn_to(f"{self.name or self.shape}.end", end - start)
+
+
+@dataclass(frozen=True)
+class Box(Collider):
+    """A box with rounded edges. Its edges meet particles, not the links between them: use a radius that is large
+    against the links of what lies on them.
+
+    Args:
+        center: (3,) m.
+        size: (3,) m, whole edges along the three axes before it is turned.
+        edge_radius: m, of its edges and corners; less than half the shortest edge.
+        rotation: (3,) rad, a vector along the axis that it is turned about, as long as the angle.
+    """
+
+    shape: ClassVar[str] = "rounded_box"
+    center: ArrayLike
+    size: ArrayLike
+    edge_radius: float
+    rotation: ArrayLike = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        half = 0.5 * self._vector("size", self.size)
+        self._positive(**{f"size[{k}]": float(h) for k, h in enumerate(half)}, edge_radius=self.edge_radius)
+        if not self.edge_radius < half.min():
+            fix = "give less than half of the shortest edge"
+            raise SceneError(
+                f"{self.name or self.shape}.edge_radius", "is too large for the box", self.edge_radius, fix
+            )
+        self._placed()
+
+    @property
+    def sizes(self) -> Mapping[str, float]:
+        half = 0.5 * self._vector("size", self.size)
+        return {
+            **{f"half_{axis}": float(h) for axis, h in zip("xyz", half, strict=True)},
+            "radius": float(self.edge_radius),
+        }
+
+    def _placed(self) -> tuple[Array, Array]:
+        return self._vector("center", self.center), self._vector("rotation", self.rotation)
+
+
+def _turn_to(field_name: str, axis: Array) -> Array:
+    """The shortest rotation of the third axis to a direction, (3,) rad."""
+    length = float(np.linalg.norm(axis))
+    if not length > 0.0:
+        raise SceneError(field_name, "has no direction", axis.tolist(), "give a vector that is not zero")
+    n = axis / length
+    across = np.array([-n[1], n[0], 0.0])  # e3 x n
+    sine = float(np.linalg.norm(across))
+    angle = float(np.arctan2(sine, n[2]))
+    return across * (angle / sine) if sine > 0.0 else np.array([angle, 0.0, 0.0])
+
+
+def _quaternion(rotation: Array) -> Array:
+    angle = float(np.linalg.norm(rotation))
+    return np.append(np.sinc(angle / (2.0 * np.pi)) * 0.5 * rotation, np.cos(0.5 * angle))
+
+
+def _composed(turns: Array, first: Array) -> Array:
+    """Rotation vectors (knots, 3) of `first`, then each of `turns`, continuous from knot to knot."""
+    if not first.any():
+        return turns
+    found: list[Array] = []
+    b, bw = _quaternion(first)[:3], _quaternion(first)[3]
+    for turn in turns:
+        a, aw = _quaternion(turn)[:3], _quaternion(turn)[3]
+        v, w = aw * b + bw * a + np.cross(a, b), aw * bw - a @ b
+        sine = float(np.linalg.norm(v))
+        angle = 2.0 * float(np.arctan2(sine, w))
+        axis = v / sine if sine > 0.0 else np.array([0.0, 0.0, 1.0])
+        near = found[-1] if found else first
+        turns_more = np.round((near @ axis - angle) / (2.0 * np.pi))
+        found.append(axis * (angle + 2.0 * np.pi * turns_more))
+    return np.array(found)

@@ -1,0 +1,172 @@
+"""Which particles of a scene may touch which shapes, and how rough and how stiff that is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays.checks import index_array, is_number
+from ..errors import SceneError
+from ..quantities.quantities import ZERO_OR_MORE, Builder, Term
+from .colliders import Collider
+
+Array = np.ndarray
+ARRAYS = ("friction", "contact_radius", "contact_stiffness", "collider_pose", "collider_size")
+TOUCHES = 1e-6  # m: so deep a particle may be at the start, as under its own weight
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Particles that may touch a collider.
+
+    Attributes:
+        name: of its quantities.
+        collider: place in `Contacts.colliders`.
+        particles: (n,).
+        carried: (n,) pinned particles whose coordinates are the tangential forces that are carried from substep to
+            substep [N], in the collider's frame.
+        rigid: whether it is as stiff as masses and substeps allow.
+    """
+
+    name: str
+    collider: int
+    particles: Array
+    carried: Array
+    rigid: bool
+
+
+class Contacts:
+    """The colliders and contacts of a scene, each in the order in which they were added."""
+
+    def __init__(self) -> None:
+        self.colliders: dict[str, Collider] = {}
+        self.contacts: list[Contact] = []
+
+    def collider(self, scene: Builder, collider: Collider) -> tuple[str, int]:
+        """The name and the place of a collider, which is added unless it is there."""
+        for place, (name, known) in enumerate(self.colliders.items()):
+            if known is collider:
+                return name, place
+        name = collider.name or collider.shape
+        if name in self.colliders:
+            fix = "give each collider a name of its own, such as sb.Plane(name='table')"
+            raise SceneError("collider.name", "is taken by another collider", name, fix)
+        first_pose = 6 * sum(len(c.poses.times) for c in self.colliders.values())
+        first_size = sum(len(c.sizes) for c in self.colliders.values())
+        knots = first_pose + 6 * np.arange(len(collider.poses.times))
+        for axis, label in enumerate("xyz"):
+            scene.add_quantity(f"{name}_{label}", 0.0, "m", positive=False, scale=0.01)
+            scene.add_terms([Term("collider_pose", knots + axis, 1.0, ((f"{name}_{label}", "identity"),))])
+        for k, (label, value) in enumerate(collider.sizes.items()):
+            scene.add_quantity(f"{name}_{label}", value, "m")
+            scene.add_terms([Term("collider_size", first_size + k, 1.0, ((f"{name}_{label}", "identity"),))])
+        self.colliders[name] = collider
+        return name, len(self.colliders) - 1
+
+    def check(
+        self, particles: ArrayLike, count: int, friction: float, radius: float, stiffness: float | None, name: str
+    ) -> Array:
+        """The particles of a new contact."""
+        if any(c.name == name for c in self.contacts):
+            raise SceneError("contact.name", "is taken by another contact", name, "give each contact a name of its own")
+        which = index_array(f"{name}.contact.particles", particles, count)
+        if len(np.unique(which)) < len(which):
+            raise SceneError(f"{name}.contact.particles", "are listed twice", which.tolist(), "list each particle once")
+        for label, value, unit in (("friction", friction, "a coefficient, or 0"), ("radius", radius, "m, or 0")):
+            if not (is_number(value) and value >= 0):
+                raise SceneError(f"{name}.contact.{label}", "must not be negative", value, f"give {unit}")
+        if stiffness is not None and not (is_number(stiffness) and stiffness > 0):
+            fix = "give N/m, or leave it out for a rigid contact"
+            raise SceneError(f"{name}.contact.stiffness", "must be positive", stiffness, fix)
+        return which
+
+    def add(
+        self,
+        scene: Builder,
+        place: int,
+        which: Array,
+        carried: Array,
+        friction: float,
+        radius: float,
+        stiffness: float | None,
+        name: str,
+    ) -> None:
+        """See `Scene.contact`."""
+        at = len(self.contacts)
+        self._name(scene, f"{name}_friction", "friction", at, friction, "")
+        if radius > 0:
+            self._name(scene, f"{name}_contact_radius", "contact_radius", at, radius, "m")
+        if stiffness is not None:
+            soft = sum(not c.rigid for c in self.contacts)
+            self._name(scene, f"{name}_contact_stiffness", "contact_stiffness", soft, stiffness, "N/m")
+        self.contacts.append(Contact(name, place, which, carried, stiffness is None))
+
+    def _name(self, scene: Builder, quantity: str, array: str, at: int, value: float, unit: str) -> None:
+        scene.add_quantity(
+            quantity,
+            value,
+            unit,
+            positive=value > 0,
+            limits=None if value > 0 else ZERO_OR_MORE,
+            scale=None if value > 0 else 0.1,
+        )
+        scene.add_terms([Term(array, at, 1.0, ((quantity, "identity"),))])
+
+    def specification(self) -> dict[str, Any]:
+        """The topology, as the compiled core is made from it."""
+        poses = {name: c.poses for name, c in self.colliders.items()}
+        return {
+            "colliders": [
+                {
+                    "name": name,
+                    "shape": c.shape,
+                    "times": poses[name].times.tolist(),
+                    "interpolation": poses[name].interpolation,
+                }
+                for name, c in self.colliders.items()
+            ],
+            "contacts": [
+                {
+                    "name": c.name,
+                    "collider": c.collider,
+                    "particles": c.particles,
+                    "carried": c.carried,
+                    "rigid": c.rigid,
+                }
+                for c in self.contacts
+            ],
+        }
+
+    def arrays(self) -> Mapping[str, Array]:
+        """The plain parts of the input arrays: poses, and zero for what quantities make."""
+        poses = [
+            np.concatenate([c.poses.positions, c.poses.rotations], axis=1).ravel() for c in self.colliders.values()
+        ]
+        return {
+            "friction": np.zeros(len(self.contacts)),
+            "contact_radius": np.zeros(len(self.contacts)),
+            "contact_stiffness": np.zeros(sum(not c.rigid for c in self.contacts)),
+            "collider_pose": np.concatenate([np.zeros(0), *poses]),
+            "collider_size": np.zeros(sum(len(c.sizes) for c in self.colliders.values())),
+        }
+
+    def expect_apart(self, core: Any, inputs: Array, masses: Array, gravity: Array, held: set[int]) -> None:
+        """Refuse a start at which particles are inside a collider, deeper than they lie under their weight."""
+        soft = iter(inputs[core.layout["contact_stiffness"][0] :])
+        for k, c in enumerate(self.contacts):
+            gaps = core.contact_gaps(inputs, 0.0, k)[:, 0]
+            stiffness = np.inf if c.rigid else next(soft)
+            allowed = TOUCHES + 2.0 * masses[c.particles] * np.linalg.norm(gravity) / stiffness
+            depth = np.where(np.isin(c.particles, sorted(held)), 0.0, -gaps) - allowed
+            worst = int(np.argmax(depth))
+            if depth[worst] > 0:
+                name = list(self.colliders)[c.collider]
+                problem = (
+                    f"starts with particle {c.particles[worst]} inside '{name}', which is {-gaps[worst]:.3g} m deep"
+                )
+                fix = "let it start outside, counted from the contact's radius"
+                raise SceneError(f"{c.name}.contact", problem, int((depth > 0).sum()), fix)

@@ -1,0 +1,89 @@
+// Scenes in which particles touch shapes.
+#pragma once
+
+#include "tests/cpp/support/programs.h"
+
+namespace sheetbend::testing {
+
+// Builds a scene whose particles all may touch all colliders; nodes that carry friction follow the particles.
+struct ContactBuilder {
+  SceneSpec spec;
+  std::vector<double> x, velocity, mass, compliance, rest, friction, radius, stiffness, pose, size;
+
+  int particle(const Vec3<double>& at, double m, const Vec3<double>& v = {0.0, 0.0, 0.0}) {
+    x.insert(x.end(), {at.x, at.y, at.z});
+    velocity.insert(velocity.end(), {v.x, v.y, v.z});
+    mass.push_back(m);
+    return static_cast<int>(mass.size()) - 1;
+  }
+  void collider(const std::string& shape, const std::vector<double>& sizes, const std::vector<double>& poses,
+                const std::vector<double>& times = {0.0}) {
+    spec.colliders.push_back({shape, shape, {times, Interpolation::cubic}});
+    size.insert(size.end(), sizes.begin(), sizes.end());
+    pose.insert(pose.end(), poses.begin(), poses.end());
+  }
+  void constraint(const std::string& kind, const std::vector<int>& nodes, double c, const std::vector<double>& p) {
+    for (GroupSpec& g : spec.groups)
+      if (g.kind == kind) {
+        g.stencil.insert(g.stencil.end(), nodes.begin(), nodes.end());
+        compliances[kind].push_back(c);
+        rests[kind].insert(rests[kind].end(), p.begin(), p.end());
+        return;
+      }
+    spec.groups.push_back({kind, kind, false, {}});
+    constraint(kind, nodes, c, p);
+  }
+  // Last: of what was added before.
+  void contact(double mu, double r, double k = 0.0) {
+    if (moving < 0) moving = static_cast<int>(mass.size());
+    for (int c = 0; c < static_cast<int>(spec.colliders.size()); ++c) {
+      ContactSpec contact{"contact", c, {}, {}, k == 0.0};
+      for (int n = 0; n < moving; ++n) {
+        contact.particles.push_back(n);
+        contact.carried.push_back(particle({0.0, 0.0, 0.0}, 1.0));
+        spec.pinned.push_back(contact.carried.back());
+      }
+      spec.contacts.push_back(contact);
+      friction.push_back(mu);
+      radius.push_back(r);
+      if (k > 0.0) stiffness.push_back(k);
+    }
+  }
+  testing::Sample build(double gravity) {
+    spec.particles = static_cast<int>(mass.size());
+    testing::Sample s{build_scene(spec), {}};
+    s.inputs.resize(s.scene.layout.total());
+    const Inputs<double> in{s.scene.layout, s.inputs.data()};
+    const auto put = [&](Quantity q, const std::vector<double>& values) {
+      ASSERT_EQ(values.size(), s.scene.layout.count(q)) << quantity_names[static_cast<int>(q)];
+      std::copy(values.begin(), values.end(), in.of(q));
+    };
+    for (const GroupSpec& g : spec.groups) {
+      compliance.insert(compliance.end(), compliances[g.kind].begin(), compliances[g.kind].end());
+      rest.insert(rest.end(), rests[g.kind].begin(), rests[g.kind].end());
+    }
+    put(Quantity::position, x), put(Quantity::velocity, velocity), put(Quantity::mass, mass);
+    put(Quantity::compliance, compliance), put(Quantity::rest, rest), put(Quantity::gravity, {0.0, 0.0, -gravity});
+    put(Quantity::friction, friction), put(Quantity::contact_radius, radius);
+    put(Quantity::contact_stiffness, stiffness), put(Quantity::collider_pose, pose), put(Quantity::collider_size, size);
+    return s;
+  }
+
+  int moving = -1;
+  std::map<std::string, std::vector<double>> compliances, rests;
+};
+
+inline SolverOptions contact_options(double h) {
+  return {.h = h, .integrator = Integrator::bdf1, .partition = Partition::implicit, .iterations = 100};
+}
+
+// d x_dof/d inputs at the last step of a program.
+inline std::vector<double> gradient_of_end(const Program& p, const std::vector<double>& inputs,
+                                           const std::vector<double>& seed, int kept = every_state) {
+  std::vector<double> end(p.scene.dofs()), bar(inputs.size());
+  auto tape = record_rollout<double>(p.scene, p.plan, inputs.data(), p.t0, {p.steps}, end.data(), kept, nullptr);
+  reverse_rollout<double>(p.scene, p.plan, inputs.data(), p.t0, tape, {p.steps}, seed.data(), bar.data(), nullptr);
+  return bar;
+}
+
+}  // namespace sheetbend::testing

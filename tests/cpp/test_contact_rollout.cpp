@@ -1,0 +1,300 @@
+// Contacts in rollouts: closed forms with numbers, gradients against complex steps, and equal bits.
+#include <map>
+
+#include "core/rollout/rollout.h"
+#include "tests/cpp/support/contact_scenes.h"
+
+namespace sheetbend::testing {
+namespace {
+
+constexpr double g = 9.81;
+
+// A block on a plane that is inclined about the second axis, pressed in as deep as its weight does.
+Sample block_on_plane(double slope, double mu, double speed, double h) {
+  ContactBuilder b;
+  const Vec3<double> n(std::sin(slope), 0.0, std::cos(slope)), along(std::cos(slope), 0.0, -std::sin(slope));
+  b.particle(-(g * std::cos(slope) * h * h / rigidity) * n, 0.3, speed * along);
+  b.collider("plane", {}, {0.0, 0.0, 0.0, 0.0, slope, 0.0});
+  b.contact(mu, 0.0);
+  return b.build(g);
+}
+
+// h (N v - mu g h N (N + 1)/2) with N = floor(v/(mu g h)): what friction leaves of a speed, step by step.
+TEST(Contact, StopsASlidingBlockWhereItShould) {
+  for (const auto& [h, expected, slope] : {std::tuple{1e-2, 0.669585, -2.234718}, {1e-3, 0.678579, -2.264737}}) {
+    const Sample s = block_on_plane(0.0, 0.3, 2.0, h);
+    const Program p{s.scene, make_plan(s.scene, contact_options(h)), static_cast<int>(std::lround(0.8 / h))};
+    const auto all = states(p, s.inputs);
+    const double* end = &all[p.steps * s.scene.dofs()];
+    EXPECT_NEAR(end[0], expected, 1e-6);
+    EXPECT_NEAR(end[2], -g * h * h / rigidity, 1e-12);
+    std::vector<double> seed(s.scene.dofs());
+    seed[0] = 1.0;
+    const auto bar = gradient_of_end(p, s.inputs, seed);
+    const Inputs<const double> in{s.scene.layout, bar.data()};
+    EXPECT_NEAR(in.of(Quantity::friction)[0], slope, 2e-6);
+    EXPECT_NEAR(in.of(Quantity::velocity)[0], h * std::floor(2.0 / (0.3 * g * h)), 1e-6);  // h N
+  }
+}
+
+TEST(Contact, HoldsABlockBelowTheCriticalAngleWithoutCreep) {
+  constexpr double h = 1e-3, slope = M_PI / 6.0;
+  constexpr int steps = 400;
+  const auto travel = [&](double mu, double* dmu = nullptr) {
+    const Sample s = block_on_plane(slope, mu, 0.0, h);
+    const Program p{s.scene, make_plan(s.scene, contact_options(h)), steps};
+    const auto all = states(p, s.inputs);
+    const double* end = &all[steps * s.scene.dofs()];
+    std::vector<double> seed(s.scene.dofs());
+    seed[0] = std::cos(slope), seed[2] = -std::sin(slope);
+    if (dmu) *dmu = gradient_of_end(p, s.inputs, seed)[s.scene.layout.of(Quantity::friction)];
+    return end[0] * std::cos(slope) - end[2] * std::sin(slope);
+  };
+  double dmu;
+  EXPECT_LE(std::abs(travel(0.578, &dmu)), 1e-8);
+  EXPECT_EQ(dmu, 0.0);
+  const double t = steps * h, slides = 0.5 * g * t * t * (std::sin(slope) - 0.577 * std::cos(slope));
+  EXPECT_GT(slides, 1e-4);
+  EXPECT_NEAR(travel(0.577, &dmu), slides, 0.01 * slides);
+  EXPECT_NEAR(dmu, -0.5 * g * t * t * std::cos(slope), 0.01 * g * t * t);
+}
+
+// A rope half around a fixed cylinder, one node for every `half turn/nodes` of it, loaded at one end and pulled at the other.
+struct Capstan {
+  Sample sample;
+  int links, pulled;
+  double alpha;
+};
+Capstan capstan(int nodes, double EA, double speed, double time) {
+  constexpr double radius = 0.1, density = 0.05;
+  constexpr int free_links = 4;
+  const double turn = M_PI / nodes, chord = 2.0 * radius * std::sin(0.5 * turn);
+  ContactBuilder b;
+  std::vector<Vec3<double>> at;
+  const auto on = [&](double angle) { return Vec3<double>(-radius * std::cos(angle), 0.0, radius * std::sin(angle)); };
+  const Vec3<double> first = on(0.5 * turn), last = on(M_PI - 0.5 * turn);
+  for (int k = free_links; k > 0; --k) at.push_back(first - (k * chord) * Vec3<double>(0.0, 0.0, 1.0));
+  for (int i = 0; i < nodes; ++i) at.push_back(on((i + 0.5) * turn));
+  for (int k = 1; k <= free_links; ++k) at.push_back(last - (k * chord) * Vec3<double>(0.0, 0.0, 1.0));
+  for (const auto& x : at) b.particle(x, density * chord);
+  const int count = static_cast<int>(at.size());
+  const double alpha = chord / EA;
+  for (int i = 0; i + 1 < count; ++i) b.constraint("distance", {i, i + 1}, alpha, {chord});
+  b.collider("capsule", {radius, 10.0}, {0.0, 0.0, 0.0, M_PI / 2.0, 0.0, 0.0});
+  b.spec.driven = {count - 1};
+  b.spec.boundary = {{0.0, 0.2 * time, time}, Interpolation::linear};
+  b.spec.loaded = {0};
+  b.spec.force = {{0.0}, Interpolation::linear};
+  b.contact(0.3, 0.0);
+  Capstan c{b.build(0.0), count - 1, count - 1, alpha};
+  const Inputs<double> in{c.sample.scene.layout, c.sample.inputs.data()};
+  in.of(Quantity::force)[2] = -1.0;
+  for (int k = 0; k < 3; ++k) {
+    at.back().store(in.of(Quantity::boundary) + 3 * k);
+    in.of(Quantity::boundary)[3 * k + 2] -= speed * (k == 0 ? 0.0 : k == 1 ? 0.2 * time : time);
+  }
+  return c;
+}
+
+// The tension of link i at a state, and its gradient with respect to that state.
+double tension(const Capstan& c, const double* x, int i, double rest, double* seed = nullptr) {
+  const Vec3<double> e = Vec3<double>(x + 3 * (i + 1)) - Vec3<double>(x + 3 * i);
+  const double length = norm(e);
+  if (seed) {
+    ((1.0 / (length * c.alpha)) * e).add_to(seed + 3 * (i + 1));
+    (-(1.0 / (length * c.alpha)) * e).add_to(seed + 3 * i);
+  }
+  return (length - rest) / c.alpha;
+}
+
+TEST(Contact, MultipliesARopesTensionAroundACylinder) {
+  const auto pull = [&](int nodes, double EA, double speed, double time, double h, double* dmu = nullptr,
+                        double* matrices = nullptr) {
+    const Capstan c = capstan(nodes, EA, speed, time);
+    const Scene& scene = c.sample.scene;
+    const double rest = c.sample.inputs[scene.layout.of(Quantity::rest)];
+    const Program p{scene, make_plan(scene, contact_options(h)), static_cast<int>(std::lround(time / h))};
+    Rollout<double> rollout(scene, p.plan, c.sample.inputs.data());
+    double sum = 0.0;
+    for (int n = 0; n < p.steps; ++n) {
+      rollout.advance();
+      sum += static_cast<double>(rollout.balance()[0].size());
+    }
+    if (matrices) *matrices = sum / p.steps;
+    const double before = tension(c, rollout.x(), 0, rest);
+    std::vector<double> seed(scene.dofs());
+    const double after = tension(c, rollout.x(), c.links - 1, rest, seed.data());
+    if (dmu) *dmu = gradient_of_end(p, c.sample.inputs, seed)[scene.layout.of(Quantity::friction)];
+    EXPECT_NEAR(before, 1.0, 1e-3);
+    return after / before;
+  };
+  double dmu, matrices;
+  EXPECT_NEAR(pull(60, 1e4, 0.05, 0.1, 1e-3, &dmu, &matrices), 2.566935, 1e-3);
+  EXPECT_NEAR(dmu, 8.0666, 1e-3 * 8.0666);
+  EXPECT_LE(matrices, 4.0);
+  // A soft rope has to be pulled farther until all of it slides.
+  EXPECT_NEAR(pull(60, 100.0, 0.02, 0.5, 2e-3, nullptr, &matrices), 2.566935, 1e-3);
+  EXPECT_LE(matrices, 4.0);
+  EXPECT_NEAR(pull(30, 1e4, 0.05, 0.1, 4e-3, nullptr, &matrices), 2.5684, 3e-3);
+  EXPECT_LE(matrices, 4.0);
+}
+
+// A rope of four particles that falls into a corner of shapes which move and turn: contacts begin, slide, stick and end.
+Sample tumbling(double mu, double stiffness) {
+  ContactBuilder b;
+  const double link = 0.05;
+  for (int i = 0; i < 4; ++i)
+    b.particle({link * i, 0.004 * i * i, 0.012 + 0.011 * i}, 0.002 + 0.0003 * i, {0.4 - 0.2 * i, 0.3, -1.0 - 0.1 * i});
+  for (int i = 0; i < 3; ++i) b.constraint("distance", {i, i + 1}, link / 50.0, {link});
+  for (int i = 0; i < 2; ++i) b.constraint("bend", {i, i + 1, i + 2}, link / 1e-4, {});
+  b.collider("plane", {}, {0.0, 0.0, 0.0, 0.02, -0.05, 0.3});
+  b.collider("sphere", {0.05}, {0.02, 0.02, -0.04, 0.1, 0.2, 0.0, 0.02, 0.02, -0.03, 0.4, 1.2, -0.5}, {0.0, 0.06});
+  b.collider("capsule", {0.03, 0.1}, {0.11, 0.0, -0.015, 1.5, 0.0, 0.0, 0.11, 0.01, -0.025, 1.2, 0.5, 0.0, 0.10, 0.0, -0.01, 1.6, 0.9, 0.1},
+             {0.0, 0.03, 0.06});
+  b.collider("rounded_box", {0.04, 0.05, 0.02, 0.01}, {0.17, 0.03, -0.012, 0.0, 0.0, 0.5});
+  b.contact(mu, 0.003, stiffness);
+  return b.build(g);
+}
+
+// How often contacts of a rollout began, slid, stuck and ended.
+struct Modes {
+  int began = 0, slid = 0, stuck = 0, ended = 0;
+};
+Modes modes_of(const Program& p, const std::vector<double>& inputs) {
+  const auto all = states(p, inputs);
+  const std::size_t dofs = p.scene.dofs();
+  InverseMasses<double> masses;
+  masses.resize(p.scene, p.plan, false);
+  std::map<std::pair<int, int>, bool> touching;
+  Modes modes;
+  for (int n = 0; n < p.steps; ++n) {
+    const double *x = &all[n * dofs], *next = x + dofs;
+    const Step<double> step{p.scene, p.plan, {p.scene.layout, inputs.data()}, Bdf::at(p.plan.options, n),
+                            p.t0 + (n + 1) * p.plan.options.h, {x, x, x, x, n}};
+    ComputeEffectiveMasses::compute(step, masses);
+    for_each_contact(step, masses, [&](const auto& source, const auto& poses, int c, int i) {
+      const Contact& contact = p.scene.contacts[c];
+      const auto z = poses.next[contact.collider].in_frame(source.at(next, contact.particles[i]));
+      const auto at = touch(p.scene.colliders[contact.collider].shape, z, source.numbers(poses, c, i));
+      bool& before = touching[{c, i}];
+      modes.began += at.pushes && !before;
+      modes.ended += before && !at.pushes;
+      modes.slid += at.pushes && at.slides;
+      modes.stuck += at.pushes && !at.slides;
+      before = at.pushes;
+    });
+  }
+  return modes;
+}
+
+struct Tumble {
+  double mu, stiffness;
+};
+class Tumbling : public ::testing::TestWithParam<Tumble> {};
+
+TEST_P(Tumbling, HasTheGradientOfComplexSteps) {
+  const Sample s = tumbling(GetParam().mu, GetParam().stiffness);
+  const Program p{s.scene, make_plan(s.scene, contact_options(1e-3)), 60};
+  const Modes modes = modes_of(p, s.inputs);
+  EXPECT_GT(modes.began, 4);
+  EXPECT_GT(modes.ended, 2);
+  EXPECT_GT(modes.slid, 10);
+  EXPECT_GT(modes.stuck, GetParam().mu > 0.0 ? 2 : -1);
+  const auto found = gradient(p, s.inputs);
+  // Of some entries of each quantity.
+  std::vector<Complex> probe(s.inputs.begin(), s.inputs.end());
+  const Layout& layout = s.scene.layout;
+  for (int q = 0; q < quantity_count; ++q) {
+    std::vector<double> own, expected;
+    const std::size_t count = std::min<std::size_t>(layout.size[q], 3);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t at = layout.offset[q] + i * layout.size[q] / count;
+      probe[at].im = complex_step;
+      expected.push_back(loss(p, probe).im / complex_step);
+      own.push_back(found[at]);
+      probe[at].im = 0.0;
+    }
+    if (count > 0) {
+      EXPECT_LE(relative_error(own, expected), 1e-8) << quantity_names[q];
+    }
+  }
+}
+
+TEST_P(Tumbling, HasTheTangentsOfComplexSteps) {
+  const Sample s = tumbling(GetParam().mu, GetParam().stiffness);
+  const Program p{s.scene, make_plan(s.scene, contact_options(1e-3)), 60};
+  using D = Dual<double, 4>;
+  const Layout& layout = s.scene.layout;
+  std::vector<D> inputs(s.inputs.begin(), s.inputs.end());
+  const std::size_t along[] = {layout.of(Quantity::friction) + 1, layout.of(Quantity::collider_pose) + 8,
+                               layout.of(Quantity::collider_size), layout.of(Quantity::velocity)};
+  for (int d = 0; d < 4; ++d) inputs[along[d]].d[d] = 1.0;
+  Rollout<D> rollout(s.scene, p.plan, inputs.data());
+  for (int n = 0; n < p.steps; ++n) rollout.advance();
+  for (int d = 0; d < 4; ++d) {
+    std::vector<Complex> probe(s.inputs.begin(), s.inputs.end());
+    probe[along[d]].im = complex_step;
+    const auto all = states(p, probe);
+    std::vector<double> found, expected;
+    for (int i = 0; i < s.scene.dofs(); ++i) {
+      expected.push_back(all[p.steps * s.scene.dofs() + i].im / complex_step);
+      found.push_back(rollout.x()[i].d[d]);
+    }
+    EXPECT_LE(relative_error(found, expected), 1e-8) << d;
+  }
+}
+
+TEST_P(Tumbling, HasTheSameBitsWhateverKeepsItsStates) {
+  const Sample s = tumbling(GetParam().mu, GetParam().stiffness);
+  Program p{s.scene, make_plan(s.scene, contact_options(1e-3)), 60};
+  const auto plain = states(p, s.inputs);
+  auto recorded = record(p, s.inputs);
+  EXPECT_TRUE(same_bits(recorded.states, plain));
+  const auto expected = gradient(p, s.inputs, recorded);
+  auto few = record(p, s.inputs, Schedule::least(p.steps, Tape<double>::window(p.plan)) + 2);
+  EXPECT_TRUE(same_bits(gradient(p, s.inputs, few), expected));
+  p.plan.options.threads = 3;
+  EXPECT_TRUE(same_bits(states(p, s.inputs), plain));
+  EXPECT_TRUE(same_bits(gradient(p, s.inputs), expected));
+  p.plan.options.threads = 1;
+
+  std::vector<Pack> lanes;
+  for (const double a : s.inputs) lanes.emplace_back(a);
+  lanes[s.scene.layout.of(Quantity::gravity) + 2].set(3, -9.5);
+  auto packed = record(p, lanes);
+  const auto packed_gradient = gradient(p, lanes, packed);
+  std::vector<double> lane, lane_gradient;
+  for (const Pack& a : packed.states) lane.push_back(a[5]);
+  for (const Pack& a : packed_gradient) lane_gradient.push_back(a[5]);
+  EXPECT_TRUE(same_bits(lane, plain));
+  EXPECT_TRUE(same_bits(lane_gradient, expected));
+}
+
+INSTANTIATE_TEST_SUITE_P(Contact, Tumbling,
+                         ::testing::Values(Tumble{0.4, 0.0}, Tumble{0.4, 300.0}, Tumble{0.0, 0.0}));
+
+// A rope on a plane that is pulled aside: restarting from a state in between gives the same bits.
+TEST(Contact, GoesOnFromAnyState) {
+  const Sample s = tumbling(0.4, 0.0);
+  const Plan plan = make_plan(s.scene, contact_options(1e-3));
+  Rollout<double> whole(s.scene, plan, s.inputs.data()), second(s.scene, plan, s.inputs.data());
+  for (int n = 0; n < 30; ++n) whole.advance();
+  second.restart(30, whole.state());
+  for (int n = 0; n < 20; ++n) whole.advance(), second.advance();
+  EXPECT_TRUE(std::equal(whole.x(), whole.x() + s.scene.dofs(), second.x()));
+}
+
+TEST(Contact, IsRefusedWhereItIsNotMade) {
+  const Sample s = tumbling(0.4, 0.0);
+  for (const Partition other : {Partition::gauss_seidel, Partition::direct, Partition::newton, Partition::newton_cg}) {
+    SolverOptions options = contact_options(1e-3);
+    options.partition = other;
+    EXPECT_THROW(make_plan(s.scene, options), std::invalid_argument);
+  }
+  SolverOptions options = contact_options(1e-3);
+  options.integrator = Integrator::bdf2;
+  EXPECT_THROW(make_plan(s.scene, options), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace sheetbend::testing
