@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,14 @@ from .colliders import Collider
 Array = np.ndarray
 ARRAYS = ("friction", "contact_radius", "contact_stiffness", "collider_pose", "collider_size")
 TOUCHES = 1e-6  # m: so deep a particle may be at the start, as under its own weight
+
+
+@runtime_checkable
+class HasParticles(Protocol):
+    """A rope, a cloth, or anything else that knows its particles."""
+
+    @property
+    def particles(self) -> Array: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,11 +54,11 @@ class Contacts:
         self.colliders: dict[str, Collider] = {}
         self.contacts: list[Contact] = []
 
-    def collider(self, scene: Builder, collider: Collider) -> tuple[str, int]:
-        """The name and the place of a collider, which is added unless it is there."""
-        for place, (name, known) in enumerate(self.colliders.items()):
+    def _place(self, scene: Builder, collider: Collider) -> int:
+        """The place of a collider, which is added unless it is there."""
+        for place, known in enumerate(self.colliders.values()):
             if known is collider:
-                return name, place
+                return place
         name = collider.name or collider.shape
         if name in self.colliders:
             fix = "give each collider a name of its own, such as sb.Plane(name='table')"
@@ -65,12 +73,23 @@ class Contacts:
             scene.add_quantity(f"{name}_{label}", value, "m")
             scene.add_terms([Term("collider_size", first_size + k, 1.0, ((f"{name}_{label}", "identity"),))])
         self.colliders[name] = collider
-        return name, len(self.colliders) - 1
+        return len(self.colliders) - 1
 
     def check(
-        self, particles: ArrayLike, count: int, friction: float, radius: float, stiffness: float | None, name: str
-    ) -> Array:
-        """The particles of a new contact."""
+        self,
+        what: ArrayLike | HasParticles,
+        collider: Collider,
+        count: int,
+        friction: float,
+        radius: float,
+        stiffness: float | None,
+        name: str | None,
+    ) -> tuple[Array, str]:
+        """The particles of a new contact, of `count` in the scene, and its name."""
+        if not isinstance(collider, Collider):
+            raise SceneError("contact.collider", "is no shape", collider, "give a Plane, Sphere, Capsule or Box")
+        particles = what.particles if isinstance(what, HasParticles) else what
+        name = name or collider.name or collider.shape
         if any(c.name == name for c in self.contacts):
             raise SceneError("contact.name", "is taken by another contact", name, "give each contact a name of its own")
         which = index_array(f"{name}.contact.particles", particles, count)
@@ -82,12 +101,12 @@ class Contacts:
         if stiffness is not None and not (is_number(stiffness) and stiffness > 0):
             fix = "give N/m, or leave it out for a rigid contact"
             raise SceneError(f"{name}.contact.stiffness", "must be positive", stiffness, fix)
-        return which
+        return which, name
 
     def add(
         self,
         scene: Builder,
-        place: int,
+        collider: Collider,
         which: Array,
         carried: Array,
         friction: float,
@@ -96,7 +115,7 @@ class Contacts:
         name: str,
     ) -> None:
         """See `Scene.contact`."""
-        at = len(self.contacts)
+        at, place = len(self.contacts), self._place(scene, collider)
         self._name(scene, f"{name}_friction", "friction", at, friction, "")
         if radius > 0:
             self._name(scene, f"{name}_contact_radius", "contact_radius", at, radius, "m")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +14,7 @@ from ..quantities.kinds import KINDS
 from ..quantities.quantities import ZERO_OR_MORE, Term, product
 from .colliders import Collider
 from .compiled import CompiledScene
+from .contacts import HasParticles
 from .frames import Frame, directors_of, normals_of
 from .group import make_group
 from .moving_clamp import clamped_ends, keep_direction, let_go
@@ -24,22 +24,12 @@ from .scene_data import SceneData
 Array = np.ndarray
 
 
-@runtime_checkable
-class HasParticles(Protocol):
-    """A rope, a cloth, or anything else that knows its particles."""
-
-    @property
-    def particles(self) -> Array: ...
-
-
 class Scene(SceneData):
     """A scene under construction; `freeze()` (done by the first simulation) ends the construction.
 
     Every number enters either as a plain value or as a named quantity (`<group>_<quantity>`), by which gradients, fits
     and reports know it. SI units, z up.
     """
-
-    # --- building
 
     def add_particles(self, positions: ArrayLike, mass: ArrayLike, velocity: ArrayLike | None = None) -> Array:
         """Add particles and return their indices.
@@ -369,24 +359,18 @@ class Scene(SceneData):
             collider: `Plane`, `Sphere`, `Capsule` or `Box`; one object may serve several contacts.
             friction: Coulomb's coefficient; 0 is smooth.
             radius: m, of a rope, or half the thickness of cloth: particles touch at this distance.
-            stiffness: N/m per particle. By default contacts are rigid: 1,000 times as stiff as a particle's inertia in
-                a substep, so that it lies h^2 g/1000 deep.
+            stiffness: N/m per particle. Rigid by default: a particle lies h^2 g/1000 deep under its weight.
             name: by default that of the collider.
 
         Raises:
-            SceneError: unknown or repeated particles, negative numbers, names that are taken. A start inside the
-                collider is refused when the scene is compiled.
+            SceneError: unknown or repeated particles, negative numbers, names that are taken; a start inside the
+                collider, when the scene is compiled.
         """
         self._building()
-        if not isinstance(collider, Collider):
-            raise SceneError("contact.collider", "is no shape", collider, "give a Plane, Sphere, Capsule or Box")
-        particles = what.particles if isinstance(what, HasParticles) else what
-        name = name or collider.name or collider.shape
-        which = self.contacts.check(particles, self.particle_count, friction, radius, stiffness, name)
-        _, place = self.contacts.collider(self, collider)
+        which, name = self.contacts.check(what, collider, self.particle_count, friction, radius, stiffness, name)
         carried = self.add_particles(np.zeros((len(which), 3)), 1.0)
         self.pin(carried)
-        self.contacts.add(self, place, which, carried, friction, radius, stiffness, name)
+        self.contacts.add(self, collider, which, carried, friction, radius, stiffness, name)
         return name
 
     def freeze(self) -> Scene:
@@ -406,8 +390,6 @@ class Scene(SceneData):
         """The frozen scene as the core sees it (freezes it)."""
         self.freeze()
         return CompiledScene(self)
-
-    # --- private
 
     def _scalar(self, quantity: str, array: str, first: int, values: Array, kind: str) -> None:
         """Move one value shared by a whole group into a quantity."""
