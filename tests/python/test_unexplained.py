@@ -84,7 +84,7 @@ def test_what_a_fit_leaves_is_compared_with_the_motion_beyond_the_noise() -> Non
 
 
 def carried() -> sb.Fit:
-    """A rope that hangs from a hand, which goes to and fro by 0.2 m."""
+    """A rope that hangs from a hand, which goes back and forth by 0.2 m."""
     times, solver = np.arange(61) / 30, sb.Solver(h=1 / 240)
     hand = np.zeros((61, 1, 3))
     hand[:, 0, 0] = 0.1 * (1 - np.cos(np.pi * times))
