@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from pytest import approx
-from sheetbend.doubts.driven_errors import driven_errors
+from sheetbend.doubts.driven_errors import driven_errors, within_driven_errors
 from sheetbend.minimum.problem import FitProblem, as_parameters
 from sheetbend.statistics.blocks import contradiction, moved_by
+from sheetbend.statistics.identifiability import identify
 from test_blocks import LAYOUT, SPLITS, fitted, jacobian
 
 Array = np.ndarray
@@ -121,5 +122,8 @@ def test_what_is_not_driven_has_no_such_errors() -> None:
     recording = sb.Recording(positions=np.zeros((20, 1, 3)), times=np.arange(20) / 60, name="still")
     e = sb.Experiment(scene=scene, recording=recording, markers=[sb.on_particle(4)], solver=sb.Solver(h=1 / 240))
     problem = FitProblem([e], as_parameters(["rope_EI"], [e]))
-    errors, words = driven_errors(problem, problem.parameters.initial())
+    u = problem.parameters.initial()
+    errors, words = driven_errors(problem, u)
     assert errors.shape[1] == 0 and words == ""
+    judged = identify(problem.parameters, u, *problem.evaluate(u)[1:], layout=problem.rows_layout())
+    assert within_driven_errors(problem, u, judged, ["rope_EI"], errors, words) == {}

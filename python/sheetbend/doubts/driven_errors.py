@@ -79,7 +79,7 @@ def within_driven_errors(
     estimates: Mapping[str, Estimate] = {e.name: e for e in judged.estimates}
     free = problem.parameters.free
     columns = [c for c, name in enumerate(free) if estimates[name].half_width is not None]
-    if not columns:
+    if not columns or not errors.size:
         return {}
     _, _, J = problem.evaluate(u)
     reaches = dict(zip(columns, NORMAL * np.sqrt(np.mean(moved_by(J[:, columns], errors) ** 2, axis=1)), strict=True))
