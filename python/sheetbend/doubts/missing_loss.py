@@ -4,8 +4,7 @@ A model without one of the losses that its motion has is fitted by values that a
 is left then oscillates like the motion itself, so the comparison of its parts finds no clear contradiction. But what
 more loss would change is known to first order: backward Euler with a substep h damps an oscillation of angular
 frequency omega by omega h/2, as a Kelvin-Voigt material with the time constant h does, and the second-order formula
-hardly damps it. The difference of one simulation with each, or, of motions with contacts, which know the former alone,
-of one at the substep and one at its half, is a direction in which residuals move where the model loses
+hardly damps it. The difference of one simulation with each is a direction in which residuals move where the model loses
 more. Where this direction, beside the parameters, explains a large part of what a fit leaves beyond noise, and more
 than chance does, the model lacks a loss; where it does so backward, the model loses too much.
 
@@ -23,9 +22,7 @@ from typing import Literal
 import numpy as np
 
 from ..arrays.timeseries import Array
-from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
-from ..motion.solver import Solver
 from ..optional import require
 from ..quantities.wording import short
 from ..statistics.blocks import short_of_frames
@@ -59,14 +56,15 @@ class Asked:
 def missing_loss(problem: FitProblem, u: Array, fitted: tuple[FitProblem, Array]) -> dict[str, str]:
     """By free parameter, the motion whose losses the model does not have, or does not have so large.
 
-    Takes one simulation with the other integrator, or at half the substep. Where that has no answer, nothing is told.
+    Takes one simulation with the other integrator. Where that has no answer, nothing is told, nor of motions with
+    contacts, which know one integrator alone (half the substep moves when they begin and slide, which is no loss).
 
     Args:
         problem: whose residuals count.
         u: (free,) its minimum.
         fitted: the problem as it was fitted, whose rows are the same, and its minimum.
     """
-    if all(e.static for e in problem.experiments):
+    if all(e.static for e in problem.experiments) or any(e.scene.compiled.contacts for e in problem.experiments):
         return {}
     ok, r, J = problem.evaluate(u)
     change = of_more_loss(*fitted)
@@ -117,24 +115,20 @@ def of_more_loss(problem: FitProblem, u: Array) -> Array | None:
     """(rows,) what the residuals change with backward Euler instead of the second-order formula, divided by the
     substep, 1/s; None where it has no answer."""
     ok, r, _ = problem.evaluate(u)
-    made = [e if e.static else replace(e, solver=_other(e)[0]) for e in problem.experiments]
+    made = [
+        e if e.static else replace(e, solver=replace(e.solver, integrator=OTHER[e.solver.integrator]))
+        for e in problem.experiments
+    ]
     other = FitProblem(made, problem.given, problem.recordings, problem.threads, problem.parameters)
     ok_there, there, _ = other.evaluate(u, jacobian=False)
     if not (ok and ok_there):
         return None
     change = np.zeros(len(r))
     for i, e in enumerate(problem.experiments):
+        per = (1.0 if e.solver.integrator == "bdf2" else -1.0) / e.solver.h
         mine = _rows_of(problem, [i])
-        change[mine] = (there - r)[mine] / _other(e)[1]
+        change[mine] = per * (there - r)[mine]
     return change
-
-
-def _other(e: Experiment) -> tuple[Solver, float]:
-    """A solver that damps more or less, and by how much more as a time constant, s."""
-    h = e.solver.h
-    if e.scene.compiled.contacts:
-        return e.solver.with_h(h / 2), -h / 2
-    return replace(e.solver, integrator=OTHER[e.solver.integrator]), h if e.solver.integrator == "bdf2" else -h
 
 
 def _rows_of(problem: FitProblem, experiments: Sequence[int]) -> Array:
