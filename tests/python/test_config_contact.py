@@ -113,7 +113,7 @@ def test_a_collider_moves_at_knots_and_with_a_tool(tmp_path: Path):
         ("normal = [0.0, 0.0, 1.0]", "normal = [0.0, 0.0, 0.0]", "scene.collider[0].normal", "not zero"),
         ('name = "post"', 'name = "table"', "scene.collider[1].name", "of its own"),
         ('shape = "plane"', 'shape = "cone"', "scene.collider[0].shape", "choices"),
-        ('collider = "table"', 'collider = "tabel"', "scene.contact[0].collider", "table, post"),
+        ('collider = "table"', 'collider = "desk"', "scene.contact[0].collider", "table, post"),
         ('of = "rope"', 'of = "cord"', "scene.contact[0].of", "use some of: rope"),
         ('of = "rope"', 'of = ["rope", "rope"]', "scene.contact[0].particles", "once"),
         ("friction = 0.3", "friction = -0.3", "scene.contact[0].friction", "at least 0"),
