@@ -19,7 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays.timeseries import Array, interpolate, noise
+from ..arrays.timeseries import Array, interpolate, noise, off_neighbors
 from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
@@ -49,7 +49,7 @@ def driven_errors(problem: FitProblem, u: Array, draws: int = DRAWS) -> tuple[Ar
     if not any(n is not None for n in known.values()):
         return errors[:, :0], ""
     open_ = [_following_all(e) if known.get(i) is not None else e for i, e in enumerate(problem.experiments)]
-    driven = FitProblem(open_, problem.given, problem.recordings, problem.threads, problem.parameters)
+    driven = problem.of(open_)
     for i, n in known.items():
         if n is None:
             continue
@@ -126,25 +126,12 @@ def _noise_of_motion(e: Experiment, values: Mapping[str, float], draws: int) -> 
             moved = np.einsum("pm,dkma->dkpa", part.weights, mine)
             made[:, :, part.slots] = moved - moved[:, :1] if part.from_placed else moved
         return made
-    bends = _bends(t, x).reshape(len(t) - 4, -1)
+    bends = off_neighbors(t, x).reshape(len(t) - 4, -1)
     bends *= _hidden(e, values, bends.reshape(-1, *x.shape[1:]))
     if not bends.any():
         return None
     mixed = generator.standard_normal((draws * len(t), len(bends))) @ bends / np.sqrt(len(bends))
     return np.asarray(mixed.reshape(draws, *x.shape))
-
-
-def _bends(t: Array, x: Array) -> Array:
-    """(knots - 4, driven, 3) of every knot from the cubic through its neighbors, with the variance of the noise."""
-    at = np.arange(2, len(t) - 2)
-    near = at[:, None] + np.array([-2, -1, 1, 2])
-    weights = np.ones(near.shape)
-    for j in range(4):
-        for k in range(4):
-            if k != j:
-                weights[:, j] *= (t[at] - t[near[:, k]]) / (t[near[:, j]] - t[near[:, k]])
-    off = x[at] - np.einsum("fk,fkpa->fpa", weights, x[near])
-    return np.asarray(off / np.sqrt(1 + (weights**2).sum(axis=1))[:, None, None])
 
 
 def _hidden(e: Experiment, values: Mapping[str, float], bends: Array) -> float:

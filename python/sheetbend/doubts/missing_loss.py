@@ -119,8 +119,7 @@ def of_more_loss(problem: FitProblem, u: Array) -> Array | None:
         e if e.static else replace(e, solver=replace(e.solver, integrator=OTHER[e.solver.integrator]))
         for e in problem.experiments
     ]
-    other = FitProblem(made, problem.given, problem.recordings, problem.threads, problem.parameters)
-    ok_there, there, _ = other.evaluate(u, jacobian=False)
+    ok_there, there, _ = problem.of(made).evaluate(u, jacobian=False)
     if not (ok and ok_there):
         return None
     change = np.zeros(len(r))
