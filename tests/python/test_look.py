@@ -59,6 +59,25 @@ def test_a_rope_in_a_hand(tmp_path: Path, held: str) -> None:
     assert "the length" in told and "the density" in told
 
 
+@pytest.mark.parametrize("at", ["start", "end"])
+def test_a_hand_holds_a_rope_above_its_first_marker(tmp_path: Path, at: str) -> None:
+    whole = takes.rope_in_hand("body")
+    names = [n for n in whole.markers if n != "r0"]  # the first marker that is left hangs 88 mm below the hand
+    order = names if at == "start" else names[:3] + names[:2:-1]
+    said, text = drafted(tmp_path, whole.select(order))
+    draft = tomllib.loads(text)
+    (rope,) = draft["scene"]["rope"]
+    (grip,) = rope["grip"]
+    true = takes.LENGTH / (takes.MARKERS - 1)
+    assert grip["at"] == at and grip["lead"] == approx(true, rel=0.3)  # the standard deviation that the draft gives it
+    assert grip["lead"] + draft["parameters"][f"rope_{at}_lead"]["prior"][1] > true
+    arcs = list(rope["markers"].values())
+    assert (arcs[0] if at == "start" else rope["length"] - arcs[-1]) == approx(grip["lead"], rel=1e-4)
+    assert grip["position"] == approx([0.3, 0.2, 1.0], abs=0.3 * true)
+    assert "where the rope leaves the hand" in " ".join(said["unknown"])
+    config.build(config.parse(tmp_path / "draft.toml"), tmp_path)
+
+
 def test_a_clamp_and_a_pin_are_told_apart(tmp_path: Path) -> None:
     for clamped in (True, False):
         folder = tmp_path / str(clamped)

@@ -37,6 +37,14 @@ class RopeGrip(Section):
         "the rope's direction of travel there, in the same axes; that of its first or last link as placed when left "
         "out. With one marker: the direction that the end keeps, as in a clamp that moves without turning",
     )
+    lead: Finite | None = key(
+        None,
+        "length between the grip and the first marker beside it, where it is not known exactly: adds "
+        "<name>_start_lead or <name>_end_lead (m), that much more rope between them. For ropes, not for rods, and for "
+        "grips that give a direction",
+        "m",
+        gt=0,
+    )
     offset: Vector = key([0.0, 0.0, 0.0], "from one marker to the end, in the recording's axes", "m")
     smoothing: Finite = key(
         0.0,
@@ -54,6 +62,8 @@ class RopeGrip(Section):
             raise ValueError("takes its place and direction from its two markers|leave out position and direction")
         if count == 1 and self.position is not None:
             raise ValueError("has a position beside one marker|give the offset from the marker")
+        if count == 1 and self.lead is not None:
+            raise ValueError("has a lead beside one marker|give the offset from the marker, and a longer rope")
         if count != 1 and any(self.offset):
             raise ValueError("has an offset from one marker|give the position")
         return self
@@ -98,6 +108,10 @@ class Strand(Section):
     clamp_end: Vector | None = key(None, "direction of travel at the end, held by a clamp there")
     pinned: list[int] = key([], "nodes that are held where they start; -1 is the last")
     grip: list[RopeGrip] = key([], "what holds its ends and moves them")
+    tilts: bool = key(False, "adds <name>_start_tilt_1, ... (rad): it leaves its grips askew by these angles")
+    shifts: bool = key(
+        False, "adds <name>_start_shift_1, ... (m): it leaves its grips so far beside and before their places"
+    )
 
     @model_validator(mode="after")
     def _held_once(self) -> Self:
@@ -149,7 +163,6 @@ class Rod(Strand):
     GA: Finite | None = key(None, "shear stiffness; sections stay across the rod when left out", "N", gt=0)
     director: Vector | None = key(None, "the frame's first axis at a start that no grip holds; any when left out")
     turns: int = key(0, "whole turns by which the end's frame is ahead at the start")
-    tilts: bool = key(False, "adds <name>_start_tilt_1, ... (rad): the rod leaves its grips askew by these angles")
     roll: bool = key(False, "adds <name>_roll (rad): the twist built in when the rod was gripped at its end")
     twist_damping: Finite | None = key(None, "Kelvin-Voigt time constant of twisting", "s", gt=0)
     shear_damping: Finite | None = key(None, "Kelvin-Voigt time constant of shear; needs GA", "s", gt=0)
@@ -163,3 +176,9 @@ class Rod(Strand):
     twist_modes: list[int] = key([], "the same of the rest twist: <name>_twist_<k> (1/m)")
     softness_modes: list[int] = key([], "the same of the logarithm of the bending compliance: <name>_softness_<k>")
     density_modes: list[int] = key([], "the same of the density, relative to it: <name>_density_<k>")
+
+    @model_validator(mode="after")
+    def _known_leads(self) -> Self:
+        if any(grip.lead is not None for grip in self.grip):
+            raise ValueError("has a grip with a lead|use [[scene.rope]], or `shifts` and the exact length")
+        return self

@@ -60,6 +60,7 @@ def build_rope(
             built: Rope = _add_rod(scene, section, fields, grips)
         else:
             own: dict[str, Any] = {f"grip_{end}": grip for end, grip in grips.items()}
+            own |= {f"{grip.at}_lead": grip.lead for grip in section.grip}
             built = add_rope(scene, section.name, **fields, **own)
         hold_led(scene, built, ends)
     return built

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays.timeseries import mean_position
+from .hand import LEAD_SD, SHIFT_SD, TILT_SD, entry
 from .line import chain, plane, snapped, tangent
 from .seen import Seen
 from .text import joined
@@ -30,6 +31,8 @@ class Held:
         rope: keys of the rope.
         grips: tables of its grips.
         angles: ends whose clamps may turn by an angle that is fitted.
+        lead: m, from what holds the rope to the marker next to it.
+        priors: standard deviations of the rope's quantities that say how a hand holds it; zero is expected.
         notes, unknown: sentences about what is seen, and what is not known.
     """
 
@@ -37,6 +40,8 @@ class Held:
     rope: dict[str, Any] = field(default_factory=dict)
     grips: list[dict[str, Any]] = field(default_factory=list)
     angles: list[str] = field(default_factory=list)
+    lead: float = 0.0
+    priors: dict[str, float] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     unknown: list[str] = field(default_factory=list)
 
@@ -149,15 +154,26 @@ def _of_hand(s: Seen, hand: tuple[int, ...], found: Held) -> str:
     center = np.nanmean(r.positions[:, list(hand)], axis=1)
     reach = [float(np.nanmean(np.linalg.norm(r.positions[:, k] - center, axis=1))) for k in (order[0], order[-1])]
     at, k = ("start", order[0]) if reach[0] <= reach[1] else ("end", order[-1])
-    place = r.positions[0, k]
-    found.notes.append(
-        f"{joined(r.markers[j] for j in hand)} move as one rigid body, which holds the rope near {r.markers[k]}"
-    )
-    found.unknown.append(
-        f"in which direction the rope leaves the hand, and where: that of its first markers, at {r.markers[k]}"
-    )
-    entry = None if np.isnan(place).any() else place.tolist()
-    found.grips.append({"at": at, "markers": [r.markers[j] for j in hand], "position": entry, "smoothing": SMOOTHING})
+    name, all_of = r.markers[k], joined(r.markers[j] for j in hand)
+    where = entry(s, hand, order if at == "start" else order[::-1])
+    grip: dict[str, Any] = {"at": at, "markers": [r.markers[j] for j in hand], "position": where.place}
+    if where.lead:
+        found.notes.append(f"{all_of} move as one rigid body, which holds the rope some {where.lead:.2g} m from {name}")
+        found.unknown.append(
+            f"where the rope leaves the hand, and in which direction: as the next markers swing, {where.lead:.2g} "
+            f"m from {name}. Both are fitted. Measure that length, and give it as `lead` with a narrower prior"
+        )
+        found.lead, grip["lead"] = where.lead, where.lead
+        found.rope |= {"tilts": True, "shifts": True}
+        found.priors |= {f"{at}_tilt_{j}": TILT_SD for j in (1, 2)}
+        found.priors |= {f"{at}_shift_{j}": SHIFT_SD * where.lead for j in (1, 2)}
+        found.priors[f"{at}_lead"] = LEAD_SD * where.lead
+    else:
+        found.notes.append(f"{all_of} move as one rigid body, which holds the rope near {name}")
+        found.unknown.append(
+            f"in which direction the rope leaves the hand, and where: that of its first markers, at {name}"
+        )
+    found.grips.append(grip | {"smoothing": SMOOTHING})
     return at
 
 

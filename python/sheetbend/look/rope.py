@@ -21,6 +21,7 @@ SUBSTEP = 1 / 500  # s, at most
 BENDING = 0.15  # of the length: bending length (EI/(density g))^(1/3) at the start
 GAP = 0.1  # s, for which a marker of a grip may be lost
 EARLY = 0.05  # s, in which the speed at the first frame is looked for
+SEGMENTS = 40  # of a rope, at least
 BRANCHED = 1.1  # times the shortest tree: how much longer the line through all markers of a branched cable is
 FITTED, LONGEST = 2 / 3, 3.0  # share of the time that is fitted, and s at most; the next third is predicted
 CLAMP_SD = 0.2  # rad, of the direction of a clamp, read off the first markers
@@ -39,7 +40,11 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     if len(found.order) < 3:
         return None
     arc = _arcs(takes, found.order)
+    if found.grips and found.grips[0]["at"] == "start":
+        arc = arc + found.lead
     length, measured_length, said_length = _length(s, found, float(arc[-1]), measured)
+    if not measured_length and found.grips and found.grips[0]["at"] == "end":
+        length += found.lead
     arc = np.minimum(arc, length)
     density, said_density = _density(s, measured)
     names = r.markers
@@ -48,7 +53,9 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         notes = [f"a rope through {joined(names[k] for k in order)}, {arc[-1]:.4g} m from the first to the last"]
     unknown = [said_length, said_density, *found.unknown]
     flat = plane(r.positions[:, list(order)], length) if s.static else None
-    segments = int(min(max(40, 2 * (len(order) - 1)), 100))
+    # beside a hand that holds its direction a rope bends within a few hundredths of its length
+    least = 2 * SEGMENTS if any(len(grip["markers"]) > 1 for grip in found.grips) else SEGMENTS
+    segments = int(min(max(least, 2 * (len(order) - 1)), 100))
     rope: dict[str, Any] = {"name": "rope", "length": length, "segments": segments, "density": density}
     rope |= {"EI": density * 9.81 * (BENDING * length) ** 3, "points": "recording"}
     why = {"EI": "a guess to start from"} | ({} if measured_length else {"length": "not known well: see above"})
@@ -77,6 +84,8 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         lines += table("[[recording]]", own, why)
     for name, limits in _parameters(s.static, density, length, flat is not None).items():
         lines += table(f"[parameters.{name}]", limits)
+    for name, sd in found.priors.items():
+        lines += table(f"[parameters.rope_{name}]", {"prior": [0.0, sd]})
     for at in found.angles:
         lines += table(f"[parameters.rope_{at}_angle]", {"prior": [0.0, CLAMP_SD]}, {"prior": "rad"})
     if not measured_length:

@@ -15,7 +15,8 @@ from ..quantities.quantities import product
 from ..scene.scene import Array, Scene
 from .chain import add_drag, add_links, add_masses
 from .grip import Grip, any_across, carried
-from .rod_end import End, spread_roll, spread_shift
+from .grip_freedom import spread_shift
+from .rod_end import End, spread_roll
 from .rod_joints import Joints, shear, weigh
 from .rod_junction import STUB_MASS, Facing, Junction
 from .rod_shape import initial_frames, initial_shape

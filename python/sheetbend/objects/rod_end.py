@@ -7,9 +7,10 @@ import math
 import numpy as np
 
 from ..errors import SceneError
-from ..quantities.quantities import Term, product
+from ..quantities.quantities import Term
 from ..scene.scene import Array, Scene
 from .grip import Grip
+from .grip_freedom import add_motion, add_shifts, add_tilts, axes_of
 from .rod_junction import STUB, Facing, Junction
 from .rope import GHOST
 
@@ -97,46 +98,16 @@ class End:
                 scene.drive(nodes, grip.times, motion)
             else:
                 grip.frame.drive(scene, nodes, grip.times, motion, vectors=[n in scene.directors for n in nodes])
-        second = np.cross(grip.direction, grip.director)
+        end = f"{self.name}_{self.label}"
         if tilts:
-            for k, axis in ((1, grip.director), (2, second)):
-                tilt = scene.add_quantity(f"{self.name}_{self.label}_tilt_{k}", 0.0, "rad", positive=False, scale=0.1)
-                for n, length in ((ghost, stub), *((n, 1.0) for n in section)):
-                    _add_motion(scene, grip, n, length * axis, {tilt: "identity"})
+            add_tilts(scene, grip, end, ghost, stub, section)
         if shifts:
-            for k, axis in enumerate((grip.director, second, grip.direction), start=1):
-                quantity = f"{self.name}_{self.label}_shift_{k}"
-                shift = scene.add_quantity(quantity, 0.0, "m", positive=False, scale=5e-3)
-                for n in (node, ghost):
-                    _add_motion(scene, grip, n, axis, {shift: "identity"})
+            add_shifts(scene, grip, end, (node, ghost))
         if roll:  # cos and sin of it instead of the given director
             quantity = scene.add_quantity(f"{self.name}_roll", 0.0, "rad", positive=False, scale=0.3)
-            _add_motion(scene, grip, director, grip.director, {quantity: "cos"})
-            _add_motion(scene, grip, director, second, {quantity: "sin"})
-            _add_motion(scene, grip, director, -grip.director, {})
-
-
-def _add_motion(scene: Scene, grip: Grip, node: int, by: Array, factors: dict[str, str]) -> None:
-    if not grip.stays:
-        terms = [(factors, by)] if grip.frame is None else grip.frame.turned(by, factors)
-        for own, coefficients in terms:
-            scene.add_motion_term(node, coefficients, own)
-    else:
-        scene.add_terms([product("position", 3 * node + k, by[0, k], factors) for k in range(3)])
-
-
-def spread_shift(scene: Scene, grip: Grip, end: str, nodes: Array, shares: Array) -> None:
-    """Let nodes start shifted by shares of the shifts of a grip, so that no link is stretched in the first substep.
-
-    Args:
-        end: name of the rod and of its end, which the quantities have.
-        nodes, shares: (k,).
-    """
-    index = (3 * np.asarray(nodes)[:, None] + np.arange(3)).ravel()
-    direction, director = grip.direction[0], grip.director[0]
-    for k, axis in enumerate((director, np.cross(direction, director), direction), start=1):
-        factors = ((f"{end}_shift_{k}", "identity"),)
-        scene.add_terms([Term("position", index, (shares[:, None] * axis).ravel(), factors)])
+            add_motion(scene, grip, director, grip.director, {quantity: "cos"})
+            add_motion(scene, grip, director, axes_of(grip)[1], {quantity: "sin"})
+            add_motion(scene, grip, director, -grip.director, {})
 
 
 def spread_roll(scene: Scene, roll: str, directors: Array, shares: Array) -> None:

@@ -27,6 +27,7 @@ from .chain import (
 )
 from .grip import Grip
 from .rod_shape import initial_shape
+from .rope_grips import checked_grips, hold, lengthen, loosen
 
 GHOST = 0.01  # length of a clamp's ghost link over a rope's link; only its direction matters
 
@@ -90,6 +91,10 @@ def add_rope(
     clamp_angles: bool = False,
     grip_start: Grip | None = None,
     grip_end: Grip | None = None,
+    tilts: bool = False,
+    shifts: bool = False,
+    start_lead: float | None = None,
+    end_lead: float | None = None,
     plane: ArrayLike | None = None,
     set_modes: Sequence[int] = (),
 ) -> Rope:
@@ -97,7 +102,8 @@ def add_rope(
 
     Quantities: `<name>_length` m, `<name>_density` kg/m, and where given `_EA` N, `_EI` N m^2, `_stretch_damping` s,
     `_bend_damping` s, `_loss_factor`, `_loss_frequency` Hz, `_drag_linear` N s/m^2, `_drag_quadratic` N s^2/m^3,
-    `_start_angle` and `_end_angle` rad, `_set_<k>` 1/m.
+    `_start_angle` and `_end_angle` rad, `_set_<k>` 1/m, `_start_tilt_1`, `_start_tilt_2` and so on rad,
+    `_start_shift_1` to `_3` and `_end_shift_1` to `_3` m, `_start_lead` and `_end_lead` m.
 
     Args:
         length: m; the length of `points` by default.
@@ -118,6 +124,12 @@ def add_rope(
             the end is pinned.
         grip_start, grip_end: what holds an end and moves it: its place and its direction of travel. A rope has no
             twist: the roll of a grip plays no part. The initial shape is fitted to the length between grips.
+        tilts: add two tilts of each grip: small angles by which the rope leaves it askew, about the frame's axes.
+        shifts: add the three shifts of each grip: how far beside the given place the rope leaves it, along the frame's
+            first and second axis and along the rope.
+        start_lead, end_lead: m, the length between a grip and the first marker beside it, where it is not known
+            exactly. `_start_lead` and `_end_lead` are that much more rope between them: the grip goes back along the
+            rope, and markers keep their places.
         clamp_angles: add `_start_angle` / `_end_angle`, rotations of the clamps about `plane`.
         plane: unit normal of the plane that the rope stays in; needed by clamp_angles and set_modes.
         set_modes: k of rest-curvature modes cos(k pi s / length) about `plane`; each amplitude starts at zero.
@@ -130,7 +142,7 @@ def add_rope(
     """
     way = straight_way(direction, clamp_start, clamp_end)
     shape, length = straight_or_given(name, length, segments, start, way, points)
-    grips = _grips(name, (grip_start, grip_end), (clamp_start, clamp_end))
+    grips = checked_grips(name, (grip_start, grip_end), (clamp_start, clamp_end))
     speeds = None
     if velocity is not None or any(grips):
         held = [None if grip is None else (grip.position[0], grip.direction[0]) for grip in grips]
@@ -170,7 +182,7 @@ def add_rope(
     ghosts = [
         _clamp(scene, name, end, clamp, nodes, shape, link, normal if clamp_angles else None)
         if grip is None
-        else _hold(scene, grip, int(nodes[k]), reach * GHOST * link)
+        else hold(scene, grip, int(nodes[k]), reach * GHOST * link)
         for end, clamp, grip, k, reach in (
             ("start", clamp_start, grips[0], 0, -1.0),
             ("end", clamp_end, grips[1], -1, 1.0),
@@ -181,34 +193,20 @@ def add_rope(
     add_drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
     built = Rope(name, nodes, arc, *ghosts)
     scene.ropes[name] = built
+    for field, asked, gripped in (
+        ("tilts", tilts, any(grips)),
+        ("shifts", shifts, any(grips)),
+        ("start_lead", start_lead, grips[0] is not None),
+        ("end_lead", end_lead, grips[1] is not None),
+    ):
+        if asked and not gripped:
+            raise SceneError(f"{name}.{field}", "needs a grip", asked, "give grip_start or grip_end")
+    for end, grip, ghost, lead in zip(("start", "end"), grips, ghosts, (start_lead, end_lead), strict=True):
+        if grip is not None and ghost is not None:
+            loosen(scene, built, end, grip, ghost, GHOST * link, tilts, shifts)
+            if lead is not None:
+                lengthen(scene, built, end, grip, ghost, lead, taus)
     return built
-
-
-def _grips(
-    name: str, grips: tuple[Grip | None, Grip | None], clamps: tuple[ArrayLike | None, ArrayLike | None]
-) -> tuple[Grip | None, Grip | None]:
-    for end, grip, clamp in zip(("start", "end"), grips, clamps, strict=True):
-        if grip is not None and not isinstance(grip, Grip):
-            fix = "give sb.Grip.fixed, from_poses, from_markers or from_body"
-            raise SceneError(f"{name}.grip_{end}", "is no grip", grip, fix)
-        if grip is not None and clamp is not None:
-            fix = "leave one of them out: a grip gives the direction"
-            raise SceneError(f"{name}.grip_{end}", f"stands beside clamp_{end}", clamp, fix)
-    return grips
-
-
-def _hold(scene: Scene, grip: Grip, node: int, reach: float) -> int:
-    """Give an end the place and the direction of a grip, by a ghost particle `reach` m along the rope from it."""
-    ghost = int(scene.add_particles([grip.position[0] + reach * grip.direction[0]], 1.0)[0])
-    if grip.stays:
-        scene.pin([node, ghost])
-        return ghost
-    motion = np.stack([grip.position, grip.position + reach * grip.direction], axis=1)
-    if grip.frame is None:
-        scene.drive([node, ghost], grip.times, motion)
-    else:
-        grip.frame.drive(scene, [node, ghost], grip.times, motion)
-    return ghost
 
 
 def _clamp(

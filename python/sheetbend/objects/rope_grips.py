@@ -1,0 +1,108 @@
+"""Ends of ropes in grips."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import SceneError
+from ..scene.scene import Array, Scene
+from .chain import TimeConstant, first_value, voronoi_shares
+from .grip import Grip
+from .grip_freedom import Lead, add_shifts, add_tilts, spread_shift
+
+
+class Chain(Protocol):
+    """A built rope: particles in order, material coordinates [m], and the ghosts of its ends."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def particles(self) -> Array: ...
+    @property
+    def arc_length(self) -> Array: ...
+    @property
+    def start_ghost(self) -> int | None: ...
+    @property
+    def end_ghost(self) -> int | None: ...
+
+
+def checked_grips(
+    name: str, grips: tuple[Grip | None, Grip | None], clamps: tuple[ArrayLike | None, ArrayLike | None]
+) -> tuple[Grip | None, Grip | None]:
+    """The grips of a start and an end, of which none stands beside a clamp."""
+    for end, grip, clamp in zip(("start", "end"), grips, clamps, strict=True):
+        if grip is not None and not isinstance(grip, Grip):
+            fix = "give sb.Grip.fixed, from_poses, from_markers or from_body"
+            raise SceneError(f"{name}.grip_{end}", "is no grip", grip, fix)
+        if grip is not None and clamp is not None:
+            fix = "leave one of them out: a grip gives the direction"
+            raise SceneError(f"{name}.grip_{end}", f"stands beside clamp_{end}", clamp, fix)
+    return grips
+
+
+def hold(scene: Scene, grip: Grip, node: int, reach: float) -> int:
+    """Give an end the place and the direction of a grip, by a ghost particle `reach` m along the rope from it."""
+    ghost = int(scene.add_particles([grip.position[0] + reach * grip.direction[0]], 1.0)[0])
+    if grip.stays:
+        scene.pin([node, ghost])
+        return ghost
+    motion = np.stack([grip.position, grip.position + reach * grip.direction], axis=1)
+    if grip.frame is None:
+        scene.drive([node, ghost], grip.times, motion)
+    else:
+        grip.frame.drive(scene, [node, ghost], grip.times, motion)
+    return ghost
+
+
+def loosen(
+    scene: Scene, rope: Chain, end: str, grip: Grip, ghost: int, reach: float, tilts: bool, shifts: bool
+) -> None:
+    """Let a grip, whose ghost is `reach` m beyond the end, be askew, or beside its place."""
+    label = f"{rope.name}_{end}"
+    nodes, along = (rope.particles, 1.0) if end == "start" else (rope.particles[::-1], -1.0)
+    if tilts:
+        add_tilts(scene, grip, label, ghost, -along * reach)
+    if shifts:
+        add_shifts(scene, grip, label, (int(nodes[0]), ghost))
+        other_end = rope.end_ghost if end == "start" else rope.start_ghost
+        shares = np.ones(len(nodes)) if other_end is None else np.linspace(1.0, 0.0, len(nodes))
+        between = slice(1, None if other_end is None else -1)
+        spread_shift(scene, grip, label, nodes[between], shares[between])
+
+
+def lengthen(
+    scene: Scene,
+    rope: Chain,
+    end: str,
+    grip: Grip,
+    ghost: int,
+    length: float,
+    taus: tuple[TimeConstant | None, TimeConstant | None],
+) -> None:
+    """Let a grip be farther from the first marker than given: links, joints, masses and drags between them grow."""
+    name, link, segments = rope.name, float(rope.arc_length[1]), len(rope.particles) - 1
+    way = slice(None, None, 1 if end == "start" else -1)
+    nodes, places, links = rope.particles[way], np.arange(segments + 1)[way], np.arange(segments)[way]
+    lead = Lead(scene, f"{name}_{end}", grip, length, nodes, link)
+    lead.hold(ghost, 1.0 if end == "start" else -1.0)
+    places, links, nodes = places[: lead.count + 1], links[: lead.count], nodes[: lead.count + 1]
+    lead.lengthen("rest", first_value(scene, f"{name}_stretch") + links, {})
+    lead.lengthen("mass", nodes, {f"{name}_density": "identity"})
+    for kind in ("linear", "quadratic"):
+        if f"{name}_drag_{kind}" in scene.quantities:
+            lead.lengthen(f"drag_{kind}", nodes, {f"{name}_drag_{kind}": "identity"})
+    shares = voronoi_shares(segments)
+    for stiffness, group, own, share, tau in (
+        ("EA", "stretch", links, np.full(len(links), 1.0 / segments), taus[0]),
+        ("EI", "bend", places - (rope.start_ghost is None), shares[places], taus[1]),
+    ):
+        if f"{name}_{stiffness}" not in scene.quantities:
+            continue
+        first = scene.group(f"{name}_{group}")[1] + own
+        lead.lengthen("compliance", first, {f"{name}_{stiffness}": "inverse"})
+        if tau is not None:
+            factors = {**tau[1], f"{name}_{stiffness}": "identity", f"{name}_length": "inverse"}
+            lead.soften(first, tau[0] / share, factors, link)
