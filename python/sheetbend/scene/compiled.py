@@ -40,6 +40,7 @@ def specification(scene: SceneData) -> dict[str, Any]:
             {"name": name, "triangles": triangles.tolist()} for name, triangles in scene.volumes.triangles.items()
         ],
         **scene.contacts.specification(),
+        "bodies": [nodes.tolist() for nodes in (*(b.particles for b in scene.bodies.values()), *scene.rotors.values())],
     }
 
 
@@ -71,7 +72,7 @@ class CompiledScene:
         self.kinks = kinks(scene)
         self.domain = Domain(scene, self.layout)
         self._base = self._pack(scene)
-        self._terms = [*scene.terms, *scene.boundary.terms()]
+        self._terms = scene.every_term
         self.contacts = tuple(c.name for c in scene.contacts.contacts)
         if self.contacts:
             self._expect_apart(scene)

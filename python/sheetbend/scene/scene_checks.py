@@ -30,7 +30,8 @@ def validate(scene: SceneData) -> None:
     if scene.groups:
         touching = (c.particles for c in scene.contacts.contacts)
         used = np.zeros(scene.particle_count, dtype=bool)
-        for particles in (*(g.particles for g in scene.groups), *scene.volumes.triangles.values(), *touching):
+        bodies = (b.particles for b in scene.bodies.values())
+        for particles in (*(g.particles for g in scene.groups), *scene.volumes.triangles.values(), *touching, *bodies):
             used[particles] = True
         loose = free[~used[free]]
         if loose.size:
