@@ -127,7 +127,7 @@ class Making:
         if turn is not None:
             angle = self._start("angle", 0.0, "rad", TURN)
             rate = self._start("rate", turn, "rad/s", SPIN)
-            frame = u.frame @ self._turned(angle) @ self.axes[0].T @ self.axes[1]
+            frame = u.frame @ self._turned(angle) @ self.axes[1]
             spin = u.spin + n * Expression.of(rate)
             own += [angle, rate]
         arm, drop = u.frame @ self.places[0], frame @ self.places[1]

@@ -40,7 +40,9 @@ def specification(scene: SceneData) -> dict[str, Any]:
             {"name": name, "triangles": triangles.tolist()} for name, triangles in scene.volumes.triangles.items()
         ],
         **scene.contacts.specification(),
-        "bodies": [nodes.tolist() for nodes in (*(b.particles for b in scene.bodies.values()), *scene.rotors.values())],
+        "bodies": [
+            [*nodes.tolist(), -1] for nodes in (*(b.particles for b in scene.bodies.values()), *scene.rotors.values())
+        ],
     }
 
 
