@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import sheetbend as sb
@@ -143,3 +145,11 @@ def test_driven_body_rides_on_poses_and_a_pinned_one_stays() -> None:
     assert "wall_turn_x" in scene.quantities
     with pytest.raises(sb.SceneError, match="taken"):
         tossed()[0].add_body("box", mass=1.0, inertia=MATRIX)
+
+
+def test_saved_scene_moves_with_the_same_bits(tmp_path: Path) -> None:
+    scene, _ = tossed()
+    sb.save_scene(scene, tmp_path / "toss.sheetbend")
+    again = sb.load_scene(tmp_path / "toss.sheetbend")
+    one, other = (sb.simulate(s, [0.05], sb.Solver(h=1e-3)).positions for s in (scene, again))
+    assert (one == other).all()

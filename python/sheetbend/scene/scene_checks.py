@@ -30,9 +30,9 @@ def validate(scene: SceneData) -> None:
     if scene.groups:
         touching = (c.particles for c in scene.contacts.contacts)
         used = np.zeros(scene.particle_count, dtype=bool)
-        bodies = (b.particles for b in scene.bodies.values())
-        for particles in (*(g.particles for g in scene.groups), *scene.volumes.triangles.values(), *touching, *bodies):
+        for particles in (*(g.particles for g in scene.groups), *scene.volumes.triangles.values(), *touching):
             used[particles] = True
+        used[scene.body_nodes] = True
         loose = free[~used[free]]
         if loose.size:
             fix = "constrain them, pin them or leave them out"

@@ -87,6 +87,12 @@ class SceneData:
         self.terms += terms
 
     @property
+    def body_nodes(self) -> Array:
+        """(n, 4) nodes of the bodies and of what else has axes: the center, and three axes."""
+        nodes = [*(b.particles for b in self.bodies.values()), *self.rotors.values()]
+        return np.array(nodes, dtype=np.int64).reshape(-1, 4)
+
+    @property
     def every_term(self) -> list[Term]:
         """Those that were added, of the boundary, and of the start of bodies."""
         starts = (t for body in self.bodies.values() for t in body.start_terms())
