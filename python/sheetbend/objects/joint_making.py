@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from ..arrays.checks import finite, is_number
 from ..errors import SceneError
 from ..quantities.expression import Array, Expression, cross, expressions, numbers, terms_of, vector
-from ..quantities.quantities import Term
 from ..scene.body import AXES, PLACE, Body, FrameState
 from ..scene.scene import Scene
 from .chain import first_value, unit_vector
@@ -205,17 +204,24 @@ class Making:
         viscosity: ArrayLike | None = None,
     ) -> str:
         """Add a group whose parameters (count, n) are expressions; returns its name."""
-        wanted = expressions(weights)
-        now = numbers(wanted, self.lower.values())
         group = f"{self.name}_{label}"
-        self.scene.add_constraints(
-            kind, stencil, name=group, rest=now, compliance=compliance, damping=damping, viscosity=viscosity
-        )
-        index = first_value(self.scene, group) + np.arange(now.size).reshape(now.shape)
-        self.scene.add_terms(changes(terms_of("rest", index, wanted - now)))
+        constrain(self.scene, kind, group, stencil, expressions(weights), compliance, damping, viscosity)
         return group
 
 
-def changes(terms: list[Term]) -> list[Term]:
-    """Terms without those that are rounding of constants."""
-    return [t for t in terms if t.factors or np.any(np.abs(t.coefficient) > 0.0)]
+def constrain(
+    scene: Scene,
+    kind: str,
+    name: str,
+    stencil: list[list[int]],
+    parameters: Array,
+    compliance: ArrayLike | None = None,
+    damping: ArrayLike | None = None,
+    viscosity: ArrayLike | None = None,
+) -> None:
+    """Add a group whose parameters (count, n) are expressions of the scene's quantities."""
+    now = numbers(parameters, {q: about.value for q, about in scene.quantities.items()})
+    given = {"compliance": compliance, "damping": damping, "viscosity": viscosity}
+    scene.add_constraints(kind, stencil, name=name, rest=now, **given)
+    index = first_value(scene, name) + np.arange(now.size).reshape(now.shape)
+    scene.add_terms([t for t in terms_of("rest", index, parameters - now) if np.any(t.coefficient)])

@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike
 from ..arrays.checks import indices
 from ..errors import SceneError
 from ..quantities.quantities import Term, product
+from ..scene.body import BodyPoint
 from ..scene.scene import Array, Scene
+from .body_end import hold_place
 from .chain import (
     TimeConstant,
     add_drag,
@@ -28,6 +30,7 @@ from .chain import (
 from .grip import Grip
 from .rod_shape import initial_shape
 
+End = Grip | BodyPoint | None
 GHOST = 0.01  # length of a clamp's ghost link over a rope's link; only its direction matters
 
 
@@ -88,8 +91,8 @@ def add_rope(
     clamp_start: ArrayLike | None = None,
     clamp_end: ArrayLike | None = None,
     clamp_angles: bool = False,
-    grip_start: Grip | None = None,
-    grip_end: Grip | None = None,
+    grip_start: Grip | BodyPoint | None = None,
+    grip_end: Grip | BodyPoint | None = None,
     plane: ArrayLike | None = None,
     set_modes: Sequence[int] = (),
 ) -> Rope:
@@ -117,7 +120,8 @@ def add_rope(
         clamp_start, clamp_end: the rope's direction of travel at an end, held by a ghost particle half a joint away;
             the end is pinned.
         grip_start, grip_end: what holds an end and moves it: its place and its direction of travel. A rope has no
-            twist: the roll of a grip plays no part. The initial shape is fitted to the length between grips.
+            twist: the roll of a grip plays no part. The initial shape is fitted to the length between grips. A point of
+            a body (`Body.point`) holds the end there, in its direction `along` if it has one.
         clamp_angles: add `_start_angle` / `_end_angle`, rotations of the clamps about `plane`.
         plane: unit normal of the plane that the rope stays in; needed by clamp_angles and set_modes.
         set_modes: k of rest-curvature modes cos(k pi s / length) about `plane`; each amplitude starts at zero.
@@ -133,7 +137,7 @@ def add_rope(
     grips = _grips(name, (grip_start, grip_end), (clamp_start, clamp_end))
     speeds = None
     if velocity is not None or any(grips):
-        held = [None if grip is None else (grip.position[0], grip.direction[0]) for grip in grips]
+        held = [None if grip is None else _place(grip) for grip in grips]
         line = shape if points is None and grips[0] is None else points
         shape, speeds = initial_shape(name, length, segments, line, velocity, held, EA is not None)
     for field, value in (
@@ -170,6 +174,8 @@ def add_rope(
     ghosts = [
         _clamp(scene, name, end, clamp, nodes, shape, link, normal if clamp_angles else None)
         if grip is None
+        else _on_body(scene, grip, f"{name}_{end}", int(nodes[k]), reach * GHOST * link, GHOST * density * link)
+        if isinstance(grip, BodyPoint)
         else _hold(scene, grip, int(nodes[k]), reach * GHOST * link)
         for end, clamp, grip, k, reach in (
             ("start", clamp_start, grips[0], 0, -1.0),
@@ -184,17 +190,34 @@ def add_rope(
     return built
 
 
-def _grips(
-    name: str, grips: tuple[Grip | None, Grip | None], clamps: tuple[ArrayLike | None, ArrayLike | None]
-) -> tuple[Grip | None, Grip | None]:
+def _grips(name: str, grips: tuple[End, End], clamps: tuple[ArrayLike | None, ArrayLike | None]) -> tuple[End, End]:
     for end, grip, clamp in zip(("start", "end"), grips, clamps, strict=True):
-        if grip is not None and not isinstance(grip, Grip):
-            fix = "give sb.Grip.fixed, from_poses, from_markers or from_body"
+        if grip is not None and not isinstance(grip, Grip | BodyPoint):
+            fix = "give sb.Grip.fixed, from_poses, from_markers or from_body, or a point of a body"
             raise SceneError(f"{name}.grip_{end}", "is no grip", grip, fix)
         if grip is not None and clamp is not None:
             fix = "leave one of them out: a grip gives the direction"
             raise SceneError(f"{name}.grip_{end}", f"stands beside clamp_{end}", clamp, fix)
     return grips
+
+
+def _place(grip: Grip | BodyPoint) -> tuple[Array, Array]:
+    """Place and direction (3,) of an end at the start; any direction where a body lets it turn."""
+    if isinstance(grip, Grip):
+        return grip.position[0], grip.direction[0]
+    at, along = grip.at_start()
+    return at, np.array([1.0, 0.0, 0.0]) if along is None else along
+
+
+def _on_body(scene: Scene, point: BodyPoint, name: str, node: int, reach: float, mass: float) -> int | None:
+    """Keep an end on a body, and where the point has a direction, a light ghost `reach` m along it."""
+    hold_place(scene, point, node, f"{name}_on_{point.body.name}")
+    if point.along is None:
+        return None
+    at, along = _place(point)
+    ghost = int(scene.add_particles([at + reach * along], mass)[0])
+    hold_place(scene, point, ghost, f"{name}_stub", reach)
+    return ghost
 
 
 def _hold(scene: Scene, grip: Grip, node: int, reach: float) -> int:

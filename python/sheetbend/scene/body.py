@@ -159,6 +159,10 @@ class Body:
         frame = turned @ numbers(self.axes, at).T
         return p - frame @ numbers(self.center, at), frame
 
+    def turned(self, way: ArrayLike) -> Array:
+        """(3,) a direction of the body's frame in the world, as the scene was built."""
+        return np.asarray(self.pose(self.scene.positions)[1] @ np.asarray(way, dtype=float))
+
     def quaternions(self, motion: HasMotion | ArrayLike, values: Values = None) -> Array:
         """(..., 4), (x, y, z, w), from the body's axes to the world's; along a motion each on the side of the one
         before."""
