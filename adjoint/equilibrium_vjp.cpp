@@ -100,8 +100,10 @@ void EquilibriumDerivative::vjp(const double* x_bar, const double* lambda_bar, d
       pull_back_knots(boundary, held, bar.of(Quantity::boundary), static_cast<int>(scene_.driven.size()),
                       scene_.driven_slot[n]);
     } else if (scene_.inertial[n]) {
-      bar.of(Quantity::mass)[n] -= dot(un, gravity);
-      (-in.of(Quantity::mass)[n] * un).add_to(bar.of(Quantity::gravity));
+      if (scene_.has_weight[n]) {
+        bar.of(Quantity::mass)[n] -= dot(un, gravity);
+        (-in.of(Quantity::mass)[n] * un).add_to(bar.of(Quantity::gravity));
+      }
       if (scene_.loaded_slot[n] >= 0)
         pull_back_knots(force, -un, bar.of(Quantity::force), static_cast<int>(scene_.loaded.size()),
                         scene_.loaded_slot[n]);

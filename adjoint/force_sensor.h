@@ -64,7 +64,7 @@ template <class T>
 class SensorRun {
  public:
   SensorRun(const ForceSensor& sensor, const Scene& scene, const T* in, const T* own, double h, double t0, int last)
-      : sensor_(sensor), in_{scene.layout, in}, own_(own), h_(h), t0_(t0), last_(last) {}
+      : sensor_(sensor), scene_(scene), in_{scene.layout, in}, own_(own), h_(h), t0_(t0), last_(last) {}
 
   // Whether the load at a substep will be asked for.
   bool wants(int step) const { return next_ < sensor_.times.size() && step >= base(next_) - 1; }
@@ -84,7 +84,7 @@ class SensorRun {
       const auto now = cubic_weights(u), slopes = cubic_slopes(u), bends = cubic_bends(u);
       const Vec3<T> gravity(in_.of(Quantity::gravity)), at = by(now, 2);
       const Vec3<T> inertia = (rate * rate) * by(bends, 3);
-      const T mass = sensor_.reader.carried_mass(in_);
+      const T mass = sensor_.reader.carried_mass(scene_, in_);
       const Vec3<T> load = by(now, 0) + inertia - mass * gravity;
       const Vec3<T> twist =
           by(now, 1) + rate * by(slopes, 4) - cross(at, inertia) - cross(by(now, 3) - mass * at, gravity);
@@ -107,6 +107,7 @@ class SensorRun {
   }
 
   const ForceSensor& sensor_;
+  const Scene& scene_;
   Inputs<const T> in_;
   const T* own_;
   double h_, t0_;

@@ -1,5 +1,6 @@
-// What a recording sees of a state: markers at material coordinates, as weights on up to four nodes, with an optional offset carried in
-// the local frame (t, n, t x n) of tangent t and a given reference normal n; and the time between two substeps.
+// What a recording sees of a state: markers at material coordinates, as weights on up to four nodes, with an optional offset; and the time
+// between two substeps. An offset is carried in the local frame (t, n, t x n) of tangent t and a given reference normal n, or, on a rigid
+// body, by the body's axes, which are the last three nodes.
 #pragma once
 
 #include <array>
@@ -15,6 +16,7 @@ struct Marker {
   std::array<double, 4> tangent{};  // of the tangent (any length)
   std::array<double, 3> normal{0.0, 1.0, 0.0};
   bool carries_offset = false;
+  bool on_axes = false;  // the offset counts along nodes 1 to 3
 };
 
 // x: the state at one time; offset: 3 numbers (used when the marker carries one).
@@ -27,6 +29,10 @@ Vec3<T> marker_position(const Marker& m, const T* x, const T* offset) {
     t = t + T(m.tangent[k]) * node;
   }
   if (!m.carries_offset) return p;
+  if (m.on_axes) {
+    for (int k = 0; k < 3; ++k) p = p + offset[k] * Vec3<T>(x + m.dof[k + 1]);
+    return p;
+  }
   t = (T(1.0) / norm(t)) * t;
   Vec3<T> n(T(m.normal[0]), T(m.normal[1]), T(m.normal[2]));
   n = n - dot(n, t) * t;

@@ -3,7 +3,7 @@
 //   F = - sum_i J_i^T lambda/eta^2            the constraints' pull on the held particles (core/solver: x' = x + W J^T dl)
 //     + sum_k m_k (a_k - gravity) + c_k v_k - air_k     what the support carries besides: the mass that stands in held particles
 //
-// with a torque about one of the particles; a held director, which is a direction, takes torque and no force. The multipliers hold elastic
+// with a torque about one of the particles; a held director or axis, which is a direction, takes torque and no force. The multipliers hold elastic
 // and damping forces alike, and those of rigid constraints. Accelerations follow from positions at several substeps (force_sensor.h), so
 // that a substep hands on the moments that they are derivatives of.
 #pragma once
@@ -17,7 +17,7 @@
 namespace sheetbend {
 
 struct Support {
-  std::vector<int> nodes;    // held together, directors among them
+  std::vector<int> nodes;    // held together, directors and axes among them
   std::vector<int> carried;  // those whose mass, drag and air are the support's to bear
   int about = 0;             // node at whose place torques are taken
 };
@@ -27,7 +27,7 @@ template <class T>
 struct SupportLoad {
   static constexpr int size = 15;
   Vec3<T> force, torque, place;
-  Vec3<T> moment, spin;  // sum m x, and sum x cross m v, of what is carried
+  Vec3<T> moment, spin;  // sum m x of places, and sum x cross m v, of what is carried
 
   void store(T* to) const {
     int k = 0;
@@ -57,9 +57,10 @@ class SupportReader {
   const Support& support() const { return support_; }
 
   template <class T>
-  T carried_mass(const Inputs<const T>& in) const {
+  T carried_mass(const Scene& scene, const Inputs<const T>& in) const {
     T sum(0.0);
-    for (const int n : support_.carried) sum += in.of(Quantity::mass)[n];
+    for (const int n : support_.carried)
+      if (scene.is_place[n]) sum += in.of(Quantity::mass)[n];
     return sum;
   }
 
@@ -71,7 +72,7 @@ class SupportReader {
     const auto at = [&](const T* from, int node) { return Vec3<T>(from + scene.first_dof[node]); };
     load.place = at(x, support_.about);
     const auto hold = [&](int node, const Vec3<T>& force) {  // that the support puts on a node
-      if (!scene.is_director[node]) {
+      if (scene.is_place[node]) {
         load.force = load.force + force;
         load.torque = load.torque + cross(at(x, node) - load.place, force);
       } else {
@@ -100,7 +101,7 @@ class SupportReader {
     }
     for (const int n : support_.carried) {
       const Vec3<T> place = at(x, n), speed = at(v, n), momentum = in.of(Quantity::mass)[n] * speed;
-      load.moment = load.moment + in.of(Quantity::mass)[n] * place;
+      if (scene.is_place[n]) load.moment = load.moment + in.of(Quantity::mass)[n] * place;
       load.spin = load.spin + cross(place, momentum);
       if (!scene.has_drag) continue;
       const T c =

@@ -31,6 +31,7 @@ class FileParts {
   std::string name(const Json& parent, const std::string& key, const std::string& where = "") const;
   bool is_name(const Json& value) const;
 
+  bool has(const std::string& array) const { return header_.contains("arrays") && header_["arrays"].contains(array); }
   // Arrays (rows, columns) of the file, row by row, or (rows) where columns = 0. A file cannot hold the same bytes
   // twice, so arrays take no more memory than it has.
   std::vector<int> whole_numbers(const std::string& name, int columns = 0, std::optional<long long> rows = {});

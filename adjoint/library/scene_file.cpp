@@ -101,6 +101,13 @@ class SceneReader {
     const std::vector<int> directors = file_.whole_numbers("directors", 4);
     for (std::size_t i = 0; i < directors.size(); i += 4)
       spec.directors.push_back({directors[i], directors[i + 1], directors[i + 2], directors[i + 3]});
+    if (file_.has("bodies")) {  // older files have none
+      const std::vector<int> bodies = file_.whole_numbers("bodies", 5);
+      for (std::size_t i = 0; i < bodies.size(); i += 5) {
+        if (bodies[i + 4] != -1) file_.fail("bodies", "keep a spin", "give -1");
+        spec.bodies.push_back({bodies[i], {bodies[i + 1], bodies[i + 2], bodies[i + 3]}});
+      }
+    }
     spec.pinned = file_.whole_numbers("pinned");
     spec.driven = file_.whole_numbers("driven");
     for (const int n : spec.driven)  // the built scene only knows that it is driven

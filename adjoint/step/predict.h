@@ -24,6 +24,7 @@ struct ReverseOf<Predict> {
   static void run(const Step<T>& step, const Work<T>& work, Nothing&, Scratch<T>& scratch,
                   const StepCotangents<T>& bar) {
     free_motion(step, work, scratch, bar);
+    weightless_nodes(step, work, bar);
     fixed_nodes(step, bar);
     if (step.scene.has_drag) kept_momentum(step, bar);
   }
@@ -38,7 +39,7 @@ struct ReverseOf<Predict> {
     const T eta(bdf.eta);
     const T* kept = scene.has_drag ? work.masses.kept.data() : nullptr;
     const int *first_dof = scene.first_dof.data(), nodes = scene.nodes();
-    const char* inertial = scene.inertial.data();
+    const char* has_weight = scene.has_weight.data();
     const Coordinates<T> q_bar = cotangents.q;
     const StateCotangents<T> bar = cotangents.from;
     Vec3<T>* sums = scratch.gravity.data();
@@ -48,7 +49,7 @@ struct ReverseOf<Predict> {
         PointSum<T> sum;
         const int begin = chunk * points_per_sum, end = std::min(begin + points_per_sum, nodes);
         for_each_point<T>(begin, end, [=, &sum](int n, auto how) {
-          if (!inertial[n]) return;
+          if (!has_weight[n]) return;
           const int dof = first_dof[n];
           const auto x_bar = how.load(q_bar.of(n));
           auto v_bar = scaled(eta, x_bar);
@@ -61,6 +62,20 @@ struct ReverseOf<Predict> {
       }
     });
     for (const Vec3<T>& sum : scratch.gravity) sum.add_to(cotangents.in.of(Quantity::gravity));
+  }
+
+  template <class T>
+  static void weightless_nodes(const Step<T>& step, const Work<T>& work, const StepCotangents<T>& bar) {
+    const Scene& scene = step.scene;
+    const Exactly<T> how;
+    for (const int n : scene.axes) {
+      const int dof = scene.first_dof[n];
+      const Vec3<T> x_bar(bar.q.of(n));
+      Vec3<T> v_bar = T(step.bdf.eta) * x_bar;
+      if (scene.has_drag) v_bar = work.masses.kept[n] * v_bar;
+      pull_back_history(step.bdf, how, x_bar, bar.from.x + dof, bar.from.x_before + dof);
+      pull_back_history(step.bdf, how, v_bar, bar.from.v + dof, bar.from.v_before + dof);
+    }
   }
 
   template <class T>
@@ -88,8 +103,8 @@ struct ReverseOf<Predict> {
     for (int n = 0; n < scene.nodes(); ++n) {
       if (!scene.inertial[n]) continue;
       const int dof = scene.first_dof[n];
-      const Vec3<T> free_velocity =
-          history(step.bdf, Exactly<T>{}, step.from.v + dof, step.from.v_before + dof) + eta * gravity;
+      Vec3<T> free_velocity = history(step.bdf, Exactly<T>{}, step.from.v + dof, step.from.v_before + dof);
+      if (scene.has_weight[n]) free_velocity = free_velocity + eta * gravity;
       bar.kept[n] = dot(free_velocity, eta * Vec3<T>(bar.q.of(n)));
     }
   }

@@ -12,7 +12,8 @@
 //   };
 //
 // x holds the stencil's coordinates one node after the other (dofs of them), J is row-major (rows x dofs) and fully written.
-// `points` of the stencil are points; those after them are directors (of a rod's edges) or internal variables (see yield.h).
+// `points` of the stencil are points; those after them are directors (of a rod's edges), `axes` of bodies (core/scene/bodies.h), or internal variables
+// (see yield.h).
 // `unilateral = true` (one row): C >= 0, a constraint that pushes and never pulls. Its multiplier stays lambda >= 0.
 // `hot = true`: its kernels are inlined as a whole, which costs compile time and bytes and pays where the kind decides how long a simulation takes.
 // `periodic = true` says that C is an angle: differences of it (rate damping) are taken the short way round.
@@ -47,7 +48,7 @@ template <int Arity>
 struct OnPoints {
   static constexpr int arity = Arity;
   static constexpr int dofs = 3 * Arity;
-  static constexpr int points = Arity;
+  static constexpr int points = Arity, axes = 0;
   static constexpr int offsets = 0, factors = 0;
   static constexpr bool periodic = false;
   static constexpr bool unilateral = false;

@@ -5,17 +5,23 @@
 #include <string>
 #include <tuple>
 
+#include "core/constraints/across.h"
+#include "core/constraints/along.h"
 #include "core/constraints/area.h"
 #include "core/constraints/attachment.h"
 #include "core/constraints/bend.h"
+#include "core/constraints/body_distance.h"
+#include "core/constraints/coincide.h"
 #include "core/constraints/dihedral.h"
 #include "core/constraints/distance.h"
 #include "core/constraints/exponential_strain.h"
 #include "core/constraints/friction_hinge.h"
 #include "core/constraints/hinge.h"
 #include "core/constraints/isometric_bending.h"
+#include "core/constraints/joint_angle.h"
 #include "core/constraints/material_curvature.h"
 #include "core/constraints/planar_bend.h"
+#include "core/constraints/rigid.h"
 #include "core/constraints/shear.h"
 #include "core/constraints/sheet_curvature.h"
 #include "core/constraints/sinh_strain.h"
@@ -49,7 +55,15 @@ using Registry = std::tuple<   //
     SheetCurvature,            //
     Area,                      //
     Tether,                    //
-    FrictionHinge>;
+    FrictionHinge,             //
+    Rigid,                     //
+    Coincide,                  //
+    CoincideParticle,          //
+    BodyDistance,              //
+    BodyParticleDistance,      //
+    DirectionsAcross,          //
+    Along,                     //
+    JointAngle>;
 
 inline constexpr int kind_count = std::tuple_size_v<Registry>;
 

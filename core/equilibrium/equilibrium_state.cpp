@@ -14,16 +14,16 @@ namespace {
 constexpr double energy_share = 0.1;  // of the loads' energy that softened constraints may hold
 constexpr double stiffening = 0.9;    // of softened constraints, per iteration
 
-// Diagonal of the box around all particles.
-double scene_size(const Scene& scene, const double* x) {
+// Diagonal of the box around all particles, with bodies that have a width.
+double scene_size(const Scene& scene, const double* x, const double* mass) {
   Vec3<double> low(x), high(x);
   for (int n = 0; n < scene.nodes(); ++n) {
-    if (scene.is_director[n]) continue;
+    if (!scene.is_place[n]) continue;
     const Vec3<double> p(x + scene.first_dof[n]);
     low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
-  return norm(high - low);
+  return norm(high - low) + width_of_bodies(scene.bodies, mass);
 }
 
 // Mean distance between neighboring points of a stencil.
@@ -91,7 +91,7 @@ EquilibriumState::EquilibriumState(const Scene& scene_, const double* inputs, co
   if (start_lambda) std::copy_n(start_lambda, lambda.size(), lambda.data());
   place_fixed(scene, in, o.t0, x.data());
   retract_directors(scene, x.data());
-  size = scene_size(scene, x.data());
+  size = scene_size(scene, x.data(), in.of(Quantity::mass));
   edge = mean_edge(scene, x.data());
   external_force(scene, in, o.t0, x.data(), r_x.data());
   weight = largest(r_x);

@@ -152,6 +152,9 @@ void Kkt::assemble(const double* inputs, const double* x, const double* lambda, 
     for (int e = 0; e < 9; ++e) idle_[i][e] = t[e / 3] * t[e % 3] + m[e / 3] * m[e % 3];
     std::fill_n(metric_.begin() + scene_.first_dof[d.node], 3, 1.0 / (inverse_length * inverse_length));
   }
+  for (const Body& b : scene_.bodies)
+    if (const double width = width_of_bodies({b}, in.of(Quantity::mass)); width > 0.0)
+      for (const int n : b.axes) std::fill_n(metric_.begin() + scene_.first_dof[n], 3, 0.25 * width * width);
 }
 
 bool Kkt::factorize(double mu, const double* compliance) {

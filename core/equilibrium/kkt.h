@@ -38,7 +38,8 @@ class Kkt {
   bool factorize(double mu, const double* compliance);
   int negative_modes() const { return negative_; }
   double largest_diagonal() const { return largest_diagonal_; }
-  // What mu is multiplied by at a coordinate: 1, of a director the square of its edge's length.
+  // What mu is multiplied by at a coordinate: 1, of a director the square of its edge's length, of an axis that of its body's
+  // radius of gyration.
   double metric(int dof) const { return metric_[dof]; }
 
   // Solves A (x, lambda) = (x, lambda) in place; entries of fixed nodes come out zero. Refines until corrections are below `accuracy`

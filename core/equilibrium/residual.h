@@ -60,7 +60,7 @@ void dead_load(const Scene& scene, const Inputs<const T>& in, double t0, T* f) {
   std::fill_n(f, scene.dofs(), T(0.0));
   for (int n = 0; n < scene.nodes(); ++n) {
     if (!scene.inertial[n]) continue;
-    (in.of(Quantity::mass)[n] * gravity).store(f + scene.first_dof[n]);
+    if (scene.has_weight[n]) (in.of(Quantity::mass)[n] * gravity).store(f + scene.first_dof[n]);
     if (scene.loaded_slot[n] >= 0)
       at_knots(knots, in.of(Quantity::force), static_cast<int>(scene.loaded.size()), scene.loaded_slot[n])
           .add_to(f + scene.first_dof[n]);

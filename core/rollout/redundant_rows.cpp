@@ -62,7 +62,7 @@ RedundantRow take_apart(const DirectBlock& block, State& state, int row, const s
 double largest_distance(const Scene& scene, const double* x) {
   double largest = 0.0;
   for (int n = 1; n < scene.nodes(); ++n)
-    if (!scene.is_director[n])
+    if (scene.is_place[n])
       largest = std::max(largest, norm(Vec3<double>(x + scene.first_dof[n]) - Vec3<double>(x + scene.first_dof[0])));
   return largest;
 }

@@ -67,14 +67,19 @@ Group build_group(const GroupSpec& spec, const Scene& scene) {
   return g;
 }
 
+// What a node is that is no place.
+std::string a_direction(const Scene& scene, int node) {
+  return scene.is_director[node] ? "a director" : "an axis of a body";
+}
+
 void check_triangles(const std::string& field, const std::vector<std::array<int, 3>>& triangles, const Scene& scene) {
   for (const auto& [a, b, c] : triangles) {
     check_nodes(field, {a, b, c}, scene.nodes());
     const std::string which = std::to_string(a) + ", " + std::to_string(b) + ", " + std::to_string(c);
     if (a == b || b == c || c == a)
       refuse(field + ": triangle " + which + " has no area. Fix: give distinct particles");
-    if (scene.is_director[a] || scene.is_director[b] || scene.is_director[c])
-      refuse(field + ": triangle " + which + " holds a director. Fix: use particles");
+    for (const int n : {a, b, c})
+      if (!scene.is_place[n]) refuse(field + ": triangle " + which + " holds " + a_direction(scene, n) + ". Fix: use particles");
   }
 }
 
@@ -119,8 +124,8 @@ void check_contact(const ContactSpec& spec, const Scene& scene, std::vector<char
     refuse(spec.name + ".carried: " + std::to_string(spec.carried.size()) + " nodes. Fix: give one for each particle");
   slots(spec.particles, scene.nodes(), spec.name);
   for (const int n : spec.particles)
-    if (scene.is_director[n])
-      refuse(spec.name + ": node " + std::to_string(n) + " is a director. Fix: use particles");
+    if (!scene.is_place[n])
+      refuse(spec.name + ": node " + std::to_string(n) + " is " + a_direction(scene, n) + ". Fix: use particles");
   for (const int n : spec.carried) {
     if (carries[n] || scene.role[n] != Role::pinned)
       refuse(spec.name + ".carried: node " + std::to_string(n) + ". Fix: give each particle a pinned node of its own");
@@ -143,6 +148,24 @@ std::array<std::size_t, 5> add_contacts(const SceneSpec& spec, Scene& s) {
     s.contacts.push_back({c.name, c.collider, c.particles, c.carried, c.rigid ? -1 : static_cast<int>(soft++)});
   }
   return {s.contacts.size(), s.contacts.size(), soft, poses, sizes};
+}
+
+void add_bodies(const SceneSpec& spec, Scene& s) {
+  std::vector<char> taken = s.is_director;
+  for (const Body& b : spec.bodies) {
+    for (const int n : {b.center, b.axes[0], b.axes[1], b.axes[2]}) {
+      check_nodes("bodies", {n}, s.nodes());
+      if (taken[n])
+        refuse("bodies: node " + std::to_string(n) + " is a director or in a body already. Fix: give each body a center and three axes of its own");
+      taken[n] = true;
+    }
+    for (const int n : b.axes) {
+      s.is_place[n] = false;
+      if (s.role[n] == Role::free) s.axes.push_back(n);
+    }
+  }
+  s.bodies = spec.bodies;
+  for (int n = 0; n < s.nodes(); ++n) s.has_weight.push_back(s.inertial[n] && s.is_place[n]);
 }
 
 }  // namespace
@@ -186,7 +209,11 @@ Scene build_scene(const SceneSpec& spec) {
       refuse("directors: node " + std::to_string(d.node) + " with normal " + std::to_string(d.normal) +
              ". Fix: give a normal that stands before, the node itself for a normal, or -1");
   }
-  for (int n = 0; n < s.nodes(); ++n) s.inertial.push_back(s.role[n] == Role::free && !s.is_director[n]);
+  for (int n = 0; n < s.nodes(); ++n) {
+    s.inertial.push_back(s.role[n] == Role::free && !s.is_director[n]);
+    s.is_place.push_back(!s.is_director[n]);
+  }
+  add_bodies(spec, s);
   for (const int n : spec.loaded)
     if (s.is_director[n] && s.role[n] == Role::free)
       refuse("loaded: node " + std::to_string(n) + " is a director. Fix: let forces act on particles");

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/scene/bodies.h"
 #include "core/scene/fields.h"
 #include "core/scene/layout.h"
 #include "core/scene/motion.h"
@@ -75,8 +76,11 @@ struct Scene {
   std::vector<int> first_dof, dim;  // per node
   std::vector<Role> role;           // per node
   std::vector<Director> directors;
+  std::vector<Body> bodies;
+  std::vector<int> axes;                    // of bodies, those that are free
   bool yields = false;                      // whether any constraint does
   std::vector<char> is_director, inertial;  // per node; what is free and no director moves by its mass
+  std::vector<char> is_place, has_weight;   // per node; no director and no axis; of those, what has inertia
   std::vector<int> pinned;
   std::vector<int> driven;       // nodes whose motion is given, in the order of Quantity::boundary
   std::vector<int> driven_slot;  // per node: place in `driven`, or -1
@@ -123,8 +127,9 @@ struct ContactSpec {
 };
 
 struct SceneSpec {
-  int particles = 0;  // nodes, directors among them
+  int particles = 0;  // nodes, directors and axes among them
   std::vector<Director> directors;
+  std::vector<Body> bodies;
   std::vector<int> pinned, driven, loaded;
   bool has_drag = false;
   std::vector<std::array<int, 3>> air;

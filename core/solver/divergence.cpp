@@ -27,25 +27,25 @@ std::string in_words(const char* format, double value) {
   return text.data();
 }
 
-// Diagonal of the box around all particles.
-double size_of(const Scene& scene, const double* x) {
+// Diagonal of the box around all particles, with bodies that have a width.
+double size_of(const Scene& scene, const Moved& s) {
   std::array<double, 3> low, high;
   low.fill(1e300);
   high.fill(-1e300);
   for (int n = 0; n < scene.nodes(); ++n) {
-    if (scene.is_director[n]) continue;
+    if (!scene.is_place[n]) continue;
     for (int d = 0; d < 3; ++d) {
-      low[d] = std::min(low[d], x[scene.first_dof[n] + d]);
-      high[d] = std::max(high[d], x[scene.first_dof[n] + d]);
+      low[d] = std::min(low[d], s.start[scene.first_dof[n] + d]);
+      high[d] = std::max(high[d], s.start[scene.first_dof[n] + d]);
     }
   }
-  return std::sqrt(squared_distance(low.data(), high.data()));
+  return std::sqrt(squared_distance(low.data(), high.data())) + width_of_bodies(scene.bodies, s.mass);
 }
 
 double mass_of(const Scene& scene, const double* mass) {
   double sum = 0.0;
   for (int n = 0; n < scene.nodes(); ++n)
-    if (scene.inertial[n]) sum += mass[n];
+    if (scene.has_weight[n]) sum += mass[n];
   return sum;
 }
 
@@ -125,7 +125,7 @@ double stored(const Scene& scene, const Inputs<const double>& in, const Group& g
   return energy;
 }
 
-// How far, how fast and along which path the driven nodes have been led, in m; directors as if they were as long as the scene.
+// How far, how fast and along which path the driven nodes have been led, in m; directors and axes as if they were as long as the scene.
 struct Lead {
   double apart = 0.0;  // of the held particles among each other, since the first knot
   double speed = 0.0, path = 0.0;
@@ -143,11 +143,11 @@ Lead lead_until(const Scene& scene, const Inputs<const double>& in, double size,
     double particles = static_cast<double>(scene.pinned.size());
     for (std::size_t i = 0; i < slots; ++i) {
       const double* now = knots + 3 * (k * slots + i);
-      const bool director = scene.is_director[scene.driven[i]];
-      const double step = std::sqrt(squared_distance(now, now - 3 * slots)) * (director ? size : 1.0);
+      const bool place = scene.is_place[scene.driven[i]];
+      const double step = std::sqrt(squared_distance(now, now - 3 * slots)) * (place ? 1.0 : size);
       path[i] += step;
       lead.speed = std::max(lead.speed, step / (scene.boundary.times[k] - scene.boundary.times[k - 1]));
-      if (director) continue;
+      if (!place) continue;
       moved[i] = Vec3<double>(now) - Vec3<double>(knots + 3 * i);
       sum = sum + moved[i];
       particles += 1.0;
@@ -155,7 +155,7 @@ Lead lead_until(const Scene& scene, const Inputs<const double>& in, double size,
     if (particles < 2.0) continue;
     const Vec3<double> mean = scaled(1.0 / particles, sum);
     for (std::size_t i = 0; i < slots; ++i) {
-      if (scene.is_director[scene.driven[i]]) continue;
+      if (!scene.is_place[scene.driven[i]]) continue;
       const Vec3<double> off = moved[i] - mean;
       lead.apart = std::max(lead.apart, 2.0 * std::sqrt(dot(off, off)));
     }
@@ -181,10 +181,10 @@ double work_of_forces(const Scene& scene, const Moved& s, const Inputs<const dou
   };
   double work = 0.0;
   for (int n = 0; n < scene.nodes(); ++n)
-    if (scene.inertial[n]) work += s.mass[n] * (gravity * moved(n) + std::max(gravity, least_gravity) * size);
+    if (scene.has_weight[n]) work += s.mass[n] * (gravity * moved(n) + std::max(gravity, least_gravity) * size);
   const std::size_t loads = scene.loaded.size();
   for (std::size_t i = 0; i < loads; ++i)
-    work += longest(in.of(Quantity::force) + 3 * i, scene.force.times.size(), loads) * (moved(scene.loaded[i]) + size);
+    work += longest(in.of(Quantity::force) + 3 * i, scene.force.times.size(), loads) * (moved(scene.loaded[i]) + (scene.is_place[scene.loaded[i]] ? size : 1.0));
   const double wind = longest(in.of(Quantity::wind), scene.wind.times.size(), 1);
   for (std::size_t i = 0; i < scene.air.size(); ++i) {
     const auto& [a, b, c] = scene.air[i];
@@ -242,7 +242,7 @@ Shape shape_of(const Scene& scene, const Moved& s, double size) {
 }  // namespace
 
 bool StateCheck::suspects(const Moved& s) const {
-  const double size = size_of(scene_, s.start);
+  const double size = size_of(scene_, s);
   const double usual = fast * mass_of(scene_, s.mass) * least_gravity * size;
   if (kinetic_energy(scene_, s.mass, s.v) > std::max(usual, kinetic_)) return true;
   const Shape shape = shape_of(scene_, s, size);
@@ -250,7 +250,7 @@ bool StateCheck::suspects(const Moved& s) const {
 }
 
 std::optional<Finding> StateCheck::find(const Moved& s, const Inputs<const double>& in, double t) {
-  const double size = size_of(scene_, s.start), eta = Bdf::at(options_, 1).eta;
+  const double size = size_of(scene_, s), eta = Bdf::at(options_, 1).eta;
   const Lead lead = lead_until(scene_, in, size, t);
   const double led = 2.0 * lead.speed * (1.0 + (size > 0.0 ? lead.path / size : 0.0));
   const double given = work_of_forces(scene_, s, in, size) + energy_at_start(scene_, s, in, eta) +
@@ -261,7 +261,8 @@ std::optional<Finding> StateCheck::find(const Moved& s, const Inputs<const doubl
     int fastest = 0;
     double speed = -1.0;
     for (int n = 0; n < scene_.nodes(); ++n)
-      if (const double own = longest(s.v + scene_.first_dof[n], 1, 1); scene_.inertial[n] && own > speed)
+      if (const double own = longest(s.v + scene_.first_dof[n], 1, 1) * (scene_.is_place[n] ? 1.0 : size);
+          scene_.inertial[n] && own > speed)
         fastest = n, speed = own;
     return Finding{fastest, in_words("moves at %.3g m/s, which nothing put into the scene explains", speed)};
   }

@@ -2,7 +2,7 @@
 //
 //   x* = history(x) + eta v*,   v* = m w (history(v) + eta gravity),   w = 1/(m + eta c).
 //
-// Directors go on as they turned, pinned nodes stay, driven ones go where their boundary is at the substep's end.
+// Axes of bodies have no weight, directors go on as they turned, pinned nodes stay, driven ones go where their boundary is at the substep's end.
 #pragma once
 
 #include "core/step/stages.h"
@@ -22,6 +22,7 @@ struct Predict {
       parallel_for(
           step.scene.nodes(), step.threads(), points_per_thread,
           [points = points_of(step, work.masses, &work)](int begin, int end) { point_kernels<T>().predict(points, begin, end); });
+    weightless_nodes(step, work);
     fixed_nodes(step, work);
   }
 
@@ -47,6 +48,19 @@ struct Predict {
     for (const Director& d : scene.directors) {
       const int dof = scene.first_dof[d.node];
       extrapolated(bdf, s.x + dof, s.x_before + dof).store(q.of(d.node));
+    }
+  }
+
+  // Again, without gravity.
+  template <class T>
+  static void weightless_nodes(const Step<T>& step, Work<T>& work) {
+    const Scene& scene = step.scene;
+    const Exactly<T> how;
+    for (const int n : scene.axes) {
+      const int dof = scene.first_dof[n];
+      Vec3<T> v = history(step.bdf, how, step.from.v + dof, step.from.v_before + dof);
+      if (scene.has_drag) v = work.masses.kept[n] * v;
+      (history(step.bdf, how, step.from.x + dof, step.from.x_before + dof) + T(step.bdf.eta) * v).store(work.q.of(n));
     }
   }
 

@@ -42,6 +42,7 @@ Observations make_observations(const py::dict& d) {
     marker.tangent = get<std::array<double, 4>>(m, "tangent");
     marker.normal = get<std::array<double, 3>>(m, "normal");
     marker.carries_offset = get<bool>(m, "carries_offset");
+    marker.on_axes = get<bool>(m, "on_axes");
     o.markers.push_back(marker);
   }
   return o;

@@ -26,6 +26,11 @@ std::shared_ptr<Scene> make_scene(const py::kwargs& given) {
   spec.particles = given["particles"].cast<int>();
   for (const auto& [node, tail, head, normal] : given["directors"].cast<std::vector<std::array<int, 4>>>())
     spec.directors.push_back({node, tail, head, normal});
+  if (given.contains("bodies"))
+    for (const auto& [center, first, second, third, spin] : given["bodies"].cast<std::vector<std::array<int, 5>>>()) {
+      if (spin != -1) throw std::invalid_argument("bodies: a spin is kept at " + std::to_string(spin) + ". Fix: give -1");
+      spec.bodies.push_back({center, {first, second, third}});
+    }
   spec.pinned = whole_numbers(given["pinned"]);
   spec.driven = whole_numbers(given["driven"]);
   spec.loaded = whole_numbers(given["loaded"]);
@@ -53,6 +58,8 @@ std::shared_ptr<Scene> make_scene(const py::kwargs& given) {
 py::dict arguments_of(const Scene& s) {
   std::vector<std::array<int, 4>> directors;
   for (const Director& d : s.directors) directors.push_back({d.node, d.tail, d.head, d.normal});
+  std::vector<std::array<int, 5>> bodies;
+  for (const Body& b : s.bodies) bodies.push_back({b.center, b.axes[0], b.axes[1], b.axes[2], -1});
   py::list groups, volumes;
   for (const Group& g : s.groups) {
     const std::string kind = [&] {
@@ -79,7 +86,7 @@ py::dict arguments_of(const Scene& s) {
     contacts.append(py::dict("name"_a = c.name, "collider"_a = c.collider, "particles"_a = py::array_t<int>(py::cast(c.particles)),
                              "carried"_a = py::array_t<int>(py::cast(c.carried)), "rigid"_a = c.stiffness < 0));
   const bool cubic = s.boundary.interpolation == Interpolation::cubic;
-  return py::dict("particles"_a = s.nodes(), "directors"_a = directors, "pinned"_a = s.pinned, "driven"_a = s.driven,
+  return py::dict("particles"_a = s.nodes(), "directors"_a = directors, "bodies"_a = bodies, "pinned"_a = s.pinned, "driven"_a = s.driven,
                   "boundary_times"_a = s.boundary.times, "boundary_interpolation"_a = cubic ? "cubic" : "linear",
                   "loaded"_a = s.loaded, "force_times"_a = s.force.times, "has_drag"_a = s.has_drag, "air"_a = s.air,
                   "wind_times"_a = s.wind.times, "groups"_a = groups, "volumes"_a = volumes,

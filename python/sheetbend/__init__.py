@@ -42,7 +42,9 @@ from .objects.cloth import Cloth, add_cloth, cloth
 from .objects.fabric import Fabric
 from .objects.grip import Grip
 from .objects.hand_eye import HandEye
-from .objects.markers import Place, along_rope, between, on_cloth, on_particle, on_rope
+from .objects.joint_making import Joint, ground
+from .objects.joints import ball, cylinder, fixed, hinge, slider, universal
+from .objects.markers import Place, along_rope, between, on_body, on_cloth, on_particle, on_rope
 from .objects.rod import Rod, add_rod, rod
 from .objects.rod_junction import Junction
 from .objects.rope import Rope, add_rope, rope
@@ -53,10 +55,13 @@ from .quantities.parameters import Parameter, Parameters
 from .recording.baseline import baseline
 from .recording.force_recording import ForceRecording
 from .recording.io.folder import read_recordings
+from .recording.of_poses import start_of_poses
 from .recording.recording import Recording
 from .report.fit_result import FitResult
 from .report.scores import Score, Scores, coordinate_error, scores
+from .scene.body import Body
 from .scene.colliders import Box, Capsule, Plane, Sphere
+from .scene.inertia import Inertia
 from .scene.scene import Scene
 from .scene.scene_file import load_scene, save_scene
 from .version import __version__ as __version__
@@ -78,6 +83,7 @@ def __getattr__(name: str) -> Any:
 __all__ = [
     "KINDS",
     "Arm",
+    "Body",
     "Box",
     "Capsule",
     "Cloth",
@@ -96,7 +102,9 @@ __all__ = [
     "GradientReport",
     "Grip",
     "HandEye",
+    "Inertia",
     "InputError",
+    "Joint",
     "Junction",
     "MeshError",
     "NoEquilibriumError",
@@ -131,21 +139,27 @@ __all__ = [
     "add_rope",
     "add_tethers",
     "along_rope",
+    "ball",
     "baseline",
     "between",
     "check_gradients",
     "cloth",
     "constraint_values",
     "coordinate_error",
+    "cylinder",
     "elastic_energy",
     "equilibria",
     "equilibrium",
     "fit",
     "fit_rope",
+    "fixed",
     "force_balance",
+    "ground",
+    "hinge",
     "laws",
     "load_scene",
     "mesh",
+    "on_body",
     "on_cloth",
     "on_particle",
     "on_rope",
@@ -158,6 +172,9 @@ __all__ = [
     "scores",
     "simulate",
     "simulate_forces",
+    "slider",
+    "start_of_poses",
     "support_forces",
     "tape_plan",
+    "universal",
 ]

@@ -12,9 +12,12 @@ namespace {
 constexpr int repetitions = 20;
 using Dual1 = Dual<double, 1>;
 
-// Coordinates in space: an internal variable, the last of a stencil that yields, is none.
+// Coordinates in space: an internal variable, the last of a stencil that yields or has a dial, is none.
 template <class K>
-constexpr int spatial = Yields<K> ? K::dofs - 3 : K::dofs;
+constexpr int spatial = Yields<K> || has_dial<K> ? K::dofs - 3 : K::dofs;
+// Those with a unit of length: axes of bodies, which follow the points, have none.
+template <class K>
+constexpr int in_meters = K::axes > 0 ? 3 * K::points : spatial<K>;
 
 struct Stencil {
   std::vector<double> x, p;
@@ -246,11 +249,11 @@ TYPED_TEST(Constraint, ScalesWithTheUnitOfLength) {
   for (const double scale : {1e-3, 7.0, 1e3}) {
     const Stencil s = jittered<K>(4);
     std::vector<double> x = s.x, p = s.p;
-    for (int d = 0; d < spatial<K>; ++d) x[d] *= scale;
+    for (int d = 0; d < in_meters<K>; ++d) x[d] *= scale;
     for (std::size_t k = 0; k < p.size(); ++k) p[k] *= std::pow(scale, K::parameters[k].unit.meters);
     std::vector<double> expected = evaluate<K>(s.x, s.p);
     for (int i = 0; i < static_cast<int>(expected.size()); ++i)
-      expected[i] *= std::pow(scale, K::unit.meters - (i < K::rows || (i - K::rows) % K::dofs >= spatial<K> ? 0 : 1));
+      expected[i] *= std::pow(scale, K::unit.meters - (i < K::rows || (i - K::rows) % K::dofs >= in_meters<K> ? 0 : 1));
     const auto found = evaluate<K>(x, p);
     EXPECT_LE(relative_error(std::span(found).first(K::rows), std::span(expected).first(K::rows)), 1e-13);
     EXPECT_LE(relative_error(std::span(found).subspan(K::rows), std::span(expected).subspan(K::rows)), 1e-13);

@@ -215,6 +215,8 @@ class Experiment:
     def _depends_on(self, i: int, place: Place) -> set[int]:
         """Particles that move a marker: weights of a node right at its place are rounding errors elsewhere."""
         turns = place.offset is not None or self.recording.markers[i] in self.offsets
+        if place.body is not None:
+            return set(place.particles)
         shares = zip(place.particles, place.weights, place.tangent, strict=True)
         return {p for p, weight, tangent in shares if abs(weight) > NO_SHARE or (turns and tangent != 0.0)}
 
@@ -279,15 +281,21 @@ class Experiment:
         self._check_names()
         terms: list[Term] = []
         for m, i in enumerate(self.compared):
-            wanted = self.offsets.get(self.recording.markers[i], (None, None, None))
             terms += [
-                product("extra", 3 * m + k, 1.0, {name: "identity"})
-                for k, name in enumerate(wanted)
-                if name is not None
+                Term("extra", 3 * m + k, c, factors)
+                for k, one in enumerate(self._offset(i))
+                for factors, c in one.parts.items()
+                if factors
             ]
         if self.time_offset is not None:
             terms.append(product("extra", 3 * len(self.compared), 1.0, {self.time_offset: "identity"}))
         return terms
+
+    def _offset(self, i: int) -> np.ndarray:
+        """(3,) expressions of the offset of a compared marker, m."""
+        place = self.places[i]
+        assert place is not None
+        return place.offset_with(self.offsets.get(self.recording.markers[i], (None, None, None)))
 
     def sensor_terms(self) -> list[Term]:
         """Terms of the inputs of the force sensors, which follow the time offset."""
@@ -351,7 +359,7 @@ class Experiment:
         compiled = self.scene.compiled
         if not self.static:
             self.solver.check_smooth(compiled)
-        offsets = [place.offset or (0.0, 0.0, 0.0) for place in self.compared_places]
+        offsets = [[one.constant for one in self._offset(i)] for i in self.compared]
         observed = self.observed(recording)
         for marker, m in zip(observed["markers"], self.compared, strict=True):
             marker["carries_offset"] = marker["carries_offset"] or self.recording.markers[m] in self.offsets

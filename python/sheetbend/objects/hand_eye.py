@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays.checks import finite, is_number
 from ..errors import InputError, SceneError
+from ..quantities.expression import rotation_products
 from ..quantities.parameters import Parameter
 from ..quantities.quantities import Term
 from ..scene.moving_clamp import clamped_ends
@@ -84,7 +84,7 @@ class HandEye:
         at = {name: values.get(name, 0.0) for name in self.quantities}
         functions = {"sin": np.sin, "cos": np.cos}
         turn = np.zeros((3, 3))
-        for factors, matrix in self._products():
+        for factors, matrix in rotation_products(self.quantities[3:]):
             turn += matrix * np.prod([functions[f](at[q]) for q, f in factors.items()])
         return np.asarray(self.about + [at[q] for q in self.quantities[:3]] + (x - self.about) @ turn.T)
 
@@ -144,7 +144,7 @@ class HandEye:
 
     def turned(self, by: Array, factors: Mapping[str, str]) -> Iterator[tuple[dict[str, str], Array]]:
         """Terms of vectors (..., 3), which have factors of their own, as the correction turns them."""
-        for own, matrix in self._products():
+        for own, matrix in rotation_products(self.quantities[3:]):
             yield {**factors, **own}, by @ matrix.T
 
     def declare(self, scene: Scene) -> None:
@@ -160,21 +160,6 @@ class HandEye:
         yield from self.turned(arm, {})
         for axis, q in enumerate(self.quantities[:3]):
             yield {q: "identity"}, np.broadcast_to(shifts[:, None] * np.eye(3)[axis], arm.shape)
-
-    def _products(self) -> Iterator[tuple[dict[str, str], Array]]:
-        """Factors and matrices (3, 3) whose sum of products is Rz Ry Rx."""
-        for parts in product(*(_rotation(axis, q) for axis, q in enumerate(self.quantities[3:]))):
-            (of_x, x), (of_y, y), (of_z, z) = parts
-            matrix = z @ y @ x
-            if matrix.any():
-                yield {**of_x, **of_y, **of_z}, matrix
-
-
-def _rotation(axis: int, quantity: str) -> list[tuple[dict[str, str], Array]]:
-    """The rotation about a coordinate axis as a sum: what it keeps, and what goes with the cosine and the sine."""
-    along = np.outer(np.eye(3)[axis], np.eye(3)[axis])
-    skew = np.cross(np.eye(3)[axis], np.eye(3)).T  # skew @ v = axis x v
-    return [({}, along), ({quantity: "cos"}, np.eye(3) - along), ({quantity: "sin"}, skew)]
 
 
 def unit_quaternions(field: str, quaternions: ArrayLike, shape: tuple[int, ...]) -> Array:

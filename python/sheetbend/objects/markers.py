@@ -13,6 +13,8 @@ from numpy.typing import ArrayLike
 from ..arrays.checks import finite
 from ..errors import SceneError
 from ..mesh import Places
+from ..quantities.expression import Array, Expression, expressions
+from ..scene.body import Body
 from ..scene.scene import Scene
 from .cloth import Cloth
 from .rope import Rope
@@ -21,10 +23,10 @@ from .rope import Rope
 @dataclass(frozen=True)
 class Place:
     """A material point: weights on up to four particles, weights of its tangent, and an offset in the frame (t, n, t x
-    n).
+    n), or a point of a rigid body.
 
-    t is the rope's direction there, n the given normal made perpendicular to it. Offset components that are texts name
-    quantities.
+    t is the rope's direction there, n the given normal made perpendicular to it. On a `body` the offset counts along
+    the axes of the body's frame, and the particles are the body's nodes.
     """
 
     particles: tuple[int, ...]
@@ -32,6 +34,7 @@ class Place:
     tangent: tuple[float, ...]
     offset: tuple[float, float, float] | None = None
     normal: tuple[float, float, float] = (0.0, 1.0, 0.0)
+    body: Body | None = None
 
     def with_offset(self, offset: ArrayLike, normal: ArrayLike = (0.0, 1.0, 0.0)) -> Place:
         """The same place, standing off by `offset` (3,) m along (tangent, normal, tangent x normal)."""
@@ -50,7 +53,15 @@ class Place:
             "tangent": [*self.tangent, *[0.0] * pad],
             "normal": list(self.normal),
             "carries_offset": self.offset is not None,
+            "on_axes": self.body is not None,
         }
+
+    def offset_with(self, quantities: Sequence[str | None] = (None, None, None)) -> Array:
+        """(3,) expressions of the offset as the core takes it, m: the given one and quantities that are added to it; on
+        a body counted along its principal axes from the center of mass."""
+        given = self.offset or (0.0, 0.0, 0.0)
+        place = expressions([v if q is None else Expression.of(q) + v for v, q in zip(given, quantities, strict=True)])
+        return place if self.body is None else self.body.coordinates(place)
 
 
 def on_particle(particle: int) -> Place:
@@ -62,6 +73,13 @@ def between(first: int, second: int, fraction: float) -> Place:
     """A marker on the line through two particles, `fraction` of the way (beyond them for fractions outside 0 to 1)."""
     f = float(fraction)
     return Place((int(first), int(second)), (1.0 - f, f), (-1.0, 1.0))
+
+
+def on_body(body: Body, points: ArrayLike) -> tuple[Place, ...]:
+    """Markers at points (k, 3) m of a rigid body, in the body's frame."""
+    x = finite("points", points, (len(np.atleast_2d(np.asarray(points))), 3), SceneError)
+    nodes = tuple(int(p) for p in body.particles)
+    return tuple(Place(nodes, (1.0, 0.0, 0.0, 0.0), (0.0,) * 4, tuple(p), body=body) for p in x.tolist())
 
 
 def on_rope(rope: Rope, arc_length: float, interpolation: str = "cubic") -> Place:

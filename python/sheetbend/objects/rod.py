@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ..arrays.checks import check_positive, finite, is_number
 from ..errors import SceneError
 from ..quantities.quantities import product
+from ..scene.body import BodyPoint
 from ..scene.scene import Array, Scene
 from .chain import add_drag, add_links, add_masses
 from .grip import Grip, any_across, carried
@@ -67,8 +68,8 @@ def add_rod(
     EI2: float | None = None,
     points: ArrayLike | None = None,
     velocity: ArrayLike | None = None,
-    start: Grip | Junction | Facing | None = None,
-    end: Grip | Junction | Facing | None = None,
+    start: Grip | Junction | Facing | BodyPoint | None = None,
+    end: Grip | Junction | Facing | BodyPoint | None = None,
     director: ArrayLike | None = None,
     turns: int = 0,
     tilts: bool = False,
@@ -107,7 +108,9 @@ def add_rod(
         points: (k, 3) m, the initial shape, resampled to equal links and fitted to the length; straight from the start
             otherwise.
         velocity: (k, 3) m/s at `points`; at rest by default.
-        start, end: how the ends are held; None = free. A `Junction` holds the ends of several rods, or both of one, to
+        start, end: how the ends are held; None = free. A point of a body (`Body.point`) holds the end there, as a ball
+            joint or, where it has a direction `along` (the rod's direction of travel), firmly. A `Junction` holds the
+            ends of several rods, or both of one, to
             each other.
         director: (3,) the first frame axis at a start without a grip; any by default.
         turns: whole turns by which the end's frame is ahead at the start, beside the part of a turn that grips give.
@@ -206,6 +209,7 @@ def add_rod(
     hold = {f"{name}_GJ": "identity", f"{name}_length": "inverse"}
     scene.add_terms([product("mass", d, HOLD, hold) for d in directors])
     for e, k, ghost, stub in zip(ends, (0, -1), ghosts, stubs, strict=True):
+        e.hold_node(scene, int(nodes[k]))
         if ghost is not None:
             normal = None if normals is None else int(normals[k])
             e.hold(scene, int(nodes[k]), ghost, int(directors[k]), normal, stub, tilts, shifts, roll and k == -1)

@@ -8,7 +8,9 @@ import numpy as np
 
 from ..errors import SceneError
 from ..quantities.quantities import Term
+from ..scene.body import BodyPoint
 from ..scene.scene import Array, Scene
+from .body_end import frame_at, hold_direction, hold_place
 from .grip import Grip
 from .grip_freedom import add_motion, add_shifts, add_tilts, axes_of
 from .rod_junction import STUB, Facing, Junction
@@ -24,17 +26,19 @@ class End:
         SceneError: it is neither a grip nor a junction.
     """
 
-    def __init__(self, name: str, label: str, side: float, given: Grip | Junction | Facing | None) -> None:
-        if given is not None and not isinstance(given, Grip | Junction | Facing):
-            fix = "give sb.Grip.fixed, from_poses or from_markers, or a junction"
+    def __init__(self, name: str, label: str, side: float, given: Grip | Junction | Facing | BodyPoint | None) -> None:
+        if given is not None and not isinstance(given, Grip | Junction | Facing | BodyPoint):
+            fix = "give sb.Grip.fixed, from_poses or from_markers, a junction, or a point of a body"
             raise SceneError(f"{name}.{label}", "is no grip", given, fix)
         self.name, self.label, self.side = name, label, side
         self.grip = given if isinstance(given, Grip) else None
+        self.point = given if isinstance(given, BodyPoint) else None
         self.way = Facing(given) if isinstance(given, Junction) else given if isinstance(given, Facing) else None
 
     @property
     def held(self) -> bool:
-        return self.grip is not None or self.way is not None
+        on_body = self.point is not None and self.point.along is not None
+        return self.grip is not None or self.way is not None or on_body
 
     def shared_node(self, scene: Scene) -> int | None:
         """The junction's particle; None where this is its first rod, or no junction."""
@@ -44,6 +48,9 @@ class End:
         """Place and direction (3,) that a grip or a junction's earlier rods give."""
         if self.grip is not None:
             return self.grip.position[0], self.grip.direction[0]
+        if self.point is not None:
+            at, along = self.point.at_start()
+            return at, np.array([1.0, 0.0, 0.0]) if along is None else along
         node = self.shared_node(scene)
         if self.way is None or node is None:
             return None
@@ -53,6 +60,8 @@ class End:
         """The direction (3,) in which a held end goes on: the grip's, the junction's, or that of its link (3,)."""
         if self.grip is not None:
             return np.asarray(self.grip.direction[0])
+        if self.point is not None:
+            return self.point.at_start()[1]
         if self.way is None:
             return None
         return np.asarray(link / np.linalg.norm(link)) if self.way.direction is None else self.way.direction
@@ -65,6 +74,8 @@ class End:
         """The frame axis (3,) that a grip or a junction's earlier rods give."""
         if self.grip is not None:
             return np.asarray(self.grip.director[0])
+        if self.point is not None:
+            return None if self.point.along is None else self.point.body.turned(frame_at(self.point)[0])
         if self.way is None or along is None or self.shared_node(scene) is None:
             return None
         return self.way.junction.carried(along)
@@ -84,6 +95,8 @@ class End:
         """Give the end its pose, or join it to the other rods; the section of its stub stays across that."""
         if self.way is not None:
             self.way.junction.join(scene, f"{self.name}_{self.label}", node, ghost, director, normal, stub > 0)
+        if self.point is not None:
+            self._on_body(scene, self.point, ghost, director, normal, stub)
         if self.grip is None:
             return
         grip = self.grip
@@ -108,6 +121,22 @@ class End:
             add_motion(scene, grip, director, grip.director, {quantity: "cos"})
             add_motion(scene, grip, director, axes_of(grip)[1], {quantity: "sin"})
             add_motion(scene, grip, director, -grip.director, {})
+
+    def _on_body(
+        self, scene: Scene, point: BodyPoint, ghost: int, director: int, normal: int | None, stub: float
+    ) -> None:
+        """Let the ghost and the frame ride on a body, as the node does."""
+        first, second = frame_at(point)
+        label = f"{self.name}_{self.label}"
+        hold_place(scene, point, ghost, f"{label}_stub", stub)
+        hold_direction(scene, point, director, np.array([second]), f"{label}_roll")
+        if normal is not None:
+            hold_direction(scene, point, normal, np.array([first, second]), f"{label}_section")
+
+    def hold_node(self, scene: Scene, node: int) -> None:
+        """Let the end itself ride on a body, where it is on one."""
+        if self.point is not None:
+            hold_place(scene, self.point, node, f"{self.name}_{self.label}_on_{self.point.body.name}")
 
 
 def spread_roll(scene: Scene, roll: str, directors: Array, shares: Array) -> None:

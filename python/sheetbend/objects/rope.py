@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ..arrays.checks import indices
 from ..errors import SceneError
 from ..quantities.quantities import Term, product
+from ..scene.body import BodyPoint
 from ..scene.scene import Array, Scene
 from .chain import (
     TimeConstant,
@@ -27,7 +28,7 @@ from .chain import (
 )
 from .grip import Grip
 from .rod_shape import initial_shape
-from .rope_grips import checked_grips, hold, lengthen, loosen
+from .rope_grips import checked_grips, hold, lengthen, loosen, placed, ride
 
 GHOST = 0.01  # length of a clamp's ghost link over a rope's link; only its direction matters
 
@@ -89,8 +90,8 @@ def add_rope(
     clamp_start: ArrayLike | None = None,
     clamp_end: ArrayLike | None = None,
     clamp_angles: bool = False,
-    grip_start: Grip | None = None,
-    grip_end: Grip | None = None,
+    grip_start: Grip | BodyPoint | None = None,
+    grip_end: Grip | BodyPoint | None = None,
     tilts: bool = False,
     shifts: bool = False,
     start_lead: float | None = None,
@@ -123,7 +124,8 @@ def add_rope(
         clamp_start, clamp_end: the rope's direction of travel at an end, held by a ghost particle half a joint away;
             the end is pinned.
         grip_start, grip_end: what holds an end and moves it: its place and its direction of travel. A rope has no
-            twist: the roll of a grip plays no part. The initial shape is fitted to the length between grips.
+            twist: the roll of a grip plays no part. The initial shape is fitted to the length between grips. A point of
+            a body (`Body.point`) holds the end there, in its direction `along` if it has one.
         tilts: add two tilts of each grip: small angles by which the rope leaves it askew, about the frame's axes.
         shifts: add the three shifts of each grip: how far beside the given place the rope leaves it, along the frame's
             first and second axis and along the rope.
@@ -145,7 +147,7 @@ def add_rope(
     grips = checked_grips(name, (grip_start, grip_end), (clamp_start, clamp_end))
     speeds = None
     if velocity is not None or any(grips):
-        held = [None if grip is None else (grip.position[0], grip.direction[0]) for grip in grips]
+        held = [None if grip is None else placed(grip) for grip in grips]
         line = shape if points is None and grips[0] is None else points
         shape, speeds = initial_shape(name, length, segments, line, velocity, held, EA is not None)
     for field, value in (
@@ -182,6 +184,8 @@ def add_rope(
     ghosts = [
         _clamp(scene, name, end, clamp, nodes, shape, link, normal if clamp_angles else None)
         if grip is None
+        else ride(scene, grip, f"{name}_{end}", int(nodes[k]), reach * GHOST * link, GHOST * density * link)
+        if isinstance(grip, BodyPoint)
         else hold(scene, grip, int(nodes[k]), reach * GHOST * link)
         for end, clamp, grip, k, reach in (
             ("start", clamp_start, grips[0], 0, -1.0),
@@ -193,16 +197,17 @@ def add_rope(
     add_drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
     built = Rope(name, nodes, arc, *ghosts)
     scene.ropes[name] = built
-    for field, asked, gripped in (
-        ("tilts", tilts, any(grips)),
-        ("shifts", shifts, any(grips)),
-        ("start_lead", start_lead, grips[0] is not None),
-        ("end_lead", end_lead, grips[1] is not None),
+    gripped = [isinstance(grip, Grip) for grip in grips]
+    for field, asked, possible in (
+        ("tilts", tilts, any(gripped)),
+        ("shifts", shifts, any(gripped)),
+        ("start_lead", start_lead, gripped[0]),
+        ("end_lead", end_lead, gripped[1]),
     ):
-        if asked and not gripped:
+        if asked and not possible:
             raise SceneError(f"{name}.{field}", "needs a grip", asked, "give grip_start or grip_end")
     for end, grip, ghost, lead in zip(("start", "end"), grips, ghosts, (start_lead, end_lead), strict=True):
-        if grip is not None and ghost is not None:
+        if isinstance(grip, Grip) and ghost is not None:
             loosen(scene, built, end, grip, ghost, GHOST * link, tilts, shifts)
             if lead is not None:
                 lengthen(scene, built, end, grip, ghost, lead, taus)

@@ -8,10 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import SceneError
+from ..scene.body import BodyPoint
 from ..scene.scene import Array, Scene
+from .body_end import hold_place
 from .chain import TimeConstant, first_value, voronoi_shares
 from .grip import Grip
 from .grip_freedom import Lead, add_shifts, add_tilts, spread_shift
+
+End = Grip | BodyPoint | None
 
 
 class Chain(Protocol):
@@ -30,17 +34,25 @@ class Chain(Protocol):
 
 
 def checked_grips(
-    name: str, grips: tuple[Grip | None, Grip | None], clamps: tuple[ArrayLike | None, ArrayLike | None]
-) -> tuple[Grip | None, Grip | None]:
+    name: str, grips: tuple[End, End], clamps: tuple[ArrayLike | None, ArrayLike | None]
+) -> tuple[End, End]:
     """The grips of a start and an end, of which none stands beside a clamp."""
     for end, grip, clamp in zip(("start", "end"), grips, clamps, strict=True):
-        if grip is not None and not isinstance(grip, Grip):
-            fix = "give sb.Grip.fixed, from_poses, from_markers or from_body"
+        if grip is not None and not isinstance(grip, Grip | BodyPoint):
+            fix = "give sb.Grip.fixed, from_poses, from_markers or from_body, or a point of a body"
             raise SceneError(f"{name}.grip_{end}", "is no grip", grip, fix)
         if grip is not None and clamp is not None:
             fix = "leave one of them out: a grip gives the direction"
             raise SceneError(f"{name}.grip_{end}", f"stands beside clamp_{end}", clamp, fix)
     return grips
+
+
+def placed(grip: Grip | BodyPoint) -> tuple[Array, Array]:
+    """Place and direction (3,) of an end at the start; any direction where a body lets it turn."""
+    if isinstance(grip, Grip):
+        return grip.position[0], grip.direction[0]
+    at, along = grip.at_start()
+    return at, np.array([1.0, 0.0, 0.0]) if along is None else along
 
 
 def hold(scene: Scene, grip: Grip, node: int, reach: float) -> int:
@@ -54,6 +66,17 @@ def hold(scene: Scene, grip: Grip, node: int, reach: float) -> int:
         scene.drive([node, ghost], grip.times, motion)
     else:
         grip.frame.drive(scene, [node, ghost], grip.times, motion)
+    return ghost
+
+
+def ride(scene: Scene, point: BodyPoint, name: str, node: int, reach: float, mass: float) -> int | None:
+    """Keep an end on a body, and where the point has a direction, a light ghost `reach` m along it."""
+    hold_place(scene, point, node, f"{name}_on_{point.body.name}")
+    if point.along is None:
+        return None
+    at, along = placed(point)
+    ghost = int(scene.add_particles([at + reach * along], mass)[0])
+    hold_place(scene, point, ghost, f"{name}_stub", reach)
     return ghost
 
 

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_increasing, finite, is_number
+from ..arrays.rotations import continuous, rotation_vectors
 from ..errors import SceneError
 from ..quantities.quantities import ZERO_OR_MORE
 from ..recording.io.poses import read_poses
-from ..scene.colliders import Collider, rotation_vectors
+from ..scene.colliders import Collider
 from ..scene.scene import Scene
 from .hand_eye import HandEye, rotated, unit_quaternions
 
@@ -61,9 +62,8 @@ class Tool:
         check_increasing("tool.times", t)
         x = finite("tool.positions", self.positions, (len(t), 3), SceneError)
         q = unit_quaternions("tool.quaternions", self.quaternions, (len(t), 4))
-        # q and -q are the same turn: neighbors on one side, so that what lies between them is between them
-        flips = np.cumprod(np.append(1.0, np.where((q[1:] * q[:-1]).sum(axis=1) < 0, -1.0, 1.0)))
-        for name, values in (("times", t), ("positions", x), ("quaternions", q * flips[:, None])):
+        # neighbors on one side, so that what lies between them is between them
+        for name, values in (("times", t), ("positions", x), ("quaternions", continuous(q))):
             object.__setattr__(self, name, values)
 
     @classmethod

@@ -16,6 +16,7 @@ from ..arrays.timeseries import Array, Kind
 from ..errors import RecordingError
 from . import io
 from .marker_data import MarkerData, read_only
+from .of_poses import markers_of_poses
 from .recording_checks import checked_times, choose_from, marker_indices
 
 _SAME_TIME = 1e-9  # s: decimal bounds such as 0.66 must find the frame stored as 0.6600000000000001
@@ -62,6 +63,36 @@ class Recording(MarkerData):
         recording = object.__new__(cls)
         recording._set(**vars(io.read(Path(path), units)))  # which is checked
         return recording
+
+    @classmethod
+    def from_poses(
+        cls,
+        times: ArrayLike,
+        positions: ArrayLike,
+        quaternions: ArrayLike,
+        points: ArrayLike,
+        markers: Sequence[str] = (),
+        **fields: Any,
+    ) -> Recording:
+        """The poses of a rigid body as markers at points of it, which `sb.on_body(body, points)` places.
+
+        Take points off one line, as far from the origin of the body's frame as an error of a place is large beside one
+        of an angle: corners of a box.
+
+        Args:
+            times: (frames,) s.
+            positions: (frames, 3) m, of the origin of the body's frame; NaN where the body was not seen.
+            quaternions: (frames, 4), (x, y, z, w), from the body's axes to the recording's.
+            points: (k, 3) m, in the body's frame.
+            markers: their names, p0, p1, ... by default.
+            fields: further attributes, such as `name`.
+
+        Raises:
+            RecordingError: shapes, quaternions of no length, or as for any recording.
+        """
+        x = markers_of_poses(positions, quaternions, points)
+        names = tuple(markers) or tuple(f"p{k}" for k in range(x.shape[1]))
+        return cls(x, np.asarray(times, dtype=float), markers=names, **fields)
 
     def save(self, path: str | Path) -> None:
         """Write the recording in meters; the suffix picks the writer. A JSON of the same stem holds the rest.

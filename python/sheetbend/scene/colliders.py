@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_increasing, check_positive, finite
+from ..arrays.rotations import rotation_vectors
 from ..errors import SceneError
 
 Array = np.ndarray
@@ -239,18 +240,3 @@ def _composed(turns: Array, first: Array) -> Array:
         a, aw = _quaternion(turn)[:3], _quaternion(turn)[3]
         products.append(np.append(aw * b + bw * a + np.cross(a, b), aw * bw - a @ b))
     return rotation_vectors(np.array(products), first)
-
-
-def rotation_vectors(quaternions: Array, first: Array) -> Array:
-    """Unit quaternions (knots, 4), (x, y, z, w), as vectors (knots, 3) rad that are continuous from knot to knot; the
-    first one is the nearest to `first`, (3,)."""
-    found: list[Array] = []
-    for q in quaternions:
-        v, w = q[:3], q[3]
-        sine = float(np.linalg.norm(v))
-        angle = 2.0 * float(np.arctan2(sine, w))
-        axis = v / sine if sine > 0.0 else np.array([0.0, 0.0, 1.0])
-        near = found[-1] if found else first
-        turns_more = np.round((near @ axis - angle) / (2.0 * np.pi))
-        found.append(axis * (angle + 2.0 * np.pi * turns_more))
-    return np.array(found)

@@ -40,7 +40,14 @@ def specification(scene: SceneData) -> dict[str, Any]:
             {"name": name, "triangles": triangles.tolist()} for name, triangles in scene.volumes.triangles.items()
         ],
         **scene.contacts.specification(),
+        "bodies": bodies_of(scene).tolist(),
     }
+
+
+def bodies_of(scene: SceneData) -> np.ndarray:
+    """(n, 5) nodes of bodies as the core takes them; the last is that of a spin that is kept, -1 for none."""
+    nodes = scene.body_nodes
+    return np.concatenate([nodes, np.full((len(nodes), 1), -1)], axis=1)
 
 
 class CompiledScene:
@@ -71,7 +78,7 @@ class CompiledScene:
         self.kinks = kinks(scene)
         self.domain = Domain(scene, self.layout)
         self._base = self._pack(scene)
-        self._terms = [*scene.terms, *scene.boundary.terms()]
+        self._terms = scene.every_term
         self.contacts = tuple(c.name for c in scene.contacts.contacts)
         if self.contacts:
             self._expect_apart(scene)

@@ -132,7 +132,7 @@ class Domain:
     def _makers(self, column: int, theta: Array | None) -> dict[str, float]:
         """The quantities that an input is made from: those that are zero, else those of either sign, else all."""
         names: dict[str, None] = {}
-        for t in (*self._scene.terms, *self._scene.boundary.terms()):
+        for t in self._scene.every_term:
             if (np.ravel(t.index) + self._layout[t.array][0] == column).any():
                 names |= dict.fromkeys(t.quantities)
         quantities = self._scene.quantities
@@ -147,7 +147,9 @@ class Domain:
         if array in ("position", "velocity"):
             return f"particle {i // 3}"
         if array in ("mass", "drag_linear", "drag_quadratic"):
-            return f"particle {i}"
+            bodies = {int(p): (k, b.name) for b in self._scene.bodies.values() for k, p in enumerate(b.particles)}
+            axis, body = bodies.get(i, (0, ""))
+            return f"axis {axis} of the body '{body}'" if axis else f"particle {i}"
         if array.startswith("volume"):
             return f"'{list(self._scene.volumes.triangles)[i]}'"
         if array in ("friction", "contact_radius"):

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_increasing, finite, indices
 from ..errors import SceneError
+from ..quantities.quantities import Term
 
 Array = np.ndarray
 
@@ -23,6 +24,7 @@ class Forces:
         self.particles: list[int] = []
         self.times: Array = np.zeros(0)
         self._values: list[Array] = []
+        self._terms: list[tuple[int, int, int, str]] = []
 
     def add(self, particles: ArrayLike, forces: ArrayLike, times: ArrayLike, particle_count: int) -> None:
         """See `Scene.add_force`."""
@@ -41,6 +43,18 @@ class Forces:
         self.times = t
         self.particles += which
         self._values += [f[:, k] for k in range(len(which))]
+
+    def add_term(self, particle: int, knot: int, axis: int, quantity: str) -> None:
+        """Add a quantity to a force along an axis at a knot."""
+        self._terms.append((particle, knot, axis, quantity))
+
+    def terms(self) -> list[Term]:
+        """Their places are known once every loaded particle is."""
+        slot, loads = {p: k for k, p in enumerate(self.particles)}, len(self.particles)
+        return [
+            Term("force", 3 * (knot * loads + slot[p]) + axis, 1.0, ((quantity, "identity"),))
+            for p, knot, axis, quantity in self._terms
+        ]
 
     @property
     def values(self) -> Array:

@@ -2,172 +2,113 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import finite, indices, per_item, points
+from ..arrays.checks import indices, per_item
 from ..errors import SceneError
 from ..quantities.kinds import KINDS
 from ..quantities.quantities import ZERO_OR_MORE, Term, product
+from .bodies import (
+    HasPoses,
+    Path,
+    add_drag,
+    check_name,
+    checked_inertia,
+    checked_start,
+    drive_body,
+    make_body,
+    named_start,
+    nodes_of,
+)
+from .body import Body
 from .colliders import Collider
 from .compiled import CompiledScene
 from .contacts import HasParticles
-from .frames import Frame, directors_of, normals_of
 from .group import make_group
-from .moving_clamp import clamped_ends, keep_direction, let_go
+from .held import HeldScene
+from .inertia import Inertia
 from .scene_checks import validate
-from .scene_data import SceneData
 
 Array = np.ndarray
 
 
-class Scene(SceneData):
+class Scene(HeldScene):
     """A scene under construction; `freeze()` (done by the first simulation) ends the construction.
 
     Every number enters either as a plain value or as a named quantity (`<group>_<quantity>`), by which gradients, fits
     and reports know it. SI units, z up.
     """
 
-    def add_particles(self, positions: ArrayLike, mass: ArrayLike, velocity: ArrayLike | None = None) -> Array:
-        """Add particles and return their indices.
-
-        Args:
-            positions: (n, 3) m.
-            mass: one for all or (n,), kg; zero where only named quantities make up the mass.
-            velocity: (n, 3) m/s, at rest by default.
-
-        Raises:
-            SceneError: shapes, NaN, or negative masses.
-        """
-        self._building()
-        x = points("positions", positions)
-        m = per_item("mass", mass, len(x))
-        if (m < 0).any():
-            raise SceneError(
-                "mass", "must not be negative", float(m.min()), "give kg; pin a particle to make it immovable"
-            )
-        v = np.zeros_like(x) if velocity is None else finite("velocity", velocity, x.shape, SceneError)
-        first = self.particle_count
-        self._positions.extend(x)
-        self._velocities.extend(v)
-        self._mass.extend(m)
-        return np.arange(first, first + len(x))
-
-    def add_directors(self, edges: ArrayLike, directions: ArrayLike, normals: ArrayLike | None = None) -> Array:
-        """Give edges material frames and return the indices of their directors, which count as particles.
-
-        A director is a vector across its edge, the frame's first axis; it turns about the edge without inertia.
-
-        Args:
-            edges: (n, 2) particles that each edge leads from and to.
-            directions: (n, 3) initial directions, of any length and not along their edges.
-            normals: (n,) of `add_normals`, for sections that shear: the directors stay across them.
-
-        Raises:
-            SceneError: shapes, NaN, or a direction along its edge.
-        """
-        self._building()
-        return self._with_frames(*directors_of(edges, directions, normals, self.positions, self.directors))
-
-    def add_normals(self, edges: ArrayLike) -> Array:
-        """Give edges (n, 2) sections that may lean against them, and return the indices of the sections' normals, which
-        count as particles. They start along the edges, and turn without inertia.
-
-        Raises:
-            SceneError: unknown particles, or an edge without length.
-        """
-        self._building()
-        return self._with_frames(*normals_of(edges, self.positions))
-
-    def _with_frames(self, directions: Array, frames: list[Frame]) -> Array:
-        nodes = self.add_particles(directions, 0.0)
-        self.directors |= dict(zip(nodes.tolist(), frames, strict=True))
-        return nodes
-
-    def pin(self, particles: ArrayLike) -> None:
-        """Hold particles where they start."""
-        self._building()
-        self.pinned |= set(indices("pin", particles, self.particle_count))
-
-    def drive(self, particles: ArrayLike, times: ArrayLike, positions: ArrayLike, interpolation: str = "cubic") -> None:
-        """Give particles a motion. An end of a rope that is clamped takes its clamp along, which keeps its direction.
-
-        Args:
-            particles: (k,) indices.
-            times: (knots,) s, increasing; one set of knots serves the whole scene.
-            positions: (knots, k, 3) m.
-            interpolation: "cubic" (C1) or "linear" (kicks at every knot).
-
-        Raises:
-            SceneError: shapes, NaN, times that do not increase, or other knots than an earlier call's.
-        """
-        self._building()
-        which, ends = self._with_clamps("drive", particles)
-        x = np.asarray(positions)
-        if ends and x.ndim == 3 and x.shape[1] == len(which):
-            x = np.concatenate([x, x[:, [slot for slot, _ in ends]]], axis=1)
-            which = [*which, *(ghost for _, ghost in ends)]
-        self.boundary.drive(which, times, x, interpolation, self.particle_count)
-        keep_direction(self, which, ends)
-
-    def follow(
+    def add_body(
         self,
-        particles: ArrayLike,
-        times: ArrayLike,
-        motion: ArrayLike,
-        markers: Sequence[str],
-        weights: ArrayLike | None = None,
-        placed: ArrayLike | None = None,
-        interpolation: str = "cubic",
-    ) -> None:
-        """Give particles the motion of recorded markers, so that a fit can allow for its noise
-        (`Experiment.driven_sigma`). Clamped ends of ropes take their clamp along, as in `drive`.
+        name: str = "body",
+        *,
+        mass: float | None = None,
+        inertia: ArrayLike | None = None,
+        center: ArrayLike = (0.0, 0.0, 0.0),
+        of: Inertia | Sequence[Inertia] | None = None,
+        at: ArrayLike = (0.0, 0.0, 0.0),
+        rotation: ArrayLike | None = None,
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        spin: ArrayLike = (0.0, 0.0, 0.0),
+        pinned: bool = False,
+        poses: HasPoses | None = None,
+        drag: float | None = None,
+        turn_drag: float | None = None,
+    ) -> Body:
+        """Add a rigid body. docs/bodies.md has the law and its limits.
+
+        Quantities: the ten of its inertia, `<name>_mass` kg, `<name>_center_x`, `_y`, `_z` m in the body's frame,
+        `<name>_inertia_1`, `_2`, `_3` kg m^2, the principal moments about the center of mass, and
+        `<name>_axes_turn_x`, `_y`, `_z` rad, by which the principal axes are turned in the body's frame from where they
+        were given (about its x first); of the start `<name>_x`, `_y`, `_z` m and `<name>_turn_x`, ... rad, by which the
+        frame is moved from where it was given, about the world's axes, `<name>_velocity_x`, ... m/s of its origin and
+        `<name>_spin_x`, ... rad/s in the world's axes; where given `<name>_drag` N s/m, `<name>_turn_drag` N m s.
 
         Args:
-            particles: (k,) indices.
-            times: (knots,) s, increasing, from the scene's start on; see `drive`.
-            motion: (knots, markers, 3) m, of the markers.
-            markers: their names in the recording.
-            weights: (k, markers), by which a particle moves with each; one marker for each particle by default.
-            placed: (k, 3) m, where the particles are at the first knot: they move from there by what the markers move.
-                By default they are where the weighted markers are.
-            interpolation: "cubic" (C1) or "linear" (kicks at every knot).
+            name: of the body.
+            mass: kg.
+            inertia: about the center of mass, along the frame's axes: three moments or a matrix (3, 3), kg m^2.
+            center: (3,) m, the center of mass in the body's frame.
+            of: an `Inertia` instead of these three, such as `Inertia.of_mesh(mesh, density)`, or several that are
+                welded together.
+            at: (3,) m, where the origin of the body's frame starts.
+            rotation: how the frame starts: a matrix (3, 3) whose columns are its axes, a quaternion (x, y, z, w) or a
+                rotation vector (3,) rad; along the world's axes by default.
+            velocity: (3,) m/s, of the origin of the frame.
+            spin: (3,) rad/s, the angular velocity, in the world's axes.
+            pinned: it stays where it is.
+            poses: it rides on them, such as a `Tool`; `at`, `rotation` and the start's quantities play no part.
+            drag: of the air, force on the center of mass over its speed, N s/m.
+            turn_drag: torque over the angular velocity, N m s.
+
+        Returns:
+            Body, also kept as `scene.bodies[name]`.
 
         Raises:
-            SceneError: shapes, NaN, times that do not increase or differ from an earlier call's, names that are
-                repeated, particles that are driven already.
+            SceneError: shapes, NaN, or an inertia that no body has.
         """
         self._building()
-        which, ends = self._with_clamps("follow", particles)
-        if ends:
-            slots = [slot for slot, _ in ends]
-            w = np.eye(len(which)) if weights is None else np.asarray(weights, dtype=float)
-            weights = np.concatenate([w, w[slots]])
-            if placed is not None:
-                placed = np.concatenate([np.asarray(placed, dtype=float), np.asarray(placed, dtype=float)[slots]])
-            which = [*which, *(ghost for _, ghost in ends)]
-        self.boundary.follow(which, times, motion, markers, weights, placed, interpolation, self.particle_count)
-        keep_direction(self, which, ends)
-
-    def _with_clamps(self, field: str, particles: ArrayLike) -> tuple[list[int], list[tuple[int, int]]]:
-        """Particles to be driven, and those of them that are clamped ends of ropes, which are let go."""
-        which = indices(field, particles, self.particle_count)
-        ends = clamped_ends(self, which)
-        let_go(self, which, ends)
-        return which, ends
-
-    def add_motion_term(self, particle: ArrayLike, coefficients: ArrayLike, factors: Mapping[str, str]) -> None:
-        """Add to a driven particle's motion (knots, 3) coefficients times a product of functions of quantities; to
-        those of several particles (k,) with coefficients (knots, k, 3).
-
-        Raises:
-            SceneError: the particle is not driven, shapes, NaN, or unknown quantities.
-        """
-        self._building()
-        self.boundary.add_term(particle, coefficients, factors, self.quantities)
+        check_name(self, name, pinned, poses)
+        given = checked_inertia(name, mass, inertia, center, of)
+        path = None if poses is None else Path.of(name, poses)
+        start = checked_start(name, at, rotation, velocity, spin) if path is None else path.start()
+        role = "pinned" if pinned else "free" if path is None else "driven"
+        x, v = nodes_of(given, start)
+        nodes = self.add_particles(x, 0.0, v if role == "free" else None)
+        body = make_body(self, name, given, nodes, named_start(self, name, start, role), role)
+        if path is not None:
+            drive_body(self, body, path, getattr(poses, "frame", None))
+        elif pinned:
+            self.pin(nodes)
+        else:
+            self.add_constraints("rigid", [nodes[1:].tolist()], name=f"{name}_rigid")
+            add_drag(self, body, drag, turn_drag)
+        return body
 
     def add_force(self, particles: ArrayLike, forces: ArrayLike, times: ArrayLike = (0.0,)) -> None:
         """Let forces act on particles: (knots, k, 3) N at `times` (knots,), linear between and constant outside the
@@ -243,11 +184,6 @@ class Scene(SceneData):
         (index,) = indices("add_point_mass.particle", [particle], self.particle_count)
         self.add_quantity(f"{name}_mass", mass, "kg")
         self.add_terms([product("mass", index, 1.0, {f"{name}_mass": "identity"})])
-
-    def shift_base(self, particle: int, by: ArrayLike) -> None:
-        """Move the plain part of a particle's position, (3,) m, where terms make up the rest."""
-        self._building()
-        self._positions.values[particle] += np.asarray(by, dtype=float)
 
     def set_drag(self, linear: ArrayLike | None = None, quadratic: ArrayLike | None = None) -> None:
         """Air drag per particle: linear (n,) N s/m and quadratic (n,) N s^2/m^2, force -(c1 + c2 |v|) v."""

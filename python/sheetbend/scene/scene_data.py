@@ -14,6 +14,7 @@ from ..errors import SceneError
 from ..quantities.kinds import KINDS
 from ..quantities.quantities import Quantity, Term
 from .air import Air
+from .body import Body
 from .boundary import Boundary
 from .contacts import Contacts
 from .forces import Forces
@@ -42,6 +43,8 @@ class SceneData:
         self.contacts = Contacts()
         self.ropes: dict[str, Any] = {}
         self.cloths: dict[str, Any] = {}
+        self.bodies: dict[str, Body] = {}
+        self.rotors: dict[str, Array] = {}  # (4,) nodes by joint, of which the second turns
         self._positions, self._velocities, self._mass = Column(3), Column(3), Column()
         self._frozen = False
         self._drag: dict[str, Array] = {}
@@ -82,6 +85,18 @@ class SceneData:
             if missing:
                 raise SceneError("terms", "use unknown quantities", missing, "declare them with add_quantity")
         self.terms += terms
+
+    @property
+    def body_nodes(self) -> Array:
+        """(n, 4) nodes of the bodies and of what else has axes: the center, and three axes."""
+        nodes = [*(b.particles for b in self.bodies.values()), *self.rotors.values()]
+        return np.array(nodes, dtype=np.int64).reshape(-1, 4)
+
+    @property
+    def every_term(self) -> list[Term]:
+        """Those that were added, of the boundary, and of the start of bodies."""
+        starts = (t for body in self.bodies.values() for t in body.start_terms())
+        return [*self.terms, *self.boundary.terms(), *self.forces.terms(), *starts]
 
     @property
     def frozen(self) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import SceneError
 from ..files.whole import written
+from .compiled import bodies_of
 from .contacts import ARRAYS as CONTACT_ARRAYS
 from .scene import Scene
 from .scene_reader import LONGEST_HEADER, LONGEST_NAME, MAGIC, NUMBERS, PREFIX, VERSION, SceneReader, is_name
@@ -24,8 +25,8 @@ Array = np.ndarray
 def save_scene(scene: Scene, path: str | Path) -> None:
     """Write a scene to one file, from which `load_scene` makes a scene with the same bits of motion and gradient.
 
-    Ropes, cloths and meshes that built the scene (`Scene.ropes`, `Scene.cloths`) are not in it: places of markers on
-    them must be given as `Place`s.
+    Ropes, cloths, bodies and meshes that built the scene (`Scene.ropes`, `Scene.cloths`, `Scene.bodies`) are not in it:
+    places of markers on them must be given as `Place`s.
 
     Args:
         scene: is frozen by this.
@@ -112,6 +113,7 @@ def _arrays(scene: Scene) -> dict[str, Array]:
         "force_times": scene.forces.times,
         "air": scene.air.triangles.reshape(-1, 3),
         "wind_times": scene.air.times,
+        **({"bodies": bodies_of(scene)} if len(scene.body_nodes) else {}),
         **{f"stencil_{i}": g.particles for i, g in enumerate(scene.groups)},
         **{f"volume_{i}": t for i, t in enumerate(scene.volumes.triangles.values())},
         **{f"following_{i}": f.slots for i, f in enumerate(scene.boundary.following)},

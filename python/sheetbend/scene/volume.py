@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike
 
 from ..arrays.checks import is_number, triangle_array
 from ..errors import SceneError
-from ..mesh.topology import half_edges
 from ..quantities.quantities import Builder, Term
+from .inertia import check_closed
 
 Array = np.ndarray
 
@@ -29,7 +29,7 @@ class Volumes:
         if name in self.triangles:
             raise SceneError(field, "is there already", name, "give each volume a name of its own")
         surface = triangle_array(f"{field}.triangles", triangles, scene.particle_count)
-        _check_closed(f"{field}.triangles", surface)
+        check_closed(f"{field}.triangles", surface)
         initial = enclosed_volume(surface, scene.positions)
         if initial < 0:
             fix = "list corners counterclockwise as seen from outside"
@@ -64,15 +64,3 @@ def enclosed_volume(triangles: Array, positions: Array) -> float:
     """
     x = (positions - positions[triangles[0, 0]])[triangles]  # keeps the digits of what is far from the origin
     return float(np.einsum("ij,ij->", x[:, 0], np.cross(x[:, 1], x[:, 2])) / 6.0)
-
-
-def _check_closed(field: str, triangles: Array) -> None:
-    """Every edge lies between two triangles, which go along it in opposite directions."""
-    edges = half_edges(triangles)
-    size = triangles.max() + 1
-    there, back = edges @ [size, 1], edges @ [1, size]
-    known, at, times = np.unique(there, return_inverse=True, return_counts=True)
-    bad = (times[at] > 1) | ~np.isin(back, known)
-    if bad.any():
-        fix = "let every edge be between two triangles that are both counterclockwise as seen from outside"
-        raise SceneError(field, "are not a closed surface at the edge", edges[int(np.argmax(bad))].tolist(), fix)

@@ -30,6 +30,10 @@ struct Case {
   bool curved = true;                          // whether C has second derivatives
 };
 
+// Kinds whose last node is a number: of a joint's angle (joint_angle.h).
+template <class K>
+inline constexpr bool has_dial = requires { requires K::dials > 0; };
+
 template <class K>
 Case case_of() {
   static_assert(sizeof(K) == 0, "this registered constraint has no row in tests/cpp/support/cases.h: add one");
@@ -315,6 +319,125 @@ inline Case case_of<Area>() {
           .relabeling = {0, 2, 1},
           .sign = {1},
           .parameter_sign = {1}};
+}
+
+// The axes of a body that is strained.
+inline const std::vector<double> axes_sample{0.9, 0.3, -0.2, -0.2, 1.1, 0.1, 0.3, -0.1, 0.95};
+
+template <>
+inline Case case_of<Rigid>() {
+  return {.x = axes_sample,
+          .p = {},
+          .compliance = 1e-3,
+          .damping = 1.0,
+          .under_rotation = UnderRotation::stays,
+          .relabeling = {0, 1, 2},
+          .sign = {1, 1, 1, 1, 1, 1},
+          .parameter_sign = {}};
+}
+
+// Two bodies: their centers, then their axes.
+inline std::vector<double> bodies_sample(bool centers) {
+  std::vector<double> x;
+  if (centers) x = {0, 0, 0, 0.06, 0.02, 0.05};
+  x.insert(x.end(), axes_sample.begin(), axes_sample.end());
+  x.insert(x.end(), {0.8, -0.5, 0.1, 0.4, 0.9, -0.2, 0.1, 0.2, 1.05});
+  return x;
+}
+inline const std::vector<int> other_body_first{1, 0, 5, 6, 7, 2, 3, 4};
+
+template <>
+inline Case case_of<Coincide>() {
+  return {.x = bodies_sample(true),
+          .p = {0.03, -0.04, 0.05, -0.06, 0.03, -0.07},
+          .compliance = 3e-4,
+          .damping = 3.0,
+          .under_rotation = UnderRotation::turns,
+          .relabeling = other_body_first,
+          .sign = {-1, -1, -1},
+          .parameter_sign = {1, 1, 1, 1, 1, 1},
+          .parameter_relabeling = {3, 4, 5, 0, 1, 2},
+          .curved = false};
+}
+
+template <>
+inline Case case_of<CoincideParticle>() {
+  std::vector<double> x{0, 0, 0, 0.06, 0.02, 0.05};
+  x.insert(x.end(), axes_sample.begin(), axes_sample.end());
+  return {.x = x,
+          .p = {0.03, -0.04, 0.05},
+          .compliance = 3e-4,
+          .damping = 3.0,
+          .under_rotation = UnderRotation::turns,
+          .relabeling = {0, 1, 2, 3, 4},
+          .sign = {1, 1, 1},
+          .parameter_sign = {1, 1, 1},
+          .curved = false};
+}
+
+template <>
+inline Case case_of<BodyDistance>() {
+  return {.x = bodies_sample(true),
+          .p = {0.03, -0.04, 0.05, -0.06, 0.03, -0.07, 0.11},
+          .compliance = 3e-4,
+          .damping = 3.0,
+          .under_rotation = UnderRotation::stays,
+          .relabeling = other_body_first,
+          .sign = {1},
+          .parameter_sign = {1, 1, 1, 1, 1, 1, 1},
+          .parameter_relabeling = {3, 4, 5, 0, 1, 2, 6}};
+}
+
+template <>
+inline Case case_of<BodyParticleDistance>() {
+  Case row = case_of<CoincideParticle>();
+  row.p = {0.03, -0.04, -0.05, 0.11};
+  row.under_rotation = UnderRotation::stays;
+  row.sign = {1};
+  row.parameter_sign = {1, 1, 1, 1};
+  row.curved = true;
+  return row;
+}
+
+template <>
+inline Case case_of<DirectionsAcross>() {
+  return {.x = bodies_sample(false),
+          .p = {0.6, 0.2, -0.7, 0.5, 0.6, 0.4},
+          .compliance = 1e-3,
+          .damping = 0.5,
+          .under_rotation = UnderRotation::stays,
+          .relabeling = {3, 4, 5, 0, 1, 2},
+          .sign = {1},
+          .parameter_sign = {1, 1, 1, 1, 1, 1},
+          .parameter_relabeling = {3, 4, 5, 0, 1, 2}};
+}
+
+template <>
+inline Case case_of<Along>() {
+  std::vector<double> x = bodies_sample(true);
+  x[3] = 0.3, x[4] = 0.25, x[5] = -0.2;
+  return {.x = x,
+          .p = {0.03, -0.04, 0.05, -0.06, 0.03, -0.07, 0.7, 0.5, -0.4, 0.02},
+          .compliance = 3e-4,
+          .damping = 3.0,
+          .under_rotation = UnderRotation::stays,
+          .relabeling = {0, 1, 2, 3, 4, 5, 6, 7},
+          .sign = {1},
+          .parameter_sign = std::vector<int>(10, 1)};
+}
+
+template <>
+inline Case case_of<JointAngle>() {
+  std::vector<double> x = bodies_sample(false);
+  x.insert(x.end(), {0.3, 0.0, 0.0});
+  return {.x = x,
+          .p = {0.9, 0.1, -0.2, 0.1, 0.8, 0.3, 0.7, 0.5, 0.2, 0.15},
+          .compliance = 1e-3,
+          .damping = 0.5,
+          .under_rotation = UnderRotation::stays,
+          .relabeling = {0, 1, 2, 3, 4, 5, 6},
+          .sign = {1},
+          .parameter_sign = std::vector<int>(10, 1)};
 }
 
 // The Registry as GoogleTest's list of types, and the names its reports use.

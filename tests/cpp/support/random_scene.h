@@ -2,7 +2,7 @@
 // together one sample stencil of every kind, jittered, and braces. Ropes start at one driven particle, so
 // that constraints of one color, and direct blocks, share it; or, as a net, at one free particle and with
 // ties between them: one block with branches and loops. Joints bring the directors of their edges, or two edges with
-// sections that shear, and the set of those that yield. A closed surface may hang on each rope, one of them with a driven particle, another with a pinned one.
+// sections that shear, and the set of those that yield; two bodies with what joins them on a damped and an undamped one. A closed surface may hang on each rope, one of them with a driven particle, another with a pinned one.
 #pragma once
 
 #include "core/scene/scene.h"
@@ -38,6 +38,7 @@ struct SceneBuilder {
   };
   std::vector<Values> groups{};
   std::vector<int> sets{}, sections{};  // sections: of the current rope, two normals and two directors
+  std::vector<Body> bodies{};           // of the current rope
   std::vector<double> volumes{}, volume_compliances{};
 
   explicit SceneBuilder(unsigned seed) : random(seed) {}
@@ -129,6 +130,34 @@ struct SceneBuilder {
     return tail;
   }
 
+  // A body on particle `tail`; returns its center.
+  int add_body(int tail, bool damped) {
+    constexpr double away[3] = {0.06, 0.02, 0.05};
+    Body body{add_near(away, tail), {}};
+    for (int k = 0; k < 3; ++k) body.axes[k] = add_near(&axes_sample[3 * k]);
+    bodies.push_back(body);
+    spec.bodies.push_back(body);
+    add_constraint<Rigid>(damped, {body.axes.begin(), body.axes.end()}, {});
+    return body.center;
+  }
+
+  // A constraint on the rope's two bodies, which the first kind adds; returns the last particle.
+  template <class K>
+  int add_on_bodies(int tail, bool damped) {
+    if (bodies.empty()) tail = add_body(add_body(tail, damped), damped);
+    if constexpr (std::same_as<K, Rigid>) return tail;
+    std::vector<int> nodes;
+    for (int k = 0; k < K::points; ++k)
+      nodes.push_back(3 * k < K::axes ? bodies[k].center : tail = add_near(&case_of<K>().x[3 * k], bodies[0].center));
+    for (int k = 0; k < K::axes; ++k) nodes.push_back(bodies[k / 3].axes[k % 3]);
+    for (int k = K::points + K::axes; k < K::arity; ++k) {
+      nodes.push_back(add_near(&case_of<K>().x[3 * k]));
+      sets.push_back(nodes.back());
+    }
+    add_constraint<K>(damped, nodes, jittered_parameters<K>());
+    return tail;
+  }
+
   void add_brace(int a, int b) {
     const double l = std::hypot(x[3 * b] - x[3 * a], x[3 * b + 1] - x[3 * a + 1], x[3 * b + 2] - x[3 * a + 2]);
     add_constraint<Distance>(false, {a, b}, {l * random(0.97, 1.03)});
@@ -157,14 +186,18 @@ struct SceneBuilder {
     volume_compliances.push_back(5e-8 * random(0.5, 1.5));
   }
 
-  std::vector<int> add_rope(bool damped, const SceneShape& shape) {
+  std::vector<int> add_rope(bool damped, bool with_bodies, const SceneShape& shape) {
     const int first = static_cast<int>(x.size()) / 3;
     int tail = 0;
     sections.clear();
+    bodies.clear();
     for_each_kind([&]<class K>(K) {
       if (K::unilateral && !shape.unilateral) return;
       if (K::points != K::arity && !shape.directors) return;
-      if constexpr (K::points == 0)
+      if (K::axes > 0 && !with_bodies) return;
+      if constexpr (K::axes > 0)
+        tail = add_on_bodies<K>(tail, damped);
+      else if constexpr (K::points == 0)
         tail = add_between_sections<K>(tail, damped);
       else
         tail = add_stencil<K>(tail, damped);
@@ -173,6 +206,8 @@ struct SceneBuilder {
     const auto is_point = [&](int n) {
       return std::none_of(spec.directors.begin(), spec.directors.end(),
                           [&](const Director& d) { return d.node == n; }) &&
+             std::none_of(bodies.begin(), bodies.end(),
+                          [&](const Body& b) { return std::ranges::find(b.axes, n) != b.axes.end(); }) &&
              std::find(sets.begin(), sets.end(), n) == sets.end();
     };
     for (int n = first; n < static_cast<int>(x.size()) / 3; ++n)
@@ -219,7 +254,7 @@ inline Sample random_scene(unsigned seed, const SceneShape& shape = {}) {
   detail::SceneBuilder b(seed);
   b.add_particle(0.0, 0.0, 0.0);
   std::vector<std::vector<int>> ropes;
-  for (int r = 0; r < shape.ropes; ++r) ropes.push_back(b.add_rope(r < 2, shape));
+  for (int r = 0; r < shape.ropes; ++r) ropes.push_back(b.add_rope(r < 2, r == 0 || r == 2, shape));
   if (shape.net)
     for (std::size_t r = 1; r < ropes.size(); ++r)
       for (std::size_t k = 1; k + 2 < ropes[r].size(); k += 2) b.add_brace(ropes[r - 1][k], ropes[r][k + 2]);

@@ -1,0 +1,105 @@
+"""What turns a hinge or resists it: a torsion spring, viscosity, a servo, or the torque of a motor over time.
+
+All are the constraint `joint_angle`, whose dial is the x of a particle: pinned at zero for a spring, driven for a
+servo. The dial of a motor is free: the rotor, an axis with inertia and no weight, which turns with the joint and on
+which the torque acts.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays.checks import check_increasing, finite, is_number
+from ..errors import SceneError
+from ..quantities.expression import Expression
+from ..quantities.quantities import ZERO_OR_MORE, Term
+from .joint_making import Array, Making
+
+Knots = tuple[ArrayLike, ArrayLike]  # times (knots,) s and values (knots,)
+MOST_NAMED = 50  # knots of a torque that are quantities
+
+
+def add_spring(made: Making, stiffness: float | None, rest: float, viscosity: float | None) -> None:
+    """A torsion spring, viscosity, or both, against a dial at zero."""
+    if stiffness is None and viscosity is None:
+        return
+    dial = made.scene.add_particles(np.zeros((1, 3)), 1.0)
+    made.scene.pin(dial)
+    _angle(made, "spring", int(dial[0]), stiffness, rest, viscosity)
+
+
+def add_servo(made: Making, knots: Knots, stiffness: float | None, rest: float, viscosity: float | None) -> None:
+    """A dial that is driven, which the joint follows at once, or as a spring does."""
+    t, angles = _knots(f"{made.name}.servo", knots)
+    dial = made.scene.add_particles([[float(angles[0]), 0.0, 0.0]], 1.0)
+    made.scene.drive(dial, t, angles[:, None, None] * np.eye(3)[0])
+    if stiffness is None and (rest or viscosity is not None):
+        fix = "give a stiffness too, or put the rest angle into the servo's"
+        raise SceneError(f"{made.name}.servo", "is stiff, and has no rest angle or viscosity", (rest, viscosity), fix)
+    _angle(made, "servo", int(dial[0]), stiffness, rest, viscosity)
+
+
+def add_motor(made: Making, torque: Knots | None, rotor: float | None) -> None:
+    """A rotor that turns with the joint, and the torque that acts on it."""
+    if torque is None and rotor is None:
+        return
+    if not (is_number(rotor) and rotor > 0):  # type: ignore[operator]
+        fix = "give the rotor's inertia in kg m^2, as the joint feels it; small beside the arm's"
+        raise SceneError(f"{made.name}.rotor", "must be positive", rotor, fix)
+    scene, name = made.scene, made.name
+    dial = scene.add_rotor(name)
+    scene.add_quantity(f"{name}_rotor", float(rotor), "kg m^2")  # type: ignore[arg-type]
+    rate = ((f"{name}_rate", "identity"),) if f"{name}_rate" in scene.quantities else ()
+    angle = ((f"{name}_angle", "identity"),) if rate else ()
+    scene.add_terms([Term("mass", dial, 1.0, ((f"{name}_rotor", "identity"),))])
+    if rate:
+        scene.add_terms([Term("position", 3 * dial, 1.0, angle), Term("velocity", 3 * dial, 1.0, rate)])
+    _angle(made, "motor", dial, None, 0.0, None)
+    if torque is None:
+        return
+    t, values = _knots(f"{name}.torque", torque)
+    named = len(t) <= MOST_NAMED
+    scene.add_force([dial], (0.0 if named else 1.0) * values[:, None, None] * np.eye(3)[0], t)
+    if named:
+        size = float(abs(values).max()) or 1.0
+        for k, value in enumerate(values):
+            quantity = scene.add_quantity(f"{name}_torque_{k}", float(value), "N m", positive=False, scale=size)
+            scene.forces.add_term(dial, k, 0, quantity)
+
+
+def _angle(made: Making, label: str, dial: int, stiffness: float | None, rest: float, viscosity: float | None) -> None:
+    """A group `joint_angle`, whose numbers are quantities where they are given."""
+    scene, name = made.scene, made.name
+    for field, value, least in (("stiffness", stiffness, 0.0), ("viscosity", viscosity, -1e-300)):
+        if value is not None and not (is_number(value) and value > least):
+            raise SceneError(f"{name}.{field}", "must be positive", value, "give a positive number, or leave it out")
+    if not is_number(rest):
+        raise SceneError(f"{name}.rest", "must be a finite number", rest, "give rad")
+    zero: Expression | float = 0.0
+    if stiffness is not None:
+        zero = Expression.of(scene.add_quantity(f"{name}_rest", rest, "rad", positive=False, scale=0.1))
+    weights = [*made.direction(0, 1), *made.direction(0, 2), *made.direction(1, 1), zero]
+    (_, *a), (_, *b) = made.nodes
+    one, none = np.ones(1), np.zeros(1)
+    damped = none if viscosity is not None else None
+    if stiffness is None and viscosity is not None:
+        group = made.constrain("joint_angle", label, [[*a, *b, dial]], [weights], viscosity=none)
+    else:
+        compliance = None if stiffness is None else one
+        group = made.constrain("joint_angle", label, [[*a, *b, dial]], [weights], compliance, damped)
+    own, first, _ = scene.group(group)
+    if stiffness is not None:
+        own.compliance[:] = 0.0
+        scene.add_quantity(f"{name}_stiffness", stiffness, "N m/rad")
+        scene.add_terms([Term("compliance", first, 1.0, ((f"{name}_stiffness", "inverse"),))])
+    if viscosity is not None:
+        limits = None if viscosity > 0 else ZERO_OR_MORE
+        scene.add_quantity(f"{name}_viscosity", viscosity, "N m s/rad", positive=viscosity > 0, limits=limits)
+        scene.add_terms([Term("damping", first, 1.0, ((f"{name}_viscosity", "identity"),))])
+
+
+def _knots(field: str, knots: Knots) -> tuple[Array, Array]:
+    t = finite(f"{field}.times", knots[0], None, SceneError).ravel()
+    check_increasing(f"{field}.times", t)
+    return t, finite(field, knots[1], (len(t),), SceneError)

@@ -1,0 +1,182 @@
+"""Joints between rigid bodies: ball, hinge, universal, slider, cylinder and fixed.
+
+A joint is a few rigid constraints between points and directions of two bodies (`coincide`, `across`, `along` in
+docs/constraints.md). The second body starts where the joint lets it be: the first body's state and the joint's own
+coordinates make its state, so that any values of the quantities give a start that the joint allows.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays.checks import finite
+from ..errors import SceneError
+from ..scene.body import Body
+from .joint_making import Joint, Making
+from .joint_spring import Knots, add_motor, add_servo, add_spring
+
+
+def ball(
+    upper: Body | None, lower: Body, *, at: ArrayLike, name: str = "ball", compliance: float | None = None
+) -> Joint:
+    """Join two bodies at a point, about which they turn freely.
+
+    Quantities: `<name>_upper_x`, ... and `<name>_lower_x`, ... m, the point in the two bodies' frames, and with a
+    compliance `<name>_compliance` m/N. The lower body keeps its `<body>_turn_x`, ... and `<body>_spin_x`, ....
+
+    Args:
+        upper, lower: the bodies; None is the ground.
+        at: (3,) m, the point in the world, as the bodies were given.
+        compliance: m/N of a mount that gives way; rigid by default.
+
+    Raises:
+        SceneError: shapes, NaN, or bodies that are none or the same.
+    """
+    made = Making("ball", upper, lower, at, (1.0, 0.0, 0.0), name)
+    made.hang()
+    made.coincide(compliance)
+    return made.joint()
+
+
+def hinge(
+    upper: Body | None,
+    lower: Body,
+    *,
+    at: ArrayLike,
+    axis: ArrayLike,
+    name: str = "hinge",
+    rate: float = 0.0,
+    stiffness: float | None = None,
+    rest: float = 0.0,
+    viscosity: float | None = None,
+    servo: Knots | None = None,
+    torque: Knots | None = None,
+    rotor: float | None = None,
+) -> Joint:
+    """Join two bodies by a hinge.
+
+    Quantities: its place as of `ball`; `<name>_angle` rad and `<name>_rate` rad/s, the start of the lower body, which
+    replace its own place, attitude, velocity and spin; with a spring `<name>_stiffness` N m/rad and `<name>_rest` rad;
+    with viscosity `<name>_viscosity` N m s/rad. The angle counts from how the bodies were given.
+
+    Args:
+        upper, lower: the bodies; None is the ground.
+        at: (3,) m, a point of the hinge in the world, as the bodies were given.
+        axis: (3,) its direction in the world; the angle grows counterclockwise about it.
+        rate: rad/s, of the angle at the start.
+        stiffness: of a torsion spring, N m/rad.
+        rest: rad, the angle at which it rests.
+        viscosity: torque over the rate, N m s/rad.
+        servo: times (knots,) s and angles (knots,) rad. The hinge has this angle, or with a stiffness a spring that
+            rests at it (`rest` is added).
+        torque: times (knots,) s and torques (knots,) N m of a motor on the lower body, linear between and constant
+            outside; up to 50 knots are the quantities `<name>_torque_0`, `_1`, and so on.
+        rotor: kg m^2, the inertia of the motor seen from the joint, the quantity `<name>_rotor`. With a torque it is
+            needed: a torque acts on the rotor, which turns with the joint.
+
+    Raises:
+        SceneError: shapes, NaN, negative numbers, or bodies that are none or the same.
+    """
+    made = Making("hinge", upper, lower, at, axis, name)
+    made.hang(turn=rate)
+    made.coincide()
+    made.across([(0, 1), (0, 2)])
+    if servo is not None:
+        add_servo(made, servo, stiffness, rest, viscosity)
+    else:
+        add_spring(made, stiffness, rest, viscosity)
+    add_motor(made, torque, rotor)
+    return made.joint()
+
+
+def universal(upper: Body | None, lower: Body, *, at: ArrayLike, axes: ArrayLike, name: str = "universal") -> Joint:
+    """Join two bodies by a universal joint (Cardan): they meet in a point, and an axis of the one stays across an axis
+    of the other.
+
+    Quantities: its place as of `ball`. The lower body keeps its attitude and spin, which must suit the joint.
+
+    Args:
+        axes: (2, 3) directions in the world, across each other: the upper body's and the lower body's.
+
+    Raises:
+        SceneError: shapes, NaN, axes that are not across each other.
+    """
+    first, second = finite(f"{name}.axes", axes, (2, 3), SceneError)
+    made = Making("universal", upper, lower, at, first, name, across=second)
+    made.hang()
+    made.coincide()
+    made.across([(0, 1)])
+    return made.joint()
+
+
+def slider(
+    upper: Body | None, lower: Body, *, at: ArrayLike, axis: ArrayLike, name: str = "slider", rate: float = 0.0
+) -> Joint:
+    """Let one body slide along a line of the other without turning against it.
+
+    Quantities: its place as of `ball`; `<name>_shift` m and `<name>_rate` m/s, the start of the lower body.
+
+    Args:
+        at: (3,) m, a point of the lower body in the world that stays on the line.
+        axis: (3,) the line's direction in the world.
+        rate: m/s, at the start.
+
+    Raises:
+        SceneError: as `ball`.
+    """
+    made = Making("slider", upper, lower, at, axis, name)
+    made.hang(shift=rate, fixed=True)
+    made.along()
+    made.across([(0, 1), (0, 2), (1, 2)])
+    return made.joint()
+
+
+def cylinder(
+    upper: Body | None,
+    lower: Body,
+    *,
+    at: ArrayLike,
+    axis: ArrayLike,
+    name: str = "cylinder",
+    rate: float = 0.0,
+    turn_rate: float = 0.0,
+) -> Joint:
+    """Let one body slide along a line of the other and turn about it.
+
+    Quantities: its place as of `ball`; `<name>_shift` m, `<name>_shift_rate` m/s, `<name>_angle` rad and `<name>_rate`
+    rad/s, the start of the lower body.
+
+    Args:
+        at, axis: as of `slider`.
+        rate: m/s, along the line at the start.
+        turn_rate: rad/s, about it.
+
+    Raises:
+        SceneError: as `ball`.
+    """
+    made = Making("cylinder", upper, lower, at, axis, name)
+    made.hang(shift=rate, turn=turn_rate)
+    made.along()
+    made.across([(0, 1), (0, 2)])
+    return made.joint()
+
+
+def fixed(upper: Body | None, lower: Body, *, at: ArrayLike | None = None, name: str = "fixed") -> Joint:
+    """Weld two bodies together, such as a payload to a gripper.
+
+    Quantities: its place as of `ball`. The lower body starts where the upper one carries it.
+
+    Args:
+        at: (3,) m, the point in the world where they are held together; the origin of the lower body's frame by
+            default. It is where a joint's force counts from.
+
+    Raises:
+        SceneError: as `ball`.
+    """
+    place = lower.pose(lower.scene.positions)[0] if at is None and isinstance(lower, Body) else at
+    made = Making("fixed", upper, lower, np.zeros(3) if place is None else place, (1.0, 0.0, 0.0), name)
+    made.hang(fixed=True)
+    made.coincide()
+    made.across([(0, 1), (0, 2), (1, 2)])
+    return made.joint()

@@ -1,0 +1,242 @@
+"""A rigid body in a scene: the four nodes that it is, points on it, and what its motion shows.
+
+The nodes are the center of mass p, a particle of the body's mass m, and three axes a1, a2, a3 along the principal axes
+of inertia, orthonormal and of masses J_k = (I1 + I2 + I3)/2 - I_k [kg m^2] (Betsch & Steinmann 2001, Multibody Syst.
+Dyn. 6, 367). The material point X, counted from p along the principal axes, is at p + X1 a1 + X2 a2 + X3 a3. The user's
+frame of the body lies anywhere: it has the center of mass c and the principal axes R in it, so that X = R' (x - c).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays.checks import finite
+from ..arrays.rotations import quaternions_of
+from ..errors import SceneError
+from ..quantities.expression import cross, expressions, numbers, terms_of, vector
+from ..quantities.quantities import Builder, Quantity, Term
+
+Array = np.ndarray
+Values = Mapping[str, float] | None
+AXES = "xyz"
+PLACE, TURN = 0.01, 0.1  # m, rad: the sizes against which the precision of places and angles is judged
+
+
+class HasMotion(Protocol):
+    """A trajectory."""
+
+    @property
+    def positions(self) -> Array: ...
+
+    @property
+    def velocities(self) -> Array: ...
+
+
+class InScene(Builder, Protocol):
+    """A scene, as a body of it asks for numbers."""
+
+    @property
+    def quantities(self) -> dict[str, Quantity]: ...
+
+    @property
+    def gravity(self) -> Array: ...
+
+    def base_arrays(self) -> dict[str, Array]: ...
+
+
+@dataclass(frozen=True, eq=False)
+class FrameState:
+    """The state of a body's frame at the start, expressions of quantities.
+
+    Attributes:
+        origin: (3,) m.
+        frame: (3, 3), its axes as columns.
+        velocity: (3,) m/s, of the origin.
+        spin: (3,) rad/s, in the world's axes.
+        own: names of the quantities that nothing else is made of.
+        carrier: name of the body that a joint hangs this one on.
+    """
+
+    origin: Array
+    frame: Array
+    velocity: Array
+    spin: Array
+    own: tuple[str, ...] = ()
+    carrier: str | None = None
+
+
+@dataclass(eq=False)
+class Body:
+    """A rigid body of a scene.
+
+    Attributes:
+        name: quantities are called `<name>_...`.
+        particles: (4,) its nodes: the center of mass, and three axes, which have no place.
+        center: (3,) expressions, the center of mass in the body's frame, m.
+        axes: (3, 3) expressions, the principal axes of inertia in the body's frame, as columns.
+        start: the state of its frame that it starts with.
+        role: "free", "pinned" or "driven".
+    """
+
+    name: str
+    particles: Array
+    center: Array = field(repr=False)
+    axes: Array = field(repr=False)
+    scene: InScene = field(repr=False)
+    start: FrameState = field(repr=False)
+    role: str = "free"
+
+    def point(
+        self, at: ArrayLike = (0.0, 0.0, 0.0), along: ArrayLike | None = None, name: str | None = None
+    ) -> BodyPoint:
+        """A point that moves with the body, where ropes, rods, joints and forces act.
+
+        Args:
+            at: (3,) m, in the body's frame.
+            along: (3,) a direction there, such as that of a rod which leaves it.
+            name: makes its place the quantities `<name>_x`, `_y`, `_z` m in the body's frame.
+
+        Raises:
+            SceneError: shapes, NaN, or a direction of no length.
+        """
+        where = f"{self.name}.point"
+        x = finite(where, at, (3,), SceneError)
+        place = expressions(x)
+        if name is not None:
+            names = [f"{name}_{a}" for a in AXES]
+            for quantity, value in zip(names, x, strict=True):
+                self.scene.add_quantity(quantity, value, "m", positive=False, scale=PLACE)
+            place = vector(names)
+        if along is None:
+            return BodyPoint(self, place)
+        way = finite(f"{where}.along", along, (3,), SceneError)
+        if not way.any():
+            raise SceneError(f"{where}.along", "has no length", way.tolist(), "give a direction")
+        return BodyPoint(self, place, way / np.linalg.norm(way))
+
+    def start_terms(self) -> list[Term]:
+        """Terms of the nodes' first positions and velocities: what the start makes of the quantities, less what stands
+        in the scene's arrays already."""
+        if self.role == "driven":
+            return []
+        s, index = self.start, 3 * self.particles[:, None] + np.arange(3)
+        arms = np.stack([s.frame @ self.center, *(s.frame @ self.axes).T])
+        places = arms.copy()
+        places[0] = s.origin + arms[0]
+        found = terms_of("position", index, places - self.scene.positions[self.particles])
+        if self.role == "pinned":
+            return found
+        rates = np.stack([cross(s.spin, arm) for arm in arms])
+        rates[0] = s.velocity + rates[0]
+        return found + terms_of("velocity", index, rates - self.scene.base_arrays()["velocity"][self.particles])
+
+    def coordinates(self, place: Array) -> Array:
+        """(3,) expressions: a place (3,) of the body's frame, counted from p along the principal axes."""
+        return self.directions(place - self.center)
+
+    def directions(self, way: Array) -> Array:
+        """(3,) expressions: a direction (3,) of the body's frame, along the principal axes."""
+        return np.asarray(self.axes.T @ way)
+
+    def pose(self, motion: HasMotion | ArrayLike, values: Values = None) -> tuple[Array, Array]:
+        """Where the body's frame is.
+
+        Args:
+            motion: a trajectory, or positions (..., particles, 3) of the whole scene.
+            values: quantities that the motion was simulated with, where they are not the scene's.
+
+        Returns:
+            Its origin (..., 3) m and its axes (..., 3, 3), as columns, in the world.
+        """
+        x = motion if not hasattr(motion, "positions") else motion.positions
+        p, turned = self._nodes(np.asarray(x, dtype=float))
+        at = self.values(values)
+        frame = turned @ numbers(self.axes, at).T
+        return p - frame @ numbers(self.center, at), frame
+
+    def turned(self, way: ArrayLike) -> Array:
+        """(3,) a direction of the body's frame in the world, as the scene was built."""
+        return np.asarray(self.pose(self.scene.positions)[1] @ np.asarray(way, dtype=float))
+
+    def quaternions(self, motion: HasMotion | ArrayLike, values: Values = None) -> Array:
+        """(..., 4), (x, y, z, w), from the body's axes to the world's; along a motion each on the side of the one
+        before."""
+        return quaternions_of(self.pose(motion, values)[1])
+
+    def angular_velocity(self, motion: HasMotion) -> Array:
+        """(frames, 3) rad/s, in the world's axes."""
+        _, a = self._nodes(motion.positions)
+        _, v = self._nodes(motion.velocities)
+        return np.asarray(0.5 * np.cross(a, v, axis=-2).sum(axis=-1))
+
+    def momentum(self, motion: HasMotion, values: Values = None) -> Array:
+        """(frames, 3) kg m/s."""
+        return np.asarray(self.inertia_of_nodes(values)[0] * self._nodes(motion.velocities)[0])
+
+    def angular_momentum(self, motion: HasMotion, values: Values = None, about: ArrayLike | None = None) -> Array:
+        """(frames, 3) kg m^2/s about the center of mass, or about a fixed point (3,) m."""
+        x, a = self._nodes(motion.positions)
+        v, rates = self._nodes(motion.velocities)
+        mass, *J = self.inertia_of_nodes(values)
+        spin = np.asarray((np.cross(a, rates, axis=-2) * J).sum(axis=-1))
+        if about is None:
+            return spin
+        return spin + mass * np.cross(x - finite(f"{self.name}.about", about, (3,), SceneError), v)
+
+    def kinetic_energy(self, motion: HasMotion, values: Values = None) -> Array:
+        """(frames,) J."""
+        v, rates = self._nodes(motion.velocities)
+        mass, *J = self.inertia_of_nodes(values)
+        return np.asarray(0.5 * (mass * (v**2).sum(axis=-1) + ((rates**2).sum(axis=-2) * J).sum(axis=-1)))
+
+    def energy(self, motion: HasMotion, values: Values = None) -> Array:
+        """(frames,) J, kinetic and of the weight, which is zero at the world's origin."""
+        x, _ = self._nodes(motion.positions)
+        return self.kinetic_energy(motion, values) - self.inertia_of_nodes(values)[0] * (x @ self.scene.gravity)
+
+    def inertia_of_nodes(self, values: Values = None) -> Array:
+        """(4,) the mass, kg, and J1, J2, J3, kg m^2."""
+        at = self.values(values)
+        moments = np.array([at[f"{self.name}_inertia_{k}"] for k in (1, 2, 3)])
+        return np.append(at[f"{self.name}_mass"], 0.5 * moments.sum() - moments)
+
+    def values(self, changed: Values = None) -> dict[str, float]:
+        """The scene's quantities by name, some of them changed."""
+        return {name: q.value for name, q in self.scene.quantities.items()} | dict(changed or {})
+
+    def _nodes(self, x: Array) -> tuple[Array, Array]:
+        """Of arrays (..., particles, 3): what p has, (..., 3), and what the axes have, (..., 3, 3) as columns."""
+        own = x[..., self.particles, :]
+        return own[..., 0, :], np.swapaxes(own[..., 1:, :], -1, -2)
+
+
+@dataclass(frozen=True, eq=False)
+class BodyPoint:
+    """A point on a body, and perhaps a direction there; `Body.point` makes it.
+
+    Attributes:
+        place: (3,) expressions, m, in the body's frame.
+        along: (3,) unit vector in the body's frame, or None.
+    """
+
+    body: Body
+    place: Array = field(repr=False)
+    along: Array | None = None
+
+    @property
+    def coordinates(self) -> Array:
+        """(3,) expressions, counted from the center of mass along the principal axes: the weights of the axes."""
+        return self.body.coordinates(self.place)
+
+    def at_start(self) -> tuple[Array, Array | None]:
+        """Its place (3,) m and its direction (3,) in the world as the scene was built."""
+        origin, frame = self.body.pose(self.body.scene.positions)
+        return (
+            origin + frame @ numbers(self.place, self.body.values()),
+            None if self.along is None else frame @ self.along,
+        )

@@ -1,0 +1,194 @@
+"""Joints between rigid bodies: what they hold, how they start, springs, servos and motors, linkages against oracles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import sheetbend as sb
+
+INERTIA = sb.Inertia.box(0.3, (0.1, 0.06, 0.04))
+AT, AXIS = np.array([0.1, 0.02, 0.01]), np.array([0.2, 1.0, 0.3])
+Join = Callable[[sb.Body, sb.Body], sb.Joint]
+
+
+def pair(join: Join) -> tuple[sb.Scene, sb.Body, sb.Body, sb.Joint]:
+    """Two bodies that fly, joined beside both of their centers."""
+    scene = sb.Scene("pair")
+    given = {"of": INERTIA.moved((0.01, 0.005, 0.0)), "velocity": (0.3, 0.0, 0.5)}
+    upper = scene.add_body("upper", rotation=(0.1, 0.2, -0.3), spin=(2.0, -1.0, 3.0), **given)
+    lower = scene.add_body("lower", at=(0.2, 0.03, 0.0), rotation=(0.5, -0.2, 0.1), spin=(1.0, 2.0, -3.0), **given)
+    return scene, upper, lower, join(upper, lower)
+
+
+CASES: dict[str, tuple[Join, int]] = {
+    "ball": (lambda u, v: sb.ball(u, v, at=AT), 3),
+    "hinge": (lambda u, v: sb.hinge(u, v, at=AT, axis=AXIS, rate=4.0), 5),
+    "slider": (lambda u, v: sb.slider(u, v, at=AT, axis=AXIS, rate=0.3), 5),
+    "cylinder": (lambda u, v: sb.cylinder(u, v, at=AT, axis=AXIS, rate=0.3, turn_rate=4.0), 4),
+    "fixed": (lambda u, v: sb.fixed(u, v, at=AT), 6),
+}
+
+
+def gaps(joint: sb.Joint, motion: sb.Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    """Of the two places (frames, 3) m along the upper body's three directions, and how the lower one is turned in
+    them, (frames, 3, 3)."""
+    from sheetbend.quantities.expression import numbers
+
+    (o, a), (p, b) = joint.upper.pose(motion), joint.lower.pose(motion)
+    known = joint.upper.values()
+    first, second = (numbers(place, known) for place in joint.places)
+    a, p, o, b = a @ joint.axes[0].T, p + b @ second, o + a @ first, b @ joint.axes[1].T
+    return np.einsum("fa,fab->fb", p - o, a), np.einsum("fab,fac->fbc", a, b)
+
+
+@pytest.mark.parametrize("kind", CASES)
+def test_joint_holds_what_it_says_and_leaves_the_rest_free(kind: str) -> None:
+    join, rows = CASES[kind]
+    scene, upper, lower, joint = pair(join)
+    motion = sb.simulate(scene, [0.0, 1e-3, 0.1], sb.Solver(h=1e-3))
+    way, turn = gaps(joint, motion)
+    slides, turns = kind in ("slider", "cylinder"), kind in ("hinge", "cylinder")
+    assert abs(way[:, 1:]).max() < 1e-12
+    assert (abs(way[:, 0]).max() < 1e-12) is not slides
+    if kind != "ball":
+        assert abs(turn[:, 0, 1:]).max() < 1e-12
+        assert (abs(turn - np.eye(3)).max() < 1e-12) is not turns
+    if turns:
+        assert joint.angle(motion.positions)[:2] == pytest.approx([0.0, 4e-3], rel=0.05, abs=1e-12)
+    momentum = upper.momentum(motion) + lower.momentum(motion)
+    assert np.allclose(momentum - momentum[0], np.outer(motion.times, [0.0, 0.0, -9.81 * 0.6]), atol=2e-5)
+    spin = sum(b.angular_momentum(motion, about=(0.0, 0.0, 0.0)) for b in (upper, lower))
+    places = [b.pose(motion)[0] for b in (upper, lower)]
+    assert np.isfinite(spin).all() and len(places) == 2
+    assert scene.compiled.core.rows == 12 + rows
+
+
+@pytest.mark.parametrize("kind", ["hinge", "cylinder"])
+def test_any_values_start_in_the_joint_and_have_exact_gradients(kind: str) -> None:
+    scene, _, _, _ = pair(CASES[kind][0])
+    changed = {f"{kind}_angle": 0.4, f"{kind}_upper_x": 0.13, f"{kind}_lower_y": 0.01, "upper_turn_z": 0.5}
+    changed |= {"lower_center_x": 0.02, "lower_axes_turn_y": 0.3, f"{kind}_rate": -2.0}
+    start = sb.simulate(scene, [0.0, 1e-3], sb.Solver(h=1e-3), changed)
+    C = sb.constraint_values(scene, start.positions[0], changed)
+    assert max(abs(c).max() for c in C.values()) < 1e-14
+    report = sb.check_gradients(scene, [0.01, 0.02], samples=1, values=changed)
+    assert report.passed, str(report)
+
+
+def test_universal_joint_keeps_two_axes_across_each_other() -> None:
+    scene = sb.Scene("cardan")
+    fork = scene.add_body("fork", of=INERTIA, spin=(0.0, 0.0, 5.0))
+    cross = scene.add_body("cross", of=INERTIA, at=(0.0, 0.0, -0.1), spin=(0.0, 0.0, 5.0))
+    joint = sb.universal(fork, cross, at=(0.0, 0.0, -0.05), axes=[(1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
+    motion = sb.simulate(scene, [0.0, 0.1], sb.Solver(h=1e-3))
+    way, turn = gaps(joint, motion)
+    assert abs(way).max() < 1e-12
+    assert abs(turn[:, 0, 1]).max() < 1e-12
+    with pytest.raises(sb.SceneError, match="not across each other"):
+        sb.universal(fork, cross, at=(0.0, 0.0, 0.0), axes=[(1.0, 0.0, 0.0), (1.0, 1.0, 0.0)], name="no")
+
+
+def wheel(**options: object) -> tuple[sb.Scene, sb.Joint]:
+    """A body on a hinge through its center, about z."""
+    scene = sb.Scene("wheel")
+    body = scene.add_body("wheel", of=INERTIA)
+    return scene, sb.hinge(None, body, at=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0), **options)  # type: ignore[arg-type]
+
+
+def test_torsion_spring_has_its_period_and_viscosity_its_decay() -> None:
+    moment = INERTIA.matrix[2, 2]
+    scene, joint = wheel(stiffness=0.05, rest=0.2)
+    w = np.sqrt(0.05 / moment)
+    times = np.round(np.array([0.5, 1.0]) * 2.0 * np.pi / w, 3)
+    motion = sb.simulate(scene, times, sb.Solver(h=5e-4))
+    assert joint.angle(motion.positions) == pytest.approx(0.2 - 0.2 * np.cos(w * times), abs=4e-4)
+    scene, joint = wheel(viscosity=1e-3, rate=2.0)
+    motion = sb.simulate(scene, [0.2], sb.Solver(h=1e-3))
+    tau = moment / 1e-3
+    assert joint.angle(motion.positions) == pytest.approx([2.0 * tau * (1.0 - np.exp(-0.2 / tau))], rel=2e-3)
+
+
+def test_servo_follows_and_a_torque_turns_body_and_rotor() -> None:
+    moment = INERTIA.matrix[2, 2]
+    times = np.linspace(0.0, 0.4, 21)
+    scene, joint = wheel(servo=(times, np.sin(4.0 * times)))
+    motion = sb.simulate(scene, [0.2, 0.4], sb.Solver(h=1e-3))
+    assert joint.angle(motion.positions) == pytest.approx(np.sin([0.8, 1.6]), abs=1e-10)
+    scene, joint = wheel(torque=([0.0, 0.4], [0.01, 0.01]), rotor=1e-4)
+    motion = sb.simulate(scene, [0.2], sb.Solver(h=1e-3))
+    assert joint.angle(motion.positions) == pytest.approx([0.5 * 0.01 / (moment + 1e-4) * 0.2**2], rel=2e-3)
+    report = sb.check_gradients(scene, [0.01, 0.02], samples=1)
+    assert report.passed and "hinge_torque_1" in scene.quantities
+    with pytest.raises(sb.SceneError, match="rotor"):
+        wheel(torque=([0.0], [1.0]))
+
+
+def arms(angles: list[float], solver: sb.Solver, until: float) -> np.ndarray:
+    """Angles of the triple pendulum of the oracle, from bodies on hinges."""
+    scene, top, upper, bodies = sb.Scene("triple"), np.zeros(3), None, []
+    for k, (m, a, inertia) in enumerate(
+        zip((0.23, 0.25, 0.22), (0.1, 0.1, 0.08), (1.0e-3, 1.1e-3, 0.9e-3), strict=True)
+    ):
+        d = np.array([np.sin(angles[k]), 0.0, -np.cos(angles[k])])
+        frame = np.stack([d, np.cross([0.0, 1.0, 0.0], d), [0.0, 1.0, 0.0]], axis=1)
+        arm = scene.add_body(f"arm{k}", mass=m, inertia=[inertia] * 3, center=(a, 0.0, 0.0), at=top, rotation=frame)
+        sb.hinge(upper, arm, at=top, axis=(0.0, -1.0, 0.0), name=f"hinge{k}")
+        upper, top = arm, top + 0.17 * d
+        bodies.append(arm)
+    motion = sb.simulate(scene, [0.0, until], solver)
+    return np.array([np.arctan2(*(b.pose(motion)[1][-1][[0, 2], 0] * [1.0, -1.0])) for b in bodies])
+
+
+def test_triple_pendulum_of_bodies_in_three_extrapolated_runs() -> None:
+    found = arms([2.0, 1.2, 2.5], sb.Solver(h=1 / 960, extrapolate=3), 1.5)
+    wanted = np.array([-0.2205024, 3.6357706, 12.4751056])
+    assert abs(np.exp(1j * found) - np.exp(1j * wanted)).max() < 1e-3
+
+
+def test_two_link_arm_gives_spring_viscosity_length_and_torques_to_1e_6() -> None:
+    knots = np.linspace(0.0, 0.4, 20)
+    torques = 0.02 * np.sin(2.0 * np.pi * knots / 0.3) + 0.01
+
+    def arm(stiffness: float, viscosity: float, length: float, torque: np.ndarray) -> tuple[sb.Scene, list[sb.Place]]:
+        scene = sb.Scene("arm")
+        first = scene.add_body("first", of=INERTIA, at=(0.05, 0.0, 0.0))
+        second = scene.add_body("second", of=INERTIA, at=(0.05 + length, 0.0, 0.0))
+        axis = (0.0, -1.0, 0.0)
+        sb.hinge(None, first, at=(0.0, 0.0, 0.0), axis=axis, name="shoulder", torque=(knots, torque), rotor=1e-5)
+        spring = {"stiffness": stiffness, "viscosity": viscosity}
+        sb.hinge(first, second, at=(length, 0.0, 0.0), axis=axis, name="elbow", **spring)
+        return scene, [
+            *sb.on_body(first, [[0.05, 0.0, 0.0]]),
+            *sb.on_body(second, [[0.05, 0.0, 0.0], [0.0, 0.0, 0.02]]),
+        ]
+
+    solver, times = sb.Solver(h=2.5e-3), np.arange(41) * 0.01
+    truth, places = arm(0.3, 2e-3, 0.1, torques)
+    x = sb.simulate(truth, times, solver).positions
+    seen = []
+    for place in places:
+        body = place.body
+        assert body is not None and place.offset is not None
+        origin, frame = body.pose(x)
+        seen.append(origin + frame @ np.array(place.offset))
+    recording = sb.Recording(np.stack(seen, axis=1), times)
+    scene, places = arm(0.35, 3e-3, 0.1, 0.5 * torques)
+    names = ["elbow_stiffness", "elbow_viscosity", "elbow_upper_x", *(f"shoulder_torque_{k}" for k in range(20))]
+    found = sb.fit(scene, recording, names, markers=places, solver=solver, start_time=0.0, sigma=1e-4, refine=False)
+    assert found.values["elbow_stiffness"] == pytest.approx(0.3, rel=1e-6)
+    assert found.values["elbow_viscosity"] == pytest.approx(2e-3, rel=1e-6)
+    assert found.values["elbow_upper_x"] == pytest.approx(0.05, rel=1e-6)
+    assert [found.values[n] for n in names[3:]] == pytest.approx(torques, abs=3e-8)
+
+
+def test_bad_joints_are_refused() -> None:
+    scene = sb.Scene("bad")
+    body, other = scene.add_body("body", of=INERTIA), sb.Scene("other").add_body("body", of=INERTIA)
+    with pytest.raises(sb.SceneError, match="upper one"):
+        sb.ball(body, body, at=(0.0, 0.0, 0.0))
+    with pytest.raises(sb.SceneError, match="another scene"):
+        sb.ball(other, body, at=(0.0, 0.0, 0.0))
+    with pytest.raises(sb.SceneError, match="is no body"):
+        sb.ball(None, 3, at=(0.0, 0.0, 0.0))  # type: ignore[arg-type]
