@@ -54,7 +54,7 @@ class CompiledScene:
         names: quantity names in the order of theta.
         theta: their values.
         contacts: names of those that particles may have with colliders.
-        kinks: what makes its motions not smooth in time, in words; empty if nothing.
+        kinks: what beside contacts makes its motions not smooth in time, in words; empty if nothing.
         domain: which quantities and inputs make sense.
     """
 
