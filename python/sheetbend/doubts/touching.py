@@ -29,6 +29,7 @@ def what_touches(problem: FitProblem, u: Array) -> tuple[ContactFit, ...]:
     for e, modes in zip(problem.experiments, _modes(problem, u), strict=True):
         for name, mode in modes.items():
             touches = mode != OPEN
+            start = e.scene.compiled.settled.get(name)
             rows.append(
                 ContactFit(
                     recording=e.name,
@@ -40,6 +41,8 @@ def what_touches(problem: FitProblem, u: Array) -> tuple[ContactFit, ...]:
                     sliding=_share(mode == SLIDES, touches),
                     sticking=_share(mode == STICKS, touches),
                     bdf1=1.0 if e.solver.integrator == "bdf1" else None,
+                    settled=0 if start is None else start.particles,
+                    settled_by=0.0 if start is None else start.farthest,
                 )
             )
     return tuple(rows)

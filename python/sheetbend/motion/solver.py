@@ -144,6 +144,12 @@ class Solver:
             if size and not (scene.inputs()[offset : offset + size] > 0).all():
                 fix = "use 'direct', or give every constraint a compliance"
                 raise InputError("solver.method", "cannot hold rigid constraints", self.method, fix)
+        for f in scene.fastest:
+            if f.speed * self.h > f.reach:
+                problem = f"lets '{f.name}' move {1e3 * f.speed * self.h:.3g} mm at most, past what it touches: it is "
+                problem += f"{1e3 * f.reach:.3g} mm thick to each side, the contact's radius included"
+                fix = f"use at most {f.reach / f.speed:.2g} s, or a slower or thicker collider"
+                raise InputError("solver.h", problem, self.h, fix)
         if self.method == "direct" and self.sweeps == 1 and "shear" in scene.kinds:
             problem = "loses up to half of the digits of gradients of rods that shear (GA)"
             raise InputError("solver.iterations", problem, 1, "use 2, or leave GA out")

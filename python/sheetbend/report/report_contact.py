@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..quantities.wording import short
-from ..result.result import FitData
+from ..result.result import ContactFit, FitData
 from .tables import Section
 
 NO_LOSSES = "energy that the model loses otherwise than the recording is not looked for in motions with contacts"
@@ -33,6 +33,11 @@ def _contacts(result: FitData) -> Section:
         ("sliding, sticking", "shares of the touches at the frames of the recording"),
         ("bdf1", "share of the substeps of backward Euler, which damps vibrations"),
         ("losses", NO_LOSSES),
+        *(
+            (f"start of {c.recording}", f"settle moved {c.settled} particles out of {c.contact}, by up to {_mm(c)} mm")
+            for c in result.contacts
+            if c.settled
+        ),
     )
     return Section("Contacts", headers, tuple(rows), notes if rows else ())
 
@@ -49,6 +54,10 @@ def _kinks(result: FitData) -> Section:
     return Section(
         "Contacts that differ between the ends of an interval", headers, tuple(rows), (note,) if differs else ()
     )
+
+
+def _mm(contact: ContactFit) -> str:
+    return short(1e3 * contact.settled_by, 2)
 
 
 def _percent(share: float) -> str:

@@ -168,6 +168,8 @@ class ContactFit:
         most: that touch at one frame.
         began, ended: touches that are there at a frame and not at the one before, and the reverse.
         sliding, sticking: shares of all touches.
+        settled: particles that started inside the collider and were moved to its surface.
+        settled_by: m, the farthest of these moves.
         bdf1: share of the substeps that went with backward Euler, which damps vibrations; None where it is not known.
     """
 
@@ -180,6 +182,8 @@ class ContactFit:
     sliding: float
     sticking: float
     bdf1: float | None = None
+    settled: int = 0
+    settled_by: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
