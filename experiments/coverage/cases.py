@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 
+import contact_cases as contact
 import numpy as np
 import sheetbend as sb
 from sheetbend import textile
@@ -177,4 +178,21 @@ CASES: Mapping[str, Case] = {
     ),
     "cloth": Case("cloth, white noise", CLOTH, of_motion(cloth, 4, lambda: seen(cloth(4)), CLOTH)),
     "pull": Case("pulls of five specimens, white noise", PULL, pull),
+    "contact_drag": Case(
+        "rope dragged over a table", contact.DRAG, contact.twin(contact.drag, contact.DRAG), least=180, most=200
+    ),
+    "contact_drawn": Case(
+        "cloth drawn over a table's edge",
+        contact.DRAWN,
+        contact.twin(contact.drawn, contact.DRAWN),
+        least=180,
+        most=200,
+    ),
+    "contact_over": Case(
+        "rope over a cylinder, with its force",
+        contact.OVER,
+        contact.twin(contact.over, contact.OVER, sensed=True),
+        least=180,
+        most=200,
+    ),
 }

@@ -60,7 +60,7 @@ def rows(folder: Path) -> Iterator[str]:
         matched = lines(folder, case.beside) if case.beside else {}
         for parameter, truth in case.truth.items() if known else ():
             ends = [entry["estimates"][parameter][1:3] for entry in known.values()]
-            inside = sum(lower is not None and upper is not None and lower <= truth <= upper for lower, upper in ends)
+            inside = sum(holds(lower, upper, truth) for lower, upper in ends)
             low, high = binomtest(inside, len(ends)).proportion_ci(method="exact")
             half = median_half(known, parameter)
             ratio = f"{half / median_half(matched, parameter):.2f}" if matched else ""
@@ -70,6 +70,12 @@ def rows(folder: Path) -> Iterator[str]:
                 f"| {case.about} | {parameter} | {inside} | {len(ends)} | {bounds} | {wanted} "
                 f"| {100 * half / truth:.2g} % | {ratio} |"
             )
+
+
+def holds(lower: float | None, upper: float | None, truth: float) -> bool:
+    """Whether an interval holds the truth; it may be open on one side, and one that is open on both tells nothing."""
+    told = lower is not None or upper is not None
+    return told and (lower is None or lower <= truth) and (upper is None or truth <= upper)
 
 
 def median_half(known: dict[int, dict], parameter: str) -> float:

@@ -85,6 +85,10 @@ class ContactSection(Section):
         0.0, "of a rope, or half the thickness of a cloth: particles touch at this distance", "m", ge=0
     )
     stiffness: Finite | None = key(None, "per particle; rigid when left out", "N/m", gt=0)
+    settle: bool = key(
+        False,
+        "move particles that start inside, as measured ones may by noise, to the surface before the motion starts",
+    )
 
     @property
     def touching(self) -> list[str]:

@@ -60,7 +60,7 @@ def add_contacts(
         particles = [p for name in contact.touching for p in named.get(name, ())]
         if not particles:
             continue
-        numbers = contact.model_dump(include={"friction", "radius", "stiffness"})
+        numbers = contact.model_dump(include={"friction", "radius", "stiffness", "settle"})
         with located(path, f"{contact.name or contact.collider}.contact"):
             scene.contact(particles, colliders[contact.collider], name=contact.name, **numbers)
 

@@ -69,7 +69,8 @@ def judged_parameters(
     _, r, J = problem.evaluate_exactly(u)
     rows, behind = problem.prior_rows
     asked, end = fitted or (problem, u)
-    profiles = None if refitter is None or len(u) == 1 else Profiles(asked, end, refitter, u - end)
+    level = len(u) == 1 and not any(e.scene.compiled.contacts for e in problem.experiments)  # its cost has no kinks
+    profiles = None if refitter is None or level else Profiles(asked, end, refitter, u - end)
     judged = identify(
         problem.parameters,
         u,

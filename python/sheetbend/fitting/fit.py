@@ -24,6 +24,7 @@ from ..doubts.prediction import Comparison, compare, predicted_values
 from ..doubts.profiles import Elsewhere
 from ..doubts.stationary import unfinished
 from ..doubts.stuck import bounded_by_sticking
+from ..doubts.touching import kinks, what_touches
 from ..doubts.unexplained import unexplained
 from ..errors import InputError
 from ..experiment.clock import outside, told_clocks
@@ -294,6 +295,8 @@ def fit(
         misfit=misfit(at.problem, at.u),
         forces=tuple(row for c in comparisons for one in c.forces for row in one.fits()),
         growth=_growth(found.growths, grown),
+        contacts=what_touches(at.problem, at.u),
+        kinks=() if interrupted else kinks(at.problem, at.u, estimates),
         windows=best.windows,
         evaluations=evaluations,
         jacobians=jacobians,

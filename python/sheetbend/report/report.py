@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from ..optional import require
 from ..quantities.wording import figures, short
 from ..result.result import UNSOUND, Estimate, FitData, Given, MotionGrowth, Premise, RecordingFit
+from .report_contact import contact_sections
 from .report_driven import driven_sections
 from .tables import Section, plain_section, rich_section
 
@@ -46,6 +47,7 @@ def sections(result: FitData) -> list[Section]:
         _forces(result),
         _held_out_motion(result),
         *driven_sections(result),
+        *contact_sections(result),
         _unknown(result),
         _correlations(result),
         _course(result),

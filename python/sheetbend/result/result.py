@@ -159,6 +159,51 @@ class ForceFit:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ContactFit:
+    """What one contact of one fitted motion does at the frames of the recording.
+
+    Attributes:
+        recording, contact: names.
+        particles: that may touch.
+        most: that touch at one frame.
+        began, ended: touches that are there at a frame and not at the one before, and the reverse.
+        sliding, sticking: shares of all touches.
+        settled: particles that started inside the collider and were moved to its surface.
+        settled_by: m, the farthest of these moves.
+        bdf1: share of the substeps that went with backward Euler, which damps vibrations; None where it is not known.
+    """
+
+    recording: str
+    contact: str
+    particles: int
+    most: int
+    began: int
+    ended: int
+    sliding: float
+    sticking: float
+    bdf1: float | None = None
+    settled: int = 0
+    settled_by: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kinks:
+    """How many contacts differ at some frame between the motions at the ends of one parameter's interval.
+
+    Attributes:
+        name: of the parameter.
+        begin, end: touch at the upper end alone, or at the lower end alone.
+        stick, slide: touch at both, and stick at the upper and slide at the lower end, or the reverse.
+    """
+
+    name: str
+    begin: int
+    end: int
+    stick: int
+    slide: int
+
+
+@dataclass(frozen=True, kw_only=True)
 class Misfit:
     """How large the residuals are against what was told of their size.
 
@@ -251,6 +296,8 @@ class FitData:
         forces: errors per force sensor.
         premises: numbers that the fit took as given, and what an error in each moves.
         warnings: what a reader must know before using the numbers.
+        contacts: what touches in the fitted motions.
+        kinks: of each parameter with an interval, what touches otherwise at its ends.
         assumed: how the ends of ropes are held and what that assumes, in words, where a configuration says it.
     """
 
@@ -285,6 +332,8 @@ class FitData:
     not_counted: tuple[str, ...] = ()
     forces: tuple[ForceFit, ...] = ()
     assumed: tuple[str, ...] = ()
+    contacts: tuple[ContactFit, ...] = ()
+    kinks: tuple[Kinks, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of that name; KeyError names the ones there are."""

@@ -13,8 +13,10 @@ from .. import _core
 from ..errors import SceneError, refusal
 from ..quantities.quantities import FUNCTIONS, Term
 from .domain import Domain
+from .fast import Fastest, fastest
 from .kinks import kinks
 from .scene_data import SceneData
+from .settle import SettledStart, settled
 
 VECTORS = ("position", "velocity", "boundary", "force", "wind", "collider_pose")
 
@@ -61,7 +63,9 @@ class CompiledScene:
         names: quantity names in the order of theta.
         theta: their values.
         contacts: names of those that particles may have with colliders.
-        kinks: what makes its motions not smooth in time, in words; empty if nothing.
+        kinks: what beside contacts makes its motions not smooth in time, in words; empty if nothing.
+        settled: by contact, what started inside a collider and was moved to its surface.
+        fastest: the colliders that move and could pass particles unseen.
         domain: which quantities and inputs make sense.
     """
 
@@ -80,8 +84,20 @@ class CompiledScene:
         self._base = self._pack(scene)
         self._terms = scene.every_term
         self.contacts = tuple(c.name for c in scene.contacts.contacts)
+        self.settled: dict[str, SettledStart] = {}
+        self.fastest: tuple[Fastest, ...] = ()
         if self.contacts:
+            self._settle(scene)
             self._expect_apart(scene)
+            first, size = self.layout["contact_radius"]
+            self.fastest = fastest(scene.contacts, self.inputs()[first : first + size])
+
+    def _settle(self, scene: SceneData) -> None:
+        first, size = self.layout["position"]
+        if scene.contacts.settling:
+            inputs = _core.ParameterMap(self.map()).inputs(self.theta)
+            moved, self.settled = settled(scene, self.core, inputs, first)
+            self._base[first : first + size] += moved.ravel()
 
     def _expect_apart(self, scene: SceneData) -> None:
         inputs = self.inputs()

@@ -53,6 +53,7 @@ class Contacts:
     def __init__(self) -> None:
         self.colliders: dict[str, Collider] = {}
         self.contacts: list[Contact] = []
+        self.settling: set[str] = set()  # those that move what starts inside to the surface
 
     def _place(self, scene: Builder, collider: Collider) -> int:
         """The place of a collider, which is added unless it is there."""
@@ -187,5 +188,8 @@ class Contacts:
                 problem = (
                     f"starts with particle {c.particles[worst]} inside '{name}', which is {-gaps[worst]:.3g} m deep"
                 )
-                fix = "let it start outside, counted from the contact's radius"
+                fix = (
+                    "let it start outside, counted from the contact's radius, or give settle=True (settle = true in a "
+                    "configuration), which moves such particles to the surface before the motion starts"
+                )
                 raise SceneError(f"{c.name}.contact", problem, int((depth > 0).sum()), fix)

@@ -8,6 +8,7 @@ from .scene_data import SceneData
 def kinks(scene: SceneData) -> str:
     """What makes motions of a scene not smooth in time, so that errors have no power series in h; empty if nothing.
 
+    Contacts are not among these, for errors of backward Euler have a first term there all the same (`time_step`).
     Tethers, which act from one side only, need sweeps, and those are refused as such.
     """
     found = []
@@ -15,8 +16,6 @@ def kinks(scene: SceneData) -> str:
         found.append("joints that yield")
     if any(group.kind == "friction_hinge" for group in scene.groups):
         found.append("joints with dry friction")
-    if scene.contacts.contacts:
-        found.append("contacts")
     if scene.boundary.driven and scene.boundary.interpolation == "linear":
         found.append("driven particles with linear knots, which kick them (use 'cubic')")
     return " and ".join(found)

@@ -282,13 +282,12 @@ class Scene(HeldScene):
         radius: float = 0.0,
         stiffness: float | None = None,
         name: str | None = None,
+        settle: bool = False,
     ) -> str:
-        """Let particles touch a shape, and return the contact's name. docs/contact.md has the law and its limits.
+        """Let particles (no links or triangles) touch a shape, and return the contact's name; see docs/contact.md.
 
-        Particles are pushed out along the normal and held by Coulomb friction; links and triangles between them are
-        not. Needs method "implicit" with integrator "bdf1". The numbers are the quantities `<name>_friction`, unless
-        zero `<name>_contact_radius` m, where given `<name>_contact_stiffness` N/m, and of the collider `<collider>_x`,
-        `_y`, `_z` m (how far it is from where it was given) and its lengths, such as `<collider>_radius` m.
+        Needs method "implicit" with integrator "bdf1". Quantities: `<name>_friction`, unless zero `_contact_radius` m,
+        where given `_contact_stiffness` N/m; of the collider `<collider>_x`, `_y`, `_z` m and its lengths.
 
         Args:
             what: a rope, a cloth, or particles (n,).
@@ -297,16 +296,17 @@ class Scene(HeldScene):
             radius: m, of a rope, or half the thickness of cloth: particles touch at this distance.
             stiffness: N/m per particle. Rigid by default: a particle lies h^2 g/1000 deep under its weight.
             name: by default that of the collider.
+            settle: move what starts inside to the surface, at the values that the scene is given with.
 
         Raises:
-            SceneError: unknown or repeated particles, negative numbers, names that are taken; a start inside the
-                collider, when the scene is compiled.
+            SceneError: unknown or repeated particles, negative numbers, names that are taken; later a start inside.
         """
         self._building()
         which, name = self.contacts.check(what, collider, self.particle_count, friction, radius, stiffness, name)
         carried = self.add_particles(np.zeros((len(which), 3)), 1.0)
         self.pin(carried)
         self.contacts.add(self, collider, which, carried, friction, radius, stiffness, name)
+        self.contacts.settling |= {name} if settle else set()
         return name
 
     def freeze(self) -> Scene:

@@ -1,0 +1,110 @@
+"""What touches in the motions of a fit, and what touches otherwise at the ends of its intervals.
+
+A motion with contacts has kinks where one begins, ends, sticks or slides. An interval that holds several such motions
+holds kinks of the cost, of which a derivative at the estimate knows one side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays.timeseries import Array
+from ..errors import DivergenceError, UnbalancedError
+from ..minimum.problem import FitProblem
+from ..motion.contact_modes import OPEN, SLIDES, STICKS, contact_modes
+from ..result.result import ContactFit, Estimate, Kinks
+from ..statistics.gauge import RANK_TOLERANCE
+
+
+def what_touches(problem: FitProblem, u: Array) -> tuple[ContactFit, ...]:
+    """What every contact of the fitted motions does at the frames of its recording, at u (free,).
+
+    Takes one simulation of each experiment that has contacts; a motion that has no answer is left out.
+    """
+    rows = []
+    for e, modes in zip(problem.experiments, _modes(problem, u), strict=True):
+        for name, mode in modes.items():
+            touches = mode != OPEN
+            start = e.scene.compiled.settled.get(name)
+            rows.append(
+                ContactFit(
+                    recording=e.name,
+                    contact=name,
+                    particles=mode.shape[1],
+                    most=int(touches.sum(axis=1).max()),
+                    began=int((~touches[:-1] & touches[1:]).sum()),
+                    ended=int((touches[:-1] & ~touches[1:]).sum()),
+                    sliding=_share(mode == SLIDES, touches),
+                    sticking=_share(mode == STICKS, touches),
+                    bdf1=1.0 if e.solver.integrator == "bdf1" else None,
+                    settled=0 if start is None else start.particles,
+                    settled_by=0.0 if start is None else start.farthest,
+                )
+            )
+    return tuple(rows)
+
+
+def kinks(problem: FitProblem, u: Array, estimates: Sequence[Estimate]) -> tuple[Kinks, ...]:
+    """For each estimate with an interval, how many contacts differ between the motions at its ends.
+
+    The other parameters are refitted to first order. Takes two simulations for each of these.
+
+    Args:
+        u: (free,) the minimum.
+    """
+    if not any(e.scene.compiled.contacts for e in problem.experiments):
+        return ()
+    _, _, J = problem.evaluate(u)
+    found = []
+    for e in estimates:
+        if e.lower is None or e.upper is None or e.name not in problem.parameters.free:
+            continue
+        ends = [_modes(problem, _refitted(problem, u, J, e.name, value)) for value in (e.lower, e.upper)]
+        counts = {"begin": 0, "end": 0, "stick": 0, "slide": 0}
+        for low, high in zip(*ends, strict=True):
+            for name in low.keys() & high.keys():
+                a, b = low[name], high[name]
+                counts["begin"] += _contacts((a == OPEN) & (b != OPEN))
+                counts["end"] += _contacts((a != OPEN) & (b == OPEN))
+                counts["stick"] += _contacts((a == SLIDES) & (b == STICKS))
+                counts["slide"] += _contacts((a == STICKS) & (b == SLIDES))
+        found.append(Kinks(name=e.name, **counts))
+    return tuple(found)
+
+
+def _contacts(differs: Array) -> int:
+    """Number of particles that differ at some frame."""
+    return int(differs.any(axis=0).sum())
+
+
+def _share(some: Array, touches: Array) -> float:
+    return float(some.sum() / max(touches.sum(), 1))
+
+
+def _modes(problem: FitProblem, u: Array) -> list[dict[str, Array]]:
+    """By experiment and contact (frames, particles); empty where nothing can touch, or the motion has no answer."""
+    found: list[dict[str, Array]] = []
+    for e, recording in zip(problem.experiments, problem.recordings, strict=True):
+        found.append({})
+        if e.static or not e.scene.compiled.contacts:
+            continue
+        values = problem.values_of(e, u)
+        times = np.maximum(e.scene_times(recording.times, values), 0.0)
+        with suppress(DivergenceError, UnbalancedError):
+            found[-1] = contact_modes(e.scene, times, replace(e.solver, extrapolate=1), values)
+    return found
+
+
+def _refitted(problem: FitProblem, u: Array, J: Array, name: str, value: float) -> Array:
+    """u with one parameter at a value and the others where they follow to first order, inside their bounds."""
+    column = problem.parameters.free.index(name)
+    by = problem.parameters[name].to_internal(value) - u[column]
+    size = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
+    others = np.delete(J / size, column, axis=1)
+    follow = np.linalg.lstsq(others, -J[:, column] * by, rcond=RANK_TOLERANCE)[0]
+    moved = u + np.insert(follow / np.delete(size, column), column, by)
+    return np.asarray(np.clip(moved, *problem.parameters.limits()))

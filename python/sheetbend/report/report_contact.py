@@ -1,0 +1,64 @@
+"""Sections of a report on scenes with contacts: what touches, and what touches otherwise at the ends of intervals."""
+
+from __future__ import annotations
+
+from ..quantities.wording import short
+from ..result.result import ContactFit, FitData
+from .tables import Section
+
+NO_LOSSES = "energy that the model loses otherwise than the recording is not looked for in motions with contacts"
+
+
+def contact_sections(result: FitData) -> list[Section]:
+    """Both sections; empty where nothing can touch."""
+    return [_contacts(result), _kinks(result)]
+
+
+def _contacts(result: FitData) -> Section:
+    rows = [
+        (
+            c.recording,
+            c.contact,
+            f"{c.most} of {c.particles}",
+            str(c.began),
+            str(c.ended),
+            _percent(c.sliding),
+            _percent(c.sticking),
+            "" if c.bdf1 is None else _percent(c.bdf1),
+        )
+        for c in result.contacts
+    ]
+    headers = ("recording", "contact", "most at once", "began", "ended", "sliding", "sticking", "bdf1")
+    notes = (
+        ("sliding, sticking", "shares of the touches at the frames of the recording"),
+        ("bdf1", "share of the substeps of backward Euler, which damps vibrations"),
+        ("losses", NO_LOSSES),
+        *(
+            (f"start of {c.recording}", f"settle moved {c.settled} particles out of {c.contact}, by up to {_mm(c)} mm")
+            for c in result.contacts
+            if c.settled
+        ),
+    )
+    return Section("Contacts", headers, tuple(rows), notes if rows else ())
+
+
+def _kinks(result: FitData) -> Section:
+    rows = [(k.name, *(str(n) if n else "" for n in (k.begin, k.end, k.stick, k.slide))) for k in result.kinks]
+    headers = ("parameter", "begin", "end", "stick", "slide")
+    note = (
+        "",
+        "particles that do so at some frame at the upper end of the interval, and not at the lower end. The cost has a "
+        "kink where one does: profiles follow it, linear intervals do not",
+    )
+    differs = any(k.begin or k.end or k.stick or k.slide for k in result.kinks)
+    return Section(
+        "Contacts that differ between the ends of an interval", headers, tuple(rows), (note,) if differs else ()
+    )
+
+
+def _mm(contact: ContactFit) -> str:
+    return short(1e3 * contact.settled_by, 2)
+
+
+def _percent(share: float) -> str:
+    return f"{short(100.0 * share, 3)} %"

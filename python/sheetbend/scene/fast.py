@@ -1,0 +1,62 @@
+"""How fast colliders move: one that goes farther in a substep than it is thick may pass particles unseen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .colliders import Collider
+from .contacts import Contacts
+
+CUBIC = 1.5  # of the mean speed between two knots, which a cubic that rests at both reaches
+
+
+@dataclass(frozen=True)
+class Fastest:
+    """A collider's surface at its fastest.
+
+    Attributes:
+        name: of the collider.
+        speed: m/s.
+        reach: m, from the middle of the collider to where particles touch it: a particle that is passed by more than
+            this in a substep may come out on the other side.
+    """
+
+    name: str
+    speed: float
+    reach: float
+
+
+def fastest(contacts: Contacts, radii: np.ndarray) -> tuple[Fastest, ...]:
+    """Of every collider that moves and can pass through particles, which a half space cannot.
+
+    Args:
+        radii: (contacts,) m.
+    """
+    found = []
+    for place, (name, collider) in enumerate(contacts.colliders.items()):
+        own = [radius for c, radius in zip(contacts.contacts, radii, strict=True) if c.collider == place]
+        if collider.shape == "plane" or collider.motion is None or len(collider.motion.times) < 2 or not own:
+            continue
+        thin, far = _half_thickness(collider)
+        found.append(Fastest(name, _speed(collider, far), thin + min(own)))
+    return tuple(found)
+
+
+def _half_thickness(collider: Collider) -> tuple[float, float]:
+    """The smallest half thickness, and how far the surface is from the origin at most, m."""
+    sizes = collider.sizes
+    halves = [size for label, size in sizes.items() if label.startswith("half_")]
+    if collider.shape == "rounded_box":
+        return min(halves), float(np.linalg.norm(halves))
+    return sizes["radius"], sizes["radius"] + sum(halves)
+
+
+def _speed(collider: Collider, far: float) -> float:
+    motion = collider.poses
+    steps = np.diff(motion.times)
+    along = np.linalg.norm(np.diff(motion.positions, axis=0), axis=1)
+    turned = np.linalg.norm(np.diff(motion.rotations, axis=0), axis=1) * far
+    factor = CUBIC if motion.interpolation == "cubic" else 1.0
+    return factor * float(((along + turned) / steps).max())
