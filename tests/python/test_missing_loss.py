@@ -7,7 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import sheetbend as sb
+from sheetbend.doubts.absent_damping import absent_damping
+from sheetbend.doubts.held_losses import held_losses
 from sheetbend.doubts.missing_loss import EXPLAINS, LEVEL, asked_for, of_more_loss
+from sheetbend.minimum.optimizers import minimize
 from sheetbend.minimum.problem import FitProblem, as_parameters
 
 SIGMA = 3e-4
@@ -48,10 +51,47 @@ def test_a_model_without_a_damping_of_its_recording_is_doubtful(told: float) -> 
 
 def test_a_model_that_loses_more_than_its_recording_is_doubtful() -> None:
     """Backward Euler damps the model by itself."""
-    e = fall(rope(drag_linear=0.01), drag_linear=0.005)
+    e = fall(rope())
     found = fitted(replace(e, solver=replace(SOLVER, integrator="bdf1")), "rope_EI")
     EI = found["rope_EI"]
     assert EI.verdict == "doubtful" and "the model loses more energy than fall" in EI.words
+
+
+@pytest.mark.parametrize("times", [1 / 3, 3.0])
+def test_a_given_loss_of_another_size_is_named(times: float) -> None:
+    """A damping that is told three times too large explained 11 % of what the fit leaves, and EI was "identified"
+    beside it, 1.1 half-widths off."""
+    e = fall(rope(drag_linear=0.01, bend_damping=0.003 * times), drag_linear=0.005, bend_damping=0.003)
+    found = fitted(e, "rope_EI", "rope_drag_linear")
+    for one in found.result.estimates:
+        size = "large" if times > 1.0 else "small"
+        assert one.verdict == "doubtful" and f"the given rope_bend_damping is too {size}" in one.words
+
+
+def test_a_drag_of_another_size_is_named_and_not_the_damping_that_is_right() -> None:
+    losses = {"drag_linear": 0.005, "bend_damping": 0.01}
+    e = fall(rope(drag_linear=0.015, bend_damping=0.01), **losses)
+    assert "the given rope_drag_linear is too large" in fitted(e, "rope_EI")["rope_EI"].words
+
+
+@pytest.mark.parametrize("corrected", [False, True])
+def test_a_driven_rope_without_its_large_damping_is_doubtful(corrected: bool) -> None:
+    """30 ms change the motion in another way than a little damping does, and corrections of the hand take up most of
+    it: 13 % was left to be explained."""
+    e = shaken({"drag_linear": 0.005}, drag_linear=0.005, bend_damping=0.03)
+    found = fitted(e if corrected else replace(e, driven_sigma=None), "rope_EI")
+    assert found["rope_EI"].verdict == "doubtful" and "shaken loses energy" in found["rope_EI"].words
+
+
+@pytest.mark.parametrize("change", [{"clamp_start": (1, 0, 0.1)}, {"length": 0.49}, {"gravity": (0.5, 0, -9.8)}])
+def test_other_errors_ask_for_no_damping(change: dict[str, object]) -> None:
+    """They leave 200 to 1,600 times the noise's variance."""
+    given = {"length": 0.5, "clamp_start": (1, 0, 0)} | change
+    model = sb.rope(given.pop("length"), 8, density=0.05, EI=2e-3, drag_linear=0.01, **given)  # type: ignore[arg-type]
+    e = fall(model, drag_linear=0.005)
+    problem = FitProblem([e], as_parameters(["rope_EI", "rope_drag_linear"], [e]))
+    u = minimize(problem, problem.parameters.initial())[0].u
+    assert absent_damping(problem, u) == {} and held_losses(problem, u) == {}
 
 
 @pytest.mark.parametrize("losses", [{}, {"bend_damping": 0.01}])
@@ -96,13 +136,16 @@ def two(first: float, second: float, held: float) -> list[sb.Experiment]:
 
 
 def test_motions_that_share_a_parameter_lack_a_loss_together_or_not_at_all() -> None:
-    """Where one asks for more of it and the other for less, something else is wrong. Each is judged apart too."""
+    """Where one asks for more of it and the other for less, something else is wrong, such as a loss that is given. Each
+    is judged apart too."""
     e = two(0.003, 0.002, 0.006)
     shared = fitted(e, "rope_EI", "rope_drag_linear")
+    assert all("the given rope_bend_damping is too large" in one.words for one in shared.result.estimates)
     assert not any("energy" in one.words for one in shared.result.estimates)
     private = {name: {"private": True} for name in ("rope_EI", "rope_drag_linear")}
     apart = sb.fit(e, parameters=private, profiles=False, beginnings=False)
-    assert "fall loses energy" in apart["rope_EI[fall]"].words and apart["rope_EI[again]"].verdict == "identified"
+    assert "fall loses energy" in apart["rope_EI[fall]"].words
+    assert "the given rope_bend_damping is too large" in apart["rope_EI[again]"].words
 
 
 def shaken(model: dict[str, float], **given: float) -> sb.Experiment:
@@ -136,11 +179,11 @@ def test_corrected_driven_markers_do_not_hide_a_missing_loss() -> None:
 
 
 def test_its_simulation_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    e = fall(rope(drag_linear=0.01), drag_linear=0.005)
+    e = fall(rope(drag_linear=0.005), drag_linear=0.005)
     with_it = fitted(e, "rope_EI").result
     monkeypatch.setattr("sheetbend.fitting.fit.missing_loss", lambda *given: {})
     without = fitted(e, "rope_EI").result
-    assert with_it.judging == (without.judging[0] + 1, without.judging[1])
+    assert with_it.judging == (without.judging[0] + 2, without.judging[1] + 1)  # of the given drag, and of all losses
     assert f"besides, for intervals and doubts: {with_it.judging[0]}, " in with_it.report()
 
 

@@ -34,14 +34,15 @@ from ..minimum.time_step import SECOND_ORDER
 from ..minimum.windows import chosen, cut
 from ..optional import require
 from ..quantities.wording import short
-from ..statistics.blocks import FEWEST, LEVEL, moved_by, short_of_frames
+from ..statistics.blocks import FEWEST, LEVEL, short_of_frames
 from ..statistics.covariance import Covariance, autocorrelation, covariance
 from ..statistics.gauge import null_space
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
+from ..statistics.shared_errors import moved_by
 from ..statistics.stretches import scatter, within_sigma
 from .contradictions import CLAIMS, drawn_along, finer_experiments, value_words
-from .driven_errors import driven_errors, within_driven_errors
+from .driven_errors import driven_errors
 
 FRAMES = 12  # of every motion: fewer do not tell how residuals correlate
 LARGE = 4.0  # of the residuals' mean square, in sigma squared
@@ -164,11 +165,8 @@ def of_beginnings(
         u: (free,) minimum of the whole, where the beginnings were fitted from.
     """
     words = _asked(Whole(problem, u), judged, found, refinement)
-    errors, what = driven_errors(problem, u) if words else (np.zeros((0, 0)), "")
-    if not errors.size:
-        return words
-    left = _asked(Whole(problem, u, errors), judged, found, refinement)
-    return within_driven_errors(problem, u, judged, list(words), errors, what) | left
+    errors = driven_errors(problem, u) if words else np.zeros((0, 0))
+    return _asked(Whole(problem, u, errors), judged, found, refinement) if errors.size else words
 
 
 def _asked(whole: Whole, judged: Identifiability, found: Sequence[Beginning], refinement: Refinement) -> dict[str, str]:

@@ -17,6 +17,7 @@ from ..result.result import UNSOUND, Estimate, Misfit
 from ..statistics.identifiability import Identifiability, identify
 from ..statistics.intervals import open_estimate, ran_off
 from ..statistics.judge import Nuisance
+from .driven_errors import FEW, driven_errors
 from .floors import solver_floors
 from .profiles import Elsewhere, Profiles
 from .roughness import rough_parameters
@@ -83,6 +84,7 @@ def judged_parameters(
         profile=profiles,
         path=None if profiles is None else profiles.path,
         nuisance=Nuisance(J[behind:], sum(map(problem.core.absorbed, range(len(problem.experiments))))),
+        errors=driven_errors(problem, u, FEW),
     )
     return judged, () if profiles is None else tuple(profiles.lower)
 

@@ -20,7 +20,7 @@ from ..statistics.blocks import Difference, Split, contradiction
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
 from ..statistics.profile import FARTHEST
-from .driven_errors import driven_errors, within_driven_errors
+from .driven_errors import driven_errors
 from .prediction import Comparison
 from .profiles import NOISELESS, Elsewhere
 
@@ -60,8 +60,7 @@ def between_parts(
     All parameters together must differ between the parts by more than chance explains at the 1 % level. Those are named
     of which a part differs from the others by more than its 95 % interval, and from the estimate by more than the
     estimate's, what the discretization moves in that part counted. No simulation is needed beyond the last Jacobian,
-    unless parts differ: then what noise of driven particles does to all parts alike counts too, and is named instead
-    where that is what makes them differ (`driven_errors`).
+    unless parts differ: then what noise of driven particles does to all parts alike counts too (`driven_errors`).
 
     Args:
         refinement: of the discretization; where parts differ, one simulation each tells what it explains of that.
@@ -70,11 +69,8 @@ def between_parts(
     if not words:
         return {}
     shifts = _residual_shifts(problem, u, refinement) if refinement is not None else []
-    errors, what = driven_errors(problem, u)
-    if not shifts and not errors.size:
-        return words
-    left = _between(problem, u, judged, shifts, errors)
-    return within_driven_errors(problem, u, judged, list(words), errors, what) | left
+    errors = driven_errors(problem, u)
+    return _between(problem, u, judged, shifts, errors) if shifts or errors.size else words
 
 
 def _between(

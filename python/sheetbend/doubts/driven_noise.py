@@ -1,29 +1,32 @@
 """What the noise of driven markers did to a fit that took their recorded motion for the truth.
 
-Their noise n moves the compared markers by A n, which is in the residuals r. The expected cost then holds half the
-expectation of |A n|^2 besides what the parameters u are to explain, and its minimum is where both together are least:
-to first order it is off by -(J'J)^-1 times the gradient with respect to u of half that expectation (errors in
-variables; Fuller
-1987, Measurement Error Models, chapter 3). A few random directions stand for the expectation. Besides, A n differs from
-one recording to the next, of which residuals tell too little.
+Their noise n moves the compared markers by A n, which is in the residuals r. How far that moves the estimates from one
+recording to the next is in their intervals (`driven_errors`). Besides, the expected cost holds half the expectation of
+|A n|^2 beside what the parameters u are to explain, and its minimum is where both together are least: to first order it
+is off by -(J'J)^-1 times the gradient with respect to u of half that expectation (errors in variables; Fuller 1987,
+Measurement Error Models, chapter 3). A few random directions stand for the expectation.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
+from ..result.result import Estimate
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.identifiability import Identifiability
+from ..statistics.intervals import reach_of
+from .driven_errors import DrivenErrors, drawn_noise
 
 Array = np.ndarray
 DIRECTIONS = 8  # of noise, which share a rollout
 HARMLESS = 0.25  # of the residual: then a sixteenth of its variance is the driven markers'
 DISHONEST = 1.5  # times what a sigma says
-OFF = 0.5  # half-widths, by which an estimate must be off to be named
+OFF = 0.5  # half-widths, by which an estimate must be drawn off to be doubtful
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,7 @@ class DrivenNoise:
         moved: by which such noise moves a compared marker, m, or what a force sensor reads, N.
         residual: of these, in the same unit.
         sensor: name of the force sensor; empty for the markers.
+        follows: whether the scene follows markers, so that `driven_sigma` can correct them.
     """
 
     experiment: str
@@ -43,10 +47,11 @@ class DrivenNoise:
     moved: float
     residual: float
     sensor: str = ""
+    follows: bool = True
 
     @property
     def harms(self) -> bool:
-        """Whether the intervals are too narrow for it."""
+        """Whether it makes up a part of the residuals that counts."""
         return self.moved > HARMLESS * self.residual
 
 
@@ -54,66 +59,82 @@ def driven_noises(problem: FitProblem, u: Array) -> tuple[tuple[DrivenNoise, ...
     """What the noise of driven markers does at the minimum u (free,), where no correction allows for it.
 
     Returns:
-        Of every experiment whose scene follows noisy markers; and by how much all of them together are expected to have
-        moved each free parameter, in internal coordinates, where one of them harms.
+        Of every experiment that noisy motion drives; and by how much all of them together are expected to have moved
+        each free parameter, in internal coordinates, where one of them harms.
     """
+    drawn = drawn_noise(problem, u, DIRECTIONS)
+    if drawn is None:
+        return (), {}
     rows, layout = problem.core.first_rows, problem.rows_layout()
     found: list[DrivenNoise] = []
     _, r, J = problem.evaluate(u)
-    draws: dict[int, Array] = {}
-    for i, (e, recording) in enumerate(zip(problem.experiments, problem.recordings, strict=True)):
-        correction = e.correction(recording)
-        noise = None if correction is None or e.driven_noise is not None else e.recorded_noise()
-        if correction is None or not noise:
-            continue
-        draws[i] = noise * np.random.default_rng(0).standard_normal((DIRECTIONS, int(np.prod(correction.shape))))
-        moved, left = problem.core.respond(i, u, draws[i]), r[rows[i] : rows[i + 1]]
+    for i, moved in drawn.responses(u).items():
+        e, left = problem.experiments[i], r[rows[i] : rows[i + 1]]
         clock, channel = layout.clocks[layout.recording == i], layout.channel[layout.recording == i]
         parts = [("", e.sigma, clock == 0)]
         parts += [(s.name, s.sigma, (clock == k) & (channel < 3)) for k, s in enumerate(e.forces, start=1)]
+        follows = bool(e.scene.boundary.following)
         found += [
-            DrivenNoise(e.name, noise, sigma * _rms(moved[:, part]), sigma * _rms(left[part]), sensor)
+            DrivenNoise(e.name, drawn.size[i], sigma * _rms(moved[:, part]), sigma * _rms(left[part]), sensor, follows)
             for sensor, sigma, part in parts
             if part.any()
         ]
-    if not any(one.harms for one in found):
-        return tuple(found), {}
+    return tuple(found), _drawn_off(problem, u, J, drawn) if any(one.harms for one in found) else {}
 
-    def expected(at: Array) -> float:
-        return sum(float((problem.core.respond(i, at, b) ** 2).sum()) / DIRECTIONS for i, b in draws.items())
 
+def _drawn_off(problem: FitProblem, u: Array, J: Array, drawn: DrivenErrors) -> dict[str, float]:
     size = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
-    here = expected(u)
-    slope = np.array([expected(u + step) - here for step in np.diag(1.0 / size)])  # by u times its size
+    here = drawn.expected(u)
+    slope = np.array([drawn.expected(u + step) - here for step in np.diag(1.0 / size)])  # by u times its size
     normal = (J / size).T @ (J / size)
     off = -0.5 * np.linalg.pinv(normal, rcond=RANK_TOLERANCE, hermitian=True) @ slope / size
-    return tuple(found), dict(zip(problem.parameters.free, off.tolist(), strict=True))
+    return dict(zip(problem.parameters.free, off.tolist(), strict=True))
 
 
-def doubts(problem: FitProblem, u: Array, judged: Identifiability) -> tuple[str, ...]:
-    """What a reader must know of driven markers: `driven_noises` in words where they harm, and where a correction and
-    its prior disagree."""
-    return (*_uncorrected(problem, u, judged), *_corrected(problem, u))
+def driven_doubts(problem: FitProblem, u: Array, judged: Identifiability) -> tuple[tuple[str, ...], dict[str, str]]:
+    """What a reader must know of driven markers.
 
-
-def _uncorrected(problem: FitProblem, u: Array, judged: Identifiability) -> list[str]:
+    Returns:
+        Warnings: `driven_noises` in words where they harm, and where a correction and its prior disagree. And by
+        parameter, that noise draws the fit off by more than its interval allows for.
+    """
     found, off = driven_noises(problem, u)
-    values = problem.parameters.to_physical(u)
-    named = []
-    for estimate in judged.estimates:
-        p, x = problem.parameters[estimate.name], off.get(estimate.name, 0.0)
-        by = values[estimate.name] * float(np.expm1(x)) if p.log else x
-        if estimate.half_width is not None and abs(by) > OFF * estimate.half_width:
-            size = f"{short(100 * abs(np.expm1(x)), 2)} %" if p.log else f"{short(abs(by), 2)} {p.unit}".rstrip()
-            named.append(f"{estimate.name} by some {size} too {'high' if by > 0 else 'low'}")
-    bias = f", and the fit is drawn off, {', '.join(named)} to first order" if named else ""
-    return [
-        f"{one.experiment}: noise of its driven markers ({short(1e3 * one.noise, 2)} mm, from the recording) moves "
-        f"{_moved_words(one)} (of one coordinate). The intervals do not allow for it{bias}: "
-        + ("drive the grips by smoother poses, or leave the forces out" if one.sensor else "set driven_sigma")
-        for one in found
-        if one.harms
+    harm = [one for one in found if one.harms]
+    worst = max(harm, key=lambda one: one.moved / max(one.residual, np.finfo(float).tiny), default=None)
+    doubted = {} if worst is None else _doubted(problem, worst, off, judged.estimates)
+    wide = [e.name for e in judged.estimates if e.statistical is not None and e.driven > e.statistical]
+    more = f", of which it is the larger part for {', '.join(wide)}" if wide else ""
+    words = [
+        f"{one.experiment}: noise of its {_what(one)} ({short(1e3 * one.noise, 2)} mm, from the recording) moves "
+        f"{_moved_words(one)} (of one coordinate). The intervals count that to first order{more}: {_fix(one)}"
+        for one in harm
     ]
+    return (*words, *_corrected(problem, u)), doubted
+
+
+def _doubted(problem: FitProblem, worst: DrivenNoise, off: dict[str, float], of: Sequence[Estimate]) -> dict[str, str]:
+    named = {}
+    for estimate in of:
+        p, x = problem.parameters[estimate.name], off.get(estimate.name, 0.0)
+        if abs(x) > OFF * reach_of(p, estimate):
+            size = f"{short(100 * abs(np.expm1(x)), 2)} %" if p.log else f"{short(abs(x), 2)} {p.unit}".rstrip()
+            named[estimate.name] = (
+                f"noise of the {_what(worst)} of {worst.experiment} ({short(1e3 * worst.noise, 2)} mm) draws the fit "
+                f"off: this one by some {size} too {'high' if x > 0 else 'low'}, to first order. Fix: {_fix(worst)}"
+            )
+    return named
+
+
+def _what(one: DrivenNoise) -> str:
+    return "driven markers" if one.follows else "driven motion"
+
+
+def _fix(one: DrivenNoise) -> str:
+    if one.sensor:
+        return "drive the grips by smoother poses, or leave the forces out"
+    if one.follows:
+        return "set driven_sigma, which estimates the true motion and makes intervals narrower"
+    return "hold the grip's pose by more markers farther apart, or follow a marker with driven_sigma"
 
 
 def _moved_words(one: DrivenNoise) -> str:

@@ -14,101 +14,58 @@ prior rows too, is then what a loss leaves that corrections do not take up, as a
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
 from ..arrays.timeseries import Array
 from ..minimum.problem import FitProblem
-from ..optional import require
 from ..quantities.wording import short
-from ..statistics.blocks import short_of_frames
-from ..statistics.covariance import Layout, covariance
-from ..statistics.gauge import RANK_TOLERANCE
-from ..statistics.white_noise import white_noise
+from .absent_damping import absent_damping
+from .directions import EXPLAINS, LEVEL, Asked, asked_for, rows_of, tied
+from .held_losses import held_losses
 
-EXPLAINS = 1 / 3
-"""Of what a fit leaves beyond noise: the part that a loss must explain. It is 50 to 78 % for ropes without the damping
-of their recordings (0.3 to 30 ms); a finer mesh looks like a loss by up to 21 %, a turned clamp by 16 %, a wrong length
-by 4 %, and noise by any part of next to nothing, which is why chance is asked too (measured)."""
-LEVEL = 1e-3  # chance that a right model is contradicted
 OTHER: dict[str, Literal["bdf1", "bdf2"]] = {"bdf1": "bdf2", "bdf2": "bdf1"}
-
-
-@dataclass(frozen=True)
-class Asked:
-    """What the residuals of some motions ask for of more loss.
-
-    Attributes:
-        more: of the loss, times the substep's, 1/s: negative where less would fit better.
-        explained: share of what the fit leaves beyond noise; may exceed 1 by chance.
-        chance: that a right model asks for so much.
-    """
-
-    more: float
-    explained: float
-    chance: float
 
 
 def missing_loss(problem: FitProblem, u: Array, fitted: tuple[FitProblem, Array]) -> dict[str, str]:
     """By free parameter, the motion whose losses the model does not have, or does not have so large.
 
-    Takes one simulation with the other integrator. Where that has no answer, nothing is told, nor of motions with
-    contacts, which know one integrator alone (half the substep moves when they begin and slide, which is no loss).
+    Losses that are given are tested first (`held_losses`), then all losses by one simulation with the other integrator.
+    Where that has no answer, it tells nothing, nor of motions with contacts, which know one integrator alone (half the
+    substep moves when they begin and slide, which is no loss). Last, where neither shows anything,
+    comes damping where the model has none (`absent_damping`).
 
     Args:
         problem: whose residuals count.
         u: (free,) its minimum.
         fitted: the problem as it was fitted, whose rows are the same, and its minimum.
     """
-    if all(e.static for e in problem.experiments) or any(e.scene.compiled.contacts for e in problem.experiments):
+    if all(e.static for e in problem.experiments):
+        return {}
+    found = held_losses(problem, u)
+    found |= {name: words for name, words in _by_other_integrator(problem, u, fitted).items() if name not in found}
+    return found or absent_damping(*fitted)
+
+
+def _by_other_integrator(problem: FitProblem, u: Array, fitted: tuple[FitProblem, Array]) -> dict[str, str]:
+    if any(e.scene.compiled.contacts for e in problem.experiments):
         return {}
     ok, r, J = problem.evaluate(u)
     change = of_more_loss(*fitted)
     if not ok or not np.isfinite(J).all() or change is None:
         return {}
-    layout, groups = problem.rows_layout(), _tied(problem)
+    layout, groups = problem.rows_layout(), tied(problem)
     taken = sum(map(problem.core.absorbed, range(len(problem.experiments))))
     found: dict[str, str] = {}
     for group in groups:
-        mine = _rows_of(problem, group)
+        mine = rows_of(problem, group)
         asked = asked_for(r, J, np.where(mine, change, 0.0), mine, layout, taken)
         if asked is not None and asked.explained > EXPLAINS and asked.chance < LEVEL / len(groups):
             words = _words([problem.experiments[i].name for i in group], asked)
             found |= {name: words for i in group for name in problem.acting_on(problem.experiments[i])}
     return found
-
-
-def asked_for(r: Array, J: Array, column: Array, mine: Array, layout: Layout, taken: float = 0.0) -> Asked | None:
-    """How much of a column residuals ask for beside the parameters; None where these replace it, or leave but noise.
-
-    Args:
-        r: (rows + others,) residuals of the data, then those of priors, as those of corrections.
-        J: (rows + others, p) their derivative.
-        column: (rows + others,) what a loss changes.
-        mine: (rows + others,) bool, those of the motions in question.
-        layout: of the data's rows.
-        taken: degrees of freedom of the data's residuals that corrections took.
-    """
-    rows = len(layout.frame)
-    q, sizes, _ = np.linalg.svd(J / np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny), full_matrices=False)
-    q = q[:, sizes > RANK_TOLERANCE * sizes.max(initial=0.0)]
-    beside = column - q @ (q.T @ column)
-    inner = float(beside @ beside)
-    left = float(r[mine] @ r[mine]) - _noise(r[:rows], layout, mine[:rows])
-    if not inner > RANK_TOLERANCE * float(column @ column) or not left > 0.0 or rows - taken <= q.shape[1] + 1:
-        return None
-    more = -float(beside @ r) / inner
-    after = r + more * beside
-    spread = covariance(after[:rows], beside[:rows, None], layout, beside[rows:, None], taken + q.shape[1])
-    variance = short_of_frames(spread, int(np.ptp(layout.frame)) + 1) * float(spread.matrix[0, 0])
-    score = abs(more) / math.sqrt(max(variance, np.finfo(float).tiny))
-    degrees = max(float(spread.degrees[0]), 1.0)
-    chance = 2.0 * float(require("scipy.special", "fit").stdtr(degrees, -score))
-    return Asked(more, more**2 * inner / left, chance)
 
 
 def of_more_loss(problem: FitProblem, u: Array) -> Array | None:
@@ -125,41 +82,9 @@ def of_more_loss(problem: FitProblem, u: Array) -> Array | None:
     change = np.zeros(len(r))
     for i, e in enumerate(problem.experiments):
         per = (1.0 if e.solver.integrator == "bdf2" else -1.0) / e.solver.h
-        mine = _rows_of(problem, [i])
+        mine = rows_of(problem, [i])
         change[mine] = per * (there - r)[mine]
     return change
-
-
-def _rows_of(problem: FitProblem, experiments: Sequence[int]) -> Array:
-    """(rows,) bool, the data of some experiments, and what their corrections leave."""
-    first, corrections = problem.core.first_rows, problem.correction_rows
-    mine = np.zeros(problem.core.rows, dtype=bool)
-    for i in experiments:
-        mine[first[i] : first[i + 1]] = True
-        mine[corrections.get(i, slice(0))] = True
-    return mine
-
-
-def _tied(problem: FitProblem) -> list[list[int]]:
-    """The motions, by their places, in groups that share no parameter. A loss that is missing is missing in all of a
-    group: where one motion asks for more and another for less, none is."""
-    groups: list[tuple[list[int], set[str]]] = []
-    for i, e in enumerate(problem.experiments):
-        if e.static:
-            continue
-        mine, names = [i], set(problem.acting_on(e))
-        tied = [g for g in groups if g[1] & names]
-        groups = [g for g in groups if not g[1] & names]
-        for others, theirs in tied:
-            mine, names = others + mine, names | theirs
-        groups.append((sorted(mine), names))
-    return [group for group, _ in groups]
-
-
-def _noise(r: Array, layout: Layout, mine: Array) -> float:
-    """Sum of squares of the white noise in some residuals, each recording's apart."""
-    counts = np.bincount(layout.recording[mine])
-    return sum(float(counts[i]) * white_noise(r, layout, i) for i in np.flatnonzero(counts).tolist())
 
 
 def _words(names: list[str], asked: Asked) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from ..doubts.beginnings import Beginning, checked, of_beginnings
 from ..doubts.conclude import judged_parameters, misfit, warnings_of, without_verdict
 from ..doubts.contradictions import between_parts, doubtful, elsewhere, held_out_motion, together
-from ..doubts.driven_noise import doubts
+from ..doubts.driven_noise import driven_doubts
 from ..doubts.floors import at_floor_of_sweeps
 from ..doubts.given import check_given, half_widths, premises
 from ..doubts.leave_one_out import MEANING, companions, each_left_out
@@ -225,8 +225,9 @@ def fit(
             parts = of_beginnings(problem, best.u, judged, begun, refinement)
             parts |= between_parts(at.problem, at.u, judged, refinement)
             if not lost:
-                parts = together(missing_loss(at.problem, at.u, (problem, best.u)), parts)
-                doubted = doubts(at.problem, at.u, judged) + loss_doubts(at.problem, at.u, judged)
+                doubted, drawn_off = driven_doubts(at.problem, at.u, judged)
+                doubted += loss_doubts(at.problem, at.u, judged)
+                parts = together(missing_loss(at.problem, at.u, (problem, best.u)), drawn_off, parts)
         return _Conclusion(at, tuple(every), judged, lower, *predicted, doubted + unknown, rests_on, parts)
 
     left_out: dict[str, Comparison] = {}

@@ -101,5 +101,6 @@ def _moved(parameters: Parameters, e: Estimate, start: Array, end: Array) -> Est
         statistical=None if e.statistical is None else e.statistical * factor,
         discretization=e.discretization * factor,
         systematic=e.systematic * factor,
+        driven=e.driven * factor,
         moved=e.moved + value - e.value,
     )

@@ -128,6 +128,7 @@ class HandEye:
                 "drive.particles", "are clamped ends, which a tool would have to turn", which.tolist(), fix
             )
         scene.drive(which, times, motion)
+        scene.boundary.posed.update(which.tolist())
         shifts = ~np.broadcast_to(np.asarray(vectors, dtype=bool), which.shape)
         arm = motion - np.where(shifts[:, None], self.about, 0.0)
         for factors, coefficients in self._moves(scene, arm, shifts):

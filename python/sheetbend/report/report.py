@@ -154,18 +154,21 @@ def _interval_parts(result: FitData) -> Section:
     rows = []
     counted = any(e.systematic > 0 for e in result.estimates)
     moved = any(e.moved != 0 for e in result.estimates)
+    shaken = any(e.driven > 0 for e in result.estimates)
     for e in result.estimates:
-        if e.discretization + e.systematic > 0 and e.half_width is not None:
-            parts = (e.half_width, e.statistical, e.discretization, *([e.systematic] if counted else []))
-            parts += (e.moved,) if moved else ()
+        if e.discretization + e.systematic + e.driven > 0 and e.half_width is not None:
+            parts = (e.half_width, e.statistical, *([e.driven] if shaken else []), e.discretization)
+            parts += (*([e.systematic] if counted else []), *([e.moved] if moved else []))
             rows.append((e.name, *figures(parts, e.half_width), e.unit))
     more = (["systematic"] if counted else []) + (["value moved by"] if moved else [])
-    headers = ("parameter", "+/-", "statistical", "discretization", *more, "unit")
+    driven = ["driven noise"] if shaken else []
+    headers = ("parameter", "+/-", "statistical", *driven, "discretization", *more, "unit")
     meshes = " and of fine meshes" if any(refit.left for refit in result.refits) else ""
     note = f"values are moved to the limit of short substeps{meshes}, and what that leaves open is counted"
-    return Section(
-        "Where the intervals come from", headers, tuple(rows), (("discretization", note),) if moved and rows else ()
-    )
+    notes = [("discretization", note)] if moved and rows else []
+    if shaken and rows:
+        notes.insert(0, ("driven noise", "of what drives the scenes; adds to the statistical part as squares do"))
+    return Section("Where the intervals come from", headers, tuple(rows), tuple(notes))
 
 
 def _refits(result: FitData) -> Section:

@@ -30,6 +30,8 @@ class Estimate:
         lower, upper: 95 % interval, all parts together; None where it is open.
         half_width: half of it, None where it is open.
         statistical: half-width from the residuals alone, None where it is open.
+        driven: half-width from noise of what drives the scenes, to first order; its square and that of `statistical`
+            add up. 0 without such noise.
         discretization: half-width of what the time step, the mesh and sweeps leave open, see `FitResult.refits`; 0 when
             that was not measured.
         systematic: half-width of what else the interval counts; 0 when nothing.
@@ -51,6 +53,7 @@ class Estimate:
     words: str
     systematic: float = 0.0
     moved: float = 0.0
+    driven: float = 0.0
 
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:

@@ -40,6 +40,7 @@ class Boundary:
         times: (knots,) s.
         interpolation: "cubic" or "linear".
         following: those of the driven particles that move with recorded markers.
+        posed: driven particles that move with the poses of a robot's tool, which no marker measured.
     """
 
     def __init__(self) -> None:
@@ -47,6 +48,7 @@ class Boundary:
         self.times: Array = np.zeros(0)
         self.interpolation = "cubic"
         self.following: list[Following] = []
+        self.posed: set[int] = set()
         self._values: list[Array] = []
         self._terms: list[tuple[Array, Array, dict[str, str]]] = []
 

@@ -27,6 +27,7 @@ from ..arrays.timeseries import Array
 from ..optional import require
 from .covariance import Covariance, Integers, Layout, covariance
 from .gauge import RANK_TOLERANCE, null_space
+from .shared_errors import variance_of
 
 LEVEL = 0.01
 """Chance that a right model is contradicted, whatever the number of splits."""
@@ -168,8 +169,7 @@ def _compared(
     V = short_of_frames(spread, int(np.ptp(layout.frame)) + 1) * spread.matrix
     degrees = max(float(np.median((spread.degrees / (2 - 1 / spread.inflation))[compared])), 1.0)
     if drawn.any():
-        off = moved_by(every[:, used], drawn)
-        V, degrees = V + off @ off.T / drawn.shape[1], min(degrees, float(drawn.shape[1]))
+        V, degrees = V + variance_of(every[:, used], drawn), min(degrees, float(drawn.shape[1]))
     sd = np.sqrt(np.diag(V))
     values, turn = np.linalg.eigh((V / np.outer(sd, sd))[np.ix_(compared, compared)])
     told = values > _FLAT * values[-1]
@@ -189,18 +189,6 @@ def _compared(
 def short_of_frames(spread: Covariance, frames: int) -> float:
     """Factor of variances that few frames, many of them alike, make too small."""
     return float((1 + _SHORT * (spread.autocorrelation_time - 1) / frames) ** 2)
-
-
-def moved_by(jacobian: Array, errors: Array) -> Array:
-    """(p, draws) by which errors (rows, draws) of the residuals move the least-squares estimate, to first order.
-
-    Args:
-        jacobian: (rows + others, p), the rows of priors last; of these errors are zero.
-    """
-    size = np.linalg.norm(jacobian, axis=0)
-    full = np.zeros((len(jacobian), errors.shape[1]))
-    full[: len(errors)] = errors
-    return np.asarray(-np.linalg.lstsq(jacobian / size, full, rcond=None)[0] / size[:, None])
 
 
 def _independent(every: Array) -> list[int]:

@@ -56,6 +56,7 @@ def identify(
     profile: Callable[[str, float], float] | None = None,
     path: Callable[[str, float, float], tuple[float, float]] | None = None,
     nuisance: Nuisance | None = None,
+    errors: Array | None = None,
     rank_tolerance: float = RANK_TOLERANCE,
 ) -> Identifiability:
     """Judge every free parameter of a finished fit.
@@ -75,6 +76,8 @@ def identify(
             estimate at which the profile has risen so far; that half-width on both sides where the cost confirms it,
             infinite on a side where it never rises so far, NaN on one that is left to `profile`.
         nuisance: what unknowns left that were solved for at every point.
+        errors: (rows, draws) random draws of errors of the residuals that are alike in all of the data, such as noise
+            of what drives a scene makes.
         rank_tolerance: see `gauge.RANK_TOLERANCE`.
 
     Raises:
@@ -84,7 +87,8 @@ def identify(
     floors, discretization, systematic = floors or {}, discretization or {}, systematic or {}
     _check(parameters, internal, residuals, jacobian, {*floors, *discretization, *systematic})
     nuisance = nuisance or Nuisance(np.zeros((0, len(parameters.free))), 0.0)
-    judge = Judge(parameters, internal, residuals, jacobian, layout, rank_tolerance, profile, path, nuisance)
+    errors = np.zeros((len(residuals), 0)) if errors is None else errors
+    judge = Judge(parameters, internal, residuals, jacobian, layout, rank_tolerance, profile, path, nuisance, errors)
     estimates = tuple(
         judge.estimate(column, floors.get(name), (discretization.get(name, 0.0), systematic.get(name, 0.0)))
         for column, name in enumerate(parameters.free)

@@ -14,7 +14,7 @@ from ..optional import require
 from ..quantities.parameters import Parameter, Parameters
 from ..quantities.wording import figures, floor_words, quantity, ran_off_words, side_words
 from ..result.result import Correlation, Estimate
-from .covariance import Layout, covariance
+from .covariance import Covariance, Layout, covariance
 from .gauge import Gauge, null_space
 from .intervals import (
     at_far_limit,
@@ -29,6 +29,7 @@ from .intervals import (
     widened,
 )
 from .profile import FARTHEST, Ends, profile_interval
+from .shared_errors import variance_of, with_shared
 
 LEVEL = 0.95
 _AT_BOUND = 1e-6
@@ -79,6 +80,7 @@ class Judge:
         profile: Callable[[str, float], float] | None,
         path: Callable[[str, float, float], tuple[float, float]] | None,
         nuisance: Nuisance,
+        errors: Array,
     ) -> None:
         self.parameters, self.internal, self.profile, self.path = parameters, internal, profile, path
         self.quantile = require("scipy.special", "fit").stdtrit
@@ -96,15 +98,22 @@ class Judge:
         unique = [column for column in range(len(names)) if column not in self.space.pivots]
         # A parameter at its bound stays there for the others; its own interval lets all of them move.
         self.columns = [column for column in unique if not bounded[column]]
-        self.spread = covariance(residuals, jacobian[:, self.columns], layout, prior[:, self.columns], nuisance.taken)
+
+        def spread_of(columns: list[int]) -> tuple[Covariance, Array]:
+            """The covariance of some parameters, and the part of it that known errors make."""
+            own = covariance(residuals, jacobian[:, columns], layout, prior[:, columns], nuisance.taken)
+            more = variance_of(self.rows[:, columns], errors)
+            return with_shared(own, more, errors.shape[1]), more
+
+        self.spread, self.driven = spread_of(self.columns)
         # Half-widths that the data would leave with all other parameters known and without priors.
         size = np.maximum(np.linalg.norm(data, axis=0), np.finfo(float).tiny)
         with np.errstate(over="ignore"):  # infinite where the data do not depend on it
             self.alone = 2 * math.sqrt(self.spread.residual_variance) / size
-        self.wide_columns, self.wide = self.columns, self.spread
+        self.wide_columns, self.wide, self.wide_driven = self.columns, self.spread, self.driven
         if len(self.columns) < len(unique):
             self.wide_columns = unique
-            self.wide = covariance(residuals, jacobian[:, unique], layout, prior[:, unique], nuisance.taken)
+            self.wide, self.wide_driven = spread_of(unique)
         self.space = replace(self.space, gauges=tuple(self._measured(gauge) for gauge in self.space.gauges))
 
     def estimate(self, column: int, floor: Floor | None, more: tuple[float, float]) -> Estimate:
@@ -121,8 +130,11 @@ class Judge:
             left = quantity(alone, parameter)
             words = f"the data hardly depend on it: they would leave it open to {left} if all others were known"
             return open_estimate(parameter, value, words, more)
-        columns, spread = (self.columns, self.spread) if column in self.columns else (self.wide_columns, self.wide)
+        near = column in self.columns
+        columns, spread = (self.columns, self.spread) if near else (self.wide_columns, self.wide)
         index = columns.index(column)
+        known_part, whole = (self.driven if near else self.wide_driven)[index, index], spread.matrix[index, index]
+        shaken = min(float(known_part / whole), 1.0) if whole > 0 else 0.0  # of the variance
         t = float(self.quantile(spread.degrees[index], 0.5 + LEVEL / 2))
         reach = t * math.sqrt(spread.matrix[index, index])
         if reach <= _ROUNDING * max(abs(self.internal[column]), 1.0) and spread.residual_variance > 1:
@@ -138,7 +150,7 @@ class Judge:
             if rise > 0:
                 ends, diverged = _with_answers(self._profiled(column, self.profile, reach, rise), ends)
                 note += diverged
-        return self._judged(column, parameter, value, ends, more, floor, note)
+        return self._judged(column, parameter, value, ends, more, floor, note, shaken)
 
     def _judged(
         self,
@@ -149,13 +161,14 @@ class Judge:
         more: tuple[float, float],
         floor: Floor | None,
         note: str,
+        shaken: float,
     ) -> Estimate:
         if ends == (None, None):
             words = "the cost stays level on both sides: the data hardly depend on it"
             words = ran_off_words(parameter, value) if ran_off(parameter, value) else words
             return open_estimate(parameter, value, words + note, more)
         lower, upper = widened(parameter, value, ends, sum(more))
-        half = half_width((lower, upper))
+        half, own = half_width((lower, upper)), half_width(ends)
         if floor is not None and (value >= floor.value if floor.ceiling else value <= floor.value):
             verdict, words = "at its floor", floor_words(parameter, floor.value, floor.ceiling, floor.reason)
         elif at_far_limit(parameter, value):
@@ -176,9 +189,10 @@ class Judge:
             lower=lower,
             upper=upper,
             half_width=half,
-            statistical=half_width(ends),
+            statistical=None if own is None else own * math.sqrt(1.0 - shaken),
             discretization=float(more[0]),
             systematic=float(more[1]),
+            driven=0.0 if own is None else own * math.sqrt(shaken),
             verdict=verdict,
             words=words,
         )

@@ -1,0 +1,100 @@
+"""Whether a loss that the model was given has another size.
+
+A fit takes a damping or a drag as given that is too large or too small, and makes up for it with other parameters. The
+derivative of the residuals with respect to the logarithm of that loss is the direction in which they would move: where
+what the fit leaves lies along it, the loss is wrong (a score test; Rao 1948, Mathematical Proceedings of the Cambridge
+Philosophical Society 44, 50).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays.timeseries import Array
+from ..minimum.problem import FitProblem, quantities_of
+from ..quantities.parameters import Parameter, Parameters
+from ..quantities.wording import short
+from .directions import EXPLAINS, LEVEL, Asked, asked_for, rows_of, tied
+from .losses import LOSSES
+
+
+def held_losses(problem: FitProblem, u: Array) -> dict[str, str]:
+    """By free parameter, the given loss of its motion that the residuals ask another size of. One Jacobian.
+
+    Args:
+        u: (free,) the minimum.
+    """
+    ok, r, J = problem.evaluate(u)
+    free = {problem.parameters.roots[name][0] for name in problem.parameters}
+    names = [
+        name
+        for name, q in quantities_of(problem.experiments).items()
+        if name.endswith(LOSSES) and name not in free and not problem.given.keys() & {name} and q.value > 0.0
+    ]
+    if not names or not ok or not np.isfinite(J).all():
+        return {}
+    columns = _columns(problem, u, names)
+    layout, groups = problem.rows_layout(), tied(problem)
+    taken = sum(map(problem.core.absorbed, range(len(problem.experiments))))
+    found: dict[str, str] = {}
+    for group in groups:
+        mine = rows_of(problem, group)
+        asked = {name: asked_for(r, J, np.where(mine, g, 0.0), mine, layout, taken) for name, g in columns.items()}
+        told = {
+            name: one
+            for name, one in asked.items()
+            if one is not None and one.explained > EXPLAINS and one.chance < LEVEL / (len(groups) * len(names))
+        }
+        if told:
+            name = max(told, key=lambda name: told[name].explained)
+            words = _words(name, told[name])
+            found |= {other: words for i in group for other in problem.acting_on(problem.experiments[i])}
+    return found
+
+
+def _columns(problem: FitProblem, u: Array, names: Sequence[str]) -> dict[str, Array]:
+    """By name of a loss, (rows,) the derivative of the residuals with respect to its logarithm, in all experiments that
+    have it."""
+    values = problem.parameters.to_physical(u)
+    held = [
+        p if p.tied_to is not None else replace(p, fixed=True, initial=values[name], prior=None)
+        for name, p in problem.parameters.items()
+    ]
+    units = {name: q.unit for name, q in quantities_of(problem.experiments).items()}
+    freed = [
+        Parameter(name=f"{name}[{e.name}]", initial=e.scene.quantities[name].value, log=True, unit=units[name])
+        for name in names
+        for e in problem.experiments
+        if name in e.scene.quantities and e.scene.quantities[name].value > 0.0
+    ]
+    private = [Parameter(name=name, private=True, log=True, unit=units[name]) for name in names]
+    with_losses = FitProblem(
+        problem.experiments,
+        Parameters([*problem.given.values(), *private]),
+        problem.recordings,
+        problem.threads,
+        Parameters([*held, *freed]),
+    )
+    _, _, J = with_losses.evaluate(with_losses.parameters.initial())
+    columns = dict(zip(with_losses.parameters.free, J.T, strict=True))
+    rows = problem.core.rows
+    data = problem.core.data_rows
+    found = {}
+    for name in names:
+        own = sum(c for key, c in columns.items() if key.startswith(f"{name}["))
+        full = np.zeros(rows)
+        full[:data] = own[:data]
+        full[rows - (len(own) - data) :] = own[data:]  # of corrections; the held parameters' priors have no rows
+        found[name] = full
+    return found
+
+
+def _words(name: str, asked: Asked) -> str:
+    part = f"{short(100 * min(asked.explained, 1.0), 2)} % of what the fit leaves"
+    return (
+        f"the given {name} is too {'small' if asked.more > 0.0 else 'large'}: "
+        f"{'more' if asked.more > 0.0 else 'less'} of it would explain {part}. Free it, or measure it"
+    )
