@@ -201,7 +201,7 @@ def _study(config: Config, source: Path, start: Path | None) -> Study:
 
 
 def _check_starts(config: Config, problem: FitProblem) -> None:
-    for i, start in enumerate(config.fit.starts):
+    for i, start in enumerate([] if isinstance(config.fit.starts, int) else config.fit.starts):
         for name in start:
             if name not in problem.parameters.free:
                 raise ConfigError(

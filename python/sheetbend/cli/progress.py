@@ -41,14 +41,23 @@ class Iterations:
             self.console.print(line, soft_wrap=True)
 
     def _line(self, progress: Progress) -> Text:
+        if progress.condition is not None:
+            over = "" if progress.window is None else f" (over the first {progress.window:.3g} s)"
+            return Text(f"at the start: {progress.condition.words}{over}")
         values = self.parameters.to_physical(progress.u)
         shown = self.parameters.free[:SHOWN]
         parts = [f"{name} {values[name]:.4g} {self.parameters[name].unit}".rstrip() for name in shown]
         more = len(self.parameters.free) - len(shown)
         line = Text.assemble(
             "" if progress.window is None else (f"first {progress.window:g} s  ", "dim"),
-            (f"iteration {progress.iteration:3d}", "bold"),
+            (_turn(progress), "bold"),
             f"  cost {progress.cost:.6g}  ",
             ("  ".join(parts), "cyan"),
         )
         return line.append(f"  and {more} more", style="dim") if more else line
+
+
+def _turn(progress: Progress) -> str:
+    if progress.start is None:
+        return f"iteration {progress.iteration:3d}"
+    return f"start {progress.start[0]:3d} of {progress.start[1]}"

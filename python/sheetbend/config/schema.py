@@ -185,7 +185,11 @@ class FitSection(Section):
     """[fit]: how the fit runs."""
 
     optimizer: Literal["auto", "ceres", "scipy"] = key("auto", "Ceres where it was built, else SciPy")
-    starts: list[dict[str, Finite]] = key([], "further starting values by name; the best end wins")
+    starts: list[dict[str, Finite]] | int = key(
+        [],
+        "further starting values by name; the best end wins. Or how many starts: the initial one and others over the "
+        "priors, between bounds, or over two decades; all are raced through the windows, one of each group is fitted",
+    )
     windows: Literal["auto"] | list[Finite] = key(
         "auto",
         "increasing lengths: so much of every motion from its start on is fitted first, one after another; auto "

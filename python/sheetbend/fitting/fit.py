@@ -32,7 +32,7 @@ from ..experiment.experiment import Experiment
 from ..minimum.counts import counted
 from ..minimum.discretization import Refinement, settled, to_the_limit, wanted_refinement
 from ..minimum.fine_meshes import at_the_limit
-from ..minimum.growth import Growth, growths
+from ..minimum.growth import growths
 from ..minimum.journal import journaled
 from ..minimum.optimizers import Observer, ceres_trouble
 from ..minimum.problem import FitProblem, ParameterLike, as_parameters
@@ -42,9 +42,10 @@ from ..optional import require
 from ..quantities.parameters import Parameter, Parameters
 from ..recording.recording import Recording
 from ..report.fit_result import FitResult
-from ..result.result import Estimate, Given, MotionGrowth, Premise, RecordingFit, Start
+from ..result.result import Estimate, Given, Premise
 from ..scene.scene import Scene
 from ..statistics.identifiability import Identifiability
+from .rows import every_end, given_rows, growth_rows, recording_fit, start_rows
 
 Systematic = Callable[[FitProblem, np.ndarray], Mapping[str, float]]
 
@@ -107,7 +108,7 @@ def fit(
     parameters: Mapping[str, ParameterLike] | Iterable[str | Parameter] = (),
     *,
     optimizer: str = "auto",
-    starts: Sequence[Mapping[str, float]] = (),
+    starts: Sequence[Mapping[str, float]] | int = (),
     windows: Sequence[float] | str = "auto",
     tolerance: float = 1e-10,
     refine: Refinement | str | bool | None = "auto",
@@ -128,7 +129,11 @@ def fit(
         scene: a scene with its `recording` (and any field of `Experiment` as keyword), or one or several experiments.
         parameters: what to fit: names of quantities, `Parameter`s, or a mapping from name to fields of `Parameter`.
         optimizer: "ceres", "scipy", or "auto" (Ceres where it was built).
-        starts: further starting values by name; the best end wins, all are reported.
+        starts: further starting values by name; the best end wins, all are reported. Or a number of starts: the initial
+            one and others from a Sobol sequence, over the priors, between bounds, or two decades about the initial
+            value. They are raced through the windows with a loose tolerance, and the best of each group that ends in
+            the same minimum is fitted (`sheetbend.minimum.race`). A start at a bound is moved off it by 5 % of the
+            range.
         windows: s, increasing: so much of every motion from its scene's start on is fitted first, one after another,
             each from where the one before ended. "auto" chooses the lengths, and none where the first step on the whole
             motion keeps what it promises; () for none.
@@ -243,7 +248,7 @@ def fit(
     comparisons = compare(end.experiments, wanted, end.values, threads, corrected)
     rows = problem.core.first_rows
     count = {e.name: rows[i + 1] - rows[i] for i, e in enumerate(fitted)}
-    errors = tuple(_errors(c, count, left_out, corrected) for c in comparisons)
+    errors = tuple(recording_fit(c, count, left_out, corrected) for c in comparisons)
     starts_elsewhere = [
         Elsewhere(m.cost - best.cost, problem.parameters.to_physical(m.u), "another start") for m in ends[1:]
     ]
@@ -259,6 +264,7 @@ def fit(
     values = end.values | problem.parameters.to_physical(limit)
     errors = told_clocks(errors, end.experiments, end.values, estimates)
     shifted = tuple(outside(end.experiments, end.values))
+    each = every_end(ends, found.raced)
     evaluations, jacobians = sum(m.evaluations for m in ends), sum(m.jacobians for m in ends)
     result = FitResult(
         estimates=estimates,
@@ -273,7 +279,7 @@ def fit(
         converged=best.converged,
         interrupted=interrupted,
         message=best.message,
-        given=_given(problem.parameters, values) + end.given,
+        given=given_rows(problem.parameters, values) + end.given,
         correlations=judged.correlations,
         gauges=tuple(g.words for g in judged.gauges),
         baseline="; ".join(
@@ -281,28 +287,21 @@ def fit(
         ),
         held_out_is=MEANING if left_out else "",
         autocorrelation_time=judged.autocorrelation_time,
-        starts=tuple(
-            Start(
-                cost=m.cost if np.isfinite(m.cost) else None,
-                iterations=m.iterations,
-                converged=m.converged,
-                values=problem.parameters.to_physical(m.u),
-            )
-            for m in ends
-        ),
+        starts=start_rows(each, problem.parameters),
+        condition=None if found.condition is None else found.condition.words,
         refits=at.refits,
         not_counted=at.not_counted,
         premises=end.premises,
         misfit=misfit(at.problem, at.u),
         forces=tuple(row for c in comparisons for one in c.forces for row in one.fits()),
-        growth=_growth(found.growths, grown),
+        growth=growth_rows(found.growths, grown),
         contacts=what_touches(at.problem, at.u),
         kinks=() if interrupted else kinks(at.problem, at.u, estimates),
         windows=best.windows,
         evaluations=evaluations,
         jacobians=jacobians,
         judging=(counted()[0] - before[0] - evaluations, counted()[1] - before[1] - jacobians),
-        warnings=warnings_of(ends, interrupted, problem, estimates, ahead)
+        warnings=warnings_of([m for m, _ in each], interrupted, problem, estimates, ahead)
         + end.doubts
         + at.warnings
         + shifted
@@ -351,49 +350,3 @@ def _experiments(
 def _moved(judged: Identifiability, by: Mapping[str, float]) -> Identifiability:
     """With how far each estimate was moved to the limit of short substeps."""
     return replace(judged, estimates=tuple(replace(e, moved=by.get(e.name, 0.0)) for e in judged.estimates))
-
-
-def _errors(
-    c: Comparison, rows: Mapping[str, int], left_out: Mapping[str, Comparison], corrected: Mapping[str, np.ndarray]
-) -> RecordingFit:
-    found = c.errors(rows.get(c.experiment.name, 0))
-    if c.experiment.name in corrected:
-        by = float(np.sqrt(np.mean(corrected[c.experiment.name] ** 2)))
-        found = replace(found, driven_sigma=c.experiment.driven_noise, corrected_by=by)
-    if c.experiment.name not in left_out:
-        return found
-    other = left_out[c.experiment.name].errors(0)
-    return replace(
-        other, rows=found.rows, rms=found.rms, driven_sigma=found.driven_sigma, corrected_by=found.corrected_by
-    )
-
-
-def _growth(start: Sequence[Growth], end: Sequence[Growth]) -> tuple[MotionGrowth, ...]:
-    return tuple(
-        MotionGrowth(
-            name=first.name,
-            largest=(_finite(first.largest), _finite(last.largest)),
-            rate=(first.rate, last.rate),
-            until=(first.until, last.until),
-        )
-        for first, last in zip(start, end, strict=True)
-    )
-
-
-def _finite(number: float) -> float | None:
-    return number if np.isfinite(number) else None
-
-
-def _given(parameters: Parameters, values: Mapping[str, float]) -> tuple[Given, ...]:
-    rows = []
-    for name, p in parameters.items():
-        if not p.free:
-            words = (
-                "fixed"
-                if p.tied_to is None
-                else f"{p.factor:g} times {p.tied_to}"
-                if p.factor != 1.0
-                else f"equal to {p.tied_to}"
-            )
-            rows.append(Given(name=name, value=values[name], unit=p.unit, words=words))
-    return tuple(rows)

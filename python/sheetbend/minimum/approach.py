@@ -80,6 +80,11 @@ class Approach:
         cost = 0.5 * float(r @ r) if ok else math.inf
         return (cost, r, J if jacobian else None) if math.isfinite(cost) else (math.inf, r, None)
 
+    @property
+    def jacobian(self) -> Array | None:
+        """(rows, free) where it is, if it was made there."""
+        return self._J
+
     def step(self) -> bool:
         """Go to a lower cost; False where no step inside the limits promises or gives one."""
         if self._J is None:

@@ -17,6 +17,7 @@ from ..optional import require
 from ..quantities.wording import short
 from ..statistics.gauge import RANK_TOLERANCE
 from .approach import step_limits
+from .conditioning import Condition
 from .counts import count, counted
 from .problem import FitProblem
 
@@ -29,19 +30,22 @@ ROUNDING = 1e-12  # of the first cost: residuals of data without noise end as ro
 @dataclass(frozen=True)
 class Progress:
     """One iteration: its number, the cost (half the sum of squares), the internal point, and the length [s] of the
-    window that is fitted first, if one is."""
+    window that is fitted first, if one is. Before the first step it has the number 0 and the condition there; while
+    many starts are raced it is the end of one of them, (its number, of how many)."""
 
     iteration: int
     cost: float
     u: np.ndarray
     window: float | None = None
+    condition: Condition | None = None
+    start: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)
 class Minimum:
     """Where an optimizer ended; `interrupted` by Ctrl-C, with its best so far. `first` is the cost where it began,
     `doubt` says what speaks against its being a minimum. `evaluations` simulated all experiments, `jacobians` of these
-    with derivatives; `windows` [s] were fitted before."""
+    with derivatives; `windows` [s] were fitted before. `group` is the number of the raced starts that it speaks for."""
 
     u: np.ndarray
     cost: float
@@ -54,6 +58,7 @@ class Minimum:
     doubt: str = ""
     jacobians: int = 0
     windows: tuple[float, ...] = ()
+    group: int = 0
 
 
 Observer = Callable[[Progress], None]

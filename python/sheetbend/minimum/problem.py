@@ -102,7 +102,7 @@ class FitProblem:
     ) -> None:
         """With `corrected`, by experiment (knots, markers, 3) m, no experiment estimates a correction of its own."""
         self.experiments = tuple(experiments)
-        self.given, self.threads = parameters, threads
+        self.given, self.threads, self._corrected = parameters, threads, corrected
         self._last: tuple[np.ndarray, tuple[bool, np.ndarray, np.ndarray]] | None = None
         self.seconds: dict[bool, float] = {}
         self.recordings = tuple(recordings if recordings is not None else (e.fitted() for e in experiments))
@@ -121,6 +121,11 @@ class FitProblem:
             raise refusal(error, InputError, [len(r.times) for r in self.recordings]) from error
         scenes = [e.scene for e in self.experiments]
         self.evaluator = Evaluator(self.core, lambda: content.of_problem(scenes, cores, theta, slots, free))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Made again from what it was made from."""
+        made_from = (self.experiments, self.given, self.recordings, self.threads, self.parameters, self._corrected)
+        return FitProblem, made_from
 
     def known(self, u: np.ndarray) -> tuple[np.ndarray, list[list[int]], dict[int, tuple[str, float]]]:
         """All values at u, where each experiment's quantities are among them, and by place the parameter that is there:

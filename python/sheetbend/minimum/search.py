@@ -1,6 +1,7 @@
 """How a fit finds its minimum: from every start, through short windows first where they help (`windows`), by steps that
 are limited for each parameter (`approach`), and by Ceres or SciPy once it is near.
 
+Of many starts (`starts = 32`) all are raced through the windows first, and the best of each group goes on (`race`).
 Corrections of driven markers come last: far from the minimum they would explain away what the parameters have to.
 """
 
@@ -14,18 +15,18 @@ import numpy as np
 
 from ..errors import InputError, SheetbendError
 from .approach import Approach, Tally
+from .conditioning import Condition
 from .growth import Growth, growths
 from .optimizers import Minimum, Observer, Progress, judged, minimize, named
 from .problem import FitProblem
-from .windows import chosen, cut, holds_frames
+from .race import Course, Raced, race
+from .starts import drawn, off_bounds
+from .windows import STEPS, TOLERANCE, along, chosen, cut
 
 AUTO = "auto"
-WINDOW_TOLERANCE = 1e-2  # of the cost: a window's minimum is only a start
-WINDOW_STEPS = 40
 NEAR_TOLERANCE = 1e-3  # of the cost: what is left is for the optimizer
 MUCH, DONE = 0.25, 1e-3  # of the cost: what a first step promises where the start is near, and at the minimum
 NOISE = 2.0  # sigmas: a start whose residuals are no larger is near, too
-BACK = 0.1  # of the length: where windows so little longer diverge, there is no way on
 
 
 @dataclass(frozen=True)
@@ -37,12 +38,16 @@ class Found:
         optimizer: name of the one that ended the search.
         interrupted: whether Ctrl-C did.
         growths: of the motions at the first start.
+        condition: of the Jacobian at the first start; None where the motion diverges there.
+        raced: the starts that were raced, in their order; `ends` are then one for each of their groups.
     """
 
     ends: tuple[Minimum, ...]
     optimizer: str
     interrupted: bool
     growths: tuple[Growth, ...]
+    condition: Condition | None = None
+    raced: tuple[Raced, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -50,7 +55,7 @@ class Search:
     """What `fit` was asked for, see there."""
 
     optimizer: str = "auto"
-    starts: Sequence[Mapping[str, float]] = ()
+    starts: Sequence[Mapping[str, float]] | int = ()
     windows: Sequence[float] | str = AUTO
     max_iterations: int = 200
     tolerance: float = 1e-10
@@ -80,26 +85,63 @@ class Search:
         points = self._points(problem)
         for length in () if self.windows == AUTO else self.windows:
             cut(problem, float(length))
-        ends: list[Minimum] = []
-        began: tuple[Growth, ...] = ()
-        for u in points:
-            way = _Way(self, problem, name)
+        if isinstance(self.starts, int) and len(points) > 1:
+            return self._raced(problem, name, points)
+        return self._searched([_Way(self, problem, name, u) for u in points])
+
+    def _searched(self, ways: Sequence[_Way]) -> Found:
+        """One way after the other to its end."""
+        name, ends, began = ways[0].optimizer, list[Minimum](), tuple[Growth, ...]()
+        for way in ways:
             try:
-                grown = growths(problem, u) if not ends or self.windows == AUTO else ()
+                grown = growths(way.problem, way.start) if not ends or self.windows == AUTO else ()
                 began = began or grown
-                ends.append(way.end(u, grown))
+                ends.append(way.end(grown))
             except KeyboardInterrupt:
                 end = way.interrupted()
                 if end is None and not ends:  # before the first point of the first start
                     raise
-                return Found(_best_first(ends if end is None else [*ends, end]), name, True, began)
+                return Found(_best_first(ends if end is None else [*ends, end]), name, True, began, ways[0].condition)
             except SheetbendError as error:
-                ends.append(way.diverged(u, str(error)))
+                ends.append(way.diverged(str(error)))
             if ends[-1].interrupted:
-                return Found(_best_first(ends), name, True, began)
+                return Found(_best_first(ends), name, True, began, ways[0].condition)
         if not any(np.isfinite(end.cost) for end in ends):
             raise SheetbendError(ends[0].message)
-        return Found(_best_first(ends), name, False, began)
+        return Found(_best_first(ends), name, False, began, ways[0].condition)
+
+    def _raced(self, problem: FitProblem, name: str, points: Sequence[np.ndarray]) -> Found:
+        """Race all starts, and go on from the best of each group. Ctrl-C passes through as long as they race."""
+        whole = problem.uncorrected(problem.recordings) if problem.estimates_corrections else problem
+        auto = isinstance(self.windows, str)
+        course = Course(whole, chosen(problem, growths(problem, points[0])) if auto else [*map(float, self.windows)])
+        window = None if math.isinf(course.lengths[-1]) else course.lengths[-1]
+        condition = self._told(Approach(course.last, points[0]), window)
+
+        def observe(end: Raced, number: int) -> None:
+            if self.progress is not None and math.isfinite(end.cost):
+                self.progress(Progress(0, end.cost, end.u.copy(), window, start=(number, len(points))))
+
+        raced = race(course, points, observe)
+        onward = replace(self, windows=() if window is None else (window,))
+        ways = []
+        for number in range(1, 1 + max(end.group for end in raced)):
+            group = [end for end in raced if end.group == number]
+            best, first = min(group, key=lambda end: end.cost), whole.cost(group[0].first)
+            took = Tally(0, sum(end.evaluations for end in group), sum(end.jacobians for end in group))
+            ways.append(_Way(onward, problem, name, best.u, number, taken=took, first=_finite(first)))
+        if not ways:
+            raise SheetbendError(raced[0].message)
+        return replace(onward._searched(ways), condition=condition, raced=raced)
+
+    def _told(self, walk: Approach, window: float | None) -> Condition | None:
+        """The condition where a walk begins, also told to whoever follows the progress."""
+        if walk.jacobian is None:
+            return None
+        found = Condition.of(walk.jacobian, walk.problem.parameters.free, window)
+        if self.progress is not None:
+            self.progress(Progress(0, walk.cost, walk.u.copy(), window, found))
+        return found
 
     def onward(self, problem: FitProblem, u: np.ndarray) -> Minimum:
         """Search on the whole motion from a point that came out of its windows. Ctrl-C passes through.
@@ -107,9 +149,11 @@ class Search:
         Raises:
             SheetbendError: the motion has no answer there.
         """
-        return _Way(replace(self, windows=()), problem, named(self.optimizer)).end(u, ())
+        return _Way(replace(self, windows=()), problem, named(self.optimizer), u).end(())
 
     def _points(self, problem: FitProblem) -> list[np.ndarray]:
+        if isinstance(self.starts, int):
+            return [off_bounds(problem.parameters, u) for u in drawn(problem.parameters, self.starts)]
         first = problem.parameters.to_physical(problem.parameters.initial())
         points = [problem.parameters.initial()]
         for changes in self.starts:
@@ -119,17 +163,21 @@ class Search:
                     "starts", "name no free parameter", sorted(unknown), f"use: {', '.join(problem.parameters.free)}"
                 )
             points.append(problem.parameters.to_internal(first | dict(changes)))
-        return points
+        return [off_bounds(problem.parameters, u) for u in points]
 
 
 def _best_first(ends: Sequence[Minimum]) -> tuple[Minimum, ...]:
     return tuple(sorted(ends, key=lambda m: m.cost))
 
 
+def _finite(cost: float) -> float | None:
+    return cost if math.isfinite(cost) else None
+
+
 def fitted_window(part: FitProblem, u: np.ndarray, tolerance: float) -> Approach:
     """At a minimum of a window, searched from u; its cost is infinite where the window has no answer there."""
     walk = Approach(part, u)
-    while walk.iterations < WINDOW_STEPS and walk.step():
+    while walk.iterations < STEPS and walk.step():
         if walk.promised < tolerance or walk.taken < tolerance:
             break
     return walk
@@ -142,12 +190,15 @@ class _Way:
     search: Search
     problem: FitProblem
     optimizer: str
+    start: np.ndarray
+    group: int = 0  # of raced starts
     windows: list[float] = field(default_factory=list)  # s, that were fitted
     taken: Tally = field(default_factory=Tally)
     first: float | None = None  # cost of the whole motion at the start
     u: np.ndarray | None = None  # the best point of what was fitted last
+    condition: Condition | None = None  # at the start
 
-    def end(self, u: np.ndarray, grown: Sequence[Growth]) -> Minimum:
+    def end(self, grown: Sequence[Growth]) -> Minimum:
         """Raises SheetbendError where the whole motion diverges at the start and after every window."""
         most = self.search.max_iterations
         whole = (
@@ -155,16 +206,17 @@ class _Way:
         )
         given = [] if isinstance(self.search.windows, str) else [float(length) for length in self.search.windows]
         if given:
-            self._began(u, whole.cost(u))
+            self._began(self.start, whole.cost(self.start))
             self.taken.evaluations += 1
-            walk = self._through(whole, given, u)
+            walk = self._through(whole, given, self.start)
         else:
-            walk = Approach(whole, u, self.taken)
+            walk = Approach(whole, self.start, self.taken)
             self._began(walk.u, walk.cost)
+            self.condition = self.search._told(walk, None)
         if self.search.windows == AUTO:
             lengths = chosen(self.problem, grown)
             if (lengths or not np.isfinite(walk.cost)) and not self._starts_near(walk):
-                walk = self._through(whole, lengths, u)
+                walk = self._through(whole, lengths, self.start)
         if not np.isfinite(walk.cost):
             raise SheetbendError(f"the fit cannot start: {whole.failure}")
         self._walk(walk, NEAR_TOLERANCE, most - 1, None)
@@ -189,7 +241,7 @@ class _Way:
 
     def _began(self, u: np.ndarray, cost: float) -> None:
         if np.isfinite(cost):
-            self.first, self.u = cost, u
+            self.first, self.u = cost if self.first is None else self.first, u
 
     def interrupted(self) -> Minimum | None:
         """The best point so far, after Ctrl-C; None before the first, or where the whole motion diverges there."""
@@ -200,9 +252,9 @@ class _Way:
             return None
         return self._counted(Minimum(self.u, cost, 0, 1, False, True, "interrupted: the best point so far"))
 
-    def diverged(self, u: np.ndarray, words: str) -> Minimum:
+    def diverged(self, words: str) -> Minimum:
         """The row of a start that has no answer."""
-        return self._counted(Minimum(u, math.inf, 0, 0, False, False, words))
+        return self._counted(Minimum(self.start, math.inf, 0, 0, False, False, words))
 
     def _starts_near(self, walk: Approach) -> bool:
         """Whether the first step on the whole motion promises much of the cost (or nothing is left to promise), keeps
@@ -217,23 +269,14 @@ class _Way:
     def _through(self, whole: FitProblem, lengths: Sequence[float], u: np.ndarray) -> Approach:
         """Fit window after window; where one diverges at the values of the one before, one in between comes first.
         Gives the whole motion at the end of the last."""
-        longest = max(float(r.times[-1]) - e.t0 for e, r in zip(whole.experiments, whole.recordings, strict=True))
-        ahead, reached = [*lengths, math.inf], 0.0
-        while True:
-            part = whole if math.isinf(ahead[0]) else cut(whole, ahead[0])
-            walk = Approach(part, u, self.taken)
-            if math.isfinite(walk.cost):
-                if part is whole:
-                    return walk
-                self._walk(walk, WINDOW_TOLERANCE, min(WINDOW_STEPS, self.search.max_iterations), ahead[0])
-                u, reached = walk.u, ahead.pop(0)
-                self.windows.append(reached)
-                continue
-            upto = min(ahead[0], longest)
-            between = 0.5 * (reached + upto)
-            if upto - reached < BACK * upto or not holds_frames(whole, between):
-                return Approach(whole, u, self.taken)
-            ahead.insert(0, between)
+        for length, walk in along(whole, [*lengths, math.inf], u, self.taken):
+            if math.isinf(length):
+                return walk
+            if not self.windows and self.search.windows != AUTO and not self.group:
+                self.condition = self.search._told(walk, length)
+            self._walk(walk, TOLERANCE, min(STEPS, self.search.max_iterations), length)
+            self.windows.append(length)
+        raise AssertionError("the whole motion comes last")
 
     def _walk(self, walk: Approach, tolerance: float, most: int, window: float | None) -> None:
         """Steps until the next promises little, and on the whole motion until it is near."""
@@ -262,4 +305,5 @@ class _Way:
             evaluations=self.taken.evaluations + end.evaluations,
             jacobians=self.taken.jacobians + end.jacobians,
             windows=tuple(self.windows),
+            group=self.group,
         )

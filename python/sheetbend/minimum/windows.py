@@ -7,11 +7,13 @@ and where small displacements grow, the times at which they have grown by some m
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from ..errors import InputError
+from .approach import Approach, Tally
 from .growth import ROUGH, Growth
 from .problem import FitProblem
 
@@ -20,6 +22,8 @@ GROWN = (30.0, 1e3, ROUGH)
 FRAMES = 6  # that the shortest window holds of every motion
 ROWS = 2  # residuals for each parameter
 APART = 1.3  # factor between neighbors
+TOLERANCE, STEPS = 1e-2, 40  # of the cost, and at most: a window's minimum is only a start
+BACK = 0.1  # of the length: where windows so little longer diverge, there is no way on
 
 
 def chosen(problem: FitProblem, growths: Sequence[Growth]) -> tuple[float, ...]:
@@ -61,6 +65,37 @@ def cut(problem: FitProblem, length: float) -> FitProblem:
             raise InputError("windows", f"hold no fitted frame of '{e.name}'", length, fix)
         pieces.append(recording if e.static else recording.piece(None, last))
     return problem.uncorrected(pieces)
+
+
+def along(
+    whole: FitProblem,
+    lengths: Sequence[float],
+    u: np.ndarray,
+    tally: Tally,
+    part_of: Callable[[FitProblem, float], FitProblem] | None = None,
+) -> Iterator[tuple[float, Approach]]:
+    """Window after window, each with a walk that begins where the one before was left, for the caller to walk; where
+    one diverges at the values of the one before, one in between comes first. The length of the whole motion is
+    infinite. Where there is no way on, the whole motion comes last, with an infinite cost or not.
+
+    Args:
+        part_of: makes the problem of a window; `cut` by default.
+    """
+    longest = max(float(r.times[-1]) - e.t0 for e, r in zip(whole.experiments, whole.recordings, strict=True))
+    ahead, reached, made = [*lengths], 0.0, part_of or cut
+    while ahead:
+        walk = Approach(whole if math.isinf(ahead[0]) else made(whole, ahead[0]), u, tally)
+        if math.isfinite(walk.cost):
+            reached = ahead.pop(0)
+            yield reached, walk
+            u = walk.u
+            continue
+        upto = min(ahead[0], longest)
+        between = 0.5 * (reached + upto)
+        if upto - reached < BACK * upto or not holds_frames(whole, between):
+            yield math.inf, Approach(whole, u, tally)
+            return
+        ahead.insert(0, between)
 
 
 def holds_frames(problem: FitProblem, length: float) -> bool:

@@ -17,7 +17,7 @@ from ..quantities.wording import short
 from ..report.fit_result import FitResult
 from ..report.report import headline, sections
 from ..report.tables import Section
-from ..result.result import UNSOUND
+from ..result.result import UNSOUND, Start
 from .packed import packed_motions
 from .render import compressed, render, table
 from .shown import Shown, fitted_motion
@@ -139,18 +139,29 @@ def _starts(result: FitResult) -> dict[str, Any] | None:
     """A table of the starts' ends, best first."""
     if len(result.starts) < 2:
         return None
-    names = list(result.starts[0].values)
+    names, raced = list(result.starts[0].values), any(start.first for start in result.starts)
     rows = [
         (
             "diverged" if start.cost is None else short(start.cost, 6),
             str(start.iterations),
             "yes" if start.converged else "no",
             *(short(start.values[name]) for name in names),
+            *_raced(start, names, raced),
         )
         for start in result.starts
     ]
     headers = ("cost", "iterations", "converged", *names)
+    headers += ("group", "raced to", *(f"{name} at first" for name in names)) if raced else ()
     return {"title": "Starts", "headers": headers, "rows": rows, "left": [False] * len(headers), "notes": ()}
+
+
+def _raced(start: Start, names: Sequence[str], shown: bool) -> tuple[str, ...]:
+    """The end of its race, and where it began."""
+    if not shown:
+        return ()
+    group = "" if start.group is None else str(start.group)
+    cost = "" if start.raced is None else short(start.raced, 6)
+    return (group, cost, *(short(start.first[name]) if start.first else "" for name in names))
 
 
 def _matrix(result: FitResult) -> dict[str, Any] | None:

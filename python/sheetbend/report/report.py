@@ -12,6 +12,7 @@ from ..quantities.wording import figures, short
 from ..result.result import UNSOUND, Estimate, FitData, Given, MotionGrowth, Premise, RecordingFit
 from .report_contact import contact_sections
 from .report_driven import driven_sections
+from .report_starts import groups_of_starts, starts_note
 from .tables import Section, plain_section, rich_section
 
 if TYPE_CHECKING:
@@ -29,8 +30,6 @@ PREMISES_SHOWN = 8
 PREMISE_COLUMNS = 4
 """Number of parameters above which a given value is listed with the one that it moves most."""
 _FELT = 0.02  # of a half-width: given values that move every parameter by less are not listed
-
-_SAME_MINIMUM = 0.01  # starts that end within 1 % of the best cost found the same minimum
 
 
 def sections(result: FitData) -> list[Section]:
@@ -50,6 +49,7 @@ def sections(result: FitData) -> list[Section]:
         *contact_sections(result),
         _unknown(result),
         _correlations(result),
+        groups_of_starts(result),
         _course(result),
         Section("Warnings", notes=tuple(("", warning) for warning in result.warnings)),
     ]
@@ -322,13 +322,9 @@ def _course(result: FitData) -> Section:
         time = result.autocorrelation_time
         words = f"one in {time:.3g} counts as independent; the intervals allow for it"
         notes.append(("neighboring residuals are alike", words))
-    if len(result.starts) > 1:
-        costs = [start.cost for start in result.starts if start.cost is not None]
-        same = sum(cost <= min(costs) * (1 + _SAME_MINIMUM) for cost in costs)
-        words = f"{same} of {len(result.starts)} ended within 1 % of the best cost; the worst at {max(costs):.4g}"
-        if len(costs) < len(result.starts):
-            words += f"; {len(result.starts) - len(costs)} diverged"
-        notes.append(("starts", words))
+    if result.condition:
+        notes.append(("where it starts", result.condition))
+    notes += starts_note(result)
     return Section("Course", notes=tuple(notes))
 
 

@@ -224,12 +224,24 @@ class Misfit:
 
 @dataclass(frozen=True, kw_only=True)
 class Start:
-    """One start of a multi-start fit: cost at its end, None where the motion diverges, and physical values there."""
+    """One start of a multi-start fit.
+
+    Attributes:
+        cost: at its end, None where the motion diverges; of a raced start at the end of the best of its group.
+        iterations, converged: on the way there.
+        values: physical values there.
+        first: of a raced start, those where it began; empty for others.
+        raced: cost of the last window where its race ended; None for others, and where the motion diverged.
+        group: number of the minimum that its race ended in, from 1; None for others, and where it diverged.
+    """
 
     cost: float | None
     iterations: int
     converged: bool
     values: Mapping[str, float]
+    first: Mapping[str, float] = field(default_factory=dict)
+    raced: float | None = None
+    group: int | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -292,6 +304,7 @@ class FitData:
         optimizer, iterations, seconds, converged, interrupted, message: how it went.
         growth: of every fitted motion.
         windows: s, the lengths that were fitted first, as given or chosen.
+        condition: of the Jacobian where the fit started, in words; None where the motion diverges there.
         evaluations, jacobians: how often all experiments were simulated, and how often of these with a Jacobian, over
             all starts and windows, up to the minimum.
         judging: how often all experiments, or some of them, were simulated besides, and how often of these with a
@@ -337,6 +350,7 @@ class FitData:
     assumed: tuple[str, ...] = ()
     contacts: tuple[ContactFit, ...] = ()
     kinks: tuple[Kinks, ...] = ()
+    condition: str | None = None
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of that name; KeyError names the ones there are."""

@@ -1,0 +1,96 @@
+"""Rows of a fit's result, from what the fit found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..doubts.prediction import Comparison
+from ..minimum.growth import Growth
+from ..minimum.optimizers import Minimum
+from ..minimum.race import Raced
+from ..quantities.parameters import Parameters
+from ..result.result import Given, MotionGrowth, RecordingFit, Start
+
+
+def recording_fit(
+    c: Comparison, rows: Mapping[str, int], left_out: Mapping[str, Comparison], corrected: Mapping[str, np.ndarray]
+) -> RecordingFit:
+    """Errors of one recording, with the correction of its driven markers, predicted by the others where it was left
+    out.
+
+    Args:
+        rows: number of residuals by recording.
+    """
+    found = c.errors(rows.get(c.experiment.name, 0))
+    if c.experiment.name in corrected:
+        by = float(np.sqrt(np.mean(corrected[c.experiment.name] ** 2)))
+        found = replace(found, driven_sigma=c.experiment.driven_noise, corrected_by=by)
+    if c.experiment.name not in left_out:
+        return found
+    other = left_out[c.experiment.name].errors(0)
+    return replace(
+        other, rows=found.rows, rms=found.rms, driven_sigma=found.driven_sigma, corrected_by=found.corrected_by
+    )
+
+
+def growth_rows(start: Sequence[Growth], end: Sequence[Growth]) -> tuple[MotionGrowth, ...]:
+    """Of every motion, where the fit started and where it ended."""
+    return tuple(
+        MotionGrowth(
+            name=first.name,
+            largest=(_finite(first.largest), _finite(last.largest)),
+            rate=(first.rate, last.rate),
+            until=(first.until, last.until),
+        )
+        for first, last in zip(start, end, strict=True)
+    )
+
+
+def _finite(number: float) -> float | None:
+    return number if np.isfinite(number) else None
+
+
+def given_rows(parameters: Parameters, values: Mapping[str, float]) -> tuple[Given, ...]:
+    """The parameters that are not fitted."""
+    rows = []
+    for name, p in parameters.items():
+        if not p.free:
+            words = (
+                "fixed"
+                if p.tied_to is None
+                else f"{p.factor:g} times {p.tied_to}"
+                if p.factor != 1.0
+                else f"equal to {p.tied_to}"
+            )
+            rows.append(Given(name=name, value=values[name], unit=p.unit, words=words))
+    return tuple(rows)
+
+
+def every_end(ends: Sequence[Minimum], raced: Sequence[Raced]) -> list[tuple[Minimum, Raced | None]]:
+    """One end for each start, best first: of raced starts that of the best of their group, and those that led nowhere
+    last."""
+    found: list[tuple[Minimum, Raced | None]] = []
+    for end in ends:
+        mine = sorted((r for r in raced if end.group and r.group == end.group), key=lambda r: r.cost)
+        found += [(end, one) for one in mine] or [(end, None)]
+    lost = [r for r in raced if not r.group]
+    return found + [(Minimum(r.first, np.inf, 0, 0, False, False, r.message), r) for r in lost]
+
+
+def start_rows(ends: Sequence[tuple[Minimum, Raced | None]], parameters: Parameters) -> tuple[Start, ...]:
+    """From `every_end`."""
+    return tuple(
+        Start(
+            cost=_finite(end.cost),
+            iterations=end.iterations,
+            converged=end.converged,
+            values=parameters.to_physical(end.u),
+            first={} if raced is None else parameters.to_physical(raced.first),
+            raced=None if raced is None else _finite(raced.cost),
+            group=None if raced is None or not raced.group else raced.group,
+        )
+        for end, raced in ends
+    )
