@@ -8,10 +8,12 @@ import typer
 
 from .bench import bench
 from .check import check
+from .compare import compare
 from .fabric import fabric
 from .fit import fit
 from .info import info
 from .new import new
+from .schema import schema
 from .simulate import simulate
 from .textile import textile
 from .view import view
@@ -43,6 +45,6 @@ def options(
     """Simulate ropes, beams and cloth, and find their physical parameters from recordings, with error bars."""
 
 
-for command in (new, fit, simulate, view, check, info, textile, fabric):
+for command in (new, fit, simulate, view, check, info, compare, textile, fabric, schema):
     app.command()(command)
 app.command(hidden=True, context_settings={"ignore_unknown_options": True})(bench)
