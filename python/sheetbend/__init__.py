@@ -6,7 +6,7 @@ to recordings, with intervals and words for what the data cannot tell.
 
 from typing import TYPE_CHECKING, Any
 
-from . import mesh
+from . import mesh, plot
 from .errors import (
     ConfigError,
     DivergenceError,
@@ -50,6 +50,7 @@ from .objects.rod_junction import Junction
 from .objects.rope import Rope, add_rope, rope
 from .objects.tethers import add_tethers
 from .objects.tool import Tool
+from .page.notebook import show_in_notebooks
 from .quantities.kinds import KINDS
 from .quantities.parameters import Parameter, Parameters
 from .recording.baseline import baseline
@@ -70,6 +71,7 @@ if TYPE_CHECKING:
     from .gripped.recipe import fit_rope
 
 keep_old_modules()
+show_in_notebooks()
 
 
 def __getattr__(name: str) -> Any:
@@ -163,6 +165,7 @@ __all__ = [
     "on_cloth",
     "on_particle",
     "on_rope",
+    "plot",
     "read_mesh",
     "read_recordings",
     "rod",

@@ -19,7 +19,7 @@ LAYERS = (
     ("minimum", "report", "torch"),
     ("doubts", "textile"),
     ("fitting", "pictures"),
-    ("gripped", "page"),
+    ("gripped", "page", "plot"),
     ("", "config"),
     ("cli",),
 )

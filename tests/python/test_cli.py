@@ -102,6 +102,7 @@ class TestFit:
         assert names == {
             "fit.json",
             "report.txt",
+            "parameters.csv",
             "report.html",
             "fitted.toml",
             "predicted_swing.npz",

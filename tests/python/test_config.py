@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.config import load, parse
-from sheetbend.config.reference import renewed
+from sheetbend.config.reference import fabric_tables, renewed
 from sheetbend.config.values import with_values, write
 
 ROOT = Path(__file__).parents[2]
@@ -575,3 +575,5 @@ def test_missing_and_binary_files(folder: Path) -> None:
 def test_document_holds_every_key() -> None:
     text = (ROOT / "docs" / "configuration.md").read_text()
     assert text == renewed(text), "run: python -m sheetbend.config.reference docs/configuration.md"
+    fabric = (ROOT / "docs" / "fabric.md").read_text()
+    assert fabric == renewed(fabric, fabric_tables()), "run: python -m sheetbend.config.reference docs/fabric.md"

@@ -57,10 +57,10 @@ def test_a_picture_of_each_kind(tmp_path: Path) -> None:
         Field("b [1]", values**2),
         Field("c [mm]", np.array([0.1, np.nan]), places=places),
     ]
-    figure = plot_fields(MESH, fields, title="three")
-    labels = [axis.get_xlabel() for axis in figure.axes]
+    panels = plot_fields(MESH, fields, title="three")
+    labels = [axis.get_xlabel() for axis in panels[0].figure.axes]
     assert {"a [1]", "b [1]", "c [mm]", "along the warp [m]"} <= set(labels)
-    save(figure, tmp_path / "three.png")
+    save(panels, tmp_path / "three.png")
     assert (tmp_path / "three.png").stat().st_size > 10_000
 
 
@@ -71,7 +71,7 @@ def test_colors_go_around_zero_only_where_both_signs_occur() -> None:
         (-np.ones(16), (-1, 0)),
         (np.zeros(16), (0, 1)),
     ):
-        (drawn,) = plot_fields(MESH, [Field("a", values)]).axes[0].collections
+        (drawn,) = plot_fields(MESH, [Field("a", values)])[0].collections
         assert drawn.get_clim() == pytest.approx(ends)
 
 
@@ -79,7 +79,7 @@ def test_colors_go_around_zero_only_where_both_signs_occur() -> None:
     ("gravity", "axis", "turned"), [((0, -9.81, 0), 1, False), ((0, 9.81, 0), 1, True), ((0, 0, 0), 2, False)]
 )
 def test_what_gravity_pulls_at_hangs_down(gravity: tuple, axis: int, turned: bool) -> None:
-    panel = plot_fields(MESH, [Field("a", np.ones(16), MESH.vertices)], gravity=gravity).axes[0]
+    (panel,) = plot_fields(MESH, [Field("a", np.ones(16), MESH.vertices)], gravity=gravity)
     assert panel._vertical_axis == axis
     low, high = (panel.get_xlim(), panel.get_ylim(), panel.get_zlim())[axis]
     assert (low > high) == turned
@@ -89,3 +89,22 @@ def test_what_gravity_pulls_at_hangs_down(gravity: tuple, axis: int, turned: boo
 def test_what_is_refused(fields: list[Field], problem: str) -> None:
     with pytest.raises(sb.InputError, match=problem):
         plot_fields(MESH, fields)
+
+
+def test_fields_of_one_scale_have_the_same_colors_and_one_bar() -> None:
+    alone, values = np.linspace(0.0, 1.0, 16), np.linspace(-2.0, 1.0, 16)
+    fields = [Field("u", alone, MESH.vertices, scale="strain [%]"), Field("v", values, scale="strain [%]")]
+    panels = plot_fields(MESH, [*fields, Field("other [m]", alone)])
+    limits = [panel.collections[0].get_clim() for panel in panels]
+    assert limits == [(-2, 2), (-2, 2), (0, 1)]
+    bars = [axes.get_xlabel() for axes in panels[0].figure.axes if axes not in panels]
+    assert bars == ["strain [%]", "other [m]"]
+    assert [panel.get_title() for panel in panels] == ["u", "v", ""]
+
+
+def test_numbers_at_places_are_drawn_in_space() -> None:
+    places = MESH.at([[0.1, 0.05], [0.15, 0.02]])
+    (panel,) = plot_fields(MESH, [Field("rms [mm]", np.array([1.0, 2.0]), MESH.vertices, places)])
+    dots = panel.collections[1]
+    np.testing.assert_allclose(np.array(dots._offsets3d)[:2].T, [[0.1, 0.05], [0.15, 0.02]], atol=1e-12)
+    assert list(dots.get_array()) == [1.0, 2.0]

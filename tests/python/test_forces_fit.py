@@ -250,8 +250,7 @@ def test_a_configuration_weighs_a_rope_by_a_load_cell(folder: Path) -> None:
 def test_a_figure_shows_every_component_that_counts(folder: Path) -> None:
     study = load(folder / "forces.toml")
     found = sb.fit(list(study.experiments), parameters=study.parameters, **study.options)
-    figure = plot_forces(found.comparisons[0].forces[0])
-    (panel,) = figure.axes
+    (panel,) = plot_forces(found.comparisons[0].forces[0])
     assert panel.get_ylabel() == "force z [N]"
     dots, line = panel.get_lines()
     assert len(dots.get_xdata()) == len(line.get_xdata()) == 100

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import sheetbend.plot as plot
 from rich.console import Console
 from sheetbend.errors import InputError
 from sheetbend.optional import MissingExtraError, require
@@ -207,17 +208,19 @@ def test_trajectory_figure(motion: tuple[np.ndarray, ...], tmp_path: Path) -> No
     from sheetbend.pictures.plotting import plot_residuals, plot_trajectories, save
 
     measured, simulated, times = motion
-    figure = plot_trajectories(measured, simulated, times, held_out=(0.5, 1.0))
-    assert len(figure.axes) == 6  # of eight markers
-    dots, line = figure.axes[-1].lines
+    panels = plot_trajectories(measured, simulated, times, held_out=(0.5, 1.0))
+    assert len(panels) == 6  # of eight markers
+    dots, line = panels[-1].lines
     np.testing.assert_allclose(line.get_ydata(), 1e3 * simulated[:, 7, 2])
     np.testing.assert_allclose(dots.get_ydata(), 1e3 * measured[:, 7, 2])
-    assert figure.axes[-1].get_xlabel() == "time [s]"
-    save(figure, tmp_path / "motion.png")
+    (strip,) = set(panels[0].figure.axes) - set(panels)
+    assert strip.get_xlabel() == "time [s]"
+    np.testing.assert_allclose(strip.lines[1].get_ydata(), np.where(np.isnan(measured[:, 0, 2]), np.nan, -1.0))
+    save(panels, tmp_path / "motion.png")
     assert (tmp_path / "motion.png").stat().st_size > 10_000
 
     residuals = plot_residuals(measured, simulated, times)
-    mean = residuals.axes[0].lines[-1].get_ydata()
+    mean = residuals.lines[-1].get_ydata()
     np.testing.assert_allclose(mean, math.sqrt(3), rtol=1e-9)  # 1 mm in x, y and z, gaps left out
     with pytest.raises(InputError, match="match simulated"):
         plot_trajectories(measured[:, :3], simulated, times)
@@ -230,11 +233,13 @@ def test_motions_share_a_figure() -> None:
     from sheetbend.pictures.plotting import Motion, plot_motions
 
     times = np.linspace(0, 1, 50)
-    figure = plot_motions(
+    panels = plot_motions(
         [Motion("a", times, np.sin(times), np.cos(times), (0.5, 1.0)), Motion("b", times, times, times)]
     )
-    assert [axes.get_title("left") for axes in figure.axes] == ["a", "b"]
-    assert [len(axes.patches) for axes in figure.axes] == [1, 0]
+    assert [axes.get_title("left") for axes in panels] == ["a", "b"]
+    assert [len(axes.patches) for axes in panels] == [1, 0]
+    strips = [axes for axes in panels[0].figure.axes if axes not in panels]
+    np.testing.assert_allclose(strips[0].lines[1].get_ydata(), 1e3 * (np.cos(times) - np.sin(times)))
     with pytest.raises(InputError, match="empty"):
         plot_motions([])
 
@@ -244,12 +249,12 @@ def test_shape_and_estimate_figures(result: FitResult) -> None:
     from sheetbend.pictures.plotting import plot_estimates, plot_shapes
 
     line = np.column_stack([np.linspace(0, 1, 20), np.zeros(20), np.linspace(0, 1, 20) ** 2])
-    figure = plot_shapes([line] * 4, [line] * 4, names=list("abcd"))
-    panels = [axes for axes in figure.axes if axes.get_visible()]
+    panels = list(plot_shapes([line] * 4, [line] * 4, names=list("abcd")))
+    assert [axes for axes in panels[0].figure.axes if axes.get_visible()] == panels
     assert [axes.get_title("left") for axes in panels] == list("abcd")
     assert all(axes.get_aspect() == 1 for axes in panels)
-    figure = plot_estimates(result.estimates, published={"beam_E": (2.5e5, 3e5)})
-    assert len(figure.axes) == 3  # Pa, s, N
+    panels = plot_estimates(result.estimates, published={"beam_E": (2.5e5, 3e5)})
+    assert [axes.get_xlabel() for axes in panels] == ["[Pa]", "[s]", "[N]"]
     with pytest.raises(InputError, match="at least one"):
         plot_shapes([], [])
     with pytest.raises(InputError, match="empty"):
@@ -263,10 +268,37 @@ def test_numbers_of_a_wide_estimate_stand_apart(lower: float, upper: float) -> N
     from sheetbend.pictures.plotting import plot_estimates
 
     wide = dataclasses.replace(estimate("cloth_warp", 50.0, 20.0, "weak", ""), lower=lower, upper=upper)
-    figure = plot_estimates([wide])
-    figure.canvas.draw()
-    (axis,) = (axes.xaxis for axes in figure.axes)
+    (panel,) = plot_estimates([wide])
+    panel.figure.canvas.draw()
+    axis = panel.xaxis
     texts = [*axis.get_ticklabels(), *axis.get_ticklabels(minor=True)]
     boxes = sorted((t.get_window_extent() for t in texts if t.get_text()), key=lambda box: box.x0)
     assert len(boxes) >= 3
     assert all(left.x1 < right.x0 for left, right in itertools.pairwise(boxes))
+
+
+class TestAxesOfOthers:
+    """Every figure goes into axes that the caller has."""
+
+    def test_each_draws_where_it_is_told(self, motion: tuple[np.ndarray, ...], result: FitResult) -> None:
+        figure = pytest.importorskip("matplotlib.figure").Figure()
+        measured, simulated, times = motion
+        line = np.column_stack([times, times, times])
+        given = figure.subplots(2, 2).ravel()
+        assert list(plot.trajectories(measured[:, :2], simulated[:, :2], times, ax=given[:2])) == list(given[:2])
+        assert plot.residuals(measured, simulated, times, ax=given[2]) is given[2]
+        assert list(plot.shapes([line], [line], ax=given[3])) == [given[3]]
+        assert len(given[0].lines) == len(given[1].lines) == 2
+        alone = figure.add_axes((0.1, 0.1, 0.5, 0.5))  # of no grid
+        assert list(plot.motions([plot.Motion("a", times, times, times)], ax=alone)) == [alone]
+        assert alone.get_position().y0 > 0.2 and figure.axes[-1].get_position().y0 == pytest.approx(0.1)
+
+    @pytest.mark.parametrize("count", [0, 1, 3])
+    def test_too_many_or_few_are_refused(self, result: FitResult, count: int) -> None:
+        figure = pytest.importorskip("matplotlib.figure").Figure()
+        given = [figure.add_axes((0, 0, 1, 1)) for _ in range(count)]
+        two = [e for e in result.estimates if e.unit in ("Pa", "s")]
+        with pytest.raises(InputError, match="2 of them"):
+            plot.estimates(two, ax=given)
+        with pytest.raises(InputError, match="must be axes"):
+            plot.estimates(two, ax=[figure, 3])

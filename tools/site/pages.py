@@ -6,6 +6,7 @@ root, and the pages of experiments, the derivation and CONTRIBUTING.md are added
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from pathlib import Path, PurePosixPath
@@ -25,7 +26,18 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         for path in sorted(ROOT.glob(pattern)):
             name = path.relative_to(ROOT).as_posix()
             files.append(File(name, str(ROOT), config.site_dir, config.use_directory_urls))
+    for path in sorted((ROOT / "docs").glob("notebooks/*.ipynb")):
+        files.append(File.generated(config, f"notebooks/{path.stem}.md", content=as_text(path)))
     return files
+
+
+def as_text(notebook: Path) -> str:
+    """A notebook as Markdown: its texts, and its code in blocks."""
+    parts = [f"[Download this notebook]({notebook.name}) and run it in a copy of the repository."]
+    for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"]:
+        source = "".join(cell["source"])
+        parts.append(source if cell["cell_type"] == "markdown" else f"```python\n{source}\n```")
+    return "\n\n".join([parts[1], parts[0], *parts[2:]]) + "\n"
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
@@ -33,7 +45,9 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
 
     Of a link to a file that no page shows, the words remain.
     """
-    here = Path(page.file.abs_src_path or "").parent
+    if page.file.abs_src_path is None:  # made of a notebook
+        return markdown
+    here = Path(page.file.abs_src_path).parent
     folder = PurePosixPath(page.file.src_uri).parent
 
     def on_site(target: str) -> str | None:
@@ -41,7 +55,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
         if re.match(r"\w+:", target):
             return target
         name = Path(os.path.normpath(here / target)).relative_to(ROOT).as_posix()
-        name = "index.md" if name == "README.md" else name.removeprefix("docs/")
+        name = "index.md" if name == "README.md" else name.removeprefix("docs/").replace(".ipynb", ".md")
         return os.path.relpath(name, folder) if files.get_file_from_path(name) else None
 
     def without_link(found: re.Match[str]) -> str:

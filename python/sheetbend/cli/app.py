@@ -8,9 +8,12 @@ import typer
 
 from .bench import bench
 from .check import check
+from .compare import compare
+from .fabric import fabric
 from .fit import fit
 from .info import info
 from .new import new
+from .schema import schema
 from .simulate import simulate
 from .textile import textile
 from .view import view
@@ -21,7 +24,6 @@ app = typer.Typer(
     epilog="Exit codes: 0 done, 2 bad input, 3 not identifiable, 4 did not converge or is doubtful, 5 a check failed, "
     "130 and 143 stopped by Ctrl-C and SIGTERM.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 
@@ -43,6 +45,6 @@ def options(
     """Simulate ropes, beams and cloth, and find their physical parameters from recordings, with error bars."""
 
 
-for command in (new, fit, simulate, view, check, info, textile):
+for command in (new, fit, simulate, view, check, info, compare, textile, fabric, schema):
     app.command()(command)
 app.command(hidden=True, context_settings={"ignore_unknown_options": True})(bench)

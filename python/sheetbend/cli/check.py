@@ -41,7 +41,10 @@ def check(
 ) -> None:
     """Check the gradients of every recording's scene over a short stretch, and the residuals' Jacobian; exit 5 where
     one fails. Of large scenes a sample is checked, and named. Also reports how far small displacements grow along every
-    fitted motion."""
+    fitted motion.
+
+    Example: sheetbend check experiments/twin/twin.toml
+    """
     run(lambda console: _check(console, config), json)
 
 

@@ -15,11 +15,14 @@ from ..pictures.field_plot import Field, plot_fields
 from ..pictures.strain import strain_fields
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
+
+_STRAIN = "strain [%]"
 
 
-def cloth_figures(found: Fit, c: Comparison) -> dict[str, Figure]:
-    """By name of the cloth: its shape with the measured markers, its strains, and the residual of each marker.
+def cloth_figures(found: Fit, c: Comparison) -> dict[str, Axes]:
+    """By name of the cloth the first panel of its figure: its shape with the measured markers, its strains, and the
+    residual of each marker. A cloth that no flat chart covers, such as a tube, is drawn where it is in space.
 
     A motion is shown where the markers are farthest from their start, in the fitted part.
     """
@@ -36,20 +39,17 @@ def cloth_figures(found: Fit, c: Comparison) -> dict[str, Figure]:
         mine, places = _markers(c, cloth)
         strain = strain_fields(e.scene, cloth, positions, values)
         where = positions[cloth.particles]
+        seen = c.recording.positions[frame, mine]
+        chart = where if cloth.mesh.material.ndim == 3 else None
         fields = [
-            Field(
-                "strain along the warp [%]",
-                1e2 * strain["strain_warp"],
-                where,
-                measured=c.recording.positions[frame, mine],
-            ),
-            Field("strain along the weft [%]", 1e2 * strain["strain_weft"]),
-            Field("shear [%]", 1e2 * strain["strain_shear"]),
+            Field("along the warp", 1e2 * strain["strain_warp"], where, measured=seen, scale=_STRAIN),
+            Field("along the weft", 1e2 * strain["strain_weft"], chart, scale=_STRAIN),
+            Field("shear", 1e2 * strain["strain_shear"], chart, scale=_STRAIN),
         ]
         if mine:
-            fields.append(Field("residual of each marker, rms [mm]", rms[mine], places=places))
+            fields.append(Field("residual of each marker, rms [mm]", rms[mine], chart, places))
         title = f"{e.name}: {cloth.name} {when}"
-        figures[cloth.name] = plot_fields(cloth.mesh, fields, title=title, gravity=e.scene.gravity)
+        figures[cloth.name] = plot_fields(cloth.mesh, fields, title=title, gravity=e.scene.gravity)[0]
     return figures
 
 

@@ -20,7 +20,7 @@ from ..pictures.force_plot import plot_forces
 from .cloth_figures import cloth_figures
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
 BACKENDS = {"png": "agg", "svg": "svg", "pdf": "pdf"}
 
@@ -44,7 +44,7 @@ def write_figures(found: Fit, config: Config, form: str, folder: Path) -> list[s
     """Measured against simulated for every recording, and the estimates; gives the files' names."""
     if form == "none":
         return []
-    figures: dict[str, Figure] = {}
+    figures: dict[str, Axes | np.ndarray] = {}  # some axes of each
     static = [c for c in found.comparisons if c.experiment.static and not c.experiment.scene.cloths]
     if static:
         figures["shapes"] = _shapes(found, static)
@@ -53,8 +53,8 @@ def write_figures(found: Fit, config: Config, form: str, folder: Path) -> list[s
         figures["motions"] = plotting.plot_motions([_liveliest(c) for c in moving], title=config.experiment.name)
     for c in moving:
         name = c.experiment.name
-        figures[f"{name}_markers"] = _trajectories(c)
-        figures[f"{name}_residuals"] = _residuals(c)
+        figures[f"{name}_markers"] = plotting.plot_trajectories(**plotting.compared(c))
+        figures[f"{name}_residuals"] = plotting.plot_residuals(**plotting.compared(c))
         figures |= {f"{name}_{one.sensor}": plot_forces(one) for one in c.forces}
     for c in found.comparisons:
         figures |= {f"{c.experiment.name}_{name}": figure for name, figure in cloth_figures(found, c).items()}
@@ -80,7 +80,7 @@ def figure_files(experiments: Sequence[Experiment], config: Config) -> list[str]
     return [f"{name}.{form}" for name in names]
 
 
-def _shapes(found: Fit, comparisons: list[Comparison]) -> Figure:
+def _shapes(found: Fit, comparisons: list[Comparison]) -> np.ndarray:
     return plotting.plot_shapes(
         [c.recording.positions[0] for c in comparisons],
         [_line(found, c) for c in comparisons],
@@ -112,7 +112,8 @@ def _liveliest(c: Comparison) -> plotting.Motion:
     x = c.recording.positions
     marker, axis = np.unravel_index(np.argmax(np.nanvar(x, axis=0)), x.shape[1:])
     name = f"{c.experiment.name}: {c.recording.markers[marker]}, {'xyz'[axis]}"
-    return plotting.Motion(name, c.recording.times, x[:, marker, axis], c.simulated[:, marker, axis], _held_out(c))
+    held_out = plotting.compared(c)["held_out"]
+    return plotting.Motion(name, c.recording.times, x[:, marker, axis], c.simulated[:, marker, axis], held_out)
 
 
 def _line(found: Fit, c: Comparison) -> np.ndarray:
@@ -122,25 +123,6 @@ def _line(found: Fit, c: Comparison) -> np.ndarray:
         return c.simulated[0]
     (rope,) = scene.ropes.values()
     return equilibrium(scene, values=found.values_of(c.experiment)).positions[rope.particles]
-
-
-def _trajectories(c: Comparison) -> Figure:
-    x, names = c.recording.positions, c.recording.markers
-    return plotting.plot_trajectories(
-        x, c.simulated, c.recording.times, markers=names, held_out=_held_out(c), title=c.experiment.name
-    )
-
-
-def _residuals(c: Comparison) -> Figure:
-    x, names = c.recording.positions, c.recording.markers
-    return plotting.plot_residuals(
-        x, c.simulated, c.recording.times, markers=names, held_out=_held_out(c), title=c.experiment.name
-    )
-
-
-def _held_out(c: Comparison) -> tuple[float, float] | None:
-    times = c.recording.times[c.held_out]
-    return (float(times[0]), float(times[-1])) if len(times) else None
 
 
 def _published(found: Fit, config: Config) -> dict[str, float | tuple[float, float]]:

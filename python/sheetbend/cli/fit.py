@@ -23,6 +23,7 @@ from ..minimum.problem import FitProblem, as_parameters
 from ..pictures.movie import movie_paths
 from ..recording.recording import Recording
 from ..report.fit_result import FitResult
+from ..report.parameter_table import TABLE, parameter_table
 from ..report.report import plain, rich_report
 from .figures import figure_files, figures_form, write_figures
 from .folders import alone, made
@@ -66,7 +67,10 @@ def fit(
         bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
     ] = False,
 ) -> None:
-    """Fit parameters to recordings. Ctrl-C and SIGTERM stop at the best point so far and still report."""
+    """Fit parameters to recordings. Ctrl-C and SIGTERM stop at the best point so far and still report.
+
+    Example: sheetbend fit experiments/twin/twin.toml --output out/twin
+    """
 
     def command(console: Console) -> Outcome:
         if more:
@@ -146,7 +150,7 @@ def _files(study: Study) -> list[str]:
     """What `_write` may leave behind."""
     markers = predicted_files(e.name for e in study.experiments)
     figures = figure_files(study.experiments, study.config)
-    return ["fit.json", "report.txt", PAGE, "fitted.toml", *markers, *figures]
+    return ["fit.json", "report.txt", TABLE, PAGE, "fitted.toml", *markers, *figures]
 
 
 @contextmanager
@@ -216,10 +220,11 @@ def _write(found: Fit, study: Study, source: Path, form: str, page: bool, folder
     """Everything a fit leaves behind; names relative to the folder."""
     found.save(folder / "fit.json")
     write_text(folder / "report.txt", plain(found.result))
+    write_text(folder / TABLE, parameter_table(found.result))
     write(with_values(study.config, found.values), folder / "fitted.toml", study.folder)
     pages = write_fit_page(found, study.config, source, folder) if page else []
     markers = [
         file for c in found.comparisons for file in save_predicted(c.recording, c.simulated, c.experiment.name, folder)
     ]
     figures = write_figures(found, study.config, form, folder)
-    return ["fit.json", "report.txt", *pages, "fitted.toml", *markers, *figures]
+    return ["fit.json", "report.txt", TABLE, *pages, "fitted.toml", *markers, *figures]

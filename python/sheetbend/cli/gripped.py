@@ -21,6 +21,7 @@ from ..objects.chain import unit_vector
 from ..recording.io.folder import read_recordings
 from ..recording.recording import Recording
 from ..recording.recording_checks import marker_indices
+from ..report.parameter_table import TABLE, parameter_table
 from ..report.tables import plain_section
 from .figures import figures_form
 from .gripped_figure import write_figure
@@ -117,7 +118,7 @@ def _check_nominal(nominal: Sequence[Sequence[float]], key: str, motions: Sequen
 def rope_files(config: GrippedConfig) -> list[str]:
     """Every file that `fit_ropes` may write; names relative to the folder."""
     form = config.output.figures
-    names = ["fit.json", "report.txt", PAGE, *([] if form == "none" else [f"predicted.{form}"])]
+    names = ["fit.json", "report.txt", TABLE, PAGE, *([] if form == "none" else [f"predicted.{form}"])]
     return ["report.txt", *(f"{rope.name}/{name}" for rope in config.gripped_rope for name in names)]
 
 
@@ -218,7 +219,8 @@ def _write(report: RopeReport, form: str, page: bool, rope: RopeData, folder: Pa
     text = json.dumps(report.to_dict(), indent=2, allow_nan=False) + "\n"
     write_text(own / "fit.json", text)
     write_text(own / "report.txt", report.plain())
+    write_text(own / TABLE, parameter_table(report.result))
     drawn = report.unseen or evaluate(report.found, rope.train)
     pages = write_rope_page(report, drawn, own) if page else []
-    names = ["fit.json", "report.txt", *pages, *write_figure(report, drawn, form, own)]
+    names = ["fit.json", "report.txt", TABLE, *pages, *write_figure(report, drawn, form, own)]
     return [f"{report.name}/{name}" for name in names]

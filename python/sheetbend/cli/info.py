@@ -46,7 +46,10 @@ def info(
     ] = False,
 ) -> None:
     """Show versions and what is built in; with a configuration also its scenes, quantities and parameters, with a
-    recording what it holds and where its markers are first seen."""
+    recording what it holds and where its markers are first seen.
+
+    Example: sheetbend info experiments/twin/data/twin.npz
+    """
     run(lambda console: _info(console, config), json)
 
 

@@ -1,4 +1,4 @@
-"""The cloths of a simulated scene as files for other programs."""
+"""The cloths and ropes of a simulated scene as files for other programs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ import numpy as np
 from ..mesh import write_obj_sequence, write_ply, write_ply_sequence
 from ..mesh.export import frame_files
 from ..motion.simulate import Trajectory
+from ..optional import require
+from ..pictures.gltf import write_gltf
 from ..pictures.strain import strain_fields
+from ..pictures.usd import write_usd
 from ..scene.scene import Scene
 
 
@@ -20,10 +23,24 @@ class MeshFormat(StrEnum):
     OBJ = "obj"
     PLY = "ply"
     PLY_SEQUENCE = "ply-sequence"
+    GLTF = "gltf"
+    USD = "usd"
+
+
+WHOLE = {MeshFormat.GLTF: ".glb", MeshFormat.USD: ".usdc"}
+"""Formats that hold all cloths and ropes of a motion in one file, by its suffix."""
+
+
+def check_format(form: MeshFormat) -> None:
+    """Raise MissingExtraError, before any work, where a format needs a package that is not installed."""
+    if form is MeshFormat.USD:
+        require("pxr", "usd")
 
 
 def mesh_files(name: str, scene: Scene, frames: int, folder: Path, form: MeshFormat) -> list[Path]:
     """Every file that `write_meshes` will write."""
+    if form in WHOLE:
+        return [folder / f"{name}{WHOLE[form]}"]
     files: list[Path] = []
     for cloth in scene.cloths:
         path = folder / f"{name}_{cloth}"
@@ -35,7 +52,12 @@ def mesh_files(name: str, scene: Scene, frames: int, folder: Path, form: MeshFor
 
 
 def write_meshes(name: str, scene: Scene, motion: Trajectory, folder: Path, form: MeshFormat) -> list[str]:
-    """Every cloth of a scene, all frames as OBJ or PLY, or the last as PLY; gives the paths."""
+    """Every cloth of a scene, all frames as OBJ or PLY, or the last as PLY; or everything in one file. Gives the
+    paths."""
+    if form in WHOLE:
+        path = folder / f"{name}{WHOLE[form]}"
+        (write_gltf if form is MeshFormat.GLTF else write_usd)(path, scene, motion)
+        return [str(path)]
     written = []
     for cloth in scene.cloths.values():
         path = folder / f"{name}_{cloth.name}"

@@ -18,6 +18,7 @@ from ..errors import InputError, SheetbendError
 from ..files.door import noting
 from ..optional import MissingExtraError
 from ..report.fit_result import FitResult
+from .notices import noticed
 from .screen import Screen
 from .stopping import Stopping
 
@@ -53,7 +54,7 @@ def run(command: Callable[[Console], Outcome], as_json: bool) -> None:
     console = Screen(stderr=as_json)
     stopping = Stopping()
     try:
-        with noting(), stopping:
+        with noting(), stopping, noticed(_warn):
             outcome = command(console)
     except (InputError, MissingExtraError) as error:
         outcome = _failed(error, Code.BAD_INPUT)
@@ -101,6 +102,10 @@ def _failed(error: SheetbendError, code: Code) -> Outcome:
     if isinstance(error, InputError):
         told |= {"field": error.field, "problem": error.problem, "got": repr(error.got)[:_SHOWN], "fix": error.fix}
     return Outcome({"error": told | ({"more": more} if more else {})}, code)
+
+
+def _warn(message: str) -> None:
+    Screen(stderr=True).print(Text.assemble(("warning ", "bold yellow"), message), soft_wrap=True)
 
 
 def _complain(message: str, more: list[str]) -> None:

@@ -25,7 +25,7 @@ from ..pictures.movie import Motion, movie_paths, save_movie
 from ..recording.recording import Recording
 from ..scene.scene import Scene
 from .folders import made
-from .meshes import MeshFormat, mesh_files, write_meshes
+from .meshes import WHOLE, MeshFormat, check_format, mesh_files, write_meshes
 from .movies import OPTION, MoviePath, check_before
 from .outcome import Outcome, run
 from .predicted import at_starting_values, predicted_files, save_predicted
@@ -70,7 +70,7 @@ def simulate(
         MeshFormat | None,
         typer.Option(
             help="Also write every cloth: a folder of OBJ or PLY files, one per frame, or a PLY of the last frame with "
-            "strains and energy per triangle.",
+            "strains and energy per triangle; or cloths and ropes over time in one file, glTF (.glb) or USD.",
             show_default=False,
         ),
     ] = None,
@@ -81,7 +81,10 @@ def simulate(
 ) -> None:
     """Simulate a scene and write its trajectory as NPZ: times, positions, velocities, the constraints' forces, the
     pressures of volumes that are kept, and what force sensors read (sensor_NAME_times, _forces, _torques); with a
-    recording also its markers as simulated, predicted_NAME.npz."""
+    recording also its markers as simulated, predicted_NAME.npz.
+
+    Example: sheetbend simulate experiments/twin/twin.toml --output out/twin --movie motion.gif
+    """
     run(lambda console: _simulate(console, config, output, duration, recording, mesh, movie), json)
 
 
@@ -101,8 +104,11 @@ def _simulate(
         tasks = tasks_of(study, duration, recording)
     name = study.config.experiment.name
     folder = output if output is not None else Path("out") / name
-    if mesh is not None and not any(task.scene.cloths for task in tasks):
-        raise ConfigError("--mesh", "needs a cloth, and the scene has none", mesh.value, "leave it out")
+    if mesh is not None:
+        check_format(mesh)
+        if not any(task.scene.cloths or (mesh in WHOLE and task.scene.ropes) for task in tasks):
+            needs = "a cloth or a rope" if mesh in WHOLE else "a cloth"
+            raise ConfigError("--mesh", f"needs {needs}, and the scene has none", mesh.value, "leave it out")
     moving = [task for task in tasks if not task.static]
     if movie is not None:
         check_before(movie, [task.scene for task in moving])

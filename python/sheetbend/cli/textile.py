@@ -72,7 +72,10 @@ def textile(
         bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
     ] = False,
 ) -> None:
-    """Read a testing machine's curves, print their KES numbers, and fit the law of a pull with intervals."""
+    """Read a testing machine's curves, print their KES numbers, and fit the law of a pull with intervals.
+
+    Example: sheetbend textile strips.csv --length 20cm --width 5cm --law chosen
+    """
 
     def command(console: Console) -> Outcome:
         columns, units = _pairs("--column", column), _pairs("--unit", unit)

@@ -27,6 +27,7 @@ def write_figure(
     along: str,
     form: str,
     folder: Path,
+    name: str = "curves",
 ) -> list[str]:
     """Loops gray, their mean with its scatter warm, the fitted fabric in the accent; gives the file's name."""
     if form == "none":
@@ -48,5 +49,5 @@ def write_figure(
     clean(panel)
     panel.set(xlabel=x_label, ylabel=y_label)
     key(panel, entries)
-    plotting.save(figure, folder / f"curves.{form}")
-    return [f"curves.{form}"]
+    plotting.save(figure, folder / f"{name}.{form}")
+    return [f"{name}.{form}"]

@@ -166,6 +166,9 @@ class Cloth(Section):
         "name of an earlier cloth that is cut from the same fabric: what the fabric is, from `density` to "
         "`drag_quadratic` and `law`, is that cloth's, and so are the quantities",
     )
+    fabric_file: str | None = key(
+        None, "file that `sheetbend fabric` has written: `density`, `warp` to `bending_twist` and `law` are those in it"
+    )
     mesh: ClothMesh = key(..., "[scene.cloth.mesh]")
     density: Finite = key(..., "mass per area", "kg/m^2", gt=0)
     warp: Finite = key(..., "tension stiffness along the warp, of a strip with free sides", "N/m", gt=0)

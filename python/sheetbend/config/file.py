@@ -15,6 +15,7 @@ from ..files.json_file import check_depth
 from ..files.names import steering
 from .build import Study, build
 from .errors import from_validation
+from .fabric_file import with_fabric_files
 from .gripped_schema import GrippedConfig
 from .schema import Config
 
@@ -56,7 +57,7 @@ def parse_any(path: str | Path) -> Config | GrippedConfig:
         ConfigError: as `load`.
     """
     with reading(path, ConfigError):
-        data = _content(Path(path))
+        data = with_fabric_files(content(Path(path)), Path(path).parent, content)
         model = GrippedConfig if "gripped_rope" in data else Config
         try:
             return model.model_validate(data)
@@ -64,7 +65,12 @@ def parse_any(path: str | Path) -> Config | GrippedConfig:
             raise from_validation(error, model) from error
 
 
-def _content(path: Path) -> dict[str, Any]:
+def content(path: Path) -> dict[str, Any]:
+    """A TOML file as plain data.
+
+    Raises:
+        ConfigError: it is missing, no TOML, or larger than `LARGEST`, or a text in it would steer a terminal.
+    """
     if not path.is_file():
         raise ConfigError(str(path), "is no file", str(path), "give the path of a configuration, such as my.toml")
     try:
@@ -75,28 +81,28 @@ def _content(path: Path) -> dict[str, Any]:
         fix = "write tables, as docs/configuration.md shows them"
         raise ConfigError(str(path), "holds a key of very many parts", path.name, fix)
     try:
-        content = tomllib.loads(text)
+        found = tomllib.loads(text)
     except UnicodeError:
         raise
     except ValueError as error:  # tomllib's own is one, and so is that of a number of too many digits
         raise ConfigError(str(path), f"is no valid TOML: {error}", path.name, "correct that line") from error
-    check_depth(path, content, ConfigError)
-    _check_texts(content)
-    return content
+    check_depth(path, found, ConfigError)
+    _check_texts(found)
+    return found
 
 
-def _check_texts(content: Any, key: str = "") -> None:
+def _check_texts(found: Any, key: str = "") -> None:
     """Refuse texts that would steer a terminal where they are printed.
 
     Raises:
         ConfigError: a key or a value holds a control character; it names the key.
     """
-    if isinstance(content, str) and steering(content, "\n\t"):
-        raise ConfigError(key or "a key", "holds a control character", content, "use characters that print")
-    if isinstance(content, dict):
-        for name, part in content.items():
+    if isinstance(found, str) and steering(found, "\n\t"):
+        raise ConfigError(key or "a key", "holds a control character", found, "use characters that print")
+    if isinstance(found, dict):
+        for name, part in found.items():
             _check_texts(name, key)
             _check_texts(part, f"{key}.{name}" if key else name)
-    if isinstance(content, list):
-        for i, part in enumerate(content):
+    if isinstance(found, list):
+        for i, part in enumerate(found):
             _check_texts(part, f"{key}[{i}]")

@@ -1,4 +1,4 @@
-"""The tables of docs/configuration.md, made from the schema: `python -m sheetbend.config.reference
+"""The tables of docs/configuration.md and docs/fabric.md, made from the schema: `python -m sheetbend.config.reference
 docs/configuration.md` renews them."""
 
 from __future__ import annotations
@@ -12,7 +12,16 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
-from . import cloth_schema, contact_schema, gripped_schema, rope_schema, scene_schema, schema, solver_schema
+from . import (
+    cloth_schema,
+    contact_schema,
+    fabric_schema,
+    gripped_schema,
+    rope_schema,
+    scene_schema,
+    schema,
+    solver_schema,
+)
 from .section import AXES, NAME, REFERENCE, Section
 
 HEADERS: dict[str, type[Section]] = {
@@ -55,6 +64,15 @@ ROPE_HEADERS: dict[str, type[Section]] = {
     "[fit]": gripped_schema.GrippedFitSection,
     "[output]": schema.OutputSection,
 }
+FABRIC_HEADERS: dict[str, type[Section]] = {
+    "[fabric]": fabric_schema.FabricSection,
+    "[weight]": fabric_schema.Weight,
+    "[[pull]]": fabric_schema.Pull,
+    "[[shear]]": fabric_schema.ShearTest,
+    "[[bending]]": fabric_schema.BendingTest,
+    "[drape]": fabric_schema.DrapeTest,
+    "[given]": fabric_schema.Given,
+}
 START, END = "<!-- tables: start -->", "<!-- tables: end -->"
 
 
@@ -66,11 +84,16 @@ def tables() -> str:
     return "\n".join([*with_scene, f"## All keys of ropes between grips\n\n{about}\n", *ropes])
 
 
-def renewed(text: str) -> str:
-    """A document with the part between the markers replaced by the tables."""
+def fabric_tables() -> str:
+    """The same of the files of `sheetbend fabric`."""
+    return "\n".join(_section(header, model) for header, model in FABRIC_HEADERS.items())
+
+
+def renewed(text: str, made: str | None = None) -> str:
+    """A document with the part between the markers replaced by tables, by default `tables()`."""
     before, rest = text.split(START)
     _, after = rest.split(END)
-    return f"{before}{START}\n\n{tables()}\n{END}{after}"
+    return f"{before}{START}\n\n{tables() if made is None else made}\n{END}{after}"
 
 
 def _section(header: str, model: type[Section]) -> str:
@@ -149,4 +172,5 @@ def _pattern(metadata: list[Any]) -> str:
 
 if __name__ == "__main__":
     document = Path(sys.argv[1])
-    document.write_text(renewed(document.read_text(encoding="utf-8")), encoding="utf-8")
+    of_fabric = fabric_tables() if document.name == "fabric.md" else None
+    document.write_text(renewed(document.read_text(encoding="utf-8"), of_fabric), encoding="utf-8")

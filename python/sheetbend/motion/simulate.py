@@ -31,6 +31,7 @@ class Trajectory:
         forces: per group the constraints' multipliers (frames, count, rows) in units of force (distance: minus the
             tension in N; bend and hinge: minus the moment in N m), zero at the initial frame.
         pressures: per volume (frames,) its multiplier, Pa, inside above outside; zero at the initial frame.
+        scene: that was simulated; None of a motion that was put together otherwise.
     """
 
     times: np.ndarray
@@ -38,6 +39,7 @@ class Trajectory:
     velocities: np.ndarray
     forces: Mapping[str, np.ndarray]
     pressures: Mapping[str, np.ndarray] = field(default_factory=dict)
+    scene: Scene | None = field(default=None, repr=False, compare=False)
 
 
 def simulate(
@@ -82,6 +84,7 @@ def simulate(
         velocities,
         forces_by_group(scene, out["multipliers"]),
         pressures_by_volume(scene, out["multipliers"]),
+        scene,
     )
 
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from ..errors import InputError
 from ..optional import require
 
 if TYPE_CHECKING:
@@ -47,3 +50,59 @@ def key(parent: Axes | Figure, entries: Sequence[tuple[str, str]]) -> None:
     parent.add_artist(
         boxes.AnnotationBbox(row, (1, 1), box_alignment=corner, xycoords=coordinates, frameon=False, pad=0, **offset)
     )
+
+
+def strip(panel: Axes, label: str, *, share: float = 0.25) -> Axes:
+    """A panel for residuals in the lower part of another one's place, on the same time axis, which it labels from now
+    on.
+
+    Args:
+        share: of the place.
+    """
+    figure, place = panel.figure, panel.get_subplotspec()
+    if place is not None:
+        grid = place.subgridspec(2, 1, height_ratios=[1.0 - share, share], hspace=0.0)
+        panel.set_subplotspec(grid[0])
+        below: Axes = figure.add_subplot(grid[1], sharex=panel)
+    else:
+        box = panel.get_position()
+        panel.set_position((box.x0, box.y0 + 1.2 * share * box.height, box.width, (1.0 - 1.2 * share) * box.height))
+        below = figure.add_axes((box.x0, box.y0, box.width, share * box.height), sharex=panel)
+    clean(below)
+    panel.tick_params(labelbottom=False, bottom=False)
+    panel.set_xlabel("")
+    panel.spines["bottom"].set_visible(False)
+    below.axhline(0.0, color=GRAY, linewidth=0.6, zorder=0)
+    below.set_ylabel(label)
+    below.locator_params(axis="y", nbins=3)
+    return below
+
+
+def panels_in(
+    ax: Any, count: int, size: tuple[float, float], title: str, **grid: Any
+) -> tuple[list[Axes], Axes | Figure]:
+    """The panels of a picture: the caller's, or new ones in a figure of their own, one below the other.
+
+    Args:
+        ax: axes, or a sequence or array of them; None for a new figure.
+        count: of panels.
+        size: of a new figure, inches.
+        title: of a new figure, or above the first of the caller's panels.
+        grid: options of `Figure.subplots`.
+
+    Returns:
+        The panels, and what the key of the whole picture belongs to.
+
+    Raises:
+        InputError: more or fewer axes than there are panels, or something else than axes.
+    """
+    if ax is None:
+        figure = new_figure(*size, title)
+        return list(figure.subplots(**{"nrows": count, "squeeze": False, **grid}).ravel()), figure
+    panels = list(np.ravel(np.array(ax, dtype=object)))
+    if len(panels) != count or not all(hasattr(one, "add_artist") for one in panels):
+        got = [type(one).__name__ for one in panels]
+        raise InputError("ax", f"must be axes, {count} of them", got, "leave it out for a new figure")
+    if title.strip():
+        panels[0].set_title(title, fontsize=11, color=INK, loc="left", weight="bold")
+    return panels, panels[0]

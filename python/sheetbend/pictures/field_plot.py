@@ -13,7 +13,7 @@ from ..arrays.checks import finite
 from ..errors import InputError
 from ..mesh import Places, TriangleMesh
 from ..optional import require
-from .drawing import ACCENT, GRAY, INK, PALE, WARM, clean, key, new_figure
+from .drawing import ACCENT, GRAY, INK, PALE, WARM, clean, key, new_figure, panels_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,8 +31,9 @@ class Field:
         label: what is drawn, with its unit.
         values: (m,), a number per triangle, NaN where there is none; or (k,), one per place.
         positions: (n, 3) m, where the vertices are in space; None draws the flat fabric.
-        places: of the (k,) values, drawn as disks on the flat fabric.
+        places: of the (k,) values, drawn as disks on the fabric.
         measured: (k, 3) m, markers drawn as dots in space; NaN where not seen.
+        scale: fields that name the same one have the same colors, and one color bar.
     """
 
     label: str
@@ -40,64 +41,104 @@ class Field:
     positions: Array | None = None
     places: Places | None = None
     measured: Array | None = None
+    scale: str = ""
 
 
 def plot_fields(
-    mesh: TriangleMesh, fields: Sequence[Field], *, title: str = "", gravity: ArrayLike = (0.0, 0.0, -9.81)
-) -> Figure:
-    """Fields side by side, each with its own color bar: around zero where both signs occur, else from zero.
+    mesh: TriangleMesh,
+    fields: Sequence[Field],
+    *,
+    title: str = "",
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+    ax: Axes | Sequence[Axes] | Array | None = None,
+) -> Array:
+    """Fields side by side with their color bars: around zero where both signs occur, else from zero. Fields of one
+    `scale` stand next to each other and share a bar.
 
     Args:
+        mesh: of the cloth.
+        fields: at least one.
+        title: above the figure.
         gravity: (3,), which points down in pictures of space.
+        ax: axes to draw in, one for each field, with `projection="3d"` where a field has positions.
+
+    Returns:
+        (fields,) axes.
 
     Raises:
-        InputError: no field, or values that are neither one per triangle nor one per place.
+        InputError: no field, values that are neither one per triangle nor one per place, or another number of axes.
     """
     if not fields:
         raise InputError("fields", "are empty", 0, "give at least one")
-    figure = new_figure(3.3 * len(fields) + 0.4, 3.9, title or " ")
-    figure.set_layout_engine("constrained", w_pad=0.12, wspace=0.03)
-    first_flat = next((i for i, field in enumerate(fields, start=1) if field.positions is None), 0)
-    for index, field in enumerate(fields, start=1):
-        count = len(mesh.triangles) if field.places is None else len(field.places)
-        values = np.asarray(field.values, dtype=float)
-        if values.shape != (count,):
-            raise InputError(f"fields[{index - 1}].values", "has the wrong shape", values.shape, f"give ({count},)")
-        options = {} if field.positions is None else {"projection": "3d"}
-        panel = figure.add_subplot(1, len(fields), index, **options)
+    values = [_checked(f"fields[{k}].values", mesh, field) for k, field in enumerate(fields)]
+    panels, whole = _panels(fields, title, ax)
+    first_flat = next((k for k, field in enumerate(fields) if field.positions is None), -1)
+    scales = [field.scale or f"{k}" for k, field in enumerate(fields)]
+    drawn = []
+    for k, (panel, field) in enumerate(zip(panels, fields, strict=True)):
+        colors = field_colors(np.concatenate([v for v, s in zip(values, scales, strict=True) if s == scales[k]]))
+        draw = _in_space if field.positions is not None else _on_fabric
+        drawn.append(draw(panel, mesh, field, values[k], colors))
         if field.positions is not None:
-            drawn = _in_space(panel, mesh, field, values, gravity)
-        elif field.places is not None:
-            drawn = _at_places(panel, mesh, field.places, values)
-        else:
-            drawn = _flat(panel, mesh, values)
-        if field.positions is None and index != first_flat:
+            seen = [] if field.measured is None else [_seen(np.asarray(field.measured))]
+            box_in_space(panel, np.vstack([field.positions, *seen]), gravity)
+        elif k != first_flat:
             panel.set_ylabel("")
             panel.tick_params(labelleft=False)
-        bar = figure.colorbar(drawn, ax=panel, orientation="horizontal", shrink=0.8, pad=0.03, aspect=28)
-        bar.set_label(field.label, color=INK, fontsize=9)
-        bar.ax.tick_params(colors=INK, labelsize=8)
-        bar.ax.locator_params(nbins=5)
-        bar.outline.set_visible(False)
+        if field.scale:
+            panel.set_title(field.label, color=INK, fontsize=9)
+    for s in dict.fromkeys(scales):
+        own = [k for k, other in enumerate(scales) if other == s]
+        _bar([panels[k] for k in own], drawn[own[0]], fields[own[0]].scale or fields[own[0]].label)
     if any(field.measured is not None for field in fields):
-        key(figure, [("measured markers", WARM)])
-    return figure
+        key(whole, [("measured markers", WARM)])
+    return np.array(panels)
 
 
-def _flat(panel: Axes, mesh: TriangleMesh, values: Array) -> Any:
+def _checked(name: str, mesh: TriangleMesh, field: Field) -> Array:
+    count = len(mesh.triangles) if field.places is None else len(field.places)
+    values = np.asarray(field.values, dtype=float)
+    if values.shape != (count,):
+        raise InputError(name, "has the wrong shape", values.shape, f"give ({count},)")
+    return values
+
+
+def _panels(fields: Sequence[Field], title: str, ax: Any) -> tuple[list[Axes], Axes | Figure]:
+    """As `panels_in`, but new ones are flat or of space, side by side."""
+    if ax is not None:
+        return panels_in(ax, len(fields), (0.0, 0.0), title)
+    figure = new_figure(3.3 * len(fields) + 0.4, 3.9, title or " ")
+    figure.set_layout_engine("constrained", w_pad=0.12, wspace=0.03)
+    kinds = [{} if field.positions is None else {"projection": "3d"} for field in fields]
+    return [figure.add_subplot(1, len(fields), k, **kind) for k, kind in enumerate(kinds, start=1)], figure
+
+
+def _bar(panels: list[Axes], drawn: Any, label: str) -> None:
+    """Below all of the panels, as thick as one below a single panel."""
+    figure: Any = panels[0].figure
+    shrink = 0.8 if len(panels) == 1 else 0.5
+    aspect = 35.0 * len(panels) * shrink
+    bar = figure.colorbar(drawn, ax=panels, orientation="horizontal", shrink=shrink, pad=0.03, aspect=aspect)
+    bar.set_label(label, color=INK, fontsize=9)
+    bar.ax.tick_params(colors=INK, labelsize=8)
+    bar.ax.locator_params(nbins=5)
+    bar.outline.set_visible(False)
+
+
+def _on_fabric(panel: Axes, mesh: TriangleMesh, field: Field, values: Array, colors: dict[str, Any]) -> Any:
+    if field.places is not None:
+        return _at_places(panel, mesh, field.places, values, colors)
     collections = require("matplotlib.collections", "plot")
-    drawn = panel.add_collection(
-        collections.PolyCollection(mesh.corners, array=_masked(values), **field_colors(values))
-    )
+    edges = {"edgecolor": "face", "linewidth": 0.2}
+    drawn = panel.add_collection(collections.PolyCollection(mesh.corners, array=_masked(values), **edges, **colors))
     _frame(panel, mesh)
     return drawn
 
 
-def _at_places(panel: Axes, mesh: TriangleMesh, places: Places, values: Array) -> Any:
+def _at_places(panel: Axes, mesh: TriangleMesh, places: Places, values: Array, colors: dict[str, Any]) -> Any:
     collections = require("matplotlib.collections", "plot")
     panel.add_collection(collections.PolyCollection(mesh.corners, facecolor="none", edgecolor=PALE, linewidth=0.6))
     at = np.einsum("kc,kcx->kx", places.weights, mesh.corners[places.triangles])
-    colors = {k: v for k, v in field_colors(values).items() if k in ("cmap", "norm")}
     x, y = at.T
     drawn = panel.scatter(x, y, s=42, c=_masked(values), edgecolors=GRAY, linewidths=0.4, zorder=3, **colors)
     _frame(panel, mesh)
@@ -113,20 +154,28 @@ def _frame(panel: Axes, mesh: TriangleMesh) -> None:
     panel.locator_params(nbins=5)
 
 
-def _in_space(panel: Any, mesh: TriangleMesh, field: Field, values: Array, gravity: ArrayLike) -> Any:
-    assert field.positions is not None  # what sent it here
+def _in_space(panel: Any, mesh: TriangleMesh, field: Field, values: Array, colors: dict[str, Any]) -> Any:
     art = require("mpl_toolkits.mplot3d.art3d", "plot")
+    assert field.positions is not None  # what sent it here
     x = finite("positions", field.positions, mesh.vertices.shape, InputError)
-    drawn = panel.add_collection3d(
-        art.Poly3DCollection(x[mesh.triangles], array=_masked(values), **field_colors(values, line=0.25))
-    )
-    shown = [x]
+    edges = {"edgecolor": GRAY, "linewidth": 0.25}
+    panel.computed_zorder = False  # dots stay in front
+    if field.places is None:
+        sheet = art.Poly3DCollection(x[mesh.triangles], array=_masked(values), **edges, **colors)
+    else:
+        sheet = art.Poly3DCollection(x[mesh.triangles], facecolor=PALE, **edges)
+    drawn = panel.add_collection3d(sheet)
+    if field.places is not None:
+        at = field.places.positions(x)
+        drawn = panel.scatter(*at.T, s=30, c=_masked(values), edgecolors=GRAY, depthshade=False, zorder=9, **colors)
     if field.measured is not None:
-        seen = np.asarray(field.measured)[np.isfinite(field.measured).all(axis=1)]
+        seen = _seen(np.asarray(field.measured))
         panel.plot(*seen.T, "o", color=WARM, markersize=2.6, markeredgewidth=0, zorder=10)
-        shown.append(seen)
-    box_in_space(panel, np.vstack(shown), gravity)
     return drawn
+
+
+def _seen(points: Array) -> Array:
+    return points[np.isfinite(points).all(axis=1)]
 
 
 def box_in_space(panel: Any, points: Array, gravity: ArrayLike) -> None:
@@ -152,8 +201,8 @@ def box_in_space(panel: Any, points: Array, gravity: ArrayLike) -> None:
     panel.grid(visible=False)
 
 
-def field_colors(values: Array, line: float = 0.0) -> dict[str, Any]:
-    """Colors of a field; both ends alike far from zero where it has both signs."""
+def field_colors(values: Array) -> dict[str, Any]:
+    """Color map and scale of a field; both ends alike far from zero where it has both signs."""
     colors = require("matplotlib.colors", "plot")
     seen = values[np.isfinite(values)]
     size = float(np.abs(seen).max(initial=0.0)) or 1.0
@@ -165,8 +214,7 @@ def field_colors(values: Array, line: float = 0.0) -> dict[str, Any]:
     else:
         palette, low, high = [PALE, ACCENT, _DARK], 0.0, size
     shades = colors.LinearSegmentedColormap.from_list("field", palette).with_extremes(bad="white")
-    edges: dict[str, Any] = {"edgecolor": GRAY, "linewidth": line} if line else {"edgecolor": "face", "linewidth": 0.2}
-    return {"cmap": shades, "norm": colors.Normalize(low, high), **edges}
+    return {"cmap": shades, "norm": colors.Normalize(low, high)}
 
 
 def _masked(values: ArrayLike) -> Any:

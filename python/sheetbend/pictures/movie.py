@@ -122,7 +122,7 @@ def _picture(motion: Motion, shown: Array, title: str) -> tuple[Figure, Any]:
         every = np.concatenate([values for own in strains.values() for values in own.values()])
         sparse = sum(len(c.mesh.triangles) for c in cloths) <= _WITH_EDGES
         shades = np.append(np.minimum(every, np.quantile(every, 0.995)), 0.0)
-        colors = field_colors(shades, line=0.2 if sparse else 0.05)
+        colors = {**field_colors(shades), "edgecolor": GRAY, "linewidth": 0.2 if sparse else 0.05}
         for cloth in cloths:
             drawn = panel.add_collection3d(
                 art.Poly3DCollection(motion.positions[0, cloth.particles][cloth.mesh.triangles], **colors)

@@ -1,7 +1,7 @@
 """Figures of a fit: measured against simulated, residuals, and estimates with their intervals.
 
-Every function returns a matplotlib figure that belongs to no window and changes no global state; `save`
-writes it.
+Every function draws in the axes `ax`, or in a new figure that belongs to no window and changes no global state, and
+returns its axes. `save` writes their figure.
 """
 
 from __future__ import annotations
@@ -14,11 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays.timeseries import Array
+from ..doubts.prediction import Comparison
 from ..errors import InputError
 from ..files.whole import written
 from ..optional import require
+from ..quantities.wording import raised
 from ..result.result import Estimate
-from .drawing import ACCENT, GRAY, INK, PALE, WARM, clean, key, new_figure
+from .drawing import ACCENT, GRAY, INK, PALE, WARM, clean, key, panels_in, strip
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,10 +31,28 @@ _MOST_PANELS = 6
 _AXES = "xyz"
 
 
-def save(figure: Figure, path: str | Path) -> None:
-    """Write a figure, whole or not at all; the format follows from the name (png, svg, pdf)."""
+def save(drawn: Figure | Axes | Array, path: str | Path) -> None:
+    """Write a figure, or the figure of some axes, whole or not at all; the format follows from the name (png, svg,
+    pdf)."""
+    first: Any = np.ravel(np.array(drawn, dtype=object))[0]
+    figure = first.figure.figure  # of axes in a part of a figure the whole one
     with written(path) as beside:
         figure.savefig(beside, dpi=160, facecolor="white")
+
+
+def compared(c: Comparison) -> dict[str, Any]:
+    """What `plot_trajectories` and `plot_residuals` take of a motion that a fit compared:
+    `plot_trajectories(**compared(fit.comparisons[0]))`."""
+    times = c.recording.times
+    held_out = times[c.held_out]
+    return {
+        "measured": c.recording.positions,
+        "simulated": c.simulated,
+        "times": times,
+        "markers": c.recording.markers,
+        "held_out": (float(held_out[0]), float(held_out[-1])) if len(held_out) else None,
+        "title": c.experiment.name,
+    }
 
 
 def plot_trajectories(
@@ -45,8 +65,10 @@ def plot_trajectories(
     baseline: Array | None = None,
     held_out: tuple[float, float] | None = None,
     title: str = "",
-) -> Figure:
-    """One coordinate of each marker over time, measured (dots) against simulated (line).
+    ax: Axes | Sequence[Axes] | Array | None = None,
+) -> Array:
+    """One coordinate of each marker over time, measured (dots) against simulated (line), and below the last one how far
+    the simulated ones are off.
 
     Args:
         measured: (frames, markers, 3) m, NaN in gaps.
@@ -57,13 +79,20 @@ def plot_trajectories(
         baseline: (frames, markers, 3) m, a prediction without physics, drawn thin beside.
         held_out: (first, last) s of the part that the fit did not see; it is shaded.
         title: above the figure.
+        ax: axes to draw in, one for each marker that is drawn.
+
+    Returns:
+        (panels,) axes.
+
+    Raises:
+        InputError: arrays that do not match, or another number of axes than of panels.
     """
     _same_shape(measured, simulated, times)
     names = list(markers) or [f"m{index}" for index in range(measured.shape[1])]
     shown = np.unique(np.linspace(0, measured.shape[1] - 1, min(_MOST_PANELS, measured.shape[1])).astype(int))
     axis = _liveliest(measured) if axis is None else axis
-    figure = new_figure(7.2, 1.1 + 1.15 * len(shown), title)
-    panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
+    heights = [1.0] * (len(shown) - 1) + [1.7]  # the last one has the strip
+    panels, _ = panels_in(ax, len(shown), (7.2, 1.8 + 1.15 * len(shown)), title, sharex=True, height_ratios=heights)
     for panel, marker in zip(panels, shown, strict=True):
         clean(panel)
         panel.plot(times, 1e3 * measured[:, marker, axis], ".", color=GRAY, markersize=3.6, markeredgewidth=0)
@@ -76,9 +105,14 @@ def plot_trajectories(
     _name_shade(panels[0], held_out)
     without = [("without physics", WARM)] if baseline is not None else []
     key(panels[0], [("measured", GRAY), ("simulated", ACCENT), *without])
-    panels[-1].set_xlabel("time [s]")
-    figure.supylabel(f"{_AXES[axis]} [mm]", color=INK, fontsize=9)
-    return figure
+    panels[len(panels) // 2].set_ylabel(f"{_AXES[axis]} [mm]")
+    off = 1e3 * (simulated - measured)[:, shown, axis]
+    below = strip(panels[-1], "off [mm]", share=0.4)
+    below.plot(times, off, color=GRAY, linewidth=0.5)
+    below.plot(times, off[:, int(np.nansum(off**2, axis=0).argmax())], color=WARM, linewidth=0.8)
+    _shade(below, held_out)
+    below.set_xlabel("time [s]")
+    return np.array(panels)
 
 
 @dataclass(frozen=True)
@@ -93,23 +127,41 @@ class Motion:
     held_out: tuple[float, float] | None = None
 
 
-def plot_motions(motions: Sequence[Motion], *, title: str = "") -> Figure:
-    """One coordinate of each of several recordings, measured (dots) against simulated (line), one panel each."""
+def plot_motions(
+    motions: Sequence[Motion], *, title: str = "", ax: Axes | Sequence[Axes] | Array | None = None
+) -> Array:
+    """One coordinate of each of several recordings, measured (dots) against simulated (line), and below each how far
+    the simulated one is off.
+
+    Args:
+        motions: at least one.
+        title: above the figure.
+        ax: axes to draw in, one for each motion.
+
+    Returns:
+        (motions,) axes.
+
+    Raises:
+        InputError: no motion, or another number of axes than of motions.
+    """
     if not motions:
         raise InputError("motions", "are empty", 0, "give at least one")
-    figure = new_figure(7.2, 0.6 + 1.75 * len(motions), title or " ")
-    for panel, motion in zip(figure.subplots(len(motions), 1, squeeze=False)[:, 0], motions, strict=True):
+    panels, whole = panels_in(ax, len(motions), (7.2, 0.6 + 2.2 * len(motions)), title or " ")
+    for panel, motion in zip(panels, motions, strict=True):
         clean(panel)
         panel.plot(motion.times, 1e3 * motion.measured, ".", color=GRAY, markersize=4, markeredgewidth=0)
         panel.plot(motion.times, 1e3 * motion.simulated, color=ACCENT, linewidth=1.3)
         panel.margins(x=0)
         panel.set_title(motion.name, fontsize=9, color=INK, loc="left", pad=4)
         panel.set_ylabel("[mm]")
-        _shade(panel, motion.held_out)
-    panel.set_xlabel("time [s]")
+        below = strip(panel, "off [mm]")
+        below.plot(motion.times, 1e3 * (motion.simulated - motion.measured), color=WARM, linewidth=0.8)
+        for part in (panel, below):
+            _shade(part, motion.held_out)
+    below.set_xlabel("time [s]")
     shaded = [("shaded: held out", INK)] if any(motion.held_out for motion in motions) else []
-    key(figure, [("measured", GRAY), ("simulated", ACCENT), *shaded])
-    return figure
+    key(whole, [("measured", GRAY), ("simulated", ACCENT), *shaded])
+    return np.array(panels)
 
 
 def plot_shapes(
@@ -120,7 +172,8 @@ def plot_shapes(
     names: Sequence[str] = (),
     plane: tuple[int, int] = (0, 2),
     title: str = "",
-) -> Figure:
+    ax: Axes | Sequence[Axes] | Array | None = None,
+) -> Array:
     """Static shapes in a plane: measured points and the simulated line, one panel each, equal axes.
 
     Args:
@@ -130,6 +183,13 @@ def plot_shapes(
         names: of the shapes.
         plane: the two axes that are drawn, 0 to 2.
         title: above the figure.
+        ax: axes to draw in, one for each shape.
+
+    Returns:
+        (shapes,) axes.
+
+    Raises:
+        InputError: no shapes, measured ones that are not as many as simulated ones, or another number of axes.
     """
     if not measured or len(measured) != len(simulated):
         got = (len(measured), len(simulated))
@@ -139,8 +199,9 @@ def plot_shapes(
     width, height = np.ptp(_finite(np.vstack([*measured, *simulated])[:, plane]), axis=0)
     cell = 7.6 / columns
     ratio = min(max(height / max(width, 1e-9), 0.2), 1.5)
-    figure = new_figure(7.6, 0.75 + rows * ((cell - 0.35) * ratio + 0.3), title or " ")
-    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    size = (7.6, 0.75 + rows * ((cell - 0.35) * ratio + 0.3))
+    grid = {"nrows": rows, "ncols": columns, "sharex": True, "sharey": True}
+    panels, whole = panels_in(ax, len(measured), size, title or " ", **grid)
     for panel in panels[len(measured) :]:
         panel.set_visible(False)
     labels = list(names) or [f"shape {index}" for index in range(len(measured))]
@@ -158,8 +219,8 @@ def plot_shapes(
         if index + columns >= len(measured):
             panel.set_xlabel(f"{_AXES[plane[0]]} [mm]")
             panel.tick_params(labelbottom=True)
-    key(figure, [("measured", GRAY), ("simulated", ACCENT)])
-    return figure
+    key(whole, [("measured", GRAY), ("simulated", ACCENT)])
+    return np.array(panels[: len(measured)])
 
 
 def plot_residuals(
@@ -170,11 +231,18 @@ def plot_residuals(
     markers: Sequence[str] = (),
     held_out: tuple[float, float] | None = None,
     title: str = "",
-) -> Figure:
+    ax: Axes | None = None,
+) -> Axes:
     """Distance between measured and simulated markers over time: each marker thin, their rms heavy.
 
     The marker that is worst on the whole is drawn in the warm color and named. Arguments as in
     `plot_trajectories`.
+
+    Returns:
+        The axes.
+
+    Raises:
+        InputError: arrays that do not match, or no single axes.
     """
     _same_shape(measured, simulated, times)
     names = list(markers) or [f"m{index}" for index in range(measured.shape[1])]
@@ -184,8 +252,7 @@ def plot_residuals(
     mean = np.sqrt(squares.sum(1) / np.maximum(seen.sum(1), 1))
     mean[~seen.any(1)] = np.nan
     worst = int(np.argmax(squares.sum(0) / np.maximum(seen.sum(0), 1)))
-    figure = new_figure(7.2, 3.0, title)
-    panel = figure.subplots()
+    (panel,), _ = panels_in(ax, 1, (7.2, 3.0), title)
     clean(panel)
     panel.plot(times, gap, color=GRAY, linewidth=0.5, alpha=0.5)
     panel.plot(times, gap[:, worst], color=WARM, linewidth=0.9)
@@ -197,7 +264,7 @@ def plot_residuals(
     panel.set_xlabel("time [s]")
     panel.set_ylabel("distance [mm]")
     key(panel, [("each marker", GRAY), (f"worst marker: {names[worst]}", WARM), ("all markers, rms", ACCENT)])
-    return figure
+    return panel
 
 
 def plot_estimates(
@@ -205,13 +272,21 @@ def plot_estimates(
     *,
     published: Mapping[str, float | tuple[float, float]] | None = None,
     title: str = "",
-) -> Figure:
+    ax: Axes | Sequence[Axes] | Array | None = None,
+) -> Array:
     """Values with 95 % intervals, parameters of one unit on one axis, published values as marks.
 
     Args:
         estimates: of a `FitResult`, or of several.
         published: value, or (lowest, highest), by parameter.
         title: above the figure.
+        ax: axes to draw in, one for each unit that occurs.
+
+    Returns:
+        (units,) axes.
+
+    Raises:
+        InputError: no estimate, or another number of axes than of units.
     """
     if not estimates:
         raise InputError("estimates", "are empty", [], "give at least one estimate")
@@ -220,16 +295,16 @@ def plot_estimates(
     for estimate in estimates:
         groups.setdefault(estimate.unit, []).append(estimate)
     sizes = [len(group) for group in groups.values()]
-    figure = new_figure(7.2, 0.55 + 0.3 * sum(sizes) + 0.55 * len(groups), title or " ")
-    panels = figure.subplots(len(groups), 1, squeeze=False, height_ratios=[size + 0.6 for size in sizes])[:, 0]
+    size = (7.2, 0.55 + 0.3 * sum(sizes) + 0.55 * len(groups))
+    panels, whole = panels_in(ax, len(groups), size, title or " ", height_ratios=[size + 0.6 for size in sizes])
     for panel, (unit, group) in zip(panels, groups.items(), strict=True):
         _estimates_panel(panel, group, published)
-        panel.set_xlabel(f"[{unit or '1'}]", labelpad=2)
+        panel.set_xlabel(f"[{raised(unit) or '1'}]", labelpad=2)
     entries = [("value and 95 % interval", ACCENT)]
     if any(estimate.name in published for estimate in estimates):
         entries.append(("published", WARM))
-    key(figure, entries)
-    return figure
+    key(whole, entries)
+    return np.array(panels)
 
 
 def _estimates_panel(
@@ -244,6 +319,7 @@ def _estimates_panel(
         panel.set_xscale("log")
     else:
         panel.ticklabel_format(axis="x", useOffset=False)
+        panel.locator_params(axis="x", nbins=6)
     low, high = (min(ends) / 1.5, max(ends) * 1.5) if log else _padded(min(ends), max(ends))
     panel.set_xlim(low, high)
     if log:

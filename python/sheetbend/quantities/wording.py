@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 
 from .parameters import Parameter
+
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def short(number: float, digits: int = 3) -> str:
@@ -32,6 +35,11 @@ def figures(numbers: Sequence[float | None], uncertainty: float | None) -> list[
     digits = min(max(digits, 0), 9)
     tail = f"e{exponent:+03d}" if exponent else ""
     return ["" if number is None else f"{number / 10.0**exponent:.{digits}f}{tail}" for number in numbers]
+
+
+def raised(unit: str) -> str:
+    """A unit with its powers as superscripts, for figures: N m^2 as N m²."""
+    return re.sub(r"\^(-?[0-9]+)", lambda power: power[1].translate(_RAISED), unit)
 
 
 def quantity(value: float, parameter: Parameter) -> str:

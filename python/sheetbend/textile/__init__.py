@@ -14,11 +14,13 @@ from .drape import Drape, DrapeState, drape, drape_scene, drape_state
 from .fabric_fit import FabricFit, Measured, fit_fabric
 from .forecast import PullForecast, forecast_pull
 from .kes import BendingLoop, ShearLoop, TensileLoop, bending_loop, shear_loop, tensile_loop
+from .outline import Outline, read_outline
 from .picture_frame import PictureFrame, picture_frame
 from .pull import fit_pull, pulled, strains_under
 from .reading import GRAM_FORCE, Reading
 from .shear import Shear, shear
 from .uniaxial import Uniaxial, uniaxial
+from .whole_fabric import FabricTests, WholeFabric, fit_tests
 
 __all__ = [
     "GRAM_FORCE",
@@ -30,8 +32,10 @@ __all__ = [
     "Drape",
     "DrapeState",
     "FabricFit",
+    "FabricTests",
     "MeanCurve",
     "Measured",
+    "Outline",
     "PictureFrame",
     "PullForecast",
     "Reading",
@@ -39,6 +43,7 @@ __all__ = [
     "ShearLoop",
     "TensileLoop",
     "Uniaxial",
+    "WholeFabric",
     "bending_loop",
     "bias_extension",
     "cantilever",
@@ -47,11 +52,13 @@ __all__ = [
     "drape_state",
     "fit_fabric",
     "fit_pull",
+    "fit_tests",
     "forecast_pull",
     "mean_curve",
     "picture_frame",
     "pulled",
     "read_curves",
+    "read_outline",
     "shear",
     "shear_loop",
     "strains_under",

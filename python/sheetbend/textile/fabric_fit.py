@@ -106,6 +106,11 @@ class FabricFit:
     freedom: int
 
     def __str__(self) -> str:
+        found, read = self.sections()
+        return "\n".join([*plain_section(found), "", *plain_section(read)])
+
+    def sections(self) -> tuple[Section, Section]:
+        """The report's tables: the numbers found, and each reading beside the fabric's."""
         found = tuple(
             (e.name, f"{values[0]} {e.unit}".rstrip(), f"{values[1]} to {values[2]}" if values[1] else "open", e.words)
             for e in self.estimates
@@ -128,14 +133,9 @@ class FabricFit:
             f"{size}; intervals are widened by its root" if _widening(self.misfit, self.freedom) > 1 else size,
         )
         left_out = tuple(("left out", told) for told in dict.fromkeys(m.note for m in self.measured) if told)
-        return "\n".join(
-            [
-                *plain_section(Section("Fabric", ("number", "value", "95 % interval", "verdict"), found)),
-                "",
-                *plain_section(
-                    Section("Readings", ("test", "laboratory", "fabric", "off by, sigma"), read, (note, *left_out))
-                ),
-            ]
+        return (
+            Section("Fabric", ("number", "value", "95 % interval", "verdict"), found),
+            Section("Readings", ("test", "laboratory", "fabric", "off by, sigma"), read, (note, *left_out)),
         )
 
 

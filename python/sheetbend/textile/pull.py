@@ -74,7 +74,7 @@ def pulled(
     ways = {c.name: chosen(c, cycle).way(way) for c in curves}
     length, width = _specimen(curves)
     note, found = _left_out(curves, cycle, way), []
-    for load in _loads(curves, cycle, way, levels):
+    for load in mean_loads(curves, cycle, way, levels):
         strains = {name: 100.0 * w.deformation_at(load) for name, w in ways.items()}
         missing = [name for name, strain in strains.items() if math.isnan(strain)]
         if missing:
@@ -146,28 +146,36 @@ def fit_pull(
     count = max(_LEVELS, 2 * len(LAWS[name]))
     measured = pulled(curves, along, way, cycle=cycle, levels=count, error=error)
     pretension = curves[0].pretension
-    loads = _loads(curves, cycle, way, count)
+    loads = mean_loads(curves, cycle, way, count)
     loose = (loads[-1] / loads) ** float(weights)
     measured = [replace(m, sigma=m.sigma * x, note=m.note + told) for m, x in zip(measured, loose, strict=True)]
     loads = loads - pretension
     if name in NUMBERS and levels is not None:
         return fit_locking(name, measured, loads, levels, along, measured[0].note)
-    strains = np.array([m.value for m in measured]) / 100.0
+    stiffness, laws = first_guess(loads, np.array([m.value for m in measured]) / 100.0)
+    sizes = {"density": 0.1, "bending": 1e-5, "warp": stiffness, "weft": stiffness, "shear": stiffness / 2.0}
+    start = Fabric(**sizes, poisson=poisson, law=laws[name])
+    return fit_fabric(measured, start, [along, *(f"{along}_{number}" for number in LAWS[name])])
+
+
+def first_guess(loads: np.ndarray, strains: np.ndarray) -> tuple[float, dict[str, Law]]:
+    """Stiffness, N/m, and every law of the simulation with numbers to begin with, the same for warp, weft and shear.
+
+    Args:
+        loads: (n,) N/m beyond the pretension, increasing.
+        strains: (n,) under them.
+    """
     green = strains + strains**2 / 2.0
     secants = loads / (green * (1.0 + strains))  # of a free strip: k exp(b green^2), or k sinh(b green)/(b green)
     grown = max(math.log(secants[-1] / secants[0]), 0.0)
     b = max(grown / (green[-1] ** 2 - green[0] ** 2), 0.01)
     evenly = max(math.sqrt(6.0 * grown) / green[-1], 0.01)  # where sinh(t)/t is about exp(t^2/6)
-    stiffness = float(secants[0])
-    laws: dict[str, Law] = {
+    return float(secants[0]), {
         "linear": Linear(),
         "exponential": Exponential(b, b, b),
         "sinh": Sinh(evenly, evenly, evenly),
         "spline": Spline((float(green[-1]) / 4.0,) * 3),
     }
-    sizes = {"density": 0.1, "bending": 1e-5, "warp": stiffness, "weft": stiffness, "shear": stiffness / 2.0}
-    start = Fabric(**sizes, poisson=poisson, law=laws[name])
-    return fit_fabric(measured, start, [along, *(f"{along}_{number}" for number in LAWS[name])])
 
 
 def strains_under(
@@ -230,7 +238,7 @@ def checked_pulls(curves: Sequence[Curve]) -> None:
         raise InputError("curves", "share a name", [c.name for c in curves], fix)
 
 
-def _loads(curves: Sequence[Curve], cycle: int, way: str, levels: int) -> np.ndarray:
+def mean_loads(curves: Sequence[Curve], cycle: int, way: str, levels: int) -> np.ndarray:
     """(levels,) N/m of the mean curve at even shares of its strain, up to the load that all reach."""
     mean = mean_curve(curves, way, cycle=cycle)
     top = min(float(chosen(c, cycle).way(way).load.max()) for c in curves)

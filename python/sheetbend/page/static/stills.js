@@ -25,6 +25,7 @@ class Stills {
       pen.strokeStyle = color("accent");
       for (const part of motion.lines) this.path(pen, at, part, frame);
       for (const part of motion.sheets) this.wires(pen, at, part, frame);
+      for (const part of motion.ticks) this.ticks(pen, at, part, frame);
       this.points(pen, at, motion.measured, motion.markers.length, frame, "gray");
       this.points(pen, at, motion.simulated, motion.markers.length, frame, "accent");
     }
@@ -34,6 +35,18 @@ class Stills {
     pen.beginPath();
     for (let n = 0; n < part.nodes; ++n) pen.lineTo(...at(part.places, 3 * (frame * part.nodes + n)));
     pen.stroke();
+  }
+
+  // Twist of rods, and the outlines of what they touch.
+  ticks(pen, at, part, frame) {
+    pen.strokeStyle = color(part.name === "twist" ? "warm" : "gray");
+    pen.beginPath();
+    for (let n = 0; n < part.nodes; n += 2) {
+      pen.moveTo(...at(part.places, 3 * (frame * part.nodes + n)));
+      pen.lineTo(...at(part.places, 3 * (frame * part.nodes + n + 1)));
+    }
+    pen.stroke();
+    pen.strokeStyle = color("accent");
   }
 
   wires(pen, at, part, frame) {

@@ -1,0 +1,87 @@
+"""What other programs get of a motion: cloths as meshes and ropes as lines, at some frames."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..motion.simulate import Trajectory
+from ..scene.scene import Scene
+from .strain import largest_strain
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Body:
+    """A cloth or a rope over time.
+
+    Attributes:
+        name: in the scene.
+        positions: (frames, vertices, 3) m.
+        velocities: the same, m/s.
+        triangles: (m, 3) of a cloth; None of a rope.
+        material: (vertices, 2) m, of a cloth that one chart covers; None otherwise.
+        strain: (frames, m) largest principal Green strain of each triangle; None of a rope.
+    """
+
+    name: str
+    positions: Array
+    velocities: Array
+    triangles: Array | None = None
+    material: Array | None = None
+    strain: Array | None = None
+
+
+def bodies(scene: Scene, motion: Trajectory, frames: Array) -> Iterator[Body]:
+    """Cloths first, then ropes and rods, at some frames of a motion.
+
+    Raises:
+        InputError: the scene has neither.
+    """
+    if not scene.cloths and not scene.ropes:
+        raise InputError("scene", "has neither cloth nor rope", scene.name, "give one that has something to write")
+    x, v = motion.positions[frames], motion.velocities[frames]
+    for cloth in scene.cloths.values():
+        mesh, own = cloth.mesh, cloth.particles
+        strain = np.stack([largest_strain(mesh, frame) for frame in x[:, own]])
+        material = mesh.material if mesh.material.ndim == 2 else None
+        yield Body(cloth.name, x[:, own], v[:, own], mesh.triangles, material, strain)
+    for rope in scene.ropes.values():
+        yield Body(rope.name, x[:, rope.particles], v[:, rope.particles])
+
+
+def chosen_frames(times: Array, most: int) -> Array:
+    """Indices of at most so many frames, evenly."""
+    return np.unique(np.linspace(0, len(times) - 1, min(most, len(times))).round().astype(int))
+
+
+def tube(lines: Array, radius: float, sides: int) -> tuple[Array, Array]:
+    """A rope's (frames, nodes, 3) m as the surface of a tube: (frames, nodes * sides, 3) m and (m, 3) triangles.
+
+    Its sides are carried along the rope without twist (parallel transport), from a direction across its first link.
+    """
+    along = np.gradient(lines, axis=1)
+    along /= np.maximum(np.linalg.norm(along, axis=2, keepdims=True), np.finfo(float).tiny)
+    least = np.eye(3)[np.abs(along[:, 0]).argmin(axis=1)]
+    across = np.empty_like(lines)
+    across[:, 0] = _perpendicular(least, along[:, 0])
+    for k in range(1, lines.shape[1]):
+        across[:, k] = _perpendicular(across[:, k - 1], along[:, k])
+    other = np.cross(along, across)
+    turn = 2.0 * np.pi * np.arange(sides) / sides
+    ring = across[:, :, None] * np.cos(turn)[:, None] + other[:, :, None] * np.sin(turn)[:, None]
+    surface = (lines[:, :, None] + radius * ring).reshape(len(lines), -1, 3)
+    first = sides * np.arange(lines.shape[1] - 1)[:, None] + np.arange(sides)
+    right = sides * np.arange(lines.shape[1] - 1)[:, None] + (np.arange(sides) + 1) % sides
+    quads = np.stack([first, right, right + sides, first + sides], axis=-1).reshape(-1, 4)
+    return surface, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def _perpendicular(vector: Array, along: Array) -> Array:
+    """(n, 3) unit vectors: what vectors have across unit vectors."""
+    across = vector - (vector * along).sum(axis=1, keepdims=True) * along
+    return np.asarray(across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny))
