@@ -45,7 +45,8 @@ Single<T> numbers_vjp(const ContactSource<T>& source, const ColliderPoses<Single
     return S(0.0);
   }
   const S w = source.read(source.w[node]);
-  return -(S(rigidity) * bar.kappa / (w * w));
+  const double share = source.bdf.eta / source.h;
+  return -(S(rigidity * share * share) * bar.kappa / (w * w));
 }
 
 // Reverse of ContactSource::poses.

@@ -22,6 +22,7 @@ struct Step {
   Bdf bdf;
   double t_next;
   SubstepStates<T> from;  // the states at n and n-1
+  Scenes scenes = all_scenes<T>;  // that are solved; the others' numbers are left over
 
   int threads() const { return plan.options.threads; }
 };

@@ -42,12 +42,13 @@ Solver solver_of(const py::tuple& a) {
                      a[7].cast<int>(), a[8].cast<double>(), a[9].cast<int>());
 }
 
-// Forward only: positions, velocities and constraint multipliers in force units at the wanted substeps.
+// Forward only: positions, velocities and constraint multipliers in force units at the wanted substeps, and how many substeps went with BDF1.
 py::dict simulate(const Solver& s, const Array& inputs, const Steps& steps, double t0) {
   check(s, inputs, 1, steps);
   const std::size_t dofs = s.scene->dofs(), rows = s.scene->multipliers(), frames = steps.size();
   auto positions = empty({frames, dofs}), velocities = empty({frames, dofs}), multipliers = empty({frames, rows});
   double *x = positions.mutable_data(), *v = velocities.mutable_data(), *force = multipliers.mutable_data();
+  int first_order = 0;
   {
     Release release;
     SignalInterrupt interrupt;
@@ -56,7 +57,8 @@ py::dict simulate(const Solver& s, const Array& inputs, const Steps& steps, doub
     rollout.run(
         steps.back(),
         [&](int step, const double* xs, const double* vs) {
-          const double eta = Bdf::at(s.plan.options, std::max(step - 1, 0)).eta;
+          const double eta = rollout.bdf().eta;
+          if (step > 0) first_order += rollout.first_order() != 0;
           const double* lambda = next < frames && steps[next] == step ? rollout.multipliers() : nullptr;
           for (; next < frames && steps[next] == step; ++next) {
             x = std::copy_n(xs, dofs, x);
@@ -70,6 +72,7 @@ py::dict simulate(const Solver& s, const Array& inputs, const Steps& steps, doub
   out["positions"] = positions;
   out["velocities"] = velocities;
   out["multipliers"] = multipliers;
+  out["first_order"] = first_order;
   return out;
 }
 

@@ -31,6 +31,8 @@ class Trajectory:
         forces: per group the constraints' multipliers (frames, count, rows) in units of force (distance: minus the
             tension in N; bend and hinge: minus the moment in N m), zero at the initial frame.
         pressures: per volume (frames,) its multiplier, Pa, inside above outside; zero at the initial frame.
+        bdf1_share: of the substeps, how many went with BDF1. With integrator "bdf2" that is the first one, and three
+            from where a contact begins. BDF1 damps like zeta = omega h/2.
     """
 
     times: np.ndarray
@@ -38,6 +40,7 @@ class Trajectory:
     velocities: np.ndarray
     forces: Mapping[str, np.ndarray]
     pressures: Mapping[str, np.ndarray] = field(default_factory=dict)
+    bdf1_share: float = 0.0
 
 
 def simulate(
@@ -82,6 +85,7 @@ def simulate(
         velocities,
         forces_by_group(scene, out["multipliers"]),
         pressures_by_volume(scene, out["multipliers"]),
+        out["first_order"] / max(steps[-1], 1),
     )
 
 

@@ -73,8 +73,8 @@ struct ContactBuilder {
   std::map<std::string, std::vector<double>> compliances, rests;
 };
 
-inline SolverOptions contact_options(double h) {
-  return {.h = h, .integrator = Integrator::bdf1, .partition = Partition::implicit, .iterations = 100};
+inline SolverOptions contact_options(double h, Integrator integrator = Integrator::bdf1) {
+  return {.h = h, .integrator = integrator, .partition = Partition::implicit, .iterations = 100};
 }
 
 // d x_dof/d inputs at the last step of a program.
