@@ -56,16 +56,16 @@ inline Touch<double> touch_matrix(int shape, const Vec3<double>& z, const Contac
   const Touch<double> plain = touch(distance, Vec3<double>(n), z, c);
   std::fill_n(A, 9, 0.0);
   if (!plain.pushes) return plain;
-  D zd[3], distance_d(distance), nd[3] = {n[0], n[1], n[2]};
+  D zd[3], distance_d(distance), n_d[3] = {n[0], n[1], n[2]};
   for (int d = 0; d < 3; ++d) {
     zd[d] = D(at[d]);
     zd[d].d[d] = 1.0;
     distance_d.d[d] = n[d];
   }
   const ContactNumbers<D> cd = constants<D>(c);
-  if (curved) distance_from(shape, zd, cd.size, distance_d, nd);
+  if (curved) distance_from(shape, zd, cd.size, distance_d, n_d);
   D force[3];
-  touch(distance_d, Vec3<D>(nd), Vec3<D>(zd), cd).force.store(force);
+  touch(distance_d, Vec3<D>(n_d), Vec3<D>(zd), cd).force.store(force);
   for (int a = 0; a < 3; ++a)
     for (int b = 0; b < 3; ++b) A[3 * a + b] = -force[a].d[b];
   return plain;

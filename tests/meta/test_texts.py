@@ -98,7 +98,8 @@ def test_configurations_in_the_texts_load(block: str, tmp_path: Path) -> None:
         assert config.parse_any(tmp_path / "text.toml").gripped_rope
         return
     motion = sb.simulate(sb.rope(1.0, 10, density=0.05, EI=1e-3), [k / 20 for k in range(21)])
-    sb.Recording(positions=motion.positions, times=motion.times).save(tmp_path / "swing.npz")
+    for file in ("swing.npz", "drag.npz"):
+        sb.Recording(positions=motion.positions, times=motion.times).save(tmp_path / file)
     study = config.load(tmp_path / "text.toml")
     assert study.experiments and study.parameters
 

@@ -55,6 +55,8 @@ WHOLE: dict[str, Any] = {
         "wind": {"velocity": [1, 0, 0]},
         "tool": [{"name": "t"}],
         "drive": [{"particles": ["a"], "markers": ["m0"]}],
+        "collider": [{"name": "table", "shape": "plane"}],
+        "contact": [{"of": "rope", "collider": "table", "friction": 0.3}],
         "quantities": {"NAME": {}},
     },
     "marker": [{"marker": "m0", "particle": "a"}],

@@ -242,7 +242,7 @@ class Bent:
 
     def __init__(self, shift: float) -> None:
         self.shift, self.parameters = shift, Parameters([Parameter(name=n, initial=0.0) for n in ("moved", "bent")])
-        self.experiments, self.core, self.jacobians = (), SimpleNamespace(data_rows=3), 0
+        self.experiments, self.core, self.jacobians = (), SimpleNamespace(data_rows=3, rows=3), 0
 
     def evaluate(self, u: np.ndarray, jacobian: bool = True) -> tuple[bool, np.ndarray, np.ndarray]:
         self.jacobians += jacobian
@@ -254,7 +254,7 @@ def test_a_step_in_vain_does_not_throw_the_limit_away(monkeypatch: pytest.Monkey
     """The first step takes off all that the limit has to give, the second raises the cost by a tenth."""
     problem, limit, finest = Bent(0.0), Bent(5.0), Bent(5.5)
     given = iter([limit, finest])
-    monkeypatch.setattr(time_step, "_at", lambda problem, experiments: next(given))
+    monkeypatch.setattr(problem, "of", lambda experiments: next(given), raising=False)
     start = np.array([0.0, 2.0])
     found = time_step.settle(problem, start)
     assert found.problem is limit and limit.jacobians <= 2

@@ -118,14 +118,9 @@ def noise(times: Array, positions: Array) -> Array:
         that has fewer than 8 runs of five frames seen in a row.
     """
     markers = positions.shape[1]
-    frames = np.arange(2, len(times) - 2)
-    if len(frames) < _FEWEST_WINDOWS:
+    if len(times) - 4 < _FEWEST_WINDOWS:
         return np.full(markers, np.nan)
-    neighbors = frames[:, None] + np.array([-2, -1, 1, 2])
-    weights = _lagrange_weights(times[neighbors], times[frames])
-    residual = positions[frames] - np.einsum("fk,fkmc->fmc", weights, positions[neighbors])
-    residual /= np.sqrt(1 + np.sum(weights**2, axis=1))[:, None, None]
-
+    residual = off_neighbors(times, positions)
     deviation = np.full(markers, np.nan)
     for marker in range(markers):
         size = np.abs(residual[:, marker])
@@ -134,6 +129,17 @@ def noise(times: Array, positions: Array) -> Array:
             per_axis = _MAD_TO_STANDARD_DEVIATION * np.median(size, axis=0)
             deviation[marker] = np.sqrt(np.mean(per_axis**2))
     return deviation
+
+
+def off_neighbors(times: Array, positions: Array) -> Array:
+    """(frames - 4, markers, 3) how far each sample is from the cubic through its two neighbors on either side, over
+    sqrt(1 + sum of the squared Lagrange weights): independent noise keeps its deviation. NaN where one is not seen."""
+    frames = np.arange(2, len(times) - 2)
+    neighbors = frames[:, None] + np.array([-2, -1, 1, 2])
+    weights = _lagrange_weights(times[neighbors], times[frames])
+    residual: Array = positions[frames] - np.einsum("fk,fkmc->fmc", weights, positions[neighbors])
+    residual /= np.sqrt(1 + np.sum(weights**2, axis=1))[:, None, None]
+    return residual
 
 
 def _lagrange_weights(nodes: Array, at: Array) -> Array:

@@ -14,6 +14,7 @@ from ..minimum.problem import as_parameters
 from ..motion.solver import Solver
 from ..scene.scene import Scene
 from . import schema
+from .contacts import check_solver
 from .errors import located
 from .forces import force_sensors
 from .held import assumptions
@@ -78,6 +79,7 @@ def build(config: schema.Config, folder: Path, finer: int = 1) -> Study:
     Raises:
         ConfigError: anything that cannot be built, with the path of its key.
     """
+    check_solver(config.scene, config.solver)
     experiments = tuple(_experiment(config, folder, i, finer) for i in range(len(config.recording)))
     names = [e.name for e in experiments]
     for i, name in enumerate(names):
@@ -96,10 +98,13 @@ def build(config: schema.Config, folder: Path, finer: int = 1) -> Study:
 
 def scene_alone(config: schema.Config, folder: Path = Path()) -> tuple[Scene, Solver]:
     """The scene of a configuration without recordings, and its solver; files of meshes are relative to `folder`."""
+    check_solver(config.scene, config.solver)
     tools = tools_of(config.scene, {}, None, 0.0, folder, "")
     scene, _ = build_scene(config.experiment.name, config.scene, None, {}, folder=folder, tools=tools)
     set_start_values(scene, config, {}, "")
     solver = solver_for(config.solver, None)
+    with located("scene"):
+        assert scene.compiled
     solver.core(scene.compiled)  # raise or warn here, before any work starts
     return scene, solver
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
-from . import cloth_schema, gripped_schema, rope_schema, scene_schema, schema, solver_schema
+from . import cloth_schema, contact_schema, gripped_schema, rope_schema, scene_schema, schema, solver_schema
 from .section import AXES, NAME, REFERENCE, Section
 
 HEADERS: dict[str, type[Section]] = {
@@ -38,6 +38,8 @@ HEADERS: dict[str, type[Section]] = {
     "[scene.wind]": scene_schema.Wind,
     "[[scene.tool]]": scene_schema.Tool,
     "[[scene.drive]]": scene_schema.Drive,
+    "[[scene.collider]]": contact_schema.ColliderSection,
+    "[[scene.contact]]": contact_schema.ContactSection,
     "[scene.quantities.NAME]": scene_schema.ExtraQuantity,
     "[[recording]]": schema.RecordingSection,
     "[[recording.force]]": schema.ForceSection,

@@ -14,8 +14,12 @@ def check_rest(path: str, section: SceneSection, scene: Scene) -> None:
     """A scene of which the key at `path` wants the equilibrium must have one that `sb.equilibrium` can find.
 
     Raises:
-        ConfigError: a wind blows at its start, or a pressure ends at a free rim.
+        ConfigError: a wind blows at its start, a pressure ends at a free rim, or there are contacts.
     """
+    if scene.contacts.contacts:
+        names = [contact.name for contact in scene.contacts.contacts]
+        fix = "let it come to rest in a motion, or leave the contact out for this recording (leave_out)"
+        raise ConfigError(path, "asks for a state of rest, which is not found with contacts", names, fix)
     _check_still(path, section)
     for cloth in section.cloth:
         if cloth.pressure is not None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ConfigError
-from ..objects.chain import first_given
+from ..objects.chain import straight_way
 from ..objects.grip import Grip
 from ..objects.rod import add_rod
 from ..objects.rod_shape import initial_shape
@@ -113,7 +113,7 @@ def _pose(held: Grip | Led | None, place: Array | None, points: Array, k: int) -
 
 
 def _straight(section: schema.Rope | schema.Rod) -> Array:
-    along = np.array(first_given(section.direction, section.clamp_start, section.clamp_end, (1.0, 0.0, 0.0)))
+    along = np.array(straight_way(section.direction, section.clamp_start, section.clamp_end)[1])
     size = float(np.linalg.norm(along)) or 1.0
     return np.array(section.start) + np.outer([0.0, 1.0], along) * ((section.length or 1.0) / size)
 

@@ -7,6 +7,7 @@ from typing import Any, Literal, Self
 from pydantic import model_validator
 
 from .cloth_schema import Cloth, with_fabrics
+from .contact_schema import ColliderSection, ContactSection
 from .rope_schema import Rod, Rope
 from .section import Finite, Name, Quaternion, Reference, Section, Vector, key
 
@@ -214,6 +215,8 @@ class SceneSection(Section):
     force: list[Force] = key([], "forces over time")
     tool: list[Tool] = key([], "tools whose poses were recorded")
     drive: list[Drive] = key([], "motion taken from markers, or from a tool")
+    collider: list[ColliderSection] = key([], "shapes that ropes and cloths touch")
+    contact: list[ContactSection] = key([], "who may touch them")
     quantities: dict[Name, ExtraQuantity] = key({}, "further named numbers")
 
     @property
@@ -226,6 +229,18 @@ class SceneSection(Section):
     @classmethod
     def _cuts_have_their_fabric(cls, given: Any) -> Any:
         return given if not isinstance(given, dict) else given | with_fabrics(given)
+
+    @model_validator(mode="after")
+    def _colliders_are_corrected_by_nothing(self) -> Self:
+        corrected = {tool.name for tool in self.tool if tool.shift_sd is not None or tool.turn_sd is not None}
+        for collider in self.collider:
+            if collider.tool in corrected:
+                fix = "leave these out, and fit the collider's own place, such as"
+                raise ValueError(
+                    f"has a collider on tool {collider.tool}, whose shift_sd and turn_sd would not move it|"
+                    f"{fix} [parameters.{collider.name}_x]"
+                )
+        return self
 
     @model_validator(mode="after")
     def _wind_blows_on_something(self) -> Self:

@@ -21,6 +21,7 @@ from ..scene.scene import Scene
 from . import scene_schema as schema
 from .cloth_markers import seats
 from .cloths import build_cloth, placed_mesh
+from .contacts import add_contacts
 from .errors import located
 from .moment import Moment
 from .rope_points import Seats
@@ -202,6 +203,7 @@ def build_scene(
     _add_forces(scene, particles, section.force)
     for i, drive in enumerate(section.drive):
         _add_drive(scene, particles, f"scene.drive[{i}]", drive, moment, tools)
+    add_contacts(scene, section, particles.named, tools)
     if section.pin:
         scene.pin([particles.find("scene.pin", r) for r in section.pin])
     return scene, particles

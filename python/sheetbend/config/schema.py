@@ -91,7 +91,8 @@ class RecordingSection(Section):
     ropes: list[Name] | None = key(None, "names of the ropes that it shows; all when left out", min_length=1)
     leave_out: list[Name] = key(
         [],
-        "names of cloths, particles, constraints, hung masses, forces and quantities that its scene does without",
+        "names of cloths, particles, constraints, hung masses, forces, contacts and quantities that its scene does "
+        "without",
     )
     frames: list[int] | None = key(
         None, "[first, stop] or [first, stop, step]: use these frames only", min_length=2, max_length=3

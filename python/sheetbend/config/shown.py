@@ -9,7 +9,7 @@ from . import schema
 from .cloth_schema import MarkerGrid
 from .scene_schema import SceneSection
 
-OPTIONAL = ("cloth", "particles", "constraints", "point_mass", "force")
+OPTIONAL = ("cloth", "particles", "constraints", "point_mass", "force", "contact")
 """Lists of the scene that a recording can leave out by name."""
 
 

@@ -34,13 +34,14 @@ from ..minimum.time_step import SECOND_ORDER
 from ..minimum.windows import chosen, cut
 from ..optional import require
 from ..quantities.wording import short
-from ..statistics.blocks import FEWEST, LEVEL, short_of_frames
+from ..statistics.blocks import FEWEST, LEVEL, moved_by, short_of_frames
 from ..statistics.covariance import Covariance, autocorrelation, covariance
 from ..statistics.gauge import null_space
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
 from ..statistics.stretches import scatter, within_sigma
 from .contradictions import CLAIMS, drawn_along, finer_experiments, value_words
+from .driven_errors import driven_errors, within_driven_errors
 
 FRAMES = 12  # of every motion: fewer do not tell how residuals correlate
 LARGE = 4.0  # of the residuals' mean square, in sigma squared
@@ -80,8 +81,10 @@ class Whole:
         u: (free,) its minimum.
     """
 
-    def __init__(self, problem: FitProblem, u: Array) -> None:
+    def __init__(self, problem: FitProblem, u: Array, errors: Array | None = None) -> None:
+        """`errors`: (data rows, draws) of the whole motions' residuals (`driven_errors`)."""
         self.problem, self.u = problem, u
+        self.errors = np.zeros((problem.core.data_rows, 0)) if errors is None else errors
         self.spread = _spread_of(problem, u)
 
     def scatter(self, b: Beginning, columns: Sequence[int]) -> Array:
@@ -92,6 +95,16 @@ class Whole:
         r = within_sigma(self.problem.evaluate(self.u)[1][: self.problem.core.data_rows], layout)
         J = b.problem.evaluate(b.u)[2][:, list(columns)]
         return scatter(np.where(still[layout.recording], 0.0, r), layout, part, J)
+
+    def shared(self, b: Beginning, columns: Sequence[int]) -> Array:
+        """(columns, columns) mean square by which errors that both share move a beginning's minimum from the whole's"""
+        if not self.errors.size:
+            return np.zeros((len(columns), len(columns)))
+        mine = list(columns)
+        part = self.errors[_times(self.problem) < b.length]
+        here = moved_by(self.problem.evaluate(self.u)[2][:, mine], self.errors)
+        off = moved_by(b.problem.evaluate(b.u)[2][:, mine], part) - here
+        return np.asarray(off @ off.T / self.errors.shape[1])
 
 
 def checked(
@@ -145,13 +158,22 @@ def of_beginnings(
 
     All parameters together must differ by more than chance explains at the 1 % level, for all beginnings together.
     Those are named that differ by 3 % or more, by more than the 95 % interval of the difference, and by more than the
-    estimate's, what the discretization moves in them counted.
+    estimate's, what the discretization moves in them counted, and what noise of driven particles moves.
 
     Args:
         u: (free,) minimum of the whole, where the beginnings were fitted from.
     """
+    words = _asked(Whole(problem, u), judged, found, refinement)
+    errors, what = driven_errors(problem, u) if words else (np.zeros((0, 0)), "")
+    if not errors.size:
+        return words
+    left = _asked(Whole(problem, u, errors), judged, found, refinement)
+    return within_driven_errors(problem, u, judged, list(words), errors, what) | left
+
+
+def _asked(whole: Whole, judged: Identifiability, found: Sequence[Beginning], refinement: Refinement) -> dict[str, str]:
+    problem, u = whole.problem, whole.u
     words: dict[str, str] = {}
-    whole = Whole(problem, u)
     for b in found:
         shift: Array | None = None
         for column, (step, reach) in _differences(whole, b, LEVEL / len(found)).items():
@@ -204,7 +226,7 @@ def _differences(end: Whole, b: Beginning, level: float) -> Mapping[int, tuple[f
         return {}
     own, whole = _spread_of(b.problem, b.u)(columns), end.spread(columns)
     V = short_of_frames(own, max(len(r.times) for r in b.problem.recordings)) * own.matrix + whole.matrix
-    V += end.scatter(b, columns)
+    V += end.scatter(b, columns) + end.shared(b, columns)
     step, sd = (b.u - u)[list(columns)], np.sqrt(np.diag(V))
     degrees = max(float(np.median(own.degrees)), 1.0)
     score = float(step / sd @ np.linalg.lstsq(V / np.outer(sd, sd), step / sd, rcond=None)[0])

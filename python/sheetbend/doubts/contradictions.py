@@ -20,6 +20,7 @@ from ..statistics.blocks import Difference, Split, contradiction
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
 from ..statistics.profile import FARTHEST
+from .driven_errors import driven_errors, within_driven_errors
 from .prediction import Comparison
 from .profiles import NOISELESS, Elsewhere
 
@@ -59,17 +60,26 @@ def between_parts(
     All parameters together must differ between the parts by more than chance explains at the 1 % level. Those are named
     of which a part differs from the others by more than its 95 % interval, and from the estimate by more than the
     estimate's, what the discretization moves in that part counted. No simulation is needed beyond the last Jacobian,
-    unless parts differ.
+    unless parts differ: then what noise of driven particles does to all parts alike counts too, and is named instead
+    where that is what makes them differ (`driven_errors`).
 
     Args:
         refinement: of the discretization; where parts differ, one simulation each tells what it explains of that.
     """
     words = _between(problem, u, judged, [])
-    shifts = _residual_shifts(problem, u, refinement) if words and refinement is not None else []
-    return _between(problem, u, judged, shifts) if shifts else words
+    if not words:
+        return {}
+    shifts = _residual_shifts(problem, u, refinement) if refinement is not None else []
+    errors, what = driven_errors(problem, u)
+    if not shifts and not errors.size:
+        return words
+    left = _between(problem, u, judged, shifts, errors)
+    return within_driven_errors(problem, u, judged, list(words), errors, what) | left
 
 
-def _between(problem: FitProblem, u: Array, judged: Identifiability, shifts: Sequence[Array]) -> dict[str, str]:
+def _between(
+    problem: FitProblem, u: Array, judged: Identifiability, shifts: Sequence[Array], errors: Array | None = None
+) -> dict[str, str]:
     _, r, J = problem.evaluate(u)
     rows, names = problem.core.data_rows, problem.parameters.free
     estimates = {e.name: e for e in judged.estimates}
@@ -89,6 +99,7 @@ def _between(problem: FitProblem, u: Array, judged: Identifiability, shifts: Seq
         within=_private(problem, J[:rows, used]),
         shifts=np.column_stack(shifts) if shifts else None,
         taken=sum(map(problem.core.absorbed, range(len(problem.experiments)))),
+        errors=errors,
     )
     if found is None:
         return {}

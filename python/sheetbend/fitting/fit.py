@@ -23,6 +23,7 @@ from ..doubts.missing_loss import missing_loss
 from ..doubts.prediction import Comparison, compare, predicted_values
 from ..doubts.profiles import Elsewhere
 from ..doubts.stationary import unfinished
+from ..doubts.stuck import bounded_by_sticking
 from ..doubts.unexplained import unexplained
 from ..errors import InputError
 from ..experiment.clock import outside, told_clocks
@@ -214,6 +215,8 @@ def fit(
             at.problem, at.u, refined, more, refitter if profiles else None, lost, (problem, best.u)
         )
         judged = at_floor_of_sweeps(_moved(judged, at.moved), at.refits)
+        if refitter is not None and profiles and not lost:
+            judged = bounded_by_sticking(at.problem, at.u, judged, refitter)
         predicted = predicted_values(every, wanted, values, refitter, threads)
         doubted: tuple[str, ...] = ()
         parts: dict[str, str] = {}

@@ -144,6 +144,10 @@ class FitProblem:
         held = self.parameters.replace(name, fixed=True, initial=value, prior=None, lower=-np.inf, upper=np.inf)
         return FitProblem(self.experiments, self.given, self.recordings, self.threads, held)
 
+    def of(self, experiments: Sequence[Experiment]) -> FitProblem:
+        """The same problem of other experiments with the same recordings, such as these with another solver."""
+        return FitProblem(experiments, self.given, self.recordings, self.threads, self.parameters)
+
     def uncorrected(self, recordings: Sequence[Recording]) -> FitProblem:
         """The same problem on (parts of) the recordings, with the markers that scenes follow taken for the truth."""
         return FitProblem(self.experiments, self.given, recordings, self.threads, self.parameters, corrected={})

@@ -76,12 +76,8 @@ def combined(experiments: Sequence[Experiment]) -> list[Experiment]:
     ]
 
 
-def _at(problem: FitProblem, experiments: Sequence[Experiment]) -> FitProblem:
-    return FitProblem(experiments, problem.given, problem.recordings, problem.threads, problem.parameters)
-
-
 def _moved(problem: FitProblem, u: np.ndarray) -> Settled:
-    limit = _at(problem, combined(problem.experiments))
+    limit = problem.of(combined(problem.experiments))
     there = residuals_there(problem, limit, u)  # raises where the combination has no answer at u
     _, r, J = problem.evaluate(u)
     first = gauss_newton(problem.parameters, u, J, there - r)
@@ -105,14 +101,14 @@ def _moved(problem: FitProblem, u: np.ndarray) -> Settled:
         whole = Refit(name=TIME_STEP, to_limit=1.0, moved=moves(problem.parameters, u, end))
         told = words("short substeps", "at the same substep", "refine=False, or halve_step = false in a configuration,")
         return Settled(problem, u, refits=(whole,), warnings=(told,))
-    finest = _at(problem, combined(halved(problem.experiments)))
+    finest = problem.of(combined(halved(problem.experiments)))
     left = np.abs(THIRD_ORDER * (one_step(limit, finest, end) - end)) + np.abs(onward - end)
     rest = Refit(name=TIME_STEP, to_limit=1.0, moved=moves(problem.parameters, end, end + left))
     return Settled(limit, end, moves(problem.parameters, u, end), (rest,))
 
 
 def _counted_whole(problem: FitProblem, u: np.ndarray) -> Settled:
-    halves = _at(problem, halved(problem.experiments))
+    halves = problem.of(halved(problem.experiments))
     made = moves(problem.parameters, u, one_step(problem, halves, u))
     whole = Refit(name=TIME_STEP, to_limit=to_limit_of_steps(problem.experiments), moved=made)
     return Settled(problem, u, refits=(whole,))

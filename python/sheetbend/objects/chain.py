@@ -25,9 +25,23 @@ def resample(polyline: ArrayLike, segments: int) -> Array:
     return np.stack([np.interp(wanted, s, line[:, k]) for k in range(3)], axis=1)
 
 
+def straight_way(
+    direction: ArrayLike | None, clamp_start: ArrayLike | None, clamp_end: ArrayLike | None
+) -> tuple[str, ArrayLike]:
+    """Where a straight rope points, and the field that says it: its direction, or as a clamp holds it, or along x."""
+    ways = {"direction": direction, "clamp_start": clamp_start, "clamp_end": clamp_end}
+    return next(((field, way) for field, way in ways.items() if way is not None), ("direction", (1.0, 0.0, 0.0)))
+
+
 def straight_or_given(
-    name: str, length: float | None, segments: int, start: ArrayLike, direction: ArrayLike, given: ArrayLike | None
+    name: str,
+    length: float | None,
+    segments: int,
+    start: ArrayLike,
+    way: tuple[str, ArrayLike],
+    given: ArrayLike | None,
 ) -> tuple[Array, float]:
+    """(segments + 1, 3) nodes of a rope along a way, see `straight_way`, or through given points, and its length."""
     if not isinstance(segments, int | np.integer) or segments < 1:
         raise SceneError(f"{name}.segments", "must be a positive whole number", segments, "give at least 1")
     if length is not None and not (np.isfinite(length) and length > 0):
@@ -38,14 +52,9 @@ def straight_or_given(
         return shape, float(length if length is not None else np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
     if length is None:
         raise SceneError(f"{name}.length", "is missing", None, "give the length in m, or initial points")
-    along = unit_vector(f"{name}.direction", direction)
+    along = unit_vector(f"{name}.{way[0]}", way[1])
     origin = finite(f"{name}.start", start, (3,), SceneError)
     return origin + np.linspace(0.0, length, segments + 1)[:, None] * along, float(length)
-
-
-def first_given(*values: ArrayLike | None) -> ArrayLike:
-    """The first of these that is not None."""
-    return next(value for value in values if value is not None)
 
 
 def unit_vector(field: str, vector: ArrayLike) -> Array:

@@ -20,6 +20,7 @@ from .chain import (
     add_masses,
     first_value,
     straight_or_given,
+    straight_way,
     time_constants,
     unit_vector,
     voronoi_shares,
@@ -127,11 +128,8 @@ def add_rope(
     Raises:
         SceneError: wrong or missing values; the message names the field.
     """
-    for field, clamp in (("clamp_start", clamp_start), ("clamp_end", clamp_end), ("direction", (1.0, 0.0, 0.0))):
-        if direction is None and clamp is not None:
-            direction = unit_vector(f"{name}.{field}", clamp)
-    assert direction is not None
-    shape, length = straight_or_given(name, length, segments, start, direction, points)
+    way = straight_way(direction, clamp_start, clamp_end)
+    shape, length = straight_or_given(name, length, segments, start, way, points)
     grips = _grips(name, (grip_start, grip_end), (clamp_start, clamp_end))
     speeds = None
     if velocity is not None or any(grips):

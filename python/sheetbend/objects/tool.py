@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,10 +13,12 @@ from ..arrays.checks import check_increasing, finite, is_number
 from ..errors import SceneError
 from ..quantities.quantities import ZERO_OR_MORE
 from ..recording.io.poses import read_poses
+from ..scene.colliders import Collider, rotation_vectors
 from ..scene.scene import Scene
 from .hand_eye import HandEye, rotated, unit_quaternions
 
 Array = np.ndarray
+Shape = TypeVar("Shape", bound=Collider)
 COVERED = 1e-9  # s
 SMOOTHING, FEWEST = 0.1, 5  # s and poses, over which an acceleration is taken from a parabola
 
@@ -140,6 +143,25 @@ class Tool:
             given = self._load(path.mean(axis=1), scene.gravity)
             every = np.broadcast_to(given[:, None], path.shape)
             scene.add_motion_term(which, every, {name: "identity"})
+
+    def carry(self, collider: Shape) -> Shape:
+        """A shape that moves and turns with the tool, from where it is given at 0 s, where the scene starts.
+
+        The six quantities of the tool's frame do not correct it.
+
+        Raises:
+            SceneError: the tool has a rod that bends.
+        """
+        if self.flex is not None:
+            fix = "leave out flex, or give the motion by Collider.moving"
+            raise SceneError("tool.flex", "is that of a rod that bends, which no collider follows", self.flex, fix)
+        origin = collider.poses.positions[0]
+        moved = self.path(self.held(origin[None]))[:, 0] - origin
+        x, w = np.split(self._pose(0.0)[1], [3])
+        q, qw = np.split(self.quaternions, [3], axis=1)
+        axes = w * q - qw * x - np.cross(q, x)  # of each quaternion times the inverse of the one at 0 s
+        turns = np.concatenate([self.frame.directions(axes), qw * w + (q @ x)[:, None]], axis=1)
+        return collider.moving(self.times, moved, rotation_vectors(turns, np.zeros(3)))
 
     def _load(self, path: Array, gravity: Array) -> Array:
         """(poses, 3) m/s^2: what a path (poses, 3) m of the grip puts on its rod, across it."""

@@ -12,6 +12,7 @@ from ..fitting.fit import Fit
 from ..fitting.fitted_motion import fitted_positions
 from ..mesh import TriangleMesh
 from ..motion.simulate import Trajectory
+from ..pictures.collider_lines import collider_lines
 from ..pictures.strain import largest_strain
 from ..recording.recording import Recording
 from ..scene.scene import Scene
@@ -38,7 +39,8 @@ class Shown:
         name: of the recording or the scene.
         times: (frames,) s.
         lines: ropes by name, (frames, nodes, 3) m.
-        ticks: of twisted rods by name, (frames, edges, 2, 3) m, from the edge's middle along its director.
+        ticks: short lines by name, (frames, lines, 2, 3) m: "twist" of rods, from an edge's middle along its director,
+            and the outlines of colliders.
         sheets: cloths by name.
         markers: names of the measured markers.
         measured, simulated, baseline: (frames, markers, 3) m, NaN where there is nothing; None without.
@@ -110,7 +112,7 @@ def _shown(name: str, scene: Scene, times: Array, positions: Array, recorded: Ma
     sheets = {c.name: _sheet(c.mesh, positions[:, c.particles]) for c in scene.cloths.values()}
     if not lines and not sheets:  # a scene of bare particles and constraints: its links
         lines = _links(scene, positions)
-    ticks = _ticks(scene, positions)
+    ticks = _ticks(scene, positions) | collider_lines(scene, times, positions)
     return Shown(name, times, lines, ticks, sheets, up=_unit(-scene.gravity), **recorded)  # type: ignore[arg-type]
 
 

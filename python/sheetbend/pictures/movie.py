@@ -13,7 +13,8 @@ from ..errors import InputError
 from ..files.whole import written
 from ..optional import require
 from ..scene.scene import Scene
-from .drawing import ACCENT, INK, WARM, key, new_figure
+from .collider_lines import collider_lines
+from .drawing import ACCENT, GRAY, INK, WARM, key, new_figure
 from .field_plot import box_in_space, field_colors
 from .strain import largest_strain
 
@@ -131,10 +132,16 @@ def _picture(motion: Motion, shown: Array, title: str) -> tuple[Figure, Any]:
         bar.set_label("largest strain [%]", color=INK, fontsize=9)
         bar.ax.tick_params(colors=INK, labelsize=8)
         bar.outline.set_visible(False)
+    solids = [
+        (lines, panel.add_collection3d(art.Line3DCollection(lines[0], colors=GRAY, linewidth=0.5, zorder=0)))
+        for lines in collider_lines(motion.scene, motion.times, motion.positions).values()
+    ]
     ropes = [(r.particles, panel.plot([], [], [], color=ACCENT, linewidth=1.8)[0]) for r in motion.scene.ropes.values()]
     dots = panel.plot([], [], [], "o", color=WARM, markersize=3.2, markeredgewidth=0, zorder=10)[0]
     off = panel.add_collection3d(art.Line3DCollection(np.zeros((1, 2, 3)), colors=INK, linewidth=1.2, zorder=9))
-    reach = [motion.positions[shown].reshape(-1, 3)]
+    drawn_particles = np.concatenate([p.particles for p in (*motion.scene.ropes.values(), *cloths)])
+    reach = [motion.positions[shown][:, drawn_particles].reshape(-1, 3)]
+    reach += [lines[shown].reshape(-1, 3) for lines, _ in solids]
     if motion.measured is not None:
         reach.append(_seen(motion.measured[shown].reshape(-1, 3)))
         key(figure, [("measured markers", WARM), ("to where they should be", INK)])
@@ -146,6 +153,8 @@ def _picture(motion: Motion, shown: Array, title: str) -> tuple[Figure, Any]:
         for cloth, drawn in sheets:
             drawn.set_verts(motion.positions[frame, cloth.particles][cloth.mesh.triangles])
             drawn.set_array(strains[cloth.name][frame])
+        for lines, outline in solids:
+            outline.set_segments(lines[frame])
         for particles, line in ropes:
             line.set_data_3d(*motion.positions[frame, particles].T)
         if motion.measured is not None:

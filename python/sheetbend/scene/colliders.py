@@ -233,11 +233,20 @@ def _composed(turns: Array, first: Array) -> Array:
     """Rotation vectors (knots, 3) of `first`, then each of `turns`, continuous from knot to knot."""
     if not first.any():
         return turns
-    found: list[Array] = []
     b, bw = _quaternion(first)[:3], _quaternion(first)[3]
+    products = []
     for turn in turns:
         a, aw = _quaternion(turn)[:3], _quaternion(turn)[3]
-        v, w = aw * b + bw * a + np.cross(a, b), aw * bw - a @ b
+        products.append(np.append(aw * b + bw * a + np.cross(a, b), aw * bw - a @ b))
+    return rotation_vectors(np.array(products), first)
+
+
+def rotation_vectors(quaternions: Array, first: Array) -> Array:
+    """Unit quaternions (knots, 4), (x, y, z, w), as vectors (knots, 3) rad that are continuous from knot to knot; the
+    first one is the nearest to `first`, (3,)."""
+    found: list[Array] = []
+    for q in quaternions:
+        v, w = q[:3], q[3]
         sine = float(np.linalg.norm(v))
         angle = 2.0 * float(np.arctan2(sine, w))
         axis = v / sine if sine > 0.0 else np.array([0.0, 0.0, 1.0])

@@ -12,6 +12,7 @@ Priors hold for u, and tell nothing of d. Rows of no part, such as a static expe
 not count: they would hold the mean of the parts at their own value, and what contradicts that would look like a
 difference between parts. Parameters that a single recording has are solved for within it, not compared.
 What is known to be wrong with the residuals (their change on a finer mesh or step) takes columns of its own.
+Errors of known size that all parts share, such as the noise of what drives a scene, add to V what they move in d.
 """
 
 from __future__ import annotations
@@ -91,6 +92,7 @@ def contradiction(
     within: Sequence[tuple[slice, Sequence[int]]] = (),
     shifts: Array | None = None,
     taken: float = 0.0,
+    errors: Array | None = None,
 ) -> Contradiction | None:
     """The least likely disagreement between parts of the data, if it is less likely than `LEVEL`.
 
@@ -103,6 +105,7 @@ def contradiction(
         within: rows of a recording and the columns of parameters that it alone has.
         shifts: (rows, directions) known errors of the residuals of unknown size.
         taken: degrees of freedom of the data's residuals that unknowns took which were solved for at every point.
+        errors: (rows, draws) random draws of errors that are alike in all parts; of more draws than are compared.
 
     Raises:
         MissingExtraError: scipy is not installed.
@@ -112,8 +115,13 @@ def contradiction(
     known = np.zeros((len(residuals), 0 if shifts is None else shifts.shape[1]))
     if shifts is not None:
         known[:rows] = shifts
+    drawn = np.zeros((len(residuals), 0 if errors is None else errors.shape[1]))
+    if errors is not None:
+        drawn[:rows] = errors
     compared = [
-        found for split in splits if (found := _compared(residuals, jacobian, split, layout, within, known, taken))
+        found
+        for split in splits
+        if (found := _compared(residuals, jacobian, split, layout, within, known, taken, drawn))
     ]
     least = min(compared, key=lambda found: found.chance, default=None)
     return least if least is not None and least.chance < LEVEL / len(compared) else None
@@ -127,6 +135,7 @@ def _compared(
     within: Sequence[tuple[slice, Sequence[int]]],
     known: Array,
     taken: float,
+    drawn: Array,
 ) -> Contradiction | None:
     """None where a part is too small, or where the parts have nothing to compare."""
     if (split.part < 0).any():
@@ -134,7 +143,7 @@ def _compared(
         kept = np.append(mine, np.ones(len(residuals) - len(mine), dtype=bool))
         own = [(slice(int(mine[: k.start].sum()), int(mine[: k.stop].sum())), columns) for k, columns in within]
         rest = Split(split.part[mine], split.names)
-        return _compared(residuals[kept], jacobian[kept], rest, layout.of(mine), own, known[kept], taken)
+        return _compared(residuals[kept], jacobian[kept], rest, layout.of(mine), own, known[kept], taken, drawn[kept])
     rows, parts = len(layout.frame), len(split.names)
     private = {column for _, columns in within for column in columns}
     shared = [column for column in range(jacobian.shape[1]) if column not in private]
@@ -145,7 +154,9 @@ def _compared(
     coding = np.vstack([np.eye(parts - 1), -np.ones(parts - 1)])[split.part]
     coding = np.vstack([coding, np.zeros((len(residuals) - rows, parts - 1))])
     opposed = [jacobian[:, shared] * coding[:, [k]] for k in range(parts - 1)]
-    every, left = _solved_within(jacobian, within, np.hstack([jacobian[:, shared], *opposed, known]), residuals, rows)
+    columns = np.hstack([jacobian[:, shared], *opposed, known, drawn])
+    every, left = _solved_within(jacobian, within, columns, residuals, rows)
+    every, drawn = np.split(every, [every.shape[1] - drawn.shape[1]], axis=1)
     used = _independent(every)
     compared = [i for i, c in enumerate(used) if count <= c < count * parts]
     if not compared:
@@ -156,6 +167,9 @@ def _compared(
     spread = covariance(left[:rows], every[:rows, used], layout, every[rows:, used], taken + len(private))
     V = short_of_frames(spread, int(np.ptp(layout.frame)) + 1) * spread.matrix
     degrees = max(float(np.median((spread.degrees / (2 - 1 / spread.inflation))[compared])), 1.0)
+    if drawn.any():
+        off = moved_by(every[:, used], drawn)
+        V, degrees = V + off @ off.T / drawn.shape[1], min(degrees, float(drawn.shape[1]))
     sd = np.sqrt(np.diag(V))
     values, turn = np.linalg.eigh((V / np.outer(sd, sd))[np.ix_(compared, compared)])
     told = values > _FLAT * values[-1]
@@ -175,6 +189,18 @@ def _compared(
 def short_of_frames(spread: Covariance, frames: int) -> float:
     """Factor of variances that few frames, many of them alike, make too small."""
     return float((1 + _SHORT * (spread.autocorrelation_time - 1) / frames) ** 2)
+
+
+def moved_by(jacobian: Array, errors: Array) -> Array:
+    """(p, draws) by which errors (rows, draws) of the residuals move the least-squares estimate, to first order.
+
+    Args:
+        jacobian: (rows + others, p), the rows of priors last; of these errors are zero.
+    """
+    size = np.linalg.norm(jacobian, axis=0)
+    full = np.zeros((len(jacobian), errors.shape[1]))
+    full[: len(errors)] = errors
+    return np.asarray(-np.linalg.lstsq(jacobian / size, full, rcond=None)[0] / size[:, None])
 
 
 def _independent(every: Array) -> list[int]:

@@ -105,12 +105,13 @@ class Space {
   }
 
   ticks(part) {
-    const object = this.segments(part.nodes / 2, "warm"), position = object.geometry.attributes.position;
+    const tone = part.name === "twist" ? "warm" : "gray"; // any other name is a collider's
+    const object = this.segments(part.nodes / 2, tone), position = object.geometry.attributes.position;
     const at = (frame) => {
       position.array.set(part.places.subarray(3 * frame * part.nodes, 3 * (frame + 1) * part.nodes));
       position.needsUpdate = true;
     };
-    return { name: "twist", tone: "warm", object, at };
+    return { name: part.name, tone, object, at };
   }
 
   dots(name, x, count, tone, radius) {

@@ -1,0 +1,92 @@
+"""[[scene.collider]] and [[scene.contact]]: the shapes that ropes and cloths touch, and who touches them."""
+
+from __future__ import annotations
+
+from dataclasses import MISSING, fields
+from typing import Literal, Self
+
+from pydantic import model_validator
+
+from ..scene.colliders import Box, Capsule, Collider, Plane, Sphere
+from .section import Finite, Name, Section, Vector, key
+
+SHAPES: dict[str, type[Collider]] = {"plane": Plane, "sphere": Sphere, "capsule": Capsule, "box": Box}
+_COMMON = {"name", "motion"}
+
+
+def arguments(shape: str) -> dict[str, bool]:
+    """The keys of a shape, and whether each must be given."""
+    return {f.name: f.default is MISSING for f in fields(SHAPES[shape]) if f.name not in _COMMON}
+
+
+class ColliderSection(Section):
+    """A shape that ropes and cloths touch, `sb.Plane`, `sb.Sphere`, `sb.Capsule` or `sb.Box`, standing, moving at knots
+    or with a tool. A list: [[scene.collider]]. Its quantities are <name>_x, <name>_y and <name>_z (m), how far it is
+    from where it was given, and its lengths, such as <name>_radius (m)."""
+
+    name: Name = key(..., "prefix of its quantities, and what contacts call it")
+    shape: Literal["plane", "sphere", "capsule", "box"] = key(..., "a plane is solid below, a long capsule a cylinder")
+    point: Vector | None = key(None, "of a plane: a point on it; the origin when left out", "m")
+    normal: Vector | None = key(None, "of a plane: to its free side, of any length; up (z) when left out")
+    center: Vector | None = key(None, "of a sphere or box", "m")
+    start: Vector | None = key(None, "of a capsule: where its segment starts", "m")
+    end: Vector | None = key(None, "of a capsule: where its segment ends", "m")
+    radius: Finite | None = key(None, "of a sphere or capsule", "m", gt=0)
+    size: Vector | None = key(None, "of a box: its whole edges, before it is turned", "m")
+    edge_radius: Finite | None = key(None, "of a box: of its rounded edges, below half of the shortest edge", "m", gt=0)
+    rotation: Vector | None = key(
+        None, "of a box: a vector along the axis that it is turned about, as long as the angle", "rad"
+    )
+    times: list[Finite] | None = key(
+        None, "knots of its motion in the scene's time (0 = its start); it stands before and after", "s", min_length=1
+    )
+    displacements: list[Vector] | None = key(
+        None, "at the knots: of a plane's point, or the center, from where it was given", "m"
+    )
+    rotations: list[Vector] | None = key(
+        None, "at the knots, about that point: vectors along the axis, as long as the angle", "rad"
+    )
+    interpolation: Literal["cubic", "linear"] = key("cubic", "of the motion between knots")
+    tool: Name | None = key(None, "the [[scene.tool]] that it moves with, from where it is given at the scene's start")
+
+    @model_validator(mode="after")
+    def _of_its_shape(self) -> Self:
+        own = arguments(self.shape)
+        missing = [name for name, needed in own.items() if needed and getattr(self, name) is None]
+        if missing:
+            raise ValueError(f"is a {self.shape} without {' and '.join(missing)}|add {', '.join(missing)}")
+        every = {name for shape in SHAPES for name in arguments(shape)}
+        alien = sorted(name for name in every - set(own) if getattr(self, name) is not None)
+        if alien:
+            raise ValueError(f"is a {self.shape} and has {' and '.join(alien)}|a {self.shape} has {', '.join(own)}")
+        return self
+
+    @model_validator(mode="after")
+    def _one_motion(self) -> Self:
+        if (self.times is None) != (self.displacements is None):
+            raise ValueError("has only one of times and displacements|give both, or neither of one that stands")
+        if self.times is None and (self.rotations is not None or self.interpolation != "cubic"):
+            raise ValueError("turns and has no times|give times and displacements (zeros where it turns in place)")
+        if self.tool is not None and self.times is not None:
+            raise ValueError("moves with a tool and at knots|give one of tool and times")
+        return self
+
+
+class ContactSection(Section):
+    """Who may touch a collider, and how rough that is, `Scene.contact` (docs/contact.md). A list: [[scene.contact]].
+    It needs method = "implicit" and integrator = "bdf1" in [solver]. Its quantities are <name>_friction, unless zero
+    <name>_contact_radius (m), and where given <name>_contact_stiffness (N/m)."""
+
+    name: Name | None = key(None, "prefix of its quantities; the collider's name when left out")
+    of: Name | list[Name] = key(..., "a rope, a cloth or a set of particles, or several: all of their particles")
+    collider: Name = key(..., "the [[scene.collider]] that they may touch")
+    friction: Finite = key(..., "Coulomb's coefficient; 0 is smooth", ge=0)
+    radius: Finite = key(
+        0.0, "of a rope, or half the thickness of a cloth: particles touch at this distance", "m", ge=0
+    )
+    stiffness: Finite | None = key(None, "per particle; rigid when left out", "N/m", gt=0)
+
+    @property
+    def touching(self) -> list[str]:
+        """Names of what may touch."""
+        return [self.of] if isinstance(self.of, str) else self.of

@@ -1,0 +1,88 @@
+"""Contacts of a configuration's ropes and cloths with shapes that stand, move at knots, or move with a tool."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from ..errors import ConfigError
+from ..objects.tool import Tool
+from ..scene.colliders import Collider
+from ..scene.scene import Scene
+from .contact_schema import SHAPES, ColliderSection, arguments
+from .errors import located
+from .scene_schema import SceneSection
+from .solver_schema import SolverSection
+from .tools import tool_named
+
+NEEDED = {"method": "implicit", "integrator": "bdf1"}
+
+
+def check_solver(section: SceneSection, solver: SolverSection) -> None:
+    """Contacts need a solver that knows them.
+
+    Raises:
+        ConfigError: another method or integrator, with the lines that [solver] needs.
+    """
+    for name, needed in NEEDED.items():
+        given = getattr(solver, name)
+        if section.contact and given != needed:
+            lines = " and ".join(f'{key} = "{value}"' for key, value in NEEDED.items())
+            problem = "does not know the contacts of [[scene.contact]]"
+            raise ConfigError(f"solver.{name}", problem, given, f"write {lines} in [solver]")
+
+
+def add_contacts(
+    scene: Scene,
+    section: SceneSection,
+    named: Mapping[str, Sequence[int]],
+    tools: Mapping[str, Tool],
+) -> None:
+    """Let what is named in [[scene.contact]] touch its colliders; what this scene does without touches nothing.
+
+    Args:
+        named: particles by the name of their rope, cloth or set.
+
+    Raises:
+        ConfigError: unknown names, a collider that cannot be, or names of contacts that are taken.
+    """
+    colliders = _colliders(section, tools)
+    known = {*named, *(strand.name for _, strand in section.strands), *(cloth.name for cloth in section.cloth)}
+    known |= {some.name for some in section.particles}
+    for i, contact in enumerate(section.contact):
+        path = f"scene.contact[{i}]"
+        unknown = [name for name in contact.touching if name not in known]
+        if unknown:
+            fix = f"use some of: {', '.join(named) or 'none yet'}"
+            raise ConfigError(f"{path}.of", "names no rope, cloth or set of particles", unknown, fix)
+        if contact.collider not in colliders:
+            fix = f"name one of: {', '.join(colliders) or 'none, add a [[scene.collider]]'}"
+            raise ConfigError(f"{path}.collider", "is no collider of the scene", contact.collider, fix)
+        particles = [p for name in contact.touching for p in named.get(name, ())]
+        if not particles:
+            continue
+        numbers = contact.model_dump(include={"friction", "radius", "stiffness"})
+        with located(path, f"{contact.name or contact.collider}.contact"):
+            scene.contact(particles, colliders[contact.collider], name=contact.name, **numbers)
+
+
+def _colliders(section: SceneSection, tools: Mapping[str, Tool]) -> dict[str, Collider]:
+    found: dict[str, Collider] = {}
+    for i, described in enumerate(section.collider):
+        path = f"scene.collider[{i}]"
+        if described.name in found:
+            raise ConfigError(f"{path}.name", "is taken", described.name, "give every collider a name of its own")
+        with located(path, described.name):
+            given = described.model_dump(include=set(arguments(described.shape)), exclude_none=True)
+            standing = SHAPES[described.shape](name=described.name, **given)
+        with located(path, f"{described.name}.moving"):
+            found[described.name] = _moved(path, described, standing, tools)
+    return found
+
+
+def _moved(path: str, described: ColliderSection, standing: Collider, tools: Mapping[str, Tool]) -> Collider:
+    if described.tool is not None:
+        tool = tool_named(f"{path}.tool", described.tool, tools)
+        return tool.carry(standing)
+    if described.times is None:
+        return standing
+    return standing.moving(described.times, described.displacements or [], described.rotations, described.interpolation)

@@ -1,0 +1,164 @@
+"""Colliders and contacts in configurations: what they build, a motion with them, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from sheetbend.config import load, parse, scene_alone
+from sheetbend.config.schema import Config
+
+DRAGGED = """\
+[experiment]
+name = "dragged"
+
+[solver]
+h = 2e-3
+method = "implicit"
+integrator = "bdf1"
+
+[[scene.rope]]
+length = 0.2
+segments = 8
+density = 0.05
+EA = 200.0
+EI = 1e-4
+start = [0.0, 0.0, 0.005]
+
+[[scene.collider]]
+name = "table"
+shape = "plane"
+normal = [0.0, 0.0, 1.0]
+
+[[scene.collider]]
+name = "post"
+shape = "capsule"
+start = [0.1, 0.1, 0.0]
+end = [0.1, 0.1, 0.3]
+radius = 0.02
+
+[[scene.contact]]
+of = "rope"
+collider = "table"
+friction = 0.3
+radius = 0.005
+
+[[scene.contact]]
+of = ["rope"]
+collider = "post"
+friction = 0.2
+stiffness = 500.0
+"""
+SOLVER = sb.Solver(h=2e-3, method="implicit", integrator="bdf1")
+
+
+@pytest.fixture(autouse=True)
+def in_its_own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def parsed(text: str) -> Config:
+    Path("dragged.toml").write_text(text)
+    return parse("dragged.toml")
+
+
+def built(text: str) -> sb.Scene:
+    return scene_alone(parsed(text))[0]
+
+
+def test_a_file_builds_the_scene_that_python_builds():
+    scene = sb.Scene("dragged", (0, 0, -9.81))
+    rope = sb.add_rope(scene, length=0.2, segments=8, density=0.05, EA=200.0, EI=1e-4, start=(0, 0, 0.005))
+    scene.contact(rope, sb.Plane(name="table"), friction=0.3, radius=0.005)
+    post = sb.Capsule(start=(0.1, 0.1, 0), end=(0.1, 0.1, 0.3), radius=0.02, name="post")
+    scene.contact(rope, post, friction=0.2, stiffness=500.0)
+    read, solver = scene_alone(parsed(DRAGGED))
+    assert {n: q.value for n, q in read.quantities.items()} == {n: q.value for n, q in scene.quantities.items()}
+    assert {"table_friction", "table_contact_radius", "post_contact_stiffness", "post_radius"} <= set(read.quantities)
+    ours, theirs = (sb.simulate(s, [0.0, 0.05], solver).positions for s in (read, scene))
+    assert np.array_equal(ours, theirs)
+
+
+def test_a_collider_moves_at_knots_and_with_a_tool(tmp_path: Path):
+    times = np.linspace(0.0, 1.0, 21)
+    angle = 1.5 * np.pi * times  # beyond half a turn
+    turns = np.stack([0 * angle, 0 * angle, np.sin(angle / 2), np.cos(angle / 2)], axis=1)
+    np.savez(tmp_path / "hand.npz", times=times, positions=np.outer(times, [0.0, 0.0, 0.1]), quaternions=turns)
+    knots = DRAGGED.replace("radius = 0.02", "radius = 0.02\ntimes = [0.0, 1.0]\ndisplacements = [[0,0,0], [0,0,1]]")
+    at_end = built(knots).contacts.colliders["post"].poses
+    assert at_end.positions[-1] == pytest.approx([0.1, 0.1, 1.15])
+    ridden = DRAGGED.replace("radius = 0.02", 'radius = 0.02\ntool = "hand"')
+    ridden += '[[scene.tool]]\nname = "hand"\nfile = "hand.npz"\nposition = [1.0, 0.0, 0.0]\n'
+    scene, _ = scene_alone(parsed(ridden), tmp_path)
+    poses = scene.contacts.colliders["post"].poses
+    arm = np.array([0.1 - 1.0, 0.1, 0.15])  # from the tool's origin, at 1.0 on x
+    away = np.stack([np.cos(angle) * arm[0] - np.sin(angle) * arm[1], np.sin(angle) * arm[0] + np.cos(angle) * arm[1]])
+    assert poses.positions[:, :2] == pytest.approx(away.T + np.array([1.0, 0.0]))
+    assert poses.positions[:, 2] == pytest.approx(0.15 + 0.1 * times)
+    assert poses.rotations == pytest.approx(np.outer(angle, [0, 0, 1]))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "field", "words"),
+    [
+        ('method = "implicit"', 'method = "direct"', "solver.method", 'integrator = "bdf1"'),
+        ('integrator = "bdf1"', "", "solver.integrator", 'method = "implicit"'),
+        ("radius = 0.02", "", "scene.collider[1]", "add radius"),
+        ("radius = 0.02", "radius = 0.0", "scene.collider[1].radius", "greater than 0"),
+        ("radius = 0.02", "radius = 0.02\nsize = [1.0, 1.0, 1.0]", "scene.collider[1]", "has start, end, radius"),
+        ("radius = 0.02", "radius = 0.02\ntimes = [0.0]", "scene.collider[1]", "give both"),
+        ("radius = 0.02", 'radius = 0.02\ntool = "hand"', "scene.collider[1].tool", "add a [[scene.tool]]"),
+        ("normal = [0.0, 0.0, 1.0]", "normal = [0.0, 0.0, 0.0]", "scene.collider[0].normal", "not zero"),
+        ('name = "post"', 'name = "table"', "scene.collider[1].name", "of its own"),
+        ('shape = "plane"', 'shape = "cone"', "scene.collider[0].shape", "choices"),
+        ('collider = "table"', 'collider = "desk"', "scene.contact[0].collider", "table, post"),
+        ('of = "rope"', 'of = "cord"', "scene.contact[0].of", "use some of: rope"),
+        ('of = "rope"', 'of = ["rope", "rope"]', "scene.contact[0].particles", "once"),
+        ("friction = 0.3", "friction = -0.3", "scene.contact[0].friction", "at least 0"),
+        ("radius = 0.005", "raduis = 0.005", "scene.contact[0].raduis", "did you mean 'radius'"),
+        ("start = [0.0, 0.0, 0.005]", "start = [0.0, 0.0, 0.002]", "scene.table.contact", "0.003 m deep"),
+    ],
+)
+def test_what_cannot_be_is_refused(old: str, new: str, field: str, words: str):
+    with pytest.raises(sb.ConfigError) as error:
+        built(DRAGGED.replace(old, new, 1))
+    assert error.value.field == field
+    assert words in str(error.value)
+
+
+def test_a_tool_that_is_corrected_moves_no_collider(tmp_path: Path):
+    text = DRAGGED.replace("radius = 0.02", 'radius = 0.02\ntool = "hand"')
+    with pytest.raises(sb.ConfigError, match="post_x"):
+        parsed(text + '[[scene.tool]]\nname = "hand"\nfile = "hand.npz"\nshift_sd = 1e-3\n')
+    tool = sb.Tool([0.0, 1.0], np.zeros((2, 3)), [[0, 0, 0, 1]] * 2, flex=1e-4)
+    with pytest.raises(sb.SceneError, match="bends"):
+        tool.carry(sb.Plane())
+
+
+def recorded(folder: Path, more: str) -> Path:
+    scene = built(DRAGGED)
+    motion = sb.simulate(scene, np.linspace(0.0, 0.2, 11), SOLVER)
+    on_rope = motion.positions[:, scene.ropes["rope"].particles]
+    sb.Recording(positions=on_rope, times=motion.times, markers=[f"m{k}" for k in range(9)]).save(folder / "take.npz")
+    markers = ", ".join(f"m{k} = {0.025 * k}" for k in range(9))
+    text = DRAGGED.replace("EA = 200.0", f"EA = 200.0\nmarkers = {{ {markers} }}")
+    (folder / "dragged.toml").write_text(f'{text}\n[[recording]]\nfile = "take.npz"\nfit = [0.0, 0.2]\n{more}')
+    return folder / "dragged.toml"
+
+
+def test_a_recording_knows_contacts_and_can_do_without(tmp_path: Path):
+    both = load(recorded(tmp_path, "[parameters.table_friction]\n"))
+    assert both.experiments[0].scene.compiled.contacts == ("table", "post")
+    assert both.options["refine"].finer is not None
+    finer = both.options["refine"].finer()[0].scene
+    assert len(finer.contacts.contacts[0].particles) == 17
+    path = recorded(tmp_path, 'leave_out = ["over"]\n')
+    path.write_text(path.read_text().replace('of = "rope"', 'name = "over"\nof = "rope"'))
+    assert load(path).experiments[0].scene.compiled.contacts == ("post",)
+
+
+def test_a_state_of_rest_with_contacts_is_refused(tmp_path: Path):
+    with pytest.raises(sb.ConfigError, match=r"recording\[0\].static.*contacts"):
+        load(recorded(tmp_path, "static = true\n"))
