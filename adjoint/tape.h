@@ -1,11 +1,13 @@
 // The tape of a rollout: the coordinates at substep boundaries, at all of them or at those that checkpoints.h keeps. Velocities follow from
-// them, and a substep is recomputed before it is reversed, so nothing inside a substep is kept but its formula where that changes at contacts. Implicit blocks are not solved again, but known
+// them, and a substep is recomputed before it is reversed, so nothing inside a substep is kept but its formula where that changes at contacts, and the velocities of what has
+// bounced. Implicit blocks are not solved again, but known
 // by where a substep ends: for them the last boundary is kept as well.
 //
 // A reverse writes to a tape that dropped boundaries, so such reverses wait for each other; a whole tape is only read, by any number at a time.
 #pragma once
 
 #include <chrono>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <stdexcept>
@@ -68,6 +70,10 @@ class Tape {
     if (!first_order_.empty()) return first_order_[step];
     return Bdf::at(plan_.options, step).before == 0.0 ? all_scenes<T> : Scenes{0};
   }
+  // The particles that have bounced in the substep to `step`: kept for all of them.
+  void record_bounced(int step, const std::vector<Bounced<T>>& bounced) {
+    if (!bounced.empty()) bounced_[step] = bounced;
+  }
   bool holds(int first, int last) const {
     return std::all_of(slot_.begin() + first, slot_.begin() + last + 1, [](int slot) { return slot >= 0; });
   }
@@ -99,6 +105,13 @@ class Tape {
       else
         for (int i = begin; i < end; ++i) v[i] = chosen(first, by_first(i), by_second(i));
     });
+    const auto bounced = bounced_.find(step);
+    if (bounced == bounced_.end()) return;
+    for (const Bounced<T>& b : bounced->second) {
+      T own[3];
+      b.v.store(own);
+      for (int d = 0, i = scene_.first_dof[b.node]; d < 3; ++d, ++i) v[i] = chosen(b.scenes, own[d], v[i]);
+    }
   }
 
  private:
@@ -117,6 +130,7 @@ class Tape {
   std::vector<int> slot_, spare_;  // per boundary where it stands in x_, or -1
   std::vector<T> x_;
   std::vector<Scenes> first_order_;  // per substep
+  std::map<int, std::vector<Bounced<T>>> bounced_;  // by the boundary at which a substep with bounces ends
 };
 
 }  // namespace sheetbend

@@ -13,6 +13,14 @@
 
 namespace sheetbend {
 
+// The velocity of a particle that has bounced, in these scenes.
+template <class T>
+struct Bounced {
+  int node;
+  Scenes scenes;
+  Vec3<T> v;
+};
+
 // T: double, Pack, Complex, Dual<double, 1>, Dual<double, 4> or Dual<double, 8>. List: the stages of a substep.
 template <class T, class List = Substep>
 class Rollout {
@@ -55,6 +63,15 @@ class Rollout {
   Scenes first_order() const { return first_order_; }
   const Bdf& bdf() const { return bdf_; }
 
+  // What the last substep left each particle of each contact with (of a pack: scene after scene).
+  const std::vector<ContactMode>& contact_modes() const { return record_.template of<CarryFriction>().modes; }
+
+  // How particles bounced in the last substep.
+  const std::vector<Impact<Single<T>>>& impacts() const { return record_.template of<Bounce>().impacts; }
+
+  // The particles that have bounced in the last substep, with their velocities, which positions do not tell.
+  const std::vector<Bounced<T>>& bounced() const { return bounced_; }
+
   // Of the last substep, per implicit block: the force left at the start and after each Newton step, over the largest one.
   std::vector<std::vector<double>> balance() const;
 
@@ -62,6 +79,7 @@ class Rollout {
 
  private:
   bool take(const Bdf& bdf, Scenes scenes);
+  Scenes find_bounced();
   void throw_diverged() const;
 
   const Scene& scene_;
@@ -72,6 +90,7 @@ class Rollout {
   AfterImpact<T> after_impact_;
   Scenes first_order_ = 0;
   Bdf bdf_;
+  std::vector<Bounced<T>> bounced_;
   std::vector<T> x_, x_before_, x_next_, v_, v_before_, v_next_;
   std::vector<T> multipliers_;
   SubstepRecord<T, List> record_;
@@ -140,7 +159,8 @@ void Rollout<T, List>::advance(std::optional<Scenes> first_order) {
       v_next_[i] = chosen(first, v_next_[i], v[i]);
     }
   }
-  if (watches) after_impact_.count(begun | begins(first));
+  const Scenes bounced = find_bounced();
+  if (watches) after_impact_.count(begun | begins(first), bounced);
   first_order_ = first;
   ++step_;
   std::swap(x_before_, x_);
@@ -148,6 +168,22 @@ void Rollout<T, List>::advance(std::optional<Scenes> first_order) {
   std::swap(v_before_, v_);
   std::swap(v_, v_next_);
   if (!finite) throw_diverged();
+}
+
+// Of the last substep; returns the scenes in which some have.
+template <class T, class List>
+Scenes Rollout<T, List>::find_bounced() {
+  Scenes scenes = 0;
+  bounced_.clear();
+  for (const auto& impact : impacts()) {
+    const auto own = static_cast<Scenes>(1u << impact.lane);
+    scenes |= own;
+    auto known = std::find_if(bounced_.begin(), bounced_.end(), [&](const auto& b) { return b.node == impact.node; });
+    if (known == bounced_.end())
+      known = bounced_.insert(known, {impact.node, 0, Vec3<T>(v_next_.data() + scene_.first_dof[impact.node])});
+    known->scenes |= own;
+  }
+  return scenes;
 }
 
 template <class T, class List>

@@ -4,6 +4,7 @@
 
 #include <type_traits>
 
+#include "core/contact/impact.h"
 #include "core/contact/pose.h"
 #include "core/contact/touch.h"
 #include "core/scalar/pack.h"
@@ -94,6 +95,20 @@ struct ContactSource {
                                     : eta2 * read(in.of(Quantity::contact_stiffness)[c.stiffness]);
     read_size(collider, numbers.size);
     return numbers;
+  }
+
+  // What particles bounce off at a contact with restitution.
+  Surface<S> surface(const ColliderPoses<S>& poses, int contact) const {
+    const Contact& c = scene.contacts[contact];
+    Surface<S> s;
+    s.friction = read(in.of(Quantity::friction)[contact]);
+    s.restitution = read(in.of(Quantity::restitution)[c.restitution]);
+    s.radius = read(in.of(Quantity::contact_radius)[contact]);
+    for (S& a : s.size) a = S(0.0);
+    read_size(scene.colliders[c.collider], s.size);
+    s.now = poses.now[c.collider];
+    s.next = poses.next[c.collider];
+    return s;
   }
 
   // The gap of a particle at x from a contact's surface, with its collider at a pose.

@@ -51,7 +51,7 @@ void load_implicit(const SubstepState<T>& s, const DirectBlock& block, const Sub
   if constexpr (is_plain<T>)
     potential.contacts = state.contacts[scene];
   else
-    potential.contacts = values_of(state.contacts[scene]);
+    take_values(state.contacts[scene], potential.contacts);
 }
 
 // The particle, in the block's order, of place k of a run's constraint.

@@ -14,7 +14,7 @@ from ..quantities.kinds import KINDS
 from ..quantities.quantities import ZERO_OR_MORE, Term, product
 from .colliders import Collider
 from .compiled import CompiledScene
-from .contacts import HasParticles
+from .contacts import ContactNumbers, HasParticles
 from .frames import Frame, directors_of, normals_of
 from .group import make_group
 from .moving_clamp import clamped_ends, keep_direction, let_go
@@ -345,40 +345,40 @@ class Scene(SceneData):
         friction: float,
         radius: float = 0.0,
         stiffness: float | None = None,
+        restitution: float | None = None,
         name: str | None = None,
     ) -> str:
         """Let particles touch a shape, and return the contact's name. docs/contact.md has the law and its limits.
 
         Particles are pushed out along the normal and held by Coulomb friction; links and triangles between them are
-        not. Needs method "implicit" with integrator "bdf1". The numbers are the quantities `<name>_friction`, unless
-        zero `<name>_contact_radius` m, where given `<name>_contact_stiffness` N/m, and of the collider `<collider>_x`,
-        `_y`, `_z` m (how far it is from where it was given) and its lengths, such as `<collider>_radius` m.
+        not. Needs method "implicit". Its numbers are the quantities in brackets, and so are those of the collider:
+        `<collider>_x`, `_y` and `_z`, m from where it was given, and its lengths, such as `<collider>_radius` m.
 
         Args:
             what: a rope, a cloth, or particles (n,).
             collider: `Plane`, `Sphere`, `Capsule` or `Box`; one object may serve several contacts.
-            friction: Coulomb's coefficient; 0 is smooth.
-            radius: m, of a rope, or half the thickness of cloth: particles touch at this distance.
-            stiffness: N/m per particle. Rigid by default: a particle lies h^2 g/1000 deep under its weight.
+            friction: Coulomb's coefficient (`<name>_friction`); 0 is smooth.
+            radius: m, of a rope, or half the thickness of cloth (`<name>_contact_radius` unless zero).
+            stiffness: N/m per particle (`<name>_contact_stiffness`). By default rigid: h^2 g/1000 deep under weight.
+            restitution: 0 to 1 (`<name>_restitution`), of particles that no constraint holds; by default 0 of all.
             name: by default that of the collider.
 
         Raises:
-            SceneError: unknown or repeated particles, negative numbers, names that are taken; a start inside the
-                collider, when the scene is compiled.
+            SceneError: numbers out of range; when it is compiled: a start inside, restitution of what constraints hold.
         """
         self._building()
-        which, name = self.contacts.check(what, collider, self.particle_count, friction, radius, stiffness, name)
+        numbers = ContactNumbers(friction, radius, stiffness, restitution)
+        which, name = self.contacts.check(what, collider, self.particle_count, numbers, name)
         carried = self.add_particles(np.zeros((len(which), 3)), 1.0)
         self.pin(carried)
-        self.contacts.add(self, collider, which, carried, friction, radius, stiffness, name)
+        self.contacts.add(self, collider, which, carried, numbers, name)
         return name
 
     def freeze(self) -> Scene:
         """End the construction: validates the whole scene and returns it. Later additions raise.
 
         Raises:
-            SceneError: no particles, nothing can move, massless free particles, or particles that no constraint and no
-                boundary holds.
+            SceneError: no particles, nothing that can move, free particles without mass or that nothing holds.
         """
         if not self._frozen:
             validate(self)
