@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <sstream>
 
 namespace sheetbend {
@@ -14,7 +15,10 @@ constexpr int most_halvings = 60;
 constexpr int turns = 8;                  // in which a direction of negative curvature gets steeper
 constexpr double first_departure = 1e-4;  // along it, of the block's size
 constexpr double first_share = 0.25, least_share = 1.0 / 256.0;  // of friction, that a step adds
-constexpr int most_leaps = 8, patience = 4;                      // leaps over a kink, and steps without progress before one
+constexpr int patience = 4;  // steps without progress before a leap over a kink
+// How far leaps go, of a whole step. Whole steps alone may lead back to the same kink again and again.
+constexpr double leap_shares[] = {1.0, 0.5, 2.0, 0.25, 1.5, 0.75, 0.35, 0.6};
+constexpr int most_leaps = static_cast<int>(std::size(leap_shares));
 constexpr double near_saddle = 1e-3;      // so little of the largest force is left where it may be a saddle's
 
 std::string words(const Unbalanced& e, int substep, double time) {
@@ -258,7 +262,7 @@ void ImplicitBlock::solve(const Scene& scene, const DirectBlock& block, const So
 void ImplicitBlock::begin() { first_ = balance_.size(); }
 
 // Newton's method from x_, where the potential was looked at last. False where it stalls, or takes too many matrices. Where friction acts, its merit may
-// lead to a kink that is no balance; a whole step leaps over it.
+// lead to a kink that is no balance; a step that need not lower it leaps over that.
 bool ImplicitBlock::find_balance(const Scene& scene, const DirectBlock& block, const SolverOptions& options) {
   int leaps = 0;
   std::size_t last_leap = first_;
@@ -283,9 +287,8 @@ bool ImplicitBlock::find_balance(const Scene& scene, const DirectBlock& block, c
       continue;
     take_direction(block);
     if (rubs_ && leaps < most_leaps && stalls(last_leap)) {
-      ++leaps;
       last_leap = balance_.size();
-      move(x_, 1.0, d_, trial_);
+      move(x_, leap_shares[leaps++], d_, trial_);
       const double there = potential.evaluate(block, trial_);
       if (std::isfinite(there)) {
         std::swap(x_, trial_);
