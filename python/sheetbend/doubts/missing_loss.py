@@ -33,9 +33,9 @@ def missing_loss(problem: FitProblem, u: Array, fitted: tuple[FitProblem, Array]
     """By free parameter, the motion whose losses the model does not have, or does not have so large.
 
     Losses that are given are tested first (`held_losses`), then all losses by one simulation with the other integrator.
-    Where that has no answer, it tells nothing, nor of motions with contacts, which know one integrator alone (half the
-    substep moves when they begin and slide, which is no loss). Last, where neither shows anything,
-    comes damping where the model has none (`absent_damping`).
+    Where that has no answer, it tells nothing, nor of motions with contacts, where another integrator or substep moves
+    when they begin and slide, which is no loss. Last, where neither shows anything, comes damping where the model has
+    none (`absent_damping`).
 
     Args:
         problem: whose residuals count.

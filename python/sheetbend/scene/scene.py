@@ -27,7 +27,7 @@ from .bodies import (
 from .body import Body
 from .colliders import Collider
 from .compiled import CompiledScene
-from .contacts import HasParticles
+from .contacts import ContactNumbers, HasParticles
 from .group import make_group
 from .held import HeldScene
 from .inertia import Inertia
@@ -281,31 +281,35 @@ class Scene(HeldScene):
         friction: float,
         radius: float = 0.0,
         stiffness: float | None = None,
+        restitution: float | None = None,
         name: str | None = None,
         settle: bool = False,
     ) -> str:
         """Let particles (no links or triangles) touch a shape, and return the contact's name; see docs/contact.md.
 
-        Needs method "implicit" with integrator "bdf1". Quantities: `<name>_friction`, unless zero `_contact_radius` m,
-        where given `_contact_stiffness` N/m; of the collider `<collider>_x`, `_y`, `_z` m and its lengths.
+        Particles are pushed out along the normal and held by Coulomb friction; links and triangles between them are
+        not. Needs method "implicit". Its numbers are the quantities in brackets, and so are those of the collider:
+        `<collider>_x`, `_y` and `_z`, m from where it was given, and its lengths, such as `<collider>_radius` m.
 
         Args:
             what: a rope, a cloth, or particles (n,).
             collider: `Plane`, `Sphere`, `Capsule` or `Box`; one object may serve several contacts.
-            friction: Coulomb's coefficient; 0 is smooth.
-            radius: m, of a rope, or half the thickness of cloth: particles touch at this distance.
-            stiffness: N/m per particle. Rigid by default: a particle lies h^2 g/1000 deep under its weight.
+            friction: Coulomb's coefficient (`<name>_friction`); 0 is smooth.
+            radius: m, of a rope, or half the thickness of cloth (`<name>_contact_radius` unless zero).
+            stiffness: N/m per particle (`<name>_contact_stiffness`). By default rigid: h^2 g/1000 deep under weight.
+            restitution: 0 to 1 (`<name>_restitution`), of particles that no constraint holds; by default 0 of all.
             name: by default that of the collider.
             settle: move what starts inside to the surface, at the values that the scene is given with.
 
         Raises:
-            SceneError: unknown or repeated particles, negative numbers, names that are taken; later a start inside.
+            SceneError: numbers out of range; when it is compiled: a start inside, restitution of what constraints hold.
         """
         self._building()
-        which, name = self.contacts.check(what, collider, self.particle_count, friction, radius, stiffness, name)
+        numbers = ContactNumbers(friction, radius, stiffness, restitution)
+        which, name = self.contacts.check(what, collider, self.particle_count, numbers, name)
         carried = self.add_particles(np.zeros((len(which), 3)), 1.0)
         self.pin(carried)
-        self.contacts.add(self, collider, which, carried, friction, radius, stiffness, name)
+        self.contacts.add(self, collider, which, carried, numbers, name)
         self.contacts.settling |= {name} if settle else set()
         return name
 
@@ -313,8 +317,7 @@ class Scene(HeldScene):
         """End the construction: validates the whole scene and returns it. Later additions raise.
 
         Raises:
-            SceneError: no particles, nothing can move, massless free particles, or particles that no constraint and no
-                boundary holds.
+            SceneError: no particles, nothing that can move, free particles without mass or that nothing holds.
         """
         if not self._frozen:
             validate(self)
