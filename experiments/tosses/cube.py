@@ -12,6 +12,7 @@ from sheetbend.quantities.quantities import product
 
 DATA = Path(__file__).parent / "data" / "flights.npz"
 RATE, MASS, SIDE = 148.0, 0.37, 0.1048  # Hz, kg, m
+DRAG = 0.02  # N s/m, to start from
 CORNERS = SIDE / 2 * np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])  # four of them, a tetrahedron
 SIGMA = 5e-5  # m, of a corner
 SEEN = 4  # frames that a prediction starts from
@@ -38,14 +39,14 @@ def flights() -> list[Flight]:
     ]
 
 
-def scene_of(flight: Flight, gravity: float = 9.81) -> tuple[sb.Scene, sb.Body]:
-    """The cube as a homogeneous box that flies from the first poses; gravity is the quantity `gravity`, m/s^2 in the
-    recording's unit of length."""
+def scene_of(flight: Flight, gravity: float = 9.81, drag: float = DRAG) -> tuple[sb.Scene, sb.Body]:
+    """The cube as a homogeneous box that flies from the first poses, slowed by the air; gravity is the quantity
+    `gravity`, m/s^2 in the recording's unit of length."""
     scene = sb.Scene(flight.name, gravity=(0.0, 0.0, 0.0))
     down = np.array([0.0, 0.0, -gravity])
     first = slice(0, SEEN)
     start = sb.start_of_poses(flight.times[first], flight.positions[first], flight.quaternions[first], down)
-    body = scene.add_body("cube", of=sb.Inertia.box(MASS, np.full(3, SIDE)), **start)
+    body = scene.add_body("cube", of=sb.Inertia.box(MASS, np.full(3, SIDE)), drag=drag, **start)
     scene.add_quantity("gravity", gravity, "m/s^2")
     scene.add_terms([product("gravity", 2, -1.0, {"gravity": "identity"})])
     return scene, body

@@ -3,7 +3,7 @@
     python experiments/tosses/tosses.py [--flights 62]
 
 Fits four groups of flights in the order of the source, compares what gravity says of the scale in the first and the
-second half, and predicts every flight from its first four frames with the gravity that the other half shows.
+second half, and predicts every flight from its first four frames with the gravity and drag that the other half shows.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 import sheetbend as sb
 from cube import CORNERS, RATE, SEEN, Flight, experiment, flights, parameters, scene_of
 
-SHARED = ["gravity", *(f"cube_center_{a}" for a in "xyz"), "cube_inertia_2", "cube_inertia_3"]
+SHARED = ["gravity", "cube_drag", *(f"cube_center_{a}" for a in "xyz"), "cube_inertia_2", "cube_inertia_3"]
 GROUPS = 4
 
 
@@ -29,9 +29,9 @@ def pooled(values: list[tuple[float, float]]) -> tuple[float, float]:
     return float(weights @ [v for v, _ in values] / weights.sum()), float(weights.sum() ** -0.5)
 
 
-def predicted(flight: Flight, gravity: float) -> tuple[float, float]:
+def predicted(flight: Flight, gravity: float, drag: float) -> tuple[float, float]:
     """Errors at a flight's last frame, m and degrees, of its prediction from the first frames."""
-    scene, body = scene_of(flight, gravity)
+    scene, body = scene_of(flight, gravity, drag)
     motion = sb.simulate(scene, [0.0, float(flight.times[-1])], sb.Solver(h=1 / (4 * RATE)))
     origin, frame = body.pose(motion)
     seen = sb.Recording.from_poses(flight.times, flight.positions, flight.quaternions, CORNERS).positions[-1]
@@ -54,13 +54,13 @@ def main(count: int) -> None:
             print(f"  {name:15s} {one.value:10.4g} +- {found[name][-1][1]:8.2g}  {one.verdict}")
     for name in SHARED:
         print(f"all: {name:15s} {pooled(found[name])[0]:10.4g} +- {pooled(found[name])[1]:8.2g}")
-    halves = [pooled(found["gravity"][part]) for part in (slice(0, 2), slice(2, 4))]
+    halves = [[pooled(found[q][part])[0] for q in SHARED[:2]] for part in (slice(0, 2), slice(2, 4))]
     scales = [9.81 / g for g, _ in halves]
     apart = abs(scales[0] / scales[1] - 1)
     print(f"scale of lengths from gravity: {scales[0]:.4f} and {scales[1]:.4f}, {apart:.2%} apart")
     middle = len(every) // 2
     errors = np.array(
-        [predicted(f, halves[1][0]) for f in every[:middle]] + [predicted(f, halves[0][0]) for f in every[middle:]]
+        [predicted(f, *halves[1]) for f in every[:middle]] + [predicted(f, *halves[0]) for f in every[middle:]]
     )
     for label, column, unit in (("place", 1e3 * errors[:, 0], "mm"), ("attitude", errors[:, 1], "degrees")):
         order = np.argsort(column)

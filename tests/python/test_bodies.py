@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.arrays.rotations import quaternions_of, rotation_matrix
+from sheetbend.quantities.expression import numbers, rotation
 
 TURN = np.array([0.3, -0.5, 0.8])
 MATRIX = np.array([[2e-3, 1e-4, 0.0], [1e-4, 3e-3, 2e-4], [0.0, 2e-4, 4e-3]])
@@ -153,3 +155,49 @@ def test_saved_scene_moves_with_the_same_bits(tmp_path: Path) -> None:
     again = sb.load_scene(tmp_path / "toss.sheetbend")
     one, other = (sb.simulate(s, [0.05], sb.Solver(h=1e-3)).positions for s in (scene, again))
     assert (one == other).all()
+
+
+def test_payload_weighed_by_a_wrist_against_newton_and_euler() -> None:
+    """All ten numbers of a load that a driven gripper shakes, from force and torque without a simulation of ours."""
+    times = np.arange(0, 4001) * 1e-4
+    swing = 0.5 - 0.5 * np.cos(np.outer(times, 2.0 * np.pi * np.array([2.5, 3.5, 4.5, 3.0, 4.0, 2.5])))
+    x, angles = 0.1 * swing[:, :3], swing[:, 3:] * [1.0, -0.9, 1.2]
+    names = ["a", "b", "c"]
+    turns = np.stack([numbers(rotation(names), dict(zip(names, a, strict=True))) for a in angles])
+    rate = partial(np.gradient, axis=0, edge_order=2)
+    center = x + turns @ CENTER
+    force = 0.4 * (rate(rate(center, times), times) - np.array([0.0, 0.0, -9.81]))
+    skew = rate(turns, times) @ np.swapaxes(turns, 1, 2)
+    spin = np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], axis=1)
+    momentum = np.einsum("fab,bc,fdc,fd->fa", turns, MATRIX, turns, spin)
+    torque = rate(momentum, times) + np.cross(center - x, force)
+    every, knots = slice(200, 3801, 100), slice(0, None, 20)
+    wrist = sb.ForceRecording(times[every], force[every], torque[every], name="wrist")
+    tool = sb.Tool(times[knots], x[knots], quaternions_of(turns[knots]))
+
+    scene = sb.Scene("payload")
+    hand = scene.add_body("hand", mass=1e-6, inertia=(1e-9, 1e-9, 1e-9), poses=tool)
+    origin, frame = hand.pose(scene.positions)
+    moments, axes = sb.Inertia(0.4, MATRIX).principal()
+    guess = axes @ np.diag(moments * [1.05, 0.97, 1.03]) @ axes.T
+    load = scene.add_body("load", mass=0.45, inertia=guess, center=0.8 * CENTER, at=origin, rotation=frame)
+    sb.fixed(hand, load)
+    sensor = sb.ForceSensor(recording=wrist, at=hand.particles.tolist(), sigma=0.05, torque_sigma=2e-3)
+    marked = sb.Recording(tool.path([[0.05, 0.0, 0.0]])[::10], tool.times[::10])
+    wanted = dict(zip([f"load_inertia_{k}" for k in (1, 2, 3)], moments, strict=True)) | {"load_mass": 0.4}
+    wanted |= {f"load_center_{a}": c for a, c in zip("xyz", CENTER, strict=True)}
+    wanted |= {f"load_axes_turn_{a}": 0.0 for a in "xyz"}
+    found = sb.fit(
+        scene,
+        marked,
+        list(wanted),
+        markers=sb.on_body(load, [[0.05, 0.0, 0.0]]),
+        solver=sb.Solver(h=2e-3),
+        forces=[sensor],
+        start_time=0.0,
+        refine=False,
+    )
+    for name, value in wanted.items():
+        size = {"mass": 2e-3, "center": 2e-4, "inertia": 3e-5, "axes": 0.05}[name.split("_")[1]]
+        assert found.values[name] == pytest.approx(value, abs=size), name
+    assert found["load_mass"].verdict == "identified"

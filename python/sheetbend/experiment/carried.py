@@ -78,7 +78,7 @@ def _grips(scene: Scene) -> list[list[int]]:
         return p
 
     links = [row for g in scene.groups for row in g.particles.tolist()]
-    links += [[d, *frame] for d, frame in scene.directors.items()]
+    links += [[d, *frame] for d, frame in scene.directors.items()] + scene.body_nodes.tolist()
     for link in links:
         held = [p for p in link if p in owner]
         for other in held[1:]:
@@ -91,7 +91,7 @@ def _grips(scene: Scene) -> list[list[int]]:
 
 def _motion(e: Experiment, grip: Sequence[int], times: Array, every: Values) -> Array:
     """(frames, points, 3) m of a grip's particles at times of the recording. A director counts as a point one edge away
-    from the node that its edge starts from."""
+    from the node that its edge starts from, an axis of a body as one a meter from its center."""
     scene, boundary = e.scene, e.scene.boundary
     values = {name: value for name, value in every.get(e.name, {}).items() if name in scene.quantities}
     inputs = scene.compiled.inputs(scene.compiled.values(values))
@@ -103,9 +103,12 @@ def _motion(e: Experiment, grip: Sequence[int], times: Array, every: Values) -> 
     def path(p: int) -> Array:
         return driven[:, slot[p]] if p in slot else np.broadcast_to(scene.positions[p], (len(at), 3))
 
+    center = {int(axis): int(p) for p, *axes in scene.body_nodes for axis in axes}
     points = []
     for p in grip:
-        if p not in scene.directors:
+        if p in center:
+            points.append(path(center[p]) + path(p))
+        elif p not in scene.directors:
             points.append(path(p))
         elif (start := scene.directors[p][0]) in grip:
             length = np.linalg.norm(scene.positions[scene.directors[p][1]] - scene.positions[start])

@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..objects.hand_eye import rotated
 from ..quantities.quantities import Term, product
 from ..recording.force_recording import ForceRecording
+from ..scene.body import GROUND
 from ..scene.scene import Scene
 
 Array = np.ndarray
@@ -256,7 +257,8 @@ def end_of_rope(scene: Scene, rope: str, end: str, path: str = "force") -> list[
 
 
 def carried(scene: Scene, particles: Sequence[int]) -> list[int]:
-    """Those of a support's particles whose mass is a rope's or a cloth's: pivots and stubs have masses that nothing
-    uses."""
-    bodies = {int(p) for body in (*scene.ropes.values(), *scene.cloths.values()) for p in body.particles}
+    """Those of a support's particles whose mass is a rope's, a cloth's or a rigid body's: pivots and stubs have masses
+    that nothing uses."""
+    every = (*scene.ropes.values(), *scene.cloths.values(), *scene.bodies.values())
+    bodies = {int(p) for body in every if body.name != GROUND for p in body.particles}
     return [p for p in particles if p in bodies]

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..arrays.checks import finite, is_number
 from ..errors import SceneError
 from ..quantities.expression import Array, Expression, cross, expressions, numbers, terms_of, vector
-from ..scene.body import AXES, PLACE, Body, FrameState
+from ..scene.body import AXES, GROUND, PLACE, Body, FrameState
 from ..scene.scene import Scene
 from .chain import first_value, unit_vector
 from .grip import any_across
@@ -50,12 +50,12 @@ class Joint:
 
 def ground(scene: Scene) -> Body:
     """The body that stands for the world: pinned at its origin, along its axes. It has no quantities."""
-    if "ground" not in scene.bodies:
+    if GROUND not in scene.bodies:
         nodes = scene.add_particles(np.vstack([np.zeros(3), np.eye(3)]), np.array([1.0, 1e-12, 1e-12, 1e-12]))
         scene.pin(nodes)
         zero, one = expressions(np.zeros(3)), expressions(np.eye(3))
-        scene.bodies["ground"] = Body("ground", nodes, zero, one, scene, FrameState(zero, one, zero, zero), "pinned")
-    return scene.bodies["ground"]
+        scene.bodies[GROUND] = Body(GROUND, nodes, zero, one, scene, FrameState(zero, one, zero, zero), "pinned")
+    return scene.bodies[GROUND]
 
 
 class Making:

@@ -12,6 +12,7 @@ from ..fitting.fit import Fit
 from ..fitting.fitted_motion import fitted_positions
 from ..mesh import TriangleMesh
 from ..motion.simulate import Trajectory
+from ..pictures.body_lines import body_lines
 from ..pictures.collider_lines import collider_lines
 from ..pictures.strain import largest_strain
 from ..recording.recording import Recording
@@ -115,9 +116,10 @@ def of_recording(recording: Recording, name: str) -> Shown:
 def _shown(name: str, scene: Scene, times: Array, positions: Array, recorded: Mapping[str, object]) -> Shown:
     lines = {rope.name: positions[:, rope.particles] for rope in scene.ropes.values()}
     sheets = {c.name: _sheet(c.mesh, positions[:, c.particles]) for c in scene.cloths.values()}
-    if not lines and not sheets:  # a scene of bare particles and constraints: its links
+    boxes = body_lines(scene, positions)
+    if not lines and not sheets and not boxes:  # a scene of bare particles and constraints: its links
         lines = _links(scene, positions)
-    ticks = _ticks(scene, positions) | collider_lines(scene, times, positions)
+    ticks = _ticks(scene, positions) | collider_lines(scene, times, positions) | boxes
     return Shown(name, times, lines, ticks, sheets, up=_unit(-scene.gravity), **recorded)  # type: ignore[arg-type]
 
 

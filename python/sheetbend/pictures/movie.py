@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..files.whole import written
 from ..optional import require
 from ..scene.scene import Scene
+from .body_lines import body_lines
 from .collider_lines import collider_lines
 from .drawing import ACCENT, GRAY, INK, WARM, key, new_figure
 from .field_plot import box_in_space, field_colors
@@ -33,7 +34,7 @@ class Motion:
     """What a moving picture shows.
 
     Attributes:
-        scene: whose cloths and ropes are drawn.
+        scene: whose cloths, ropes and bodies are drawn.
         times: (frames,) s.
         positions: (frames, particles, 3) m.
         measured: (frames, markers, 3) m, drawn as dots, NaN where not seen; None without a recording.
@@ -51,16 +52,16 @@ def check_movie(field: str, path: Path, scenes: Sequence[Scene]) -> None:
     """Everything that would stop `save_movie` after the work is done.
 
     Raises:
-        InputError: a file that is no GIF or MP4, or a scene without cloth or rope.
+        InputError: a file that is no GIF or MP4, or a scene without cloth, rope or body.
         MissingExtraError: matplotlib, Pillow (GIF) or a program that encodes (MP4) is not installed.
     """
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(field, "is no GIF or MP4", str(path), f"give a file that ends in {' or '.join(SUFFIXES)}")
     if path.is_dir():
         raise InputError(field, "is a folder", str(path), "give a file")
-    bare = [scene.name for scene in scenes if not scene.cloths and not scene.ropes]
+    bare = [scene.name for scene in scenes if not scene.cloths and not scene.ropes and not scene.bodies]
     if bare or not scenes:
-        raise InputError(field, "needs a motion of a cloth or a rope", bare or "none", "leave it out")
+        raise InputError(field, "needs a motion of a body, a cloth or a rope", bare or "none", "leave it out")
     _writer(path, RATE)
 
 
@@ -132,14 +133,17 @@ def _picture(motion: Motion, shown: Array, title: str) -> tuple[Figure, Any]:
         bar.set_label("largest strain [%]", color=INK, fontsize=9)
         bar.ax.tick_params(colors=INK, labelsize=8)
         bar.outline.set_visible(False)
+    boxes = body_lines(motion.scene, motion.positions)
     solids = [
         (lines, panel.add_collection3d(art.Line3DCollection(lines[0], colors=GRAY, linewidth=0.5, zorder=0)))
-        for lines in collider_lines(motion.scene, motion.times, motion.positions).values()
+        for lines in (*collider_lines(motion.scene, motion.times, motion.positions).values(), *boxes.values())
     ]
     ropes = [(r.particles, panel.plot([], [], [], color=ACCENT, linewidth=1.8)[0]) for r in motion.scene.ropes.values()]
     dots = panel.plot([], [], [], "o", color=WARM, markersize=3.2, markeredgewidth=0, zorder=10)[0]
     off = panel.add_collection3d(art.Line3DCollection(np.zeros((1, 2, 3)), colors=INK, linewidth=1.2, zorder=9))
-    drawn_particles = np.concatenate([p.particles for p in (*motion.scene.ropes.values(), *cloths)])
+    drawn_particles = np.concatenate(
+        [np.zeros(0, int), *(p.particles for p in (*motion.scene.ropes.values(), *cloths))]
+    )
     reach = [motion.positions[shown][:, drawn_particles].reshape(-1, 3)]
     reach += [lines[shown].reshape(-1, 3) for lines, _ in solids]
     if motion.measured is not None:

@@ -24,6 +24,7 @@ from ..quantities.quantities import Builder, Quantity, Term
 Array = np.ndarray
 Values = Mapping[str, float] | None
 AXES = "xyz"
+GROUND = "ground"  # the name of the body that stands for the world
 PLACE, TURN = 0.01, 0.1  # m, rad: the sizes against which the precision of places and angles is judged
 
 

@@ -1,0 +1,36 @@
+"""Rigid bodies as boxes, for movies and pages."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from ..scene.body import GROUND
+from ..scene.scene import Scene
+
+Array = np.ndarray
+CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+EDGES = [(i, j) for i, j in combinations(range(8), 2) if np.count_nonzero(CORNERS[i] != CORNERS[j]) == 1]
+
+
+def body_lines(scene: Scene, positions: Array) -> dict[str, Array]:
+    """By body, (frames, 13, 2, 3) m: the edges of the homogeneous box that has its mass and inertia, and the way from
+    its center to the origin of its frame.
+
+    Args:
+        positions: (frames, particles, 3) m.
+    """
+    found = {}
+    for body in scene.bodies.values():
+        if body.name == GROUND:
+            continue
+        mass, *second = body.inertia_of_nodes()
+        sides = np.sqrt(12.0 * np.maximum(second, 0.0) / mass)
+        center, *axes = np.moveaxis(positions[:, body.particles], 1, 0)
+        turn = np.stack(axes, axis=2)
+        corners = center[:, None] + np.einsum("fab,kb->fka", turn, sides * CORNERS)
+        origin, _ = body.pose(positions)
+        lines = [corners[:, pair] for pair in EDGES]
+        found[body.name] = np.stack([*lines, np.stack([center, origin], axis=1)], axis=1)
+    return found
