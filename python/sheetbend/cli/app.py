@@ -9,6 +9,7 @@ import typer
 from .bench import bench
 from .check import check
 from .fit import fit
+from .identify import identify
 from .info import info
 from .new import new
 from .simulate import simulate
@@ -43,6 +44,6 @@ def options(
     """Simulate ropes, beams and cloth, and find their physical parameters from recordings, with error bars."""
 
 
-for command in (new, fit, simulate, view, check, info, textile):
+for command in (new, fit, simulate, view, check, info, identify, textile):
     app.command()(command)
 app.command(hidden=True, context_settings={"ignore_unknown_options": True})(bench)

@@ -74,7 +74,7 @@ def _table(section: Section) -> list[str]:
 
 def flush_left(section: Section) -> list[bool]:
     """Of each column: words are flush left, numbers flush right."""
-    words = {"parameter", "with", "recording", "unit", "verdict", "step", "stays", "rope", "given"}
+    words = {"parameter", "with", "recording", "unit", "verdict", "step", "stays", "rope", "given", "change"}
     return [header in words for header in section.headers]
 
 
