@@ -20,6 +20,7 @@ from ..fitting.fit import Fit
 from ..fitting.fit import fit as run_fit
 from ..minimum.journal import Journal
 from ..minimum.problem import FitProblem, as_parameters
+from ..minimum.workers import processes, working_on
 from ..pictures.movie import movie_paths
 from ..recording.recording import Recording
 from ..report.fit_result import FitResult
@@ -59,6 +60,9 @@ def fit(
         ),
     ] = False,
     movie: MoviePath = None,
+    workers: Annotated[
+        int, typer.Option(min=1, help="Processes that share out recordings, raced starts and leave-one-out.")
+    ] = 1,
     strict: Annotated[
         bool, typer.Option("--strict", help="Exit 3 when any parameter is not identifiable, not only when all are.")
     ] = False,
@@ -72,7 +76,8 @@ def fit(
         if more:
             fix = "give one configuration; values of an earlier fit are started from with --from fit.json"
             raise ConfigError("--resume" if resume else "arguments", "are too many", [str(config), *more], fix)
-        return _fit(console, config, output, start, resume, movie, strict)
+        with processes(workers) as executor, working_on(executor):
+            return _fit(console, config, output, start, resume, movie, strict)
 
     run(command, json)
 
