@@ -8,6 +8,7 @@ import typer
 
 from .bench import bench
 from .check import check
+from .collect import collect
 from .fit import fit
 from .identify import identify
 from .info import info
@@ -44,6 +45,6 @@ def options(
     """Simulate ropes, beams and cloth, and find their physical parameters from recordings, with error bars."""
 
 
-for command in (new, fit, simulate, view, check, info, identify, textile):
+for command in (new, fit, simulate, view, check, info, identify, collect, textile):
     app.command()(command)
 app.command(hidden=True, context_settings={"ignore_unknown_options": True})(bench)
