@@ -23,6 +23,8 @@ from .experiment.experiment import Experiment
 from .experiment.force_readings import simulate_forces
 from .experiment.force_sensor import ForceSensor
 from .fitting.fit import Fit, fit
+from .fitting.identify import identify
+from .fitting.plan import Plan
 from .mesh import TriangleMesh, read_mesh
 from .minimum.discretization import Refinement
 from .motion.balance import ForceBalance, force_balance
@@ -115,6 +117,7 @@ __all__ = [
     "Parameter",
     "Parameters",
     "Place",
+    "Plan",
     "Plane",
     "Recording",
     "RecordingError",
@@ -160,6 +163,7 @@ __all__ = [
     "force_balance",
     "ground",
     "hinge",
+    "identify",
     "laws",
     "load_scene",
     "mesh",

@@ -8,9 +8,11 @@ import typer
 
 from .bench import bench
 from .check import check
+from .collect import collect
 from .compare import compare
 from .fabric import fabric
 from .fit import fit
+from .identify import identify
 from .info import info
 from .new import new
 from .schema import schema
@@ -45,6 +47,6 @@ def options(
     """Simulate ropes, beams and cloth, and find their physical parameters from recordings, with error bars."""
 
 
-for command in (new, fit, simulate, view, check, info, compare, textile, fabric, schema):
+for command in (new, fit, simulate, view, check, info, identify, compare, collect, textile, fabric, schema):
     app.command()(command)
 app.command(hidden=True, context_settings={"ignore_unknown_options": True})(bench)

@@ -20,15 +20,17 @@ from ..fitting.fit import Fit
 from ..fitting.fit import fit as run_fit
 from ..minimum.journal import Journal
 from ..minimum.problem import FitProblem, as_parameters
+from ..minimum.workers import processes, working_on
 from ..pictures.movie import movie_paths
 from ..recording.recording import Recording
 from ..report.fit_result import FitResult
 from ..report.parameter_table import TABLE, parameter_table
 from ..report.report import plain, rich_report
+from .ensemble import fit_all
 from .figures import figure_files, figures_form, write_figures
 from .folders import alone, made
 from .gripped import fit_ropes, load_ropes, rope_files
-from .journals import journal_in, made_from
+from .journals import NAME, journal_in, made_from
 from .movies import OPTION, MoviePath, check_before, write_movies
 from .outcome import Code, Outcome, code_of, run
 from .pages import PAGE, page_possible, write_fit_page
@@ -40,7 +42,11 @@ from .targets import check_targets
 
 def fit(
     config: Annotated[
-        Path, typer.Argument(help="A TOML configuration, see docs/configuration.md.", show_default=False)
+        Path,
+        typer.Argument(
+            help="A TOML configuration, see docs/configuration.md; or a pattern such as 'ropes/*.toml'.",
+            show_default=False,
+        ),
     ],
     more: Annotated[list[str] | None, typer.Argument(hidden=True)] = None,
     output: Annotated[
@@ -60,6 +66,9 @@ def fit(
         ),
     ] = False,
     movie: MoviePath = None,
+    workers: Annotated[
+        int, typer.Option(min=1, help="Processes that share out recordings, raced starts and leave-one-out.")
+    ] = 1,
     strict: Annotated[
         bool, typer.Option("--strict", help="Exit 3 when any parameter is not identifiable, not only when all are.")
     ] = False,
@@ -73,12 +82,24 @@ def fit(
     """
 
     def command(console: Console) -> Outcome:
+        if "*" in str(config) and not config.exists() and not more:
+            if start is not None or movie is not None:
+                option = "--from" if start is not None else OPTION
+                raise ConfigError(option, "is not for several fits", str(start or movie), "leave it out")
+            with processes(workers) as executor:
+                return fit_all(console, str(config), output, strict, _single, executor)
         if more:
             fix = "give one configuration; values of an earlier fit are started from with --from fit.json"
             raise ConfigError("--resume" if resume else "arguments", "are too many", [str(config), *more], fix)
-        return _fit(console, config, output, start, resume, movie, strict)
+        with processes(workers) as executor, working_on(executor):
+            return _fit(console, config, output, start, resume, movie, strict)
 
     run(command, json)
+
+
+def _single(console: Console, config: Path, output: Path, strict: bool) -> Outcome:
+    """One fit of several; it goes on with what a killed one left."""
+    return _fit(console, config, output, None, (output / NAME).exists(), None, strict)
 
 
 def _fit(

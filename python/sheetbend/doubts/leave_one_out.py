@@ -9,6 +9,7 @@ from ..errors import InputError
 from ..experiment.experiment import Experiment
 from ..minimum.optimizers import refit
 from ..minimum.problem import FitProblem
+from ..minimum.workers import Common
 from ..quantities.parameters import Parameters
 from .prediction import Comparison, compare, predicted_values
 
@@ -42,21 +43,15 @@ def each_left_out(
         experiments: the fitted ones.
         values: where the fit to all of them ended, by expanded name; the refits start there.
     """
-    return {
-        e.name: _left_out(e, companions(e, experiments, wanted), wanted, values, refitter, threads)
-        for e in experiments
-        if e.held_out is None
-    }
+    left = [i for i, e in enumerate(experiments) if e.held_out is None]
+    common = Common((tuple(experiments), wanted, dict(values), refitter, threads))
+    return {experiments[i].name: found for i, found in zip(left, common.map(_left_out, left), strict=True)}
 
 
-def _left_out(
-    e: Experiment,
-    others: Sequence[Experiment],
-    wanted: Parameters,
-    values: Mapping[str, float],
-    refitter: str,
-    threads: int,
-) -> Comparison:
+def _left_out(common: tuple[Sequence[Experiment], Parameters, Mapping[str, float], str, int], left: int) -> Comparison:
+    experiments, wanted, values, refitter, threads = common
+    e = experiments[left]
+    others = companions(e, experiments, wanted)
     known = set().union(*(o.scene.quantities for o in others))
     part = Parameters(p for p in wanted.values() if p.name in known)
     problem = FitProblem(others, part, threads=threads)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -38,6 +39,7 @@ from ..minimum.optimizers import Observer, ceres_trouble
 from ..minimum.problem import FitProblem, ParameterLike, as_parameters
 from ..minimum.search import Search
 from ..minimum.time_step import Settled
+from ..minimum.workers import shared_out
 from ..optional import require
 from ..quantities.parameters import Parameter, Parameters
 from ..recording.recording import Recording
@@ -101,6 +103,7 @@ class Fit:
         self.result.save(path)
 
 
+@shared_out
 @journaled
 def fit(
     scene: Scene | Experiment | Sequence[Experiment],
@@ -121,6 +124,7 @@ def fit(
     threads: int = 1,
     progress: Observer | None = None,
     journal: str | Path | None = None,
+    executor: Executor | None = None,
     **experiment: Any,
 ) -> Fit:
     """Fit quantities of scenes to recordings.
@@ -161,6 +165,9 @@ def fit(
         journal: file that keeps every evaluation until the fit is done (see `sheetbend.minimum.journal`). After a kill,
             the same call with the same file goes on from there and gives the same bits; with another recording, scene
             or version it is refused.
+        executor: shares out evaluations of several experiments, raced starts and leave-one-out to its workers, such as
+            those of `concurrent.futures.ProcessPoolExecutor(2)`; the result has the same bits. Only this process
+            writes the journal.
 
     Returns:
         Fit. On Ctrl-C it holds the best point so far, marked `interrupted`, with linear intervals: whatever needs a

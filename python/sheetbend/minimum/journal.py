@@ -253,10 +253,26 @@ class Journal(AbstractContextManager["Journal"]):
         self._say(self.trouble)
 
 
-class Evaluator:
-    """Evaluates a compiled problem, through the journal that was open when it was made, if one was."""
+class Evaluated(Protocol):
+    """What can be evaluated: a compiled problem, or one that workers evaluate."""
 
-    def __init__(self, core: _core.Problem, made_from: Callable[[], Mapping[str, str]]) -> None:
+    @property
+    def rows(self) -> int: ...
+
+    @property
+    def parameters(self) -> int: ...
+
+    def evaluate(self, u: np.ndarray, jacobian: bool) -> Evaluation: ...
+
+    def state(self) -> np.ndarray: ...
+
+    def restore(self, state: np.ndarray) -> None: ...
+
+
+class Evaluator:
+    """Evaluates a problem, through the journal that was open when it was made, if one was."""
+
+    def __init__(self, core: Evaluated, made_from: Callable[[], Mapping[str, str]]) -> None:
         """With the digests of what the problem is made from, which are asked for when the journal first needs them."""
         self._core, self._journal = core, current()
         self._made_from: Callable[[], Mapping[str, str]] | None = None if self._journal is None else made_from
@@ -285,7 +301,7 @@ class Evaluator:
 
     def capsule(self) -> object:
         """The same for Ceres; the problem must outlive it."""
-        if self._journal is None:
+        if self._journal is None and isinstance(self._core, _core.Problem):
             return self._core.evaluation()
         return _core.evaluation_of(self._core.rows, self._core.parameters, self, bool(self._state()))
 

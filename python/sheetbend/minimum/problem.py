@@ -19,6 +19,7 @@ from ..statistics.covariance import Layout
 from . import content
 from .counts import count
 from .journal import Evaluator
+from .spread import Spread, reaching
 
 ParameterLike = Parameter | Mapping[str, Any] | None
 NOTHING = np.zeros((0, 1, 3))  # no correction at any knot
@@ -120,7 +121,10 @@ class FitProblem:
         except ValueError as error:
             raise refusal(error, InputError, [len(r.times) for r in self.recordings]) from error
         scenes = [e.scene for e in self.experiments]
-        self.evaluator = Evaluator(self.core, lambda: content.of_problem(scenes, cores, theta, slots, free))
+        self._spread = Spread.of(self)
+        self.evaluator = Evaluator(
+            self._spread or self.core, lambda: content.of_problem(scenes, cores, theta, slots, free)
+        )
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Made again from what it was made from."""
@@ -160,21 +164,20 @@ class FitProblem:
     def around(self, name: str) -> FitProblem:
         """The part that one free (expanded) parameter is tied to, through shared parameters; the rest of the minimum
         does not depend on it."""
-        free = set(self.parameters.free)
         free_of = [set(self.acting_on(e)) for e in self.experiments]
         names: set[str] = {name}
         chosen: list[int] = []
         while (reached := [i for i, mine in enumerate(free_of) if mine & names]) != chosen:
             chosen = reached
             names |= set().union(*(free_of[i] for i in chosen))
-        part = Parameters(
-            p
-            for key, p in self.parameters.items()
-            if self.parameters.roots[key][0] in names | (set(self.parameters) - free)
-        )
-        return FitProblem(
-            [self.experiments[i] for i in chosen], self.given, [self.recordings[i] for i in chosen], self.threads, part
-        )
+        return self.piece(chosen)
+
+    def piece(self, chosen: Sequence[int]) -> FitProblem:
+        """The part of some experiments, by number, with the parameters that reach them."""
+        experiments, recordings = [self.experiments[i] for i in chosen], [self.recordings[i] for i in chosen]
+        names = set().union(*map(self.acting_on, experiments))
+        part = reaching(self.parameters, names)
+        return FitProblem(experiments, self.given, recordings, self.threads, part, self._corrected)
 
     def acting_on(self, e: Experiment) -> tuple[str, ...]:
         """The free (expanded) parameters that an experiment's motion depends on, in their order."""
@@ -259,7 +262,7 @@ class FitProblem:
     @property
     def failure(self) -> str:
         """Why the last evaluation was not ok."""
-        return self.core.failure or "a residual is not finite"
+        return (self._spread or self.core).failure or "a residual is not finite"
 
     def evaluate_exactly(self, u: np.ndarray) -> tuple[bool, np.ndarray, np.ndarray]:
         """`evaluate` with corrections linearized at u itself, as intervals need it; a fit's own steps may use an

@@ -9,17 +9,20 @@ a worker makes inside a piece of work of its own are made again by a fit that go
 from __future__ import annotations
 
 import hashlib
+import multiprocessing
+import os
 import pickle
+import signal
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future
-from contextlib import contextmanager
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from functools import wraps
 from typing import Any, Generic, ParamSpec, TypeVar
 
-from ..errors import InputError
+from ..errors import InputError, SheetbendError
 
 KEPT = 8  # things that calls have in common, in each worker
 _current: ContextVar[Executor | None] = ContextVar("workers", default=None)
@@ -74,8 +77,9 @@ class Common(Generic[S]):
             return [work(self.value, item) for item in items]
         key, content = self.packed()
         sent, self._sent = self._sent, True
-        futures = [executor.submit(_answer, work, key, None if sent else content, item) for item in items]
+        futures: list[Future[tuple[T] | None]] = []
         try:
+            futures += [executor.submit(_answer, work, key, None if sent else content, item) for item in items]
             answers = []
             for item, future in zip(items, futures, strict=True):
                 answer = future.result()
@@ -84,14 +88,12 @@ class Common(Generic[S]):
                 assert answer is not None
                 answers.append(answer[0])
             return answers
-        except BaseException:
-            _cancel(futures)
-            raise
-
-
-def _cancel(futures: Sequence[Future[Any]]) -> None:
-    for future in futures:
-        future.cancel()
+        except BrokenExecutor as error:
+            words = f"a worker ended before its work was done ({error}); with a journal the fit can go on from here"
+            raise SheetbendError(words) from error
+        finally:
+            for future in futures:
+                future.cancel()
 
 
 class _Kept(threading.local):
@@ -115,6 +117,35 @@ def _answer(work: Callable[[Any, Any], T], key: bytes, content: bytes | None, it
             values.popitem(last=False)
     values.move_to_end(key)
     return (work(values[key], item),)
+
+
+@contextmanager
+def processes(count: int) -> Iterator[Executor | None]:
+    """That many processes of this machine, each with one thread of linear algebra; None for one or none."""
+    if count < 2:
+        yield None
+        return
+    with ExitStack() as undone:
+        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+            undone.callback(_set, name, os.environ.get(name))
+            os.environ[name] = "1"
+        pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _ignore_interrupts)
+        try:
+            yield pool
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _set(name: str, value: str | None) -> None:
+    if value is None:
+        os.environ.pop(name, None)
+    else:
+        os.environ[name] = value
+
+
+def _ignore_interrupts() -> None:
+    """Ctrl-C reaches all processes; this one's client decides what comes of it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 P = ParamSpec("P")

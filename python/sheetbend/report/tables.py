@@ -74,7 +74,20 @@ def _table(section: Section) -> list[str]:
 
 def flush_left(section: Section) -> list[bool]:
     """Of each column: words are flush left, numbers flush right."""
-    words = {"parameter", "with", "recording", "unit", "verdict", "step", "stays", "rope", "given", "fit", "key"}
+    words = {
+        "parameter",
+        "with",
+        "recording",
+        "unit",
+        "verdict",
+        "step",
+        "stays",
+        "rope",
+        "given",
+        "change",
+        "fit",
+        "key",
+    }
     words |= {"number", "test", "along"}  # of fabrics
     return [header in words for header in section.headers]
 

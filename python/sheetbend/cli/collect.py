@@ -1,0 +1,72 @@
+"""sheetbend collect: the results of many fits in one table, and the population that their specimens are of."""
+
+from __future__ import annotations
+
+import json as json_
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from ..errors import ConfigError
+from ..files.whole import write_text
+from ..optional import MissingExtraError
+from ..pictures.forest import plot_forest
+from ..pictures.plotting import save
+from ..report.collected import Collected
+from ..report.fit_result import FitResult
+from .folders import made
+from .outcome import Outcome, run, strict
+from .targets import check_targets
+
+FILES = ("fits.csv", "parameters.tsv", "population.json", "population.txt", "forest.png")
+
+
+def collect(
+    results: Annotated[
+        list[Path], typer.Argument(help="Folders of fits, or folders of such folders, or fit.json.", show_default=False)
+    ],
+    output: Annotated[Path, typer.Option(help="Folder for the tables and the forest plot.")] = Path("out/collected"),
+    json: Annotated[
+        bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
+    ] = False,
+) -> None:
+    """Collect fits of many specimens: one table of all parameters, and mean and spread between specimens of each, with
+    the errors of the fits taken out (random effects, REML)."""
+    run(lambda console: _collect(console, results, output), json)
+
+
+def _collect(console: Console, results: list[Path], output: Path) -> Outcome:
+    files = [file for path in results for file in _fits_in(path)]
+    check_targets("--output", output, [output / name for name in FILES])
+    fits: dict[str, FitResult] = {}
+    for file in dict.fromkeys(files):
+        name = file.resolve().parent.name
+        fits[name if name not in fits else str(file.parent)] = FitResult.load(file)
+    found = Collected.of(fits)
+    folder, report = made("--output", output), found.report()
+    console.print("\n" + report, soft_wrap=True, end="")
+    write_text(folder / "fits.csv", found.table())
+    write_text(folder / "parameters.tsv", found.petab())
+    write_text(folder / "population.json", json_.dumps(strict(found.to_dict()), indent=2, allow_nan=False) + "\n")
+    write_text(folder / "population.txt", report)
+    names = list(FILES[:-1])
+    if any(trait.found is not None for trait in found.traits):
+        try:
+            save(plot_forest(found), folder / FILES[-1])
+            names.append(FILES[-1])
+        except MissingExtraError as error:
+            console.print(f"no forest plot: {error}", soft_wrap=True)
+    console.print(f"\nwritten to {folder}: {', '.join(names)}", soft_wrap=True)
+    return Outcome({"population": found.to_dict(), "fits": list(fits), "output": str(folder), "files": names})
+
+
+def _fits_in(path: Path) -> list[Path]:
+    """The fit.json at a path: itself, in the folder, or in the folders in there."""
+    if path.is_file():
+        return [path]
+    found = [path / "fit.json"] if (path / "fit.json").is_file() else sorted(path.glob("*/fit.json"))
+    if not found:
+        raise ConfigError("results", "hold no fit.json", str(path), "give the folders that `sheetbend fit` wrote to")
+    return found

@@ -1,0 +1,88 @@
+"""Changes of planned experiments that need no new scene: one more marker, a force sensor at a support, the same
+recordings once more, a parameter that is measured apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..experiment.experiment import Experiment
+from ..experiment.force_sensor import ForceSensor
+from ..objects.markers import Place, on_rope
+from ..quantities.parameters import Parameters
+from ..recording.force_recording import ForceRecording
+from ..recording.recording import Recording
+
+MEASURED = 0.01  # relative error of a parameter that is measured apart
+FORCE = 0.01  # of the weight of the scene: error of a force sensor
+GRAVITY = 9.81  # m/s^2, of the weights that set the errors of sensors
+
+Change = tuple[str, list[Experiment], Parameters]
+
+
+def changes(experiments: Sequence[Experiment], free: Parameters, wanted: Parameters) -> Iterator[Change]:
+    """Every change in words, with the experiments and the parameters that come of it.
+
+    Args:
+        free: expanded, of the plan.
+        wanted: as given.
+    """
+    marked = [_with_marker(e) for e in experiments]
+    if any(new is not e for new, e in zip(marked, experiments, strict=True)):
+        yield "one more marker, in the widest gap", marked, wanted
+    felt = [_with_sensor(e) for e in experiments]
+    if any(new is not e for new, e in zip(felt, experiments, strict=True)):
+        yield "a force sensor at the support", felt, wanted
+    again = [replace(e, recording=_named(e.recording, f"{e.name} again"), name=f"{e.name} again") for e in experiments]
+    yield "the same recordings once more", [*experiments, *again], wanted
+    for name, p in wanted.items():
+        if p.free and p.log and p.prior is None and not p.private and name in free and p.initial is not None:
+            known = wanted.replace(name, prior=(p.initial, MEASURED))
+            yield f"{name} measured to {100 * MEASURED:g} %", list(experiments), known
+
+
+def _named(recording: Recording, name: str) -> Recording:
+    return replace(recording, name=name)
+
+
+def _with_marker(e: Experiment) -> Experiment:
+    """One more marker on the rope, in the middle of the longest piece without one; the same experiment where there is
+    no single rope."""
+    if len(e.scene.ropes) != 1:
+        return e
+    (rope,) = e.scene.ropes.values()
+    arc = {int(n): float(s) for n, s in zip(rope.particles, rope.arc_length, strict=True)}
+    seen = sorted(s for place in e.compared_places if (s := _arc_of(place, arc)) is not None)
+    ends = np.array([0.0, *seen, rope.length])
+    widest = int(np.argmax(np.diff(ends)))
+    at = float(ends[widest] + ends[widest + 1]) / 2 if ends[widest + 1] < rope.length or not seen else rope.length
+    r = e.recording
+    name = "new marker"
+    anywhere = np.broadcast_to(e.scene.positions[rope.particles[-1]], (len(r.times), 1, 3))
+    positions = np.concatenate([r.positions, anywhere], axis=1)
+    recording = replace(r, positions=positions, markers=(*r.markers, name))
+    return replace(e, recording=recording, markers=[*e.places, on_rope(rope, at)])
+
+
+def _arc_of(place: Place, arc: dict[int, float]) -> float | None:
+    """Material coordinate of a marker; None off the rope."""
+    if not all(p in arc for p in place.particles):
+        return None
+    return float(sum(w * arc[p] for p, w in zip(place.particles, place.weights, strict=True)))
+
+
+def _with_sensor(e: Experiment) -> Experiment:
+    """A force sensor at the particles that are held; the same experiment where it cannot have one."""
+    held = sorted(set(e.scene.pinned) | set(e.scene.boundary.driven))
+    if e.static or e.forces or e.driven_sigma is not None or not held:
+        return e
+    times = e.recording.times[e.recording.times > e.t0]
+    if len(times) == 0:
+        return e
+    compiled = e.scene.compiled
+    offset, size = compiled.layout["mass"]
+    weight = GRAVITY * float(np.sum(compiled.inputs()[offset : offset + size]))
+    forces = ForceRecording(times, np.zeros((len(times), 3)), name="new sensor")
+    return replace(e, forces=[ForceSensor(recording=forces, at=held, sigma=max(FORCE * weight, 1e-12))])

@@ -1,0 +1,130 @@
+"""Work that is shared out: the same bits for any number of workers, and what a fit says where one dies."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import signal
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from sheetbend.errors import InputError
+from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.minimum.workers import Common, working_on
+from test_journal import TIMED, swinging
+
+PRIVATE: dict[str, Any] = {"rope_EI": {}, "rope_bend_damping": {"private": True, "prior": (0.01, 0.5)}}
+GIVEN: dict[str, Any] = {
+    "parameters": PRIVATE,
+    "starts": 4,
+    "leave_one_out": True,
+    "refine": False,
+    "beginnings": False,
+    "profiles": False,
+    "optimizer": "scipy",
+}
+
+
+def several(count: int = 3) -> list[sb.Experiment]:
+    return [swinging(seed=k, name=f"swing {k}") for k in range(count)]
+
+
+def bits(fit: sb.Fit) -> str:
+    data = fit.result.to_dict()
+    return json.dumps({key: value for key, value in data.items() if key not in (*TIMED, "seconds")})
+
+
+class Backwards(Executor):
+    """Does its work where it is, all of it packed and unpacked on the way, the last item first."""
+
+    def __init__(self) -> None:
+        self.ahead: list[tuple[Future[Any], Any, Any]] = []
+        self.bytes: list[int] = []
+
+    def submit(self, work: Any, /, *args: Any, **options: Any) -> Future[Any]:
+        future: Future[Any] = _Lazy(self)
+        packed = pickle.dumps((work, args))
+        self.bytes.append(len(packed))
+        self.ahead.append((future, packed, None))
+        return future
+
+    def run(self) -> None:
+        while self.ahead:
+            future, packed, _ = self.ahead.pop()
+            work, args = pickle.loads(packed)
+            future.set_result(pickle.loads(pickle.dumps(work(*args))))
+
+
+class _Lazy(Future[Any]):
+    def __init__(self, executor: Backwards) -> None:
+        super().__init__()
+        self.executor = executor
+
+    def result(self, timeout: float | None = None) -> Any:
+        self.executor.run()
+        return super().result(timeout)
+
+
+def test_an_evaluation_that_is_shared_out_has_the_bits_of_one_here() -> None:
+    experiments = several(5)
+    alone = FitProblem(experiments, as_parameters(PRIVATE, experiments))
+    u = alone.parameters.initial() + 0.01
+    ok, r, J = alone.evaluate(u)
+    executor = Backwards()
+    with working_on(executor):
+        shared = FitProblem(experiments, as_parameters(PRIVATE, experiments))
+        for jacobian in (True, False, True):
+            found = shared.evaluate(u, jacobian)
+            assert found[0] is ok is True and found[1].tobytes() == r.tobytes()
+            assert found[2].tobytes() == (J.tobytes() if jacobian else b"")
+            shared._last = None
+    assert max(executor.bytes[5:]) < 2000 < max(executor.bytes[:5])  # what is common travels once
+
+
+def test_a_motion_that_diverges_at_a_worker_is_told() -> None:
+    experiments = several(2)
+    with working_on(Backwards()):
+        shared = FitProblem(experiments, as_parameters({"rope_EI": {}}, experiments))
+        assert not shared.evaluate(np.array([800.0]), jacobian=False)[0] and shared.failure
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_a_fit_has_the_same_bits_for_any_number_of_workers(workers: int) -> None:
+    alone = sb.fit(several(), **GIVEN)
+    with ThreadPoolExecutor(workers) as executor:
+        assert bits(sb.fit(several(), **GIVEN, executor=executor)) == bits(alone)
+    assert bits(sb.fit(several(), **GIVEN, executor=Backwards())) == bits(alone)
+
+
+def test_only_the_client_writes_the_journal(tmp_path: Path) -> None:
+    path = tmp_path / "journal.sqlite"
+    given = {**GIVEN, "leave_one_out": False, "starts": ()}
+    found = sb.fit(several(), **given, executor=Backwards(), journal=path)
+    assert bits(found) == bits(sb.fit(several(), **given)) and not path.exists()
+
+
+def test_no_executor_is_refused() -> None:
+    with pytest.raises(InputError, match="executor"):
+        sb.fit(swinging(), parameters=["rope_EI"], executor=2)
+
+
+def _doubled(common: int, item: int) -> int:
+    return common * item
+
+
+def _killed(common: int, item: int) -> int:
+    os.kill(os.getpid(), signal.SIGKILL)
+    return 0
+
+
+def test_processes_answer_in_order_and_one_that_dies_is_an_error() -> None:
+    with ProcessPoolExecutor(1, get_context("spawn")) as executor, working_on(executor):
+        assert Common(2).map(_doubled, [3, 1, 2]) == [6, 2, 4]
+        with pytest.raises(sb.SheetbendError, match="a worker ended"):
+            Common(2).map(_killed, [1])
