@@ -27,12 +27,13 @@ class Gradient:
 
     Attributes:
         quantities: derivative with respect to each named quantity, by its name.
-        inputs: derivative with respect to each input array, by its name and in its shape: "position", "velocity" (particles, 3), "mass" (particles,), "compliance",
-            "damping" (constraints,), "rest" (all rest parameters,), "boundary", "force" (knots times particles, 3),
-            "gravity" (3,), "drag_linear", "drag_quadratic" (particles,), "wind" (knots, 3), "air_normal",
-            "air_tangential", "pressure" (triangles in air,), "volume", "volume_compliance" (volumes,), "friction",
-            "contact_radius" (contacts,), "contact_stiffness" (those that are not rigid,), "collider_pose" (position and
-            rotation at each knot of each collider, 3), "collider_size" (lengths of all colliders,).
+        inputs: derivative with respect to each input array, by its name and in its shape: "position", "velocity"
+            (particles, 3), "mass" (particles,), "compliance", "damping" (constraints,), "rest" (all rest
+            parameters,), "boundary", "force" (knots times particles, 3), "gravity" (3,), "drag_linear",
+            "drag_quadratic" (particles,), "wind" (knots, 3), "air_normal", "air_tangential", "pressure" (triangles
+            in air,), "volume", "volume_compliance" (volumes,), "friction", "contact_radius" (contacts,),
+            "contact_stiffness" (those that are not rigid,), "collider_pose" (position and rotation at each knot of
+            each collider, 3), "collider_size" (lengths of all colliders,).
         recomputed: substeps that the forward program ran again: as planned, or more where the same rollout was
             differentiated before and its tape no longer holds what it held.
         tape: bytes of the tape.
