@@ -52,7 +52,7 @@ class TestSchemas:
         content = tomllib.loads(path.read_text())
         kind = "ropes" if "gripped_rope" in content else "scene"
         assert [e.message for e in validate(SCHEMAS[kind]()).iter_errors(content)] == []
-        wrong = content | {"experimnt": {}}
+        wrong = content | {"experiment_2": {}}
         assert len(list(validate(SCHEMAS[kind]()).iter_errors(wrong))) == 1
 
     def test_fit_json_is_valid(self, result: sb.FitResult) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 
@@ -17,6 +18,7 @@ STILL, CALM = 6.0, 4.0  # times the noise, by which a marker that stays may move
 SILENT = 2e-3  # of the extent: how little a marker moves that stays, where no noise is known
 RIGID = 1.8  # times the noise, the standard deviation of the distance of two markers of one body: sqrt(2) is expected
 MANY, ABOVE = 50, 2.9  # frames from which on 98 % of the distances are 2.05 sqrt(2) times the noise above the true one
+SHARE, FEW = 0.98, 10  # of the frames have smaller distances; frames from which on noise is taken out of these
 REST = 0.15  # s that a recording must begin at rest to be called so
 NEAR = 1.9  # times the nearest neighbor's distance: markers of a sheet have more than two others so near
 SHARP, TURNS = 0.15, 3  # share of markers at which the shortest way through those of a sheet turns back, and how many
@@ -78,9 +80,9 @@ def seen(recording: Recording) -> Seen:
     moved = np.sqrt(np.nanmean(np.sum((x - center) ** 2, axis=2), axis=0)) if len(t) > 1 else np.zeros(count)
     still = moved <= max(STILL * noise, SILENT * extent)
     distance = _distances(x)
-    apart = np.nanquantile(distance, 0.98, axis=0)
-    if len(t) >= MANY:
-        apart = np.maximum(apart - ABOVE * noise, 0.5 * apart)
+    apart = np.nanquantile(distance, SHARE, axis=0)
+    if len(t) >= FEW:
+        apart = np.maximum(apart - _above(len(distance)) * noise, 0.5 * apart)
     change = np.nanstd(distance, axis=0)
     bodies = [] if len(t) < 3 else _bodies(change <= np.maximum(RIGID * noise, 1e-3 * apart), apart, still)
     in_bodies = {k for body in bodies for k in body}
@@ -99,6 +101,15 @@ def seen(recording: Recording) -> Seen:
         told=told,
         sheet=_is_sheet(x, apart, in_bodies),
     )
+
+
+def _above(frames: int) -> float:
+    """By how many times the noise of a coordinate the quantile of so many distances is above a distance that does not
+    change: of a few an order statistic of normal numbers (Blom 1958), of sqrt(2) times the noise."""
+    if frames >= MANY:
+        return ABOVE
+    rank = 1.0 + SHARE * (frames - 1)
+    return float(np.sqrt(2.0)) * NormalDist().inv_cdf((rank - 0.375) / (frames + 0.25))
 
 
 def _distances(x: Array) -> Array:

@@ -23,17 +23,18 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Gradient:
-    """Derivatives of a number by everything that a rollout depends on.
+    """Derivatives of a loss with respect to everything that a rollout depends on.
 
     Attributes:
-        quantities: by named quantity.
-        inputs: by input array, in its shape: "position", "velocity" (particles, 3), "mass" (particles,), "compliance",
-            "damping" (constraints,), "rest" (all rest parameters,), "boundary", "force" (knots times particles, 3),
-            "gravity" (3,), "drag_linear", "drag_quadratic" (particles,), "wind" (knots, 3), "air_normal",
-            "air_tangential", "pressure" (triangles in air,), "volume", "volume_compliance" (volumes,), "friction",
-            "contact_radius" (contacts,), "contact_stiffness" (those that are not rigid,), "collider_pose" (position and
-            rotation at each knot of each collider, 3), "collider_size" (lengths of all colliders,),
-            "restitution" (contacts that have one,).
+        quantities: derivative with respect to each named quantity, by its name.
+        inputs: derivative with respect to each input array, by its name and in its shape: "position", "velocity"
+            (particles, 3), "mass" (particles,), "compliance", "damping" (constraints,), "rest" (all rest
+            parameters,), "boundary", "force" (knots times particles, 3), "gravity" (3,), "drag_linear",
+            "drag_quadratic" (particles,), "wind" (knots, 3), "air_normal", "air_tangential", "pressure" (triangles
+            in air,), "volume", "volume_compliance" (volumes,), "friction", "contact_radius" (contacts,),
+            "contact_stiffness" (those that are not rigid,), "collider_pose" (position and rotation at each knot of
+            each collider, 3), "collider_size" (lengths of all colliders,), "restitution" (contacts that have
+            one,).
         recomputed: substeps that the forward program ran again: as planned, or more where the same rollout was
             differentiated before and its tape no longer holds what it held.
         tape: bytes of the tape.

@@ -1,9 +1,9 @@
 """The tests of a textile laboratory, as experiments in the computer.
 
-Each takes a `Fabric` and gives what the laboratory would read, in its unit and in SI, with the derivative with
-respect to every
-number of the fabric, and the state of rest for pictures. Sizes are those of the standards. `fit_fabric` goes the other
-way, from what a laboratory has read to a fabric; `read_curves` reads what its machines have written.
+Each test takes a `Fabric` and returns what the laboratory would read, in its unit and in SI, the derivative of the
+reading with respect to every number of the fabric, and the state of rest for pictures. Sizes are those of the
+standards. `fit_fabric` goes the other way, from readings to a fabric, and `fit_tests` from all tests of a
+laboratory. `read_curves` and `read_outline` read the files.
 """
 
 from .bias_extension import BiasExtension, bias_extension

@@ -16,7 +16,7 @@ class Reading:
     Attributes:
         value: in `unit`.
         unit: SI.
-        gradient: derivative of `value` by every named quantity of the fabric, such as "cloth_bending".
+        gradient: derivative of `value` with respect to every named quantity of the fabric, such as "cloth_bending".
         laboratory_unit: the unit in which laboratories give it.
         per: laboratory units per SI unit.
     """

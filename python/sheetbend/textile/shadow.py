@@ -19,7 +19,8 @@ class Shadow:
     Attributes:
         radius: (RAYS,) m, at equal angles.
         area: m^2.
-        area_bar: (vertices, 3) m, derivative of the area by the positions; exact, and continuous but for kinks.
+        area_bar: (vertices, 3) m, derivative of the area with respect to the positions; exact, and continuous but for
+            kinks.
         hidden: share of the rays that meet the border more than once: there the cloth overhangs itself, and the outline
             takes what lies under the outermost fold for covered.
     """
