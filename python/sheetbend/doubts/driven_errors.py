@@ -11,7 +11,8 @@ a smoothed marker), the noise is that of the motion itself: each knot is compare
 neighbors, as in `timeseries.noise`. Smoothing hides noise from that comparison and leaves what is slow. So where a
 recorded marker keeps its distance from a driven particle, the noise is taken as no less than that marker's own, which
 is an upper bound: what has been smoothed has less of it. Poses of a robot's tool are no markers, and are taken as they
-show.
+show. In any case A n is no larger than what the fit leaves, of which it is a part: where it would be, as in motions
+that grow, the noise is less or the tangents say too much, and the draws are made smaller.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from ..arrays.timeseries import Array, interpolate, noise, off_neighbors
 from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
 from ..scene.boundary import Following
+from ..statistics.gauge import RANK_TOLERANCE
 
 DRAWS = 64  # of the noise where parts of the data are compared; eight of them share a rollout
 FEW = 24  # of the noise, for intervals
@@ -41,23 +43,26 @@ class DrivenErrors:
         problem: the same problem with every driven particle free to move by itself.
         draws: by place of the experiment, (draws, numbers) m.
         size: by place of the experiment, m of one coordinate.
+        moved: by place of the experiment, (draws, its data rows) what the noise does to the weighted residuals.
+        believed: by place of the experiment, by how much the draws of `moved` had to be made smaller; 1 = not at all.
     """
 
     problem: FitProblem
     draws: Mapping[int, Array]
     size: Mapping[int, float]
-
-    def responses(self, u: Array) -> dict[int, Array]:
-        """By place of the experiment, (draws, its data rows) of weighted residuals at u (free,)."""
-        return {i: self.problem.core.respond(i, u, n) for i, n in self.draws.items()}
+    moved: Mapping[int, Array]
+    believed: Mapping[int, float]
 
     def expected(self, u: Array) -> float:
-        """Mean over the draws of the sum of squares that noise adds to twice the cost at u (free,)."""
-        return sum(float((moved**2).sum()) / len(moved) for moved in self.responses(u).values())
+        """Mean over the draws of the sum of squares that noise adds to twice the cost at u (free,), in motions whose
+        tangents are to be believed."""
+        sound = {i: n for i, n in self.draws.items() if self.believed[i] == 1.0}
+        return sum(float((self.problem.core.respond(i, u, n) ** 2).sum()) / len(n) for i, n in sound.items())
 
 
 def drawn_noise(problem: FitProblem, u: Array, draws: int) -> DrivenErrors | None:
-    """Draws of the noise of every driven motion, the same for every call; None where none has any."""
+    """Draws of the noise of every driven motion at the minimum u (free,), the same for every call; None where none has
+    any."""
     every = {i: _noise_of_motion(e, problem.values_of(e, u), draws) for i, e in _shaken(problem).items()}
     known = {i: n for i, n in every.items() if n is not None}
     if not known:
@@ -72,7 +77,27 @@ def drawn_noise(problem: FitProblem, u: Array, draws: int) -> DrivenErrors | Non
         e = problem.experiments[i]
         places = [k for k, p in enumerate(e.scene.boundary.driven) if p not in e.scene.directors]
         size[i] = _noise_of_markers(e) or float(np.sqrt(np.mean(n[:, :, places] ** 2)))
-    return DrivenErrors(driven, flat, size)
+    moved = {i: np.asarray(driven.core.respond(i, u, n)) for i, n in flat.items()}
+    believed = _believed(problem, u, moved)
+    return DrivenErrors(driven, flat, size, {i: believed[i] * m for i, m in moved.items()}, believed)
+
+
+def _believed(problem: FitProblem, u: Array, moved: Mapping[int, Array]) -> dict[int, float]:
+    """By place of the experiment, the part of the responses that fits into what the fit leaves, 1 at most. Parameters
+    take some of either up."""
+    _, r, J = problem.evaluate(u)
+    rows = problem.core.first_rows
+    basis, sizes, _ = np.linalg.svd(
+        J / np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny), full_matrices=False
+    )
+    basis = basis[:, sizes > RANK_TOLERANCE * sizes.max(initial=0.0)]
+    found = {}
+    for i, errors in moved.items():
+        own = slice(rows[i], rows[i + 1])
+        beside = errors - (errors @ basis[own]) @ basis[own].T
+        square = float(np.mean(beside**2))
+        found[i] = min(1.0, float(np.sqrt(np.mean(r[own] ** 2) / square))) if square > 0.0 else 1.0
+    return found
 
 
 def driven_errors(problem: FitProblem, u: Array, draws: int = DRAWS) -> Array:
@@ -80,7 +105,7 @@ def driven_errors(problem: FitProblem, u: Array, draws: int = DRAWS) -> Array:
     correction allows for it; no draws where nothing is driven."""
     found = drawn_noise(problem, u, draws)
     errors = np.zeros((problem.core.data_rows, 0 if found is None else draws))
-    for i, moved in ({} if found is None else found.responses(u)).items():
+    for i, moved in ({} if found is None else found.moved).items():
         errors[problem.core.first_rows[i] : problem.core.first_rows[i + 1]] = moved.T
     return errors
 

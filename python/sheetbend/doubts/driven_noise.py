@@ -68,7 +68,7 @@ def driven_noises(problem: FitProblem, u: Array) -> tuple[tuple[DrivenNoise, ...
     rows, layout = problem.core.first_rows, problem.rows_layout()
     found: list[DrivenNoise] = []
     _, r, J = problem.evaluate(u)
-    for i, moved in drawn.responses(u).items():
+    for i, moved in drawn.moved.items():
         e, left = problem.experiments[i], r[rows[i] : rows[i + 1]]
         clock, channel = layout.clocks[layout.recording == i], layout.channel[layout.recording == i]
         parts = [("", e.sigma, clock == 0)]

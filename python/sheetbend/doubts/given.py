@@ -26,12 +26,12 @@ from ..quantities.quantities import Quantity, Term
 from ..recording.recording import Recording
 from ..result.result import Premise
 from ..statistics.gauge import RANK_TOLERANCE
+from ..statistics.intervals import NORMAL
 
 Array = np.ndarray
 AXES = "xyz"
 DEGREE, MILLIMETER = math.pi / 180.0, 1e-3
 STEPS = {"rad": (DEGREE, "1 degree"), "m": (MILLIMETER, "1 mm"), "s": (1e-3, "1 ms")}
-NORMAL = 1.959963984540054  # standard deviations of half a 95 % interval
 GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
     "gravity": ("rad", STEPS["rad"]),
     "clamps": ("m", STEPS["m"]),

@@ -8,8 +8,10 @@ Philosophical Society 44, 50).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +21,8 @@ from ..quantities.parameters import Parameter, Parameters
 from ..quantities.wording import short
 from .directions import EXPLAINS, LEVEL, Asked, asked_for, rows_of, tied
 from .losses import LOSSES
+
+HELD: dict[str, Any] = {"fixed": True, "log": False, "prior": None, "lower": -math.inf, "upper": math.inf}
 
 
 def held_losses(problem: FitProblem, u: Array) -> dict[str, str]:
@@ -60,7 +64,7 @@ def _columns(problem: FitProblem, u: Array, names: Sequence[str]) -> dict[str, A
     have it."""
     values = problem.parameters.to_physical(u)
     held = [
-        p if p.tied_to is not None else replace(p, fixed=True, initial=values[name], prior=None)
+        p if p.tied_to is not None else replace(p, initial=values[name], **HELD)
         for name, p in problem.parameters.items()
     ]
     units = {name: q.unit for name, q in quantities_of(problem.experiments).items()}

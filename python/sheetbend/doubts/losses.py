@@ -18,12 +18,12 @@ from ..quantities.parameters import Parameters
 from ..quantities.wording import short
 from ..result.result import Estimate
 from ..statistics.identifiability import Identifiability
+from ..statistics.intervals import NORMAL
 
 Array = np.ndarray
 LOSSES = ("_damping", "_viscosity", "_drag_linear", "_drag_quadratic", "_air_normal", "_air_tangential", "_loss_factor")
 """Ends of the names of quantities that take energy."""
 KNOWN = 0.2  # relative half-width up to which a sum counts as known, as an identified parameter does
-HALF = 1.959963984540054  # standard deviations of half a 95 % interval
 AIR, LARGEST_DRAG = 1.2, 2.0  # kg/m^3; drag coefficient of a plate across the flow, and hardly anything has more
 COEFFICIENTS = ("_air_normal", "_air_tangential")
 
@@ -109,7 +109,7 @@ def loss_sum(problem: FitProblem, u: Array, names: Sequence[str], autocorrelatio
     weights = found[order] / found[order[0]]
     named = tuple(names[k] for k in order)
     value = float(sum(w * values[n] for w, n in zip(weights, named, strict=True)))
-    return LossSum(named, tuple(weights.tolist()), value, float(HALF * deviation / np.sqrt(seen)))
+    return LossSum(named, tuple(weights.tolist()), value, float(NORMAL * deviation / np.sqrt(seen)))
 
 
 def _is_loss(parameters: Parameters, name: str) -> bool:

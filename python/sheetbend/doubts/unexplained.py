@@ -23,6 +23,7 @@ from ..arrays.timeseries import Array, mean_position
 from ..experiment.carried import Values, carried_baselines
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
+from ..statistics.white_noise import white_variance
 from .prediction import Comparison
 
 Mask = NDArray[np.bool_]
@@ -100,7 +101,8 @@ def shares(c: Comparison, values: Values | None = None) -> Shares | None:
     carried = carried_baselines(c.experiment, [(c.experiment, part)], part, values)
     beside = [_variance(measured - x[..., axes], seen, c.experiment.loss) for x in carried.values()]
     least = min(beside, default=np.inf)
-    noise = max(told, _noise(measured, seen))
+    three = seen[:-2] & seen[1:-1] & seen[2:]
+    noise = max(told, white_variance(measured[:-2][three], measured[1:-1][three], measured[2:][three]))
     return Shares(left, min(moved, least), noise, int(seen.sum()) * len(axes), least < moved)
 
 
@@ -109,14 +111,6 @@ def _variance(x: Array, seen: Mask, loss: str) -> float:
     puts up with outliers."""
     squares = ((x - mean_position(x)) ** 2).sum(axis=-1)[seen]
     return float(squares.mean() if loss == "squares" else np.median(squares))
-
-
-def _noise(x: Array, seen: Mask) -> float:
-    """The variance of white noise that would make the second differences of neighboring frames. A motion adds to it,
-    so that it is no less than the noise's."""
-    three = seen[:-2] & seen[1:-1] & seen[2:]
-    bends = ((x[:-2] - 2 * x[1:-1] + x[2:]) ** 2).sum(axis=-1)[three]
-    return float(bends.mean()) / 6.0 if bends.size else 0.0
 
 
 def _words(c: Comparison, alike: float, values: Values) -> str:

@@ -31,6 +31,8 @@ PREMISE_COLUMNS = 4
 """Number of parameters above which a given value is listed with the one that it moves most."""
 _FELT = 0.02  # of a half-width: given values that move every parameter by less are not listed
 
+_SHAKEN = 0.1  # of a half-width: less adds next to nothing to it
+
 
 def sections(result: FitData) -> list[Section]:
     """The report as data, empty sections left out."""
@@ -154,9 +156,9 @@ def _interval_parts(result: FitData) -> Section:
     rows = []
     counted = any(e.systematic > 0 for e in result.estimates)
     moved = any(e.moved != 0 for e in result.estimates)
-    shaken = any(e.driven > 0 for e in result.estimates)
+    shaken = any(e.driven > _SHAKEN * (e.half_width or math.inf) for e in result.estimates)
     for e in result.estimates:
-        if e.discretization + e.systematic + e.driven > 0 and e.half_width is not None:
+        if e.discretization + e.systematic + shaken * e.driven > 0 and e.half_width is not None:
             parts = (e.half_width, e.statistical, *([e.driven] if shaken else []), e.discretization)
             parts += (*([e.systematic] if counted else []), *([e.moved] if moved else []))
             rows.append((e.name, *figures(parts, e.half_width), e.unit))

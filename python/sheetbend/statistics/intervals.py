@@ -11,6 +11,8 @@ from .profile import FARTHEST, Ends
 
 IDENTIFIED = 0.2
 """Largest 95 % half-width of an identified parameter, as a part of its value (or of its scale)."""
+NORMAL = 1.959963984540054
+"""Standard deviations of half a 95 % interval, of what is normally distributed."""
 RAN_OFF = math.log(1e3)
 """On a log scale: a parameter that a fit moved so far from its start, and that data do not see there, ran off."""
 _NEAR = 1e-3  # of a logarithm: so near the farthest that a search looks

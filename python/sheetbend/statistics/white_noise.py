@@ -1,4 +1,4 @@
-"""How much of some residuals is white noise, by how they bend from frame to frame."""
+"""How much of some series is white noise, by how they bend from frame to frame."""
 
 from __future__ import annotations
 
@@ -8,9 +8,19 @@ from ..arrays.timeseries import Array
 from .covariance import Layout
 
 
+def white_variance(before: Array, here: Array, after: Array) -> float:
+    """Variance of the white noise that would make second differences like these, summed over the last axis where there
+    are two; 0 without any. A motion adds to it, so that it is no less than the noise's.
+
+    Args:
+        before, here, after: (n,) or (n, axes), consecutive samples.
+    """
+    bends = (before - 2 * here + after) ** 2
+    return float(bends.sum() / len(bends)) / 6.0 if bends.size else 0.0
+
+
 def white_noise(residuals: Array, layout: Layout, recording: int) -> float:
-    """Mean square of the white noise that would make the second differences of one recording's residuals, and no more
-    than the given sigma, which is 1. A motion adds to it, so that it is no less than the noise's.
+    """`white_variance` of one recording's residuals, and no more than the given sigma, which is 1.
 
     Args:
         residuals: (rows,) of all recordings, weighted by sigma.
@@ -22,5 +32,4 @@ def white_noise(residuals: Array, layout: Layout, recording: int) -> float:
     series = np.stack([layout.clocks[own], layout.channel[own]])
     next_to = (np.diff(series) == 0).all(axis=0) & (np.diff(layout.frame[own]) == 1)
     three, r = next_to[:-1] & next_to[1:], residuals[own]
-    bends = (r[:-2] - 2 * r[1:-1] + r[2:])[three]
-    return min(1.0, float(np.mean(bends**2)) / 6.0) if bends.size else 1.0
+    return min(1.0, white_variance(r[:-2][three], r[1:-1][three], r[2:][three])) if three.any() else 1.0

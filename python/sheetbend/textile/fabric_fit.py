@@ -19,13 +19,12 @@ from ..quantities.wording import figures, short
 from ..report.tables import Section, plain_section
 from ..result.result import Estimate
 from ..statistics.gauge import null_space
-from ..statistics.intervals import known, open_estimate
+from ..statistics.intervals import NORMAL, known, open_estimate
 from .reading import Reading
 
 _UNITS = {"density": "kg/m^2", "warp": "N/m", "weft": "N/m", "shear": "N/m", "poisson": ""} | dict.fromkeys(
     ("bending", "bending_weft", "bending_twist"), "N m"
 )
-_NORMAL = 1.959964  # two-sided 95 %
 _BLIND = (
     2.0 / 30.0
 )  # sigmas that a number moves all readings by, per e-fold or per scale: less, and they do not contain it
@@ -286,7 +285,7 @@ def _errors(measured: Sequence[Measured]) -> Array:
 def _quantile(measured: Sequence[Measured]) -> float:
     """Two-sided 95 %: normal, or of Student's t where scatter is that of a few specimens."""
     counts = [len(m.specimens) for m in measured if len(m.specimens) > 1]
-    return float(require("scipy.special", "fit").stdtrit(min(counts) - 1, 0.975)) if counts else _NORMAL
+    return float(require("scipy.special", "fit").stdtrit(min(counts) - 1, 0.975)) if counts else NORMAL
 
 
 def _estimate(p: Parameter, internal: float, reach: float, gauges: str) -> Estimate:
