@@ -92,8 +92,7 @@ void Experiment::run(const Plan& own, const T* in, Frame&& frame, double weight,
     for (std::size_t s = 0; s < runs.size(); ++s, to += sensors[s - 1].measured.size()) {
       if (!runs[s].wants(step)) continue;
       if (!lambda) lambda = rollout.multipliers();
-      const double eta = Bdf::at(own.options, step - 1).eta;
-      runs[s].take(step, sensors[s].reader.read(*scene, scene_in, eta, rollout.time(step), x, v, lambda));
+      runs[s].take(step, sensors[s].reader.read(*scene, scene_in, rollout.bdf().eta, rollout.time(step), x, v, lambda));
       runs[s].read(step, T(weight), to);
     }
   };

@@ -32,16 +32,22 @@ inline std::size_t plan_bytes(const Plan& plan) {
   return bytes;
 }
 
+// States that are set aside where a pack's scenes go with different formulas.
+template <class T>
+std::size_t mixed_states(const Scene& scene, const Plan& plan) {
+  return scenes_of<T> > 1 && changes_at_contacts(scene, plan.options) ? 2 : 0;
+}
+
 template <class T, class List = Substep>
 std::size_t rollout_bytes(const Scene& scene, const Plan& plan) {
-  return 6 * sizeof(T) * scene.dofs() + Records<T, List>::bytes(scene, plan, false);
+  return (6 + mixed_states<T>(scene, plan)) * sizeof(T) * scene.dofs() + Records<T, List>::bytes(scene, plan, false);
 }
 
 template <class T, class List = Substep>
 std::size_t reverse_bytes(const Scene& scene, const Plan& plan) {
   // Cotangents, velocities, room for the coordinates; the end where implicit blocks need it.
   const std::size_t states = 7 + (plan.options.integrator == Integrator::bdf1 ? 1 : 2) +
-                             (plan.options.partition == Partition::implicit ? 1 : 0);
+                             (plan.options.partition == Partition::implicit ? 1 : 0) + mixed_states<T>(scene, plan);
   return states * sizeof(T) * scene.dofs() + Records<T, List>::bytes(scene, plan, true) +
          Scratches<T, List>::bytes(scene, plan);
 }

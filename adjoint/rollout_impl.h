@@ -33,6 +33,10 @@ Tape<T> record_rollout(const Scene& scene, const Plan& plan, const T* inputs, do
   Rollout<T> rollout(scene, plan, inputs, t0);
   auto next = wanted.begin();
   const auto write = [&](int step, const T* x, const T*) {
+    if (step > 0) {
+      tape.record_first_order(step - 1, rollout.first_order());
+      tape.record_bounced(step, rollout.bounced());
+    }
     if (keep[step]) tape.record(step, x);
     for (; next != wanted.end() && *next == step; ++next) states = std::copy_n(x, scene.dofs(), states);
   };

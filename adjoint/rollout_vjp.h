@@ -27,17 +27,18 @@ class StateReverse {
     if (!x_next_.empty()) std::copy_n(x, x_next_.size(), x_next_.data());
   }
 
-  // From step n + 1 to n; seed adds the loss's cotangent at n.
+  // From step n + 1 to n, which went with BDF1 in the scenes `first_order`; seed adds the loss's cotangent at n.
   template <class Seed>
-  void step(int n, const Inputs<const T>& in, double t_next, SubstepStates<T> states, Seed&& seed,
+  void step(int n, Scenes first_order, const Inputs<const T>& in, double t_next, SubstepStates<T> states, Seed&& seed,
             const Inputs<T>& in_bar) {
-    const Bdf bdf = Bdf::at(plan_.options, n);
     if (!x_next_.empty()) states.x_next = x_next_.data();
     seed(n, x_bar_.data());
     try {
-      const Step<T> step{scene_, plan_, in, bdf, t_next, states};
-      substep_vjp(step, q_.data(), x_next_bar.data(), v_next_bar.data(), record_, scratch_,
-                  {x_bar_.data(), x_before_bar_.data(), v_bar_.data(), v_before_bar_.data()}, in_bar);
+      for_each_formula(first_order, [&](const Bdf& bdf, Scenes scenes) {
+        const Step<T> step{scene_, plan_, in, bdf, t_next, states, scenes};
+        substep_vjp(step, q_.data(), x_next_bar.data(), v_next_bar.data(), record_, scratch_,
+                    {x_bar_.data(), x_before_bar_.data(), v_bar_.data(), v_before_bar_.data()}, in_bar);
+      });
     } catch (const Unbalanced& e) {
       throw Unbalanced(e, n + 1, t_next);
     }
@@ -51,6 +52,25 @@ class StateReverse {
   }
 
  private:
+  // Calls reverse(bdf, scenes) for all scenes, or where they went with different formulas once for either, with the cotangents of the others zero.
+  template <class F>
+  void for_each_formula(Scenes first, F&& reverse) {
+    constexpr Scenes all = all_scenes<T>;
+    const Bdf one = Bdf::first_order(plan_.options.h), two = Bdf::second_order(plan_.options.h);
+    if (first == all) return reverse(one, all);
+    if (first == 0) return reverse(two, all);
+    const std::vector<T> x_bar = x_next_bar, v_bar = v_next_bar;
+    const auto take = [&](const Bdf& bdf, Scenes scenes) {
+      for (std::size_t i = 0; i < x_bar.size(); ++i) {
+        x_next_bar[i] = chosen(scenes, x_bar[i], T(0.0));
+        v_next_bar[i] = chosen(scenes, v_bar[i], T(0.0));
+      }
+      reverse(bdf, scenes);
+    };
+    take(one, first);
+    take(two, all ^ first);
+  }
+
   static SubstepRecord<T, List> whole(const Scene& scene, const Plan& plan) {
     SubstepRecord<T, List> record;
     record.resize(scene, plan, true);
@@ -116,7 +136,7 @@ long rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t
     forward->restart(a.from, state(a.from));
     for (int n = a.from + 1; n <= a.to; ++n) {
       poll(interrupt, n, scene.dofs());
-      forward->advance();
+      forward->advance(tape.first_order(n - 1));
       if (n >= a.keep) tape.record(n, forward->x());
       ++recomputed;
     }
@@ -132,7 +152,7 @@ long rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t
     }
     const int n = std::get<Reverse>(*action).step;
     poll(interrupt, n, scene.dofs());
-    reverse.step(n, in, t0 + (n + 1) * plan.options.h, state(n), seed, in_bar);
+    reverse.step(n, tape.first_order(n), in, t0 + (n + 1) * plan.options.h, state(n), seed, in_bar);
     if (n % growth.every == 0) growth.look(n, t0 + n * plan.options.h, scene, reverse.x_next_bar.data());
   }
   reverse.finish(in, in_bar);

@@ -14,6 +14,15 @@ ColliderPoses<Single<T>> no_pose_cotangents(const ContactSource<T>& source) {
   return {none, none, source.bdf.before == 0.0 ? std::vector<Pose<Single<T>>>{} : none};
 }
 
+// Cotangents of a collider's lengths.
+template <class T>
+void size_vjp(const ContactSource<T>& source, const Collider& collider, const Single<T>* bar, const Inputs<T>& in_bar) {
+  with_shape(collider.shape, [&]<class Shape>(Shape) {
+    for (int k = 0; k < size_count<Shape>; ++k)
+      source.add(bar[k], in_bar.of(Quantity::collider_size)[collider.first_size + k]);
+  });
+}
+
 // Reverse of ContactSource::numbers. Returns the cotangent of the particle's inverse mass.
 template <class T>
 Single<T> numbers_vjp(const ContactSource<T>& source, const ColliderPoses<Single<T>>& poses, int contact, int item,
@@ -36,16 +45,32 @@ Single<T> numbers_vjp(const ContactSource<T>& source, const ColliderPoses<Single
   source.add(eta2 * bar.carried, from_bar.x + scene.first_dof[c.carried[item]]);
   source.add(bar.friction, in_bar.of(Quantity::friction)[contact]);
   source.add(bar.radius, in_bar.of(Quantity::contact_radius)[contact]);
-  with_shape(collider.shape, [&]<class Shape>(Shape) {
-    for (int k = 0; k < size_count<Shape>; ++k)
-      source.add(bar.size[k], in_bar.of(Quantity::collider_size)[collider.first_size + k]);
-  });
+  size_vjp(source, collider, bar.size, in_bar);
   if (c.stiffness >= 0) {
     source.add(eta2 * bar.kappa, in_bar.of(Quantity::contact_stiffness)[c.stiffness]);
     return S(0.0);
   }
   const S w = source.read(source.w[node]);
-  return -(S(rigidity) * bar.kappa / (w * w));
+  const double share = source.bdf.eta / source.h;
+  return -(S(rigidity * share * share) * bar.kappa / (w * w));
+}
+
+// Reverse of ContactSource::surface.
+template <class T>
+void surface_vjp(const ContactSource<T>& source, int contact, const Surface<Single<T>>& bar,
+                 ColliderPoses<Single<T>>& poses_bar, const Inputs<T>& in_bar) {
+  using S = Single<T>;
+  const Contact& c = source.scene.contacts[contact];
+  source.add(bar.friction, in_bar.of(Quantity::friction)[contact]);
+  source.add(bar.restitution, in_bar.of(Quantity::restitution)[c.restitution]);
+  source.add(bar.radius, in_bar.of(Quantity::contact_radius)[contact]);
+  size_vjp(source, source.scene.colliders[c.collider], bar.size, in_bar);
+  const auto add = [](const Pose<S>& from, Pose<S>& to) {
+    to.position = to.position + from.position;
+    for (int k = 0; k < 9; ++k) to.turn[k] += from.turn[k];
+  };
+  add(bar.now, poses_bar.now[c.collider]);
+  add(bar.next, poses_bar.next[c.collider]);
 }
 
 // Reverse of ContactSource::poses.

@@ -13,12 +13,13 @@
 
 namespace sheetbend {
 
-// z = K^-T z of every scene.
+// z = K^-T z of some scenes; of others z is zero.
 template <class T>
-void solve_implicit(const DirectBlock& block, const BlockState<T>& state, std::vector<T>& z) {
+void solve_implicit(const DirectBlock& block, Scenes scenes, const BlockState<T>& state, std::vector<T>& z) {
   if constexpr (std::is_same_v<T, Pack>) {
     std::vector<double> own(z.size());
     for (int scene = 0; scene < Pack::lanes; ++scene) {
+      if (!has(scenes, scene)) continue;
       for (std::size_t i = 0; i < z.size(); ++i) own[i] = z[i][scene];
       state.implicit[scene].solve_transposed(block, own.data());
       for (std::size_t i = 0; i < z.size(); ++i) z[i].set(scene, own[i]);
@@ -58,10 +59,11 @@ void pull_back_contacts(const DirectBlock& block, BlockState<T>& state, const st
 }
 
 template <class T>
-void project_implicit_vjp(const SubstepState<T>& s, const DirectBlock& block, const sheetbend_packs::KernelTable& table,
-                          BlockState<T>& state, BlockCotangents<T>& bar) {
+void project_implicit_vjp(const SubstepState<T>& s, const DirectBlock& block, Scenes scenes,
+                          const sheetbend_packs::KernelTable& table, BlockState<T>& state, BlockCotangents<T>& bar) {
   constexpr int passes = 2;
-  for (ImplicitBlock& scene : state.implicit) scene.factorize(s.scene, block);
+  for (int scene = 0; scene < static_cast<int>(state.implicit.size()); ++scene)
+    if (has(scenes, scene)) state.implicit[scene].factorize(s.scene, block);
   for (auto& scene : bar.contacts) scene.clear();
   auto& own = state.at(0);
   state.lambda[0].clear();  // all of it is dl
@@ -77,7 +79,7 @@ void project_implicit_vjp(const SubstepState<T>& s, const DirectBlock& block, co
   std::vector<T> p(3 * static_cast<std::size_t>(block.movable)), x_bar(p.size(), T(0.0));
   for (int pass = 0; pass < passes; ++pass) {
     for (std::size_t i = 0; i < p.size(); ++i) p[i] = bar.x[sheetbend_blocks::row * (i / 3) + i % 3];
-    solve_implicit(block, state, p);
+    solve_implicit(block, scenes, state, p);
     bar.y.clear();
     numbers_of_block(block, state, 0).subtract_times(p.data(), bar.y.data());
     for (int j = 0; j < block.size(); ++j) bar.y[j] = -(bar.y[j] / state.diagonal[j]);

@@ -14,7 +14,8 @@ struct ReverseOf<CarryFriction> {
   using Scratch = Nothing;
 
   template <class T>
-  static void run(const Step<T>& step, const Work<T>& work, Nothing&, Nothing&, const StepCotangents<T>& bar) {
+  static void run(const Step<T>& step, const Work<T>& work, CarryFriction::Record<T>&, Nothing&,
+                  const StepCotangents<T>& bar) {
     using S = Single<T>;
     const Scene& scene = step.scene;
     if (scene.contacts.empty()) return;

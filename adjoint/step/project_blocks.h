@@ -36,7 +36,7 @@ struct ReverseOf<ProjectBlocks> {
         BlockCotangents<T>& block_bar = scratch.blocks[b];
         begin_block_vjp<T>(state, block, bar.q.data, nullptr, bar.in, block_bar);
         if (block.implicit)
-          project_implicit_vjp(state, block, pack_kernels(), record.blocks[b], block_bar);
+          project_implicit_vjp(state, block, step.scenes, pack_kernels(), record.blocks[b], block_bar);
         else
           for (int iteration = plan.options.iterations - 1; iteration >= 0; --iteration)
             project_block_vjp(state, block, pack_kernels(), record.blocks[b], iteration, block_bar);
@@ -46,6 +46,9 @@ struct ReverseOf<ProjectBlocks> {
       }
     });
     for (std::size_t b = 0; b < plan.blocks.size(); ++b) {
+      // Where the formula changes at contacts, a scene gathers in the same order alone and beside others that change at other times.
+      if (changes_at_contacts(step.scene, plan.options))
+        finish_block(step.scene, plan.blocks[b], step.in, bar.in, scratch.blocks[b]);
       add_fixed(step.scene, plan.blocks[b], scratch.blocks[b], bar.q.data, bar.from.x, bar.from.x_before);
       auto& contacts = scratch.blocks[b].contacts;
       for (std::size_t lane = 0; lane < contacts.size(); ++lane)

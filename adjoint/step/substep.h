@@ -3,6 +3,7 @@
 
 #include "adjoint/step/apply_air_forces.h"
 #include "adjoint/step/apply_forces.h"
+#include "adjoint/step/bounce.h"
 #include "adjoint/step/carry_friction.h"
 #include "adjoint/step/effective_masses.h"
 #include "adjoint/step/predict.h"

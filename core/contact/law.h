@@ -13,7 +13,7 @@
 
 namespace sheetbend {
 
-// kappa of a rigid contact, over the particle's mass. It is as deep as g eta^2/rigidity under its own weight.
+// kappa of a rigid contact, over the particle's mass and (eta/h)^2. It is as deep as g h^2/rigidity under its own weight.
 inline constexpr double rigidity = 1e3;
 
 template <class T>

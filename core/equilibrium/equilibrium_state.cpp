@@ -61,6 +61,12 @@ void expect_no_unilateral(const Scene& scene) {
       throw std::invalid_argument("equilibrium: group " + group.name + " may go slack. Fix: leave it out");
 }
 
+void expect_no_contact(const Scene& scene) {
+  if (!scene.contacts.empty())
+    throw std::invalid_argument("equilibrium: contact " + scene.contacts.front().name +
+                                " is not known here. Fix: let it come to rest in a simulation, or leave contacts out");
+}
+
 }  // namespace
 
 double largest(const std::vector<double>& v) {
@@ -85,6 +91,7 @@ EquilibriumState::EquilibriumState(const Scene& scene_, const double* inputs, co
       soft(scene_.groups.size() + scene_.volumes.size(), std::numeric_limits<double>::infinity()) {
   expect_energy(scene, in, o.t0);
   expect_no_unilateral(scene);
+  expect_no_contact(scene);
   const double* from = start_x ? start_x : in.of(Quantity::position);
   x.assign(from, from + scene.dofs());
   lambda.assign(scene.multipliers(), 0.0);

@@ -2,13 +2,24 @@
 // Compiled once per scalar (adjoint/instances_*.cpp): whoever steps a rollout does not compile the solver again.
 #pragma once
 
+#include <optional>
+
 #include "core/scalar/complex.h"
 #include "core/scalar/dual.h"
 #include "core/solver/divergence.h"
 #include "core/solver/interrupt.h"
+#include "core/step/contact_begins.h"
 #include "core/step/substep.h"
 
 namespace sheetbend {
+
+// The velocity of a particle that has bounced, in these scenes.
+template <class T>
+struct Bounced {
+  int node;
+  Scenes scenes;
+  Vec3<T> v;
+};
 
 // T: double, Pack, Complex, Dual<double, 1>, Dual<double, 4> or Dual<double, 8>. List: the stages of a substep.
 template <class T, class List = Substep>
@@ -20,7 +31,9 @@ class Rollout {
   // Driven nodes start where their boundary is at t0.
   static void initial_state(const Scene& scene, const Inputs<const T>& in, double t0, T* x, T* v);
 
-  void advance();
+  // The next substep. Where the scene's formula changes at contacts, it goes with BDF1 in the scenes `first_order`, if these are known, otherwise where a
+  // contact begins or has just begun.
+  void advance(std::optional<Scenes> first_order = {});
 
   // Goes on from another state, at `step`, which need not be one of this rollout's own.
   void restart(int step, const SubstepStates<T>& s);
@@ -28,7 +41,7 @@ class Rollout {
   const T* x() const { return x_.data(); }
 
   // All that the next substep begins with.
-  SubstepStates<T> state() const { return {x_.data(), x_before_.data(), v_.data(), v_before_.data(), step_}; }
+  SubstepStates<T> state() const { return {x_.data(), x_before_.data(), v_.data(), v_before_.data(), step_, nullptr, after_impact_}; }
 
   // Calls sink(step, x, v) for the initial state and after every substep. Throws Diverged, also for a finite state that means nothing.
   template <class Sink>
@@ -46,12 +59,27 @@ class Rollout {
   // The last substep's multipliers (scene.multipliers()); zero before the first.
   const T* multipliers();
 
+  // The scenes whose last substep went with BDF1, and the formula of a rollout of one scene in it.
+  Scenes first_order() const { return first_order_; }
+  const Bdf& bdf() const { return bdf_; }
+
+  // What the last substep left each particle of each contact with (of a pack: scene after scene).
+  const std::vector<ContactMode>& contact_modes() const { return record_.template of<CarryFriction>().modes; }
+
+  // How particles bounced in the last substep.
+  const std::vector<Impact<Single<T>>>& impacts() const { return record_.template of<Bounce>().impacts; }
+
+  // The particles that have bounced in the last substep, with their velocities, which positions do not tell.
+  const std::vector<Bounced<T>>& bounced() const { return bounced_; }
+
   // Of the last substep, per implicit block: the force left at the start and after each Newton step, over the largest one.
   std::vector<std::vector<double>> balance() const;
 
   double time(int step) const { return t0_ + step * plan_.options.h; }
 
  private:
+  bool take(const Bdf& bdf, Scenes scenes);
+  Scenes find_bounced();
   void throw_diverged() const;
 
   const Scene& scene_;
@@ -59,6 +87,10 @@ class Rollout {
   Inputs<const T> in_;
   double t0_;
   int step_ = 0;
+  AfterImpact<T> after_impact_;
+  Scenes first_order_ = 0;
+  Bdf bdf_;
+  std::vector<Bounced<T>> bounced_;
   std::vector<T> x_, x_before_, x_next_, v_, v_before_, v_next_;
   std::vector<T> multipliers_;
   SubstepRecord<T, List> record_;
@@ -66,7 +98,7 @@ class Rollout {
 
 template <class T, class List>
 Rollout<T, List>::Rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0)
-    : scene_(scene), plan_(plan), in_{scene.layout, inputs}, t0_(t0) {
+    : scene_(scene), plan_(plan), in_{scene.layout, inputs}, t0_(t0), bdf_(Bdf::at(plan.options, 0)) {
   for (auto* buffer : {&x_, &x_before_, &x_next_, &v_, &v_before_, &v_next_}) buffer->resize(scene.dofs());
   record_.resize(scene, plan, false);
   initial_state(scene, in_, t0, x_.data(), v_.data());
@@ -89,15 +121,47 @@ void Rollout<T, List>::initial_state(const Scene& scene, const Inputs<const T>& 
 }
 
 template <class T, class List>
-void Rollout<T, List>::advance() {
-  const Bdf bdf = Bdf::at(plan_.options, step_);
-  bool finite;
+bool Rollout<T, List>::take(const Bdf& bdf, Scenes scenes) {
+  bdf_ = bdf;
   try {
-    const Step<T> step{scene_, plan_, in_, bdf, time(step_ + 1), state()};
-    finite = substep(step, x_next_.data(), v_next_.data(), record_);
+    const Step<T> step{scene_, plan_, in_, bdf, time(step_ + 1), state(), scenes};
+    return substep(step, x_next_.data(), v_next_.data(), record_);
   } catch (const Unbalanced& e) {
     throw Unbalanced(e, step_ + 1, time(step_ + 1));
   }
+}
+
+template <class T, class List>
+void Rollout<T, List>::advance(std::optional<Scenes> first_order) {
+  const SolverOptions& o = plan_.options;
+  const bool watches = changes_at_contacts(scene_, o) && !first_order;
+  const auto begins = [&](Scenes scenes) -> Scenes {
+    if (!watches) return 0;
+    return where_contact_begins(Step<T>{scene_, plan_, in_, bdf_, time(step_ + 1), state(), scenes}, x_next_.data());
+  };
+  constexpr Scenes all = all_scenes<T>;
+  Scenes first = o.integrator == Integrator::bdf1 || step_ == 0 ? all : first_order.value_or(after_impact_.scenes());
+  Scenes begun = 0;
+  bool finite = true;
+  if (first != all) {
+    const Scenes second = all ^ first;
+    finite = take(Bdf::second_order(o.h), second);
+    begun = begins(second);
+    first |= begun;
+  }
+  if (first == all) {
+    finite = take(Bdf::first_order(o.h), all);
+  } else if (first != 0) {
+    const std::vector<T> x = x_next_, v = v_next_;
+    finite = take(Bdf::first_order(o.h), first) && finite;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      x_next_[i] = chosen(first, x_next_[i], x[i]);
+      v_next_[i] = chosen(first, v_next_[i], v[i]);
+    }
+  }
+  const Scenes bounced = find_bounced();
+  if (watches) after_impact_.count(begun | begins(first), bounced);
+  first_order_ = first;
   ++step_;
   std::swap(x_before_, x_);
   std::swap(x_, x_next_);
@@ -106,9 +170,26 @@ void Rollout<T, List>::advance() {
   if (!finite) throw_diverged();
 }
 
+// Of the last substep; returns the scenes in which some have.
+template <class T, class List>
+Scenes Rollout<T, List>::find_bounced() {
+  Scenes scenes = 0;
+  bounced_.clear();
+  for (const auto& impact : impacts()) {
+    const auto own = static_cast<Scenes>(1u << impact.lane);
+    scenes |= own;
+    auto known = std::find_if(bounced_.begin(), bounced_.end(), [&](const auto& b) { return b.node == impact.node; });
+    if (known == bounced_.end())
+      known = bounced_.insert(known, {impact.node, 0, Vec3<T>(v_next_.data() + scene_.first_dof[impact.node])});
+    known->scenes |= own;
+  }
+  return scenes;
+}
+
 template <class T, class List>
 void Rollout<T, List>::restart(int step, const SubstepStates<T>& s) {
   step_ = step;
+  after_impact_ = s.after_impact;
   std::copy_n(s.x, x_.size(), x_.data());
   std::copy_n(s.x_before, x_.size(), x_before_.data());
   std::copy_n(s.v, v_.size(), v_.data());

@@ -1,6 +1,7 @@
 #include "core/scene/scene.h"
 
 #include <algorithm>
+#include <map>
 #include <set>
 #include <stdexcept>
 
@@ -128,9 +129,27 @@ void check_contact(const ContactSpec& spec, const Scene& scene, std::vector<char
   }
 }
 
+// The free particles of contacts with restitution, which nothing else may hold.
+void add_bouncers(Scene& s) {
+  std::map<int, std::vector<int>> contacts;
+  for (std::size_t c = 0; c < s.contacts.size(); ++c)
+    if (s.contacts[c].restitution >= 0)
+      for (const int n : s.contacts[c].particles)
+        if (s.role[n] == Role::free) contacts[n].push_back(static_cast<int>(c));
+  const auto expect_loose = [&](const std::string& name, const std::vector<int>& nodes) {
+    for (const int n : nodes)
+      if (const auto found = contacts.find(n); found != contacts.end())
+        refuse(s.contacts[found->second.front()].name + ".restitution: particle " + std::to_string(n) + " is held by '" +
+               name + "'. Fix: leave it out, only particles that nothing holds bounce");
+  };
+  for (const Group& g : s.groups) expect_loose(g.name, g.stencil);
+  for (const Volume& v : s.volumes) expect_loose(v.name, v.nodes);
+  for (auto& [node, own] : contacts) s.bouncers.push_back({node, std::move(own)});
+}
+
 // Colliders and contacts; returns how many numbers there are of each of their quantities.
-std::array<std::size_t, 5> add_contacts(const SceneSpec& spec, Scene& s) {
-  std::size_t poses = 0, sizes = 0, soft = 0;
+std::array<std::size_t, 6> add_contacts(const SceneSpec& spec, Scene& s) {
+  std::size_t poses = 0, sizes = 0, soft = 0, bouncing = 0;
   for (const ColliderSpec& c : spec.colliders) {
     check_knots(c.name + ".times", c.motion, true);
     s.colliders.push_back({c.name, shape_of(c.shape), c.motion, poses, sizes});
@@ -140,9 +159,11 @@ std::array<std::size_t, 5> add_contacts(const SceneSpec& spec, Scene& s) {
   std::vector<char> carries(s.nodes(), false);
   for (const ContactSpec& c : spec.contacts) {
     check_contact(c, s, carries);
-    s.contacts.push_back({c.name, c.collider, c.particles, c.carried, c.rigid ? -1 : static_cast<int>(soft++)});
+    s.contacts.push_back({c.name, c.collider, c.particles, c.carried, c.rigid ? -1 : static_cast<int>(soft++),
+                          c.bounces ? static_cast<int>(bouncing++) : -1, particles_in_contact(s)});
   }
-  return {s.contacts.size(), s.contacts.size(), soft, poses, sizes};
+  add_bouncers(s);
+  return {s.contacts.size(), s.contacts.size(), soft, poses, sizes, bouncing};
 }
 
 }  // namespace
@@ -223,7 +244,7 @@ Scene build_scene(const SceneSpec& spec) {
 
   for (const VolumeSpec& v : spec.volumes) s.volumes.push_back(build_volume(v, s));
 
-  const auto [frictions, radii, stiffnesses, poses, sizes] = add_contacts(spec, s);
+  const auto [frictions, radii, stiffnesses, poses, sizes, restitutions] = add_contacts(spec, s);
 
   const std::size_t dofs = s.dofs(), nodes = s.nodes(), m = s.constraints;
   s.layout.size = {dofs,
@@ -247,7 +268,8 @@ Scene build_scene(const SceneSpec& spec) {
                    radii,
                    stiffnesses,
                    poses,
-                   sizes};
+                   sizes,
+                   restitutions};
   s.layout.close();
   return s;
 }

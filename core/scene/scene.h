@@ -68,6 +68,14 @@ struct Contact {
   std::vector<int> particles;
   std::vector<int> carried;  // per particle: that node
   int stiffness;             // place in Quantity::contact_stiffness, -1 where it is rigid
+  int restitution;           // place in Quantity::restitution, -1 where nothing bounces
+  std::size_t first = 0;     // of its particles, in arrays of all contacts' particles
+};
+
+// A particle that bounces: no constraint holds it.
+struct Bouncer {
+  int node;
+  std::vector<int> contacts;  // off which it does
 };
 
 struct Scene {
@@ -89,6 +97,7 @@ struct Scene {
   std::vector<Volume> volumes;
   std::vector<Collider> colliders;
   std::vector<Contact> contacts;
+  std::vector<Bouncer> bouncers;  // by node
   int constraints = 0, rows = 0;
   std::size_t stencil_coordinates = 0, gradient_entries = 0;
   Layout layout;
@@ -120,6 +129,7 @@ struct ContactSpec {
   int collider;
   std::vector<int> particles, carried;  // as in Contact; those that carry are pinned
   bool rigid = true;
+  bool bounces = false;  // has a restitution
 };
 
 struct SceneSpec {
@@ -140,6 +150,11 @@ inline std::size_t damped_rows(const Scene& scene) {
   for (const Group& group : scene.groups)
     if (group.damped) return scene.rows;
   return 0;
+}
+
+// Particles of all contacts, each as often as it stands in one.
+inline std::size_t particles_in_contact(const Scene& scene) {
+  return scene.contacts.empty() ? 0 : scene.contacts.back().first + scene.contacts.back().particles.size();
 }
 
 // Builds and validates the topology. Throws std::invalid_argument("field: what, got, fix").

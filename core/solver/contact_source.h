@@ -4,6 +4,7 @@
 
 #include <type_traits>
 
+#include "core/contact/impact.h"
 #include "core/contact/pose.h"
 #include "core/contact/touch.h"
 #include "core/scalar/pack.h"
@@ -76,6 +77,7 @@ struct ContactSource {
     return all;
   }
 
+  // The stiffness of a rigid contact is rigidity m/h^2 in either formula, so that what rests is as deep in both.
   ContactNumbers<S> numbers(const ColliderPoses<S>& poses, int contact, int item) const {
     const Contact& c = scene.contacts[contact];
     const Collider& collider = scene.colliders[c.collider];
@@ -84,17 +86,47 @@ struct ContactSource {
     numbers.from = S(bdf.now) * poses.now[c.collider].in_frame(at(from.x, node));
     if (bdf.before != 0.0)
       numbers.from = numbers.from + S(bdf.before) * poses.before[c.collider].in_frame(at(from.x_before, node));
+    const double share = bdf.eta / h;
     const S eta2(bdf.eta * bdf.eta);
     numbers.carried = eta2 * at(from.x, c.carried[item]);
     numbers.friction = read(in.of(Quantity::friction)[contact]);
     numbers.radius = read(in.of(Quantity::contact_radius)[contact]);
-    numbers.kappa = c.stiffness < 0 ? S(rigidity) / read(w[node])
+    numbers.kappa = c.stiffness < 0 ? S(rigidity * share * share) / read(w[node])
                                     : eta2 * read(in.of(Quantity::contact_stiffness)[c.stiffness]);
+    read_size(collider, numbers.size);
+    return numbers;
+  }
+
+  // What particles bounce off at a contact with restitution.
+  Surface<S> surface(const ColliderPoses<S>& poses, int contact) const {
+    const Contact& c = scene.contacts[contact];
+    Surface<S> s;
+    s.friction = read(in.of(Quantity::friction)[contact]);
+    s.restitution = read(in.of(Quantity::restitution)[c.restitution]);
+    s.radius = read(in.of(Quantity::contact_radius)[contact]);
+    for (S& a : s.size) a = S(0.0);
+    read_size(scene.colliders[c.collider], s.size);
+    s.now = poses.now[c.collider];
+    s.next = poses.next[c.collider];
+    return s;
+  }
+
+  // The gap of a particle at x from a contact's surface, with its collider at a pose.
+  S gap(const Pose<S>& pose, int contact, const Vec3<S>& x) const {
+    const Collider& collider = scene.colliders[scene.contacts[contact].collider];
+    S size[most_sizes], at[3], n[3], distance;
+    read_size(collider, size);
+    pose.in_frame(x).store(at);
+    distance_from(collider.shape, at, size, distance, n);
+    return distance - read(in.of(Quantity::contact_radius)[contact]);
+  }
+
+ private:
+  void read_size(const Collider& collider, S* size) const {
     with_shape(collider.shape, [&]<class Shape>(Shape) {
       for (int k = 0; k < size_count<Shape>; ++k)
-        numbers.size[k] = read(in.of(Quantity::collider_size)[collider.first_size + k]);
+        size[k] = read(in.of(Quantity::collider_size)[collider.first_size + k]);
     });
-    return numbers;
   }
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <sstream>
 
 namespace sheetbend {
@@ -13,6 +14,11 @@ constexpr double flat = 1e-8;        // relative changes of Phi that rounding ma
 constexpr int most_halvings = 60;
 constexpr int turns = 8;                  // in which a direction of negative curvature gets steeper
 constexpr double first_departure = 1e-4;  // along it, of the block's size
+constexpr double first_share = 0.25, least_share = 1.0 / 256.0;  // of friction, that a step adds
+constexpr int patience = 4;  // steps without progress before a leap over a kink
+// How far leaps go, of a whole step. Whole steps alone may lead back to the same kink again and again.
+constexpr double leap_shares[] = {1.0, 0.5, 2.0, 0.25, 1.5, 0.75, 0.35, 0.6};
+constexpr int most_leaps = static_cast<int>(std::size(leap_shares));
 constexpr double near_saddle = 1e-3;      // so little of the largest force is left where it may be a saddle's
 
 std::string words(const Unbalanced& e, int substep, double time) {
@@ -69,7 +75,7 @@ bool ImplicitBlock::balanced(double tolerance) const {
 // Whether the last step has left more than half of the force that there was before it.
 bool ImplicitBlock::slow() const {
   const std::size_t k = balance_.size();
-  return k > 1 && balance_[k - 1] > 0.5 * balance_[k - 2];
+  return k > first_ + 1 && balance_[k - 1] > 0.5 * balance_[k - 2];
 }
 
 // The matrix of a Newton step from x_, where the potential was looked at last.
@@ -248,28 +254,95 @@ void ImplicitBlock::solve(const Scene& scene, const DirectBlock& block, const So
     x_ = potential.target;
     return;
   }
+  begin();
   take_first_step(scene, block);
+  if (!find_balance(scene, block, options) && !raise_friction(scene, block, options)) give_up(block);
+}
+
+void ImplicitBlock::begin() { first_ = balance_.size(); }
+
+// Newton's method from x_, where the potential was looked at last. False where it stalls, or takes too many matrices. Where friction acts, its merit may
+// lead to a kink that is no balance; a step that need not lower it leaps over that.
+bool ImplicitBlock::find_balance(const Scene& scene, const DirectBlock& block, const SolverOptions& options) {
+  int leaps = 0;
+  std::size_t last_leap = first_;
+  const auto stalls = [&](std::size_t since) {
+    const std::size_t k = balance_.size();
+    return k > since + patience && balance_[k - 1] > 0.9 * balance_[k - 1 - patience];
+  };
   while (true) {
     balance_.push_back(potential.balance());
-    if (!std::isfinite(phi_)) give_up(block);
+    if (!std::isfinite(phi_)) return false;
     if (balanced(options.force_tolerance)) {
-      if (convexity_ == 0.0) return;
+      if (convexity_ == 0.0) return true;
       factorize_newton(scene, block);
-      if (convexity_ == 0.0 || !leave_saddle(scene, block)) return;
+      if (convexity_ == 0.0 || !leave_saddle(scene, block)) return true;
       continue;
     }
-    if (matrices_ >= options.iterations) give_up(block);
+    if (matrices_ >= options.iterations) return false;
     const bool was_convex = convexity_ > 0.0;
     factorize_newton(scene, block);
     // Past a saddle the way is long with a matrix that was made convex.
     if (was_convex && convexity_ > 0.0 && slow() && balance_.back() < near_saddle && leave_saddle(scene, block))
       continue;
     take_direction(block);
+    if (rubs_ && leaps < most_leaps && stalls(last_leap)) {
+      last_leap = balance_.size();
+      move(x_, leap_shares[leaps++], d_, trial_);
+      const double there = potential.evaluate(block, trial_);
+      if (std::isfinite(there)) {
+        std::swap(x_, trial_);
+        accept(there);
+        continue;
+      }
+      potential.evaluate(block, x_);
+    }
     if (!search_line(block) && !search_where_it_rubs(scene, block)) {
       potential.evaluate(block, x_);
-      give_up(block);
+      return false;
     }
   }
+}
+
+// Friction has kinks where it starts to slide and where it turns round, and the merit may have a minimum at one that is no balance. From the balance
+// without friction that with all of it follows in steps, which are halved where one fails. False where that fails too.
+bool ImplicitBlock::raise_friction(const Scene& scene, const DirectBlock& block, const SolverOptions& options) {
+  auto& numbers = potential.contacts.numbers;
+  std::vector<double> friction;
+  for (const auto& n : numbers) friction.push_back(n.friction);
+  if (std::all_of(friction.begin(), friction.end(), [](double mu) { return mu == 0.0; })) return false;
+  const auto take = [&](double share) {
+    for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i].friction = share * friction[i];
+    begin();
+  };
+  const auto balances = [&] {
+    SolverOptions again = options;  // each share of friction may take as many matrices
+    again.iterations += matrices_;
+    return find_balance(scene, block, again);
+  };
+  take(0.0);
+  take_first_step(scene, block);
+  bool found = balances();
+  Numbers<double> last = x_;
+  for (double done = 0.0, step = first_share; found && done < 1.0;) {
+    const double share = std::min(1.0, done + step);
+    take(share);
+    accept(potential.evaluate(block, x_));
+    if (balances()) {
+      done = share;
+      last = x_;
+      step *= 2.0;
+    } else {
+      x_ = last;
+      step *= 0.5;
+      found = step >= least_share;
+    }
+  }
+  if (!found) {
+    take(1.0);
+    potential.evaluate(block, x_);
+  }
+  return found;
 }
 
 void ImplicitBlock::take_guess(const DirectBlock& block) {

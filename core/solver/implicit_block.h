@@ -55,6 +55,9 @@ class ImplicitBlock {
   }
 
  private:
+  void begin();
+  bool find_balance(const Scene& scene, const DirectBlock& block, const SolverOptions& options);
+  bool raise_friction(const Scene& scene, const DirectBlock& block, const SolverOptions& options);
   void take_first_step(const Scene& scene, const DirectBlock& block);
   void factorize_newton(const Scene& scene, const DirectBlock& block);
   void take_direction(const DirectBlock& block);
@@ -75,6 +78,7 @@ class ImplicitBlock {
   bool rubs_ = false;               // likewise, whether friction acts
   double convexity_ = 0.0;  // of the last matrix: 0 for K, 1 where no constraint's share has negative eigenvalues
   int matrices_ = 0;
+  std::size_t first_ = 0;  // of balance_ since Newton's method began, for the last time
 };
 
 }  // namespace sheetbend

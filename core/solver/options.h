@@ -26,10 +26,12 @@ struct Bdf {
   double eta, now, before;
   double extrapolate_now, extrapolate_before;  // the velocity at n+1, extrapolated (for the size of quadratic drag)
 
-  // The first substep of BDF2 is BDF1.
+  static Bdf first_order(double h) { return {h, 1.0, 0.0, 1.0, 0.0}; }
+  static Bdf second_order(double h) { return {2.0 * h / 3.0, 4.0 / 3.0, -1.0 / 3.0, 2.0, -1.0}; }
+
+  // Of a substep where nothing touches. The first one of BDF2 is BDF1.
   static Bdf at(const SolverOptions& o, int substep) {
-    if (o.integrator == Integrator::bdf1 || substep == 0) return {o.h, 1.0, 0.0, 1.0, 0.0};
-    return {2.0 * o.h / 3.0, 4.0 / 3.0, -1.0 / 3.0, 2.0, -1.0};
+    return o.integrator == Integrator::bdf1 || substep == 0 ? first_order(o.h) : second_order(o.h);
   }
 };
 

@@ -327,14 +327,6 @@ void expect_no_contact(const Scene& scene) {
                                 " may touch a collider, which needs substeps whose forces balance. Fix: use implicit");
 }
 
-// The first substeps of a contact are BDF1's.
-void expect_one_step(const Scene& scene, const SolverOptions& options) {
-  if (!scene.contacts.empty() && options.integrator != Integrator::bdf1)
-    throw std::invalid_argument("solver.integrator: particles of " + scene.contacts.front().name +
-                                " may touch a collider, and a second-order step goes through an impact as if nothing "
-                                "had happened. Fix: use bdf1");
-}
-
 // Blocks are made of constraints and what they join.
 void expect_constraints_around_volumes(const Scene& scene) {
   if (scene.volumes.empty()) return;
@@ -367,7 +359,6 @@ Plan make_plan(const Scene& scene, const SolverOptions& options) {
   if (options.partition == Partition::implicit) {
     expect_points(scene);
     expect_no_volume(scene);
-    expect_one_step(scene, options);
   } else {
     expect_no_contact(scene);
   }

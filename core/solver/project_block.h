@@ -34,10 +34,6 @@ std::size_t member_number(int member, int parts, int part) {
   return members_in_lanes<Plain<T>> ? lane_at(member, parts, part) : static_cast<std::size_t>(member) * parts + part;
 }
 
-// Scenes in a number.
-template <class T>
-inline constexpr int scenes_of = std::is_same_v<T, Pack> ? Pack::lanes : 1;
-
 template <class T>
 struct BlockState {
   struct Iteration {

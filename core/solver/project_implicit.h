@@ -51,7 +51,7 @@ void load_implicit(const SubstepState<T>& s, const DirectBlock& block, const Sub
   if constexpr (is_plain<T>)
     potential.contacts = state.contacts[scene];
   else
-    potential.contacts = values_of(state.contacts[scene]);
+    take_values(state.contacts[scene], potential.contacts);
 }
 
 // The particle, in the block's order, of place k of a run's constraint.
@@ -172,13 +172,14 @@ void write_solution(const SubstepState<T>& s, const DirectBlock& block, BlockSta
 }
 
 // From the predicted coordinates in state.x to those at which forces balance, with gradients and multipliers. Nothing is solved where these coordinates
-// are known, as on the way back.
+// are known, as on the way back, nor in scenes other than `scenes`.
 template <class T>
 void project_implicit(const SubstepState<T>& s, const DirectBlock& block, const SolverOptions& options,
-                      const SubstepStates<T>& states, const sheetbend_packs::KernelTable& table, BlockState<T>& state) {
+                      const SubstepStates<T>& states, Scenes scenes, const sheetbend_packs::KernelTable& table,
+                      BlockState<T>& state) {
   for (int scene = 0; scene < static_cast<int>(state.implicit.size()); ++scene) {
     load_implicit(s, block, states, options.h, state, scene);
-    if (states.x_next)
+    if (states.x_next || !has(scenes, scene))
       state.implicit[scene].take_guess(block);
     else
       state.implicit[scene].solve(s.scene, block, options);

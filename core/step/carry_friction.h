@@ -6,11 +6,12 @@
 
 namespace sheetbend {
 
-// Calls f(source, poses, contact, item) for every contact of a movable particle, one scene of a pack after the other.
+// Calls f(source, poses, contact, item) for every contact of a movable particle, one of the step's scenes after the other.
 template <class T, class F>
 void for_each_contact(const Step<T>& step, const InverseMasses<T>& masses, F&& f) {
   if (step.scene.contacts.empty()) return;
-  for (int lane = 0; lane < (std::is_same_v<T, Pack> ? Pack::lanes : 1); ++lane) {
+  for (int lane = 0; lane < scenes_of<T>; ++lane) {
+    if (!has(step.scenes, lane)) continue;
     const ContactSource<T> source = contact_source(step, masses, lane);
     const auto poses = source.poses();
     for (int c = 0; c < static_cast<int>(step.scene.contacts.size()); ++c)
@@ -19,21 +20,38 @@ void for_each_contact(const Step<T>& step, const InverseMasses<T>& masses, F&& f
   }
 }
 
+// What a particle does at a collider in a substep.
+enum class ContactMode : char { apart, sticks, slides };
+
 struct CarryFriction {
   static constexpr bool repeated = false;
+
+  // What each particle of each contact did last, contact after contact; in a pack one scene after the other.
   template <class T>
-  using Record = Nothing;
+  struct Record {
+    std::vector<ContactMode> modes;
+
+    void resize(const Scene& scene, const Plan&, bool reversed) {
+      if (!reversed) modes.assign(scenes_of<T> * particles_in_contact(scene), ContactMode::apart);
+    }
+    static std::size_t bytes(const Scene& scene, const Plan&, bool reversed) {
+      return reversed ? 0 : scenes_of<T> * particles_in_contact(scene);
+    }
+  };
 
   template <class T>
-  static void forward(const Step<T>& step, Work<T>& work, Nothing&) {
+  static void forward(const Step<T>& step, Work<T>& work, Record<T>& record) {
     const Scene& scene = step.scene;
     const double rate = 1.0 / (step.bdf.eta * step.bdf.eta);
+    const std::size_t count = particles_in_contact(scene);
     for_each_contact(step, work.masses, [&](const auto& source, const auto& poses, int c, int i) {
       using S = Single<T>;
       const Contact& contact = scene.contacts[c];
       const auto z = poses.next[contact.collider].in_frame(source.at(work.x_next, contact.particles[i]));
       const auto found = touch(scene.colliders[contact.collider].shape, z, source.numbers(poses, c, i));
       source.write(S(rate) * found.tangential, work.x_next + scene.first_dof[contact.carried[i]]);
+      record.modes[source.lane * count + contact.first + i] =
+          !found.pushes ? ContactMode::apart : found.slides ? ContactMode::slides : ContactMode::sticks;
     });
   }
 };

@@ -46,7 +46,7 @@ struct ProjectBlocks {
         load_contacts(
             block, [&](int lane) { return contact_source(step, work.masses, lane); }, record.blocks[b]);
         if (block.implicit)
-          project_implicit(state, block, plan.options, step.from, pack_kernels(), record.blocks[b]);
+          project_implicit(state, block, plan.options, step.from, step.scenes, pack_kernels(), record.blocks[b]);
         else
           for (int iteration = 0; iteration < plan.options.iterations; ++iteration)
             project_block(state, block, pack_kernels(), record.blocks[b], iteration);

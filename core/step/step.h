@@ -22,6 +22,7 @@ struct Step {
   Bdf bdf;
   double t_next;
   SubstepStates<T> from;  // the states at n and n-1
+  Scenes scenes = all_scenes<T>;  // that are solved; the others' numbers are left over
 
   int threads() const { return plan.options.threads; }
 };
@@ -42,6 +43,15 @@ struct InverseMasses {
   }
 };
 
+// A particle that bounced in a substep, in one scene of a T.
+template <class S>
+struct Impact {
+  int lane, node;
+  int contact;
+  double time;  // since the flight began that it ended
+  Flight<S> before, after;
+};
+
 // What the stages write for each other.
 template <class T>
 struct Work {
@@ -49,6 +59,7 @@ struct Work {
   Coordinates<T> q;    // predicted, then corrected: in the rows of the kernels that sweep, otherwise in x_next
   T *x_next, *v_next;  // (dofs); the repetition for a reverse has no v_next
   bool finite = true;  // whether all of x_next is
+  const std::vector<Impact<Single<T>>>* impacts = nullptr;  // particle by particle, in order; none where it is null
 };
 
 // What the contacts of a scene of T read of a substep.

@@ -4,6 +4,7 @@
 
 #include "core/step/apply_air_forces.h"
 #include "core/step/apply_forces.h"
+#include "core/step/bounce.h"
 #include "core/step/carry_friction.h"
 #include "core/step/effective_masses.h"
 #include "core/step/predict.h"
@@ -19,9 +20,11 @@ using Substep = Stages<ComputeEffectiveMasses,  // w = 1/(m + eta c), c the impl
                        Predict,                 // x* = history(x) + eta v*,  v* = m w (history(v) + eta gravity)
                        ApplyForces,             // x* += eta^2 w f(t)
                        ApplyAirForces,          // x* += eta^2 w f of the wind and the pressure on triangles
+                       Bounce,                  // what meets a collider with restitution goes on from there
                        ProjectBlocks,           // direct blocks: x <- x + W J^T dlambda, or until their forces balance
                        SweepColors,             // the same for one constraint after the other, and for kept volumes
                        UpdateVelocities,        // v = (x - history(x))/eta
+                       LeaveImpacts,            // of what has bounced, with the velocity after the impact
                        RetractDirectors,        // rods: frames are made orthonormal again
                        Yield,                   // joints that slide: their set follows
                        CarryFriction            // contacts: their tangential forces go on to the next substep

@@ -4,10 +4,14 @@
 #include <numeric>
 
 #include "adjoint/rollout.h"
+#include "core/rollout/contact_counts.h"
 #include "core/rollout/redundant_rows.h"
 #include "python/bindings/solver.h"
 
 namespace sheetbend::bindings {
+
+using namespace py::literals;
+
 namespace {
 
 Solver make_solver(std::shared_ptr<Scene> scene, double h, const std::string& integrator, const std::string& partition,
@@ -42,12 +46,15 @@ Solver solver_of(const py::tuple& a) {
                      a[7].cast<int>(), a[8].cast<double>(), a[9].cast<int>());
 }
 
-// Forward only: positions, velocities and constraint multipliers in force units at the wanted substeps.
+// Forward only: positions, velocities and constraint multipliers in force units at the wanted substeps, how many substeps went with BDF1, and
+// what contacts did.
 py::dict simulate(const Solver& s, const Array& inputs, const Steps& steps, double t0) {
   check(s, inputs, 1, steps);
   const std::size_t dofs = s.scene->dofs(), rows = s.scene->multipliers(), frames = steps.size();
   auto positions = empty({frames, dofs}), velocities = empty({frames, dofs}), multipliers = empty({frames, rows});
   double *x = positions.mutable_data(), *v = velocities.mutable_data(), *force = multipliers.mutable_data();
+  int first_order = 0;
+  CountContacts contacts(*s.scene);
   {
     Release release;
     SignalInterrupt interrupt;
@@ -56,7 +63,11 @@ py::dict simulate(const Solver& s, const Array& inputs, const Steps& steps, doub
     rollout.run(
         steps.back(),
         [&](int step, const double* xs, const double* vs) {
-          const double eta = Bdf::at(s.plan.options, std::max(step - 1, 0)).eta;
+          const double eta = rollout.bdf().eta;
+          if (step > 0) {
+            first_order += rollout.first_order() != 0;
+            contacts.look(rollout);
+          }
           const double* lambda = next < frames && steps[next] == step ? rollout.multipliers() : nullptr;
           for (; next < frames && steps[next] == step; ++next) {
             x = std::copy_n(xs, dofs, x);
@@ -70,6 +81,12 @@ py::dict simulate(const Solver& s, const Array& inputs, const Steps& steps, doub
   out["positions"] = positions;
   out["velocities"] = velocities;
   out["multipliers"] = multipliers;
+  out["first_order"] = first_order;
+  py::list counts;
+  for (const ContactCounts& c : contacts.counts())
+    counts.append(py::dict("most"_a = c.most, "began"_a = c.began, "ended"_a = c.ended, "touching"_a = c.touching,
+                           "sliding"_a = c.sliding));
+  out["contacts"] = counts;
   return out;
 }
 

@@ -45,7 +45,7 @@ std::shared_ptr<Scene> make_scene(const py::kwargs& given) {
                               {c["times"].cast<std::vector<double>>(), interpolation_of(c["interpolation"].cast<std::string>())}});
   for (const py::handle c : given["contacts"])
     spec.contacts.push_back({c["name"].cast<std::string>(), c["collider"].cast<int>(), whole_numbers(c["particles"]),
-                             whole_numbers(c["carried"]), c["rigid"].cast<bool>()});
+                             whole_numbers(c["carried"]), c["rigid"].cast<bool>(), c["bounces"].cast<bool>()});
   return std::make_shared<Scene>(build_scene(spec));
 }
 
@@ -77,7 +77,8 @@ py::dict arguments_of(const Scene& s) {
     });
   for (const Contact& c : s.contacts)
     contacts.append(py::dict("name"_a = c.name, "collider"_a = c.collider, "particles"_a = py::array_t<int>(py::cast(c.particles)),
-                             "carried"_a = py::array_t<int>(py::cast(c.carried)), "rigid"_a = c.stiffness < 0));
+                             "carried"_a = py::array_t<int>(py::cast(c.carried)), "rigid"_a = c.stiffness < 0,
+                             "bounces"_a = c.restitution >= 0));
   const bool cubic = s.boundary.interpolation == Interpolation::cubic;
   return py::dict("particles"_a = s.nodes(), "directors"_a = directors, "pinned"_a = s.pinned, "driven"_a = s.driven,
                   "boundary_times"_a = s.boundary.times, "boundary_interpolation"_a = cubic ? "cubic" : "linear",

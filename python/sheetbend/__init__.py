@@ -26,6 +26,7 @@ from .fitting.fit import Fit, fit
 from .mesh import TriangleMesh, read_mesh
 from .minimum.discretization import Refinement
 from .motion.balance import ForceBalance, force_balance
+from .motion.contact_counts import ContactCounts
 from .motion.equilibrium import Equilibrium, NoEquilibriumError, equilibria, equilibrium
 from .motion.gradients import GradientReport, check_gradients
 from .motion.redundancy import RedundantConstraintsWarning
@@ -82,6 +83,7 @@ __all__ = [
     "Capsule",
     "Cloth",
     "ConfigError",
+    "ContactCounts",
     "DivergenceError",
     "EmptyGradientError",
     "Equilibrium",

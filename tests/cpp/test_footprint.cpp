@@ -7,6 +7,7 @@
 #include "adjoint/tape_plan.h"
 #include "core/scalar/dual.h"
 #include "tests/cpp/support/bipyramid.h"
+#include "tests/cpp/support/contact_scenes.h"
 #include "tests/cpp/support/programs.h"
 
 namespace {
@@ -96,6 +97,19 @@ TEST(FootprintOfAVolume, IsWhatIsAllocated) {
   const Plan plan = make_plan(sample.scene, {.h = 4e-3, .partition = Partition::gauss_seidel, .iterations = 3});
   expect_footprint<double>(sample.scene, plan, sample.inputs);
   expect_footprint<Pack>(sample.scene, plan, {sample.inputs.begin(), sample.inputs.end()});
+  expect_footprint<Dual<double, 1>>(sample.scene, plan, {sample.inputs.begin(), sample.inputs.end()});
+}
+
+// A rope above a plane, whose substeps may change their formula.
+TEST(FootprintOfContacts, IsWhatIsAllocated) {
+  ContactBuilder b;
+  for (int i = 0; i < 300; ++i) b.particle({0.01 * i, 0.0, 0.1}, 0.001);
+  for (int i = 0; i + 1 < 300; ++i) b.constraint("distance", {i, i + 1}, 0.01 / 50.0, {0.01});
+  b.collider("plane", {}, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0});
+  b.contact(0.3, 0.0);
+  const Sample sample = b.build(9.81);
+  const Plan plan = make_plan(sample.scene, contact_options(1e-3, Integrator::bdf2));
+  expect_footprint<double>(sample.scene, plan, sample.inputs);
   expect_footprint<Dual<double, 1>>(sample.scene, plan, {sample.inputs.begin(), sample.inputs.end()});
 }
 

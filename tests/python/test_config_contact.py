@@ -103,8 +103,9 @@ def test_a_collider_moves_at_knots_and_with_a_tool(tmp_path: Path):
 @pytest.mark.parametrize(
     ("old", "new", "field", "words"),
     [
-        ('method = "implicit"', 'method = "direct"', "solver.method", 'integrator = "bdf1"'),
-        ('integrator = "bdf1"', "", "solver.integrator", 'method = "implicit"'),
+        ('method = "implicit"', 'method = "direct"', "solver.method", 'method = "implicit"'),
+        ("friction = 0.3", "friction = 0.3\nrestitution = 1.2", "scene.contact[0].restitution", "at most 1"),
+        ("friction = 0.3", "friction = 0.3\nrestitution = 0.5", "scene.table.restitution", "nothing holds"),
         ("radius = 0.02", "", "scene.collider[1]", "add radius"),
         ("radius = 0.02", "radius = 0.0", "scene.collider[1].radius", "greater than 0"),
         ("radius = 0.02", "radius = 0.02\nsize = [1.0, 1.0, 1.0]", "scene.collider[1]", "has start, end, radius"),

@@ -62,6 +62,27 @@ def test_quantities_have_gradients_as_differences_have():
     assert found["table_friction"] < -0.1
 
 
+def test_bdf2_says_how_many_substeps_went_with_bdf1():
+    solver = sb.Solver(h=1e-3, method="implicit")
+    high = sb.simulate(rope_above(height=1.0), TIMES, solver).contacts["table"]
+    assert high.bdf1_share == pytest.approx(0.01)
+    landed = sb.simulate(rope_above(height=0.015), TIMES, solver).contacts["table"]
+    assert 0.04 <= landed.bdf1_share < 0.5
+    assert sb.simulate(rope_above(), TIMES, SOLVER).contacts["table"].bdf1_share == 1.0
+
+
+def test_a_simulation_counts_what_contacts_do():
+    high = sb.simulate(rope_above(height=1.0), TIMES, SOLVER).contacts["table"]
+    assert high == sb.ContactCounts(most=0, began=0, ended=0, sliding_share=0.0, sticking_share=0.0, bdf1_share=1.0)
+    scene = moved(rope_above())
+    count = len(scene.ropes["rope"].particles)
+    short, long = (sb.simulate(scene, [0.0, end], SOLVER).contacts["table"] for end in (0.1, 0.4))
+    assert (short.most, short.began - short.ended) == (count, count)
+    assert short.sliding_share > 0.9
+    assert 0.3 < long.sliding_share < 0.6  # it stands still after 0.17 s
+    assert long.sliding_share + long.sticking_share == pytest.approx(1.0)
+
+
 def test_a_moving_bar_lifts_a_cloth():
     scene = sb.Scene("lifted")
     cloth = sb.add_cloth(scene, sb.mesh.grid(0.2, 0.1, 6, 3), density=0.2, warp=200, shear=20, bending=1e-4)
@@ -135,8 +156,6 @@ def test_other_methods_name_the_one_that_can(method):
 
 def test_what_does_not_know_contacts_says_so(tmp_path):
     scene = rope_above()
-    with pytest.raises(sb.InputError, match="bdf1"):
-        sb.simulate(scene, TIMES, sb.Solver(h=1e-3, method="implicit"))
     with pytest.raises(sb.InputError, match="contacts"):
         sb.simulate(scene, TIMES, sb.Solver(h=1e-3, method="implicit", integrator="bdf1", extrapolate=2))
     with pytest.raises(sb.SceneError, match="contacts"):

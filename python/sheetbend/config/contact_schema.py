@@ -74,8 +74,8 @@ class ColliderSection(Section):
 
 class ContactSection(Section):
     """Who may touch a collider, and how rough that is, `Scene.contact` (docs/contact.md). A list: [[scene.contact]].
-    It needs method = "implicit" and integrator = "bdf1" in [solver]. Its quantities are <name>_friction, unless zero
-    <name>_contact_radius (m), and where given <name>_contact_stiffness (N/m)."""
+    It needs method = "implicit" in [solver]. Its quantities are <name>_friction, unless zero <name>_contact_radius (m),
+    and where given <name>_contact_stiffness (N/m) and <name>_restitution."""
 
     name: Name | None = key(None, "prefix of its quantities; the collider's name when left out")
     of: Name | list[Name] = key(..., "a rope, a cloth or a set of particles, or several: all of their particles")
@@ -85,6 +85,9 @@ class ContactSection(Section):
         0.0, "of a rope, or half the thickness of a cloth: particles touch at this distance", "m", ge=0
     )
     stiffness: Finite | None = key(None, "per particle; rigid when left out", "N/m", gt=0)
+    restitution: Finite | None = key(
+        None, "speed after an impact over that before, of particles that nothing holds; 0 when left out", ge=0, le=1
+    )
     settle: bool = key(
         False,
         "move particles that start inside, as measured ones may by noise, to the surface before the motion starts",

@@ -14,21 +14,17 @@ from .scene_schema import SceneSection
 from .solver_schema import SolverSection
 from .tools import tool_named
 
-NEEDED = {"method": "implicit", "integrator": "bdf1"}
-
 
 def check_solver(section: SceneSection, solver: SolverSection) -> None:
     """Contacts need a solver that knows them.
 
     Raises:
-        ConfigError: another method or integrator, with the lines that [solver] needs.
+        ConfigError: another method, with the line that [solver] needs.
     """
-    for name, needed in NEEDED.items():
-        given = getattr(solver, name)
-        if section.contact and given != needed:
-            lines = " and ".join(f'{key} = "{value}"' for key, value in NEEDED.items())
-            problem = "does not know the contacts of [[scene.contact]]"
-            raise ConfigError(f"solver.{name}", problem, given, f"write {lines} in [solver]")
+    method = solver.model_dump()["method"]
+    if section.contact and method != "implicit":
+        problem = "does not know the contacts of [[scene.contact]]"
+        raise ConfigError("solver.method", problem, method, 'write method = "implicit" in [solver]')
 
 
 def add_contacts(
@@ -60,7 +56,7 @@ def add_contacts(
         particles = [p for name in contact.touching for p in named.get(name, ())]
         if not particles:
             continue
-        numbers = contact.model_dump(include={"friction", "radius", "stiffness", "settle"})
+        numbers = contact.model_dump(include={"friction", "radius", "stiffness", "restitution", "settle"})
         with located(path, f"{contact.name or contact.collider}.contact"):
             scene.contact(particles, colliders[contact.collider], name=contact.name, **numbers)
 

@@ -57,7 +57,7 @@ def missing_loss(problem: FitProblem, u: Array, fitted: tuple[FitProblem, Array]
     """By free parameter, the motion whose losses the model does not have, or does not have so large.
 
     Takes one simulation with the other integrator. Where that has no answer, nothing is told, nor of motions with
-    contacts, which know one integrator alone (half the substep moves when they begin and slide, which is no loss).
+    contacts (another integrator or substep moves when they begin and slide, which is no loss).
 
     Args:
         problem: whose residuals count.

@@ -30,7 +30,7 @@ RUNS = 6.0  # of the scene for differences along one direction, mostly
 SHORTER = (1.0, 0.5, 0.25, 0.125)
 POSITIVE = (
     *("mass", "compliance", "damping", "drag_linear", "drag_quadratic", "air_normal", "air_tangential"),
-    *("volume", "volume_compliance", "friction", "contact_radius", "contact_stiffness", "collider_size"),
+    *("volume", "volume_compliance", "friction", "contact_radius", "contact_stiffness", "collider_size", "restitution"),
 )
 
 

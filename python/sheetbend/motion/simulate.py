@@ -15,6 +15,7 @@ from ..errors import DivergenceError, InputError, UnbalancedError, UnconvergedEr
 from ..files.memory import expect_room
 from ..quantities.kinds import KINDS
 from ..scene.scene import Scene
+from .contact_counts import ContactCounts, contact_counts
 from .solver import Solver
 
 MOST_SUBSTEPS = 2**31 - 1  # that the core counts
@@ -31,6 +32,7 @@ class Trajectory:
         forces: per group the constraints' multipliers (frames, count, rows) in units of force (distance: minus the
             tension in N; bend and hinge: minus the moment in N m), zero at the initial frame.
         pressures: per volume (frames,) its multiplier, Pa, inside above outside; zero at the initial frame.
+        contacts: per contact of the scene, by name, how many particles touched, slid, stuck, began and ended.
     """
 
     times: np.ndarray
@@ -38,6 +40,7 @@ class Trajectory:
     velocities: np.ndarray
     forces: Mapping[str, np.ndarray]
     pressures: Mapping[str, np.ndarray] = field(default_factory=dict)
+    contacts: Mapping[str, ContactCounts] = field(default_factory=dict)
 
 
 def simulate(
@@ -82,6 +85,9 @@ def simulate(
         velocities,
         forces_by_group(scene, out["multipliers"]),
         pressures_by_volume(scene, out["multipliers"]),
+        contact_counts(
+            [c.name for c in scene.contacts.contacts], out["contacts"], out["first_order"] / max(steps[-1], 1)
+        ),
     )
 
 

@@ -15,7 +15,7 @@ from ..quantities.quantities import ZERO_OR_MORE, Builder, Term
 from .colliders import Collider
 
 Array = np.ndarray
-ARRAYS = ("friction", "contact_radius", "contact_stiffness", "collider_pose", "collider_size")
+ARRAYS = ("friction", "contact_radius", "contact_stiffness", "collider_pose", "collider_size", "restitution")
 TOUCHES = 1e-6  # m: so deep a particle may be at the start, as under its own weight
 
 
@@ -38,6 +38,7 @@ class Contact:
         carried: (n,) pinned particles whose coordinates are the tangential forces that are carried from substep to
             substep [N], in the collider's frame.
         rigid: whether it is as stiff as masses and substeps allow.
+        bounces: whether it has a restitution.
     """
 
     name: str
@@ -45,6 +46,37 @@ class Contact:
     particles: Array
     carried: Array
     rigid: bool
+    bounces: bool
+
+
+@dataclass(frozen=True)
+class ContactNumbers:
+    """What describes a contact, as `Scene.contact` takes it.
+
+    Attributes:
+        friction: Coulomb's coefficient.
+        radius: m.
+        stiffness: N/m; None where it is rigid.
+        restitution: None where nothing bounces.
+    """
+
+    friction: float
+    radius: float
+    stiffness: float | None
+    restitution: float | None
+
+    def check(self, name: str) -> None:
+        """Raises SceneError where a number is none that it could be."""
+        needed = (("friction", self.friction, "a coefficient, or 0"), ("radius", self.radius, "m, or 0"))
+        for label, value, unit in needed:
+            if not (is_number(value) and value >= 0):
+                raise SceneError(f"{name}.contact.{label}", "must not be negative", value, f"give {unit}")
+        if self.stiffness is not None and not (is_number(self.stiffness) and self.stiffness > 0):
+            fix = "give N/m, or leave it out for a rigid contact"
+            raise SceneError(f"{name}.contact.stiffness", "must be positive", self.stiffness, fix)
+        if self.restitution is not None and not (is_number(self.restitution) and 0 <= self.restitution <= 1):
+            fix = "give the speed after an impact over that before, or leave it out"
+            raise SceneError(f"{name}.contact.restitution", "must be between 0 and 1", self.restitution, fix)
 
 
 class Contacts:
@@ -81,9 +113,7 @@ class Contacts:
         what: ArrayLike | HasParticles,
         collider: Collider,
         count: int,
-        friction: float,
-        radius: float,
-        stiffness: float | None,
+        numbers: ContactNumbers,
         name: str | None,
     ) -> tuple[Array, str]:
         """The particles of a new contact, of `count` in the scene, and its name."""
@@ -96,12 +126,7 @@ class Contacts:
         which = index_array(f"{name}.contact.particles", particles, count)
         if len(np.unique(which)) < len(which):
             raise SceneError(f"{name}.contact.particles", "are listed twice", which.tolist(), "list each particle once")
-        for label, value, unit in (("friction", friction, "a coefficient, or 0"), ("radius", radius, "m, or 0")):
-            if not (is_number(value) and value >= 0):
-                raise SceneError(f"{name}.contact.{label}", "must not be negative", value, f"give {unit}")
-        if stiffness is not None and not (is_number(stiffness) and stiffness > 0):
-            fix = "give N/m, or leave it out for a rigid contact"
-            raise SceneError(f"{name}.contact.stiffness", "must be positive", stiffness, fix)
+        numbers.check(name)
         return which, name
 
     def add(
@@ -110,20 +135,24 @@ class Contacts:
         collider: Collider,
         which: Array,
         carried: Array,
-        friction: float,
-        radius: float,
-        stiffness: float | None,
+        numbers: ContactNumbers,
         name: str,
     ) -> None:
         """See `Scene.contact`."""
         at, place = len(self.contacts), self._place(scene, collider)
-        self._name(scene, f"{name}_friction", "friction", at, friction, "")
-        if radius > 0:
-            self._name(scene, f"{name}_contact_radius", "contact_radius", at, radius, "m")
-        if stiffness is not None:
+        self._name(scene, f"{name}_friction", "friction", at, numbers.friction, "")
+        if numbers.radius > 0:
+            self._name(scene, f"{name}_contact_radius", "contact_radius", at, numbers.radius, "m")
+        if numbers.stiffness is not None:
             soft = sum(not c.rigid for c in self.contacts)
-            self._name(scene, f"{name}_contact_stiffness", "contact_stiffness", soft, stiffness, "N/m")
-        self.contacts.append(Contact(name, place, which, carried, stiffness is None))
+            self._name(scene, f"{name}_contact_stiffness", "contact_stiffness", soft, numbers.stiffness, "N/m")
+        if numbers.restitution is not None:
+            bouncing = sum(c.bounces for c in self.contacts)
+            quantity = f"{name}_restitution"
+            scene.add_quantity(quantity, numbers.restitution, "", positive=False, scale=0.1, limits=(0.0, 1.0))
+            scene.add_terms([Term("restitution", bouncing, 1.0, ((quantity, "identity"),))])
+        rigid, bounces = numbers.stiffness is None, numbers.restitution is not None
+        self.contacts.append(Contact(name, place, which, carried, rigid, bounces))
 
     def _name(self, scene: Builder, quantity: str, array: str, at: int, value: float, unit: str) -> None:
         scene.add_quantity(
@@ -156,6 +185,7 @@ class Contacts:
                     "particles": c.particles,
                     "carried": c.carried,
                     "rigid": c.rigid,
+                    "bounces": c.bounces,
                 }
                 for c in self.contacts
             ],
@@ -172,6 +202,7 @@ class Contacts:
             "contact_stiffness": np.zeros(sum(not c.rigid for c in self.contacts)),
             "collider_pose": np.concatenate([np.zeros(0), *poses]),
             "collider_size": np.zeros(sum(len(c.sizes) for c in self.colliders.values())),
+            "restitution": np.zeros(sum(c.bounces for c in self.contacts)),
         }
 
     def expect_apart(self, core: Any, inputs: Array, masses: Array, gravity: Array, held: set[int]) -> None:

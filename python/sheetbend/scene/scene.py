@@ -14,7 +14,7 @@ from ..quantities.kinds import KINDS
 from ..quantities.quantities import ZERO_OR_MORE, Term, product
 from .colliders import Collider
 from .compiled import CompiledScene
-from .contacts import HasParticles
+from .contacts import ContactNumbers, HasParticles
 from .frames import Frame, directors_of, normals_of
 from .group import make_group
 from .moving_clamp import clamped_ends, keep_direction, let_go
@@ -345,31 +345,32 @@ class Scene(SceneData):
         friction: float,
         radius: float = 0.0,
         stiffness: float | None = None,
+        restitution: float | None = None,
         name: str | None = None,
         settle: bool = False,
     ) -> str:
         """Let particles (no links or triangles) touch a shape, and return the contact's name; see docs/contact.md.
 
-        Needs method "implicit" with integrator "bdf1". Quantities: `<name>_friction`, unless zero `_contact_radius` m,
-        where given `_contact_stiffness` N/m; of the collider `<collider>_x`, `_y`, `_z` m and its lengths.
+        Needs method "implicit". Quantities are in brackets; the collider's are `<collider>_x`, `_y`, `_z` and lengths.
 
         Args:
             what: a rope, a cloth, or particles (n,).
             collider: `Plane`, `Sphere`, `Capsule` or `Box`; one object may serve several contacts.
-            friction: Coulomb's coefficient; 0 is smooth.
-            radius: m, of a rope, or half the thickness of cloth: particles touch at this distance.
-            stiffness: N/m per particle. Rigid by default: a particle lies h^2 g/1000 deep under its weight.
+            friction: Coulomb's coefficient (`<name>_friction`); 0 is smooth.
+            radius: m, of a rope, or half the thickness of cloth (`<name>_contact_radius` unless zero).
+            stiffness: N/m per particle (`<name>_contact_stiffness`). By default rigid: h^2 g/1000 deep under weight.
+            restitution: 0 to 1 (`<name>_restitution`), of particles that no constraint holds; by default 0 of all.
             name: by default that of the collider.
             settle: move what starts inside to the surface, at the values that the scene is given with.
-
         Raises:
-            SceneError: unknown or repeated particles, negative numbers, names that are taken; later a start inside.
+            SceneError: numbers out of range; when it is compiled: a start inside, restitution of what constraints hold.
         """
         self._building()
-        which, name = self.contacts.check(what, collider, self.particle_count, friction, radius, stiffness, name)
+        numbers = ContactNumbers(friction, radius, stiffness, restitution)
+        which, name = self.contacts.check(what, collider, self.particle_count, numbers, name)
         carried = self.add_particles(np.zeros((len(which), 3)), 1.0)
         self.pin(carried)
-        self.contacts.add(self, collider, which, carried, friction, radius, stiffness, name)
+        self.contacts.add(self, collider, which, carried, numbers, name)
         self.contacts.settling |= {name} if settle else set()
         return name
 
@@ -377,8 +378,7 @@ class Scene(SceneData):
         """End the construction: validates the whole scene and returns it. Later additions raise.
 
         Raises:
-            SceneError: no particles, nothing can move, massless free particles, or particles that no constraint and no
-                boundary holds.
+            SceneError: no particles, nothing that can move, free particles without mass or that nothing holds.
         """
         if not self._frozen:
             validate(self)

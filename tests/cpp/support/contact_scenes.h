@@ -8,7 +8,7 @@ namespace sheetbend::testing {
 // Builds a scene whose particles all may touch all colliders; nodes that carry friction follow the particles.
 struct ContactBuilder {
   SceneSpec spec;
-  std::vector<double> x, velocity, mass, compliance, rest, friction, radius, stiffness, pose, size;
+  std::vector<double> x, velocity, mass, compliance, rest, friction, radius, stiffness, restitution, pose, size;
 
   int particle(const Vec3<double>& at, double m, const Vec3<double>& v = {0.0, 0.0, 0.0}) {
     x.insert(x.end(), {at.x, at.y, at.z});
@@ -33,11 +33,11 @@ struct ContactBuilder {
     spec.groups.push_back({kind, kind, false, {}});
     constraint(kind, nodes, c, p);
   }
-  // Last: of what was added before.
-  void contact(double mu, double r, double k = 0.0) {
+  // Last: of what was added before. Nothing bounces where e is negative.
+  void contact(double mu, double r, double k = 0.0, double e = -1.0) {
     if (moving < 0) moving = static_cast<int>(mass.size());
     for (int c = 0; c < static_cast<int>(spec.colliders.size()); ++c) {
-      ContactSpec contact{"contact", c, {}, {}, k == 0.0};
+      ContactSpec contact{"contact", c, {}, {}, k == 0.0, e >= 0.0};
       for (int n = 0; n < moving; ++n) {
         contact.particles.push_back(n);
         contact.carried.push_back(particle({0.0, 0.0, 0.0}, 1.0));
@@ -47,6 +47,7 @@ struct ContactBuilder {
       friction.push_back(mu);
       radius.push_back(r);
       if (k > 0.0) stiffness.push_back(k);
+      if (e >= 0.0) restitution.push_back(e);
     }
   }
   testing::Sample build(double gravity) {
@@ -65,7 +66,7 @@ struct ContactBuilder {
     put(Quantity::position, x), put(Quantity::velocity, velocity), put(Quantity::mass, mass);
     put(Quantity::compliance, compliance), put(Quantity::rest, rest), put(Quantity::gravity, {0.0, 0.0, -gravity});
     put(Quantity::friction, friction), put(Quantity::contact_radius, radius);
-    put(Quantity::contact_stiffness, stiffness), put(Quantity::collider_pose, pose), put(Quantity::collider_size, size);
+    put(Quantity::contact_stiffness, stiffness), put(Quantity::restitution, restitution), put(Quantity::collider_pose, pose), put(Quantity::collider_size, size);
     return s;
   }
 
@@ -73,8 +74,8 @@ struct ContactBuilder {
   std::map<std::string, std::vector<double>> compliances, rests;
 };
 
-inline SolverOptions contact_options(double h) {
-  return {.h = h, .integrator = Integrator::bdf1, .partition = Partition::implicit, .iterations = 100};
+inline SolverOptions contact_options(double h, Integrator integrator = Integrator::bdf1) {
+  return {.h = h, .integrator = integrator, .partition = Partition::implicit, .iterations = 100};
 }
 
 // d x_dof/d inputs at the last step of a program.

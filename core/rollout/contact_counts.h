@@ -1,0 +1,58 @@
+// What the contacts of a scene did in a rollout, counted over its substeps.
+#pragma once
+
+#include <vector>
+
+#include "core/scene/scene.h"
+#include "core/step/carry_friction.h"
+
+namespace sheetbend {
+
+// Of one contact. A particle that touches in the first substep has not begun to; one that bounces begins and ends.
+struct ContactCounts {
+  int most = 0;                  // particles that touched at once
+  int began = 0, ended = 0;      // how often one did
+  long touching = 0, sliding = 0;  // particles, summed over substeps
+};
+
+class CountContacts {
+ public:
+  explicit CountContacts(const Scene& scene) : scene_(scene), counts_(scene.contacts.size()) {}
+
+  // After each substep of a rollout.
+  template <class R>
+  void look(const R& rollout) {
+    const std::vector<ContactMode>& modes = rollout.contact_modes();
+    for (const auto& impact : rollout.impacts()) {
+      ++counts_[impact.contact].began;
+      ++counts_[impact.contact].ended;
+    }
+    const bool first = before_.empty();
+    for (std::size_t c = 0; c < counts_.size(); ++c) {
+      const std::size_t begin = scene_.contacts[c].first, end = begin + scene_.contacts[c].particles.size();
+      ContactCounts& count = counts_[c];
+      int touching = 0;
+      for (std::size_t i = begin; i < end; ++i) {
+        const bool touches = modes[i] != ContactMode::apart;
+        touching += touches;
+        count.sliding += modes[i] == ContactMode::slides;
+        if (first) continue;
+        const bool touched = before_[i] != ContactMode::apart;
+        count.began += touches && !touched;
+        count.ended += touched && !touches;
+      }
+      count.touching += touching;
+      count.most = std::max(count.most, touching);
+    }
+    before_ = modes;
+  }
+
+  const std::vector<ContactCounts>& counts() const { return counts_; }
+
+ private:
+  const Scene& scene_;
+  std::vector<ContactCounts> counts_;
+  std::vector<ContactMode> before_;
+};
+
+}  // namespace sheetbend

@@ -1,0 +1,41 @@
+"""What the contacts of a scene did in a simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ContactCounts:
+    """What the particles of one contact did, over all substeps of a simulation.
+
+    Attributes:
+        most: how many of them touched at once, at most.
+        began: how often one began to touch. Those that touch in the first substep have not begun to; bounces count.
+        ended: how often one came off, bounces again.
+        sliding_share: of what touched, particle by particle and substep by substep, how much slid; 0 where nothing
+            touched.
+        sticking_share: likewise, how much was held by friction.
+        bdf1_share: of the scene's substeps, how many went with BDF1. With integrator "bdf2" that is the first one, and
+            three from where a contact begins. BDF1 damps like zeta = omega h/2.
+    """
+
+    most: int
+    began: int
+    ended: int
+    sliding_share: float
+    sticking_share: float
+    bdf1_share: float
+
+
+def contact_counts(
+    names: Sequence[str], counted: Sequence[Mapping[str, int]], bdf1_share: float
+) -> dict[str, ContactCounts]:
+    """By the contacts' names, from what the core has counted."""
+    counts = {}
+    for name, c in zip(names, counted, strict=True):
+        slid = c["sliding"] / max(c["touching"], 1)
+        stuck = (c["touching"] - c["sliding"]) / max(c["touching"], 1)
+        counts[name] = ContactCounts(c["most"], c["began"], c["ended"], slid, stuck, bdf1_share)
+    return counts

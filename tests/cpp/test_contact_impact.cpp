@@ -1,0 +1,88 @@
+// BDF2 through impacts: second order, no bounce, and BDF2 itself where nothing touches.
+#include "core/rollout/rollout.h"
+#include "tests/cpp/support/contact_scenes.h"
+
+namespace sheetbend::testing {
+namespace {
+
+constexpr double g = 9.81;
+
+// A particle that falls from a height and slides.
+struct Landing {
+  double x, highest;  // where it comes to rest, and how high it is at most after it has touched
+  double by_height, by_speed, by_friction;
+  int first_order;  // substeps
+};
+Landing land(double h) {
+  ContactBuilder b;
+  b.particle({0.0, 0.0, 0.1}, 0.2, {2.0, 0.0, 0.0});
+  b.collider("plane", {}, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0});
+  b.contact(0.3, 0.0);
+  const Sample s = b.build(g);
+  const Program p{s.scene, make_plan(s.scene, contact_options(h, Integrator::bdf2)), static_cast<int>(std::lround(0.8 / h))};
+  Rollout<double> rollout(s.scene, p.plan, s.inputs.data());
+  Landing found{0.0, -1.0, 0.0, 0.0, 0.0, 0};
+  bool touched = false;
+  for (int n = 0; n < p.steps; ++n) {
+    rollout.advance();
+    touched |= rollout.x()[2] < 0.0;
+    if (touched) found.highest = std::max(found.highest, rollout.x()[2]);
+    found.first_order += rollout.first_order();
+  }
+  found.x = rollout.x()[0];
+  std::vector<double> seed(s.scene.dofs());
+  seed[0] = 1.0;
+  const auto bar = gradient_of_end(p, s.inputs, seed);
+  const Inputs<const double> in{s.scene.layout, bar.data()};
+  found.by_height = in.of(Quantity::position)[2];
+  found.by_speed = in.of(Quantity::velocity)[0];
+  found.by_friction = in.of(Quantity::friction)[0];
+  return found;
+}
+
+TEST(Impact, IsOfSecondOrderWithoutABounce) {
+  constexpr double mu = 0.3, v = 2.0, h0 = 0.1;
+  const double fall = std::sqrt(2.0 * h0 / g), left = v - mu * g * fall;
+  const double x = v * fall + left * left / (2.0 * mu * g);  // 0.709579
+  double before = 0.0;
+  for (const int rate : {240, 480, 960, 1920}) {
+    const Landing found = land(1.0 / rate);
+    const double error = std::abs(found.x - x);
+    EXPECT_LE(found.highest, 1e-9);
+    EXPECT_NEAR(found.by_height, mu, 1e-4);
+    EXPECT_EQ(found.first_order, 4);
+    if (before > 0.0) {
+      EXPECT_NEAR(before / error, 4.0, 1.0);
+    }
+    before = error;
+  }
+  EXPECT_LE(before, 3e-6);
+}
+
+// A rope far above a plane, and the same rope without one.
+TEST(Impact, LeavesFreeFlightAsItIs) {
+  const auto fly = [](bool above) {
+    ContactBuilder b;
+    for (int i = 0; i < 5; ++i) b.particle({0.05 * i, 0.01 * i * i, 10.0}, 0.002, {0.3 * i, 0.1, 0.2 * i});
+    for (int i = 0; i < 4; ++i) b.constraint("distance", {i, i + 1}, 0.05 / 50.0, {0.05});
+    for (int i = 0; i < 3; ++i) b.constraint("bend", {i, i + 1, i + 2}, 0.05 / 1e-4, {});
+    if (above) {
+      b.collider("plane", {}, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0});
+      b.contact(0.3, 0.0);
+    }
+    const Sample s = b.build(g);
+    const Plan plan = make_plan(s.scene, contact_options(1e-3, Integrator::bdf2));
+    Rollout<double> rollout(s.scene, plan, s.inputs.data());
+    std::vector<double> all;
+    for (int n = 0; n < 40; ++n) {
+      rollout.advance();
+      EXPECT_EQ(rollout.first_order() != 0, n == 0);
+      all.insert(all.end(), rollout.x(), rollout.x() + 15);
+    }
+    return all;
+  };
+  EXPECT_TRUE(same_bits(fly(true), fly(false)));
+}
+
+}  // namespace
+}  // namespace sheetbend::testing

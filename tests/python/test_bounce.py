@@ -1,0 +1,75 @@
+"""Restitution: a ball that bounces, its gradients, a fit of it, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sheetbend as sb
+
+SOLVER = sb.Solver(h=1 / 480, method="implicit")
+
+
+def ball(restitution=0.8, height=1.0, speed=(0.0, 0.0, 0.0), friction=0.1, **contact) -> sb.Scene:
+    scene = sb.Scene("ball")
+    scene.add_particles([[0.0, 0.0, height]], 0.1, [speed])
+    scene.contact([0], sb.Plane(name="table"), friction=friction, restitution=restitution, **contact)
+    return scene
+
+
+def test_a_ball_rises_as_its_restitution_says():
+    motion = sb.simulate(ball(), [0.0, 0.7], SOLVER)
+    assert motion.positions[-1, 0, 2] == pytest.approx(0.5776531, abs=1e-4)
+    assert motion.velocities[-1, 0, 2] == pytest.approx(0.8 * 9.81 * 0.4515236 - 9.81 * (0.7 - 0.4515236), abs=1e-3)
+    rests = sb.simulate(ball(restitution=0.5, height=0.1, radius=0.02), np.arange(0, 2.01, 0.1), SOLVER)
+    assert rests.positions[-1, 0, 2] == pytest.approx(0.02, abs=1e-6)
+    assert rests.positions[:, 0, 2].min() > 0.02 - 1e-6
+
+
+@pytest.mark.parametrize("integrator", ["bdf1", "bdf2"])
+def test_its_gradients_are_those_of_differences(integrator):
+    solver = sb.Solver(h=1 / 240, method="implicit", integrator=integrator)
+    scene = ball(speed=(2.0, 0.0, -1.0), height=0.3, radius=0.02)
+    scene.contact([0], sb.Sphere(center=(0.75, 0.0, 0.1), radius=0.15, name="post"), friction=0.2, restitution=0.6)
+    times = [0.0, 0.4]
+    rollout = sb.rollout(scene, times, solver)
+    bar = np.zeros_like(rollout.positions)
+    bar[-1, 0] = (1.0, 0.0, 0.5)
+    found = rollout.gradient(bar).quantities
+
+    def loss(**values):
+        return (bar * sb.rollout(scene, times, solver, values=values).positions).sum()
+
+    for name in ("table_restitution", "post_restitution", "table_friction", "post_radius", "table_contact_radius"):
+        value = scene.quantities[name].value
+        expected = (loss(**{name: value + 1e-7}) - loss(**{name: value - 1e-7})) / 2e-7
+        assert found[name] == pytest.approx(expected, rel=1e-5, abs=1e-6), name
+    assert abs(found["table_restitution"]) > 1e-3
+    assert abs(found["post_restitution"]) > 1e-3
+
+
+def test_restitution_is_fitted_inside_its_interval():
+    times = np.arange(0, 1.2001, 1 / 60)
+    clean = sb.simulate(ball(restitution=0.75, height=0.5), times, SOLVER).positions
+    noise = np.random.default_rng(3).normal(0.0, 1e-3, clean.shape)
+    recording = sb.Recording(positions=(clean + noise)[:, :1], times=times, name="ball")
+    scene, places = ball(restitution=0.6, height=0.5), [sb.on_particle(0)]
+    fit = sb.fit(scene, recording, ["table_restitution"], markers=places, solver=SOLVER, sigma=1e-3)
+    (found,) = fit.result.estimates
+    assert found.verdict == "identified"
+    assert found.lower < 0.75 < found.upper
+    assert found.upper - found.lower < 0.02
+
+
+def test_what_constraints_hold_does_not_bounce():
+    scene = sb.rope(0.2, 8, density=0.05, EA=200.0, EI=1e-4, start=(0, 0, 0.006), pinned=())
+    scene.contact(scene.ropes["rope"], sb.Plane(name="table"), friction=0.3, radius=0.005, restitution=0.5)
+    with pytest.raises(sb.SceneError, match="held by 'rope_") as error:
+        _ = scene.compiled
+    assert error.value.field == "table.restitution"
+
+
+@pytest.mark.parametrize("restitution", [-0.1, 1.1, np.nan, "much"])
+def test_restitutions_that_cannot_be_are_refused(restitution):
+    with pytest.raises(sb.SceneError) as error:
+        ball(restitution=restitution)
+    assert error.value.field == "table.contact.restitution"
