@@ -173,6 +173,6 @@ class EmptyGradientError(SheetbendError, RuntimeError):
         return (
             f"the gradient is empty: moving {names} by its scale changes the loss by {self.change:.1e} at most, and "
             f"rounding alone by {self.rounding:.1e}. What the loss looks at does not feel them: motion after the last "
-            "frame, a slack or soft rope through which it has not arrived, or a symmetric start. "
-            "Fix: let the loss look later, or start elsewhere."
+            "frame, a slack or soft rope through which it has not arrived, a contact that nothing touches yet, or a "
+            "symmetric start. Fix: let the loss look later, or start elsewhere, such as where something touches."
         )

@@ -100,7 +100,7 @@ def test_the_report_tells_what_touches_and_where_motions_have_kinks() -> None:
     result = fitted(dragged(0.3), dragged(0.29), ["table_friction"], 1, world).result
     (touch,), (kinks,) = result.contacts, result.kinks
     assert (touch.contact, touch.particles, touch.most, touch.bdf1) == ("table", 12, 11, 1.0)  # one is driven
-    assert touch.began == 11 and touch.ended == 0  # it falls on the table
+    assert touch.began >= 11 and touch.began - touch.ended == 11  # it falls on the table
     assert touch.sliding + touch.sticking == pytest.approx(1.0)
     assert 0.3 < touch.sliding < 0.9
     assert kinks.name == "table_friction" and kinks.stick > 0 and kinks.begin == kinks.end == 0
@@ -117,7 +117,8 @@ def test_slides_and_sticks_are_those_of_a_block_on_a_slope() -> None:
         plane = sb.Plane(normal=(0.0, -0.2, 1.0), name="slope")
         scene.contact([block], plane, friction=friction)
         scene.set_drag(linear=[1e-3, 0.0])
-        modes = contact_modes(scene, np.linspace(0.0, 0.2, 11), SOLVER, {})["slope"]
+        motion = sb.simulate(scene, np.linspace(0.0, 0.2, 11), SOLVER)
+        modes = contact_modes(scene, motion, SOLVER, {})["slope"]
         assert modes.shape == (11, 1)
         assert float((modes[2:] == SLIDES).mean()) == sliding
         assert float((modes[2:] == STICKS).mean()) == 1.0 - sliding

@@ -77,3 +77,20 @@ def test_a_collider_that_would_jump_over_particles_is_refused(h: float, interpol
 def test_a_collider_that_is_seen_pushes() -> None:
     swept(2.5e-3)
     swept(4e-3, radius=0.02)
+
+
+def test_a_gradient_is_empty_while_nothing_touches_and_says_so() -> None:
+    """A rope that falls on a table: where its end lies does not depend on friction before it has landed and slides."""
+    scene = sb.rope(0.2, 8, density=0.05, EA=200.0, EI=1e-4, start=(0, 0, 0.06), pinned=(0,))
+    scene.contact(scene.ropes["rope"], sb.Plane(name="table"), friction=0.3, radius=0.005)
+    scales = {"table_friction": 0.1, "table_z": 0.01}
+
+    def felt(until: float) -> sb.Gradient:
+        rolled = sb.rollout(scene, [until], SOLVER)
+        bar = np.zeros_like(rolled.positions)
+        bar[0, scene.ropes["rope"].particles[-1]] = 1.0
+        return rolled.gradient(bar)
+
+    with pytest.raises(sb.EmptyGradientError, match="nothing touches yet"):
+        felt(0.04).require(scales)
+    felt(0.3).require(scales)

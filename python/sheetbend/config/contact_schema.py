@@ -85,12 +85,12 @@ class ContactSection(Section):
         0.0, "of a rope, or half the thickness of a cloth: particles touch at this distance", "m", ge=0
     )
     stiffness: Finite | None = key(None, "per particle; rigid when left out", "N/m", gt=0)
+    restitution: Finite | None = key(
+        None, "speed after an impact over that before, of particles that nothing holds; 0 when left out", ge=0, le=1
+    )
     settle: bool = key(
         False,
         "move particles that start inside, as measured ones may by noise, to the surface before the motion starts",
-    )
-    restitution: Finite | None = key(
-        None, "speed after an impact over that before, of particles that nothing holds; 0 when left out", ge=0, le=1
     )
 
     @property

@@ -16,31 +16,34 @@ from ..arrays.timeseries import Array
 from ..errors import DivergenceError, UnbalancedError
 from ..minimum.problem import FitProblem
 from ..motion.contact_modes import OPEN, SLIDES, STICKS, contact_modes
+from ..motion.simulate import Trajectory, simulate
+from ..motion.solver import Solver
 from ..result.result import ContactFit, Estimate, Kinks
 from ..statistics.gauge import RANK_TOLERANCE
 
 
 def what_touches(problem: FitProblem, u: Array) -> tuple[ContactFit, ...]:
-    """What every contact of the fitted motions does at the frames of its recording, at u (free,).
+    """What every contact of the fitted motions does, at u (free,).
 
     Takes one simulation of each experiment that has contacts; a motion that has no answer is left out.
     """
     rows = []
-    for e, modes in zip(problem.experiments, _modes(problem, u), strict=True):
-        for name, mode in modes.items():
-            touches = mode != OPEN
-            start = e.scene.compiled.settled.get(name)
+    for e, run in zip(problem.experiments, _runs(problem, u), strict=True):
+        if run is None:
+            continue
+        for c in e.scene.contacts.contacts:
+            counts, start = run[0].contacts[c.name], e.scene.compiled.settled.get(c.name)
             rows.append(
                 ContactFit(
                     recording=e.name,
-                    contact=name,
-                    particles=mode.shape[1],
-                    most=int(touches.sum(axis=1).max()),
-                    began=int((~touches[:-1] & touches[1:]).sum()),
-                    ended=int((touches[:-1] & ~touches[1:]).sum()),
-                    sliding=_share(mode == SLIDES, touches),
-                    sticking=_share(mode == STICKS, touches),
-                    bdf1=1.0 if e.solver.integrator == "bdf1" else None,
+                    contact=c.name,
+                    particles=len(c.particles),
+                    most=counts.most,
+                    began=counts.began,
+                    ended=counts.ended,
+                    sliding=counts.sliding_share,
+                    sticking=counts.sticking_share,
+                    bdf1=counts.bdf1_share,
                     settled=0 if start is None else start.particles,
                     settled_by=0.0 if start is None else start.farthest,
                 )
@@ -81,21 +84,25 @@ def _contacts(differs: Array) -> int:
     return int(differs.any(axis=0).sum())
 
 
-def _share(some: Array, touches: Array) -> float:
-    return float(some.sum() / max(touches.sum(), 1))
-
-
 def _modes(problem: FitProblem, u: Array) -> list[dict[str, Array]]:
-    """By experiment and contact (frames, particles); empty where nothing can touch, or the motion has no answer."""
-    found: list[dict[str, Array]] = []
+    """By experiment and contact (frames, particles)."""
+    runs = zip(problem.experiments, _runs(problem, u), strict=True)
+    return [contact_modes(e.scene, run[0], run[1], run[2]) if run else {} for e, run in runs]
+
+
+def _runs(problem: FitProblem, u: Array) -> list[tuple[Trajectory, Solver, dict[str, float]] | None]:
+    """By experiment its motion at the substeps that are nearest to its frames, with the solver and the values of that
+    one run; None where nothing can touch, or the motion has no answer."""
+    found: list[tuple[Trajectory, Solver, dict[str, float]] | None] = []
     for e, recording in zip(problem.experiments, problem.recordings, strict=True):
-        found.append({})
+        found.append(None)
         if e.static or not e.scene.compiled.contacts:
             continue
-        values = problem.values_of(e, u)
+        solver, values = replace(e.solver, extrapolate=1), problem.values_of(e, u)
         times = np.maximum(e.scene_times(recording.times, values), 0.0)
         with suppress(DivergenceError, UnbalancedError):
-            found[-1] = contact_modes(e.scene, times, replace(e.solver, extrapolate=1), values)
+            motion = simulate(e.scene, np.rint(times / solver.h) * solver.h, solver, values)
+            found[-1] = (motion, solver, values)
     return found
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..scene.scene import Scene
-from .simulate import simulate
+from .simulate import Trajectory
 from .solver import Solver
 
 Array = np.ndarray
@@ -16,24 +16,18 @@ RIGIDITY = 1e3  # N h^2/(kg m): stiffness of rigid contacts, as core/contact/law
 AT_THE_CONE = 1e-6  # of Coulomb's limit: a tangential force so near it slides
 
 
-def contact_modes(scene: Scene, times: Array, solver: Solver, values: Mapping[str, float]) -> dict[str, Array]:
-    """Simulate a scene, and tell for each contact what its particles do.
+def contact_modes(scene: Scene, motion: Trajectory, solver: Solver, values: Mapping[str, float]) -> dict[str, Array]:
+    """For each contact of a motion, what its particles do at the frames.
 
     A particle touches where it lies inside the surface (by 1e-8 m under its weight), and slides where its tangential
-    force is Coulomb's limit.
+    force is Coulomb's limit. With "bdf2", what slides in the substeps that went with BDF1 counts as sticking.
 
     Args:
-        times: (frames,) s, moved to the nearest substeps.
-        values: quantities to change for this run, by name.
+        motion: of the scene with this solver, one run, and these values (of quantities that it changed, by name).
 
     Returns:
         By contact (frames, particles) of OPEN, STICKS and SLIDES. Particles that are held or driven are open.
-
-    Raises:
-        SheetbendError: as `simulate`.
     """
-    on_grid = np.rint(np.asarray(times) / solver.h) * solver.h
-    positions = simulate(scene, on_grid, solver, values).positions
     compiled = scene.compiled
     inputs = compiled.inputs(compiled.values(values))
     arrays = compiled.unpack(inputs)
@@ -46,8 +40,8 @@ def contact_modes(scene: Scene, times: Array, solver: Solver, values: Mapping[st
         mass = arrays["mass"][contact.particles]
         stiffness = RIGIDITY * mass / eta**2 if contact.rigid else np.full(len(mass), next(soft))
         limit = arrays["friction"][k] * stiffness
-        modes = np.full((len(on_grid), len(mass)), OPEN)
-        for frame, (t, x) in enumerate(zip(on_grid, positions, strict=True)):
+        modes = np.full((len(motion.times), len(mass)), OPEN)
+        for frame, (t, x) in enumerate(zip(motion.times, motion.positions, strict=True)):
             inputs[first : first + size] = x.ravel()
             depth = -compiled.core.contact_gaps(inputs, t, k)[:, 0]
             force = np.linalg.norm(x[contact.carried], axis=1)

@@ -24,13 +24,13 @@ def _contacts(result: FitData) -> Section:
             str(c.ended),
             _percent(c.sliding),
             _percent(c.sticking),
-            "" if c.bdf1 is None else _percent(c.bdf1),
+            _percent(c.bdf1),
         )
         for c in result.contacts
     ]
     headers = ("recording", "contact", "most at once", "began", "ended", "sliding", "sticking", "bdf1")
     notes = (
-        ("sliding, sticking", "shares of the touches at the frames of the recording"),
+        ("sliding, sticking", "shares of all touches, over all substeps"),
         ("bdf1", "share of the substeps of backward Euler, which damps vibrations"),
         ("losses", NO_LOSSES),
         *(

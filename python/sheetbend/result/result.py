@@ -163,17 +163,17 @@ class ForceFit:
 
 @dataclass(frozen=True, kw_only=True)
 class ContactFit:
-    """What one contact of one fitted motion does at the frames of the recording.
+    """What one contact of one fitted motion does, over all substeps; see `ContactCounts`.
 
     Attributes:
         recording, contact: names.
         particles: that may touch.
-        most: that touch at one frame.
-        began, ended: touches that are there at a frame and not at the one before, and the reverse.
-        sliding, sticking: shares of all touches.
+        most: that touch at once.
+        began, ended: how often one begins and ends to touch.
+        sliding, sticking: shares of all touches, particle by particle and substep by substep.
+        bdf1: share of the scene's substeps that went with backward Euler, which damps vibrations.
         settled: particles that started inside the collider and were moved to its surface.
         settled_by: m, the farthest of these moves.
-        bdf1: share of the substeps that went with backward Euler, which damps vibrations; None where it is not known.
     """
 
     recording: str
@@ -184,7 +184,7 @@ class ContactFit:
     ended: int
     sliding: float
     sticking: float
-    bdf1: float | None = None
+    bdf1: float
     settled: int = 0
     settled_by: float = 0.0
 

@@ -300,7 +300,6 @@ class Scene(HeldScene):
             restitution: 0 to 1 (`<name>_restitution`), of particles that no constraint holds; by default 0 of all.
             name: by default that of the collider.
             settle: move what starts inside to the surface, at the values that the scene is given with.
-
         Raises:
             SceneError: numbers out of range; when it is compiled: a start inside, restitution of what constraints hold.
         """
