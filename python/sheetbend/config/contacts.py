@@ -21,9 +21,10 @@ def check_solver(section: SceneSection, solver: SolverSection) -> None:
     Raises:
         ConfigError: another method, with the line that [solver] needs.
     """
-    if section.contact and solver.method != "implicit":
+    method = solver.model_dump()["method"]
+    if section.contact and method != "implicit":
         problem = "does not know the contacts of [[scene.contact]]"
-        raise ConfigError("solver.method", problem, solver.method, 'write method = "implicit" in [solver]')
+        raise ConfigError("solver.method", problem, method, 'write method = "implicit" in [solver]')
 
 
 def add_contacts(
