@@ -51,7 +51,8 @@ def main() -> None:
             best[case] = min(best.get(case, np.inf), seconds)
             ratio = best[case] / best["without"]
             asked = f", asked {ASKED[case]:.2f}" if case in ASKED else ""
-            print(f"{case:10} {1e6 * best[case]:7.1f} us per Newton step, {steps:.2f} a substep, ratio {ratio:.2f}{asked}")
+            took = f"{1e6 * best[case]:7.1f} us per Newton step, {steps:.2f} a substep"
+            print(f"{case:10} {took}, ratio {ratio:.2f}{asked}")
 
 
 if __name__ == "__main__":
