@@ -3,7 +3,7 @@
 #pragma once
 
 #include "core/contact/impact.h"
-#include "core/scalar/dual.h"
+#include "core/contact/touch.h"
 
 namespace sheetbend {
 

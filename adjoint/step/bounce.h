@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <ranges>
 
-#include "adjoint/contact/impact_vjp.h"
 #include "adjoint/solver/contact_source_vjp.h"
 #include "adjoint/step/stages.h"
 #include "core/step/bounce.h"

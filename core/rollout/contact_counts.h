@@ -1,9 +1,9 @@
 // What the contacts of a scene did in a rollout, counted over its substeps.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
-#include "core/scene/scene.h"
 #include "core/step/carry_friction.h"
 
 namespace sheetbend {

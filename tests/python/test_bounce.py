@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 import sheetbend as sb
@@ -58,6 +60,26 @@ def test_restitution_is_fitted_inside_its_interval():
     assert found.verdict == "identified"
     assert found.lower < 0.75 < found.upper
     assert found.upper - found.lower < 0.02
+
+
+def test_a_batch_bounces_as_each_scene_alone():
+    scene = ball(height=0.3)
+    core, compiled = pickle.loads(pickle.dumps(SOLVER.core(scene.compiled))), scene.compiled
+    inputs = np.stack([compiled.inputs(compiled.values({"table_restitution": e})) for e in (0.3, 0.8, 1.0)])
+    together = core.simulate_batch(inputs, [96, 192], 0.0)
+    alone = [core.states(own, [96, 192], 0.0) for own in inputs]
+    assert np.array_equal(together, np.stack(alone))
+    bar = np.ones_like(together)
+    gradients = core.vjp_batch(inputs, [96, 192], bar, 0.0)
+    for own, states_bar, found in zip(inputs, bar, gradients, strict=True):
+        _, tape = core.record(own, [96, 192], 0.0)
+        assert np.array_equal(core.vjp(own, tape, [96, 192], states_bar, 0.0), found)
+
+
+def test_a_bounce_is_a_contact_that_begins_and_ends():
+    counts = sb.simulate(ball(), [0.0, 0.7], SOLVER).contacts["table"]
+    assert (counts.began, counts.ended, counts.most) == (1, 1, 0)
+    assert counts.bdf1_share == pytest.approx(2 / 336)
 
 
 def test_what_constraints_hold_does_not_bounce():
