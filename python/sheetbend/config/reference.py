@@ -12,7 +12,16 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
-from . import cloth_schema, contact_schema, gripped_schema, rope_schema, scene_schema, schema, solver_schema
+from . import (
+    body_schema,
+    cloth_schema,
+    contact_schema,
+    gripped_schema,
+    rope_schema,
+    scene_schema,
+    schema,
+    solver_schema,
+)
 from .section import AXES, NAME, REFERENCE, Section
 
 HEADERS: dict[str, type[Section]] = {
@@ -32,6 +41,8 @@ HEADERS: dict[str, type[Section]] = {
     "[[scene.particles]]": scene_schema.Particles,
     "[[scene.pendulum]]": scene_schema.Pendulum,
     "[[scene.arm]]": scene_schema.Arm,
+    "[[scene.body]]": body_schema.BodySection,
+    "[[scene.joint]]": body_schema.JointSection,
     "[[scene.constraints]]": scene_schema.Constraints,
     "[[scene.point_mass]]": scene_schema.PointMass,
     "[[scene.force]]": scene_schema.Force,

@@ -14,7 +14,8 @@ from ..arrays.checks import check_increasing, finite, is_number
 from ..errors import SceneError
 from ..quantities.expression import Expression
 from ..quantities.quantities import ZERO_OR_MORE, Term
-from .joint_making import Array, Making
+from ..scene.scene import Array
+from .joint_making import Making
 
 Knots = tuple[ArrayLike, ArrayLike]  # times (knots,) s and values (knots,)
 MOST_NAMED = 50  # knots of a torque that are quantities

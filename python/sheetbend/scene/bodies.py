@@ -139,7 +139,9 @@ def named_start(scene: SceneData, name: str, start: Start, role: str) -> FrameSt
     """The state of a frame at the start; of a body that is not driven, as quantities of place, attitude and velocity
     make it."""
     if role == "driven":
-        return FrameState(*(expressions(v) for v in (start.at, start.frame, start.velocity, start.spin)))
+        given = (expressions(v) for v in (start.at, start.frame, start.velocity, start.spin))
+        origin, frame, velocity, spin = given
+        return FrameState(origin, frame, velocity, spin)
     names = names_of(name)
     given = {"place": np.zeros(3), "turn": np.zeros(3)}
     if role == "free":
