@@ -139,9 +139,8 @@ def named_start(scene: SceneData, name: str, start: Start, role: str) -> FrameSt
     """The state of a frame at the start; of a body that is not driven, as quantities of place, attitude and velocity
     make it."""
     if role == "driven":
-        given = (expressions(v) for v in (start.at, start.frame, start.velocity, start.spin))
-        origin, frame, velocity, spin = given
-        return FrameState(origin, frame, velocity, spin)
+        known = [expressions(v) for v in (start.at, start.frame, start.velocity, start.spin)]
+        return FrameState(known[0], known[1], known[2], known[3])
     names = names_of(name)
     given = {"place": np.zeros(3), "turn": np.zeros(3)}
     if role == "free":
