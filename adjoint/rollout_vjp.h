@@ -74,7 +74,9 @@ class StateReverse {
 
 // Cotangents of the initial state to those of the inputs: driven nodes started on their boundary.
 template <class T>
-void initial_state_vjp(const Scene& scene, double t0, const T* x_bar, const T* v_bar, const Inputs<T>& in_bar) {
+void initial_state_vjp(const Scene& scene, const Inputs<const T>& in, double t0, T* x_bar, T* v_bar, const Inputs<T>& in_bar) {
+  start_spins_vjp(scene, in.of(Quantity::mass), in.of(Quantity::position), in.of(Quantity::velocity), x_bar, v_bar,
+                  in_bar.of(Quantity::mass));
   const KnotWeights boundary = scene.driven.empty() ? KnotWeights{} : scene.boundary.at(t0);
   for (int node = 0; node < scene.nodes(); ++node) {
     const int dof = scene.first_dof[node];
@@ -102,8 +104,10 @@ long rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t
   const auto state = [&](int n) -> SubstepStates<T> {
     const T* v0 = in.of(Quantity::velocity);
     tape.velocity(n, v0, v.data());
+    if (n > 0) turn_velocities(scene, in.of(Quantity::mass), tape.x(n), v.data());
     if (v_before.empty()) return {tape.x(n), tape.x(n), v.data(), v.data(), n};
     tape.velocity(n - 1, v0, v_before.data());
+    if (n > 1) turn_velocities(scene, in.of(Quantity::mass), tape.x(n - 1), v_before.data());
     return {tape.x(n), tape.x(n - 1), v.data(), v_before.data(), n};
   };
   std::optional<Rollout<T, List>> forward;
@@ -136,7 +140,7 @@ long rollout_vjp(const Scene& scene, const Plan& plan, const T* inputs, double t
     if (n % growth.every == 0) growth.look(n, t0 + n * plan.options.h, scene, reverse.x_next_bar.data());
   }
   reverse.finish(in, in_bar);
-  initial_state_vjp(scene, t0, reverse.x_next_bar.data(), reverse.v_next_bar.data(), in_bar);
+  initial_state_vjp(scene, in, t0, reverse.x_next_bar.data(), reverse.v_next_bar.data(), in_bar);
   if (forward) tape.count_recomputed(recomputed);
   return recomputed;
 }

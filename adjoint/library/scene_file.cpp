@@ -103,10 +103,8 @@ class SceneReader {
       spec.directors.push_back({directors[i], directors[i + 1], directors[i + 2], directors[i + 3]});
     if (file_.has("bodies")) {  // older files have none
       const std::vector<int> bodies = file_.whole_numbers("bodies", 5);
-      for (std::size_t i = 0; i < bodies.size(); i += 5) {
-        if (bodies[i + 4] != -1) file_.fail("bodies", "keep a spin", "give -1");
-        spec.bodies.push_back({bodies[i], {bodies[i + 1], bodies[i + 2], bodies[i + 3]}});
-      }
+      for (std::size_t i = 0; i < bodies.size(); i += 5)
+        spec.bodies.push_back({bodies[i], {bodies[i + 1], bodies[i + 2], bodies[i + 3]}, bodies[i + 4]});
     }
     spec.pinned = file_.whole_numbers("pinned");
     spec.driven = file_.whole_numbers("driven");
@@ -123,6 +121,11 @@ class SceneReader {
     spec.force = {file_.numbers("force_times"), Interpolation::linear};
     spec.wind = {file_.numbers("wind_times"), Interpolation::linear};
     spec.air = triangles("air");
+    if (file_.has("loads")) {
+      const std::vector<int> loads = file_.whole_numbers("loads", 3);
+      for (std::size_t i = 0; i < loads.size(); i += 3) spec.loads.push_back({loads[i], loads[i + 1], loads[i + 2]});
+      spec.load = {file_.numbers("load_times"), Interpolation::linear};
+    }
     std::set<std::string> names;
     for_each_record("groups", [&](const Json& g, const std::string& i, const std::string& where) {
       GroupSpec group{file_.name(g, "name", where), file_.name(g, "kind", where), file_.flag(g, "damped", where), {}};

@@ -34,7 +34,7 @@ struct ReverseOf<ProjectBlocks> {
       for (int b = begin; b < end; ++b) {
         const DirectBlock& block = plan.blocks[b];
         BlockCotangents<T>& block_bar = scratch.blocks[b];
-        begin_block_vjp<T>(state, block, bar.q.data, nullptr, bar.in, block_bar);
+        begin_block_vjp<T>(state, block, bar.q.data, bar.multipliers, bar.in, block_bar);
         if (block.implicit)
           project_implicit_vjp(state, block, pack_kernels(), record.blocks[b], block_bar);
         else

@@ -28,6 +28,7 @@ struct StepCotangents {
   T* w_of_forces;         // per loaded particle, of its w as the forces see it: added to mass and drag after `w`
   StateCotangents<T> from;  // of the states at n and n-1, added to
   Inputs<T> in;           // of the inputs, added to
+  T* multipliers = nullptr;  // of Work::multipliers
 };
 
 // Reverse of history().

@@ -3,8 +3,10 @@
 
 #include "adjoint/step/apply_air_forces.h"
 #include "adjoint/step/apply_forces.h"
+#include "adjoint/step/apply_loads.h"
 #include "adjoint/step/carry_friction.h"
 #include "adjoint/step/effective_masses.h"
+#include "adjoint/step/keep_spin.h"
 #include "adjoint/step/predict.h"
 #include "adjoint/step/project_blocks.h"
 #include "adjoint/step/retract_directors.h"
@@ -31,7 +33,7 @@ void substep_vjp(const Step<T>& step, T* q, T* x_next_bar, const T* v_next_bar, 
   auto& masses = scratch.template of<ComputeEffectiveMasses>();
   auto& colors = scratch.template of<SweepColors>();
   std::fill(masses.w.begin(), masses.w.end(), T(0.0));
-  const StepCotangents<T> cotangents{x_next_bar,
+  StepCotangents<T> cotangents{x_next_bar,
                                      v_next_bar,
                                      colors.of_coordinates(step.plan, scratch.template of<UpdateVelocities>().q.data()),
                                      colors.of_inverse_masses(step.plan, masses.w.data()),
@@ -39,6 +41,7 @@ void substep_vjp(const Step<T>& step, T* q, T* x_next_bar, const T* v_next_bar, 
                                      masses.w_of_forces.data(),
                                      bar,
                                      in_bar};
+  if (auto& own = scratch.template of<KeepSpin>().multipliers; !own.empty()) cotangents.multipliers = own.data();
   List::backward([&]<class Stage>(Stage) {
     ReverseOf<Stage>::run(step, work, record.template of<Stage>(), scratch.template of<Stage>(), cotangents);
   });

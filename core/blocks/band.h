@@ -11,7 +11,7 @@ namespace sheetbend {
 
 inline constexpr int max_band = 64;
 inline constexpr int band_padding = 3;  // numbers after the last column that a vector of four may touch
-inline constexpr int unrolled_bands[] = {1, 2, 5, 10};
+inline constexpr int unrolled_bands[] = {1, 2, 5, 10, 15};  // 15: bodies on hinges
 
 // The width that a band is stored with: one that the compiler has unrolled, where there is one.
 inline int stored_band(int band) {

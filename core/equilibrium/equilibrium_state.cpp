@@ -85,6 +85,8 @@ EquilibriumState::EquilibriumState(const Scene& scene_, const double* inputs, co
       soft(scene_.groups.size() + scene_.volumes.size(), std::numeric_limits<double>::infinity()) {
   expect_energy(scene, in, o.t0);
   expect_no_unilateral(scene);
+  if (!scene.loads.empty())
+    throw std::invalid_argument("equilibrium: loads act along rows. Fix: leave them out, or simulate with drag until the motion has died down");
   const double* from = start_x ? start_x : in.of(Quantity::position);
   x.assign(from, from + scene.dofs());
   lambda.assign(scene.multipliers(), 0.0);

@@ -17,7 +17,7 @@ class Rollout {
   Rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0 = 0.0);
   ~Rollout();
 
-  // Driven nodes start where their boundary is at t0.
+  // Driven nodes start where their boundary is at t0, and bodies that keep their spin with that of their velocities.
   static void initial_state(const Scene& scene, const Inputs<const T>& in, double t0, T* x, T* v);
 
   void advance();
@@ -81,6 +81,7 @@ template <class T, class List>
 void Rollout<T, List>::initial_state(const Scene& scene, const Inputs<const T>& in, double t0, T* x, T* v) {
   std::copy_n(in.of(Quantity::position), scene.dofs(), x);
   std::copy_n(in.of(Quantity::velocity), scene.dofs(), v);
+  start_spins(scene, in.of(Quantity::mass), x, v);
   if (scene.driven.empty()) return;
   const KnotWeights k = scene.boundary.at(t0);
   for (std::size_t i = 0; i < scene.driven.size(); ++i)

@@ -15,17 +15,20 @@
 
 namespace sheetbend {
 
+// A body that keeps its spin has its angular momentum about the center [kg m^2/s] in the coordinates of a pinned node (core/step/keep_spin.h).
 struct Body {
   int center;
   std::array<int, 3> axes;
+  int spin = -1;
 };
 
 // Twice the largest radius of gyration of the bodies, which scenes count to their size [m]; 0 without bodies.
 template <class Mass>
 double width_of_bodies(const std::vector<Body>& bodies, const Mass& mass) {
   double width2 = 0.0;
-  for (const auto& [center, axes] : bodies)
-    if (const double m = mass[center]; m > 0.0) width2 = std::max(width2, (mass[axes[0]] + mass[axes[1]] + mass[axes[2]]) / m);
+  for (const Body& b : bodies)
+    if (const double m = mass[b.center]; m > 0.0)
+      width2 = std::max(width2, (mass[b.axes[0]] + mass[b.axes[1]] + mass[b.axes[2]]) / m);
   return 2.0 * std::sqrt(width2);
 }
 

@@ -31,14 +31,15 @@ enum class Quantity : int {
   contact_stiffness,  // per contact that is not rigid  [N/m]
   collider_pose,      // per collider and knot: position [m] and rotation vector [rad] of its frame (2 x 3)
   collider_size,      // per collider: the lengths of its shape  [m]
+  load,               // (knots, loads along rows): energy over the unit of C, such as N m where it is an angle
 };
-inline constexpr int quantity_count = 22;
+inline constexpr int quantity_count = 23;
 inline constexpr int oldest_quantity_count = 17;  // those after it are left out of saved scenes that have none of them
 inline constexpr std::array<const char*, quantity_count> quantity_names{
     "position",      "velocity",         "mass",           "compliance",        "damping",       "rest",
     "boundary",      "force",            "gravity",        "drag_linear",       "drag_quadratic", "wind",
     "air_normal",    "air_tangential",   "pressure",       "volume",            "volume_compliance", "friction",
-    "contact_radius", "contact_stiffness", "collider_pose", "collider_size"};
+    "contact_radius", "contact_stiffness", "collider_pose", "collider_size", "load"};
 
 struct Layout {
   std::array<std::size_t, quantity_count> size{};

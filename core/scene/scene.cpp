@@ -150,6 +150,28 @@ std::array<std::size_t, 5> add_contacts(const SceneSpec& spec, Scene& s) {
   return {s.contacts.size(), s.contacts.size(), soft, poses, sizes};
 }
 
+void add_loads(const SceneSpec& spec, Scene& s) {
+  check_knots("load_times", spec.load, !spec.loads.empty());
+  for (const Load& l : spec.loads)
+    if (l.group < 0 || l.group >= static_cast<int>(s.groups.size()) || l.item < 0 || l.item >= s.groups[l.group].count ||
+        l.row < 0 || l.row >= s.groups[l.group].rows)
+      refuse("loads: group " + std::to_string(l.group) + ", constraint " + std::to_string(l.item) + ", row " + std::to_string(l.row) +
+             " does not exist. Fix: give the numbers of a constraint and a row that it has");
+  s.loads = spec.loads;
+  s.load = spec.load;
+}
+
+void find_turning(Scene& s) {
+  if (!s.keeps_spin) return;
+  std::vector<char> turns(s.nodes(), false);
+  for (const Body& b : s.bodies)
+    for (const int n : b.axes) turns[n] = b.spin >= 0;
+  for (int g = 0; g < static_cast<int>(s.groups.size()); ++g)
+    for (int i = 0; i < s.groups[g].count; ++i)
+      if (s.groups[g].kind != kind_of(Rigid::name) && std::ranges::any_of(s.groups[g].nodes(i), [&](int n) { return turns[n]; }))
+        s.turning.push_back({g, i});
+}
+
 void add_bodies(const SceneSpec& spec, Scene& s) {
   std::vector<char> taken = s.is_director;
   for (const Body& b : spec.bodies) {
@@ -163,6 +185,15 @@ void add_bodies(const SceneSpec& spec, Scene& s) {
       s.is_place[n] = false;
       if (s.role[n] == Role::free) s.axes.push_back(n);
     }
+    if (b.spin < 0) continue;
+    check_nodes("bodies", {b.spin}, s.nodes());
+    if (taken[b.spin] || s.role[b.spin] != Role::pinned)
+      refuse("bodies: node " + std::to_string(b.spin) + " keeps a spin. Fix: give each a pinned node of its own");
+    if (std::ranges::any_of(b.axes, [&](int n) { return s.role[n] != Role::free; }))
+      refuse("bodies: the spin of center " + std::to_string(b.center) + " is kept, but its axes are held. Fix: leave its spin out");
+    taken[b.spin] = true;
+    s.is_place[b.spin] = false;
+    s.keeps_spin = true;
   }
   s.bodies = spec.bodies;
   for (int n = 0; n < s.nodes(); ++n) s.has_weight.push_back(s.inertial[n] && s.is_place[n]);
@@ -248,6 +279,9 @@ Scene build_scene(const SceneSpec& spec) {
     s.gradient_entries += static_cast<std::size_t>(built.count) * 3 * built.arity * built.rows;
   }
 
+  find_turning(s);
+  add_loads(spec, s);
+
   for (const VolumeSpec& v : spec.volumes) s.volumes.push_back(build_volume(v, s));
 
   const auto [frictions, radii, stiffnesses, poses, sizes] = add_contacts(spec, s);
@@ -274,7 +308,8 @@ Scene build_scene(const SceneSpec& spec) {
                    radii,
                    stiffnesses,
                    poses,
-                   sizes};
+                   sizes,
+                   s.load.times.size() * s.loads.size()};
   s.layout.close();
   return s;
 }

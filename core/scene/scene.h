@@ -71,6 +71,16 @@ struct Contact {
   int stiffness;             // place in Quantity::contact_stiffness, -1 where it is rigid
 };
 
+// A load along a row of a constraint (core/step/apply_loads.h).
+struct Load {
+  int group, item, row;
+};
+
+// A constraint that turns a body which keeps its spin.
+struct Turning {
+  int group, item;
+};
+
 struct Scene {
   Fields fields;
   std::vector<int> first_dof, dim;  // per node
@@ -78,6 +88,8 @@ struct Scene {
   std::vector<Director> directors;
   std::vector<Body> bodies;
   std::vector<int> axes;                    // of bodies, those that are free
+  bool keeps_spin = false;                  // whether any body does
+  std::vector<Turning> turning;             // but for `rigid`, which turns none
   bool yields = false;                      // whether any constraint does
   std::vector<char> is_director, inertial;  // per node; what is free and no director moves by its mass
   std::vector<char> is_place, has_weight;   // per node; no director and no axis; of those, what has inertia
@@ -88,7 +100,8 @@ struct Scene {
   std::vector<int> loaded_slot;
   bool has_drag = false;
   std::vector<std::array<int, 3>> air;  // nodes of the triangles that air acts on
-  Knots boundary, force, wind;
+  Knots boundary, force, wind, load;
+  std::vector<Load> loads;
   std::vector<Group> groups;
   std::vector<Volume> volumes;
   std::vector<Collider> colliders;
@@ -133,8 +146,9 @@ struct SceneSpec {
   std::vector<int> pinned, driven, loaded;
   bool has_drag = false;
   std::vector<std::array<int, 3>> air;
-  Knots boundary, force, wind;
+  Knots boundary, force, wind, load;
   std::vector<GroupSpec> groups;
+  std::vector<Load> loads;
   std::vector<VolumeSpec> volumes;
   std::vector<ColliderSpec> colliders;
   std::vector<ContactSpec> contacts;

@@ -53,6 +53,7 @@ struct ProjectBlocks {
         end_block(state, block, record.blocks[b]);
       }
     });
+    if (work.multipliers) multipliers(step.scene, plan, step.in, record, work.multipliers);
   }
 
   // Writes the multipliers of the last substep in the scene's order.

@@ -49,6 +49,7 @@ struct Work {
   Coordinates<T> q;    // predicted, then corrected: in the rows of the kernels that sweep, otherwise in x_next
   T *x_next, *v_next;  // (dofs); the repetition for a reverse has no v_next
   bool finite = true;  // whether all of x_next is
+  T* multipliers = nullptr;  // of the substep, where a later stage reads them
 };
 
 // What the contacts of a scene of T read of a substep.

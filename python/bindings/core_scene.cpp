@@ -27,10 +27,8 @@ std::shared_ptr<Scene> make_scene(const py::kwargs& given) {
   for (const auto& [node, tail, head, normal] : given["directors"].cast<std::vector<std::array<int, 4>>>())
     spec.directors.push_back({node, tail, head, normal});
   if (given.contains("bodies"))
-    for (const auto& [center, first, second, third, spin] : given["bodies"].cast<std::vector<std::array<int, 5>>>()) {
-      if (spin != -1) throw std::invalid_argument("bodies: a spin is kept at " + std::to_string(spin) + ". Fix: give -1");
-      spec.bodies.push_back({center, {first, second, third}});
-    }
+    for (const auto& [center, first, second, third, spin] : given["bodies"].cast<std::vector<std::array<int, 5>>>())
+      spec.bodies.push_back({center, {first, second, third}, spin});
   spec.pinned = whole_numbers(given["pinned"]);
   spec.driven = whole_numbers(given["driven"]);
   spec.loaded = whole_numbers(given["loaded"]);
@@ -51,6 +49,10 @@ std::shared_ptr<Scene> make_scene(const py::kwargs& given) {
   for (const py::handle c : given["contacts"])
     spec.contacts.push_back({c["name"].cast<std::string>(), c["collider"].cast<int>(), whole_numbers(c["particles"]),
                              whole_numbers(c["carried"]), c["rigid"].cast<bool>()});
+  if (given.contains("loads")) {
+    for (const auto& [group, item, row] : given["loads"].cast<std::vector<std::array<int, 3>>>()) spec.loads.push_back({group, item, row});
+    spec.load = {given["load_times"].cast<std::vector<double>>(), Interpolation::linear};
+  }
   return std::make_shared<Scene>(build_scene(spec));
 }
 
@@ -59,7 +61,7 @@ py::dict arguments_of(const Scene& s) {
   std::vector<std::array<int, 4>> directors;
   for (const Director& d : s.directors) directors.push_back({d.node, d.tail, d.head, d.normal});
   std::vector<std::array<int, 5>> bodies;
-  for (const Body& b : s.bodies) bodies.push_back({b.center, b.axes[0], b.axes[1], b.axes[2], -1});
+  for (const Body& b : s.bodies) bodies.push_back({b.center, b.axes[0], b.axes[1], b.axes[2], b.spin});
   py::list groups, volumes;
   for (const Group& g : s.groups) {
     const std::string kind = [&] {
@@ -70,6 +72,8 @@ py::dict arguments_of(const Scene& s) {
     groups.append(py::dict("name"_a = g.name, "kind"_a = kind, "damped"_a = g.damped,
                            "stencil"_a = py::array_t<int>(static_cast<py::ssize_t>(g.stencil.size()), g.stencil.data())));
   }
+  std::vector<std::array<int, 3>> loads;
+  for (const Load& l : s.loads) loads.push_back({l.group, l.item, l.row});
   for (const Volume& v : s.volumes) {
     Triangles triangles = v.triangles;
     for (auto& t : triangles)
@@ -90,7 +94,7 @@ py::dict arguments_of(const Scene& s) {
                   "boundary_times"_a = s.boundary.times, "boundary_interpolation"_a = cubic ? "cubic" : "linear",
                   "loaded"_a = s.loaded, "force_times"_a = s.force.times, "has_drag"_a = s.has_drag, "air"_a = s.air,
                   "wind_times"_a = s.wind.times, "groups"_a = groups, "volumes"_a = volumes,
-                  "colliders"_a = colliders, "contacts"_a = contacts);
+                  "colliders"_a = colliders, "contacts"_a = contacts, "loads"_a = loads, "load_times"_a = s.load.times);
 }
 
 }  // namespace

@@ -232,7 +232,6 @@ BodyScene door() {
   const Body leaf = s.add_body({0.4, 0, 0}, 2.0, {0.1, 0.12, 0.05}, BodyScene::upright(), {0, 1.0, 0}, {0, 0, -0.4});
   hinge(s, frame, {0, -0.5, 0}, leaf, {-0.4, -0.5, 0});
   hinge(s, frame, {0, 0.5, 0}, leaf, {-0.4, 0.5, 0});
-  s.gravity = {};
   return s;
 }
 

@@ -61,6 +61,7 @@ TEST_P(RolloutOf, MassGaugeMovesNothing) {
   scale(Quantity::compliance, 1.0 / c);
   scale(Quantity::damping, c);
   scale(Quantity::force, c);
+  scale(Quantity::load, c);
   scale(Quantity::drag_linear, c);
   scale(Quantity::drag_quadratic, c);
   scale(Quantity::air_normal, c);

@@ -35,6 +35,12 @@ struct BodyScene {
     add("rigid", {b.axes.begin(), b.axes.end()}, {});
     return b;
   }
+  // Its angular momentum becomes a state of its own.
+  void keep_spin(Body& b) {
+    for (Body& own : spec.bodies)
+      if (own.center == b.center) own.spin = b.spin = add_node({}, 1.0);
+    spec.pinned.push_back(b.spin);
+  }
   static std::array<Vec3<double>, 3> upright() { return {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}; }
   // Turned by `angle` about y.
   static std::array<Vec3<double>, 3> turned(double angle) {

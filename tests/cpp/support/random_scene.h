@@ -225,6 +225,7 @@ struct SceneBuilder {
     fill(Quantity::velocity, -0.3, 0.3);
     fill(Quantity::mass, 0.01, 0.03);
     fill(Quantity::force, -0.1, 0.1);
+    fill(Quantity::load, -0.01, 0.01);
     fill(Quantity::gravity, -9.0, 9.0);
     fill(Quantity::drag_linear, 0.01, 0.1);
     fill(Quantity::drag_quadratic, 0.01, 0.1);
@@ -275,6 +276,9 @@ inline Sample random_scene(unsigned seed, const SceneShape& shape = {}) {
   b.spec.wind = {{0.0, 0.008, 0.02}, Interpolation::linear};
   for (const auto& g : b.groups)
     b.spec.groups.push_back({g.kind + (g.damped ? "_damped" : ""), g.kind, g.damped, g.stencil});
+  for (std::size_t g = 0; g < b.groups.size(); g += 3)  // the last row of every third group
+    with_kind(kind_of(b.groups[g].kind), [&]<class K>(K) { b.spec.loads.push_back({static_cast<int>(g), 0, K::rows - 1}); });
+  b.spec.load = {{0.0, 0.02}, Interpolation::linear};
   Sample sample{build_scene(b.spec), {}};
   sample.inputs.resize(sample.scene.layout.total());
   b.fill(sample.scene, sample.inputs);

@@ -1,0 +1,67 @@
+// The reverse of ApplyLoads: with z_i the cotangents of the pushes eta^2 tau J_row on the stencil, tau_bar = eta^2 J_row . z, and eta^2 tau Hess(C_row) z goes to the
+// positions that the row was taken at.
+#pragma once
+
+#include "adjoint/element/constraint_vjp.h"
+#include "adjoint/step/stages.h"
+#include "core/step/apply_loads.h"
+
+namespace sheetbend {
+
+// z(node): the cotangent of the push on a node.
+template <class T, class Z>
+void row_loads_vjp(const Step<T>& step, Z&& z, const StateCotangents<T>& from, const Inputs<T>& in_bar) {
+  const RowLoads<T> loads(step);
+  const T eta2(step.bdf.eta * step.bdf.eta);
+  for (std::size_t i = 0; i < step.scene.loads.size(); ++i) {
+    const Load& load = step.scene.loads[i];
+    const Group& group = step.scene.groups[load.group];
+    const auto nodes = group.nodes(load.item);
+    const T size = eta2 * loads.at(i);
+    with_kind(group.kind, [&]<class K>(K) {
+      T x[K::dofs], own[K::dofs], along[K::rows * K::dofs], x_bar[K::dofs], none[std::max(K::rows, K::dofs)], chosen[K::rows];
+      loads.template gather<K>(i, x);
+      const Evaluation<K, T> at(x, loads.parameters(i));
+      for (T& a : along) a = T(0.0);
+      for (T& a : none) a = T(0.0);
+      for (int j = 0; j < K::rows; ++j) chosen[j] = T(j == load.row ? 1.0 : 0.0);
+      T sum(0.0);
+      for (int k = 0; k < K::arity; ++k) {
+        const Vec3<T> of_node = z(nodes[k]);
+        sum += dot(Vec3<T>(at.J + load.row * K::dofs + 3 * k), of_node);
+        (size * of_node).store(own + 3 * k);
+      }
+      for (int d = 0; d < K::dofs; ++d) along[load.row * K::dofs + d] = own[d], x_bar[d] = T(0.0);
+      T* p_bar = in_bar.of(Quantity::rest) + loads.first_parameter(i);
+      if constexpr (HasReverse<K>)
+        K::reverse(x, loads.parameters(i), chosen, none, own, none, x_bar, p_bar);
+      else
+        gradients_vjp<K>(x, loads.parameters(i), none, along, x_bar, p_bar);
+      for (int k = 0; k < K::arity; ++k) {
+        const int dof = step.scene.first_dof[nodes[k]];
+        pull_back_extrapolated(step.bdf, Vec3<T>(x_bar + 3 * k), from.x + dof, from.x_before + dof);
+      }
+      T* values_bar = in_bar.of(Quantity::load) + loads.knots.first * step.scene.loads.size() + i;
+      for (int k = 0; k < loads.knots.count; ++k) values_bar[k * step.scene.loads.size()] += T(loads.knots.weight[k]) * (eta2 * sum);
+    });
+  }
+}
+
+template <>
+struct ReverseOf<ApplyLoads> {
+  template <class T>
+  using Scratch = Nothing;
+
+  template <class T>
+  static void run(const Step<T>& step, const Work<T>& work, Nothing&, Nothing&, const StepCotangents<T>& bar) {
+    const Scene& scene = step.scene;
+    if (scene.loads.empty()) return;
+    RowLoads<T>(step).for_each_push([&](int n, const Vec3<T>& push) {
+      if (scene.inertial[n]) bar.w.of(n) += dot(push, Vec3<T>(bar.q.of(n)));
+    });
+    const Vec3<T> none(T(0.0), T(0.0), T(0.0));
+    row_loads_vjp(step, [&](int n) { return scene.inertial[n] ? work.masses.w[n] * Vec3<T>(bar.q.of(n)) : none; }, bar.from, bar.in);
+  }
+};
+
+}  // namespace sheetbend
