@@ -12,8 +12,10 @@ from ..errors import ConfigError
 from ..objects.grip import Grip
 from ..objects.rope import Rope
 from ..objects.tool import Tool
+from ..scene.body import BodyPoint
 from ..scene.scene import Scene
 from . import rope_schema as schema
+from .bodies import named_body
 from .errors import located
 from .moment import Moment
 from .tools import tool_named
@@ -96,7 +98,29 @@ def held_end(
         return Grip.fixed(grip.position[0], grip.direction[0], grip.director[0]) if moment.static else grip
 
 
-def hold_led(scene: Scene, rope: Rope, ends: Mapping[str, Grip | Led]) -> None:
+def end_on_body(path: str, section: schema.RopeGrip, scene: Scene, place: Array | None) -> BodyPoint:
+    """The point of a body that holds an end; `place` (3,) m of the end as placed, where it is known.
+
+    Raises:
+        ConfigError: no such body, or a place that is not known.
+    """
+    body = named_body(f"{path}.body", section.body or "", scene)
+    at = section.position
+    if at is None:
+        origin, frame = body.pose(scene.positions)
+        at = ((_known(path, "position", None, place) - origin) @ frame).tolist()
+    with located(path):
+        return body.point(at, section.direction)
+
+
+def place_of(held: Grip | Led | BodyPoint) -> Array:
+    """(3,) m, where an end is held at the scene's start."""
+    if isinstance(held, BodyPoint):
+        return held.at_start()[0]
+    return held.place if isinstance(held, Led) else held.position[0]
+
+
+def hold_led(scene: Scene, rope: Rope, ends: Mapping[str, Grip | Led | BodyPoint]) -> None:
     """Drive the ends of a built rope that follow one marker."""
     for end, held in ends.items():
         if isinstance(held, Led):

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ..errors import ConfigError, RecordingError
 from ..objects.cloth import Cloth
-from ..objects.markers import Place, between, on_cloth, on_particle, on_rope
+from ..objects.markers import Place, between, on_body, on_cloth, on_particle, on_rope
 from ..recording.recording import Recording
 from ..recording.recording_checks import marker_indices
 from ..scene.scene import Scene
 from . import schema
+from .bodies import named_body
 from .cloth_markers import places_on_cloths
 from .errors import located
 from .rope_points import Seats
@@ -116,6 +119,10 @@ def _placed(path: str, marker: schema.Marker, scene: Scene, particles: Particles
         place = on_particle(particles.find(f"{path}.particle", marker.particle))
     elif marker.arm is not None:
         return _on_arm(path, marker, particles)
+    elif marker.body is not None:
+        body = named_body(f"{path}.body", marker.body, scene)
+        off = np.add(marker.point or np.zeros(3), marker.offset or np.zeros(3))
+        return on_body(body, [off])[0]
     elif marker.between is not None:
         first, second = (particles.find(f"{path}.between", r) for r in marker.between)
         place = between(first, second, marker.fraction)

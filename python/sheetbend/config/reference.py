@@ -13,6 +13,7 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from . import (
+    body_schema,
     cloth_schema,
     contact_schema,
     fabric_schema,
@@ -41,6 +42,8 @@ HEADERS: dict[str, type[Section]] = {
     "[[scene.particles]]": scene_schema.Particles,
     "[[scene.pendulum]]": scene_schema.Pendulum,
     "[[scene.arm]]": scene_schema.Arm,
+    "[[scene.body]]": body_schema.BodySection,
+    "[[scene.joint]]": body_schema.JointSection,
     "[[scene.constraints]]": scene_schema.Constraints,
     "[[scene.point_mass]]": scene_schema.PointMass,
     "[[scene.force]]": scene_schema.Force,

@@ -14,7 +14,7 @@ class RopeGrip(Section):
 
     One marker gives the place alone: the end is pinned to it and turns freely. Two markers, in the order in which the
     rope passes them, also give the direction, but no roll about it. Three or more markers on a rigid piece, and a tool,
-    give the whole pose."""
+    give the whole pose. On a rigid body the end turns freely, unless it has a direction."""
 
     at: Literal["start", "end"] = key(..., "which end")
     markers: list[str | int] | None = key(
@@ -26,10 +26,11 @@ class RopeGrip(Section):
     tool: Name | None = key(
         None, "the [[scene.tool]] that holds it, instead of markers: poses of a robot or rigid body"
     )
+    body: Name | None = key(None, "the [[scene.body]] that it is fixed to, instead of markers")
     position: Vector | None = key(
         None,
-        "where the rope enters the grip: of a tool in its axes, of three or more markers in the recording's axes at "
-        "the scene's start; where the end is placed when left out",
+        "where the rope enters the grip: of a tool or body in its axes, of three or more markers in the recording's "
+        "axes at the scene's start; where the end is placed when left out",
         "m",
     )
     direction: Vector | None = key(
@@ -55,8 +56,8 @@ class RopeGrip(Section):
 
     @model_validator(mode="after")
     def _one_mover(self) -> Self:
-        if (self.markers is None) == (self.tool is None):
-            raise ValueError("must have one of markers and tool|give what moves the end, or use clamp or pinned")
+        if sum(given is not None for given in (self.markers, self.tool, self.body)) != 1:
+            raise ValueError("must have one of markers, tool and body|give what moves the end, or use clamp or pinned")
         count = 0 if self.markers is None else len(self.markers)
         if count == 2 and (self.position is not None or self.direction is not None):
             raise ValueError("takes its place and direction from its two markers|leave out position and direction")

@@ -14,10 +14,11 @@ from ..objects.rod import add_rod
 from ..objects.rod_shape import initial_shape
 from ..objects.rope import Rope, add_rope
 from ..objects.tool import Tool
+from ..scene.body import BodyPoint
 from ..scene.scene import Scene
 from . import rope_schema as schema
 from .errors import located
-from .grips import Led, held_end, hold_led
+from .grips import Led, end_on_body, held_end, hold_led, place_of
 from .moment import Moment
 from .rope_points import Array, Seats, curve, through_markers
 
@@ -49,9 +50,9 @@ def build_rope(
         ConfigError: anything inconsistent, with the path of the key.
     """
     section = section.model_copy(update={"segments": finer * section.segments})
-    points, speeds, ends = _start(path, section, moment, seats, tools)
+    points, speeds, ends = _start(scene, path, section, moment, seats, tools)
     fields: dict[str, Any] = section.model_dump(exclude=_ELSEWHERE, exclude_none=True)
-    grips = {end: held for end, held in ends.items() if isinstance(held, Grip)}
+    grips = {end: held for end, held in ends.items() if not isinstance(held, Led)}
     # one marker with a direction is a clamp that the marker moves
     clamps = {f"clamp_{g.at}": g.direction for g in section.grip if g.at not in grips and g.direction is not None}
     fields |= clamps | {"points": points, "velocity": speeds, "segments": section.segments}
@@ -67,8 +68,13 @@ def build_rope(
 
 
 def _start(
-    path: str, section: schema.Rope | schema.Rod, moment: Moment | None, seats: Seats, tools: Mapping[str, Tool]
-) -> tuple[Array | None, Array | None, dict[str, Grip | Led]]:
+    scene: Scene,
+    path: str,
+    section: schema.Rope | schema.Rod,
+    moment: Moment | None,
+    seats: Seats,
+    tools: Mapping[str, Tool],
+) -> tuple[Array | None, Array | None, dict[str, Grip | Led | BodyPoint]]:
     """Initial points and velocities, and what moves the ends."""
     measured = section.points == "recording"
     points = None if measured or section.points is None else np.array(section.points)
@@ -81,12 +87,15 @@ def _start(
         assert length is not None
         points, _ = curve(f"{path}.points", section, moment, seats, length, {})
     line = _straight(section) if points is None else points
-    ends: dict[str, Grip | Led] = {}
+    ends: dict[str, Grip | Led | BodyPoint] = {}
     for i, grip in enumerate(section.grip):
         here = None if points is None and grip.at == "end" else line[0 if grip.at == "start" else -1]
+        if grip.body is not None:
+            ends[grip.at] = end_on_body(f"{path}.grip[{i}]", grip, scene, here)
+            continue
         way = np.diff(line[:2] if grip.at == "start" else line[-2:], axis=0)[0]
         ends[grip.at] = held_end(f"{path}.grip[{i}]", grip, moment, tools, here, way)
-    places = {end: held.place if isinstance(held, Led) else held.position[0] for end, held in ends.items()}
+    places = {end: place_of(held) for end, held in ends.items()}
     if exact:
         assert length is not None
         points, speeds = curve(f"{path}.points", section, moment, seats, length, places)
@@ -106,9 +115,13 @@ def _start(
     return points, speeds, ends
 
 
-def _pose(held: Grip | Led | None, place: Array | None, points: Array, k: int) -> tuple[Array, Array] | None:
+def _pose(
+    held: Grip | Led | BodyPoint | None, place: Array | None, points: Array, k: int
+) -> tuple[Array, Array] | None:
     if held is None or place is None:
         return None
+    if isinstance(held, BodyPoint) and held.along is not None:
+        return place, held.body.turned(held.along)
     way = np.diff(points[:2] if k == 0 else points[-2:], axis=0)[0]
     return place, (held.direction[0] if isinstance(held, Grip) else way / max(float(np.linalg.norm(way)), 1e-12))
 
@@ -127,7 +140,7 @@ def _length(path: str, moment: Moment | None, seats: Seats) -> float:
     return float(np.linalg.norm(np.diff(through_markers(f"{path}.points", moment, seats, None), axis=0), axis=1).sum())
 
 
-def _add_rod(scene: Scene, section: schema.Rod, fields: dict[str, Any], grips: Mapping[str, Grip]) -> Rope:
+def _add_rod(scene: Scene, section: schema.Rod, fields: dict[str, Any], grips: Mapping[str, Grip | BodyPoint]) -> Rope:
     """A rod takes clamps as grips that stay."""
     given = {key: value for key, value in fields.items() if key not in _OF_ROPES}
     points = _straight(section) if fields["points"] is None else fields["points"]

@@ -6,6 +6,7 @@ from typing import Any, Literal, Self
 
 from pydantic import model_validator
 
+from .body_schema import BodySection, JointSection
 from .cloth_schema import Cloth, with_fabrics
 from .contact_schema import ColliderSection, ContactSection
 from .rope_schema import Rod, Rope
@@ -210,6 +211,8 @@ class SceneSection(Section):
     particles: list[Particles] = key([], "single particles")
     pendulum: list[Pendulum] = key([], "simple pendulums")
     arm: list[Arm] = key([], "rigid arms")
+    body: list[BodySection] = key([], "rigid bodies")
+    joint: list[JointSection] = key([], "joints between them")
     constraints: list[Constraints] = key([], "constraint groups")
     point_mass: list[PointMass] = key([], "hung masses")
     force: list[Force] = key([], "forces over time")

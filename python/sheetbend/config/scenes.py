@@ -19,6 +19,7 @@ from ..objects.tool import Tool
 from ..quantities.quantities import product
 from ..scene.scene import Scene
 from . import scene_schema as schema
+from .bodies import add_bodies
 from .cloth_markers import seats
 from .cloths import build_cloth, placed_mesh
 from .contacts import add_contacts
@@ -155,6 +156,7 @@ def build_scene(
     recorded = None if moment is None else moment.recording.gravity
     gravity = section.gravity if section.gravity is not None else EARTH if recorded is None else recorded
     scene, particles = Scene(name, gravity), Particles(finer)
+    add_bodies(scene, section, tools)
     for path, rope in section.strands:
         if ropes is not None and rope.name not in ropes:
             continue

@@ -34,6 +34,8 @@ class Marker(Section):
     particle: Reference | None = key(None, "a particle instead")
     arm: Name | None = key(None, "an arm or pendulum instead, with `radius`")
     radius: Finite | None = key(None, "distance from the arm's pivot", "m")
+    body: Name | None = key(None, "a rigid body instead, with `point`")
+    point: Vector | None = key(None, "place in the body's frame; `offset` counts along its axes", "m")
     between: list[Reference] | None = key(None, "two particles instead, with `fraction`", min_length=2, max_length=2)
     fraction: Finite = key(0.5, "share of the way from the first of the two to the second")
     offset: Vector | None = key(None, "standing off along (tangent, normal, tangent x normal)", "m")
@@ -41,12 +43,14 @@ class Marker(Section):
 
     @model_validator(mode="after")
     def _one_place(self) -> Self:
-        kinds = ("arc_length", "material", "particle", "arm", "between")
+        kinds = ("arc_length", "material", "particle", "arm", "body", "between")
         places = [n for n in kinds if getattr(self, n) is not None]
         if len(places) != 1:
             raise ValueError(f"names {' and '.join(places) or 'no place'}|give one of {', '.join(kinds)}")
         if (self.arm is None) != (self.radius is None):
             raise ValueError("has only one of arm and radius|give both")
+        if (self.body is None) != (self.point is None):
+            raise ValueError("has only one of body and point|give both")
         return self
 
 

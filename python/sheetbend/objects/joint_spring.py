@@ -14,7 +14,7 @@ from ..arrays.checks import check_increasing, finite, is_number
 from ..errors import SceneError
 from ..quantities.expression import Expression
 from ..quantities.quantities import ZERO_OR_MORE, Term
-from ..scene.scene_data import Array
+from ..scene.scene import Array
 from .joint_making import Making
 
 Knots = tuple[ArrayLike, ArrayLike]  # times (knots,) s and values (knots,)

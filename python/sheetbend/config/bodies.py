@@ -1,0 +1,66 @@
+"""Rigid bodies and joints of a configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ..errors import ConfigError
+from ..objects.joint_making import Joint
+from ..objects.joints import ball, cylinder, fixed, hinge, slider, universal
+from ..objects.tool import Tool
+from ..scene.body import Body
+from ..scene.inertia import Inertia
+from ..scene.scene import Scene
+from .body_schema import GROUND, JOINTS
+from .errors import located
+from .scene_schema import SceneSection
+from .tools import tool_named
+
+MADE: Mapping[str, Callable[..., Joint]] = {
+    "ball": ball,
+    "hinge": hinge,
+    "universal": universal,
+    "slider": slider,
+    "cylinder": cylinder,
+    "fixed": fixed,
+}
+
+
+def add_bodies(scene: Scene, section: SceneSection, tools: Mapping[str, Tool]) -> None:
+    """Add the bodies of [[scene.body]], then the joints of [[scene.joint]].
+
+    Raises:
+        ConfigError: names that are taken or unknown, an inertia that no body has.
+    """
+    for i, body in enumerate(section.body):
+        path = f"scene.body[{i}]"
+        if body.name in scene.bodies or body.name == GROUND:
+            raise ConfigError(f"{path}.name", "is taken", body.name, "give every body a name of its own")
+        poses = None if body.tool is None else tool_named(f"{path}.tool", body.tool, tools)
+        given = body.model_dump(include={"at", "velocity", "spin", "pinned", "drag", "turn_drag"})
+        with located(path, body.name):
+            if body.box is not None:
+                inertia = Inertia.box(body.mass, body.box).moved(body.center)
+            else:
+                inertia = Inertia(body.mass, body.inertia or [], body.center)
+            scene.add_body(body.name, of=inertia, rotation=body.quaternion, poses=poses, **given)
+    for i, joint in enumerate(section.joint):
+        path = f"scene.joint[{i}]"
+        upper = None if joint.upper == GROUND else named_body(f"{path}.upper", joint.upper, scene)
+        lower = named_body(f"{path}.lower", joint.lower, scene)
+        own: dict[str, Any] = {name: getattr(joint, name) for name in JOINTS[joint.kind]}
+        with located(path, joint.name):
+            MADE[joint.kind](upper, lower, at=joint.at, name=joint.name, **own)
+
+
+def named_body(path: str, name: str, scene: Scene) -> Body:
+    """A body of the scene.
+
+    Raises:
+        ConfigError: there is none of this name.
+    """
+    if name not in scene.bodies:
+        fix = f"name one of: {', '.join(scene.bodies) or 'none, add a [[scene.body]]'}"
+        raise ConfigError(path, "is no body of the scene", name, fix)
+    return scene.bodies[name]

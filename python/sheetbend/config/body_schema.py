@@ -1,0 +1,79 @@
+"""[[scene.body]] and [[scene.joint]]: rigid bodies, and what joins them."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import model_validator
+
+from .section import Finite, Name, Quaternion, Section, Vector, key
+
+GROUND = "ground"
+JOINTS: dict[str, tuple[str, ...]] = {
+    "ball": ("compliance",),
+    "hinge": ("axis", "rate", "stiffness", "rest", "viscosity"),
+    "universal": ("axes",),
+    "slider": ("axis", "rate"),
+    "cylinder": ("axis", "rate", "turn_rate"),
+    "fixed": (),
+}
+"""The keys that each kind of joint takes beside those that all have."""
+NEEDED = ("axis", "axes")
+
+
+class BodySection(Section):
+    """A rigid body, `Scene.add_body`. A list: [[scene.body]]. docs/bodies.md lists its quantities."""
+
+    name: Name = key(..., "prefix of its quantities, and what joints, grips and markers call it")
+    mass: Finite = key(..., "its mass", "kg", gt=0)
+    inertia: Vector | list[Vector] | None = key(
+        None, "about the center of mass, along the frame's axes: three moments, or a matrix", "kg m^2"
+    )
+    box: Vector | None = key(None, "sides of a homogeneous box, instead of the inertia; `center` is its middle", "m")
+    center: Vector = key([0.0, 0.0, 0.0], "the center of mass in the body's frame", "m")
+    at: Vector = key([0.0, 0.0, 0.0], "where the origin of its frame starts", "m")
+    quaternion: Quaternion = key([0.0, 0.0, 0.0, 1.0], "(x, y, z, w), how its frame starts: from its axes to the world")
+    velocity: Vector = key([0.0, 0.0, 0.0], "of the frame's origin at the start", "m/s")
+    spin: Vector = key([0.0, 0.0, 0.0], "angular velocity at the start, in the world's axes", "rad/s")
+    pinned: bool = key(False, "hold it where it starts")
+    tool: Name | None = key(None, "the [[scene.tool]] that it rides on; its start plays no part then")
+    drag: Finite | None = key(None, "of the air, force over speed: <name>_drag", "N s/m", ge=0)
+    turn_drag: Finite | None = key(None, "torque over angular velocity: <name>_turn_drag", "N m s", ge=0)
+
+    @model_validator(mode="after")
+    def _one_inertia(self) -> Self:
+        if (self.inertia is None) == (self.box is None):
+            raise ValueError("must have one of inertia and box|give three moments, or the sides of a box")
+        if self.pinned and self.tool is not None:
+            raise ValueError("is pinned and rides on a tool|leave one of them out")
+        return self
+
+
+class JointSection(Section):
+    """A joint between two bodies, `sb.ball`, `sb.hinge` and the like. A list: [[scene.joint]]. Its quantities begin
+    with its name: docs/bodies.md lists them."""
+
+    kind: Literal["ball", "hinge", "universal", "slider", "cylinder", "fixed"] = key(..., "what it leaves free")
+    name: Name = key(..., "prefix of its quantities")
+    upper: Name = key(GROUND, 'the body that carries the other one; "ground" is the world')
+    lower: Name = key(..., "the body that hangs on it")
+    at: Vector = key(..., "a point of the joint in the world, as the bodies start", "m")
+    axis: Vector | None = key(None, "of a hinge, slider or cylinder: its direction in the world")
+    axes: list[Vector] | None = key(None, "of a universal joint: the two bodies' axes", min_length=2, max_length=2)
+    rate: Finite = key(0.0, "at the start: of a hinge's angle, rad/s; of a slider or cylinder along the axis, m/s")
+    turn_rate: Finite = key(0.0, "of a cylinder's angle at the start", "rad/s")
+    stiffness: Finite | None = key(None, "of a hinge's spring: <name>_stiffness", "N m/rad", gt=0)
+    rest: Finite = key(0.0, "the angle at which that spring rests, counted from the start: <name>_rest", "rad")
+    viscosity: Finite | None = key(None, "of a hinge, torque over rate: <name>_viscosity", "N m s/rad", gt=0)
+    compliance: Finite | None = key(None, "of a ball joint that gives way: <name>_compliance", "m/N", gt=0)
+
+    @model_validator(mode="after")
+    def _of_its_kind(self) -> Self:
+        own, every = JOINTS[self.kind], {name for names in JOINTS.values() for name in names}
+        missing = [name for name in NEEDED if name in own and getattr(self, name) is None]
+        if missing:
+            raise ValueError(f"is a {self.kind} without {missing[0]}|add {missing[0]}")
+        alien = sorted((every - set(own)) & self.model_fields_set)
+        if alien:
+            raise ValueError(f"is a {self.kind} with {' and '.join(alien)}|leave {', '.join(alien)} out")
+        return self
