@@ -78,15 +78,6 @@ SolverOptions options_of(const Solver& s) {
 
 Plan plan_of(const Model& model, const Solver& solver) {
   const SolverOptions options = options_of(solver);
-  const Layout& layout = model.topology.layout;
-  if (solver.method == Method::newton || solver.method == Method::newton_cg || solver.method == Method::implicit) {
-    const std::vector<double> inputs = checked_inputs(model, {});
-    const auto first = inputs.begin() + static_cast<std::ptrdiff_t>(layout.of(sheetbend::Quantity::compliance));
-    if (std::any_of(first, first + static_cast<std::ptrdiff_t>(layout.count(sheetbend::Quantity::compliance)),
-                    [](double a) { return !(a > 0.0); }))
-      throw InputError("solver.method", "cannot hold rigid constraints",
-                       "use Method::direct, or give every constraint a compliance");
-  }
   if (solver.method == Method::direct && options.iterations == 1 &&
       std::ranges::any_of(model.groups, [](const Group& g) { return g.kind == "shear"; }))
     throw InputError("solver.iterations", "1 loses up to half of the digits of gradients of rods that shear", "use 2");

@@ -5,7 +5,8 @@
 // F: the forces of contacts,
 // and everything else as for a projection (element/element_vjp.h) with dl = lambda and v_j = lambda_j W z. Both y and v are linear in p, and what the
 // elements and contacts send to the coordinates is what K^T p leaves of x'_bar: a second pass on that refines p, and brings the first order
-// of scalars that carry one. K is not symmetric where contacts slide.
+// of scalars that carry one. K is not symmetric where contacts slide. Rows that do not give way (core/solver/rigid_rows.h) have no D^-1: their y is an
+// unknown beside p, with J p = D y.
 #pragma once
 
 #include "adjoint/solver/project_block_vjp.h"
@@ -13,19 +14,52 @@
 
 namespace sheetbend {
 
-// z = K^-T z of some scenes; of others z is zero.
 template <class T>
-void solve_implicit(const DirectBlock& block, Scenes scenes, const BlockState<T>& state, std::vector<T>& z) {
-  if constexpr (std::is_same_v<T, Pack>) {
-    std::vector<double> own(z.size());
-    for (int scene = 0; scene < Pack::lanes; ++scene) {
-      if (!has(scenes, scene)) continue;
+bool has_rigid_rows(const BlockState<T>& state) {
+  return std::ranges::any_of(state.implicit, [](const ImplicitBlock& scene) { return !scene.rigid().empty(); });
+}
+
+// z = K^-T z of some scenes, with y (rows of the block; of rigid ones alone) that is taken along; of others both are zero.
+template <class T>
+void solve_implicit(const DirectBlock& block, Scenes scenes, const BlockState<T>& state, std::vector<T>& z,
+                    std::vector<T>& y) {
+  for (int scene = 0; scene < static_cast<int>(state.implicit.size()); ++scene) {
+    if (!has(scenes, scene)) continue;
+    const ImplicitBlock& implicit = state.implicit[scene];
+    const RigidRows& rigid = implicit.rigid();
+    std::vector<Single<T>> mu(rigid.size());
+    if constexpr (std::is_same_v<T, Pack>) {
+      std::vector<double> own(z.size());
       for (std::size_t i = 0; i < z.size(); ++i) own[i] = z[i][scene];
-      state.implicit[scene].solve_transposed(block, own.data());
+      for (int j = 0; j < rigid.size(); ++j) mu[j] = y[rigid.row(j)][scene];
+      implicit.solve_transposed(block, own.data(), mu.data());
       for (std::size_t i = 0; i < z.size(); ++i) z[i].set(scene, own[i]);
+      for (int j = 0; j < rigid.size(); ++j) y[rigid.row(j)].set(scene, mu[j]);
+    } else {
+      for (int j = 0; j < rigid.size(); ++j) mu[j] = y[rigid.row(j)];
+      implicit.solve_transposed(block, z.data(), mu.data());
+      for (int j = 0; j < rigid.size(); ++j) y[rigid.row(j)] = mu[j];
     }
-  } else {
-    state.implicit[0].solve_transposed(block, z.data());
+  }
+}
+
+// y of the rigid rows goes to the place of what a division by their compliance would be, J p, and what that leaves of their equations into `rest`.
+template <class T>
+void keep_rigid_rows(BlockState<T>& state, const std::vector<T>& y, std::vector<T>& rest, const std::vector<T>& Jp,
+                     BlockCotangents<T>& bar) {
+  for (int scene = 0; scene < static_cast<int>(state.implicit.size()); ++scene) {
+    const RigidRows& rigid = state.implicit[scene].rigid();
+    for (int j = 0; j < rigid.size(); ++j) {
+      const int row = rigid.row(j);
+      const T left = rest[row] - Jp[row] + state.diagonal[row] * y[row];
+      if constexpr (std::is_same_v<T, Pack>) {
+        bar.y[row].set(scene, y[row][scene]);
+        rest[row].set(scene, left[scene]);
+      } else {
+        bar.y[row] = y[row];
+        rest[row] = left;
+      }
+    }
   }
 }
 
@@ -61,7 +95,8 @@ void pull_back_contacts(const DirectBlock& block, BlockState<T>& state, const st
 template <class T>
 void project_implicit_vjp(const SubstepState<T>& s, const DirectBlock& block, Scenes scenes,
                           const sheetbend_packs::KernelTable& table, BlockState<T>& state, BlockCotangents<T>& bar) {
-  constexpr int passes = 2;
+  const bool has_rigid = has_rigid_rows(state);
+  const int passes = has_rigid ? 3 : 2;
   for (int scene = 0; scene < static_cast<int>(state.implicit.size()); ++scene)
     if (has(scenes, scene)) state.implicit[scene].factorize(s.scene, block);
   for (auto& scene : bar.contacts) scene.clear();
@@ -77,12 +112,19 @@ void project_implicit_vjp(const SubstepState<T>& s, const DirectBlock& block, Sc
   arrays.C_r_bar = bar.C_r.numbers();
 
   std::vector<T> p(3 * static_cast<std::size_t>(block.movable)), x_bar(p.size(), T(0.0));
+  std::vector<T> rest(has_rigid ? block.size() : 0, T(0.0)), y, Jp;  // of rigid rows
   for (int pass = 0; pass < passes; ++pass) {
     for (std::size_t i = 0; i < p.size(); ++i) p[i] = bar.x[sheetbend_blocks::row * (i / 3) + i % 3];
-    solve_implicit(block, scenes, state, p);
+    y = rest;
+    solve_implicit(block, scenes, state, p, y);
     bar.y.clear();
     numbers_of_block(block, state, 0).subtract_times(p.data(), bar.y.data());
+    if (has_rigid) {
+      Jp.resize(block.size());
+      for (int j = 0; j < block.size(); ++j) Jp[j] = -bar.y[j];
+    }
     for (int j = 0; j < block.size(); ++j) bar.y[j] = -(bar.y[j] / state.diagonal[j]);
+    keep_rigid_rows(state, y, rest, Jp, bar);
     for (int n = 0; n < static_cast<int>(block.particles.size()); ++n) {
       const std::size_t at = sheetbend_blocks::row * static_cast<std::size_t>(n);
       Vec3<T> left = Vec3<T>(&bar.x[at]) - transpose_times_at<T>(arrays, n, bar.y.data());

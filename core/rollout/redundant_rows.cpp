@@ -58,6 +58,32 @@ RedundantRow take_apart(const DirectBlock& block, State& state, int row, const s
   return found;
 }
 
+// The same for the rigid rows of a block whose other rows stand in a matrix of its particles.
+void find_among_rigid(const SubstepState<double>& substep, const DirectBlock& block, std::vector<RedundantRow>& found) {
+  State state;
+  state.resize(substep.scene, block, 0);
+  begin_block(substep, block, state);
+  RigidRows rigid;
+  const RigidRows::Given given{block, state.values, state.C_r};
+  const double* at = state.x[0].data();
+  rigid.find(substep.scene, given, at);
+  if (rigid.empty()) return;
+  rigid.leave_out(given, at);
+  for (int row = 0; row < rigid.size(); ++row) {
+    if (!rigid.left_out(row) || !rigid.moves(row)) continue;
+    const std::vector<double> c = rigid.as_sum(given, at, row);
+    RedundantRow one{block.multipliers[rigid.row(row)], {}, rigid.value(row)};
+    for (int i = 0; i < rigid.size(); ++i) {
+      one.contradiction -= c[i] * rigid.value(i);
+      if (c[i] * c[i] * rigid.weight(row) > least_share * least_share * rigid.weight(i))
+        one.others.push_back(block.multipliers[rigid.row(i)]);
+    }
+    std::ranges::sort(one.others);
+    one.contradiction = std::abs(one.contradiction) / rigid.steepness(block, row);
+    found.push_back(one);
+  }
+}
+
 // From the first particle.
 double largest_distance(const Scene& scene, const double* x) {
   double largest = 0.0;
@@ -89,7 +115,10 @@ std::vector<RedundantRow> redundant_rows(const Scene& scene, const Plan& plan, c
   std::vector<double> q(x, x + scene.dofs());
   const SubstepState<double> substep{scene, {scene.layout, inputs}, eta, q.data(), w, nullptr, nullptr};
   for (const DirectBlock& block : plan.blocks) {
-    if (block.condensation) continue;  // what gives way is never said by others
+    if (block.condensation) {
+      find_among_rigid(substep, block, found);  // what gives way is never said by others
+      continue;
+    }
     State state;
     state.resize(scene, block, 0);
     begin_block(substep, block, state);

@@ -1,10 +1,11 @@
-// The solve with A = J W J^T + D of a block whose constraints all give way, D = a/(1+g) > 0, through its particles:
+// The solve with A = J W J^T + D of a block whose constraints give way, D = a/(1+g) > 0, through its particles:
 //   A^-1 b = D^-1 (b - J H^-1 J^T D^-1 b),     H = W^-1 + J^T D^-1 J     (Woodbury)
 // H is the Hessian of implicit Euler without the curvature of C: global Newton. A sheet has an eighth as many coordinates as scalar constraints, and its H
 // a fraction of A's fill. H is factored, or solved with by conjugate gradients.
 //
-// The rows g of kept volumes may be rigid, and would fill H: they stay beside it. From z = H^-1 J^T D^-1 b of the constraints alone their part of the
-// solution is p = S^-1 (b_p - g^T z), S = a + g^T H^-1 g, which adds H^-1 g p to z.
+// The rows g of rigid constraints have no D^-1, and those of kept volumes would fill H: they stay beside it, as its border. From z = H^-1 J^T D^-1 b of the
+// other rows alone their part of the solution is p = S^-1 (b_p - g^T z), S = D + g^T H^-1 g, which adds H^-1 g p to z. It costs a solve with H per row of
+// the border: it is for a pole or a body in a cloth, not for chains of rigid links.
 #pragma once
 
 #include <algorithm>
@@ -23,15 +24,19 @@ template <class T>
 class CondensedSolver {
  public:
   void prepare(const Condensation& plan, const BlockNumbers<T>& block, typename Factor<T>::FactorSupernodes compiled) {
-    const int constraints = block.size - block.volumes;
     stiffness_.assign(block.size, T(0.0));
-    for (int row = 0; row < constraints; ++row) stiffness_[row] = T(1.0) / block.diagonal[row];
+    border_.clear();
+    for (int row = 0; row < block.size; ++row)
+      if (row >= block.size - block.volumes || is_rigid(block.diagonal[row]))
+        border_.push_back(row);
+      else
+        stiffness_[row] = T(1.0) / block.diagonal[row];
     if (const auto* pattern = std::get_if<CondensedPattern>(&plan))
       factor_.factorize(*pattern, block, stiffness_.data(), compiled);
     else
       cg_.prepare(std::get<CondensedIteration>(plan).aggregation, block, stiffness_.data(),
                   is_plain<T> ? compiled : nullptr);
-    if (block.volumes > 0) prepare_volumes(plan, block);
+    if (!border_.empty()) prepare_border(plan, block);
   }
 
   // b = A^-1 b, with the numbers that were prepared.
@@ -39,7 +44,7 @@ class CondensedSolver {
   void solve(const Condensation& plan, const BlockNumbers<T>& block, U* b) const {
     const int rows = block.size;
     std::vector<U>& own = scratch<U>();
-    own.resize(work(plan, block.movable, rows, block.volumes));
+    own.resize(work(plan, block.movable, rows, border_.size()));
     U *y = own.data(), *rest = y + rows, *room = rest + rows;
     std::copy_n(b, rows, y);
     solve_once(plan, block, y, room);
@@ -52,16 +57,17 @@ class CondensedSolver {
   }
 
   // Numbers that solve() works on.
-  static std::size_t work(const Condensation& plan, std::size_t movable, std::size_t rows, std::size_t volumes) {
+  static std::size_t work(const Condensation& plan, std::size_t movable, std::size_t rows, std::size_t border) {
     const auto* iteration = std::get_if<CondensedIteration>(&plan);
-    return 3 * rows + 3 * movable + volumes +
+    return 3 * rows + 3 * movable + border +
            (iteration ? CondensedCg<T>::work(iteration->aggregation) : CondensedFactor<T>::work(movable));
   }
 
-  // What it holds once it has solved.
+  // What it holds once it has solved; of a border that of volumes, since which constraints are rigid is not known before.
   static std::size_t bytes(const Condensation& plan, std::size_t movable, std::size_t rows, std::size_t volumes) {
     const auto* pattern = std::get_if<CondensedPattern>(&plan);
     return sizeof(T) * (rows + work(plan, movable, rows, volumes) + volumes * (6 * movable + volumes)) +
+           sizeof(int) * volumes +
            (pattern ? Factor<T>::bytes(pattern->structure)
                     : CondensedCg<T>::bytes(std::get<CondensedIteration>(plan).aggregation));
   }
@@ -76,15 +82,25 @@ class CondensedSolver {
   // y = D^-1 (y - J H^-1 J^T D^-1 y)
   template <class U>
   void solve_once(const Condensation& plan, const BlockNumbers<T>& block, U* y, U* room) const {
-    const int constraints = block.size - block.volumes;
     U *scaled = room, *z = scaled + block.size, *p = z + 3 * static_cast<std::size_t>(block.movable);
     for (int i = 0; i < block.size; ++i) scaled[i] = stiffness_[i] * y[i];
     block.transpose_times(scaled, z);
-    solve_particles(plan, z, p + block.volumes);
-    if (block.volumes > 0) add_volumes(block, y + constraints, z, p);
+    solve_particles(plan, z, p + border_.size());
+    if (!border_.empty()) add_border(block, y, z, p);
     block.subtract_times(z, y);
-    for (int i = 0; i < constraints; ++i) y[i] = stiffness_[i] * y[i];
-    std::copy_n(p, block.volumes, y + constraints);
+    for (int i = 0; i < block.size; ++i) y[i] = stiffness_[i] * y[i];
+    for (std::size_t v = 0; v < border_.size(); ++v) y[border_[v]] = p[v];
+  }
+
+  // Of one scene at least.
+  static bool is_rigid(const T& D) {
+    if constexpr (std::is_same_v<T, Pack>) {
+      for (int lane = 0; lane < Pack::lanes; ++lane)
+        if (D[lane] == 0.0) return true;
+      return false;
+    } else {
+      return value_of(D) == 0.0;
+    }
   }
 
   // z = H^-1 z
@@ -97,8 +113,8 @@ class CondensedSolver {
   }
 
   // g, H^-1 g and the factors of S.
-  void prepare_volumes(const Condensation& plan, const BlockNumbers<T>& block) {
-    const int count = block.volumes;
+  void prepare_border(const Condensation& plan, const BlockNumbers<T>& block) {
+    const int count = static_cast<int>(border_.size());
     const std::size_t dofs = 3 * static_cast<std::size_t>(block.movable);
     gradients_.resize(count * dofs);
     schur_.resize(static_cast<std::size_t>(count) * count);
@@ -106,7 +122,7 @@ class CondensedSolver {
     own.resize(work(plan, block.movable, block.size, count));
     for (int v = 0; v < count; ++v) {
       std::fill_n(own.data(), block.size, T(0.0));
-      own[block.size - count + v] = T(1.0);
+      own[border_[v]] = T(1.0);
       block.transpose_times(own.data(), &gradients_[v * dofs]);
     }
     responses_ = gradients_;
@@ -114,7 +130,7 @@ class CondensedSolver {
     T* L = schur_.data();
     for (int v = 0; v < count; ++v)
       for (int w = 0; w <= v; ++w) {
-        T sum = v == w ? block.diagonal[block.size - count + v] : T(0.0);
+        T sum = v == w ? block.diagonal[border_[v]] : T(0.0);
         for (std::size_t d = 0; d < dofs; ++d) sum += gradients_[v * dofs + d] * responses_[w * dofs + d];
         const T own = sum;
         for (int k = 0; k < w; ++k) sum -= L[v * count + k] * L[k * count + k] * L[w * count + k];
@@ -125,12 +141,12 @@ class CondensedSolver {
 
   // p = S^-1 (b_p - g^T z), z += H^-1 g p
   template <class U>
-  void add_volumes(const BlockNumbers<T>& block, const U* b, U* z, U* p) const {
-    const int count = block.volumes;
+  void add_border(const BlockNumbers<T>& block, const U* b, U* z, U* p) const {
+    const int count = static_cast<int>(border_.size());
     const std::size_t dofs = 3 * static_cast<std::size_t>(block.movable);
     const T* L = schur_.data();
     for (int v = 0; v < count; ++v) {
-      p[v] = b[v];
+      p[v] = b[border_[v]];
       for (std::size_t d = 0; d < dofs; ++d) p[v] -= gradients_[v * dofs + d] * z[d];
       for (int k = 0; k < v; ++k) p[v] -= L[v * count + k] * p[k];
     }
@@ -142,7 +158,7 @@ class CondensedSolver {
       for (std::size_t d = 0; d < dofs; ++d) z[d] += responses_[v * dofs + d] * p[v];
   }
 
-  // a/pivot; zero in the row of a volume that others keep already, whose pivot is zero (pivot.h).
+  // a/pivot; zero in a row that others say already, whose pivot is zero (pivot.h).
   template <class U>
   static U over_pivot(const U& a, const T& pivot) {
     const T left_out = select(pivot > T(0.0), T(0.0), T(1.0));
@@ -172,9 +188,10 @@ class CondensedSolver {
 
   CondensedFactor<T> factor_;
   CondensedCg<T> cg_;
-  std::vector<T> stiffness_;              // D^-1; zero in the rows of volumes
-  std::vector<T> gradients_, responses_;  // g and H^-1 g of the volumes, three numbers per movable particle
-  std::vector<T> schur_;                  // (volumes, volumes) factors of S: L below the diagonal, the pivots on it
+  std::vector<T> stiffness_;              // D^-1; zero in the rows of the border
+  std::vector<int> border_;               // its rows, those of volumes last
+  std::vector<T> gradients_, responses_;  // their g and H^-1 g, three numbers per movable particle
+  std::vector<T> schur_;                  // (border, border) factors of S: L below the diagonal, the pivots on it
   mutable std::vector<T> scratch_;
 };
 

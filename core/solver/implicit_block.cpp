@@ -5,12 +5,13 @@
 #include <iterator>
 #include <sstream>
 
+#include "core/solver/moved_rows.h"
+
 namespace sheetbend {
 namespace {
 
 constexpr int row = sheetbend_blocks::row;
 constexpr double sufficient = 1e-4;  // share of the slope's promise that a step has to keep (Armijo)
-constexpr double flat = 1e-8;        // relative changes of Phi that rounding may hide
 constexpr int most_halvings = 60;
 constexpr int turns = 8;                  // in which a direction of negative curvature gets steeper
 constexpr double first_departure = 1e-4;  // along it, of the block's size
@@ -27,18 +28,18 @@ std::string words(const Unbalanced& e, int substep, double time) {
   return out.str();
 }
 
-// Sets `to` to the rows `from` plus t d on the movable particles.
-void move(Numbers<double>& from, double t, const std::vector<double>& d, Numbers<double>& to) {
-  to = from;
-  double* x = to.data();
-  for (std::size_t i = 0, p = 0; i < d.size(); i += 3, p += row)
-    for (int k = 0; k < 3; ++k) x[p + k] += t * d[i + k];
-}
-
-double product(const std::vector<double>& a, const std::vector<double>& b) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
-  return sum;
+// The multipliers of rigid rows that leave the least of R at the solution x. What is left of it is rounding, which contacts make large: on the way back these
+// multipliers are found again from x, and have to be the same. The second pass takes back the rounding of the first.
+void balance_rigid(const DirectBlock& block, IncrementalPotential& potential, Numbers<double>& x) {
+  RigidRows& rigid = potential.rigid;
+  if (rigid.empty()) return;
+  for (int pass = 0; pass < 2; ++pass) {
+    potential.evaluate(block, x);
+    if (pass == 0) rigid.factorize(block, x.data());
+    const std::vector<double> more = rigid.balance(block, x.data(), potential.R().data());
+    for (std::size_t j = 0; j < more.size(); ++j) rigid.lambda[j] += more[j];
+  }
+  potential.evaluate(block, x);
 }
 
 }  // namespace
@@ -82,11 +83,15 @@ bool ImplicitBlock::slow() const {
 void ImplicitBlock::factorize_newton(const Scene& scene, const DirectBlock& block) {
   ++matrices_;
   matrix_.find(block, potential, x_);
-  if (!potential.rubs()) {
+  if (!potential.by_merit()) {
     convexity_ = matrix_.factorize_convex_enough(scene, block);
     return;
   }
-  convexity_ = 0.0;
+  convexity_ = 0.0;  // what has no potential has no saddles to be left
+  if (block.contacts.empty()) {
+    matrix_.factorize_convex_enough(scene, block);
+    return;
+  }
   if (matrix_.symmetric() && matrix_.factorize(scene, block, 0.0)) return;
   if (!matrix_.factorize_unsymmetric(scene, block, 0.0)) matrix_.factorize_unsymmetric(scene, block, 1.0);
 }
@@ -94,20 +99,45 @@ void ImplicitBlock::factorize_newton(const Scene& scene, const DirectBlock& bloc
 // The Newton step.
 void ImplicitBlock::take_direction(const DirectBlock& block) {
   for (std::size_t i = 0; i < d_.size(); ++i) d_[i] = -potential.R()[i];
-  matrix_.solve(block, d_.data());
+  for (std::size_t j = 0; j < dl_.size(); ++j) dl_[j] = -rigid().residual(static_cast<int>(j));
+  find_step(block);
+}
+
+// From the right sides in d_ and dl_.
+void ImplicitBlock::find_step(const DirectBlock& block) {
+  if (rigid().empty()) return matrix_.solve(block, d_.data());
+  rigid().solve(block, d_.data(), dl_.data(), [&](double* z) { matrix_.solve(block, z); }, enough_digits);
+  for (double& l : dl_) l = -l;
+}
+
+void ImplicitBlock::expect_digits(const DirectBlock& block, double share) const {
+  if (share <= enough_digits) return;
+  throw Unbalanced(
+      "rigid constraints nearly follow from one another, or hold particles that others hold far more stiffly than they "
+      "weigh: no derivative",
+      "use a smaller substep, remove constraints that say the same, or give them a compliance", matrices_,
+      potential.balance(), potential.worst_node(block));
 }
 
 // The point that the potential was looked at last is x_.
 void ImplicitBlock::accept(double phi) {
   phi_ = phi;
   merit_ = potential.merit();
-  rubs_ = potential.rubs();
+  by_merit_ = potential.by_merit();
+  lambda_ = potential.rigid.lambda;
 }
 
 // One Newton step from the guess, to the first order in where fixed particles go; or the state at n with those moved, where Phi is lower.
 void ImplicitBlock::take_first_step(const Scene& scene, const DirectBlock& block) {
   x_ = guess;
-  potential.evaluate(block, x_);
+  if (!rigid().empty()) {
+    potential.rigid.leave_out(potential.given(block), start.data());
+    lambda_.assign(rigid().size(), 0.0);
+  } else {
+    lambda_.clear();
+  }
+  dl_ = lambda_;
+  look(block);
   factorize_newton(scene, block);
   z_.clear();
   bool moved = false;
@@ -120,57 +150,27 @@ void ImplicitBlock::take_first_step(const Scene& scene, const DirectBlock& block
     matrix_.multiply(block, z_, Kz_);
     for (std::size_t i = 0; i < d_.size(); ++i) d_[i] -= Kz_[row * (i / 3) + i % 3];
   }
-  matrix_.solve(block, d_.data());
+  if (!rigid().empty()) {
+    rigid().multiply(block, z_.data(), dl_.data());
+    rigid().add_softened(block, dl_.data(), d_.data());  // which K z has, being softened
+    for (std::size_t j = 0; j < dl_.size(); ++j) dl_[j] = -(dl_[j] + rigid().residual(static_cast<int>(j)));
+  }
+  find_step(block);
   move(guess, 1.0, d_, trial_);
   x_ = start;
   for (Numbers<double>* rows : {&x_, &trial_})
     std::copy(potential.target.data() + row * block.movable, potential.target.data() + row * block.particles.size(),
               rows->data() + row * block.movable);
-  accept(potential.evaluate(block, x_));
+  accept(look(block));
+  potential.rigid.lambda = dl_;
   const double there = potential.evaluate(block, trial_);
-  const bool falls = rubs_ || potential.rubs() ? potential.merit() < merit_ : there < phi_;
+  const bool falls = by_merit_ || potential.by_merit() ? potential.merit() < merit_ : there < phi_;
   if (falls || !std::isfinite(phi_)) {
     std::swap(x_, trial_);
     accept(there);
   } else {
-    potential.evaluate(block, x_);
+    look(block);
   }
-}
-
-// Goes along d_ as far as Phi falls enough, or the merit where friction acts; R and the forces are those of the new x_. False where it does not fall.
-bool ImplicitBlock::search_line(const DirectBlock& block) {
-  const double slope = product(potential.R(), d_);
-  double t = 1.0;
-  for (int halving = 0; halving < most_halvings; ++halving, t *= 0.5) {
-    move(x_, t, d_, trial_);
-    const double there = potential.evaluate(block, trial_);
-    if (rubs_ || potential.rubs()) {
-      const bool falls = potential.merit() <= (1.0 - 2.0 * sufficient * t) * merit_;
-      if (!falls && potential.largest() > potential.rounding()) continue;
-    } else {
-      const bool falls = there <= phi_ + sufficient * t * slope;
-      // Near the minimum rounding hides what Phi does, not what its slope does (Hager & Zhang 2005).
-      const bool levels = there <= phi_ + flat * phi_ && std::abs(product(potential.R(), d_)) <= 0.5 * std::abs(slope);
-      if (!falls && !levels) continue;
-    }
-    std::swap(x_, trial_);
-    accept(there);
-    return true;
-  }
-  return false;
-}
-
-// Where the Newton step does not lower the merit, those of more convex matrices may.
-bool ImplicitBlock::search_where_it_rubs(const Scene& scene, const DirectBlock& block) {
-  if (block.contacts.empty()) return false;
-  for (const double convexity : {1.0 / 8.0, 1.0}) {
-    potential.evaluate(block, x_);
-    ++matrices_;
-    if (!matrix_.factorize_unsymmetric(scene, block, convexity)) continue;
-    take_direction(block);
-    if (search_line(block)) return true;
-  }
-  return false;
 }
 
 // Of K along d_, which is made as long as one in its largest number; Kz_ is K d_.
@@ -252,6 +252,7 @@ void ImplicitBlock::solve(const Scene& scene, const DirectBlock& block, const So
   };
   if (!finite(start) || !finite(potential.target)) {
     x_ = potential.target;
+    std::fill(potential.rigid.lambda.begin(), potential.rigid.lambda.end(), 0.0);
     return;
   }
   begin();
@@ -274,7 +275,10 @@ bool ImplicitBlock::find_balance(const Scene& scene, const DirectBlock& block, c
     balance_.push_back(potential.balance());
     if (!std::isfinite(phi_)) return false;
     if (balanced(options.force_tolerance)) {
-      if (convexity_ == 0.0) return true;
+      if (convexity_ == 0.0) {
+        balance_rigid(block, potential, x_);
+        return true;
+      }
       factorize_newton(scene, block);
       if (convexity_ == 0.0 || !leave_saddle(scene, block)) return true;
       continue;
@@ -286,19 +290,18 @@ bool ImplicitBlock::find_balance(const Scene& scene, const DirectBlock& block, c
     if (was_convex && convexity_ > 0.0 && slow() && balance_.back() < near_saddle && leave_saddle(scene, block))
       continue;
     take_direction(block);
-    if (rubs_ && leaps < most_leaps && stalls(last_leap)) {
+    if (rigid().empty() && by_merit_ && leaps < most_leaps && stalls(last_leap)) {
       last_leap = balance_.size();
-      move(x_, leap_shares[leaps++], d_, trial_);
-      const double there = potential.evaluate(block, trial_);
+      const double there = look(block, leap_shares[leaps++]);
       if (std::isfinite(there)) {
         std::swap(x_, trial_);
         accept(there);
         continue;
       }
-      potential.evaluate(block, x_);
+      look(block);
     }
-    if (!search_line(block) && !search_where_it_rubs(scene, block)) {
-      potential.evaluate(block, x_);
+    if (!go_down(scene, block, options.iterations)) {
+      look(block);
       return false;
     }
   }
@@ -324,23 +327,26 @@ bool ImplicitBlock::raise_friction(const Scene& scene, const DirectBlock& block,
   take_first_step(scene, block);
   bool found = balances();
   Numbers<double> last = x_;
+  std::vector<double> multipliers = lambda_;
   for (double done = 0.0, step = first_share; found && done < 1.0;) {
     const double share = std::min(1.0, done + step);
     take(share);
-    accept(potential.evaluate(block, x_));
+    accept(look(block));
     if (balances()) {
       done = share;
       last = x_;
+      multipliers = lambda_;
       step *= 2.0;
     } else {
       x_ = last;
+      lambda_ = multipliers;
       step *= 0.5;
       found = step >= least_share;
     }
   }
   if (!found) {
     take(1.0);
-    potential.evaluate(block, x_);
+    look(block);
   }
   return found;
 }
@@ -348,13 +354,17 @@ bool ImplicitBlock::raise_friction(const Scene& scene, const DirectBlock& block,
 void ImplicitBlock::take_guess(const DirectBlock& block) {
   x_ = potential.target;
   std::copy_n(guess.data(), row * block.movable, x_.data());
+  if (rigid().empty()) return;
+  potential.rigid.leave_out(potential.given(block), start.data());
+  balance_rigid(block, potential, x_);
 }
 
 void ImplicitBlock::factorize(const Scene& scene, const DirectBlock& block) {
   matrix_.find(block, potential, x_, true);
   if (matrix_.symmetric() && matrix_.factorize(scene, block, 0.0)) return;
   potential.evaluate(block, x_);
-  if ((potential.rubs() || !matrix_.symmetric()) && matrix_.factorize_unsymmetric(scene, block, 0.0)) return;
+  const bool has_lu = potential.by_merit() ? !block.contacts.empty() : !matrix_.symmetric();
+  if (has_lu && matrix_.factorize_unsymmetric(scene, block, 0.0)) return;
   throw Unbalanced(
       "forces balance where they have no stiffness against some motion, at the point of buckling: no derivative",
       "use a smaller substep, or an imperfection that says which way", matrices_, potential.balance(),

@@ -2,7 +2,7 @@
 // linearized iteration of it. The coordinates of the movable particles go to a minimum of the incremental potential by Newton's method
 // with a line search. A saddle, such as a flat sheet that is pressed in its plane, is left along a direction of negative curvature. Where friction acts
 // there is no potential: the same Newton method with the whole unsymmetric matrix goes down in the merit sum w |R|^2, for which its steps always are a
-// direction of descent.
+// direction of descent. The same holds where rows do not give way, whose multipliers are unknowns beside the coordinates (rigid_rows.h).
 #pragma once
 
 #include <stdexcept>
@@ -37,6 +37,7 @@ class ImplicitBlock {
   // The movable particles' guess is the solution, found before.
   void take_guess(const DirectBlock& block);
   const double* x() { return x_.data(); }  // the solution, rows of four
+  const RigidRows& rigid() const { return potential.rigid; }  // with the solution's multipliers
 
   // The largest |R| over the largest force, at the start and after each Newton step of the last solve.
   const std::vector<double>& balance() const { return balance_; }
@@ -44,24 +45,34 @@ class ImplicitBlock {
   // K at the solution, for derivatives: with the curvature of colliders. Throws Unbalanced where it is not positive definite, or has no inverse
   // where friction acts.
   void factorize(const Scene& scene, const DirectBlock& block);
-  // z = K^-1 z or K^-T z, three numbers per movable particle; z may be over a larger scalar.
+  // z = K^-1 z or K^-T z, three numbers per movable particle; z may be over a larger scalar. With rigid rows [z; mu] is that of the whole matrix (rigid_rows.h),
+  // and Unbalanced is thrown where it has no digits.
   template <class U>
-  void solve(const DirectBlock& block, U* z) const {
-    matrix_.solve(block, z);
+  void solve(const DirectBlock& block, U* z, U* mu) const {
+    if (rigid().empty()) return matrix_.solve(block, z);
+    expect_digits(block, rigid().solve(block, z, mu, [&](U* dz) { matrix_.solve(block, dz); }, all_digits));
   }
   template <class U>
-  void solve_transposed(const DirectBlock& block, U* z) const {
-    matrix_.solve_transposed(block, z);
+  void solve_transposed(const DirectBlock& block, U* z, U* mu) const {
+    if (rigid().empty()) return matrix_.solve_transposed(block, z);
+    expect_digits(block, rigid().solve(block, z, mu, [&](U* dz) { matrix_.solve_transposed(block, dz); }, all_digits));
   }
 
  private:
   void begin();
   bool find_balance(const Scene& scene, const DirectBlock& block, const SolverOptions& options);
   bool raise_friction(const Scene& scene, const DirectBlock& block, const SolverOptions& options);
+  static constexpr double all_digits = 1e-15, enough_digits = 1e-8;  // of multipliers, for derivatives and for Newton steps
+  void expect_digits(const DirectBlock& block, double share) const;
+  double look(const DirectBlock& block);
+  double look(const DirectBlock& block, double t);
+  void find_step(const DirectBlock& block);
   void take_first_step(const Scene& scene, const DirectBlock& block);
   void factorize_newton(const Scene& scene, const DirectBlock& block);
   void take_direction(const DirectBlock& block);
-  bool search_line(const DirectBlock& block);
+  bool search_line(const DirectBlock& block, int most_trials);
+  bool step_over_kinks(const Scene& scene, const DirectBlock& block, int most_matrices);
+  bool go_down(const Scene& scene, const DirectBlock& block, int most_matrices);
   bool search_where_it_rubs(const Scene& scene, const DirectBlock& block);
   void accept(double phi);
   bool leave_saddle(const Scene& scene, const DirectBlock& block);
@@ -74,8 +85,9 @@ class ImplicitBlock {
   NewtonMatrix matrix_;
   Numbers<double> x_, trial_, z_, Kz_;
   std::vector<double> d_, balance_;
+  std::vector<double> lambda_, dl_;  // of the rigid rows at x_, and their step
   double phi_ = 0.0, merit_ = 0.0;  // at x_
-  bool rubs_ = false;               // likewise, whether friction acts
+  bool by_merit_ = false;           // likewise, whether steps are judged by the merit
   double convexity_ = 0.0;  // of the last matrix: 0 for K, 1 where no constraint's share has negative eigenvalues
   int matrices_ = 0;
   std::size_t first_ = 0;  // of balance_ since Newton's method began, for the last time

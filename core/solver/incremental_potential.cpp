@@ -79,6 +79,10 @@ double IncrementalPotential::evaluate(const DirectBlock& block, Numbers<double>&
   double elastic = pack_kernels().potential->evaluate(arrays(block, at));
   rubs_ = false;
   if (!block.contacts.empty()) elastic += add_contacts(block, at.data());
+  if (!rigid.empty()) {
+    rigid.evaluate(given(block), at.data());
+    rigid.push(block, push_.data(), magnitude_.data());
+  }
   double inertial = 0.0, stiffest = 0.0, farthest = 0.0, lightest = std::numeric_limits<double>::infinity();
   const double *x = at.data(), *predicted = target.data();
   const double *push = push_.data(), *magnitude = magnitude_.data(), *stiffness = stiffness_.data();
@@ -97,9 +101,19 @@ double IncrementalPotential::evaluate(const DirectBlock& block, Numbers<double>&
       farthest = std::max(farthest, std::abs(x[i]));
     }
   }
+  if (!rigid.empty()) add_rigid_residuals();
   // No more than what moves a particle by nothing: near a collapsed triangle any force is rounding.
   rounding_ = std::min(256.0 * std::numeric_limits<double>::epsilon() * stiffest, nothing * lightest) * farthest;
   return elastic + 0.5 * inertial;
+}
+
+// A residual counts as the force that would take it away.
+void IncrementalPotential::add_rigid_residuals() {
+  for (int j = 0; j < rigid.size(); ++j) {
+    const double c = rigid.residual(j), multiplier = c * rigid.weight(j);
+    merit_ += c * multiplier;
+    largest_ = std::max(largest_, std::abs(multiplier) * rigid.steepest(j));
+  }
 }
 
 int IncrementalPotential::worst_node(const DirectBlock& block) const {

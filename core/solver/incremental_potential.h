@@ -4,7 +4,8 @@
 //   R = dPhi/dx = (x - x~)/w - J^T lambda                                    lambda = -(C + g (C - C_r))/a
 //
 // R is the force that does not balance, times eta^2. Contacts add lambda_n^2/(2 kappa) to Phi and their forces to R (core/contact/law.h). Friction has no
-// potential: where it acts, Phi says nothing, and what is to fall is the merit sum w |R|^2.
+// potential: where it acts, Phi says nothing, and what is to fall is the merit sum w |R|^2. Rows that do not give way have multipliers of their own
+// (rigid_rows.h), and their residuals are part of the merit.
 #pragma once
 
 #include <vector>
@@ -13,6 +14,7 @@
 #include "core/scalar/numbers.h"
 #include "core/solver/block_contacts.h"
 #include "core/solver/plan.h"
+#include "core/solver/rigid_rows.h"
 
 namespace sheetbend {
 
@@ -23,6 +25,7 @@ class IncrementalPotential {
   Numbers<double> C_r;
   std::vector<Numbers<double>> values;
   BlockContacts<double> contacts;
+  RigidRows rigid;
   double eta = 0.0;  // of `values`; 0 where they are not filled yet
 
   void resize(const Scene& scene, const DirectBlock& block);
@@ -37,12 +40,20 @@ class IncrementalPotential {
   double balance() const { return force_ > 0.0 ? largest_ / force_ : 0.0; }
   double merit() const { return merit_; }
   bool rubs() const { return rubs_; }  // whether friction acts anywhere
+  bool by_merit() const { return rubs_ || !rigid.empty(); }  // whether steps are judged by the merit
   int worst_node(const DirectBlock& block) const;
 
   // The constraints' runs at `at`, as the kernels take them.
   sheetbend_blocks::Potential arrays(const DirectBlock& block, Numbers<double>& at);
 
+  RigidRows::Given given(const DirectBlock& block) { return {block, values, C_r}; }
+  // Adds the rigid rows' matrices to those of all members; `at` is where evaluate() looked last.
+  void add_rigid_elements(const DirectBlock& block, Numbers<double>& at, std::vector<Numbers<double>>& elements) {
+    if (!rigid.empty()) rigid.add_elements(given(block), at.data(), stiffness_.data(), elements);
+  }
+
  private:
+  void add_rigid_residuals();
   double add_contacts(const DirectBlock& block, const double* x);
 
   std::vector<sheetbend_blocks::Run> runs_;

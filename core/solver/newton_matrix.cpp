@@ -73,6 +73,7 @@ void NewtonMatrix::find(const DirectBlock& block, IncrementalPotential& potentia
   arrays_ = potential.arrays(block, at);
   arrays_.elements = element_numbers_.data();
   pack_kernels().potential->find_elements(arrays_);
+  potential.add_rigid_elements(block, at, elements_);
   convex_found_ = false;
   find_contacts(block, potential.contacts, at.data(), curved);
 }

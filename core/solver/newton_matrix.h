@@ -4,7 +4,7 @@
 //
 // as the sum of masses and one symmetric matrix per constraint, and its factors. Where K is not positive definite, a part of the way to the matrix in
 // which no constraint's share has negative eigenvalues (Teran et al. 2005; on demand: Longva et al. 2023) is. Contacts add a 3 x 3 matrix to their
-// particle. Those that slide are not symmetric, and K is factored as LU then.
+// particle. Those that slide are not symmetric, and K is factored as LU then. Rows that do not give way add what rigid_rows.h says: K is softened there.
 #pragma once
 
 #include <vector>

@@ -16,6 +16,22 @@ double number_of(const T& a, [[maybe_unused]] int scene) {
     return value_of(a);
 }
 
+// Which rows do not give way: judged by inputs alone, so that it does not depend on where a rollout begins.
+template <class T>
+void find_rigid(const SubstepState<T>& s, const DirectBlock& block, IncrementalPotential& potential, int scene) {
+  Numbers<double> at;
+  at.assign(sheetbend_blocks::row * block.particles.size());
+  for (std::size_t p = 0; p < block.particles.size(); ++p) {
+    const int node = block.particles[p];
+    for (int d = 0; d < 3; ++d)
+      at[sheetbend_blocks::row * p + d] = number_of(s.inputs.of(Quantity::position)[s.scene.first_dof[node] + d], scene);
+    if (p >= static_cast<std::size_t>(block.movable)) continue;
+    const double mass = number_of(s.inputs.of(Quantity::mass)[node], scene);
+    at[sheetbend_blocks::row * p + 3] = 1.0 / (s.scene.inertial[node] ? mass : mass * s.eta * s.eta);
+  }
+  potential.rigid.find(s.scene, potential.given(block), at.data());
+}
+
 // Hands a scene's numbers to its solver; the guess is where the substep ends if that is known.
 template <class T>
 void load_implicit(const SubstepState<T>& s, const DirectBlock& block, const SubstepStates<T>& states, double h,
@@ -32,6 +48,7 @@ void load_implicit(const SubstepState<T>& s, const DirectBlock& block, const Sub
               number_of<T>(state.values[r][member_number<T>(i, count, part)], scene);
     }
     potential.eta = s.eta;
+    find_rigid(s, block, potential, scene);
   }
   for (std::size_t p = 0; p < block.particles.size(); ++p) {
     const int node = block.particles[p];
@@ -60,9 +77,13 @@ int particle_of(const MemberRun& run, int i, int k) {
   return run.nodes[lane_at(i, K::arity, k)] / sheetbend_blocks::row;
 }
 
-// Calls f(K{}, run, i, J, lambda) for every constraint over T, at the coordinates at(particle, d): lambda = -(C + g (C - C_r))/a.
+// Calls f(K{}, run, i, J, lambda) for every constraint over T, at the coordinates at(particle, d): lambda = -(C + g (C - C_r))/a. That of a rigid row is
+// the one in the state; c (rigid rows) gets their residuals.
 template <class T, class At, class F>
-void for_each_elastic(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state, At&& at, F&& f) {
+void for_each_elastic(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state, std::vector<T>& c, At&& at,
+                      F&& f) {
+  const RigidRows& rigid = state.implicit[0].rigid();
+  c.assign(rigid.size(), T(0.0));
   for (const MemberRun& run : block.runs) {
     const Group& group = s.scene.groups[run.group];
     with_kind(group.kind, [&]<class K>(K kind) {
@@ -79,7 +100,12 @@ void for_each_elastic(const SubstepState<T>& s, const DirectBlock& block, BlockS
           for (int j = 0; j < K::rows; ++j) {
             T residual = value.C[j];
             if (group.damped) residual += rates.g * difference<K>(value.C[j], T(state.C_r[run.first_row[i] + j]));
-            lambda[j] = -(residual / rates.a);
+            if (const int own = rigid.own_row(run.first_row[i] + j); own >= 0) {
+              lambda[j] = T(state.lambda[0][run.first_row[i] + j]);
+              c[own] = rates.scale * (residual + rates.a * lambda[j]);
+            } else {
+              lambda[j] = -(residual / rates.a);
+            }
           }
           f(kind, run, i, value.J, lambda);
         }
@@ -87,12 +113,12 @@ void for_each_elastic(const SubstepState<T>& s, const DirectBlock& block, BlockS
   }
 }
 
-// R -= J^T lambda over T at x, three numbers per particle.
+// R -= J^T lambda over T at x, three numbers per particle; c as above.
 template <class T>
 void subtract_elastic_forces(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state,
-                             const std::vector<T>& x, std::vector<T>& R) {
+                             const std::vector<T>& x, std::vector<T>& R, std::vector<T>& c) {
   for_each_elastic(
-      s, block, state, [&](int particle, int d) { return x[3 * particle + d]; },
+      s, block, state, c, [&](int particle, int d) { return x[3 * particle + d]; },
       [&]<class K>(K, const MemberRun& run, int i, const T* J, const T* lambda) {
         T push[K::dofs];
         transpose_times<K>(J, lambda, push);
@@ -118,30 +144,77 @@ void subtract_contact_forces(const DirectBlock& block, const BlockState<T>& stat
 // The multipliers of scalars that carry tangents, which the solution comes without.
 template <class T>
 void carry_multipliers(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state) {
+  std::vector<T> c;
   for_each_elastic(
-      s, block, state,
+      s, block, state, c,
       [&](int particle, int d) { return T(state.x[0][sheetbend_blocks::row * static_cast<std::size_t>(particle) + d]); },
       [&]<class K>(K, const MemberRun& run, int i, const T*, const T* lambda) {
         for (int j = 0; j < K::rows; ++j) state.lambda[0][run.first_row[i] + j] = lambda[j];
       });
 }
 
+// What R and c carry beside their values at x (particles, 3) and the rigid rows' multipliers in the state.
+template <class T>
+void find_first_order(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state, const std::vector<T>& x,
+                      std::vector<T>& R, std::vector<T>& c) {
+  R.resize(3 * static_cast<std::size_t>(block.movable));
+  for (int p = 0; p < block.movable; ++p) {
+    const int dof = s.scene.first_dof[block.particles[p]];
+    const T w(state.x[0][sheetbend_blocks::row * static_cast<std::size_t>(p) + 3]);
+    for (int d = 0; d < 3; ++d) R[3 * p + d] = (x[3 * p + d] - s.q[dof + d]) / w;
+  }
+  subtract_elastic_forces(s, block, state, x, R, c);
+  subtract_contact_forces(block, state, x, R);
+  for (auto* residuals : {&R, &c})
+    for (T& r : *residuals) r = r - T(value_of(r));
+}
+
+// Adds to the multipliers of rigid rows.
+template <class T>
+void add_rigid(const RigidRows& rigid, const std::vector<T>& more, BlockState<T>& state) {
+  for (int j = 0; j < rigid.size(); ++j) state.lambda[0][rigid.row(j)] = T(state.lambda[0][rigid.row(j)]) + more[j];
+}
+
+// The multipliers of rigid rows at the solution: what solving has found.
+template <class T>
+void set_rigid(BlockState<T>& state) {
+  for (int scene = 0; scene < static_cast<int>(state.implicit.size()); ++scene) {
+    const RigidRows& rigid = state.implicit[scene].rigid();
+    for (int j = 0; j < rigid.size(); ++j)
+      if constexpr (std::is_same_v<T, Pack>)
+        state.lambda[0][rigid.row(j)].set(scene, rigid.lambda[j]);
+      else
+        state.lambda[0][rigid.row(j)] = T(rigid.lambda[j]);
+  }
+}
+
 // What a scalar carries beside its value at the solution x (particles, 3), which comes with the value alone.
 template <class T>
 void carry_first_order(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state, std::vector<T>& x) {
-  constexpr int passes = 2;  // the second one refines
+  const RigidRows& rigid = state.implicit[0].rigid();
+  const int passes = rigid.empty() ? 2 : 3;  // after the first one they refine
   state.implicit[0].factorize(s.scene, block);
-  std::vector<T> R(3 * static_cast<std::size_t>(block.movable));
+  std::vector<T> R, c;
   for (int pass = 0; pass < passes; ++pass) {
-    for (int p = 0; p < block.movable; ++p) {
-      const std::size_t at = sheetbend_blocks::row * static_cast<std::size_t>(p);
-      for (int d = 0; d < 3; ++d) R[3 * p + d] = (x[3 * p + d] - T(state.x[0][at + d])) / T(state.x[0][at + 3]);
-    }
-    subtract_elastic_forces(s, block, state, x, R);
-    subtract_contact_forces(block, state, x, R);
-    for (T& r : R) r = r - T(value_of(r));
-    state.implicit[0].solve(block, R.data());
+    find_first_order(s, block, state, x, R, c);
+    state.implicit[0].solve(block, R.data(), c.data());
     for (std::size_t i = 0; i < R.size(); ++i) x[i] = x[i] - R[i];
+    add_rigid(rigid, c, state);
+  }
+}
+
+// The same of the rigid rows' multipliers alone, where the coordinates are known: those that balance what R carries.
+template <class T>
+void carry_rigid(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state) {
+  const RigidRows& rigid = state.implicit[0].rigid();
+  if (rigid.empty()) return;
+  std::vector<T> x(3 * block.particles.size()), R, c;
+  for (std::size_t i = 0; i < x.size(); ++i) x[i] = T(state.x[0][sheetbend_blocks::row * (i / 3) + i % 3]);
+  std::vector<double> at(sheetbend_blocks::row * block.particles.size());
+  for (std::size_t i = 0; i < at.size(); ++i) at[i] = value_of(T(state.x[0][i]));
+  for (int pass = 0; pass < 2; ++pass) {
+    find_first_order(s, block, state, x, R, c);
+    add_rigid(rigid, rigid.balance(block, at.data(), R.data()), state);
   }
 }
 
@@ -171,6 +244,23 @@ void write_solution(const SubstepState<T>& s, const DirectBlock& block, BlockSta
   }
 }
 
+// Puts the rigid rows' multipliers (of all rows; empty where there are none) in the place of what a division by their compliance has made.
+template <class T>
+void keep_rigid(const std::vector<T>& lambda, BlockState<T>& state) {
+  T* dl = state.at(0).dl.data();
+  for (int scene = 0; !lambda.empty() && scene < static_cast<int>(state.implicit.size()); ++scene) {
+    const RigidRows& rigid = state.implicit[scene].rigid();
+    for (int j = 0; j < rigid.size(); ++j) {
+      const int row = rigid.row(j);
+      if constexpr (std::is_same_v<T, Pack>)
+        dl[row].set(scene, lambda[row][scene]);
+      else
+        dl[row] = lambda[row];
+      state.lambda[0][row] = dl[row];
+    }
+  }
+}
+
 // From the predicted coordinates in state.x to those at which forces balance, with gradients and multipliers. Nothing is solved where these coordinates
 // are known, as on the way back, nor in scenes other than `scenes`.
 template <class T>
@@ -184,6 +274,7 @@ void project_implicit(const SubstepState<T>& s, const DirectBlock& block, const 
     else
       state.implicit[scene].solve(s.scene, block, options);
   }
+  set_rigid(state);
   if (states.x_next)
     for (int p = 0; p < block.movable; ++p)
       for (int d = 0; d < 3; ++d)
@@ -194,7 +285,14 @@ void project_implicit(const SubstepState<T>& s, const DirectBlock& block, const 
     const auto arrays = arrays_of(block, runs_of(s, block, state), state, 0);
     forward_kernels<T>(table).evaluate(arrays);
     T* dl = state.at(0).dl.data();
+    std::vector<T> rigid;
+    if (std::ranges::any_of(state.implicit, [](const ImplicitBlock& scene) { return !scene.rigid().empty(); })) {
+      if constexpr (!is_plain<T>)
+        if (states.x_next) carry_rigid(s, block, state);
+      rigid.assign(state.lambda[0].data(), state.lambda[0].data() + block.size());
+    }
     for (int j = 0; j < block.size(); ++j) state.lambda[0][j] = dl[j] = dl[j] / state.diagonal[j];
+    keep_rigid(rigid, state);
   }
 }
 

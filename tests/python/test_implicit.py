@@ -254,15 +254,8 @@ def test_a_tolerance_that_is_none_is_named(given: float) -> None:
         replace(IMPLICIT, force_tolerance=given)
 
 
-def test_rigid_constraints_are_refused() -> None:
-    """Rods' frames, tethers, volumes: tests/cpp/test_implicit.cpp, test_tethers.py, test_volume.py."""
-    scene = strip(1.0)
-    scene.add_constraints("distance", np.array([[4, 5]]), compliance=0.0)
-    with pytest.raises(sb.InputError, match=r"solver\.method: cannot hold rigid constraints.*use 'direct'"):
-        sb.simulate(scene, [0.0, 0.1], replace(IMPLICIT, h=0.1))
-
-
 def test_rods_are_refused() -> None:
+    """Tethers and volumes: tests/cpp/test_implicit.cpp, test_tethers.py, test_volume.py."""
     scene = sb.rod(0.5, 8, density=0.05, EI=1e-3, GJ=1e-3, EA=1e3)
     with pytest.raises(sb.InputError, match=r"has frames of rods.*Fix: use direct"):
         sb.simulate(scene, [0.0, 0.1], replace(IMPLICIT, h=0.1))

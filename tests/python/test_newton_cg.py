@@ -134,15 +134,6 @@ def test_running_out_of_iterations_is_told() -> None:
     assert caught.value.residual > short.cg_tolerance
 
 
-@pytest.mark.parametrize("method", ["newton", "newton_cg"])
-def test_rigid_constraints_are_refused(method: str) -> None:
-    scene = sb.Scene("rigid")
-    scene.add_particles([[0, 0, 0], [1, 0, 0]], mass=1.0)
-    scene.add_constraints("distance", [[0, 1]], compliance=0.0, rest=1.0)
-    with pytest.raises(sb.InputError, match=r"solver\.method: cannot hold rigid constraints .*use 'direct'"):
-        sb.simulate(scene, [0.0, 0.1], sb.Solver(h=0.1, method=method))
-
-
 @pytest.mark.parametrize(
     ("given", "said"),
     [

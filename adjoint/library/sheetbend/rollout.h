@@ -64,8 +64,8 @@ class SHEETBEND_API Rollout {
   std::unique_ptr<Parts> parts_;
 };
 
-/// Which rigid constraints of the first substep follow from others, in words; empty where none do. The method `direct`
-/// leaves them out, and their multipliers are not unique.
+/// Which rigid constraints of the first substep follow from others, in words; empty where none do. All methods but
+/// `gauss_seidel` leave them out, and their multipliers are not unique.
 SHEETBEND_API std::string redundant_constraints(const Scene& scene, const Solver& solver = {});
 
 }  // namespace sheetbend::inline v0

@@ -17,9 +17,9 @@ enum class Integrator {
 /// How the constraints of a substep are solved; see `sheetbend.Solver` of the Python package.
 enum class Method {
   direct,        ///< each connected part by its constraints: for ropes
-  newton,        ///< the same parts by their particles: for cloth; every compliance must be positive
+  newton,        ///< the same parts by their particles: for cloth; each rigid row costs a solve more
   newton_cg,     ///< the same by conjugate gradients: for cloth of more than some 20,000 vertices
-  implicit,      ///< each substep solved until its forces balance; no rods, no rigid constraints
+  implicit,      ///< each substep solved until its forces balance; no rods
   gauss_seidel,  ///< colored sweeps
 };
 

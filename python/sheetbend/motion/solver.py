@@ -27,11 +27,11 @@ class Solver:
         h: substep, s. Constant within a rollout.
         integrator: "bdf2" (second order, the default) or "bdf1" (backward Euler: damps like zeta = omega h/2).
         method: "direct" (each connected part is one block, solved for the multipliers of its constraints: for ropes;
-            the default), "newton" (the same blocks, solved for their particles: for cloth; every compliance must be
-            positive), "newton_cg" (the same by conjugate gradients on two levels: for cloth of more than some 20,000
-            vertices, in half the memory), "implicit" (each substep is solved until its forces balance: for fabrics
-            that stiffen strongly; no rods, no rigid constraints) or "gauss_seidel" (colored sweeps; unconverged ones
-            add about 0.9 h^2/(m sweeps) of compliance per link).
+            the default), "newton" (the same blocks, solved for their particles: for cloth; each rigid row, of
+            compliance 0, costs a solve more), "newton_cg" (the same by conjugate gradients on two levels: for cloth of
+            more than some 20,000 vertices, in half the memory), "implicit" (each substep is solved until its forces
+            balance: for fabrics that stiffen strongly, and for contacts; no rods) or "gauss_seidel" (colored sweeps;
+            unconverged ones add about 0.9 h^2/(m sweeps) of compliance per link).
         iterations: Newton iterations of a block (2 by default), sweeps (10 by default), or the Newton matrices that an
             "implicit" substep may take (100 by default): to need more is an error.
         threads: of one rollout; results do not depend on it.
@@ -127,10 +127,11 @@ class Solver:
         """The compiled solver for a scene, or what is called as it is and combines several.
 
         Raises:
-            InputError: the method cannot step the scene, such as "newton" with rigid constraints.
+            InputError: the method cannot step the scene, such as "implicit" with the frames of rods.
 
         Warns:
-            RedundantConstraintsWarning: method "direct", and some rigid constraints follow from others at the start.
+            RedundantConstraintsWarning: some rigid constraints follow from others at the start; "gauss_seidel" leaves
+                none out, and does not say so.
         """
         self.check_smooth(scene)
         if self.extrapolate == 1:
@@ -139,11 +140,6 @@ class Solver:
         return cast(_core.Solver, Extrapolated(ones, [w for _, w in self.runs]))
 
     def _one(self, scene: CompiledScene) -> _core.Solver:
-        if self.method in ("implicit", "newton", "newton_cg"):
-            offset, size = scene.layout["compliance"]
-            if size and not (scene.inputs()[offset : offset + size] > 0).all():
-                fix = "use 'direct', or give every constraint a compliance"
-                raise InputError("solver.method", "cannot hold rigid constraints", self.method, fix)
         for f in scene.fastest:
             if f.speed * self.h > f.reach:
                 problem = f"lets '{f.name}' move {1e3 * f.speed * self.h:.3g} mm at most, past what it touches: it is "
@@ -157,8 +153,12 @@ class Solver:
             core = _core.Solver(scene=scene.core, threads=self.threads, grain=self.grain, **self.core_options)
         except ValueError as error:
             raise refusal(error, InputError, self.method) from error
-        if self.method == "direct":
-            warn_redundant(scene.name, core.redundant(scene.inputs(), 0.0))
+        inputs = scene.inputs()
+        offset, size = scene.layout["compliance"]
+        if self.method == "direct" or (
+            self.method != "gauss_seidel" and not (inputs[offset : offset + size] > 0).all()
+        ):
+            warn_redundant(scene.name, core.redundant(inputs, 0.0))
         return core
 
 

@@ -1,0 +1,258 @@
+#include "core/solver/rigid_rows.h"
+
+#include <algorithm>
+
+#include "core/constraints/registry.h"
+#include "core/element/second_order.h"
+#include "core/scalar/pivot.h"
+#include "core/solver/ordering.h"
+
+namespace sheetbend {
+namespace {
+
+constexpr int at_row = sheetbend_blocks::row;
+constexpr double gives_way = 1e-10;   // D of a row that does, of J W J^T
+constexpr double softening = 1e-5;    // S, of J diag(K)^-1 J^T
+constexpr std::size_t few = 256;      // rows whose order is kept, as a border of H does (condensed.h)
+constexpr double no_stiffness = 1e150;  // a of a member that has been taken out: products with zero stay zero
+
+// A member's numbers as its kind wants them.
+template <class K>
+struct Numbered {
+  double x[K::dofs], w[K::arity], p[parameter_count<K> + 1];
+  Numbered(const MemberRun& run, const double* values, int count, int place, const double* at) {
+    for (int k = 0; k < K::arity; ++k) {
+      const double* from = at + run.nodes[lane_at(place, K::arity, k)];
+      std::copy_n(from, 3, x + 3 * k);
+      w[k] = from[3];
+    }
+    for (int k = 0; k < parameter_count<K>; ++k) p[k] = values[lane_at(place, count, count - parameter_count<K> + k)];
+  }
+};
+
+}  // namespace
+
+void RigidRows::find(const Scene& scene, const Given& given, const double* at) {
+  *this = {};
+  for (int r = 0; r < static_cast<int>(given.block.runs.size()); ++r) {
+    const MemberRun& run = given.block.runs[r];
+    const Group& group = scene.groups[run.group];
+    const int count = sheetbend_blocks::value_count(group.damped, group.parameters);
+    double* values = given.values[r].data();
+    with_kind(group.kind, [&]<class K>(K) {
+      if constexpr (holds_points<K>)
+        for (int i = 0; i < run.count; ++i) {
+          double& a = values[lane_at(i, count, 0)];
+          const double g = group.damped ? values[lane_at(i, count, 1)] : 0.0;
+          const Numbered<K> own(run, values, count, i, at);
+          const Evaluation<K, double> value(own.x, own.p);
+          double stiffest = 0.0;  // J W J^T
+          for (int j = 0; j < K::rows; ++j) {
+            double sum = 0.0;
+            for (int d = 0; d < K::dofs; ++d) sum += own.w[d / 3] * value.J[j * K::dofs + d] * value.J[j * K::dofs + d];
+            stiffest = std::max(stiffest, sum);
+          }
+          if (a != 0.0 && !(a <= gives_way * (1.0 + g) * stiffest)) continue;
+          members_.push_back({group.kind, r, i, run.first_row[i], K::rows, 0, K::arity, group.damped});
+          for (int j = 0; j < K::rows; ++j) {
+            a_.push_back(a);
+            g_.push_back(g);
+          }
+          a = no_stiffness;
+        }
+    });
+  }
+  if (!empty()) place_rows(given.block);
+}
+
+// Rows in the order of the block's, or in one of low fill where there are many and that is no band.
+void RigidRows::place_rows(const DirectBlock& block) {
+  const std::size_t count = members_.size();
+  std::vector<int> first(count), order(count);
+  for (std::size_t m = 0, row = 0; m < count; row += members_[m++].count) first[m] = static_cast<int>(row);
+  const std::vector<double> a = a_, g = g_;
+  const std::vector<Member> members = members_;
+  const auto put = [&] {
+    members_.clear(), rows_.clear(), a_.clear(), g_.clear();
+    uses_.assign(block.movable, {});
+    std::size_t J = 0;
+    for (const int m : order) {
+      Member own = members[m];
+      const int block_row = own.first;
+      own.first = static_cast<int>(rows_.size());
+      own.J = J;
+      for (int j = 0; j < own.count; ++j) {
+        for (int k = 0; k < own.arity; ++k)
+          if (const int p = particle(block, own, k); p < block.movable)
+            uses_[p].push_back({own.first + j, J + 3 * static_cast<std::size_t>(j * own.arity + k)});
+        rows_.push_back(block_row + j);
+        a_.push_back(a[first[m] + j]);
+        g_.push_back(g[first[m] + j]);
+      }
+      J += static_cast<std::size_t>(3 * own.count * own.arity);
+      members_.push_back(own);
+    }
+    J_.assign(J, 0.0);
+    std::vector<std::pair<int, int>> entries;
+    for (const auto& uses : uses_)
+      for (const Use& i : uses)
+        for (const Use& k : uses)
+          if (k.row <= i.row) entries.emplace_back(i.row, k.row);
+    structure_ = FactorStructure(static_cast<int>(rows_.size()), entries, true, redundant_pivot);
+  };
+  for (std::size_t m = 0; m < count; ++m) order[m] = static_cast<int>(m);
+  std::sort(order.begin(), order.end(), [&](int m, int n) { return members[m].first < members[n].first; });
+  put();
+  if (!structure_.banded() && rows_.size() > few) {
+    std::vector<std::vector<int>> joined(block.movable);
+    for (std::size_t m = 0; m < count; ++m)
+      for (int k = 0; k < members[m].arity; ++k)
+        if (const int p = particle(block, members[m], k); p < block.movable) joined[p].push_back(static_cast<int>(m));
+    const std::vector<int> place = places_for_low_fill(static_cast<int>(count), joined);
+    for (std::size_t m = 0; m < count; ++m) order[place[m]] = static_cast<int>(m);
+    put();
+  }
+  const std::size_t n = rows_.size();
+  D_.resize(n);
+  for (std::size_t j = 0; j < n; ++j) D_[j] = a_[j] / (1.0 + g_[j]);
+  S_ = D_;
+  for (auto* numbers : {&C_, &c_, &weight_, &steepest_, &lambda}) numbers->assign(n, 0.0);
+  left_out_.assign(n, false);
+  own_rows_.assign(block.size(), -1);
+  for (std::size_t j = 0; j < n; ++j) own_rows_[rows_[j]] = static_cast<int>(j);
+}
+
+void RigidRows::evaluate(const Given& given, const double* at) {
+  for (const Member& m : members_)
+    with_kind(m.kind, [&]<class K>(K) {
+      if constexpr (holds_points<K>) {
+        const MemberRun& run = given.block.runs[m.run];
+        const int count = sheetbend_blocks::value_count(m.damped, parameter_count<K>);
+        const Numbered<K> own(run, given.values[m.run].data(), count, m.place, at);
+        const Evaluation<K, double> value(own.x, own.p);
+        std::copy_n(value.J, K::rows * K::dofs, &J_[m.J]);
+        for (int j = 0; j < K::rows; ++j) {
+          const int row = m.first + j;
+          C_[row] = value.C[j];
+          steepest_[row] = 0.0;
+          for (int d = 0; d < K::dofs; ++d)
+            steepest_[row] = std::max(steepest_[row], std::abs(value.J[j * K::dofs + d]));
+          double residual = value.C[j] + a_[row] * lambda[row];
+          if (m.damped) residual += g_[row] * difference<K>(value.C[j], given.C_r[rows_[row]]);
+          c_[row] = left_out_[row] ? 0.0 : residual / (1.0 + g_[row]);
+        }
+      }
+    });
+}
+
+// A column of J W J^T + D over all rows.
+std::vector<double> RigidRows::matrix(const DirectBlock& block, const double* at, int column) const {
+  std::vector<double> sum(D_.size(), 0.0);
+  sum[column] = D_[column];
+  for (int p = 0; p < block.movable; ++p)
+    for (const Use& k : uses_[p]) {
+      if (k.row != column) continue;
+      const Vec3<double> wG = at[at_row * p + 3] * Vec3<double>(&J_[k.J]);
+      for (const Use& i : uses_[p]) sum[i.row] += dot(wG, Vec3<double>(&J_[i.J]));
+    }
+  return sum;
+}
+
+// Of the rows that are not left out; those have zeros.
+void RigidRows::factorize(const DirectBlock& block, const double* at) {
+  factor_.reset(structure_);
+  for (int j = 0; j < size(); ++j)
+    if (!left_out_[j]) factor_.values[structure_.position(j, j)] = D_[j];
+  for (int p = 0; p < block.movable; ++p)
+    for (const Use& k : uses_[p]) {
+      const Vec3<double> wG = at[at_row * p + 3] * Vec3<double>(&J_[k.J]);
+      for (const Use& i : uses_[p])
+        if (i.row >= k.row && !left_out_[i.row] && !left_out_[k.row])
+          factor_.values[structure_.position(i.row, k.row)] += dot(wG, Vec3<double>(&J_[i.J]));
+    }
+  factor_.factorize(structure_);
+}
+
+void RigidRows::leave_out(const Given& given, const double* at) {
+  std::fill(left_out_.begin(), left_out_.end(), false);
+  std::fill(lambda.begin(), lambda.end(), 0.0);
+  evaluate(given, at);
+  for (int j = 0; j < size(); ++j) weight_[j] = D_[j];
+  for (int p = 0; p < given.block.movable; ++p)
+    for (const Use& k : uses_[p]) {
+      const Vec3<double> G(&J_[k.J]);
+      weight_[k.row] += at[at_row * p + 3] * dot(G, G);
+    }
+  for (double& w : weight_) w = w > 0.0 ? 1.0 / w : 0.0;
+  factorize(given.block, at);
+  const std::size_t before = structure_.banded() ? structure_.stored_band() : 0;
+  for (int j = 0; j < size(); ++j) left_out_[j] = factor_.inverse[before + j] == 0.0;
+}
+
+std::vector<double> RigidRows::as_sum(const Given& given, const double* at, int row) {
+  std::vector<double> c = matrix(given.block, at, row);
+  for (int j = 0; j < size(); ++j)
+    if (left_out_[j]) c[j] = 0.0;
+  c.resize(Factor<double>::right_side(structure_));
+  factorize(given.block, at);
+  factor_.solve(structure_, c.data());
+  c.resize(D_.size());
+  return c;
+}
+
+double RigidRows::steepness(const DirectBlock& block, int row) const {
+  double sum = 0.0;
+  for (int p = 0; p < block.movable; ++p)
+    for (const Use& use : uses_[p])
+      if (use.row == row) sum += dot(Vec3<double>(&J_[use.J]), Vec3<double>(&J_[use.J]));
+  return std::sqrt(sum);
+}
+
+void RigidRows::push(const DirectBlock& block, double* force, double* magnitude) const {
+  for_each_number(block, [&](int j, int dof, double J) {
+    const double term = J * lambda[j];
+    const int to = at_row * (dof / 3) + dof % 3;
+    force[to] += term;
+    magnitude[to] += std::abs(term);
+  });
+}
+
+void RigidRows::add_elements(const Given& given, double* at, const double* stiffness,
+                             std::vector<Numbers<double>>& elements) {
+  S_ = D_;
+  std::vector<double> soft(D_.size(), 0.0);
+  for_each_number(given.block, [&](int j, int dof, double J) {
+    const int p = at_row * (dof / 3);
+    soft[j] += softening * J * J / (1.0 / at[p + 3] + stiffness[p + dof % 3]);
+  });
+  for (int j = 0; j < size(); ++j) S_[j] = std::max({D_[j], soft[j], left_out_[j] ? 1.0 : 0.0});
+  for (const Member& m : members_)
+    with_kind(m.kind, [&]<class K>(K) {
+      if constexpr (holds_points<K>) {
+        const MemberRun& run = given.block.runs[m.run];
+        const int count = sheetbend_blocks::value_count(m.damped, parameter_count<K>);
+        const Numbered<K> own(run, given.values[m.run].data(), count, m.place, at);
+        double E[triangle(K::dofs)]{}, minus[K::rows];
+        for (int j = 0; j < K::rows; ++j) minus[j] = -lambda[m.first + j];
+        const SecondOrder<K, double> value(own.x, own.p);
+        value.add_hessian(minus, E);
+        for (int j = 0; j < K::rows; ++j)
+          if (!left_out_[m.first + j])
+            for (int a = 0; a < K::dofs; ++a)
+              for (int b = 0; b <= a; ++b)
+                E[triangle(a) + b] += value.J[j * K::dofs + a] * value.J[j * K::dofs + b] / S_[m.first + j];
+        for (int e = 0; e < triangle(K::dofs); ++e) elements[m.run][lane_at(m.place, triangle(K::dofs), e)] += E[e];
+      }
+    });
+}
+
+void RigidRows::multiply(const DirectBlock& block, const double* z, double* to) const {
+  for (const Member& m : members_)
+    for (int j = 0; j < m.count; ++j) {
+      if (left_out_[m.first + j]) continue;
+      const double* J = &J_[m.J + static_cast<std::size_t>(3 * j * m.arity)];
+      for (int d = 0; d < 3 * m.arity; ++d) to[m.first + j] += J[d] * z[at_row * particle(block, m, d / 3) + d % 3];
+    }
+}
+
+}  // namespace sheetbend
