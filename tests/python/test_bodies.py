@@ -42,6 +42,19 @@ def test_free_box_turns_over_as_the_oracle_says_with_second_order() -> None:
     assert 3.8 < errors[0] / errors[1] < 4.5
 
 
+def test_kept_spin_turns_the_box_as_a_finer_substep_would(tmp_path: Path) -> None:
+    scene = sb.Scene("box", gravity=(0.0, 0.0, 0.0))
+    given = {"of": sb.Inertia.box(1.0, (0.1, 0.2, 0.3)), "spin": (1e-3, 5.0, 1e-3)}
+    box = scene.add_body(**given, keep_spin=True)  # type: ignore[arg-type]
+    motion = sb.simulate(scene, [0.0, 6.0], sb.Solver(h=1 / 240))
+    assert abs(box.pose(motion)[1][-1][0] - [0.6748674, 0.0021918, -0.7379358]).max() < 3.3e-3
+    spin = np.linalg.norm(box.angular_momentum(motion), axis=1)
+    assert spin[1] == pytest.approx(spin[0], rel=1e-9)
+    sb.save_scene(scene, tmp_path / "box.sheetbend")
+    again = sb.simulate(sb.load_scene(tmp_path / "box.sheetbend"), [0.0, 6.0], sb.Solver(h=1 / 240))
+    assert (again.positions == motion.positions).all()
+
+
 def test_center_of_mass_falls_and_momenta_are_kept() -> None:
     scene, box = tossed()
     motion = sb.simulate(scene, np.linspace(0.0, 0.2, 5), sb.Solver(h=1e-3))

@@ -78,7 +78,7 @@ def _grips(scene: Scene) -> list[list[int]]:
         return p
 
     links = [row for g in scene.groups for row in g.particles.tolist()]
-    links += [[d, *frame] for d, frame in scene.directors.items()] + scene.body_nodes.tolist()
+    links += [[d, *frame] for d, frame in scene.directors.items()] + scene.body_nodes[:, :4].tolist()
     for link in links:
         held = [p for p in link if p in owner]
         for other in held[1:]:
@@ -103,7 +103,7 @@ def _motion(e: Experiment, grip: Sequence[int], times: Array, every: Values) -> 
     def path(p: int) -> Array:
         return driven[:, slot[p]] if p in slot else np.broadcast_to(scene.positions[p], (len(at), 3))
 
-    center = {int(axis): int(p) for p, *axes in scene.body_nodes for axis in axes}
+    center = {int(axis): int(p) for p, *axes in scene.body_nodes[:, :4] for axis in axes}
     points = []
     for p in grip:
         if p in center:

@@ -24,7 +24,7 @@ def collider_lines(scene: Scene, times: Array, positions: Array) -> dict[str, Ar
     """
     used = {contact.collider for contact in scene.contacts.contacts}
     found = {}
-    carried = [*(contact.carried for contact in scene.contacts.contacts), scene.body_nodes[:, 1:].ravel()]
+    carried = [*(contact.carried for contact in scene.contacts.contacts), scene.body_nodes[:, 1:4].ravel()]
     real = np.setdiff1d(np.arange(positions.shape[1]), np.concatenate([np.zeros(0, int), *carried]))
     for place, (name, collider) in enumerate(scene.contacts.colliders.items()):
         if place not in used:

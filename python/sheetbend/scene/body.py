@@ -82,6 +82,7 @@ class Body:
         axes: (3, 3) expressions, the principal axes of inertia in the body's frame, as columns.
         start: the state of its frame that it starts with.
         role: "free", "pinned" or "driven".
+        spin_node: the pinned node that holds the angular momentum of a body that keeps it, or -1.
     """
 
     name: str
@@ -91,6 +92,7 @@ class Body:
     scene: InScene = field(repr=False)
     start: FrameState = field(repr=False)
     role: str = "free"
+    spin_node: int = -1
 
     def point(
         self, at: ArrayLike = (0.0, 0.0, 0.0), along: ArrayLike | None = None, name: str | None = None

@@ -42,14 +42,8 @@ def specification(scene: SceneData) -> dict[str, Any]:
             {"name": name, "triangles": triangles.tolist()} for name, triangles in scene.volumes.triangles.items()
         ],
         **scene.contacts.specification(),
-        "bodies": bodies_of(scene).tolist(),
+        "bodies": scene.body_nodes.tolist(),
     }
-
-
-def bodies_of(scene: SceneData) -> np.ndarray:
-    """(n, 5) nodes of bodies as the core takes them; the last is that of a spin that is kept, -1 for none."""
-    nodes = scene.body_nodes
-    return np.concatenate([nodes, np.full((len(nodes), 1), -1)], axis=1)
 
 
 class CompiledScene:

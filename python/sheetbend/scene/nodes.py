@@ -83,7 +83,7 @@ class SceneNodes(SceneData):
         self._building()
         nodes = self.add_particles(np.zeros((4, 3)), np.array([1.0, 0.0, 1e-12, 1e-12]))
         self.pin(nodes[[0, 2, 3]])
-        self.rotors[name] = nodes
+        self.rotors[name] = np.append(nodes, -1)
         return int(nodes[1])
 
     def shift_base(self, particle: int, by: ArrayLike) -> None:

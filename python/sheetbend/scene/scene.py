@@ -59,6 +59,7 @@ class Scene(HeldScene):
         poses: HasPoses | None = None,
         drag: float | None = None,
         turn_drag: float | None = None,
+        keep_spin: bool = False,
     ) -> Body:
         """Add a rigid body. docs/bodies.md has the law and its limits.
 
@@ -85,6 +86,8 @@ class Scene(HeldScene):
             poses: it rides on them, such as a `Tool`; `at`, `rotation` and the start's quantities play no part.
             drag: of the air, force on the center of mass over its speed, N s/m.
             turn_drag: torque over the angular velocity, N m s.
+            keep_spin: carry the angular momentum on as a state of its own, for bodies that turn by more than 0.05 rad
+                in a substep: method "direct" alone.
 
         Returns:
             Body, also kept as `scene.bodies[name]`.
@@ -108,6 +111,9 @@ class Scene(HeldScene):
         else:
             self.add_constraints("rigid", [nodes[1:].tolist()], name=f"{name}_rigid")
             add_drag(self, body, drag, turn_drag)
+            if keep_spin:
+                body.spin_node = int(self.add_particles(np.zeros((1, 3)), 1.0)[0])
+                self.pin([body.spin_node])
         return body
 
     def add_force(self, particles: ArrayLike, forces: ArrayLike, times: ArrayLike = (0.0,)) -> None:

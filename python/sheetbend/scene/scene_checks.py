@@ -32,7 +32,7 @@ def validate(scene: SceneData) -> None:
         used = np.zeros(scene.particle_count, dtype=bool)
         for particles in (*(g.particles for g in scene.groups), *scene.volumes.triangles.values(), *touching):
             used[particles] = True
-        used[scene.body_nodes] = True
+        used[scene.body_nodes[:, :4]] = True
         loose = free[~used[free]]
         if loose.size:
             fix = "constrain them, pin them or leave them out"

@@ -44,7 +44,7 @@ class SceneData:
         self.ropes: dict[str, Any] = {}
         self.cloths: dict[str, Any] = {}
         self.bodies: dict[str, Body] = {}
-        self.rotors: dict[str, Array] = {}  # (4,) nodes by joint, of which the second turns
+        self.rotors: dict[str, Array] = {}  # (5,) nodes by joint, of which the second turns
         self._positions, self._velocities, self._mass = Column(3), Column(3), Column()
         self._frozen = False
         self._drag: dict[str, Array] = {}
@@ -88,9 +88,10 @@ class SceneData:
 
     @property
     def body_nodes(self) -> Array:
-        """(n, 4) nodes of the bodies and of what else has axes: the center, and three axes."""
-        nodes = [*(b.particles for b in self.bodies.values()), *self.rotors.values()]
-        return np.array(nodes, dtype=np.int64).reshape(-1, 4)
+        """(n, 5) nodes of the bodies and of what else has axes: the center, three axes, and the node that keeps the
+        spin, or -1."""
+        nodes = [*([*b.particles, b.spin_node] for b in self.bodies.values()), *self.rotors.values()]
+        return np.array(nodes, dtype=np.int64).reshape(-1, 5)
 
     @property
     def every_term(self) -> list[Term]:

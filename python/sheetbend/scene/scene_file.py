@@ -14,7 +14,6 @@ import numpy as np
 
 from ..errors import SceneError
 from ..files.whole import written
-from .compiled import bodies_of
 from .contacts import ARRAYS as CONTACT_ARRAYS
 from .scene import Scene
 from .scene_reader import LONGEST_HEADER, LONGEST_NAME, MAGIC, NUMBERS, PREFIX, VERSION, SceneReader, is_name
@@ -113,7 +112,7 @@ def _arrays(scene: Scene) -> dict[str, Array]:
         "force_times": scene.forces.times,
         "air": scene.air.triangles.reshape(-1, 3),
         "wind_times": scene.air.times,
-        **({"bodies": bodies_of(scene)} if len(scene.body_nodes) else {}),
+        **({"bodies": scene.body_nodes} if len(scene.body_nodes) else {}),
         **{f"stencil_{i}": g.particles for i, g in enumerate(scene.groups)},
         **{f"volume_{i}": t for i, t in enumerate(scene.volumes.triangles.values())},
         **{f"following_{i}": f.slots for i, f in enumerate(scene.boundary.following)},

@@ -172,9 +172,7 @@ class SceneReader:
         scene.pinned = set(self.array("pinned", "i4", (None,)).tolist())
         if "bodies" in self.described:  # older files have none
             nodes = self.array("bodies", "i4", (None, 5))
-            if (nodes[:, 4] != -1).any():
-                self.fail("bodies", "keep a spin", nodes[:, 4].tolist(), DAMAGED)
-            scene.rotors = {f"body {k}": own for k, own in enumerate(nodes[:, :4])}
+            scene.rotors = {f"body {k}": own for k, own in enumerate(nodes)}
         scene.directors = {d: (a, b, n) for d, a, b, n in self.array("directors", "i4", (None, 4)).tolist()}
         boundary = scene.boundary
         boundary.driven = self.array("driven", "i4", (None,)).tolist()
