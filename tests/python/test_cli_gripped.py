@@ -127,7 +127,13 @@ class TestFit:
     def written(self, folder: Path, rope: dict[str, Any]) -> None:
         assert {p.name for p in folder.iterdir()} == {"report.txt", "rope_1"}
         own = folder / "rope_1"
-        assert {p.name for p in own.iterdir()} == {"fit.json", "report.txt", "report.html", "predicted.png"}
+        assert {p.name for p in own.iterdir()} == {
+            "fit.json",
+            "report.txt",
+            "parameters.csv",
+            "report.html",
+            "predicted.png",
+        }
         kept = FitResult.load(own / "fit.json")  # at the limit of fine meshes; the values above are of this mesh
         assert kept.values.keys() == rope["values"].keys()
         for e in kept.estimates:
@@ -177,7 +183,12 @@ class TestFit:
         result = run("fit", config, "--json", "--output", "there")
         rope = last_line(result)["ropes"]["rope_1"]
         assert rope["error"] is None and rope["unseen"] == {} and [s["name"] for s in rope["steps"]] == [TWIST.name]
-        assert {p.name for p in Path("there/rope_1").iterdir()} == {"fit.json", "report.txt", "report.html"}
+        assert {p.name for p in Path("there/rope_1").iterdir()} == {
+            "fit.json",
+            "report.txt",
+            "parameters.csv",
+            "report.html",
+        }
 
     def test_ctrl_c_reports_the_last_finished_rung(self, config: Path) -> None:
         edited(config, ('["twist", "tilts"]', '["twist", "yield"]'), ("[1.0, 4.0]", "[1.0, 1.0]"))
