@@ -7,20 +7,38 @@ that reach them. The pieces are the same for any number of workers, and are put 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any, Protocol, Self
 
 import numpy as np
 
+from .. import _core
 from ..arrays.timeseries import Array
+from ..experiment.experiment import Experiment
 from ..quantities.parameters import Parameters
 from .workers import Common, current
-
-if TYPE_CHECKING:
-    from .problem import FitProblem
 
 PIECES = 32  # at most
 
 Piece = tuple[bool, Array, Array, str]  # ok, residuals, columns of the Jacobian, why not
+
+
+class Shareable(Protocol):
+    """What is asked of a problem (`problem.FitProblem`) that is shared out."""
+
+    experiments: tuple[Experiment, ...]
+    parameters: Parameters
+    core: _core.Problem
+
+    @property
+    def estimates_corrections(self) -> bool: ...
+
+    @property
+    def failure(self) -> str: ...
+
+    def acting_on(self, e: Experiment) -> tuple[str, ...]: ...
+
+    def piece(self, chosen: Sequence[int]) -> Self: ...
 
 
 class Spread:
@@ -30,7 +48,7 @@ class Spread:
         failure: why the last evaluation was not ok.
     """
 
-    def __init__(self, problem: FitProblem) -> None:
+    def __init__(self, problem: Shareable) -> None:
         count = len(problem.experiments)
         size = math.ceil(count / PIECES)
         self._pieces = [range(k, min(k + size, count)) for k in range(0, count, size)]
@@ -40,7 +58,7 @@ class Spread:
         self.failure = ""
 
     @staticmethod
-    def of(problem: FitProblem) -> Spread | None:
+    def of(problem: Shareable) -> Spread | None:
         """Where workers are in use and there are several experiments, all with something to fit. Corrections of driven
         markers depend on the evaluation before, and stay in this process."""
         if current() is None or len(problem.experiments) < 2 or problem.estimates_corrections:
@@ -81,20 +99,20 @@ class Spread:
 class _Parts:
     """A problem in a worker, with its pieces once they are made."""
 
-    def __init__(self, problem: FitProblem) -> None:
+    def __init__(self, problem: Shareable) -> None:
         self.problem = problem
-        self.made: dict[range, FitProblem] = {}
+        self.made: dict[range, Shareable] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _Parts, (self.problem,)
 
-    def piece(self, which: range) -> FitProblem:
+    def piece(self, which: range) -> Shareable:
         if which not in self.made:
             self.made[which] = self.problem.piece(which)
         return self.made[which]
 
 
-def _columns(problem: FitProblem, piece: range) -> list[int]:
+def _columns(problem: Shareable, piece: range) -> list[int]:
     """Numbers of the free parameters that reach a piece."""
     names = set().union(*(problem.acting_on(problem.experiments[i]) for i in piece))
     return [k for k, name in enumerate(problem.parameters.free) if name in names]

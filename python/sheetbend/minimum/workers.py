@@ -9,14 +9,13 @@ a worker makes inside a piece of work of its own are made again by a fit that go
 from __future__ import annotations
 
 import hashlib
-import multiprocessing
 import os
 import pickle
 import signal
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from functools import wraps
@@ -125,6 +124,9 @@ def processes(count: int) -> Iterator[Executor | None]:
     if count < 2:
         yield None
         return
+    import multiprocessing  # here, since importing sheetbend is to stay light
+    from concurrent.futures import ProcessPoolExecutor
+
     with ExitStack() as undone:
         for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
             undone.callback(_set, name, os.environ.get(name))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from ..optional import require
 from ..report.collected import COUNTED, Collected, Trait
 from .drawing import ACCENT, GRAY, INK, PALE, clean, new_figure
 
@@ -43,5 +44,6 @@ def _panel(panel: Axes, found: Collected, trait: Trait, specimens: list[str], na
     panel.plot([inverse(p.mean)], [last + 0.5], "D", color=ACCENT, markersize=4.5)
     panel.set_yticks([*range(last), last + 0.5], [*specimens, "mean"] if names else [""] * (last + 1))
     panel.set_ylim(last + 1.2, -0.8)
+    panel.xaxis.set_major_locator(require("matplotlib.ticker", "plot").MaxNLocator(4))
     panel.set_xlabel(f"{trait.name} [{trait.unit}]" if trait.unit else trait.name)
     clean(panel)
