@@ -21,7 +21,7 @@ from ..minimum.problem import FitProblem
 from ..quantities.wording import short
 from ..scene.scene import Scene
 from ..statistics.gauge import RANK_TOLERANCE
-from .directions import EXPLAINS, LEVEL, asked_for, noise_in, rows_of, tied
+from .directions import EXPLAINS, clearly, noise_in, rows_of, tied
 
 FRAMES = (1 / 3, 1.0, 3.0)  # intervals between frames: the time constants that are tried
 LEAVES = 0.2  # of the noise: a fit that leaves less beyond it lacks nothing that could be told
@@ -41,7 +41,6 @@ def absent_damping(problem: FitProblem, u: Array) -> dict[str, str]:
     if not ok or not np.isfinite(J).all():
         return {}
     layout, data = problem.rows_layout(), problem.core.data_rows
-    taken = sum(map(problem.core.absorbed, range(len(problem.experiments))))
     groups = []
     for group in tied(problem):
         mine = rows_of(problem, group)
@@ -55,10 +54,8 @@ def absent_damping(problem: FitProblem, u: Array) -> dict[str, str]:
         more = _with_damping(problem, u, frames)
         ok, there, _ = more.evaluate(u, jacobian=False)
         for group, mine, noise in groups if ok else ():
-            asked = asked_for(r, J, np.where(mine, there - r, 0.0), mine, layout, taken)
-            if asked is None or asked.more < 0.0 or asked.explained < EXPLAINS:
-                continue
-            if asked.chance > LEVEL / (len(groups) * len(FRAMES)):
+            asked = clearly(problem, u, there - r, mine, len(groups) * len(FRAMES))
+            if asked is None or asked.more < 0.0:
                 continue
             left = _left_with(more, u, mine)
             share = 1.0 - (left - noise) / (float(r[mine] @ r[mine]) - noise)

@@ -19,6 +19,7 @@ from ..statistics.blocks import short_of_frames
 from ..statistics.covariance import Layout, covariance
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.white_noise import white_noise
+from .driven_errors import FEW, driven_errors
 
 EXPLAINS = 1 / 3
 """Of what a fit leaves beyond noise: the part that a loss must explain. It is 50 to 78 % for ropes without the damping
@@ -42,7 +43,30 @@ class Asked:
     chance: float
 
 
-def asked_for(r: Array, J: Array, column: Array, mine: Array, layout: Layout, taken: float = 0.0) -> Asked | None:
+def clearly(problem: FitProblem, u: Array, column: Array, mine: Array, tests: int) -> Asked | None:
+    """`asked_for` at a minimum u (free,), if it explains a third of what some rows leave and chance does not, of so
+    many tests. What noise of what drives the scenes does to the residuals counts as chance."""
+    _, r, J = problem.evaluate(u)
+    layout, taken = problem.rows_layout(), sum(map(problem.core.absorbed, range(len(problem.experiments))))
+    column = np.where(mine, column, 0.0)
+    asked = asked_for(r, J, column, mine, layout, taken)
+    if asked is None or not (asked.explained > EXPLAINS and asked.chance < LEVEL / tests):
+        return None
+    errors = driven_errors(problem, u, FEW)
+    if errors.size:
+        asked = asked_for(r, J, column, mine, layout, taken, errors)
+    return asked if asked is not None and asked.chance < LEVEL / tests else None
+
+
+def asked_for(
+    r: Array,
+    J: Array,
+    column: Array,
+    mine: Array,
+    layout: Layout,
+    taken: float = 0.0,
+    errors: Array | None = None,
+) -> Asked | None:
     """How much of a column residuals ask for beside the parameters; None where these replace it, or leave but noise.
 
     Args:
@@ -52,6 +76,7 @@ def asked_for(r: Array, J: Array, column: Array, mine: Array, layout: Layout, ta
         mine: (rows + others,) bool, those of the motions in question.
         layout: of the data's rows.
         taken: degrees of freedom of the data's residuals that corrections took.
+        errors: (rows, draws) random draws of errors that are alike in all of the data.
     """
     rows = len(layout.frame)
     q, sizes, _ = np.linalg.svd(J / np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny), full_matrices=False)
@@ -65,8 +90,11 @@ def asked_for(r: Array, J: Array, column: Array, mine: Array, layout: Layout, ta
     after = r + more * beside
     spread = covariance(after[:rows], beside[:rows, None], layout, beside[rows:, None], taken + q.shape[1])
     variance = short_of_frames(spread, int(np.ptp(layout.frame)) + 1) * float(spread.matrix[0, 0])
-    score = abs(more) / math.sqrt(max(variance, np.finfo(float).tiny))
     degrees = max(float(spread.degrees[0]), 1.0)
+    if errors is not None:
+        variance += float(np.mean((beside[:rows] @ errors / inner) ** 2))
+        degrees = min(degrees, float(errors.shape[1]))
+    score = abs(more) / math.sqrt(max(variance, np.finfo(float).tiny))
     chance = 2.0 * float(require("scipy.special", "fit").stdtr(degrees, -score))
     return Asked(more, more**2 * inner / left, chance)
 

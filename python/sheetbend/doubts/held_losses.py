@@ -19,7 +19,7 @@ from ..arrays.timeseries import Array
 from ..minimum.problem import FitProblem, quantities_of
 from ..quantities.parameters import Parameter, Parameters
 from ..quantities.wording import short
-from .directions import EXPLAINS, LEVEL, Asked, asked_for, rows_of, tied
+from .directions import Asked, clearly, rows_of, tied
 from .losses import LOSSES
 
 HELD: dict[str, Any] = {"fixed": True, "log": False, "prior": None, "lower": -math.inf, "upper": math.inf}
@@ -31,7 +31,7 @@ def held_losses(problem: FitProblem, u: Array) -> dict[str, str]:
     Args:
         u: (free,) the minimum.
     """
-    ok, r, J = problem.evaluate(u)
+    ok, _, J = problem.evaluate(u)
     free = {problem.parameters.roots[name][0] for name in problem.parameters}
     names = [
         name
@@ -41,17 +41,12 @@ def held_losses(problem: FitProblem, u: Array) -> dict[str, str]:
     if not names or not ok or not np.isfinite(J).all():
         return {}
     columns = _columns(problem, u, names)
-    layout, groups = problem.rows_layout(), tied(problem)
-    taken = sum(map(problem.core.absorbed, range(len(problem.experiments))))
+    groups = tied(problem)
     found: dict[str, str] = {}
     for group in groups:
         mine = rows_of(problem, group)
-        asked = {name: asked_for(r, J, np.where(mine, g, 0.0), mine, layout, taken) for name, g in columns.items()}
-        told = {
-            name: one
-            for name, one in asked.items()
-            if one is not None and one.explained > EXPLAINS and one.chance < LEVEL / (len(groups) * len(names))
-        }
+        asked = {name: clearly(problem, u, g, mine, len(groups) * len(names)) for name, g in columns.items()}
+        told = {name: one for name, one in asked.items() if one is not None}
         if told:
             name = max(told, key=lambda name: told[name].explained)
             words = _words(name, told[name])

@@ -23,7 +23,7 @@ from ..arrays.timeseries import Array
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
 from .absent_damping import absent_damping
-from .directions import EXPLAINS, LEVEL, Asked, asked_for, rows_of, tied
+from .directions import Asked, clearly, rows_of, tied
 from .held_losses import held_losses
 
 OTHER: dict[str, Literal["bdf1", "bdf2"]] = {"bdf1": "bdf2", "bdf2": "bdf1"}
@@ -52,17 +52,16 @@ def missing_loss(problem: FitProblem, u: Array, fitted: tuple[FitProblem, Array]
 def _by_other_integrator(problem: FitProblem, u: Array, fitted: tuple[FitProblem, Array]) -> dict[str, str]:
     if any(e.scene.compiled.contacts for e in problem.experiments):
         return {}
-    ok, r, J = problem.evaluate(u)
+    ok, _, J = problem.evaluate(u)
     change = of_more_loss(*fitted)
     if not ok or not np.isfinite(J).all() or change is None:
         return {}
-    layout, groups = problem.rows_layout(), tied(problem)
-    taken = sum(map(problem.core.absorbed, range(len(problem.experiments))))
+    groups = tied(problem)
     found: dict[str, str] = {}
     for group in groups:
         mine = rows_of(problem, group)
-        asked = asked_for(r, J, np.where(mine, change, 0.0), mine, layout, taken)
-        if asked is not None and asked.explained > EXPLAINS and asked.chance < LEVEL / len(groups):
+        asked = clearly(problem, u, change, mine, len(groups))
+        if asked is not None:
             words = _words([problem.experiments[i].name for i in group], asked)
             found |= {name: words for i in group for name in problem.acting_on(problem.experiments[i])}
     return found
