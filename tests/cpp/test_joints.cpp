@@ -99,7 +99,7 @@ TEST(RodPendulum, SwingsWithItsPeriod) {
   EXPECT_NEAR(period / exact, 1.0, 3e-5);
 }
 
-// A wheel on a hinge with a spring: theta = theta0 cos(sqrt(k/I) t), so its derivative by k is known too.
+// A wheel on a hinge with a spring: theta = theta0 cos(sqrt(k/I) t), so its derivative with respect to k is known too.
 TEST(HingeSpring, SwingsWithItsPeriodAndItsDerivative) {
   constexpr double k = 0.02, I = 4e-4, theta0 = 0.3;
   const double period = 2 * pi * std::sqrt(I / k);

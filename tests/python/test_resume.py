@@ -26,7 +26,15 @@ from sheetbend.minimum.journal import Journal
 from sheetbend.minimum.optimizers import Progress, has_ceres
 from typer.testing import Result
 
-WRITTEN = {"fit.json", "report.txt", "report.html", "fitted.toml", "predicted_swing.npz", "predicted_swing.json"}
+WRITTEN = {
+    "fit.json",
+    "report.txt",
+    "parameters.csv",
+    "report.html",
+    "fitted.toml",
+    "predicted_swing.npz",
+    "predicted_swing.json",
+}
 ROPE = """\
 [experiment]
 name = "swing"

@@ -57,11 +57,10 @@ def _predictions(fits: Sequence[Written], pairs: Mapping[str, Paired | None]) ->
 def _sentence(first: str, pair: Paired | None) -> str:
     if pair is None:
         return f"holds out no frame that {first} holds out too, so nothing can be compared"
-    side = "larger" if pair.ratio > 1.0 else "smaller"
-    size = f"its error is {100 * abs(pair.ratio - 1.0):.2g} % {side} than that of {first}"
+    size = f"its error is {short(pair.ratio)} times that of {first}, and larger in {pair.worse:.0%} of the frames"
     if pair.lower is None:
-        few = f"the held-out part has only {pair.stretches} independent stretches"
-        return f"{size}; {few}, and {FEWEST} are needed to say how sure that is"
+        parts = "one independent stretch" if pair.stretches == 1 else f"{pair.stretches} independent stretches"
+        return f"{size}; the held-out part has only {parts}, and {FEWEST} are needed to say how sure that is"
     sure = f"from {pair.stretches} independent stretches"
     if pair.clear:
         return f"{'predicts worse' if pair.ratio > 1.0 else 'predicts better'}: {size} ({sure})"

@@ -24,6 +24,7 @@ class Paired:
         ratio: second over first.
         lower, upper: 95 % interval of the ratio; None where there are too few independent stretches.
         stretches: number of stretches that were taken as independent.
+        worse: share of the frames in which the second errs more.
     """
 
     first: float
@@ -32,6 +33,7 @@ class Paired:
     lower: float | None
     upper: float | None
     stretches: int
+    worse: float
 
     @property
     def clear(self) -> bool:
@@ -72,7 +74,8 @@ def paired(series: Sequence[tuple[Array, Array]]) -> Paired:
         reach = float(require("scipy.special", "fit").stdtrit(n - 1, 0.975)) * error
         lower, upper = math.exp(value - reach), math.exp(value + reach)
     rms = (math.sqrt(first / count), math.sqrt(second / count))
-    return Paired(*rms, math.exp(value), lower, upper, n)
+    worse = sum(int((b > a).sum()) for a, b in series) / int(count)
+    return Paired(*rms, math.exp(value), lower, upper, n, worse)
 
 
 def _stretches(a: Array, b: Array) -> list[tuple[Array, Array]]:
