@@ -90,7 +90,8 @@ struct CarriedOn : OnPoints<Points + 3 * Bodies + Dials> {
           p_bar[weight] += by[j * width + 3 * vector + d].v * (dl[j] * a[i] - y[j] * (b[i] + x[i]));
         }
       });
-      if (j < Law::parameters) p_bar[weights + j] += y[j];
+      if constexpr (Law::parameters > 0)
+        if (j < Law::parameters) p_bar[weights + j] += y[j];
     }
     if constexpr (Law::linear) return;
     for_each_weight([&](int vector, int node, int weight) {
