@@ -50,8 +50,8 @@ struct ReverseOf<PushAlongX> {
 };
 
 using PushedSubstep =
-    Stages<ComputeEffectiveMasses, Predict, ApplyForces, ApplyLoads, PushAlongX, ApplyAirForces, ProjectBlocks, SweepColors,
-           UpdateVelocities, KeepSpin, RetractDirectors, Yield>;
+    Stages<ComputeEffectiveMasses, Predict, ApplyForces, ApplyLoads, PushAlongX, ApplyAirForces, Bounce, ProjectBlocks,
+           SweepColors, UpdateVelocities, LeaveImpacts, KeepSpin, RetractDirectors, Yield, CarryFriction>;
 
 }  // namespace sheetbend
 
