@@ -18,7 +18,7 @@ constexpr double no_slip = 1e30;    // a friction
 constexpr int most_sections = 36;   // of the way, where its lowest point is looked for
 constexpr double well_down = 0.9;   // of the merit: less than this is gained where a kink holds it up
 
-// What sticks does so within a slip of next to nothing, and steps of a matrix that has it sliding go to and fro over that. From one point to another some
+// What sticks does so within a slip of next to nothing, and steps of a matrix that has it sliding go back and forth over that. From one point to another some
 // contacts turn to slide the other way: they are to stick, as if friction had no bound. Says whether there are any.
 bool hold_turning(const DirectBlock& block, IncrementalPotential& potential, const double* from, const double* to) {
   bool any = false;

@@ -55,6 +55,8 @@ WHOLE: dict[str, Any] = {
         "wind": {"velocity": [1, 0, 0]},
         "tool": [{"name": "t"}],
         "drive": [{"particles": ["a"], "markers": ["m0"]}],
+        "body": [{"name": "plug", "mass": 0.1, "box": [0.1, 0.1, 0.1]}],
+        "joint": [{"kind": "hinge", "name": "door", "lower": "plug", "at": [0, 0, 0], "axis": [0, 0, 1]}],
         "collider": [{"name": "table", "shape": "plane"}],
         "contact": [{"of": "rope", "collider": "table", "friction": 0.3}],
         "quantities": {"NAME": {}},

@@ -47,7 +47,7 @@ def test_a_dragged_rope_tells_its_friction_in_the_limit_of_short_substeps() -> N
     assert friction.statistical < 0.005
     assert abs(friction.moved) > 0.004
     assert friction.discretization < 0.3 * abs(friction.moved)
-    assert fit.result.warnings == ()
+    assert not [w for w in fit.result.warnings if "noise of its driven motion" not in w]  # which the intervals count
 
 
 def test_a_recording_that_was_simulated_at_the_substep_of_the_fit_is_told_as_such() -> None:

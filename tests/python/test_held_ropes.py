@@ -210,7 +210,7 @@ def test_noise_of_one_marker_is_allowed_for(tmp_path: Path) -> None:
 
 
 BAD = {
-    "nothing that moves": ('at = "start"', "must have one of markers and tool"),
+    "nothing that moves": ('at = "start"', "must have one of markers, tool and body"),
     "no such marker": ('at = "start"\nmarkers = ["thumb"]', "unknown marker"),
     "a line": ('at = "start"\nmarkers = ["r1", "r2", "r3"]', "on one line"),
     "position": ('at = "start"\nmarkers = ["grip"]\nposition = [0, 0, 0]', "give the offset"),

@@ -33,7 +33,10 @@ def collect(
     ] = False,
 ) -> None:
     """Collect fits of many specimens: one table of all parameters, and mean and spread between specimens of each, with
-    the errors of the fits taken out (random effects, REML)."""
+    the errors of the fits taken out (random effects, REML).
+
+    Example: sheetbend collect out/ropes
+    """
     run(lambda console: _collect(console, results, output), json)
 
 

@@ -60,7 +60,10 @@ def identify(
     ] = False,
 ) -> None:
     """Tell before an experiment what it will tell: intervals and verdicts to expect, what stays free, and what one more
-    marker, mass, force sensor or motion would give. Parameters are planned with at their initial values."""
+    marker, mass, force sensor or motion would give. Parameters are planned with at their initial values.
+
+    Example: sheetbend identify rope.toml --noise 0.0005
+    """
 
     def command(console: Console) -> Outcome:
         frames = _Frames(duration, rate, markers)

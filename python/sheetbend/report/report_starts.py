@@ -16,6 +16,8 @@ def starts_note(result: FitData) -> list[tuple[str, str]]:
     if len(result.starts) < 2:
         return []
     costs = [start.cost for start in result.starts if start.cost is not None]
+    if not costs:
+        return [("starts", f"all {len(result.starts)} diverged")]
     same = sum(cost <= min(costs) * (1 + _SAME_MINIMUM) for cost in costs)
     words = f"{same} of {len(result.starts)} ended within 1 % of the best cost; the worst at {max(costs):.4g}"
     if len(costs) < len(result.starts):
@@ -35,7 +37,8 @@ def groups_of_starts(result: FitData) -> Section:
         raced = [start.raced for start in group if start.raced is not None]
         cost = "diverged" if group[0].cost is None else short(group[0].cost, 6)
         values = [short(group[0].values[name]) for name in names]
-        rows.append((str(len(group)), cost, short(min(raced), 6), short(max(raced), 6), *values))
+        ends = (short(min(raced), 6), short(max(raced), 6)) if raced else ("", "")
+        rows.append((str(len(group)), cost, *ends, *values))
     headers = ("starts", "cost of its fit", "raced to", "at most", *names)
     notes = []
     if groups:
