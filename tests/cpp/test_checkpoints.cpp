@@ -156,7 +156,7 @@ TEST(CheckpointsInThreads, GiveTheBitsOfTheWholeTape) {
 }
 
 TEST_P(Checkpoints, GiveTheBitsOfTheWholeTapeInLanes) {
-  const Sample sample = random_scene(76, GetParam().shape());
+  const Sample sample = random_scene(77, GetParam().shape());
   const Program p = program(sample.scene);
   Random random(76);
   std::vector<Pack> packed(sample.inputs.size());

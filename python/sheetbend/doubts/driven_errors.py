@@ -31,6 +31,7 @@ from ..statistics.gauge import RANK_TOLERANCE
 
 DRAWS = 64  # of the noise where parts of the data are compared; eight of them share a rollout
 FEW = 24  # of the noise, for intervals
+SOUND = 0.5  # to which draws may have been made smaller where a bias is told: beyond, the tangents say too much
 FEWEST = 12  # knots, that tell the noise of a motion
 STEADY = 3.0  # times its noise: by so much the distance of a marker from a driven particle varies at most
 
@@ -56,7 +57,7 @@ class DrivenErrors:
     def expected(self, u: Array) -> float:
         """Mean over the draws of the sum of squares that noise adds to twice the cost at u (free,), in motions whose
         tangents are to be believed."""
-        sound = {i: n for i, n in self.draws.items() if self.believed[i] == 1.0}
+        sound = {i: n for i, n in self.draws.items() if self.believed[i] >= SOUND}
         return sum(float((self.problem.core.respond(i, u, n) ** 2).sum()) / len(n) for i, n in sound.items())
 
 
