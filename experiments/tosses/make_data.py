@@ -67,7 +67,7 @@ def main(folder: Path) -> None:
         },
         "known": {key: told["known"][key] for key in ("mass_kg", "side_m")},
         "source": told["source"],
-        "license": told["licence"],
+        "licence": told["licence"],
         "attribution": told["attribution"],
     }
     (DATA / "flights.json").write_text(json.dumps(about, indent=1) + "\n")
