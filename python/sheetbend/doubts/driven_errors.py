@@ -11,8 +11,9 @@ a smoothed marker), the noise is that of the motion itself: each knot is compare
 neighbors, as in `timeseries.noise`. Smoothing hides noise from that comparison and leaves what is slow. So where a
 recorded marker keeps its distance from a driven particle, the noise is taken as no less than that marker's own, which
 is an upper bound: what has been smoothed has less of it. Poses of a robot's tool are no markers, and are taken as they
-show. In any case A n is no larger than what the fit leaves, of which it is a part: where it would be, as in motions
-that grow, the noise is less or the tangents say too much, and the draws are made smaller.
+show. In any case A n is a part of what the fit leaves: it is no larger, and what is left resembles the draws as these
+resemble each other. Where it does not, as in motions that grow or behind a path that is exact, the noise is less or the
+tangents say too much, and the draws are made smaller.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from ..statistics.gauge import RANK_TOLERANCE
 
 DRAWS = 64  # of the noise where parts of the data are compared; eight of them share a rollout
 FEW = 24  # of the noise, for intervals
+CHANCE = 0.05  # share of the draws that resemble the others less than residuals of such noise are taken to do
 SOUND = 0.5  # to which draws may have been made smaller where a bias is told: beyond, the tangents say too much
 FEWEST = 12  # knots, that tell the noise of a motion
 STEADY = 3.0  # times its noise: by so much the distance of a marker from a driven particle varies at most
@@ -96,9 +98,28 @@ def _believed(problem: FitProblem, u: Array, moved: Mapping[int, Array]) -> dict
     for i, errors in moved.items():
         own = slice(rows[i], rows[i + 1])
         beside = errors - (errors @ basis[own]) @ basis[own].T
-        square = float(np.mean(beside**2))
-        found[i] = min(1.0, float(np.sqrt(np.mean(r[own] ** 2) / square))) if square > 0.0 else 1.0
+        found[i] = min(1.0, _share(_square(r[own]), _square(beside)), _share(*_alike(r[own], beside)))
     return found
+
+
+def _share(left: float, made: float) -> float:
+    return float(np.sqrt(left / made)) if made > 0.0 else 1.0
+
+
+def _square(series: Array) -> float:
+    return float(np.mean(series**2))
+
+
+def _alike(left: Array, draws: Array) -> tuple[float, float]:
+    """How much residuals (rows,) resemble draws (draws, rows), and how much one draw resembles the others at least: the
+    mean square of the projection onto another's direction, of the draws its lower 5 %."""
+    products = draws @ draws.T
+    squares = np.diag(products).copy()
+    if len(draws) < 2 or not squares.all():
+        return 0.0, 0.0
+    np.fill_diagonal(products, 0.0)
+    others = (products**2 / squares).sum(axis=1) / (len(draws) - 1)
+    return float(np.mean((draws @ left) ** 2 / squares)), float(np.quantile(others, CHANCE))
 
 
 def driven_errors(problem: FitProblem, u: Array, draws: int = DRAWS) -> Array:
