@@ -24,7 +24,7 @@ from ..motion.solver import Solver
 from ..objects.chain import unit_vector
 from ..quantities.parameters import Parameters
 from .gripped import RUNGS, RopeData, load_ropes
-from .outcome import Code, Outcome, run
+from .outcome import Code, Json, Outcome, run
 
 FRAMES, SUBSTEPS = 4, 4  # of the stretch: long enough for both time-stepping starts and several compositions
 FITTED_FRAMES = 5
@@ -35,9 +35,7 @@ def check(
     config: Annotated[
         Path, typer.Argument(help="A TOML configuration, see docs/configuration.md.", show_default=False)
     ],
-    json: Annotated[
-        bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
-    ] = False,
+    json: Json = False,
 ) -> None:
     """Check the gradients of every recording's scene over a short stretch, and the residuals' Jacobian; exit 5 where
     one fails. Of large scenes a sample is checked, and named. Also reports how far small displacements grow along every

@@ -17,7 +17,7 @@ from ..pictures.plotting import save
 from ..report.collected import Collected
 from ..report.fit_result import FitResult
 from .folders import made
-from .outcome import Outcome, run, strict
+from .outcome import Json, Outcome, run, strict
 from .targets import check_targets
 
 FILES = ("fits.csv", "parameters.tsv", "population.json", "population.txt", "forest.png")
@@ -28,9 +28,7 @@ def collect(
         list[Path], typer.Argument(help="Folders of fits, or folders of such folders, or fit.json.", show_default=False)
     ],
     output: Annotated[Path, typer.Option(help="Folder for the tables and the forest plot.")] = Path("out/collected"),
-    json: Annotated[
-        bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
-    ] = False,
+    json: Json = False,
 ) -> None:
     """Collect fits of many specimens: one table of all parameters, and mean and spread between specimens of each, with
     the errors of the fits taken out (random effects, REML).

@@ -20,7 +20,7 @@ from ..statistics.paired import Paired, paired
 from .compare_report import compare_dict, compare_sections
 from .compared import Written, in_common, read_written
 from .folders import made
-from .outcome import Outcome, run
+from .outcome import Json, Outcome, run
 from .targets import check_targets
 
 FILES = ("compare.txt", "compare.png")
@@ -36,9 +36,7 @@ def compare(
         Path | None,
         typer.Option(help="Folder for compare.txt and compare.png; nothing is written when left out."),
     ] = None,
-    json: Annotated[
-        bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
-    ] = False,
+    json: Json = False,
 ) -> None:
     """Say which of several fits predicts held-out data better, how sure that is, and what differs between them.
 

@@ -17,7 +17,7 @@ from .fabric_figures import PICTURES, fabric_pictures
 from .fabric_page import fabric_page_of
 from .fabric_report import fabric_dict, fabric_sections
 from .folders import made
-from .outcome import Code, Outcome, run
+from .outcome import Code, Json, Outcome, run
 from .pages import page_possible
 from .screen import heading
 from .targets import check_targets
@@ -37,9 +37,7 @@ def fabric(
             show_default=False,
         ),
     ] = None,
-    json: Annotated[
-        bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
-    ] = False,
+    json: Json = False,
 ) -> None:
     """Find one fabric, with intervals, from all tests of a laboratory: pulls, shear, bending, drape and weight.
 

@@ -32,7 +32,7 @@ from .folders import alone, made
 from .gripped import fit_ropes, load_ropes, rope_files
 from .journals import NAME, journal_in, made_from
 from .movies import OPTION, MoviePath, check_before, write_movies
-from .outcome import Code, Outcome, code_of, run
+from .outcome import Code, Json, Outcome, code_of, run
 from .pages import PAGE, page_possible, write_fit_page
 from .predicted import predicted_files, save_predicted
 from .progress import Iterations
@@ -72,9 +72,7 @@ def fit(
     strict: Annotated[
         bool, typer.Option("--strict", help="Exit 3 when any parameter is not identifiable, not only when all are.")
     ] = False,
-    json: Annotated[
-        bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
-    ] = False,
+    json: Json = False,
 ) -> None:
     """Fit parameters to recordings. Ctrl-C and SIGTERM stop at the best point so far and still report.
 

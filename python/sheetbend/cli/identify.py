@@ -21,7 +21,7 @@ from ..fitting.plan import Plan
 from ..recording.recording import Recording
 from ..report.tables import rich_section
 from .folders import made
-from .outcome import Code, Outcome, run
+from .outcome import Code, Json, Outcome, run
 from .screen import heading, show
 from .targets import check_targets
 
@@ -55,9 +55,7 @@ def identify(
     output: Annotated[
         Path | None, typer.Option(help="Folder for plan.json; nothing is written when left out.", show_default=False)
     ] = None,
-    json: Annotated[
-        bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
-    ] = False,
+    json: Json = False,
 ) -> None:
     """Tell before an experiment what it will tell: intervals and verdicts to expect, what stays free, and what one more
     marker, mass, force sensor or motion would give. Parameters are planned with at their initial values.

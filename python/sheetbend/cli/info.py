@@ -26,7 +26,7 @@ from ..recording.unit_doubt import extent, unit_doubt
 from ..scene.scene import Scene
 from ..version import __version__
 from .gripped import RopeData, load_ropes
-from .outcome import Outcome, run
+from .outcome import Json, Outcome, run
 from .screen import heading, listing
 
 PACKAGES = ("numpy", "scipy", "torch", "matplotlib", "pydantic", "rich", "typer")
@@ -41,9 +41,7 @@ def info(
             show_default=False,
         ),
     ] = None,
-    json: Annotated[
-        bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
-    ] = False,
+    json: Json = False,
 ) -> None:
     """Show versions and what is built in; with a configuration also its scenes, quantities and parameters, with a
     recording what it holds and where its markers are first seen.

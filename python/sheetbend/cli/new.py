@@ -20,7 +20,7 @@ from ..recording.recording import Recording
 from ..recording.unit_doubt import unit_doubt
 from .folders import made
 from .gripped import load_ropes
-from .outcome import Outcome, run
+from .outcome import Json, Outcome, run
 from .screen import heading, listing
 from .spelling import options
 from .targets import check_targets
@@ -43,9 +43,7 @@ def new(
     units: Annotated[
         str | None, typer.Option(help="Length unit of the files: m, cm or mm.", show_default=False)
     ] = None,
-    json: Annotated[
-        bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
-    ] = False,
+    json: Json = False,
 ) -> None:
     """Look at a recording and write a configuration that `sheetbend fit` runs, with comments on what is seen in it and
     what cannot be known.

@@ -27,7 +27,7 @@ from ..scene.scene import Scene
 from .folders import made
 from .meshes import WHOLE, MeshFormat, check_format, mesh_files, write_meshes
 from .movies import OPTION, MoviePath, check_before
-from .outcome import Outcome, run
+from .outcome import Json, Outcome, run
 from .predicted import at_starting_values, predicted_files, save_predicted
 from .screen import heading
 from .targets import check_targets
@@ -75,9 +75,7 @@ def simulate(
         ),
     ] = None,
     movie: MoviePath = None,
-    json: Annotated[
-        bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
-    ] = False,
+    json: Json = False,
 ) -> None:
     """Simulate a scene and write its trajectory as NPZ: times, positions, velocities, the constraints' forces, the
     pressures of volumes that are kept, and what force sensors read (sensor_NAME_times, _forces, _torques); with a

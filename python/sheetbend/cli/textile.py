@@ -16,7 +16,7 @@ from ..files.whole import write_text
 from ..textile import Curve, fit_pull, forecast_pull, mean_curve, read_curves
 from ..textile.units import quantity
 from .folders import made
-from .outcome import Code, Outcome, run
+from .outcome import Code, Json, Outcome, run
 from .spelling import options
 from .targets import check_targets
 from .textile_figure import write_figure
@@ -68,9 +68,7 @@ def textile(
         typer.Option(help="Folder for report, mean and figure; out/NAME when left out.", show_default=False),
     ] = None,
     figures: Annotated[Form, typer.Option(help="Format of the figure.")] = "png",
-    json: Annotated[
-        bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
-    ] = False,
+    json: Json = False,
 ) -> None:
     """Read a testing machine's curves, print their KES numbers, and fit the law of a pull with intervals.
 

@@ -17,7 +17,7 @@ from ..page import Shown, motion_page, of_recording, of_trajectory
 from ..recording.recording import Recording
 from ..version import __version__
 from .folders import made
-from .outcome import Outcome, run
+from .outcome import Json, Outcome, run
 from .screen import heading
 from .simulate import motion_of, tasks_of
 from .spelling import options
@@ -38,9 +38,7 @@ def view(
     units: Annotated[
         str | None, typer.Option(help="Length unit of a recording: m, cm or mm.", show_default=False)
     ] = None,
-    json: Annotated[
-        bool, typer.Option("--json", help="One JSON object on stdout; everything else goes to stderr.")
-    ] = False,
+    json: Json = False,
 ) -> None:
     """Write one HTML file that shows a motion in space and opens without a network.
 

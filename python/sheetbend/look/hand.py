@@ -12,13 +12,8 @@ from .seen import Seen
 
 Array = np.ndarray
 RIDES = 3.0  # times the noise: a marker that moves less in the hand's own axes rides on the hand
-LEAST, MOST = (
-    0.1,
-    0.9,
-)  # of the next marker's motion in the hand's axes: beyond, the first marker tells nothing of a lead
-BEYOND_HINGE = (
-    1.3  # times the distance to the point about which the rope seems to turn: the rope is stiff, and held above it
-)
+LEAST, MOST = 0.1, 0.9  # of the next marker's motion, seen from the hand: beyond, the first one tells of no lead
+BEYOND_HINGE = 1.3  # times the distance of the point it seems to turn about: a stiff rope is held above that
 LEAD_SD = 0.3  # of a lead
 TILT_SD, SHIFT_SD = 0.2, 0.1  # rad; of a lead
 

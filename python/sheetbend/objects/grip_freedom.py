@@ -13,9 +13,7 @@ from .chain import voronoi_shares
 from .grip import Grip
 
 SHORTEST, LONGEST = 0.6, 0.8  # of a lead: by so much it shrinks and grows at most
-SERIES = (
-    9  # powers of the growth of a lead in what is inverse to it: 0.03 % are left out at half of the lead, 6 % at most
-)
+SERIES = 9  # powers of its growth in what is inverse to a lead: 0.03 % are left out at half of it, 6 % at most
 
 
 def axes_of(grip: Grip) -> tuple[Array, Array, Array]:
