@@ -90,6 +90,16 @@ def test_prior_counts_as_one_observation_of_its_sd() -> None:
     assert result.matrix[0, 0] == pytest.approx(0.5, rel=0.1)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_parameter_that_only_its_prior_tells_divides_nothing_by_zero() -> None:
+    """The data do not move with it, so its variance from them is zero before and after frames that are alike count."""
+    rng = np.random.default_rng(3)
+    jacobian = np.column_stack([rng.standard_normal(200), np.zeros(200)])
+    found = covariance(rng.standard_normal(200), jacobian, prior_jacobian=np.array([[0.0, 4.0]]))
+    assert found.matrix[1, 1] == pytest.approx(1 / 16)
+    assert found.inflation[1] == 1.0
+
+
 def test_covariance_does_not_depend_on_units() -> None:
     rng = np.random.default_rng(5)
     jacobian, size = design(150), np.array([1e-9, 1.0, 1e8, 1e-3])

@@ -175,7 +175,7 @@ def covariance(
         if np.all(np.diag(spectral)[told] > 1e-6 * white[told]):  # else its correlations mean nothing: one frame, say
             from_data = spectral
         stretch = np.ones(count)
-        stretch[told] = np.sqrt((inflation * white / np.diag(from_data))[told])
+        stretch[told] = np.sqrt(inflation[told] * white[told] / np.diag(from_data)[told])
         from_data = from_data * np.outer(stretch, stretch)
     matrix = (from_data + from_prior) / np.outer(size, size)
     return Covariance(matrix, np.maximum((rows - absorbed) / inflation, 1.0), inflation, variance, time)
