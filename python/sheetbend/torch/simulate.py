@@ -15,7 +15,7 @@ from ..motion.solver import Solver
 from ..scene.scene import Scene
 from .function import respond
 from .inputs import InputMap
-from .rollouts import Rollouts
+from ..motion.rollouts import Rollouts
 
 
 class Simulation:
