@@ -64,4 +64,3 @@ class FlatInputs:
         for place, row in zip(self._places, rows, strict=True):
             inputs[:, place] = row
         return inputs
-

@@ -27,9 +27,9 @@ def simulate(
 ) -> jax.Array:
     """Positions of a simulated scene, differentiable once in reverse mode with respect to every array given.
 
-    Works under `jax.jit`, `grad`, `vjp`, `jacrev` and `vmap`; a batch of `vmap` is one call of the core, eight scenes to a
-    vector. Forward mode and second derivatives are not available: `sheetbend.torch.simulate` has them. Backward simulates
-    once more.
+    Works under `jax.jit`, `grad`, `vjp`, `jacrev` and `vmap`; a batch of `vmap` is one call of the core, eight scenes
+    to a vector. Forward mode and second derivatives are not available: `sheetbend.torch.simulate` has them. Backward
+    simulates once more.
 
     Args:
         scene: is frozen by this.
@@ -66,9 +66,7 @@ def _function(flat: FlatInputs, out: jax.ShapeDtypeStruct) -> Any:
 
         return jax.pure_callback(on_numpy, result, *args, vmap_method="broadcast_all")
 
-    @jax.custom_vjp
-    def positions(theta: jax.Array, arrays: Sequence[jax.Array]) -> jax.Array:
-        return called(flat.positions, out, theta, arrays)
+    positions = jax.custom_vjp(lambda theta, arrays: called(flat.positions, out, theta, arrays))
 
     def forward(theta: jax.Array, arrays: Sequence[jax.Array]) -> tuple[jax.Array, Any]:
         return positions(theta, arrays), (theta, arrays)

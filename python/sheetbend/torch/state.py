@@ -78,7 +78,7 @@ class State:
     def _part(self, i: int) -> Tensor:
         size = (self.numbers.shape[-1] - _WHOLE) // 4
         part = self.numbers[..., i * size : (i + 1) * size]
-        return part.unflatten(-1, (-1, 3)).to(self.dtype)
+        return part.reshape(*part.shape[:-1], -1, 3).to(self.dtype)
 
 
 def _collated(batch: Sequence[State], **_: Any) -> State:
@@ -88,7 +88,7 @@ def _collated(batch: Sequence[State], **_: Any) -> State:
 pytree.register_pytree_node(
     State,
     lambda state: ([state.numbers], state.dtype),
-    lambda numbers, dtype: State(*numbers, dtype),  # type: ignore[call-arg, misc]
+    lambda numbers, dtype: State(*numbers, dtype),  # type: ignore[call-arg]
     serialized_type_name="sheetbend.torch.State",
 )
 default_collate_fn_map[State] = _collated

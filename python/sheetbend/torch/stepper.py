@@ -1,4 +1,4 @@
-"""One substep after the other, each a differentiable function of a state, the scene's inputs and what acts meanwhile."""
+"""One substep after the other: differentiable functions of a state, the scene's inputs and what acts meanwhile."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from torch import Tensor
 
 from .. import _core
 from ..errors import InputError
+from ..motion.rollouts import Rollouts
 from ..motion.simulate import divergence
 from ..motion.solver import Solver
 from ..scene.scene import Scene
 from .function import respond
 from .inputs import InputMap, broadcast
-from ..motion.rollouts import Rollouts
 from .state import State
 from .substep import Core, take_substep
 
@@ -34,10 +34,11 @@ class Stepper:
     loss.backward()
     ```
 
-    Single substeps give the bits of one `sheetbend.simulate` over the same inputs. Gradients are exact: reverse mode and
-    forward mode (tangents), once, with respect to the state, the scene's inputs and everything given for a substep.
-    `torch.func.vmap`, `grad`, `vjp`, `jvp`, `jacrev` and `jacfwd` work. A batch of states goes through the core in one
-    call, eight scenes to a vector; its states may be at different substeps. Everything is computed in float64.
+    Single substeps give the bits of one `sheetbend.simulate` over the same inputs. Gradients are exact in reverse mode
+    and in forward mode (tangents), with respect to the state, the scene's inputs and everything given for a substep.
+    `torch.func.vmap`, `grad`, `vjp`, `jvp`, `jacrev` and `jacfwd` work; there are no second derivatives. A batch of
+    states goes through the core in one call, eight scenes to a vector; its states may be at different substeps.
+    Everything is computed in float64.
 
     A stepper can be copied and pickled, and so can be used in the workers of a DataLoader. Backward needs no memory but
     the states: about 100 bytes per particle and substep.
@@ -136,22 +137,24 @@ class Stepper:
             raise _wrong_inputs(flat)
         names = tuple(given)
         core = self._cores.get(names) or self._core(names)
-        rows = [numbers, flat, *(self._row(name, array) for name, array in given.items())]
-        if all(row.dim() == 1 for row in rows):
-            return State(take_substep(core, rows), self.dtype)
-        batch = broadcast({name: tuple(r.shape[:-1]) for name, r in zip(("state", "inputs", *names), rows, strict=True)})
-        together = [row.expand(*batch, -1).reshape(-1, row.shape[-1]) for row in rows]
+        arrays = [self._array(name, array) for name, array in given.items()]
+        batches = [numbers.shape[:-1], flat.shape[:-1], *(batch for _, batch in arrays)]
+        if not any(batches):
+            return State(take_substep(core, [numbers, flat, *(array for array, _ in arrays)]), self.dtype)
+        batch = broadcast({name: tuple(b) for name, b in zip(("state", "inputs", *names), batches, strict=True)})
+        every = zip([numbers, flat, *(array for array, _ in arrays)], batches, strict=True)
+        together = [t.expand(*batch, *t.shape[len(own) :]).reshape(-1, *t.shape[len(own) :]) for t, own in every]
         return State(take_substep(core, together).reshape(*batch, -1), self.dtype)
 
-    def _row(self, name: str, array: Tensor) -> Tensor:
-        """An array (*batch, ...) as (*batch, numbers) float64."""
+    def _array(self, name: str, array: Tensor) -> tuple[Tensor, torch.Size]:
+        """An array (*batch, ...) in float64, and its batch."""
         shape = self._shapes[name]
         dims = array.dim() - len(shape) if isinstance(array, Tensor) else -1
         if dims < 0 or array.shape[dims:] != shape or not array.is_floating_point():
             got = tuple(array.shape) if isinstance(array, Tensor) else type(array).__name__
             fix = f"give a floating tensor {shape}, batch dimensions before it if any"
             raise InputError(name, "is no tensor of the right shape", got, fix)
-        return array.double().flatten(dims)
+        return array.double(), array.shape[:dims]
 
     def _core(self, names: tuple[str, ...]) -> Core:
         """Of substeps for which these arrays are given."""
@@ -161,7 +164,8 @@ class Stepper:
                 raise InputError(name, "cannot be given for a substep", name, f"give some of: {', '.join(possible)}")
         held = frozenset(names) & frozenset(_MOTIONS)
         places = [self._place(name) for name in names]
-        core = Core(self._stepper(held), places, self._check, lambda: divergence(self.scene))
+        early = not set(names) <= {*_MOTIONS, "gravity", "pressure"}
+        core = Core(self._stepper(held), places, self._check, early, lambda: divergence(self.scene))
         self._cores[names] = core
         return core
 

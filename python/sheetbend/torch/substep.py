@@ -4,14 +4,14 @@
     SubstepVjp    (..., next, next_bar) -> cotangents in one row      refused: a second derivative
     SubstepJvp    (..., tangents) -> next_dot                         refused: a second derivative
 
-Tensors are rows (n,), or (batch, n), all of them alike. As in function.py, derivatives are Functions with vmap rules of
-their own, so that torch.func works.
+States and inputs are rows (n,), or (batch, n); what is given has its own shape, and the batch before it where they have
+one. As in function.py, derivatives are Functions with vmap rules of their own, so that torch.func works.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 import torch
@@ -28,13 +28,25 @@ class Core:
         compiled: `_core.Stepper`.
         places: a slice of the inputs for each of the arrays.
         check: raises InputError for inputs (batch, total) that make no sense.
+        early: whether to check before a substep. Numbers that merely must be finite are looked at when the next state
+            is not.
         translated: a context that raises the package's errors for those of the core.
     """
 
     def __init__(
-        self, compiled: Any, places: Sequence[slice], check: Callable[[Array], None], translated: Callable[[], Any]
+        self,
+        compiled: Any,
+        places: Sequence[slice],
+        check: Callable[[Array], None],
+        early: bool,
+        translated: Callable[[], Any],
     ) -> None:
-        self.compiled, self.places, self.check, self.translated = compiled, tuple(places), check, translated
+        self.compiled, self.places, self.translated = compiled, tuple(places), translated
+        self._check, self.early = check, early
+
+    def check(self, inputs: Array) -> None:
+        """Raises InputError for inputs that make no sense."""
+        self._check(inputs.reshape(-1, inputs.shape[-1]))
 
     def filled(self, inputs: Array, given: Sequence[Array]) -> Array:
         """The inputs with the given arrays in place: a copy where there are any."""
@@ -42,12 +54,12 @@ class Core:
             return inputs
         inputs = inputs.copy()
         for place, array in zip(self.places, given, strict=True):
-            inputs[..., place] = array
+            inputs[..., place] = array.reshape(*inputs.shape[:-1], -1)
         return inputs
 
 
 class _SubstepFunction(Function):
-    """What the three have in common: arguments (core, *rows), one tensor of rows out."""
+    """What the three have in common: arguments (core, states, ...), one tensor of rows out."""
 
     @classmethod
     def vmap(cls, info: Any, in_dims: tuple[int | None, ...], core: Core, *tensors: Tensor) -> tuple[Tensor, int]:
@@ -55,15 +67,15 @@ class _SubstepFunction(Function):
             t.expand(info.batch_size, *t.shape) if dim is None else t.movedim(dim, 0)
             for t, dim in zip(tensors, in_dims[1:], strict=True)
         ]
-        out = _apply(cls, core, *(t.flatten(0, -2) for t in mapped))
-        return out.unflatten(0, mapped[0].shape[:-1]), 0
+        out = _apply(cls, core, *(t.flatten(0, mapped[0].dim() - 2) for t in mapped))
+        return out.reshape(*mapped[0].shape[:-1], -1), 0
 
     @staticmethod
-    def backward(ctx: Any, *_: Any) -> NoReturn:
+    def backward(ctx: Any, *bars: Any) -> Any:
         raise NotImplementedError(_SECOND)
 
     @staticmethod
-    def jvp(ctx: Any, *_: Any) -> NoReturn:
+    def jvp(ctx: Any, *tangents: Any) -> Any:
         raise NotImplementedError(_SECOND)
 
 
@@ -73,11 +85,12 @@ class Substep(_SubstepFunction):
     @staticmethod
     def forward(core: Core, states: Tensor, inputs: Tensor, *given: Tensor) -> Tensor:
         numbers = core.filled(_array(inputs), [_array(g) for g in given])
-        if given:
-            core.check(numbers.reshape(-1, numbers.shape[-1]))
+        if core.early:
+            core.check(numbers)
         try:
             out = core.compiled.step(_array(states), numbers)
         except RuntimeError:
+            core.check(numbers)
             with core.translated():
                 raise
         return torch.from_numpy(out).view(states.shape)
@@ -89,17 +102,18 @@ class Substep(_SubstepFunction):
         ctx.save_for_forward(*tensors)
 
     @staticmethod
-    def backward(ctx: Any, next_bar: Tensor) -> tuple[Tensor | None, ...]:
-        states, inputs, *_ = saved = ctx.saved_tensors
+    def backward(ctx: Any, *bars: Tensor) -> tuple[Tensor | None, ...]:
+        (next_bar,) = bars
+        states, inputs, *given, _ = saved = ctx.saved_tensors
         if _transformed() or torch.is_grad_enabled():
-            bars = _apply(SubstepVjp, ctx.core, *saved, next_bar)
+            row = _apply(SubstepVjp, ctx.core, *saved, next_bar)
         else:
-            bars = SubstepVjp.forward(ctx.core, *saved, next_bar)
-        states_bar, inputs_bar = bars.split((states.shape[-1], inputs.shape[-1]), -1)
+            row = SubstepVjp.forward(ctx.core, *saved, next_bar)
+        states_bar, inputs_bar = torch.split(row, [states.shape[-1], inputs.shape[-1]], -1)
         places = ctx.core.places
         given_bar = [
-            inputs_bar[..., place] if wanted else None
-            for place, wanted in zip(places, ctx.needs_input_grad[3:], strict=True)
+            inputs_bar[..., place].reshape(array.shape) if wanted else None
+            for place, array, wanted in zip(places, given, ctx.needs_input_grad[3:], strict=True)
         ]
         if not ctx.needs_input_grad[2]:
             return None, states_bar, None, *given_bar
@@ -110,8 +124,9 @@ class Substep(_SubstepFunction):
         return None, states_bar, inputs_bar, *given_bar
 
     @staticmethod
-    def jvp(ctx: Any, _: None, *tangents: Tensor) -> Tensor:
-        return _apply(SubstepJvp, ctx.core, *ctx.saved_tensors[: len(tangents)], *tangents)
+    def jvp(ctx: Any, *tangents: Any) -> Tensor:
+        dots = tangents[1:]
+        return _apply(SubstepJvp, ctx.core, *ctx.saved_tensors[: len(dots)], *dots)
 
 
 class PlainSubstep(Function):
@@ -135,8 +150,11 @@ class SubstepVjp(_SubstepFunction):
     def forward(core: Core, states: Tensor, inputs: Tensor, *more: Tensor) -> Tensor:
         *given, after, after_bar = map(_array, more)
         numbers = core.filled(_array(inputs), given)
-        with core.translated():
+        try:
             bars = core.compiled.vjp(_array(states), numbers, after, after_bar)
+        except RuntimeError:
+            with core.translated():
+                raise
         return torch.from_numpy(bars).view(*states.shape[:-1], -1)
 
     @staticmethod
@@ -153,9 +171,7 @@ class SubstepJvp(_SubstepFunction):
         half = len(arrays) // 2
         (states, inputs, *given), (states_dot, inputs_dot, *given_dot) = arrays[:half], arrays[half:]
         with core.translated():
-            out = core.compiled.jvp(
-                states, core.filled(inputs, given), states_dot, core.filled(inputs_dot, given_dot)
-            )
+            out = core.compiled.jvp(states, core.filled(inputs, given), states_dot, core.filled(inputs_dot, given_dot))
         return torch.from_numpy(out).view(tensors[0].shape)
 
     @staticmethod
@@ -186,5 +202,6 @@ def _apply(function: type[Function], core: Core, *tensors: Tensor) -> Tensor:
 
 
 def _array(tensor: Tensor) -> Array:
-    """A view of the tensor's memory; a copy only where it is not contiguous."""
-    return tensor.detach().contiguous().numpy()
+    """A view of the tensor's memory."""
+    array: Array = tensor.numpy(force=True)
+    return array
