@@ -1,4 +1,5 @@
 #include "adjoint/rollout_impl.h"
+#include "adjoint/single_step_vjp.h"
 #include "core/scalar/scalar.h"
 
 namespace sheetbend {
@@ -10,5 +11,6 @@ template Tape<double> record_rollout<double>(const Scene&, const Plan&, const do
                                              double*, int, Interrupt*);
 template long reverse_rollout<double>(const Scene&, const Plan&, const double*, double, Tape<double>&,
                                       const std::vector<int>&, const double*, double*, Interrupt*);
+template void single_step_vjp<double>(const Scene&, const Plan&, int, Scenes, const double*, const double*, const double*, double*, double*, double*);
 
 }  // namespace sheetbend

@@ -1,4 +1,5 @@
 #include "adjoint/rollout_impl.h"
+#include "adjoint/single_step_vjp.h"
 #include "core/scalar/pack.h"
 
 namespace sheetbend {
@@ -10,5 +11,6 @@ template Tape<Pack> record_rollout<Pack>(const Scene&, const Plan&, const Pack*,
                                          int, Interrupt*);
 template long reverse_rollout<Pack>(const Scene&, const Plan&, const Pack*, double, Tape<Pack>&,
                                     const std::vector<int>&, const Pack*, Pack*, Interrupt*);
+template void single_step_vjp<Pack>(const Scene&, const Plan&, int, Scenes, const Pack*, const Pack*, const Pack*, Pack*, Pack*, Pack*);
 
 }  // namespace sheetbend

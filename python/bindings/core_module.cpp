@@ -60,4 +60,5 @@ PYBIND11_MODULE(_core, m) {
   bind_equilibrium(m);
   bind_values(m);
   bind_problem(m);
+  bind_stepper(m);
 }

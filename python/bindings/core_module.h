@@ -15,5 +15,6 @@ void bind_rollout(py::module_& m);
 void bind_equilibrium(py::module_& m);
 void bind_values(py::module_& m);
 void bind_problem(py::module_& m);
+void bind_stepper(py::module_& m);
 
 }  // namespace sheetbend::bindings

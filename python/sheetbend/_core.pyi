@@ -86,6 +86,20 @@ class Tape:
     @property
     def recomputed(self) -> int: ...  # substeps that the last reverse advanced again
 
+class Stepper:
+    """Single substeps. States (batch, width), inputs (batch, total)."""
+
+    def __init__(self, solver: Solver, held: Sequence[str] = ()) -> None: ...
+    @property
+    def width(self) -> int: ...
+    def step(self, states: ArrayLike, inputs: ArrayLike) -> Array: ...  # (batch, width)
+    def vjp(
+        self, states: ArrayLike, inputs: ArrayLike, next: ArrayLike, next_bar: ArrayLike
+    ) -> Array: ...  # (batch, width + total)
+    def jvp(
+        self, states: ArrayLike, inputs: ArrayLike, states_dot: ArrayLike, inputs_dot: ArrayLike
+    ) -> Array: ...  # (batch, width)
+
 class TapePlan:
     @property
     def steps(self) -> int: ...

@@ -12,7 +12,8 @@ def run(code: str) -> str:
 
 def test_loads_neither_torch_nor_scipy() -> None:
     loaded = run(
-        "import sys, sheetbend; heavy = ('torch', 'scipy', 'matplotlib', 'rich', 'typer', 'pydantic', 'trimesh'); "
+        "import sys, sheetbend; "
+        "heavy = ('torch', 'jax', 'scipy', 'matplotlib', 'rich', 'typer', 'pydantic', 'trimesh'); "
         "print([m for m in heavy if m in sys.modules])"
     )
     assert loaded == "[]"

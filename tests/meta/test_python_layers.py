@@ -16,7 +16,7 @@ LAYERS = (
     ("recording", "scene", "statistics"),
     ("look", "motion", "objects"),
     ("experiment",),
-    ("minimum", "report", "torch"),
+    ("jax", "minimum", "report", "torch"),
     ("doubts", "textile"),
     ("fitting", "pictures"),
     ("gripped", "page", "plot"),

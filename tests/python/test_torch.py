@@ -19,6 +19,7 @@ import pytest
 import sheetbend as sb
 import sheetbend.torch as st
 import torch
+from sheetbend.motion.rollouts import Rollouts
 from torch.autograd import gradcheck, gradgradcheck
 from torch.func import grad, hessian, jacfwd, jacrev, jvp, vjp, vmap
 
@@ -297,7 +298,7 @@ def test_a_batch_is_one_call_of_the_core(scene: sb.Scene) -> None:
 
 def test_a_tape_serves_its_own_inputs_only(scene: sb.Scene) -> None:
     core, inputs, bar = SOLVER.core(scene.compiled), scene.compiled.inputs()[None], np.ones((1, 3, 15))
-    keeping, fresh = (st.rollouts.Rollouts(scene, core, [0, 5, 10], keep, SOLVER) for keep in (True, False))
+    keeping, fresh = (Rollouts(scene, core, [0, 5, 10], keep, SOLVER) for keep in (True, False))
     assert np.array_equal(keeping.value(inputs), fresh.value(inputs))
     assert np.array_equal(keeping.vjp(inputs, bar), fresh.vjp(inputs, bar))
     assert np.array_equal(keeping.vjp(1.1 * inputs, bar), fresh.vjp(1.1 * inputs, bar))

@@ -16,6 +16,7 @@ import pytest
 import sheetbend as sb
 import sheetbend.torch as st
 import torch
+from sheetbend.motion.rollouts import Rollouts
 from torch.func import functional_call, grad, hessian, jacfwd, jvp, vmap
 
 TIMES, STEPS = np.arange(5) / 50, [0, 4, 8, 12, 16]
@@ -48,9 +49,9 @@ def batch(scene: sb.Scene) -> tuple[Array, ...]:
     return distinct[SCENE_OF], directions, *bars
 
 
-def rollouts(scene: sb.Scene, threads: int, lengths: Array | None = None) -> st.rollouts.Rollouts:
+def rollouts(scene: sb.Scene, threads: int, lengths: Array | None = None) -> Rollouts:
     s = solver(threads)
-    return st.rollouts.Rollouts(scene, s.core(scene.compiled), STEPS, False, s, lengths)
+    return Rollouts(scene, s.core(scene.compiled), STEPS, False, s, lengths)
 
 
 @threads

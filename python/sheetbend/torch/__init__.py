@@ -13,5 +13,7 @@ from .equilibrium import Equilibrium, equilibrium  # noqa: E402
 from .forces import forces  # noqa: E402
 from .module import SceneModule  # noqa: E402
 from .simulate import Simulation, simulate  # noqa: E402
+from .state import State  # noqa: E402
+from .stepper import Stepper  # noqa: E402
 
-__all__ = ["Equilibrium", "SceneModule", "Simulation", "equilibrium", "forces", "simulate"]
+__all__ = ["Equilibrium", "SceneModule", "Simulation", "State", "Stepper", "equilibrium", "forces", "simulate"]

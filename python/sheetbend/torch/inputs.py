@@ -84,7 +84,7 @@ class InputMap:
         """
         batches = {name: self._batch_of_value(name, value) for name, value in values.items()}
         batches |= {name: self._batch_of_array(name, array) for name, array in arrays.items()}
-        batch = _broadcast(batches)
+        batch = broadcast(batches)
         flat = self._map(self._quantities(values, batch))
         if not arrays:
             return flat
@@ -176,7 +176,7 @@ def _dense(field: str, tensor: object) -> tuple[int, ...]:
     return tuple(tensor.shape)
 
 
-def _broadcast(batches: Mapping[str, tuple[int, ...]]) -> tuple[int, ...]:
+def broadcast(batches: Mapping[str, tuple[int, ...]]) -> tuple[int, ...]:
     try:
         batch = np.broadcast_shapes(*batches.values())
     except ValueError as error:

@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from ..errors import InputError
+from ..motion.rollouts import Rollouts
 from ..motion.simulate import substeps
 from ..motion.solver import Solver
 from ..scene.scene import Scene
 from .function import respond
 from .inputs import InputMap
-from .rollouts import Rollouts
 
 
 class Simulation:

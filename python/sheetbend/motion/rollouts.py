@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..motion.simulate import divergence
-from ..motion.solver import Solver
-from ..motion.tape import budget
 from ..scene.scene import Scene
+from .simulate import divergence
+from .solver import Solver
+from .tape import budget
 
 Array = np.ndarray
 
