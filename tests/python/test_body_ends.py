@@ -48,6 +48,17 @@ def test_end_rides_on_the_body_in_its_direction_and_frame(kind: str) -> None:
         assert np.allclose(normals, [1.0, 0.0, 0.0], atol=1e-9)
 
 
+@pytest.mark.parametrize("kind", ["rope", "rod"])
+@pytest.mark.filterwarnings("error")
+def test_fine_cable_holds_its_plug(kind: str) -> None:
+    """Rows of the plug were left out as redundant from 40 links (rods) and 160 (ropes) on, and rods then diverged."""
+    places = []
+    for segments in (20, 160):
+        scene, plug = cable(kind, segments)
+        places.append(plug.pose(sb.simulate(scene, [0.0, 0.1], sb.Solver(h=1e-3)))[0][-1])
+    assert np.allclose(places[1], places[0], atol=2e-4)
+
+
 def test_cable_with_a_plug_has_exact_gradients() -> None:
     scene, _ = cable("rod", 4)
     report = sb.check_gradients(scene, [0.01, 0.02], samples=1)

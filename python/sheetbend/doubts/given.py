@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -22,11 +21,12 @@ from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
 from ..motion.simulate import divergence
 from ..objects.markers import Place
-from ..quantities.quantities import Quantity, Term
+from ..quantities.quantities import Quantity
 from ..recording.recording import Recording
 from ..result.result import Premise
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.intervals import NORMAL
+from .tangents import tangents
 
 Array = np.ndarray
 AXES = "xyz"
@@ -188,8 +188,7 @@ def _collect(
     own = theta[slots[i]]
     gravity = _gravity(e)
     entries: list[tuple[str, str, float, _Told]] = []
-    free: list[dict[str, Any]] = []
-    at: list[float] = []
+    asked: list[tuple[str, int, bool]] = []
     for name, k, value, factor, q in _told(problem, u, i):
         log = q.positive and value > 0
         step = _step(q, value, log)
@@ -197,34 +196,13 @@ def _collect(
             continue
         one = told.setdefault(name, _Told(q.unit, step[1:], value, step[0]))
         entries.append((name, name, 1.0 if log else abs(value) if step[0] else factor, one))
-        free.append({"name": name, "log": log, "slots": [k], "factors": [1.0], "prior": None})
-        at.append(math.log(value) if log else value)
-    names = [f"gravity toward {AXES[axis]}" for axis in gravity]
-    for n, name in enumerate(names):
-        unit, step_of = GROUPS["gravity"]
-        entries.append(("gravity", name, 1.0, told.setdefault("gravity", _Told(unit, step_of))))
-        free.append({"name": name, "log": False, "slots": [len(own) + n], "factors": [1.0], "prior": None})
-        at.append(0.0)
-    columns = np.zeros((len(J), len(free)))
-    if free:
-        d = e.core(r, corrected)
-        terms = [
-            Term("gravity", np.arange(3), v, ((name, "identity"),))
-            for name, v in zip(names, gravity.values(), strict=True)
-        ]
-        terms = [*e.extra_terms(), *e.sensor_terms(), *terms]
-        map_ = e.scene.compiled.map(3 * len(e.compared) + 1, terms, [*e.scene.quantities, *names])
-        d["map"] = map_ | {"base": d["map"]["base"]}
-        core = _core.Problem(
-            experiments=[d],
-            theta=[*own, *np.zeros(len(names))],
-            slots=[list(range(len(own) + len(names)))],
-            free=free,
-            threads=problem.threads,
-        )
-        ok, _, columns = core.evaluate(np.array(at))
-        if not ok:
-            raise SheetbendError(core.failure)
+        asked.append((name, k, log))
+    names = {f"gravity toward {AXES[axis]}": v for axis, v in gravity.items()}
+    unit, step_of = GROUPS["gravity"]
+    entries += [("gravity", name, 1.0, told.setdefault("gravity", _Told(unit, step_of))) for name in names]
+    columns = np.zeros((len(J), len(entries)))
+    if entries:
+        columns = tangents(problem, u, i, names, asked, corrected)
         for (_, label, weight, one), column in zip(entries, columns.T, strict=True):
             one.add(label, J.T @ (weight * column))
     by_gravity = dict(zip(gravity, columns.T[len(columns.T) - len(names) :], strict=True))

@@ -20,6 +20,7 @@ from ..doubts.given import check_given, half_widths, premises
 from ..doubts.leave_one_out import MEANING, companions, each_left_out
 from ..doubts.losses import loss_doubts
 from ..doubts.misread import misread
+from ..doubts.missing_force import missing_force
 from ..doubts.missing_loss import missing_loss
 from ..doubts.prediction import Comparison, compare, predicted_values
 from ..doubts.profiles import Elsewhere
@@ -239,7 +240,8 @@ def fit(
             if not lost:
                 doubted, drawn_off = driven_doubts(at.problem, at.u, judged)
                 doubted += loss_doubts(at.problem, at.u, judged)
-                parts = together(missing_loss(at.problem, at.u, (problem, best.u)), drawn_off, parts)
+                lacking = missing_loss(at.problem, at.u, (problem, best.u)), missing_force(at.problem, at.u, judged)
+                parts = together(*lacking, drawn_off, parts)
         return _Conclusion(at, tuple(every), judged, lower, *predicted, doubted + unknown, rests_on, parts)
 
     left_out: dict[str, Comparison] = {}

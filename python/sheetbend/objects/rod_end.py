@@ -10,6 +10,7 @@ from ..errors import SceneError
 from ..quantities.quantities import Term
 from ..scene.body import BodyPoint
 from ..scene.scene import Array, Scene
+from . import body_end
 from .body_end import frame_at, hold_direction, hold_place
 from .grip import Grip
 from .grip_freedom import add_motion, add_shifts, add_tilts, axes_of
@@ -68,7 +69,7 @@ class End:
 
     def stub(self, link: float) -> float:
         """How far, m, along the rod the particle lies that holds the direction; negative before the start."""
-        return self.side * (GHOST if self.way is None else STUB) * link
+        return self.side * (body_end.STUB if self.point else STUB if self.way else GHOST) * link
 
     def director(self, scene: Scene, along: Array | None) -> Array | None:
         """The frame axis (3,) that a grip or a junction's earlier rods give."""

@@ -14,6 +14,7 @@ from ..errors import SceneError
 from ..quantities.quantities import Term, product
 from ..scene.body import BodyPoint
 from ..scene.scene import Array, Scene
+from .body_end import STUB
 from .chain import (
     TimeConstant,
     add_drag,
@@ -184,7 +185,7 @@ def add_rope(
     ghosts = [
         _clamp(scene, name, end, clamp, nodes, shape, link, normal if clamp_angles else None)
         if grip is None
-        else ride(scene, grip, f"{name}_{end}", int(nodes[k]), reach * GHOST * link, GHOST * density * link)
+        else ride(scene, grip, f"{name}_{end}", int(nodes[k]), reach * STUB * link, GHOST * density * link)
         if isinstance(grip, BodyPoint)
         else hold(scene, grip, int(nodes[k]), reach * GHOST * link)
         for end, clamp, grip, k, reach in (

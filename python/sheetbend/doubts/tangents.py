@@ -1,0 +1,61 @@
+"""What numbers that a fit takes as given change of the residuals of one of its experiments."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..arrays.timeseries import Array
+from ..errors import SheetbendError
+from ..minimum.problem import FitProblem
+from ..quantities.quantities import Term
+
+
+def tangents(
+    problem: FitProblem,
+    u: Array,
+    i: int,
+    gravity: Mapping[str, Array],
+    quantities: Sequence[tuple[str, int, bool]] = (),
+    corrected: Array | None = None,
+) -> Array:
+    """(rows, numbers) derivatives of the residuals of the i-th experiment, quantities first.
+
+    Args:
+        u: (free,) the point.
+        gravity: (3,) m/s^2 by name: what one unit of each adds to gravity.
+        quantities: name, place among the scene's quantities, and whether the derivative is that with respect to the
+            logarithm.
+        corrected: the experiment's corrections there (`FitProblem.corrections`).
+
+    Raises:
+        SheetbendError: the motion has no answer there.
+    """
+    e = problem.experiments[i]
+    theta, slots, _ = problem.known(u)
+    own = theta[slots[i]]
+    names = list(gravity)
+    free: list[dict[str, Any]] = [
+        {"name": name, "log": log, "slots": [slot], "factors": [1.0], "prior": None}
+        for name, slot, log in [*quantities, *((name, len(own) + n, False) for n, name in enumerate(names))]
+    ]
+    at = [float(np.log(own[slot]) if log else own[slot]) for _, slot, log in quantities] + [0.0] * len(names)
+    d = e.core(problem.recordings[i], corrected)
+    terms = [Term("gravity", np.arange(3), v, ((name, "identity"),)) for name, v in gravity.items()]
+    terms = [*e.extra_terms(), *e.sensor_terms(), *terms]
+    map_ = e.scene.compiled.map(3 * len(e.compared) + 1, terms, [*e.scene.quantities, *names])
+    d["map"] = map_ | {"base": d["map"]["base"]}
+    core = _core.Problem(
+        experiments=[d],
+        theta=[*own, *np.zeros(len(names))],
+        slots=[list(range(len(own) + len(names)))],
+        free=free,
+        threads=problem.threads,
+    )
+    ok, _, columns = core.evaluate(np.array(at))
+    if not ok:
+        raise SheetbendError(core.failure)
+    return np.asarray(columns)
