@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from sheetbend.statistics.gauge import null_space
 from sheetbend.statistics.identifiability import identify
 from sheetbend.statistics.intervals import widened
 from sheetbend.statistics.judge import Floor
-from sheetbend.statistics.profile import profile_interval
+from sheetbend.statistics.profile import Profile, Profiler, Wanted, profile_interval
 
 SEEDS = 400
 
@@ -294,27 +295,58 @@ def test_at_its_floor() -> None:
         judge(one(1.0), floors={"q": Floor(0.5, "")})
 
 
+def by_refits(log: bool, cost: Callable[[float], float]) -> Profiler:
+    """Ends where a known cost has risen by that at the end of the linear interval, of residuals that are white."""
+
+    def profiles(wanted: Sequence[Wanted]) -> list[Profile]:
+        assert [w.name for w in wanted] == ["p"]
+        reach = wanted[0].reach
+        rise = 0.5 * 400 * reach**2  # of the linear picture
+        return [Profile(profile_interval(cost, 1.0, rise, step=min(reach, 1.0), log=log), (0.0,), (0.0,), reach)]
+
+    return profiles
+
+
 def test_one_sided_by_the_profile() -> None:
     problem = one(16.0, log=True)
     base = 0.5 * problem[1] @ problem[1]
 
-    def profile(name: str, value: float) -> float:
-        assert name == "p"
+    def cost(value: float) -> float:
         return base * (1 + max(0.0, -math.log(value)) ** 2)
 
-    estimate = judge(problem, profile=profile)
+    estimate = judge(problem, profiler=by_refits(True, cost))
     assert estimate.verdict == "one-sided"
     assert estimate.upper is None
     assert 0 < estimate.lower < 1
     assert estimate.words.startswith("at least")
-    assert judge(problem, profile=lambda name, value: base).verdict == "not identifiable"
+    assert judge(problem, profiler=by_refits(True, lambda value: base)).verdict == "not identifiable"
 
 
-def test_profile_is_asked_about_weak_parameters_only() -> None:
-    def never(name: str, value: float) -> float:
-        raise AssertionError(f"asked for {name} at {value}")
+def test_every_interval_is_profiled_of_many_the_weak_ones() -> None:
+    """A lopsided cost moves the ends of a precise parameter too; nothing is asked at a bound."""
 
-    assert judge(one(1.0), profile=never).verdict == "identified"
+    def lopsided(wanted: Sequence[Wanted]) -> list[Profile]:
+        return [Profile((1.0 - w.reach, 1.0 + 1.5 * w.reach)) for w in wanted]
+
+    linear, found = judge(one(1.0)), judge(one(1.0), profiler=lopsided)
+    assert found.verdict == linear.verdict == "identified"
+    assert found.lower == approx(linear.lower) and found.upper - 1.0 == approx(1.5 * (linear.upper - 1.0))
+    assert judge(one(1.0, lower=1.0), profiler=lopsided) == judge(one(1.0, lower=1.0))
+
+    asked: list[str] = []
+    names = [f"p{k}" for k in range(61)]
+    size = np.where(np.arange(61) == 5, 0.01, 1.0)  # that one is weak
+    jacobian = np.tile(np.eye(61) * size, (6, 1))
+    residuals = 0.1 * np.tile([[1.0], [-1.0]], (3, 61)).ravel()
+
+    def told(wanted: Sequence[Wanted]) -> list[Profile]:
+        asked.extend(w.name for w in wanted)
+        return [Profile((0.0, 2.0)) for _ in wanted]
+
+    identify(
+        Parameters([Parameter(name=n, initial=1.0) for n in names]), np.ones(61), residuals, jacobian, profiler=told
+    )
+    assert asked == ["p5"]
 
 
 def test_profile_interval_of_known_costs() -> None:
@@ -348,11 +380,11 @@ def test_a_profile_that_diverges_leaves_the_linear_end_and_says_so() -> None:
     problem = one(16.0, log=True)
     base, asked = 0.5 * problem[1] @ problem[1], []
 
-    def profile(name: str, value: float) -> float:
+    def cost(value: float) -> float:
         asked.append(value)
         return math.inf if value > 1.2 else base + 4e3 * math.log(value) ** 2
 
-    estimate, linear = judge(problem, profile=profile), judge(problem)
+    estimate, linear = judge(problem, profiler=by_refits(True, cost)), judge(problem)
     assert estimate.upper == linear.upper and estimate.lower > linear.lower
     assert "with it held above diverged" in estimate.words
     assert len(asked) < 40

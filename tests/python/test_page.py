@@ -54,6 +54,18 @@ def fitted() -> sb.Fit:
     )
 
 
+def test_the_page_draws_the_cost_along_each_parameter(fitted: sb.Fit) -> None:
+    page = fit_page(fitted, "swing")
+    lines = re.findall(r'<polyline class="(\w+)" points="([^"]+)"', page)
+    assert [kind for kind, _ in lines] == ["parabola", "curve"] * 2
+    for kind, points in lines:
+        places = np.array([[float(x) for x in point.split(",")] for point in points.split()])
+        assert (np.diff(places[:, 0]) > 0).all() and places[0, 0] == 0.0 and places[-1, 0] == 200.0
+        if kind == "curve":
+            assert places[[0, -1], 1] == pytest.approx(90 * 0.3 / 1.3, abs=0.06)
+            assert places[:, 1].max() == 90.0
+
+
 def data_of(page: str) -> dict[str, Any]:
     (content,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', page, re.S)
     return json.loads(content)

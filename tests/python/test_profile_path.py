@@ -14,9 +14,9 @@ from scipy.optimize import brentq, least_squares
 from sheetbend.doubts.profiles import Profiles
 from sheetbend.minimum.optimizers import minimize, named
 from sheetbend.minimum.problem import FitProblem, as_parameters
-from sheetbend.minimum.profile_path import ProfilePath
+from sheetbend.minimum.profile_path import Linear, ProfilePath
 from sheetbend.objects.markers import on_particle
-from sheetbend.statistics.profile import profile_interval
+from sheetbend.statistics.profile import Wanted, profile_interval
 
 T = np.linspace(0.0, 3.0, 60)
 RISE = 2.0  # of the cost: a 95 % interval for residuals of unit variance
@@ -65,9 +65,9 @@ class Model:
         )
         return whole(found.x)
 
-    def path(self, u: np.ndarray, column: int) -> ProfilePath:
-        r, J, longest = self.residuals(u), self.jacobian(u), np.ones(len(u))
-        return ProfilePath(self, u, r, J, column, RISE, (self.lower, self.upper), longest)
+    def path(self, u: np.ndarray, column: int, linear: float) -> ProfilePath:
+        picture = Linear(u, self.residuals(u), self.jacobian(u))
+        return ProfilePath(self, picture, column, linear, (self.lower, self.upper), np.ones(len(u)))
 
     def exact(self, u: np.ndarray, column: int, side: float, farthest: float) -> float:
         """The end by refits of all others at every value."""
@@ -102,10 +102,10 @@ def test_asymmetric_ends_are_those_of_refits_at_a_few_evaluations() -> None:
     lopsided = []
     for column in range(3):
         first, before = reach(m.jacobian(u), column), m.evaluations
-        ends = m.path(u, column).ends(first)
+        ends = m.path(u, column, first).ends(first)
         exact = [m.exact(u, column, side, 8 * first) for side in (-1.0, 1.0)]
         half = 0.5 * (exact[1] - exact[0])
-        assert ends == approx(exact, abs=0.03 * half)
+        assert ends == approx(exact, abs=0.02 * half)
         assert m.evaluations - before <= 12
         lopsided.append(-exact[0] / exact[1])
     assert max(lopsided) > 2.0
@@ -115,7 +115,7 @@ def test_ends_that_the_cost_confirms_take_two_evaluations_and_stay() -> None:
     m = model(decay, np.array([0.0, 0.3, 0.2]), 0.002)
     u = m.fitted(np.array([0.0, 0.3, 0.2]))
     first = reach(m.jacobian(u), 1)
-    assert m.path(u, 1).ends(first) == (-first, first)
+    assert m.path(u, 1, first).ends(first) == (-first, first)
     assert (m.evaluations, m.jacobians) == (2, 0)
     assert np.ptp(np.array(m.asked)[:, 1]) == approx(2 * first)
 
@@ -127,7 +127,7 @@ def test_an_end_beyond_the_limit_is_open(share: float) -> None:
     first = reach(m.jacobian(u), 1)
     exact, beyond = (m.exact(u, 1, side, 8 * first) for side in (-1.0, 1.0))
     m.upper[1] = u[1] + share * beyond
-    lower, upper = m.path(u, 1).ends(first)
+    lower, upper = m.path(u, 1, first).ends(first)
     assert upper == math.inf and lower == approx(exact, rel=0.04)
     assert max(at[1] for at in m.asked) <= m.upper[1]
 
@@ -142,7 +142,7 @@ def test_another_parameter_at_its_bound_leaves_it_where_that_lowers_the_cost() -
     J = m.jacobian(u)
     first = math.sqrt(2 * RISE * np.linalg.inv(J[:, :2].T @ J[:, :2])[1, 1])
     exact = [m.exact(u, 1, side, 8 * first) for side in (-1.0, 1.0)]
-    ends = m.path(u, 1).ends(first)
+    ends = m.path(u, 1, first).ends(first)
     assert exact[1] > 1.3 * first  # with the offset held it would end near `first`
     assert ends == approx(exact, abs=0.04 * 0.5 * (exact[1] - exact[0]))
     assert min(at[2] for at in m.asked) >= 0.1
@@ -156,7 +156,7 @@ def test_a_direction_without_effect_does_not_run_off() -> None:
         lambda w: three.residuals(np.array([w[0] + w[3], w[1], w[2]])), np.full(4, -np.inf), np.full(4, np.inf)
     )
     first = reach(three.jacobian(u), 1)
-    plain, beside = three.path(u, 1).ends(first), four.path(np.append(u, 0.0), 1).ends(first)
+    plain, beside = three.path(u, 1, first).ends(first), four.path(np.append(u, 0.0), 1, first).ends(first)
     assert beside == approx(plain, rel=0.01)
     assert max(abs(at[3]) for at in four.asked) < 1.0
 
@@ -171,7 +171,7 @@ def test_where_the_model_bends_away_the_jacobian_is_made_again() -> None:
     u = np.zeros(2)
     first = reach(m.jacobian(u), 0)
     exact = [m.exact(u, 0, side, 4.0) for side in (-1.0, 1.0)]
-    ends = m.path(u, 0).ends(first)
+    ends = m.path(u, 0, first).ends(first)
     assert 0 < m.jacobians <= 4
     assert ends == approx(exact, rel=0.05)
 
@@ -179,7 +179,7 @@ def test_where_the_model_bends_away_the_jacobian_is_made_again() -> None:
 def test_a_cost_that_levels_off_is_left_to_refits() -> None:
     """It rises up to 1.62, however far one goes."""
     m = Model(lambda u: 1.8 * np.tanh(u), np.full(1, -np.inf), np.full(1, np.inf))
-    lower, upper = m.path(np.zeros(1), 0).ends(2 / 1.8)
+    lower, upper = m.path(np.zeros(1), 0, 2 / 1.8).ends(2 / 1.8)
     assert math.isnan(lower) and math.isnan(upper)
 
 
@@ -187,7 +187,7 @@ def test_a_point_without_an_answer_is_left_to_refits() -> None:
     m = Model(
         lambda u: np.where(np.abs(u[0]) > 0.1, np.nan, u[0]) * np.ones(3), np.full(1, -np.inf), np.full(1, np.inf)
     )
-    lower, upper = m.path(np.zeros(1), 0).ends(1.0)
+    lower, upper = m.path(np.zeros(1), 0, 1.0).ends(1.0)
     assert math.isnan(lower) and math.isnan(upper) and m.evaluations <= 4
 
 
@@ -225,8 +225,14 @@ def test_the_ends_of_a_ropes_profiles_are_those_of_refits() -> None:
     for column, name in enumerate(problem.parameters.free):
         first = math.sqrt(4.0 * variance * spread[column, column])
         profiles = Profiles(problem, u, named("auto"), np.zeros(3))
-        path = profiles.path(name, rise, min(first, 1.0))
         p = problem.parameters[name]
+        found = profiles.profile(Wanted(name, first))
+        path = [None if end is None else p.to_internal(end) - u[column] for end in found.ends]
+        assert list(found.away) == sorted(found.away) and 7 <= len(found.away) <= 15
+        assert min(found.rises) == found.rises[found.away.index(0.0)] == 0.0
+        for end, last, at in zip(path, (0, -1), found.ends, strict=True):
+            assert (found.rises[last] < 1.0) == (at is None)
+            assert at is None or (found.away[last], found.rises[last]) == (approx(end), 1.0)
         ends = profile_interval(
             lambda value, name=name, profiles=profiles: profiles(name, value),
             p.to_physical(u[column]),
@@ -235,11 +241,10 @@ def test_the_ends_of_a_ropes_profiles_are_those_of_refits() -> None:
             log=p.log,
         )
         for at, end in zip(path, ends, strict=True):
-            if math.isnan(at):
+            if at is None or end is None:
+                assert at is end
                 continue
-            assert end is not None
-            exact = p.to_internal(end) - u[column]
-            assert at == approx(exact, rel=0.2 if path == (-first, first) else 0.04)
+            assert at == approx(p.to_internal(end) - u[column], rel=0.025)
             sides.append(name)
         assert not profiles.lower
     assert len(sides) >= 4

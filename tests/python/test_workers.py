@@ -46,11 +46,13 @@ class Backwards(Executor):
     def __init__(self) -> None:
         self.ahead: list[tuple[Future[Any], Any, Any]] = []
         self.bytes: list[int] = []
+        self.work: set[str] = set()
 
     def submit(self, work: Any, /, *args: Any, **options: Any) -> Future[Any]:
         future: Future[Any] = _Lazy(self)
         packed = pickle.dumps((work, args))
         self.bytes.append(len(packed))
+        self.work.add(args[0].__name__)
         self.ahead.append((future, packed, None))
         return future
 
@@ -100,6 +102,15 @@ def test_a_fit_has_the_same_bits_for_any_number_of_workers(workers: int) -> None
     with ThreadPoolExecutor(workers) as executor:
         assert bits(sb.fit(several(), **GIVEN, executor=executor)) == bits(alone)
     assert bits(sb.fit(several(), **GIVEN, executor=Backwards())) == bits(alone)
+
+
+def test_profiles_that_are_shared_out_have_the_same_bits() -> None:
+    given = {**GIVEN, "leave_one_out": False, "starts": (), "profiles": True}
+    alone, executor = sb.fit(several(2), **given), Backwards()
+    shared = sb.fit(several(2), **given, executor=executor)
+    assert bits(shared) == bits(alone)
+    assert [p.name for p in shared.result.profiles] == [e.name for e in shared.result.estimates]
+    assert "_profiled" in executor.work
 
 
 def test_only_the_client_writes_the_journal(tmp_path: Path) -> None:

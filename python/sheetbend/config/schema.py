@@ -215,7 +215,7 @@ class FitSection(Section):
     )
     linear_refits: bool = key(False, "with `double_segments = true`: the one simulation instead of the refit")
     profiles: bool = key(
-        True, "refit the others along weak parameters for their intervals; false: linear intervals, which cost nothing"
+        True, "follow the cost to the ends of every interval, the others refitted; false: linear intervals, for nothing"
     )
     leave_one_out: bool = key(False, "also predict every recording that holds nothing out by a fit to the others")
     strict: bool = key(False, "exit 3 when any requested parameter is not identifiable, not only when all are")

@@ -70,8 +70,7 @@ def judged_parameters(
     _, r, J = problem.evaluate_exactly(u)
     rows, behind = problem.prior_rows
     asked, end = fitted or (problem, u)
-    level = len(u) == 1 and not any(e.scene.compiled.contacts for e in problem.experiments)  # its cost has no kinks
-    profiles = None if refitter is None or level else Profiles(asked, end, refitter, u - end)
+    profiles = None if refitter is None else Profiles(asked, end, refitter, u - end)
     judged = identify(
         problem.parameters,
         u,
@@ -81,8 +80,7 @@ def judged_parameters(
         floors=solver_floors(problem.experiments, problem.parameters),
         discretization=refined,
         systematic=systematic,
-        profile=profiles,
-        path=None if profiles is None else profiles.path,
+        profiler=None if profiles is None else profiles.each,
         nuisance=Nuisance(J[behind:], sum(map(problem.core.absorbed, range(len(problem.experiments))))),
         errors=driven_errors(problem, u, FEW),
     )

@@ -19,10 +19,10 @@ from ..result.result import UNSOUND, Estimate, RecordingFit
 from ..statistics.blocks import Difference, Split, contradiction
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
-from ..statistics.profile import FARTHEST
+from ..statistics.profile import FARTHEST, NOISELESS
 from .driven_errors import driven_errors
 from .prediction import Comparison
-from .profiles import NOISELESS, Elsewhere
+from .profiles import Elsewhere
 
 CLAIMS = ("identified", "weak", "one-sided")  # verdicts that can be contradicted
 ORDINALS = ("first", "second", "third")

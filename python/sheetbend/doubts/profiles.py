@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 from ..arrays.timeseries import Array
 from ..errors import SheetbendError
 from ..minimum.approach import step_limits
+from ..minimum.counts import count, counted
 from ..minimum.optimizers import refit
 from ..minimum.problem import FitProblem
-from ..minimum.profile_path import ProfilePath
+from ..minimum.profile_path import Linear, ProfilePath
+from ..minimum.workers import Common, current
 from ..statistics.gauge import RANK_TOLERANCE
+from ..statistics.profile import NOISELESS, Ends, Profile, Wanted, profile_interval
 
 PROFILE_TOLERANCE = 0.02
 """Of the cost of one row: what an interval's end rises by is a hundred times that. A relative tolerance of all rows
 together would waste steps on few rows, and stop too early on many."""
-NOISELESS = 1e-18  # of sigma squared: data without noise, whose residuals are rounding errors
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,10 @@ class Profiles:
         self._parts: dict[str, FitProblem] = {}  # by name
         self._here: dict[FitProblem, tuple[float, float]] = {}  # by part: cost at the minimum, and residual variance
         self._ends: dict[str, dict[float, Array]] = {}  # by name and value held: where the others ended, all internal
+        self._linear: dict[FitProblem, Linear | None] = {}  # by part
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Profiles, (self._problem, self._u, self._refitter, self._moved)
 
     def __call__(self, name: str, value: float) -> float:
         parameter, by = self._problem.parameters[name], self._moved[self._problem.parameters.free.index(name)]
@@ -87,25 +95,73 @@ class Profiles:
         self._is_lower(name, part, {**held.parameters.to_physical(end.u), name: value}, cost)
         return cost
 
-    def path(self, name: str, rise: float, first: float) -> tuple[float, float]:
-        """Internal distances of both ends of an interval from the estimate, see `ProfilePath.ends`.
+    def each(self, wanted: Sequence[Wanted]) -> list[Profile]:
+        """The profiles of several parameters; workers share them."""
+        if self._problem.estimates_corrections or current() is None:  # corrections go on from the last evaluation
+            return [self.profile(one) for one in wanted]
+        profiles = []
+        for profile, lower, (evaluations, jacobians) in Common(self).map(_profiled, wanted):
+            profiles.append(profile)
+            self.lower += lower
+            count(evaluations, jacobians)
+        return profiles
 
-        Args:
-            rise: of the cost at the ends.
-            first: half-width of the linear interval.
-        """
-        part = self._part(name)
-        parameters = part.parameters
-        u = parameters.to_internal(self._values) if part is not self._problem else self._u
-        ok, r, J = part.evaluate_exactly(u)
-        if not ok:
-            return math.nan, math.nan
-        column, limits = parameters.free.index(name), parameters.limits()
-        path = ProfilePath(part.evaluate, u, r, J, column, rise, limits, step_limits(parameters))
-        ends = path.ends(first)
+    def profile(self, wanted: Wanted) -> Profile:
+        """Both ends from the path along the profile, and from refits on the sides where it does not settle."""
+        name, part = wanted.name, self._part(wanted.name)
+        linear, parameters = self._picture(part), part.parameters
+        if linear is None:
+            return Profile((math.nan, math.nan))
+        parameter, column = parameters[name], parameters.free.index(name)
+        by = self._moved[self._problem.parameters.free.index(name)]
+        limits, longest = parameters.limits(), step_limits(parameters)
+        path = ProfilePath(part.evaluate, linear, column, wanted.reach, limits, longest)
+        first = min(wanted.reach, 1.0) if parameter.log else wanted.reach
+        told = path.ends(first)
         rose, there = path.lowest()
-        lower = self._is_lower(name, part, parameters.to_physical(there), 0.5 * float(r @ r) + rose)
-        return (math.nan, math.nan) if lower else ends
+        cost = 0.5 * float(linear.r @ linear.r)
+        if self._is_lower(name, part, parameters.to_physical(there), cost + rose):
+            told = (math.nan, math.nan)
+        at = float(linear.u[column]) + by
+        sides = tuple(side for side, end in zip((-1.0, 1.0), told, strict=True) if math.isnan(end))
+        refitted: Ends = (None, None)
+        asked: dict[float, float] = {}
+        if sides:
+            refitted = profile_interval(
+                partial(self._remembered, name, asked),
+                parameter.to_physical(at),
+                path.rise,
+                step=first,
+                lower=parameter.lower,
+                upper=parameter.upper,
+                log=parameter.log,
+                sides=sides,
+            )
+        ends: list[float | None] = []
+        curve = [(0.0, 0.0)]
+        for side, end, other in zip((-1.0, 1.0), told, refitted, strict=True):
+            if math.isnan(end):
+                points = [(parameter.to_internal(value) - at, height - cost) for value, height in asked.items()]
+                curve += [(t, rise / path.rise) for t, rise in points if t * side > 0.0 and math.isfinite(rise)]
+                found = other
+            else:
+                curve += path.curve(side, end)
+                found = None if math.isinf(end) else parameter.to_physical(at + end)
+            ends.append(None if found is None else min(max(found, parameter.lower), parameter.upper))
+        away, rises = zip(*sorted(curve), strict=True)
+        return Profile((ends[0], ends[1]), tuple(map(float, away)), tuple(map(float, rises)), wanted.reach)
+
+    def _remembered(self, name: str, asked: dict[float, float], value: float) -> float:
+        asked[value] = self(name, value)
+        return asked[value]
+
+    def _picture(self, part: FitProblem) -> Linear | None:
+        """The linear picture of a part at the minimum; None where its physics has no answer."""
+        if part not in self._linear:
+            u = part.parameters.to_internal(self._values) if part is not self._problem else self._u
+            ok, r, J = part.evaluate_exactly(u)
+            self._linear[part] = Linear(u, r, J) if ok else None
+        return self._linear[part]
 
     def _part(self, name: str) -> FitProblem:
         if name not in self._parts:
@@ -140,3 +196,11 @@ class Profiles:
         if lower:
             self.lower.append(Elsewhere(cost - here, {**self._values, **there}, f"a fit with {name} held"))
         return lower
+
+
+def _profiled(profiles: Profiles, wanted: Wanted) -> tuple[Profile, list[Elsewhere], tuple[int, int]]:
+    """In a worker: a profile, lower minima on its way, and what it took."""
+    known, before = len(profiles.lower), counted()
+    profile = profiles.profile(wanted)
+    after = counted()
+    return profile, profiles.lower[known:], (after[0] - before[0], after[1] - before[1])

@@ -48,7 +48,7 @@ from ..report.fit_result import FitResult
 from ..result.result import Estimate, Given, Premise
 from ..scene.scene import Scene
 from ..statistics.identifiability import Identifiability
-from .rows import every_end, given_rows, growth_rows, recording_fit, start_rows
+from .rows import curves, every_end, given_rows, growth_rows, recording_fit, start_rows
 
 Systematic = Callable[[FitProblem, np.ndarray], Mapping[str, float]]
 
@@ -156,8 +156,8 @@ def fit(
             "gravity" (its direction) and "clamp_direction" are in rad, "clamps" and "markers" (their places) in m. What
             each of these numbers moves is in `FitResult.premises` in any case.
         leave_one_out: also predict every recording that holds nothing out by a fit to the others.
-        profiles: refit the others along the worst parameters for their intervals; without, intervals are the linear
-            ones, which cost nothing beside the fit.
+        profiles: follow the cost to the ends of every interval, all other parameters fitted again; of more than 60
+            parameters only for weak ones. Without, intervals are the linear ones, which cost nothing beside the fit.
         beginnings: also fit the beginnings of the motions by themselves, to doubt what they contradict and to search on
             from there (`sheetbend.doubts.beginnings`). That costs about as much as the fit itself.
         max_iterations: per start and window.
@@ -166,9 +166,9 @@ def fit(
         journal: file that keeps every evaluation until the fit is done (see `sheetbend.minimum.journal`). After a kill,
             the same call with the same file goes on from there and gives the same bits; with another recording, scene
             or version it is refused.
-        executor: shares out evaluations of several experiments, raced starts and leave-one-out to its workers, such as
-            those of `concurrent.futures.ProcessPoolExecutor(2)`; the result has the same bits. Only this process
-            writes the journal.
+        executor: shares out evaluations of several experiments, raced starts, profiles and leave-one-out to its
+            workers, such as those of `concurrent.futures.ProcessPoolExecutor(2)`; the result has the same bits. Only
+            this process writes the journal.
 
     Returns:
         Fit. On Ctrl-C it holds the best point so far, marked `interrupted`, with linear intervals: whatever needs a
@@ -298,6 +298,7 @@ def fit(
         autocorrelation_time=judged.autocorrelation_time,
         starts=start_rows(each, problem.parameters),
         condition=None if found.condition is None else found.condition.words,
+        profiles=curves(judged.profiles, problem.parameters, limit),
         refits=at.refits,
         not_counted=at.not_counted,
         premises=end.premises,

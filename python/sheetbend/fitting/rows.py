@@ -12,7 +12,8 @@ from ..minimum.growth import Growth
 from ..minimum.optimizers import Minimum
 from ..minimum.race import Raced
 from ..quantities.parameters import Parameters
-from ..result.result import Given, MotionGrowth, RecordingFit, Start
+from ..result.result import Given, MotionGrowth, ProfileCurve, RecordingFit, Start
+from ..statistics.profile import Profile
 
 
 def recording_fit(
@@ -47,6 +48,23 @@ def growth_rows(start: Sequence[Growth], end: Sequence[Growth]) -> tuple[MotionG
         )
         for first, last in zip(start, end, strict=True)
     )
+
+
+def curves(profiles: Mapping[str, Profile], parameters: Parameters, u: np.ndarray) -> tuple[ProfileCurve, ...]:
+    """Of every profile, around the estimate u (free,), internal, in the order of the parameters."""
+    found = []
+    for column, name in enumerate(parameters.free):
+        if name in profiles and len(profiles[name].away) > 1:
+            p, at = profiles[name], float(u[column])
+            found.append(
+                ProfileCurve(
+                    name=name,
+                    values=tuple(parameters[name].to_physical(at + t) for t in p.away),
+                    rises=p.rises,
+                    parabola=tuple((t / p.reach) ** 2 for t in p.away),
+                )
+            )
+    return tuple(found)
 
 
 def _finite(number: float) -> float | None:

@@ -9,6 +9,10 @@ height is from proportional to t, and, from the least-squares step of the others
 bends. Interpolated between the points that were evaluated (`profile_shape`), on both sides of the estimate, they place
 the next point, and at last the end.
 
+How high an end lies is told by its distance in the linear picture, that of the linear interval. So a profile says by
+how much the cost is not a parabola, and leaves everything else that an interval counts (correlated residuals, noise of
+what drives a scene, priors that count as they are) as the linear interval has it.
+
 J need not be exact for that: it only has to show how much the others' step would still take off (`Point.slack`), and
 the error of that is of second order. Where its change is as large as J itself, it is made again.
 """
@@ -24,32 +28,47 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..statistics.gauge import RANK_TOLERANCE
 from .approach import inside
-from .profile_shape import FAR_OFF, SAME, Point, bend, end, telling
+from .profile_shape import FAR_OFF, SAME, Point, bend, distance, telling
 
 MOST = 7  # evaluations for one end, before it is left to refits
 JACOBIANS = 2  # for one end
-CONFIRMED = 0.2  # of a rise: both linear ends stand where the cost rises as the linear picture has it, to this part
+CONFIRMED = 0.03  # of the rise: both linear ends stand where the cost rises as the linear picture has it, to this part
 CLOSE = 0.15  # of the height at an end: from so near it is interpolated
 SLACK = 0.05  # of the rise: what the others may leave there, which shifts an end by half of that
 CURVED = 0.6  # of the way of the residuals: where they are so far from r + J d, J is made again
 STRIDE = 2.5  # times the farthest distance so far
+CURVE = 4  # points of a curve on each side
 WEAK = 0.01  # of the rise: what the others' longest steps must promise to be worth taking
 
 Evaluate = Callable[[Array, bool], tuple[bool, Array, Array]]
 """(u (p,), whether with a Jacobian) -> ok, residuals (rows,), Jacobian (rows, p), those of priors included."""
 
 
-class Others:
-    """The step of all parameters but one that lowers the cost most, from a Jacobian (rows, p) and inside limits."""
+class Linear:
+    """The linear picture at an estimate, which all profiles around it share.
 
-    def __init__(self, jacobian: Array, column: int, ridge: Array, limits: tuple[Array, Array]) -> None:
-        self._rest = np.arange(jacobian.shape[1]) != column
-        self._Q, self._R = np.linalg.qr(jacobian[:, self._rest])
+    Attributes:
+        u, r, J: (p,) internal, residuals (rows,) and Jacobian (rows, p) there.
+        Q, R: of J.
+    """
+
+    def __init__(self, u: Array, r: Array, J: Array) -> None:
+        self.u, self.r, self.J = u, r, J
+        self.Q, self.R = np.linalg.qr(J)
+
+
+class Others:
+    """The step of all parameters but one that lowers the cost most, from Q and R of a Jacobian and inside limits."""
+
+    def __init__(self, Q: Array, R: Array, column: int, ridge: Array, limits: tuple[Array, Array]) -> None:
+        self._rest = np.arange(R.shape[1]) != column
+        self._Q = Q
+        self._S, self._R = np.linalg.qr(R[:, self._rest])
         self._ridge, self._limits = ridge[self._rest], limits
 
     def step(self, u: Array, r: Array) -> tuple[Array, float]:
         """(p,) the step from u, where the residuals are r (rows,), and what it takes off half their sum of squares."""
-        s, seen = np.zeros(len(u)), self._Q.T @ r
+        s, seen = np.zeros(len(u)), self._S.T @ (self._Q.T @ r)
         if len(seen):
             lower, upper = (limit[self._rest] - u[self._rest] for limit in self._limits)
             s[self._rest] = inside(self._R, seen, self._ridge, np.minimum(lower, 0.0), np.maximum(upper, 0.0))
@@ -62,36 +81,36 @@ class ProfilePath:
 
     Attributes:
         evaluate: see `Evaluate`.
-        u, r, J: the estimate (p,), internal, and residuals (rows,) and Jacobian (rows, p) there.
+        linear: the picture at the estimate.
         column: of the parameter.
-        rise: of the cost at the ends that are looked for.
+        reach: distance of the ends that are looked for in the linear picture.
         limits: (p,) each, of the search.
         longest: (p,) longest steps; infinite where there is none.
         points: that were evaluated, in order.
+        rise: of the cost at the ends.
     """
 
     evaluate: Evaluate
-    u: Array
-    r: Array
-    J: Array
+    linear: Linear
     column: int
-    rise: float
+    reach: float
     limits: tuple[Array, Array]
     longest: Array
     points: list[Point] = field(default_factory=list)
 
     def __post_init__(self) -> None:
+        self.u, self.r, R = self.linear.u, self.linear.r, self.linear.R
         self._cost = 0.5 * float(self.r @ self.r)
-        size = np.maximum(np.linalg.norm(self.J, axis=0), np.finfo(float).tiny)
-        self._ridge = np.maximum(math.sqrt(2.0 * WEAK * self.rise) / self.longest, RANK_TOLERANCE * size)
+        size = np.maximum(np.linalg.norm(R, axis=0), np.finfo(float).tiny)
         moves = (self.u > self.limits[0]) & (self.u < self.limits[1])
         moves[self.column] = False
         self._line = np.zeros(len(self.u))
-        slope = np.linalg.lstsq(self.J[:, moves] / size[moves], self.J[:, self.column], rcond=RANK_TOLERANCE)[0]
+        slope = np.linalg.lstsq(R[:, moves] / size[moves], R[:, self.column], rcond=RANK_TOLERANCE)[0]
         self._line[moves] = -slope / size[moves]
         self._line[self.column] = 1.0
-        self._reach = math.sqrt(2.0 * self.rise) / float(np.linalg.norm(self.J @ self._line))
-        others = Others(self.J, self.column, self._ridge, self.limits)
+        self.rise = 0.5 * (self.reach * float(np.linalg.norm(R @ self._line))) ** 2
+        self._ridge = np.maximum(math.sqrt(2.0 * WEAK * self.rise) / self.longest, RANK_TOLERANCE * size)
+        others = Others(self.linear.Q, R, self.column, self._ridge, self.limits)
         self._others = {-1.0: others, 1.0: others}
         self._room = {side: (self.limits[int(side > 0)] - self.u)[self.column] * side for side in (-1.0, 1.0)}
 
@@ -99,29 +118,35 @@ class ProfilePath:
         """Distances of both ends from the estimate, internal, the lower one first.
 
         Args:
-            first: expected distance: that of the linear interval. Both ends lie exactly there where the cost confirms
-                it.
+            first: where to look first, at most `reach`. Both ends lie exactly at `reach` where the cost confirms it.
 
         Returns:
             Infinite on a side where the cost does not rise so far up to the limit, NaN where the path does not settle.
         """
         lower = self._evaluated(-first, -1.0, straight=True)
-        if self._confirms(lower, first) and self._confirms(self._evaluated(first, 1.0, straight=True), first):
-            return -first, first
+        if self._confirms(lower) and self._confirms(self._evaluated(first, 1.0, straight=True)):
+            return -self.reach, self.reach
         return self._end(-1.0), self._end(1.0)
+
+    def curve(self, side: float, end: float) -> list[tuple[float, float]]:
+        """(distance from the estimate, rise of the profile over that at the ends) along one side (-1 or 1): up to a
+        finite end as interpolated, beyond which nothing is known; else at the points that were evaluated."""
+        if math.isinf(end):
+            return sorted((at.t, at.height**2) for at in self.points if at.t * side > 0.0 and at.slack <= SLACK)
+        heights = np.arange(1, CURVE) / CURVE
+        away = [min(distance(self.points, side, self.reach, z), abs(end)) for z in heights]
+        return sorted([(side * t, float(z**2)) for t, z in zip(away, heights, strict=True)] + [(end, 1.0)])
 
     def lowest(self) -> tuple[float, Array]:
         """The least rise of the cost over that at the estimate among the points, and the point (p,)."""
         costs = [(0.5 * float(at.r @ at.r) - self._cost, at.u) for at in self.points]
         return min(costs, key=lambda pair: pair[0], default=(0.0, self.u))
 
-    def _confirms(self, at: Point | None, first: float) -> bool:
-        """Whether the cost at a point on the line is what the linear picture says of that distance."""
-        if at is None or (at.u != self.u + at.t * self._line).any() or abs(at.t) != first:
+    def _confirms(self, at: Point | None) -> bool:
+        """Whether a point on the line is a linear end, and the profile as high there as the linear picture says."""
+        if at is None or (at.u != self.u + at.t * self._line).any() or abs(at.t) != self.reach:
             return False
-        expected = (first / self._reach) ** 2
-        rose = (0.5 * float(at.r @ at.r) - self._cost) / self.rise
-        return abs(rose - expected) <= CONFIRMED * expected and at.slack <= CONFIRMED * expected
+        return abs(at.height**2 - 1.0) <= CONFIRMED and at.slack <= SLACK
 
     def _end(self, side: float) -> float:
         made, before = 0, None
@@ -149,15 +174,15 @@ class ProfilePath:
     def _arrived(self, at: Point, side: float) -> bool:
         """Whether the end is known from that point, about as many parts of the way off as the height is."""
         near = at.slack <= SLACK and abs(at.height - 1.0) <= CLOSE
-        return near and abs(end(self.points, side, self._reach) - abs(at.t)) <= 2.0 * CLOSE * abs(at.t)
+        return near and abs(distance(self.points, side, self.reach) - abs(at.t)) <= 2.0 * CLOSE * abs(at.t)
 
     def _found(self, side: float) -> float:
-        away = end(self.points, side, self._reach)
+        away = distance(self.points, side, self.reach)
         return side * (away if away <= self._room[side] else math.inf)
 
     def _curved(self, at: Point) -> bool:
         """Whether the residuals say that the Jacobian there is another one."""
-        off = float(np.linalg.norm(at.r - self.r - self.J @ (at.u - self.u)))
+        off = float(np.linalg.norm(at.r - self.r - self.linear.J @ (at.u - self.u)))
         return off > CURVED * math.sqrt(2.0 * self.rise) * at.height
 
     def _made_again(self, at: Point, side: float) -> Point | None:
@@ -165,7 +190,7 @@ class ProfilePath:
         ok, _, J = self.evaluate(at.u, True)
         if not ok or not np.isfinite(J).all():
             return None
-        self._others[side] = Others(J, self.column, self._ridge, self.limits)
+        self._others[side] = Others(*np.linalg.qr(J), self.column, self._ridge, self.limits)
         return self._keep(self._point(at.t, at.u, at.r, side))
 
     def _evaluated(self, t: float, side: float, straight: bool = False) -> Point | None:
@@ -200,8 +225,8 @@ class ProfilePath:
 
     def _aim(self, side: float) -> float:
         """The end as far as it is known, no farther than the limit and a stride beyond the points."""
-        reached = max((abs(at.t) for at in telling(self.points, side)), default=self._reach)
-        return side * min(end(self.points, side, self._reach), STRIDE * reached, self._room[side])
+        reached = max((abs(at.t) for at in telling(self.points, side)), default=self.reach)
+        return side * min(distance(self.points, side, self.reach), STRIDE * reached, self._room[side])
 
 
 def _stalls(before: Point, last: Point) -> bool:

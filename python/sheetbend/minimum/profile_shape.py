@@ -51,8 +51,9 @@ def _two(points: Sequence[Point], side: float) -> list[Point]:
     return every[:1] + [at for at in every[1:] if at.slack <= FAR_OFF][:1]
 
 
-def end(points: Sequence[Point], side: float, reach: float) -> float:
-    """Distance of the end on one side, infinite where the heights do not rise so far.
+def distance(points: Sequence[Point], side: float, reach: float, height: float = 1.0) -> float:
+    """Distance at which the profile has a height on one side, by default that of the end; infinite where the heights do
+    not rise so far.
 
     Args:
         reach: distance of the end in the linear picture.
@@ -61,10 +62,10 @@ def end(points: Sequence[Point], side: float, reach: float) -> float:
     z = [math.copysign(at.height, side * at.t) for at in near]
     slopes = [(at.height * reach / abs(at.t) - 1.0) / max(x, LEAST, key=abs) for x, at in zip(z, near, strict=True)]
     if near:
-        factor += slopes[0]
+        factor += height * slopes[0]
     if len(near) == 2 and abs(z[1] - z[0]) > SAME:
-        factor += (1.0 - z[0]) * (slopes[1] - slopes[0]) / (z[1] - z[0])
-    return reach / factor if factor > LEAST else math.inf
+        factor += height * (height - z[0]) * (slopes[1] - slopes[0]) / (z[1] - z[0])
+    return height * reach / factor if factor > LEAST else math.inf
 
 
 def bend(points: Sequence[Point], side: float, t: float) -> Array | float:

@@ -19,6 +19,7 @@ from ..report.report import headline, sections
 from ..report.tables import Section
 from ..result.result import UNSOUND, Start
 from .packed import packed_motions
+from .profile_curves import HEIGHT, WIDTH, profile_pictures
 from .render import compressed, render, table
 from .shown import Shown, fitted_motion
 
@@ -91,6 +92,8 @@ def result_page(
         first=[part for part in told if part["title"] in _FIRST],
         rest=[part for part in told if part["title"] not in _FIRST],
         starts=_starts(result),
+        profiles=profile_pictures(result),
+        box=(WIDTH, HEIGHT),
         data={
             "motions": packed_motions(motions),
             "correlations": _matrix(result),

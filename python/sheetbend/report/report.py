@@ -12,6 +12,7 @@ from ..quantities.wording import figures, short
 from ..result.result import UNSOUND, Estimate, FitData, Given, MotionGrowth, Premise, RecordingFit
 from .report_contact import contact_sections
 from .report_driven import driven_sections
+from .report_profiles import lopsided_profiles
 from .report_starts import groups_of_starts, starts_note
 from .tables import Section, plain_section, rich_section
 
@@ -51,6 +52,7 @@ def sections(result: FitData) -> list[Section]:
         *contact_sections(result),
         _unknown(result),
         _correlations(result),
+        lopsided_profiles(result),
         groups_of_starts(result),
         _course(result),
         Section("Warnings", notes=tuple(("", warning) for warning in result.warnings)),

@@ -102,6 +102,24 @@ class Correlation:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ProfileCurve:
+    """How the cost rises with one parameter held beside its estimate and all others fitted again.
+
+    Attributes:
+        name: of the parameter.
+        values: in its unit, ascending; the estimate is among them.
+        rises: of the cost over that at the estimate, at each value; 1 is that at the ends of the interval from the
+            residuals, driven noise included. Between the ends it is interpolated between the points that were computed.
+        parabola: the rises at the same values in the linear picture.
+    """
+
+    name: str
+    values: tuple[float, ...]
+    rises: tuple[float, ...]
+    parabola: tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
 class RecordingFit:
     """How well one recording is explained: rms distance over markers and frames, in `unit`.
 
@@ -314,6 +332,7 @@ class FitData:
         warnings: what a reader must know before using the numbers.
         contacts: what touches in the fitted motions.
         kinks: of each parameter with an interval, what touches otherwise at its ends.
+        profiles: of the parameters whose profiles were followed.
         assumed: how the ends of ropes are held and what that assumes, in words, where a configuration says it.
     """
 
@@ -351,6 +370,7 @@ class FitData:
     contacts: tuple[ContactFit, ...] = ()
     kinks: tuple[Kinks, ...] = ()
     condition: str | None = None
+    profiles: tuple[ProfileCurve, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of that name; KeyError names the ones there are."""

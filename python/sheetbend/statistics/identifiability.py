@@ -1,15 +1,15 @@
 """What a fit may claim: intervals, correlations, gauges, and one verdict for each parameter.
 
 The statistics are linear at the minimum, in internal coordinates, so that an interval on a log scale is
-asymmetric in physical units and never crosses zero. Where an interval is wide and the cost at its ends is not
-what the linear picture says, the profile of the cost decides: the interval then holds the values at which a
-refit of all other parameters costs little more.
+asymmetric in physical units and never crosses zero. Where the cost at its ends is not what the linear picture
+says, the profile of the cost decides: the interval then holds the values at which a refit of all other
+parameters costs little more.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,7 +19,8 @@ from ..quantities.parameters import Parameters
 from ..result.result import Correlation, Estimate
 from .covariance import Layout
 from .gauge import RANK_TOLERANCE, Gauge
-from .judge import Floor, Judge, Nuisance
+from .judge import Floor, Judge, Linear, Nuisance
+from .profile import Profile, Profiler
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,7 @@ class Identifiability:
         singular_values: of the column-scaled Jacobian, descending.
         gauges: combinations that stay free, in words.
         autocorrelation_time: frames of residual that count as one.
+        profiles: by parameter, of those that were profiled.
     """
 
     estimates: tuple[Estimate, ...]
@@ -41,6 +43,7 @@ class Identifiability:
     singular_values: Array
     gauges: tuple[Gauge, ...]
     autocorrelation_time: float
+    profiles: Mapping[str, Profile] = field(default_factory=dict)
 
 
 def identify(
@@ -53,8 +56,7 @@ def identify(
     floors: Mapping[str, Floor] | None = None,
     discretization: Mapping[str, float] | None = None,
     systematic: Mapping[str, float] | None = None,
-    profile: Callable[[str, float], float] | None = None,
-    path: Callable[[str, float, float], tuple[float, float]] | None = None,
+    profiler: Profiler | None = None,
     nuisance: Nuisance | None = None,
     errors: Array | None = None,
     rank_tolerance: float = RANK_TOLERANCE,
@@ -70,11 +72,8 @@ def identify(
         floors: what the solver makes up, by parameter.
         discretization: what refits at half the step and twice the nodes move, by parameter, in its unit.
         systematic: half-widths of what else the intervals count, by parameter, in its unit.
-        profile: (name, physical value) -> cost (half the sum of squares with priors) with all others
-            refitted; it is asked about weak parameters only.
-        path: (name, rise of the cost, internal half-width of the linear interval) -> internal distances from the
-            estimate at which the profile has risen so far; that half-width on both sides where the cost confirms it,
-            infinite on a side where it never rises so far, NaN on one that is left to `profile`.
+        profiler: finds the profiles of several parameters. It is asked about all that have an interval and rest at no
+            bound; of more than `judge.MANY` parameters about the weak ones alone. Without one intervals are linear.
         nuisance: what unknowns left that were solved for at every point.
         errors: (rows, draws) random draws of errors of the residuals that are alike in all of the data, such as noise
             of what drives a scene makes.
@@ -88,10 +87,18 @@ def identify(
     _check(parameters, internal, residuals, jacobian, {*floors, *discretization, *systematic})
     nuisance = nuisance or Nuisance(np.zeros((0, len(parameters.free))), 0.0)
     errors = np.zeros((len(residuals), 0)) if errors is None else errors
-    judge = Judge(parameters, internal, residuals, jacobian, layout, rank_tolerance, profile, path, nuisance, errors)
-    estimates = tuple(
-        judge.estimate(column, floors.get(name), (discretization.get(name, 0.0), systematic.get(name, 0.0)))
+    judge = Judge(parameters, internal, residuals, jacobian, layout, rank_tolerance, nuisance, errors)
+    linear = [
+        judge.linear(column, (discretization.get(name, 0.0), systematic.get(name, 0.0)))
         for column, name in enumerate(parameters.free)
+    ]
+    wanted = [w for part in linear if isinstance(part, Linear) and (w := judge.wanted(part)) is not None]
+    found = {} if profiler is None or not wanted else dict(zip((w.name for w in wanted), profiler(wanted), strict=True))
+    estimates = tuple(
+        judge.concluded(part, floors.get(part.parameter.name), found.get(part.parameter.name))
+        if isinstance(part, Linear)
+        else part
+        for part in linear
     )
     space = judge.space
     return Identifiability(
@@ -101,6 +108,7 @@ def identify(
         space.singular_values,
         space.gauges,
         judge.spread.autocorrelation_time,
+        found,
     )
 
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -28,10 +26,11 @@ from .intervals import (
     ran_off,
     widened,
 )
-from .profile import FARTHEST, Ends, profile_interval
+from .profile import FARTHEST, NOISELESS, Ends, Profile, Wanted
 from .shared_errors import variance_of, with_shared
 
 LEVEL = 0.95
+MANY = 60  # parameters: of more, such as the private ones of many recordings, only weak ones are profiled
 _AT_BOUND = 1e-6
 _ROUNDING = 1e-14
 _LARGEST = 700.0  # exponent of a number that a computer can hold
@@ -66,6 +65,30 @@ class Nuisance:
     taken: float
 
 
+@dataclass(frozen=True)
+class Linear:
+    """The linear interval of one parameter.
+
+    Attributes:
+        column: among the free parameters.
+        parameter, value: physical.
+        reach: its internal half-width.
+        ends: physical.
+        more: discretization and systematic parts.
+        note: for the words of the verdict.
+        shaken: part of the variance that noise of what drives the scenes makes.
+    """
+
+    column: int
+    parameter: Parameter
+    value: float
+    reach: float
+    ends: Ends
+    more: tuple[float, float]
+    note: str
+    shaken: float
+
+
 class Judge:
     """The shared facts behind the estimates of one fit."""
 
@@ -77,12 +100,10 @@ class Judge:
         jacobian: Array,
         layout: Layout | None,
         tolerance: float,
-        profile: Callable[[str, float], float] | None,
-        path: Callable[[str, float, float], tuple[float, float]] | None,
         nuisance: Nuisance,
         errors: Array,
     ) -> None:
-        self.parameters, self.internal, self.profile, self.path = parameters, internal, profile, path
+        self.parameters, self.internal = parameters, internal
         self.quantile = require("scipy.special", "fit").stdtrit
         names, log = parameters.free, [parameters[name].log for name in parameters.free]
         data = np.vstack([jacobian, nuisance.jacobian])
@@ -116,8 +137,9 @@ class Judge:
             self.wide, self.wide_driven = spread_of(unique)
         self.space = replace(self.space, gauges=tuple(self._measured(gauge) for gauge in self.space.gauges))
 
-    def estimate(self, column: int, floor: Floor | None, more: tuple[float, float]) -> Estimate:
-        """Value, interval and verdict of the parameter in that column; `more`: discretization and systematic parts."""
+    def linear(self, column: int, more: tuple[float, float]) -> Estimate | Linear:
+        """The linear interval of the parameter in that column, or its estimate where it has none; `more`:
+        discretization and systematic parts."""
         parameter = self.parameters[self.parameters.free[column]]
         value = parameter.to_physical(self.internal[column])
         counted = tuple(part if has_answer(parameter, value, part) else 0.0 for part in more)
@@ -145,24 +167,22 @@ class Judge:
             note += "; the residuals are exactly zero, so that nothing tells how wrong it may be"
         if self._limit(column) is not None:
             ends = clipped(parameter, ends)
-        elif self.profile is not None and not is_precise(parameter, value, ends, sum(more)):
-            rise = t**2 * spread.residual_variance * float(spread.inflation[index]) / 2
-            if rise > 0:
-                ends, diverged = _with_answers(self._profiled(column, self.profile, reach, rise), ends)
-                note += diverged
-        return self._judged(column, parameter, value, ends, more, floor, note, shaken)
+        return Linear(column, parameter, value, reach, ends, more, note, shaken)
 
-    def _judged(
-        self,
-        column: int,
-        parameter: Parameter,
-        value: float,
-        ends: Ends,
-        more: tuple[float, float],
-        floor: Floor | None,
-        note: str,
-        shaken: float,
-    ) -> Estimate:
+    def wanted(self, linear: Linear) -> Wanted | None:
+        """The profile that is to check a linear interval; None where that stays as it is."""
+        if self._limit(linear.column) is not None or self.spread.residual_variance <= NOISELESS:
+            return None
+        precise = is_precise(linear.parameter, linear.value, linear.ends, sum(linear.more))
+        return None if precise and len(self.parameters.free) > MANY else Wanted(linear.parameter.name, linear.reach)
+
+    def concluded(self, linear: Linear, floor: Floor | None, profile: Profile | None) -> Estimate:
+        """Value, interval and verdict."""
+        parameter, value, more, note = linear.parameter, linear.value, linear.more, linear.note
+        ends = linear.ends
+        if profile is not None:
+            ends, diverged = _with_answers(profile.ends, ends)
+            note += diverged
         if ends == (None, None):
             words = "the cost stays level on both sides: the data hardly depend on it"
             words = ran_off_words(parameter, value) if ran_off(parameter, value) else words
@@ -173,13 +193,13 @@ class Judge:
             verdict, words = "at its floor", floor_words(parameter, floor.value, floor.ceiling, floor.reason)
         elif at_far_limit(parameter, value):
             verdict, words = "at a bound", f"{ran_off_words(parameter, value)} (as far as a search looks)"
-        elif (limit := self._limit(column)) is not None:
+        elif (limit := self._limit(linear.column)) is not None:
             verdict, words = "at a bound", f"stopped at its {limit}: widen it, or doubt the model"
         elif lower is None or upper is None:
             verdict, words = "one-sided", side_words(parameter, lower, upper)
         else:
             verdict, words = known(parameter, value, lower, upper)
-        if column in self.by_prior:
+        if linear.column in self.by_prior:
             words += "; through its prior, not through the data"
         words += note
         return Estimate(
@@ -189,38 +209,13 @@ class Judge:
             lower=lower,
             upper=upper,
             half_width=half,
-            statistical=None if own is None else own * math.sqrt(1.0 - shaken),
+            statistical=None if own is None else own * math.sqrt(1.0 - linear.shaken),
             discretization=float(more[0]),
             systematic=float(more[1]),
-            driven=0.0 if own is None else own * math.sqrt(shaken),
+            driven=0.0 if own is None else own * math.sqrt(linear.shaken),
             verdict=verdict,
             words=words,
         )
-
-    def _profiled(self, column: int, profile: Callable[[str, float], float], reach: float, rise: float) -> Ends:
-        """Both ends from the path along the profile, and from refits on the sides where it does not settle."""
-        parameter = self.parameters[self.parameters.free[column]]
-        first, at = min(reach, 1.0) if parameter.log else reach, float(self.internal[column])
-        told = (math.nan, math.nan) if self.path is None else self.path(parameter.name, rise, first)
-        left = tuple(side for side, by in zip((-1.0, 1.0), told, strict=True) if math.isnan(by))
-        refitted: Ends = (None, None)
-        if left:
-            refitted = profile_interval(
-                partial(profile, parameter.name),
-                parameter.to_physical(at),
-                rise,
-                step=first,
-                lower=parameter.lower,
-                upper=parameter.upper,
-                log=parameter.log,
-                sides=left,
-            )
-        found = [
-            other if math.isnan(by) else None if math.isinf(by) else parameter.to_physical(at + by)
-            for by, other in zip(told, refitted, strict=True)
-        ]
-        ends = [end if end is None else min(max(end, parameter.lower), parameter.upper) for end in found]
-        return ends[0], ends[1]
 
     def correlations(self) -> tuple[Correlation, ...]:
         """Of every pair of parameters that has an interval."""

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
 
 from ..errors import InputError
 from ..quantities.parameters import Parameter
 
 FARTHEST = math.log(1e6)
 """On a log scale nobody looks beyond a factor of a million."""
+NOISELESS = 1e-18  # of sigma squared: data without noise, whose residuals are rounding errors
 
 _DOUBLINGS = 14
 _HALVINGS = 8
@@ -17,6 +19,35 @@ _THERE = 0.005  # of the height at the end of an interval
 
 Ends = tuple[float | None, float | None]
 """Lower and upper end of an interval in physical units, None where it is open."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A profile that is wanted: the name of a parameter, and the internal half-width of its linear interval."""
+
+    name: str
+    reach: float
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The profile of a parameter around its estimate.
+
+    Attributes:
+        ends: of the interval; NaN where there is no answer.
+        away: internal distances of points from the estimate, ascending.
+        rises: of the cost at these points, over that at the ends of the interval.
+        reach: internal half-width of the linear interval.
+    """
+
+    ends: Ends
+    away: tuple[float, ...] = ()
+    rises: tuple[float, ...] = ()
+    reach: float = math.inf
+
+
+Profiler = Callable[[Sequence[Wanted]], Sequence[Profile]]
+"""The profile of each."""
 
 
 def profile_interval(
