@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import SceneError
 from ..quantities.quantities import Term, product
+from ..scene.in_frame import add_motion_in_frame
 from ..scene.scene import Array, Scene
 from .chain import voronoi_shares
 from .grip import Grip
@@ -126,9 +127,7 @@ class Lead:
 def add_motion(scene: Scene, grip: Grip, node: int, by: Array, factors: dict[str, str]) -> None:
     """Add `by` (knots, 3), times a product of functions of quantities, to what a grip makes of a held node."""
     if not grip.stays:
-        terms = [(factors, by)] if grip.frame is None else grip.frame.turned(by, factors)
-        for own, coefficients in terms:
-            scene.add_motion_term(node, coefficients, own)
+        add_motion_in_frame(scene, grip.frame, node, by, factors)
     else:
         scene.add_terms([product("position", 3 * node + k, by[0, k], factors) for k in range(3)])
 

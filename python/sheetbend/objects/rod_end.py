@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import SceneError
 from ..quantities.quantities import Term
 from ..scene.body import BodyPoint
+from ..scene.in_frame import drive_in_frame
 from ..scene.scene import Array, Scene
 from . import body_end
 from .body_end import frame_at, hold_direction, hold_place
@@ -108,10 +109,8 @@ class End:
             poses = [grip.position, grip.position + stub * grip.direction, grip.director]
             motion = np.stack(poses + [grip.direction for _ in section], axis=1)
             nodes = [node, ghost, director, *section]
-            if grip.frame is None:
-                scene.drive(nodes, grip.times, motion)
-            else:
-                grip.frame.drive(scene, nodes, grip.times, motion, vectors=[n in scene.directors for n in nodes])
+            vectors = [n in scene.directors for n in nodes]
+            drive_in_frame(scene, grip.frame, nodes, grip.times, motion, vectors)
         end = f"{self.name}_{self.label}"
         if tilts:
             add_tilts(scene, grip, end, ghost, stub, section)

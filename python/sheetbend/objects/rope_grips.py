@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import SceneError
 from ..scene.body import BodyPoint
+from ..scene.in_frame import drive_in_frame
 from ..scene.scene import Array, Scene
 from .body_end import hold_place
 from .chain import TimeConstant, first_value, voronoi_shares
@@ -62,10 +63,7 @@ def hold(scene: Scene, grip: Grip, node: int, reach: float) -> int:
         scene.pin([node, ghost])
         return ghost
     motion = np.stack([grip.position, grip.position + reach * grip.direction], axis=1)
-    if grip.frame is None:
-        scene.drive([node, ghost], grip.times, motion)
-    else:
-        grip.frame.drive(scene, [node, ghost], grip.times, motion)
+    drive_in_frame(scene, grip.frame, [node, ghost], grip.times, motion)
     return ghost
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,7 @@ from ..quantities.expression import Expression, by_factors, expressions, numbers
 from ..quantities.quantities import ZERO_OR_MORE, Term
 from .body import AXES, PLACE, TURN, Body, FrameState
 from .held import HeldScene
+from .in_frame import HasCorrection, add_motion_in_frame, drive_in_frame
 from .inertia import Inertia
 from .scene_data import SceneData
 
@@ -35,16 +36,6 @@ class HasPoses(Protocol):
 
     @property
     def quaternions(self) -> Array: ...
-
-
-class HasCorrection(Protocol):
-    """A frame of poses whose quantities correct them (`HandEye`)."""
-
-    def drive(
-        self, scene: Any, particles: ArrayLike, times: Array, motion: Array, vectors: ArrayLike = False
-    ) -> None: ...
-
-    def turned(self, by: Array, factors: Mapping[str, str]) -> Iterator[tuple[dict[str, str], Array]]: ...
 
 
 @dataclass(frozen=True)
@@ -198,15 +189,10 @@ def drive_body(scene: HeldScene, body: Body, path: Path, frame: HasCorrection | 
     known = numbers(own, body.values())
     motion = np.einsum("tab,kb->tka", path.frames, known)
     motion[:, 0] += path.origins
-    if frame is None:
-        scene.drive(body.particles, path.times, motion)
-    else:
-        frame.drive(scene, body.particles, path.times, motion, vectors=[False, True, True, True])
+    drive_in_frame(scene, frame, body.particles, path.times, motion, vectors=[False, True, True, True])
     for factors, c in by_factors(own - known).items():
         by = np.einsum("tab,kb->tka", path.frames, c)
-        terms = [(dict(factors), by)] if frame is None else frame.turned(by, dict(factors))
-        for all_factors, coefficients in terms:
-            scene.add_motion_term(body.particles, coefficients, all_factors)
+        add_motion_in_frame(scene, frame, body.particles, by, dict(factors))
 
 
 def checked_start(name: str, at: ArrayLike, turned: ArrayLike | None, velocity: ArrayLike, spin: ArrayLike) -> Start:
