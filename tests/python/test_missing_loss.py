@@ -72,8 +72,8 @@ def test_a_given_loss_of_another_size_is_named(times: float) -> None:
 
 @pytest.mark.parametrize("EI", [5e-4, 2e-3, 8e-3])
 def test_a_large_damping_that_is_given_as_three_times_larger_is_named(EI: float) -> None:
-    """90 ms instead of 30 leave errors as slow as the motion: 1,800 to 6,600 times the noise, and EI was "identified" 7 %
-    off at 2e-3. The drag runs off to nothing, from where it must come back."""
+    """90 ms instead of 30 leave errors as slow as the motion: 1,800 to 6,600 times the noise, and EI was "identified"
+    7 % off at 2e-3. The drag runs off to nothing, from where it must come back."""
     times = np.arange(151) / 100
     model, true = ({"drag_linear": 0.01, "bend_damping": 0.09}, {"drag_linear": 0.005, "bend_damping": 0.03})
     scenes = [sb.rope(0.5, 8, density=0.05, EI=EI, clamp_start=(1, 0, 0), **losses) for losses in (model, true)]
