@@ -79,24 +79,54 @@ def asked_for(
         errors: (rows, draws) random draws of errors that are alike in all of the data.
     """
     rows = len(layout.frame)
-    q, sizes, _ = np.linalg.svd(J / np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny), full_matrices=False)
-    q = q[:, sizes > RANK_TOLERANCE * sizes.max(initial=0.0)]
-    beside = column - q @ (q.T @ column)
+    beside, rank = _beside(J, column)
     inner = float(beside @ beside)
     left = float(r[mine] @ r[mine]) - noise_in(r[:rows], layout, mine[:rows])
-    if not inner > RANK_TOLERANCE * float(column @ column) or not left > 0.0 or rows - taken <= q.shape[1] + 1:
+    if not inner > RANK_TOLERANCE * float(column @ column) or not left > 0.0 or rows - taken <= rank + 1:
         return None
     more = -float(beside @ r) / inner
-    after = r + more * beside
-    spread = covariance(after[:rows], beside[:rows, None], layout, beside[rows:, None], taken + q.shape[1])
+    chance = _chance(abs(more), beside, r + more * beside, layout, taken + rank, errors)
+    return Asked(more, more**2 * inner / left, chance)
+
+
+def chance_of_drop(problem: FitProblem, u: Array, after: Array, mine: Array, drop: float) -> float:
+    """Chance that a right model leaves more by so much, in the sum of squares of some rows, than another one does.
+
+    Args:
+        u: (free,) the minimum of the first.
+        after: (rows,) what the other leaves. Errors are taken to be like these.
+        mine: (rows,) bool, the rows in question.
+        drop: positive.
+    """
+    _, r, J = problem.evaluate(u)
+    layout, taken = problem.rows_layout(), sum(map(problem.core.absorbed, range(len(problem.experiments))))
+    beside, rank = _beside(J, np.where(mine, after - r, 0.0))
+    inner = float(beside @ beside)
+    if not inner > 0.0 or len(layout.frame) - taken <= rank + 1:
+        return 1.0
+    errors = driven_errors(problem, u, FEW)
+    told = errors if errors.size else None
+    return _chance(math.sqrt(drop / inner), beside, after, layout, taken + rank, told)
+
+
+def _beside(J: Array, column: Array) -> tuple[Array, int]:
+    """What parameters cannot take up of a column, and how many of them there are."""
+    q, sizes, _ = np.linalg.svd(J / np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny), full_matrices=False)
+    q = q[:, sizes > RANK_TOLERANCE * sizes.max(initial=0.0)]
+    return column - q @ (q.T @ column), q.shape[1]
+
+
+def _chance(size: float, beside: Array, after: Array, layout: Layout, taken: float, errors: Array | None) -> float:
+    """Chance that errors like residuals `after` hold so much of a direction, of either sign."""
+    rows, inner = len(layout.frame), float(beside @ beside)
+    spread = covariance(after[:rows], beside[:rows, None], layout, beside[rows:, None], taken)
     variance = short_of_frames(spread, int(np.ptp(layout.frame)) + 1) * float(spread.matrix[0, 0])
     degrees = max(float(spread.degrees[0]), 1.0)
     if errors is not None:
         variance += float(np.mean((beside[:rows] @ errors / inner) ** 2))
         degrees = min(degrees, float(errors.shape[1]))
-    score = abs(more) / math.sqrt(max(variance, np.finfo(float).tiny))
-    chance = 2.0 * float(require("scipy.special", "fit").stdtr(degrees, -score))
-    return Asked(more, more**2 * inner / left, chance)
+    score = size / math.sqrt(max(variance, np.finfo(float).tiny))
+    return 2.0 * float(require("scipy.special", "fit").stdtr(degrees, -score))
 
 
 def rows_of(problem: FitProblem, experiments: Sequence[int]) -> Array:

@@ -32,12 +32,7 @@ def held_losses(problem: FitProblem, u: Array) -> dict[str, str]:
         u: (free,) the minimum.
     """
     ok, _, J = problem.evaluate(u)
-    free = {problem.parameters.roots[name][0] for name in problem.parameters}
-    names = [
-        name
-        for name, q in quantities_of(problem.experiments).items()
-        if name.endswith(LOSSES) and name not in free and not problem.given.keys() & {name} and q.value > 0.0
-    ]
+    names = held_names(problem)
     if not names or not ok or not np.isfinite(J).all():
         return {}
     columns = _columns(problem, u, names)
@@ -52,6 +47,32 @@ def held_losses(problem: FitProblem, u: Array) -> dict[str, str]:
             words = _words(name, told[name])
             found |= {other: words for i in group for other in problem.acting_on(problem.experiments[i])}
     return found
+
+
+def held_names(problem: FitProblem) -> list[str]:
+    """Losses of its scenes that a problem takes as given."""
+    free = {problem.parameters.roots[name][0] for name in problem.parameters}
+    return [
+        name
+        for name, q in quantities_of(problem.experiments).items()
+        if name.endswith(LOSSES) and name not in free and not problem.given.keys() & {name} and q.value > 0.0
+    ]
+
+
+def of_size(problem: FitProblem, name: str, times: float) -> FitProblem:
+    """The problem with so many times a loss that it takes as given, in each experiment that has it."""
+    sized = [
+        Parameter(name=f"{name}[{e.name}]", initial=times * e.scene.quantities[name].value, fixed=True)
+        for e in problem.experiments
+        if name in e.scene.quantities
+    ]
+    return FitProblem(
+        problem.experiments,
+        Parameters([*problem.given.values(), Parameter(name=name, private=True)]),
+        problem.recordings,
+        problem.threads,
+        Parameters([*problem.parameters.values(), *sized]),
+    )
 
 
 def _columns(problem: FitProblem, u: Array, names: Sequence[str]) -> dict[str, Array]:

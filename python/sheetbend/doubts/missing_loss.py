@@ -22,9 +22,9 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
-from .absent_damping import absent_damping
 from .directions import Asked, clearly, rows_of, tied
 from .held_losses import held_losses
+from .other_losses import other_losses
 
 OTHER: dict[str, Literal["bdf1", "bdf2"]] = {"bdf1": "bdf2", "bdf2": "bdf1"}
 
@@ -34,8 +34,8 @@ def missing_loss(problem: FitProblem, u: Array, fitted: tuple[FitProblem, Array]
 
     Losses that are given are tested first (`held_losses`), then all losses by one simulation with the other integrator.
     Where that has no answer, it tells nothing, nor of motions with contacts, where another integrator or substep moves
-    when they begin and slide, which is no loss. Last, where neither shows anything, comes damping where the model has
-    none (`absent_damping`).
+    when they begin and slide, which is no loss. Last, where neither shows anything, come fits with losses of
+    quite another size (`other_losses`).
 
     Args:
         problem: whose residuals count.
@@ -46,7 +46,7 @@ def missing_loss(problem: FitProblem, u: Array, fitted: tuple[FitProblem, Array]
         return {}
     found = held_losses(problem, u)
     found |= {name: words for name, words in _by_other_integrator(problem, u, fitted).items() if name not in found}
-    return found or absent_damping(*fitted)
+    return found or other_losses(*fitted)
 
 
 def _by_other_integrator(problem: FitProblem, u: Array, fitted: tuple[FitProblem, Array]) -> dict[str, str]:

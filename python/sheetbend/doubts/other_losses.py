@@ -1,0 +1,141 @@
+"""Whether a fit with other losses would leave much less.
+
+What a little more loss changes is known to first order (`missing_loss`, `held_losses`). A large one changes the motion
+in another way: what a little of it would damp is long gone, and what fits leave without it is large and alike over
+time, so that no direction is told from chance. So fits are made with other losses: each that was given gets a third and
+three times its size, and elements that have a stiffness and no damping are given one (`absent_damping`). What two
+Gauss-Newton steps leave then decides: a model that is wrong in another way leaves nearly as much with any loss.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays.timeseries import Array
+from ..errors import SheetbendError
+from ..minimum.problem import FitProblem
+from ..quantities.wording import short
+from ..statistics.gauge import RANK_TOLERANCE
+from .absent_damping import FRAMES, undamped, with_damping
+from .directions import LEVEL, chance_of_drop, noise_in, rows_of, tied
+from .held_losses import held_names, of_size
+
+SIZES = {1 / 3: ("large", "a third"), 3.0: ("small", "three times")}  # of given losses, and what their ends are told
+LEAVES = 0.2  # of the noise: a fit that leaves less beyond it lacks nothing that could be told
+LESS = 0.6
+"""Of what a fit leaves beyond noise: by so much less another loss must leave. It is 0.98 to 1 less where 30 ms of
+damping were given as 90, and 0.63 to 1 where they were missing. It is at most 0.33 where a length, a clamp, gravity or
+the kind of drag was wrong, and 0.53 where the mesh was coarse (measured)."""
+STEP = 1.0  # internal: the largest step that is tried
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Motions that share parameters, their rows, and what the fit leaves in these: noise, and in all."""
+
+    motions: list[int]
+    mine: Array
+    noise: float
+    left: float
+
+
+def other_losses(problem: FitProblem, u: Array) -> dict[str, str]:
+    """By free parameter, the loss of its motion with which a fit would leave much less, the best of those tried.
+
+    Takes two simulations for each loss, and a Jacobian and a third where these leave less. A loss with which the motion
+    has no answer tells nothing.
+
+    Args:
+        problem: as it was fitted.
+        u: (free,) the minimum.
+    """
+    ok, r, J = problem.evaluate(u)
+    groups = _unexplained(problem, r) if ok and np.isfinite(J).all() else []
+    best: dict[int, tuple[float, str]] = {}
+    tried = list(_tried(problem, u, groups)) if groups else []
+    for more, words in tried:
+        after = _reached(more, u, J, groups)
+        for k, group in enumerate(groups):
+            if after is None or (share := _less(group, after)) <= max(LESS, best.get(k, (0.0, ""))[0]):
+                continue
+            drop = group.left - float(after[group.mine] @ after[group.mine])
+            if chance_of_drop(problem, u, after, group.mine, drop) < LEVEL / len(tried):
+                best[k] = share, words
+    return {
+        name: _words([problem.experiments[i].name for i in groups[k].motions], words, share)
+        for k, (share, words) in best.items()
+        for i in groups[k].motions
+        for name in problem.acting_on(problem.experiments[i])
+    }
+
+
+def _unexplained(problem: FitProblem, r: Array) -> list[_Group]:
+    """The motions whose residuals are not noise alone."""
+    layout, data = problem.rows_layout(), problem.core.data_rows
+    groups = []
+    for motions in tied(problem):
+        mine = rows_of(problem, motions)
+        noise, left = noise_in(r[:data], layout, mine[:data]), float(r[mine] @ r[mine])
+        if left > (1.0 + LEAVES) * noise:
+            groups.append(_Group(motions, mine, noise, left))
+    return groups
+
+
+def _tried(problem: FitProblem, u: Array, groups: list[_Group]) -> Iterator[tuple[FitProblem, str]]:
+    """Problems with other losses, and what it says of the model if one of them leaves less."""
+    scenes = [problem.experiments[i].scene for group in groups for i in group.motions]
+    for name in held_names(problem):
+        if any(name in scene.quantities for scene in scenes):
+            for times, (size, share) in SIZES.items():
+                words = f"the given {name} is too {size}: with {share} of it the fit"
+                yield of_size(problem, name, times), words
+    if any(undamped(scene) for scene in scenes):
+        for frames in FRAMES:
+            yield with_damping(problem, u, frames), ""
+
+
+def _reached(more: FitProblem, u: Array, J: Array, groups: list[_Group]) -> Array | None:
+    """(rows,) what two Gauss-Newton steps from u leave, the first with the Jacobian J of another problem; None where
+    that first one leaves no less of any group, or where there is no answer."""
+    try:
+        ok, r, _ = more.evaluate(u, jacobian=False)
+        first = _step(more, u, r, J) if ok else u
+        ok, r, _ = more.evaluate(first, jacobian=False)
+        if not ok or all(_less(group, r) <= 0.0 for group in groups):
+            return None
+        ok, r, J = more.evaluate(first)
+        if not ok or not np.isfinite(J).all():
+            return None
+        ok, after, _ = more.evaluate(_step(more, first, r, J), jacobian=False)
+    except SheetbendError:
+        return None
+    return after if ok and float(after @ after) < float(r @ r) else r
+
+
+def _step(problem: FitProblem, u: Array, r: Array, J: Array) -> Array:
+    """Where a Gauss-Newton step of limited length from u ends. A number on a logarithmic scale that grows takes the
+    step of its own unit: one that ran off to nothing comes back at once."""
+    size = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
+    step = np.maximum(-np.linalg.lstsq(J / size, r, rcond=RANK_TOLERANCE)[0] / size, -STEP)
+    log = np.array([problem.parameters[name].log for name in problem.parameters.free])
+    step = np.where(log & (step > 0.0), np.log1p(np.abs(step)), np.minimum(step, STEP))
+    return np.asarray(np.clip(u + step, *problem.parameters.bounds()))
+
+
+def _less(group: _Group, after: Array) -> float:
+    """Share of what the fit leaves beyond noise in the rows of a group that residuals `after` do not leave."""
+    return (group.left - float(after[group.mine] @ after[group.mine])) / (group.left - group.noise)
+
+
+def _words(names: list[str], given: str, share: float) -> str:
+    percent = f"{short(100 * min(share, 1.0), 2)} % less beyond noise"
+    if given:
+        return f"{given} would leave {percent}. Free it, or measure it"
+    return (
+        f"{f'{names[0]} loses' if len(names) == 1 else 'the recordings lose'} energy that the model does not: with "
+        f"damping the fit would leave {percent}. Give the model the loss that it lacks (such as bend_damping or "
+        "membrane_damping)"
+    )
