@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from pytest import approx
-from sheetbend.statistics.covariance import Layout, _colored, _expected_lags, _Grid, _lagged
+from sheetbend.errors import InputError
+from sheetbend.statistics.covariance import Layout, _colored, _columns, _expected_lags, _Grid, _lagged
 
 
 def uneven() -> tuple[Layout, np.random.Generator]:
@@ -14,6 +16,16 @@ def uneven() -> tuple[Layout, np.random.Generator]:
     rows = [(r, c, f, k) for r, c, k, frames in series for f in range(frames) if rng.random() > 0.2 or f == frames - 1]
     recording, channel, frame, kind = np.array(rows).T
     return Layout(recording, channel, frame, kind), rng
+
+
+def test_columns_are_told_apart_as_numpy_does_and_no_two_rows_share_a_place() -> None:
+    layout, rng = uneven()
+    places = rng.integers(-3, 4, (2, 500))
+    own, which = _columns(places)
+    wanted, index = np.unique(places, axis=1, return_inverse=True)
+    assert (own == wanted).all() and (which == np.ravel(index)).all()
+    with pytest.raises(InputError, match="two rows in one place"):
+        layout.of(np.append(np.arange(len(layout.frame)), 7))
 
 
 def test_the_covariance_of_rows_and_of_what_a_fit_leaves_of_them() -> None:

@@ -13,7 +13,7 @@ import sheetbend as sb
 from pytest import approx
 from sheetbend.cli.app import app
 from sheetbend.config import Study, build, parse
-from sheetbend.doubts.driven_errors import FEW, driven_errors
+from sheetbend.doubts.driven_errors import FEW, drawn_noise, driven_errors
 from sheetbend.doubts.driven_noise import driven_doubts, driven_noises
 from sheetbend.minimum.optimizers import Progress, minimize
 from sheetbend.minimum.problem import FitProblem, as_parameters
@@ -302,6 +302,22 @@ def test_what_noise_moves_is_what_it_moves():
         noisy = hand(times) + told.noise * np.random.default_rng(seed).standard_normal((61, 3))
         moved.append(sb.simulate(rope(times, noisy), times, sb.Solver(h=H)).positions[:, SEEN] - true)
     assert told.moved == approx(np.sqrt(np.mean(np.square(moved))), rel=0.1)
+
+
+def test_the_slope_of_what_noise_adds_is_that_of_its_size():
+    """Against the squares of the responses to the same draws, to both sides of the point."""
+    e = shaken(14, frames=61, driven_sigma=None)
+    problem = problem_of(e)
+    u, _ = at(problem, e)
+    drawn = drawn_noise(problem, u, 8)
+    assert drawn is not None
+
+    def squares(at: Array) -> float:
+        return float((drawn.problem.core.respond(0, at, drawn.draws[0]) ** 2).sum()) / 8
+
+    slope = drawn.slope(u, problem.evaluate(u)[2])
+    for k, step in enumerate(1e-3 * np.eye(len(u))):
+        assert slope[k] == approx((squares(u + step) - squares(u - step)) / 2e-3, rel=0.02, abs=0.02 * abs(slope).max())
 
 
 def test_sigmas_that_belie_the_residuals_are_told():

@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import sheetbend as sb
+from sheetbend.arrays.smoothing import LocalFit, steadiest
+from sheetbend.doubts.driven_errors import drawn_noise
 from sheetbend.gripped import GrippedMotion, RopeModel
 from sheetbend.gripped.judging import predict
 from sheetbend.gripped.model import nominal_directions, shared_gravity
 from sheetbend.gripped.motion import smoothed
-from sheetbend.gripped.pieces import experiments_of
+from sheetbend.gripped.pieces import experiments_of, problem_of
+from sheetbend.quantities.parameters import Parameter
 
 TIMES = np.arange(101) / 100.0
 LENGTH, SPAN, GRIP = 0.9, 0.6, 0.03  # m between the grips: arc, chord; and in each grip
@@ -86,6 +89,54 @@ class TestSmoothing:
         values, slopes = smoothed(TIMES, x, width)
         np.testing.assert_array_equal(values, x)
         np.testing.assert_allclose(slopes[1:-1], (x[2:] - x[:-2]) / 0.02, rtol=1e-9)
+
+
+SLOW, NOISE = np.arange(301) / 100.0, 5e-4
+
+
+def wandering(motion: Array) -> Array:
+    """(frames, 4, 3) m, four markers that move with a motion (frames, 3), as noisy as those of a camera system."""
+    return motion[:, None] + NOISE * np.random.default_rng(6).standard_normal((len(motion), 4, 3))
+
+
+class TestSteadying:
+    def test_a_polynomial_of_its_degree_stays_what_it_is(self) -> None:
+        rng = np.random.default_rng(4)
+        times = np.sort(TIMES + rng.uniform(-0.004, 0.004, len(TIMES)))
+        x = np.polynomial.polynomial.polyval(times, [0.1, -1.0, 2.0, 3.0, -2.0])
+        np.testing.assert_allclose(LocalFit(0.4, 4).of(times, x)[0], x, atol=1e-11)
+        np.testing.assert_allclose(LocalFit(0.08, 2).of(times, x)[0], smoothed(times, x, 0.08)[0], atol=1e-12)
+
+    def test_slow_motion_is_smoothed_over_more(self) -> None:
+        slow = 0.2 * np.sin(2 * np.pi * np.outer(SLOW, [0.4, 0.7, 0.9]))
+        found = steadiest(SLOW, wandering(slow), 0.08)
+        assert found is not None and found.degree == 4 and found.width >= 0.3
+        off = found.of(SLOW, wandering(slow))[0] - slow[:, None]
+        assert off[30:-30].std() < 0.35 * NOISE  # 0.5 of it over 0.08 s
+
+    def test_fast_motion_is_not(self) -> None:
+        fast = 0.02 * np.sin(2 * np.pi * np.outer(SLOW, [6.0, 7.0, 8.0]))
+        assert steadiest(SLOW, wandering(fast), 0.08) == LocalFit(0.08, 2)
+
+    def test_too_few_frames_are_left_as_they_are(self) -> None:
+        assert steadiest(SLOW[::4], wandering(0.0 * SLOW[:, None])[::4], 0.08) is None
+        assert steadiest(SLOW, wandering(0.0 * SLOW[:, None]), 0.0) is None
+        short = steadiest(SLOW[:20], wandering(0.0 * SLOW[:, None])[:20], 0.08)
+        assert short is not None and short.frames(SLOW) <= 20
+
+    def test_grips_are_steadied_and_their_noise_is_told(self) -> None:
+        """What the grips' noise moves in a simulation is what was left of it, not what was recorded."""
+        clean = carried_about()
+        noise = NOISE * np.random.default_rng(8).standard_normal(clean.positions.shape)
+        motion = GrippedMotion.of(carried_about(positions=clean.positions + noise), 0.08)
+        held = [0, 1, -2, -1]
+        left = (motion.positions - clean.positions)[:, held]
+        assert np.sqrt(np.mean(left**2)) < 0.45 * NOISE
+        EI = Parameter(name="rope_EI", initial=0.02, log=True)
+        problem = problem_of([model_of(motion).experiment(motion)], [EI], {})
+        drawn = drawn_noise(problem, problem.parameters.initial(), 8)
+        assert drawn is not None
+        assert drawn.size[0] == pytest.approx(np.sqrt(np.mean(left[:, 1:3] ** 2)), rel=0.25)
 
 
 class TestMotion:

@@ -175,6 +175,22 @@ def test_a_rod_in_a_hand_is_found_from_100_times_off(rod, optimizer, far):
 
 
 @pytest.mark.slow
+def test_a_loose_tolerance_leaves_nothing_to_the_optimizer(rod):
+    """Where the steps have arrived, the derivatives of an optimizer's start and end would tell nothing."""
+    best = Search().run(problem_of(rod, hand_held.FEW)).ends[0]
+    problem = problem_of(rod, hand_held.FEW)
+    near = FitProblem(
+        problem.experiments,
+        Parameters(
+            replace(p, initial=1.00005 * problem.parameters.to_physical(best.u)[name])
+            for name, p in problem.parameters.items()
+        ),
+    )
+    end = Search(windows=(), tolerance=1e-3).run(near).ends[0]
+    assert end.converged and "less than the tolerance" in end.message and end.jacobians <= end.iterations + 1
+    assert end.cost == approx(best.cost, rel=1e-3)
+
+
 def test_twelve_numbers_of_a_rod_need_no_bounds():
     """The draw of experiments/far_starts that took 200 iterations to nowhere when Ceres began at the start."""
     truth = hand_held.TWELVE

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 Array = np.ndarray
 FEWEST = 5  # frames that a parabola is fitted to
+WIDER = (2.0, 2.8, 4.0, 5.6, 8.0)  # times a width: longer ones, in which a polynomial of degree 4 replaces a parabola
 
 
 def smoothed(times: Array, positions: Array, width: float) -> tuple[Array, Array]:
@@ -26,6 +29,66 @@ def smoothed(times: Array, positions: Array, width: float) -> tuple[Array, Array
     fit = np.linalg.pinv(powers)  # (frames, 3, window): value, slope and half the bend from the window's samples
     value, slope = sum(np.einsum("nc,n...->cn...", fit[:, :2, k], positions[first + k]) for k in range(frames))
     return value, slope / unit
+
+
+@dataclass(frozen=True)
+class LocalFit:
+    """Smoothing by the polynomial fitted around each frame, one-sided at the ends.
+
+    Attributes:
+        width: s.
+        degree: of the polynomial.
+    """
+
+    width: float
+    degree: int
+
+    def frames(self, times: Array) -> int:
+        """How many frames (odd) a polynomial is fitted to."""
+        return 2 * round(self.width / float(np.median(np.diff(times))) / 2) + 1
+
+    def of(self, times: Array, positions: Array) -> tuple[Array, float]:
+        """Smoothed positions, and the mean weight of a frame in its own value.
+
+        Args:
+            times: (frames,) s, increasing; the intervals need not be equal.
+            positions: (frames, ...) finite.
+        """
+        count = self.frames(times)
+        first = np.clip(np.arange(len(times)) - count // 2, 0, len(times) - count)
+        apart = times[first[:, None] + np.arange(count)] - times[:, None]
+        powers = (apart / np.abs(apart).max())[..., None] ** np.arange(self.degree + 1)
+        value = np.zeros((len(times), self.degree + 1))
+        value[:, 0] = 1.0
+        inner = np.linalg.solve(np.swapaxes(powers, 1, 2) @ powers, value[..., None])
+        weights = (powers @ inner)[..., 0]
+        smooth = sum(np.einsum("n,n...->n...", weights[:, k], positions[first + k]) for k in range(count))
+        return np.asarray(smooth), float(np.mean(weights[np.arange(len(times)), np.arange(len(times)) - first]))
+
+
+def steadiest(times: Array, positions: Array, width: float) -> LocalFit | None:
+    """How positions are best smoothed, over `width` s or more: what is smoothest where they are noise beside a slow
+    motion, and no more than `width` where they are not. Decided by generalized cross-validation (Craven & Wahba 1979).
+
+    Args:
+        times: (frames,) s, increasing.
+        positions: (frames, ...) finite.
+        width: s.
+
+    Returns:
+        None where `width` holds too few frames to smooth over.
+    """
+    narrow, best, least = LocalFit(width, 2), None, np.inf
+    if not FEWEST <= narrow.frames(times) <= len(times):
+        return None
+    for tried in (narrow, *(LocalFit(factor * width, 4) for factor in WIDER)):
+        if tried.frames(times) > len(times):
+            break
+        smooth, own = tried.of(times, positions)
+        score = float(np.mean((positions - smooth) ** 2)) / (1.0 - own) ** 2
+        if score < least:
+            best, least = tried, score
+    return best
 
 
 def state_at(times: Array, positions: Array, at: float, width: float) -> tuple[Array, Array]:

@@ -34,6 +34,8 @@ DRAWS = 64  # of the noise where parts of the data are compared; eight of them s
 FEW = 24  # of the noise, for intervals
 CHANCE = 0.05  # share of the draws that resemble the others less than residuals of such noise are taken to do
 SOUND = 0.5  # to which draws may have been made smaller where a bias is told: beyond, the tangents say too much
+DIRECTIONS = 8  # of noise, at least, that a parameter's slope is told from
+STEP = 0.1  # of the noise, along which a Jacobian changes
 FEWEST = 12  # knots, that tell the noise of a motion
 STEADY = 3.0  # times its noise: by so much the distance of a marker from a driven particle varies at most
 
@@ -56,11 +58,30 @@ class DrivenErrors:
     moved: Mapping[int, Array]
     believed: Mapping[int, float]
 
-    def expected(self, u: Array) -> float:
-        """Mean over the draws of the sum of squares that noise adds to twice the cost at u (free,), in motions whose
-        tangents are to be believed."""
-        sound = {i: n for i, n in self.draws.items() if self.believed[i] >= SOUND}
-        return sum(float((self.problem.core.respond(i, u, n) ** 2).sum()) / len(n) for i, n in sound.items())
+    def slope(self, u: Array, J: Array) -> Array:
+        """(free,) by u (free,): how the mean over the draws of the sum of squares grows that noise adds to twice the
+        cost, in motions whose tangents are to be believed. That of |A n|^2 is twice A n times how J changes along n.
+
+        Args:
+            J: (rows, free) at u.
+        """
+        rows, experiments = self.problem.core.first_rows, self.problem.experiments
+        sound = [i for i in self.draws if self.believed[i] >= SOUND]
+        acting = [name for i in sound for name in self.problem.acting_on(experiments[i])]
+        if not acting:
+            return np.zeros(len(u))
+        fewest = min(acting.count(name) for name in acting)
+        total, made = np.zeros(len(u)), 0
+        for k in range(min(-(-DIRECTIONS // fewest), *(len(self.draws[i]) for i in sound))):
+            along = {experiments[i].name: STEP * self.draws[i][k] for i in sound}
+            ok, _, there = self.problem.moved(along).evaluate(u)
+            if not ok:
+                continue
+            made += 1
+            for i in sound:
+                own = slice(rows[i], rows[i + 1])
+                total += 2.0 / STEP * (self.moved[i][k] / self.believed[i]) @ (there[own] - J[own])
+        return total / max(made, 1)
 
 
 def drawn_noise(problem: FitProblem, u: Array, draws: int) -> DrivenErrors | None:
@@ -174,7 +195,11 @@ def _noise_of_motion(e: Experiment, values: Mapping[str, float], draws: int) -> 
     if not bends.any():
         return None
     mixed = generator.standard_normal((draws * len(t), len(bends))) @ bends / np.sqrt(len(bends))
-    return np.asarray(mixed.reshape(draws, *x.shape))
+    white = mixed.reshape(draws, *x.shape)
+    if boundary.smoothed is None or boundary.smoothed.frames(t) > len(t):
+        return np.asarray(white)
+    smooth, _ = boundary.smoothed.of(t, np.swapaxes(white, 0, 1))
+    return np.ascontiguousarray(np.swapaxes(smooth, 0, 1))
 
 
 def _hidden(e: Experiment, values: Mapping[str, float], bends: Array) -> float:

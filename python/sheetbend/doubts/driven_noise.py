@@ -20,11 +20,10 @@ from ..result.result import Estimate
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
-from .driven_errors import DrivenErrors, drawn_noise
+from .driven_errors import DIRECTIONS, DrivenErrors, drawn_noise
 
 Array = np.ndarray
 UNFELT = 1e-9  # of the largest column of J: a parameter that moves less is not drawn off
-DIRECTIONS = 8  # of noise, which share a rollout
 HARMLESS = 0.25  # of the residual: then a sixteenth of its variance is the driven markers'
 DISHONEST = 1.5  # times what a sigma says
 OFF = 0.5  # half-widths, by which an estimate must be drawn off to be doubtful
@@ -87,10 +86,7 @@ def _drawn_off(problem: FitProblem, u: Array, J: Array, drawn: DrivenErrors) -> 
     length = np.linalg.norm(J, axis=0)
     felt = length > UNFELT * length.max()
     size = np.where(felt, length, 1.0)
-    here, steps = drawn.expected(u), np.minimum(1.0 / size, 1.0)
-    slope = np.zeros(len(u))  # by u times its size
-    for k in np.flatnonzero(felt):
-        slope[k] = (drawn.expected(u + steps[k] * np.eye(len(u))[k]) - here) / (steps[k] * size[k])
+    slope = np.where(felt, drawn.slope(u, J), 0.0) / size  # by u times its size
     normal = (J / size).T @ (J / size)
     off = -0.5 * np.linalg.pinv(normal, rcond=RANK_TOLERANCE, hermitian=True) @ slope / size
     return dict(zip(problem.parameters.free, off.tolist(), strict=True))

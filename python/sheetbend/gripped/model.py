@@ -96,6 +96,7 @@ class RopeModel:
             density_modes=self.density_modes,
             **options,
         )
+        scene.boundary.smoothed = motion.steadied
         if self.places:
             for k in motion.free:
                 scene.add_quantity(place_of(k), 0.0, "m", positive=False, scale=5e-3)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import timeseries
-from ..arrays.smoothing import smoothed
+from ..arrays.smoothing import LocalFit, smoothed, steadiest
 from ..arrays.timeseries import mean_position
 from ..errors import RecordingError
 from ..objects.grip import Grip
@@ -33,6 +33,7 @@ class GrippedMotion:
         fractions: (markers,) arc length from the first inner marker over the free length, mean chords; outside 0 to 1
             in the grips.
         length: m, mean arc length of a smooth curve through the free markers.
+        steadied: by what the gripped markers were smoothed; None = not at all.
     """
 
     recording: Recording
@@ -41,10 +42,12 @@ class GrippedMotion:
     velocities: Array
     fractions: Array
     length: float
+    steadied: LocalFit | None = None
 
     @classmethod
     def of(cls, recording: Recording, smoothing: float) -> GrippedMotion:
-        """Smooth over `smoothing` s (0 = not at all).
+        """Smooth over `smoothing` s (0 = not at all); gripped markers over more, where that leaves nothing but noise
+        behind (`steadiest`): what shakes a grip shakes the rope.
 
         Raises:
             RecordingError: the rope is not gripped by two markers at each end, its markers are not in order, or too
@@ -67,7 +70,12 @@ class GrippedMotion:
         some = best[np.linspace(0, len(best) - 1, min(len(best), 20)).astype(int)]
         curves = [_curve(x[f, part], fractions[part]) for f in some]
         length = float(np.mean([np.linalg.norm(np.diff(c, axis=0), axis=1).sum() for c in curves]))
-        return cls(recording, inner, x, v, fractions, length)
+        gripped = np.r_[: inner[0] + 1, inner[1] : len(recording.markers)]
+        steadied = steadiest(recording.times, positions[:, gripped], smoothing)
+        if steadied is not None and steadied.width > smoothing:
+            x = x.copy()
+            x[:, gripped], _ = steadied.of(recording.times, positions[:, gripped])
+        return cls(recording, inner, x, v, fractions, length, steadied)
 
     @property
     def free(self) -> range:

@@ -130,9 +130,9 @@ def inside(J: Array, r: Array, ridge: Array, lower: Array, upper: Array) -> Arra
         J, r, ridge: (rows, n), (rows,), (n,).
     """
     n = J.shape[1]
-    q, R = np.linalg.qr(J)
-    A = np.concatenate([R, np.diag(ridge)])
-    b = np.concatenate([-(q.T @ r), np.zeros(n)])
+    R = np.linalg.qr(np.column_stack([J, r]), mode="r")[:n]  # its last column is Q'r
+    A = np.concatenate([R[:, :n], np.diag(ridge)])
+    b = np.concatenate([-R[:, n], np.zeros(n)])
     s, held = np.zeros(n), np.zeros(n, dtype=bool)
     for _ in range(4 * n + 4):
         free = ~held

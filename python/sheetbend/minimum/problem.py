@@ -106,6 +106,7 @@ class FitProblem:
         self.given, self.threads, self._corrected = parameters, threads, corrected
         self._last: tuple[np.ndarray, tuple[bool, np.ndarray, np.ndarray]] | None = None
         self.seconds: dict[bool, float] = {}
+        self._layout: Layout | None = None
         self.recordings = tuple(recordings if recordings is not None else (e.fitted() for e in experiments))
         names = [e.name for e in experiments]
         if len(set(names)) != len(names):
@@ -160,6 +161,12 @@ class FitProblem:
     def uncorrected(self, recordings: Sequence[Recording]) -> FitProblem:
         """The same problem on (parts of) the recordings, with the markers that scenes follow taken for the truth."""
         return FitProblem(self.experiments, self.given, recordings, self.threads, self.parameters, corrected={})
+
+    def moved(self, by: Mapping[str, np.ndarray]) -> FitProblem:
+        """The same problem with the markers that scenes follow moved, by experiment (knots * markers * 3,) m."""
+        shapes = {e.name: e.correction(r) for e, r in zip(self.experiments, self.recordings, strict=True)}
+        given = {name: np.reshape(x, shape.shape) for name, x in by.items() if (shape := shapes[name]) is not None}
+        return FitProblem(self.experiments, self.given, self.recordings, self.threads, self.parameters, given)
 
     def around(self, name: str) -> FitProblem:
         """The part that one free (expanded) parameter is tied to, through shared parameters; the rest of the minimum
@@ -344,6 +351,8 @@ class FitProblem:
     def rows_layout(self) -> Layout:
         """Where each data row comes from, for the covariance. Markers are on clock 0, force sensors on clocks of their
         own; each axis of either is a kind of its own, but along a static shape all are one."""
+        if self._layout is not None:
+            return self._layout
         recording, channel, frame, kind, clock = [], [], [], [], []
         for i, (e, r) in enumerate(zip(self.experiments, self.recordings, strict=True)):
             seen_frame, seen_marker = np.nonzero(r.mask)
@@ -362,7 +371,8 @@ class FitProblem:
                 frame.append(sample)
                 kind.append(3 + reads)
                 clock.append(np.full(len(sample), k))
-        return Layout(*(np.concatenate(part) for part in (recording, channel, frame, kind, clock)))
+        self._layout = Layout(*(np.concatenate(part) for part in (recording, channel, frame, kind, clock)))
+        return self._layout
 
     def row_times(self) -> np.ndarray:
         """(rows,) s, when each data row was recorded; of an equilibrium NaN."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..errors import InputError, SheetbendError
-from .approach import Approach, Tally
+from .approach import LEAST, Approach, Tally
 from .conditioning import Condition
 from .growth import Growth, growths
 from .optimizers import Minimum, Observer, Progress, judged, minimize, named
@@ -223,21 +223,25 @@ class _Way:
         if whole is not self.problem:
             walk = Approach(self.problem, walk.u, self.taken)
             self._walk(walk, NEAR_TOLERANCE, most - 1, None)
-        before = self.taken.iterations
-        end, _ = minimize(
-            self.problem,
-            walk.u,
-            self.optimizer,
-            max(1, most - walk.iterations),
-            self.search.tolerance,
-            self._observer(None, before),
-            first=walk.cost if np.isfinite(walk.cost) else None,
-        )
+        end = self._arrived_at(walk) or self._optimized(walk, max(1, most - walk.iterations))
         try:
             end = judged(self.problem, end, end.cost if self.first is None else self.first)
         except KeyboardInterrupt:
             end = replace(end, interrupted=True)
         return self._counted(end)
+
+    def _arrived_at(self, walk: Approach) -> Minimum | None:
+        """Where the walk ended, if its last step promised less than a tolerance that is no finer than the walk's own:
+        derivatives at an optimizer's start and end would tell nothing more."""
+        if walk.problem is not self.problem or not max(walk.promised, LEAST) < self.search.tolerance:
+            return None
+        words = f"the last step promised {walk.promised:.2g} of the cost, less than the tolerance"
+        return Minimum(walk.u, walk.cost, 0, 0, True, False, words)
+
+    def _optimized(self, walk: Approach, most: int) -> Minimum:
+        """On from a walk by the optimizer."""
+        observe, first = self._observer(None, self.taken.iterations), walk.cost if np.isfinite(walk.cost) else None
+        return minimize(self.problem, walk.u, self.optimizer, most, self.search.tolerance, observe, first=first)[0]
 
     def _began(self, u: np.ndarray, cost: float) -> None:
         if np.isfinite(cost):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.checks import check_increasing, finite, indices
+from ..arrays.smoothing import LocalFit
 from ..errors import SceneError
 from ..quantities.quantities import Term
 
@@ -41,6 +42,7 @@ class Boundary:
         interpolation: "cubic" or "linear".
         following: those of the driven particles that move with recorded markers.
         posed: driven particles that move with the poses of a robot's tool, which no marker measured.
+        smoothed: by what the recorded motion was smoothed; None = not at all, or by what nobody told.
     """
 
     def __init__(self) -> None:
@@ -49,6 +51,7 @@ class Boundary:
         self.interpolation = "cubic"
         self.following: list[Following] = []
         self.posed: set[int] = set()
+        self.smoothed: LocalFit | None = None
         self._values: list[Array] = []
         self._terms: list[tuple[Array, Array, dict[str, str]]] = []
 

@@ -74,8 +74,9 @@ class Layout:
         lengths = [len(getattr(self, field)) for field in ("recording", "channel", "frame", "kind", "clock")]
         if len(set(lengths)) > 1:
             raise InputError("layout", "has arrays of different lengths", lengths, "give one entry per residual row")
-        places = np.stack([self.recording, self.clocks, self.channel, self.frame])
-        if np.unique(places, axis=1).shape[1] != len(self.frame):
+        places = np.stack([self.frame, self.channel, self.clocks, self.recording])
+        places = places[:, np.lexsort(places)]
+        if (places[:, 1:] == places[:, :-1]).all(axis=0).any():
             fix = "number the recordings, channels and frames apart"
             raise InputError("layout", "has two rows in one place", len(self.frame), fix)
 
@@ -202,14 +203,25 @@ class _Part:
     mask: Array
 
 
+def _columns(places: Integers) -> tuple[Integers, Integers]:
+    """(2, k) the different columns of (2, n) in order, and (n,) which of them each is. NumPy's own `unique` of columns
+    takes ten times as long."""
+    order = np.lexsort(places[::-1])
+    ordered = places[:, order]
+    new = np.ones(len(order), dtype=bool)
+    new[1:] = (ordered[:, 1:] != ordered[:, :-1]).any(axis=0)
+    which = np.empty(len(order), dtype=int)
+    which[order] = np.cumsum(new) - 1
+    return ordered[:, new], which
+
+
 class _Grid:
     """Rows laid out as (frames, channels) arrays, zero where there is no row."""
 
     def __init__(self, layout: Layout, residuals: Array) -> None:
         series = np.stack([layout.recording, layout.clocks])
-        owner, inverse = np.unique(series, axis=1, return_inverse=True)
-        self._recording = np.ravel(inverse)
-        channels, self._channel = np.unique(np.stack([self._recording, layout.channel]), axis=1, return_inverse=True)
+        owner, self._recording = _columns(series)
+        channels, self._channel = _columns(np.stack([self._recording, layout.channel]))
         first = np.full(owner.shape[1], np.iinfo(int).max)
         np.minimum.at(first, self._recording, layout.frame)
         self._frame = layout.frame - first[self._recording]
@@ -238,8 +250,8 @@ class _Grid:
 
     def parts(self, columns: Array, kinds: Integers) -> list[_Part]:
         """(rows, p) by recording and kind of channel."""
-        owner, index = np.unique(np.stack([self.recordings, kinds]), axis=1, return_inverse=True)
-        part_of, place, found = np.ravel(index), np.zeros(len(kinds), dtype=int), []
+        owner, part_of = _columns(np.stack([self.recordings, kinds]))
+        place, found = np.zeros(len(kinds), dtype=int), []
         order = np.argsort(part_of[self._channel], kind="stable")
         ends = np.searchsorted(part_of[self._channel][order], np.arange(owner.shape[1] + 1))
         frames = np.zeros(owner[0].max() + 1, dtype=int)
