@@ -24,7 +24,7 @@ from ..statistics.profile import profile_interval
 from .profiles import Profiles
 
 NORMAL = 1.96  # standard deviations, of a 95 % interval
-ASKED = ("identified", "weak", "not identifiable")
+ASKED = ("identified", "weak", "not identifiable", "one-sided")
 LEVEL = 0.25  # of the rise that the end of an interval has: a cost that rises less there is level
 STEP = 0.1  # of the logarithm, or of the coefficient: the first step of the search
 
@@ -54,6 +54,8 @@ def bounded_by_sticking(problem: FitProblem, u: Array, judged: Identifiability, 
 
 def _bounded(e: Estimate, problem: FitProblem, profiles: Profiles, rise: float) -> Estimate:
     parameter = problem.parameters[e.name]
+    if e.verdict == "one-sided":  # as its profile found
+        return replace(e, words=f"{e.words}, for all that touches sticks") if e.upper is None else e
     side = 1.0 if e.statistical is not None else -1.0
     if e.statistical is not None and (
         profiles(e.name, e.value + e.statistical) > profiles(e.name, e.value) + LEVEL * rise
