@@ -175,7 +175,7 @@ def test_a_stiffening_twin_in_motion_gives_its_numbers() -> None:
     markers = [sb.on_particle(int(k)) for k in free]
     experiment = sb.Experiment(scene=scene, recording=recording, markers=markers, solver=solver, sigma=noise)
     start = {name: {"initial": factor * truth[name]} for name, factor in zip(truth, (1.4, 0.6), strict=True)}
-    found = sb.fit(experiment, parameters=start, refine=False)
+    found = sb.fit(experiment, parameters=start)
     for name, value in truth.items():
         assert found[name].verdict == "identified"
         assert found[name].lower < value < found[name].upper

@@ -123,7 +123,11 @@ class TestFitPage:
         names = [f"cloth_stiffness_{k}" for k in range(400)]
         pairs = tuple(Correlation(first=a, second=b, value=0.123) for i, a in enumerate(names) for b in names[:i])
         result = replace(
-            fitted.result, estimates=tuple(replace(one, name=n) for n in names), correlations=pairs, premises=()
+            fitted.result,
+            estimates=tuple(replace(one, name=n) for n in names),
+            profiles=tuple(replace(fitted.result.profiles[0], name=n) for n in names),
+            correlations=pairs,
+            premises=(),
         )
         page = fit_page(replace(fitted, result=result), "many")
         assert len(page.encode()) < LARGEST and names[-1] in page

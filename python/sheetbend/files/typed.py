@@ -51,7 +51,10 @@ def as_type(wanted: Any, value: object, where: str) -> Any:
         (only,) = (part for part in inner if part is not type(None))
         return None if value is None else as_type(only, value, where)
     if origin is tuple:
-        return tuple(as_type(inner[0], part, f"{where}[{i}]") for i, part in enumerate(listed(value, where)))
+        parts = listed(value, where)
+        if inner[-1] is not Ellipsis and len(parts) != len(inner):
+            _refuse(where, f"must have {len(inner)} entries", value)
+        return tuple(as_type(inner[0], part, f"{where}[{i}]") for i, part in enumerate(parts))
     if origin is not None and issubclass(origin, Mapping):
         return {name: as_type(inner[1], part, f"{where}.{name}") for name, part in mapping(value, where).items()}
     if dataclasses.is_dataclass(wanted):
