@@ -4,6 +4,10 @@
 
 namespace sheetbend {
 
+template void EquilibriumDerivative::jvp(const Dual<double, 1>*, Dual<double, 1>*, Dual<double, 1>*) const;
+template void EquilibriumDerivative::jvp(const Dual<double, 4>*, Dual<double, 4>*, Dual<double, 4>*) const;
+template void EquilibriumDerivative::jvp(const Dual<double, 8>*, Dual<double, 8>*, Dual<double, 8>*) const;
+
 Equilibrium EquilibriumAnchor::solve(const Scene& scene, const double* inputs, const EquilibriumOptions& options,
                                      Interrupt* interrupt) {
   EquilibriumSolver solver(scene);

@@ -41,25 +41,7 @@ class EquilibriumDerivative {
 
   // Coordinates (dofs) and multipliers (may be null) with their first-order parts, from inputs that carry some.
   template <class T>
-  void jvp(const T* inputs, T* x, T* lambda) const {
-    const Inputs<const T> in{scene_.layout, inputs};
-    std::vector<T> at_x(at_.x.begin(), at_.x.end()), at_lambda(at_.lambda.begin(), at_.lambda.end());
-    place_fixed(scene_, in, at_.t0, at_x.data());
-    std::vector<T> r_x(at_x.size()), r_l(at_lambda.size());
-    equilibrium_residual(scene_, in, at_.t0, at_x.data(), at_lambda.data(), r_x.data(), r_l.data());
-    std::vector<double> x_dot(r_x.size()), lambda_dot(r_l.size());
-    for (int k = 0; k < Tangents<T>::count; ++k) {
-      for (std::size_t i = 0; i < r_x.size(); ++i) x_dot[i] = -Tangents<T>::part(r_x[i], k);
-      for (std::size_t i = 0; i < r_l.size(); ++i) lambda_dot[i] = -Tangents<T>::part(r_l[i], k);
-      for (const RedundantRow& r : at_.left_out) lambda_dot[r.row] = 0.0;
-      solve(x_dot, lambda_dot);
-      for (std::size_t i = 0; i < r_x.size(); ++i) Tangents<T>::part(at_x[i], k) += x_dot[i];
-      for (std::size_t i = 0; i < r_l.size(); ++i) Tangents<T>::part(at_lambda[i], k) = lambda_dot[i];
-    }
-    retract_directors(scene_, at_x.data());
-    std::copy(at_x.begin(), at_x.end(), x);
-    if (lambda) std::copy(at_lambda.begin(), at_lambda.end(), lambda);
-  }
+  void jvp(const T* inputs, T* x, T* lambda) const;
 
  private:
   void solve(std::vector<double>& x, std::vector<double>& lambda) const;
@@ -69,5 +51,31 @@ class EquilibriumDerivative {
   Equilibrium at_;
   Kkt kkt_;
 };
+
+template <class T>
+void EquilibriumDerivative::jvp(const T* inputs, T* x, T* lambda) const {
+  const Inputs<const T> in{scene_.layout, inputs};
+  std::vector<T> at_x(at_.x.begin(), at_.x.end()), at_lambda(at_.lambda.begin(), at_.lambda.end());
+  place_fixed(scene_, in, at_.t0, at_x.data());
+  std::vector<T> r_x(at_x.size()), r_l(at_lambda.size());
+  equilibrium_residual(scene_, in, at_.t0, at_x.data(), at_lambda.data(), r_x.data(), r_l.data());
+  std::vector<double> x_dot(r_x.size()), lambda_dot(r_l.size());
+  for (int k = 0; k < Tangents<T>::count; ++k) {
+    for (std::size_t i = 0; i < r_x.size(); ++i) x_dot[i] = -Tangents<T>::part(r_x[i], k);
+    for (std::size_t i = 0; i < r_l.size(); ++i) lambda_dot[i] = -Tangents<T>::part(r_l[i], k);
+    for (const RedundantRow& r : at_.left_out) lambda_dot[r.row] = 0.0;
+    solve(x_dot, lambda_dot);
+    for (std::size_t i = 0; i < r_x.size(); ++i) Tangents<T>::part(at_x[i], k) += x_dot[i];
+    for (std::size_t i = 0; i < r_l.size(); ++i) Tangents<T>::part(at_lambda[i], k) = lambda_dot[i];
+  }
+  retract_directors(scene_, at_x.data());
+  std::copy(at_x.begin(), at_x.end(), x);
+  if (lambda) std::copy(at_lambda.begin(), at_lambda.end(), lambda);
+}
+
+// Compiled in equilibrium_tangents.cpp.
+extern template void EquilibriumDerivative::jvp(const Dual<double, 1>*, Dual<double, 1>*, Dual<double, 1>*) const;
+extern template void EquilibriumDerivative::jvp(const Dual<double, 4>*, Dual<double, 4>*, Dual<double, 4>*) const;
+extern template void EquilibriumDerivative::jvp(const Dual<double, 8>*, Dual<double, 8>*, Dual<double, 8>*) const;
 
 }  // namespace sheetbend

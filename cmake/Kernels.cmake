@@ -110,11 +110,13 @@ function(sheetbend_add_kernels variant part)
   if(CMAKE_CXX_COMPILER_ID MATCHES "Clang")
     target_compile_options(${library} PRIVATE -Wno-undefined-var-template)  # they are defined in the units of the kinds
   endif()
+  sheetbend_precompile(${library} adjoint/packs/kernels_of_kind.h adjoint/blocks/kernels_of_kind.h)
   set(kernel_objects ${kernel_objects} $<TARGET_OBJECTS:${library}> PARENT_SCOPE)
   set(kernel_libraries ${kernel_libraries} ${library} PARENT_SCOPE)
 endfunction()
 
 set(tables adjoint/packs/kernel_table.cpp adjoint/blocks/kernel_table.cpp core/points/kernel_table.cpp)
+set_source_files_properties(${tables} PROPERTIES SKIP_PRECOMPILE_HEADERS ON)  # they would compile the kernels of every kind
 foreach(variant IN LISTS variants)
   if(NOT variant STREQUAL "portable")
     sheetbend_add_kernels(${variant} hot SOURCES ${tables} ${hot_packs} ${hot_blocks} OPTIONS -O3 ${inlined_whole})
@@ -122,7 +124,7 @@ foreach(variant IN LISTS variants)
     sheetbend_add_kernels(${variant} cold_blocks SOURCES ${cold_blocks} OPTIONS -O3)
   elseif(has_x86_kernels)
     # Processors without AVX2, and builds that are to be quick.
-    sheetbend_add_kernels(${variant} all SOURCES ${tables} ${hot_packs} ${hot_blocks} ${cold_packs} ${cold_blocks} OPTIONS -O2)
+    sheetbend_add_kernels(${variant} all SOURCES ${tables} ${hot_packs} ${hot_blocks} ${cold_packs} ${cold_blocks} OPTIONS -O1)
   else()
     # Kernels of blocks compute with whole packs; where a register holds two lanes of eight, inlining them takes minutes.
     sheetbend_add_kernels(${variant} packs SOURCES ${hot_packs} OPTIONS -O3 ${inlined_whole})

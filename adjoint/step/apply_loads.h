@@ -2,7 +2,7 @@
 // positions that the row was taken at.
 #pragma once
 
-#include "adjoint/element/constraint_vjp.h"
+#include "adjoint/element/pushes_vjp.h"
 #include "adjoint/step/stages.h"
 #include "core/step/apply_loads.h"
 
@@ -19,11 +19,10 @@ void row_loads_vjp(const Step<T>& step, Z&& z, const StateCotangents<T>& from, c
     const auto nodes = group.nodes(load.item);
     const T size = eta2 * loads.at(i);
     with_kind(group.kind, [&]<class K>(K) {
-      T x[K::dofs], own[K::dofs], along[K::rows * K::dofs], x_bar[K::dofs], none[std::max(K::rows, K::dofs)], chosen[K::rows];
+      T x[K::dofs], own[K::dofs], x_bar[K::dofs], chosen[K::rows];
       loads.template gather<K>(i, x);
       const Evaluation<K, T> at(x, loads.parameters(i));
-      for (T& a : along) a = T(0.0);
-      for (T& a : none) a = T(0.0);
+      for (T& a : x_bar) a = T(0.0);
       for (int j = 0; j < K::rows; ++j) chosen[j] = T(j == load.row ? 1.0 : 0.0);
       T sum(0.0);
       for (int k = 0; k < K::arity; ++k) {
@@ -31,12 +30,7 @@ void row_loads_vjp(const Step<T>& step, Z&& z, const StateCotangents<T>& from, c
         sum += dot(Vec3<T>(at.J + load.row * K::dofs + 3 * k), of_node);
         (size * of_node).store(own + 3 * k);
       }
-      for (int d = 0; d < K::dofs; ++d) along[load.row * K::dofs + d] = own[d], x_bar[d] = T(0.0);
-      T* p_bar = in_bar.of(Quantity::rest) + loads.first_parameter(i);
-      if constexpr (HasReverse<K>)
-        K::reverse(x, loads.parameters(i), chosen, none, own, none, x_bar, p_bar);
-      else
-        gradients_vjp<K>(x, loads.parameters(i), none, along, x_bar, p_bar);
+      pushes_vjp<K>(x, loads.parameters(i), chosen, own, x_bar, in_bar.of(Quantity::rest) + loads.first_parameter(i));
       for (int k = 0; k < K::arity; ++k) {
         const int dof = step.scene.first_dof[nodes[k]];
         pull_back_extrapolated(step.bdf, Vec3<T>(x_bar + 3 * k), from.x + dof, from.x_before + dof);

@@ -6,7 +6,7 @@
 // and F_bar goes on to the multipliers, as J F_bar, and through J to coordinates and parameters.
 #pragma once
 
-#include "adjoint/element/constraint_vjp.h"
+#include "adjoint/element/pushes_vjp.h"
 #include "adjoint/step/apply_loads.h"
 #include "adjoint/step/stages.h"
 #include "core/step/keep_spin.h"
@@ -58,7 +58,7 @@ struct ReverseOf<KeepSpin> {
     std::fill(s.push.begin(), s.push.end(), Vec3<T>(T(0.0), T(0.0), T(0.0)));
     for (const Body& body : scene.bodies)
       if (body.spin >= 0) turn_back(step, body, work.masses, record, s, bar);
-    pushes_vjp(step, record, s, bar);
+    all_pushes_vjp(step, record, s, bar);
     if (!scene.loads.empty()) row_loads_vjp(step, [&](int n) { return s.push[n]; }, bar.from, bar.in);
   }
 
@@ -115,7 +115,7 @@ struct ReverseOf<KeepSpin> {
 
   // F = J^T lambda of the constraints.
   template <class T>
-  static void pushes_vjp(const Step<T>& step, const KeepSpin::Record<T>& record, Scratch<T>& s, const StepCotangents<T>& bar) {
+  static void all_pushes_vjp(const Step<T>& step, const KeepSpin::Record<T>& record, Scratch<T>& s, const StepCotangents<T>& bar) {
     const Scene& scene = step.scene;
     std::fill(s.multipliers.begin(), s.multipliers.end(), T(0.0));
     for_each_turning(scene, [&]<class K>(K, const Group& group, int item) {
@@ -123,23 +123,16 @@ struct ReverseOf<KeepSpin> {
       const std::size_t value = group.first_value + static_cast<std::size_t>(item) * group.parameters;
       const int row = group.first_row + item * K::rows;
       const T *p = step.in.of(Quantity::rest) + value, *lambda = record.multipliers.data() + row;
-      T x[K::dofs], z[K::dofs], x_bar[K::dofs], none[std::max(K::rows, K::dofs)], along[K::rows * K::dofs];
+      T x[K::dofs], z[K::dofs], x_bar[K::dofs];
       for (int k = 0; k < K::arity; ++k) {
         std::copy_n(s.x.data() + scene.first_dof[nodes[k]], 3, x + 3 * k);
         s.push[nodes[k]].store(z + 3 * k);
       }
       for (T& a : x_bar) a = T(0.0);
-      for (T& a : none) a = T(0.0);
       const Evaluation<K, T> at(x, p);
       for (int j = 0; j < K::rows; ++j)
-        for (int d = 0; d < K::dofs; ++d) {
-          s.multipliers[row + j] += at.J[j * K::dofs + d] * z[d];
-          along[j * K::dofs + d] = lambda[j] * z[d];
-        }
-      if constexpr (HasReverse<K>)
-        K::reverse(x, p, lambda, none, z, none, x_bar, bar.in.of(Quantity::rest) + value);
-      else
-        gradients_vjp<K>(x, p, none, along, x_bar, bar.in.of(Quantity::rest) + value);
+        for (int d = 0; d < K::dofs; ++d) s.multipliers[row + j] += at.J[j * K::dofs + d] * z[d];
+      pushes_vjp<K>(x, p, lambda, z, x_bar, bar.in.of(Quantity::rest) + value);
       for (int k = 0; k < K::arity; ++k) Vec3<T>(x_bar + 3 * k).add_to(bar.x_next + scene.first_dof[nodes[k]]);
     });
   }

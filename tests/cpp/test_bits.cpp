@@ -1,6 +1,5 @@
 // The same bits: with and without tape, in every number of threads, in every lane, run after run.
-#include "core/scalar/pack.h"
-#include "tests/cpp/support/programs.h"
+#include "tests/cpp/support/lanes.h"
 
 namespace sheetbend::testing {
 namespace {
@@ -12,6 +11,7 @@ struct Bits : ::testing::TestWithParam<Solver> {
     SolverOptions options = GetParam().options(2);
     options.threads = threads;
     options.grain = 1;
+    options.cg_tolerance = 1e-4;  // to be fast
     return {scene, make_plan(scene, options), steps, 0.004};
   }
 };
@@ -74,22 +74,7 @@ TEST_P(Bits, AreEqualForEveryNumberOfThreads) {
 TEST_P(Bits, AreEqualInEveryLane) {
   const Sample sample = random_scene(73, GetParam().shape());
   const Program p = program(sample.scene);
-  Random random(73);
-  std::vector<std::vector<double>> inputs(Pack::lanes, sample.inputs);
-  std::vector<Pack> packed(sample.inputs.size());
-  for (int lane = 0; lane < Pack::lanes; ++lane)
-    for (std::size_t i = 0; i < packed.size(); ++i) packed[i].set(lane, inputs[lane][i] *= random(0.98, 1.02));
-  const auto lane_of = [](const std::vector<Pack>& packs, int lane) {
-    std::vector<double> out;
-    for (const Pack& a : packs) out.push_back(a[lane]);
-    return out;
-  };
-  const auto forward = states(p, packed);
-  const auto reverse = gradient(p, packed);
-  for (int lane = 0; lane < Pack::lanes; ++lane) {
-    EXPECT_TRUE(same_bits(lane_of(forward, lane), states(p, inputs[lane]))) << "forward, lane " << lane;
-    EXPECT_TRUE(same_bits(lane_of(reverse, lane), gradient(p, inputs[lane]))) << "reverse, lane " << lane;
-  }
+  expect_bits_of_lanes(p, scattered(sample.inputs, 73), every_lane);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // Restitution: particles that bounce, against closed forms, and their gradients.
 #include "core/rollout/rollout.h"
 #include "tests/cpp/support/contact_scenes.h"
+#include "tests/cpp/support/lanes.h"
 
 namespace sheetbend::testing {
 namespace {
@@ -182,30 +183,11 @@ TEST_P(Juggling, HasTheGradientOfComplexSteps) {
 
 TEST_P(Juggling, HasTheSameBitsWhateverKeepsItsStates) {
   const Sample s = juggled(0.7);
-  Program p = program(s, GetParam().h, 0.08, GetParam().integrator);
-  const auto plain = states(p, s.inputs);
-  auto recorded = record(p, s.inputs);
-  EXPECT_TRUE(same_bits(recorded.states, plain));
-  const auto expected = gradient(p, s.inputs, recorded);
-  const int least = Schedule::least(p.steps, Tape<double>::window(p.plan));
-  auto checkpoints = record(p, s.inputs, least);
-  EXPECT_TRUE(same_bits(gradient(p, s.inputs, checkpoints), expected));
-
-  std::vector<Pack> lanes;
-  for (const double a : s.inputs) lanes.emplace_back(a);
-  std::vector<double> other = s.inputs;
-  const std::size_t falls = s.scene.layout.of(Quantity::velocity) + 2;
-  lanes[falls].set(3, other[falls] = -0.9);
-  const auto other_gradient = gradient(p, other);
-  auto packed = record(p, lanes, least);
-  const auto packed_gradient = gradient(p, lanes, packed);
-  for (const int lane : {3, 5}) {
-    std::vector<double> own, own_gradient;
-    for (const Pack& a : packed.states) own.push_back(a[lane]);
-    for (const Pack& a : packed_gradient) own_gradient.push_back(a[lane]);
-    EXPECT_TRUE(same_bits(own, lane == 3 ? states(p, other) : plain));
-    EXPECT_TRUE(same_bits(own_gradient, lane == 3 ? other_gradient : expected));
-  }
+  const Program p = program(s, GetParam().h, 0.08, GetParam().integrator);
+  expect_bits_of_any_tape(p, s.inputs);
+  InputsOfLanes inputs(Pack::lanes, s.inputs);
+  inputs[3][s.scene.layout.of(Quantity::velocity) + 2] = -0.9;
+  expect_bits_of_lanes(p, inputs, {3, 5}, Schedule::least(p.steps, Tape<double>::window(p.plan)));
 }
 
 // A slow approach comes to rest, as deep as under its weight.

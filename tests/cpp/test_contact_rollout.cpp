@@ -5,6 +5,7 @@
 #include "core/equilibrium/equilibrium.h"
 #include "core/rollout/rollout.h"
 #include "tests/cpp/support/contact_scenes.h"
+#include "tests/cpp/support/lanes.h"
 
 namespace sheetbend::testing {
 namespace {
@@ -205,24 +206,8 @@ TEST_P(Tumbling, HasTheGradientOfComplexSteps) {
   EXPECT_GT(modes.ended, 2);
   EXPECT_GT(modes.slid, 10);
   EXPECT_GT(modes.stuck, GetParam().mu > 0.0 ? 2 : -1);
-  const auto found = gradient(p, s.inputs);
-  // Of some entries of each quantity.
-  std::vector<Complex> probe(s.inputs.begin(), s.inputs.end());
-  const Layout& layout = s.scene.layout;
-  for (int q = 0; q < quantity_count; ++q) {
-    std::vector<double> own, expected, differences;
-    const std::size_t count = std::min<std::size_t>(layout.size[q], 3);
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::size_t at = layout.offset[q] + i * layout.size[q] / count;
-      probe[at].im = complex_step;
-      expected.push_back(loss(p, probe).im / complex_step);
-      own.push_back(found[at]);
-      probe[at].im = 0.0;
-    }
-    if (count > 0) {
-      EXPECT_LE(relative_error(own, expected), 1e-8) << quantity_names[q];
-    }
-  }
+  const auto of = [&](const std::vector<Complex>& probe) { return loss(p, probe); };
+  expect_some_entries_agree(s.scene.layout, of, s.inputs, gradient(p, s.inputs), 1e-8);
 }
 
 TEST_P(Tumbling, HasTheTangentsOfComplexSteps) {
@@ -251,40 +236,16 @@ TEST_P(Tumbling, HasTheTangentsOfComplexSteps) {
 
 TEST_P(Tumbling, HasTheSameBitsWhateverKeepsItsStates) {
   const Sample s = tumbling(GetParam().mu, GetParam().stiffness);
-  Program p{s.scene, make_plan(s.scene, contact_options(1e-3, GetParam().integrator)), 60};
-  const auto plain = states(p, s.inputs);
-  auto recorded = record(p, s.inputs);
-  EXPECT_TRUE(same_bits(recorded.states, plain));
-  const auto expected = gradient(p, s.inputs, recorded);
-  auto few = record(p, s.inputs, Schedule::least(p.steps, Tape<double>::window(p.plan)) + 2);
-  EXPECT_TRUE(same_bits(gradient(p, s.inputs, few), expected));
-  p.plan.options.threads = 3;
-  EXPECT_TRUE(same_bits(states(p, s.inputs), plain));
-  EXPECT_TRUE(same_bits(gradient(p, s.inputs), expected));
-  p.plan.options.threads = 1;
+  const Program p{s.scene, make_plan(s.scene, contact_options(1e-3, GetParam().integrator)), 60};
+  expect_bits_of_any_tape(p, s.inputs);
 
-  const Layout& layout = s.scene.layout;
-  std::vector<Pack> lanes;
-  for (const double a : s.inputs) lanes.emplace_back(a);
   // Another scene in a lane touches at other times.
-  std::vector<double> other = s.inputs;
-  for (const auto& [at, value] : {std::pair{layout.of(Quantity::gravity) + 2, -9.5}, {layout.of(Quantity::velocity) + 2, -0.7}}) {
-    other[at] = value;
-    lanes[at].set(3, value);
-  }
-  const auto other_plain = states(p, other);
-  const auto other_gradient = gradient(p, other);
-  for (const int kept : {every_state, Schedule::least(p.steps, Tape<double>::window(p.plan)) + 2}) {
-    auto packed = record(p, lanes, kept);
-    const auto packed_gradient = gradient(p, lanes, packed);
-    for (const int lane : {3, 5}) {
-      std::vector<double> own, own_gradient;
-      for (const Pack& a : packed.states) own.push_back(a[lane]);
-      for (const Pack& a : packed_gradient) own_gradient.push_back(a[lane]);
-      EXPECT_TRUE(same_bits(own, lane == 3 ? other_plain : plain));
-      EXPECT_TRUE(same_bits(own_gradient, lane == 3 ? other_gradient : expected));
-    }
-  }
+  const Layout& layout = s.scene.layout;
+  InputsOfLanes inputs(Pack::lanes, s.inputs);
+  inputs[3][layout.of(Quantity::gravity) + 2] = -9.5;
+  inputs[3][layout.of(Quantity::velocity) + 2] = -0.7;
+  for (const int kept : {every_state, Schedule::least(p.steps, Tape<double>::window(p.plan)) + 2})
+    expect_bits_of_lanes(p, inputs, {3, 5}, kept);
 }
 
 INSTANTIATE_TEST_SUITE_P(Contact, Tumbling,

@@ -5,6 +5,7 @@
 #include "core/rollout/redundant_rows.h"
 #include "core/rollout/rollout.h"
 #include "tests/cpp/support/contact_scenes.h"
+#include "tests/cpp/support/lanes.h"
 
 namespace sheetbend::testing {
 namespace {
@@ -135,24 +136,8 @@ INSTANTIATE_TEST_SUITE_P(RigidCube, RigidTumble,
                                            std::tuple{false, 0.0, true}, std::tuple{false, 0.5, true}));
 
 TEST_P(RigidTumble, HasTheGradientOfComplexSteps) {
-  const Program& p = program;
-  const auto found = gradient_of_particles(p, sample.inputs);
-  std::vector<Complex> probe(sample.inputs.begin(), sample.inputs.end());
-  const Layout& layout = sample.scene.layout;
-  for (int q = 0; q < quantity_count; ++q) {
-    std::vector<double> own, expected;
-    const std::size_t count = std::min<std::size_t>(layout.size[q], 3);
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::size_t at = layout.offset[q] + i * layout.size[q] / count;
-      probe[at].im = complex_step;
-      expected.push_back(loss_of_particles(p, probe).im / complex_step);
-      own.push_back(found[at]);
-      probe[at].im = 0.0;
-    }
-    if (count > 0) {
-      EXPECT_LE(relative_error(own, expected), 1e-10) << quantity_names[q];
-    }
-  }
+  const auto of = [&](const std::vector<Complex>& probe) { return loss_of_particles(program, probe); };
+  expect_some_entries_agree(sample.scene.layout, of, sample.inputs, gradient_of_particles(program, sample.inputs), 1e-10);
 }
 
 TEST_P(RigidTumble, HasTheGradientOfDifferences) {
@@ -202,30 +187,11 @@ TEST_P(RigidTumble, HasTheTangentsOfComplexSteps) {
 }
 
 TEST_P(RigidTumble, HasTheSameBitsWhateverKeepsItsStates) {
-  Program p = program;
-  const Sample& s = sample;
-  const auto plain = states(p, s.inputs);
-  auto recorded = record(p, s.inputs);
-  EXPECT_TRUE(same_bits(recorded.states, plain));
-  const auto expected = gradient(p, s.inputs, recorded);
-  auto few = record(p, s.inputs, Schedule::least(p.steps, Tape<double>::window(p.plan)) + 2);
-  EXPECT_TRUE(same_bits(gradient(p, s.inputs, few), expected));
-  p.plan.options.threads = 3;
-  EXPECT_TRUE(same_bits(states(p, s.inputs), plain));
-  EXPECT_TRUE(same_bits(gradient(p, s.inputs), expected));
-  p.plan.options.threads = 1;
-
-  std::vector<Pack> lanes;
-  for (const double a : s.inputs) lanes.emplace_back(a);
-  lanes[s.scene.layout.of(Quantity::gravity) + 2].set(3, -9.5);
-  lanes[s.scene.layout.of(Quantity::compliance)].set(4, 1e-4);  // gives way in this scene alone
-  auto packed = record(p, lanes);
-  const auto packed_gradient = gradient(p, lanes, packed);
-  std::vector<double> lane, lane_gradient;
-  for (const Pack& a : packed.states) lane.push_back(a[5]);
-  for (const Pack& a : packed_gradient) lane_gradient.push_back(a[5]);
-  EXPECT_TRUE(same_bits(lane, plain));
-  EXPECT_TRUE(same_bits(lane_gradient, expected));
+  expect_bits_of_any_tape(program, sample.inputs);
+  InputsOfLanes inputs(Pack::lanes, sample.inputs);
+  inputs[3][sample.scene.layout.of(Quantity::gravity) + 2] = -9.5;
+  inputs[4][sample.scene.layout.of(Quantity::compliance)] = 1e-4;  // gives way in this scene alone
+  expect_bits_of_lanes(program, inputs, {3, 4, 5});
 }
 
 // A rigid rope that slides off a ball, of links whose compliance is next to nothing, or nothing: the same motion, and many rows.

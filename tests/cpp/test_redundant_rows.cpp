@@ -3,8 +3,7 @@
 #include "core/rollout/redundant_rows.h"
 
 #include "core/scalar/dual.h"
-#include "core/scalar/pack.h"
-#include "tests/cpp/support/programs.h"
+#include "tests/cpp/support/lanes.h"
 
 namespace sheetbend::testing {
 namespace {
@@ -122,21 +121,10 @@ TEST_P(RedundantRows, HaveTheTangentsOfTheMotion) {
 
 // Lanes whose net is bulged have all of their rows, the others beside them not.
 TEST_P(RedundantRows, AreTheirOwnInEveryLane) {
-  std::vector<std::vector<double>> inputs;
+  InputsOfLanes inputs;
   for (int lane = 0; lane < Pack::lanes; ++lane)
     inputs.push_back(lane % 3 == 0 ? sample.inputs : net(GetParam(), 0.004 * lane).inputs);
-  std::vector<Pack> packed(sample.inputs.size());
-  for (std::size_t i = 0; i < packed.size(); ++i)
-    packed[i] = per_lane([&](int lane) { return inputs[lane][i]; });
-  const auto forward = states(program, packed);
-  const auto reverse = gradient(program, packed);
-  for (int lane = 0; lane < Pack::lanes; ++lane) {
-    std::vector<double> of_lane, bar;
-    for (const Pack& a : forward) of_lane.push_back(a[lane]);
-    for (const Pack& a : reverse) bar.push_back(a[lane]);
-    EXPECT_TRUE(same_bits(of_lane, states(program, inputs[lane]))) << "lane " << lane;
-    EXPECT_TRUE(same_bits(bar, gradient(program, inputs[lane]))) << "lane " << lane;
-  }
+  expect_bits_of_lanes(program, inputs, every_lane);
 }
 
 TEST_P(RedundantRows, AreAsManyAsTheRankIsShort) {

@@ -2,7 +2,7 @@
 // the other side, and equal bits.
 #include "core/rollout/redundant_rows.h"
 #include "core/rollout/rollout.h"
-#include "tests/cpp/support/programs.h"
+#include "tests/cpp/support/lanes.h"
 
 namespace sheetbend::testing {
 namespace {
@@ -61,20 +61,10 @@ TEST_P(RigidBorder, HasItsDerivatives) {
 }
 
 TEST_P(RigidBorder, HasTheBitsOfItsLanes) {
-  const auto plain = states(program, sample.inputs);
-  auto recorded = record(program, sample.inputs);
-  EXPECT_TRUE(same_bits(recorded.states, plain));
-  const auto expected = gradient(program, sample.inputs, recorded);
-  std::vector<Pack> lanes;
-  for (const double a : sample.inputs) lanes.emplace_back(a);
-  lanes[sample.scene.layout.of(Quantity::gravity) + 2].set(3, -9.5);
-  auto packed = record(program, lanes);
-  const auto packed_gradient = gradient(program, lanes, packed);
-  std::vector<double> lane, lane_gradient;
-  for (const Pack& a : packed.states) lane.push_back(a[5]);
-  for (const Pack& a : packed_gradient) lane_gradient.push_back(a[5]);
-  EXPECT_TRUE(same_bits(lane, plain));
-  EXPECT_TRUE(same_bits(lane_gradient, expected));
+  expect_bits_of_any_tape(program, sample.inputs);
+  InputsOfLanes inputs(Pack::lanes, sample.inputs);
+  inputs[3][sample.scene.layout.of(Quantity::gravity) + 2] = -9.5;
+  expect_bits_of_lanes(program, inputs, {3, 5});
 }
 
 }  // namespace

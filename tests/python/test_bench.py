@@ -244,6 +244,7 @@ class TestCommand:
 
 
 class TestChainAndLadder:
+    @pytest.mark.slow
     def test_rod(self) -> None:
         found = measure_rod(repeats=1, substeps=20)
         assert found["gradient_error"] <= found["gradient_error_bound"]

@@ -132,6 +132,7 @@ def expected_gradient(scene: sb.Scene) -> dict[str, float]:
     return {"height": height, **rollout.gradient(bar).quantities}
 
 
+@pytest.mark.slow
 def test_the_example_prints_the_gradient_of_python(examples: Path, tmp_path: Path) -> None:
     shown = gradient_of(run(examples / "rope_gradient", saved(rope(), tmp_path)))
     assert shown == expected_gradient(rope()) and all(shown.values())
@@ -162,6 +163,7 @@ def settings(solver: sb.Solver) -> list[str]:
 
 
 @motions
+@pytest.mark.slow
 def test_bits_are_those_of_python(
     programs: Path, tmp_path: Path, make: Callable[[], sb.Scene], solver: sb.Solver
 ) -> None:

@@ -89,6 +89,7 @@ PARAMETERS = {
 QUICK = {"refine": False, "profiles": False, "windows": ()}
 
 
+@pytest.mark.slow
 def test_forces_tell_density_and_stiffness_apart_in_twenty_draws(twin) -> None:
     inside = dict.fromkeys(TRUTH, 0)
     for seed in range(20):

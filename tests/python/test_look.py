@@ -295,6 +295,7 @@ def test_a_draft_of_the_beam_predicts_what_the_shipped_configuration_does(tmp_pa
     assert fit.recordings[0].held_out < 0.14e-3
 
 
+@pytest.mark.slow
 def test_the_tutorial_runs_as_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its script, its commands, what it shows of their output, and its table."""
     text = (ROOT / "docs/tutorials/one_hand.md").read_text()

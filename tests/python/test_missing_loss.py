@@ -101,6 +101,7 @@ def test_a_drag_of_another_size_is_named_and_not_the_damping_that_is_right() -> 
 
 
 @pytest.mark.parametrize("corrected", [False, True])
+@pytest.mark.slow
 def test_a_driven_rope_without_its_large_damping_is_doubtful(corrected: bool) -> None:
     """30 ms change the motion in another way than a little damping does, and corrections of the hand take up most of
     it: 13 % was left to be explained."""

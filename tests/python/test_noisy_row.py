@@ -83,6 +83,7 @@ def test_a_noisy_row_gives_no_confident_air(seed: int, noise: float) -> None:
     assert "rough" in result.report()
 
 
+@pytest.mark.slow
 def test_a_clean_row_gives_the_right_air() -> None:
     times, x = truth()
     top = sb.mesh.grid(SIZE, SIZE, CELLS, CELLS, pattern="one_way").sets["top"]

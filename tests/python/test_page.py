@@ -237,6 +237,7 @@ def test_vendored_scripts_are_as_they_were_made() -> None:
 
 
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="Chromium is not installed")
+@pytest.mark.slow
 def test_a_browser_draws_it_without_a_network(fitted: sb.Fit, tmp_path: Path) -> None:
     (tmp_path / "report.html").write_text(fit_page(fitted, "swing"))
     command = ["chromium", "--headless", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]

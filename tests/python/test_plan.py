@@ -44,6 +44,7 @@ def errors(rng: np.random.Generator, shape: tuple[int, ...], alike: float) -> np
 
 
 @pytest.mark.parametrize("alike", [0.0, 0.7])
+@pytest.mark.slow
 def test_intervals_are_those_that_fits_to_noisy_data_print(alike: float) -> None:
     e = planned()
     plan = sb.identify(e, parameters=WANTED, noise=5e-4, autocorrelation=alike, suggest=False)

@@ -74,6 +74,7 @@ def told(folder: Path) -> dict[str, object]:
     return json.loads(done.stdout)
 
 
+@pytest.mark.slow
 def test_one_command_finds_the_fabric(folder: Path, told: dict[str, object]) -> None:
     found = {e["name"]: e for e in told["estimates"]}
     assert set(found) == {"warp", "warp_stiffening", "density", "bending"}

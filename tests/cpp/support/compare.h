@@ -121,6 +121,27 @@ inline void expect_gradients_agree(const Layout& layout, std::span<const double>
   }
 }
 
+// Compares up to three entries of every quantity in a gradient with complex steps through `loss`, which maps inputs to a Complex.
+template <class F>
+void expect_some_entries_agree(const Layout& layout, F&& loss, const std::vector<double>& inputs,
+                               std::span<const double> found, double bound) {
+  std::vector<Complex> probe(inputs.begin(), inputs.end());
+  for (int q = 0; q < quantity_count; ++q) {
+    std::vector<double> own, expected;
+    const std::size_t count = std::min<std::size_t>(layout.size[q], 3);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t at = layout.offset[q] + i * layout.size[q] / count;
+      probe[at].im = complex_step;
+      expected.push_back(loss(probe).im / complex_step);
+      own.push_back(found[at]);
+      probe[at].im = 0.0;
+    }
+    if (count > 0) {
+      EXPECT_LE(relative_error(own, expected), bound) << quantity_names[q];
+    }
+  }
+}
+
 template <class T>
 ::testing::AssertionResult same_bits(const std::vector<T>& a, const std::vector<T>& b) {
   if (a.size() != b.size()) return ::testing::AssertionFailure() << a.size() << " numbers against " << b.size();
