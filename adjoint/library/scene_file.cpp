@@ -113,11 +113,7 @@ class SceneReader {
         file_.fail("driven", "particle " + std::to_string(n) + " is pinned too", "either pin or drive a particle");
     spec.loaded = file_.whole_numbers("loaded");
     spec.has_drag = file_.flag(header_, "has_drag");
-    const auto& interpolation = file_.text(header_, "interpolation");
-    if (interpolation != "cubic" && interpolation != "linear")
-      file_.fail("interpolation", "is unknown", "use 'cubic' or 'linear'");
-    spec.boundary = {file_.numbers("boundary_times"),
-                     interpolation == "cubic" ? Interpolation::cubic : Interpolation::linear};
+    spec.boundary = {file_.numbers("boundary_times"), interpolation(header_)};
     spec.force = {file_.numbers("force_times"), Interpolation::linear};
     spec.wind = {file_.numbers("wind_times"), Interpolation::linear};
     spec.air = triangles("air");
@@ -139,7 +135,32 @@ class SceneReader {
       if (!names.insert(name).second) file_.fail(where + "name", "is there twice");
       spec.volumes.push_back({name, triangles("volume_" + i, file_.whole(v, "triangles", where))});
     });
+    if (header_.contains("contacts")) contacts(spec);  // older files have none
     return spec;
+  }
+
+  Interpolation interpolation(const Json& parent, const std::string& where = "") {
+    const auto& how = file_.text(parent, "interpolation", where);
+    if (how != "cubic" && how != "linear") file_.fail(where + "interpolation", "is unknown", "use 'cubic' or 'linear'");
+    return how == "cubic" ? Interpolation::cubic : Interpolation::linear;
+  }
+
+  void contacts(SceneSpec& spec) {
+    for_each_record("colliders", [&](const Json& c, const std::string& i, const std::string& where) {
+      spec.colliders.push_back({file_.name(c, "name", where), file_.text(c, "shape", where),
+                                {file_.numbers("collider_times_" + i), interpolation(c, where)}});
+    });
+    for_each_record("contacts", [&](const Json& c, const std::string& i, const std::string& where) {
+      ContactSpec contact{file_.name(c, "name", where), -1, {}, {}, file_.flag(c, "rigid", where), file_.flag(c, "bounces", where)};
+      if (const long long own = file_.whole(c, "collider", where); own < static_cast<long long>(spec.colliders.size()))
+        contact.collider = static_cast<int>(std::max(own, -1LL));
+      const std::vector<int> pairs = file_.whole_numbers("contact_" + i, 2);
+      for (std::size_t k = 0; k < pairs.size(); k += 2) {
+        contact.particles.push_back(pairs[k]);
+        contact.carried.push_back(pairs[k + 1]);
+      }
+      spec.contacts.push_back(std::move(contact));
+    });
   }
 
   // Driven particles that follow recorded markers: checked, and otherwise of no use here.
@@ -200,8 +221,10 @@ class SceneReader {
       const double *first = map.base.data() + layout.offset[q], *last = first + layout.size[q];
       if (not_negative(array) && std::any_of(first, last, [](double v) { return v < 0.0; }))
         file_.fail(std::string("base.") + quantity_names[q], "must not be negative");
-      if ((array == Quantity::volume || array == Quantity::volume_compliance) &&
-          std::any_of(first, last, [](double v) { return v != 0.0; }))
+      const bool made = array == Quantity::volume || array == Quantity::volume_compliance || array == Quantity::friction ||
+                        array == Quantity::contact_radius || array == Quantity::contact_stiffness ||
+                        array == Quantity::collider_size || array == Quantity::restitution;
+      if (made && std::any_of(first, last, [](double v) { return v != 0.0; }))
         file_.fail(std::string("base.") + quantity_names[q], "must be zero, quantities make it");
     }
   }

@@ -47,7 +47,7 @@ Solver solver_of(const py::tuple& a) {
 }
 
 // Forward only: positions, velocities and constraint multipliers in force units at the wanted substeps, how many substeps went with BDF1, and
-// what contacts did.
+// what contacts did: counted over the substeps, and in the last one before each frame (0 apart, 1 sticks, 2 slides), one contact after the other.
 py::dict simulate(const Solver& s, const Array& inputs, const Steps& steps, double t0) {
   check(s, inputs, 1, steps);
   const std::size_t dofs = s.scene->dofs(), rows = s.scene->multipliers(), frames = steps.size();
@@ -55,6 +55,9 @@ py::dict simulate(const Solver& s, const Array& inputs, const Steps& steps, doub
   double *x = positions.mutable_data(), *v = velocities.mutable_data(), *force = multipliers.mutable_data();
   int first_order = 0;
   CountContacts contacts(*s.scene);
+  const std::size_t touching = particles_in_contact(*s.scene);
+  py::array_t<unsigned char> modes({frames, touching});
+  unsigned char* mode = modes.mutable_data();
   {
     Release release;
     SignalInterrupt interrupt;
@@ -73,6 +76,8 @@ py::dict simulate(const Solver& s, const Array& inputs, const Steps& steps, doub
             x = std::copy_n(xs, dofs, x);
             v = std::copy_n(vs, dofs, v);
             for (std::size_t r = 0; r < rows; ++r) *force++ = step == 0 ? 0.0 : lambda[r] / (eta * eta);
+            mode = std::transform(rollout.contact_modes().begin(), rollout.contact_modes().end(), mode,
+                                  [](ContactMode m) { return static_cast<unsigned char>(m); });
           }
         },
         &interrupt);
@@ -87,6 +92,7 @@ py::dict simulate(const Solver& s, const Array& inputs, const Steps& steps, doub
     counts.append(py::dict("most"_a = c.most, "began"_a = c.began, "ended"_a = c.ended, "touching"_a = c.touching,
                            "sliding"_a = c.sliding));
   out["contacts"] = counts;
+  out["contact_modes"] = modes;
   return out;
 }
 

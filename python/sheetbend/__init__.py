@@ -28,7 +28,7 @@ from .fitting.plan import Plan
 from .mesh import TriangleMesh, read_mesh
 from .minimum.discretization import Refinement
 from .motion.balance import ForceBalance, force_balance
-from .motion.contact_counts import ContactCounts
+from .motion.contact_counts import ContactCounts, ContactMode
 from .motion.equilibrium import Equilibrium, NoEquilibriumError, equilibria, equilibrium
 from .motion.gradients import GradientReport, check_gradients
 from .motion.redundancy import RedundantConstraintsWarning
@@ -94,6 +94,7 @@ __all__ = [
     "Cloth",
     "ConfigError",
     "ContactCounts",
+    "ContactMode",
     "DivergenceError",
     "EmptyGradientError",
     "Equilibrium",

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend.motion.contact_modes import SLIDES, STICKS, contact_modes
 
 SOLVER = sb.Solver(h=2e-3, method="implicit", integrator="bdf1")
 TIMES = np.linspace(0.0, 0.6, 31)
@@ -109,7 +110,8 @@ def test_the_report_tells_what_touches_and_where_motions_have_kinks() -> None:
     assert sb.FitResult.from_dict(result.to_dict()) == result
 
 
-def test_slides_and_sticks_are_those_of_a_block_on_a_slope() -> None:
+@pytest.mark.parametrize("integrator", ["bdf1", "bdf2"])
+def test_slides_and_sticks_are_those_of_a_block_on_a_slope(integrator: str) -> None:
     """Below the critical angle all sticks at rest, above it all slides, also where drag adds to the mass."""
     for friction, sliding in ((0.25, 0.0), (0.15, 1.0)):
         scene = sb.Scene("block")
@@ -117,8 +119,9 @@ def test_slides_and_sticks_are_those_of_a_block_on_a_slope() -> None:
         plane = sb.Plane(normal=(0.0, -0.2, 1.0), name="slope")
         scene.contact([block], plane, friction=friction)
         scene.set_drag(linear=[1e-3, 0.0])
-        motion = sb.simulate(scene, np.linspace(0.0, 0.2, 11), SOLVER)
-        modes = contact_modes(scene, motion, SOLVER, {})["slope"]
+        motion = sb.simulate(scene, np.linspace(0.0, 0.2, 11), replace(SOLVER, integrator=integrator))
+        modes = motion.contact_modes["slope"]
         assert modes.shape == (11, 1)
-        assert float((modes[2:] == SLIDES).mean()) == sliding
-        assert float((modes[2:] == STICKS).mean()) == 1.0 - sliding
+        assert modes[0, 0] == sb.ContactMode.APART
+        assert float((modes[2:] == sb.ContactMode.SLIDES).mean()) == sliding
+        assert float((modes[2:] == sb.ContactMode.STICKS).mean()) == 1.0 - sliding

@@ -48,6 +48,57 @@ def test_the_same_bits(make: Callable[[], sb.Scene], tmp_path: Path) -> None:
     assert (tmp_path / "b.scene").read_bytes() == (tmp_path / "a.scene").read_bytes()
 
 
+def touching() -> sb.Scene:
+    """A rope that falls on a table and on shapes that move."""
+    scene = sb.rope(0.3, 6, density=0.05, EI=1e-3, EA=50.0, start=(0, 0, 0.009), pinned=())
+    rope, table = scene.ropes["rope"], sb.Plane(name="table")
+    (loose,) = scene.add_particles([[0.5, 0.0, 0.01]], 0.1, [[0.0, 0.0, -1.0]])
+    scene.contact(rope, table, friction=0.3, radius=0.005)
+    scene.contact([loose], table, friction=0.3, restitution=0.4, name="bounce")
+    ball = sb.Sphere((0.1, 0.0, -0.025), 0.03, name="ball").moving([0.0, 0.1], [[0, 0, 0], [0, 0, 0.01]])
+    scene.contact(rope, ball, friction=0.2, stiffness=1e3)
+    scene.contact(rope.particles[:2], sb.Capsule((0, -1, -0.05), (0, 1, -0.05), 0.02, name="bar"), friction=0.0)
+    scene.contact([3], sb.Box((0.2, 0, -0.06), (0.1, 0.1, 0.1), 0.01, name="box"), friction=0.1)
+    return scene
+
+
+def test_contacts_are_kept_with_the_same_bits(tmp_path: Path) -> None:
+    scene, solver = touching(), sb.Solver(h=1e-3, method="implicit")
+    sb.save_scene(scene, tmp_path / "a.scene")
+    loaded = sb.load_scene(tmp_path / "a.scene")
+    assert loaded.compiled.layout == scene.compiled.layout
+    motions = [sb.simulate(s, TIMES, solver) for s in (scene, loaded)]
+    assert motions[0].contacts == motions[1].contacts and motions[0].contacts["table"].began > 0
+    assert np.array_equal(motions[0].positions, motions[1].positions)
+    rollouts = [sb.rollout(s, TIMES, solver, {"table_friction": 0.2, "ball_radius": 0.031}) for s in (scene, loaded)]
+    gradients = [r.gradient(r.positions) for r in rollouts]
+    assert gradients[0].quantities == gradients[1].quantities and gradients[0].quantities["bounce_restitution"] != 0.0
+    sb.save_scene(loaded, tmp_path / "b.scene")
+    assert (tmp_path / "b.scene").read_bytes() == (tmp_path / "a.scene").read_bytes()
+
+
+def test_forged_contacts_are_refused(tmp_path: Path) -> None:
+    sb.save_scene(touching(), tmp_path / "a.scene")
+    whole = (tmp_path / "a.scene").read_bytes()
+
+    def put(part: str, key: str, value: object) -> Callable[[dict[str, Any]], object]:
+        return lambda header: header[part][0].__setitem__(key, value)
+
+    for change in (
+        put("contacts", "collider", 9),
+        put("contacts", "rigid", False),
+        put("contacts", "bounces", 1),
+        put("colliders", "shape", "torus"),
+        put("colliders", "interpolation", "quintic"),
+        put("colliders", "name", "ball"),
+        lambda header: header.pop("colliders"),
+        lambda header: header.pop("contacts"),
+    ):
+        refused(forged(whole, change), tmp_path / "x.scene")
+    pairs = np.array([[k, 9999] for k in range(7)], "<i4")
+    refused(altered(whole, "contact_0", pairs), tmp_path / "x.scene")
+
+
 def test_what_follows_markers_is_kept(tmp_path: Path) -> None:
     scene = following()
     sb.save_scene(scene, tmp_path / "a.scene")

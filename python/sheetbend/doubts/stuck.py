@@ -20,10 +20,10 @@ from ..minimum.problem import FitProblem
 from ..quantities.wording import quantity, side_words
 from ..result.result import Estimate
 from ..statistics.identifiability import Identifiability
+from ..statistics.intervals import NORMAL
 from ..statistics.profile import profile_interval
 from .profiles import Profiles
 
-NORMAL = 1.96  # standard deviations, of a 95 % interval
 ASKED = ("identified", "weak", "not identifiable", "one-sided")
 LEVEL = 0.25  # of the rise that the end of an interval has: a cost that rises less there is level
 STEP = 0.1  # of the logarithm, or of the coefficient: the first step of the search

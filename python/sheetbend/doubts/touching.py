@@ -6,7 +6,7 @@ holds kinks of the cost, of which a derivative at the estimate knows one side.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -15,9 +15,8 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..errors import DivergenceError, UnbalancedError
 from ..minimum.problem import FitProblem
-from ..motion.contact_modes import OPEN, SLIDES, STICKS, contact_modes
+from ..motion.contact_counts import ContactMode
 from ..motion.simulate import Trajectory, simulate
-from ..motion.solver import Solver
 from ..result.result import ContactFit, Estimate, Kinks
 from ..statistics.gauge import RANK_TOLERANCE
 
@@ -32,7 +31,7 @@ def what_touches(problem: FitProblem, u: Array) -> tuple[ContactFit, ...]:
         if run is None:
             continue
         for c in e.scene.contacts.contacts:
-            counts, start = run[0].contacts[c.name], e.scene.compiled.settled.get(c.name)
+            counts, start = run.contacts[c.name], e.scene.compiled.settled.get(c.name)
             rows.append(
                 ContactFit(
                     recording=e.name,
@@ -71,10 +70,11 @@ def kinks(problem: FitProblem, u: Array, estimates: Sequence[Estimate]) -> tuple
         for low, high in zip(*ends, strict=True):
             for name in low.keys() & high.keys():
                 a, b = low[name], high[name]
-                counts["begin"] += _contacts((a == OPEN) & (b != OPEN))
-                counts["end"] += _contacts((a != OPEN) & (b == OPEN))
-                counts["stick"] += _contacts((a == SLIDES) & (b == STICKS))
-                counts["slide"] += _contacts((a == STICKS) & (b == SLIDES))
+                apart, sticks, slides = ContactMode
+                counts["begin"] += _contacts((a == apart) & (b != apart))
+                counts["end"] += _contacts((a != apart) & (b == apart))
+                counts["stick"] += _contacts((a == slides) & (b == sticks))
+                counts["slide"] += _contacts((a == sticks) & (b == slides))
         found.append(Kinks(name=e.name, **counts))
     return tuple(found)
 
@@ -84,16 +84,15 @@ def _contacts(differs: Array) -> int:
     return int(differs.any(axis=0).sum())
 
 
-def _modes(problem: FitProblem, u: Array) -> list[dict[str, Array]]:
+def _modes(problem: FitProblem, u: Array) -> list[Mapping[str, Array]]:
     """By experiment and contact (frames, particles)."""
-    runs = zip(problem.experiments, _runs(problem, u), strict=True)
-    return [contact_modes(e.scene, run[0], run[1], run[2]) if run else {} for e, run in runs]
+    return [{} if motion is None else motion.contact_modes for motion in _runs(problem, u)]
 
 
-def _runs(problem: FitProblem, u: Array) -> list[tuple[Trajectory, Solver, dict[str, float]] | None]:
-    """By experiment its motion at the substeps that are nearest to its frames, with the solver and the values of that
-    one run; None where nothing can touch, or the motion has no answer."""
-    found: list[tuple[Trajectory, Solver, dict[str, float]] | None] = []
+def _runs(problem: FitProblem, u: Array) -> list[Trajectory | None]:
+    """By experiment its motion at the substeps that are nearest to its frames; None where nothing can touch, or the
+    motion has no answer."""
+    found: list[Trajectory | None] = []
     for e, recording in zip(problem.experiments, problem.recordings, strict=True):
         found.append(None)
         if e.static or not e.scene.compiled.contacts:
@@ -101,8 +100,7 @@ def _runs(problem: FitProblem, u: Array) -> list[tuple[Trajectory, Solver, dict[
         solver, values = replace(e.solver, extrapolate=1), problem.values_of(e, u)
         times = np.maximum(e.scene_times(recording.times, values), 0.0)
         with suppress(DivergenceError, UnbalancedError):
-            motion = simulate(e.scene, np.rint(times / solver.h) * solver.h, solver, values)
-            found[-1] = (motion, solver, values)
+            found[-1] = simulate(e.scene, np.rint(times / solver.h) * solver.h, solver, values)
     return found
 
 

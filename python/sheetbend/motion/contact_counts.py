@@ -4,6 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+
+class ContactMode(IntEnum):
+    """What a particle does at a collider."""
+
+    APART = 0
+    STICKS = 1
+    SLIDES = 2
 
 
 @dataclass(frozen=True)
@@ -27,6 +38,13 @@ class ContactCounts:
     sliding_share: float
     sticking_share: float
     bdf1_share: float
+
+
+def contact_modes(sizes: Mapping[str, int], modes: np.ndarray) -> dict[str, np.ndarray]:
+    """By the contacts' names, with as many particles as `sizes` says, the part (frames, particles) of what the core
+    tells of all of them one after the other, (frames, all particles)."""
+    ends = np.cumsum(list(sizes.values()))
+    return dict(zip(sizes, np.split(modes, ends[:-1], axis=1), strict=True)) if sizes else {}
 
 
 def contact_counts(

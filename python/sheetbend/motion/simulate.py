@@ -15,7 +15,7 @@ from ..errors import DivergenceError, InputError, UnbalancedError, UnconvergedEr
 from ..files.memory import expect_room
 from ..quantities.kinds import KINDS
 from ..scene.scene import Scene
-from .contact_counts import ContactCounts, contact_counts
+from .contact_counts import ContactCounts, contact_counts, contact_modes
 from .solver import Solver
 
 MOST_SUBSTEPS = 2**31 - 1  # that the core counts
@@ -33,6 +33,8 @@ class Trajectory:
             tension in N; bend and hinge: minus the moment in N m), zero at the initial frame.
         pressures: per volume (frames,) its multiplier, Pa, inside above outside; zero at the initial frame.
         contacts: per contact of the scene, by name, how many particles touched, slid, stuck, began and ended.
+        contact_modes: per contact, by name, (frames, particles) what each of its particles did in the last substep
+            before a frame, numbers of `ContactMode`; apart in the initial frame, and where it is held or driven.
         scene: that was simulated; None of a motion that was put together otherwise.
     """
 
@@ -42,6 +44,7 @@ class Trajectory:
     forces: Mapping[str, np.ndarray]
     pressures: Mapping[str, np.ndarray] = field(default_factory=dict)
     contacts: Mapping[str, ContactCounts] = field(default_factory=dict)
+    contact_modes: Mapping[str, np.ndarray] = field(default_factory=dict)
     scene: Scene | None = field(default=None, repr=False, compare=False)
 
 
@@ -90,6 +93,7 @@ def simulate(
         contact_counts(
             [c.name for c in scene.contacts.contacts], out["contacts"], out["first_order"] / max(steps[-1], 1)
         ),
+        contact_modes({c.name: len(c.particles) for c in scene.contacts.contacts}, out["contact_modes"]),
         scene,
     )
 

@@ -14,9 +14,19 @@ import numpy as np
 
 from ..errors import SceneError
 from ..files.whole import written
-from .contacts import ARRAYS as CONTACT_ARRAYS
+from .contact_file import written_contacts
 from .scene import Scene
-from .scene_reader import LONGEST_HEADER, LONGEST_NAME, MAGIC, NUMBERS, PREFIX, VERSION, SceneReader, is_name
+from .scene_reader import (
+    LONGEST_HEADER,
+    LONGEST_NAME,
+    MAGIC,
+    NUMBERS,
+    PREFIX,
+    VERSION,
+    SceneReader,
+    file_layout,
+    is_name,
+)
 
 Array = np.ndarray
 
@@ -32,12 +42,9 @@ def save_scene(scene: Scene, path: str | Path) -> None:
         path: is replaced only once the file is whole.
 
     Raises:
-        SceneError: a name that no file can hold, or contacts, which files do not hold.
+        SceneError: a name that no file can hold.
         UnwrittenError: the path cannot be written.
     """
-    if scene.contacts.contacts:
-        fix = "build it again where it is needed, or leave its contacts out"
-        raise SceneError(scene.name, "has contacts, which scene files do not hold", len(scene.contacts.contacts), fix)
     header, arrays = _header(scene), _arrays(scene)
     offset = 0
     header["arrays"] = {}
@@ -67,7 +74,7 @@ def load_scene(path: str | Path) -> Scene:
 
 def _header(scene: Scene) -> dict[str, Any]:
     scene.freeze()
-    named = {
+    named: dict[str, Any] = {
         "name": scene.name,
         "groups": [
             {"name": g.name, "kind": g.kind, "damped": g.damped, "count": len(g.particles)} for g in scene.groups
@@ -86,7 +93,9 @@ def _header(scene: Scene) -> dict[str, Any]:
         ],
         "following": [{"markers": list(f.markers), "from_placed": f.from_placed} for f in scene.boundary.following],
     }
-    every = [scene.name, *(n["name"] for part in ("groups", "volumes", "quantities") for n in named[part])]  # type: ignore[index]
+    named |= written_contacts(scene.contacts)[0]
+    parts = ("groups", "volumes", "quantities", "colliders", "contacts")
+    every = [scene.name, *(n["name"] for part in parts for n in named.get(part, ()))]
     for text in (*every, *(q.unit for q in scene.quantities.values()), *_markers(scene)):
         if not is_name(text):
             raise SceneError("name", "cannot be written to a file", text, f"use up to {LONGEST_NAME} printable letters")
@@ -96,7 +105,7 @@ def _header(scene: Scene) -> dict[str, Any]:
         **named,
         "interpolation": scene.boundary.interpolation,
         "has_drag": bool(scene.has_drag),
-        "layout": {name: list(place) for name, place in scene.compiled.layout.items() if name not in CONTACT_ARRAYS},
+        "layout": file_layout(scene),
     }
 
 
@@ -115,6 +124,7 @@ def _arrays(scene: Scene) -> dict[str, Array]:
         **({"bodies": scene.body_nodes} if len(scene.body_nodes) else {}),
         **{f"stencil_{i}": g.particles for i, g in enumerate(scene.groups)},
         **{f"volume_{i}": t for i, t in enumerate(scene.volumes.triangles.values())},
+        **written_contacts(scene.contacts)[1],
         **{f"following_{i}": f.slots for i, f in enumerate(scene.boundary.following)},
         **{f"weights_{i}": f.weights for i, f in enumerate(scene.boundary.following)},
         **{name: np.asarray(values) for name, values in map_.items()},

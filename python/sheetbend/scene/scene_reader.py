@@ -18,6 +18,7 @@ from ..quantities.kinds import KINDS
 from ..quantities.quantities import FUNCTIONS, Quantity, Term
 from .boundary import Following
 from .compiled import CompiledScene
+from .contact_file import read_contacts
 from .contacts import ARRAYS as CONTACT_ARRAYS
 from .domain import NOT_NEGATIVE
 from .group import Group
@@ -131,8 +132,7 @@ class SceneReader:
                 raise
             self.fail(error.field, error.problem, error.got, error.fix)
         scene.__dict__["compiled"] = compiled
-        places = {name: list(place) for name, place in compiled.layout.items() if name not in CONTACT_ARRAYS}
-        if places != self.header.get("layout"):
+        if file_layout(scene) != self.header.get("layout"):
             self.fail("layout", "is not the one of this scene", self.header.get("layout"), DAMAGED)
         return scene
 
@@ -247,6 +247,7 @@ class SceneReader:
         for name in ("volume", "volume_compliance"):
             if take(name, len(scene.volumes.triangles)).any():
                 self.fail(f"base.{name}", "must be zero, quantities make it", "other numbers", DAMAGED)
+        read_contacts(self, scene, take, DAMAGED)
         if taken != len(base):
             self.fail("base", "is longer than the scene's inputs", [len(base), taken], DAMAGED)
 
@@ -299,6 +300,12 @@ class SceneReader:
                 begin = e
             known = key
         return terms
+
+
+def file_layout(scene: Scene) -> dict[str, list[int]]:
+    """Where the input arrays stand, as a file says it: without those of contacts where there are none."""
+    own = scene.compiled.layout.items()
+    return {name: list(place) for name, place in own if scene.contacts.contacts or name not in CONTACT_ARRAYS}
 
 
 def _layout(scene: Scene) -> Mapping[str, tuple[int, int]]:
