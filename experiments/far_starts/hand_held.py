@@ -73,9 +73,9 @@ def scene(finer: int, wanted: Mapping[str, float]) -> sb.Scene:
     return made
 
 
-def recording(wanted: Mapping[str, float], seed: int = 0, seconds: float = SECONDS) -> sb.Recording:
-    """Markers at equal distances on the rod of twice the links, at half the step."""
-    fine = scene(2, wanted)
+def recording(wanted: Mapping[str, float], seed: int = 0, seconds: float = SECONDS, finer: int = 2) -> sb.Recording:
+    """Markers at equal distances on the rod of `finer` times the links, at half the step."""
+    fine = scene(finer, wanted)
     times = np.arange(round(seconds * RATE) + 1) / RATE
     values = {name: value for name, value in wanted.items() if name in fine.quantities}
     x = sb.simulate(fine, times, sb.Solver(h=H / 2), values).positions
