@@ -26,7 +26,7 @@ class Stepper:
     """Simulates a scene one substep at a time, for networks, policies and controllers that act in between.
 
     ```python
-    stepper = sb.torch.Stepper(scene, sb.Solver(h=1 / 240))
+    stepper = Stepper(scene, sb.Solver(h=1 / 240))
     state = stepper.start()
     for _ in range(200):
         state = stepper(state, force=network(state.positions, state.velocities))
