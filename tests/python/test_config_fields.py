@@ -197,7 +197,8 @@ def test_missing_out_of_range_and_not_finite(tmp_path: Path, place: Place, name:
     if is_number(field.annotation):
         for value in (math.nan, math.inf, -math.inf):
             refused(tmp_path, place, name, value)
-    if is_vector(field.annotation) and name not in ("times", "values", "factors", "windows"):  # which may have any length
+    any_length = ("times", "values", "factors", "windows")
+    if is_vector(field.annotation) and name not in any_length:
         for vector in ([], [0.0], [0.0] * 4, [0.0, math.nan], [0.0, 0.0, math.inf]):
             refused(tmp_path, place, name, vector)
 

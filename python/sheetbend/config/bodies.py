@@ -69,8 +69,8 @@ def _start_on(tool: Tool, body: BodySection, gravity: np.ndarray) -> dict[str, n
     """The state at the scene's start that the tool's first poses show."""
     path = Path.of(body.name, tool)
     first = slice(int((path.times < -COVERED).sum()), None)
-    poses = [a[first][: body.start_poses] for a in (path.times, path.origins, quaternions_of(path.frames))]
-    return start_of_poses(*poses, gravity if body.start_falls else np.zeros(3), time=0.0)
+    times, places, turns = (a[first][: body.start_poses] for a in (path.times, path.origins, quaternions_of(path.frames)))
+    return start_of_poses(times, places, turns, gravity if body.start_falls else np.zeros(3), time=0.0)
 
 
 def named_body(path: str, name: str, scene: Scene) -> Body:
