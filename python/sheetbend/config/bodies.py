@@ -69,7 +69,9 @@ def _start_on(tool: Tool, body: BodySection, gravity: np.ndarray) -> dict[str, n
     """The state at the scene's start that the tool's first poses show."""
     path = Path.of(body.name, tool)
     first = slice(int((path.times < -COVERED).sum()), None)
-    times, places, turns = (a[first][: body.start_poses] for a in (path.times, path.origins, quaternions_of(path.frames)))
+    times, places, turns = (
+        a[first][: body.start_poses] for a in (path.times, path.origins, quaternions_of(path.frames))
+    )
     return start_of_poses(times, places, turns, gravity if body.start_falls else np.zeros(3), time=0.0)
 
 
