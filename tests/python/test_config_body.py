@@ -217,12 +217,12 @@ def test_configured_servo_motor_force_and_start(tmp_path: Path) -> None:
     [
         ("values = [0.1, -0.2]", "values = [0.1]", "different numbers"),
         ("rotor = 1e-5", "", "rotor"),
-        ('starts_on = "shown"', 'starts_on = "shwon"', "no tool of the scene"),
+        ('starts_on = "shown"', 'starts_on = "other"', "no tool of the scene"),
         ('starts_on = "shown"', 'starts_on = "shown"\nat = [0.0, 0.0, 0.0]', "has at"),
         ('starts_on = "shown"\n', "", "no tool for it"),
         ('body = "lower"\npoint', "point", "on nothing"),
         ('body = "lower"\npoint', 'body = "box"\nparticles = ["box"]\npoint', "particles and a body"),
-        ('body = "lower"\npoint', 'body = "lowre"\npoint', "no body of the scene"),
+        ('body = "lower"\npoint', 'body = "other"\npoint', "no body of the scene"),
     ],
 )
 def test_mistakes_in_servos_starts_and_forces_are_told(tmp_path: Path, old: str, new: str, match: str) -> None:
