@@ -106,6 +106,48 @@ def test_body_moves_alike_whatever_frame_its_user_chose() -> None:
     assert np.allclose(turned, frame @ other, atol=1e-11)
 
 
+def test_force_at_a_point_changes_both_momenta() -> None:
+    """A force in the world's axes on a point that turns with the body, and another on a second point."""
+    scene, box = tossed(0.0)
+    point, knots = np.array([0.05, -0.02, 0.03]), [0.0, 0.1]
+    push = np.array([[0.5, -1.0, 2.0], [1.5, 1.0, -0.5]])
+    scene.add_force(box.point(point), push, knots, name="thrust")
+    scene.add_force(box.point((0.0, 0.0, 0.1)), (0.0, 0.3, 0.0), knots)
+    times = np.arange(201) * 5e-4
+    motion = sb.simulate(scene, times, sb.Solver(h=5e-4))
+    frame = box.pose(motion)[1]
+    f = np.stack([np.interp(times, knots, push[:, k]) for k in range(3)], axis=1)
+    second = np.array([0.0, 0.3, 0.0])
+    gained = box.momentum(motion)[-1] - box.momentum(motion)[0]
+    assert gained == pytest.approx(np.trapezoid(f + second, times, axis=0), rel=1e-3)
+    torque = np.cross(frame @ (point - CENTER), f) + np.cross(frame @ ([0.0, 0.0, 0.1] - CENTER), second)
+    turned = box.angular_momentum(motion)[-1] - box.angular_momentum(motion)[0]
+    assert turned == pytest.approx(np.trapezoid(torque, times, axis=0), abs=2e-3 * np.linalg.norm(turned))
+    assert scene.quantities["thrust_z_1"].value == -0.5
+    scene, box = tossed()
+    scene.add_force(box.point(point, name="nozzle"), (0.5, -1.0, 2.0), name="thrust")
+    report = sb.check_gradients(scene, [0.01, 0.02], samples=1)
+    assert report.passed and {"thrust_x", "nozzle_y"} <= set(scene.quantities), str(report)
+
+
+@pytest.mark.parametrize(
+    ("given", "match"),
+    [
+        ({"forces": (1.0, 0.0)}, "forces"),
+        ({"forces": np.zeros((60, 3)), "times": np.arange(60.0), "name": "thrust"}, "too many knots"),
+        ({"forces": (1.0, 0.0, 0.0), "times": [1.0, 0.0]}, "times"),
+    ],
+)
+def test_bad_forces_on_points_are_refused(given: dict[str, object], match: str) -> None:
+    scene, box = tossed()
+    with pytest.raises(sb.SceneError, match=match):
+        scene.add_force(box.point(), **given)  # type: ignore[arg-type]
+    with pytest.raises(sb.SceneError, match="another scene"):
+        sb.Scene("other").add_force(box.point(), (1.0, 0.0, 0.0))
+    with pytest.raises(sb.SceneError, match="force on particles"):
+        scene.add_force(box.particles[:1], (1.0, 0.0, 0.0), name="thrust")
+
+
 def test_rotational_drag_slows_a_ball_as_its_torque_says() -> None:
     scene = sb.Scene("ball", gravity=(0.0, 0.0, 0.0))
     inertia = sb.Inertia.ball(0.2, 0.05)

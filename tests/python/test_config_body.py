@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend import config
+from sheetbend.config.build import scene_alone
+from sheetbend.config.file import parse
 
 TEXT = """
 [experiment]
@@ -117,3 +119,113 @@ def test_mistakes_in_bodies_and_joints_are_told(tmp_path: Path, old: str, new: s
     assert old in TEXT
     with pytest.raises(sb.ConfigError, match=match):
         config.load(written(tmp_path, TEXT.replace(old, new)))
+
+
+MOVED = """
+[experiment]
+name = "arm"
+
+[solver]
+h = 2e-3
+
+[[scene.tool]]
+name = "shown"
+file = "poses.npz"
+
+[[scene.body]]
+name = "box"
+mass = 0.4
+box = [0.1, 0.2, 0.3]
+starts_on = "shown"
+start_falls = true
+
+[[scene.body]]
+name = "upper"
+mass = 0.3
+box = [0.2, 0.02, 0.02]
+at = [0.1, 0.0, 0.0]
+
+[[scene.body]]
+name = "lower"
+mass = 0.2
+box = [0.2, 0.02, 0.02]
+at = [0.3, 0.0, 0.0]
+
+[[scene.joint]]
+kind = "hinge"
+name = "shoulder"
+lower = "upper"
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+servo = { times = [0.0, 0.1, 0.2], values = [0.0, 0.3, 0.2] }
+
+[[scene.joint]]
+kind = "hinge"
+name = "elbow"
+upper = "upper"
+lower = "lower"
+at = [0.2, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+torque = { times = [0.0, 0.1], values = [0.1, -0.2] }
+rotor = 1e-5
+
+[[scene.force]]
+name = "push"
+body = "lower"
+point = [0.1, 0.0, 0.0]
+force = [0.0, 0.0, 1.0]
+times = [0.0, 0.1]
+factors = [1.0, 0.5]
+"""
+
+
+def moved(folder: Path, text: str = MOVED) -> sb.Scene:
+    times = np.arange(8) * 0.01
+    spin = np.outer(times, [0.0, 0.0, 2.0])
+    places = np.outer(times, [1.0, 0.0, 3.0]) + np.outer(times**2, [0.0, 0.0, -4.905]) + [0.0, 0.0, 1.0]
+    half = spin[:, 2] / 2
+    turns = np.stack([0 * half, 0 * half, np.sin(half), np.cos(half)], axis=1)
+    np.savez(folder / "poses.npz", times=times, positions=places, quaternions=turns)
+    (folder / "arm.toml").write_text(text)
+    return scene_alone(parse(folder / "arm.toml"), folder)[0]
+
+
+def test_configured_servo_motor_force_and_start(tmp_path: Path) -> None:
+    """As the same scene in Python."""
+    scene = moved(tmp_path)
+    box = scene.bodies["box"]
+    motion = sb.simulate(scene, [0.0, 0.1], sb.Solver(h=2e-3))
+    assert box.pose(motion)[0][0] == pytest.approx([0.0, 0.0, 1.0], abs=1e-12)
+    assert box.momentum(motion)[0] == pytest.approx([0.4, 0.0, 1.2], abs=1e-10)
+    assert box.angular_velocity(motion)[0] == pytest.approx([0.0, 0.0, 2.0], abs=1e-9)
+    same = sb.Scene("arm")
+    upper = same.add_body("upper", of=sb.Inertia.box(0.3, (0.2, 0.02, 0.02)), at=(0.1, 0.0, 0.0))
+    lower = same.add_body("lower", of=sb.Inertia.box(0.2, (0.2, 0.02, 0.02)), at=(0.3, 0.0, 0.0))
+    servo = ([0.0, 0.1, 0.2], [0.0, 0.3, 0.2])
+    sb.hinge(None, upper, at=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0), name="shoulder", servo=servo)
+    motor = {"torque": ([0.0, 0.1], [0.1, -0.2]), "rotor": 1e-5}
+    sb.hinge(upper, lower, at=(0.2, 0.0, 0.0), axis=(0.0, 1.0, 0.0), name="elbow", **motor)  # type: ignore[arg-type]
+    same.add_force(lower.point((0.1, 0.0, 0.0)), [[0.0, 0.0, 1.0], [0.0, 0.0, 0.5]], [0.0, 0.1])
+    wanted = lower.pose(sb.simulate(same, [0.0, 0.1], sb.Solver(h=2e-3)))
+    found = scene.bodies["lower"].pose(motion)
+    assert np.allclose(found[0], wanted[0], atol=1e-13) and np.allclose(found[1], wanted[1], atol=1e-12)
+    assert {"push_z", "elbow_torque_1", "elbow_rotor"} <= set(scene.quantities)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "match"),
+    [
+        ("values = [0.1, -0.2]", "values = [0.1]", "different numbers"),
+        ("rotor = 1e-5", "", "rotor"),
+        ('starts_on = "shown"', 'starts_on = "other"', "no tool of the scene"),
+        ('starts_on = "shown"', 'starts_on = "shown"\nat = [0.0, 0.0, 0.0]', "has at"),
+        ('starts_on = "shown"\n', "", "no tool for it"),
+        ('body = "lower"\npoint', "point", "on nothing"),
+        ('body = "lower"\npoint', 'body = "box"\nparticles = ["box"]\npoint', "particles and a body"),
+        ('body = "lower"\npoint', 'body = "other"\npoint', "no body of the scene"),
+    ],
+)
+def test_mistakes_in_servos_starts_and_forces_are_told(tmp_path: Path, old: str, new: str, match: str) -> None:
+    assert old in MOVED
+    with pytest.raises(sb.ConfigError, match=match):
+        moved(tmp_path, MOVED.replace(old, new, 1))

@@ -56,7 +56,18 @@ WHOLE: dict[str, Any] = {
         "tool": [{"name": "t"}],
         "drive": [{"particles": ["a"], "markers": ["m0"]}],
         "body": [{"name": "plug", "mass": 0.1, "box": [0.1, 0.1, 0.1]}],
-        "joint": [{"kind": "hinge", "name": "door", "lower": "plug", "at": [0, 0, 0], "axis": [0, 0, 1]}],
+        "joint": [
+            {
+                "kind": "hinge",
+                "name": "door",
+                "lower": "plug",
+                "at": [0, 0, 0],
+                "axis": [0, 0, 1],
+                "servo": {"times": [0.0], "values": [0.0]},
+                "torque": {"times": [0.0], "values": [0.1]},
+                "rotor": 1e-5,
+            }
+        ],
         "collider": [{"name": "table", "shape": "plane"}],
         "contact": [{"of": "rope", "collider": "table", "friction": 0.3}],
         "quantities": {"NAME": {}},
@@ -186,7 +197,8 @@ def test_missing_out_of_range_and_not_finite(tmp_path: Path, place: Place, name:
     if is_number(field.annotation):
         for value in (math.nan, math.inf, -math.inf):
             refused(tmp_path, place, name, value)
-    if is_vector(field.annotation) and name not in ("times", "factors", "windows"):  # which may have any length
+    any_length = ("times", "values", "factors", "windows")
+    if is_vector(field.annotation) and name not in any_length:
         for vector in ([], [0.0], [0.0] * 4, [0.0, math.nan], [0.0, 0.0, math.inf]):
             refused(tmp_path, place, name, vector)
 

@@ -11,7 +11,7 @@ from .section import Finite, Name, Quaternion, Section, Vector, key
 GROUND = "ground"
 JOINTS: dict[str, tuple[str, ...]] = {
     "ball": ("compliance",),
-    "hinge": ("axis", "rate", "stiffness", "rest", "viscosity"),
+    "hinge": ("axis", "rate", "stiffness", "rest", "viscosity", "servo", "torque", "rotor"),
     "universal": ("axes",),
     "slider": ("axis", "rate"),
     "cylinder": ("axis", "rate", "turn_rate"),
@@ -35,6 +35,11 @@ class BodySection(Section):
     quaternion: Quaternion = key([0.0, 0.0, 0.0, 1.0], "(x, y, z, w), how its frame starts: from its axes to the world")
     velocity: Vector = key([0.0, 0.0, 0.0], "of the frame's origin at the start", "m/s")
     spin: Vector = key([0.0, 0.0, 0.0], "angular velocity at the start, in the world's axes", "rad/s")
+    starts_on: Name | None = key(
+        None, "the [[scene.tool]] whose first recorded poses show the start of a free body, instead of these four keys"
+    )
+    start_poses: int = key(4, "how many poses, over which its spin is about constant", ge=2)
+    start_falls: bool = key(False, "gravity bends its path over them, as in free flight")
     pinned: bool = key(False, "hold it where it starts")
     tool: Name | None = key(None, "the [[scene.tool]] that it rides on; its start plays no part then")
     drag: Finite | None = key(None, "of the air, force over speed: <name>_drag", "N s/m", ge=0)
@@ -46,6 +51,24 @@ class BodySection(Section):
             raise ValueError("must have one of inertia and box|give three moments, or the sides of a box")
         if self.pinned and self.tool is not None:
             raise ValueError("is pinned and rides on a tool|leave one of them out")
+        given = sorted({"at", "quaternion", "velocity", "spin", "pinned", "tool"} & self.model_fields_set)
+        if self.starts_on is not None and given:
+            raise ValueError(f"starts on a tool, and has {', '.join(given)}|leave {', '.join(given)} out")
+        if self.starts_on is None and {"start_poses", "start_falls"} & self.model_fields_set:
+            raise ValueError("has poses of a start and no tool for it|add starts_on")
+        return self
+
+
+class Knots(Section):
+    """A number over time: `times` in the scene's time (0 = its start), linear between, constant outside."""
+
+    times: list[Finite] = key(..., "knots, increasing", "s", min_length=1)
+    values: list[Finite] = key(..., "one at each", min_length=1)
+
+    @model_validator(mode="after")
+    def _one_at_each(self) -> Self:
+        if len(self.times) != len(self.values):
+            raise ValueError("has times and values of different numbers|give one value at each time")
         return self
 
 
@@ -65,6 +88,13 @@ class JointSection(Section):
     stiffness: Finite | None = key(None, "of a hinge's spring: <name>_stiffness", "N m/rad", gt=0)
     rest: Finite = key(0.0, "the angle at which that spring rests, counted from the start: <name>_rest", "rad")
     viscosity: Finite | None = key(None, "of a hinge, torque over rate: <name>_viscosity", "N m s/rad", gt=0)
+    servo: Knots | None = key(
+        None, "the angles that a hinge has, or its spring rests at: { times = [...], values = [...] }", "s, rad"
+    )
+    torque: Knots | None = key(
+        None, "of a motor on a hinge, linear between the times; up to 50 are <name>_torque_0, ...", "s, N m"
+    )
+    rotor: Finite | None = key(None, "inertia of that motor, as the hinge feels it: <name>_rotor", "kg m^2", gt=0)
     compliance: Finite | None = key(None, "of a ball joint that gives way: <name>_compliance", "m/N", gt=0)
 
     @model_validator(mode="after")

@@ -44,6 +44,7 @@ HEADERS: dict[str, type[Section]] = {
     "[[scene.arm]]": scene_schema.Arm,
     "[[scene.body]]": body_schema.BodySection,
     "[[scene.joint]]": body_schema.JointSection,
+    "[scene.joint.servo], [scene.joint.torque]": body_schema.Knots,
     "[[scene.constraints]]": scene_schema.Constraints,
     "[[scene.point_mass]]": scene_schema.PointMass,
     "[[scene.force]]": scene_schema.Force,

@@ -97,15 +97,26 @@ class PointMass(Section):
 
 
 class Force(Section):
-    """A force over time on particles. A list: [[scene.force]]; all of one scene share their times."""
+    """A force over time on particles, or on a point of a body. A list: [[scene.force]]; all of one scene share their
+    times."""
 
     name: Name | None = key(None, "adds the quantities <name>_x, <name>_y, <name>_z (N); a plain force when left out")
-    particles: list[Reference] = key(..., "each of them bears the whole force", min_length=1)
+    particles: list[Reference] = key([], "each of them bears the whole force")
+    body: Name | None = key(None, "the [[scene.body]] that it acts on, instead of particles")
+    point: Vector = key([0.0, 0.0, 0.0], "where it acts, in the body's frame", "m")
     force: Vector = key(..., "the force", "N")
     times: list[Finite] = key(
         [0.0], "knots in the scene's time (0 = its start); linear between, constant outside", "s", min_length=1
     )
     factors: list[Finite] | None = key(None, "share of the force at each knot; 1 when left out")
+
+    @model_validator(mode="after")
+    def _acts_on_something(self) -> Self:
+        if bool(self.particles) == (self.body is not None):
+            raise ValueError("acts on particles and a body, or on nothing|give particles, or a body and a point of it")
+        if self.body is None and "point" in self.model_fields_set:
+            raise ValueError("has a point without its body|add body")
+        return self
 
 
 class Tool(Section):

@@ -16,7 +16,6 @@ from ..objects.arm_data import Arm
 from ..objects.cloth import Cloth
 from ..objects.rope import Rope
 from ..objects.tool import Tool
-from ..quantities.quantities import product
 from ..scene.scene import Scene
 from . import scene_schema as schema
 from .bodies import add_bodies
@@ -24,6 +23,7 @@ from .cloth_markers import seats
 from .cloths import build_cloth, placed_mesh
 from .contacts import add_contacts
 from .errors import located
+from .forces_on import add_forces
 from .moment import Moment
 from .rope_points import Seats
 from .ropes import build_rope
@@ -202,7 +202,7 @@ def build_scene(
     for quantity, extra in section.quantities.items():
         with located(f"scene.quantities.{quantity}"):
             scene.add_quantity(quantity, **extra.model_dump())
-    _add_forces(scene, particles, section.force)
+    add_forces(scene, section.force, particles.find)
     for i, drive in enumerate(section.drive):
         _add_drive(scene, particles, f"scene.drive[{i}]", drive, moment, tools)
     add_contacts(scene, section, particles.named, tools)
@@ -246,34 +246,6 @@ def _add_arm(scene: Scene, particles: Particles, path: str, arm: schema.Arm | sc
     with located(path, arm.name):
         add = add_arm if isinstance(arm, schema.Arm) else add_pendulum
         particles.add_arm(add(scene, arm.name, pivot=pivot, **fields))
-
-
-def _add_forces(scene: Scene, particles: Particles, forces: Sequence[schema.Force]) -> None:
-    """Forces, plain or made of named quantities; the terms come last, when the number of loaded particles is known."""
-    terms = []
-    for i, force in enumerate(forces):
-        path = f"scene.force[{i}]"
-        factors = [1.0] * len(force.times) if force.factors is None else force.factors
-        if len(factors) != len(force.times):
-            raise ConfigError(f"{path}.factors", "do not match the times", len(factors), f"give {len(force.times)}")
-        which = [particles.find(f"{path}.particles", r) for r in force.particles]
-        plain = np.zeros(3) if force.name else np.array(force.force)
-        first = len(scene.forces.particles)
-        with located(path):
-            scene.add_force(which, np.array(factors)[:, None, None] * plain, force.times)
-            if force.name is None:
-                continue
-            size = float(np.linalg.norm(force.force)) or 1.0
-            for k, axis in enumerate("xyz"):
-                quantity = scene.add_quantity(f"{force.name}_{axis}", force.force[k], "N", positive=False, scale=size)
-                terms += [
-                    (knot, first + w, k, f, quantity)
-                    for knot, f in enumerate(factors)
-                    for w in range(len(which))
-                    if f != 0.0
-                ]
-    loaded = len(scene.forces.particles)
-    scene.add_terms([product("force", 3 * (knot * loaded + w) + k, f, {q: "identity"}) for knot, w, k, f, q in terms])
 
 
 def _add_drive(

@@ -29,7 +29,11 @@ def markers_of_poses(positions: ArrayLike, quaternions: ArrayLike, points: Array
 
 
 def start_of_poses(
-    times: ArrayLike, positions: ArrayLike, quaternions: ArrayLike, gravity: ArrayLike = (0.0, 0.0, 0.0)
+    times: ArrayLike,
+    positions: ArrayLike,
+    quaternions: ArrayLike,
+    gravity: ArrayLike = (0.0, 0.0, 0.0),
+    time: float | None = None,
 ) -> dict[str, Array]:
     """The state that a body starts with, for `Scene.add_body(..., **start_of_poses(...))`.
 
@@ -37,9 +41,10 @@ def start_of_poses(
     a constant angular velocity. Give few poses, over which that is right: four at 100 Hz or more.
 
     Args:
-        times: (frames,) s; the state is that at the first of them.
+        times: (frames,) s.
         positions, quaternions: as in `Recording.from_poses`.
         gravity: (3,) m/s^2 of a free flight; zero where the first poses are about straight and even.
+        time: s, that of the state; the first of `times` by default.
 
     Returns:
         `at` (3,) m, `rotation` (3, 3), `velocity` (3,) m/s and `spin` (3,) rad/s.
@@ -56,7 +61,7 @@ def start_of_poses(
     if len(t) < FEWEST or len(x) != len(t) or not (np.isfinite(x).all() and np.isfinite(q).all()):
         fix = "give two or more poses that were seen, and as many times"
         raise RecordingError("positions", "do not show a state", (len(t), len(x)), fix)
-    s = t - t[0]
+    s = t - (t[0] if time is None else float(finite("time", time, (), RecordingError)))
     fall = 0.5 * np.outer(s**2, finite("gravity", gravity, (3,), RecordingError))
     frames = matrices_of(q)
     line = np.column_stack([np.ones_like(s), s])

@@ -24,7 +24,8 @@ from .bodies import (
     named_start,
     nodes_of,
 )
-from .body import Body
+from .body import Body, BodyPoint
+from .body_force import push_body
 from .colliders import Collider
 from .compiled import CompiledScene
 from .contacts import ContactNumbers, HasParticles
@@ -116,15 +117,32 @@ class Scene(HeldScene):
                 self.pin([body.spin_node])
         return body
 
-    def add_force(self, particles: ArrayLike, forces: ArrayLike, times: ArrayLike = (0.0,)) -> None:
-        """Let forces act on particles: (knots, k, 3) N at `times` (knots,), linear between and constant outside the
-        knots.
+    def add_force(
+        self,
+        particles: ArrayLike | BodyPoint,
+        forces: ArrayLike,
+        times: ArrayLike = (0.0,),
+        name: str | None = None,
+    ) -> None:
+        """Let forces act on particles, or on a point of a body, linear between knots and constant outside.
+
+        Args:
+            particles: (k,), or what `Body.point` returns.
+            forces: (knots, k, 3) N in the world's axes; on a point (knots, 3).
+            times: (knots,) s.
+            name: of a force on a point, which makes it the quantities `<name>_x`, `_y`, `_z` N, and with several knots
+                (at most 50) `<name>_x_0`, `_y_0`, ...; without one its numbers are none.
 
         Raises:
             SceneError: shapes, NaN, or other knots than an earlier call's.
         """
         self._building()
-        self.forces.add(particles, forces, times, self.particle_count)
+        if isinstance(particles, BodyPoint):
+            push_body(self, self.forces, particles, forces, times, name)
+        elif name is not None:
+            raise SceneError("add_force.name", "names a force on particles", name, "leave it out")
+        else:
+            self.forces.add(particles, forces, times, self.particle_count)
 
     def add_constraints(
         self,
