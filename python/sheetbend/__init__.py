@@ -24,6 +24,7 @@ from .experiment.force_readings import simulate_forces
 from .experiment.force_sensor import ForceSensor
 from .fitting.fit import Fit, fit
 from .fitting.identify import identify
+from .fitting.many import fit_many
 from .fitting.plan import Plan
 from .mesh import TriangleMesh, read_mesh
 from .minimum.discretization import Refinement
@@ -159,6 +160,7 @@ __all__ = [
     "equilibria",
     "equilibrium",
     "fit",
+    "fit_many",
     "fit_rope",
     "fixed",
     "force_balance",

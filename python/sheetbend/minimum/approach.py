@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 
 from ..arrays.timeseries import Array
 from ..quantities.parameters import Parameters
 from .counts import counted
-from .problem import FitProblem
 
 LOG_STEP = math.log(10.0)
 LINEAR_STEP = 1.0  # natural scales
@@ -49,6 +49,18 @@ class Tally:
     jacobians: int = 0
 
 
+class Walked(Protocol):
+    """What a walk asks of a problem: `problem.FitProblem`, or many recordings (`blocks.ManyProblem`)."""
+
+    @property
+    def parameters(self) -> Parameters: ...
+
+    @property
+    def cheap_jacobian(self) -> bool: ...
+
+    def evaluate(self, u: Array, jacobian: bool = True) -> tuple[bool, Array, Any]: ...
+
+
 class Approach:
     """A walk along such steps on one problem.
 
@@ -56,12 +68,13 @@ class Approach:
         u: (free,) where it is, with its cost (half the sum of squares): infinite where the start has no answer.
         free: whether its last step was as good as promised at the first try, and held up by no limit.
         near: whether the last step was as good as promised, held up by no limit, and a small part of the longest.
+        least: share of the cost that a step must promise.
         promised: share of the cost that the last step was to take off.
         taken: share of the cost that it took off.
         iterations: steps so far.
     """
 
-    def __init__(self, problem: FitProblem, u: Array, tally: Tally | None = None) -> None:
+    def __init__(self, problem: Walked, u: Array, tally: Tally | None = None) -> None:
         self.problem, self._tally = problem, tally or Tally()
         self._lower, self._upper = problem.parameters.limits()
         self.u = np.clip(u, self._lower, self._upper)
@@ -71,7 +84,19 @@ class Approach:
         self.iterations = 0
         self.cost, self._r, self._J = self._evaluated(self.u, True)
 
-    def _evaluated(self, u: Array, jacobian: bool) -> tuple[float, Array, Array | None]:
+    @property
+    def least(self) -> float:
+        return LEAST
+
+    def _inside(self, lower: Array, upper: Array) -> Array:
+        """The best step in a box."""
+        assert self._J is not None
+        return inside(self._J, self._r, math.sqrt(2.0 * RIDGE * self.cost) / self._longest, lower, upper)
+
+    def _finite(self) -> bool:
+        return self._J is not None and bool(np.isfinite(self._J).all())
+
+    def _evaluated(self, u: Array, jacobian: bool) -> tuple[float, Array, Any]:
         before = counted()
         ok, r, J = self.problem.evaluate(u, jacobian)
         made = counted()
@@ -92,17 +117,17 @@ class Approach:
         if self.cost == 0.0:
             self.promised = 0.0
             return False
-        if self._J is None or not np.isfinite(self._J).all():
+        if self._J is None or not self._finite():
             return False
         longest, tries = self._longest, 0
         while self._radius > SHORTEST:
             tries += 1
             box = self._radius * longest
             lower, upper = np.maximum(self._lower - self.u, -box), np.minimum(self._upper - self.u, box)
-            s = inside(self._J, self._r, math.sqrt(2.0 * RIDGE * self.cost) / longest, lower, upper)
+            s = self._inside(lower, upper)
             promised = self.cost - 0.5 * float(np.sum((self._r + self._J @ s) ** 2))
             self.promised = promised / self.cost
-            if self.promised < LEAST:
+            if self.promised < self.least:
                 return False
             cost, r, J = self._evaluated(self.u + s, self.problem.cheap_jacobian)
             share, used = (self.cost - cost) / promised, float(np.max(np.abs(s) / longest))

@@ -81,6 +81,14 @@ def as_parameters(
     return Parameters(complete)
 
 
+def expanded_to(parameters: Parameters, experiments: Sequence[Experiment]) -> Parameters:
+    """With private parameters expanded to one for each experiment that has them."""
+    has = {f"{name}[{e.name}]": q.value for e in experiments for name, q in e.scene.quantities.items()}
+    every = parameters.expand([e.name for e in experiments], has)
+    private = {f"{p.name}[{e.name}]" for p in parameters.values() if p.private for e in experiments}
+    return Parameters(p for name, p in every.items() if name not in private or name in has)
+
+
 class FitProblem:
     """Experiments with shared and private parameters, compiled for one set of recordings' parts.
 
@@ -111,7 +119,7 @@ class FitProblem:
         names = [e.name for e in experiments]
         if len(set(names)) != len(names):
             raise InputError("experiments", "share a name", names, "give each a name of its own")
-        self.parameters = self._expanded(parameters) if expanded is None else expanded
+        self.parameters = expanded_to(parameters, self.experiments) if expanded is None else expanded
         theta, slots, slot_of = self._slots()
         held = [None if corrected is None else corrected.get(e.name, NOTHING) for e in self.experiments]
         cores = [e.core(r, b) for e, r, b in zip(self.experiments, self.recordings, held, strict=True)]
@@ -201,12 +209,6 @@ class FitProblem:
         """Expanded parameter name of each quantity of an experiment, whether or not it is a parameter."""
         private = {p.name for p in self.given.values() if p.private}
         return {name: f"{name}[{e.name}]" if name in private else name for name in e.scene.quantities}
-
-    def _expanded(self, parameters: Parameters) -> Parameters:
-        has = {f"{name}[{e.name}]": q.value for e in self.experiments for name, q in e.scene.quantities.items()}
-        every = parameters.expand([e.name for e in self.experiments], has)
-        private = {f"{p.name}[{e.name}]" for p in parameters.values() if p.private for e in self.experiments}
-        return Parameters(p for name, p in every.items() if name not in private or name in has)
 
     def _slots(self) -> tuple[list[float], list[list[int]], dict[str, int]]:
         """theta, per experiment the place of each of its quantities in it, and the place of each expanded parameter."""

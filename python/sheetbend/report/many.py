@@ -1,0 +1,157 @@
+"""The result of a fit to many recordings: shared estimates, and private ones as a distribution."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..files.whole import write_text
+from ..quantities.wording import short
+from ..result.result import Estimate
+from .tables import Section, plain_section
+
+FORMAT = "sheetbend many 1"
+SHARES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+FAR = 2.0  # times the median misfit: such recordings are named
+NAMED = 5
+
+
+@dataclass(frozen=True)
+class OwnParameter:
+    """A private parameter in all recordings.
+
+    Attributes:
+        name, unit, log: of the parameter.
+        values: one for each recording; NaN where it has none.
+        sds: standard deviations, of the logarithm where `log`; NaN where the data do not determine it.
+    """
+
+    name: str
+    unit: str
+    log: bool
+    values: tuple[float, ...]
+    sds: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class ManyFit:
+    """A fit to many recordings.
+
+    Attributes:
+        estimates: of the shared parameters; intervals from the residuals alone.
+        scatter: by shared parameter, the standard deviation that the scatter between recordings asks for, over that of
+            independent residuals.
+        own: of the private parameters.
+        recordings: their names.
+        misfit: (recordings,) root mean square of each one's residuals, in sigma.
+        cost, first_cost: half the sum of squared residuals, priors included, at the end and at the start.
+        rows: residuals.
+        iterations, converged, seconds: how it went.
+        evaluations, jacobians: how often all recordings were simulated, and how often of these with a Jacobian.
+        jacobian_bytes: what was kept of one Jacobian.
+    """
+
+    estimates: tuple[Estimate, ...]
+    scatter: Mapping[str, float]
+    own: tuple[OwnParameter, ...]
+    recordings: tuple[str, ...]
+    misfit: tuple[float, ...]
+    cost: float
+    first_cost: float
+    rows: int
+    iterations: int
+    converged: bool
+    seconds: float
+    evaluations: int
+    jacobians: int
+    jacobian_bytes: int
+
+    def __getitem__(self, name: str) -> Estimate:
+        """The estimate of a shared parameter; KeyError names the ones there are."""
+        for estimate in self.estimates:
+            if estimate.name == name:
+                return estimate
+        raise KeyError(f"no estimate of {name!r}; there are: {', '.join(e.name for e in self.estimates)}")
+
+    def report(self) -> str:
+        """The report as plain text."""
+        return "\n".join("\n".join([*plain_section(part), ""]) for part in self._sections())
+
+    def table(self) -> str:
+        """A CSV row for each recording: its misfit, and value and standard deviation of its private parameters."""
+        out = io.StringIO()
+        writer = csv.writer(out, lineterminator="\n")
+        pairs = [(f"{p.name} [{p.unit}]" if p.unit else p.name, _sd_of(p)) for p in self.own]
+        writer.writerow(["recording", "misfit [sigma]", *(header for pair in pairs for header in pair)])
+        for i, name in enumerate(self.recordings):
+            numbers = [x for p in self.own for x in (p.values[i], p.sds[i])]
+            writer.writerow([name, repr(self.misfit[i]), *("" if math.isnan(x) else repr(x) for x in numbers)])
+        return out.getvalue()
+
+    def save(self, path: str | Path) -> None:
+        """Write all as JSON (numbers that are not known as null), whole or not at all; beside it, with the ending .csv,
+        `table`."""
+        data = {"format": FORMAT, **asdict(self)}
+        for one in data["own"]:
+            one |= {key: [None if math.isnan(x) else x for x in one[key]] for key in ("values", "sds")}
+        write_text(path, json.dumps(data, indent=2, allow_nan=False) + "\n")
+        write_text(Path(path).with_suffix(".csv"), self.table())
+
+    def _sections(self) -> list[Section]:
+        shared = []
+        for e in self.estimates:
+            ends = "" if e.lower is None or e.upper is None else f"[{short(e.lower, 5)}, {short(e.upper, 5)}]"
+            more = "" if e.name not in self.scatter else short(self.scatter[e.name], 2)
+            shared.append((e.name, short(e.value, 5), ends, e.unit, more, e.verdict))
+        words = "standard deviation from the scatter between recordings over that of independent residuals"
+        headers = ("parameter", "value", "95 % interval", "unit", "scatter", "verdict")
+        note = ("scatter", f"{words}; the larger counts")
+        open_ones = [(e.name, e.words) for e in self.estimates if e.verdict not in ("identified", "weak")]
+        own = [(p.name, *(short(x) for x in _spread(p.values)), p.unit, _typical(p)) for p in self.own]
+        shares = [f"{100 * share:g} %" for share in SHARES]
+        misfit = ("misfit", *(short(x, 3) for x in np.quantile(self.misfit, SHARES)), "sigma", "")
+        far = sorted(zip(self.misfit, self.recordings, strict=True), reverse=True)
+        far = [(x, name) for x, name in far if x > FAR * float(np.median(self.misfit))]
+        notes = [(name, f"its misfit is {short(x, 3)} sigma") for x, name in far[:NAMED]]
+        if len(far) > NAMED:
+            notes.append(("and", f"{len(far) - NAMED} further recordings above {FAR:g} times the median"))
+        end = "converged" if self.converged else "did NOT converge"
+        course = (
+            ("fit", f"{end} after {self.iterations} iterations, {self.seconds:.3g} s"),
+            ("cost", f"{short(self.cost, 6)} over {self.rows:,} residuals of {len(self.recordings):,} recordings"),
+            ("at the start", short(self.first_cost, 6)),
+            ("simulations of all", f"{self.evaluations}, {self.jacobians} of them with a Jacobian"),
+            ("kept of a Jacobian", f"{short(self.jacobian_bytes / 1e6, 3)} MB"),
+            ("not counted", "time step, mesh and given values; sheetbend.fit counts them, of a few of the recordings"),
+        )
+        each = ("of each recording", *shares, "unit", "its own half-width")
+        return [
+            Section("Shared parameters", headers, tuple(shared), (note, *open_ones)),
+            Section("Recordings (shares that lie below)", each, (*own, misfit), tuple(notes)),
+            Section("Course", notes=course),
+        ]
+
+
+def _sd_of(p: OwnParameter) -> str:
+    return f"sd of ln {p.name}" if p.log else f"sd of {p.name}" + (f" [{p.unit}]" if p.unit else "")
+
+
+def _spread(values: tuple[float, ...]) -> list[float]:
+    known = [x for x in values if not math.isnan(x)]
+    return [float(x) for x in np.quantile(known, SHARES)] if known else [math.nan] * len(SHARES)
+
+
+def _typical(p: OwnParameter) -> str:
+    """Median of the recordings' half-widths."""
+    known = [x for x in p.sds if not math.isnan(x)]
+    if not known:
+        return "open"
+    half = 1.96 * float(np.median(known))
+    return f"{short(100 * half, 2)} %" if p.log else f"{short(half, 2)} {p.unit}".rstrip()

@@ -1,0 +1,139 @@
+"""Fits to many recordings: triangles of blocks against the dense Jacobian, and results against `sheetbend.fit`."""
+
+from __future__ import annotations
+
+import csv
+import json
+from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from pytest import approx
+from sheetbend.errors import InputError
+from sheetbend.minimum.approach import inside
+from sheetbend.minimum.blocks import ManyProblem
+from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.report.many import ManyFit
+from test_workers import Backwards
+
+COUNT = 20
+WANTED: dict[str, Any] = {
+    "rope_EI": {"initial": 2e-3, "prior": (1e-3, 2.0)},
+    "rope_drag_linear": {"initial": 0.02},
+    "rope_bend_damping": {"private": True, "prior": (0.01, 0.5)},
+}
+SOLVER = sb.Solver(h=1 / 120)
+SEEN = (1, 2, 3, 4)
+
+
+def rope(**changed: float) -> sb.Scene:
+    given = {"EI": 1e-3, "bend_damping": 0.01, "drag_linear": 0.01, **changed}
+    return sb.rope(0.5, 4, density=0.05, clamp_start=(1, 0, 0), **given)
+
+
+@cache
+def swings(differ: float = 0.0, count: int = COUNT) -> tuple[sb.Experiment, ...]:
+    """Ropes with damping of their own, and stiffness too where they differ."""
+    times, rng, found = np.arange(12) / 30, np.random.default_rng(3), []
+    for k in range(count):
+        own = {"bend_damping": 0.01 * np.exp(0.3 * rng.standard_normal()), "EI": 1e-3 * np.exp(differ * (-1) ** k)}
+        exact = sb.simulate(rope(**own), times, SOLVER).positions[:, SEEN]
+        noisy = exact + 1e-3 * rng.standard_normal(exact.shape)
+        recording = sb.Recording(noisy, times, name=f"swing {k}")
+        markers = [sb.on_particle(p) for p in SEEN]
+        found.append(sb.Experiment(scene=rope(), recording=recording, markers=markers, solver=SOLVER, sigma=1e-3))
+    return tuple(found)
+
+
+@cache
+def fitted() -> ManyFit:
+    return sb.fit_many(swings(), WANTED)
+
+
+def test_triangles_say_what_the_dense_jacobian_says() -> None:
+    """Sums of squares along steps, and the best step in a box, of which sides hold shared and own numbers."""
+    few = swings()[:5]
+    wanted = as_parameters(WANTED, few)
+    dense, many = FitProblem(few, wanted), ManyProblem(few, wanted)
+    assert many.parameters.free == dense.parameters.free and len(many.shared) == 2
+    rng = np.random.default_rng(0)
+    u = dense.parameters.initial() + 0.05 * rng.standard_normal(7)
+    _, r, J = dense.evaluate(u)
+    _, short, arrow = many.evaluate(u)
+    _, told, none = many.evaluate(u, jacobian=False)
+    assert none is None and short @ short == approx(r @ r, rel=1e-12) and told @ told == approx(r @ r, rel=1e-12)
+    for _ in range(3):
+        s = 0.1 * rng.standard_normal(7)
+        assert np.sum((short + arrow @ s) ** 2) == approx(np.sum((r + J @ s) ** 2), rel=1e-10)
+    assert arrow.nbytes == 5 * 8 * 4**2
+    ridge = np.full(7, 0.3)
+    free = inside(J, r, ridge, np.full(7, -9.0), np.full(7, 9.0))
+    assert arrow.inside(ridge, np.full(7, -9.0), np.full(7, 9.0)) == approx(free, rel=1e-7, abs=1e-12)
+    for held in (many.shared[:1], many.own[3], np.concatenate([many.shared[:1], many.own[1]])):
+        lower, upper = np.full(7, -9.0), np.full(7, 9.0)
+        lower[held], upper[held] = np.minimum(0.4 * free[held], 0.0), np.maximum(0.4 * free[held], 0.0)
+        exact = inside(J, r, ridge, lower, upper)
+        assert arrow.inside(ridge, lower, upper) == approx(exact, rel=1e-6, abs=1e-9)
+
+
+def test_a_fit_of_many_recordings_ends_where_that_of_all_at_once_does() -> None:
+    found = fitted()
+    plain = sb.fit(swings(), parameters=WANTED, refine=False, beginnings=False, profiles=False, tolerance=1e-12)
+    assert found.converged and found.cost == approx(plain.result.cost, rel=1e-7)
+    assert found.rows == plain.result.rows and len(found.recordings) == COUNT
+    for e in found.estimates:
+        other = plain[e.name]
+        assert abs(e.value - other.value) < 0.02 * other.half_width
+        assert e.half_width == approx(other.half_width, rel=0.6) and e.lower < e.value < e.upper
+    assert abs(found["rope_EI"].value - 1e-3) < 1.5 * found["rope_EI"].half_width
+    (own,) = found.own
+    for k, (value, sd) in enumerate(zip(own.values, own.sds, strict=True)):
+        other = plain[f"rope_bend_damping[swing {k}]"]
+        assert np.log(value / other.value) == approx(0.0, abs=0.05 * sd)
+        assert 1.96 * sd == approx(np.log(other.upper / other.lower) / 2, rel=0.5)
+    assert found.misfit == approx(np.ones(COUNT), abs=0.25)
+
+
+def test_recordings_that_differ_widen_the_interval() -> None:
+    """Stiffness of the ropes differs by 20 % either way; the mean of the logarithm is zero."""
+    found, alike = sb.fit_many(swings(0.2), WANTED), fitted()
+    assert found.scatter["rope_EI"] > 3.0 > 1.6 > alike.scatter["rope_EI"]
+    sd = 0.2 / np.sqrt(COUNT - 1)
+    assert np.log(found["rope_EI"].upper / found["rope_EI"].lower) / 2 == approx(2.09 * sd, rel=0.35)
+
+
+@pytest.mark.parametrize("executor", [Backwards(), ThreadPoolExecutor(3)])
+def test_the_bits_do_not_depend_on_the_workers(executor: Executor) -> None:
+    alone, shared = fitted(), sb.fit_many(swings(), WANTED, executor=executor)
+    executor.shutdown(wait=False)
+    took = {"seconds": 0.0}
+    assert repr(replace(shared, **took)) == repr(replace(alone, **took))
+
+
+def test_it_tells_and_saves_all_recordings(tmp_path: Path) -> None:
+    found = fitted()
+    text = found.report()
+    assert "Shared parameters" in text and "rope_bend_damping" in text and "20 recordings" in text
+    assert all(len(line) <= 120 for line in text.splitlines())
+    found.save(tmp_path / "many.json")
+    data = json.loads((tmp_path / "many.json").read_text())
+    assert data["cost"] == found.cost and data["own"][0]["values"] == list(found.own[0].values)
+    rows = list(csv.reader((tmp_path / "many.csv").open()))
+    assert len(rows) == COUNT + 1 and rows[1][0] == "swing 0" and float(rows[1][2]) == found.own[0].values[0]
+
+
+def test_what_does_not_go_is_refused() -> None:
+    with pytest.raises(InputError, match="are few"):
+        sb.fit_many(swings()[:3], WANTED)
+    with pytest.raises(InputError, match="are all private"):
+        sb.fit_many(swings(), {"rope_EI": {"private": True}})
+    with pytest.raises(InputError, match="share a name"):
+        sb.fit_many([*swings(), swings()[0]], WANTED)
+    many = ManyProblem(swings()[:2], as_parameters(WANTED, swings()[:2]))
+    ok, _, _ = many.evaluate(np.full(4, 800.0))
+    assert not ok and many.failure.startswith("swing 0: ")
