@@ -130,7 +130,7 @@ def inside(J: Array, r: Array, ridge: Array, lower: Array, upper: Array) -> Arra
         J, r, ridge: (rows, n), (rows,), (n,).
     """
     n = J.shape[1]
-    R = np.linalg.qr(np.column_stack([J, r]), mode="r")[:n]  # its last column is Q'r
+    R = np.asarray(np.linalg.qr(np.column_stack([J, r]), mode="r"))[:n]  # its last column is Q'r
     A = np.concatenate([R[:, :n], np.diag(ridge)])
     b = np.concatenate([-R[:, n], np.zeros(n)])
     s, held = np.zeros(n), np.zeros(n, dtype=bool)
