@@ -78,7 +78,8 @@ def steadiest(times: Array, positions: Array, width: float) -> LocalFit | None:
     Returns:
         None where `width` holds too few frames to smooth over.
     """
-    narrow, best, least = LocalFit(width, 2), None, np.inf
+    narrow, least = LocalFit(width, 2), np.inf
+    best: LocalFit | None = None
     if not FEWEST <= narrow.frames(times) <= len(times):
         return None
     for tried in (narrow, *(LocalFit(factor * width, 4) for factor in WIDER)):

@@ -111,7 +111,12 @@ class GrippedRopeSection(Section):
         _default("max_segments"), "links are doubled, up to these, until EI moves by less than 5 %", ge=4
     )
     substeps: int = key(_default("substeps"), "per frame", ge=1)
-    smoothing: Finite = key(_default("smoothing"), "over which recorded grips and starts are smoothed", "s", ge=0)
+    smoothing: Finite = key(
+        _default("smoothing"),
+        "over which starts are smoothed; grips over that or more, as their noise asks for",
+        "s",
+        ge=0,
+    )
     sigma: Finite = key(_default("sigma"), "expected error of a marker, against which priors count", "m", gt=0)
 
     @field_validator("rungs")

@@ -10,10 +10,11 @@ neighbors, it is the sigma of the compared markers. Where the scene does not kno
 a smoothed marker), the noise is that of the motion itself: each knot is compared with the cubic through its four
 neighbors, as in `timeseries.noise`. Smoothing hides noise from that comparison and leaves what is slow. So where a
 recorded marker keeps its distance from a driven particle, the noise is taken as no less than that marker's own, which
-is an upper bound: what has been smoothed has less of it. Poses of a robot's tool are no markers, and are taken as they
-show. In any case A n is a part of what the fit leaves: it is no larger, and what is left resembles the draws as these
-resemble each other. Where it does not, as in motions that grow or behind a path that is exact, the noise is less or the
-tangents say too much, and the draws are made smaller.
+is an upper bound: what has been smoothed has less of it. Where a scene tells by what it was smoothed
+(`Boundary.smoothed`), so are the draws. Poses of a robot's tool are no markers, and are taken as they show. In any case
+A n is a part of what the fit leaves: it is no larger, and what is left resembles the draws as these resemble each
+other. Where it does not, as in motions that grow or behind a path that is exact, the noise is less or the tangents say
+too much, and the draws are made smaller.
 """
 
 from __future__ import annotations

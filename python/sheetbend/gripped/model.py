@@ -40,7 +40,7 @@ class RopeModel:
         segments: links between the grips.
         substeps: per frame.
         iterations: Newton iterations per substep.
-        smoothing: s, over which the recorded grips and starts are smoothed.
+        smoothing: s, over which starts are smoothed, and grips at least (`GrippedMotion.of`).
         sigma: m, expected error of a marker, against which priors count.
     """
 
