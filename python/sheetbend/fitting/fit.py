@@ -26,8 +26,11 @@ from ..doubts.prediction import Comparison, compare, predicted_values
 from ..doubts.profiles import Elsewhere
 from ..doubts.stationary import unfinished
 from ..doubts.stuck import bounded_by_sticking
+from ..doubts.told import told_numbers
 from ..doubts.touching import kinks, what_touches
 from ..doubts.unexplained import unexplained
+from ..doubts.wrong_given import doubts_of, explained_by, wrong_given
+from ..doubts.wrong_given import warnings_of as wrong_given_warnings
 from ..errors import InputError
 from ..experiment.clock import outside, told_clocks
 from ..experiment.experiment import Experiment
@@ -50,6 +53,7 @@ from ..scene.scene import Scene
 from ..statistics.identifiability import Identifiability
 from .rows import curves, every_end, given_rows, growth_rows, recording_fit, start_rows
 
+IGNORED = ", and their standard deviations do not count"
 Systematic = Callable[[FitProblem, np.ndarray], Mapping[str, float]]
 
 
@@ -220,7 +224,10 @@ def fit(
     def conclude(refitter: str | None) -> _Conclusion:
         at, every = settled(refinement, experiments, problem, best, refitter)
         values = problem.parameters.to_physical(at.u)
-        rests_on, unknown = ((), ()) if refitter is None or lost else premises(at.problem, at.u, given or {})
+        told, silent = ([], "") if refitter is None or lost else told_numbers(at.problem, at.u)
+        uncounted = f"what errors of the given values would move is not known{IGNORED if given else ''}: {silent}"
+        unknown = (uncounted,) if silent else ()
+        rests_on = premises(at.problem, at.u, given or {}, told)
         more = dict(half_widths(rests_on, problem.parameters.free))
         for parameter, reach in ({} if systematic is None else systematic(at.problem, at.u)).items():
             more[parameter] = more.get(parameter, 0.0) + reach
@@ -240,7 +247,13 @@ def fit(
             if not lost:
                 doubted, drawn_off = driven_doubts(at.problem, at.u, judged)
                 doubted += loss_doubts(at.problem, at.u, judged)
-                lacking = missing_loss(at.problem, at.u, (problem, best.u)), missing_force(at.problem, at.u, judged)
+                wrong = wrong_given(at.problem, at.u, told)
+                doubted += wrong_given_warnings(at.problem, wrong)
+                lacking = (
+                    doubts_of(at.problem, at.u, judged, wrong),
+                    missing_loss(at.problem, at.u, (problem, best.u), explained_by(at.problem, wrong)),
+                    missing_force(at.problem, at.u, judged),
+                )
                 parts = together(*lacking, drawn_off, parts)
         return _Conclusion(at, tuple(every), judged, lower, *predicted, doubted + unknown, rests_on, parts)
 
