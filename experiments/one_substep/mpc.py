@@ -18,6 +18,7 @@ from mpc_tasks import Now, Rope, Towel
 from torch import Tensor
 
 KNOTS = 5  # actions of a plan, one for each 0.1 s
+UNIT = 0.03  # m; costs far from 1 would have L-BFGS begin with steps that are far too short
 Cost = Callable[[Tensor], Tensor]
 Search = Callable[[Cost, Tensor], Tensor]
 
@@ -32,13 +33,13 @@ def carried_out(task: Rope | Towel, now: Now, action: Tensor) -> list[Now]:
 
 
 def cost_of(task: Rope | Towel, now: Now, plan: Tensor) -> Tensor:
-    """Mean cost (*batch) over the substeps of a plan (*batch, KNOTS, 3)."""
+    """Mean cost (*batch) over the substeps of a plan (*batch, KNOTS, 3), near 1 where the task is off by UNIT."""
     costs = []
     for k in range(KNOTS):
         after = carried_out(task, now, plan[..., k, :])
         costs += [task.cost(later, last=k == KNOTS - 1) for later in after]
         now = after[-1]
-    return torch.stack(costs).mean(0) + 1e-5 * plan.square().sum((-1, -2))
+    return torch.stack(costs).mean(0) / UNIT**2 + 1e-3 * plan.square().sum((-1, -2))
 
 
 def by_gradient(evaluations: int) -> Search:

@@ -33,7 +33,8 @@ def run(target):
 
 def score(name, count=200):
     with torch.no_grad():
-        worst = run(start + 0.4 * (torch.rand(count, 3, generator=torch.Generator().manual_seed(1)) - 0.5)).max(0).values
+        new = torch.rand(count, 3, generator=torch.Generator().manual_seed(1))
+        worst = run(start + 0.4 * (new - 0.5)).max(0).values
     near, most = (worst < 0.02).float().mean(), float(worst.quantile(0.9))
     print(f"{name}: {near:.0%} of {count} new targets within 2 cm, 90 % {most:.4f} m")
     return most

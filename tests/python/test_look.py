@@ -276,8 +276,8 @@ def test_drafts_of_the_shipped_recordings_build(tmp_path: Path, file: str) -> No
 
 def test_a_draft_of_a_cloth_that_is_moved_has_air_across_it_and_fits_where_it_moves(tmp_path: Path) -> None:
     """With the true bending and air (per the density that the draft takes) it predicts the last 1.1 s to 18 mm. The
-    poses of the bar give 7.3: the rest is noise of the markers that move it, and the draft says so. A drag of particles,
-    fitted to the quiet first 1.5 s, left 75 mm there."""
+    poses of the bar give 7.3: the rest is noise of the markers that move it, and the draft says so. A drag of each
+    particle, fitted to the quiet first 1.5 s, left 75 mm there."""
     recording = ROOT / "experiments/held_cloth/data/seen.npz"
     path = tmp_path / "draft.toml"
     said = last_line(run("new", recording, "--output", path, "--json"))
