@@ -13,12 +13,14 @@ import time
 from collections.abc import Callable
 
 import numpy as np
+import sheetbend as sb
 import torch
 from mpc_tasks import Now, Rope, Towel
 from torch import Tensor
 
 KNOTS = 5  # actions of a plan, one for each 0.1 s
 UNIT = 0.03  # m; costs far from 1 would have L-BFGS begin with steps that are far too short
+NO_MOTION = 1e6
 Cost = Callable[[Tensor], Tensor]
 Search = Callable[[Cost, Tensor], Tensor]
 
@@ -64,6 +66,14 @@ def by_gradient(evaluations: int) -> Search:
     return search
 
 
+def costs_of(cost: Cost, plans: Tensor) -> list[float]:
+    """Costs of a batch of plans. A plan that tears at the scene so hard that a substep has no solution costs NO_MOTION."""
+    try:
+        return list(cost(plans).tolist())
+    except sb.UnbalancedError:
+        return [NO_MOTION] if len(plans) == 1 else [c for plan in plans for c in costs_of(cost, plan[None])]
+
+
 def by_evolution(seconds: float) -> Search:
     """CMA-ES for so much processor time; a generation is one batch of 16 scenes."""
     import cma
@@ -78,7 +88,7 @@ def by_evolution(seconds: float) -> Search:
             while time.process_time() < end:
                 asked = evolution.ask()
                 plans = torch.tensor(np.array(asked), dtype=plan.dtype).view(-1, *plan.shape)
-                costs = cost(plans).tolist()
+                costs = costs_of(cost, plans)
                 evolution.tell(asked, costs)
                 best = min([best, *zip(costs, plans, strict=True)], key=lambda found: found[0])
         return best[1]

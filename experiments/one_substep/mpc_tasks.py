@@ -80,7 +80,8 @@ class Towel:
         scene = sb.Scene("towel")
         mesh = sb.mesh.grid(0.3, 0.3, cells, cells, pattern="one_way")
         stiffness = {"warp": 40.0, "weft": 40.0, "shear": 4.0, "bending": 2e-5}
-        cloth = sb.add_cloth(scene, mesh, density=0.2, **stiffness, drag_linear=0.5)
+        damping = {"membrane_damping": 5e-3, "bend_damping": 2e-2, "drag_linear": 0.5}
+        cloth = sb.add_cloth(scene, mesh, density=0.2, **stiffness, **damping)
         corners = tuple(int(cloth.particles[k]) for k in (0, -1, cells, -1 - cells))
         scene.add_force(corners[:1], np.zeros((1, 1, 3)))
         table = sb.Plane(name="table", point=(0.0, 0.0, -0.002))
