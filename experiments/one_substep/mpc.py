@@ -67,7 +67,7 @@ def by_gradient(evaluations: int) -> Search:
 
 
 def costs_of(cost: Cost, plans: Tensor) -> list[float]:
-    """Costs of a batch of plans. A plan that tears at the scene so hard that a substep has no solution costs NO_MOTION."""
+    """Costs of a batch of plans; NO_MOTION for one that pulls so hard that a substep has no solution."""
     try:
         return list(cost(plans).tolist())
     except sb.UnbalancedError:
