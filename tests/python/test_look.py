@@ -274,6 +274,31 @@ def test_drafts_of_the_shipped_recordings_build(tmp_path: Path, file: str) -> No
     assert result.exit_code == 0 and last_line(result)["parameters"], result.output
 
 
+def test_a_draft_of_a_cloth_that_is_moved_has_air_across_it_and_fits_where_it_moves(tmp_path: Path) -> None:
+    """With the true bending and air (per the density that the draft takes) it predicts the last 1.1 s to 18 mm. The
+    poses of the bar give 7.3: the rest is noise of the markers that move it, and the draft says so. A drag of each
+    particle, fitted to the quiet first 1.5 s, left 75 mm there."""
+    recording = ROOT / "experiments/held_cloth/data/seen.npz"
+    path = tmp_path / "draft.toml"
+    said = last_line(run("new", recording, "--output", path, "--json"))
+    assert "cloth_air_normal" in said["parameters"]
+    assert any("4.1 mm" in sentence and "driven_sigma" in sentence for sentence in said["unknown"])
+    text = path.read_text()
+    known = {"bending": 4.8e-4, "air_normal": 0.48, "air_tangential": 0.04, "substeps": 8}
+    for key, value in known.items():
+        text, count = re.subn(rf"(?m)^{key} = [^#\n]*", f"{key} = {value} ", text)
+        assert count == 1, key
+    path.write_text(text)
+    part = tomllib.loads(text)["recording"][0]["held_out"]
+    assert run("simulate", path, "--output", tmp_path / "out").exit_code == 0
+    found = sb.Recording.load(tmp_path / "out" / "predicted_seen.npz")
+    true = sb.Recording.load(recording)
+    there = (found.times >= part[0]) & (found.times <= part[1])
+    at = [int(np.argmin(np.abs(true.times - t))) for t in found.times[there]]
+    miss = found.positions[there][:, :12] - true.positions[at][:, :12]  # the others move it
+    assert np.sqrt(np.nanmean(np.sum(miss**2, axis=2))) < 0.02
+
+
 def test_a_draft_of_the_twin_comes_to_its_truth(tmp_path: Path) -> None:
     """With the sum of distances between markers as its length, EI was 0.8 % off and the held-out error 2.10 mm, against
     1.34 mm of the shipped configuration."""

@@ -77,9 +77,11 @@ def simulate(
     movie: MoviePath = None,
     json: Json = False,
 ) -> None:
-    """Simulate a scene and write its trajectory as NPZ: times, positions, velocities, the constraints' forces, the
-    pressures of volumes that are kept, and what force sensors read (sensor_NAME_times, _forces, _torques); with a
-    recording also its markers as simulated, predicted_NAME.npz.
+    """Simulate a scene without fitting, and write its motion.
+
+    The NPZ holds times, positions, velocities, forces of the constraints, pressures of kept volumes, and readings of
+    force sensors (sensor_NAME_times, _forces, _torques). If the scene has a recording, predicted_NAME.npz holds the
+    simulated markers.
 
     Example: sheetbend simulate experiments/twin/twin.toml --output out/twin --movie motion.gif
     """
