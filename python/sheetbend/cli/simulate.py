@@ -106,8 +106,8 @@ def _simulate(
     folder = output if output is not None else Path("out") / name
     if mesh is not None:
         check_format(mesh)
-        if not any(task.scene.cloths or (mesh in WHOLE and task.scene.ropes) for task in tasks):
-            needs = "a cloth or a rope" if mesh in WHOLE else "a cloth"
+        if not any(task.scene.cloths or (mesh in WHOLE and (task.scene.ropes or task.scene.solids)) for task in tasks):
+            needs = "a cloth, a solid or a rope" if mesh in WHOLE else "a cloth"
             raise ConfigError("--mesh", f"needs {needs}, and the scene has none", mesh.value, "leave it out")
     moving = [task for task in tasks if not task.static]
     if movie is not None:

@@ -36,6 +36,8 @@ class Marker(Section):
     radius: Finite | None = key(None, "distance from the arm's pivot", "m")
     body: Name | None = key(None, "a rigid body instead, with `point`")
     point: Vector | None = key(None, "place in the body's frame; `offset` counts along its axes", "m")
+    solid: Name | None = key(None, "a solid instead, with `place`")
+    place: Vector | None = key(None, "point of the solid's shape at rest, on its surface or inside", "m")
     between: list[Reference] | None = key(None, "two particles instead, with `fraction`", min_length=2, max_length=2)
     fraction: Finite = key(0.5, "share of the way from the first of the two to the second")
     offset: Vector | None = key(None, "standing off along (tangent, normal, tangent x normal)", "m")
@@ -43,7 +45,7 @@ class Marker(Section):
 
     @model_validator(mode="after")
     def _one_place(self) -> Self:
-        kinds = ("arc_length", "material", "particle", "arm", "body", "between")
+        kinds = ("arc_length", "material", "particle", "arm", "body", "solid", "between")
         places = [n for n in kinds if getattr(self, n) is not None]
         if len(places) != 1:
             raise ValueError(f"names {' and '.join(places) or 'no place'}|give one of {', '.join(kinds)}")
@@ -51,6 +53,10 @@ class Marker(Section):
             raise ValueError("has only one of arm and radius|give both")
         if (self.body is None) != (self.point is None):
             raise ValueError("has only one of body and point|give both")
+        if (self.solid is None) != (self.place is None):
+            raise ValueError("has only one of solid and place|give both")
+        if self.solid is not None and self.offset is not None:
+            raise ValueError("stands off a solid|leave offset out, and give the place below it")
         return self
 
 

@@ -18,12 +18,13 @@ from ..scene.body import Body
 from ..scene.scene import Scene
 from .cloth import Cloth
 from .rope import Rope
+from .solid import Solid, SolidSurface
 
 
 @dataclass(frozen=True)
 class Place:
-    """A material point: weights on up to four particles, weights of its tangent, and an offset in the frame (t, n, t x
-    n), or a point of a rigid body.
+    """A material point: weights on up to eight particles (on up to four with an offset), weights of its tangent, and
+    an offset in the frame (t, n, t x n), or a point of a rigid body.
 
     t is the rope's direction there, n the given normal made perpendicular to it. On a `body` the offset counts along
     the axes of the body's frame, and the particles are the body's nodes.
@@ -45,12 +46,12 @@ class Place:
         return replace(self, offset=tuple(off.tolist()), normal=tuple((n / np.linalg.norm(n)).tolist()))
 
     def core(self) -> dict[str, Any]:
-        """As the compiled core takes it: four coordinates' places, padded with zero weights."""
-        pad = 4 - len(self.particles)
+        """As the compiled core takes it: places of four coordinates or more, padded with zero weights."""
+        pad = max(4 - len(self.particles), 0)
         return {
             "dof": [3 * p for p in self.particles] + [3 * self.particles[-1]] * pad,
             "weight": [*self.weights, *[0.0] * pad],
-            "tangent": [*self.tangent, *[0.0] * pad],
+            "tangent": [*self.tangent, *[0.0] * pad][:4],
             "normal": list(self.normal),
             "carries_offset": self.offset is not None,
             "on_axes": self.body is not None,
@@ -118,12 +119,28 @@ def on_cloth(cloth: Cloth, points: ArrayLike) -> tuple[Place, ...]:
     return on_mesh(cloth, cloth.mesh.at(points))
 
 
-def on_mesh(cloth: Cloth, places: Places) -> tuple[Place, ...]:
+def on_mesh(cloth: Cloth | SolidSurface, places: Places) -> tuple[Place, ...]:
     """Markers at places of a cloth's mesh, such as `cloth.mesh.project` finds for points in space."""
     return tuple(
         Place(tuple(cloth.particles[vertices].tolist()), tuple(weights.tolist()), (0.0, 0.0, 0.0))
         for vertices, weights in zip(places.vertices, places.weights, strict=True)
     )
+
+
+def on_solid(solid: Solid, points: ArrayLike) -> tuple[Place, ...]:
+    """Markers at points (k, 3) m of a solid's shape at rest, on its surface or inside.
+
+    For points beside the surface take `on_mesh(solid.surface, solid.surface.mesh.project(points))`.
+
+    Raises:
+        MeshError: a point lies outside of the solid.
+    """
+    places = solid.mesh.at(points)
+    found = []
+    for vertices, weights in zip(solid.particles[places.vertices].tolist(), places.weights.tolist(), strict=True):
+        own = [(p, w) for p, w in zip(vertices, weights, strict=True) if w != 0.0]
+        found.append(Place(tuple(p for p, _ in own), tuple(w for _, w in own), (0.0,) * len(own)))
+    return tuple(found)
 
 
 def places_for(
