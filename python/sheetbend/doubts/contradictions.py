@@ -68,7 +68,7 @@ def between_parts(
     words = _between(problem, u, judged, [])
     if not words:
         return {}
-    shifts = _residual_shifts(problem, u, refinement) if refinement is not None else []
+    shifts = residual_shifts(problem, u, refinement) if refinement is not None else []
     errors = driven_errors(problem, u)
     return _between(problem, u, judged, shifts, errors) if shifts or errors.size else words
 
@@ -129,7 +129,7 @@ def finer_experiments(problem: FitProblem, refinement: Refinement) -> list[Seque
     return finer
 
 
-def _residual_shifts(problem: FitProblem, u: Array, refinement: Refinement) -> list[Array]:
+def residual_shifts(problem: FitProblem, u: Array, refinement: Refinement) -> list[Array]:
     """(rows,) what the data's residuals change at half the step and on a finer mesh, where these are asked for. One
     that has no answer there is left out."""
     _, r, _ = problem.evaluate(u)

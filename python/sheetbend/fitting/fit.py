@@ -247,7 +247,7 @@ def fit(
             if not lost:
                 doubted, drawn_off = driven_doubts(at.problem, at.u, judged)
                 doubted += loss_doubts(at.problem, at.u, judged)
-                wrong = wrong_given(at.problem, at.u, told)
+                wrong = wrong_given(at.problem, at.u, told, refinement)
                 doubted += wrong_given_warnings(at.problem, wrong)
                 lacking = (
                     doubts_of(at.problem, at.u, judged, wrong),
