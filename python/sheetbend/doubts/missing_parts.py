@@ -39,8 +39,8 @@ def missing_parts(problem: FitProblem, u: Array, i: int) -> list[Told]:
     except SheetbendError:
         return []
     return [
-        Told(i, "", label, "", (0.0, ""), column, missing=says)
-        for (label, _, says), column in zip(parts, columns.T, strict=True)
+        Told(i, "", label, "", (0.0, ""), column, missing=says, signed=added[0] == "velocity")
+        for (label, added, says), column in zip(parts, columns.T, strict=True)
     ]
 
 

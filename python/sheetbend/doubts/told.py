@@ -57,6 +57,7 @@ class Told:
         relative: whether `step` and `column` are.
         marker: whose place it is.
         missing: of what the model lacks (`missing_parts`): what a size of it says.
+        signed: whether there may be less than none of what is missing.
     """
 
     experiment: int
@@ -70,6 +71,7 @@ class Told:
     relative: bool = False
     marker: str = ""
     missing: Callable[[float], str] | None = None
+    signed: bool = False
 
 
 def told_numbers(problem: FitProblem, u: Array) -> tuple[list[Told], str]:

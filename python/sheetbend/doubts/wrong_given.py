@@ -17,26 +17,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays.timeseries import Array
+from ..minimum.discretization import Refinement
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
 from ..result.result import UNSOUND
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
-from .contradictions import value_words
-from .directions import clearly, noise_in, rows_of, tied
+from .contradictions import residual_shifts, value_words
+from .directions import LEVEL, asked_for, noise_in, rows_of, tied
+from .driven_errors import FEW, driven_errors
 from .held_losses import held_names
 from .missing_parts import missing_parts
 from .other_losses import LEAVES
 from .told import DEGREE, LARGER, LATER, MILLIMETER, SIZE, SLOWER, Told
 
-NEARLY_ALL = 0.85
+NEARLY_ALL = 0.9
 """Of what a fit leaves beyond noise: the part that an error must explain. The one that was made explains 0.88 to 1.1 on
 small ropes (gravity, lengths, clamps, places, clocks, drag, masses, stretch). Others explain at most 0.83, but for
 those that look the same, such as the size of gravity and a clock; a mesh four times finer at most 0.28 (measured)."""
 ALIKE = 0.05  # by so much less explained, another number is named beside
 MOST_NAMED = 3
-FARTHEST = {"rad": 0.3, "m": 0.1, "s": 0.1, "": 0.3}
+FARTHEST = {"rad": 0.3, "m": 0.1, "s": 0.1, "": 0.7}
 """Largest errors that are told, by unit; "" for relative ones. First order says nothing of larger ones."""
 LONGEST = 5e7  # rows times directions: above, markers are asked only all together
 
@@ -58,22 +60,39 @@ class Wrong:
     explained: float
 
 
-def wrong_given(problem: FitProblem, u: Array, told: Sequence[Told]) -> list[Wrong]:
+def wrong_given(
+    problem: FitProblem, u: Array, told: Sequence[Told], refinement: Refinement | None = None
+) -> list[Wrong]:
     """What residuals ask of the told numbers, and of what the model lacks: two sets of tangents of motions whose
     residuals are more than noise.
 
     Args:
         u: (free,) the minimum.
         told: `told_numbers` there.
+        refinement: of the discretization; where a number is to be named, one simulation each tells what a shorter
+            substep and a finer mesh explain, and that counts first.
     """
     ok, r, J = problem.evaluate(u)
     if not ok or not np.isfinite(J).all() or problem.estimates_corrections:
         return []
-    layout, data = problem.rows_layout(), problem.core.data_rows
+    found = _asked(problem, u, r, J, told)
+    if found and refinement is not None and (shifts := residual_shifts(problem, u, refinement)):
+        found = _asked(problem, u, r, J, told, np.column_stack(shifts))
+    return found
+
+
+def _asked(
+    problem: FitProblem, u: Array, r: Array, J: Array, told: Sequence[Told], known: Array | None = None
+) -> list[Wrong]:
+    """The same, with known errors of the residuals (rows, errors) of any size taken out."""
+    layout, data, count = problem.rows_layout(), problem.core.data_rows, J.shape[1]
+    if known is not None:
+        J = np.hstack([J, np.vstack([known, np.zeros((len(r) - data, known.shape[1]))])])
     scale = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
     q, sizes, right = np.linalg.svd(J / scale, full_matrices=False)
     kept = sizes > RANK_TOLERANCE * sizes.max(initial=0.0)
     q, inverse = q[:, kept], right[kept].T / sizes[kept] / scale[:, None]
+    r = r - q @ (q.T @ r)
     found = []
     groups = [g for g in tied(problem) if all(problem.experiments[i].loss == "squares" for i in g)]
     for group in groups:
@@ -81,26 +100,35 @@ def wrong_given(problem: FitProblem, u: Array, told: Sequence[Told]) -> list[Wro
         left = float(r[mine] @ r[mine]) - noise_in(r[:data], layout, mine[:data])
         if not left > 0.0:
             continue
-        asked, count = [], 0
         lacking = [part for i in group for part in missing_parts(problem, u, i)] if left > LEAVES * data else []
-        for one, column in _directions(problem, [*told, *lacking], group):
-            count += 1
+        tried = list(_directions(problem, [*told, *lacking], group))
+        asked = []
+        for one, column in tried:
             beside = column - q @ (q.T @ column)
             inner, along = float(beside @ beside), float(beside @ r)
-            if not inner > RANK_TOLERANCE * float(column @ column):
-                continue
-            far = FARTHEST.get("" if one.relative else one.unit, np.inf) if one.missing is None else np.inf
-            negative = one.missing is not None and along > 0.0 and not one.label.startswith("start")
-            if along**2 > NEARLY_ALL * inner * left and abs(along) < far * inner and not negative:
+            seen = inner > RANK_TOLERANCE * float(column @ column)
+            if seen and along**2 > NEARLY_ALL * inner * left and _possible(one, -along / inner):
                 asked.append((along**2 / inner / left, -along / inner, one, column))
         asked.sort(key=lambda each: -each[0])
         asked = [each for each in asked if each[0] > asked[0][0] - ALIKE][:MOST_NAMED]
-        sure = [each for each in asked if clearly(problem, u, each[3], mine, count * len(groups)) is not None]
+        errors = driven_errors(problem, u, FEW) if asked else np.zeros((0, 0))
+        sure = []
+        for each in asked:
+            answer = asked_for(r, J, each[3], mine, layout, errors=errors if errors.size else None)
+            if answer is not None and answer.chance < LEVEL / (len(tried) * len(groups)):
+                sure.append(each)
         if sure:
             words = tuple(_off(one, more, problem, group) for _, more, one, _ in sure)
-            steps = tuple(-inverse @ (q.T @ (more * column)) for _, more, _, column in sure)
+            steps = tuple((-inverse @ (q.T @ (more * column)))[:count] for _, more, _, column in sure)
             found.append(Wrong(tuple(group), words, steps, sure[0][0]))
     return found
+
+
+def _possible(one: Told, more: float) -> bool:
+    """Whether an error of this size can be: small enough for first order, and of what is missing no less than none."""
+    if one.missing is not None:
+        return more > 0.0 or one.signed
+    return abs(more) < FARTHEST.get("" if one.relative else one.unit, np.inf)
 
 
 def doubts_of(problem: FitProblem, u: Array, judged: Identifiability, wrong: Sequence[Wrong]) -> dict[str, str]:

@@ -17,6 +17,7 @@ from ..doubts.contradictions import between_parts, doubtful, elsewhere, held_out
 from ..doubts.driven_noise import driven_doubts
 from ..doubts.floors import at_floor_of_sweeps
 from ..doubts.given import check_given, half_widths, premises
+from ..doubts.implausible import implausible
 from ..doubts.leave_one_out import MEANING, companions, each_left_out
 from ..doubts.losses import loss_doubts
 from ..doubts.misread import misread
@@ -247,7 +248,7 @@ def fit(
             if not lost:
                 doubted, drawn_off = driven_doubts(at.problem, at.u, judged)
                 doubted += loss_doubts(at.problem, at.u, judged)
-                wrong = wrong_given(at.problem, at.u, told)
+                wrong = wrong_given(at.problem, at.u, told, refinement)
                 doubted += wrong_given_warnings(at.problem, wrong)
                 lacking = (
                     doubts_of(at.problem, at.u, judged, wrong),
@@ -275,14 +276,17 @@ def fit(
         Elsewhere(m.cost - best.cost, problem.parameters.to_physical(m.u), "another start") for m in ends[1:]
     ]
     stopped, ahead = unfinished(problem, best, judged)
+    missed = unexplained(problem, comparisons, judged.autocorrelation_time, at.u)
     contradicted = (
         held_out_motion(problem, comparisons, errors)
         | elsewhere(problem, judged, best.cost, [*starts_elsewhere, *end.lower])
         | end.parts
-        | unexplained(problem, comparisons, judged.autocorrelation_time, at.u)
+        | missed
         | stopped
     )
-    estimates, limit = at_the_limit(doubtful(judged.estimates, contradicted), at.refits, problem.parameters, at.u)
+    estimates, limit = at_the_limit(
+        doubtful(judged.estimates, contradicted, missed), at.refits, problem.parameters, at.u
+    )
     values = end.values | problem.parameters.to_physical(limit)
     errors = told_clocks(errors, end.experiments, end.values, estimates)
     shifted = tuple(outside(end.experiments, end.values))
@@ -329,7 +333,7 @@ def fit(
         + at.warnings
         + shifted
         + fallback
-        + (() if interrupted else misread(problem, best.u)),
+        + (() if interrupted else misread(problem, best.u) + implausible(problem)),
     )
     return Fit(result, tuple(comparisons), wanted, corrected, end.values)
 
