@@ -1,8 +1,8 @@
 """A rope that swings in a plane below a moving pivot, in the angles of its links: another simulator than sheetbend's.
 
 n rigid links of length l = L/n turn against each other by elastic, damped joints. Masses and drag are lumped at the
-nodes. With A_ij = l^2 (mass beyond links i and j), B_i = l (mass beyond i), a the pivot's acceleration, e_i = (cos, sin)
-of angle i from straight down:
+nodes. With A_ij = l^2 (mass beyond links i and j), B_i = l (mass beyond i), a the acceleration of the pivot, e_i =
+(cos, sin) of angle i from straight down:
 
     sum_j A_ij [cos(t_i - t_j) t_j'' + sin(t_i - t_j) t_j'^2] = -B_i [a_x cos t_i + (a_z + g) sin t_i]
                                                         + bending_i - sum over nodes k beyond i of l drag_k v_k . e_i
