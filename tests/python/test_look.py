@@ -12,7 +12,9 @@ import pytest
 import sheetbend as sb
 import takes
 from commands import last_line, run
+from oracles.cable import swinging_rope
 from pytest import approx
+from scipy.interpolate import CubicSpline
 from sheetbend import config
 from sheetbend.look.seen import seen
 from sheetbend.look.sheet import flattened
@@ -318,6 +320,34 @@ def test_a_draft_of_the_beam_predicts_what_the_shipped_configuration_does(tmp_pa
     fit = fitted(tmp_path, "beam/data/beam_gravity_b.npz", "--density", "0.963", "--length", "0.1")
     assert fit["beam_EI"].value == approx(0.0183, rel=0.05)  # of the shipped configuration
     assert fit.recordings[0].held_out < 0.14e-3
+
+
+@pytest.mark.slow
+def test_a_rope_of_another_simulator_in_two_commands(tmp_path: Path) -> None:
+    """One marker in the hand, 0.5 mm of noise. The other simulator has the angles of rigid links and an implicit
+    Runge-Kutta method; for 2 s it is within 0.1 mm of sheetbend's motion with the same numbers."""
+    times = np.arange(301) / takes.RATE
+    fine = np.arange(0.0, times[-1] + 0.01, 2e-3)
+    since = np.maximum(fine - 0.3, 0.0)
+    ease = 1.0 - np.exp(-((since / 0.3) ** 2))
+    place = np.stack([0.12 * np.sin(5.0 * since), 0.06 * np.sin(4.1 * since)], axis=1)
+    hand = CubicSpline(fine, ease[:, None] * place)
+    pivot = (hand, hand.derivative(), hand.derivative(2))
+    x = swinging_rope(times, pivot, takes.LENGTH, 24, takes.DENSITY, takes.EI, takes.DAMPING, takes.DRAG)[:, ::3]
+    markers = np.stack([x[..., 0], np.zeros(x.shape[:2]), x[..., 1]], axis=2)
+    take = sb.Recording(takes.noisy(markers, 0), times, name="take")
+    _, text = drafted(tmp_path, take, "--density", str(takes.DENSITY))
+    (tmp_path / "draft.toml").write_text(text + '\n[output]\nfigures = "none"\n')
+    result = run("fit", tmp_path / "draft.toml", "--output", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    fit = sb.FitResult.load(tmp_path / "out/fit.json")
+    for name, true in {"rope_EI": takes.EI, "rope_bend_damping": takes.DAMPING, "rope_drag_linear": takes.DRAG}.items():
+        found = fit[name]
+        half = 0.5 * (found.upper - found.lower)
+        assert found.verdict in ("identified", "weak") and abs(found.value - true) < 1.25 * half, name
+    assert fit["rope_EI"].verdict == "identified"
+    (part,) = fit.recordings
+    assert part.held_out < 1.5 * np.sqrt(3) * takes.NOISE  # 1.45 measured, without physics 340
 
 
 @pytest.mark.slow

@@ -33,7 +33,7 @@ MESH = "mesh"
 
 @dataclass(frozen=True)
 class Refinement:
-    """How to refine.
+    """How a fit is repeated on a finer time step and mesh.
 
     Attributes:
         halve_step: move the estimate to the limit of short substeps, and count what that leaves open.
