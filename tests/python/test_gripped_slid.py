@@ -75,7 +75,7 @@ def test_an_elastic_rope_remembers_nothing() -> None:
 
 
 def test_too_few_frames_tell_nothing() -> None:
-    short = replace(MODEL, slid_modes=MODES, smoothing=0.015)
+    short = replace(MODEL, slid_modes=MODES, smoothing=0.03)
     assert set(slid(short, recorded(HISTORY), 0.0, {}).values()) == {0.0}
 
 

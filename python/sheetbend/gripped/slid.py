@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..arrays.smoothing import FEWEST
 from ..experiment.experiment import Experiment, Window
 from ..minimum.problem import FitProblem
 from ..quantities.parameters import Parameter, Parameters
@@ -23,7 +24,7 @@ from .motion import Array, GrippedMotion
 MODES = tuple(range(6))
 LARGEST = 4.0  # standard deviation of mode 0, in yield curvatures: a joint that has slid too far slides back at once
 FIRST = 0.5  # the same, before the frames were seen
-STEPS, ROUNDS = 4, 30  # of the sets, and of their size in each
+STEPS, ROUNDS = 4, 30  # to what had slid, and to its size in each
 LEAST_NOISE = 1e-4  # m, of a marker
 # The speed at a start comes from the same frames. Its error moves a marker by up to twice the noise there, in all of
 # the some nine frames alike.
@@ -46,10 +47,10 @@ def window_of(
 
 
 def slid(model: RopeModel, motion: GrippedMotion, first: float, values: Mapping[str, float]) -> dict[str, float]:
-    """The most likely sets of a rope, 1/m, by quantity; zero where the first frames do not tell.
+    """The most likely curvatures by which a rope had slid, 1/m, by quantity; zero where the first frames do not tell.
 
     Args:
-        model: with set modes.
+        model: with slid modes.
         first: s, where the motion starts; the frames are those of the `smoothing` s from there on.
         values: of the rope's quantities.
     """
@@ -57,7 +58,7 @@ def slid(model: RopeModel, motion: GrippedMotion, first: float, values: Mapping[
     assert yields is not None
     nothing = {f"{NAME}_slid_{axis}_{k}": 0.0 for k in model.slid_modes for axis in (1, 2)}
     until, times = first + model.smoothing, motion.recording.times
-    if ((times >= first - 1e-9) & (times <= until + 1e-9)).sum() < 3:
+    if ((times >= first - 1e-9) & (times <= until + 1e-9)).sum() < FEWEST:
         return nothing
     e = replace(model.experiment(motion, (first, until)), sigma=OFF * noise(motion.recording.positions))
     free = [Parameter(name=name, initial=0.0, scale=1.0, unit="1/m") for name in nothing]
