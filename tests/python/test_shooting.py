@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 import sheetbend as sb
 from sheetbend.experiment.cut import borders
-from sheetbend.experiment.shooting import Shooting
 from sheetbend.minimum.continuity import with_window
+from sheetbend.minimum.journal import Journal
 from sheetbend.minimum.lifted import Lifted
 from sheetbend.minimum.problem import FitProblem, as_parameters
 from sheetbend.statistics.chain import Chain, Gap, Window
@@ -33,7 +34,8 @@ def swing(stop: float = 2.0, kicks: float = 0.0, seed: int = 0, **fields: object
     blank = sb.Recording(np.zeros((len(times), 1, 3)), times, markers=("m",), name="swing")
     markers = {"m": arm.place(0.2)}
     plain = sb.Experiment(scene=scene, recording=blank, markers=markers, solver=sb.Solver(h=1 / 400), axes="xz")
-    problem = FitProblem([plain], as_parameters(list(WANTED), [plain]))
+    truth = replace(plain, solver=sb.Solver(h=1 / 3200))
+    problem = FitProblem([truth], as_parameters(list(WANTED), [truth]))
     u, x, begun = problem.parameters.initial(), np.zeros((len(times), 1, 3)), 0
     for stop_at in [*range(10, len(times), 10), len(times)] if kicks else [len(times)]:
         x[begun:stop_at] = problem.simulate(u)[0][: stop_at - begun]
@@ -50,7 +52,7 @@ def swing(stop: float = 2.0, kicks: float = 0.0, seed: int = 0, **fields: object
 
 def cut(e: sb.Experiment, loss: float) -> FitProblem:
     """The problem of an experiment in windows of 0.4 s with states off the best ones."""
-    e = with_window(replace(e, shooting=Shooting(0.4, loss)))
+    e = with_window(replace(e, shooting=sb.Shooting(0.4, loss)))
     states = tuple((1.0 + 0.1 * k, -0.3 * k) for k in range(1, len(borders(e)) - 1))
     e = replace(e, shooting=replace(e.shooting, states=states))  # type: ignore[type-var]
     return FitProblem([e], as_parameters(list(WANTED), [e]))
@@ -126,7 +128,7 @@ def test_hard_continuity_gives_the_estimate_and_the_intervals_of_one_run() -> No
     wanted = list(WANTED)
     plain = sb.fit(e, parameters=wanted, refine=False, beginnings=False, profiles=False)
     shot = sb.fit(
-        replace(e, shooting=Shooting(0.4, 1e-6)), parameters=wanted, refine=False, beginnings=False, profiles=False
+        replace(e, shooting=sb.Shooting(0.4, 1e-6)), parameters=wanted, refine=False, beginnings=False, profiles=False
     )
     for name in wanted:
         a, b = plain[name], shot[name]
@@ -138,3 +140,66 @@ def test_hard_continuity_gives_the_estimate_and_the_intervals_of_one_run() -> No
     assert shot.result.recordings[0].rms == pytest.approx(plain.result.recordings[0].rms, rel=1e-4)
     (motion,) = shot.result.shot
     assert motion.windows == 5 and motion.upper is None and motion.gap < 1e-6
+
+
+def test_kicks_that_the_model_does_not_know_are_what_it_loses() -> None:
+    kicked, options = swing(kicks=0.3, seed=1), {"refine": False, "beginnings": False, "profiles": False}
+    soft = sb.fit(replace(kicked, shooting=0.4), parameters=list(WANTED), **options)  # type: ignore[arg-type]
+    hard = sb.fit(replace(kicked, shooting=sb.Shooting(0.4, 1e-6)), parameters=list(WANTED), **options)  # type: ignore[arg-type]
+    (lost,) = soft.result.shot
+    assert lost.lower is not None and lost.upper is not None and lost.upper < 4 * lost.loss
+    assert 0.005 < lost.lower < lost.loss < lost.upper  # two kicks of 0.3 rad/s in a window, at 0.15 m, times 0.2 s
+    assert lost.lower < lost.gap / lost.length < lost.upper
+    e = soft["arm_hinge_viscosity"]
+    assert e.lower is not None and e.upper is not None and e.lower < 2e-4 < e.upper
+    assert hard.result.recordings[0].rms > 3 * soft.result.recordings[0].rms  # type: ignore[operator]
+
+
+def test_a_motion_that_loses_nothing_says_so_in_every_result(tmp_path: Path) -> None:
+    e = swing(fit=(0.0, 1.6), held_out=(1.6, 2.0), shooting=0.4)
+    found = sb.fit(e, parameters=list(WANTED))
+    (lost,) = found.result.shot
+    assert (lost.windows, lost.numbers) == (4, 2)
+    assert lost.lower == 0.0 and lost.upper is not None and lost.upper < 2e-3
+    held = found.result.recordings[0].held_out
+    assert held is not None and held < 1.6 * NOISE  # noise in two coordinates is 1.41 times that of one
+    for name, truth in zip(WANTED, (0.003, 2e-4, 1.0, 0.5), strict=True):
+        assert found[name].verdict in ("identified", "weak")
+        assert found[name].lower < truth < found[name].upper, name  # type: ignore[operator]
+    assert "6 numbers of states at borders" in found.report() and "less than" in found.report()
+    found.save(tmp_path / "fit.json")
+    assert sb.FitResult.load(tmp_path / "fit.json").shot == found.result.shot
+
+
+def test_a_journal_brings_back_the_states_too(tmp_path: Path) -> None:
+    points = [np.array([np.log(0.0032) + d, np.log(1.5e-4), 1.0, 0.5]) for d in (0.0, 1e-3, -1e-3)]
+    onward = points[0] + 2e-3
+    problem = cut(swing(), 1e-3)
+    alone = [problem.evaluate(u) for u in (*points, onward)]
+    with Journal(tmp_path / "journal"):
+        problem = cut(swing(), 1e-3)
+        for u in points:
+            problem.evaluate(u)
+    with Journal(tmp_path / "journal") as journal:
+        problem = cut(swing(), 1e-3)
+        resumed = [problem.evaluate(u) for u in (*points, onward)]
+        assert (journal.read, journal.made) == (len(points), 1)
+    for (_, r, J), (_, s, K) in zip(alone, resumed, strict=True):
+        assert np.array_equal(r, s) and np.array_equal(J, K)
+
+
+def test_windows_are_refused_where_they_cannot_be() -> None:
+    rope = sb.rope(0.6, 6, density=0.05, EI=1e-3, clamp_start=(1, 0, 0))
+    times = np.arange(20) / 50
+    recording = sb.Recording(np.zeros((20, 7, 3)) + np.arange(20)[:, None, None] / 20, times)
+    with pytest.raises(sb.InputError, match="needs quantities that set how the scene starts"):
+        sb.fit(sb.Experiment(scene=rope, recording=recording, shooting=0.2), parameters=["rope_EI"])
+    with pytest.raises(sb.InputError, match="is short for these frames"):
+        with_window(replace(swing(), shooting=0.05))
+    with pytest.raises(sb.InputError, match="does not go with"):
+        replace(swing(), shooting=0.4, static=True)
+    with pytest.raises(sb.InputError, match="must be a length"):
+        replace(swing(), shooting=-1.0)
+    many = [replace(swing(), name=f"swing {k}", shooting=0.4) for k in range(20)]
+    with pytest.raises(sb.InputError, match="does not go with many recordings"):
+        sb.fit_many(many, list(WANTED)[:2])
