@@ -198,7 +198,7 @@ class Experiment:
     @cached_property
     def places(self) -> tuple[Place | None, ...]:
         """The markers' places, None where not compared."""
-        return places_for(self.scene, self.markers, self.recording.markers)
+        return places_for(self.scene, self.markers, self.recording.markers, self.recording.positions)
 
     @property
     def compared_places(self) -> list[Place]:
