@@ -22,6 +22,7 @@ from .errors import (
 from .experiment.experiment import Experiment
 from .experiment.force_readings import simulate_forces
 from .experiment.force_sensor import ForceSensor
+from .experiment.shooting import Shooting
 from .fitting.fit import Fit, fit
 from .fitting.identify import identify
 from .fitting.many import fit_many
@@ -136,6 +137,7 @@ __all__ = [
     "Score",
     "Scores",
     "SheetbendError",
+    "Shooting",
     "Solid",
     "SolidMesh",
     "Solver",

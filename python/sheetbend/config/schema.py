@@ -146,6 +146,12 @@ class RecordingSection(Section):
     )
     loss: Literal["squares", "soft_l1", "huber"] = key("squares", "robust loss")
     loss_scale: Finite = key(1.0, "where the robust loss sets in, in units of sigma", gt=0)
+    shooting: Finite | Literal["auto"] | None = key(
+        None,
+        'cut the motion into windows of this length, or "auto": their states at the start are found along with the '
+        "parameters, so that a chaotic motion can be fitted; the report says what the model loses per second",
+        "s",
+    )
     marker: list[Marker] = key([], "places of this recording's markers; those of [[marker]] when left out")
     grids: dict[Name, MarkerGrid] = key({}, "by cloth, markers on a grid in this recording, instead of the cloth's own")
     offsets: dict[str, list[str]] = key(

@@ -35,6 +35,7 @@ from ..doubts.wrong_given import warnings_of as wrong_given_warnings
 from ..errors import InputError
 from ..experiment.clock import outside, told_clocks
 from ..experiment.experiment import Experiment
+from ..minimum.continuity import joined, shot_motions
 from ..minimum.counts import counted
 from ..minimum.discretization import Refinement, settled, to_the_limit, wanted_refinement
 from ..minimum.fine_meshes import at_the_limit
@@ -202,7 +203,9 @@ def fit(
     if leave_one_out:
         for e in fitted:
             companions(e, fitted, wanted)
-    problem = FitProblem(fitted, wanted, threads=threads)
+    experiments, found_at = joined(experiments, wanted, threads, progress)
+    fitted = [e for e in experiments if e.predict is None]
+    problem = FitProblem(fitted, wanted, threads=threads, expanded=found_at)
     problem.check_start()
     check_given(given or {}, problem)
     found = search.run(problem)
@@ -323,6 +326,7 @@ def fit(
         forces=tuple(row for c in comparisons for one in c.forces for row in one.fits()),
         growth=growth_rows(found.growths, grown),
         contacts=what_touches(at.problem, at.u),
+        shot=shot_motions(problem, best.u),
         kinks=() if interrupted else kinks(at.problem, at.u, estimates),
         windows=best.windows,
         evaluations=evaluations,

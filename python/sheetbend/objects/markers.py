@@ -144,23 +144,43 @@ def on_solid(solid: Solid, points: ArrayLike) -> tuple[Place, ...]:
 
 
 def places_for(
-    scene: Scene, markers: Mapping[str, Place] | Sequence[Place | None] | None, names: Sequence[str]
+    scene: Scene,
+    markers: Mapping[str, Place] | Sequence[Place | None] | None,
+    names: Sequence[str],
+    positions: np.ndarray | None = None,
 ) -> tuple[Place | None, ...]:
     """One place per marker of a recording, None for markers that are not compared.
 
     Args:
-        markers: by marker name, in the recording's order, or None: equally spaced along the only rope.
+        markers: by marker name, in the recording's order, or None: equally spaced along the only rope, or where the
+            recording shows every particle of the scene, its clamps' ghosts among them, on these.
+        positions: (frames, markers, 3) m, what was recorded.
 
     Raises:
         SceneError: unknown names, a wrong number, particles that do not exist, or no rope (or several) to spread
             markers along.
     """
+    if markers is None and positions is not None and _shows_particles(scene, positions):
+        markers = [on_particle(p) for p in range(scene.particle_count)]
     places = _places_for(scene, markers, names)
     for name, place in zip(names, places, strict=True):
         if place is not None and not all(0 <= p < scene.particle_count for p in place.particles):
             fix = f"use particles 0 to {scene.particle_count - 1}"
             raise SceneError("markers", f"put '{name}' on particles that do not exist", place.particles, fix)
     return places
+
+
+def _shows_particles(scene: Scene, positions: np.ndarray) -> bool:
+    """Whether a recording has as many markers as the scene with one clamped rope has particles, and that of each ghost
+    beside the rope's end that it belongs to: a marker that far along the rope would be a rope's length away."""
+    if len(scene.ropes) != 1 or positions.shape[1] != scene.particle_count:
+        return False
+    (rope,) = scene.ropes.values()
+    first, last = rope.particles[0], rope.particles[-1]
+    ghosts = [(g, end) for g, end in ((rope.start_ghost, first), (rope.end_ghost, last)) if g is not None]
+    near = np.diff(rope.arc_length).min() / 2
+    away = [np.linalg.norm(positions[:, ghost] - positions[:, end], axis=1) for ghost, end in ghosts]
+    return bool(ghosts) and all(np.isfinite(d).any() and np.nanmedian(d) < near for d in away)
 
 
 def _places_for(
