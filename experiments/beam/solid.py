@@ -10,7 +10,7 @@ import numpy as np
 import sheetbend as sb
 from scipy.fft import rfft
 from sheetbend.config import load
-from sheetbend.quantities.quantities import product, Term
+from sheetbend.quantities.quantities import Term, product
 
 CONFIG = Path(__file__).with_name("beam.toml")
 SIDE, DENSITY, POISSON = 0.03, 1070.0, 0.499  # m, kg/m^3; silicone
