@@ -79,7 +79,9 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         notes.append("it hangs askew, and hardly moves: a wind blows, or another axis points up")
     unknown = [
         "what holds the cloth: the whole upper edge is taken. Change the set, or give a grip with the holder's markers",
-        "the edges of the fabric and which way its warp runs: measure them and correct mesh, origin and markers",
+        "the size of the flat fabric: distances are taken as it hangs, stretched by its weight and the air. If that is "
+        "1 %, the lowest markers are off by 1 % of the height, and the fitted tension is too stiff. Measure the edges "
+        "and the markers on the flat cloth, and which way its warp runs, and correct mesh, origin and markers",
         "the stiffness in tension: a cloth that hangs hardly shows it. warp and shear are kept, not fitted"
         if sheet.wind is None
         else "the stiffness in tension at the start: warp and shear begin at a guess, and the wind's pull shows them",
