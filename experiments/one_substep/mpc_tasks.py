@@ -40,7 +40,7 @@ class Rope:
         return self.stepper.start(), torch.zeros(2, 3, dtype=torch.float64)
 
     def first_plan(self, knots: int) -> Tensor:
-        """To and fro: the gradient of a rope that hangs straight down has no component that leaves the vertical."""
+        """Back and forth: the gradient of a rope that hangs straight down has no component that leaves the vertical."""
         plan = torch.zeros(knots, 3, dtype=torch.float64)
         plan[:, 0] = torch.tensor([0.3, 0.0, -0.3, 0.0, 0.3])
         return plan

@@ -61,34 +61,37 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     if len(own) < WHOLE * len(names):
         raise RecordingError(
             "markers",
-            f"do not hang together as one sheet: {len(own)} of them do, the others are on grips or on further cloths",
+            f"do not hang together as one sheet: {len(own)} of them do, the others are on grips or on other cloths",
             joined(names),
             "give a recording with the markers of one cloth and of what holds it, or write the configuration by hand",
         )
     sheet = _looked_at(s, own, density)
     apart = spacing(s.apart[np.ix_(own, own)])
-    edge = "moves: it is taken for what holds the cloth"
+    edge = "moves: it is taken as what holds the cloth"
     if sheet.pinned:
-        edge = "hardly moves: the edge above it is held"
+        edge = "hardly moves: the edge above it is taken as held"
     notes = [
         f"{len(own)} markers lie on a sheet, some {1e3 * apart:.3g} mm apart: a cloth of {sheet.width:.3g} x "
         f"{sheet.height:.3g} m with half of that beyond the outer ones",
         f"the upper row of markers, {joined(names[k] for k in sheet.row)}, {edge}",
     ]
     if sheet.wind is not None:
-        notes.append("it hangs askew, and hardly moves: a wind blows, or another axis points up")
+        notes.append("it hangs at a slant and hardly moves: a wind blows, or another axis points up")
     unknown = [
         "what holds the cloth: the whole upper edge is taken. Change the set, or give a grip with the holder's markers",
-        "the edges of the fabric and which way its warp runs: measure them and correct mesh, origin and markers",
-        "the stiffness in tension: a cloth that hangs hardly shows it. warp and shear are kept, not fitted"
+        "the size of the flat fabric: distances are taken as it hangs, stretched by its weight and the air. If that is "
+        "1 %, the lowest markers are off by 1 % of the height, and the fitted tension is too stiff. Measure the edges "
+        "and the markers on the flat cloth, and which way its warp runs, and correct mesh, origin and markers",
+        "the stiffness in tension: a hanging cloth hardly shows it. warp and shear are not fitted"
         if sheet.wind is None
         else "the stiffness in tension at the start: warp and shear begin at a guess, and the wind's pull shows them",
         "the wind: the air is taken to stand still, and `air_tangential`, its friction along the cloth, is a guess"
         if sheet.wind is None
-        else "how strongly the air acts at the start: `air_normal` begins as that of a plate; a steady wind tells it "
-        "only together with the wind's speed",
-        "the density"
-        + (": 0.2 kg/m^2 is taken, and all else goes with it" if measured.density is None else " of the markers"),
+        else "how strongly the air acts at the start: `air_normal` begins with the value of a plate; a steady wind "
+        "shows it only together with the wind's speed",
+        "the density: 0.2 kg/m^2 is assumed, and all other values are proportional to it"
+        if measured.density is None
+        else "the mass of the markers",
     ]
     if not sheet.pinned:
         unknown.append(
@@ -98,7 +101,7 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         )
     others = [k for k in range(len(names)) if k not in set(own)]
     if others:
-        unknown.append(f"what {joined(names[k] for k in others)} are on: they are left out")
+        unknown.append(f"what {joined(names[k] for k in others)} are attached to: they are left out")
     return Description("a cloth" + (" at rest" if s.static else ""), notes, unknown, _lines(takes, sheet, density))
 
 
