@@ -156,9 +156,11 @@ class SolidRows:
         stiff = ((self.tau, "identity"), (self.E, "identity"))
         if damped:
             terms.append(Term("damping", at, volume, (*stiff, (self.nu, "over_one_plus"))))
-        whole = self.mesh.volumes[self.kept]
+        fill = np.asarray(self.mesh.fill)[self.kept]
+        rest = self.mesh.volumes[self.kept] / fill
         kind, name = VOLUME[self.mesh.elements.shape[1]], f"{self.name}_volume"
-        at = self._group(kind, name, self.nodes, damped, whole)
+        at = self._group(kind, name, self.nodes, damped, rest)
+        whole = rest / fill
         terms += [
             Term("compliance", at, whole, (E, (self.nu, "inverse"))),
             Term("compliance", at, -whole, (E,)),
