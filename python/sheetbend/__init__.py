@@ -55,6 +55,7 @@ from .objects.rod import Rod, add_rod, rod
 from .objects.rod_junction import Junction
 from .objects.rope import Rope, add_rope, rope
 from .objects.solid import Solid, add_solid, solid
+from .objects.solid_rows import Orthotropic
 from .objects.tethers import add_tethers
 from .objects.tool import Tool
 from .page.notebook import show_in_notebooks
@@ -120,6 +121,7 @@ __all__ = [
     "LockingWarning",
     "MeshError",
     "NoEquilibriumError",
+    "Orthotropic",
     "Parameter",
     "Parameters",
     "Place",

@@ -114,3 +114,31 @@ def test_tetrahedra_are_told_by_how_much_they_lock():
     assert locking(mesh, 0.3, held) == approx(1.32, rel=0.01)
     with pytest.warns(sb.LockingWarning, match="6.1 times too stiff"):
         sb.solid(mesh, density=1070.0, E=2.64e5, poisson=0.499, pinned=mesh.sets["x_min"])
+
+
+def test_bricks_carry_a_surface():
+    """A ball: its volume by the shares, places for all vertices, and its law's energy in that volume."""
+    ball = sb.mesh.icosphere(0.05, 3)
+    mesh = sb.mesh.bricks_around(ball, 0.0125)
+    corners = ball.vertices[ball.triangles]
+    inside = np.linalg.det(corners).sum() / 6
+    assert mesh.volumes.sum() == approx(inside, rel=0.02)
+    assert mesh.fill.min() > 0 and mesh.fill.max() == 1.0
+    solid = sb.solid(mesh, density=1000.0, E=1e5, poisson=0.3).solids["solid"]
+    places = sb.on_solid(solid, ball.vertices)
+    found = np.array([np.asarray(p.weights) @ mesh.vertices[list(p.particles)] for p in places])
+    assert found == approx(ball.vertices, abs=1e-9)
+    scene = sb.solid(mesh, density=1000.0, E=1e5, poisson=0.3)
+    stored = sum(float(e.sum()) for e in sb.elastic_energy(scene, mesh.vertices * [1.1, 1.0, 1.0]).values())
+    strain, mu, lam = (1.1**2 - 1) / 2, 1e5 / 2.6, 1e5 * 0.3 / (1.3 * 0.4)
+    assert stored == approx((mu * strain**2 + lam * 0.1**2 / 2) * mesh.volumes.sum(), rel=1e-9)
+    box = sb.mesh.bricks(BOX, (3, 2, 1)).surface[0]
+    around = sb.mesh.bricks_around(box, 0.01)
+    assert len(around.elements) == 60 and (around.fill == 1.0).all()
+    with pytest.raises(sb.MeshError, match="inside out"):
+        sb.mesh.bricks_around(
+            sb.TriangleMesh(box.vertices, box.triangles[:, ::-1], box.corners[:, [0, 2, 1]] * [1, -1]), 0.01
+        )
+    opened = sb.mesh.grid(0.1, 0.1, 2, 2)
+    with pytest.raises(sb.MeshError, match="not closed"):
+        sb.mesh.bricks_around(opened, 0.01)

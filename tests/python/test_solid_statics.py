@@ -159,3 +159,84 @@ def test_a_beam_converges_to_timoshenkos(nu, two, limit):
     coarse, fine = deflection(2, nu), deflection(3, nu)
     assert coarse == approx(two, abs=2e-3)
     assert (9 * fine - 4 * coarse) / 5 == approx(limit, abs=0.015)
+
+
+WOOD = sb.Orthotropic(E=(1e5, 4e4, 2e4), G=(1.5e4, 2.2e4, 3e4), poisson=(0.2, 0.1, 0.3))
+
+
+def turned(rotation: np.ndarray) -> tuple[sb.Scene, sb.Solid]:
+    law = sb.Orthotropic(WOOD.E, WOOD.G, WOOD.poisson, axes=rotation)
+    scene = sb.Scene("block", gravity=(0, 0, 0))
+    return scene, sb.add_solid(scene, sb.mesh.bricks((SIDE,) * 3, (2, 1, 1)), density=1e3, orthotropic=law)
+
+
+def energy_of(scene: sb.Scene, x: np.ndarray) -> float:
+    return sum(float(e.sum()) for e in sb.elastic_energy(scene, x).values()) / SIDE**3
+
+
+@pytest.mark.parametrize("seed", [None, 4])
+def test_an_orthotropic_block(seed):
+    """Pulled along its axis i by a Green strain e it stores E_i e^2/2 where it narrows by nu_ij e, and this is least;
+    sheared between i and j by 2 e_ij it stores G_ij (2 e_ij)^2/2. In whatever direction its axes lie."""
+    rotation = np.eye(3)
+    if seed is not None:
+        rotation = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))[0]
+    scene, cube = turned(rotation)
+
+    def energy(strain: np.ndarray) -> float:
+        w, v = np.linalg.eigh(np.eye(3) + 2 * strain)
+        F = rotation @ (v * np.sqrt(w)) @ v.T @ rotation.T
+        return energy_of(scene, cube.mesh.vertices @ F.T)
+
+    couplings = {(0, 1): 0.2, (0, 2): 0.1, (1, 2): 0.3}
+    for i in range(3):
+        strain = np.zeros((3, 3))
+        strain[i, i] = 0.1
+        for j in range(3):
+            if j != i:
+                strain[j, j] = -0.1 * couplings[min(i, j), max(i, j)] * np.sqrt(WOOD.E[i] / WOOD.E[j])
+        assert energy(strain) == approx(WOOD.E[i] * 0.1**2 / 2, rel=1e-10)
+        for j in range(3):
+            if j != i:
+                change = np.zeros((3, 3))
+                change[j, j] = 1e-3
+                assert energy(strain + change) > energy(strain) and energy(strain - change) > energy(strain)
+    for (i, j), G in zip(((1, 2), (0, 2), (0, 1)), WOOD.G, strict=True):
+        strain = np.zeros((3, 3))
+        strain[i, j] = strain[j, i] = 0.05
+        assert energy(strain) == approx(G * 0.1**2 / 2, rel=1e-10)
+
+
+def test_an_isotropic_block_is_an_orthotropic_one():
+    x = np.random.default_rng(0).uniform(-0.01, 0.01, (12, 3))
+    law = sb.Orthotropic((E,) * 3, (MU,) * 3, (NU,) * 3)
+    mesh = sb.mesh.bricks((SIDE,) * 3, (2, 1, 1))
+    energies = []
+    for numbers in ({"orthotropic": law}, {"E": E, "poisson": NU, "volume_row": False}):
+        scene = sb.Scene("block", gravity=(0, 0, 0))
+        cube = sb.add_solid(scene, mesh, density=1e3, **numbers)
+        energies.append(energy_of(scene, cube.mesh.vertices + x))
+    assert energies[0] == approx(energies[1], rel=1e-12)
+
+
+def test_gradients_of_an_orthotropic_block():
+    mesh = sb.mesh.bricks((0.04, 0.02, 0.02), (2, 1, 1))
+    scene = sb.solid(mesh, density=1e3, orthotropic=WOOD, damping=2e-3, pinned=mesh.sets["x_min"])
+    found = sb.check_gradients(scene, [0.0, 0.006], sb.Solver(h=2e-3, method="newton"), samples=2)
+    assert all(row.passed for row in found.rows), str(found)
+    assert {"solid_E_2", "solid_G_13", "solid_poisson_23"} <= {row.name for row in found.rows}
+
+
+def test_orthotropic_refusals():
+    for numbers, match in (
+        ({"E": (1e5, 1e5, 0.0)}, "positive"),
+        ({"poisson": (0.7, 0.7, 0.7)}, "stable"),
+        ({"axes": 2 * np.eye(3)}, "perpendicular"),
+    ):
+        with pytest.raises(sb.SceneError, match=match):
+            sb.Orthotropic(**{"E": WOOD.E, "G": WOOD.G, **numbers})
+    mesh = sb.mesh.bricks((SIDE,) * 3, (1, 1, 1))
+    with pytest.raises(sb.SceneError, match="beside"):
+        sb.solid(mesh, density=1e3, E=E, orthotropic=WOOD)
+    with pytest.raises(sb.SceneError, match="missing"):
+        sb.solid(mesh, density=1e3, E=E)

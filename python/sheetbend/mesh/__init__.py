@@ -10,6 +10,7 @@ from .grids import equilateral, grid
 from .locality import renumbered
 from .places import Places
 from .shapes import disk, icosphere
+from .solid_around import bricks_around
 from .solid_files import read_solid
 from .solid_mesh import SolidMesh, SolidPlaces, bricks, tetrahedra
 from .triangle_mesh import TriangleMesh
@@ -21,6 +22,7 @@ __all__ = [
     "SolidPlaces",
     "TriangleMesh",
     "bricks",
+    "bricks_around",
     "disk",
     "equilateral",
     "grid",

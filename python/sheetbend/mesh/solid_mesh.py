@@ -56,6 +56,7 @@ class SolidMesh:
         vertices: (n, 3) m.
         elements: (m, 8) or (m, 4) vertex indices, numbered as in VTK and Gmsh.
         sets: vertices by name.
+        fill: (m,) the share of each element that is material, above 0 and at most 1; all of it by default.
 
     Raises:
         MeshError: a wrong shape, an index out of range, a vertex without an element, an element without volume or
@@ -65,15 +66,20 @@ class SolidMesh:
     vertices: Array
     elements: Indices
     sets: Mapping[str, Indices] = field(default_factory=dict)
+    fill: Array | None = None
 
     def __post_init__(self) -> None:
         vertices = validate.rows("vertices", self.vertices, 3)
         elements = _checked_elements(self.elements, len(vertices))
         sets = {name: validate.checked_set(name, ids, len(vertices)) for name, ids in self.sets.items()}
-        for array in (vertices, elements, *sets.values()):
+        fill = np.ones(len(elements)) if self.fill is None else finite("fill", self.fill, (len(elements),), MeshError)
+        if not ((fill > 0) & (fill <= 1)).all():
+            raise MeshError("fill", "must be above 0 and at most 1", float(fill.min()), "leave empty elements out")
+        for array in (vertices, elements, fill, *sets.values()):
             array.flags.writeable = False
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "elements", elements)
+        object.__setattr__(self, "fill", fill)
         object.__setattr__(self, "sets", MappingProxyType(sets))
         bad = np.flatnonzero((self.points[1] <= 0).any(axis=1))
         if bad.size:
@@ -85,7 +91,7 @@ class SolidMesh:
         return f"SolidMesh({len(self.vertices)} vertices, {len(self.elements)} {self.shape}, sets {sorted(self.sets)})"
 
     def __reduce__(self) -> tuple[object, ...]:
-        return SolidMesh, (self.vertices, self.elements, dict(self.sets))
+        return SolidMesh, (self.vertices, self.elements, dict(self.sets), self.fill)
 
     @property
     def shape(self) -> str:
@@ -94,13 +100,15 @@ class SolidMesh:
 
     @cached_property
     def points(self) -> tuple[Array, Array, Array]:
-        """At the quadrature points: gradients (m, q, n, 3) 1/m of the shape functions, volumes (m, q) m^3; and the
-        nodes' shares (m, n) m^3 of each element."""
-        return quadrature(self.vertices[self.elements])
+        """At the quadrature points: gradients (m, q, n, 3) 1/m of the shape functions, volumes (m, q) m^3 of material;
+        and the nodes' shares (m, n) m^3 of each element's."""
+        gradients, volumes, shares = quadrature(self.vertices[self.elements])
+        fill = np.asarray(self.fill)[:, None]
+        return gradients, volumes * fill, shares * fill
 
     @cached_property
     def volumes(self) -> Array:
-        """(m,) m^3, of the elements."""
+        """(m,) m^3, of material in the elements."""
         return self.points[1].sum(axis=1)
 
     @cached_property

@@ -69,8 +69,8 @@ def _lowest(mesh: SolidMesh, poisson: float, held: Array, *, linear: bool) -> fl
     rows, columns = np.repeat(dofs, dofs.shape[1], axis=1), np.tile(dofs, dofs.shape[1])
     size = 3 * len(still)
     free = np.flatnonzero(np.repeat(~still, 3))
-    coo = require("scipy.sparse", "fit").coo_matrix
-    whole: Any = coo((K.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)).tocsc()
+    from_parts = require("scipy.sparse", "fit").coo_matrix
+    whole: Any = from_parts((K.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)).tocsc()
     mass = _masses(elements, volume, len(still))
     scale = 1.0 / np.sqrt(np.repeat(mass, 3)[free])
     scaled = whole[free][:, free].multiply(scale[:, None]).multiply(scale[None, :]).tocsc()

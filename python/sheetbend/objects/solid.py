@@ -16,11 +16,8 @@ from ..errors import SceneError
 from ..mesh import SolidMesh, TriangleMesh
 from ..quantities.quantities import Term
 from ..scene.scene import Array, Scene
-from .chain import first_value
 from .locking import LockingWarning, locking
-
-STRAIN = {8: "brick_strain", 4: "tetrahedron_strain"}
-VOLUME = {8: "brick_volume", 4: "tetrahedron_volume"}
+from .solid_rows import Orthotropic, SolidRows
 
 
 @dataclass(frozen=True)
@@ -66,8 +63,6 @@ def solid(
     mesh: SolidMesh,
     *,
     density: float,
-    E: float,
-    poisson: float,
     name: str = "solid",
     gravity: ArrayLike = (0.0, 0.0, -9.81),
     pinned: ArrayLike = (),
@@ -78,7 +73,7 @@ def solid(
     scene = Scene(name, gravity)
     still = indices("solid.pinned", pinned, len(mesh.vertices)) if np.size(pinned) else []
     given = {"held": still, **options}
-    built = add_solid(scene, mesh, name, density=density, E=E, poisson=poisson, **given)  # type: ignore[arg-type]
+    built = add_solid(scene, mesh, name, density=density, **given)  # type: ignore[arg-type]
     if still:
         scene.pin(built.particles[still])
     return scene
@@ -91,15 +86,16 @@ def add_solid(
     *,
     material: str = "",
     density: float,
-    E: float,
-    poisson: float,
+    E: float | None = None,
+    poisson: float | None = None,
+    orthotropic: Orthotropic | None = None,
     damping: float | None = None,
     volume_row: bool | None = None,
     held: ArrayLike = (),
     positions: ArrayLike | None = None,
     velocities: ArrayLike | None = None,
 ) -> Solid:
-    """Add a solid of an isotropic material to a scene. docs/solids.md has the law and its limits.
+    """Add a solid to a scene. docs/solids.md has the law and its limits.
 
     Quantities: `<material>_density` kg/m^3, `<material>_E` Pa, `<material>_poisson`, and where given
     `<material>_damping` s.
@@ -115,6 +111,7 @@ def add_solid(
         density: kg/m^3.
         E: Young's modulus, Pa.
         poisson: Poisson's number, above -1 and below 0.5.
+        orthotropic: a material that differs along three axes, instead of these two; it has no volume row.
         damping: Kelvin-Voigt time constant, s.
         volume_row: one row for the volume of an element, which lets nearly incompressible bricks bend; `poisson` is
             then between 0 and 0.5. Without it the energy has lambda (tr E)^2/2 at the quadrature points instead, and
@@ -129,16 +126,8 @@ def add_solid(
     Raises:
         SceneError: wrong or missing values, or others than those of a solid of the same material before.
     """
-    check_positive(name, {"density": density, "E": E}, {"damping": damping})
-    if not (is_number(poisson) and -1 < poisson < 0.5):
-        fix = "give one above -1 and below 0.5; 0.499 hardly changes its volume"
-        raise SceneError(f"{name}.poisson", "is no Poisson's number of a stable material", poisson, fix)
-    by_row = poisson > 0 if volume_row is None else bool(volume_row)
-    if by_row and poisson <= 0:
-        fix = "give a positive one, or volume_row = False"
-        raise SceneError(f"{name}.poisson", "must be positive with a volume row", poisson, fix)
+    numbers = _checked_numbers(name, density, E, poisson, orthotropic, damping, volume_row)
     material = material or name
-    numbers = {"density": density, "E": E, "poisson": poisson, "damping": damping, "volume_row": by_row}
     _check_material(scene, name, material, numbers)
     count = len(mesh.vertices)
     shape = mesh.vertices if positions is None else finite(f"{name}.positions", positions, (count, 3), SceneError)
@@ -149,14 +138,51 @@ def add_solid(
     if not free.any():
         raise SceneError(f"{name}.held", "are all vertices", count, "leave some free")
     if mesh.elements.shape[1] == 4:
-        _warn_locking(name, mesh, poisson, ~free)
+        _warn_locking(name, mesh, 0.3 if poisson is None else poisson, ~free)
 
     particles = scene.add_particles(shape, 0.0, moving)
     _weigh(scene, mesh, material, particles, density)
-    _Rows(scene, mesh, name, material, particles, free).add(E, poisson, damping, by_row)
+    rows = SolidRows(scene, mesh, name, material, particles, free)
+    if orthotropic is None:
+        rows.add(numbers["E"], numbers["poisson"], damping, numbers["volume_row"])
+    else:
+        rows.add_orthotropic(orthotropic, damping)
     built = Solid(name, mesh, particles, material, numbers)
     scene.solids[name] = built
     return built
+
+
+def _checked_numbers(
+    name: str,
+    density: float,
+    E: float | None,
+    poisson: float | None,
+    orthotropic: Orthotropic | None,
+    damping: float | None,
+    volume_row: bool | None,
+) -> dict[str, Any]:
+    """The numbers of a material, with what follows from them."""
+    if orthotropic is not None:
+        check_positive(name, {"density": density}, {"damping": damping})
+        given = {"E": E, "poisson": poisson, "volume_row": volume_row or None}
+        both = [field for field, value in given.items() if value is not None]
+        if both:
+            raise SceneError(
+                f"{name}.{both[0]}", "is given beside orthotropic", given[both[0]], "leave one of them out"
+            )
+        return {"density": density, "orthotropic": orthotropic, "damping": damping}
+    if E is None or poisson is None:
+        missing = "E" if E is None else "poisson"
+        raise SceneError(f"{name}.{missing}", "is missing", None, "give E and poisson, or orthotropic")
+    check_positive(name, {"density": density, "E": E}, {"damping": damping})
+    if not (is_number(poisson) and -1 < poisson < 0.5):
+        fix = "give one above -1 and below 0.5; 0.499 hardly changes its volume"
+        raise SceneError(f"{name}.poisson", "is no Poisson's number of a stable material", poisson, fix)
+    by_row = poisson > 0 if volume_row is None else bool(volume_row)
+    if by_row and poisson <= 0:
+        fix = "give a positive one, or volume_row = False"
+        raise SceneError(f"{name}.poisson", "must be positive with a volume row", poisson, fix)
+    return {"density": density, "E": E, "poisson": poisson, "damping": damping, "volume_row": by_row}
 
 
 def _check_material(scene: Scene, name: str, material: str, numbers: Mapping[str, Any]) -> None:
@@ -164,7 +190,7 @@ def _check_material(scene: Scene, name: str, material: str, numbers: Mapping[str
         if other.name == name:
             raise SceneError(f"{name}.name", "is taken by another solid", name, "give each solid a name of its own")
         if other.material == material and other.numbers != numbers:
-            differing = [key for key, value in numbers.items() if other.numbers[key] != value]
+            differing = [key for key, value in numbers.items() if other.numbers.get(key) != value]
             fix = f"give what {other.name} has, or another material"
             raise SceneError(
                 f"{name}.{differing[0]}", f"is not that of its material, {material}", numbers[differing[0]], fix
@@ -183,83 +209,3 @@ def _weigh(scene: Scene, mesh: SolidMesh, material: str, particles: Array, densi
     share = np.bincount(mesh.elements.ravel(), mesh.points[2].ravel(), len(mesh.vertices))
     scene.add_quantity(f"{material}_density", density, "kg/m^3", shared=True)
     scene.add_terms([Term("mass", particles, share, ((f"{material}_density", "identity"),))])
-
-
-class _Rows:
-    """Adds the constraints of a solid: strains at the quadrature points, and volumes of the elements."""
-
-    def __init__(self, scene: Scene, mesh: SolidMesh, name: str, material: str, particles: Array, free: Array) -> None:
-        self.scene, self.name = scene, name
-        self.kept = np.flatnonzero(free[mesh.elements].any(axis=1))
-        self.nodes = particles[mesh.elements[self.kept]]
-        self.mesh = mesh
-        self.E, self.nu, self.tau = (f"{material}_{label}" for label in ("E", "poisson", "damping"))
-
-    def add(self, E: float, poisson: float, damping: float | None, by_row: bool) -> None:
-        limits = (0.0, 0.5) if by_row else (-1.0, 0.5)
-        self.scene.add_quantity(self.E, E, "Pa", shared=True)
-        self.scene.add_quantity(self.nu, poisson, "", positive=False, scale=0.1, limits=limits, shared=True)
-        if damping is not None:
-            self.scene.add_quantity(self.tau, damping, "s", shared=True)
-        if by_row:
-            self._beside_volume(damping is not None)
-        else:
-            self._alone(damping is not None)
-
-    def _strains(self, damped: bool) -> tuple[Array, Array, Array]:
-        """Adds the strains with zero compliance; returns their constraints, volumes and first own parameters."""
-        gradients, volumes, _ = (part[self.kept] for part in self.mesh.points)
-        count, points, nodes, _ = gradients.shape
-        usual = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0])
-        rest = gradients[:, :, 1:].reshape(count * points, 3 * (nodes - 1))
-        at = self._group(
-            STRAIN[nodes],
-            f"{self.name}_strain",
-            np.repeat(self.nodes, points, axis=0),
-            damped,
-            np.hstack([rest, np.broadcast_to(usual, (len(rest), len(usual)))]),
-        )
-        width = 3 * (nodes - 1) + len(usual)
-        return at, volumes.ravel(), first_value(self.scene, f"{self.name}_strain") + width * np.arange(len(rest))
-
-    def _group(self, kind: str, name: str, stencils: Array, damped: bool, rest: Array) -> Array:
-        none = np.zeros(len(stencils))
-        self.scene.add_constraints(
-            kind, stencils, name=name, compliance=none, damping=none if damped else None, rest=rest
-        )
-        first: int = self.scene.group(name)[1]
-        return first + np.arange(len(stencils))
-
-    def _beside_volume(self, damped: bool) -> None:
-        """mu V tr E^2 + lambda V (J - 1)^2/2, 2 mu = E/(1 + nu) and lambda = E nu/((1 + nu) (1 - 2 nu))."""
-        at, volume, _ = self._strains(damped)
-        E, nu, tau = (self.E, "inverse"), (self.nu, "identity"), (self.tau, "identity")
-        terms = [Term("compliance", at, 1.0 / volume, (E,)), Term("compliance", at, 1.0 / volume, (E, nu))]
-        stiff = ((self.tau, "identity"), (self.E, "identity"))
-        if damped:
-            terms.append(Term("damping", at, volume, (*stiff, (self.nu, "over_one_plus"))))
-        whole = self.mesh.volumes[self.kept]
-        kind, name = VOLUME[self.mesh.elements.shape[1]], f"{self.name}_volume"
-        at = self._group(kind, name, self.nodes, damped, whole)
-        terms += [
-            Term("compliance", at, whole, (E, (self.nu, "inverse"))),
-            Term("compliance", at, -whole, (E,)),
-            Term("compliance", at, -2.0 * whole, (E, nu)),
-        ]
-        if damped:
-            third = 1.0 / (3.0 * whole)
-            terms.append(Term("damping", at, third, (tau, (self.E, "identity"), (self.nu, "over_one_minus_twice"))))
-            terms.append(Term("damping", at, -third, (*stiff, (self.nu, "over_one_plus"))))
-        self.scene.add_terms(terms)
-
-    def _alone(self, damped: bool) -> None:
-        """mu V tr E^2 + lambda V (tr E)^2/2 in the strains' own couplings."""
-        at, volume, values = self._strains(damped)
-        terms = [Term("compliance", at, 1.0 / volume, ((self.E, "inverse"),))]
-        if damped:
-            terms.append(Term("damping", at, volume, ((self.tau, "identity"), (self.E, "identity"))))
-        first = 3 * (self.mesh.elements.shape[1] - 1)
-        nu = (self.nu, "identity")
-        terms += [Term("rest", values + first + k, 1.0, (nu,)) for k in range(3)]
-        terms += [Term("rest", values + first + k, 2.0, (nu,)) for k in range(5, 8)]
-        self.scene.add_terms(terms)

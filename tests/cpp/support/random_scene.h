@@ -92,8 +92,8 @@ struct SceneBuilder {
     std::vector<double> p = case_of<K>().p;
     for (double& v : p) {
       const double by = random(-0.02, 0.02);
-      v += std::same_as<K, Area> ? by * v
-                                 : by;  // an area stays positive: at none the triangle has no shape to go back to
+      v += K::unit.meters > 1 ? by * v
+                              : by;  // areas and volumes stay positive: at none there is no shape to go back to
     }
     return p;
   }
