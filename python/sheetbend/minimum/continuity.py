@@ -33,7 +33,7 @@ from .problem import FitProblem, expanded_to
 
 GROWN = 10.0  # of small displacements, over a window that is chosen
 PARTS = 10  # at least, of a motion whose windows are chosen
-CLOSER = 0.1  # of the gap before: the next one that parameters are fitted with, at least
+CLOSER = 0.03  # of the gap before: the next one that parameters are fitted with, at least
 ROUNDS, STEPS, TOLERANCE = 12, 20, 1e-3  # of gaps, of the walk with each, and of the cost there
 SETTLED = 0.03  # of the logarithm of a gap's size
 SMALLEST, LARGEST, LOOKED = 1e-6, 1.0, 37  # of the motion's size: gaps that are looked at, and how many
