@@ -134,8 +134,8 @@ def test_hard_continuity_gives_the_estimate_and_the_intervals_of_one_run() -> No
     for name in wanted:
         a, b = plain[name], shot[name]
         assert a.half_width is not None and b.half_width is not None
-        assert abs(a.value - b.value) < 0.02 * a.half_width, name
-        assert b.half_width == pytest.approx(a.half_width, rel=0.02), name
+        assert abs(a.value - b.value) < 0.005 * a.half_width, name
+        assert b.half_width == pytest.approx(a.half_width, rel=1e-3), name
         assert a.verdict == b.verdict
     assert shot.result.rows == plain.result.rows
     assert shot.result.recordings[0].rms == pytest.approx(plain.result.recordings[0].rms, rel=1e-4)
