@@ -16,7 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays.timeseries import Array
-from ..experiment.cut import LEAST_FRAMES, LEAST_STEPS, cut, shot, start_quantities
+from ..errors import InputError
+from ..experiment.cut import LEAST_FRAMES, LEAST_STEPS, borders, cut, shot, start_quantities
 from ..experiment.experiment import Experiment
 from ..experiment.shooting import AUTO, Shooting
 from ..optional import require
@@ -33,7 +34,9 @@ from .problem import FitProblem, expanded_to
 
 GROWN = 10.0  # of small displacements, over a window that is chosen
 PARTS = 10  # at least, of a motion whose windows are chosen
-CLOSER = 0.1  # of the gap before: the next one that parameters are fitted with, at least
+FINER = (4, 2)  # parts of a window that states are looked for in first
+LOOSE = 0.1  # of the motion's size: gaps to begin with
+CLOSER = 0.03  # of the gap before: the next one that parameters are fitted with, at least
 ROUNDS, STEPS, TOLERANCE = 12, 20, 1e-3  # of gaps, of the walk with each, and of the cost there
 SETTLED = 0.03  # of the logarithm of a gap's size
 SMALLEST, LARGEST, LOOKED = 1e-6, 1.0, 37  # of the motion's size: gaps that are looked at, and how many
@@ -67,17 +70,11 @@ def joined(
     u = parameters.initial()
     size = {e.name: _size(e) for e in fitted}
     given = {e.name: own.loss for e in fitted if (own := shot(e)) is not None and own.is_given}
-    fitted = begun(fitted, wanted, u)
-    fitted = [_with_gap(e, 0.1 * size[e.name]) for e in fitted]
+    fitted, u = _nearer(fitted, wanted, parameters, threads, observe)
+    fitted = [_with_gap(e, LOOSE * size[e.name]) for e in fitted]
     for _ in range(ROUNDS):
         problem = FitProblem(fitted, wanted, threads=threads, expanded=parameters)
-        walk = Approach(problem, u)
-        while walk.iterations < STEPS and walk.step():
-            if observe is not None:
-                observe(Progress(walk.iterations, walk.cost, walk.u.copy()))
-            if walk.promised < TOLERANCE:
-                break
-        u = walk.u
+        u = _walked(problem, u, observe)
         ok, _, _ = problem.evaluate(u)
         if not ok:
             break
@@ -101,6 +98,52 @@ def joined(
     for name in parameters.free:
         parameters = parameters.replace(name, initial=at[name])
     return every, parameters
+
+
+def _walked(problem: FitProblem, u: Array, observe: Observer | None) -> Array:
+    """Where a walk ends that leaves the last steps to a search."""
+    walk = Approach(problem, u)
+    while walk.iterations < STEPS and walk.step():
+        if observe is not None:
+            observe(Progress(walk.iterations, walk.cost, walk.u.copy()))
+        if walk.promised < TOLERANCE:
+            break
+    return walk.u
+
+
+def _nearer(
+    experiments: Sequence[Experiment], wanted: Parameters, expanded: Parameters, threads: int, observe: Observer | None
+) -> tuple[list[Experiment], Array]:
+    """The experiments with states at every border, and a point, both from windows of a part of the length: far from the
+    parameters, the longer a window the less its states can follow the recording."""
+    parts = [_in_parts(e) for e in experiments]
+    u = expanded.initial()
+    short = [_with_gap(e, LOOSE * _size(e)) for e in begun([e for e, _ in parts], wanted, u)]
+    problem = FitProblem(short, wanted, threads=threads, expanded=expanded)
+    u = _walked(problem, u, observe)
+    problem.evaluate(u)
+    found = []
+    for i, (e, (_, count)) in enumerate(zip(experiments, parts, strict=True)):
+        own, fine = shot(e), shot(_state(short[i], problem, i))
+        if own is not None and fine is not None:
+            e = replace(e, shooting=replace(own, states=own.states or fine.states[count - 1 :: count]))
+        found.append(e)
+    return found, u
+
+
+def _in_parts(e: Experiment) -> tuple[Experiment, int]:
+    """With its windows divided into as many as these can be, and how many that are."""
+    own = shot(e)
+    if own is None:
+        return e, 1
+    edges = borders(e)
+    length = float(edges[-1] - edges[0]) / (len(edges) - 1)
+    for count in FINER:
+        try:
+            return cut(replace(e, shooting=replace(own, window=length / count, states=()))), count
+        except InputError:
+            continue
+    return e, 1
 
 
 def with_window(e: Experiment) -> Experiment:
