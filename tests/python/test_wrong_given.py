@@ -136,6 +136,37 @@ def test_a_part_that_the_model_lacks_is_named_with_its_size(case: str) -> None:
     assert 0.95 < found.explained < 1.1
 
 
+@pytest.mark.parametrize("axis", [1, 2])
+def test_a_rest_curvature_that_a_rod_lacks_is_named(axis: int) -> None:
+    """EI was 14 half-widths off and "identified" beside one about the second axis."""
+
+    def rod(curvature: float | None = None) -> sb.Scene:
+        modes = () if curvature is None else (0,)
+        known = {"density": 0.05, "EI": 2e-3, "GJ": 1.5e-3, "bend_damping": 0.01, "twist_damping": 0.01}
+        clamp = sb.Grip.fixed([0, 0, 0], [1, 0, 0], [0, 0, 1])
+        points = np.outer(np.linspace(0, 1, 9), [0.5, 0, 0])
+        scene = sb.rod(0.5, 8, points=points, start=clamp, drag_linear=5e-3, curvature_modes=modes, **known)  # type: ignore[arg-type]
+        if curvature is not None:
+            name = f"rod_curvature_{axis}_0"
+            scene.quantities[name] = replace(scene.quantities[name], value=curvature)
+        return scene
+
+    model = rod()
+    at = [int(model.ropes["rod"].particles[k]) for k in AT]
+    x = sb.simulate(rod(0.05), TIMES, SOLVER).positions[:, at]
+    x = x + SIGMA * np.random.default_rng(0).standard_normal(x.shape)
+    e = replace(
+        fall(rope()),
+        scene=model,
+        recording=sb.Recording(positions=x, times=TIMES, name="fall"),
+        markers=[sb.on_particle(k) for k in at],
+    )
+    (found,) = asked(e, names=("rod_EI", "rod_bend_damping", "rod_drag_linear"))
+    which = ("first", "second")[axis - 1]
+    size = (0.049, 0.05)[axis - 1]
+    assert any(f"curved at rest by {size} 1/m about the {which} axis" in w for w in found.words), found.words
+
+
 @pytest.mark.parametrize("lacks", ["damping", "nothing"])
 def test_a_damping_and_nothing_are_no_wrong_numbers(lacks: str) -> None:
     lossless, names = rope(bend_damping=None), ("rope_EI", "rope_drag_linear")

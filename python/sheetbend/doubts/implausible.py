@@ -10,7 +10,7 @@ from ..quantities.wording import short
 from ..scene.scene import Scene
 
 STEEL = 8000.0  # kg/m^3: what ropes and sheets are made of is hardly ever denser
-THICK = 0.1  # of its length: what is thicker is no rope
+THICK = 0.15  # of its length: what is thicker is no rope; a stubby beam of silicone has 0.12
 LIGHTEST = 1e-6  # kg/m, a third of a human hair
 SHEETS = (1e-3, 0.005 * STEEL)  # kg/m^2: a thousandth of paper's, and 5 mm of steel
 HEAVIEST_GRAVITY = 30.0  # m/s^2, more than on Jupiter

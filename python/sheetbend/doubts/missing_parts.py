@@ -1,4 +1,4 @@
-"""What a model may lack: stretch, masses at its markers and free ends, drag, and motion at its start.
+"""What a model may lack: stretch, masses at its markers and free ends, drag, rest curvature, and motion at its start.
 
 None of these has a number in the model, since it has none of them. But inputs of a simulation stand at zero there, and
 a little of each changes the residuals in a direction that one set of tangents tells.
@@ -39,7 +39,7 @@ def missing_parts(problem: FitProblem, u: Array, i: int) -> list[Told]:
     except SheetbendError:
         return []
     return [
-        Told(i, "", label, "", (0.0, ""), column, missing=says, signed=added[0] == "velocity")
+        Told(i, "", label, "", (0.0, ""), column, missing=says, signed=added[0] in ("velocity", "rest"))
         for (label, added, says), column in zip(parts, columns.T, strict=True)
     ]
 
@@ -54,6 +54,7 @@ def _parts(e: Experiment, inputs: Array) -> Iterator[Part]:
     yield from _drags(free, mass, values)
     yield from _masses(e, held)
     yield from _stretch(e, x, values["compliance"])
+    yield from _curvature(e, values["rest"], values["compliance"])
     if e.scene.pinned and not len(e.scene.boundary.driven) and not values["velocity"].any():
         arm = x[free] - x[sorted(e.scene.pinned)].mean(axis=0)
         entries = (3 * free[:, None] + np.arange(3)).ravel()
@@ -103,6 +104,27 @@ def _stretch(e: Experiment, x: Array, compliance: Array) -> Iterator[Part]:
                 return f"{name} gave way with an EA of {short(1.0 / size, 2)} N, where the model keeps its length"
 
             yield f"stretch of {g.name}", ("compliance", own, length), says
+
+
+def _curvature(e: Experiment, rest: Array, compliance: Array) -> Iterator[Part]:
+    """Of rods that are straight at rest, about either axis of their sections: a turn at each joint, which is the
+    curvature times its share of the length, as compliances are."""
+    first = at = 0
+    for g in e.scene.groups:
+        own = first + np.arange(g.rest.size)
+        first += len(own)
+        share = compliance[at : at + len(g.particles)]
+        at += len(share)
+        rod = e.scene.ropes.get(g.name.removesuffix("_bend"))
+        turns = own.reshape(g.rest.shape)[:, -2:]  # before them stands the ratio of the two stiffnesses
+        if g.kind == "material_curvature" and rod is not None and not rest[turns].any():
+            share = share / np.median(share) * float(rod.arc_length[-1]) / (len(rod.arc_length) - 1)
+            for axis, words in enumerate(("first", "second")):
+
+                def says(size: float, name: str = rod.name, words: str = words) -> str:
+                    return f"{name} were curved at rest by {short(size, 2)} 1/m about the {words} axis of its sections"
+
+                yield f"curvature of {g.name} {axis}", ("rest", turns[:, axis], share), says
 
 
 def _turning(motion: str, axis: str) -> Callable[[float], str]:
