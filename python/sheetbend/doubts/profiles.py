@@ -189,7 +189,8 @@ class Profiles:
     def _is_lower(self, name: str, part: FitProblem, there: Mapping[str, float], cost: float) -> bool:
         """Whether a point is lower than the minimum by more than the residual variance; if so, keep it."""
         if part not in self._here:
-            here = part.cost(part.parameters.to_internal(self._values))
+            _, r, _ = part.evaluate(part.parameters.to_internal(self._values))  # which is known there
+            here = 0.5 * float(r @ r)
             self._here[part] = (here, here / max(part.core.data_rows - len(part.parameters.free), 1))
         here, variance = self._here[part]
         lower = cost < here - variance and variance > NOISELESS

@@ -89,25 +89,39 @@ def _moved(problem: FitProblem, u: np.ndarray) -> Settled:
     if not (ok and float(np.sum(there**2)) <= before):
         whole = Refit(name=TIME_STEP, to_limit=1.0, moved=moves(problem.parameters, u, first))
         return Settled(problem, u, refits=(whole,))
+    if _arrived(problem, there, J, gauss_newton(problem.parameters, first, J, there) - first) and refuted(
+        problem, u, there
+    ):
+        return _stays(problem, u, first)
     onward = first
     for _ in range(TANGENTS):
         end = onward
         _, r, J = limit.evaluate(end)
         after, onward = float(np.sum(r**2)), gauss_newton(problem.parameters, end, J, r)
-        scatter = after / max(len(r) - len(u), 1)
-        if float(np.sum((J @ (onward - end)) ** 2)) <= THERE**2 * len(u) * scatter:
+        if _arrived(problem, r, J, onward - end):
             break
         ok, there, _ = limit.evaluate(onward, jacobian=False)
         if not (ok and float(np.sum(there**2)) <= after):
             break  # what that step would move counts as open
     if refuted(problem, u, r):
-        whole = Refit(name=TIME_STEP, to_limit=1.0, moved=moves(problem.parameters, u, end))
-        told = words("short substeps", "at the same substep", "refine=False, or halve_step = false in a configuration")
-        return Settled(problem, u, refits=(whole,), warnings=(told,))
+        return _stays(problem, u, end)
     finest = problem.of(combined(halved(problem.experiments)))
     left = np.abs(order_left(problem.experiments) * (one_step(limit, finest, end) - end)) + np.abs(onward - end)
     rest = Refit(name=TIME_STEP, to_limit=1.0, moved=moves(problem.parameters, end, end + left))
     return Settled(limit, end, moves(problem.parameters, u, end), (rest,))
+
+
+def _arrived(problem: FitProblem, r: np.ndarray, J: np.ndarray, step: np.ndarray) -> bool:
+    """Whether a step (free,) from where the residuals are r (rows,), with derivatives J, is too short to be taken."""
+    scatter = float(r @ r) / max(len(r) - len(problem.parameters.free), 1)
+    return float(np.sum((J @ step) ** 2)) <= THERE**2 * len(step) * scatter
+
+
+def _stays(problem: FitProblem, u: np.ndarray, limit: np.ndarray) -> Settled:
+    """Where the data speak against the limit (free,): all that it would move counts."""
+    whole = Refit(name=TIME_STEP, to_limit=1.0, moved=moves(problem.parameters, u, limit))
+    told = words("short substeps", "at the same substep", "refine=False, or halve_step = false in a configuration")
+    return Settled(problem, u, refits=(whole,), warnings=(told,))
 
 
 def _counted_whole(problem: FitProblem, u: np.ndarray) -> Settled:
