@@ -1,4 +1,4 @@
-// What a recording sees of a state: markers at material coordinates, as weights on up to four nodes, with an optional offset; and the time
+// What a recording sees of a state: markers at material coordinates, as weights on up to eight nodes, with an optional offset on up to four; and the time
 // between two substeps. An offset is carried in the local frame (t, n, t x n) of tangent t and a given reference normal n, or, on a rigid
 // body, by the body's axes, which are the last three nodes.
 #pragma once
@@ -11,8 +11,9 @@
 namespace sheetbend {
 
 struct Marker {
-  std::array<int, 4> dof{};         // first coordinate of each node
-  std::array<double, 4> weight{};   // of the position
+  int nodes = 4;                    // from four to eight
+  std::array<int, 8> dof{};         // first coordinate of each node
+  std::array<double, 8> weight{};   // of the position
   std::array<double, 4> tangent{};  // of the tangent (any length)
   std::array<double, 3> normal{0.0, 1.0, 0.0};
   bool carries_offset = false;
@@ -28,6 +29,7 @@ Vec3<T> marker_position(const Marker& m, const T* x, const T* offset) {
     p = p + T(m.weight[k]) * node;
     t = t + T(m.tangent[k]) * node;
   }
+  for (int k = 4; k < m.nodes; ++k) p = p + T(m.weight[k]) * Vec3<T>(x + m.dof[k]);
   if (!m.carries_offset) return p;
   if (m.on_axes) {
     for (int k = 0; k < 3; ++k) p = p + offset[k] * Vec3<T>(x + m.dof[k + 1]);

@@ -11,7 +11,19 @@
 
 namespace sheetbend {
 
-enum class Factor1d : int { identity, inverse, square, sine, cosine, root, inverse_root, exponential };
+enum class Factor1d : int {
+  identity,
+  inverse,
+  square,
+  sine,
+  cosine,
+  root,
+  inverse_root,
+  exponential,
+  over_one_plus,        // 1/(1 + x) and
+  over_one_minus_twice  // 1/(1 - 2 x): of Poisson's number, in Lame's constants
+};
+inline constexpr int factor_count = static_cast<int>(Factor1d::over_one_minus_twice) + 1;
 
 inline double exp(double a) { return std::exp(a); }
 template <class T, int N>
@@ -32,6 +44,8 @@ T evaluate(Factor1d f, const T& x, double weight) {
     case Factor1d::root: return sqrt(x);
     case Factor1d::inverse_root: return T(1.0) / sqrt(x);
     case Factor1d::exponential: return exp(weight * x);
+    case Factor1d::over_one_plus: return T(1.0) / (T(1.0) + x);
+    case Factor1d::over_one_minus_twice: return T(1.0) / (T(1.0) - T(2.0) * x);
   }
   throw std::logic_error("unknown factor of a parameter map");
 }
@@ -47,6 +61,8 @@ T slope(Factor1d f, const T& x, double weight) {
     case Factor1d::root: return T(0.5) / sqrt(x);
     case Factor1d::inverse_root: return -(T(0.5) / (x * sqrt(x)));
     case Factor1d::exponential: return weight * exp(weight * x);
+    case Factor1d::over_one_plus: return -(T(1.0) / ((T(1.0) + x) * (T(1.0) + x)));
+    case Factor1d::over_one_minus_twice: return T(2.0) / ((T(1.0) - T(2.0) * x) * (T(1.0) - T(2.0) * x));
   }
   throw std::logic_error("unknown factor of a parameter map");
 }

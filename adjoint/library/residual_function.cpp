@@ -60,7 +60,7 @@ Experiment experiment_of(const Scene& scene, Observations observed, Solver solve
   for (const Marker& m : observed.markers) {
     sheetbend::Marker& marker = e.observed.markers.emplace_back();
     for (int k = 0; k < 4; ++k) marker.dof[k] = model->topology.first_dof[m.particles[k]];
-    marker.weight = m.weights;
+    std::ranges::copy(m.weights, marker.weight.begin());
   }
   e.observed.sigma.assign(observed.times.size() * observed.markers.size(), observed.sigma);
   e.observed.times = std::move(observed.times);

@@ -210,7 +210,7 @@ class SceneReader {
     };
     within("target", m.target, layout.total());
     within("parameter", m.parameter, quantities);
-    within("function", function, static_cast<std::size_t>(Factor1d::exponential) + 1);
+    within("function", function, factor_count);
     for (const int f : function) m.function.push_back(static_cast<Factor1d>(f));
     return m;
   }

@@ -25,6 +25,8 @@
 #include "core/constraints/shear.h"
 #include "core/constraints/sheet_curvature.h"
 #include "core/constraints/sinh_strain.h"
+#include "core/constraints/solid_strain.h"
+#include "core/constraints/solid_volume.h"
 #include "core/constraints/spline_strain.h"
 #include "core/constraints/strain.h"
 #include "core/constraints/tether.h"
@@ -63,7 +65,11 @@ using Registry = std::tuple<   //
     BodyParticleDistance,      //
     DirectionsAcross,          //
     Along,                     //
-    JointAngle>;
+    JointAngle,                //
+    BrickStrain,               //
+    BrickVolume,               //
+    TetrahedronStrain,         //
+    TetrahedronVolume>;
 
 inline constexpr int kind_count = std::tuple_size_v<Registry>;
 

@@ -37,8 +37,13 @@ Observations make_observations(const py::dict& d) {
   for (const py::handle item : d["markers"]) {
     const auto m = item.cast<py::dict>();
     Marker marker;
-    marker.dof = get<std::array<int, 4>>(m, "dof");
-    marker.weight = get<std::array<double, 4>>(m, "weight");
+    const auto dof = get<std::vector<int>>(m, "dof");
+    const auto weight = get<std::vector<double>>(m, "weight");
+    if (dof.size() < 4 || dof.size() > marker.dof.size() || weight.size() != dof.size())
+      throw std::invalid_argument("markers: a place has four to eight nodes and as many weights");
+    marker.nodes = static_cast<int>(dof.size());
+    std::ranges::copy(dof, marker.dof.begin());
+    std::ranges::copy(weight, marker.weight.begin());
     marker.tangent = get<std::array<double, 4>>(m, "tangent");
     marker.normal = get<std::array<double, 3>>(m, "normal");
     marker.carries_offset = get<bool>(m, "carries_offset");

@@ -22,11 +22,12 @@ from .errors import (
 from .experiment.experiment import Experiment
 from .experiment.force_readings import simulate_forces
 from .experiment.force_sensor import ForceSensor
+from .experiment.shooting import Shooting
 from .fitting.fit import Fit, fit
 from .fitting.identify import identify
 from .fitting.many import fit_many
 from .fitting.plan import Plan
-from .mesh import TriangleMesh, read_mesh
+from .mesh import SolidMesh, TriangleMesh, read_mesh
 from .minimum.discretization import Refinement
 from .motion.balance import ForceBalance, force_balance
 from .motion.contact_counts import ContactCounts, ContactMode
@@ -48,10 +49,13 @@ from .objects.grip import Grip
 from .objects.hand_eye import HandEye
 from .objects.joint_making import Joint, ground
 from .objects.joints import ball, cylinder, fixed, hinge, slider, universal
-from .objects.markers import Place, along_rope, between, on_body, on_cloth, on_particle, on_rope
+from .objects.locking import LockingWarning
+from .objects.markers import Place, along_rope, between, on_body, on_cloth, on_particle, on_rope, on_solid
 from .objects.rod import Rod, add_rod, rod
 from .objects.rod_junction import Junction
 from .objects.rope import Rope, add_rope, rope
+from .objects.solid import Solid, add_solid, solid
+from .objects.solid_rows import Orthotropic
 from .objects.tethers import add_tethers
 from .objects.tool import Tool
 from .page.notebook import show_in_notebooks
@@ -116,8 +120,10 @@ __all__ = [
     "InputError",
     "Joint",
     "Junction",
+    "LockingWarning",
     "MeshError",
     "NoEquilibriumError",
+    "Orthotropic",
     "Parameter",
     "Parameters",
     "Place",
@@ -135,6 +141,9 @@ __all__ = [
     "Score",
     "Scores",
     "SheetbendError",
+    "Shooting",
+    "Solid",
+    "SolidMesh",
     "Solver",
     "Sphere",
     "TapePlan",
@@ -148,6 +157,7 @@ __all__ = [
     "add_pendulum",
     "add_rod",
     "add_rope",
+    "add_solid",
     "add_tethers",
     "along_rope",
     "ball",
@@ -176,6 +186,7 @@ __all__ = [
     "on_cloth",
     "on_particle",
     "on_rope",
+    "on_solid",
     "plot",
     "read_mesh",
     "read_recordings",
@@ -187,6 +198,7 @@ __all__ = [
     "simulate",
     "simulate_forces",
     "slider",
+    "solid",
     "start_of_poses",
     "support_forces",
     "tape_plan",

@@ -57,20 +57,19 @@ class ConfigError(InputError):
 
 
 class DivergenceError(SheetbendError, RuntimeError):
-    """A rollout left the finite numbers, or reached a state or a gradient that means nothing.
+    """A simulation diverged: a number is not finite, or a state or a gradient is far outside of what is possible.
 
-    A finite state counts as diverged where the energy put into the scene does not explain it by a wide margin:
-    particles that move too fast, constraints stretched to several times their width, a scene shrunk to a point. A
-    gradient counts as diverged where it grows by more than 1/eps = 4.5e15 on its way back through time, so that
-    rounding errors decide it.
+    A finite state counts as diverged if it is far beyond the energy put into the scene: particles that move too fast,
+    constraints stretched to several times their width, a scene shrunk to a point. A gradient counts as diverged if it
+    grows by more than 1/eps = 4.5e15 during the backward pass, so that it consists of rounding errors.
 
     Args:
-        substep: index of the substep after which it was seen, from 0. Finite states are looked at every 32 substeps
+        substep: index of the substep after which it was noticed, from 0. Finite states are checked every 32 substeps
             and at the end.
         time: its time, s.
-        particle: index of the first particle that is at fault.
+        particle: index of the first diverged particle.
         where: what was being computed, in words (solver, constraint group).
-        seen: what was seen of the particle.
+        seen: what the particle does, as the message says it.
     """
 
     def __init__(self, substep: int, time: float, particle: int, where: str, seen: str = "is not finite") -> None:
@@ -94,11 +93,11 @@ class DivergenceError(SheetbendError, RuntimeError):
 
 
 class UnconvergedError(SheetbendError, RuntimeError):
-    """Conjugate gradients (method "newton_cg") took as many iterations as they may.
+    """Conjugate gradients (method "newton_cg") did not converge within `Solver.cg_iterations`.
 
     Args:
-        iterations: what they may take.
-        residual: that is left, over the right side.
+        iterations: the largest allowed number.
+        residual: at the end, relative to the right side.
         where: what was being computed, in words.
     """
 
@@ -117,16 +116,16 @@ class UnconvergedError(SheetbendError, RuntimeError):
 
 
 class UnbalancedError(SheetbendError, RuntimeError):
-    """The forces of a substep (method "implicit") do not balance, or they do at the point of buckling, where they have
-    no derivative.
+    """The forces of a substep (method "implicit") do not balance, or they balance at a point of buckling, where the
+    solution has no derivative.
 
     Args:
         problem: what happened, in words.
         fix: what to do about it.
         substep: number of the substep.
         time: at its end, s.
-        particle: where forces balance worst.
-        residual: largest force that is left, over the largest one.
+        particle: the one with the largest unbalanced force.
+        residual: largest unbalanced force, relative to the largest force.
         where: what was being computed, in words.
     """
 
@@ -148,12 +147,12 @@ class UnbalancedError(SheetbendError, RuntimeError):
 
 
 class EmptyGradientError(SheetbendError, RuntimeError):
-    """A loss feels nothing of the quantities that it is to be improved by; no step along its gradient means anything.
+    """A loss does not depend on the quantities that an optimizer would change: its gradient is zero or rounding errors.
 
     Args:
         names: the quantities.
-        change: the largest change of the loss when one of them moves by its scale, to the first order.
-        rounding: what the loss changes by when its positions are rounded; zero when it feels no position.
+        change: the largest change of the loss when one of them moves by its scale, to first order.
+        rounding: the change of the loss when its positions are rounded; zero if it depends on no position.
     """
 
     def __init__(self, names: tuple[str, ...], change: float, rounding: float) -> None:

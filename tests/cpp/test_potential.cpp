@@ -57,6 +57,11 @@ struct PotentialCase {
         p.potential.target[at] = is_weight ? p.x[at] : p.x[at] + random(-1e-3, 1e-3);
       }
     for (int j = 0; j < block.size(); ++j) p.potential.C_r[j] = random(-0.1, 0.1);
+    for (const MemberRun& run : block.runs)  // volumes are of about a thousandth of a cubic meter
+      with_kind(scene().groups[run.group].kind, [&]<class K>(K) {
+        if (K::unit.meters == 3)
+          for (int i = 0; i < run.count; ++i) p.potential.C_r[run.first_row[i]] *= 1e-3;
+      });
     return p;
   }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pickle
 import random
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +24,7 @@ from sheetbend.files.door import reading
 from sheetbend.files.names import flaw
 from sheetbend.report.fit_result import FitResult
 from sheetbend.result import result
+from sheetbend.scene.scene_reader import MAGIC, PREFIX, VERSION
 from sheetbend.textile import read_curves
 
 EXPERIMENTS = Path(__file__).resolve().parents[2] / "experiments"
@@ -176,6 +178,25 @@ def _poses(folder: Path) -> list[Files]:
     return [{"tool.csv": (header + rows).encode()}, {"tool.npz": (folder / "tool.npz").read_bytes()}]
 
 
+def _scenes(folder: Path) -> list[Files]:
+    rope = sb.rope(0.3, 4, density=0.05, EI=1e-3, bend_damping=0.01, drag_linear=0.01, clamp_start=(1, 0, 0))
+    cloth, mesh = sb.Scene("cloth"), sb.mesh.grid(0.2, 0.2, 2, 2, pattern="one_way")
+    made = sb.add_cloth(cloth, mesh, density=0.1, warp=40.0, shear=10.0, bending=1e-4)
+    cloth.drive(made.particles[:1], [0.0, 0.1, 0.2], np.zeros((3, 1, 3)))
+    for scene in (rope, cloth):
+        sb.save_scene(scene, folder / f"{scene.name}.scene")
+    return [{"a.scene": (folder / f"{name}.scene").read_bytes()} for name in ("rope", "cloth")]
+
+
+def _forces(folder: Path) -> list[Files]:
+    times, forces = np.arange(5) / 100, np.random.default_rng(2).normal(size=(5, 3))
+    sb.ForceRecording(times, forces, torques=forces, quaternions=np.ones((5, 4))).save(folder / "f.npz")
+    table = "time_ms,fx,fy,fz,tx,ty,tz\n" + "".join(f"{10 * k},{k}.5,-1,,{k},0,1e-3\n" for k in range(9))
+    cell = "time,fz\n0,1\n0.01,2\n0.02,nan\n"
+    archive = (folder / "f.npz").read_bytes()
+    return [{"f.csv": table.encode()}, {"f.csv": cell.encode()}, {"f.npz": archive}]
+
+
 # ---- readers --------------------------------------------------------------------------------------------
 
 
@@ -207,6 +228,24 @@ def _curve(path: Path) -> None:
     read_curves(path, length=0.2, width="Width")
 
 
+def _scene(path: Path) -> None:
+    assert sb.load_scene(path).compiled
+
+
+def sealed(rng: random.Random, content: bytes, others: list[bytes]) -> bytes:
+    """A scene file changed anywhere or, with its checksum and length right again, in its header or its arrays."""
+    if rng.random() < 0.3:
+        return mutated(rng, content, others)
+    end = PREFIX.size + PREFIX.unpack_from(content)[-1]
+    header, arrays = content[PREFIX.size : end], content[end:]
+    if rng.random() < 0.6:
+        header = json_tree(rng, header, [header])
+        header += b" " * (-len(header) % 8)
+    else:
+        arrays = mutated(rng, arrays, [arrays])
+    return PREFIX.pack(MAGIC, VERSION, zlib.crc32(header + arrays), len(header)) + header + arrays
+
+
 TARGETS: dict[str, Target] = {
     "csv": Target(_csv, _recording, mutated),
     "mocap": Target(_mocap, _recording, mutated),
@@ -220,4 +259,6 @@ TARGETS: dict[str, Target] = {
     "mesh": Target(_meshes, sb.read_mesh, mutated),
     "curve": Target(_curves, _curve, mutated),
     "poses": Target(_poses, sb.Tool.load, mutated),
+    "scene": Target(_scenes, _scene, sealed),
+    "forces": Target(_forces, sb.ForceRecording.load, mutated),
 }

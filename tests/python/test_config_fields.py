@@ -46,6 +46,16 @@ WHOLE: dict[str, Any] = {
                 "grid": {"first": [0, 0], "last": [0.1, 0.1], "counts": [2, 2]},
             }
         ],
+        "solid": [
+            {
+                "size": [0.1, 0.1, 0.1],
+                "cells": [1, 1, 1],
+                "density": 1e3,
+                "E": 1e5,
+                "poisson": 0.3,
+                "set": [{"name": "low", "lower": [0, 0, 0], "upper": [1, 1, 0]}],
+            }
+        ],
         "particles": [{"name": "a", "positions": [[0, 0, 0]]}],
         "pendulum": [{"length": 1.0}],
         "arm": [{"mass": 1.0, "first_moment": 0.1, "inertia": 0.1, "length": 0.5}],

@@ -21,6 +21,10 @@ CASES = {
     "fit": 1000,
     "mesh": 400,
     "curve": 500,
+    "trc": 500,
+    "poses": 400,
+    "scene": 400,
+    "forces": 500,
 }
 
 

@@ -217,7 +217,7 @@ def test_what_cannot_be_measured_costs_no_fit(recording: sb.Recording, monkeypat
     def lost(*_: object) -> None:
         raise sb.DivergenceError(3, 0.1, 2, "rope")
 
-    monkeypatch.setattr("sheetbend.doubts.given._collect", lost)
+    monkeypatch.setattr("sheetbend.doubts.told._collect", lost)
     found = fit(hanging(), recording, given={"rope_density": 0.1})
     assert found.result.converged
     assert found.result.premises == ()

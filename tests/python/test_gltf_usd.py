@@ -102,7 +102,7 @@ class TestGltf:
             write_gltf(tmp_path / "m.obj", scene, motion)
         bare = sb.Scene("bare")
         bare.add_particles([[0, 0, 0]], 1.0)
-        with pytest.raises(sb.InputError, match="neither cloth nor rope"):
+        with pytest.raises(sb.InputError, match="neither cloth nor solid nor rope"):
             write_gltf(tmp_path / "m.glb", bare, sb.simulate(bare, [0.0]))
 
 

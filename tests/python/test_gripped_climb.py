@@ -71,7 +71,7 @@ class TestLadder:
         model = replace(MODEL.with_values(EI=TRUE["rope_EI"]), **MARKERS.options)
         wanted = [replace(p, prior=None) for p in MARKERS.wanted(motion)]
         assert [p.name for p in wanted] == [place_of(k) for k in motion.free]
-        end = descend(experiments_of(model, [motion], (1.0, 1.0)), wanted, {}, 20)
+        end = descend(experiments_of(model, [motion], (1.0, 1.0), {}), wanted, {}, 20)
         assert end.ended
         for name, value in true.items():
             assert end.values[name] == pytest.approx(value, rel=0.03), name
@@ -83,7 +83,7 @@ class TestLadder:
         (x,) = predict(model, [MOTION], {**TRUE, **true})
         motion = replace(MOTION, recording=replace(MOTION.recording, positions=x))
         wanted = [replace(p, prior=None) for p in SHIFTS.parameters if p.name in true]
-        end = descend(experiments_of(model, [motion], (1.0, 1.0)), wanted, {}, 20)
+        end = descend(experiments_of(model, [motion], (1.0, 1.0), {}), wanted, {}, 20)
         assert end.ended
         for name, value in true.items():
             assert end.values[name] == pytest.approx(value, rel=0.03), name
@@ -101,7 +101,7 @@ class TestBounds:
         wide = replace(TWIST.parameters[2], initial=50.0, prior=None)
         (p,) = bounded([wide], MODEL, [MOTION], 5.0)[:1]
         assert (p.lower, p.upper) == pytest.approx((0.001, 10.0))
-        end = descend(experiments_of(MODEL, [shown()], (1.0, 1.0)), bounded([wide], MODEL, [MOTION], 1.0), {}, 3)
+        end = descend(experiments_of(MODEL, [shown()], (1.0, 1.0), {}), bounded([wide], MODEL, [MOTION], 1.0), {}, 3)
         assert end.values["rope_bend_damping"] <= 2.0
 
     def test_stiffness_and_damping_cannot_trade_without_end(self) -> None:
@@ -132,7 +132,7 @@ class TestBounds:
 
 class TestDescent:
     def test_it_ends_within_a_tenth_of_the_intervals(self) -> None:
-        experiments = experiments_of(MODEL, [shown()], (1.0, 1.0))
+        experiments = experiments_of(MODEL, [shown()], (1.0, 1.0), {})
         found = descend(experiments, TWIST.parameters[:1], {"rope_EI": 0.3}, 30)
         assert found.ended and found.values["rope_EI"] == pytest.approx(0.03, rel=1e-3) and found.iterations <= 10
         problem = problem_of(experiments, TWIST.parameters[:1], {})
@@ -142,7 +142,8 @@ class TestDescent:
         names = ("rope_EI", "rope_bend_damping", "rope_length", "rope_roll")
         wanted = [replace(p, prior=None) for p in TWIST.parameters if p.name in names]
         motion = shown(rope_roll=0.4)
-        experiments, start = experiments_of(MODEL, [motion], (1.0, 1.0)), {"rope_EI": 0.06, "rope_bend_damping": 0.06}
+        experiments = experiments_of(MODEL, [motion], (1.0, 1.0), {})
+        start = {"rope_EI": 0.06, "rope_bend_damping": 0.06}
         ends, taken = [], []
         for least in (np.inf, 0):
             monkeypatch.setattr(descent, "DEAR", least)
@@ -158,7 +159,7 @@ class TestDescent:
         assert taken[0][0] == taken[0][1] and taken[1][1] < min(taken[1][0], taken[0][1])
 
     def test_a_start_that_diverges_costs_infinitely_much(self) -> None:
-        end = descend(experiments_of(MODEL, [shaken("bad")], (1.0, 1.0)), STIFFNESS, {}, 5)
+        end = descend(experiments_of(MODEL, [shaken("bad")], (1.0, 1.0), {}), STIFFNESS, {}, 5)
         assert not end.finite and end.iterations == 0 and not end.ended
 
 
@@ -245,7 +246,7 @@ class TestClimb:
 
 class TestConclusion:
     def test_a_finer_rope_that_diverges_is_not_counted(self) -> None:
-        good, bad = (experiments_of(MODEL, [m], (1.0, 1.0)) for m in (shown(), shaken("bad")))
+        good, bad = (experiments_of(MODEL, [m], (1.0, 1.0), {}) for m in (shown(), shaken("bad")))
         assert checked(good, STIFFNESS, {}, 1) is good
         with pytest.raises(sb.SheetbendError, match="diverges"):
             checked(bad, STIFFNESS, {}, 1)
@@ -285,7 +286,7 @@ class TestConclusion:
     def test_no_end_of_an_optimizer_has_a_negative_cost(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """Ceres tells a cost of -1 where it cannot begin; that must not win over a real end."""
         ceres = pytest.importorskip("sheetbend._ceres")
-        problem = problem_of(experiments_of(MODEL, [shown()], (1.0, 1.0)), STIFFNESS, {})
+        problem = problem_of(experiments_of(MODEL, [shown()], (1.0, 1.0), {}), STIFFNESS, {})
         u = problem.parameters.initial()
         failed = {"u": u, "cost": -1.0, "iterations": 0, "evaluations": 1, "jacobians": 1}
         failed |= {"converged": False, "stopped": False, "message": "no derivatives"}

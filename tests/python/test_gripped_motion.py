@@ -191,7 +191,7 @@ class TestMotion:
         positions[45:56, 2:7] = np.nan
         motion = GrippedMotion.of(carried_about(positions=positions), 0.08)
         assert not motion.shown(50)
-        starts = [e.start_time for e in experiments_of(model_of(motion), [motion], (0.25, 5.0))]
+        starts = [e.start_time for e in experiments_of(model_of(motion), [motion], (0.25, 5.0), {})]
         assert starts == pytest.approx([0.0, 0.25, 0.75])
 
     def test_a_recording_that_starts_with_few_markers_is_refused_with_a_time_to_start_from(self) -> None:

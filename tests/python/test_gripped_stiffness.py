@@ -10,6 +10,7 @@ import pytest
 import sheetbend as sb
 from sheetbend.gripped import GrippedMotion, fit_rope
 from sheetbend.gripped.judging import predict
+from sheetbend.gripped.report import counted
 from sheetbend.gripped.stiffness import stiffness_section, tangent_stiffness
 from sheetbend.report.fit_result import FitResult
 from sheetbend.result.result import Correlation, Estimate
@@ -58,6 +59,12 @@ class TestTangent:
         assert section is not None
         assert [row[0] for row in section.rows] == ["EI at small strain", "EI where the rope slides inside"]
         assert section.rows[0][1:] == ("0.2", "0.18", "0.22", "N m^2")
+
+    def test_what_had_slid_before_is_no_part_of_the_intervals(self) -> None:
+        elastic = replace(result(0.0), estimates=(estimate("EI", 0.2, 0.02),))
+        for found, told in ((result(0.0), True), (elastic, False)):
+            (_, _), (label, words) = counted(found)
+            assert label == "not counted" and ("what had slid inside before" in words) == told
 
     def test_an_elastic_rope_has_one(self) -> None:
         elastic = replace(result(0.0), estimates=(estimate("EI", 0.2, 0.02),))

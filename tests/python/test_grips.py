@@ -242,7 +242,7 @@ SET = {
 
 
 SHEARS = {"GA": 0.7, "shear_damping": 0.01}
-YIELDS = {"yield_curvature": 3.0, "yield_share": 0.4}
+YIELDS = {"yield_curvature": 3.0, "yield_share": 0.4, "slid_modes": (0, 1)}
 
 
 @pytest.mark.parametrize("options", [{}, SHEARS, SHEARS | YIELDS], ids=["", "shear", "shear and yield"])

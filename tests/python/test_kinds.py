@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import sheetbend as sb
+from sheetbend import _core
 from sheetbend.quantities.kinds import IN_REST
 from sheetbend.scene.rest_values import rest_values
 
@@ -12,7 +13,10 @@ NORMAL = (0.0, 0.6, 0.8)
 
 
 def stencils(kind: str, count: int = 5) -> np.ndarray:
-    return np.random.default_rng(1).normal(size=(count, sb.KINDS[kind]["arity"], 3))
+    x = np.random.default_rng(1).normal(size=(count, sb.KINDS[kind]["arity"], 3))
+    if kind.endswith("_volume"):  # of elements that are not turned inside out
+        x[_core.rest_values(kind, x)[:, 0] < 0] *= -1.0
+    return x
 
 
 def sources(kind: str) -> set[str]:

@@ -43,7 +43,7 @@ def test_a_swing_shows_the_sum_of_its_losses() -> None:
     found = sb.fit(e, parameters=list(TRUE), refine=False, profiles=False)
     assert all(found[name].verdict != "identified" for name in TRUE)
     (words,) = [w for w in found.result.warnings if w.startswith("losses:")]
-    assert "does not tell strip_bend_damping and strip_drag_linear apart" in words and "Hysteresis" in words
+    assert "does not separate strip_bend_damping and strip_drag_linear." in words and "hysteresis" in words
     # The sum is right where neither of the two is.
     problem = FitProblem([e], as_parameters(list(TRUE), [e]))
     known = loss_sum(problem, problem.parameters.to_internal(found.values), list(TRUE))
@@ -77,7 +77,7 @@ def test_air_of_too_much_density_is_doubted() -> None:
         words="",
     )
     (words,) = air_doubts([air])
-    assert "at least 3 kg/m^3, where air has 1.2" in words
+    assert "at least 3 kg/m^3, but air has 1.2" in words
     assert list(air_doubts([replace(air, value=1.0, lower=0.8, upper=1.2)])) == []
     assert list(air_doubts([replace(air, lower=0.9)])) == []  # the interval holds what air may have
     assert len(list(air_doubts([replace(air, name="cloth_air_normal[a]")]))) == 1

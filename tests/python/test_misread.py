@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 import sheetbend as sb
+from sheetbend.doubts.contradictions import doubtful
+from sheetbend.doubts.implausible import implausible
 from sheetbend.doubts.misread import _better, misread
 from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.statistics.intervals import open_estimate
 
 SOLVER, SIGMA = sb.Solver(h=1 / 400), 3e-4
 TRUE = {"rope_EI": 2e-3, "rope_bend_damping": 0.01, "rope_drag_linear": 5e-3}
@@ -74,6 +78,57 @@ def test_a_wrong_unit_is_named() -> None:
     (words,) = misread(wrong, wrong.parameters.initial())
     assert "3.3 times as far apart" in words
     assert misread(problem, problem.parameters.initial()) == ()
+
+
+@pytest.mark.parametrize(("rate", "words"), [(2.0, "taken at 0.5 times"), (0.8, "taken at 1.25 times")])
+def test_another_frame_rate_is_named(rate: float, words: str) -> None:
+    """Half of the rate left three parameters "not identifiable", which the data know well."""
+    e = fall(rope())
+    slow = replace(e, recording=replace(e.recording, times=rate * e.recording.times))
+    problem = FitProblem([slow], as_parameters(list(TRUE), [slow]))
+    (said,) = misread(problem, problem.parameters.initial())
+    assert words in said and "frame rate" in said
+
+
+def test_where_no_motion_is_explained_nothing_is_said_to_be_unknown() -> None:
+    """That the data do not contain a parameter was said by fits that explained none of their motion."""
+    e = fall(rope())
+    problem = FitProblem([e], as_parameters(["rope_EI"], [e]))
+    words = "moves no residual: the data do not contain it"
+    estimate = open_estimate(problem.parameters["rope_EI"], 2e-3, words, verdict="not identifiable")
+    missed = {"rope_EI": "the fit leaves 98 % of the variance"}
+    (kept,), (doubted,) = doubtful([estimate], missed), doubtful([estimate], missed, missed)
+    assert kept is estimate
+    assert doubted.verdict == "doubtful" and "98 %" in doubted.words and "else not identifiable" in doubted.words
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"density": 50.0, "EI": 2.0}, "rope_density of 50 kg/m makes rope 89 mm thick over 0.5 m"),
+        ({"density": 5e-7}, "rope_density of 5e-07 kg/m is less than a hair's"),
+        ({"gravity": (0.0, 0.0, -9810.0)}, "gravity of 9810 m/s^2 is no planet's"),
+    ],
+)
+def test_numbers_in_another_unit_are_named(changed: dict[str, Any], words: str) -> None:
+    """A density of 50 kg/m gave an EI that is a thousand times too large, "identified" at a reduced chi-square of 1."""
+    e = fall(rope())
+    problem = FitProblem([replace(e, scene=rope(**changed))], as_parameters(["rope_EI"], [e]))
+    (said,) = implausible(problem)
+    assert words in said
+    assert implausible(FitProblem([e], problem.given)) == ()
+    fitted = FitProblem([replace(e, scene=rope(**changed))], as_parameters(["rope_density"], [e]))
+    assert (implausible(fitted) == ()) == ("density" in changed)  # what is fitted is not given
+
+
+def test_a_fabric_in_grams_is_named() -> None:
+    mesh, scene = sb.mesh.grid(0.2, 0.2, 2, 2, pattern="one_way"), sb.Scene("cloth")
+    made = sb.add_cloth(scene, mesh, density=150.0, warp=100.0, shear=30.0)
+    recording = sb.Recording(positions=mesh.vertices[None] + np.zeros((3, 1, 1)), times=[0.0, 0.1, 0.2])
+    places = [sb.on_particle(int(k)) for k in made.particles]
+    e = sb.Experiment(scene=scene, recording=recording, markers=places, solver=sb.Solver(h=0.01, method="newton"))
+    (said,) = implausible(FitProblem([e], as_parameters(["cloth_warp"], [e])))
+    assert "cloth_density of 150 kg/m^2 is that of 19 mm of steel" in said
 
 
 def test_a_mirror_is_told_from_a_rotation() -> None:

@@ -233,7 +233,7 @@ FORGED_ARRAYS: list[tuple[str, Any]] = [
     ("first_factor", np.array([1])),
     ("first_factor", np.array([0, 5, 2])),
     ("parameter", np.array([50])),
-    ("function", np.array([8])),
+    ("function", np.array([10])),
     ("coefficient", np.array([np.inf])),
 ]
 

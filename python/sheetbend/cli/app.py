@@ -22,7 +22,7 @@ from .view import view
 
 app = typer.Typer(
     name="sheetbend",
-    help="Simulate ropes, beams and cloth, and find their physical parameters from recordings, with error bars.",
+    help="Simulate ropes, beams and cloth, and fit their physical parameters to recordings, with error bars.",
     epilog="Exit codes: 0 done, 2 bad input, 3 not identifiable, 4 did not converge or is doubtful, 5 a check failed, "
     "130 and 143 stopped by Ctrl-C and SIGTERM.",
     no_args_is_help=True,
@@ -44,7 +44,7 @@ def options(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    """Simulate ropes, beams and cloth, and find their physical parameters from recordings, with error bars."""
+    """Simulate ropes, beams and cloth, and fit their physical parameters to recordings, with error bars."""
 
 
 for command in (new, fit, simulate, view, check, info, identify, compare, collect, textile, fabric, schema):

@@ -37,9 +37,11 @@ def check(
     ],
     json: Json = False,
 ) -> None:
-    """Check the gradients of every recording's scene over a short stretch, and the residuals' Jacobian; exit 5 where
-    one fails. Of large scenes a sample is checked, and named. Also reports how far small displacements grow along every
-    fitted motion.
+    """Compare the gradients of a scene with independent ones.
+
+    Checks every recording's scene over a short part of the motion, and the Jacobian of the residuals. Exits with 5 if a
+    check fails. Of a large scene only a sample is checked; the output lists it. Also prints how far small displacements
+    grow along each fitted motion.
 
     Example: sheetbend check experiments/twin/twin.toml
     """

@@ -30,8 +30,9 @@ def collect(
     output: Annotated[Path, typer.Option(help="Folder for the tables and the forest plot.")] = Path("out/collected"),
     json: Json = False,
 ) -> None:
-    """Collect fits of many specimens: one table of all parameters, and mean and spread between specimens of each, with
-    the errors of the fits taken out (random effects, REML).
+    """Collect the fits of many specimens into one table, with the mean and spread of each parameter.
+
+    The errors of the single fits are subtracted from the spread (random effects, REML).
 
     Example: sheetbend collect out/ropes
     """

@@ -38,7 +38,7 @@ def compare(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Say which of several fits predicts held-out data better, how sure that is, and what differs between them.
+    """Compare fits: which predicts held-out data better, with an interval, and what differs between them.
 
     Example: sheetbend compare out/plain out/with_drag
     """

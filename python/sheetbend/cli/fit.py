@@ -44,7 +44,7 @@ def fit(
     config: Annotated[
         Path,
         typer.Argument(
-            help="A TOML configuration, see docs/configuration.md; or a pattern such as 'ropes/*.toml'.",
+            help="A TOML configuration (docs/configuration.md), or a pattern such as 'ropes/*.toml'.",
             show_default=False,
         ),
     ],
@@ -74,7 +74,9 @@ def fit(
     ] = False,
     json: Json = False,
 ) -> None:
-    """Fit parameters to recordings. Ctrl-C and SIGTERM stop at the best point so far and still report.
+    """Fit parameters to recordings, and write a report.
+
+    Ctrl-C and SIGTERM stop the fit; the report then shows the best point so far.
 
     Example: sheetbend fit experiments/twin/twin.toml --output out/twin
     """

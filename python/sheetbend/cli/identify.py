@@ -44,7 +44,7 @@ def identify(
     duration: Annotated[float, typer.Option(help="s, of a motion that has no recording yet.")] = 1.0,
     rate: Annotated[float, typer.Option(help="Frames per second of a motion that has no recording yet.")] = 100.0,
     markers: Annotated[
-        int, typer.Option(help="Markers along the rope where there is neither a recording nor a [[marker]].")
+        int, typer.Option(help="Markers along the rope, if there is neither a recording nor a marker table.")
     ] = MARKERS,
     other: Annotated[
         list[Path] | None,
@@ -57,8 +57,10 @@ def identify(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Tell before an experiment what it will tell: intervals and verdicts to expect, what stays free, and what one more
-    marker, mass, force sensor or motion would give. Parameters are planned with at their initial values.
+    """Predict, before an experiment, which parameters it will determine and how well.
+
+    Prints the expected intervals and verdicts, the combinations of parameters that stay free, and what one more marker,
+    mass, force sensor or motion would change. The prediction is made at the initial values of the parameters.
 
     Example: sheetbend identify rope.toml --noise 0.0005
     """

@@ -43,8 +43,10 @@ def info(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Show versions and what is built in; with a configuration also its scenes, quantities and parameters, with a
-    recording what it holds and where its markers are first seen.
+    """Show what a recording or a configuration holds, and which versions are installed.
+
+    Prints the versions and what this build contains. With a recording, also what it holds and where each marker is
+    first seen. With a configuration, also its scenes, quantities and parameters.
 
     Example: sheetbend info experiments/twin/data/twin.npz
     """

@@ -33,20 +33,25 @@ def new(
     ],
     output: Annotated[
         Path | None,
-        typer.Option(help="The configuration; NAME.toml in the working directory when left out.", show_default=False),
+        typer.Option(
+            help="The configuration to write. Default: NAME.toml in the working directory.", show_default=False
+        ),
     ] = None,
     density: Annotated[
         float | None,
-        typer.Option(help="As weighed: kg/m of a rope or beam, kg/m^2 of a cloth.", show_default=False),
+        typer.Option(help="Measured density: kg/m of a rope or beam, kg/m^2 of a cloth.", show_default=False),
     ] = None,
-    length: Annotated[float | None, typer.Option(help="As measured: m, of a rope or beam.", show_default=False)] = None,
+    length: Annotated[
+        float | None, typer.Option(help="Measured length of a rope or beam, m.", show_default=False)
+    ] = None,
     units: Annotated[
         str | None, typer.Option(help="Length unit of the files: m, cm or mm.", show_default=False)
     ] = None,
     json: Json = False,
 ) -> None:
-    """Look at a recording and write a configuration that `sheetbend fit` runs, with comments on what is seen in it and
-    what cannot be known.
+    """Look at a recording and write a configuration for `sheetbend fit`.
+
+    Comments in the configuration say what the recording shows and what it cannot show.
 
     Example: sheetbend new take.csv --density 0.05
     """

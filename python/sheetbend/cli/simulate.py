@@ -77,9 +77,11 @@ def simulate(
     movie: MoviePath = None,
     json: Json = False,
 ) -> None:
-    """Simulate a scene and write its trajectory as NPZ: times, positions, velocities, the constraints' forces, the
-    pressures of volumes that are kept, and what force sensors read (sensor_NAME_times, _forces, _torques); with a
-    recording also its markers as simulated, predicted_NAME.npz.
+    """Simulate a scene without fitting, and write its motion.
+
+    The NPZ holds times, positions, velocities, forces of the constraints, pressures of kept volumes, and readings of
+    force sensors (sensor_NAME_times, _forces, _torques). If the scene has a recording, predicted_NAME.npz holds the
+    simulated markers.
 
     Example: sheetbend simulate experiments/twin/twin.toml --output out/twin --movie motion.gif
     """
@@ -104,8 +106,8 @@ def _simulate(
     folder = output if output is not None else Path("out") / name
     if mesh is not None:
         check_format(mesh)
-        if not any(task.scene.cloths or (mesh in WHOLE and task.scene.ropes) for task in tasks):
-            needs = "a cloth or a rope" if mesh in WHOLE else "a cloth"
+        if not any(task.scene.cloths or (mesh in WHOLE and (task.scene.ropes or task.scene.solids)) for task in tasks):
+            needs = "a cloth, a solid or a rope" if mesh in WHOLE else "a cloth"
             raise ConfigError("--mesh", f"needs {needs}, and the scene has none", mesh.value, "leave it out")
     moving = [task for task in tasks if not task.static]
     if movie is not None:

@@ -50,15 +50,18 @@ def textile(
     ] = None,
     decimal: Annotated[str | None, typer.Option(help="Decimal mark: a point or a comma.", show_default=False)] = None,
     pretension: Annotated[
-        str | None, typer.Option(help="From where strains count: 2N, or 1cN/cm.", show_default=False)
+        str | None, typer.Option(help="Load at which strains are zero: 2N, or 1cN/cm.", show_default=False)
     ] = None,
     along: Annotated[Along, typer.Option(help="Direction of a pull.")] = "warp",
     law: Annotated[LawName, typer.Option(help="Fitted to a pull.")] = "exponential",
     weights: Annotated[
-        str, typer.Option(help="Power by which smaller loads count less in the fit of a pull, or 'chosen'.")
+        str,
+        typer.Option(
+            help="Weight of small loads in the fit of a pull: a power of the load (0: all alike), or 'chosen'."
+        ),
     ] = "0",
     forecast: Annotated[
-        bool, typer.Option("--forecast", help="Carry a pull on to 1/0.6 times its strain, with an interval.")
+        bool, typer.Option("--forecast", help="Extrapolate a pull to 1/0.6 times its strain, with an interval.")
     ] = False,
     poisson: Annotated[float, typer.Option(help="sqrt(nu_uv nu_vu) of the fabric, where it is known.")] = 0.0,
     way: Annotated[Way, typer.Option(help="Which way of the loop the elastic law follows.")] = "loading",

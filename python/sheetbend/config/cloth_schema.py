@@ -163,8 +163,8 @@ class Cloth(Section):
     name: Name = key("cloth", "prefix of its quantities: <name>_warp and so on")
     fabric: Name | None = key(
         None,
-        "name of an earlier cloth that is cut from the same fabric: what the fabric is, from `density` to "
-        "`drag_quadratic` and `law`, is that cloth's, and so are the quantities",
+        "name of an earlier cloth that is cut from the same fabric: both share the keys from `density` to "
+        "`drag_quadratic` and `law`, and their quantities",
     )
     fabric_file: str | None = key(
         None, "file that `sheetbend fabric` has written: `density`, `warp` to `bending_twist` and `law` are those in it"
@@ -216,15 +216,15 @@ class Cloth(Section):
     grid: MarkerGrid | None = key(None, "[scene.cloth.grid], markers on a grid; a recording may have its own")
     nearest_at: Finite | None = key(
         None,
-        "time of a recording at which the cloth lies as placed: markers without another place, that move no grip, sit "
-        "where they are nearest to it then",
+        "time of a recording at which the cloth lies as placed: a marker without another place, which moves no grip, "
+        "is attached where it is nearest to the cloth at that time",
         "s",
     )
 
     layout: list[Pair] | None = key(
         None,
-        "material coordinates at which markers sit, in no order: at `nearest_at` each is taken by the marker nearest "
-        "to it, and markers that are nearest to none sit nowhere",
+        "material coordinates of markers, in any order: at `nearest_at` each goes to the marker nearest to it; "
+        "markers that get none are not attached",
         "m",
         min_length=1,
     )

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import ConfigError, RecordingError
 from ..objects.cloth import Cloth
-from ..objects.markers import Place, between, on_body, on_cloth, on_particle, on_rope
+from ..objects.markers import Place, between, on_body, on_cloth, on_particle, on_rope, on_solid
 from ..recording.recording import Recording
 from ..recording.recording_checks import marker_indices
 from ..scene.scene import Scene
@@ -22,6 +22,7 @@ from .rope_schema import Rod, Rope
 from .ropes import check_markers
 from .scene_schema import SceneSection
 from .scenes import Particles
+from .solids import named_solid
 
 
 @dataclass(frozen=True)
@@ -123,6 +124,9 @@ def _placed(path: str, marker: schema.Marker, scene: Scene, particles: Particles
         body = named_body(f"{path}.body", marker.body, scene)
         off = np.add(marker.point or np.zeros(3), marker.offset or np.zeros(3))
         return on_body(body, [off])[0]
+    elif marker.solid is not None:
+        with located(path):
+            return on_solid(named_solid(f"{path}.solid", marker.solid, scene), [marker.place or ()])[0]
     elif marker.between is not None:
         first, second = (particles.find(f"{path}.between", r) for r in marker.between)
         place = between(first, second, marker.fraction)

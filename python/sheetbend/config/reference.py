@@ -21,6 +21,7 @@ from . import (
     rope_schema,
     scene_schema,
     schema,
+    solid_schema,
     solver_schema,
 )
 from .section import AXES, NAME, REFERENCE, Section
@@ -39,6 +40,8 @@ HEADERS: dict[str, type[Section]] = {
     "[[scene.cloth.set]]": cloth_schema.VertexSet,
     "[[scene.cloth.grip]]": cloth_schema.Grip,
     "[scene.cloth.grid], [recording.grids.NAME]": cloth_schema.MarkerGrid,
+    "[[scene.solid]]": solid_schema.SolidSection,
+    "[[scene.solid.set]]": solid_schema.SolidSet,
     "[[scene.particles]]": scene_schema.Particles,
     "[[scene.pendulum]]": scene_schema.Pendulum,
     "[[scene.arm]]": scene_schema.Arm,

@@ -177,6 +177,11 @@ class Rod(Strand):
     twist_modes: list[int] = key([], "the same of the rest twist: <name>_twist_<k> (1/m)")
     softness_modes: list[int] = key([], "the same of the logarithm of the bending compliance: <name>_softness_<k>")
     density_modes: list[int] = key([], "the same of the density, relative to it: <name>_density_<k>")
+    slid_modes: list[int] = key(
+        [],
+        "the same of the curvature by which internal friction has slid before the start, about both axes: "
+        "<name>_slid_1_<k>, _2_<k> (1/m); needs yield_curvature",
+    )
 
     @model_validator(mode="after")
     def _known_leads(self) -> Self:

@@ -11,6 +11,7 @@ from .cloth_schema import Cloth, with_fabrics
 from .contact_schema import ColliderSection, ContactSection
 from .rope_schema import Rod, Rope
 from .section import Finite, Name, Quaternion, Reference, Section, Vector, key
+from .solid_schema import SolidSection
 
 
 class Particles(Section):
@@ -219,6 +220,7 @@ class SceneSection(Section):
     rope: list[Rope] = key([], "ropes")
     rod: list[Rod] = key([], "rods, which store twist")
     cloth: list[Cloth] = key([], "cloths")
+    solid: list[SolidSection] = key([], "solids")
     particles: list[Particles] = key([], "single particles")
     pendulum: list[Pendulum] = key([], "simple pendulums")
     arm: list[Arm] = key([], "rigid arms")

@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import ConfigError
-from ..mesh import TriangleMesh
+from ..mesh import SolidMesh, TriangleMesh
 from ..objects.arm import add_arm, add_pendulum
 from ..objects.arm_data import Arm
 from ..objects.cloth import Cloth
 from ..objects.rope import Rope
+from ..objects.solid import Solid
 from ..objects.tool import Tool
 from ..scene.scene import Scene
 from . import scene_schema as schema
@@ -27,6 +28,7 @@ from .forces_on import add_forces
 from .moment import Moment
 from .rope_points import Seats
 from .ropes import build_rope
+from .solids import build_solid
 from .tools import tool_named
 from .winds import add_winds
 
@@ -51,7 +53,10 @@ class Particles:
         """The name, unless it is taken."""
         if name in self.named:
             raise ConfigError(
-                f"{path}.name", "is taken", name, "give every rope, cloth, arm and set of particles a name of its own"
+                f"{path}.name",
+                "is taken",
+                name,
+                "give every rope, cloth, solid, arm and set of particles a name of its own",
             )
         return name
 
@@ -65,12 +70,11 @@ class Particles:
 
     def add_cloth(self, cloth: Cloth, configured: TriangleMesh) -> None:
         self.add(cloth.name, cloth.particles[cloth.mesh.nearest(configured.vertices)].tolist())
-        self.labels[cloth.name] = {
-            label: int(cloth.particles[vertex])
-            for name, vertices in cloth.mesh.sets.items()
-            for k, vertex in enumerate(vertices)
-            for label in ([name, f"{name}:0"] if len(vertices) == 1 else [f"{name}:{k}"])
-        }
+        self.labels[cloth.name] = _labels(cloth)
+
+    def add_solid(self, solid: Solid, configured: SolidMesh) -> None:
+        self.add(solid.name, solid.particles[solid.mesh.nearest(configured.vertices)].tolist())
+        self.labels[solid.name] = _labels(solid)
 
     def add_arm(self, arm: Arm) -> None:
         self.add(arm.name, arm.particles)
@@ -91,7 +95,7 @@ class Particles:
         if name not in self.named:
             raise ConfigError(
                 path,
-                "names no rope, cloth or set of particles",
+                "names no rope, cloth, solid or set of particles",
                 reference,
                 f"use one of: {', '.join(self.named) or 'none yet'}",
             )
@@ -127,6 +131,16 @@ class Particles:
                 f"use 0 to {count - 1}, or -1 for the last",
             )
         return particles[at]
+
+
+def _labels(sheet: Cloth | Solid) -> dict[str, int]:
+    """Particles of the sets of a mesh: "SET:0", "SET:1", ..., and "SET" where it has one."""
+    return {
+        label: int(sheet.particles[vertex])
+        for name, vertices in sheet.mesh.sets.items()
+        for k, vertex in enumerate(vertices)
+        for label in ([name, f"{name}:0"] if len(vertices) == 1 else [f"{name}:{k}"])
+    }
 
 
 def build_scene(
@@ -175,6 +189,10 @@ def build_scene(
         if cloth.markers == "vertices" and moment is not None:
             _check_sequence(f"{path}.markers", coarse, moment)
         particles.add_cloth(build_cloth(scene, path, cloth, mesh, own, moment, tools), coarse)
+    for i, solid in enumerate(section.solid):
+        path = f"scene.solid[{i}]"
+        particles.free_name(path, solid.name)
+        particles.add_solid(*build_solid(scene, path, solid, folder, finer))
     add_winds(scene, section)
     for i, some in enumerate(section.particles):
         path = f"scene.particles[{i}]"

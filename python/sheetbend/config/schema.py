@@ -36,6 +36,8 @@ class Marker(Section):
     radius: Finite | None = key(None, "distance from the arm's pivot", "m")
     body: Name | None = key(None, "a rigid body instead, with `point`")
     point: Vector | None = key(None, "place in the body's frame; `offset` counts along its axes", "m")
+    solid: Name | None = key(None, "a solid instead, with `place`")
+    place: Vector | None = key(None, "point of the solid's shape at rest, on its surface or inside", "m")
     between: list[Reference] | None = key(None, "two particles instead, with `fraction`", min_length=2, max_length=2)
     fraction: Finite = key(0.5, "share of the way from the first of the two to the second")
     offset: Vector | None = key(None, "standing off along (tangent, normal, tangent x normal)", "m")
@@ -43,7 +45,7 @@ class Marker(Section):
 
     @model_validator(mode="after")
     def _one_place(self) -> Self:
-        kinds = ("arc_length", "material", "particle", "arm", "body", "between")
+        kinds = ("arc_length", "material", "particle", "arm", "body", "solid", "between")
         places = [n for n in kinds if getattr(self, n) is not None]
         if len(places) != 1:
             raise ValueError(f"names {' and '.join(places) or 'no place'}|give one of {', '.join(kinds)}")
@@ -51,6 +53,10 @@ class Marker(Section):
             raise ValueError("has only one of arm and radius|give both")
         if (self.body is None) != (self.point is None):
             raise ValueError("has only one of body and point|give both")
+        if (self.solid is None) != (self.place is None):
+            raise ValueError("has only one of solid and place|give both")
+        if self.solid is not None and self.offset is not None:
+            raise ValueError("stands off a solid|leave offset out, and give the place below it")
         return self
 
 
@@ -95,24 +101,26 @@ class RecordingSection(Section):
     ropes: list[Name] | None = key(None, "names of the ropes that it shows; all when left out", min_length=1)
     leave_out: list[Name] = key(
         [],
-        "names of cloths, particles, constraints, hung masses, forces, contacts and quantities that its scene does "
-        "without",
+        "names of cloths, particles, constraints, hung masses, forces, contacts and quantities that are not in its "
+        "scene",
     )
     frames: list[int] | None = key(
         None, "[first, stop] or [first, stop, step]: use these frames only", min_length=2, max_length=3
     )
     max_gap: Finite | None = key(
         None,
-        "longest time for which a marker that drives something may be lost: its motion is then closed by a cubic; "
+        "longest time for which a marker that drives something may be lost; a cubic fills the gap; "
         "3.5 frame intervals when left out",
         "s",
         ge=0,
     )
-    fit: Window | None = key(None, "[start, stop] in the recording's time: what the fit sees; all when left out", "s")
-    held_out: Window | None = key(None, "[start, stop]: what is only predicted, from the same start", "s")
+    fit: Window | None = key(
+        None, "[start, stop] in the recording's time: the part that is fitted; all when left out", "s"
+    )
+    held_out: Window | None = key(None, "[start, stop]: the part that is only predicted, from the same start", "s")
     tools: dict[Name, str] = key({}, "poses of tools in this recording: files by tool, see `scene.tool.file`")
     start_time: Finite | None = key(
-        None, "recording time at which the scene starts; the start of `fit` when left out", "s"
+        None, "recording time at which the scene starts; by default the start of `fit`", "s"
     )
     static: bool = key(False, "it shows an equilibrium; the frames of `fit` are averaged")
     start: Literal["given", "equilibrium"] = key(
@@ -127,8 +135,8 @@ class RecordingSection(Section):
     driven_sigma: Finite | Literal["estimate"] | None = key(
         None,
         'noise of the markers that `scene.drive` and grips follow, in each coordinate, or "estimate" (from the '
-        "recording): their true motion is then estimated too, with this as prior, and intervals allow for it; `sigma` "
-        "must be as honest",
+        "recording): the fit also estimates their true motion, with this noise as prior, and intervals allow for it; "
+        "`sigma` must be right too",
         "m",
     )
     axes: str = key("xyz", "coordinates that count", pattern=AXES)
@@ -138,8 +146,14 @@ class RecordingSection(Section):
         "m",
         gt=0,
     )
-    loss: Literal["squares", "soft_l1", "huber"] = key("squares", "robust loss")
-    loss_scale: Finite = key(1.0, "where the robust loss sets in, in units of sigma", gt=0)
+    loss: Literal["squares", "soft_l1", "huber"] = key("squares", "soft_l1 and huber give large residuals less weight")
+    loss_scale: Finite = key(1.0, "residual beyond which a robust loss grows more slowly, in sigma", gt=0)
+    shooting: Finite | Literal["auto"] | None = key(
+        None,
+        'cut the motion into windows of this length, or "auto": their states at the start are found along with the '
+        "parameters, so that a chaotic motion can be fitted; the report says what the model loses per second",
+        "s",
+    )
     marker: list[Marker] = key([], "places of this recording's markers; those of [[marker]] when left out")
     grids: dict[Name, MarkerGrid] = key({}, "by cloth, markers on a grid in this recording, instead of the cloth's own")
     offsets: dict[str, list[str]] = key(
@@ -148,8 +162,8 @@ class RecordingSection(Section):
     )
     time_offset: str | None = key(
         None,
-        "a quantity (s) that is added to the recording's times to get the scene's: -0.3 belongs to a camera that is "
-        "0.3 s late (what its frame at 1 s shows happened at 0.7 s). Start the scene early enough: `start_time`",
+        "a quantity (s) that is added to the times of the recording to get those of the scene: -0.3 for a camera that "
+        "is 0.3 s late (its frame at 1 s shows what happened at 0.7 s). Start the scene early enough: `start_time`",
     )
     force: list[ForceSection] = key([], "forces that were measured at its supports")
     values: dict[str, Finite] = key(
@@ -163,14 +177,14 @@ class ParameterSection(Section):
     initial: Finite | None = key(None, "starting value; the scene's when left out")
     lower: Finite | None = key(None, "lower bound")
     upper: Finite | None = key(None, "upper bound")
-    log: bool | None = key(None, "fit the logarithm; by default for what must be positive")
+    log: bool | None = key(None, "fit the logarithm; by default for quantities that must be positive")
     fixed: bool = key(False, "keep the initial value")
     tied_to: str | None = key(None, "follow another parameter")
     factor: Finite = key(1.0, "value = factor times that of `tied_to`")
     prior: Pair | None = key(None, "[mean, sd]; with log the sd is that of the natural logarithm")
     unit: str | None = key(None, "for reports; the scene's when left out")
     private: bool = key(False, "one value per recording")
-    scale: Finite | None = key(None, "natural size of what may be zero", gt=0)
+    scale: Finite | None = key(None, "natural size of a parameter that may be zero", gt=0)
 
 
 class GivenSection(Section):
@@ -191,33 +205,34 @@ class FitSection(Section):
     optimizer: Literal["auto", "ceres", "scipy"] = key("auto", "Ceres where it was built, else SciPy")
     starts: list[dict[str, Finite]] | int = key(
         [],
-        "further starting values by name; the best end wins. Or how many starts: the initial one and others over the "
-        "priors, between bounds, or over two decades; all are raced through the windows, one of each group is fitted",
+        "further starting values by name; the best result counts. Or a number of starts: the initial one, and others "
+        "drawn from priors, between bounds, or over two decades; all race through the windows, and one of each group "
+        "that ends in the same minimum is fitted",
     )
     windows: Literal["auto"] | list[Finite] = key(
         "auto",
-        "increasing lengths: so much of every motion from its start on is fitted first, one after another; auto "
-        "chooses them, and none for a start nearby; [] = none",
+        "increasing lengths of the beginnings that are fitted first, one after another; auto chooses them (none if the "
+        "start is near the minimum); [] = none",
         "s",
     )
     max_iterations: int = key(200, "per start and window", ge=1)
-    tolerance: Finite = key(1e-10, "relative change of the cost that counts as none", gt=0, lt=1)
-    threads: int = key(1, "over recordings and derivatives; results do not depend on it", ge=1)
+    tolerance: Finite = key(1e-10, "relative change of the cost at which the optimizer stops", gt=0, lt=1)
+    threads: int = key(1, "share the work of recordings and derivatives; results do not depend on it", ge=1)
     halve_step: bool = key(
         True,
-        "move the estimates to the limit of short substeps and count what that leaves open in the intervals; some three"
-        " evaluations with tangents",
+        "extrapolate the estimates to the limit of short substeps, and include the remaining error in the intervals; "
+        "costs about three evaluations with tangents",
     )
     double_segments: bool | None = key(
         None,
-        "left out: one simulation with twice the segments in every rope and twice the cells in every cloth, and what"
-        " its residuals would move counts; true: refit there; false: the mesh does not count",
+        "true: fit again with twice the segments in every rope and twice the cells in every cloth; left out: one "
+        "simulation there, whose effect on the estimates to first order counts; false: the mesh does not count",
     )
-    linear_refits: bool = key(False, "with `double_segments = true`: the one simulation instead of the refit")
+    linear_refits: bool = key(False, "with `double_segments = true`: one simulation instead of the second fit")
     profiles: bool = key(
-        True, "follow the cost to the ends of every interval, the others refitted; false: linear intervals, for nothing"
+        True, "follow the cost to the ends of every interval, refitting the others; false: linear intervals, at no cost"
     )
-    leave_one_out: bool = key(False, "also predict every recording that holds nothing out by a fit to the others")
+    leave_one_out: bool = key(False, "predict every recording that has no held-out part by a fit to the others")
     strict: bool = key(False, "exit 3 when any requested parameter is not identifiable, not only when all are")
 
 

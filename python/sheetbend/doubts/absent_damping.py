@@ -31,21 +31,22 @@ def undamped(scene: Scene) -> list[int]:
     ]
 
 
-def with_damping(problem: FitProblem, u: Array, frames: float) -> FitProblem:
-    """The problem with a damping of so many frame intervals in all undamped groups of its motions."""
+def with_damping(problem: FitProblem, u: Array, frames: float, only: str = "") -> FitProblem:
+    """The problem with a damping of so many frame intervals in all undamped groups of its motions, or in one of them by
+    name."""
     theta, slots, _ = problem.known(u)
     return problem.of(
         [
-            e if e.static else _damped(e, theta[own], frames * float(np.median(np.diff(recording.times))))
+            e if e.static else _damped(e, theta[own], frames * float(np.median(np.diff(recording.times))), only)
             for e, own, recording in zip(problem.experiments, slots, problem.recordings, strict=True)
         ]
     )
 
 
-def _damped(e: Experiment, theta: Array, time: float) -> Experiment:
+def _damped(e: Experiment, theta: Array, time: float, only: str) -> Experiment:
     """With Kelvin-Voigt damping of a time constant [s] in its undamped groups: the force per rate is that time over the
     compliance."""
-    bare = undamped(e.scene)
+    bare = [k for k in undamped(e.scene) if only in ("", e.scene.groups[k].name)]
     at, _ = e.scene.compiled.layout["compliance"]
     compliance = e.scene.compiled.inputs(theta)[at:]
     scene = copy.copy(e.scene)

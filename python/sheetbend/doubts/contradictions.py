@@ -25,6 +25,7 @@ from .prediction import Comparison
 from .profiles import Elsewhere
 
 CLAIMS = ("identified", "weak", "one-sided")  # verdicts that can be contradicted
+DENIES = "not identifiable"  # that the data know a parameter
 ORDINALS = ("first", "second", "third")
 MOST_RECORDINGS = 8  # each of them is compared with the others; more are compared by halves
 FEWEST_MARKERS = 4  # that are compared by halves
@@ -33,11 +34,18 @@ TRADES = 0.3  # correlation from which on a parameter shares the error of anothe
 APART = 2.0  # half-widths from the estimate: another minimum
 
 
-def doubtful(estimates: Sequence[Estimate], doubts: Mapping[str, str]) -> tuple[Estimate, ...]:
-    """The estimates, "doubtful" in place of a claim where there is a doubt, with its words."""
+def doubtful(
+    estimates: Sequence[Estimate], doubts: Mapping[str, str], of_all: Mapping[str, str] | None = None
+) -> tuple[Estimate, ...]:
+    """The estimates, "doubtful" in place of a claim where there is a doubt, with its words.
+
+    Args:
+        of_all: those that leave no statement standing, that the data do not know a parameter neither.
+    """
+    of_all = of_all or {}
     return tuple(
         replace(e, verdict="doubtful", words=f"{doubts[e.name]} (else {e.verdict}, {e.words})")
-        if e.name in doubts and e.verdict in CLAIMS
+        if e.name in doubts and (e.verdict in CLAIMS or (e.name in of_all and e.verdict == DENIES))
         else e
         for e in estimates
     )
@@ -68,7 +76,7 @@ def between_parts(
     words = _between(problem, u, judged, [])
     if not words:
         return {}
-    shifts = _residual_shifts(problem, u, refinement) if refinement is not None else []
+    shifts = residual_shifts(problem, u, refinement) if refinement is not None else []
     errors = driven_errors(problem, u)
     return _between(problem, u, judged, shifts, errors) if shifts or errors.size else words
 
@@ -129,7 +137,7 @@ def finer_experiments(problem: FitProblem, refinement: Refinement) -> list[Seque
     return finer
 
 
-def _residual_shifts(problem: FitProblem, u: Array, refinement: Refinement) -> list[Array]:
+def residual_shifts(problem: FitProblem, u: Array, refinement: Refinement) -> list[Array]:
     """(rows,) what the data's residuals change at half the step and on a finer mesh, where these are asked for. One
     that has no answer there is left out."""
     _, r, _ = problem.evaluate(u)

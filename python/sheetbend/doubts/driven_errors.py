@@ -22,6 +22,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -33,6 +34,8 @@ from ..statistics.gauge import RANK_TOLERANCE
 
 DRAWS = 64  # of the noise where parts of the data are compared; eight of them share a rollout
 FEW = 24  # of the noise, for intervals
+PACK = 8  # draws that share a rollout
+UNFELT = 0.2  # standard errors: what moves estimates by less adds no more than 2 % to an interval
 CHANCE = 0.05  # share of the draws that resemble the others less than residuals of such noise are taken to do
 SOUND = 0.5  # to which draws may have been made smaller where a bias is told: beyond, the tangents say too much
 DIRECTIONS = 8  # of noise, at least, that a parameter's slope is told from
@@ -95,33 +98,68 @@ def drawn_noise(problem: FitProblem, u: Array, draws: int) -> DrivenErrors | Non
     driven = problem.of([_following_all(e) if i in known else e for i, e in enumerate(problem.experiments)])
     flat: dict[int, Array] = {}
     size: dict[int, float] = {}
+    moved: dict[int, Array] = {}
     for i, n in known.items():
         correction = driven.experiments[i].correction(problem.recordings[i])
         assert correction is not None  # it follows all that is driven
-        flat[i] = np.ascontiguousarray(n[:, : correction.knots]).reshape(draws, -1)
-        e = problem.experiments[i]
+        made = np.ascontiguousarray(n[:, : correction.knots]).reshape(draws, -1)
+        responses = _responses(problem, driven, i, u, made)
+        if responses is None:
+            continue
+        flat[i], moved[i], e = made, responses, problem.experiments[i]
         places = [k for k, p in enumerate(e.scene.boundary.driven) if p not in e.scene.directors]
         size[i] = _noise_of_markers(e) or float(np.sqrt(np.mean(n[:, :, places] ** 2)))
-    moved = {i: np.asarray(driven.core.respond(i, u, n)) for i, n in flat.items()}
+    if not moved:
+        return None
     believed = _believed(problem, u, moved)
     return DrivenErrors(driven, flat, size, {i: believed[i] * m for i, m in moved.items()}, believed)
+
+
+_KNOWN: WeakKeyDictionary[FitProblem, dict[tuple[int, bytes], Array]] = WeakKeyDictionary()
+"""Responses to the first draws, which are the same however many are asked for."""
+
+
+def _responses(problem: FitProblem, driven: FitProblem, i: int, u: Array, draws: Array) -> Array | None:
+    """(draws, data rows of the i-th experiment) what draws of the noise do to the residuals at u; None where no
+    interval would feel it. The part of A n that parameters can take up, over the residuals' size, is what it moves
+    them in standard errors, and |A n| is the most that it can move anything."""
+    known = _KNOWN.setdefault(problem, {})
+    key, rows = (i, u.tobytes()), problem.core.first_rows
+    found = known.get(key)
+    if found is None:
+        found = np.asarray(driven.core.respond(i, u, draws[:PACK]))
+        _, r, J = problem.evaluate(u)
+        own = slice(rows[i], rows[i + 1])
+        left = np.sqrt(_square(r[own]))
+        taken = np.linalg.norm(found @ _basis(J)[own], axis=1)
+        if np.sqrt(_square(taken)) < UNFELT * left and np.linalg.norm(found, axis=1).max() < left:
+            found = np.zeros((0, rows[i + 1] - rows[i]))
+        known[key] = found
+    if not len(found):
+        return None
+    if len(found) < len(draws):
+        known[key] = found = np.vstack([found, np.asarray(driven.core.respond(i, u, draws[len(found) :]))])
+    return found[: len(draws)]
 
 
 def _believed(problem: FitProblem, u: Array, moved: Mapping[int, Array]) -> dict[int, float]:
     """By place of the experiment, the part of the responses that fits into what the fit leaves, 1 at most. Parameters
     take some of either up."""
     _, r, J = problem.evaluate(u)
-    rows = problem.core.first_rows
-    basis, sizes, _ = np.linalg.svd(
-        J / np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny), full_matrices=False
-    )
-    basis = basis[:, sizes > RANK_TOLERANCE * sizes.max(initial=0.0)]
+    rows, basis = problem.core.first_rows, _basis(J)
     found = {}
     for i, errors in moved.items():
         own = slice(rows[i], rows[i + 1])
         beside = errors - (errors @ basis[own]) @ basis[own].T
         found[i] = min(1.0, _share(_square(r[own]), _square(beside)), _share(*_alike(r[own], beside)))
     return found
+
+
+def _basis(J: Array) -> Array:
+    """Orthonormal, of what the columns of J span."""
+    size = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
+    basis, sizes, _ = np.linalg.svd(J / size, full_matrices=False)
+    return np.asarray(basis[:, sizes > RANK_TOLERANCE * sizes.max(initial=0.0)])
 
 
 def _share(left: float, made: float) -> float:

@@ -157,14 +157,15 @@ def _corrected(problem: FitProblem, u: Array) -> list[str]:
         if not 1 / DISHONEST < residual < DISHONEST:
             seen, said = short(1e3 * e.sigma * residual, 2), short(1e3 * e.sigma, 2)
             words.append(
-                f"{e.name}: residuals of {seen} mm (of one coordinate) belie a sigma of {said} mm, against which "
-                "driven_sigma is weighed: set sigma to what they are"
+                f"{e.name}: residuals of {seen} mm (of one coordinate) contradict a sigma of {said} mm. The fit weighs "
+                "driven_sigma against sigma: set sigma to the size of the residuals"
             )
         told = e.driven_noise * float(np.sqrt(problem.core.absorbed(i) / found[e.name].size))  # the rest stays zero
         if by > DISHONEST * told:
             words.append(
-                f"{e.name}: driven markers had to be moved by {short(1e3 * by, 2)} mm, where a driven_sigma of "
-                f"{short(1e3 * e.driven_noise, 2)} mm lets expect {short(1e3 * told, 2)}: raise it, or doubt the model"
+                f"{e.name}: the fit corrected driven markers by {short(1e3 * by, 2)} mm, but a driven_sigma of "
+                f"{short(1e3 * e.driven_noise, 2)} mm implies {short(1e3 * told, 2)} mm: raise driven_sigma, or doubt "
+                "the model"
             )
     return words
 

@@ -9,7 +9,7 @@ Philosophical Society 44, 50).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -25,11 +25,12 @@ from .losses import LOSSES
 HELD: dict[str, Any] = {"fixed": True, "log": False, "prior": None, "lower": -math.inf, "upper": math.inf}
 
 
-def held_losses(problem: FitProblem, u: Array) -> dict[str, str]:
+def held_losses(problem: FitProblem, u: Array, known: Mapping[str, float] | None = None) -> dict[str, str]:
     """By free parameter, the given loss of its motion that the residuals ask another size of. One Jacobian.
 
     Args:
         u: (free,) the minimum.
+        known: by parameter, the share of what the fit leaves that has another cause. A loss must explain more.
     """
     ok, _, J = problem.evaluate(u)
     names = held_names(problem)
@@ -44,8 +45,9 @@ def held_losses(problem: FitProblem, u: Array) -> dict[str, str]:
         told = {name: one for name, one in asked.items() if one is not None}
         if told:
             name = max(told, key=lambda name: told[name].explained)
-            words = _words(name, told[name])
-            found |= {other: words for i in group for other in problem.acting_on(problem.experiments[i])}
+            words, rival = _words(name, told[name]), known or {}
+            others = [other for i in group for other in problem.acting_on(problem.experiments[i])]
+            found |= {other: words for other in others if told[name].explained > rival.get(other, 0.0)}
     return found
 
 

@@ -42,9 +42,9 @@ def air_doubts(estimates: Sequence[Estimate]) -> Iterator[str]:
         if least > most and (surface or e.name.partition("[")[0].endswith(COEFFICIENTS)):
             density = 2.0 * least / LARGEST_DRAG
             yield (
-                f"{e.name} is no air's: even with a drag coefficient of {LARGEST_DRAG:g} it takes a density of at "
-                f"least {short(density, 2)} kg/m^3, where air has {AIR:g}. Other losses (friction in the fabric or the "
-                "grip) or an error of the model stand in it"
+                f"{e.name} is too large for air: even with a drag coefficient of {LARGEST_DRAG:g} it needs a density "
+                f"of at least {short(density, 2)} kg/m^3, but air has {AIR:g}. It contains other losses (friction in "
+                "the fabric or the grip) or an error of the model"
             )
 
 
@@ -73,10 +73,10 @@ def _combined(problem: FitProblem, u: Array, judged: Identifiability) -> list[st
     unit = problem.parameters[known.names[0]].unit
     parts = [n if w == 1.0 else f"{short(w, 2)} {n}" for n, w in zip(known.names, known.weights, strict=True)]
     return [
-        f"losses: the motion does not tell {' and '.join(names)} apart. What it shows is their sum, "
-        f"{' + '.join(parts)} = {short(known.value)} {unit} (to {short(100 * known.half_width, 2)} %). Fix all but "
-        "one, or add a motion in which they act apart, such as a faster one. Hysteresis of a fabric and friction in "
-        "its grip, which have no number here, are in it too"
+        f"losses: the motion does not separate {' and '.join(names)}. It shows their sum, {' + '.join(parts)} = "
+        f"{short(known.value)} {unit} (to {short(100 * known.half_width, 2)} %). Fix all but one, or add a motion in "
+        "which they act differently, such as a faster one. The sum also contains hysteresis of the fabric and friction "
+        "in its grip, which the model does not have"
     ]
 
 

@@ -1,9 +1,10 @@
-"""What a large misfit looks like: markers in another order, turned or mirrored axes, another unit; or none of these.
+"""What a large misfit looks like: markers in another order, turned or mirrored axes, another unit or frame rate.
 
 Intervals take what a fit leaves for noise. Where that is a noticeable part of the motion, the cause is often how the
 recording was read, or which way gravity points. These tests take no fit: simulated markers are put in another order,
-turned, mirrored or scaled, and whichever of these leaves much less of the measured motion is named. They are tried at
-the fitted values and at those that the fit began with, since a fit to misread markers may end anywhere.
+turned, mirrored, scaled or taken at other times, and whichever of these leaves much less of the measured motion is
+named. They are tried at the fitted values and at those that the fit began with, since a fit to misread markers may end
+anywhere.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ SEEN = 3.0  # sigmas: what is left is no noise
 EXPLAINS = 0.5  # of what is left, at most, where the markers are read otherwise
 TURNED = 5.0  # degrees
 SCALED = 0.2  # of the size
-CAUSES = "gravity, lengths, densities, clamps, a loss that the model lacks, and the markers' order and places"
+RATES = (1 / 4, 1 / 2, 4 / 5, 5 / 6, 6 / 5, 5 / 4, 2.0, 4.0)  # of frames, as told ones to those of the camera
+CAUSES = "gravity, lengths, densities, clamps, frame rate, a loss that the model lacks, the markers' order and places"
 
 
 def misread(problem: FitProblem, u: Array) -> tuple[str, ...]:
@@ -48,6 +50,9 @@ def misread(problem: FitProblem, u: Array) -> tuple[str, ...]:
         if simulated is None:
             simulated = [shapes for at in (u, problem.parameters.initial()) if (shapes := _simulated(problem, at))]
         readings = [one for shapes in simulated for one in _better(shapes[i][..., axes], measured, seen)]
+        if not e.scene.boundary.driven and e.time_offset is None:
+            times = recording.times - e.t0
+            readings += [one for shapes in simulated for one in _clocked(shapes[i][..., axes], measured, seen, times)]
         better = min(readings, key=lambda one: one[0], default=(np.inf, ""))
         missed = f"the fit misses {_percent(left, motion)} of the motion of {e.name}"
         if better[0] < EXPLAINS * left:
@@ -93,6 +98,21 @@ def _readings(x: Array, y: Array, seen: Mask) -> Iterator[tuple[float, str]]:
         yield _rms(size * a, b, seen), f"{short(size, 2)} times as far apart"
     if x.shape[-1] == 3:
         yield from _turned(a, b, seen)
+
+
+def _clocked(x: Array, y: Array, seen: Mask, times: Array) -> Iterator[tuple[float, str]]:
+    """What would be left if frames had been taken at other rates, and which, as far as the simulated motion goes. The
+    frames that it reaches stand for all."""
+    plain = _rms(x, y, seen)
+    for rate in RATES:
+        at = rate * times
+        there = at <= times[-1]
+        moved = np.stack([np.interp(at[there], times, c) for c in x.reshape(len(times), -1).T], axis=-1)
+        before = _rms(x[there], y[there], seen[there])
+        if before > 0.0:
+            left = plain * _rms(moved.reshape(-1, *x.shape[1:]), y[there], seen[there]) / before
+            if left < EXPLAINS * plain:
+                yield left, f"taken at {short(rate, 3)} times the told times, as of another frame rate"
 
 
 def _order(x: Array, y: Array, seen: Mask) -> Array:

@@ -14,6 +14,7 @@ prior rows too, is then what a loss leaves that corrections do not take up, as a
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Literal
 
@@ -29,7 +30,9 @@ from .other_losses import other_losses
 OTHER: dict[str, Literal["bdf1", "bdf2"]] = {"bdf1": "bdf2", "bdf2": "bdf1"}
 
 
-def missing_loss(problem: FitProblem, u: Array, fitted: tuple[FitProblem, Array]) -> dict[str, str]:
+def missing_loss(
+    problem: FitProblem, u: Array, fitted: tuple[FitProblem, Array], known: Mapping[str, float] | None = None
+) -> dict[str, str]:
     """By free parameter, the motion whose losses the model does not have, or does not have so large.
 
     Losses that are given are tested first (`held_losses`), then all losses by one simulation with the other integrator.
@@ -41,15 +44,22 @@ def missing_loss(problem: FitProblem, u: Array, fitted: tuple[FitProblem, Array]
         problem: whose residuals count.
         u: (free,) its minimum.
         fitted: the problem as it was fitted, whose rows are the same, and its minimum.
+        known: by parameter, the share of what the fit leaves that has another cause. A loss must explain more.
     """
     if all(e.static for e in problem.experiments):
         return {}
-    found = held_losses(problem, u)
-    found |= {name: words for name, words in _by_other_integrator(problem, u, fitted).items() if name not in found}
-    return found or other_losses(*fitted)
+    found = held_losses(problem, u, known or {})
+    found |= {
+        name: words
+        for name, words in _by_other_integrator(problem, u, fitted, known or {}).items()
+        if name not in found
+    }
+    return found or ({} if known else other_losses(*fitted))
 
 
-def _by_other_integrator(problem: FitProblem, u: Array, fitted: tuple[FitProblem, Array]) -> dict[str, str]:
+def _by_other_integrator(
+    problem: FitProblem, u: Array, fitted: tuple[FitProblem, Array], known: Mapping[str, float]
+) -> dict[str, str]:
     if any(e.scene.compiled.contacts for e in problem.experiments):
         return {}
     ok, _, J = problem.evaluate(u)
@@ -63,7 +73,8 @@ def _by_other_integrator(problem: FitProblem, u: Array, fitted: tuple[FitProblem
         asked = clearly(problem, u, change, mine, len(groups))
         if asked is not None:
             words = _words([problem.experiments[i].name for i in group], asked)
-            found |= {name: words for i in group for name in problem.acting_on(problem.experiments[i])}
+            names = [name for i in group for name in problem.acting_on(problem.experiments[i])]
+            found |= {name: words for name in names if asked.explained > known.get(name, 0.0)}
     return found
 
 

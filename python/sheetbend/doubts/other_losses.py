@@ -3,8 +3,9 @@
 What a little more loss changes is known to first order (`missing_loss`, `held_losses`). A large one changes the motion
 in another way: what a little of it would damp is long gone, and what fits leave without it is large and alike over
 time, so that no direction is told from chance. So fits are made with other losses: each that was given gets a third and
-three times its size, and elements that have a stiffness and no damping are given one (`absent_damping`). What two
-Gauss-Newton steps leave then decides: a model that is wrong in another way leaves nearly as much with any loss.
+three times its size, and elements that have a stiffness and no damping are given one, all together and each kind by
+itself (`absent_damping`). What two Gauss-Newton steps leave then decides: a model that is wrong in another way leaves
+nearly as much with any loss.
 """
 
 from __future__ import annotations
@@ -92,9 +93,10 @@ def _tried(problem: FitProblem, u: Array, groups: list[_Group]) -> Iterator[tupl
             for times, (size, share) in SIZES.items():
                 words = f"the given {name} is too {size}: with {share} of it the fit"
                 yield of_size(problem, name, times), words
-    if any(undamped(scene) for scene in scenes):
+    bare = list(dict.fromkeys(scene.groups[k].name for scene in scenes for k in undamped(scene)))
+    for only in (*([""] if bare else []), *(bare if len(bare) > 1 else [])):
         for frames in FRAMES:
-            yield with_damping(problem, u, frames), ""
+            yield with_damping(problem, u, frames, only), f"with damping{f' of {only}' if only else ''} the fit"
 
 
 def _reached(more: FitProblem, u: Array, J: Array, groups: list[_Group]) -> Array | None:
@@ -132,10 +134,9 @@ def _less(group: _Group, after: Array) -> float:
 
 def _words(names: list[str], given: str, share: float) -> str:
     percent = f"{short(100 * min(share, 1.0), 2)} % less beyond noise"
-    if given:
+    if not given.startswith("with"):
         return f"{given} would leave {percent}. Free it, or measure it"
     return (
-        f"{f'{names[0]} loses' if len(names) == 1 else 'the recordings lose'} energy that the model does not: with "
-        f"damping the fit would leave {percent}. Give the model the loss that it lacks (such as bend_damping or "
-        "membrane_damping)"
+        f"{f'{names[0]} loses' if len(names) == 1 else 'the recordings lose'} energy that the model does not: {given} "
+        f"would leave {percent}. Give the model the loss that it lacks (such as bend_damping or membrane_damping)"
     )

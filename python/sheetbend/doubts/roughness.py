@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..arrays.timeseries import Array
+from ..experiment.cut import start_quantities
 from ..minimum.growth import Growth
 from ..minimum.problem import FitProblem
 from ..quantities.parameters import Parameter
@@ -70,8 +71,9 @@ def _words(problem: FitProblem, i: int, u: Array, jacobian: Array, growth: Growt
         until = float(problem.recordings[i].times[max(late - 1, 0)]) - e.t0
     else:
         return ""
+    shoot = ", or fit it all with shooting = 'auto'" if start_quantities(e.scene) and e.shooting is None else ""
     fix = (
-        f"up to {short(until, 2)} s it can be fitted: give windows up to there, or cut the recording"
+        f"up to {short(until, 2)} s it can be fitted: give windows up to there, or cut the recording{shoot}"
         if until > 0 and not e.static
         else "start from other values"
     )

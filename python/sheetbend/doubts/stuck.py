@@ -73,8 +73,8 @@ def _bounded(e: Estimate, problem: FitProblem, profiles: Profiles, rise: float) 
     best = min(costs, key=lambda value: costs[value])
     if costs[best] < costs[e.value] - rise:
         words = (
-            f"nothing slides here, so that no gradient leads away, and {quantity(best, parameter)} explains the data "
-            "better: start from there"
+            f"nothing slides here, so the gradient is zero, but {quantity(best, parameter)} explains the data better: "
+            "start from there"
         )
         return replace(e, verdict="no minimum", words=words)
     if bound is None or not np.isfinite(bound) or ends[1] is not None:

@@ -13,12 +13,15 @@ from ..errors import SheetbendError
 from ..minimum.problem import FitProblem
 from ..quantities.quantities import Term
 
+Input = tuple[str, np.ndarray, np.ndarray]
+"""Name of an input array of a scene, entries of it (k,), and what is added to each (k,)."""
+
 
 def tangents(
     problem: FitProblem,
     u: Array,
     i: int,
-    gravity: Mapping[str, Array],
+    added: Mapping[str, Array | Input],
     quantities: Sequence[tuple[str, int, bool]] = (),
     corrected: Array | None = None,
 ) -> Array:
@@ -26,7 +29,7 @@ def tangents(
 
     Args:
         u: (free,) the point.
-        gravity: (3,) m/s^2 by name: what one unit of each adds to gravity.
+        added: by name, what one unit of it adds: to gravity (3,) m/s^2, or to another input array.
         quantities: name, place among the scene's quantities, and whether the derivative is that with respect to the
             logarithm.
         corrected: the experiment's corrections there (`FitProblem.corrections`).
@@ -37,14 +40,16 @@ def tangents(
     e = problem.experiments[i]
     theta, slots, _ = problem.known(u)
     own = theta[slots[i]]
-    names = list(gravity)
+    names = list(added)
     free: list[dict[str, Any]] = [
         {"name": name, "log": log, "slots": [slot], "factors": [1.0], "prior": None}
         for name, slot, log in [*quantities, *((name, len(own) + n, False) for n, name in enumerate(names))]
     ]
     at = [float(np.log(own[slot]) if log else own[slot]) for _, slot, log in quantities] + [0.0] * len(names)
     d = e.core(problem.recordings[i], corrected)
-    terms = [Term("gravity", np.arange(3), v, ((name, "identity"),)) for name, v in gravity.items()]
+    inputs: list[Input] = [v if isinstance(v, tuple) else ("gravity", np.arange(3), v) for v in added.values()]
+    made = zip(names, inputs, strict=True)
+    terms = [Term(array, where, by, ((name, "identity"),)) for name, (array, where, by) in made]
     terms = [*e.extra_terms(), *e.sensor_terms(), *terms]
     map_ = e.scene.compiled.map(3 * len(e.compared) + 1, terms, [*e.scene.quantities, *names])
     d["map"] = map_ | {"base": d["map"]["base"]}

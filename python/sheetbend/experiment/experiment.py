@@ -19,6 +19,7 @@ from ..recording.recording import Recording
 from ..scene.scene import Scene
 from .correction import Correction, recorded_noise
 from .force_sensor import INPUTS, ForceSensor
+from .shooting import Shooting
 
 Window = tuple[float, float]
 NO_SHARE = 1e-9  # interpolation weights below this are zero
@@ -55,6 +56,8 @@ class Experiment:
         radius: distance of the markers from a pivot, m: errors are then reported as angles in rad, rms
             distance/radius; None = in m.
         loss: "squares", "soft_l1" or "huber", with loss_scale in units of sigma.
+        shooting: cuts a motion whose errors grow into windows of this length, s, "auto", or a `Shooting`: their states
+            at the start are found along with the parameters, and what the model loses over a window is a result.
         forces: sensors whose recorded forces are residuals too, beside those of the markers; for motions.
         predict: None takes part in the fit. Otherwise the recording is only predicted, with the shared parameters as
             fitted on the others and its private ones either fitted to its own fit window ("window": initial states,
@@ -81,6 +84,7 @@ class Experiment:
     loss_scale: float = 1.0
     predict: str | None = None
     forces: Sequence[ForceSensor] = ()
+    shooting: float | str | Shooting | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.recording, Recording):
@@ -93,6 +97,9 @@ class Experiment:
             )
         self._check_driven_sigma()
         self._check_forces()
+        corrected, late = self.driven_sigma is not None, self.time_offset is not None
+        beside = {"static": self.static, "forces": bool(self.forces), "driven_sigma": corrected, "time_offset": late}
+        object.__setattr__(self, "shooting", Shooting.given(self.name, self.shooting, beside))
         if not self.axes or set(self.axes) - set("xyz") or len(set(self.axes)) != len(self.axes):
             raise InputError(f"{self.name}.axes", "must be some of x, y, z", self.axes, "give such as 'xz'")
         if self.radius is not None and not (math.isfinite(self.radius) and self.radius > 0):
@@ -191,7 +198,7 @@ class Experiment:
     @cached_property
     def places(self) -> tuple[Place | None, ...]:
         """The markers' places, None where not compared."""
-        return places_for(self.scene, self.markers, self.recording.markers)
+        return places_for(self.scene, self.markers, self.recording.markers, self.recording.positions)
 
     @property
     def compared_places(self) -> list[Place]:

@@ -28,7 +28,7 @@ _IGNORED = 1.0  # a sigma of channels that do not count
 
 @dataclass(frozen=True, kw_only=True)
 class ForceSensor:
-    """A sensor between a support of the scene (a grip, a clamp, a hook) and what holds or moves that.
+    """A force sensor between a support of the scene (a grip, a clamp, a hook) and whatever holds or moves the support.
 
     Its readings are residuals of a motion, beside those of the markers. With the force F and torque T that the support
     puts on the body, gravity g, and the axes R of the sensor, it reads at the point p + R arm, p being where the first

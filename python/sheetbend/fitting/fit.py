@@ -17,6 +17,7 @@ from ..doubts.contradictions import between_parts, doubtful, elsewhere, held_out
 from ..doubts.driven_noise import driven_doubts
 from ..doubts.floors import at_floor_of_sweeps
 from ..doubts.given import check_given, half_widths, premises
+from ..doubts.implausible import implausible
 from ..doubts.leave_one_out import MEANING, companions, each_left_out
 from ..doubts.losses import loss_doubts
 from ..doubts.misread import misread
@@ -26,11 +27,15 @@ from ..doubts.prediction import Comparison, compare, predicted_values
 from ..doubts.profiles import Elsewhere
 from ..doubts.stationary import unfinished
 from ..doubts.stuck import bounded_by_sticking
+from ..doubts.told import told_numbers
 from ..doubts.touching import kinks, what_touches
 from ..doubts.unexplained import unexplained
+from ..doubts.wrong_given import doubts_of, explained_by, wrong_given
+from ..doubts.wrong_given import warnings_of as wrong_given_warnings
 from ..errors import InputError
 from ..experiment.clock import outside, told_clocks
 from ..experiment.experiment import Experiment
+from ..minimum.continuity import joined, shot_motions
 from ..minimum.counts import counted
 from ..minimum.discretization import Refinement, settled, to_the_limit, wanted_refinement
 from ..minimum.fine_meshes import at_the_limit
@@ -50,6 +55,7 @@ from ..scene.scene import Scene
 from ..statistics.identifiability import Identifiability
 from .rows import curves, every_end, given_rows, growth_rows, recording_fit, start_rows
 
+IGNORED = ", and their standard deviations do not count"
 Systematic = Callable[[FitProblem, np.ndarray], Mapping[str, float]]
 
 
@@ -197,7 +203,9 @@ def fit(
     if leave_one_out:
         for e in fitted:
             companions(e, fitted, wanted)
-    problem = FitProblem(fitted, wanted, threads=threads)
+    experiments, found_at = joined(experiments, wanted, threads, progress)
+    fitted = [e for e in experiments if e.predict is None]
+    problem = FitProblem(fitted, wanted, threads=threads, expanded=found_at)
     problem.check_start()
     check_given(given or {}, problem)
     found = search.run(problem)
@@ -220,7 +228,10 @@ def fit(
     def conclude(refitter: str | None) -> _Conclusion:
         at, every = settled(refinement, experiments, problem, best, refitter)
         values = problem.parameters.to_physical(at.u)
-        rests_on, unknown = ((), ()) if refitter is None or lost else premises(at.problem, at.u, given or {})
+        told, silent = ([], "") if refitter is None or lost else told_numbers(at.problem, at.u)
+        uncounted = f"what errors of the given values would move is not known{IGNORED if given else ''}: {silent}"
+        unknown = (uncounted,) if silent else ()
+        rests_on = premises(at.problem, at.u, given or {}, told)
         more = dict(half_widths(rests_on, problem.parameters.free))
         for parameter, reach in ({} if systematic is None else systematic(at.problem, at.u)).items():
             more[parameter] = more.get(parameter, 0.0) + reach
@@ -240,7 +251,13 @@ def fit(
             if not lost:
                 doubted, drawn_off = driven_doubts(at.problem, at.u, judged)
                 doubted += loss_doubts(at.problem, at.u, judged)
-                lacking = missing_loss(at.problem, at.u, (problem, best.u)), missing_force(at.problem, at.u, judged)
+                wrong = wrong_given(at.problem, at.u, told, refinement)
+                doubted += wrong_given_warnings(at.problem, wrong)
+                lacking = (
+                    doubts_of(at.problem, at.u, judged, wrong),
+                    missing_loss(at.problem, at.u, (problem, best.u), explained_by(at.problem, wrong)),
+                    missing_force(at.problem, at.u, judged),
+                )
                 parts = together(*lacking, drawn_off, parts)
         return _Conclusion(at, tuple(every), judged, lower, *predicted, doubted + unknown, rests_on, parts)
 
@@ -262,14 +279,17 @@ def fit(
         Elsewhere(m.cost - best.cost, problem.parameters.to_physical(m.u), "another start") for m in ends[1:]
     ]
     stopped, ahead = unfinished(problem, best, judged)
+    missed = unexplained(problem, comparisons, judged.autocorrelation_time, at.u)
     contradicted = (
         held_out_motion(problem, comparisons, errors)
         | elsewhere(problem, judged, best.cost, [*starts_elsewhere, *end.lower])
         | end.parts
-        | unexplained(problem, comparisons, judged.autocorrelation_time, at.u)
+        | missed
         | stopped
     )
-    estimates, limit = at_the_limit(doubtful(judged.estimates, contradicted), at.refits, problem.parameters, at.u)
+    estimates, limit = at_the_limit(
+        doubtful(judged.estimates, contradicted, missed), at.refits, problem.parameters, at.u
+    )
     values = end.values | problem.parameters.to_physical(limit)
     errors = told_clocks(errors, end.experiments, end.values, estimates)
     shifted = tuple(outside(end.experiments, end.values))
@@ -306,6 +326,7 @@ def fit(
         forces=tuple(row for c in comparisons for one in c.forces for row in one.fits()),
         growth=growth_rows(found.growths, grown),
         contacts=what_touches(at.problem, at.u),
+        shot=shot_motions(problem, best.u),
         kinks=() if interrupted else kinks(at.problem, at.u, estimates),
         windows=best.windows,
         evaluations=evaluations,
@@ -316,7 +337,7 @@ def fit(
         + at.warnings
         + shifted
         + fallback
-        + (() if interrupted else misread(problem, best.u)),
+        + (() if interrupted else misread(problem, best.u) + implausible(problem)),
     )
     return Fit(result, tuple(comparisons), wanted, corrected, end.values)
 

@@ -273,7 +273,7 @@ class Climb:
 
     def _descended(self, rope: Rope, window: Span, most: int = LONG) -> tuple[Rope, float] | None:
         """A rope and its cost after a descent on the windows that do not diverge at first; None where most do."""
-        experiments = experiments_of(rope.model, self.split.fitted, window)
+        experiments = experiments_of(rope.model, self.split.fitted, window, rope.values)
         free = bounded(rope.parameters, rope.model, self.split.fitted, window[0])
         end = descend(experiments, free, rope.values, most, self.threads, ENOUGH)
         if not end.finite:

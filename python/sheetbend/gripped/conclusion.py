@@ -48,7 +48,7 @@ def conclude(
     """
     rope, say, threads = climb.rope, climb.say, climb.threads
     assert rope is not None
-    experiments = experiments_of(rope.model, motions, window)
+    experiments = experiments_of(rope.model, motions, window, rope.values)
     parameters = bounded(rope.parameters, rope.model, motions, window[0])
     say(f"the fit that counts, to {counted(motions, window)}")
     if len(experiments) > MANY:
@@ -59,7 +59,7 @@ def conclude(
             spread = model_spread(rope, climb.equal())
             few = climb.windows[-1]
             if len(places(motions, few)) < len(experiments):  # most of the way at a part of the price
-                values = _at_the_end(climb, values, experiments_of(rope.model, motions, few), parameters)
+                values = _at_the_end(climb, values, experiments_of(rope.model, motions, few, values), parameters)
             values = _at_the_end(climb, values, experiments, parameters)
         except KeyboardInterrupt:
             interrupted = True
@@ -67,7 +67,7 @@ def conclude(
 
     def finer() -> list[Experiment]:
         model = replace(rope.model, segments=2 * rope.model.segments)
-        return checked(experiments_of(model, motions, window), parameters, values, threads)
+        return checked(experiments_of(model, motions, window, values), parameters, values, threads)
 
     last = fit(
         experiments,
@@ -145,6 +145,8 @@ def _together(offsets: Mapping[str, float], spread: Mapping[str, float]) -> dict
 
 
 def _seconds(rope: Rope, motions: Sequence[GrippedMotion], window: Span, threads: int) -> float:
-    one = problem_of(experiments_of(rope.model, motions[:1], (window[0], window[0])), rope.parameters, rope.values)
+    one = problem_of(
+        experiments_of(rope.model, motions[:1], (window[0], window[0]), rope.values), rope.parameters, rope.values
+    )
     one.evaluate(one.parameters.initial())
     return EVALUATIONS * one.seconds.get(True, 0.0) * len(places(motions, window)) / threads

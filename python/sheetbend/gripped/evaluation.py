@@ -37,7 +37,8 @@ class Evaluation:
 def evaluate(found: RopeFit, recordings: Sequence[Recording | GrippedMotion]) -> Evaluation:
     """Predict each recording open loop from its first frame, and score it (`sheetbend.scores`).
 
-    Recordings are screened first; motions are taken as they are.
+    Recordings are screened first; motions are taken as they are. Shape and speed at the start, and what had slid inside
+    a rope that yields, come from the first `smoothing` s of the model (`fit_rope`).
     """
     usable = screened(recordings, found.model.smoothing)
     reach = found.values[f"{NAME}_length"]

@@ -19,6 +19,7 @@ from .judging import Errors, Split, Verdict, verdict
 from .model import RopeModel
 from .motion import Array
 from .pieces import experiments_of, numbered, problem_of
+from .slid import window_of
 from .windows import Span
 
 PART = 1e-3  # of the step, along which the recordings that judge change
@@ -42,8 +43,10 @@ def first_order(
     """
     if not split.judged:
         return None
-    fitted = problem_of(experiments_of(larger, split.fitted, window), parameters, values, threads)
-    judged = problem_of(numbered([larger.experiment(m) for m in split.judged]), parameters, values, threads)
+    fitted = problem_of(experiments_of(larger, split.fitted, window, values), parameters, values, threads)
+    judged = problem_of(
+        numbered([window_of(larger, m, None, values) for m in split.judged]), parameters, values, threads
+    )
     u = fitted.parameters.initial()
     (ok, r, J), (answers, r2, _) = fitted.evaluate(u), judged.evaluate(u, jacobian=False)
     if not (ok and answers and np.isfinite(J).all()):

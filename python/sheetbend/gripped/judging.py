@@ -18,6 +18,7 @@ from .ladder import TWIST
 from .model import NAME, RopeModel
 from .motion import Array, GrippedMotion
 from .pieces import numbered, problem_of
+from .slid import window_of
 from .split import split
 
 BETTER = 0.99  # median ratio of errors on what was not fitted, below which a larger model stays
@@ -193,7 +194,7 @@ def predict(
     """Whole recordings, open loop from their first frames; NaN where a motion diverges."""
     if not motions:
         return []
-    experiments = [replace(model.experiment(m), fit=None) for m in motions]
+    experiments = [replace(window_of(model, m, None, values), fit=None) for m in motions]
     problem = problem_of(numbered(experiments), (TWIST.parameters[0],), values)
     u = problem.parameters.initial()
 

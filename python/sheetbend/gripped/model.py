@@ -32,7 +32,7 @@ class RopeModel:
             share them share their material frames.
         values: starting values of quantities, as options of `add_rod` (EI, GJ, bend_damping, ...); None = without it.
         tilts, shifts, roll: nuisances of the grips, see `add_rod`.
-        curvature_modes, softness_modes, density_modes: see `add_rod`.
+        curvature_modes, softness_modes, density_modes, slid_modes: see `add_rod`.
         places: let each free marker stand off from its measured place along the rope, by the quantity
             `rope_place_<its number>`, m.
         marker_mass: kg of each free marker, beside `density`; spread over the rope it does the same, so that no motion
@@ -53,6 +53,7 @@ class RopeModel:
     curvature_modes: Sequence[int] = ()
     softness_modes: Sequence[int] = ()
     density_modes: Sequence[int] = ()
+    slid_modes: Sequence[int] = ()
     places: bool = False
     marker_mass: float = 0.0
     segments: int = 12
@@ -94,6 +95,7 @@ class RopeModel:
             curvature_modes=self.curvature_modes,
             softness_modes=self.softness_modes,
             density_modes=self.density_modes,
+            slid_modes=self.slid_modes,
             **options,
         )
         scene.boundary.smoothed = motion.steadied

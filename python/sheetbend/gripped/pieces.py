@@ -12,12 +12,16 @@ from ..minimum.problem import FitProblem
 from ..quantities.parameters import Parameter, Parameters
 from .model import RopeModel
 from .motion import GrippedMotion
+from .slid import window_of
 from .windows import Span, places
 
 
-def experiments_of(model: RopeModel, motions: Sequence[GrippedMotion], span: Span) -> list[Experiment]:
-    """The model on the windows of a span, each predicted open loop from its first frame."""
-    return [model.experiment(m, (start, start + span[0])) for m, start in places(motions, span)]
+def experiments_of(
+    model: RopeModel, motions: Sequence[GrippedMotion], span: Span, values: Mapping[str, float]
+) -> list[Experiment]:
+    """The model on the windows of a span, each predicted open loop from its first frame, with what had slid before it
+    at these values."""
+    return [window_of(model, m, (start, start + span[0]), values) for m, start in places(motions, span)]
 
 
 def numbered(experiments: Sequence[Experiment]) -> list[Experiment]:

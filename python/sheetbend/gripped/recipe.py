@@ -118,7 +118,8 @@ def fit_rope(
         segments, max_segments: links at the start, and at most; they are doubled until EI moves by less than 5 %. Of
             two numbers from 24 on that agree so the smaller one is taken.
         substeps: per frame.
-        smoothing: s, of the starts; grips are smoothed over that or more, as their noise asks for. 0 = as recorded.
+        smoothing: s, of the starts; grips are smoothed over that or more, as their noise asks for. 0 = as recorded. In
+            these frames what had slid inside a rope that yields shows, with which each window starts.
         sigma: m, expected error of a marker.
         gravity: m/s^2, where the recordings do not tell.
         given: standard deviations of what the fit takes as given, such as {"rope_density": 0.02}; see `sheetbend.fit`.

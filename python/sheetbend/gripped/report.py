@@ -136,6 +136,8 @@ def counted(result: FitResult, spread: str = "") -> tuple[tuple[str, str], ...]:
     model = f", {spread}" if spread else ""
     density = next((p for p in result.premises if p.name == f"{NAME}_density" and p.sd and p.value), None)
     unseen = "a roll of the grips that nothing shows, noise of the grips"
+    if any(e.name == f"{NAME}_yield_share" for e in result.estimates):
+        unseen += ", an error of what had slid inside before a recording (its first frames tell)"
     if density is not None and density.sd is not None and density.value is not None:
         model += f", the density to {short(100 * density.sd / density.value, 2)} % (1 sd, unweighed markers included)"
     elif not is_over_density(result):

@@ -22,7 +22,7 @@ QUIET = 0.1  # of the motion of all: how little the upper row moves where the ed
 ASKEW = 0.15  # slope at which a cloth hangs that a wind blows on
 AIR = 0.7  # kg/m^3, of a plate across the wind: half the density of air times a drag coefficient of 1.2
 SUBSTEP = 1 / 250  # s, at most
-FITTED, LONGEST = 2 / 3, 1.5  # share of the time that is fitted, and s at most
+FITTED, LONGEST = 2 / 3, 3.0  # share of the time that is fitted, and s at most
 
 
 @dataclass(frozen=True)
@@ -61,43 +61,47 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     if len(own) < WHOLE * len(names):
         raise RecordingError(
             "markers",
-            f"do not hang together as one sheet: {len(own)} of them do, the others are on grips or on further cloths",
+            f"do not hang together as one sheet: {len(own)} of them do, the others are on grips or on other cloths",
             joined(names),
             "give a recording with the markers of one cloth and of what holds it, or write the configuration by hand",
         )
     sheet = _looked_at(s, own, density)
     apart = spacing(s.apart[np.ix_(own, own)])
-    edge = "moves: it is taken for what holds the cloth"
+    edge = "moves: it is taken as what holds the cloth"
     if sheet.pinned:
-        edge = "hardly moves: the edge above it is held"
+        edge = "hardly moves: the edge above it is taken as held"
     notes = [
         f"{len(own)} markers lie on a sheet, some {1e3 * apart:.3g} mm apart: a cloth of {sheet.width:.3g} x "
         f"{sheet.height:.3g} m with half of that beyond the outer ones",
         f"the upper row of markers, {joined(names[k] for k in sheet.row)}, {edge}",
     ]
     if sheet.wind is not None:
-        notes.append("it hangs askew, and hardly moves: a wind blows, or another axis points up")
+        notes.append("it hangs at a slant and hardly moves: a wind blows, or another axis points up")
     unknown = [
         "what holds the cloth: the whole upper edge is taken. Change the set, or give a grip with the holder's markers",
-        "the edges of the fabric and which way its warp runs: measure them and correct mesh, origin and markers",
-        "the stiffness in tension: a cloth that hangs hardly shows it. warp and shear are kept, not fitted"
+        "the size of the flat fabric: distances are taken as it hangs, stretched by its weight and the air. If that is "
+        "1 %, the lowest markers are off by 1 % of the height, and the fitted tension is too stiff. Measure the edges "
+        "and the markers on the flat cloth, and which way its warp runs, and correct mesh, origin and markers",
+        "the stiffness in tension: a hanging cloth hardly shows it. warp and shear are not fitted"
         if sheet.wind is None
         else "the stiffness in tension at the start: warp and shear begin at a guess, and the wind's pull shows them",
-        "the wind: the air is taken to stand still"
+        "the wind: the air is taken to stand still, and `air_tangential`, its friction along the cloth, is a guess"
         if sheet.wind is None
-        else "how strongly the air acts at the start: `air_normal` begins as that of a plate; a steady wind tells it "
-        "only together with the wind's speed",
-        "the density"
-        + (": 0.2 kg/m^2 is taken, and all else goes with it" if measured.density is None else " of the markers"),
+        else "how strongly the air acts at the start: `air_normal` begins with the value of a plate; a steady wind "
+        "shows it only together with the wind's speed",
+        "the density: 0.2 kg/m^2 is assumed, and all other values are proportional to it"
+        if measured.density is None
+        else "the mass of the markers",
     ]
     if not sheet.pinned:
         unknown.append(
-            "the true motion of the holder: the noise of the upper row goes into the motion. Give the holder's own "
-            "markers, or its poses as a [[scene.tool]]"
+            f"the true motion of the holder: the upper row's noise, {1e3 * s.noise:.2g} mm in each coordinate, shakes "
+            "the cloth, and the prediction is worse for it. Give the holder's own markers, or its poses as a "
+            '[[scene.tool]]; or add `driven_sigma = "estimate"` to [[recording]], which takes many times as long'
         )
     others = [k for k in range(len(names)) if k not in set(own)]
     if others:
-        unknown.append(f"what {joined(names[k] for k in others)} are on: they are left out")
+        unknown.append(f"what {joined(names[k] for k in others)} are attached to: they are left out")
     return Description("a cloth" + (" at rest" if s.static else ""), notes, unknown, _lines(takes, sheet, density))
 
 
@@ -141,7 +145,8 @@ def _lines(takes: Sequence[Take], sheet: Sheet, density: float) -> list[str]:
         lines += table("[scene.wind]", {"velocity": sheet.wind.tolist()}, {"velocity": "m/s, a guess to start from"})
     cloth: dict[str, Any] = {"density": density, "warp": 500.0 * density, "shear": 100.0 * density}
     cloth |= {"bending": 1e-4 * density, "membrane_damping": 5e-3, "bend_damping": 2e-2}
-    cloth |= {"drag_linear": 0.5 * density} if sheet.wind is None else {"air_normal": AIR, "air_tangential": 0.02}
+    if not s.static:  # air resists motion across a cloth far more than along it; drag of its particles is alike in both
+        cloth |= {"air_normal": AIR, "air_tangential": 0.02}
     cloth |= {"origin": sheet.origin.tolist(), "x_axis": sheet.axes[0].tolist(), "y_axis": sheet.axes[1].tolist()}
     cloth["shape"] = "recording" if r.mask[0, sheet.own].all() or s.static else None
     cloth["pinned"] = ["top"] if sheet.pinned else None
@@ -164,10 +169,9 @@ def _lines(takes: Sequence[Take], sheet: Sheet, density: float) -> list[str]:
         for name in ("warp", "shear"):
             bounds = {"lower": 0.01 * cloth[name], "upper": 100.0 * cloth[name]}
             lines += table(f"[parameters.cloth_{name}]", bounds)
-        lines += table("[parameters.cloth_air_normal]", {"lower": 0.02, "upper": 20.0})
         lines += table("[parameters.cloth_air_tangential]", {"lower": 1e-3, "upper": 1.0})
-    elif not s.static:
-        lines += table("[parameters.cloth_drag_linear]", {"lower": 1e-3 * density, "upper": 1e2 * density})
+    if not s.static:
+        lines += table("[parameters.cloth_air_normal]", {"lower": 0.02, "upper": 20.0})
     fit = {"profiles": False, "double_segments": False}
     return lines + table("[fit]", fit, {"double_segments": "true counts the mesh in the intervals, and takes longer"})
 

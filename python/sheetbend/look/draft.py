@@ -48,7 +48,7 @@ def draft(takes: Sequence[Take], name: str, measured: Measured | None = None) ->
     else:
         got = joined(first.recording.markers)
         fix = "write a configuration by hand, see docs/configuration.md"
-        raise RecordingError("markers", "move like no rope, beam, cloth or pendulum", got, fix)
+        raise RecordingError("markers", "do not move like a rope, beam, cloth or pendulum", got, fix)
     told = (*_told(takes), *found.notes)
     lines = comment(f"Written by `sheetbend new` from {joined(t.file for t in takes)}. It shows {found.kind}.")
     lines += ["#", "# Seen:", *(line for s in told for line in _item(s))]
@@ -86,7 +86,7 @@ def _told(takes: Sequence[Take]) -> list[str]:
         said.append(f"lengths are taken as {takes[0].units}")
     if not first.told:
         axis = "xyz"[first.up]
-        said.append(f"{axis} is taken as up, the file does not say it: change `gravity` if another axis is")
+        said.append(f"{axis} is taken as up, because the file does not say it: change `gravity` if another axis is up")
     return said
 
 

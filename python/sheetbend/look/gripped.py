@@ -36,13 +36,13 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     unknown = [
         "how the rope lies in its grips, its shape at rest and its twist: the recipe for ropes between two grips tries "
         "them one after another, and keeps what predicts recordings that it was not fitted to",
-        "the density: motion alone tells stiffness and drag over density. Weigh the rope and give --density"
+        "the density: the motion shows only the ratios of stiffness and drag to it. Weigh the rope and give --density"
         if measured.density is None
-        else "the mass of the markers: say it with `marker_mass`, 0 where they were weighed with the rope",
+        else "the mass of the markers: give `marker_mass`, or 0 if they were weighed with the rope",
     ]
     if len(takes) == 1:
         unknown.append(
-            "other motions: one recording is both fitted and judged, on its last quarter. Put all recordings of the "
+            "other motions: with one recording, its last quarter judges the fit. Put all recordings of the "
             "rope into one folder, and set `pattern`"
         )
     rope: dict[str, Any] = {"name": "rope", "density": measured.density, "train": str(paths[0].parent)}

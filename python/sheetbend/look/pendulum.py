@@ -35,7 +35,10 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         f"{names[k + 1]} stays {radius:.6g} m from {names[k]}{', which does not move' * (k == 0)}: an arm"
         for k, radius in enumerate(radii)
     ]
-    unknown = ["masses: motion tells ratios only. One of them is 1 kg (or 1 kg m^2), and all others are in its unit"]
+    unknown = [
+        "masses: the motion shows only their ratios. One of them is set to 1 kg (or 1 kg m^2), and the others are "
+        "relative to it"
+    ]
     pivot = np.nanmean(x[:, joints[0]], axis=0).tolist()
     lines = [] if r.gravity is not None else table("[scene]", {"gravity": s.gravity.tolist()})
     step = float(np.median(np.diff(r.times)))

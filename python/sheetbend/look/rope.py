@@ -105,7 +105,7 @@ def _unbranched(s: Seen, order: tuple[int, ...]) -> None:
     if at and longer > BRANCHED:
         raise RecordingError(
             "markers",
-            "lie along a cable that branches, and one rope cannot go through all of them",
+            "lie along a cable that branches, so one rope cannot go through all of them",
             f"branches near {joined(s.recording.markers[k] for k in at)}",
             "give a recording of one branch, or write one [[scene.rod]] for each, see docs/configuration.md",
         )
@@ -145,9 +145,9 @@ def _length(s: Seen, found: Held, last: float, measured: Measured) -> tuple[floa
     return (
         last,
         False,
-        f"the length: the sum of the distances from {a} to {b}, which noise makes too long and bends too short, so it "
-        "is fitted too. What hangs beyond these markers is not seen: the rope is taken to end there. Measure it, and "
-        "give --length"
+        f"the length: the sum of the distances from {a} to {b}, which noise makes too long and bends make too short. "
+        "It is fitted too. The rope beyond these markers is not seen: the model ends there. Measure it, and give "
+        "--length"
         if not s.static
         else f"the length: the sum of the distances from {a} to {b}, to 1 %. Measure it, and give --length",
     )
@@ -158,13 +158,13 @@ def _density(s: Seen, measured: Measured) -> tuple[float, str]:
     if measured.density is not None:
         return (
             measured.density,
-            "the mass of the markers: weigh the rope with them, or hang them on as [[scene.point_mass]]",
+            "the mass of the markers: weigh the rope with them, or add them as [[scene.point_mass]]",
         )
     if isinstance(told, int | float):
         return float(told), "the mass of the markers; the density is the file's"
     return 1.0, (
-        "the density: motion alone tells stiffness and drag over density. It is 1 kg/m here, so rope_EI is EI/density "
-        "in m^4/s^2; weigh the rope and give --density"
+        "the density: the motion shows only the ratios of stiffness and drag to it. It is set to 1 kg/m, so rope_EI is "
+        "EI/density in m^4/s^2. Weigh the rope and give --density"
     )
 
 
@@ -175,14 +175,14 @@ def _beginning(s: Seen, found: Held, rope: dict[str, Any]) -> list[str]:
     if not _lets_go(s, found.order):
         rope["velocity"] = "recording"
         return ["it moves at the first frame: place and speed at the start are those of the markers"]
-    notes = ["at the first frame it moves no faster than its noise tells: it starts from rest"]
+    notes = ["at the first frame it moves no faster than its noise: it starts from rest"]
     way = _straight(s, found.order)
     if way is not None:
         del rope["points"]
         rope |= {"start": mean_position(s.recording.positions)[found.order[0]].tolist(), "direction": way}
         if "clamp_start" in found.rope:
             found.rope["clamp_start"] = way
-        notes.append("at the first frame it is straight, as far as its noise tells")
+        notes.append("at the first frame it is straight within its noise")
     return notes
 
 

@@ -137,11 +137,7 @@ class TriangleMesh:
         Args:
             lower, upper: (3,) m; infinite entries leave a side open.
         """
-        low, high = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
-        for name, bound in (("lower", low), ("upper", high)):
-            if bound.shape != (3,) or np.isnan(bound).any():
-                raise MeshError(name, "must be three numbers", bound.tolist(), "give x, y and z in m, or infinity")
-        return np.flatnonzero(((self.vertices >= low) & (self.vertices <= high)).all(axis=1))
+        return validate.vertices_within(self.vertices, lower, upper)
 
     def nearest(self, points: ArrayLike) -> Indices:
         """(k,) the vertex nearest to each of (k, 3) points in space, m."""

@@ -23,6 +23,20 @@ def rows(name: str, values: ArrayLike, width: int) -> Array:
     return array
 
 
+def vertices_within(vertices: Array, lower: ArrayLike, upper: ArrayLike) -> Indices:
+    """Indices of vertices (n, 3) in a box of space with corners (3,), its faces included; infinite entries leave a side
+    open.
+
+    Raises:
+        MeshError: a corner that is not three numbers.
+    """
+    low, high = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
+    for name, bound in (("lower", low), ("upper", high)):
+        if bound.shape != (3,) or np.isnan(bound).any():
+            raise MeshError(name, "must be three numbers", bound.tolist(), "give x, y and z in m, or infinity")
+    return np.flatnonzero(((vertices >= low) & (vertices <= high)).all(axis=1))
+
+
 def checked_triangles(values: ArrayLike, count: int) -> Indices:
     """(m, 3) indices of different vertices below `count`."""
     array = np.array(values)

@@ -155,7 +155,7 @@ class ManyProblem:
     def __init__(self, experiments: Sequence[Experiment], parameters: Parameters) -> None:
         """
         Raises:
-            InputError: recordings share a name, or correct the markers that their scenes follow.
+            InputError: recordings share a name, correct the markers that their scenes follow, or are shot in windows.
         """
         self.experiments, self.failure = tuple(experiments), ""
         names = [e.name for e in experiments]
@@ -165,6 +165,8 @@ class ManyProblem:
         corrected = [e.name for e in experiments if e.driven_noise is not None]
         if corrected:
             raise InputError("driven_sigma", "does not go with many recordings", corrected[:5], "use sheetbend.fit")
+        if in_windows := [e.name for e in experiments if e.shooting is not None]:
+            raise InputError("shooting", "does not go with many recordings", in_windows[:5], "use sheetbend.fit")
         self.parameters = expanded_to(parameters, self.experiments)
         place = {name: column for column, name in enumerate(self.parameters.free)}
         every = [name for name in parameters.free if not parameters[name].private]

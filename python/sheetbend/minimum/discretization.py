@@ -33,7 +33,7 @@ MESH = "mesh"
 
 @dataclass(frozen=True)
 class Refinement:
-    """How to refine.
+    """How a fit is repeated on a finer time step and mesh.
 
     Attributes:
         halve_step: move the estimate to the limit of short substeps, and count what that leaves open.
@@ -102,7 +102,7 @@ def _left_out(refinement: Refinement, experiments: Sequence[Experiment]) -> tupl
     found = []
     if not refinement.halve_step and any(not e.static for e in experiments):
         found.append(f"{TIME_STEP} not counted")
-    if refinement.finer is None and any(e.scene.ropes or e.scene.cloths for e in experiments):
+    if refinement.finer is None and any(e.scene.ropes or e.scene.sheets for e in experiments):
         found.append(f"{MESH} not counted")
     return tuple(found)
 

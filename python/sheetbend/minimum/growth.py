@@ -13,16 +13,18 @@ nothing moves (the normal of a plane motion) are left out too: a residual never 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .. import _core
 from ..arrays.timeseries import Array
+from ..experiment.cut import shot, start_quantities
 from ..experiment.experiment import Experiment
 from ..motion.equilibrium import NoEquilibriumError, equilibrium
 from ..motion.solver import Solver
 from ..scene.scene import Scene
+from .lifted import Lifted
 from .problem import FitProblem
 
 ROUGH = 1e4
@@ -30,6 +32,7 @@ ROUGH = 1e4
 a real double pendulum over 2 s has 2.4, a cloth whose fit stalls where it starts has 2e18."""
 DIRECTIONS = 8  # as many tangents as one rollout carries
 FRAMES = 100  # at which sigma is taken, at most
+WINDOWS = 8  # of a motion that is shot in windows, at which growth is looked at
 SEED = 19
 
 
@@ -96,20 +99,36 @@ def growths(problem: FitProblem, u: Array) -> tuple[Growth, ...]:
     """Growth of every moving experiment of a problem over its fitted part.
 
     Args:
-        u: (free,) internal point. A motion that diverges there is no error, see `Growth.sigma`.
+        u: (free,) internal point. A motion that diverges there is no error, see `Growth.sigma`. Of one that is shot in
+            windows it is the largest within a window, of some of them.
     """
     return tuple(
-        growth(e, float(r.times[-1]) - e.t0, problem.values_of(e, u))
-        for e, r in zip(problem.experiments, problem.recordings, strict=True)
+        growth(e, float(r.times[-1]) - e.t0, problem.values_of(e, u)) if shot(e) is None else _within(problem, i, u)
+        for i, (e, r) in enumerate(zip(problem.experiments, problem.recordings, strict=True))
         if not e.static
     )
 
 
-def growth(e: Experiment, end: float, values: Mapping[str, float] | None = None) -> Growth:
+def _within(problem: FitProblem, i: int, u: Array) -> Growth:
+    e, core = problem.experiments[i], problem.core
+    assert isinstance(core, Lifted)
+    motion, names = core.motions[i], start_quantities(e.scene)
+    known = {**dict.fromkeys(names), **problem.values_of(e, u)}
+    first = {name: e.scene.quantities[name].value if at is None else at for name, at in known.items()}
+    found = [growth(e, motion.length, first)]
+    onward = replace(e, start="given")
+    for k in range(1, len(motion.states) + 1, max(1, len(motion.states) // WINDOWS)):
+        state = dict(zip(names, motion.states[k - 1], strict=True))
+        found.append(growth(onward, motion.length, first | state, float(motion.edges[k]) - e.t0))
+    return Growth(e.name, found[0].times, np.max([one.sigma for one in found], axis=0))
+
+
+def growth(e: Experiment, end: float, values: Mapping[str, float] | None = None, t0: float = 0.0) -> Growth:
     """Growth of one moving experiment from its scene's start to `end` s; takes some three rollouts' time.
 
     Args:
         values: quantities of its scene to change, by name.
+        t0: s, of the scene's clock, at which it starts.
     """
     last = max(1, round(end / e.solver.h))
     steps = np.unique(np.rint(np.linspace(0, last, min(FRAMES, last + 1))).astype(int))
@@ -123,12 +142,12 @@ def growth(e: Experiment, end: float, values: Mapping[str, float] | None = None)
             inputs[offset : offset + size] = equilibrium(e.scene, values=values).positions.ravel()
         except NoEquilibriumError:
             return Growth(e.name, times, sigma)
-    x, moved = _rollout(e.scene, e.solver, inputs, steps)
+    x, moved = _rollout(e.scene, e.solver, inputs, steps, t0)
     sigma[: len(moved)] = _sigma(x, moved)
     return Growth(e.name, times, sigma)
 
 
-def _rollout(scene: Scene, solver: Solver, inputs: Array, steps: Array) -> tuple[Array, Array]:
+def _rollout(scene: Scene, solver: Solver, inputs: Array, steps: Array, t0: float) -> tuple[Array, Array]:
     """Free particles' positions (frames, free, 3) and displacements (frames, free, 3, directions), up to where the
     motion has an answer."""
     compiled = scene.compiled
@@ -140,7 +159,7 @@ def _rollout(scene: Scene, solver: Solver, inputs: Array, steps: Array) -> tuple
     core = solver.core(compiled)
     while True:
         try:
-            x, x_dot = core.jvp(inputs, start, steps.tolist(), 0.0)
+            x, x_dot = core.jvp(inputs, start, steps.tolist(), t0)
             break
         except _core.Diverged as error:
             steps = steps[steps < error.substep]

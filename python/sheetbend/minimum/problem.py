@@ -19,6 +19,7 @@ from ..statistics.covariance import Layout
 from . import content
 from .counts import count
 from .journal import Evaluator
+from .lifted import Known, lifted
 from .spread import Spread, reaching
 
 ParameterLike = Parameter | Mapping[str, Any] | None
@@ -95,7 +96,8 @@ class FitProblem:
     Attributes:
         experiments: in order.
         parameters: with private ones expanded to one per experiment that has them.
-        core: the compiled problem.
+        core: the compiled problem, or what stands for it (`lifted`).
+        places: theta, where each experiment's quantities are in it, and the free parameters, as it was compiled from.
         evaluator: evaluates it, through the journal that was open when it was made.
         seconds: that the last evaluation from here took, with (True) and without a Jacobian.
     """
@@ -126,10 +128,13 @@ class FitProblem:
         free = self._free(slot_of)
         self.sensed = [core["sensors"] for core in cores]
         try:
-            self.core = _core.Problem(experiments=cores, theta=theta, slots=slots, free=free, threads=threads)
+            plain = _core.Problem(experiments=cores, theta=theta, slots=slots, free=free, threads=threads)
         except ValueError as error:
             raise refusal(error, InputError, [len(r.times) for r in self.recordings]) from error
+        self.places: Known = theta, slots, free
+        self.core = lifted(plain, self.experiments, self.recordings, cores, self.places, self.parameters, threads)
         scenes = [e.scene for e in self.experiments]
+        cores = [{**c, "shooting": repr(e.shooting)} for c, e in zip(cores, self.experiments, strict=True)]
         self._spread = Spread.of(self)
         self.evaluator = Evaluator(
             self._spread or self.core, lambda: content.of_problem(scenes, cores, theta, slots, free)

@@ -43,7 +43,8 @@ def refuted(problem: FitProblem, u: Array, there: Array) -> bool:
 def words(what: str, simulated: str, option: str) -> str:
     """A warning that the estimate was not moved to the limit of `what`."""
     return (
-        f"the data are explained worse in the limit of {what}, so the estimate is not moved there, and the intervals "
-        f"count all that it would move. A recording that was simulated {simulated} looks so (then {option} leaves this "
-        "out); otherwise the discretization is too coarse for a limit, or makes up for something that the model lacks"
+        f"in the limit of {what} the model explains the data worse. So the estimate is not moved to that limit, and "
+        "the interval includes the whole difference. Possible causes: the recording was simulated "
+        f"{simulated} (then use {option}), the discretization is too coarse, or it compensates for something that the "
+        "model lacks"
     )

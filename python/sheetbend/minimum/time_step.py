@@ -102,7 +102,7 @@ def _moved(problem: FitProblem, u: np.ndarray) -> Settled:
             break  # what that step would move counts as open
     if refuted(problem, u, r):
         whole = Refit(name=TIME_STEP, to_limit=1.0, moved=moves(problem.parameters, u, end))
-        told = words("short substeps", "at the same substep", "refine=False, or halve_step = false in a configuration,")
+        told = words("short substeps", "at the same substep", "refine=False, or halve_step = false in a configuration")
         return Settled(problem, u, refits=(whole,), warnings=(told,))
     finest = problem.of(combined(halved(problem.experiments)))
     left = np.abs(order_left(problem.experiments) * (one_step(limit, finest, end) - end)) + np.abs(onward - end)

@@ -42,7 +42,7 @@ class ForceBalance:
 
 
 def force_balance(scene: Scene, end: float, solver: Solver, values: Mapping[str, float] | None = None) -> ForceBalance:
-    """How the forces of a scene's motion came into balance.
+    """Record how the forces of every substep came into balance.
 
     Args:
         scene: is frozen by this.

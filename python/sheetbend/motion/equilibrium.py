@@ -118,7 +118,7 @@ class Equilibrium:
 def equilibrium(
     scene: Scene, start: ArrayLike | None = None, values: Mapping[str, float] | None = None, stable: bool = True
 ) -> Equilibrium:
-    """The equilibrium that a start leads to.
+    """Find the equilibrium that a start leads to.
 
     Args:
         scene: is frozen by this.
@@ -161,7 +161,7 @@ def equilibrium(
 def equilibria(
     scene: Scene, starts: Iterable[ArrayLike], values: Mapping[str, float] | None = None, tolerance: float = 1e-6
 ) -> list[Equilibrium]:
-    """The distinct equilibria that several starts lead to, lowest energy first. Starts that lead nowhere are left out.
+    """Find the distinct equilibria that several starts lead to, lowest energy first. Starts without one are left out.
 
     Args:
         tolerance: m; states nearer than this everywhere are one.

@@ -64,7 +64,7 @@ class GradientRow:
 
 @dataclass(frozen=True)
 class GradientReport:
-    """What `check_gradients` found.
+    """The result of `check_gradients`.
 
     Attributes:
         scene, steps: its name, and the substeps of the stretch.

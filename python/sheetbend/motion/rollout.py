@@ -67,7 +67,7 @@ class Gradient:
 
 
 class Rollout:
-    """What `rollout` gives: positions now, gradients when asked.
+    """The result of `rollout`: positions, and gradients on request.
 
     Attributes:
         times: (frames,) s.

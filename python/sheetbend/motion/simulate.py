@@ -23,7 +23,7 @@ MOST_SUBSTEPS = 2**31 - 1  # that the core counts
 
 @dataclass(frozen=True)
 class Trajectory:
-    """What a rollout gives.
+    """The result of a simulation.
 
     Attributes:
         times: (frames,) s.

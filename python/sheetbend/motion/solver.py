@@ -18,7 +18,7 @@ ITERATIONS = {"gauss_seidel": 10, "implicit": 100}  # by default; 2 of the other
 
 @dataclass(frozen=True)
 class Solver:
-    """Substep and solver of a rollout.
+    """Time step and method of a simulation.
 
     This is the one definition of the solver's options: [solver] of a configuration takes names, types, defaults, ranges
     and descriptions from here.

@@ -18,7 +18,7 @@ from .solver import Solver
 
 @dataclass(frozen=True)
 class TapePlan:
-    """A tape under a budget, for one gradient.
+    """Memory and cost of one gradient under a memory budget.
 
     With a large budget the tape keeps the positions at every substep boundary. Otherwise it keeps
     those of some boundaries, placed by binomial checkpointing (Griewank & Walther 2000), and the forward program runs
@@ -79,7 +79,7 @@ class TapePlan:
 
 
 def tape_plan(scene: Scene, times: ArrayLike, solver: Solver | None = None, scenes: int = 1) -> TapePlan:
-    """What a gradient through `times` will cost, without running anything.
+    """Predict what a gradient through `times` costs, without running anything.
 
     Args:
         scene: is frozen by this.

@@ -14,7 +14,7 @@ __all__ = ["COMPONENTS", "Exponential", "Fabric", "Law", "Linear", "Sinh", "Spli
 
 @dataclass(frozen=True, kw_only=True)
 class Fabric:
-    """The numbers of a fabric, which hold for any piece of it. `add_cloth` tells what each means.
+    """The material parameters of a cloth, which hold for any piece of it. `add_cloth` describes each.
 
     Attributes:
         density: kg/m^2.

@@ -18,12 +18,13 @@ from ..scene.body import Body
 from ..scene.scene import Scene
 from .cloth import Cloth
 from .rope import Rope
+from .solid import Solid, SolidSurface
 
 
 @dataclass(frozen=True)
 class Place:
-    """A material point: weights on up to four particles, weights of its tangent, and an offset in the frame (t, n, t x
-    n), or a point of a rigid body.
+    """A material point: weights on up to eight particles (on up to four with an offset), weights of its tangent, and
+    an offset in the frame (t, n, t x n), or a point of a rigid body.
 
     t is the rope's direction there, n the given normal made perpendicular to it. On a `body` the offset counts along
     the axes of the body's frame, and the particles are the body's nodes.
@@ -45,12 +46,12 @@ class Place:
         return replace(self, offset=tuple(off.tolist()), normal=tuple((n / np.linalg.norm(n)).tolist()))
 
     def core(self) -> dict[str, Any]:
-        """As the compiled core takes it: four coordinates' places, padded with zero weights."""
-        pad = 4 - len(self.particles)
+        """As the compiled core takes it: places of four coordinates or more, padded with zero weights."""
+        pad = max(4 - len(self.particles), 0)
         return {
             "dof": [3 * p for p in self.particles] + [3 * self.particles[-1]] * pad,
             "weight": [*self.weights, *[0.0] * pad],
-            "tangent": [*self.tangent, *[0.0] * pad],
+            "tangent": [*self.tangent, *[0.0] * pad][:4],
             "normal": list(self.normal),
             "carries_offset": self.offset is not None,
             "on_axes": self.body is not None,
@@ -118,7 +119,7 @@ def on_cloth(cloth: Cloth, points: ArrayLike) -> tuple[Place, ...]:
     return on_mesh(cloth, cloth.mesh.at(points))
 
 
-def on_mesh(cloth: Cloth, places: Places) -> tuple[Place, ...]:
+def on_mesh(cloth: Cloth | SolidSurface, places: Places) -> tuple[Place, ...]:
     """Markers at places of a cloth's mesh, such as `cloth.mesh.project` finds for points in space."""
     return tuple(
         Place(tuple(cloth.particles[vertices].tolist()), tuple(weights.tolist()), (0.0, 0.0, 0.0))
@@ -126,24 +127,60 @@ def on_mesh(cloth: Cloth, places: Places) -> tuple[Place, ...]:
     )
 
 
+def on_solid(solid: Solid, points: ArrayLike) -> tuple[Place, ...]:
+    """Markers at points (k, 3) m of a solid's shape at rest, on its surface or inside.
+
+    For points beside the surface take `on_mesh(solid.surface, solid.surface.mesh.project(points))`.
+
+    Raises:
+        MeshError: a point lies outside of the solid.
+    """
+    places = solid.mesh.at(points)
+    found = []
+    for vertices, weights in zip(solid.particles[places.vertices].tolist(), places.weights.tolist(), strict=True):
+        own = [(p, w) for p, w in zip(vertices, weights, strict=True) if w != 0.0]
+        found.append(Place(tuple(p for p, _ in own), tuple(w for _, w in own), (0.0,) * len(own)))
+    return tuple(found)
+
+
 def places_for(
-    scene: Scene, markers: Mapping[str, Place] | Sequence[Place | None] | None, names: Sequence[str]
+    scene: Scene,
+    markers: Mapping[str, Place] | Sequence[Place | None] | None,
+    names: Sequence[str],
+    positions: np.ndarray | None = None,
 ) -> tuple[Place | None, ...]:
     """One place per marker of a recording, None for markers that are not compared.
 
     Args:
-        markers: by marker name, in the recording's order, or None: equally spaced along the only rope.
+        markers: by marker name, in the recording's order, or None: equally spaced along the only rope, or where the
+            recording shows every particle of the scene, its clamps' ghosts among them, on these.
+        positions: (frames, markers, 3) m, what was recorded.
 
     Raises:
         SceneError: unknown names, a wrong number, particles that do not exist, or no rope (or several) to spread
             markers along.
     """
+    if markers is None and positions is not None and _shows_particles(scene, positions):
+        markers = [on_particle(p) for p in range(scene.particle_count)]
     places = _places_for(scene, markers, names)
     for name, place in zip(names, places, strict=True):
         if place is not None and not all(0 <= p < scene.particle_count for p in place.particles):
             fix = f"use particles 0 to {scene.particle_count - 1}"
             raise SceneError("markers", f"put '{name}' on particles that do not exist", place.particles, fix)
     return places
+
+
+def _shows_particles(scene: Scene, positions: np.ndarray) -> bool:
+    """Whether a recording has as many markers as the scene with one clamped rope has particles, and that of each ghost
+    beside the rope's end that it belongs to: a marker that far along the rope would be a rope's length away."""
+    if len(scene.ropes) != 1 or positions.shape[1] != scene.particle_count:
+        return False
+    (rope,) = scene.ropes.values()
+    first, last = rope.particles[0], rope.particles[-1]
+    ghosts = [(g, end) for g, end in ((rope.start_ghost, first), (rope.end_ghost, last)) if g is not None]
+    near = np.diff(rope.arc_length).min() / 2
+    away = [np.linalg.norm(positions[:, ghost] - positions[:, end], axis=1) for ghost, end in ghosts]
+    return bool(ghosts) and all(np.isfinite(d).any() and np.nanmedian(d) < near for d in away)
 
 
 def _places_for(

@@ -87,6 +87,7 @@ def add_rod(
     twist_modes: Sequence[int] = (),
     softness_modes: Sequence[int] = (),
     density_modes: Sequence[int] = (),
+    slid_modes: Sequence[int] = (),
 ) -> Rod:
     """Add a discrete elastic rod of `segments` equal links to a scene (Bergou et al. 2008, 2010).
 
@@ -95,7 +96,7 @@ def add_rod(
     `_drag_quadratic` N s^2/m^3, `_start_tilt_1`, `_start_tilt_2`, `_end_tilt_1`, `_end_tilt_2`, `_roll` rad,
     `_start_shift_1` to `_3` and `_end_shift_1` to `_3` m,
     `_curvature_1_<k>`, `_curvature_2_<k>` and `_twist_<k>` 1/m, `_yield_curvature` 1/m, `_yield_share`,
-    `_softness_<k>`, `_density_<k>`.
+    `_softness_<k>`, `_density_<k>`, `_slid_1_<k>`, `_slid_2_<k>` 1/m.
 
     Args:
         length: m, between the grips.
@@ -130,6 +131,8 @@ def add_rod(
             places. The compliance is length/EI exp(sum of modes), so it stays positive.
         density_modes: the same of the density, relative to it: a rod that is heavier in places; from k = 1 on they
             leave its weight as it is. Values that make a mass negative are refused.
+        slid_modes: k of modes of the curvature by which internal friction has slid before the motion starts, about both
+            frame axes; each starts at zero. They need a rod that yields.
 
     Returns:
         Rod, also kept as `scene.ropes[name]`.
@@ -232,6 +235,7 @@ def add_rod(
         shear(scene, name, np.column_stack([edges[links], normals[links], directors[links]]), GA, shear_damping)
     joints.twist(twist_damping)
     joints.rest(curvature_modes, twist_modes)
+    joints.slid(slid_modes)
     add_drag(scene, name, nodes, segments, drag_linear, drag_quadratic)
     sections = np.zeros(0, dtype=int) if normals is None else normals
     built = Rod(name, nodes, link * np.arange(segments + 1), ghosts[0], ghosts[1], directors, sections)

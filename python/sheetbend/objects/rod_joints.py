@@ -32,6 +32,7 @@ class Joints:
         self._length = f"{name}_length"
         self._ratio: Factors = ()
         self._rest_of_bend = 0
+        self._sets: Array | None = None
 
     def bend(
         self,
@@ -49,10 +50,10 @@ class Joints:
         softness = mode_quantities(scene, name, "softness", softness_modes, self._s)
         stencils, kind = self._stencils, "section_curvature" if self._sections else "material_curvature"
         if yield_curvature is not None:
-            sets = scene.add_particles(np.zeros((len(stencils), 3)), 1.0)
-            scene.pin(sets)
+            self._sets = scene.add_particles(np.zeros((len(stencils), 3)), 1.0)
+            scene.pin(self._sets)
             kind = "section_yielding_curvature" if self._sections else "yielding_curvature"
-            stencils = np.column_stack([stencils, sets])
+            stencils = np.column_stack([stencils, self._sets])
         own = None
         if yield_curvature is not None and yield_share is not None:
             own = np.tile([yield_share, yield_curvature, 0.0, 0.0], (len(stencils), 1))
@@ -101,6 +102,19 @@ class Joints:
             for mode, weights in mode_quantities(self._scene, self._name, label, modes, self._s, "1/m"):
                 own: Factors = ((mode, "identity"), (self._length, "identity"), *factors)
                 self._scene.add_terms([Term("rest", index, self._share * weights, own)])
+
+    def slid(self, modes: Sequence[int]) -> None:
+        """The curvature by which joints have slid at the start, in modes cos(k pi s/length)."""
+        if self._sets is None:
+            if len(modes):
+                fix = "give yield_curvature and yield_share, or leave them out"
+                raise SceneError(f"{self._name}.slid_modes", "need a rod that yields", modes, fix)
+            return
+        for axis in (0, 1):
+            label, factors = f"slid_{axis + 1}", self._ratio if axis else ()
+            for mode, weights in mode_quantities(self._scene, self._name, label, modes, self._s, "1/m"):
+                own: Factors = ((mode, "identity"), (self._length, "identity"), *factors)
+                self._scene.add_terms([Term("position", 3 * self._sets + axis, self._share * weights, own)])
 
     def _group(
         self,

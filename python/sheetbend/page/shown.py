@@ -42,7 +42,7 @@ class Shown:
         lines: ropes by name, (frames, nodes, 3) m.
         ticks: short lines by name, (frames, lines, 2, 3) m: "twist" of rods, from an edge's middle along its director,
             and the outlines of colliders.
-        sheets: cloths by name.
+        sheets: cloths and surfaces of solids by name.
         markers: names of the measured markers.
         measured, simulated, baseline: (frames, markers, 3) m, NaN where there is nothing; None without.
         held_out: (frames,) frames that the fit did not see.
@@ -115,7 +115,7 @@ def of_recording(recording: Recording, name: str) -> Shown:
 
 def _shown(name: str, scene: Scene, times: Array, positions: Array, recorded: Mapping[str, object]) -> Shown:
     lines = {rope.name: positions[:, rope.particles] for rope in scene.ropes.values()}
-    sheets = {c.name: _sheet(c.mesh, positions[:, c.particles]) for c in scene.cloths.values()}
+    sheets = {c.name: _sheet(c.mesh, positions[:, c.particles]) for c in scene.sheets}
     boxes = body_lines(scene, positions)
     if not lines and not sheets and not boxes:  # a scene of bare particles and constraints: its links
         lines = _links(scene, positions)

@@ -37,15 +37,17 @@ class Body:
 
 
 def bodies(scene: Scene, motion: Trajectory, frames: Array) -> Iterator[Body]:
-    """Cloths first, then ropes and rods, at some frames of a motion.
+    """Cloths and surfaces of solids first, then ropes and rods, at some frames of a motion.
 
     Raises:
         InputError: the scene has neither.
     """
-    if not scene.cloths and not scene.ropes:
-        raise InputError("scene", "has neither cloth nor rope", scene.name, "give one that has something to write")
+    if not scene.sheets and not scene.ropes:
+        raise InputError(
+            "scene", "has neither cloth nor solid nor rope", scene.name, "give one that has something to write"
+        )
     x, v = motion.positions[frames], motion.velocities[frames]
-    for cloth in scene.cloths.values():
+    for cloth in scene.sheets:
         mesh, own = cloth.mesh, cloth.particles
         strain = np.stack([largest_strain(mesh, frame) for frame in x[:, own]])
         material = mesh.material if mesh.material.ndim == 2 else None

@@ -34,7 +34,7 @@ class Motion:
     """What a moving picture shows.
 
     Attributes:
-        scene: whose cloths, ropes and bodies are drawn.
+        scene: whose cloths, solids, ropes and bodies are drawn.
         times: (frames,) s.
         positions: (frames, particles, 3) m.
         measured: (frames, markers, 3) m, drawn as dots, NaN where not seen; None without a recording.
@@ -52,16 +52,16 @@ def check_movie(field: str, path: Path, scenes: Sequence[Scene]) -> None:
     """Everything that would stop `save_movie` after the work is done.
 
     Raises:
-        InputError: a file that is no GIF or MP4, or a scene without cloth, rope or body.
+        InputError: a file that is no GIF or MP4, or a scene without cloth, solid, rope or body.
         MissingExtraError: matplotlib, Pillow (GIF) or a program that encodes (MP4) is not installed.
     """
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(field, "is no GIF or MP4", str(path), f"give a file that ends in {' or '.join(SUFFIXES)}")
     if path.is_dir():
         raise InputError(field, "is a folder", str(path), "give a file")
-    bare = [scene.name for scene in scenes if not scene.cloths and not scene.ropes and not scene.bodies]
+    bare = [scene.name for scene in scenes if not scene.sheets and not scene.ropes and not scene.bodies]
     if bare or not scenes:
-        raise InputError(field, "needs a motion of a body, a cloth or a rope", bare or "none", "leave it out")
+        raise InputError(field, "needs a motion of a body, a solid, a cloth or a rope", bare or "none", "leave it out")
     _writer(path, RATE)
 
 
@@ -114,7 +114,7 @@ def _picture(motion: Motion, shown: Array, title: str) -> tuple[Figure, Any]:
     art = require("mpl_toolkits.mplot3d.art3d", "plot")
     figure = new_figure(7.2, 5.4, title or " ")
     panel: Any = figure.add_subplot(projection="3d", computed_zorder=False)  # what is measured stays in front
-    cloths = motion.scene.cloths.values()
+    cloths = motion.scene.sheets
     strains = {
         c.name: {k: 1e2 * largest_strain(c.mesh, motion.positions[k, c.particles]) for k in shown} for c in cloths
     }

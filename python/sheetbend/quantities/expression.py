@@ -29,6 +29,8 @@ VALUES: Mapping[str, Callable[[float], float]] = {
     "sqrt": math.sqrt,
     "inverse_sqrt": lambda x: 1.0 / math.sqrt(x),
     "exp": math.exp,
+    "over_one_plus": lambda x: 1.0 / (1.0 + x),
+    "over_one_minus_twice": lambda x: 1.0 / (1.0 - 2.0 * x),
 }
 
 

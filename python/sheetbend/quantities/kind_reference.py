@@ -12,13 +12,27 @@ from .kinds import KINDS, range_in_words
 
 _HEAD = """# Constraints
 
-Made from the headers in `core/constraints` by `python -m sheetbend.quantities.kind_reference docs/constraints.md`. Each
-header gives the equation, its source and what happens in degenerate shapes. In Python, `sheetbend.KINDS` holds it too.
+Example: a spring of 200 N/m between two particles.
 
-`Scene.add_constraints(kind, particles, compliance=..., damping=..., rest=..., normal=...)` adds constraints of a kind.
-`particles` has one row per constraint. A constraint of compliance alpha has the energy |C|^2/(2 alpha). A `scalar`
-compliance counts all rows of C alike; a `matrix` is factored into the rows, which parameters weigh against each other.
-The array `rest` has one column per parameter whose value below comes from `rest`, in the order of the table.
+```python
+import sheetbend as sb
+
+scene = sb.Scene("spring")
+scene.add_particles([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]], 0.05)
+scene.pin([0])
+scene.add_constraints("distance", [[0, 1]], compliance=1 / 200)
+print(sb.simulate(scene, [0.0, 0.1]).positions[-1, 1])
+```
+
+`Scene.add_constraints(kind, particles, compliance=..., damping=..., rest=..., normal=...)` adds constraints of one of
+the kinds below. `particles` has one row per constraint. A constraint with the compliance alpha has the energy
+|C|^2/(2 alpha). A `scalar` compliance weighs all rows of C equally. A `matrix` compliance is factored into the rows,
+and parameters of the kind weigh them against each other. The array `rest` has one column for each parameter whose value
+below comes from `rest`, in the order of the table.
+
+`python -m sheetbend.quantities.kind_reference docs/constraints.md` makes this page from the headers in
+`core/constraints`. Each header gives the equation, its source and what happens in degenerate shapes. In Python,
+`sheetbend.KINDS` has the same information.
 """
 
 

@@ -24,7 +24,7 @@ RESTS = 1e-3  # of a logarithm: so near a limit a parameter has run off
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
-    """One physical parameter.
+    """A parameter of a fit: its initial value, bounds and prior.
 
     Attributes:
         name: the `<group>_<quantity>` name used in scenes, files and reports.

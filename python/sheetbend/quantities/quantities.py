@@ -18,6 +18,7 @@ import numpy as np
 from ..errors import SceneError
 
 FUNCTIONS = {"identity": 0, "inverse": 1, "square": 2, "sin": 3, "cos": 4, "sqrt": 5, "inverse_sqrt": 6, "exp": 7}
+FUNCTIONS |= {"over_one_plus": 8, "over_one_minus_twice": 9}  # 1/(1 + x), 1/(1 - 2 x)
 ZERO_OR_MORE = (0.0, math.inf)  # limits of a quantity that starts at zero and cannot be negative
 
 

@@ -175,7 +175,7 @@ def rms_about(recording: Recording, reference: ArrayLike, scored: NDArray[np.boo
 def baseline(
     fitted: Recording | Sequence[Recording], held_out: Recording, more: Mapping[str, Array] | None = None
 ) -> NoPhysics:
-    """The strongest baseline for a held-out piece: of those that apply, the one with the smallest error.
+    """Compute the strongest baseline for a held-out part: the one with the smallest error of those that apply.
 
     Taking the smallest favors the baseline, so a simulation that beats it beats them all. `rest` applies
     when the fitted data show every free marker that the piece shows; `hold` when the piece has two frames

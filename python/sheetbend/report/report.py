@@ -13,6 +13,7 @@ from ..result.result import UNSOUND, Estimate, FitData, Given, MotionGrowth, Pre
 from .report_contact import contact_sections
 from .report_driven import driven_sections
 from .report_profiles import lopsided_profiles
+from .report_shot import shot_motions
 from .report_starts import groups_of_starts, starts_note
 from .tables import Section, plain_section, rich_section
 
@@ -25,13 +26,11 @@ CORRELATIONS_SHOWN = 15
 """Number of correlations that the report lists at most; fit.json has them all."""
 GROWTH_SHOWN = 10.0
 """Growth of small displacements from which on the report tells it."""
-
 PREMISES_SHOWN = 8
 """Number of given values that the report lists at most, those with the strongest effects; fit.json has them all."""
 PREMISE_COLUMNS = 4
 """Number of parameters above which a given value is listed with the one that it moves most."""
 _FELT = 0.02  # of a half-width: given values that move every parameter by less are not listed
-
 _SHAKEN = 0.1  # of a half-width: less adds next to nothing to it
 
 
@@ -50,6 +49,7 @@ def sections(result: FitData) -> list[Section]:
         _held_out_motion(result),
         *driven_sections(result),
         *contact_sections(result),
+        shot_motions(result),
         _unknown(result),
         _correlations(result),
         lopsided_profiles(result),

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from ..errors import InputError
+from .shot import ShotMotion
 
 UNSOUND = ("rough", "no minimum", "doubtful")
 """Verdicts of an estimate that nothing should rest on; a command that fits exits with 4 for each of them."""
@@ -333,6 +334,7 @@ class FitData:
         contacts: what touches in the fitted motions.
         kinks: of each parameter with an interval, what touches otherwise at its ends.
         profiles: of the parameters whose profiles were followed.
+        shot: of every motion that was shot in windows, what its model loses.
         assumed: how the ends of ropes are held and what that assumes, in words, where a configuration says it.
     """
 
@@ -371,6 +373,7 @@ class FitData:
     kinks: tuple[Kinks, ...] = ()
     condition: str | None = None
     profiles: tuple[ProfileCurve, ...] = ()
+    shot: tuple[ShotMotion, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of that name; KeyError names the ones there are."""

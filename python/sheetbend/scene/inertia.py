@@ -20,7 +20,7 @@ SLACK = 1e-9  # relative, by which a body may be flatter than flat from rounding
 
 @dataclass(frozen=True, eq=False)
 class Inertia:
-    """What a rigid body weighs, and where.
+    """Mass, center of mass and moments of inertia of a rigid body.
 
     Attributes:
         mass: kg.

@@ -43,6 +43,7 @@ class SceneData:
         self.contacts = Contacts()
         self.ropes: dict[str, Any] = {}
         self.cloths: dict[str, Any] = {}
+        self.solids: dict[str, Any] = {}
         self.bodies: dict[str, Body] = {}
         self.rotors: dict[str, Array] = {}  # (5,) nodes by joint, of which the second turns
         self._positions, self._velocities, self._mass = Column(3), Column(3), Column()
@@ -98,6 +99,11 @@ class SceneData:
         """Those that were added, of the boundary, and of the start of bodies."""
         starts = (t for body in self.bodies.values() for t in body.start_terms())
         return [*self.terms, *self.boundary.terms(), *self.forces.terms(), *starts]
+
+    @property
+    def sheets(self) -> list[Any]:
+        """Cloths and the surfaces of solids: what has a `name`, a `mesh` of triangles, and `particles`."""
+        return [*self.cloths.values(), *(solid.surface for solid in self.solids.values())]
 
     @property
     def frozen(self) -> bool:

@@ -24,6 +24,8 @@ _TORCH: Mapping[str, Callable[[Tensor], Tensor]] = {
     "sqrt": torch.sqrt,
     "inverse_sqrt": torch.rsqrt,
     "exp": torch.exp,
+    "over_one_plus": lambda x: 1.0 / (1.0 + x),
+    "over_one_minus_twice": lambda x: 1.0 / (1.0 - 2.0 * x),
 }
 
 

@@ -440,6 +440,62 @@ inline Case case_of<JointAngle>() {
           .parameter_sign = std::vector<int>(10, 1)};
 }
 
+// An element of about the sizes of its gradients, then couplings and ratios of stiffness. Its second and third node change places.
+inline Case solid_case(std::vector<double> x, std::vector<double> gradients) {
+  Case row{.x = std::move(x),
+           .p = std::move(gradients),
+           .compliance = 0.2,
+           .damping = 0.02,
+           .under_rotation = UnderRotation::stays,
+           .relabeling = {0, 2, 1},
+           .sign = {1, 1, 1, 1, 1, 1},
+           .parameter_sign = {},
+           .parameter_relabeling = {3, 4, 5, 0, 1, 2}};
+  for (int k = 3; k < static_cast<int>(row.x.size()) / 3; ++k) row.relabeling.push_back(k);
+  row.p.insert(row.p.end(), {0.3, 0.2, 0.25, 1.3, 0.8, 2.1, 1.7, 2.6});
+  row.parameter_sign.assign(row.p.size(), 1);
+  for (int k = 6; k < static_cast<int>(row.p.size()); ++k) row.parameter_relabeling.push_back(k);
+  return row;
+}
+inline const std::vector<double> brick_sample{0,    0,    0,   0.1,  0.01, 0.02,  0.11, 0.11, 0.03,  -0.01, 0.09, 0.01,
+                                              0.02, 0.01, 0.1, 0.12, -0.01, 0.11, 0.13, 0.12, 0.12, 0.01,  0.1,  0.09};
+inline const std::vector<double> tetrahedron_sample{0, 0, 0, 0.1, 0.01, 0.02, -0.01, 0.11, 0.01, 0.02, -0.02, 0.09};
+
+template <>
+inline Case case_of<BrickStrain>() {
+  return solid_case(brick_sample, {2.5, -1.6, -4.9, 1.6, 1.9, -3.2, -0.9, 1, -1.3, -4.4, -2.3,
+                                   3.2, 3.3, -4.4, 3.5, 2.1, 4, 2.5, -3, 2.2, 2.2});
+}
+
+template <>
+inline Case case_of<TetrahedronStrain>() {
+  return solid_case(tetrahedron_sample, {9.99, 1.07, -1.94, -1.26, 8.54, 2.13, -2.04, -1.16, 10.96});
+}
+
+template <>
+inline Case case_of<BrickVolume>() {
+  return {.x = brick_sample,
+          .p = {9.6e-4},
+          .compliance = 1e-5,
+          .damping = 1e4,
+          .under_rotation = UnderRotation::stays,
+          .relabeling = {1, 2, 3, 0, 5, 6, 7, 4},
+          .sign = {1},
+          .parameter_sign = {1}};
+}
+
+template <>
+inline Case case_of<TetrahedronVolume>() {
+  return {.x = tetrahedron_sample,
+          .p = {2e-4},
+          .compliance = 1e-5,
+          .damping = 1e4,
+          .under_rotation = UnderRotation::stays,
+          .relabeling = {1, 2, 0, 3},
+          .sign = {1},
+          .parameter_sign = {1}};
+}
+
 // The Registry as GoogleTest's list of types, and the names its reports use.
 template <class Tuple>
 struct AsTypes;

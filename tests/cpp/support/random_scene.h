@@ -92,8 +92,8 @@ struct SceneBuilder {
     std::vector<double> p = case_of<K>().p;
     for (double& v : p) {
       const double by = random(-0.02, 0.02);
-      v += std::same_as<K, Area> ? by * v
-                                 : by;  // an area stays positive: at none the triangle has no shape to go back to
+      v += K::unit.meters > 1 ? by * v
+                              : by;  // areas and volumes stay positive: at none there is no shape to go back to
     }
     return p;
   }
@@ -258,7 +258,8 @@ inline Sample random_scene(unsigned seed, const SceneShape& shape = {}) {
   for (int r = 0; r < shape.ropes; ++r) ropes.push_back(b.add_rope(r < 2, r == 0 || r == 2, shape));
   if (shape.net)
     for (std::size_t r = 1; r < ropes.size(); ++r)
-      for (std::size_t k = 1; k + 2 < ropes[r].size(); k += 2) b.add_brace(ropes[r - 1][k], ropes[r][k + 2]);
+      for (std::size_t k = 1; k + 2 < ropes[r].size() && k < ropes[r - 1].size(); k += 2)
+        b.add_brace(ropes[r - 1][k], ropes[r][k + 2]);
   if (shape.volumes)
     for (std::size_t r = 0; r < ropes.size(); ++r)
       b.add_volume(ropes[r], r == 1 ? ropes[r].size() / 2 : ropes[r].size() - 1);

@@ -16,7 +16,7 @@ def read_recordings(
     units: str | None = None,
     refused: dict[str, RecordingError] | None = None,
 ) -> list[Recording]:
-    """Every recording in a folder, in the order of the file names, numbers in them by size (9 before 10).
+    """Read every recording in a folder, in the order of the file names; numbers in names count by size (9 before 10).
 
         train = sb.read_recordings("ropes/train")
         unseen = sb.read_recordings("ropes/eval", "*.pkl")

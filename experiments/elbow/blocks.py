@@ -1,0 +1,111 @@
+"""Two blocks on a hinge, in flight: their recordings, and the scene of one flight."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import sheetbend as sb
+from sheetbend.arrays.rotations import matrices_of, quaternions_of, rotation_matrix
+from sheetbend.quantities.quantities import product
+
+DATA = Path(__file__).parent / "data" / "flights.npz"
+RATE, MASS, SIDES = 148.0, 0.37, np.array([0.1, 0.05, 0.05])  # Hz, kg, m
+HINGE, ARM = np.array([-0.035, 0.06, 0.0]), np.array([0.035, 0.0, 0.0])  # m: center to hinge, hinge to second center
+AXIS = (0.0, 1.0, 0.0)
+CORNERS = SIDES / 2 * np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])  # four of each block
+SIGMA = 1e-4  # m, of a corner
+SEEN = 4  # frames that a prediction starts from
+OWN = {
+    **{
+        f"first_{key}{axis}": unit
+        for key, unit in (("", "m"), ("turn_", "rad"), ("velocity_", "m/s"), ("spin_", "rad/s"))
+        for axis in "xyz"
+    },
+    "hinge_angle": "rad",
+    "hinge_rate": "rad/s",
+}
+
+
+@dataclass(frozen=True)
+class Flight:
+    """Poses of the first block and the angle of the hinge: times (frames,) s, positions (frames, 3) m, quaternions
+    (frames, 4), angles (frames,) rad."""
+
+    name: str
+    times: np.ndarray
+    positions: np.ndarray
+    quaternions: np.ndarray
+    angles: np.ndarray
+
+    def second(self, hinge: np.ndarray = HINGE) -> tuple[np.ndarray, np.ndarray]:
+        """Place (frames, 3) m and attitude (frames, 3, 3) of the second block, where its hinge is at `hinge` (3,) m."""
+        return second_block(self.positions, matrices_of(self.quaternions), self.angles, hinge)
+
+
+def second_block(
+    positions: np.ndarray, frames: np.ndarray, angles: np.ndarray, hinge: np.ndarray = HINGE
+) -> tuple[np.ndarray, np.ndarray]:
+    turned = frames @ np.array([rotation_matrix("angle", a * np.array(AXIS)) for a in angles])
+    return positions + frames @ hinge + turned @ ARM, turned
+
+
+def flights() -> list[Flight]:
+    """All of them, in the order of the source."""
+    data = np.load(DATA)
+    ends = zip(data["starts"][:-1], data["starts"][1:], data["toss"], strict=True)
+    return [
+        Flight(f"toss {n}", np.arange(b - a) / RATE, *(data[k][a:b] for k in ("positions", "quaternions", "angles")))
+        for a, b, n in ends
+    ]
+
+
+def scene_of(flight: Flight, gravity: float = 9.81) -> tuple[sb.Scene, sb.Body, sb.Body]:
+    """Two homogeneous boxes that fly from the first poses; gravity is the quantity `gravity`, m/s^2 in the recording's
+    unit of length."""
+    scene = sb.Scene(flight.name, gravity=(0.0, 0.0, 0.0))
+    few = slice(0, SEEN)
+    down = np.array([0.0, 0.0, -gravity])
+    start = sb.start_of_poses(flight.times[few], flight.positions[few], flight.quaternions[few], down)
+    angle, rate = np.polynomial.polynomial.polyfit(flight.times[few], flight.angles[few], 1)
+    at, frame = start["at"], start["rotation"]
+    centers, turned = second_block(at[None], frame[None], np.array([angle]))
+    box = sb.Inertia.box(MASS, SIDES)
+    first = scene.add_body("first", of=box, **start)
+    second = scene.add_body("second", of=box, at=centers[0], rotation=turned[0])
+    sb.hinge(first, second, at=at + frame @ HINGE, axis=frame @ AXIS, rate=float(rate), viscosity=1e-4)
+    scene.add_quantity("gravity", gravity, "m/s^2")
+    scene.add_terms([product("gravity", 2, -1.0, {"gravity": "identity"})])
+    return scene, first, second
+
+
+def experiment(flight: Flight, frames: int | None = None, hinge: np.ndarray = HINGE) -> sb.Experiment:
+    """The flight's first frames as data, all by default; those after them are held out."""
+    scene, first, second = scene_of(flight)
+    centers, turned = flight.second(hinge)
+    one = sb.Recording.from_poses(flight.times, flight.positions, flight.quaternions, CORNERS)
+    two = sb.Recording.from_poses(flight.times, centers, quaternions_of(turned), CORNERS)
+    names = [f"{block}_{k}" for block in ("first", "second") for k in range(len(CORNERS))]
+    recording = sb.Recording(
+        np.concatenate([one.positions, two.positions], axis=1),
+        flight.times,
+        markers=tuple(names),
+        name=flight.name.replace(" ", "_"),
+    )
+    cut = None if frames is None else float(flight.times[frames] - 0.5 / RATE)
+    return sb.Experiment(
+        scene=scene,
+        recording=recording,
+        markers=[*sb.on_body(first, CORNERS), *sb.on_body(second, CORNERS)],
+        solver=sb.Solver(h=1 / (4 * RATE)),
+        fit=None if cut is None else (0.0, cut),
+        held_out=None if cut is None else (cut, float(flight.times[-1]) + 1e-6),
+        sigma=SIGMA,
+    )
+
+
+def parameters(shared: Sequence[str]) -> list[sb.Parameter | str]:
+    """What all flights share, and the start of each."""
+    return [*shared, *(sb.Parameter(name=name, private=True, unit=unit, scale=0.1) for name, unit in OWN.items())]

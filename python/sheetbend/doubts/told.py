@@ -1,0 +1,268 @@
+"""Numbers that a fit takes as given, and how an error of each would change the residuals.
+
+With g the derivative of the residuals with respect to a told number, g of quantities and of gravity comes from one more
+set of tangents. That of markers, clamps and clocks comes from what the simulated markers do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from ..arrays.timeseries import Array
+from ..errors import SheetbendError
+from ..experiment.experiment import Experiment
+from ..minimum.problem import FitProblem
+from ..motion.simulate import divergence
+from ..objects.markers import Place
+from ..quantities.quantities import Quantity
+from ..recording.recording import Recording
+from .tangents import tangents
+
+Rows = slice | NDArray[np.bool_]
+
+AXES = "xyz"
+DEGREE, MILLIMETER = math.pi / 180.0, 1e-3
+STEPS = {"rad": (DEGREE, "1 degree"), "m": (MILLIMETER, "1 mm"), "s": (1e-3, "1 ms")}
+GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
+    "gravity": ("rad", STEPS["rad"]),
+    "clamps": ("m", STEPS["m"]),
+    "clamp_direction": ("rad", STEPS["rad"]),
+    "markers": ("m", (MILLIMETER, "1 mm each")),
+}
+"""Told numbers that are no quantities, by the name under which a standard deviation is given: unit and step."""
+SIZE, LATER, SLOWER, LARGER = "size of gravity", "frames later", "clock", "size of the recording"
+_NONE = np.zeros(0)
+
+
+@dataclass(frozen=True)
+class Told:
+    """One told number of one experiment, and what an error of it changes.
+
+    Attributes:
+        experiment: its place among those of the problem.
+        name: under which a standard deviation is given; "" for what has none (clocks, the size of gravity).
+        label: of this error, such as "gravity toward x".
+        unit: of the number.
+        step: the error whose effect a report tells, and that in words.
+        column: derivative of some of the experiment's residuals with respect to it, or to its logarithm.
+        rows: which of the experiment's rows these are; those left out do not change.
+        value: of a quantity.
+        relative: whether `step` and `column` are.
+        marker: whose place it is.
+        missing: of what the model lacks (`missing_parts`): what a size of it says.
+        signed: whether there may be less than none of what is missing.
+    """
+
+    experiment: int
+    name: str
+    label: str
+    unit: str
+    step: tuple[float, str]
+    column: Array
+    rows: Rows = field(default_factory=lambda: slice(None))
+    value: float | None = None
+    relative: bool = False
+    marker: str = ""
+    missing: Callable[[float], str] | None = None
+    signed: bool = False
+
+
+def told_numbers(problem: FitProblem, u: Array) -> tuple[list[Told], str]:
+    """All told numbers at the minimum u (free,), and why none are known where they cannot be told."""
+    try:
+        ok, _, _ = problem.evaluate_exactly(u)
+        if not ok:
+            raise SheetbendError(problem.failure)
+        corrections = problem.corrections(u)
+        every = enumerate(zip(problem.experiments, problem.recordings, strict=True))
+        return [one for i, (e, r) in every for one in _collect(problem, u, i, e, r, corrections.get(e.name))], ""
+    except (SheetbendError, _core.NoEquilibrium) as error:
+        return [], str(error)
+
+
+def told_quantities(problem: FitProblem, u: Array, i: int) -> list[tuple[str, int, float, float, Quantity]]:
+    """Per told quantity of an experiment its name (that of the parameter it is tied to), its place among the scene's,
+    its value, its factor to what it is tied to, and itself."""
+    theta, slots, roots = problem.known(u)
+    found = []
+    for k, (slot, (name, q)) in enumerate(zip(slots[i], problem.experiments[i].scene.quantities.items(), strict=True)):
+        root, factor = roots.get(slot, (name, 1.0))
+        if root not in problem.parameters.free:
+            found.append((root.partition("[")[0], k, float(theta[slot]), factor, q))
+    return found
+
+
+def _collect(
+    problem: FitProblem, u: Array, i: int, e: Experiment, r: Recording, corrected: Array | None
+) -> Iterator[Told]:
+    theta, slots, _ = problem.known(u)
+    toward = _gravity(e)
+    names = {f"gravity toward {AXES[axis]}": v for axis, v in toward.items()}
+    size = {SIZE: e.scene.gravity} if toward else {}
+    made: list[tuple[float, Told]] = []
+    asked: list[tuple[str, int, bool]] = []
+    for name, k, value, factor, q in told_quantities(problem, u, i):
+        log = q.positive and value > 0
+        step = _step(q, value, log)
+        if step is None:
+            continue
+        weight = 1.0 if log else abs(value) if step[0] else factor
+        made.append((weight, Told(i, name, name, q.unit, step[1:], _NONE, value=value, relative=step[0])))
+        asked.append((name, k, log))
+    made += [(1.0, Told(i, "gravity", name, "rad", STEPS["rad"], _NONE)) for name in names]
+    made += [(1.0, Told(i, "", SIZE, "m/s^2", (0.01, "1 %"), _NONE, relative=True)) for _ in size]
+    by_gravity: dict[int, Array] = {}
+    if made:
+        columns = tangents(problem, u, i, names | size, asked, corrected)
+        for (weight, one), column in zip(made, columns.T, strict=True):
+            yield replace(one, column=weight * column)
+        by_gravity = {axis: columns[:, len(asked) + n] for n, axis in enumerate(toward)}
+    yield from _observe(problem, i, e, r, corrected, theta[slots[i]], by_gravity)
+
+
+def _step(q: Quantity, value: float, log: bool) -> tuple[bool, float, str] | None:
+    """Whether the step of a told quantity is relative, the step, and the step in words; None where none makes sense."""
+    if log:
+        return True, 0.01, "1 %"
+    if q.unit in STEPS:
+        return (False, *STEPS[q.unit])
+    if value != 0.0 and q.scale is None:
+        return True, 0.01, "1 %"
+    return None if q.scale is None else (False, 0.1 * q.scale, f"{0.1 * q.scale:g} {q.unit}".rstrip())
+
+
+def _gravity(e: Experiment) -> dict[int, Array]:
+    """Of the two axes that lie most across gravity, what a turn toward each changes of it, m/s^2 per rad."""
+    g = e.scene.gravity
+    size = float(np.linalg.norm(g))
+    if size == 0.0:
+        return {}
+    down = g / size
+    toward = {}
+    for axis in sorted(np.argsort(np.abs(down), kind="stable")[:2].tolist()):
+        across = np.eye(3)[axis] - down[axis] * down
+        toward[axis] = size * across / np.linalg.norm(across)
+    return toward
+
+
+def _observe(
+    problem: FitProblem,
+    i: int,
+    e: Experiment,
+    r: Recording,
+    corrected: Array | None,
+    theta: Array,
+    by_gravity: Mapping[int, Array],
+) -> Iterator[Told]:
+    """Places of markers and clamps, and the clock, from the simulated markers."""
+    at, size = e.scene.compiled.layout["position"]
+    start = e.scene.compiled.inputs(theta)[at : at + size].reshape(-1, 3)
+    slopes = [_slopes(e, place, start) for place in e.compared_places]
+    count = max(map(len, slopes))
+    shown, moves = _simulated(e, r, corrected, theta, slopes, count)
+    frames, seen = np.nonzero(r.mask)
+    axes = [AXES.index(a) for a in e.axes]
+    marker = np.repeat(seen, len(axes))
+    own = slice(0, len(marker))  # the rows of the markers; forces do not depend on where these are taken to sit
+
+    def change(label: str, name: str, by: Array, unit: str = "", **more: Any) -> Told:
+        """By the markers' (frames, markers, 3) m; of a robust loss with its weight as it is."""
+        rows = np.asarray(by[frames, seen][:, axes].ravel() / e.sigma)
+        unit, step = GROUPS[name] if name else (unit, STEPS.get(unit, (0.01, "1 %")))
+        return Told(i, name, label, unit, step, rows, **({"rows": own} | more))
+
+    for k in range(count):
+        whole = change("markers", "markers", moves[k])
+        for m, name in enumerate(e.names):
+            if len(slopes[m]) > k:
+                mine = np.zeros(problem.core.first_rows[i + 1] - problem.core.first_rows[i], dtype=bool)
+                mine[own] = marker == m
+                yield replace(whole, label=f"{name} {k}", column=whole.column[marker == m], rows=mine, marker=name)
+    held = sorted(e.scene.pinned)
+    if e.scene.boundary.driven:
+        return  # what is driven moves as the recording says
+    if not e.static and e.time_offset is None and len(r.times) > 1:
+        speed = np.gradient(shown, r.times, axis=0)
+        yield change(LATER, "", speed, "s")
+        yield change(SLOWER, "", speed * (r.times - e.t0)[:, None, None], relative=True)
+    if not held:
+        return
+    for axis in [a for a in range(3) if a in axes]:
+        yield change(f"clamps along {AXES[axis]}", "clamps", np.broadcast_to(np.eye(3)[axis], shown.shape))
+    arm = shown - start[held].mean(axis=0)
+    yield change(LARGER, "", arm, relative=True)
+    if len(e.scene.air.triangles) or len(e.scene.forces.particles):
+        return  # which would have to turn as well
+    # To turn the clamps is to turn everything, with the gravity turned back.
+    down = e.scene.gravity
+    for axis in range(3):
+        turn = np.eye(3)[axis]
+        turned = change(f"clamps about {AXES[axis]}", "clamp_direction", np.cross(turn, arm))
+        g = turned.column
+        for toward, column in by_gravity.items():
+            across = _gravity(e)[toward]
+            g = g + column[own] * float(np.cross(down, turn) @ across) / float(across @ across)
+        yield replace(turned, column=g)
+
+
+def _slopes(e: Experiment, place: Place, start: Array) -> list[tuple[float, ...]]:
+    """What the weights of a place change per meter along the material: once on a rope, twice on a cloth, else never."""
+    if any(place.tangent):
+        size = 1.0  # the weights of a rope's tangent are per meter, those of a line between particles are not
+        if not any(set(place.particles) <= set(rope.particles.tolist()) for rope in e.scene.ropes.values()):
+            size = float(np.linalg.norm(np.asarray(place.tangent) @ start[list(place.particles)]))
+        return [tuple(t / size for t in place.tangent)] if size > 0 else []
+    for cloth in e.scene.cloths.values():
+        vertex = {int(p): v for v, p in enumerate(cloth.particles)}
+        if len(place.particles) == 3 and all(p in vertex for p in place.particles):
+            wanted = [vertex[p] for p in place.particles]
+            (triangle,) = np.flatnonzero(np.isin(cloth.mesh.triangles, wanted).all(axis=1))[:1]
+            order = [int(np.flatnonzero(cloth.mesh.triangles[triangle] == v)[0]) for v in wanted]
+            corners = cloth.mesh.corners[triangle][order]
+            inverse = np.linalg.inv(np.column_stack([corners, np.ones(3)]))
+            return [tuple(row) for row in inverse[:2].tolist()]
+    return []
+
+
+def _simulated(
+    e: Experiment,
+    r: Recording,
+    corrected: Array | None,
+    theta: Array,
+    slopes: list[list[tuple[float, ...]]],
+    count: int,
+) -> tuple[Array, Array]:
+    """The simulated markers (frames, markers, 3) m, and what they move per meter of their places along the material
+    (count, frames, markers, 3)."""
+    d = e.core(r, corrected)
+    places, n = e.compared_places, len(e.compared)
+    more = [
+        replace(p, weights=own[k] if len(own) > k else (0.0,) * len(p.weights), offset=None)
+        for k in range(count)
+        for p, own in zip(places, slopes, strict=True)
+    ]
+    every = (1 + count) * n
+    measured = np.zeros((len(r.times), every, 3))
+    d["observed"] |= {
+        "markers": [*d["observed"]["markers"], *(p.core() for p in more)],
+        "measured": measured,
+        "sigma": np.ones(measured.shape[:2]),
+    }
+    d["sensors"] = []
+    terms = [replace(t, index=3 * every) if np.ravel(t.index)[0] == 3 * n else t for t in e.extra_terms()]
+    base = d["map"]["base"]
+    map_ = e.scene.compiled.map(3 * every + 1, terms)
+    own = e.scene.compiled.core.inputs + 3 * n
+    map_["base"][:own] = base[:own]
+    d["map"] = map_
+    core = _core.Problem(experiments=[d], theta=theta, slots=[list(range(len(theta)))], free=[], threads=1)
+    with divergence(e.scene):
+        shown = core.simulate(0, np.zeros(0)).reshape(len(r.times), 1 + count, n, 3)
+    return shown[:, 0], np.moveaxis(shown[:, 1:], 1, 0)

@@ -1,0 +1,96 @@
+"""What had slid inside a rope before a window begins.
+
+Internal friction remembers how a rope was bent earlier, which no marker shows. But what has slid pulls: in the first
+frames it moves the rope beside what its shape, its weight and its grips do. So it is looked for in the frames over
+which the start is smoothed anyway, as smooth fields of curvature along the rope. How large they may be is found from
+the same frames (type II maximum likelihood: MacKay 1992), so that noise is not taken for a history.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays.smoothing import FEWEST
+from ..experiment.experiment import Experiment, Window
+from ..minimum.problem import FitProblem
+from ..quantities.parameters import Parameter, Parameters
+from .model import NAME, RopeModel
+from .motion import Array, GrippedMotion
+
+MODES = tuple(range(6))
+LARGEST = 4.0  # standard deviation of mode 0, in yield curvatures: a joint that has slid too far slides back at once
+FIRST = 0.5  # the same, before the frames were seen
+STEPS, ROUNDS = 4, 30  # to what had slid, and to its size in each
+LEAST_NOISE = 1e-4  # m, of a marker
+# The speed at a start comes from the same frames. Its error moves a marker by up to twice the noise there, in all of
+# the some nine frames alike.
+OFF = 6.0  # error of a frame over the noise of a marker, as if frames were independent
+
+
+def window_of(
+    model: RopeModel, motion: GrippedMotion, window: Window | None, values: Mapping[str, float]
+) -> Experiment:
+    """A window of a recording (all of it by default), which starts with what had slid before it at these values of the
+    rope's quantities. A rope that does not yield remembers nothing."""
+    if model.values.get("yield_curvature") is None:
+        return model.experiment(motion, window)
+    remembering = replace(model, slid_modes=MODES)
+    first = float(motion.recording.times[0]) if window is None else window[0]
+    e, found = remembering.experiment(motion, window), slid(remembering, motion, first, values)
+    for name, value in found.items():
+        e.scene.quantities[name] = replace(e.scene.quantities[name], value=value)
+    return e
+
+
+def slid(model: RopeModel, motion: GrippedMotion, first: float, values: Mapping[str, float]) -> dict[str, float]:
+    """The most likely curvatures by which a rope had slid, 1/m, by quantity; zero where the first frames do not tell.
+
+    Args:
+        model: with slid modes.
+        first: s, where the motion starts; the frames are those of the `smoothing` s from there on.
+        values: of the rope's quantities.
+    """
+    yields = values.get(f"{NAME}_yield_curvature", model.values["yield_curvature"])
+    assert yields is not None
+    nothing = {f"{NAME}_slid_{axis}_{k}": 0.0 for k in model.slid_modes for axis in (1, 2)}
+    until, times = first + model.smoothing, motion.recording.times
+    if ((times >= first - 1e-9) & (times <= until + 1e-9)).sum() < FEWEST:
+        return nothing
+    e = replace(model.experiment(motion, (first, until)), sigma=OFF * noise(motion.recording.positions))
+    free = [Parameter(name=name, initial=0.0, scale=1.0, unit="1/m") for name in nothing]
+    held = [Parameter(name=name, initial=values[name], fixed=True) for name in e.scene.quantities if name in values]
+    problem = FitProblem([e], Parameters([*free, *held]))
+    size = np.array([yields / (1.0 + 0.5 * k) for k in model.slid_modes for _ in (1, 2)])
+    at, spread, before = np.zeros(len(free)), FIRST, problem.cost(np.zeros(len(free)))
+    for _ in range(STEPS):
+        ok, r, J = problem.evaluate(at)
+        if not ok:
+            return nothing
+        likely, spread = _likely(J * size, r - J @ at, spread)
+        at = likely * size
+    return dict(zip(nothing, at.tolist(), strict=True)) if problem.cost(at) < before else nothing
+
+
+def _likely(J: Array, r: Array, spread: float) -> tuple[Array, float]:
+    """The most likely numbers (k,) of which r + J numbers is noise of size 1, and their standard deviation."""
+    H, g = J.T @ J, J.T @ r
+    for _ in range(ROUNDS):
+        covariance = np.linalg.inv(H + np.eye(len(H)) / spread**2)
+        likely = -covariance @ g
+        spread = float(np.clip(np.sqrt(np.mean(likely**2 + np.diag(covariance))), 1e-3, LARGEST))
+    return likely, spread
+
+
+def noise(positions: Array) -> float:
+    """Standard deviation of a coordinate, m, from third differences in time (median), which smooth motion leaves small.
+
+    Args:
+        positions: (frames, markers, 3) m, NaN = not seen.
+    """
+    third = np.diff(positions, 3, axis=0)
+    third = third[np.isfinite(third)]
+    return max(LEAST_NOISE, 1.4826 * float(np.median(np.abs(third))) / math.sqrt(20.0)) if len(third) else LEAST_NOISE

@@ -1,0 +1,285 @@
+"""How far the windows of a motion may miss each other: found from the recording before a fit searches.
+
+The windows begin where the recording says, each fitted to its own first frames. Then gaps close step by step while the
+parameters are fitted along. How far they close follows from the marginal likelihood: the states and the parameters
+integrated out of the linear picture at the point that is reached, gaps normal with one deviation for all. That is
+restricted maximum likelihood (Patterson & Thompson 1971, Biometrika 58), and the deviations that cost 1.92 of its
+logarithm bound the 95 % interval. Data count with the variance and the autocorrelation that their residuals show.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays.timeseries import Array
+from ..errors import InputError
+from ..experiment.cut import LEAST_FRAMES, LEAST_STEPS, borders, cut, shot, start_quantities
+from ..experiment.experiment import Experiment
+from ..experiment.shooting import AUTO, Shooting
+from ..optional import require
+from ..quantities.parameters import Parameters
+from ..result.shot import ShotMotion
+from ..statistics.chain import Chain
+from ..statistics.covariance import autocorrelation
+from .approach import Approach
+from .growth import over_fit
+from .lifted import Lifted, Motion
+from .lifted_starts import begun
+from .optimizers import Observer, Progress
+from .problem import FitProblem, expanded_to
+
+GROWN = 10.0  # of small displacements, over a window that is chosen
+PARTS = 10  # at least, of a motion whose windows are chosen
+FINER = (4, 2)  # parts of a window that states are looked for in first
+LOOSE = 0.1  # of the motion's size: gaps to begin with
+CLOSER = 0.03  # of the gap before: the next one that parameters are fitted with, at least
+ROUNDS, STEPS, TOLERANCE = 12, 20, 1e-3  # of gaps, of the walk with each, and of the cost there
+SETTLED = 0.03  # of the logarithm of a gap's size
+SMALLEST, LARGEST, LOOKED = 1e-6, 1.0, 37  # of the motion's size: gaps that are looked at, and how many
+LIKELY = 3.841  # of twice the logarithm of a likelihood: 95 % of a chi-square with one degree
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What a model loses, m/s: the gap that is expected over a window's length; upper and lower end of 95 %."""
+
+    value: float
+    lower: float
+    upper: float
+
+
+def joined(
+    experiments: Sequence[Experiment], wanted: Parameters, threads: int, observe: Observer | None = None
+) -> tuple[list[Experiment], Parameters | None]:
+    """The experiments with all of their shooting known, and the parameters, expanded, that they were found with, for a
+    search to begin at; None where no experiment is shot in windows.
+
+    Raises:
+        InputError: see `shooting.cut`.
+    """
+    every = [with_window(e) if isinstance(e.shooting, Shooting) and e.predict is None else e for e in experiments]
+    places = [i for i, e in enumerate(every) if e.predict is None]
+    fitted = [every[i] for i in places]
+    if not any(map(shot, fitted)):
+        return list(experiments), None
+    parameters = expanded_to(wanted, fitted)
+    u = parameters.initial()
+    size = {e.name: _size(e) for e in fitted}
+    given = {e.name: own.loss for e in fitted if (own := shot(e)) is not None and own.is_given}
+    fitted, u = _nearer(fitted, wanted, parameters, threads, observe)
+    fitted = [_with_gap(e, LOOSE * size[e.name]) for e in fitted]
+    for _ in range(ROUNDS):
+        problem = FitProblem(fitted, wanted, threads=threads, expanded=parameters)
+        u = _walked(problem, u, observe)
+        ok, _, _ = problem.evaluate(u)
+        if not ok:
+            break
+        here = [_state(e, problem, i) for i, e in enumerate(fitted)]
+        moved = 0.0
+        for i, e in enumerate(here):
+            own = shot(e)
+            if own is None or own.loss is None:
+                continue
+            told = given.get(e.name)
+            wanted_loss = loss(problem, u, i, size[e.name]).value if told is None else told
+            closer = max(wanted_loss, CLOSER * own.loss)
+            moved = max(moved, abs(math.log(closer / own.loss)))
+            here[i] = replace(e, shooting=replace(own, loss=closer))
+        fitted = here
+        if moved < SETTLED:
+            break
+    for i, e in zip(places, fitted, strict=True):
+        every[i] = e
+    at = parameters.to_physical(u)
+    for name in parameters.free:
+        parameters = parameters.replace(name, initial=at[name])
+    return every, parameters
+
+
+def _walked(problem: FitProblem, u: Array, observe: Observer | None) -> Array:
+    """Where a walk ends that leaves the last steps to a search."""
+    walk = Approach(problem, u)
+    while walk.iterations < STEPS and walk.step():
+        if observe is not None:
+            observe(Progress(walk.iterations, walk.cost, walk.u.copy()))
+        if walk.promised < TOLERANCE:
+            break
+    return walk.u
+
+
+def _nearer(
+    experiments: Sequence[Experiment], wanted: Parameters, expanded: Parameters, threads: int, observe: Observer | None
+) -> tuple[list[Experiment], Array]:
+    """The experiments with states at every border, and a point, both from windows of a part of the length: far from the
+    parameters, the longer a window the less its states can follow the recording."""
+    parts = [_in_parts(e) for e in experiments]
+    u = expanded.initial()
+    short = [_with_gap(e, LOOSE * _size(e)) for e in begun([e for e, _ in parts], wanted, u)]
+    problem = FitProblem(short, wanted, threads=threads, expanded=expanded)
+    u = _walked(problem, u, observe)
+    problem.evaluate(u)
+    found = []
+    for i, (e, (_, count)) in enumerate(zip(experiments, parts, strict=True)):
+        own, fine = shot(e), shot(_state(short[i], problem, i))
+        if own is not None and fine is not None:
+            e = replace(e, shooting=replace(own, states=own.states or fine.states[count - 1 :: count]))
+        found.append(e)
+    return found, u
+
+
+def _in_parts(e: Experiment) -> tuple[Experiment, int]:
+    """With its windows divided into as many as these can be, and how many that are."""
+    own = shot(e)
+    if own is None:
+        return e, 1
+    edges = borders(e)
+    length = float(edges[-1] - edges[0]) / (len(edges) - 1)
+    for count in FINER:
+        try:
+            return cut(replace(e, shooting=replace(own, window=length / count, states=()))), count
+        except InputError:
+            continue
+    return e, 1
+
+
+def with_window(e: Experiment) -> Experiment:
+    """An experiment that is cut, into windows of a chosen length where none is given: so long that small displacements
+    grow by `GROWN` from the scene's start on, and no longer than a part of the motion."""
+    own = e.shooting
+    assert isinstance(own, Shooting)
+    if own.window == AUTO:
+        times = e.fitted().times
+        grown = over_fit(e).below(GROWN)
+        interval = float(np.median(np.diff(times)))
+        least = max(4 * LEAST_FRAMES * interval, 2 * LEAST_STEPS * e.solver.h)
+        longest = float(times[-1] - e.t0) / PARTS
+        e = replace(e, shooting=replace(own, window=max(least, min(longest, math.inf if grown is None else grown))))
+    return cut(e)
+
+
+def loss(problem: FitProblem, u: Array, experiment: int, size: float) -> Loss:
+    """What the model of one experiment loses, from the linear picture at u, where the problem was evaluated last.
+
+    Args:
+        size: of its motion, m.
+    """
+    core, e = problem.core, problem.experiments[experiment]
+    assert isinstance(core, Lifted)
+    motion = core.motions[experiment]
+    scale = math.sqrt(len(start_quantities(e.scene))) / motion.length
+    deviance = _deviance(problem, u, experiment, motion)
+    at = np.log(size) + np.linspace(np.log(SMALLEST), np.log(LARGEST), LOOKED)
+    heights = np.array([deviance(x) for x in at])
+    best = int(np.argmin(heights))
+    optimize = require("scipy.optimize", "fit")
+    lower, upper = at[max(best - 1, 0)], at[min(best + 1, LOOKED - 1)]
+    found = optimize.minimize_scalar(deviance, bounds=(lower, upper), method="bounded", options={"xatol": 1e-3})
+    x, least = (float(found.x), float(found.fun)) if found.fun < heights[best] else (at[best], heights[best])
+    likely = [float(at[k]) for k in range(LOOKED) if heights[k] < least + LIKELY] + [x]
+
+    def end(inside: float, step: float) -> float:
+        outside = inside
+        while at[0] < outside < at[-1] and deviance(outside) < least + LIKELY:
+            outside += step
+        if not at[0] < outside < at[-1]:
+            return outside
+        return float(optimize.brentq(lambda t: deviance(t) - least - LIKELY, outside - step, outside, xtol=1e-3))
+
+    step = (at[-1] - at[0]) / (LOOKED - 1)
+    first, last = end(min(likely), -step), end(max(likely), step)
+    low = 0.0 if first <= at[0] else scale * math.exp(first)
+    return Loss(scale * math.exp(x), low, scale * math.exp(last))
+
+
+def shot_motions(problem: FitProblem, u: Array) -> tuple[ShotMotion, ...]:
+    """Of every motion that is shot in windows, what its model loses, as it was taken, with its interval at u where it
+    was not given."""
+    found: list[ShotMotion] = []
+    for i, e in enumerate(problem.experiments):
+        own, core = shot(e), problem.core
+        if own is None or own.loss is None or own.pace is None or not isinstance(core, Lifted):
+            continue
+        ok, _, _ = problem.evaluate(u)
+        motion = core.motions[i]
+        here = motion.solve(u) if ok else None
+        if here is None:
+            continue
+        gaps = np.array([motion.deviation * gap.rest for gap in motion.gaps(here.seen)])
+        told = None if own.is_given or not len(gaps) else loss(problem, u, i, _size(e))
+        found.append(
+            ShotMotion(
+                name=e.name,
+                windows=len(motion.windows),
+                length=motion.length,
+                numbers=motion.states.shape[1],
+                loss=own.loss,
+                lower=None if told is None else told.lower,
+                upper=None if told is None else told.upper,
+                gap=float(np.sqrt(np.mean(np.sum(gaps**2, axis=1)))) if len(gaps) else 0.0,
+                pace=own.pace,
+            )
+        )
+    return tuple(found)
+
+
+class _deviance:
+    """Minus twice the logarithm of the marginal likelihood, of a gap's logarithmic deviation, up to a constant."""
+
+    def __init__(self, problem: FitProblem, u: Array, experiment: int, motion: Motion) -> None:
+        first = problem.core.first_rows
+        own = slice(first[experiment], first[experiment + 1])
+        ok, r, _ = problem.evaluate(u)
+        here = motion.solve(u)
+        assert ok and here is not None
+        layout = problem.rows_layout()
+        rows = layout.recording == experiment
+        taken = motion.absorbed() + len(u)
+        variance = float(r[own] @ r[own]) / max(len(r[own]) - taken, 1.0)
+        lags = autocorrelation(r[own], layout.of(rows))
+        positive = lags[: int(np.argmax(lags <= 0))] if (lags <= 0).any() else lags
+        weight = 1.0 / math.sqrt(max(variance, 1e-300) * (1.0 + 2.0 * float(positive.sum())))
+        self._windows = [
+            replace(w, state=weight * w.state, border=weight * w.border, rest=weight * w.rest)
+            for w in motion.fitted(here.seen)
+        ]
+        self._gaps = [gap.times(motion.deviation) for gap in motion.gaps(here.seen)]
+        self._prior = problem.parameters.prior_jacobian(), problem.parameters.prior_residuals(u)
+        self._count = motion.states.size
+
+    def __call__(self, log_deviation: float) -> float:
+        chain = Chain(self._windows, [gap.times(math.exp(-log_deviation)) for gap in self._gaps])
+        M = np.column_stack([np.vstack([chain.border, self._prior[0]]), np.concatenate([chain.rest, self._prior[1]])])
+        R = np.asarray(np.linalg.qr(M, mode="r"))
+        p = M.shape[1] - 1
+        size = np.abs(np.diag(R))[:p]
+        known = size > 1e-9 * size.max(initial=1e-300)
+        cost = float(np.sum(R[p:, -1] ** 2))
+        return cost + 2.0 * (chain.log_size + float(np.log(size[known]).sum()) + self._count * log_deviation)
+
+
+def _size(e: Experiment) -> float:
+    """Of a motion, m: rms distance of its markers from their mean places."""
+    x = e.fitted().positions
+    return float(np.sqrt(3.0 * np.nanmean((x - np.nanmean(x, axis=0)) ** 2)))
+
+
+def _with_gap(e: Experiment, gap: float) -> Experiment:
+    """With a loss that leaves such a gap over a window, m."""
+    own = shot(e)
+    if own is None:
+        return e
+    assert isinstance(own.window, float | int)
+    return replace(e, shooting=replace(own, loss=gap / own.window))
+
+
+def _state(e: Experiment, problem: FitProblem, i: int) -> Experiment:
+    """With the states where the problem was evaluated last."""
+    own, core = shot(e), problem.core
+    if own is None:
+        return e
+    assert isinstance(core, Lifted)
+    return replace(e, shooting=replace(own, states=tuple(map(tuple, core.motions[i].states.tolist()))))

@@ -1,0 +1,98 @@
+"""Where the windows of a motion begin before anything is fitted: states that explain the first frames of each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from ..arrays.timeseries import Array
+from ..experiment.cut import borders, shot, start_quantities
+from ..experiment.experiment import Experiment
+from ..optional import require
+from ..quantities.parameters import Parameters
+from .lifted import of_one
+from .lifted_window import LiftedWindow, Rows
+from .problem import FitProblem, expanded_to
+
+FIRST, MORE = 3, 3  # frames of a window that its start is fitted to at first, and how many times as many next
+
+
+def begun(experiments: Sequence[Experiment], wanted: Parameters, u: Array) -> list[Experiment]:
+    """The experiments with a state at every border: by least squares on the frames behind it, from the state at the
+    border before. A window that shows too little of its start begins where the one before ends.
+
+    Args:
+        u: (free,) internal point of the parameters.
+    """
+    plain = FitProblem([replace(e, shooting=None) for e in experiments], wanted)
+    assert plain.parameters.free == expanded_to(wanted, experiments).free
+    return [_begun(plain, i, e, u) if shot(e) else e for i, e in enumerate(experiments)]
+
+
+def _begun(plain: FitProblem, i: int, e: Experiment, u: Array) -> Experiment:
+    own = shot(e)
+    assert own is not None
+    behind = own.behind or 0.0
+    if own.states:
+        return e
+    edges, recording, names = borders(e), e.fitted(), start_quantities(e.scene)
+    quantities, free = of_one(e, plain.places, i)
+    state = np.array([quantities[name] for name in names])
+    first = [int(n) for n in np.searchsorted(recording.times, edges + behind - 1e-9)]
+    before, states = np.zeros(0), list[tuple[float, ...]]()
+    for k in range(1, len(edges) - 1):
+
+        def window(frames: int, k: int = k) -> LiftedWindow:
+            part = recording.frames(slice(0, first[k] + frames))
+            return LiftedWindow(e, part, edges[: k + 2], k, quantities, free)
+
+        count, parts = first[k + 1] - first[k], list[LiftedWindow]()
+        while not parts or len(parts) < 1 + math.ceil(math.log(count / FIRST, MORE)):
+            parts.append(window(min(count, FIRST * MORE ** len(parts))))
+        if parts[-1].rows > len(names):
+            for part in parts:
+                if part.rows >= len(names):
+                    state = _nearest(partial(part.data, u), state)
+        else:
+            ahead = LiftedWindow(e, recording, edges, k - 1, quantities, free).at(u, before)
+            if ahead is not None:
+                state = _nearest(partial(_missed, parts[0], u, ahead.end.value), state)
+        before = state
+        states.append(tuple(state.tolist()))
+    return replace(e, shooting=replace(own, states=tuple(states)))
+
+
+def _missed(window: LiftedWindow, u: Array, end: Array, state: Array) -> Rows | None:
+    """By how much a window's start misses an end."""
+    rows = window.start(u, state)
+    return None if rows is None else replace(rows, value=rows.value - end)
+
+
+def _nearest(rows: Callable[[Array], Rows | None], state: Array) -> Array:
+    """The state with the least squares, from one beside it."""
+    known: dict[bytes, Rows | None] = {}
+
+    def at(s: Array) -> Rows | None:
+        if s.tobytes() not in known:
+            known[s.tobytes()] = rows(s)
+        return known[s.tobytes()]
+
+    first = at(state)
+    if first is None:
+        return state
+    count = len(first.value)
+
+    def value(s: Array) -> Array:
+        found = at(s)
+        return np.full(count, 1e6) if found is None else found.value
+
+    def slope(s: Array) -> Array:
+        found = at(s)
+        return np.zeros((count, len(s))) if found is None else found.state
+
+    least_squares = require("scipy.optimize", "fit").least_squares
+    return np.asarray(least_squares(value, state, jac=slope, x_scale="jac", max_nfev=60).x)

@@ -1,0 +1,211 @@
+"""Solids: meshes of bricks or tetrahedra, given and fitted by Young's modulus, Poisson's number and damping."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays.checks import check_positive, finite, indices, is_number
+from ..errors import SceneError
+from ..mesh import SolidMesh, TriangleMesh
+from ..quantities.quantities import Term
+from ..scene.scene import Array, Scene
+from .locking import LockingWarning, locking
+from .solid_rows import Orthotropic, SolidRows
+
+
+@dataclass(frozen=True)
+class SolidSurface:
+    """The surface of a solid as pictures, pressure and markers take it: triangles, and the particles of its
+    vertices."""
+
+    name: str
+    mesh: TriangleMesh
+    particles: Array
+
+    @property
+    def triangles(self) -> Array:
+        """(m, 3) particles, counterclockwise as seen from outside, as `Scene.add_pressure` takes them."""
+        found: Array = self.particles[self.mesh.triangles]
+        return found
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A solid in a scene.
+
+    Attributes:
+        mesh: as given.
+        particles: of its vertices.
+        material: prefix of its quantities.
+        numbers: of its material as given, those left out too.
+    """
+
+    name: str
+    mesh: SolidMesh
+    particles: Array
+    material: str
+    numbers: Mapping[str, Any]
+
+    @cached_property
+    def surface(self) -> SolidSurface:
+        mesh, vertices = self.mesh.surface
+        return SolidSurface(self.name, mesh, self.particles[vertices])
+
+
+def solid(
+    mesh: SolidMesh,
+    *,
+    density: float,
+    name: str = "solid",
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+    pinned: ArrayLike = (),
+    **options: object,
+) -> Scene:
+    """A scene with one solid; see `add_solid` for the options. `pinned` holds vertices, such as `mesh.sets["x_min"]`;
+    they are its `held` ones where no others are given."""
+    scene = Scene(name, gravity)
+    still = indices("solid.pinned", pinned, len(mesh.vertices)) if np.size(pinned) else []
+    given = {"held": still, **options}
+    built = add_solid(scene, mesh, name, density=density, **given)  # type: ignore[arg-type]
+    if still:
+        scene.pin(built.particles[still])
+    return scene
+
+
+def add_solid(
+    scene: Scene,
+    mesh: SolidMesh,
+    name: str = "solid",
+    *,
+    material: str = "",
+    density: float,
+    E: float | None = None,
+    poisson: float | None = None,
+    orthotropic: Orthotropic | None = None,
+    damping: float | None = None,
+    volume_row: bool | None = None,
+    held: ArrayLike = (),
+    positions: ArrayLike | None = None,
+    velocities: ArrayLike | None = None,
+) -> Solid:
+    """Add a solid to a scene. docs/solids.md has the law and its limits.
+
+    Quantities: `<material>_density` kg/m^3, `<material>_E` Pa, `<material>_poisson`, and where given
+    `<material>_damping` s.
+
+    The energy is mu V tr E^2 at the quadrature points, in Green strain, and lambda V (J - 1)^2/2 with one mean J = V/V0
+    of an element. Solids need method "newton", "newton_cg" or "implicit"; "direct" and "gauss_seidel" take them in
+    small numbers.
+
+    Args:
+        mesh: the shape at rest; of bricks, or of tetrahedra, which are too stiff in bending (a warning says how much).
+        material: prefix of the quantities, `name` by default. Solids of one material share them and have the same
+            values.
+        density: kg/m^3.
+        E: Young's modulus, Pa.
+        poisson: Poisson's number, above -1 and below 0.5.
+        orthotropic: a material that differs along three axes, instead of these two; it has no volume row.
+        damping: Kelvin-Voigt time constant, s.
+        volume_row: one row for the volume of an element, which lets nearly incompressible bricks bend; `poisson` is
+            then between 0 and 0.5. Without it the energy has lambda (tr E)^2/2 at the quadrature points instead, and
+            `poisson` may be negative. By default where `poisson` is positive.
+        held: vertices that will be pinned or driven: elements among them alone are left out.
+        positions: (vertices, 3) m, the initial shape; that of the mesh by default.
+        velocities: (vertices, 3) m/s at the start; zero by default.
+
+    Warns:
+        LockingWarning: tetrahedra, with the factor by which they are too stiff.
+
+    Raises:
+        SceneError: wrong or missing values, or others than those of a solid of the same material before.
+    """
+    numbers = _checked_numbers(name, density, E, poisson, orthotropic, damping, volume_row)
+    material = material or name
+    _check_material(scene, name, material, numbers)
+    count = len(mesh.vertices)
+    shape = mesh.vertices if positions is None else finite(f"{name}.positions", positions, (count, 3), SceneError)
+    moving = None if velocities is None else finite(f"{name}.velocities", velocities, (count, 3), SceneError)
+    free = np.ones(count, dtype=bool)
+    if np.size(held):
+        free[indices(f"{name}.held", held, count)] = False
+    if not free.any():
+        raise SceneError(f"{name}.held", "are all vertices", count, "leave some free")
+    if mesh.elements.shape[1] == 4:
+        _warn_locking(name, mesh, 0.3 if poisson is None else poisson, ~free)
+
+    particles = scene.add_particles(shape, 0.0, moving)
+    _weigh(scene, mesh, material, particles, density)
+    rows = SolidRows(scene, mesh, name, material, particles, free)
+    if orthotropic is None:
+        rows.add(numbers["E"], numbers["poisson"], damping, numbers["volume_row"])
+    else:
+        rows.add_orthotropic(orthotropic, damping)
+    built = Solid(name, mesh, particles, material, numbers)
+    scene.solids[name] = built
+    return built
+
+
+def _checked_numbers(
+    name: str,
+    density: float,
+    E: float | None,
+    poisson: float | None,
+    orthotropic: Orthotropic | None,
+    damping: float | None,
+    volume_row: bool | None,
+) -> dict[str, Any]:
+    """The numbers of a material, with what follows from them."""
+    if orthotropic is not None:
+        check_positive(name, {"density": density}, {"damping": damping})
+        given = {"E": E, "poisson": poisson, "volume_row": volume_row or None}
+        both = [field for field, value in given.items() if value is not None]
+        if both:
+            raise SceneError(
+                f"{name}.{both[0]}", "is given beside orthotropic", given[both[0]], "leave one of them out"
+            )
+        return {"density": density, "orthotropic": orthotropic, "damping": damping}
+    if E is None or poisson is None:
+        missing = "E" if E is None else "poisson"
+        raise SceneError(f"{name}.{missing}", "is missing", None, "give E and poisson, or orthotropic")
+    check_positive(name, {"density": density, "E": E}, {"damping": damping})
+    if not (is_number(poisson) and -1 < poisson < 0.5):
+        fix = "give one above -1 and below 0.5; 0.499 hardly changes its volume"
+        raise SceneError(f"{name}.poisson", "is no Poisson's number of a stable material", poisson, fix)
+    by_row = poisson > 0 if volume_row is None else bool(volume_row)
+    if by_row and poisson <= 0:
+        fix = "give a positive one, or volume_row = False"
+        raise SceneError(f"{name}.poisson", "must be positive with a volume row", poisson, fix)
+    return {"density": density, "E": E, "poisson": poisson, "damping": damping, "volume_row": by_row}
+
+
+def _check_material(scene: Scene, name: str, material: str, numbers: Mapping[str, Any]) -> None:
+    for other in scene.solids.values():
+        if other.name == name:
+            raise SceneError(f"{name}.name", "is taken by another solid", name, "give each solid a name of its own")
+        if other.material == material and other.numbers != numbers:
+            differing = [key for key, value in numbers.items() if other.numbers.get(key) != value]
+            fix = f"give what {other.name} has, or another material"
+            raise SceneError(
+                f"{name}.{differing[0]}", f"is not that of its material, {material}", numbers[differing[0]], fix
+            )
+
+
+def _warn_locking(name: str, mesh: SolidMesh, poisson: float, held: Array) -> None:
+    factor = locking(mesh, poisson, held)
+    stiff = "too stiff in bending" if factor is None else f"{factor:.2g} times too stiff in its slowest motion"
+    said = f"'{name}' is made of linear tetrahedra, and {stiff}: a fit finds E as much too small. Use bricks"
+    warnings.warn(f"{said} (sb.mesh.bricks, or a mesh of hexahedra).", LockingWarning, stacklevel=3)
+
+
+def _weigh(scene: Scene, mesh: SolidMesh, material: str, particles: Array, density: float) -> None:
+    """Masses: each node has its share of the elements around it."""
+    share = np.bincount(mesh.elements.ravel(), mesh.points[2].ravel(), len(mesh.vertices))
+    scene.add_quantity(f"{material}_density", density, "kg/m^3", shared=True)
+    scene.add_terms([Term("mass", particles, share, ((f"{material}_density", "identity"),))])

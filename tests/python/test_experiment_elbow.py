@@ -1,0 +1,44 @@
+"""Free flights of two blocks on a hinge: what the recording says of them, and predictions from the first frames."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sheetbend as sb
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "experiments" / "elbow"))
+
+
+def test_the_scene_starts_as_the_recording_shows() -> None:
+    from blocks import flights, scene_of
+
+    flight = flights()[2]
+    scene, _, second = scene_of(flight)
+    origin, frame = second.pose(sb.simulate(scene, [0.0, 1 / 148], sb.Solver(h=1 / 592)))
+    centers, turned = flight.second()
+    assert np.abs(origin - centers[:2]).max() < 1e-3
+    assert np.abs(frame - turned[:2]).max() < 0.02
+
+
+def test_flights_are_predicted_from_their_first_frames() -> None:
+    from blocks import flights
+    from elbow import predicted
+
+    every = flights()
+    assert len(every) == 18
+    errors = np.array([predicted(f, 9.63, 3e-4) for f in every])
+    assert (np.median(errors, axis=0) < [2e-3, 1.0, 2e-3, 1.0]).all()
+    assert errors.max(axis=0) == pytest.approx([3.2e-3, 1.3, 4.2e-3, 1.9], rel=0.1)
+
+
+@pytest.mark.slow
+def test_gravity_of_two_flights_is_that_of_the_cube() -> None:
+    from blocks import experiment, flights, parameters
+
+    every = flights()
+    found = sb.fit([experiment(every[k]) for k in (2, 10)], parameters=parameters(["gravity"]), refine=False)["gravity"]
+    assert found.half_width is not None
+    assert abs(found.value - 9.64) < found.half_width < 0.2

@@ -1,0 +1,241 @@
+"""Motions that are shot in windows: agreement with one unbroken run, derivatives, and what the model loses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from sheetbend.config import load
+from sheetbend.experiment.cut import borders
+from sheetbend.minimum.continuity import with_window
+from sheetbend.minimum.journal import Journal
+from sheetbend.minimum.lifted import Lifted
+from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.statistics.chain import Chain, Gap, Window
+
+RATE, NOISE = 50.0, 2e-4
+WANTED = ("arm_inertia", "arm_hinge_viscosity", "arm_angle", "arm_rate")
+
+
+def pendulum(inertia: float = 0.003, viscosity: float = 2e-4) -> tuple[sb.Scene, sb.Arm]:
+    scene = sb.Scene()
+    arm = sb.add_arm(
+        scene, mass=0.14, first_moment=0.016, inertia=inertia, length=0.25, viscosity=viscosity, angle=1.0, rate=0.5
+    )
+    return scene, arm
+
+
+def swing(stop: float = 2.0, kicks: float = 0.0, seed: int = 0, **fields: object) -> sb.Experiment:
+    """An arm that swings, with noise; with kicks (rad/s) of its rate that the model does not know."""
+    rng, times = np.random.default_rng(seed), np.arange(round(stop * RATE) + 1) / RATE
+    scene, arm = pendulum()
+    blank = sb.Recording(np.zeros((len(times), 1, 3)), times, markers=("m",), name="swing")
+    markers = {"m": arm.place(0.2)}
+    plain = sb.Experiment(scene=scene, recording=blank, markers=markers, solver=sb.Solver(h=1 / 400), axes="xz")
+    truth = replace(plain, solver=sb.Solver(h=1 / 3200))
+    problem = FitProblem([truth], as_parameters(list(WANTED), [truth]))
+    u, x, begun = problem.parameters.initial(), np.zeros((len(times), 1, 3)), 0
+    for stop_at in [*range(10, len(times), 10), len(times)] if kicks else [len(times)]:
+        x[begun:stop_at] = problem.simulate(u)[0][: stop_at - begun]
+        ahead = problem.simulate(u)[0][stop_at - begun :, 0] if stop_at < len(times) else x[-1:, 0]
+        angle = np.unwrap(np.arctan2(ahead[:, 0], -ahead[:, 2]))
+        rate = (-3 * angle[0] + 4 * angle[1] - angle[2]) * RATE / 2 if len(angle) > 2 else 0.0
+        u = np.array([*u[:2], angle[0], rate + kicks * rng.standard_normal()])
+        begun = stop_at
+    x[:, 0, [0, 2]] += NOISE * rng.standard_normal((len(times), 2))
+    start, _ = pendulum(0.0033, 1e-4)
+    recording = sb.Recording(x, times, markers=("m",), name="swing")
+    return replace(plain, scene=start, recording=recording, sigma=NOISE, **fields)  # type: ignore[arg-type]
+
+
+def cut(e: sb.Experiment, loss: float) -> FitProblem:
+    """The problem of an experiment in windows of 0.4 s with states off the best ones."""
+    e = with_window(replace(e, shooting=sb.Shooting(0.4, loss)))
+    states = tuple((1.0 + 0.1 * k, -0.3 * k) for k in range(1, len(borders(e)) - 1))
+    e = replace(e, shooting=replace(e.shooting, states=states))  # type: ignore[type-var]
+    return FitProblem([e], as_parameters(list(WANTED), [e]))
+
+
+def test_a_chain_is_solved_as_one_dense_system() -> None:
+    rng = np.random.default_rng(3)
+    q, p, count = 3, 2, 5
+    own = [0 if k == 0 else q for k in range(count)]
+    windows = [Window(rng.normal(size=(7, n)), rng.normal(size=(7, p)), rng.normal(size=7)) for n in own]
+    gaps = [
+        Gap(rng.normal(size=(4, n)), rng.normal(size=(4, q)), rng.normal(size=(4, p)), rng.normal(size=4)).times(1e6)
+        for n in own[:-1]
+    ]
+    chain = Chain([w.compressed() for w in windows], gaps)
+    first = np.cumsum([0, 0, *[q] * (count - 1)])
+    rows = []
+    for k, w in enumerate(windows):
+        row = np.zeros((7, first[-1] + p + 1))
+        row[:, first[k] : first[k + 1]] = w.state
+        row[:, -p - 1 :] = np.column_stack([w.border, w.rest])
+        rows.append(row)
+    for k, g in enumerate(gaps):
+        row = np.zeros((4, first[-1] + p + 1))
+        row[:, first[k] : first[k + 1]], row[:, first[k + 1] : first[k + 2]] = g.before, g.behind
+        row[:, -p - 1 :] = np.column_stack([g.border, g.rest])
+        rows.append(row)
+    M = np.vstack(rows)
+    A, B, r = M[:, : first[-1]], M[:, first[-1] : -1], M[:, -1]
+    step = rng.normal(size=p)
+    best = np.linalg.lstsq(A, -(r + B @ step), rcond=None)[0]
+    assert np.concatenate(chain.states(step)) == pytest.approx(best, rel=1e-6, abs=1e-9)
+    assert np.concatenate(chain.along()) == pytest.approx(-np.linalg.lstsq(A, B, rcond=None)[0], rel=1e-6, abs=1e-9)
+    left = np.sum((r + A @ np.linalg.lstsq(A, -r, rcond=None)[0]) ** 2)
+    assert chain.rest @ chain.rest == pytest.approx(left, rel=1e-6)
+    covariance = np.linalg.inv(A.T @ A)
+    for k, (known, cross) in enumerate(chain.covariances()):
+        mine, onward = slice(first[k], first[k + 1]), slice(first[k + 1], first[min(k + 2, count)])
+        assert known == pytest.approx(covariance[mine, mine], rel=1e-3, abs=1e-9)
+        assert cross == pytest.approx(covariance[mine, onward], rel=1e-3, abs=1e-9)
+    assert chain.log_size == pytest.approx(0.5 * np.linalg.slogdet(A.T @ A)[1], rel=1e-6)
+
+
+def test_windows_have_the_derivatives_of_their_rows() -> None:
+    core = cut(swing(), 1e-3).core
+    assert isinstance(core, Lifted)
+    window, u = core.motions[0].windows[2], np.array([np.log(0.0032), np.log(1.5e-4), 1.0, 0.5])
+    s, step = np.array([0.4, -2.0]), 1e-5
+    here = window.at(u, s)
+    assert here is not None
+    for part in ("data", "start", "end"):
+        for k in range(2):
+            ends = [getattr(window.at(u, s + sign * step * np.eye(2)[k]), part).value for sign in (1, -1)]
+            slope = getattr(here, part).state[:, k]
+            assert (ends[0] - ends[1]) / (2 * step) == pytest.approx(slope, rel=1e-5, abs=1e-6 * np.abs(slope).max())
+            ends = [getattr(window.at(u + sign * step * np.eye(4)[k], s), part).value for sign in (1, -1)]
+            slope = getattr(here, part).border[:, k]
+            assert (ends[0] - ends[1]) / (2 * step) == pytest.approx(slope, rel=1e-5, abs=1e-6 * np.abs(slope).max())
+        assert not getattr(here, part).border[:, 2:].any()  # the motion's own start does not reach it
+
+
+def test_the_cost_at_the_best_states_has_the_gradient_that_is_told() -> None:
+    problem, u = cut(swing(), 1e-2), np.array([np.log(0.0032), np.log(1.5e-4), 1.0, 0.5])
+    ok, r, J = problem.evaluate(u)
+    assert ok and len(r) == problem.core.rows > problem.prior_rows[1]
+    for k, step in enumerate((1e-4, 1e-3, 1e-4, 1e-4)):
+        costs = [problem.cost(u + sign * step * np.eye(4)[k]) for sign in (1, -1)]
+        assert (costs[0] - costs[1]) / (2 * step) == pytest.approx(J[:, k] @ r, rel=1e-4)
+
+
+def test_hard_continuity_gives_the_estimate_and_the_intervals_of_one_run() -> None:
+    e = swing()
+    wanted = list(WANTED)
+    plain = sb.fit(e, parameters=wanted, refine=False, beginnings=False, profiles=False)
+    shot = sb.fit(
+        replace(e, shooting=sb.Shooting(0.4, 1e-6)), parameters=wanted, refine=False, beginnings=False, profiles=False
+    )
+    for name in wanted:
+        a, b = plain[name], shot[name]
+        assert a.half_width is not None and b.half_width is not None
+        assert abs(a.value - b.value) < 0.005 * a.half_width, name
+        assert b.half_width == pytest.approx(a.half_width, rel=1e-3), name
+        assert a.verdict == b.verdict
+    assert shot.result.rows == plain.result.rows
+    assert shot.result.recordings[0].rms == pytest.approx(plain.result.recordings[0].rms, rel=1e-4)
+    (motion,) = shot.result.shot
+    assert motion.windows == 5 and motion.upper is None and motion.gap < 1e-6
+
+
+def test_kicks_that_the_model_does_not_know_are_what_it_loses() -> None:
+    kicked, options = swing(kicks=0.3, seed=1), {"refine": False, "beginnings": False, "profiles": False}
+    soft = sb.fit(replace(kicked, shooting=0.4), parameters=list(WANTED), **options)  # type: ignore[arg-type]
+    hard = sb.fit(replace(kicked, shooting=sb.Shooting(0.4, 1e-6)), parameters=list(WANTED), **options)  # type: ignore[arg-type]
+    (lost,) = soft.result.shot
+    assert lost.lower is not None and lost.upper is not None and lost.upper < 4 * lost.loss
+    assert 0.005 < lost.lower < lost.loss < lost.upper  # two kicks of 0.3 rad/s in a window, at 0.15 m, times 0.2 s
+    assert lost.lower < lost.gap / lost.length < lost.upper
+    e = soft["arm_hinge_viscosity"]
+    assert e.lower is not None and e.upper is not None and e.lower < 2e-4 < e.upper
+    assert hard.result.recordings[0].rms > 3 * soft.result.recordings[0].rms  # type: ignore[operator]
+
+
+def test_a_motion_that_loses_nothing_says_so_in_every_result(tmp_path: Path) -> None:
+    e = swing(fit=(0.0, 1.6), held_out=(1.6, 2.0), shooting=0.4)
+    found = sb.fit(e, parameters=list(WANTED))
+    (lost,) = found.result.shot
+    assert (lost.windows, lost.numbers) == (4, 2)
+    assert lost.lower == 0.0 and lost.upper is not None and lost.upper < 2e-3
+    held = found.result.recordings[0].held_out
+    assert held is not None and held < 1.6 * NOISE  # noise in two coordinates is 1.41 times that of one
+    for name, truth in zip(WANTED, (0.003, 2e-4, 1.0, 0.5), strict=True):
+        assert found[name].verdict in ("identified", "weak")
+        assert found[name].lower < truth < found[name].upper, name  # type: ignore[operator]
+    assert "6 numbers of states at borders" in found.report() and "less than" in found.report()
+    found.save(tmp_path / "fit.json")
+    assert sb.FitResult.load(tmp_path / "fit.json").shot == found.result.shot
+
+
+def test_a_journal_brings_back_the_states_too(tmp_path: Path) -> None:
+    points = [np.array([np.log(0.0032) + d, np.log(1.5e-4), 1.0, 0.5]) for d in (0.0, 1e-3, -1e-3)]
+    onward = points[0] + 2e-3
+    problem = cut(swing(), 1e-3)
+    alone = [problem.evaluate(u) for u in (*points, onward)]
+    with Journal(tmp_path / "journal"):
+        problem = cut(swing(), 1e-3)
+        for u in points:
+            problem.evaluate(u)
+    with Journal(tmp_path / "journal") as journal:
+        problem = cut(swing(), 1e-3)
+        resumed = [problem.evaluate(u) for u in (*points, onward)]
+        assert (journal.read, journal.made) == (len(points), 1)
+    for (_, r, J), (_, s, K) in zip(alone, resumed, strict=True):
+        assert np.array_equal(r, s) and np.array_equal(J, K)
+
+
+def test_windows_are_refused_where_they_cannot_be() -> None:
+    rope = sb.rope(0.6, 6, density=0.05, EI=1e-3, clamp_start=(1, 0, 0))
+    times = np.arange(20) / 50
+    recording = sb.Recording(np.zeros((20, 7, 3)) + np.arange(20)[:, None, None] / 20, times)
+    with pytest.raises(sb.InputError, match="needs quantities that set how the scene starts"):
+        sb.fit(sb.Experiment(scene=rope, recording=recording, shooting=0.2), parameters=["rope_EI"])
+    with pytest.raises(sb.InputError, match="is short for these frames"):
+        with_window(replace(swing(), shooting=0.05))
+    with pytest.raises(sb.InputError, match="does not go with"):
+        replace(swing(), shooting=0.4, static=True)
+    with pytest.raises(sb.InputError, match="must be a length"):
+        replace(swing(), shooting=-1.0)
+    many = [replace(swing(), name=f"swing {k}", shooting=0.4) for k in range(20)]
+    with pytest.raises(sb.InputError, match="does not go with many recordings"):
+        sb.fit_many(many, list(WANTED)[:2])
+
+
+def test_a_configuration_says_how_a_recording_is_shot(tmp_path: Path) -> None:
+    swing().recording.save(tmp_path / "swing.npz")
+    text = """
+    [experiment]
+    name = "swing"
+    [solver]
+    substeps = 8
+    [[scene.arm]]
+    name = "arm"
+    mass = 0.14
+    first_moment = 0.016
+    inertia = 0.003
+    length = 0.25
+    viscosity = 2e-4
+    [[marker]]
+    marker = "m"
+    arm = "arm"
+    radius = 0.2
+    [[recording]]
+    file = "swing.npz"
+    axes = "xz"
+    shooting = {}
+    [parameters.arm_inertia]
+    """
+    for written, window in (("0.4", 0.4), ('"auto"', "auto")):
+        (tmp_path / "swing.toml").write_text(text.format(written))
+        (e,) = load(tmp_path / "swing.toml").experiments
+        assert isinstance(e.shooting, sb.Shooting) and e.shooting.window == window
+    chosen = with_window(e).shooting
+    assert isinstance(chosen, sb.Shooting) and chosen.window == pytest.approx(0.48)  # 24 frames at least
+    (tmp_path / "swing.toml").write_text(text.format('"often"'))
+    with pytest.raises(sb.ConfigError, match="shooting"):
+        load(tmp_path / "swing.toml")
