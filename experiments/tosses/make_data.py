@@ -70,8 +70,8 @@ def main(folder: Path) -> None:
         quaternions=turns[every].astype(np.float32),
     )
     about = {
-        "what": "a tossed acrylic cube, motion capture: flights.npz has the frames before the first contact, tosses.npz "
-        "all frames until it rests, in single precision",
+        "what": "a tossed acrylic cube, motion capture: flights.npz has the frames before the first contact, "
+        "tosses.npz all frames until it rests, in single precision",
         "rate_hz": told["rate_hz"],
         "keys": {
             "starts": "first frame of each flight or toss, and the end",

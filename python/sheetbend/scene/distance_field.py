@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import spline_filter
 
 from ..errors import SceneError
 from ..mesh import TriangleMesh
@@ -130,7 +129,10 @@ def _sampled(label: str, mesh: TriangleMesh, spacing: float | None, margin: floa
     axes = [start + step * np.arange(n) for start, n in zip(origin, counts, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     distances = signed_distances(vertices, triangles, points).reshape(counts)
-    coefficients = np.pad(spline_filter(distances, order=3, mode="mirror"), 1, mode="reflect")
+    coefficients = distances
+    for axis in range(3):
+        coefficients = np.moveaxis(_interpolating(np.moveaxis(coefficients, axis, 0)), 0, axis)
+    coefficients = np.pad(coefficients, 1, mode="reflect")
     corners = vertices[triangles]
     surface = np.concatenate([vertices, _spread(corners, SAMPLES)])
     return DistanceGrid(
@@ -156,6 +158,24 @@ def spline(origin: Array, spacing: float, coefficients: Array, points: Array) ->
         own = coefficients[cell[:, 0] + i, cell[:, 1] + j, cell[:, 2] + k]
         values += weights[:, i, 0] * weights[:, j, 1] * weights[:, k, 2] * own
     return values
+
+
+def _interpolating(values: Array) -> Array:
+    """Coefficients c along the first axis with (c[i - 1] + 4 c[i] + c[i + 1])/6 = values[i], mirrored at both ends: the
+    cubic B-spline that goes through the values (Thomas algorithm)."""
+    last = len(values) - 1
+    c = 6.0 * values
+    above = np.empty(last)
+    for i in range(last + 1):
+        pivot = 4.0 if i == 0 else 4.0 - (2.0 if i == last else 1.0) * above[i - 1]
+        if i > 0:
+            c[i] -= (2.0 if i == last else 1.0) * c[i - 1]
+        c[i] /= pivot
+        if i < last:
+            above[i] = (2.0 if i == 0 else 1.0) / pivot
+    for i in range(last - 1, -1, -1):
+        c[i] -= above[i] * c[i + 1]
+    return c
 
 
 def _spread(corners: Array, count: int) -> Array:
