@@ -9,7 +9,7 @@ namespace sheetbend {
 
 // Adds to the cotangents of the numbers and returns that of z, given those of the force and of its tangential part.
 template <class S>
-Vec3<S> touch_vjp(int shape, const Vec3<S>& z, const ContactNumbers<S>& c, const Vec3<S>& force_bar,
+Vec3<S> touch_vjp(const AnyShape& shape, const Vec3<S>& z, const ContactNumbers<S>& c, const Vec3<S>& force_bar,
                   const Vec3<S>& tangential_bar, ContactNumbers<S>& bar) {
   using D = Dual<S, 12 + most_sizes>;
   int next = 0;
@@ -30,6 +30,8 @@ Vec3<S> touch_vjp(int shape, const Vec3<S>& z, const ContactNumbers<S>& c, const
   cd.radius = direct(c.radius);
   cd.kappa = direct(c.kappa);
   for (int k = 0; k < most_sizes; ++k) cd.size[k] = direct(c.size[k]);
+  cd.lift = D(c.lift);
+  cd.firm = c.firm;
   const Touch<D> t = touch(shape, zd, cd);
   if (!t.pushes) return {S(0.0), S(0.0), S(0.0)};
   next = 0;
@@ -47,10 +49,25 @@ Vec3<S> touch_vjp(int shape, const Vec3<S>& z, const ContactNumbers<S>& c, const
   bar.from = bar.from + back_vector();
   bar.carried = bar.carried + back_vector();
   bar.friction += back();
-  bar.radius += back();
+  const S nearer = back();
+  bar.radius += nearer;
+  bar.lift += nearer;
   bar.kappa += back();
   for (int k = 0; k < most_sizes; ++k) bar.size[k] += back();
   return z_bar;
+}
+
+// Adds to the cotangents of a shape's lengths and returns that of z, given that of the normal there.
+template <class S>
+Vec3<S> normal_vjp(const AnyShape& shape, const Vec3<S>& z, const S* size, const Vec3<S>& n_bar, S* size_bar) {
+  using D = Dual<S, 3 + most_sizes>;
+  D at[3] = {D(z.x), D(z.y), D(z.z)}, lengths[most_sizes];
+  for (int d = 0; d < 3; ++d) at[d].d[d] = S(1.0);
+  for (int k = 0; k < most_sizes; ++k) lengths[k] = D(size[k]), lengths[k].d[3 + k] = S(1.0);
+  const Vec3<D> n = normal_at(shape, Vec3<D>(at), lengths);
+  const auto back = [&](int i) { return n_bar.x * n.x.d[i] + n_bar.y * n.y.d[i] + n_bar.z * n.z.d[i]; };
+  for (int k = 0; k < most_sizes; ++k) size_bar[k] += back(3 + k);
+  return {back(0), back(1), back(2)};
 }
 
 // turn_bar += world frame^T

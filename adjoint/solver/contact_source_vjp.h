@@ -2,6 +2,7 @@
 #pragma once
 
 #include "adjoint/contact/impact_vjp.h"
+#include "adjoint/contact/rebound_vjp.h"
 #include "adjoint/contact/touch_vjp.h"
 #include "adjoint/solver/cotangents.h"
 #include "core/solver/contact_source.h"
@@ -24,6 +25,42 @@ void size_vjp(const ContactSource<T>& source, const Collider& collider, const Si
   });
 }
 
+// Reverse of ContactSource::surface.
+template <class T>
+void surface_vjp(const ContactSource<T>& source, int contact, const Surface<Single<T>>& bar,
+                 ColliderPoses<Single<T>>& poses_bar, const Inputs<T>& in_bar) {
+  using S = Single<T>;
+  const Contact& c = source.scene.contacts[contact];
+  source.add(bar.friction, in_bar.of(Quantity::friction)[contact]);
+  source.add(bar.restitution, in_bar.of(Quantity::restitution)[c.restitution]);
+  source.add(bar.radius, in_bar.of(Quantity::contact_radius)[contact]);
+  size_vjp(source, source.scene.colliders[c.collider], bar.size, in_bar);
+  const auto add = [](const Pose<S>& from, Pose<S>& to) {
+    to.position = to.position + from.position;
+    for (int k = 0; k < 9; ++k) to.turn[k] += from.turn[k];
+  };
+  add(bar.now, poses_bar.now[c.collider]);
+  add(bar.next, poses_bar.next[c.collider]);
+}
+
+// Reverse of ContactSource::rebound.
+template <class T>
+void rebound_vjp(const ContactSource<T>& source, const ColliderPoses<Single<T>>& poses, int contact, int item,
+                 const Rebound<Single<T>>& bar, ColliderPoses<Single<T>>& poses_bar, const StateCotangents<T>& from_bar,
+                 const Inputs<T>& in_bar) {
+  const Scene& scene = source.scene;
+  const Contact& c = scene.contacts[contact];
+  const auto f = rebound_vjp(scene.colliders[c.collider].any(), source.h, source.bdf.before == 0.0,
+                             source.falling(poses, contact, item), bar);
+  const int node = c.particles[item], dof = scene.first_dof[node];
+  source.add(f.x, from_bar.x + dof);
+  source.add(f.v, from_bar.v + dof);
+  source.add(f.gravity, in_bar.of(Quantity::gravity));
+  source.add(f.carried, from_bar.x + scene.first_dof[c.carried[item]]);
+  source.add(f.mass, in_bar.of(Quantity::mass)[node]);
+  surface_vjp(source, contact, f.surface, poses_bar, in_bar);
+}
+
 // Reverse of ContactSource::numbers. Returns the cotangent of the particle's inverse mass.
 template <class T>
 Single<T> numbers_vjp(const ContactSource<T>& source, const ColliderPoses<Single<T>>& poses, int contact, int item,
@@ -43,7 +80,10 @@ Single<T> numbers_vjp(const ContactSource<T>& source, const ColliderPoses<Single
   if (source.bdf.before != 0.0)
     history(source.bdf.before, poses.before, poses_bar.before, source.from.x_before, from_bar.x_before);
   const S eta2(source.bdf.eta * source.bdf.eta);
-  source.add(eta2 * bar.carried, from_bar.x + scene.first_dof[c.carried[item]]);
+  if (c.rebounds(item))
+    rebound_vjp(source, poses, contact, item, {eta2 * bar.carried, bar.lift, bar.leaving}, poses_bar, from_bar, in_bar);
+  else
+    source.add(eta2 * bar.carried, from_bar.x + scene.first_dof[c.carried[item]]);
   source.add(bar.friction, in_bar.of(Quantity::friction)[contact]);
   source.add(bar.radius, in_bar.of(Quantity::contact_radius)[contact]);
   size_vjp(source, collider, bar.size, in_bar);
@@ -54,24 +94,6 @@ Single<T> numbers_vjp(const ContactSource<T>& source, const ColliderPoses<Single
   const S w = source.read(source.w[node]);
   const double share = source.bdf.eta / source.h;
   return -(S(rigidity * share * share) * bar.kappa / (w * w));
-}
-
-// Reverse of ContactSource::surface.
-template <class T>
-void surface_vjp(const ContactSource<T>& source, int contact, const Surface<Single<T>>& bar,
-                 ColliderPoses<Single<T>>& poses_bar, const Inputs<T>& in_bar) {
-  using S = Single<T>;
-  const Contact& c = source.scene.contacts[contact];
-  source.add(bar.friction, in_bar.of(Quantity::friction)[contact]);
-  source.add(bar.restitution, in_bar.of(Quantity::restitution)[c.restitution]);
-  source.add(bar.radius, in_bar.of(Quantity::contact_radius)[contact]);
-  size_vjp(source, source.scene.colliders[c.collider], bar.size, in_bar);
-  const auto add = [](const Pose<S>& from, Pose<S>& to) {
-    to.position = to.position + from.position;
-    for (int k = 0; k < 9; ++k) to.turn[k] += from.turn[k];
-  };
-  add(bar.now, poses_bar.now[c.collider]);
-  add(bar.next, poses_bar.next[c.collider]);
 }
 
 // Reverse of ContactSource::poses.

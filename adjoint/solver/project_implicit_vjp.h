@@ -96,7 +96,8 @@ template <class T>
 void project_implicit_vjp(const SubstepState<T>& s, const DirectBlock& block, Scenes scenes,
                           const sheetbend_packs::KernelTable& table, BlockState<T>& state, BlockCotangents<T>& bar) {
   const bool has_rigid = has_rigid_rows(state);
-  const int passes = has_rigid ? 3 : 2;
+  const bool lifts = std::any_of(state.contacts.begin(), state.contacts.end(), [](const auto& c) { return c.lifts(); });
+  const int passes = (has_rigid ? 3 : 2) + (lifts ? 3 : 0);
   for (int scene = 0; scene < static_cast<int>(state.implicit.size()); ++scene)
     if (has(scenes, scene)) state.implicit[scene].factorize(s.scene, block);
   for (auto& scene : bar.contacts) scene.clear();

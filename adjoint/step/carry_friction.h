@@ -32,12 +32,18 @@ struct ReverseOf<CarryFriction> {
         lane = source.lane;
       }
       const Contact& contact = scene.contacts[c];
-      const int shape = scene.colliders[contact.collider].shape, dof = scene.first_dof[contact.particles[i]];
-      const Vec3<S> tangential_bar = rate * source.at(bar.x_next, contact.carried[i]);
+      const AnyShape shape = scene.colliders[contact.collider].any();
+      const int dof = scene.first_dof[contact.particles[i]];
+      const Vec3<S> carried_bar = source.at(bar.x_next, contact.carried[i]), tangential_bar = rate * carried_bar;
       const Vec3<S> x = source.read(Vec3<T>(work.q.of(contact.particles[i])));
       const ContactNumbers<S> numbers = source.numbers(poses, c, i);
       ContactNumbers<S> numbers_bar{};
-      const Vec3<S> z_bar = touch_vjp(shape, poses.next[contact.collider].in_frame(x), numbers, none, tangential_bar, numbers_bar);
+      const Vec3<S> z = poses.next[contact.collider].in_frame(x);
+      Vec3<S> z_bar = touch_vjp(shape, z, numbers, none, tangential_bar, numbers_bar);
+      if (value_of(numbers.leaving) != 0.0 && touch(shape, z, numbers).pushes) {
+        numbers_bar.leaving += dot(normal_at(shape, z, numbers.size), carried_bar);
+        z_bar = z_bar + normal_vjp(shape, z, numbers.size, numbers.leaving * carried_bar, numbers_bar.size);
+      }
       source.add(in_frame_vjp(poses.next[contact.collider], x, z_bar, poses_bar.next[contact.collider]),
                  bar.x_next + dof);
       source.add(numbers_vjp(source, poses, c, i, numbers_bar, poses_bar, bar.from, bar.in),

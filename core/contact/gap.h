@@ -8,9 +8,10 @@
 //     template <class T> static void evaluate(const T* z, const T* size, T& distance, T* n);
 //   };
 //
-// z (3) is a point in the shape's own frame [m], `distance` its distance from the surface [m], negative inside, and n (3) the gradient of the distance with respect to z,
-// a unit vector. Where the distance has a kink, n is that of one side. No number may be divided by zero: a shape says in its header what it does
-// where there is no direction. T is never a pack, so branches may look at value_of(). shapes.h lists all shapes.
+// z (3) is a point in the shape's own frame [m], `distance` its distance from the surface [m], negative inside, and n (3) the gradient of the distance with
+// respect to z, a unit vector. Where the distance has a kink, n is that of one side. No number may be divided by zero: a shape says in its header what it does
+// where there is no direction. T is never a pack, so branches may look at value_of(). shapes.h lists all shapes. distance_field.h differs: it reads a grid
+// in the place of sizes, and its gradient is no unit vector to the last digit.
 #pragma once
 
 #include <array>

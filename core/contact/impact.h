@@ -65,7 +65,7 @@ Numbers<double> as_values(const Numbers<S>& from) {
 
 // How a substep of h meets flights: of which shape the surface is, and whether paths are parabolas.
 struct ImpactRule {
-  int shape;
+  AnyShape shape;
   double h;
   bool curved;
 };
@@ -90,10 +90,10 @@ struct Approach {
     z.store(place);
     distance_from(rule.shape, place, s.size, gap, n);
     gap = gap - s.radius;
-    const Vec3<S> own(n);
-    normal = between(s.now.turned(own), s.next.turned(own));
+    const auto turned = [&](const Vec3<S>& own) { return between(s.now.turned(own), s.next.turned(own)); };
+    normal = turned(unit_normal(rule.shape, Vec3<S>(n)));
     surface_velocity = S(1.0 / rule.h) * ((s.next.position + s.next.turned(z)) - (s.now.position + s.now.turned(z)));
-    rate = dot(normal, direction - surface_velocity);
+    rate = dot(turned(Vec3<S>(n)), direction - surface_velocity);
   }
 };
 

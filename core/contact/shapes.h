@@ -5,8 +5,10 @@
 #include <stdexcept>
 #include <string>
 #include <tuple>
+#include <type_traits>
 
 #include "core/contact/capsule.h"
+#include "core/contact/distance_field.h"
 #include "core/contact/plane.h"
 #include "core/contact/rounded_box.h"
 #include "core/contact/sphere.h"
@@ -17,12 +19,20 @@ using Shapes = std::tuple<  //
     Plane,                  //
     Sphere,                 //
     Capsule,                //
-    RoundedBox>;
+    RoundedBox,             //
+    DistanceField>;
 
 inline constexpr int shape_count = std::tuple_size_v<Shapes>;
 inline constexpr int most_sizes = []<class... S>(std::tuple<S...>*) {
   return std::max({size_count<S>...});
 }(static_cast<Shapes*>(nullptr));
+
+// A shape of the list, and the grid of one that is given by numbers.
+struct AnyShape {
+  int number;
+  const DistanceGrid* grid;
+  AnyShape(int number_, const DistanceGrid* grid_ = nullptr) : number(number_), grid(grid_) {}
+};
 
 // Calls f with an object of the shape type that `shape` numbers.
 template <int I = 0, class F>
@@ -51,8 +61,31 @@ inline int shape_of(const std::string& name) {
 
 // The distance from the surface and its gradient, as in gap.h.
 template <class T>
-void distance_from(int shape, const T* z, const T* size, T& distance, T* n) {
-  with_shape(shape, [&]<class S>(S) { S::evaluate(z, size, distance, n); });
+void distance_from(const AnyShape& shape, const T* z, const T* size, T& distance, T* n) {
+  with_shape(shape.number, [&]<class S>(S) {
+    if constexpr (std::is_same_v<S, DistanceField>)
+      S::evaluate(*shape.grid, z, distance, n);
+    else
+      S::evaluate(z, size, distance, n);
+  });
+}
+
+// The direction of that gradient, which only a grid's spline may have of another length than one; the third axis where it is zero.
+template <class T>
+Vec3<T> unit_normal(const AnyShape& shape, const Vec3<T>& n) {
+  if (!shape.grid) return n;
+  T unit[3];
+  normalize(n, {T(0.0), T(0.0), T(1.0)}, unit);
+  return Vec3<T>(unit);
+}
+
+// The unit normal alone.
+template <class T>
+Vec3<T> normal_at(const AnyShape& shape, const Vec3<T>& z, const T* size) {
+  T at[3], distance, n[3];
+  z.store(at);
+  distance_from(shape, at, size, distance, n);
+  return unit_normal(shape, Vec3<T>(n));
 }
 
 }  // namespace sheetbend

@@ -14,6 +14,8 @@ struct ContactNumbers {
   Vec3<T> carried;  // tangential force before
   T friction, radius, kappa;
   T size[most_sizes];
+  T lift{}, leaving{};  // of restitution (rebound.h): how far above the surface it pushes to, and what it carries on
+  double firm = 1.0;    // how many times stiffer it is along the normal
 };
 
 template <class T>
@@ -21,39 +23,42 @@ struct Touch : ContactForce<T> {
   Vec3<T> force;  // on the particle
 };
 
+// At this distance, with this gradient. The push is along the gradient, so that it has a potential, and Coulomb's limit is that of the whole push.
 template <class T>
-Touch<T> touch(const T& distance, const Vec3<T>& n, const Vec3<T>& z, const ContactNumbers<T>& c) {
-  Touch<T> t{contact_force(distance - c.radius, n, z - c.from, c.carried, c.friction, c.kappa), {}};
+Touch<T> touch(const AnyShape& shape, const T& distance, const Vec3<T>& n, const Vec3<T>& z, const ContactNumbers<T>& c) {
+  const T gap = T(c.firm) * (distance - c.radius - c.lift);
+  const T friction = shape.grid ? sqrt(dot(n, n)) * c.friction : c.friction;
+  Touch<T> t{contact_force(gap, unit_normal(shape, n), z - c.from, c.carried, friction, c.kappa), {}};
   if (t.pushes) t.force = t.normal * n + t.tangential;
   return t;
 }
 
 template <class T>
-Touch<T> touch(int shape, const Vec3<T>& z, const ContactNumbers<T>& c) {
+Touch<T> touch(const AnyShape& shape, const Vec3<T>& z, const ContactNumbers<T>& c) {
   T at[3], distance, n[3];
   z.store(at);
   distance_from(shape, at, c.size, distance, n);
-  return touch(distance, Vec3<T>(n), z, c);
+  return touch(shape, distance, Vec3<T>(n), z, c);
 }
 
 // The same numbers over a larger scalar.
 template <class U, class T>
 ContactNumbers<U> constants(const ContactNumbers<T>& c) {
   const auto vector = [](const Vec3<T>& v) { return Vec3<U>(U(v.x), U(v.y), U(v.z)); };
-  ContactNumbers<U> u{vector(c.from), vector(c.carried), U(c.friction), U(c.radius), U(c.kappa), {}};
+  ContactNumbers<U> u{vector(c.from), vector(c.carried), U(c.friction), U(c.radius), U(c.kappa), {}, U(c.lift), U(c.leaving), c.firm};
   for (int k = 0; k < most_sizes; ++k) u.size[k] = U(c.size[k]);
   return u;
 }
 
 // A = -d force/dz, row by row, with or without the curvature of the shape: without it the normal stays, as Newton's method may have it. Returns
 // what acts.
-inline Touch<double> touch_matrix(int shape, const Vec3<double>& z, const ContactNumbers<double>& c, bool curved,
+inline Touch<double> touch_matrix(const AnyShape& shape, const Vec3<double>& z, const ContactNumbers<double>& c, bool curved,
                                   double* A) {
   using D = Dual<double, 3>;
   double at[3], distance, n[3];
   z.store(at);
   distance_from(shape, at, c.size, distance, n);
-  const Touch<double> plain = touch(distance, Vec3<double>(n), z, c);
+  const Touch<double> plain = touch(shape, distance, Vec3<double>(n), z, c);
   std::fill_n(A, 9, 0.0);
   if (!plain.pushes) return plain;
   D zd[3], distance_d(distance), n_d[3] = {n[0], n[1], n[2]};
@@ -65,7 +70,7 @@ inline Touch<double> touch_matrix(int shape, const Vec3<double>& z, const Contac
   const ContactNumbers<D> cd = constants<D>(c);
   if (curved) distance_from(shape, zd, cd.size, distance_d, n_d);
   D force[3];
-  touch(distance_d, Vec3<D>(n_d), Vec3<D>(zd), cd).force.store(force);
+  touch(shape, distance_d, Vec3<D>(n_d), Vec3<D>(zd), cd).force.store(force);
   for (int a = 0; a < 3; ++a)
     for (int b = 0; b < 3; ++b) A[3 * a + b] = -force[a].d[b];
   return plain;

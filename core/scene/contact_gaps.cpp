@@ -18,8 +18,8 @@ std::vector<std::array<double, 4>> contact_gaps(const Scene& scene, const Inputs
   for (const int node : c.particles) {
     double z[3], distance, n[3];
     pose.in_frame(Vec3<double>(x + scene.first_dof[node])).store(z);
-    distance_from(collider.shape, z, in.of(Quantity::collider_size) + collider.first_size, distance, n);
-    const Vec3<double> normal = pose.turned(Vec3<double>(n));
+    distance_from(collider.any(), z, in.of(Quantity::collider_size) + collider.first_size, distance, n);
+    const Vec3<double> normal = pose.turned(unit_normal(collider.any(), Vec3<double>(n)));
     gaps.push_back({distance - in.of(Quantity::contact_radius)[contact], normal.x, normal.y, normal.z});
   }
   return gaps;

@@ -1,12 +1,12 @@
 #include "core/scene/scene.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 #include <stdexcept>
 
 #include "core/constraints/registry.h"
-#include "core/contact/shapes.h"
 
 namespace sheetbend {
 namespace {
@@ -134,22 +134,44 @@ void check_contact(const ContactSpec& spec, const Scene& scene, std::vector<char
   }
 }
 
-// The free particles of contacts with restitution, which nothing else may hold.
+// Of contacts with restitution: the free particles that nothing holds, and which ones constraints hold. A soft contact of what is held gives back
+// by itself.
 void add_bouncers(Scene& s) {
+  std::vector<char> held(s.nodes(), false);
+  for (const Group& g : s.groups)
+    for (const int n : g.stencil) held[n] = true;
+  for (const Volume& v : s.volumes)
+    for (const int n : v.nodes) held[n] = true;
   std::map<int, std::vector<int>> contacts;
-  for (std::size_t c = 0; c < s.contacts.size(); ++c)
-    if (s.contacts[c].restitution >= 0)
-      for (const int n : s.contacts[c].particles)
-        if (s.role[n] == Role::free) contacts[n].push_back(static_cast<int>(c));
-  const auto expect_loose = [&](const std::string& name, const std::vector<int>& nodes) {
-    for (const int n : nodes)
-      if (const auto found = contacts.find(n); found != contacts.end())
-        refuse(s.contacts[found->second.front()].name + ".restitution: particle " + std::to_string(n) + " is held by '" +
-               name + "'. Fix: leave it out, only particles that nothing holds bounce");
-  };
-  for (const Group& g : s.groups) expect_loose(g.name, g.stencil);
-  for (const Volume& v : s.volumes) expect_loose(v.name, v.nodes);
+  for (std::size_t c = 0; c < s.contacts.size(); ++c) {
+    Contact& contact = s.contacts[c];
+    if (contact.restitution < 0) continue;
+    for (const int n : contact.particles) {
+      contact.held.push_back(held[n]);
+      if (s.role[n] != Role::free) continue;
+      if (!held[n])
+        contacts[n].push_back(static_cast<int>(c));
+      else if (contact.stiffness >= 0)
+        refuse(contact.name + ".restitution: particle " + std::to_string(n) +
+               " is held by constraints, and the contact has a stiffness. Fix: leave out one of the two");
+    }
+  }
   for (auto& [node, own] : contacts) s.bouncers.push_back({node, std::move(own)});
+}
+
+// A distance field has a grid, and nothing else has one.
+void check_grid(const ColliderSpec& c) {
+  const DistanceGrid* g = c.grid.get();
+  if ((c.shape == DistanceField::name) != (g != nullptr))
+    refuse(c.name + ".grid: is of distance fields alone. Fix: give one to them, and none to other shapes");
+  if (!g) return;
+  std::size_t size = 1;
+  for (const int n : g->count) size *= static_cast<std::size_t>(std::max(n, 0));
+  const auto finite = [](double a) { return std::isfinite(a); };
+  if (std::ranges::any_of(g->count, [](int n) { return n < 4; }) || size != g->coefficients.size() || !(g->spacing > 0.0) ||
+      !finite(g->spacing) || !std::ranges::all_of(g->origin, finite) || !std::ranges::all_of(g->coefficients, finite))
+    refuse(c.name + ".grid: has fewer than two points along an axis, or numbers that are not finite. "
+           "Fix: give distances on two points or more along each axis");
 }
 
 // Colliders and contacts; returns how many numbers there are of each of their quantities.
@@ -157,7 +179,8 @@ std::array<std::size_t, 6> add_contacts(const SceneSpec& spec, Scene& s) {
   std::size_t poses = 0, sizes = 0, soft = 0, bouncing = 0;
   for (const ColliderSpec& c : spec.colliders) {
     check_knots(c.name + ".times", c.motion, true);
-    s.colliders.push_back({c.name, shape_of(c.shape), c.motion, poses, sizes});
+    check_grid(c);
+    s.colliders.push_back({c.name, shape_of(c.shape), c.motion, poses, sizes, c.grid});
     poses += 6 * c.motion.times.size();
     with_shape(s.colliders.back().shape, [&]<class S>(S) { sizes += size_count<S>; });
   }

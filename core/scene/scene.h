@@ -3,10 +3,12 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "core/contact/shapes.h"
 #include "core/scene/bodies.h"
 #include "core/scene/fields.h"
 #include "core/scene/layout.h"
@@ -59,6 +61,9 @@ struct Collider {
   int shape;                            // in core/contact/shapes.h
   Knots motion;                         // when it has its poses; one knot for a shape that stands
   std::size_t first_pose, first_size;   // into Quantity::collider_pose and collider_size
+  std::shared_ptr<const DistanceGrid> grid;  // of a distance field
+
+  AnyShape any() const { return {shape, grid.get()}; }
 };
 
 // Particles that may touch a collider. The tangential force that a particle is held by is carried from substep to substep [N], in the collider's
@@ -71,6 +76,9 @@ struct Contact {
   int stiffness;             // place in Quantity::contact_stiffness, -1 where it is rigid
   int restitution;           // place in Quantity::restitution, -1 where nothing bounces
   std::size_t first = 0;     // of its particles, in arrays of all contacts' particles
+  std::vector<char> held;    // per particle where something bounces: whether constraints hold it
+
+  bool rebounds(int item) const { return !held.empty() && held[item]; }
 };
 
 // A particle that bounces: no constraint holds it.
@@ -139,6 +147,7 @@ struct VolumeSpec {
 struct ColliderSpec {
   std::string name, shape;
   Knots motion;
+  std::shared_ptr<const DistanceGrid> grid = nullptr;
 };
 
 struct ContactSpec {

@@ -25,6 +25,11 @@ struct BlockContacts {
       numbers[i] = source.numbers(poses, block.contacts[i].contact, block.contacts[i].item);
   }
 
+  // Whether restitution lifts any: such stiff contacts take more passes to the derivatives' last digits.
+  bool lifts() const {
+    return std::any_of(numbers.begin(), numbers.end(), [](const ContactNumbers<S>& n) { return n.firm > 1.0; });
+  }
+
   // Of contact i: what acts on its particle at x, in the collider's frame; `pose` turns it.
   const Pose<S>& pose(const DirectBlock& block, int i) const { return poses.next[block.contacts[i].collider]; }
   Touch<S> at(const DirectBlock& block, int i, const Vec3<S>& x) const {
@@ -49,6 +54,7 @@ void take_values(const BlockContacts<S>& c, BlockContacts<double>& all) {
     to.from = vector(n.from), to.carried = vector(n.carried);
     to.friction = value_of(n.friction), to.radius = value_of(n.radius), to.kappa = value_of(n.kappa);
     for (int k = 0; k < most_sizes; ++k) to.size[k] = value_of(n.size[k]);
+    to.lift = value_of(n.lift), to.leaving = value_of(n.leaving), to.firm = n.firm;
   }
 }
 

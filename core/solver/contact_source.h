@@ -6,6 +6,7 @@
 
 #include "core/contact/impact.h"
 #include "core/contact/pose.h"
+#include "core/contact/rebound.h"
 #include "core/contact/touch.h"
 #include "core/scalar/pack.h"
 #include "core/scene/scene.h"
@@ -89,6 +90,11 @@ struct ContactSource {
     const double share = bdf.eta / h;
     const S eta2(bdf.eta * bdf.eta);
     numbers.carried = eta2 * at(from.x, c.carried[item]);
+    if (c.rebounds(item)) {
+      const Rebound<S> r = rebound(poses, contact, item);
+      numbers.carried = eta2 * r.carried;
+      numbers.lift = r.lift, numbers.leaving = r.leaving, numbers.firm = r.lifts ? firmness : 1.0;
+    }
     numbers.friction = read(in.of(Quantity::friction)[contact]);
     numbers.radius = read(in.of(Quantity::contact_radius)[contact]);
     numbers.kappa = c.stiffness < 0 ? S(rigidity * share * share) / read(w[node])
@@ -111,13 +117,29 @@ struct ContactSource {
     return s;
   }
 
+  // Of a particle that constraints hold, at a contact with restitution.
+  Falling<S> falling(const ColliderPoses<S>& poses, int contact, int item) const {
+    const Contact& c = scene.contacts[contact];
+    const int node = c.particles[item];
+    return {at(from.x, node),
+            at(from.v, node),
+            read(Vec3<T>(in.of(Quantity::gravity))),
+            at(from.x, c.carried[item]),
+            read(in.of(Quantity::mass)[node]),
+            surface(poses, contact)};
+  }
+  Rebound<S> rebound(const ColliderPoses<S>& poses, int contact, int item) const {
+    return sheetbend::rebound(scene.colliders[scene.contacts[contact].collider].any(), h, bdf.before == 0.0,
+                              falling(poses, contact, item));
+  }
+
   // The gap of a particle at x from a contact's surface, with its collider at a pose.
   S gap(const Pose<S>& pose, int contact, const Vec3<S>& x) const {
     const Collider& collider = scene.colliders[scene.contacts[contact].collider];
     S size[most_sizes], at[3], n[3], distance;
     read_size(collider, size);
     pose.in_frame(x).store(at);
-    distance_from(collider.shape, at, size, distance, n);
+    distance_from(collider.any(), at, size, distance, n);
     return distance - read(in.of(Quantity::contact_radius)[contact]);
   }
 

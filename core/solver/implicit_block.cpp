@@ -16,6 +16,7 @@ constexpr int most_halvings = 60;
 constexpr int turns = 8;                  // in which a direction of negative curvature gets steeper
 constexpr double first_departure = 1e-4;  // along it, of the block's size
 constexpr double first_share = 0.25, least_share = 1.0 / 256.0;  // of friction, that a step adds
+constexpr double firmer = 10.0;  // contacts that lift (core/contact/rebound.h) get stiffer by this from balance to balance
 constexpr int patience = 4;  // steps without progress before a leap over a kink
 // How far leaps go, of a whole step. Whole steps alone may lead back to the same kink again and again.
 constexpr double leap_shares[] = {1.0, 0.5, 2.0, 0.25, 1.5, 0.75, 0.35, 0.6};
@@ -255,9 +256,22 @@ void ImplicitBlock::solve(const Scene& scene, const DirectBlock& block, const So
     std::fill(potential.rigid.lambda.begin(), potential.rigid.lambda.end(), 0.0);
     return;
   }
-  begin();
-  take_first_step(scene, block);
-  if (!find_balance(scene, block, options) && !raise_friction(scene, block, options)) give_up(block);
+  auto& numbers = potential.contacts.numbers;
+  double firmest = 1.0;
+  for (const auto& n : numbers) firmest = std::max(firmest, n.firm);
+  const auto wanted = numbers;
+  for (double most = 1.0;; most = std::min(firmest, firmer * most)) {  // how firm contacts are at most
+    for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i].firm = std::min(most, wanted[i].firm);
+    begin();
+    if (most == 1.0)
+      take_first_step(scene, block);
+    else
+      accept(look(block));
+    SolverOptions again = options;
+    again.iterations += matrices_;
+    if (!find_balance(scene, block, again) && !raise_friction(scene, block, again)) give_up(block);
+    if (most == firmest) return;
+  }
 }
 
 void ImplicitBlock::begin() { first_ = balance_.size(); }

@@ -62,7 +62,7 @@ double IncrementalPotential::add_contacts(const DirectBlock& block, const double
     const Touch<double> touch = contacts.at(block, i, Vec3<double>(x + at));
     if (!touch.pushes) continue;
     const double kappa = contacts.numbers[i].kappa;
-    energy += 0.5 * touch.normal * touch.normal / kappa;
+    energy += 0.5 * touch.normal * touch.normal / (contacts.numbers[i].firm * kappa);
     rubs_ |= touch.rubs;
     double force[3];
     contacts.pose(block, i).turned(touch.force).store(force);
@@ -101,6 +101,8 @@ double IncrementalPotential::evaluate(const DirectBlock& block, Numbers<double>&
       farthest = std::max(farthest, std::abs(x[i]));
     }
   }
+  for (const auto& contact : contacts.numbers)  // but rigid rows need not be as firm
+    if (contact.firm > 1.0) stiffest = std::max(stiffest, contact.firm * contact.kappa);
   if (!rigid.empty()) add_rigid_residuals();
   // No more than what moves a particle by nothing: near a collapsed triangle any force is rounding.
   rounding_ = std::min(256.0 * std::numeric_limits<double>::epsilon() * stiffest, nothing * lightest) * farthest;

@@ -175,7 +175,7 @@ std::vector<BlockContact> contacts_of(const Scene& scene, const std::map<int, in
     const Contact& contact = scene.contacts[c];
     for (int i = 0; i < static_cast<int>(contact.particles.size()); ++i)
       if (const auto at = particle_of.find(contact.particles[i]); at != particle_of.end())
-        contacts.push_back({c, i, contact.collider, scene.colliders[contact.collider].shape, at->second});
+        contacts.push_back({c, i, contact.collider, scene.colliders[contact.collider].any(), at->second});
   }
   std::stable_sort(contacts.begin(), contacts.end(),
                    [](const BlockContact& a, const BlockContact& b) { return a.particle < b.particle; });

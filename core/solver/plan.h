@@ -40,7 +40,8 @@ struct BlockVolume {
 // A particle of an implicit block that may touch a collider.
 struct BlockContact {
   int contact, item;  // in the scene
-  int collider, shape;
+  int collider;
+  AnyShape shape;
   int particle;  // in the block's order
 };
 

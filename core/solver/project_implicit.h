@@ -192,7 +192,7 @@ void set_rigid(BlockState<T>& state) {
 template <class T>
 void carry_first_order(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state, std::vector<T>& x) {
   const RigidRows& rigid = state.implicit[0].rigid();
-  const int passes = rigid.empty() ? 2 : 3;  // after the first one they refine
+  const int passes = (rigid.empty() ? 2 : 3) + (state.contacts[0].lifts() ? 3 : 0);  // after the first one they refine
   state.implicit[0].factorize(s.scene, block);
   std::vector<T> R, c;
   for (int pass = 0; pass < passes; ++pass) {

@@ -22,7 +22,7 @@ struct Bounce {
 
   template <class T>
   static ImpactRule rule(const ContactSource<T>& source, int contact) {
-    return {source.scene.colliders[source.scene.contacts[contact].collider].shape, source.h, source.bdf.before != 0.0};
+    return {source.scene.colliders[source.scene.contacts[contact].collider].any(), source.h, source.bdf.before != 0.0};
   }
 
   // From the state at n to the free end y.

@@ -1,5 +1,6 @@
-// The tangential forces of contacts at the end of a substep, f = lambda_t/eta^2 in the collider's frame, at the state that the substep has found: the next
-// substep begins with them. They stand in the coordinates of pinned nodes, so that tape, checkpoints and restarts have them as they have any other coordinate.
+// The tangential forces of contacts at the end of a substep, f = lambda_t/eta^2 in the collider's frame, at the state that the substep has found, and along
+// the normal what restitution has left to give back (core/contact/rebound.h): the next substep begins with them. They stand in the coordinates of pinned
+// nodes, so that tape, checkpoints and restarts have them as they have any other coordinate.
 #pragma once
 
 #include "core/step/stages.h"
@@ -48,8 +49,12 @@ struct CarryFriction {
       using S = Single<T>;
       const Contact& contact = scene.contacts[c];
       const auto z = poses.next[contact.collider].in_frame(source.at(work.x_next, contact.particles[i]));
-      const auto found = touch(scene.colliders[contact.collider].shape, z, source.numbers(poses, c, i));
-      source.write(S(rate) * found.tangential, work.x_next + scene.first_dof[contact.carried[i]]);
+      const AnyShape shape = scene.colliders[contact.collider].any();
+      const auto numbers = source.numbers(poses, c, i);
+      const auto found = touch(shape, z, numbers);
+      auto carried = S(rate) * found.tangential;
+      if (found.pushes && contact.rebounds(i)) carried = carried + numbers.leaving * normal_at(shape, z, numbers.size);
+      source.write(carried, work.x_next + scene.first_dof[contact.carried[i]]);
       record.modes[source.lane * count + contact.first + i] =
           !found.pushes ? ContactMode::apart : found.slides ? ContactMode::slides : ContactMode::sticks;
     });

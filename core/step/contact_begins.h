@@ -1,5 +1,5 @@
-// Where a contact begins in a substep: its particle is inside the surface at the end, and was not at the start. By values, of which nothing is
-// differentiated.
+// Where a contact begins in a substep: its particle is inside the surface at the end, or as low as restitution lifts it, and was not inside at the
+// start. By values, of which nothing is differentiated.
 #pragma once
 
 #include "core/step/step.h"
@@ -14,14 +14,23 @@ Scenes where_contact_begins(const Step<T>& step, const T* x_next) {
     if (!has(step.scenes, lane)) continue;
     const ContactSource<T> source{scene, step.in, step.bdf, step.t_next, step.plan.options.h, step.from, nullptr, lane};
     const auto poses = source.poses();
-    const auto begins = [&](const Contact& c, int contact, int node) {
-      return value_of(source.gap(poses.next[c.collider], contact, source.at(x_next, node))) < 0.0 &&
+    const auto begins = [&](const Contact& c, int contact, int item) {
+      const int node = c.particles[item];
+      double above = 0.0;
+      if (c.rebounds(item))
+        if (const auto r = source.rebound(poses, contact, item); r.lifts) above = value_of(r.lift);
+      return scene.role[node] == Role::free &&
+             value_of(source.gap(poses.next[c.collider], contact, source.at(x_next, node))) < above &&
              !(value_of(source.gap(poses.now[c.collider], contact, source.at(step.from.x, node))) < 0.0);
     };
-    for (int i = 0; i < static_cast<int>(scene.contacts.size()); ++i)
-      if (const Contact& c = scene.contacts[i]; std::any_of(c.particles.begin(), c.particles.end(), [&](int node) {
-            return scene.role[node] == Role::free && begins(c, i, node);
-          })) {
+    const auto any_begins = [&](int contact) {
+      const Contact& c = scene.contacts[contact];
+      for (int item = 0; item < static_cast<int>(c.particles.size()); ++item)
+        if (begins(c, contact, item)) return true;
+      return false;
+    };
+    for (int contact = 0; contact < static_cast<int>(scene.contacts.size()); ++contact)
+      if (any_begins(contact)) {
         begun |= static_cast<Scenes>(1u << lane);
         break;
       }

@@ -1,10 +1,10 @@
-"""Cut the free flights out of the recorded tosses of a cube.
+"""Cut the tosses of a cube where the hand has let go, and the free flights out of them.
 
     python experiments/tosses/make_data.py FOLDER
 
 FOLDER holds cube_tosses.npz and its LICENSE.source (DAIRLab/contact-nets, every ninth toss). A flight ends with the
 last frame in which every corner is 4 mm or more above the table. It begins when the hand has let go: from then on the
-angular speed stays within 6 % of its median over the second half.
+angular speed stays within 6 % of its median over the second half. A toss goes on from there until the cube rests.
 """
 
 from __future__ import annotations
@@ -43,11 +43,15 @@ def main(folder: Path) -> None:
     lowest = (source["position"][:, None] + np.einsum("fab,kb->fka", matrices_of(turns), corners))[..., 2].min(axis=1)
     starts = source["starts"]
     kept, numbers, flights = [], [], [0]
+    whole, tosses, free = [], [0], []
     for number, (first, last) in zip(source["toss"], pairwise(starts), strict=True):
         low = lowest[first:last] < ABOVE
         frames = int(low.argmax()) if low.any() else last - first
         held = in_hand(turns[first : first + frames])
         first, frames = first + held, frames - held
+        whole.append(np.arange(first, last))
+        tosses.append(tosses[-1] + last - first)
+        free.append(frames)
         if frames >= FEWEST:
             kept.append(np.arange(first, first + frames))
             numbers.append(number)
@@ -56,12 +60,23 @@ def main(folder: Path) -> None:
     DATA.mkdir(exist_ok=True)
     arrays = {"starts": np.array(flights), "toss": np.array(numbers)}
     np.savez_compressed(DATA / "flights.npz", **arrays, positions=source["position"][which], quaternions=turns[which])
+    every = np.concatenate(whole)
+    np.savez_compressed(
+        DATA / "tosses.npz",
+        starts=np.array(tosses),
+        toss=source["toss"],
+        free=np.array(free),
+        positions=source["position"][every].astype(np.float32),
+        quaternions=turns[every].astype(np.float32),
+    )
     about = {
-        "what": "free flights of a tossed acrylic cube, motion capture: the frames before the first contact",
+        "what": "a tossed acrylic cube, motion capture: flights.npz has the frames before the first contact, "
+        "tosses.npz all frames until it rests, in single precision",
         "rate_hz": told["rate_hz"],
         "keys": {
-            "starts": "first frame of each flight, and the end",
+            "starts": "first frame of each flight or toss, and the end",
             "toss": "number of the toss in the source",
+            "free": "of tosses: how many frames there are before the first contact",
             "positions": "m, center, in a unit that is about 2 % short",
             "quaternions": "(x, y, z, w), from the cube's axes to the world's",
         },

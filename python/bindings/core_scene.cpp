@@ -20,6 +20,17 @@ Interpolation interpolation_of(const std::string& name) {
 
 using Triangles = std::vector<std::array<int, 3>>;
 
+// Of a distance field: (origin, spacing, coefficients of three axes).
+std::shared_ptr<const DistanceGrid> grid_of(const py::handle& collider) {
+  if (!collider.contains("grid")) return nullptr;
+  using Values = py::array_t<double, py::array::c_style | py::array::forcecast>;
+  const auto [origin, spacing, values] = collider["grid"].cast<std::tuple<std::array<double, 3>, double, Values>>();
+  if (values.ndim() != 3) throw std::invalid_argument("collider.grid: has no three axes. Fix: give coefficients (x, y, z)");
+  DistanceGrid grid{origin, spacing, {}, std::vector<double>(values.data(), values.data() + values.size())};
+  for (int d = 0; d < 3; ++d) grid.count[d] = static_cast<int>(values.shape(d));
+  return std::make_shared<const DistanceGrid>(std::move(grid));
+}
+
 // Keyword arguments of Python's Scene to a scene.
 std::shared_ptr<Scene> make_scene(const py::kwargs& given) {
   SceneSpec spec;
@@ -45,7 +56,8 @@ std::shared_ptr<Scene> make_scene(const py::kwargs& given) {
     spec.volumes.push_back({v["name"].cast<std::string>(), v["triangles"].cast<Triangles>()});
   for (const py::handle c : given["colliders"])
     spec.colliders.push_back({c["name"].cast<std::string>(), c["shape"].cast<std::string>(),
-                              {c["times"].cast<std::vector<double>>(), interpolation_of(c["interpolation"].cast<std::string>())}});
+                              {c["times"].cast<std::vector<double>>(), interpolation_of(c["interpolation"].cast<std::string>())},
+                              grid_of(c)});
   for (const py::handle c : given["contacts"])
     spec.contacts.push_back({c["name"].cast<std::string>(), c["collider"].cast<int>(), whole_numbers(c["particles"]),
                              whole_numbers(c["carried"]), c["rigid"].cast<bool>(), c["bounces"].cast<bool>()});
@@ -85,6 +97,9 @@ py::dict arguments_of(const Scene& s) {
     with_shape(c.shape, [&]<class S>(S) {
       colliders.append(py::dict("name"_a = c.name, "shape"_a = S::name, "times"_a = c.motion.times,
                                 "interpolation"_a = c.motion.interpolation == Interpolation::cubic ? "cubic" : "linear"));
+      if (c.grid)
+        colliders[colliders.size() - 1]["grid"] =
+            py::make_tuple(c.grid->origin, c.grid->spacing, py::array_t<double>(c.grid->count, c.grid->coefficients.data()));
     });
   for (const Contact& c : s.contacts)
     contacts.append(py::dict("name"_a = c.name, "collider"_a = c.collider, "particles"_a = py::array_t<int>(py::cast(c.particles)),

@@ -70,6 +70,7 @@ from .report.fit_result import FitResult
 from .report.scores import Score, Scores, coordinate_error, scores
 from .scene.body import Body
 from .scene.colliders import Box, Capsule, Plane, Sphere
+from .scene.distance_field import DistanceField
 from .scene.inertia import Inertia
 from .scene.scene import Scene
 from .scene.scene_file import load_scene, save_scene
@@ -100,6 +101,7 @@ __all__ = [
     "ConfigError",
     "ContactCounts",
     "ContactMode",
+    "DistanceField",
     "DivergenceError",
     "EmptyGradientError",
     "Equilibrium",

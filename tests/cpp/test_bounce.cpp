@@ -206,12 +206,12 @@ TEST_P(Bouncing, ComesToRest) {
   EXPECT_NEAR(end[0], end[-static_cast<long>(s.scene.dofs())], 1e-12);
 }
 
-TEST(Bounce, IsRefusedOfWhatConstraintsHold) {
+TEST(Bounce, IsRefusedOfWhatIsHeldAndSoft) {
   ContactBuilder b;
   b.particle({0.0, 0.0, 0.1}, 0.1), b.particle({0.1, 0.0, 0.1}, 0.1);
   b.constraint("distance", {0, 1}, 1e-3, {0.1});
   b.collider("plane", {}, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0});
-  b.contact(0.3, 0.0, 0.0, 0.5);
+  b.contact(0.3, 0.0, 100.0, 0.5);
   EXPECT_THROW(b.build(g), std::invalid_argument);
 }
 

@@ -8,24 +8,38 @@ from typing import Literal, Self
 from pydantic import model_validator
 
 from ..scene.colliders import Box, Capsule, Collider, Plane, Sphere
+from ..scene.distance_field import DistanceField
 from .section import Finite, Name, Section, Vector, key
 
-SHAPES: dict[str, type[Collider]] = {"plane": Plane, "sphere": Sphere, "capsule": Capsule, "box": Box}
+SHAPES: dict[str, type[Collider]] = {
+    "plane": Plane,
+    "sphere": Sphere,
+    "capsule": Capsule,
+    "box": Box,
+    "mesh": DistanceField,
+}
 _COMMON = {"name", "motion"}
+_FILE = {"file": True, "unit": False}  # that a configuration has in the place of a mesh and its grid
 
 
 def arguments(shape: str) -> dict[str, bool]:
     """The keys of a shape, and whether each must be given."""
-    return {f.name: f.default is MISSING for f in fields(SHAPES[shape]) if f.name not in _COMMON}
+    own = {f.name: f.default is MISSING for f in fields(SHAPES[shape]) if f.name not in _COMMON}
+    if shape != "mesh":
+        return own
+    return _FILE | {name: needed for name, needed in own.items() if name not in ("mesh", "grid")}
 
 
 class ColliderSection(Section):
-    """A shape that ropes and cloths touch, `sb.Plane`, `sb.Sphere`, `sb.Capsule` or `sb.Box`, standing, moving at knots
-    or with a tool. A list: [[scene.collider]]. Its quantities are <name>_x, <name>_y and <name>_z (m), how far it is
-    from where it was given, and its lengths, such as <name>_radius (m)."""
+    """A shape that ropes and cloths touch, `sb.Plane`, `sb.Sphere`, `sb.Capsule`, `sb.Box` or a mesh
+    (`sb.DistanceField`), standing, moving at knots or with a tool. A list: [[scene.collider]]. Its quantities are
+    <name>_x, <name>_y and <name>_z (m), how far it is from where it was given, and its lengths, such as <name>_radius
+    (m)."""
 
     name: Name = key(..., "prefix of its quantities, and what contacts call it")
-    shape: Literal["plane", "sphere", "capsule", "box"] = key(..., "a plane is solid below, a long capsule a cylinder")
+    shape: Literal["plane", "sphere", "capsule", "box", "mesh"] = key(
+        ..., "a plane is solid below, a long capsule a cylinder, a mesh any closed surface from a file"
+    )
     point: Vector | None = key(None, "of a plane: a point on it; the origin when left out", "m")
     normal: Vector | None = key(None, "of a plane: to its free side, of any length; up (z) when left out")
     center: Vector | None = key(None, "of a sphere or box", "m")
@@ -35,7 +49,16 @@ class ColliderSection(Section):
     size: Vector | None = key(None, "of a box: its whole edges, before it is turned", "m")
     edge_radius: Finite | None = key(None, "of a box: of its rounded edges, below half of the shortest edge", "m", gt=0)
     rotation: Vector | None = key(
-        None, "of a box: a vector along the axis that it is turned about, as long as the angle", "rad"
+        None, "of a box or mesh: a vector along the axis that it is turned about, as long as the angle", "rad"
+    )
+    file: str | None = key(None, "of a mesh: OBJ, PLY or STL, closed, relative to the configuration")
+    unit: Literal["m", "cm", "mm"] | None = key(None, "of a mesh: length unit of the file; m when left out")
+    position: Vector | None = key(None, "of a mesh: where the origin of its coordinates is", "m")
+    spacing: Finite | None = key(
+        None, "of a mesh: of the grid of its distances; a 32nd of its longest side when left out", "m", gt=0
+    )
+    margin: Finite | None = key(
+        None, "of a mesh: how far around it the grid goes, more than contact radii; 4 spacings when left out", "m", gt=0
     )
     times: list[Finite] | None = key(
         None, "knots of its motion in the scene's time (0 = its start); it stands before and after", "s", min_length=1
@@ -85,9 +108,7 @@ class ContactSection(Section):
         0.0, "of a rope, or half the thickness of a cloth: particles touch at this distance", "m", ge=0
     )
     stiffness: Finite | None = key(None, "per particle; rigid when left out", "N/m", gt=0)
-    restitution: Finite | None = key(
-        None, "speed after an impact over that before, of particles that nothing holds; 0 when left out", ge=0, le=1
-    )
+    restitution: Finite | None = key(None, "speed after an impact over that before; 0 when left out", ge=0, le=1)
     settle: bool = key(
         False,
         "move particles that start inside, as measured ones may by noise, to the surface before the motion starts",

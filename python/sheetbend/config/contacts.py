@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from ..errors import ConfigError
+from ..mesh import TriangleMesh, read_mesh
 from ..objects.tool import Tool
 from ..scene.colliders import Collider
 from ..scene.scene import Scene
@@ -32,16 +35,18 @@ def add_contacts(
     section: SceneSection,
     named: Mapping[str, Sequence[int]],
     tools: Mapping[str, Tool],
+    folder: Path,
 ) -> None:
     """Let what is named in [[scene.contact]] touch its colliders; what this scene does without touches nothing.
 
     Args:
         named: particles by the name of their rope, cloth or set.
+        folder: files of meshes are relative to it.
 
     Raises:
         ConfigError: unknown names, a collider that cannot be, or names of contacts that are taken.
     """
-    colliders = _colliders(section, tools)
+    colliders = _colliders(section, tools, folder)
     known = {*named, *(strand.name for _, strand in section.strands), *(cloth.name for cloth in section.cloth)}
     known |= {some.name for some in section.particles}
     for i, contact in enumerate(section.contact):
@@ -61,7 +66,7 @@ def add_contacts(
             scene.contact(particles, colliders[contact.collider], name=contact.name, **numbers)
 
 
-def _colliders(section: SceneSection, tools: Mapping[str, Tool]) -> dict[str, Collider]:
+def _colliders(section: SceneSection, tools: Mapping[str, Tool], folder: Path) -> dict[str, Collider]:
     found: dict[str, Collider] = {}
     for i, described in enumerate(section.collider):
         path = f"scene.collider[{i}]"
@@ -69,10 +74,21 @@ def _colliders(section: SceneSection, tools: Mapping[str, Tool]) -> dict[str, Co
             raise ConfigError(f"{path}.name", "is taken", described.name, "give every collider a name of its own")
         with located(path, described.name):
             given = described.model_dump(include=set(arguments(described.shape)), exclude_none=True)
+            if "file" in given:
+                given["mesh"] = _mesh(f"{path}.file", folder / given.pop("file"), given.pop("unit", "m"))
             standing = SHAPES[described.shape](name=described.name, **given)
         with located(path, f"{described.name}.moving"):
             found[described.name] = _moved(path, described, standing, tools)
     return found
+
+
+def _mesh(path: str, file: Path, unit: str) -> TriangleMesh:
+    if not file.is_file():
+        fix = "give a file relative to the configuration's folder"
+        raise ConfigError(path, "does not exist", str(file), fix)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".*warp direction")  # no fabric
+        return read_mesh(file, material="unfold", unit=unit, merge=True)
 
 
 def _moved(path: str, described: ColliderSection, standing: Collider, tools: Mapping[str, Tool]) -> Collider:

@@ -223,7 +223,7 @@ def build_scene(
     add_forces(scene, section.force, particles.find)
     for i, drive in enumerate(section.drive):
         _add_drive(scene, particles, f"scene.drive[{i}]", drive, moment, tools)
-    add_contacts(scene, section, particles.named, tools)
+    add_contacts(scene, section, particles.named, tools, folder)
     if section.pin:
         scene.pin([particles.find("scene.pin", r) for r in section.pin])
     return scene, particles

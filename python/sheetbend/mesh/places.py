@@ -80,7 +80,7 @@ def closest(vertices: Array, triangles: Indices, points: Array) -> tuple[Indices
     for point, vertex in zip(points, nearest(vertices, points), strict=True):
         bound = np.linalg.norm(vertices[vertex] - point)  # no triangle farther away than that can be the closest
         near = np.flatnonzero(np.linalg.norm(centers - point, axis=1) - reach <= bound * (1 + _ON))
-        w, square = _closest_weights(corners[near], point)
+        w, square = closest_weights(corners[near], point)
         best = square.argmin()
         found.append(near[best])
         weights.append(w[best])
@@ -100,8 +100,9 @@ def _cross(u: Array, v: Array) -> Array:
     return product
 
 
-def _closest_weights(corners: Array, point: Array) -> tuple[Array, Array]:
-    """Weights (m, 3) of the point of each triangle (m, 3, 3) closest to a point (3,), and its distance squared (m,).
+def closest_weights(corners: Array, point: Array) -> tuple[Array, Array]:
+    """Weights (m, 3) of the point of each triangle (m, 3, 3) closest to a point (3,), or to one each (m, 3), and its
+    distance squared (m,).
 
     The candidates are the foot of the perpendicular, where it lies inside, and the closest point of each edge.
     """

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..scene.colliders import Collider, Motion
+from ..scene.distance_field import DistanceField
 from ..scene.scene import Scene
 
 Array = np.ndarray
@@ -16,7 +17,8 @@ MARGIN = 0.1  # of the motion's extent, by which that grid is larger
 def collider_lines(scene: Scene, times: Array, positions: Array) -> dict[str, Array]:
     """By collider, (frames, lines, 2, 3) m: the ends of short lines that draw it where it is at some times.
 
-    A plane is a grid as wide as the motion, a sphere three circles, a capsule its circles and sides, a box its edges.
+    A plane is a grid as wide as the motion, a sphere three circles, a capsule its circles and sides, a box its edges,
+    a distance field sections of its mesh.
 
     Args:
         times: (frames,) s.
@@ -55,6 +57,8 @@ def _matrix(vector: Array) -> Array:
 
 def _outline(collider: Collider) -> Array:
     """(lines, 2, 3) m in the shape's own frame."""
+    if isinstance(collider, DistanceField) and collider.grid is not None:
+        return collider.grid.outline
     sizes = collider.sizes
     if collider.shape == "rounded_box":
         half = np.array([sizes[f"half_{axis}"] for axis in "xyz"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -80,6 +80,27 @@ class Collider:
         return Motion(np.zeros(1), position[None], rotation[None])
 
     @property
+    def reach(self) -> float:
+        """m, how far from its surface it knows distances: contact radii must be smaller."""
+        return np.inf
+
+    @property
+    def half_thickness(self) -> float:
+        """m, from its middle to its surface, where that is nearest."""
+        raise NotImplementedError
+
+    @property
+    def extent(self) -> float:
+        """m, how far its surface is from its origin at most."""
+        raise NotImplementedError
+
+    @property
+    def specification(self) -> dict[str, Any]:
+        """What the core knows of it but for its name, its lengths and where it is."""
+        poses = self.poses
+        return {"shape": self.shape, "times": poses.times.tolist(), "interpolation": poses.interpolation}
+
+    @property
     def sizes(self) -> Mapping[str, float]:
         """Its lengths, m, in the order that the core knows them in."""
         raise NotImplementedError
@@ -114,6 +135,14 @@ class Plane(Collider):
     def sizes(self) -> Mapping[str, float]:
         return {}
 
+    @property
+    def half_thickness(self) -> float:
+        return np.inf
+
+    @property
+    def extent(self) -> float:
+        return np.inf
+
     def _placed(self) -> tuple[Array, Array]:
         return self._vector("point", self.point), _turn_to(
             f"{self.name or self.shape}.normal", self._vector("normal", self.normal)
@@ -141,6 +170,14 @@ class Sphere(Collider):
     def sizes(self) -> Mapping[str, float]:
         return {"radius": float(self.radius)}
 
+    @property
+    def half_thickness(self) -> float:
+        return float(self.radius)
+
+    @property
+    def extent(self) -> float:
+        return float(self.radius)
+
     def _placed(self) -> tuple[Array, Array]:
         return self._vector("center", self.center), np.zeros(3)
 
@@ -167,6 +204,14 @@ class Capsule(Collider):
     def sizes(self) -> Mapping[str, float]:
         along = self._vector("end", self.end) - self._vector("start", self.start)
         return {"radius": float(self.radius), "half_length": 0.5 * float(np.linalg.norm(along))}
+
+    @property
+    def half_thickness(self) -> float:
+        return float(self.radius)
+
+    @property
+    def extent(self) -> float:
+        return sum(self.sizes.values())
 
     def _placed(self) -> tuple[Array, Array]:
         start, end = self._vector("start", self.start), self._vector("end", self.end)
@@ -208,6 +253,14 @@ class Box(Collider):
             **{f"half_{axis}": float(h) for axis, h in zip("xyz", half, strict=True)},
             "radius": float(self.edge_radius),
         }
+
+    @property
+    def half_thickness(self) -> float:
+        return 0.5 * float(self._vector("size", self.size).min())
+
+    @property
+    def extent(self) -> float:
+        return 0.5 * float(np.linalg.norm(self._vector("size", self.size)))
 
     def _placed(self) -> tuple[Array, Array]:
         return self._vector("center", self.center), self._vector("rotation", self.rotation)

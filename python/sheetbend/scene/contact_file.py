@@ -7,6 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..errors import SceneError
 from .colliders import Box, Capsule, Collider, Motion, Plane, Sphere
 from .contacts import ARRAYS, Contact, Contacts
 from .scene import Scene
@@ -32,6 +33,10 @@ def written_contacts(contacts: Contacts) -> tuple[dict[str, Any], dict[str, Arra
     if not contacts.contacts:
         return {}, {}
     colliders = contacts.colliders.items()
+    for name, collider in colliders:
+        if collider.shape not in _MAKE:
+            fix = "leave it out, or keep the program that makes the scene"
+            raise SceneError(f"{name}.mesh", "is a distance field, which scene files do not hold", collider.shape, fix)
     header = {
         "colliders": [
             {"name": name, "shape": c.shape, "interpolation": c.poses.interpolation} for name, c in colliders

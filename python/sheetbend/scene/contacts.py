@@ -118,7 +118,9 @@ class Contacts:
     ) -> tuple[Array, str]:
         """The particles of a new contact, of `count` in the scene, and its name."""
         if not isinstance(collider, Collider):
-            raise SceneError("contact.collider", "is no shape", collider, "give a Plane, Sphere, Capsule or Box")
+            raise SceneError(
+                "contact.collider", "is no shape", collider, "give a Plane, Sphere, Capsule, Box or DistanceField"
+            )
         particles = what.particles if isinstance(what, HasParticles) else what
         name = name or collider.name or collider.shape
         if any(c.name == name for c in self.contacts):
@@ -127,6 +129,11 @@ class Contacts:
         if len(np.unique(which)) < len(which):
             raise SceneError(f"{name}.contact.particles", "are listed twice", which.tolist(), "list each particle once")
         numbers.check(name)
+        if not numbers.radius < collider.reach:
+            problem = f"is not below the {collider.reach:.3g} m around '{collider.name}' in which distances are known"
+            raise SceneError(
+                f"{name}.contact.radius", problem, numbers.radius, "give the DistanceField a larger margin"
+            )
         return which, name
 
     def add(
@@ -167,17 +174,8 @@ class Contacts:
 
     def specification(self) -> dict[str, Any]:
         """The topology, as the compiled core is made from it."""
-        poses = {name: c.poses for name, c in self.colliders.items()}
         return {
-            "colliders": [
-                {
-                    "name": name,
-                    "shape": c.shape,
-                    "times": poses[name].times.tolist(),
-                    "interpolation": poses[name].interpolation,
-                }
-                for name, c in self.colliders.items()
-            ],
+            "colliders": [{"name": name, **c.specification} for name, c in self.colliders.items()],
             "contacts": [
                 {
                     "name": c.name,

@@ -39,24 +39,14 @@ def fastest(contacts: Contacts, radii: np.ndarray) -> tuple[Fastest, ...]:
         own = [radius for c, radius in zip(contacts.contacts, radii, strict=True) if c.collider == place]
         if collider.shape == "plane" or collider.motion is None or len(collider.motion.times) < 2 or not own:
             continue
-        thin, far = _half_thickness(collider)
-        found.append(Fastest(name, _speed(collider, far), thin + min(own)))
+        found.append(Fastest(name, _speed(collider), collider.half_thickness + min(own)))
     return tuple(found)
 
 
-def _half_thickness(collider: Collider) -> tuple[float, float]:
-    """The smallest half thickness, and how far the surface is from the origin at most, m."""
-    sizes = collider.sizes
-    halves = [size for label, size in sizes.items() if label.startswith("half_")]
-    if collider.shape == "rounded_box":
-        return min(halves), float(np.linalg.norm(halves))
-    return sizes["radius"], sizes["radius"] + sum(halves)
-
-
-def _speed(collider: Collider, far: float) -> float:
+def _speed(collider: Collider) -> float:
     motion = collider.poses
     steps = np.diff(motion.times)
     along = np.linalg.norm(np.diff(motion.positions, axis=0), axis=1)
-    turned = np.linalg.norm(np.diff(motion.rotations, axis=0), axis=1) * far
+    turned = np.linalg.norm(np.diff(motion.rotations, axis=0), axis=1) * collider.extent
     factor = CUBIC if motion.interpolation == "cubic" else 1.0
     return factor * float(((along + turned) / steps).max())

@@ -317,15 +317,15 @@ class Scene(HeldScene):
 
         Args:
             what: a rope, a cloth, or particles (n,).
-            collider: `Plane`, `Sphere`, `Capsule` or `Box`; one object may serve several contacts.
+            collider: `Plane`, `Sphere`, `Capsule`, `Box` or `DistanceField`; one object may serve several contacts.
             friction: Coulomb's coefficient (`<name>_friction`); 0 is smooth.
             radius: m, of a rope, or half the thickness of cloth (`<name>_contact_radius` unless zero).
             stiffness: N/m per particle (`<name>_contact_stiffness`). By default rigid: h^2 g/1000 deep under weight.
-            restitution: 0 to 1 (`<name>_restitution`), of particles that no constraint holds; by default 0 of all.
+            restitution: 0 to 1 (`<name>_restitution`), the speed after an impact over that before; by default 0.
             name: by default that of the collider.
             settle: move what starts inside to the surface, at the values that the scene is given with.
         Raises:
-            SceneError: numbers out of range; when it is compiled: a start inside, restitution of what constraints hold.
+            SceneError: numbers out of range; when it is compiled: a start inside, restitution of what is held and soft.
         """
         self._building()
         numbers = ContactNumbers(friction, radius, stiffness, restitution)

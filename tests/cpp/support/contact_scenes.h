@@ -1,6 +1,7 @@
 // Scenes in which particles touch shapes.
 #pragma once
 
+#include "tests/cpp/support/distance_grids.h"
 #include "tests/cpp/support/programs.h"
 
 namespace sheetbend::testing {
