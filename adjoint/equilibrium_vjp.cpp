@@ -52,7 +52,7 @@ void EquilibriumDerivative::vjp(const double* x_bar, const double* lambda_bar, d
         for (int d = 0; d < K::dofs; ++d) along[j * K::dofs + d] = at_.lambda[first_row + j] * away[d];
       gradients_vjp<K>(x, p, &v[first_row], along, by, p_bar);
     }
-    const Evaluation<K, double> value(x, p);
+    const SharedEvaluation<K, double> value(x, p);
     for (int j = 0; j < K::rows; ++j) {
       bar.of(Quantity::compliance)[group.first + item] -= v[first_row + j] * at_.lambda[first_row + j];
       for (int d = 0; d < K::dofs; ++d) by[d] -= v[first_row + j] * value.J[j * K::dofs + d];

@@ -85,7 +85,7 @@ class SupportReader {
       with_kind(group.kind, [&]<class K>(K) {
         T local[K::dofs], push[K::dofs];
         gather<K>(scene, group, item, x, local);
-        const Evaluation<K, T> value(local, rest_parameters<K>(in, group, item));
+        const SharedEvaluation<K, T> value(local, rest_parameters<K>(in, group, item));
         transpose_times<K>(value.J, lambda + group.first_row + item * K::rows, push);
         const auto nodes = group.nodes(item);
         for (int k = 0; k < K::arity; ++k)

@@ -123,8 +123,12 @@ foreach(variant IN LISTS variants)
     sheetbend_add_kernels(${variant} cold_packs SOURCES ${cold_packs} OPTIONS -O3 ${inlined_in_part})
     sheetbend_add_kernels(${variant} cold_blocks SOURCES ${cold_blocks} OPTIONS -O3)
   elseif(has_x86_kernels)
-    # Processors without AVX2, and builds that are to be quick.
-    sheetbend_add_kernels(${variant} all SOURCES ${tables} ${hot_packs} ${hot_blocks} ${cold_packs} ${cold_blocks} OPTIONS -O1)
+    # Beside the others these serve processors without AVX2, of which there are few: they are to be small. Alone they serve builds that are to be quick.
+    set(level -Os)
+    if(SHEETBEND_PORTABLE_KERNELS)
+      set(level -O1)
+    endif()
+    sheetbend_add_kernels(${variant} all SOURCES ${tables} ${hot_packs} ${hot_blocks} ${cold_packs} ${cold_blocks} OPTIONS ${level})
   else()
     # Kernels of blocks compute with whole packs; where a register holds two lanes of eight, inlining them takes minutes.
     sheetbend_add_kernels(${variant} packs SOURCES ${hot_packs} OPTIONS -O3 ${inlined_whole})

@@ -21,7 +21,7 @@ void row_loads_vjp(const Step<T>& step, Z&& z, const StateCotangents<T>& from, c
     with_kind(group.kind, [&]<class K>(K) {
       T x[K::dofs], own[K::dofs], x_bar[K::dofs], chosen[K::rows];
       loads.template gather<K>(i, x);
-      const Evaluation<K, T> at(x, loads.parameters(i));
+      const SharedEvaluation<K, T> at(x, loads.parameters(i));
       for (T& a : x_bar) a = T(0.0);
       for (int j = 0; j < K::rows; ++j) chosen[j] = T(j == load.row ? 1.0 : 0.0);
       T sum(0.0);

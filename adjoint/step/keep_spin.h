@@ -129,7 +129,7 @@ struct ReverseOf<KeepSpin> {
         s.push[nodes[k]].store(z + 3 * k);
       }
       for (T& a : x_bar) a = T(0.0);
-      const Evaluation<K, T> at(x, p);
+      const SharedEvaluation<K, T> at(x, p);
       for (int j = 0; j < K::rows; ++j)
         for (int d = 0; d < K::dofs; ++d) s.multipliers[row + j] += at.J[j * K::dofs + d] * z[d];
       pushes_vjp<K>(x, p, lambda, z, x_bar, bar.in.of(Quantity::rest) + value);

@@ -123,6 +123,14 @@ template <class K, class T>
   K::evaluate(x, p, C, J);
 }
 
+// C and J where speed does not matter: one function of a kind for all who ask, instead of a copy in each of them.
+template <class K, class T>
+struct SharedEvaluation {
+  T C[K::rows];
+  T J[K::rows * K::dofs];
+  SharedEvaluation(const T* x, const T* p) { evaluate_apart<K>(x, p, C, J); }
+};
+
 // C and J on dual numbers of N directions. With many of them the work is all in memory, and inlining it into every kernel takes
 // compilers minutes; with few it pays.
 template <class K, int N, class T>

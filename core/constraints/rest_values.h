@@ -30,7 +30,7 @@ void rest_values(const double* x, double* p) {
     static_assert(measured <= K::rows && K::parameters[P - measured].otherwise.source == Source::measured,
                   "measured parameters come last and are subtracted from the first rows; else write measure(x, p)");
     std::fill_n(p + P - measured, measured, 0.0);
-    std::copy_n(Evaluation<K, double>(x, p).C, measured, p + P - measured);
+    std::copy_n(SharedEvaluation<K, double>(x, p).C, measured, p + P - measured);
   }
 }
 

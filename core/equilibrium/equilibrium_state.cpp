@@ -122,7 +122,7 @@ double EquilibriumState::force_stiffness() const {
     if (!std::ranges::all_of(group.nodes(item), [&](int n) { return counts[n]; })) return;
     double local[K::dofs], J2 = 0.0;
     gather<K>(scene, group, item, x.data(), local);
-    for (const double j : Evaluation<K, double>(local, rest_parameters<K>(in, group, item)).J)
+    for (const double j : SharedEvaluation<K, double>(local, rest_parameters<K>(in, group, item)).J)
       J2 = std::max(J2, j * j);
     if (const double alpha = compliance[group.first + item]; alpha > 0.0) softest = std::min(softest, J2 / alpha);
   });
@@ -143,7 +143,7 @@ void EquilibriumState::soften() {
       for (int i = 0; i < group.count; ++i) {
         double local[K::dofs];
         gather<K>(scene, group, i, x.data(), local);
-        for (const double c : Evaluation<K, double>(local, rest_parameters<K>(in, group, i)).C) sum += 0.5 * c * c;
+        for (const double c : SharedEvaluation<K, double>(local, rest_parameters<K>(in, group, i)).C) sum += 0.5 * c * c;
       }
     });
     soft[g] = budget > 0.0 ? std::min(sum / budget, stiffening * soft[g]) : 0.0;
@@ -193,7 +193,7 @@ void EquilibriumState::measure() {
   for_each_constraint(scene, [&]<class K>(K, const Group& group, int item) {
     double local[K::dofs];
     gather<K>(scene, group, item, x.data(), local);
-    const Evaluation<K, double> value(local, rest_parameters<K>(in, group, item));
+    const SharedEvaluation<K, double> value(local, rest_parameters<K>(in, group, item));
     for (int j = 0; j < K::rows; ++j) {
       const int row = group.first_row + item * K::rows + j;
       double J2 = 0.0;

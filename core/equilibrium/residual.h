@@ -100,7 +100,7 @@ void equilibrium_residual(const Scene& scene, const Inputs<const T>& in, double 
   for_each_constraint(scene, [&]<class K>(K, const Group& group, int item) {
     T local[K::dofs], push[K::dofs]{};
     gather<K>(scene, group, item, x, local);
-    const Evaluation<K, T> value(local, rest_parameters<K>(in, group, item));
+    const SharedEvaluation<K, T> value(local, rest_parameters<K>(in, group, item));
     const int row = group.first_row + item * K::rows;
     const T& alpha = in.of(Quantity::compliance)[group.first + item];
     for (int j = 0; j < K::rows; ++j) r_l[row + j] = value.C[j] + alpha * lambda[row + j];

@@ -86,7 +86,7 @@ void for_each_row(const Scene& scene, const Inputs<const double>& in, const Grou
     for (int k = 0; k < K::arity; ++k) std::copy_n(x + scene.first_dof[nodes[k]], 3, local + 3 * k);
     const double* rest =
         in.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(item) * parameter_count<K>;
-    const Evaluation<K, double> at(local, rest);
+    const SharedEvaluation<K, double> at(local, rest);
     for (int j = 0; j < K::rows; ++j)
       if (!K::unilateral || at.C[j] < 0.0)
         f(at.C[j], in.of(Quantity::compliance)[group.first + item],

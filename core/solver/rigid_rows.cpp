@@ -45,7 +45,7 @@ void RigidRows::find(const Scene& scene, const Given& given, const double* at) {
           double& a = values[lane_at(i, count, 0)];
           const double g = group.damped ? values[lane_at(i, count, 1)] : 0.0;
           const Numbered<K> own(run, values, count, i, at);
-          const Evaluation<K, double> value(own.x, own.p);
+          const SharedEvaluation<K, double> value(own.x, own.p);
           double stiffest = 0.0;  // J W J^T
           for (int j = 0; j < K::rows; ++j) {
             double sum = 0.0;
@@ -129,7 +129,7 @@ void RigidRows::evaluate(const Given& given, const double* at) {
         const MemberRun& run = given.block.runs[m.run];
         const int count = sheetbend_blocks::value_count(m.damped, parameter_count<K>);
         const Numbered<K> own(run, given.values[m.run].data(), count, m.place, at);
-        const Evaluation<K, double> value(own.x, own.p);
+        const SharedEvaluation<K, double> value(own.x, own.p);
         std::copy_n(value.J, K::rows * K::dofs, &J_[m.J]);
         for (int j = 0; j < K::rows; ++j) {
           const int row = m.first + j;

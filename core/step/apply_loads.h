@@ -51,7 +51,7 @@ struct RowLoads {
       with_kind(group.kind, [&]<class K>(K) {
         T x[K::dofs];
         gather<K>(i, x);
-        const Evaluation<K, T> value(x, parameters(i));
+        const SharedEvaluation<K, T> value(x, parameters(i));
         for (int k = 0; k < K::arity; ++k)
           f(group.nodes(load.item)[k], size * Vec3<T>(value.J + load.row * K::dofs + 3 * k));
       });

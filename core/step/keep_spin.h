@@ -110,7 +110,8 @@ struct KeepSpin {
 
   // F at x with the velocities v, as they were read off positions.
   template <class T>
-  static void add_pushes(const Step<T>& step, const InverseMasses<T>& masses, const T* x, const T* v, Record<T>& record) {
+  static void add_pushes(const Step<T>& step, const InverseMasses<T>& masses, const T* x, const T* v,
+                         Record<T>& record) {
     const Scene& scene = step.scene;
     const T eta(step.bdf.eta), one(1.0);
     const T* mass = step.in.of(Quantity::mass);
@@ -119,7 +120,8 @@ struct KeepSpin {
       T local[K::dofs], push[K::dofs];
       const auto nodes = group.nodes(item);
       for (int k = 0; k < K::arity; ++k) std::copy_n(x + scene.first_dof[nodes[k]], 3, local + 3 * k);
-      const Evaluation<K, T> at(local, step.in.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(item) * group.parameters);
+      const SharedEvaluation<K, T> at(
+          local, step.in.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(item) * group.parameters);
       transpose_times<K>(at.J, record.multipliers.data() + group.first_row + item * K::rows, push);
       for (int k = 0; k < K::arity; ++k) record.push[nodes[k]] = record.push[nodes[k]] + Vec3<T>(push + 3 * k);
     });
@@ -128,7 +130,8 @@ struct KeepSpin {
     for (const Body& body : scene.bodies) {
       if (body.spin < 0) continue;
       for (const int n : body.axes) {
-        if (const int slot = scene.loaded_slot[n]; slot >= 0) record.push[n] = record.push[n] + eta * ForceImpulses<T>(step).of(slot);
+        if (const int slot = scene.loaded_slot[n]; slot >= 0)
+          record.push[n] = record.push[n] + eta * ForceImpulses<T>(step).of(slot);
         if (scene.has_drag)
           record.push[n] = record.push[n] - (eta * (one / masses.w[n] - mass[n])) * Vec3<T>(v + scene.first_dof[n]);
       }

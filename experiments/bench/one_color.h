@@ -37,8 +37,12 @@ struct OneColor {
     std::fill_n(in.of(Quantity::damping), scene.layout.count(Quantity::damping), damped ? 1e-3 : 0.0);
     // the first three are a unit vector, for those that need a normal; none is zero or above one
     const double parameters[] = {0.36, 0.48, 0.8, 0.15};
-    for (std::size_t i = 0; i < scene.layout.count(Quantity::rest); ++i)
-      in.of(Quantity::rest)[i] = parameters[i % parameter_count<K> % 4];
+    for (std::size_t i = 0; i < scene.layout.count(Quantity::rest); ++i) {
+      const std::size_t p = i % parameter_count<K>;
+      // numbers that couple a material's directions must be small enough for an energy that is positive
+      const bool couples = K::parameters[p].range.least < 0.0 && K::parameters[p].range.most < 1.0;
+      in.of(Quantity::rest)[i] = parameters[p % 4] * (couples ? 0.3 : 1.0);
+    }
   }
 
   Plan plan(int sweeps) const {

@@ -28,6 +28,7 @@ OF_EXPERIMENT_SAID: dict[str, Any] = {
     "radius": 0.5,
     "loss": "huber",
     "loss_scale": 3.0,
+    "shooting": 0.1,
     "time_offset": "late",
 }
 TOML = """

@@ -476,8 +476,8 @@ template <>
 inline Case case_of<BrickVolume>() {
   return {.x = brick_sample,
           .p = {9.6e-4},
-          .compliance = 1e-5,
-          .damping = 1e4,
+          .compliance = 4e-8,
+          .damping = 2e4,
           .under_rotation = UnderRotation::stays,
           .relabeling = {1, 2, 3, 0, 5, 6, 7, 4},
           .sign = {1},
@@ -488,8 +488,8 @@ template <>
 inline Case case_of<TetrahedronVolume>() {
   return {.x = tetrahedron_sample,
           .p = {2e-4},
-          .compliance = 1e-5,
-          .damping = 1e4,
+          .compliance = 1e-8,
+          .damping = 8e4,
           .under_rotation = UnderRotation::stays,
           .relabeling = {1, 2, 0, 3},
           .sign = {1},

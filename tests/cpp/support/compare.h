@@ -61,6 +61,50 @@ std::vector<double> complex_step_gradient(F&& f, const std::vector<double>& z) {
   return g;
 }
 
+// Sums of a gradient's entries with random signs, each over up to `width` neighbors of one part of it. An error of any entry shows in its
+// sum, and an oracle by complex step needs one evaluation a sum.
+class SignedSums {
+ public:
+  SignedSums(std::span<const std::size_t> part_sizes, std::size_t width) {
+    Random random(7);
+    for (const std::size_t size : part_sizes) {
+      sums_of_part_.push_back((size + width - 1) / width);
+      for (std::size_t i = 0; i < size; ++i) {
+        if (i % width == 0) first_.push_back(sign_.size());
+        sign_.push_back(random(-1.0, 1.0) < 0.0 ? -1.0 : 1.0);
+      }
+    }
+    first_.push_back(sign_.size());
+  }
+
+  // How many sums each part has; they stand one part after the other.
+  const std::vector<std::size_t>& sums_of_part() const { return sums_of_part_; }
+
+  std::vector<double> of(std::span<const double> gradient) const {
+    std::vector<double> sums(first_.size() - 1);
+    for (std::size_t k = 0; k < sums.size(); ++k)
+      for (std::size_t i = first_[k]; i < first_[k + 1]; ++i) sums[k] += sign_[i] * gradient[i];
+    return sums;
+  }
+
+  // Those of the gradient of f, which maps vectors of Complex to a Complex.
+  template <class F>
+  std::vector<double> by_complex_step(F&& f, const std::vector<double>& z) const {
+    std::vector<Complex> probe(z.begin(), z.end());
+    std::vector<double> sums(first_.size() - 1);
+    for (std::size_t k = 0; k < sums.size(); ++k) {
+      for (std::size_t i = first_[k]; i < first_[k + 1]; ++i) probe[i].im = complex_step * sign_[i];
+      sums[k] = f(probe).im / complex_step;
+      for (std::size_t i = first_[k]; i < first_[k + 1]; ++i) probe[i].im = 0.0;
+    }
+    return sums;
+  }
+
+ private:
+  std::vector<std::size_t> sums_of_part_, first_;  // first_ is per sum
+  std::vector<double> sign_;                       // per entry
+};
+
 inline double largest(std::span<const double> a) {
   double m = 0.0;
   for (const double v : a) m = std::max(m, std::abs(v));
