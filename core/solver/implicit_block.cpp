@@ -61,11 +61,13 @@ void ImplicitBlock::resize(const Scene& scene, const DirectBlock& block) {
   matrix_.resize(scene, block);
   for (auto* a : {&start, &guess, &x_, &trial_, &z_, &Kz_}) a->assign(row * block.particles.size());
   d_.assign(3 * block.movable, 0.0);
+  firm_.resize(block.contacts.size());
 }
 
 std::size_t ImplicitBlock::bytes(const Scene& scene, const DirectBlock& block) {
   return sizeof(ImplicitBlock) + IncrementalPotential::bytes(scene, block) + NewtonMatrix::bytes(scene, block) +
-         6 * Numbers<double>::bytes(row * block.particles.size()) + sizeof(double) * 3 * block.movable;
+         6 * Numbers<double>::bytes(row * block.particles.size()) +
+         sizeof(double) * (3 * block.movable + block.contacts.size());
 }
 
 // Rounding counts once Newton's steps no longer help.
@@ -258,10 +260,9 @@ void ImplicitBlock::solve(const Scene& scene, const DirectBlock& block, const So
   }
   auto& numbers = potential.contacts.numbers;
   double firmest = 1.0;
-  for (const auto& n : numbers) firmest = std::max(firmest, n.firm);
-  const auto wanted = numbers;
+  for (std::size_t i = 0; i < numbers.size(); ++i) firmest = std::max(firmest, firm_[i] = numbers[i].firm);
   for (double most = 1.0;; most = std::min(firmest, firmer * most)) {  // how firm contacts are at most
-    for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i].firm = std::min(most, wanted[i].firm);
+    for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i].firm = std::min(most, firm_[i]);
     begin();
     if (most == 1.0)
       take_first_step(scene, block);

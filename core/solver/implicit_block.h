@@ -85,6 +85,7 @@ class ImplicitBlock {
   NewtonMatrix matrix_;
   Numbers<double> x_, trial_, z_, Kz_;
   std::vector<double> d_, balance_;
+  std::vector<double> firm_;         // of the contacts: how firm they are in the end
   std::vector<double> lambda_, dl_;  // of the rigid rows at x_, and their step
   double phi_ = 0.0, merit_ = 0.0;  // at x_
   bool by_merit_ = false;           // likewise, whether steps are judged by the merit
