@@ -185,14 +185,12 @@ def _observe(
                 mine = np.zeros(problem.core.first_rows[i + 1] - problem.core.first_rows[i], dtype=bool)
                 mine[own] = marker == m
                 yield replace(whole, label=f"{name} {k}", column=whole.column[marker == m], rows=mine, marker=name)
-    held = sorted(e.scene.pinned)
-    if e.scene.boundary.driven:
-        return  # what is driven moves as the recording says
-    if not e.static and e.time_offset is None and len(r.times) > 1:
+    held, boundary = sorted(e.scene.pinned), e.scene.boundary
+    if not e.static and e.time_offset is None and len(r.times) > 1 and not boundary.following:
         speed = np.gradient(shown, r.times, axis=0)
         yield change(LATER, "", speed, "s")
         yield change(SLOWER, "", speed * (r.times - e.t0)[:, None, None], relative=True)
-    if not held:
+    if not held or boundary.driven:  # what is driven goes where it was measured
         return
     for axis in [a for a in range(3) if a in axes]:
         yield change(f"clamps along {AXES[axis]}", "clamps", np.broadcast_to(np.eye(3)[axis], shown.shape))

@@ -24,6 +24,7 @@ from ..result.result import UNSOUND
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
+from .cloth_size import cloth_sizes
 from .contradictions import residual_shifts, value_words
 from .directions import LEVEL, asked_for, noise_in, rows_of, tied
 from .driven_errors import FEW, driven_errors
@@ -100,7 +101,7 @@ def _asked(
         left = float(r[mine] @ r[mine]) - noise_in(r[:data], layout, mine[:data])
         if not left > 0.0:
             continue
-        lacking = [part for i in group for part in missing_parts(problem, u, i)] if left > LEAVES * data else []
+        lacking = [part for i in group for part in _lacking(problem, u, i)] if left > LEAVES * data else []
         tried = list(_directions(problem, [*told, *lacking], group))
         asked = []
         for one, column in tried:
@@ -122,6 +123,11 @@ def _asked(
             steps = tuple((-inverse @ (q.T @ (more * column)))[:count] for _, more, _, column in sure)
             found.append(Wrong(tuple(group), words, steps, sure[0][0]))
     return found
+
+
+def _lacking(problem: FitProblem, u: Array, i: int) -> list[Told]:
+    """Directions of what no number of the model tells."""
+    return [*missing_parts(problem, u, i), *cloth_sizes(problem, u, i)]
 
 
 def _possible(one: Told, more: float) -> bool:
@@ -196,13 +202,17 @@ def _off(one: Told, more: float, problem: FitProblem, group: Sequence[int]) -> s
     axis = f"{'' if more > 0 else '-'}{one.label.rsplit(' ', 1)[-1]}"
     if one.label == SIZE:
         return f"gravity were {size} {'larger' if more > 0 else 'smaller'}"
+    if one.label == LATER and e.scene.boundary.driven:
+        when = f"{short(1e3 * abs(more), 2)} ms {'early' if more > 0 else 'late'}"
+        return f"the clock of the recording{of} were {when} against that of what drives the scene (time_offset)"
     if one.label == LATER:
         when = "earlier" if more > 0 else "later"
         return f"the motion{of} had begun {short(1e3 * abs(more), 2)} ms {when} than the scene does (start_time)"
     if one.label == SLOWER:
         return f"the times of the recording{of} were {size} too {'short' if more > 0 else 'long'} (its frame rate)"
     if one.label == LARGER:
-        return f"the recording{of} were {size} too {'small' if more < 0 else 'large'} (its scale)"
+        scale = f"its scale, or the size of the {'cloth' if e.scene.cloths else 'model'}"
+        return f"the recording{of} were {size} too {'small' if more < 0 else 'large'} ({scale})"
     if one.name == "gravity":
         return f"gravity were turned by {short(abs(more) / DEGREE, 2)} degrees {_way(one.label, more)}"
     if one.name == "clamp_direction":
