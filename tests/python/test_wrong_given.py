@@ -98,6 +98,47 @@ def test_a_wrong_clock_is_not_taken_for_a_loss() -> None:
     assert any("were 1 % too long (its frame rate)" in words for words in result.warnings)
 
 
+def test_a_robust_loss_hides_no_wrong_number() -> None:
+    """EI was 1.2 half-widths off and "identified" without a word."""
+    result = fitted(replace(fall(rope(length=0.495)), loss="huber"))
+    assert wrong_and_identified(result) == [] and result["rope_EI"].verdict == "doubtful"
+    assert any("rope_length were 1.8 % more" in words for words in result.warnings)
+
+
+@pytest.mark.parametrize("loss", ["huber", "soft_l1"])
+def test_directions_under_a_robust_loss_are_what_moved_markers_do(loss: Any) -> None:
+    """Some residuals are far beyond sigma, most are not."""
+    e = replace(fall(rope(length=0.497)), loss=loss, loss_scale=2.0)
+    problem = FitProblem([e], as_parameters(list(TRUE), [e]))
+    u, step = problem.parameters.initial(), 1e-7
+    (told,) = [one for one in told_numbers(problem, u)[0] if one.label == "clamps along x"]
+    ends = [
+        FitProblem([e], problem.given, [replace(e.recording, positions=e.recording.positions - np.array([side, 0, 0]))])
+        for side in (-step, step)
+    ]
+    low, high = (end.evaluate(u)[1] for end in ends)
+    slope = (high - low)[: len(told.column)] / (2.0 * step)
+    assert np.abs(told.column - slope).max() < 1e-6 * np.abs(slope).max()
+    assert (np.abs(problem.evaluate(u)[1]) > 2.0).any()
+
+
+def at_rest(seed: int, **true: Any) -> sb.Experiment:
+    """A rope at rest, and the model that it is fitted with."""
+    x = sb.equilibrium(rope(**true)).positions[list(AT)][None]
+    x = x + SIGMA * np.random.default_rng(seed).standard_normal(x.shape)
+    recording, places = sb.Recording(positions=x, times=[0.0], name="rest"), [sb.on_particle(k) for k in AT]
+    return sb.Experiment(scene=rope(), recording=recording, markers=places, static=True, sigma=SIGMA)
+
+
+def test_a_wrong_length_of_a_rope_at_rest_is_named() -> None:
+    """EI was "identified" outside of its interval, with residuals of six sigma and no warning."""
+    (found,) = asked(at_rest(0, length=0.505), names=("rope_EI",))
+    assert any("rope_length were 1 % more" in words for words in found.words), found.words
+    result = fitted(at_rest(0, length=0.505), names=("rope_EI",))
+    assert result["rope_EI"].verdict == "doubtful"
+    assert not any(asked(at_rest(seed), names=("rope_EI",)) for seed in range(20))
+
+
 def test_what_moves_no_parameter_is_a_warning_alone() -> None:
     """Across the plane of the motion."""
     tilted = fitted(fall(rope((0.0, 0.17, -9.8085))))

@@ -95,13 +95,14 @@ def _asked(
     q, inverse = q[:, kept], right[kept].T / sizes[kept] / scale[:, None]
     r = r - q @ (q.T @ r)
     found = []
-    groups = [g for g in tied(problem) if all(problem.experiments[i].loss == "squares" for i in g)]
+    groups = tied(problem, still=True)
     for group in groups:
         mine = rows_of(problem, group)
         left = float(r[mine] @ r[mine]) - noise_in(r[:data], layout, mine[:data])
         if not left > 0.0:
             continue
-        lacking = [part for i in group for part in _lacking(problem, u, i)] if left > LEAVES * data else []
+        moving = [i for i in group if not problem.experiments[i].static]
+        lacking = [part for i in moving for part in _lacking(problem, u, i)] if left > LEAVES * data else []
         tried = list(_directions(problem, [*told, *lacking], group))
         asked = []
         for one, column in tried:
@@ -211,8 +212,7 @@ def _off(one: Told, more: float, problem: FitProblem, group: Sequence[int]) -> s
     if one.label == SLOWER:
         return f"the times of the recording{of} were {size} too {'short' if more > 0 else 'long'} (its frame rate)"
     if one.label == LARGER:
-        scale = f"its scale, or the size of the {'cloth' if e.scene.cloths else 'model'}"
-        return f"the recording{of} were {size} too {'small' if more < 0 else 'large'} ({scale})"
+        return f"the recording{of} were {size} too {'small' if more < 0 else 'large'} (its scale)"
     if one.name == "gravity":
         return f"gravity were turned by {short(abs(more) / DEGREE, 2)} degrees {_way(one.label, more)}"
     if one.name == "clamp_direction":
