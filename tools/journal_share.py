@@ -13,11 +13,12 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import kills
-from sheetbend.minimum import journal
+from sheetbend.minimum import content, journal
 
 
 @dataclass
@@ -54,7 +55,7 @@ def watched(taken: Taken) -> type[journal.Journal]:
     class Watched(journal.Journal):
         def __init__(self, *given: Any, **more: Any) -> None:
             taken.measured(super().__init__, *given, **more)
-            self._db.set_trace_callback(lambda text: setattr(taken, "commits", taken.commits + (text == "COMMIT")))
+            taken.commits += 1
 
         def problem(self, made_from: Any) -> bytes:
             return taken.measured(super().problem, made_from)
@@ -69,14 +70,16 @@ def watched(taken: Taken) -> type[journal.Journal]:
                 inside, clock = time.thread_time() - began, time.perf_counter() - at
                 return found
 
-            began, at = time.thread_time(), time.perf_counter()
+            began, at, committed = time.thread_time(), time.perf_counter(), self._committed
             found = super().evaluate(problem, u, jacobian, timed, state)
+            taken.commits += self._committed != committed
             taken.seconds += time.thread_time() - began - inside
             taken.longest = max(taken.longest, time.perf_counter() - at - clock)
             return found
 
         def close(self) -> None:
             taken.read, taken.made, taken.kept = taken.read + self.read, taken.made + self.made, taken.kept + len(self)
+            taken.commits += self._db.in_transaction
             taken.measured(super().close)
 
     return Watched
@@ -88,19 +91,20 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=6)
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
-    plain = journal.Journal
+    plain, of_problem = journal.Journal, content.of_problem
     for kind in given.kinds:
         taken = Taken()
         journal.Journal = watched(taken)  # type: ignore[misc]
+        content.of_problem = partial(taken.measured, of_problem)
         with tempfile.TemporaryDirectory() as folder:
             kills.prepare(kind, given.seed, Path(folder))
             began, clock = time.process_time(), time.perf_counter()
             kills.fitted(kind, given.seed, Path(folder), str(Path(folder) / "journal"), given.size)
             whole, clock = time.process_time() - began, time.perf_counter() - clock
-        journal.Journal = plain  # type: ignore[misc]
+        journal.Journal, content.of_problem = plain, of_problem  # type: ignore[misc]
         print(
             f"{kind}: {whole:.1f} s of processor time ({clock:.1f} s by the clock), the journal {taken.seconds:.3f} s, "
-            f"{100 * taken.seconds / whole:.2f} %; {taken.made} evaluations made, {taken.kept} kept, {taken.read} read; "
+            f"{100 * taken.seconds / whole:.2f} %; {taken.made} evaluations, {taken.kept} kept, {taken.read} read, "
             f"{taken.commits} commits, {taken.commits / clock:.1f} a second; longest call {1e3 * taken.longest:.1f} ms",
             flush=True,
         )

@@ -12,6 +12,9 @@ from sheetbend.doubts.told import told_numbers
 from sheetbend.doubts.wrong_given import Wrong, doubts_of, explained_by, wrong_given
 from sheetbend.minimum.optimizers import minimize
 from sheetbend.minimum.problem import FitProblem, as_parameters
+from test_contact_fit import SOLVER as DRAGGING
+from test_contact_fit import TIMES as DRAGGED
+from test_contact_fit import dragged
 from test_misread import AT, SIGMA, SOLVER, TRUE, fall, fitted, rope, wrong_and_identified
 
 TIMES = np.arange(101) / 100
@@ -95,6 +98,47 @@ def test_a_wrong_clock_is_not_taken_for_a_loss() -> None:
     assert any("were 1 % too long (its frame rate)" in words for words in result.warnings)
 
 
+def test_a_robust_loss_hides_no_wrong_number() -> None:
+    """EI was 1.2 half-widths off and "identified" without a word."""
+    result = fitted(replace(fall(rope(length=0.495)), loss="huber"))
+    assert wrong_and_identified(result) == [] and result["rope_EI"].verdict == "doubtful"
+    assert any("rope_length were 1.8 % more" in words for words in result.warnings)
+
+
+@pytest.mark.parametrize("loss", ["huber", "soft_l1"])
+def test_directions_under_a_robust_loss_are_what_moved_markers_do(loss: Any) -> None:
+    """Some residuals are far beyond sigma, most are not."""
+    e = replace(fall(rope(length=0.497)), loss=loss, loss_scale=2.0)
+    problem = FitProblem([e], as_parameters(list(TRUE), [e]))
+    u, step = problem.parameters.initial(), 1e-7
+    (told,) = [one for one in told_numbers(problem, u)[0] if one.label == "clamps along x"]
+    ends = [
+        FitProblem([e], problem.given, [replace(e.recording, positions=e.recording.positions - np.array([side, 0, 0]))])
+        for side in (-step, step)
+    ]
+    low, high = (end.evaluate(u)[1] for end in ends)
+    slope = (high - low)[: len(told.column)] / (2.0 * step)
+    assert np.abs(told.column - slope).max() < 1e-6 * np.abs(slope).max()
+    assert (np.abs(problem.evaluate(u)[1]) > 2.0).any()
+
+
+def at_rest(seed: int, **true: Any) -> sb.Experiment:
+    """A rope at rest, and the model that it is fitted with."""
+    x = sb.equilibrium(rope(**true)).positions[list(AT)][None]
+    x = x + SIGMA * np.random.default_rng(seed).standard_normal(x.shape)
+    recording, places = sb.Recording(positions=x, times=[0.0], name="rest"), [sb.on_particle(k) for k in AT]
+    return sb.Experiment(scene=rope(), recording=recording, markers=places, static=True, sigma=SIGMA)
+
+
+def test_a_wrong_length_of_a_rope_at_rest_is_named() -> None:
+    """EI was "identified" outside of its interval, with residuals of six sigma and no warning."""
+    (found,) = asked(at_rest(0, length=0.505), names=("rope_EI",))
+    assert any("rope_length were 1 % more" in words for words in found.words), found.words
+    result = fitted(at_rest(0, length=0.505), names=("rope_EI",))
+    assert result["rope_EI"].verdict == "doubtful"
+    assert not any(asked(at_rest(seed), names=("rope_EI",)) for seed in range(20))
+
+
 def test_what_moves_no_parameter_is_a_warning_alone() -> None:
     """Across the plane of the motion."""
     tilted = fitted(fall(rope((0.0, 0.17, -9.8085))))
@@ -115,6 +159,22 @@ def heavier(particles: tuple[int, ...], mass: float) -> sb.Experiment:
     return replace(e, recording=replace(e.recording, positions=x))
 
 
+def swinging(late: float) -> sb.Experiment:
+    """A rope under a robot's hand. Its recording is stamped so many s late against the clock of the hand."""
+    knots = np.arange(0.0, 1.1, 0.01)
+    path = np.stack([0.05 * np.sin(7 * knots) ** 2, 0.03 * np.sin(5 * knots) ** 2, 0 * knots], axis=1)
+    scene, losses = sb.Scene("rope"), {"bend_damping": 0.01, "drag_linear": 5e-3}
+    line = sb.add_rope(scene, "rope", points=[[0, 0, 0], [0, 0, -0.4]], segments=8, density=0.05, EI=2e-3, **losses)
+    sb.Tool(knots, path, np.tile([0.0, 0.0, 0.0, 1.0], (len(knots), 1))).drive(scene, line.particles[:1])
+    at = [int(line.particles[k]) for k in AT]
+    shown, every = np.maximum(TIMES - late, 0.0), np.unique(np.append(0.0, np.maximum(TIMES - late, 0.0)))
+    x = sb.simulate(scene, every, SOLVER).positions[np.searchsorted(every, shown)][:, at]
+    x = x + SIGMA * np.random.default_rng(0).standard_normal(x.shape)
+    recording, places = sb.Recording(positions=x, times=TIMES, name="swing"), [sb.on_particle(k) for k in at]
+    options = {"solver": SOLVER, "sigma": SIGMA, "start_time": 0.0}
+    return sb.Experiment(scene=scene, recording=recording, markers=places, **options)  # type: ignore[arg-type]
+
+
 LACKING: dict[str, tuple[Any, str]] = {
     "drag": (lambda: fall(rope(drag_linear=None)), "it had a drag_linear of 0.099 N s/m for every kg"),
     "quadratic": (
@@ -125,6 +185,36 @@ LACKING: dict[str, tuple[Any, str]] = {
     "markers": (lambda: heavier(AT, 3e-4), "each marker weighed 0.28 g"),
     "stretch": (lambda: fall(rope(), EA=100.0), "rope_stretch gave way with an EA of 100 N"),
 }
+
+
+def test_a_clock_between_hand_and_camera_that_is_off_is_named() -> None:
+    """10 ms: the damping was 2.4 times too large, and nothing named the clock."""
+    assert asked(swinging(0.0)) == []
+    (found,) = asked(swinging(0.005))
+    (words,) = found.words
+    assert "the clock of the recording were 5 ms late against that of what drives the scene" in words
+    result = fitted(swinging(0.01))
+    assert result["rope_bend_damping"].verdict == "doubtful" and wrong_and_identified(result) == []
+    assert any("11 ms late against that of what drives the scene (time_offset)" in w for w in result.warnings)
+
+
+@pytest.mark.parametrize(
+    ("model", "words"),
+    [
+        ({"friction": 0.28}, "table_friction were"),
+        ({"depth": 0.001}, "table_z were"),
+    ],
+)
+def test_a_table_that_is_told_wrong_is_named(model: dict[str, float], words: str) -> None:
+    """A rope is drawn over it; its friction, or its height."""
+    true, told = dragged(0.3), dragged(**{"friction": 0.3, **model})
+    particles = [int(p) for p in true.ropes["rope"].particles]
+    x = sb.simulate(true, DRAGGED, DRAGGING).positions[:, particles]
+    x = x + SIGMA * np.random.default_rng(0).standard_normal(x.shape)
+    recording, places = sb.Recording(positions=x, times=DRAGGED, name="drag"), [sb.on_particle(p) for p in particles]
+    e = sb.Experiment(scene=told, recording=recording, markers=places, solver=DRAGGING, sigma=SIGMA)
+    (found,) = asked(e, names=("rope_EI",))
+    assert any(words in one for one in found.words), found.words
 
 
 @pytest.mark.parametrize("case", LACKING)

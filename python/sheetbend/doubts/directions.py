@@ -139,12 +139,16 @@ def rows_of(problem: FitProblem, experiments: Sequence[int]) -> Array:
     return mine
 
 
-def tied(problem: FitProblem) -> list[list[int]]:
+def tied(problem: FitProblem, still: bool = False) -> list[list[int]]:
     """The motions, by their places, in groups that share no parameter. A loss that is missing is missing in all of a
-    group: where one motion asks for more and another for less, none is."""
+    group: where one motion asks for more and another for less, none is.
+
+    Args:
+        still: count static experiments too.
+    """
     groups: list[tuple[list[int], set[str]]] = []
     for i, e in enumerate(problem.experiments):
-        if e.static:
+        if e.static and not still:
             continue
         mine, names = [i], set(problem.acting_on(e))
         tied = [g for g in groups if g[1] & names]

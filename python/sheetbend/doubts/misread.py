@@ -28,7 +28,7 @@ EXPLAINS = 0.5  # of what is left, at most, where the markers are read otherwise
 TURNED = 5.0  # degrees
 SCALED = 0.2  # of the size
 RATES = (1 / 4, 1 / 2, 4 / 5, 5 / 6, 6 / 5, 5 / 4, 2.0, 4.0)  # of frames, as told ones to those of the camera
-CAUSES = "gravity, lengths, densities, clamps, frame rate, a loss that the model lacks, the markers' order and places"
+CAUSES = "gravity, lengths, densities, clamps, clocks, a loss that the model lacks, the markers' order and places"
 
 
 def misread(problem: FitProblem, u: Array) -> tuple[str, ...]:

@@ -170,11 +170,12 @@ def _observe(
     frames, seen = np.nonzero(r.mask)
     axes = [AXES.index(a) for a in e.axes]
     marker = np.repeat(seen, len(axes))
+    left = (shown - r.positions)[frames, seen][:, axes] / e.sigma
     own = slice(0, len(marker))  # the rows of the markers; forces do not depend on where these are taken to sit
 
     def change(label: str, name: str, by: Array, unit: str = "", **more: Any) -> Told:
-        """By the markers' (frames, markers, 3) m; of a robust loss with its weight as it is."""
-        rows = np.asarray(by[frames, seen][:, axes].ravel() / e.sigma)
+        """By the markers' (frames, markers, 3) m."""
+        rows = _of_loss(e, left, by[frames, seen][:, axes] / e.sigma).ravel()
         unit, step = GROUPS[name] if name else (unit, STEPS.get(unit, (0.01, "1 %")))
         return Told(i, name, label, unit, step, rows, **({"rows": own} | more))
 
@@ -185,14 +186,12 @@ def _observe(
                 mine = np.zeros(problem.core.first_rows[i + 1] - problem.core.first_rows[i], dtype=bool)
                 mine[own] = marker == m
                 yield replace(whole, label=f"{name} {k}", column=whole.column[marker == m], rows=mine, marker=name)
-    held = sorted(e.scene.pinned)
-    if e.scene.boundary.driven:
-        return  # what is driven moves as the recording says
-    if not e.static and e.time_offset is None and len(r.times) > 1:
+    held, boundary = sorted(e.scene.pinned), e.scene.boundary
+    if not e.static and e.time_offset is None and len(r.times) > 1 and not boundary.following:
         speed = np.gradient(shown, r.times, axis=0)
         yield change(LATER, "", speed, "s")
         yield change(SLOWER, "", speed * (r.times - e.t0)[:, None, None], relative=True)
-    if not held:
+    if not held or boundary.driven:  # what is driven goes where it was measured
         return
     for axis in [a for a in range(3) if a in axes]:
         yield change(f"clamps along {AXES[axis]}", "clamps", np.broadcast_to(np.eye(3)[axis], shown.shape))
@@ -210,6 +209,21 @@ def _observe(
             across = _gravity(e)[toward]
             g = g + column[own] * float(np.cross(down, turn) @ across) / float(across @ across)
         yield replace(turned, column=g)
+
+
+def _of_loss(e: Experiment, d: Array, by: Array) -> Array:
+    """(n, axes) what a change `by` of markers' weighted distances d, both (n, axes), makes of their residuals, which a
+    robust loss shortens (adjoint/observation.h). By complex step."""
+    if e.loss == "squares":
+        return by
+    moved = d + 1e-30j * by
+    s = (moved**2).sum(axis=1, keepdims=True) / e.loss_scale**2
+    if e.loss == "soft_l1":
+        factor = np.sqrt(2.0 / (1.0 + np.sqrt(1.0 + s)))
+    else:
+        far = np.where(s.real > 1.0, s, 1.0)
+        factor = np.sqrt((2.0 * np.sqrt(far) - 1.0) / far)
+    return np.asarray((factor * moved).imag / 1e-30)
 
 
 def _slopes(e: Experiment, place: Place, start: Array) -> list[tuple[float, ...]]:

@@ -24,6 +24,7 @@ from ..result.result import UNSOUND
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
+from .cloth_size import cloth_sizes
 from .contradictions import residual_shifts, value_words
 from .directions import LEVEL, asked_for, noise_in, rows_of, tied
 from .driven_errors import FEW, driven_errors
@@ -94,13 +95,14 @@ def _asked(
     q, inverse = q[:, kept], right[kept].T / sizes[kept] / scale[:, None]
     r = r - q @ (q.T @ r)
     found = []
-    groups = [g for g in tied(problem) if all(problem.experiments[i].loss == "squares" for i in g)]
+    groups = tied(problem, still=True)
     for group in groups:
         mine = rows_of(problem, group)
         left = float(r[mine] @ r[mine]) - noise_in(r[:data], layout, mine[:data])
         if not left > 0.0:
             continue
-        lacking = [part for i in group for part in missing_parts(problem, u, i)] if left > LEAVES * data else []
+        moving = [i for i in group if not problem.experiments[i].static]
+        lacking = [part for i in moving for part in _lacking(problem, u, i)] if left > LEAVES * data else []
         tried = list(_directions(problem, [*told, *lacking], group))
         asked = []
         for one, column in tried:
@@ -122,6 +124,11 @@ def _asked(
             steps = tuple((-inverse @ (q.T @ (more * column)))[:count] for _, more, _, column in sure)
             found.append(Wrong(tuple(group), words, steps, sure[0][0]))
     return found
+
+
+def _lacking(problem: FitProblem, u: Array, i: int) -> list[Told]:
+    """Directions of what no number of the model tells."""
+    return [*missing_parts(problem, u, i), *cloth_sizes(problem, u, i)]
 
 
 def _possible(one: Told, more: float) -> bool:
@@ -196,6 +203,9 @@ def _off(one: Told, more: float, problem: FitProblem, group: Sequence[int]) -> s
     axis = f"{'' if more > 0 else '-'}{one.label.rsplit(' ', 1)[-1]}"
     if one.label == SIZE:
         return f"gravity were {size} {'larger' if more > 0 else 'smaller'}"
+    if one.label == LATER and e.scene.boundary.driven:
+        when = f"{short(1e3 * abs(more), 2)} ms {'early' if more > 0 else 'late'}"
+        return f"the clock of the recording{of} were {when} against that of what drives the scene (time_offset)"
     if one.label == LATER:
         when = "earlier" if more > 0 else "later"
         return f"the motion{of} had begun {short(1e3 * abs(more), 2)} ms {when} than the scene does (start_time)"

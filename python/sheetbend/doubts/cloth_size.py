@@ -1,0 +1,149 @@
+"""Whether a cloth is larger than its mesh says, along warp or weft.
+
+A cloth has no quantity for its size. But its masses, areas, and what its membrane and its bending take as the flat
+shape all follow from the material coordinates, so that the cloth made again from slightly longer coordinates tells what
+a larger size changes. Of a cloth that begins flat there are two such errors. Either its start is longer too, and what
+is pinned stands that much farther apart, or the start is as it was told, and the cloth in it is slack.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+
+import numpy as np
+
+from ..arrays.timeseries import Array
+from ..errors import SceneError, SheetbendError
+from ..mesh import TriangleMesh
+from ..minimum.problem import FitProblem
+from ..objects.cloth import Cloth, add_cloth
+from ..quantities.wording import short
+from ..scene.scene import Scene
+from .tangents import Input, tangents
+from .told import Told
+
+STEP = 1e-4  # of the size, to either side
+FLAT = 1e-6  # of the size: how far a start that is flat may be from it
+AXES = ("warp", "weft")
+OWN = ("compliance", "damping", "rest")  # arrays with entries of constraints
+PARTICLES = ("mass", "drag_linear", "drag_quadratic")
+
+
+def cloth_sizes(problem: FitProblem, u: Array, i: int) -> list[Told]:
+    """Directions of the sizes of the cloths of the i-th experiment, relative; none where its motion has no answer at
+    u (free,), or where the scene holds its cloths in another way than it was told. Takes one set of tangents."""
+    e = problem.experiments[i]
+    theta, slots, _ = problem.known(u)
+    values = dict(zip(e.scene.quantities, theta[slots[i]].tolist(), strict=True))
+    added: dict[str, Input] = {}
+    directions: list[tuple[str, Callable[[float], str], list[str]]] = []
+    for name, cloth in e.scene.cloths.items():
+        made, starts = list[str](), list[str]()
+        for axis, along in enumerate(AXES):
+            label = f"size of {name} along the {along}"
+            of = {f"{label}: {array}": one for array, one in _larger(e.scene, cloth, values, axis).items()}
+            start = {f"{label}: position": one for one in _longer_start(e.scene, cloth, axis)}
+            added |= of | start
+            directions += _told(name, label, f" along the {along}", [*of], [*start])
+            made, starts = [*made, *of], [*starts, *start]
+        directions += _told(name, f"size of {name}", "", made, starts)
+    if not directions:
+        return []
+    try:
+        columns = dict(zip(added, tangents(problem, u, i, added).T, strict=True))
+    except SheetbendError:
+        return []
+    return [
+        Told(i, "", label, "", (0.0, ""), np.sum([columns[part] for part in parts], axis=0), missing=says, signed=True)
+        for label, says, parts in directions
+    ]
+
+
+def _told(
+    name: str, label: str, along: str, made: list[str], starts: list[str]
+) -> Iterator[tuple[str, Callable[[float], str], list[str]]]:
+    """Label, words and inputs of a size, in a start as it was told, and with that."""
+    if made:
+        yield label, _says(name, along, "in a start as it was told"), made
+    if made and starts:
+        yield f"{label}, start", _says(name, along, "and its start and the places of its pins with it"), made + starts
+
+
+def _larger(scene: Scene, cloth: Cloth, values: Mapping[str, float], axis: int) -> dict[str, Input]:
+    """By input array, what a larger size along an axis of the material adds to it, relative."""
+    held = {*scene.pinned, *scene.boundary.driven}
+    for still in ((), tuple(np.flatnonzero([int(p) in held for p in cloth.particles]).tolist())):
+        try:
+            ends = [_alone(cloth, 1.0 + side * STEP, axis, still) for side in (-1.0, 1.0)]
+        except SceneError:
+            continue
+        groups = ends[0].groups
+        known = {g.name: g.particles for g in scene.groups}
+        if all(np.array_equal(known.get(g.name, ()), cloth.particles[g.particles]) for g in groups):
+            return dict(_differences(scene, cloth, ends, values))
+    return {}
+
+
+def _alone(cloth: Cloth, size: float, axis: int, still: tuple[int, ...]) -> Scene:
+    """A scene of the cloth alone, made again with another size."""
+    mesh, scale = cloth.mesh, np.ones(2)
+    scale[axis] = size
+    scene = Scene("cloth")
+    longer = TriangleMesh(mesh.vertices, mesh.triangles, mesh.material * scale, dict(mesh.sets))
+    add_cloth(scene, longer, cloth.name, fabric=cloth.fabric, held=still, **cloth.numbers)
+    return scene
+
+
+def _differences(
+    scene: Scene, cloth: Cloth, ends: list[Scene], values: Mapping[str, float]
+) -> Iterator[tuple[str, Input]]:
+    layout = ends[0].compiled.layout
+    low, high = (end.compiled.inputs([values[name] for name in end.quantities]) for end in ends)
+    slope = (high - low) / (2.0 * STEP)
+    firsts, others = _firsts(scene), _firsts(ends[0])
+    for array in (*OWN, *PARTICLES):
+        first, size = layout[array]
+        by = slope[first : first + size]
+        if not by.any():
+            continue
+        if array in PARTICLES:
+            yield array, (array, cloth.particles.astype(int), by)
+            continue
+        entries = np.zeros(size, dtype=int)
+        for g in ends[0].groups:
+            count = g.rest.size if array == "rest" else len(g.particles)
+            place = int(array == "rest")
+            mine, own = firsts[g.name][place], others[g.name][place]
+            entries[own : own + count] = mine + np.arange(count)
+        yield array, (array, entries, by)
+
+
+def _firsts(scene: Scene) -> dict[str, tuple[int, int]]:
+    """Of each group, where its constraints start, and where their parameters do."""
+    found, constraints, values = {}, 0, 0
+    for g in scene.groups:
+        found[g.name] = constraints, values
+        constraints, values = constraints + len(g.particles), values + g.rest.size
+    return found
+
+
+def _longer_start(scene: Scene, cloth: Cloth, axis: int) -> Iterator[Input]:
+    """What a larger size adds to a start that is flat, around what is pinned; nothing where it is not, or is driven."""
+    mesh = cloth.mesh
+    if mesh.material.ndim != 2 or set(scene.boundary.driven) & set(cloth.particles.tolist()):
+        return
+    x = scene.positions[cloth.particles]
+    flat = np.column_stack([mesh.material, np.ones(len(x))])
+    map_ = np.linalg.lstsq(flat, x, rcond=None)[0]
+    if np.abs(flat @ map_ - x).max() > FLAT * np.ptp(mesh.material):
+        return
+    pinned = np.isin(cloth.particles, sorted(scene.pinned))
+    from_there = mesh.material[:, axis] - (mesh.material[pinned] if pinned.any() else mesh.material)[:, axis].mean()
+    entries = (3 * cloth.particles.astype(int)[:, None] + np.arange(3)).ravel()
+    yield "position", entries, np.outer(from_there, map_[axis]).ravel()
+
+
+def _says(name: str, along: str, how: str) -> Callable[[float], str]:
+    return lambda size: (
+        f"{name} were {short(100 * abs(size), 2)} % {'larger' if size > 0 else 'smaller'}{along} than its mesh, {how}"
+    )
