@@ -80,9 +80,10 @@ def missed_from_first_frame(fitted: RopeModel, told: dict[str, Any], unseen: Scr
         model = rung.added_to(model)
     true = dict(told["true"])
     known = {f"rope_{k}": v for k, v in true.items() if k != "density"}
-    model = replace(model, density=true["density"], marker_mass=told["marker_mass"], places=False, segments=LINKS).at(
-        known
+    model = replace(
+        model, density=true["density"], marker_mass=told["marker_mass"], places=False, beside=(), segments=LINKS
     )
+    model = model.at(known)
     pairs = zip(unseen, predict(model, unseen.motions, known), strict=True)
     return [coordinate_error(motion.recording, x) for motion, x in pairs]
 

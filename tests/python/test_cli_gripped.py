@@ -20,7 +20,7 @@ from commands import last_line, run
 from sheetbend.cli import gripped
 from sheetbend.config import GrippedConfig, gripped_schema, parse, parse_any
 from sheetbend.gripped import LADDER, GrippedMotion, trades
-from sheetbend.gripped.ladder import MARKERS, REST, SHIFTS, TILTS, TWIST, VARYING, YIELD
+from sheetbend.gripped.ladder import BESIDE, MARKERS, REST, SHIFTS, TILTS, TWIST, VARYING, YIELD
 from sheetbend.report.fit_result import FitResult
 from sheetbend.result.result import Correlation, Estimate
 
@@ -469,7 +469,7 @@ class TestTrades:
 
 def test_the_rungs_of_the_configuration_are_those_of_the_recipe() -> None:
     assert tuple(gripped.RUNGS) == gripped_schema.RUNGS
-    assert tuple(gripped.RUNGS.values()) == (TWIST, TILTS, REST, VARYING, YIELD, SHIFTS, MARKERS) == tuple(LADDER)
+    assert tuple(gripped.RUNGS.values()) == (TWIST, TILTS, REST, VARYING, YIELD, BESIDE, SHIFTS, MARKERS) == tuple(LADDER)
 
 
 class TestNotWeighed:

@@ -11,10 +11,11 @@ import numpy as np
 from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
 from ..quantities.parameters import Parameter
+from .beside import Offsets, beside, frames_of, offsets_found
 from .bounds import bounded
 from .descent import bearable, descend
 from .first_order import first_order
-from .judging import BETTER, EQUAL, Errors, Split, Verdict, errors_of, misfits, verdict
+from .judging import BETTER, EQUAL, Errors, Split, Verdict, errors_of, misfits, predict, verdict
 from .ladder import Rung, together
 from .model import NAME, RopeModel
 from .motion import GrippedMotion
@@ -76,6 +77,7 @@ class Climb:
     Attributes:
         split: what is fitted and judged; without what was left out.
         left_out: sentences on recordings that are neither fitted nor judged.
+        beside: how far the markers sit beside the rope's axis, where the recordings were moved onto it.
         equal: ropes of rungs that predict as well as the last one that stayed.
     """
 
@@ -91,6 +93,7 @@ class Climb:
         self.steps: list[Step] = []
         self.tried: list[Rope] = []
         self.rope: Rope | None = None
+        self.beside: Offsets = ()
 
     def run(self, model: RopeModel, ladder: Sequence[Rung], bending_lengths: Sequence[float], most_links: int) -> None:
         """Climb; Ctrl-C passes, and leaves what is finished."""
@@ -103,19 +106,57 @@ class Climb:
             # what helped nothing before may help beside what stayed later
             if not stays and not (k < last and self._climbed(rung)):
                 dropped.append(rung)
+        dropped = [rung for rung in dropped if not rung.beside]
         if len(dropped) > 1 and not all(rung.small for rung in dropped):
             # or only beside another: stiffness that varies looks like yield, and yield like it
             self._climbed(together(dropped))
+        for rung in ladder:
+            if rung.beside and self.beside:
+                self._climbed(rung)  # what the rope's shape had taken up of the offsets, and gave back since
 
     def _climbed(self, rung: Rung) -> bool:
         """Try a rung; whether it stays."""
         began = time.perf_counter()
         assert self.rope is not None
+        if rung.beside:
+            return self._onto_axis(rung, self.rope, began)
         if rung.small and (told := self._first(rung, self.rope)) is not None and told.ratio >= BETTER:
             return self._skip(rung, told, began)
         found = self._tried(rung, self.rope)
         self._keep(rung, found, None if found is None else verdict(found.errors, self.rope.errors), began)
         return self.steps[-1].stays
+
+    def _onto_axis(self, rung: Rung, rope: Rope, began: float) -> bool:
+        """Try the recordings, moved onto the rope's axis; whether they stay there. What is fitted next follows them."""
+        given, split = self.given, self.split
+        found, offsets = None, self._offsets(rope)
+        if offsets is not None:
+            self.given, self.split = self._moved(rope, offsets)
+            found = self._judged(rope)
+        told = None if found is None else verdict(found.errors, rope.errors)
+        if told is not None and told.stays and offsets is not None:
+            before = self.beside or ((0.0, 0.0),) * len(offsets)
+            self.beside = tuple((a + c, b + d) for (a, b), (c, d) in zip(before, offsets, strict=True))
+        else:
+            self.given, self.split = given, split
+        self._keep(rung, found, told, began)
+        return self.steps[-1].stays
+
+    def _offsets(self, rope: Rope) -> Offsets | None:
+        """Of the markers, from the axis; None where a motion diverges."""
+        motions = self.split.fitted
+        try:
+            frames = [frames_of(rope.model, m, rope.values) for m in motions]
+        except SheetbendError:
+            return None
+        return offsets_found(motions, predict(rope.model, motions, rope.values, self.threads), frames)
+
+    def _moved(self, rope: Rope, offsets: Offsets) -> tuple[tuple[GrippedMotion, ...], Split]:
+        """What is given and its split, with the markers on the rope's axis."""
+        every = {id(m): m for m in (*self.whole, *self.split.motions)}
+        moved = {key: m.moved(-beside(rope.model, m, rope.values, offsets)) for key, m in every.items()}
+        fitted, judged = (tuple(moved[id(m)] for m in part) for part in (self.split.fitted, self.split.judged))
+        return tuple(moved[id(m)] for m in self.whole), replace(self.split, fitted=fitted, judged=judged)
 
     def _first(self, rung: Rung, rope: Rope) -> Verdict | None:
         """What one step with the rung would improve."""

@@ -73,7 +73,7 @@ def conclude(
         experiments,
         parameters=starting(parameters, values),
         refine=None if interrupted else Refinement(finer=finer, linear=True),
-        systematic=lambda problem, u: _together(offset_reach(problem, u), spread),
+        systematic=lambda problem, u: _together(offset_reach(problem, u, climb.beside), spread),
         windows=(),
         given=given,
         threads=threads,

@@ -14,6 +14,7 @@ from math import comb
 import numpy as np
 
 from ..errors import SheetbendError
+from .beside import beside
 from .ladder import TWIST
 from .model import NAME, RopeModel
 from .motion import Array, GrippedMotion
@@ -194,6 +195,8 @@ def predict(
     """Whole recordings, open loop from their first frames; NaN where a motion diverges."""
     if not motions:
         return []
+    if model.beside:
+        return _predicted_beside(model, motions, values, threads)
     experiments = [replace(window_of(model, m, None, values), fit=None) for m in motions]
     problem = problem_of(numbered(experiments), (TWIST.parameters[0],), values)
     u = problem.parameters.initial()
@@ -208,3 +211,19 @@ def predict(
 
     with ThreadPoolExecutor(threads) as pool:
         return list(pool.map(one, range(len(motions))))
+
+
+def _predicted_beside(
+    model: RopeModel, motions: Sequence[GrippedMotion], values: Mapping[str, float], threads: int
+) -> list[Array]:
+    """The same with markers beside the rope: it starts from where its axis is."""
+    off = [beside(model, m, values, model.beside) for m in motions]
+    sound = [np.isfinite(by).all() for by in off]
+    axes = [m.moved(-by) for m, by, ok in zip(motions, off, sound, strict=True) if ok]
+    predicted = iter(predict(replace(model, beside=()), axes, values, threads))
+    found = []
+    for motion, by, ok in zip(motions, off, sound, strict=True):
+        x = next(predicted) if ok else motion.recording.filled().positions.copy()
+        x[:, list(motion.free)] += by
+        found.append(x)
+    return found

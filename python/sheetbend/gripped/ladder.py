@@ -30,6 +30,7 @@ class Rung:
         each_marker: what it adds to the fit for each free marker; `{}` in a name is the marker's number.
         small: whether its effect is nearly linear; then it is not tried where one step promises nothing
             (`first_order`).
+        beside: whether it moves the recordings onto the rope's axis, beside which the markers sit (`beside`).
         starts: other values to start from, by option; `EI` as a factor. The end that fits best is taken.
     """
 
@@ -39,6 +40,7 @@ class Rung:
     parameters: tuple[Parameter, ...] = ()
     each_marker: tuple[Parameter, ...] = ()
     small: bool = False
+    beside: bool = False
     starts: tuple[Mapping[str, float], ...] = ()
 
     def added_to(self, model: RopeModel) -> RopeModel:
@@ -63,7 +65,7 @@ def together(rungs: Sequence[Rung]) -> Rung:
         tuple(p for rung in rungs for p in rung.parameters),
         tuple(p for rung in rungs for p in rung.each_marker),
         all(rung.small for rung in rungs),
-        tuple(start for rung in rungs for start in rung.starts),
+        starts=tuple(start for rung in rungs for start in rung.starts),
     )
 
 
@@ -124,6 +126,7 @@ YIELD = Rung(
     ),
     starts=({"yield_curvature": 1.0, "yield_share": 0.5, "EI": 1.5},),
 )
+BESIDE = Rung("markers beside the rope", beside=True)
 SHIFTS = Rung(
     "places of the grips",
     options={"shifts": True},
@@ -137,4 +140,4 @@ MARKERS = Rung(
     each_marker=(_plain("place_{}", "m", 0.005, 0.005),),
     small=True,
 )
-LADDER = (TWIST, TILTS, REST, VARYING, YIELD, SHIFTS, MARKERS)
+LADDER = (TWIST, TILTS, REST, VARYING, YIELD, BESIDE, SHIFTS, MARKERS)

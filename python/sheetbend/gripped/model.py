@@ -35,6 +35,9 @@ class RopeModel:
         curvature_modes, softness_modes, density_modes, slid_modes: see `add_rod`.
         places: let each free marker stand off from its measured place along the rope, by the quantity
             `rope_place_<its number>`, m.
+        beside: (free markers, 2) m, how far each free marker sits beside the rope's axis, about its two directors;
+            predictions start from the axis and tell where the markers are. Windows of a fit are of recordings that
+            were moved onto the axis.
         marker_mass: kg of each free marker, beside `density`; spread over the rope it does the same, so that no motion
             tells it.
         segments: links between the grips.
@@ -55,6 +58,7 @@ class RopeModel:
     density_modes: Sequence[int] = ()
     slid_modes: Sequence[int] = ()
     places: bool = False
+    beside: tuple[tuple[float, float], ...] = ()
     marker_mass: float = 0.0
     segments: int = 12
     substeps: int = 2

@@ -92,6 +92,15 @@ class GrippedMotion:
         part = self.recording.frames(which)
         return replace(self, recording=part, positions=self.positions[which], velocities=self.velocities[which])
 
+    def moved(self, by: Array) -> GrippedMotion:
+        """The same with its free markers moved by (frames, free markers, 3) m."""
+        free, x, v = list(self.free), self.positions.copy(), self.velocities.copy()
+        recorded = self.recording.positions.copy()
+        x[:, free] += by
+        v[:, free] += np.gradient(by, self.recording.times, axis=0)
+        recorded[:, free] += by
+        return replace(self, recording=replace(self.recording, positions=recorded), positions=x, velocities=v)
+
     def directions(self, end: bool) -> Array:
         """(frames, 3) unit directions of a gripped piece, in the rope's direction of travel."""
         k = self.inner[1] if end else self.inner[0] - 1

@@ -8,6 +8,8 @@ rope do not count: the places of the markers are measured, with their slack.)
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
 from ..experiment.experiment import Experiment
@@ -21,20 +23,22 @@ from .model import NAME
 from .motion import Array
 
 
-def offset_reach(problem: FitProblem, u: Array) -> dict[str, float]:
+def offset_reach(problem: FitProblem, u: Array, beside: Sequence[tuple[float, float]] = ()) -> dict[str, float]:
     """Half of the 95 % interval of each free parameter, in its unit, for independent offsets of one size about both
     directors.
 
     Args:
         problem: of experiments of a `RopeModel`.
         u: (free,) its minimum.
+        beside: (free markers, 2) m, by which the recordings were moved onto the rope's axis already. Their size counts
+            as if they had not been: what the shape of the rope can take up of them is as unknown.
     """
     _, r, J = problem.evaluate(u)
     layout = problem.rows_layout()
     rows = len(layout.frame)
     r, J, prior = r[:rows], J[:rows], problem.parameters.prior_jacobian()
     values = problem.parameters.to_physical(u)
-    axes = [_axes(e, part, values) for e, part in zip(problem.experiments, problem.recordings, strict=True)]
+    axes = [frames_at_markers(e, part, values) for e, part in zip(problem.experiments, problem.recordings, strict=True)]
     marker, axis = np.divmod(layout.channel, 3)
     count = 1 + int(marker.max())
     by_offset = np.zeros((rows, count, 2))  # residuals per meter
@@ -42,6 +46,8 @@ def offset_reach(problem: FitProblem, u: Array) -> dict[str, float]:
         mine = np.flatnonzero(layout.recording == i)
         by_offset[mine, marker[mine]] = own[layout.frame[mine], marker[mine], :, axis[mine]] / e.sigma
     G = by_offset.reshape(rows, -1)
+    if len(beside):
+        r = r - G @ np.ravel(beside)
     # how the minimum moves, and what is left in the residuals, per meter
     zeros = np.zeros((len(prior), G.shape[1]))
     moved = -np.linalg.lstsq(np.vstack([J, prior]), np.vstack([G, zeros]), rcond=None)[0]
@@ -57,7 +63,7 @@ def offset_reach(problem: FitProblem, u: Array) -> dict[str, float]:
     return {name: end[name] - values[name] for name in problem.parameters.free}
 
 
-def _axes(e: Experiment, part: Recording, values: dict[str, float]) -> Array:
+def frames_at_markers(e: Experiment, part: Recording, values: Mapping[str, float]) -> Array:
     """(frames, free markers, 2, 3): the rope's two directors at its markers, at the substeps nearest to the frames."""
     rod: Rod = e.scene.ropes[NAME]
     times = e.solver.h * np.rint((part.times - (e.start_time or 0.0)) / e.solver.h)

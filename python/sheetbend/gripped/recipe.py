@@ -194,7 +194,7 @@ def fit_rope(
         *at_bounds(rope.parameters, values, rope.model, kept, last[0]),
         *_short_links(rope.model, values),
     )
-    model = rope.model.at(values)
+    model = replace(rope.model.at(values), beside=climb.beside)
     if density is None:
         result = over_density(found.result)
         found, values = replace(found, result=result), named_over_density(values, result)

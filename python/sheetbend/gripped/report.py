@@ -85,6 +85,7 @@ class RopeReport:
             "segments": self.found.model.segments,
             "tangent_stiffness": tangent_stiffness(self.result),
             "model_spread": dict(self.found.spread),
+            "markers_beside": [list(pair) for pair in self.found.model.beside],
             "steps": steps,
             "trades": [f"{what}: {words}" for what, words in trades(self.result)],
             **errors(self.unseen, self.without_twist),
@@ -93,6 +94,14 @@ class RopeReport:
     @property
     def _unit(self) -> str:
         return "N m^2" if self.found.weighed else in_units("N m^2")
+
+    def _beside(self) -> list[Section]:
+        """How far markers sit beside the rope, where that was found; nothing elsewhere."""
+        offsets = self.found.model.beside
+        rows = [(str(k), *(_mm(x) for x in (a, b, math.hypot(a, b))), "mm") for k, (a, b) in enumerate(offsets, 1)]
+        note = "the best estimates, from the axis of the rope, about its two directors; the first free marker is 1"
+        headers = ("marker", "first", "second", "distance", "unit")
+        return [Section("Markers beside the rope", headers, tuple(rows), (("first, second", note),))] if rows else []
 
     def sections(self) -> list[Section]:
         rows = [
@@ -120,6 +129,7 @@ class RopeReport:
         stiffness = stiffness_section(self.result)
         return [
             *([] if stiffness is None else [stiffness]),
+            *self._beside(),
             Section("Steps", headers, tuple(rows), notes),
             Section("What trades against what", notes=trades(self.result)),
             Section(
