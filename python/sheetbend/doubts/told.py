@@ -185,7 +185,7 @@ def _observe(
                 mine = np.zeros(problem.core.first_rows[i + 1] - problem.core.first_rows[i], dtype=bool)
                 mine[own] = marker == m
                 yield replace(whole, label=f"{name} {k}", column=whole.column[marker == m], rows=mine, marker=name)
-    held = sorted(e.scene.pinned)
+    held = sorted(e.scene.pinned, key=e.scene.places_of)
     if e.scene.boundary.driven:
         return  # what is driven moves as the recording says
     if not e.static and e.time_offset is None and len(r.times) > 1:
@@ -251,7 +251,7 @@ def _simulated(
     every = (1 + count) * n
     measured = np.zeros((len(r.times), every, 3))
     d["observed"] |= {
-        "markers": [*d["observed"]["markers"], *(p.core() for p in more)],
+        "markers": [*d["observed"]["markers"], *(p.core(e.scene) for p in more)],
         "measured": measured,
         "sigma": np.ones(measured.shape[:2]),
     }
