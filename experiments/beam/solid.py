@@ -93,7 +93,7 @@ def loaded_frequency(study, cells, values, hung=0.052, seconds=1.5):
     beam = made.solids["beam"]
     times = np.arange(0, seconds, 0.01)
     tip = beam.particles[beam.mesh.sets["x_max"]]
-    moved = sb.simulate(made, times, SOLVER, values=values, start=rest.positions)
+    moved = sb.simulate(made, times, SOLVER, values=values, start=rest.nodes)
     return frequency(times, moved.positions[:, tip, 2].mean(axis=1))
 
 

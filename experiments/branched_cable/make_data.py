@@ -22,7 +22,7 @@ def main(file: Path = harness.FILE) -> None:
     built = harness.scene(TRUE, FINER)
     h = 1 / (harness.RATE * harness.SUBSTEPS * FINER)
     times = harness.grip_motion()[0]
-    motion = sb.simulate(built, times, sb.Solver(h=h), start=sb.equilibrium(built).positions)
+    motion = sb.simulate(built, times, sb.Solver(h=h), start=sb.equilibrium(built).nodes)
     places = harness.places(built)
     weights = {name: np.array(place.weights)[:, None] for name, place in places.items()}
     seen = [(motion.positions[:, list(place.particles)] * weights[name]).sum(axis=1) for name, place in places.items()]

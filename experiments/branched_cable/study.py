@@ -41,7 +41,7 @@ def draw(fit, recording, file):
     import matplotlib.pyplot as plt
 
     scene = harness.scene({name: fit.values[name] for name in START})
-    motion = sb.simulate(scene, recording.times, sb.Solver(h=1 / 200), start=sb.equilibrium(scene).positions)
+    motion = sb.simulate(scene, recording.times, sb.Solver(h=1 / 200), start=sb.equilibrium(scene).nodes)
     colors = {"trunk": "#333333", "left": "#1f77b4", "right": "#d95f02"}
     figure, (sides, found) = plt.subplots(1, 2, figsize=(12, 3.3), width_ratios=(2.9, 1), layout="constrained")
     for k, time in enumerate(SHOWN):

@@ -91,12 +91,12 @@ def _hanging(first: Array, last: Array, length: float) -> Array:
 
 
 def at_rest(rope: Rope, start: Grip, end: Grip, segments: int) -> Array:
-    """(particles, 3) m, the equilibrium into which the hanging rope creeps in thick air, of several there may be."""
+    """(nodes, 3) m, the equilibrium into which the hanging rope creeps in thick air, of several there may be."""
     still = scene(rope, *(Grip.fixed(g.position[0], g.direction[0], g.director[0]) for g in (start, end)), segments)
     slow = {f"rod_{k}": v for k, v in rope.values.items()} | {"rod_drag_linear": 1.0, "rod_bend_damping": 0.1}
     shape = None
     for h, seconds in CREEP:
-        shape = sb.simulate(still, [seconds], sb.Solver(h=h), slow, shape).positions[-1]
+        shape = sb.simulate(still, [seconds], sb.Solver(h=h), slow, shape).nodes[-1]
     return shape
 
 
@@ -108,8 +108,8 @@ def simulated(
     built = scene(rope, start, end, segments)
     rod = built.ropes["rod"]
     times = np.arange(round(seconds * RATE)) / RATE
-    positions = sb.simulate(built, times, sb.Solver(h=h), values, at_rest(rope, start, end, segments)).positions
-    return positions[:, rod.particles], positions[:, rod.directors[1:-1]]
+    x = sb.simulate(built, times, sb.Solver(h=h), values, at_rest(rope, start, end, segments)).nodes
+    return x[:, rod.particles], x[:, rod.directors[1:-1]]
 
 
 def free_markers(rope: Rope, nodes: Array, directors: Array) -> Array:

@@ -50,7 +50,7 @@ def fitted(tool: sb.Tool, wrist: sb.ForceRecording, seen: np.ndarray) -> sb.FitR
     """The ten numbers, started at values that are 3 to 25 % off."""
     scene = sb.Scene("payload")
     gripper = scene.add_body("gripper", mass=1e-6, inertia=(1e-9, 1e-9, 1e-9), poses=tool)
-    origin, frame = gripper.pose(scene.positions)
+    origin, frame = gripper.pose(scene.nodes)
     moments, axes = sb.Inertia(MASS, INERTIA).principal()
     guess = axes @ np.diag(moments * [1.05, 0.97, 1.03]) @ axes.T
     held = scene.add_body("load", mass=1.1 * MASS, inertia=guess, center=0.8 * CENTER, at=origin, rotation=frame)

@@ -70,7 +70,7 @@ def model(segments: int, plugged: bool = True, values: dict[str, float] = TRUTH)
 
 
 def shown(x: np.ndarray, places: list[sb.Place]) -> np.ndarray:
-    """(frames, markers, 3) m, where the markers are at positions (frames, particles, 3) of the scene."""
+    """(frames, markers, 3) m, where the markers are at positions (frames, nodes, 3) of the scene."""
     return np.stack([_one(x, place) for place in places], axis=1)
 
 
@@ -84,7 +84,7 @@ def _one(x: np.ndarray, place: sb.Place) -> np.ndarray:
 def swing(segments: int = SEGMENTS) -> np.ndarray:
     """(frames, markers, 3) m, the motion of a cable twice as fine."""
     scene, places = model(2 * segments)
-    return shown(sb.simulate(scene, TIMES, sb.Solver(h=H / 2)).positions, places)
+    return shown(sb.simulate(scene, TIMES, sb.Solver(h=H / 2)).nodes, places)
 
 
 def recorded(clean: np.ndarray, rng: np.random.Generator) -> sb.Recording:

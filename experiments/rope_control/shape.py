@@ -61,7 +61,7 @@ def add_gripper(control: Control, name: str, node: int, ghost: int, director: in
     for axis, along in zip("xyz", np.eye(3), strict=True):
         control.add(f"{name}_{axis}", "m", *PLACE, {node: along, ghost: along})
     aside, up = grip.director[0], np.cross(grip.direction[0], grip.director[0])
-    reach = float((control.scene.positions[ghost] - control.scene.positions[node]) @ grip.direction[0])
+    reach = float((control.scene.nodes[ghost] - control.scene.nodes[node]) @ grip.direction[0])
     control.add(f"{name}_up", "1", *ANGLE, {ghost: reach * up})
     control.add(f"{name}_aside", "1", *ANGLE, {ghost: reach * aside})
     control.add(f"{name}_roll", "1", *ANGLE, {director: up})

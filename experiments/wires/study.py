@@ -183,7 +183,7 @@ def branches(wire):
     values = {
         q: fit.values.get(f"{q}[{first.name}]", fit.values.get(q, scene.quantities[q].value)) for q in scene.quantities
     }
-    start = sb.equilibrium(scene).positions
+    start = sb.equilibrium(scene).nodes
     ends, s = start[rope.particles][[0, -1]], (rope.arc_length / rope.length)[:, None]
     starts = [start]
     for turns in (-2, 0, 1, 2):  # a circle through both ends, closed so many times; 0: sagging without a loop

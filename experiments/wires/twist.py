@@ -113,7 +113,7 @@ class Loop:
         while step > SHORTEST and found[-1][0] < 8 * np.pi:
             roll, rest = found[-1]
             try:
-                start, turned = self.turned(rest.positions, step), {**values, f"{self.wire}_roll": roll + step}
+                start, turned = self.turned(rest.nodes, step), {**values, f"{self.wire}_roll": roll + step}
                 further = sb.equilibrium(self.scene, start, turned, stable=False)
                 moved = np.linalg.norm((further.positions - rest.positions)[nodes], axis=1).max()
                 holds = further.unstable_modes == 0 and moved < SNAP

@@ -52,7 +52,7 @@ def inputs_dot(scene: sb.Scene, direction: Direction) -> Array:
         return compiled.inputs_dot(compiled.theta, theta_dot)
     tangent = np.zeros(compiled.core.inputs)
     for array, values in direction.items():
-        offset, size = compiled.layout[array]
+        offset, size = compiled.given[array]
         tangent[offset : offset + size] = np.ravel(values)
     return tangent
 
@@ -61,7 +61,7 @@ def tangents(scene: sb.Scene, times: ArrayLike, solver: sb.Solver, direction: Di
     """d(positions)/d(direction) by forward tangents, shape (frames, particles, 3)."""
     compiled, frames = scene.compiled, substeps(times, solver.h)
     _, x_dot = solver.core(compiled).jvp(compiled.inputs(), inputs_dot(scene, direction)[None], frames, 0.0)
-    return x_dot[0].reshape(len(frames), -1, 3)
+    return x_dot[0].reshape(len(frames), -1, 3)[:, : scene.particle_count]
 
 
 def sensitivity(
@@ -76,7 +76,9 @@ def sensitivity(
     core, inputs = solver.core(compiled), compiled.inputs()
     forward = float((tangents(scene, times, solver, direction) * weights).sum())
     _, tape = core.record(inputs, frames, 0.0)
-    bar = core.vjp(inputs, tape, frames, np.reshape(weights, (len(frames), -1)), 0.0)
+    every = np.zeros((len(frames), scene.node_count, 3))
+    every[:, : scene.particle_count] = np.reshape(weights, (len(frames), -1, 3))
+    bar = core.vjp(inputs, tape, frames, every.reshape(len(frames), -1), 0.0)
     if isinstance(direction, str):
         return forward, float(compiled.theta_bar(compiled.theta, bar)[compiled.names.index(direction)])
     return forward, float(bar @ inputs_dot(scene, direction))
@@ -99,7 +101,8 @@ def static_sensitivity(
     """
     scene = rest.scene
     tangent = inputs_dot(scene, direction)
-    x_bar = np.zeros_like(rest.positions) if weights is None else weights
+    x_bar = np.zeros_like(rest.nodes)
+    x_bar[: scene.particle_count] = 0.0 if weights is None else weights
     parts = {name: np.zeros(f.shape) for name, f in rest.forces.items()} | dict(forces or {})
     volumes = dict.fromkeys(rest.pressures, 0.0) | dict(pressures or {})
     lambda_bar = np.concatenate([*(part.ravel() for part in parts.values()), list(volumes.values())])

@@ -232,7 +232,7 @@ def test_payload_weighed_by_a_wrist_against_newton_and_euler() -> None:
 
     scene = sb.Scene("payload")
     hand = scene.add_body("hand", mass=1e-6, inertia=(1e-9, 1e-9, 1e-9), poses=tool)
-    origin, frame = hand.pose(scene.positions)
+    origin, frame = hand.pose(scene.nodes)
     moments, axes = sb.Inertia(0.4, MATRIX).principal()
     guess = axes @ np.diag(moments * [1.05, 0.97, 1.03]) @ axes.T
     load = scene.add_body("load", mass=0.45, inertia=guess, center=0.8 * CENTER, at=origin, rotation=frame)

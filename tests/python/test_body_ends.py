@@ -38,13 +38,13 @@ def test_end_rides_on_the_body_in_its_direction_and_frame(kind: str) -> None:
     if kind == "ball":
         assert rope.end_ghost is None
         return
-    stub = motion.positions[:, rope.end_ghost] - motion.positions[:, rope.particles[-1]]
+    stub = motion.nodes[:, rope.end_ghost] - motion.positions[:, rope.particles[-1]]
     assert np.allclose(stub / np.linalg.norm(stub, axis=1, keepdims=True), frame[:, :, 0], atol=1e-10)
     if kind != "rope":
-        directors = np.einsum("fab,fa->fb", frame, motion.positions[:, rope.directors[-1]])  # type: ignore[attr-defined]
+        directors = np.einsum("fab,fa->fb", frame, motion.nodes[:, rope.directors[-1]])  # type: ignore[attr-defined]
         assert np.allclose(directors, directors[0], atol=1e-9)
     if kind == "sections":
-        normals = np.einsum("fab,fa->fb", frame, motion.positions[:, rope.normals[-1]])  # type: ignore[attr-defined]
+        normals = np.einsum("fab,fa->fb", frame, motion.nodes[:, rope.normals[-1]])  # type: ignore[attr-defined]
         assert np.allclose(normals, [1.0, 0.0, 0.0], atol=1e-9)
 
 
@@ -101,7 +101,7 @@ def test_stiffness_twist_mass_and_center_of_the_plug_from_one_swing() -> None:
 def test_box_that_is_drawn_is_the_box_that_was_given() -> None:
     scene = sb.Scene("box")
     scene.add_body("box", of=sb.Inertia.box(1.0, (0.1, 0.2, 0.3)).moved((0.01, 0.0, 0.0)), at=(1.0, 2.0, 3.0))
-    (lines,) = body_lines(scene, scene.positions[None]).values()
+    (lines,) = body_lines(scene, scene.nodes[None]).values()
     assert lines.shape == (1, 13, 2, 3)
     corners = lines[0, :12].reshape(-1, 3)
     assert np.allclose(np.ptp(corners, axis=0), [0.1, 0.2, 0.3], rtol=1e-12)

@@ -56,7 +56,7 @@ def test_joint_holds_what_it_says_and_leaves_the_rest_free(kind: str) -> None:
         assert abs(turn[:, 0, 1:]).max() < 1e-12
         assert (abs(turn - np.eye(3)).max() < 1e-12) is not turns
     if turns:
-        assert joint.angle(motion.positions)[:2] == pytest.approx([0.0, 4e-3], rel=0.05, abs=1e-12)
+        assert joint.angle(motion)[:2] == pytest.approx([0.0, 4e-3], rel=0.05, abs=1e-12)
     momentum = upper.momentum(motion) + lower.momentum(motion)
     assert np.allclose(momentum - momentum[0], np.outer(motion.times, [0.0, 0.0, -9.81 * 0.6]), atol=2e-5)
     spin = sum(b.angular_momentum(motion, about=(0.0, 0.0, 0.0)) for b in (upper, lower))
@@ -71,7 +71,7 @@ def test_any_values_start_in_the_joint_and_have_exact_gradients(kind: str) -> No
     changed = {f"{kind}_angle": 0.4, f"{kind}_upper_x": 0.13, f"{kind}_lower_y": 0.01, "upper_turn_z": 0.5}
     changed |= {"lower_center_x": 0.02, "lower_axes_turn_y": 0.3, f"{kind}_rate": -2.0}
     start = sb.simulate(scene, [0.0, 1e-3], sb.Solver(h=1e-3), changed)
-    C = sb.constraint_values(scene, start.positions[0], changed)
+    C = sb.constraint_values(scene, start.nodes[0], changed)
     assert max(abs(c).max() for c in C.values()) < 1e-14
     report = sb.check_gradients(scene, [0.01, 0.02], samples=1, values=changed)
     assert report.passed, str(report)
@@ -103,11 +103,11 @@ def test_torsion_spring_has_its_period_and_viscosity_its_decay() -> None:
     w = np.sqrt(0.05 / moment)
     times = np.round(np.array([0.5, 1.0]) * 2.0 * np.pi / w, 3)
     motion = sb.simulate(scene, times, sb.Solver(h=5e-4))
-    assert joint.angle(motion.positions) == pytest.approx(0.2 - 0.2 * np.cos(w * times), abs=4e-4)
+    assert joint.angle(motion) == pytest.approx(0.2 - 0.2 * np.cos(w * times), abs=4e-4)
     scene, joint = wheel(viscosity=1e-3, rate=2.0)
     motion = sb.simulate(scene, [0.2], sb.Solver(h=1e-3))
     tau = moment / 1e-3
-    assert joint.angle(motion.positions) == pytest.approx([2.0 * tau * (1.0 - np.exp(-0.2 / tau))], rel=2e-3)
+    assert joint.angle(motion) == pytest.approx([2.0 * tau * (1.0 - np.exp(-0.2 / tau))], rel=2e-3)
 
 
 def test_servo_follows_and_a_torque_turns_body_and_rotor() -> None:
@@ -115,10 +115,10 @@ def test_servo_follows_and_a_torque_turns_body_and_rotor() -> None:
     times = np.linspace(0.0, 0.4, 21)
     scene, joint = wheel(servo=(times, np.sin(4.0 * times)))
     motion = sb.simulate(scene, [0.2, 0.4], sb.Solver(h=1e-3))
-    assert joint.angle(motion.positions) == pytest.approx(np.sin([0.8, 1.6]), abs=1e-10)
+    assert joint.angle(motion) == pytest.approx(np.sin([0.8, 1.6]), abs=1e-10)
     scene, joint = wheel(torque=([0.0, 0.4], [0.01, 0.01]), rotor=1e-4)
     motion = sb.simulate(scene, [0.2], sb.Solver(h=1e-3))
-    assert joint.angle(motion.positions) == pytest.approx([0.5 * 0.01 / (moment + 1e-4) * 0.2**2], rel=2e-3)
+    assert joint.angle(motion) == pytest.approx([0.5 * 0.01 / (moment + 1e-4) * 0.2**2], rel=2e-3)
     report = sb.check_gradients(scene, [0.01, 0.02], samples=1)
     assert report.passed and "hinge_torque_1" in scene.quantities
     with pytest.raises(sb.SceneError, match="rotor"):
@@ -166,7 +166,7 @@ def test_two_link_arm_gives_spring_viscosity_length_and_torques_to_1e_6() -> Non
 
     solver, times = sb.Solver(h=2.5e-3), np.arange(41) * 0.01
     truth, places = arm(0.3, 2e-3, 0.1, torques)
-    x = sb.simulate(truth, times, solver).positions
+    x = sb.simulate(truth, times, solver).nodes
     seen = []
     for place in places:
         body = place.body

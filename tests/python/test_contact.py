@@ -21,7 +21,7 @@ def rope_above(height=0.006, pinned=(), **contact) -> sb.Scene:
 
 def moved(scene: sb.Scene, speed=(0.5, 0.0, 0.0)) -> sb.Scene:
     count = len(scene.ropes["rope"].particles)
-    scene._velocities.values[:count] = speed
+    scene._particles.velocities.values[:count] = speed
     return scene
 
 

@@ -80,7 +80,7 @@ def adjoint(e: sb.Experiment, theta: Array, moved: Array) -> tuple[Array, Array]
     core = e.solver.core(compiled)
     states, tape = core.record(inputs, steps, 0.0)
     off = (states.reshape(len(steps), -1, 3)[:, SEEN] - e.recording.positions[:, 1:]) / e.sigma
-    bar = np.zeros((len(steps), e.scene.particle_count, 3))
+    bar = np.zeros((len(steps), e.scene.node_count, 3))
     bar[:, SEEN] = off / e.sigma
     return off.ravel(), core.vjp(inputs, tape, steps, bar.reshape(len(steps), -1), 0.0)
 

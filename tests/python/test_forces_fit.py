@@ -57,7 +57,7 @@ def twin() -> tuple[np.ndarray, np.ndarray, sb.ForceRecording]:
     scene = rod()
     frames = np.arange(0, 37) * 5 * SOLVER.h
     forces = sb.simulate_forces(scene, np.arange(2, 120) * 0.01, ("rod", "start"), SOLVER, start="equilibrium")
-    start = sb.equilibrium(scene).positions
+    start = sb.equilibrium(scene).nodes
     places = sb.simulate(scene, frames, SOLVER, start=start).positions[:, scene.ropes["rod"].particles[list(MARKS)]]
     return frames, places, forces
 
@@ -378,7 +378,7 @@ def test_two_grips_share_what_the_momentum_needs() -> None:
     h, n = 1 / 1200, 300
     scene, solver = rod(knots=4001), sb.Solver(h=h)
     rope = scene.ropes["rod"].particles
-    start = sb.equilibrium(scene).positions
+    start = sb.equilibrium(scene).nodes
     x = sb.simulate(scene, np.arange(n + 1) * h, solver, start=start).positions[:, rope]
     mass = TRUTH["rod_density"] * 0.6 / 12 * np.array([0.5, *[1.0] * 11, 0.5])
     steps = np.arange(60, n - 20, 16)

@@ -93,7 +93,7 @@ def test_turned_clamps_move_what_a_refit_moves(clean: sb.Recording) -> None:
     """The whole scene turns, its start too, about the middle of what is held."""
     base = fit(hanging(), clean)
     found, held = premise(base, "clamps about y"), sorted(hanging().pinned)
-    middle = hanging().positions[held].mean(axis=0)
+    middle = hanging().nodes[held].mean(axis=0)
     ends = []
     for sign in (1, -1):
         d = sign * 0.1 * DEGREE

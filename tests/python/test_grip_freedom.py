@@ -63,7 +63,7 @@ def test_a_tilt_turns_and_a_shift_moves_the_end() -> None:
     rope = scene.ropes["rope"]
     node, ghost = int(rope.particles[0]), int(rope.start_ghost or 0)
     before, tilted, shifted = (
-        sb.simulate(scene, [0.25], SOLVER, values).positions[0]
+        sb.simulate(scene, [0.25], SOLVER, values).nodes[0]
         for values in ({}, {"rope_start_tilt_1": 0.1}, {"rope_start_shift_1": 4e-3, "rope_start_shift_3": 2e-3})
     )
     reach = before[node] - before[ghost]

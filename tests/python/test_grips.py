@@ -125,7 +125,7 @@ def test_tilts_and_roll_at_an_end_that_moves():
     scene = sb.rod(0.5, 6, start=start, end=end, **options)
     rod = scene.ropes["rod"]
     values = {"rod_end_tilt_1": 0.2, "rod_end_tilt_2": -0.1, "rod_roll": 0.7}
-    motion = sb.simulate(scene, TIMES, sb.Solver(h=0.02), values).positions[1:]
+    motion = sb.simulate(scene, TIMES, sb.Solver(h=0.02), values).nodes[1:]
     leave = motion[:, rod.end_ghost] - motion[:, rod.particles[-1]]
     second = np.cross(end.direction, end.director)
     expected = end.direction + 0.2 * end.director - 0.1 * second
@@ -133,7 +133,7 @@ def test_tilts_and_roll_at_an_end_that_moves():
     rolled = np.cos(0.7) * end.director + np.sin(0.7) * second
     assert motion[:, rod.directors[-1]] == approx(rolled[1:], abs=1e-9)
     moved = {"rod_end_shift_1": 4e-3, "rod_end_shift_2": -2e-3, "rod_end_shift_3": 3e-3}
-    shifted = sb.simulate(scene, TIMES, sb.Solver(h=0.02), values | moved).positions
+    shifted = sb.simulate(scene, TIMES, sb.Solver(h=0.02), values | moved).nodes
     expected = end.position + 4e-3 * end.director - 2e-3 * second + 3e-3 * end.direction
     assert shifted[:, rod.particles[-1]] == approx(expected, abs=1e-12)
     assert shifted[1:, rod.end_ghost] - shifted[1:, rod.particles[-1]] == approx(leave, abs=1e-12)
@@ -162,7 +162,7 @@ def test_a_roll_twists_every_joint_alike_at_the_start(roll, moves):
     """Against the rotation of each director about its edge."""
     scene = hanging(moves)
     rod = scene.ropes["rod"]
-    plain, rolled = (sb.simulate(scene, [0.0], values={"rod_roll": r}).positions[0] for r in (0.0, roll))
+    plain, rolled = (sb.simulate(scene, [0.0], values={"rod_roll": r}).nodes[0] for r in (0.0, roll))
     chain = np.array([rod.start_ghost, *rod.particles, rod.end_ghost])
     tangents = units(np.diff(plain[chain], axis=0))
     shares = np.linspace(0.0, roll, len(tangents))[:, None]

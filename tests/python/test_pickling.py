@@ -106,7 +106,7 @@ def test_experiments_and_fits(duplicate: Duplicate) -> None:
     truth = rope()
     motion = sb.simulate(truth, TIMES, SOLVER, values={"rope_EI": 1.2e-3})
     recording = sb.Recording(motion.positions, TIMES)
-    places = [sb.on_particle(k) for k in range(8)]
+    places = [sb.on_particle(k) for k in range(7)]
     experiment = sb.Experiment(scene=truth, recording=recording, markers=places, solver=SOLVER)
     found = sb.fit(experiment, parameters=["rope_EI"], profiles=False)
     other = duplicate(experiment)

@@ -77,7 +77,7 @@ def test_adjoint_and_tangents_are_transposes(scene, solver, seed):
     v = rng.standard_normal(len(inputs)) * np.maximum(np.abs(inputs), 1e-3 * (inputs != 0.0))
     out, x_dot = core.jvp(inputs, v[None], FRAMES, 0.0)
     assume(np.isfinite(out).all())
-    w = rng.standard_normal((len(FRAMES), 3 * scene.particle_count))
+    w = rng.standard_normal((len(FRAMES), 3 * scene.node_count))
     bar = core.vjp(inputs, core.record(inputs, FRAMES, 0.0)[1], FRAMES, w, 0.0)
     forward, reverse = float((x_dot[0].reshape(w.shape) * w).sum()), float(bar @ v)
     size = float(np.abs(x_dot[0].reshape(w.shape) * w).sum() + np.abs(bar * v).sum())

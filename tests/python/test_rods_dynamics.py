@@ -182,7 +182,7 @@ def test_steps_converge_where_frames_roll():
     """To the first order: a substep's first iteration sees the frames of the substep before (docs/decisions has
     multipliers start from zero), and what it turns the forces by is not undone."""
     scene, ends = swinging(12), []
-    start = sb.equilibrium(scene).positions
+    start = sb.equilibrium(scene).nodes
     for rate in (400, 800, 1600, 3200):
         ends.append(sb.simulate(scene, [1.0], sb.Solver(h=1 / rate), start=start).positions[0, :13])
     gaps = [np.abs(a - b).max() for a, b in pairwise(ends)]
@@ -206,7 +206,7 @@ def test_links_converge_to_the_second_order():
     ends = []
     for segments in (10, 20, 40, 80):
         scene = swinging(segments)
-        start = sb.equilibrium(scene).positions
+        start = sb.equilibrium(scene).nodes
         motion = sb.simulate(scene, [1.0], sb.Solver(h=1 / 500), start=start).positions[0]
         ends.append(motion[: segments + 1 : segments // 10])
     gaps = [np.abs(a - b).max() for a, b in pairwise(ends)]

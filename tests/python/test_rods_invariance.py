@@ -40,9 +40,9 @@ def test_directors_have_no_velocity():
     motion = sb.simulate(scene, steps(1 / 480, 5), sb.Solver(h=1 / 480))
     rod = scene.ropes["rod"]
     for frames in (rod.directors, rod.normals):
-        assert np.abs(np.diff(motion.positions[:, frames], axis=0)).max() > 1e-4
-        assert np.linalg.norm(motion.positions[:, frames], axis=2) == approx(1.0, abs=1e-14)
-        assert not motion.velocities[:, frames].any()
+        assert np.abs(np.diff(motion.nodes[:, frames], axis=0)).max() > 1e-4
+        assert np.linalg.norm(motion.nodes[:, frames], axis=2) == approx(1.0, abs=1e-14)
+        assert not motion.node_velocities[:, frames].any()
     assert motion.velocities[:, rod.particles].any()
 
 
@@ -124,10 +124,10 @@ def test_turned_and_moved_scenes_move_alike(shear):
         sb.simulate(gripped(*seen, **options), steps(h, 120), sb.Solver(h=h), values)
         for seen in ((Rotation.identity(), np.zeros(3)), (turn, shift))
     )
-    moved = np.ones((here.positions.shape[1], 1))
+    moved = np.ones((here.nodes.shape[1], 1))
     moved[list(gripped(turn, shift, **options).directors)] = 0.0
-    expected = turn.apply(here.positions.reshape(-1, 3)).reshape(here.positions.shape) + moved * shift
-    assert there.positions == approx(expected, abs=1e-9)
+    expected = turn.apply(here.nodes.reshape(-1, 3)).reshape(here.nodes.shape) + moved * shift
+    assert there.nodes == approx(expected, abs=1e-9)
     for name, force in here.forces.items():
         assert there.forces[name] == approx(force, abs=1e-6), name
 
@@ -135,7 +135,7 @@ def test_turned_and_moved_scenes_move_alike(shear):
 @pytest.mark.parametrize("shear", [{}, SHEAR], ids=["", "shear"])
 def test_gradients_do_not_depend_on_the_place(shear):
     turn, shift, h = Rotation.from_rotvec([0.4, -1.1, 0.7]), np.array([3.0, -2.0, 1.0]), 1 / 480
-    weights = np.random.default_rng(0).standard_normal((1, gripped(turn, shift, **shear).particle_count, 3))
+    weights = np.random.default_rng(0).standard_normal((1, gripped(turn, shift, **shear).node_count, 3))
     found = []
     for seen, bar in (
         ((Rotation.identity(), np.zeros(3)), weights),

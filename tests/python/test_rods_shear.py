@@ -58,7 +58,7 @@ def test_sections_turn_as_the_moment_says_and_edges_lean_by_the_force():
     """Slope of the section at s: P (L s - s^2/2)/EI; the edge's is steeper by P/GA, next to the clamp too."""
     segments, load, GA = 40, 1e-3 * UNIT, 10 * UNIT
     scene = cantilever(segments, load * DOWN, GA=GA)
-    x, rod = sb.equilibrium(scene).positions, scene.ropes["rod"]
+    x, rod = sb.equilibrium(scene).nodes, scene.ropes["rod"]
     s = (np.arange(segments) + 0.5) / segments * LENGTH
     sections = x[rod.normals[1:]] @ DOWN
     edges = np.diff(x[rod.particles], axis=0) @ DOWN * segments / LENGTH

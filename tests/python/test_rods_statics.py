@@ -199,7 +199,7 @@ def test_rest_curvature_closes_a_ring(axis):
         name = f"rod_curvature_{axis}_0"
         plane = np.stack([ALONG, (FIRST, SECOND)[axis - 1]])
         start = clamped(links, points=turned(np.full(links, 6.0 / links)) @ plane)
-        rest = sb.equilibrium(scene, start.positions, values={name: ring})
+        rest = sb.equilibrium(scene, start.nodes, values={name: ring})
 
         def closed(curvature: float, links: int = links) -> np.ndarray:
             wanted = curvature * LENGTH / links * np.append(0.5, np.ones(links - 1))
@@ -223,7 +223,7 @@ def test_rest_curvature_and_twist_make_a_helix():
     world = np.stack([ALONG, FIRST, SECOND])
     for links in (10, 20, 40):
         scene = clamped(links, curvature_modes=(0,), twist_modes=(0,))
-        rod, link, start = scene.ropes["rod"], LENGTH / links, scene.positions.copy()
+        rod, link, start = scene.ropes["rod"], LENGTH / links, scene.nodes
         start[rod.particles] = [expm(s * rate)[:3, 3] @ world for s in rod.arc_length]
         start[rod.directors[1:]] = [expm((k + 0.5) * link * rate)[:3, 1] @ world for k in range(links)]
         values = {"rod_curvature_1_0": kappa1, "rod_curvature_2_0": kappa2, "rod_twist_0": twist}
@@ -257,6 +257,6 @@ def test_straight_torsion(segments):
     assert slopes["rod_length"] == approx(-torque / length, rel=1e-8)
 
     # A frame at s has turned by s/L of the roll; the edges' frames stand in the middles of the links.
-    inner = rest.positions[scene.ropes["rod"].directors[1:-1]]
+    inner = rest.nodes[scene.ropes["rod"].directors[1:-1]]
     turned_by = np.arctan2(inner @ SECOND, inner @ FIRST)
     assert turned_by == approx((np.arange(segments) + 0.5) / segments * angle, abs=1e-9)

@@ -96,13 +96,13 @@ def test_substeps_have_the_bits_and_the_gradients_of_a_rollout(case: str) -> Non
     weights = torch.from_numpy(np.random.default_rng(0).standard_normal(expected.positions.shape))
     (found,) = torch.autograd.grad(sum((w * s.positions).sum() for w, s in zip(weights, states, strict=True)), flat)
     inputs = scene.compiled.inputs()
-    own = {name: inputs[o : o + n] for name, (o, n) in scene.compiled.layout.items()}
+    own = {name: inputs[o : o + n] for name, (o, n) in scene.compiled.given.items()}
     shapes = {"gravity": (3,), "position": (-1, 3), "mass": (-1,), "velocity": (-1, 3)}
     given = {n: torch.from_numpy(own[n].reshape(shape)).requires_grad_() for n, shape in shapes.items()}
     (weights * simulate(scene, times, solver, inputs=given)).sum().backward()
     for name, tensor in given.items():
-        offset, size = scene.compiled.layout[name]
-        if size and (case != "ball" or name != "mass"):  # a ball flies and slides alike whatever its mass
+        offset, size = scene.compiled.given[name]
+        if size and (case not in ("ball", "body") or name != "mass"):  # these move alike whatever their mass
             alike(found[offset : offset + size], tensor.grad.reshape(-1))
 
 
@@ -270,7 +270,7 @@ def test_bad_arguments_are_refused() -> None:
     with pytest.raises(sb.InputError, match=r"Stepper\.inputs"):
         stepper(state, torch.zeros(3, dtype=torch.float64))
     with pytest.raises(sb.InputError, match="mass"):
-        stepper(state, mass=torch.full_like(torch.from_numpy(stepper.scene.base_arrays()["mass"]), -1.0))
+        stepper(state, mass=torch.full((stepper.scene.particle_count,), -1.0, dtype=torch.float64))
     with pytest.raises(sb.InputError, match="floating"):
         Stepper(stepper.scene, dtype=torch.int32)
     with pytest.raises(sb.DivergenceError):

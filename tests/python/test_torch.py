@@ -100,8 +100,8 @@ def scattered(count: int) -> Tensor:
 
 def array(scene: sb.Scene, name: str) -> Tensor:
     compiled = scene.compiled
-    offset, size = compiled.layout[name]
-    return torch.tensor(compiled.inputs()[offset : offset + size].reshape(scene.base_arrays()[name].shape))
+    offset, size = compiled.given[name]
+    return torch.tensor(compiled.inputs()[offset : offset + size].reshape(compiled.shapes[name]))
 
 
 def relative(a: Tensor, b: Tensor) -> float:

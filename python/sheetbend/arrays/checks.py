@@ -81,9 +81,20 @@ def index_array(field: str, values: ArrayLike, count: int) -> np.ndarray:
     return array.ravel().astype(np.int64) % count
 
 
+def node_array(field: str, values: ArrayLike, particles: int, hidden: int = 0) -> np.ndarray:
+    """Numbers of a scene's nodes as one array: particles from 0 on, and hidden nodes from -1 down where some may be."""
+    array = np.atleast_1d(np.array(values))
+    if array.size == 0 or not np.issubdtype(array.dtype, np.integer):
+        raise SceneError(field, "must be particle indices", values, "give whole numbers")
+    bad = array[(array < -hidden) | (array >= particles)]
+    if bad.size:
+        raise SceneError(field, "name particles that do not exist", bad[:5].tolist(), f"use 0 to {particles - 1}")
+    return array.ravel().astype(np.int64)
+
+
 def triangle_array(field: str, values: ArrayLike, count: int) -> np.ndarray:
     """Triangles (n, 3) of three distinct particles each."""
-    flat = index_array(field, values, count)
+    flat = node_array(field, values, count)
     if np.ndim(values) != 2 or np.shape(values)[1] != 3:
         raise SceneError(field, "have the wrong shape", np.shape(values), "give (count, 3) particles")
     corners = flat.reshape(-1, 3)

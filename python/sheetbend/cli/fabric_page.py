@@ -31,7 +31,7 @@ def fabric_page_of(
     motions = []
     if study.config.drape is not None:
         rest = draped_rest(study, found)
-        motions = [of_positions(rest.scene, np.zeros(1), rest.positions[None], "drape")]
+        motions = [of_positions(rest.scene, np.zeros(1), rest.nodes[None], "drape")]
     drawn = [(_CAPTIONS[p.stem], base64.b64encode(p.read_bytes()).decode("ascii")) for p in pictures]
     return fabric_page(
         study.config.fabric.name,

@@ -197,7 +197,7 @@ def _recorded(e: Experiment) -> dict[str, Any]:
 
 def _counts(scene: Scene) -> dict[str, Any]:
     groups = {g.name: len(g.particles) for g in scene.groups}
-    return {"particles": scene.particle_count, "dofs": 3 * len(scene.free), "constraints": groups}
+    return {"particles": scene.particle_count, "dofs": 3 * len(scene.free_nodes), "constraints": groups}
 
 
 def _role(fields: Any) -> str:

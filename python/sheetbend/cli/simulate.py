@@ -23,6 +23,7 @@ from ..motion.simulate import simulate as run_simulation
 from ..motion.solver import Solver
 from ..pictures.movie import Motion, movie_paths, save_movie
 from ..recording.recording import Recording
+from ..scene.body import GROUND
 from ..scene.scene import Scene
 from .folders import made
 from .meshes import WHOLE, MeshFormat, check_format, mesh_files, write_meshes
@@ -168,7 +169,7 @@ def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, mo
     path = folder / f"{task.name}.npz"
     arrays: dict[str, Any] = {f"force_{group}": values for group, values in motion.forces.items()}
     arrays |= {f"pressure_{name}": values for name, values in motion.pressures.items()}
-    arrays |= _readings(task)
+    arrays |= _readings(task) | _poses(task, motion)
     with written(path) as beside:
         np.savez_compressed(
             beside, times=motion.times, positions=motion.positions, velocities=motion.velocities, **arrays
@@ -178,7 +179,7 @@ def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, mo
     if task.predicted is not None:
         more["markers"] = [str(folder / file) for file in save_predicted(*task.predicted(), task.name, folder)]
     if movie is not None:
-        save_movie(Motion(task.scene, motion.times, motion.positions), movie, task.name)
+        save_movie(Motion(task.scene, motion.times, motion.nodes), movie, task.name)
         more["movie"] = [str(movie)]
     summary = {
         "npz": str(path),
@@ -206,6 +207,16 @@ def _run(console: Console, task: Task, folder: Path, mesh: MeshFormat | None, mo
     return summary
 
 
+def _poses(task: Task, motion: Trajectory) -> dict[str, np.ndarray]:
+    """Where the bodies' frames are."""
+    found: dict[str, np.ndarray] = {}
+    for name, body in task.scene.bodies.items():
+        if name != GROUND:
+            found[f"body_{name}_positions"] = body.pose(motion)[0]
+            found[f"body_{name}_quaternions"] = body.quaternions(motion)
+    return found
+
+
 def _readings(task: Task) -> dict[str, np.ndarray]:
     """What the recording's force sensors read along the motion, at the times at which they recorded."""
     e = task.experiment
@@ -226,9 +237,10 @@ def motion_of(task: Task) -> Trajectory:
     if task.static or task.at_rest:
         rest = equilibrium(task.scene)
         if task.static:
-            still = np.zeros_like(rest.positions)[None]
-            return Trajectory(
-                task.times, rest.positions[None], still, {group: values[None] for group, values in rest.forces.items()}
-            )
-        start = rest.positions
+            still = np.zeros_like(rest.nodes)[None]
+            own = slice(len(rest.positions))
+            forces = {group: values[None] for group, values in rest.forces.items()}
+            x = rest.nodes[None]
+            return Trajectory(task.times, x[:, own], still[:, own], forces, nodes=x, node_velocities=still)
+        start = rest.nodes
     return run_simulation(task.scene, task.times, task.solver, start=start)

@@ -107,7 +107,7 @@ def end_on_body(path: str, section: schema.RopeGrip, scene: Scene, place: Array 
     body = named_body(f"{path}.body", section.body or "", scene)
     at = section.position
     if at is None:
-        origin, frame = body.pose(scene.positions)
+        origin, frame = body.pose(scene.nodes)
         at = ((_known(path, "position", None, place) - origin) @ frame).tolist()
     with located(path):
         return body.point(at, section.direction)

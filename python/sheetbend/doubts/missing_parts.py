@@ -49,14 +49,14 @@ def _parts(e: Experiment, inputs: Array) -> Iterator[Part]:
     values = {array: inputs[first : first + size] for array, (first, size) in layout.items()}
     x, mass = values["position"].reshape(-1, 3), values["mass"]
     held = np.zeros(len(x), dtype=bool)
-    held[[*e.scene.pinned, *e.scene.boundary.driven]] = True
+    held[e.scene.held] = True
     free = np.flatnonzero(~held & (mass > 0.0))
     yield from _drags(free, mass, values)
     yield from _masses(e, held)
     yield from _stretch(e, x, values["compliance"])
     yield from _curvature(e, values["rest"], values["compliance"])
     if e.scene.pinned and not len(e.scene.boundary.driven) and not values["velocity"].any():
-        arm = x[free] - x[sorted(e.scene.pinned)].mean(axis=0)
+        arm = x[free] - x[e.scene.held].mean(axis=0)
         entries = (3 * free[:, None] + np.arange(3)).ravel()
         for axis, name in enumerate("xyz"):
             speed = np.cross(np.eye(3)[axis], arm).ravel()

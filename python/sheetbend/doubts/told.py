@@ -186,7 +186,7 @@ def _observe(
                 mine = np.zeros(problem.core.first_rows[i + 1] - problem.core.first_rows[i], dtype=bool)
                 mine[own] = marker == m
                 yield replace(whole, label=f"{name} {k}", column=whole.column[marker == m], rows=mine, marker=name)
-    held, boundary = sorted(e.scene.pinned), e.scene.boundary
+    held, boundary = sorted(e.scene.pinned, key=e.scene.places_of), e.scene.boundary
     if not e.static and e.time_offset is None and len(r.times) > 1 and not boundary.following:
         speed = np.gradient(shown, r.times, axis=0)
         yield change(LATER, "", speed, "s")
@@ -265,7 +265,7 @@ def _simulated(
     every = (1 + count) * n
     measured = np.zeros((len(r.times), every, 3))
     d["observed"] |= {
-        "markers": [*d["observed"]["markers"], *(p.core() for p in more)],
+        "markers": [*d["observed"]["markers"], *(p.core(e.scene) for p in more)],
         "measured": measured,
         "sigma": np.ones(measured.shape[:2]),
     }

@@ -70,7 +70,7 @@ def _grips(scene: Scene) -> list[list[int]]:
     """Held particles in sets that constraints connect, each with more than directors; empty where none is driven."""
     if not scene.boundary.driven:
         return []
-    owner = {p: p for p in (*scene.boundary.driven, *sorted(scene.pinned))}
+    owner = {p: p for p in (*scene.boundary.driven, *sorted(scene.pinned, key=scene.places_of))}
 
     def root(p: int) -> int:
         while owner[p] != p:
@@ -78,7 +78,7 @@ def _grips(scene: Scene) -> list[list[int]]:
         return p
 
     links = [row for g in scene.groups for row in g.particles.tolist()]
-    links += [[d, *frame] for d, frame in scene.directors.items()] + scene.body_nodes[:, :4].tolist()
+    links += [[d, *frame] for d, frame in scene.directors.items()] + scene.body_nodes.tolist()
     for link in links:
         held = [p for p in link if p in owner]
         for other in held[1:]:
@@ -101,9 +101,9 @@ def _motion(e: Experiment, grip: Sequence[int], times: Array, every: Values) -> 
     slot = {p: i for i, p in enumerate(boundary.driven)}
 
     def path(p: int) -> Array:
-        return driven[:, slot[p]] if p in slot else np.broadcast_to(scene.positions[p], (len(at), 3))
+        return driven[:, slot[p]] if p in slot else np.broadcast_to(scene.nodes[p], (len(at), 3))
 
-    center = {int(axis): int(p) for p, *axes in scene.body_nodes[:, :4] for axis in axes}
+    center = {int(axis): int(p) for p, *axes in scene.body_nodes for axis in axes}
     points = []
     for p in grip:
         if p in center:
@@ -111,7 +111,7 @@ def _motion(e: Experiment, grip: Sequence[int], times: Array, every: Values) -> 
         elif p not in scene.directors:
             points.append(path(p))
         elif (start := scene.directors[p][0]) in grip:
-            length = np.linalg.norm(scene.positions[scene.directors[p][1]] - scene.positions[start])
+            length = np.linalg.norm(scene.nodes[scene.directors[p][1]] - scene.nodes[start])
             points.append(path(start) + length * path(p))
     return np.stack(points, axis=1)
 

@@ -94,5 +94,5 @@ def piece(recording: Recording, edges: Array, number: int, behind: float) -> Rec
 
 
 def free_particles(scene: Scene) -> Sequence[int]:
-    """Those whose places and velocities make a gap."""
-    return [int(p) for p in np.setdiff1d(scene.free, list(scene.directors))]
+    """Places of those nodes whose positions and velocities make a gap: of particles, stubs and axes of bodies."""
+    return [int(p) for p in np.setdiff1d(scene.free_nodes, scene.places_of(list(scene.directors)))]

@@ -280,7 +280,7 @@ class Experiment:
             "axes": ["xyz".index(a) for a in self.axes],
             "loss": self.loss,
             "loss_scale": self.loss_scale,
-            "markers": [place.core() for place in self.compared_places],
+            "markers": [place.core(self.scene) for place in self.compared_places],
         }
 
     def extra_terms(self) -> list[Term]:

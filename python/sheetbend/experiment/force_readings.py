@@ -101,7 +101,7 @@ def readings_problem(
     experiment = Experiment(
         scene=scene,
         recording=Recording(np.zeros((2, 1, 3)), np.array(span)),
-        markers=[on_particle(int(scene.free[0]))],
+        markers=[on_particle(int([*scene.free, 0][0]))],
         solver=solver,
         start=start,
         start_time=span[0],

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.checks import finite, index_array, is_number
+from ..arrays.checks import finite, is_number
 from ..errors import InputError
 from ..objects.hand_eye import rotated
 from ..quantities.quantities import Term, product
@@ -172,7 +172,7 @@ class ForceSensor:
         """What the support holds, directors included; the place of the first one is where torques are taken."""
         if len(self.at) == 2 and isinstance(self.at[0], str):
             return end_of_rope(scene, str(self.at[0]), str(self.at[1]), path)
-        found: list[int] = index_array(f"{path}.at", self.at, scene.particle_count).tolist()
+        found: list[int] = scene.node_array(f"{path}.at", self.at).tolist()
         return list(dict.fromkeys(found))
 
     def terms(self, first: int) -> list[Term]:
@@ -204,8 +204,8 @@ class ForceSensor:
         sigma = [self.sigma] * 3 + [_IGNORED if self.torque_sigma is None else self.torque_sigma] * 3
         turns = np.broadcast_to(self._turns, (len(self.recording.times), 3, 3))[kept]
         return {
-            "particles": every,
-            "carried": carried(scene, every),
+            "particles": scene.places_of(every).tolist(),
+            "carried": scene.places_of(carried(scene, every)).tolist(),
             "about": every[0],
             "arm": [float(a) for a in self.arm],
             "sign": 1.0 if self.reads == "support" else -1.0,

@@ -1,4 +1,4 @@
-"""Where all particles of a fitted scene are at the frames of its recording: what pictures, movies and pages draw."""
+"""Where all nodes of a fitted scene are at the frames of its recording: what pictures, movies and pages draw."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from .fit import Fit
 
 
 def fitted_positions(found: Fit, c: Comparison, frames: Sequence[int] | slice = slice(None)) -> Array:
-    """(frames, particles, 3) m, at the substeps nearest to the recorded frames on the scene's clock; of a shape at rest
-    one frame. Costs one simulation.
+    """(frames, nodes, 3) m of all nodes, at the substeps nearest to the recorded frames on the scene's clock; of a
+    shape at rest one frame. Costs one simulation.
 
     Args:
         frames: of the comparison's recording; all by default.
@@ -25,8 +25,8 @@ def fitted_positions(found: Fit, c: Comparison, frames: Sequence[int] | slice = 
     """
     e, values = c.experiment, found.values_of(c.experiment)
     if e.static:
-        return equilibrium(e.scene, values=values).positions[None]
+        return equilibrium(e.scene, values=values).nodes[None]
     at = np.maximum(e.scene_times(c.recording.times[frames], values), 0.0)
     times, which = np.unique(np.rint(at / e.solver.h) * e.solver.h, return_inverse=True)
-    start = equilibrium(e.scene, values=values).positions if e.start == "equilibrium" else None
-    return simulate(e.scene, times, e.solver, values, start).positions[which]
+    start = equilibrium(e.scene, values=values).nodes if e.start == "equilibrium" else None
+    return simulate(e.scene, times, e.solver, values, start).nodes[which]

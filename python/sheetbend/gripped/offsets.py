@@ -67,7 +67,7 @@ def frames_at_markers(e: Experiment, part: Recording, values: Mapping[str, float
     """(frames, free markers, 2, 3): the rope's two directors at its markers, at the substeps nearest to the frames."""
     rod: Rod = e.scene.ropes[NAME]
     times = e.solver.h * np.rint((part.times - (e.start_time or 0.0)) / e.solver.h)
-    x = simulate(e.scene, times, e.solver, values).positions
+    x = simulate(e.scene, times, e.solver, values).nodes
     return np.stack([_directors(rod, place, x) for place in e.places if place is not None], axis=1)
 
 

@@ -22,26 +22,34 @@ class FlatInputs:
         rollouts: of its frames.
         names: of the quantities that are given.
         arrays: of the input arrays that are given.
+        nodes: show all nodes, not particles alone.
     """
 
     def __init__(
-        self, compiled: CompiledScene, rollouts: Rollouts, names: Sequence[str], arrays: Sequence[str]
+        self,
+        compiled: CompiledScene,
+        rollouts: Rollouts,
+        names: Sequence[str],
+        arrays: Sequence[str],
+        nodes: bool = False,
     ) -> None:
         self._compiled, self._rollouts = compiled, rollouts
+        self._shown = compiled.nodes if nodes else compiled.particles
         self._columns = [compiled.names.index(name) for name in names]
-        self._places = [slice(o, o + n) for o, n in (compiled.layout[name] for name in arrays)]
+        self._places = [slice(o, o + n) for o, n in (compiled.given[name] for name in arrays)]
 
     def positions(self, theta: Array, arrays: Sequence[Array]) -> Array:
-        """(*batch, frames, particles, 3) m from theta (*batch, names) and arrays (*batch, ...)."""
+        """(*batch, frames, particles or nodes, 3) m from theta (*batch, names) and arrays (*batch, ...)."""
         batch = theta.shape[:-1]
         states = self._rollouts.value(self._inputs(*self._rows(theta, arrays)))
-        return states.reshape(*batch, *states.shape[1:-1], -1, 3)
+        return states.reshape(*batch, *states.shape[1:-1], -1, 3)[..., : self._shown, :]
 
     def vjp(self, theta: Array, arrays: Sequence[Array], bar: Array) -> tuple[Array, list[Array]]:
         """Cotangents of theta and of the arrays."""
         every, rows = self._rows(theta, arrays)
-        states_bar = np.ascontiguousarray(bar, dtype=float).reshape(len(every), bar.shape[-3], -1)
-        inputs_bar = self._rollouts.vjp(self._inputs(every, rows), states_bar)
+        states_bar = np.zeros((len(every), bar.shape[-3], self._compiled.nodes, 3))
+        states_bar[..., : self._shown, :] = np.asarray(bar, dtype=float).reshape(len(every), *bar.shape[-3:])
+        inputs_bar = self._rollouts.vjp(self._inputs(every, rows), states_bar.reshape(len(every), bar.shape[-3], -1))
         arrays_bar = [inputs_bar[:, p].reshape(a.shape) for p, a in zip(self._places, arrays, strict=True)]
         kept = inputs_bar.copy()
         for place in self._places:

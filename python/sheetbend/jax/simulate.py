@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -24,6 +25,7 @@ def simulate(
     solver: Solver | None = None,
     values: Mapping[str, jax.Array | float] | None = None,
     inputs: Mapping[str, jax.Array] | None = None,
+    nodes: bool = False,
 ) -> jax.Array:
     """Positions of a simulated scene, differentiable once in reverse mode with respect to every array given.
 
@@ -37,9 +39,10 @@ def simulate(
         solver: `Solver()` by default.
         values: quantities to change, by name: scalars.
         inputs: input arrays to replace, by name, as in `sheetbend.torch.simulate`, without batch dimensions.
+        nodes: return the positions of all nodes, as of `sheetbend.torch.simulate`.
 
     Returns:
-        (frames, particles, 3) m; float64 where JAX has 64-bit numbers, else float32.
+        (frames, particles, 3) m, or (frames, nodes, 3) m; float64 where JAX has 64-bit numbers, else float32.
 
     Raises:
         InputError: times off the grid, unknown names, wrong shapes. Values outside their range and motions that diverge
@@ -49,10 +52,10 @@ def simulate(
     compiled, steps = scene.compiled, substeps(times, solver.h)
     given, arrays = _quantities(scene, values or {}), _arrays(scene, inputs or {})
     rollouts = Rollouts(scene, solver.core(compiled), steps, False, solver, replaced=tuple(arrays))
-    flat = FlatInputs(compiled, rollouts, tuple(given), tuple(arrays))
+    flat = FlatInputs(compiled, rollouts, tuple(given), tuple(arrays), nodes)
     kind = jnp.result_type(float)
     theta = jnp.stack([jnp.asarray(v, kind) for v in given.values()]) if given else jnp.zeros(0, kind)
-    shape = (len(steps), compiled.core.dofs // 3, 3)
+    shape = (len(steps), compiled.nodes if nodes else compiled.particles, 3)
     return _function(flat, jax.ShapeDtypeStruct(shape, kind))(theta, [jnp.asarray(a, kind) for a in arrays.values()])
 
 
@@ -90,7 +93,7 @@ def _quantities(scene: Scene, values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _arrays(scene: Scene, inputs: Mapping[str, Any]) -> dict[str, Any]:
-    shapes = {name: tuple(a.shape) for name, a in scene.base_arrays().items() if a.size}
+    shapes = {name: shape for name, shape in scene.compiled.shapes.items() if math.prod(shape)}
     for name, array in inputs.items():
         if name not in shapes:
             fix = f"name one of: {', '.join(shapes)}"

@@ -139,7 +139,7 @@ def growth(e: Experiment, end: float, values: Mapping[str, float] | None = None,
     if e.start == "equilibrium":
         offset, size = compiled.layout["position"]
         try:
-            inputs[offset : offset + size] = equilibrium(e.scene, values=values).positions.ravel()
+            inputs[offset : offset + size] = equilibrium(e.scene, values=values).nodes.ravel()
         except NoEquilibriumError:
             return Growth(e.name, times, sigma)
     x, moved = _rollout(e.scene, e.solver, inputs, steps, t0)
@@ -151,7 +151,7 @@ def _rollout(scene: Scene, solver: Solver, inputs: Array, steps: Array, t0: floa
     """Free particles' positions (frames, free, 3) and displacements (frames, free, 3, directions), up to where the
     motion has an answer."""
     compiled = scene.compiled
-    free = np.setdiff1d(scene.free, list(scene.directors)).astype(int)
+    free = np.setdiff1d(scene.free_nodes, scene.places_of(list(scene.directors)))
     offset, _ = compiled.layout["position"]
     places = (offset + 3 * free[:, None] + np.arange(3)).ravel()
     start = np.zeros((DIRECTIONS, len(inputs)))

@@ -96,7 +96,7 @@ class LiftedWindow:
             "measured": measured,
             "sigma": sigma,
             "axes": [0, 1, 2],
-            "markers": [*observed["markers"], *(on_particle(p).core() for p in particles)],
+            "markers": [*observed["markers"], *(on_particle(p).core(e.scene) for p in particles)],
         }
         core["map"]["base"] = np.append(core["map"]["base"], np.zeros(3 * len(particles)))
         core["t0"] = float(edges[number]) - e.t0

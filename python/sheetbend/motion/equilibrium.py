@@ -13,7 +13,7 @@ from ..arrays.checks import finite
 from ..errors import SceneError, SheetbendError
 from ..scene.scene import Scene
 from .redundancy import warn_redundant
-from .simulate import forces_by_group, pressures_by_volume
+from .simulate import forces_by_group, pressures_by_volume, start_of, whole
 
 _FLAT = 1e-9  # of its extent: a sheet this near to a plane has no side to which it buckles
 
@@ -23,7 +23,7 @@ class NoEquilibriumError(SheetbendError, RuntimeError):
 
 
 def no_rest(scene: Scene, problem: str, positions: np.ndarray) -> NoEquilibriumError:
-    """What the core says ("problem. Fix: what to do") of a start (particles, 3) m that leads to no rest."""
+    """What the core says ("problem. Fix: what to do") of a start (nodes, 3) m that leads to no rest."""
     flat = [name for name, cloth in scene.cloths.items() if _flat(positions[cloth.particles])]
     if flat:
         problem = (
@@ -46,6 +46,7 @@ class Equilibrium:
 
     Attributes:
         positions: (particles, 3) m.
+        nodes: (nodes, 3) m, the positions of all nodes, see `Trajectory.nodes`.
         forces: per group the multipliers (count, rows): minus the tension in N of a distance, minus the moment in N m
             of bending.
         energy: of weight, forces and strain, J; of several equilibria the lowest is the most stable one.
@@ -55,7 +56,7 @@ class Equilibrium:
         pressures: per volume that is kept its multiplier, Pa, inside above outside.
     """
 
-    positions: np.ndarray
+    nodes: np.ndarray
     forces: Mapping[str, np.ndarray]
     energy: float
     unstable_modes: int
@@ -66,6 +67,10 @@ class Equilibrium:
     theta: np.ndarray = field(repr=False)
     pressures: Mapping[str, float] = field(default_factory=dict)
 
+    @property
+    def positions(self) -> np.ndarray:
+        return self.nodes[: self.scene.particle_count]
+
     def gradient(
         self,
         positions_bar: ArrayLike | None = None,
@@ -75,7 +80,8 @@ class Equilibrium:
         """Gradient of a loss with respect to every named quantity, by the implicit function theorem.
 
         Args:
-            positions_bar: (particles, 3), derivative of the loss with respect to the positions.
+            positions_bar: (particles, 3), derivative of the loss with respect to the positions, or (nodes, 3) with
+                respect to those of all nodes.
             forces_bar: per group (count, rows), derivative with respect to `forces`.
             pressures_bar: per volume, derivative with respect to `pressures`.
 
@@ -94,7 +100,13 @@ class Equilibrium:
         x_bar = (
             None
             if positions_bar is None
-            else finite("positions_bar", positions_bar, self.positions.shape, SceneError).ravel()
+            else whole(
+                "positions_bar",
+                np.asarray(positions_bar, dtype=float),
+                self.nodes.shape,
+                self.scene.particle_count,
+                SceneError,
+            ).ravel()
         )
         if forces_bar is None and pressures_bar is None:
             return self.solution.vjp(x_bar, None)
@@ -122,12 +134,13 @@ def equilibrium(
 
     Args:
         scene: is frozen by this.
-        start: (particles, 3) m; the scene's initial positions by default.
+        start: (particles, 3) m, or (nodes, 3) m as of `simulate`; the scene's initial positions by default.
         values: quantities to change, by name.
         stable: leave saddles; False goes to the nearest equilibrium whatever its stability.
 
     Raises:
-        SceneError: the start has the wrong shape, or particles may touch colliders.
+        SceneError: the start has the wrong shape or leaves out hidden nodes that can move, or particles may touch
+            colliders.
         ValueError: air blows on triangles at the start; still air leaves a scene at rest as it is.
         NoEquilibriumError: not converged; says how far it came and what to try.
 
@@ -138,11 +151,12 @@ def equilibrium(
     if compiled.contacts:
         fix = "let it come to rest in a simulation, or leave its contacts out"
         raise SceneError(scene.name, "has contacts, which equilibria do not know", list(compiled.contacts), fix)
-    x = None if start is None else finite("start", start, (scene.particle_count, 3), SceneError).ravel()
     theta = compiled.values(values)
-    out = _core.equilibrium(compiled.core, compiled.inputs(theta), x, stable)
+    inputs = compiled.inputs(theta)
+    x = None if start is None else whole_start(scene, start, inputs)
+    out = _core.equilibrium(compiled.core, inputs, x, stable)
     if not out.converged:
-        raise no_rest(scene, out.message, scene.positions if x is None else x.reshape(-1, 3))
+        raise no_rest(scene, out.message, scene.nodes if x is None else x.reshape(-1, 3))
     warn_redundant(scene.name, out.redundant)
     return Equilibrium(
         out.positions.reshape(-1, 3),
@@ -156,6 +170,14 @@ def equilibrium(
         theta=theta,
         pressures={name: float(p) for name, p in pressures_by_volume(scene, out.multipliers).items()},
     )
+
+
+def whole_start(scene: Scene, start: ArrayLike, inputs: np.ndarray, field: str = "start") -> np.ndarray:
+    """(3 nodes,) m, positions where hidden nodes that they leave out are where the inputs have them."""
+    offset, size = scene.compiled.layout["position"]
+    x, own = inputs[offset : offset + size].copy(), start_of(scene, start, SceneError, field)
+    x[: own.size] = own.ravel()
+    return x
 
 
 def equilibria(

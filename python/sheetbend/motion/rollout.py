@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _core
-from ..arrays.checks import finite
 from ..errors import EmptyGradientError, InputError
 from ..scene.scene import Scene
-from .simulate import divergence, substeps
+from .simulate import divergence, substeps, whole
 from .solver import Solver
 from .tape import TapePlan, planned
 
@@ -27,7 +26,8 @@ class Gradient:
 
     Attributes:
         quantities: derivative with respect to each named quantity, by its name.
-        inputs: derivative with respect to each input array, by its name and in its shape: "position", "velocity"
+        inputs: derivative with respect to each input array, by its name and in its shape, of particles without hidden
+            nodes, whose share reaches the quantities: "position", "velocity"
             (particles, 3), "mass" (particles,), "compliance", "damping" (constraints,), "rest" (all rest
             parameters,), "boundary", "force" (knots times particles, 3), "gravity" (3,), "drag_linear",
             "drag_quadratic" (particles,), "wind" (knots, 3), "air_normal", "air_tangential", "pressure" (triangles
@@ -72,6 +72,7 @@ class Rollout:
     Attributes:
         times: (frames,) s.
         positions: (frames, particles, 3) m.
+        nodes: (frames, nodes, 3) m, the positions of all nodes, see `Trajectory.nodes`.
         plan: what the gradient costs.
     """
 
@@ -89,11 +90,12 @@ class Rollout:
         with divergence(scene):
             states, self._tape = self._core.record(self._inputs, self._steps, 0.0, allowed)
         self.times: Array = np.array(self._steps) * solver.h
-        self.positions: Array = states.reshape(len(self._steps), -1, 3)
+        self.nodes: Array = states.reshape(len(self._steps), -1, 3)
+        self.positions: Array = self.nodes[:, : self._compiled.particles]
 
     def gradient(self, positions_bar: ArrayLike) -> Gradient:
         """The gradient of a loss whose derivative with respect to the positions is `positions_bar`, (frames,
-        particles, 3).
+        particles, 3), or with respect to those of all nodes, (frames, nodes, 3).
 
         May be called again, with other cotangents, and from several threads; where the tape dropped states they take
         turns.
@@ -104,8 +106,7 @@ class Rollout:
             UnconvergedError: as `rollout`.
         """
         bar = np.asarray(positions_bar, dtype=float)
-        if bar.shape != self.positions.shape or not np.isfinite(bar).all():
-            bar = finite("positions_bar", positions_bar, self.positions.shape, InputError)
+        bar = whole("positions_bar", bar, self.nodes.shape, self._compiled.particles, InputError)
         with divergence(self._scene):
             inputs_bar, recomputed = self._core.reverse(self._inputs, self._tape, self._steps, bar, 0.0)
         by_quantity = self._compiled.theta_bar(self._theta, inputs_bar)

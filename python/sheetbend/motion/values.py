@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _core
-from ..arrays.checks import finite
-from ..errors import SceneError
 from ..quantities.kinds import KINDS
 from ..scene.group import Group
 from ..scene.scene import Array, Scene
-from .equilibrium import Equilibrium
+from .equilibrium import Equilibrium, whole_start
 from .simulate import forces_by_group
 
 
@@ -24,17 +22,18 @@ def constraint_values(
     """C of every constraint of a group, by group (count, rows), in the units of its kind.
 
     Args:
-        positions: (particles, 3) m; the scene's initial ones by default.
+        positions: (particles, 3) m, or (nodes, 3) m of all nodes, which it must be where hidden ones can move; the
+            scene's initial ones by default.
         values: quantities to change, by name.
 
     Raises:
         SceneError: wrong shapes or names.
     """
-    x = scene.positions if positions is None else finite("positions", positions, (scene.particle_count, 3), SceneError)
     compiled = scene.compiled
     inputs = compiled.inputs(compiled.values(values))
+    x = scene.nodes.ravel() if positions is None else whole_start(scene, positions, inputs, "positions")
     C, _ = _core.evaluate_constraints(
-        compiled.core, inputs, x.ravel(), np.zeros(compiled.core.rows + len(scene.volumes.triangles))
+        compiled.core, inputs, x, np.zeros(compiled.core.rows + len(scene.volumes.triangles))
     )
     return forces_by_group(scene, C)
 
@@ -71,16 +70,17 @@ def elastic_energy_gradient(rest: Equilibrium) -> dict[str, float]:
 
 
 def support_forces(rest: Equilibrium) -> Array:
-    """(particles, 3) N, the force of the supports on held particles at rest, zero on free ones.
+    """(nodes, 3) N, the force of the supports on held nodes at rest, zero on free ones: of particles, and behind them
+    of hidden nodes such as the stub of a clamp, which carries a part of its moment.
 
     They carry what constraints, kept volumes and given pressures put on held particles; not the weight of those, whose
     masses are not used.
     """
     scene, compiled = rest.scene, rest.scene.compiled
     inputs = compiled.inputs(rest.theta)
-    _, forces = _core.evaluate_constraints(compiled.core, inputs, rest.positions.ravel(), rest.solution.multipliers)
-    forces = -(forces.reshape(-1, 3) + _pressure_forces(scene, inputs, rest.positions))
-    forces[scene.free] = 0.0
+    _, forces = _core.evaluate_constraints(compiled.core, inputs, rest.nodes.ravel(), rest.solution.multipliers)
+    forces = -(forces.reshape(-1, 3) + _pressure_forces(scene, inputs, rest.nodes))
+    forces[scene.free_nodes] = 0.0
     return forces
 
 

@@ -136,7 +136,7 @@ class HandEye:
 
     def place(self, scene: Scene, particles: Array) -> None:
         """Let the correction move the initial positions of particles (k,), as a rigid body."""
-        x = scene.positions[particles]
+        x = scene.nodes[particles]
         index = (3 * np.asarray(particles)[:, None] + np.arange(3)).ravel()
         for factors, coefficients in self._moves(scene, (x - self.about)[None], np.ones(len(x), dtype=bool)):
             kept = coefficients[0].ravel() != 0.0

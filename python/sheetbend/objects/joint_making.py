@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..arrays.checks import finite, is_number
 from ..errors import SceneError
 from ..quantities.expression import Array, Expression, cross, expressions, numbers, terms_of, vector
-from ..scene.body import AXES, GROUND, PLACE, Body, FrameState
+from ..scene.body import AXES, GROUND, PLACE, Body, FrameState, HasMotion
 from ..scene.scene import Scene
 from .chain import first_value, unit_vector
 from .grip import any_across
@@ -39,11 +39,11 @@ class Joint:
     places: tuple[Array, Array] = field(repr=False)
     axes: tuple[Array, Array] = field(repr=False)
 
-    def angle(self, positions: ArrayLike) -> Array:
+    def angle(self, motion: HasMotion | ArrayLike) -> Array:
         """(...,) rad, by which the lower body has turned about the joint's axis against the upper one, from how they
-        were given; at positions (..., particles, 3) of the scene."""
+        were given; along a trajectory, or at positions (..., nodes, 3) m of all nodes of the scene."""
         sides = zip((self.upper, self.lower), self.axes, strict=True)
-        first, second = (body.pose(positions)[1] @ own.T for body, own in sides)
+        first, second = (body.pose(motion)[1] @ own.T for body, own in sides)
         e, f, u = first[..., 1], first[..., 2], second[..., 1]
         return np.asarray(np.arctan2((f * u).sum(axis=-1), (e * u).sum(axis=-1)))
 
@@ -51,8 +51,8 @@ class Joint:
 def ground(scene: Scene) -> Body:
     """The body that stands for the world: pinned at its origin, along its axes. It has no quantities."""
     if GROUND not in scene.bodies:
-        nodes = scene.add_particles(np.vstack([np.zeros(3), np.eye(3)]), np.array([1.0, 1e-12, 1e-12, 1e-12]))
-        scene.pin(nodes)
+        x, mass = np.vstack([np.zeros(3), np.eye(3)]), np.array([1.0, 1e-12, 1e-12, 1e-12])
+        nodes = scene.add_hidden(x, mass, pinned=True)
         zero, one = expressions(np.zeros(3)), expressions(np.eye(3))
         scene.bodies[GROUND] = Body(GROUND, nodes, zero, one, scene, FrameState(zero, one, zero, zero), "pinned")
     return scene.bodies[GROUND]
@@ -90,7 +90,7 @@ class Making:
         self.places: list[Array] = []
         self.axes: list[Array] = []
         for body, label in ((self.upper, "upper"), (lower, "lower")):
-            origin, frame = body.pose(self.scene.positions)
+            origin, frame = body.pose(self.scene.nodes)
             own = [f"{name}_{label}_{a}" for a in AXES]
             for quantity, value in zip(own, (place - origin) @ frame, strict=True):
                 self.scene.add_quantity(quantity, float(value), "m", positive=False, scale=PLACE)

@@ -1,6 +1,6 @@
 """What turns a hinge or resists it: a torsion spring, viscosity, a servo, or the torque of a motor over time.
 
-All are the constraint `joint_angle`, whose dial is the x of a particle: pinned at zero for a spring, driven for a
+All are the constraint `joint_angle`, whose dial is the x of a hidden node: pinned at zero for a spring, driven for a
 servo. The dial of a motor is free: the rotor, an axis with inertia and no weight, which turns with the joint and on
 which the torque acts.
 """
@@ -25,15 +25,14 @@ def add_spring(made: Making, stiffness: float | None, rest: float, viscosity: fl
     """A torsion spring, viscosity, or both, against a dial at zero."""
     if stiffness is None and viscosity is None:
         return
-    dial = made.scene.add_particles(np.zeros((1, 3)), 1.0)
-    made.scene.pin(dial)
+    dial = made.scene.add_hidden(np.zeros((1, 3)), 1.0, pinned=True)
     _angle(made, "spring", int(dial[0]), stiffness, rest, viscosity)
 
 
 def add_servo(made: Making, knots: Knots, stiffness: float | None, rest: float, viscosity: float | None) -> None:
     """A dial that is driven, which the joint follows at once, or as a spring does."""
     t, angles = _knots(f"{made.name}.servo", knots)
-    dial = made.scene.add_particles([[float(angles[0]), 0.0, 0.0]], 1.0)
+    dial = made.scene.add_hidden([[float(angles[0]), 0.0, 0.0]], 1.0)
     made.scene.drive(dial, t, angles[:, None, None] * np.eye(3)[0])
     if stiffness is None and (rest or viscosity is not None):
         fix = "give a stiffness too, or put the rest angle into the servo's"

@@ -174,7 +174,7 @@ def fixed(upper: Body | None, lower: Body, *, at: ArrayLike | None = None, name:
     Raises:
         SceneError: as `ball`.
     """
-    place = lower.pose(lower.scene.positions)[0] if at is None and isinstance(lower, Body) else at
+    place = lower.pose(lower.scene.nodes)[0] if at is None and isinstance(lower, Body) else at
     made = Making("fixed", upper, lower, np.zeros(3) if place is None else place, (1.0, 0.0, 0.0), name)
     made.hang(fixed=True)
     made.coincide()

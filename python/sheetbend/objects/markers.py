@@ -45,11 +45,12 @@ class Place:
             raise SceneError("normal", "has no length", n.tolist(), "give the normal of the plane of motion")
         return replace(self, offset=tuple(off.tolist()), normal=tuple((n / np.linalg.norm(n)).tolist()))
 
-    def core(self) -> dict[str, Any]:
+    def core(self, scene: Scene) -> dict[str, Any]:
         """As the compiled core takes it: places of four coordinates or more, padded with zero weights."""
         pad = max(4 - len(self.particles), 0)
+        dof = (3 * scene.places_of(self.particles)).tolist()
         return {
-            "dof": [3 * p for p in self.particles] + [3 * self.particles[-1]] * pad,
+            "dof": dof + dof[-1:] * pad,
             "weight": [*self.weights, *[0.0] * pad],
             "tangent": [*self.tangent, *[0.0] * pad][:4],
             "normal": list(self.normal),
@@ -153,28 +154,34 @@ def places_for(
 
     Args:
         markers: by marker name, in the recording's order, or None: equally spaced along the only rope, or where the
-            recording shows every particle of the scene, its clamps' ghosts among them, on these.
+            recording shows the stubs of its clamps behind its particles, as exports of earlier versions do, on these.
         positions: (frames, markers, 3) m, what was recorded.
 
     Raises:
         SceneError: unknown names, a wrong number, particles that do not exist, or no rope (or several) to spread
             markers along.
     """
-    if markers is None and positions is not None and _shows_particles(scene, positions):
-        markers = [on_particle(p) for p in range(scene.particle_count)]
+    if markers is None and positions is not None and _shows_ghosts(scene, positions):
+        markers = [on_particle(p) for p in _as_created(scene)]
     places = _places_for(scene, markers, names)
     for name, place in zip(names, places, strict=True):
-        if place is not None and not all(0 <= p < scene.particle_count for p in place.particles):
+        if place is not None and not all(-scene.hidden_count <= p < scene.particle_count for p in place.particles):
             fix = f"use particles 0 to {scene.particle_count - 1}"
             raise SceneError("markers", f"put '{name}' on particles that do not exist", place.particles, fix)
     return places
 
 
-def _shows_particles(scene: Scene, positions: np.ndarray) -> bool:
-    """Whether a recording has as many markers as the scene with one clamped rope has particles, and that of each ghost
+def _as_created(scene: Scene) -> list[int]:
+    """Particles, then hidden nodes, in the order in which they were added."""
+    return [*range(scene.particle_count), *range(-1, -1 - scene.hidden_count, -1)]
+
+
+def _shows_ghosts(scene: Scene, positions: np.ndarray) -> bool:
+    """Whether a recording has as many markers as the scene with one clamped rope has nodes, and that of each ghost
     beside the rope's end that it belongs to: a marker that far along the rope would be a rope's length away."""
-    if len(scene.ropes) != 1 or positions.shape[1] != scene.particle_count:
+    if len(scene.ropes) != 1 or positions.shape[1] != scene.node_count:
         return False
+    positions = positions[:, np.argsort(scene.places_of(_as_created(scene)))]
     (rope,) = scene.ropes.values()
     first, last = rope.particles[0], rope.particles[-1]
     ghosts = [(g, end) for g, end in ((rope.start_ghost, first), (rope.end_ghost, last)) if g is not None]

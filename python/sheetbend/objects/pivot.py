@@ -52,10 +52,8 @@ def add_resistance(
 
 
 def _fixed_above(scene: Scene, arm: Arm) -> int:
-    """A fixed particle straight above the pivot, from which the hinge counts its angle."""
-    before = int(scene.add_particles([np.add(arm.root, (0.0, 0.0, 1.0))], 0.0)[0])
-    scene.pin([before])
-    return before
+    """A fixed, hidden node straight above the pivot, from which the hinge counts its angle."""
+    return int(scene.add_hidden([np.add(arm.root, (0.0, 0.0, 1.0))], 0.0, pinned=True)[0])
 
 
 def _viscous(scene: Scene, arm: Arm, before: int, viscosity: float) -> None:
@@ -70,8 +68,7 @@ def _dry(scene: Scene, arm: Arm, carrier: Arm | None, before: int, friction: flo
             raise SceneError(
                 f"{arm.name}.{field}", "must be positive", value, "give a positive number, or leave it out"
             )
-    (stuck,) = scene.add_particles(np.zeros((1, 3)), 1.0)
-    scene.pin([stuck])
+    (stuck,) = scene.add_hidden(np.zeros((1, 3)), 1.0, pinned=True)
     angles = [(1.0, arm)] if carrier is None else [(1.0, arm), (-1.0, carrier)]
     scene.add_terms([Term("position", 3 * int(stuck), sign, ((f"{a.name}_angle", "identity"),)) for sign, a in angles])
     quantity, group = scene.add_quantity(f"{arm.name}_friction", friction, "N m"), f"{arm.name}_friction_hinge"

@@ -31,7 +31,7 @@ HOLD = 1e-4
 @dataclass(frozen=True)
 class Rod(Rope):
     """A rope with material frames: `directors` are those of its edges, with the grips' own first and last; so are
-    `normals`, those of sections that shear."""
+    `normals`, those of sections that shear. Both are hidden nodes, whose numbers index `Trajectory.nodes`."""
 
     directors: Array = field(default_factory=lambda: np.zeros(0, dtype=int))
     normals: Array = field(default_factory=lambda: np.zeros(0, dtype=int))
@@ -194,7 +194,7 @@ def add_rod(
     along = [e.along(edge) for e, edge in zip(ends, (shape[1] - shape[0], shape[-1] - shape[-2]), strict=True)]
     stubs = [e.stub(link) for e in ends]
     ghosts = [
-        None if way is None else int(scene.add_particles([at + stub * way], STUB_MASS * density * link)[0])
+        None if way is None else int(scene.add_hidden([at + stub * way], STUB_MASS * density * link)[0])
         for way, at, stub in zip(along, (shape[0], shape[-1]), stubs, strict=True)
     ]
     chain = np.array([*(g for g in ghosts[:1] if g is not None), *nodes, *(g for g in ghosts[1:] if g is not None)])
@@ -205,7 +205,7 @@ def add_rod(
         first = any_across(along[0]) if first is None else first
         last = carried(first - (first @ along[0]) * along[0], along[0], along[1][None])[0]
     edges = np.stack([chain[:-1], chain[1:]], axis=1)
-    frames = initial_frames(name, scene.positions[chain], first, last, turns)
+    frames = initial_frames(name, scene.nodes[chain], first, last, turns)
     normals = None if GA is None else scene.add_normals(edges)
     directors = scene.add_directors(edges, frames, normals)
     scene.add_quantity(f"{name}_GJ", GJ, "N m^2")

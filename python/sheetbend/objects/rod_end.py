@@ -149,7 +149,7 @@ def spread_roll(scene: Scene, roll: str, directors: Array, shares: Array) -> Non
         shares: (k,) of the quantity `roll`.
     """
     edges = np.array([scene.directors[int(d)][:2] for d in directors])
-    x = scene.positions
+    x = scene.nodes
     along = x[edges[:, 1]] - x[edges[:, 0]]
     first, second = x[directors], np.cross(along / np.linalg.norm(along, axis=1, keepdims=True), x[directors])
     index = (3 * np.asarray(directors)[:, None] + np.arange(3)).ravel()

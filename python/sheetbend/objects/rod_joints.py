@@ -50,8 +50,7 @@ class Joints:
         softness = mode_quantities(scene, name, "softness", softness_modes, self._s)
         stencils, kind = self._stencils, "section_curvature" if self._sections else "material_curvature"
         if yield_curvature is not None:
-            self._sets = scene.add_particles(np.zeros((len(stencils), 3)), 1.0)
-            scene.pin(self._sets)
+            self._sets = scene.add_hidden(np.zeros((len(stencils), 3)), 1.0, pinned=True)
             kind = "section_yielding_curvature" if self._sections else "yielding_curvature"
             stencils = np.column_stack([stencils, self._sets])
         own = None

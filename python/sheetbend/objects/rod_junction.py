@@ -61,21 +61,21 @@ class Junction:
     def direction(self) -> Array:
         """The first rod's direction of travel, (3,)."""
         assert self._scene is not None
-        x = self._scene.positions
+        x = self._scene.nodes
         along = x[self._ghost] - x[self._node] if self._arrives else x[self._node] - x[self._ghost]
         return np.asarray(along / np.linalg.norm(along))
 
     def carried(self, direction: Array) -> Array:
         """The first rod's director (3,), carried to another direction of travel (3,)."""
         assert self._scene is not None
-        return carried(self._scene.positions[self._director], self.direction, direction[None])[0]
+        return carried(self._scene.nodes[self._director], self.direction, direction[None])[0]
 
     def join(
         self, scene: Scene, label: str, node: int, ghost: int, director: int, normal: int | None, arrives: bool
     ) -> None:
         """Take in a rod's short link between `node` and `ghost`, which does not shear; it `arrives` where the rod
         ends."""
-        x = scene.positions
+        x = scene.nodes
         reach = float(np.linalg.norm(x[ghost] - x[node]))
         scene.add_constraints("distance", [[node, ghost]], name=f"{label}_stub", rest=reach)
         if normal is not None:

@@ -36,7 +36,8 @@ GHOST = 0.01  # length of a clamp's ghost link over a rope's link; only its dire
 
 @dataclass(frozen=True)
 class Rope:
-    """A rope in a scene: particles in order, material coordinates [m], and the ghosts that give clamps a direction."""
+    """A rope in a scene: particles in order, material coordinates [m], and the ghosts that give clamps a direction,
+    hidden nodes whose numbers index `Trajectory.nodes`."""
 
     name: str
     particles: Array
@@ -122,7 +123,7 @@ def add_rope(
             loss_frequency (Hz); instead of the two time constants: tau = loss_factor / (2 pi loss_frequency). In
             rubbers it varies less with frequency than tau.
         drag_linear, drag_quadratic: air drag per length, isotropic.
-        clamp_start, clamp_end: the rope's direction of travel at an end, held by a ghost particle half a joint away;
+        clamp_start, clamp_end: the rope's direction of travel at an end, held by a hidden node half a joint away;
             the end is pinned.
         grip_start, grip_end: what holds an end and moves it: its place and its direction of travel. A rope has no
             twist: the roll of a grip plays no part. The initial shape is fitted to the length between grips. A point of
@@ -225,14 +226,14 @@ def _clamp(
     link: float,
     normal: Array | None,
 ) -> int | None:
-    """Pin an end and hold its direction of travel by a ghost particle behind the start or beyond the end."""
+    """Pin an end and hold its direction of travel by a ghost, a hidden node, behind the start or beyond the end."""
     if clamp is None:
         return None
     along = unit_vector(f"{name}.clamp_{end}", clamp)
     node, place, sign = (nodes[0], shape[0], -1.0) if end == "start" else (nodes[-1], shape[-1], 1.0)
     reach = sign * GHOST * link
-    ghost = int(scene.add_particles([place + reach * along], 1.0)[0])
-    scene.pin([node, ghost])
+    ghost = int(scene.add_hidden([place + reach * along], 1.0, pinned=True)[0])
+    scene.pin([node])
     if normal is None:
         return ghost
     angle = scene.add_quantity(f"{name}_{end}_angle", 0.0, "rad", positive=False, scale=0.1)

@@ -58,7 +58,7 @@ def placed(grip: Grip | BodyPoint) -> tuple[Array, Array]:
 
 def hold(scene: Scene, grip: Grip, node: int, reach: float) -> int:
     """Give an end the place and the direction of a grip, by a ghost particle `reach` m along the rope from it."""
-    ghost = int(scene.add_particles([grip.position[0] + reach * grip.direction[0]], 1.0)[0])
+    ghost = int(scene.add_hidden([grip.position[0] + reach * grip.direction[0]], 1.0)[0])
     if grip.stays:
         scene.pin([node, ghost])
         return ghost
@@ -73,7 +73,7 @@ def ride(scene: Scene, point: BodyPoint, name: str, node: int, reach: float, mas
     if point.along is None:
         return None
     at, along = placed(point)
-    ghost = int(scene.add_particles([at + reach * along], mass)[0])
+    ghost = int(scene.add_hidden([at + reach * along], mass)[0])
     hold_place(scene, point, ghost, f"{name}_stub", reach)
     return ghost
 

@@ -133,7 +133,7 @@ class Tool:
             SceneError: shapes, NaN, or particles that are driven already.
         """
         which = np.atleast_1d(np.asarray(particles))
-        at = self.held(scene.positions[which]) if points is None else points
+        at = self.held(scene.nodes[which]) if points is None else points
         path = self.path(finite("tool.points", at, (len(which), 3), SceneError))
         self.frame.drive(scene, which, self.times, path)
         if self.flex is not None:

@@ -64,7 +64,7 @@ def _recording(recording: Recording) -> str:
 def _scene(scene: Scene) -> str:
     groups = ", ".join(f"{len(g.particles)} {g.kind} ({g.name})" for g in scene.groups)
     about = f"{scene.particle_count} particles; {groups or 'no constraints'}; drawn where the scene starts"
-    return _motion(of_positions(scene, np.zeros(1), scene.positions[None]), about)
+    return _motion(of_positions(scene, np.zeros(1), scene.nodes[None]), about)
 
 
 def _trajectory(motion: Trajectory) -> str | None:
@@ -73,7 +73,7 @@ def _trajectory(motion: Trajectory) -> str | None:
 
 def _equilibrium(rest: Equilibrium) -> str:
     about = f"at rest, energy {rest.energy:.4g} J"
-    return _motion(of_positions(rest.scene, np.zeros(1), rest.positions[None]), about)
+    return _motion(of_positions(rest.scene, np.zeros(1), rest.nodes[None]), about)
 
 
 def _motion(shown: Shown, about: str = "") -> str:

@@ -99,11 +99,11 @@ def predicted_motion(recording: Recording, predicted: Array) -> Shown:
 
 def of_trajectory(scene: Scene, motion: Trajectory, name: str = "") -> Shown:
     """A simulated motion."""
-    return of_positions(scene, motion.times, motion.positions, name)
+    return of_positions(scene, motion.times, motion.nodes, name)
 
 
 def of_positions(scene: Scene, times: Array, positions: Array, name: str = "") -> Shown:
-    """A scene whose particles are at positions (frames, particles, 3) m at times (frames,) s."""
+    """A scene whose nodes are at positions (frames, nodes, 3) m at times (frames,) s."""
     return _shown(name or scene.name, scene, times, positions, {})
 
 

@@ -19,7 +19,7 @@ def body_lines(scene: Scene, positions: Array) -> dict[str, Array]:
     its center to the origin of its frame.
 
     Args:
-        positions: (frames, particles, 3) m.
+        positions: (frames, nodes, 3) m of all nodes, such as `Trajectory.nodes`.
     """
     found = {}
     for body in scene.bodies.values():
@@ -27,10 +27,10 @@ def body_lines(scene: Scene, positions: Array) -> dict[str, Array]:
             continue
         mass, *second = body.inertia_of_nodes()
         sides = np.sqrt(12.0 * np.maximum(second, 0.0) / mass)
+        origin, _ = body.pose(positions)
         center, *axes = np.moveaxis(positions[:, body.particles], 1, 0)
         turn = np.stack(axes, axis=2)
         corners = center[:, None] + np.einsum("fab,kb->fka", turn, sides * CORNERS)
-        origin, _ = body.pose(positions)
         lines = [corners[:, pair] for pair in EDGES]
         found[body.name] = np.stack([*lines, np.stack([center, origin], axis=1)], axis=1)
     return found

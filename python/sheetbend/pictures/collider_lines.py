@@ -22,17 +22,15 @@ def collider_lines(scene: Scene, times: Array, positions: Array) -> dict[str, Ar
 
     Args:
         times: (frames,) s.
-        positions: (frames, particles, 3) m, which say how large a plane is drawn.
+        positions: (frames, particles, 3) m, or of all nodes, which say how large a plane is drawn.
     """
     used = {contact.collider for contact in scene.contacts.contacts}
-    found = {}
-    carried = [*(contact.carried for contact in scene.contacts.contacts), scene.body_nodes[:, 1:4].ravel()]
-    real = np.setdiff1d(np.arange(positions.shape[1]), np.concatenate([np.zeros(0, int), *carried]))
+    found, particles = {}, positions[:, : scene.particle_count]
     for place, (name, collider) in enumerate(scene.contacts.colliders.items()):
         if place not in used:
             continue
         x, turns = _poses(collider.poses, times)
-        lines = _grid(positions[:, real], x[0], turns[0]) if collider.shape == "plane" else _outline(collider)
+        lines = _grid(particles, x[0], turns[0]) if collider.shape == "plane" else _outline(collider)
         found[name] = np.einsum("fij,lkj->flki", turns, lines) + x[:, None, None]
     return found
 

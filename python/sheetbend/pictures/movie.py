@@ -36,7 +36,8 @@ class Motion:
     Attributes:
         scene: whose cloths, solids, ropes and bodies are drawn.
         times: (frames,) s.
-        positions: (frames, particles, 3) m.
+        positions: (frames, nodes, 3) m of all nodes, such as `Trajectory.nodes`; of particles alone where there is no
+            body.
         measured: (frames, markers, 3) m, drawn as dots, NaN where not seen; None without a recording.
         simulated: (frames, markers, 3) m, of the same markers: a line leads from each dot to where it should be.
     """

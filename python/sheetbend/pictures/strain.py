@@ -48,13 +48,17 @@ def strain_fields(
 
     Args:
         scene: is frozen by this.
-        positions: (particles, 3) m, of the whole scene.
+        positions: (particles, 3) m, of the whole scene, or of all its nodes (nodes, 3) m.
         values: quantities to change, by name.
 
     Returns:
         (m,) each; the energy is NaN on triangles that are held by all corners.
     """
-    x = finite("positions", positions, (scene.particle_count, 3), SceneError)
+    given = finite("positions", positions, None, SceneError)
+    if given.shape not in ((scene.particle_count, 3), (scene.node_count, 3)):
+        raise SceneError("positions", "has the wrong shape", given.shape, f"give {(scene.particle_count, 3)}")
+    x = scene.nodes  # a cloth has no hidden ones
+    x[: len(given)] = given
     strain = green_strain(cloth.mesh, x[cloth.particles])
     fields = {f"strain_{name}": strain[:, k] for k, name in enumerate(("warp", "weft", "shear"))}
     group, _, _ = scene.group(f"{cloth.name}_membrane")

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import SceneError
 
@@ -65,6 +66,12 @@ class Term:
         """Names of the quantities in it."""
         return tuple(name for name, _ in (*self.factors, *self.exponents))
 
+    def places(self, offset: int, size: int) -> np.ndarray:
+        """(k,) where its entries stand in the flat inputs, whose array begins at `offset`; those of hidden nodes count
+        from the end of their array."""
+        own = np.ravel(self.index)
+        return offset + np.where(own < 0, own + size, own)
+
 
 class Builder(Protocol):
     """A scene under construction, as seen by what adds particles' loads and named numbers to it."""
@@ -74,6 +81,11 @@ class Builder(Protocol):
 
     @property
     def positions(self) -> np.ndarray: ...
+
+    @property
+    def nodes(self) -> np.ndarray: ...
+
+    def node_array(self, field: str, nodes: ArrayLike) -> np.ndarray: ...
 
     def add_quantity(
         self,

@@ -18,6 +18,7 @@ from .body import AXES, PLACE, TURN, Body, FrameState
 from .held import HeldScene
 from .in_frame import HasCorrection, add_motion_in_frame, drive_in_frame
 from .inertia import Inertia
+from .nodes import SceneNodes
 from .scene_data import SceneData
 
 Array = np.ndarray
@@ -79,6 +80,11 @@ def nodes_of(inertia: Inertia, start: Start) -> tuple[Array, Array]:
     x[0] += start.at
     v[0] += start.velocity
     return x, v
+
+
+def add_nodes(scene: SceneNodes, x: Array, v: Array) -> Array:
+    """The numbers (4,) of a body's nodes, which start at x, v (4, 3): its center, a particle, and three hidden axes."""
+    return np.concatenate([scene.add_particles(x[:1], 0.0, v[:1]), scene.add_hidden(x[1:], 0.0, v[1:])])
 
 
 def make_body(scene: SceneData, name: str, inertia: Inertia, nodes: Array, start: FrameState, role: str) -> Body:

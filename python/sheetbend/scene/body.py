@@ -1,9 +1,10 @@
 """A rigid body in a scene: the four nodes that it is, points on it, and what its motion shows.
 
-The nodes are the center of mass p, a particle of the body's mass m, and three axes a1, a2, a3 along the principal axes
-of inertia, orthonormal and of masses J_k = (I1 + I2 + I3)/2 - I_k [kg m^2] (Betsch & Steinmann 2001, Multibody Syst.
-Dyn. 6, 367). The material point X, counted from p along the principal axes, is at p + X1 a1 + X2 a2 + X3 a3. The user's
-frame of the body lies anywhere: it has the center of mass c and the principal axes R in it, so that X = R' (x - c).
+The nodes are the center of mass p, a particle of the body's mass m, and three hidden axes a1, a2, a3 along the
+principal axes of inertia, orthonormal and of masses J_k = (I1 + I2 + I3)/2 - I_k [kg m^2] (Betsch & Steinmann 2001,
+Multibody Syst. Dyn. 6, 367). The material point X, counted from p along the principal axes, is at
+p + X1 a1 + X2 a2 + X3 a3. The user's frame of the body lies anywhere: it has the center of mass c and the principal
+axes R in it, so that X = R' (x - c).
 """
 
 from __future__ import annotations
@@ -29,13 +30,13 @@ PLACE, TURN = 0.01, 0.1  # m, rad: the sizes against which the precision of plac
 
 
 class HasMotion(Protocol):
-    """A trajectory."""
+    """A trajectory: positions and velocities (..., nodes, 3) of all nodes."""
 
     @property
-    def positions(self) -> Array: ...
+    def nodes(self) -> Array: ...
 
     @property
-    def velocities(self) -> Array: ...
+    def node_velocities(self) -> Array: ...
 
 
 class InScene(Builder, Protocol):
@@ -46,6 +47,9 @@ class InScene(Builder, Protocol):
 
     @property
     def gravity(self) -> Array: ...
+
+    @property
+    def node_count(self) -> int: ...
 
     def base_arrays(self) -> dict[str, Array]: ...
 
@@ -77,12 +81,12 @@ class Body:
 
     Attributes:
         name: quantities are called `<name>_...`.
-        particles: (4,) its nodes: the center of mass, and three axes, which have no place.
+        particles: (4,) its nodes: the center of mass, a particle, and three axes, hidden nodes that have no place.
         center: (3,) expressions, the center of mass in the body's frame, m.
         axes: (3, 3) expressions, the principal axes of inertia in the body's frame, as columns.
         start: the state of its frame that it starts with.
         role: "free", "pinned" or "driven".
-        spin_node: the pinned node that holds the angular momentum of a body that keeps it, or -1.
+        spin_node: the hidden, pinned node that holds the angular momentum of a body that keeps it, or None.
     """
 
     name: str
@@ -92,7 +96,7 @@ class Body:
     scene: InScene = field(repr=False)
     start: FrameState = field(repr=False)
     role: str = "free"
-    spin_node: int = -1
+    spin_node: int | None = None
 
     def point(
         self, at: ArrayLike = (0.0, 0.0, 0.0), along: ArrayLike | None = None, name: str | None = None
@@ -131,7 +135,7 @@ class Body:
         arms = np.stack([s.frame @ self.center, *(s.frame @ self.axes).T])
         places = arms.copy()
         places[0] = s.origin + arms[0]
-        found = terms_of("position", index, places - self.scene.positions[self.particles])
+        found = terms_of("position", index, places - self.scene.nodes[self.particles])
         if self.role == "pinned":
             return found
         rates = np.stack([cross(s.spin, arm) for arm in arms])
@@ -150,13 +154,16 @@ class Body:
         """Where the body's frame is.
 
         Args:
-            motion: a trajectory, or positions (..., particles, 3) of the whole scene.
+            motion: a trajectory, or positions (..., nodes, 3) m of all nodes of the scene, such as `Scene.nodes`.
             values: quantities that the motion was simulated with, where they are not the scene's.
 
         Returns:
             Its origin (..., 3) m and its axes (..., 3, 3), as columns, in the world.
+
+        Raises:
+            SceneError: positions without the hidden nodes, which hold the axes.
         """
-        x = motion if not hasattr(motion, "positions") else motion.positions
+        x = motion if not hasattr(motion, "nodes") else motion.nodes
         p, turned = self._nodes(np.asarray(x, dtype=float))
         at = self.values(values)
         frame = turned @ numbers(self.axes, at).T
@@ -164,7 +171,7 @@ class Body:
 
     def turned(self, way: ArrayLike) -> Array:
         """(3,) a direction of the body's frame in the world, as the scene was built."""
-        return np.asarray(self.pose(self.scene.positions)[1] @ np.asarray(way, dtype=float))
+        return np.asarray(self.pose(self.scene.nodes)[1] @ np.asarray(way, dtype=float))
 
     def quaternions(self, motion: HasMotion | ArrayLike, values: Values = None) -> Array:
         """(..., 4), (x, y, z, w), from the body's axes to the world's; along a motion each on the side of the one
@@ -173,18 +180,18 @@ class Body:
 
     def angular_velocity(self, motion: HasMotion) -> Array:
         """(frames, 3) rad/s, in the world's axes."""
-        _, a = self._nodes(motion.positions)
-        _, v = self._nodes(motion.velocities)
+        _, a = self._nodes(motion.nodes)
+        _, v = self._nodes(motion.node_velocities)
         return np.asarray(0.5 * np.cross(a, v, axis=-2).sum(axis=-1))
 
     def momentum(self, motion: HasMotion, values: Values = None) -> Array:
         """(frames, 3) kg m/s."""
-        return np.asarray(self.inertia_of_nodes(values)[0] * self._nodes(motion.velocities)[0])
+        return np.asarray(self.inertia_of_nodes(values)[0] * self._nodes(motion.node_velocities)[0])
 
     def angular_momentum(self, motion: HasMotion, values: Values = None, about: ArrayLike | None = None) -> Array:
         """(frames, 3) kg m^2/s about the center of mass, or about a fixed point (3,) m."""
-        x, a = self._nodes(motion.positions)
-        v, rates = self._nodes(motion.velocities)
+        x, a = self._nodes(motion.nodes)
+        v, rates = self._nodes(motion.node_velocities)
         mass, *J = self.inertia_of_nodes(values)
         spin = np.asarray((np.cross(a, rates, axis=-2) * J).sum(axis=-1))
         if about is None:
@@ -193,13 +200,13 @@ class Body:
 
     def kinetic_energy(self, motion: HasMotion, values: Values = None) -> Array:
         """(frames,) J."""
-        v, rates = self._nodes(motion.velocities)
+        v, rates = self._nodes(motion.node_velocities)
         mass, *J = self.inertia_of_nodes(values)
         return np.asarray(0.5 * (mass * (v**2).sum(axis=-1) + ((rates**2).sum(axis=-2) * J).sum(axis=-1)))
 
     def energy(self, motion: HasMotion, values: Values = None) -> Array:
         """(frames,) J, kinetic and of the weight, which is zero at the world's origin."""
-        x, _ = self._nodes(motion.positions)
+        x, _ = self._nodes(motion.nodes)
         return self.kinetic_energy(motion, values) - self.inertia_of_nodes(values)[0] * (x @ self.scene.gravity)
 
     def inertia_of_nodes(self, values: Values = None) -> Array:
@@ -213,7 +220,10 @@ class Body:
         return {name: q.value for name, q in self.scene.quantities.items()} | dict(changed or {})
 
     def _nodes(self, x: Array) -> tuple[Array, Array]:
-        """Of arrays (..., particles, 3): what p has, (..., 3), and what the axes have, (..., 3, 3) as columns."""
+        """Of arrays (..., nodes, 3): what p has, (..., 3), and what the axes have, (..., 3, 3) as columns."""
+        if x.ndim < 2 or x.shape[-2] != self.scene.node_count:
+            fix = f"give a trajectory, or the positions (..., {self.scene.node_count}, 3) of all its nodes"
+            raise SceneError(f"{self.name}.pose", "needs the nodes that hold its axes", x.shape, fix)
         own = x[..., self.particles, :]
         return own[..., 0, :], np.swapaxes(own[..., 1:, :], -1, -2)
 
@@ -238,7 +248,7 @@ class BodyPoint:
 
     def at_start(self) -> tuple[Array, Array | None]:
         """Its place (3,) m and its direction (3,) in the world as the scene was built."""
-        origin, frame = self.body.pose(self.body.scene.positions)
+        origin, frame = self.body.pose(self.body.scene.nodes)
         return (
             origin + frame @ numbers(self.place, self.body.values()),
             None if self.along is None else frame @ self.along,

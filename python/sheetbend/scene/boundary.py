@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_increasing, finite, indices
+from ..arrays.checks import check_increasing, finite
 from ..arrays.smoothing import LocalFit
 from ..errors import SceneError
 from ..quantities.quantities import Term
@@ -37,7 +37,7 @@ class Boundary:
     """The boundary motion of a scene, at one set of knots.
 
     Attributes:
-        driven: particles.
+        driven: particles and hidden nodes.
         times: (knots,) s.
         interpolation: "cubic" or "linear".
         following: those of the driven particles that move with recorded markers.
@@ -55,11 +55,8 @@ class Boundary:
         self._values: list[Array] = []
         self._terms: list[tuple[Array, Array, dict[str, str]]] = []
 
-    def drive(
-        self, particles: ArrayLike, times: ArrayLike, positions: ArrayLike, interpolation: str, particle_count: int
-    ) -> None:
+    def drive(self, which: Sequence[int], times: ArrayLike, positions: ArrayLike, interpolation: str) -> None:
         """See `Scene.drive`."""
-        which = indices("drive", particles, particle_count)
         t = finite("drive.times", times, None, SceneError).ravel()
         check_increasing("drive.times", t)
         x = finite("drive.positions", positions, (len(t), len(which), 3), SceneError)
@@ -77,17 +74,15 @@ class Boundary:
 
     def follow(
         self,
-        particles: ArrayLike,
+        which: Sequence[int],
         times: ArrayLike,
         motion: ArrayLike,
         markers: Sequence[str],
         weights: ArrayLike | None,
         placed: ArrayLike | None,
         interpolation: str,
-        particle_count: int,
     ) -> None:
         """See `Scene.follow`."""
-        which = indices("follow", particles, particle_count)
         names = tuple(markers)
         if not names or len(set(names)) != len(names):
             raise SceneError("follow.markers", "must be names, each once", names, "name every marker of the motion")
@@ -102,7 +97,7 @@ class Boundary:
         if placed is not None:
             x = x - x[0] + finite("follow.placed", placed, (len(which), 3), SceneError)
         first = len(self.driven)
-        self.drive(which, times, x, interpolation, particle_count)
+        self.drive(which, times, x, interpolation)
         self.following.append(Following(first + np.arange(len(which)), names, w, placed is not None))
 
     def add_term(

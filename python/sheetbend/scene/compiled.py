@@ -18,32 +18,43 @@ from .kinks import kinks
 from .scene_data import SceneData
 from .settle import SettledStart, settled
 
+OVER_NODES = ("position", "velocity", "mass", "drag_linear", "drag_quadratic")
 VECTORS = ("position", "velocity", "boundary", "force", "wind", "collider_pose")
 
 
 def specification(scene: SceneData) -> dict[str, Any]:
-    """The topology of a scene, as the compiled core is made from it."""
+    """The topology of a scene, as the compiled core is made from it: its particles are all nodes, by their places in
+    arrays over them, and -1 stands for none."""
+    places = scene.places_of
     return {
-        "particles": scene.particle_count,
-        "directors": [(d, *edge) for d, edge in scene.directors.items()],
-        "pinned": sorted(scene.pinned),
-        "driven": list(scene.boundary.driven),
+        "particles": scene.node_count,
+        "directors": places_or_none(scene, [(d, *edge) for d, edge in scene.directors.items()]).tolist(),
+        "pinned": sorted(places(list(scene.pinned)).tolist()),
+        "driven": places(scene.boundary.driven).tolist(),
         "boundary_times": [] if not scene.boundary.driven else list(scene.boundary.times),
         "boundary_interpolation": scene.boundary.interpolation,
-        "loaded": list(scene.forces.particles),
+        "loaded": places(scene.forces.particles).tolist(),
         "force_times": scene.forces.times.tolist(),
         "has_drag": scene.has_drag,
         "air": scene.air.triangles.tolist(),
         "wind_times": scene.air.times.tolist(),
         "groups": [
-            {"name": g.name, "kind": g.kind, "damped": g.damped, "stencil": g.particles.ravel()} for g in scene.groups
+            {"name": g.name, "kind": g.kind, "damped": g.damped, "stencil": places(g.particles).ravel()}
+            for g in scene.groups
         ],
         "volumes": [
             {"name": name, "triangles": triangles.tolist()} for name, triangles in scene.volumes.triangles.items()
         ],
-        **scene.contacts.specification(),
-        "bodies": scene.body_nodes.tolist(),
+        **scene.contacts.specification(places),
+        "bodies": places_or_none(scene, scene.with_axes).tolist(),
     }
+
+
+def places_or_none(scene: SceneData, rows: Sequence[Sequence[int | None]]) -> np.ndarray:
+    """Places (n, width) of rows of nodes in arrays over all nodes; -1 for what is None."""
+    none = np.array([[node is None for node in row] for row in rows], dtype=bool)
+    nodes = np.array([[node or 0 for node in row] for row in rows], dtype=np.int64)
+    return np.where(none, -1, scene.places_of(nodes))
 
 
 class CompiledScene:
@@ -52,6 +63,8 @@ class CompiledScene:
     Attributes:
         core: the compiled topology.
         layout: input array name -> (offset, size) in the flat input vector.
+        given: the same of what users give and get: arrays over nodes begin with the particles, and end there.
+        particles, nodes: how many there are.
         name: of the scene.
         kinds: of its constraints.
         names: quantity names in the order of theta.
@@ -69,6 +82,11 @@ class CompiledScene:
         except ValueError as error:
             raise refusal(error, SceneError, scene.name) from error
         self.layout: dict[str, tuple[int, int]] = self.core.layout
+        self.particles, self.nodes = scene.particle_count, scene.node_count
+        self.given = {
+            name: (first, size // self.nodes * self.particles if name in OVER_NODES else size)
+            for name, (first, size) in self.layout.items()
+        }
         self.name = scene.name
         self.kinds = frozenset(g.kind for g in scene.groups)
         self.names = tuple(scene.quantities)
@@ -96,8 +114,7 @@ class CompiledScene:
     def _expect_apart(self, scene: SceneData) -> None:
         inputs = self.inputs()
         offset, size = self.layout["mass"]
-        held = {*scene.pinned, *scene.boundary.driven}
-        scene.contacts.expect_apart(self.core, inputs, inputs[offset : offset + size], scene.gravity, held)
+        scene.contacts.expect_apart(self.core, inputs, inputs[offset : offset + size], scene.gravity, set(scene.held))
 
     @cached_property
     def _map(self) -> _core.ParameterMap:
@@ -105,7 +122,9 @@ class CompiledScene:
 
     def _pack(self, scene: SceneData) -> np.ndarray:
         base = np.zeros(self.core.inputs)
-        for array, values in scene.base_arrays().items():
+        arrays = scene.base_arrays()
+        self._shapes = {name: np.shape(values) for name, values in arrays.items()}
+        for array, values in arrays.items():
             offset, size = self.layout[array]
             base[offset : offset + size] = np.ravel(values)
         return base
@@ -114,7 +133,7 @@ class CompiledScene:
         """The parameter map as plain arrays, one entry per term and input that it goes to; `extra` more inputs (array
         "extra") may follow the scene's, with their own terms."""
         order = {name: i for i, name in enumerate(self.names if names is None else names)}
-        offsets = {array: offset for array, (offset, _) in self.layout.items()} | {"extra": self.core.inputs}
+        arrays = self.layout | {"extra": (self.core.inputs, extra)}
         every = [*self._terms, *terms]
         entries = np.array([np.size(t.index) for t in every], dtype=int)
         lengths = np.array([len(t.quantities) for t in every], dtype=int)
@@ -134,12 +153,19 @@ class CompiledScene:
                 weight[start + e : start + k * width : width] = own
         return {
             "base": np.concatenate([self._base, np.zeros(extra)]) if extra else self._base,
-            "target": _joined([offsets[t.array] + np.ravel(t.index) for t in every]),
+            "target": _joined([t.places(*arrays[t.array]) for t in every]),
             "coefficient": _joined(coefficients).astype(float),
             "first_factor": first_factor,
             "parameter": parameter[place],
             "function": function[place],
             "weight": weight,
+        }
+
+    @property
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Of the input arrays as users give and get them."""
+        return {
+            name: (self.particles, *shape[1:]) if name in OVER_NODES else shape for name, shape in self._shapes.items()
         }
 
     def values(self, changes: Mapping[str, float] | None = None) -> np.ndarray:
@@ -188,9 +214,10 @@ class CompiledScene:
         return self._map.theta_bar_dot(theta, theta_dot, inputs_bar, inputs_bar_dot)
 
     def unpack(self, flat: np.ndarray) -> dict[str, np.ndarray]:
-        """A flat vector of inputs (or their cotangents) by array name; vectors per particle come as (n, 3)."""
+        """A flat vector of inputs (or their cotangents) by array name, of particles without hidden nodes; vectors per
+        particle come as (n, 3)."""
         shaped: dict[str, np.ndarray] = {}
-        for array, (offset, size) in self.layout.items():
+        for array, (offset, size) in self.given.items():
             part = flat[offset : offset + size]
             shaped[array] = part.reshape(-1, 3) if array in VECTORS else part
         return shaped

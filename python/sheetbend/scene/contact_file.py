@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import SceneError
 from .colliders import Box, Capsule, Collider, Motion, Plane, Sphere
-from .contacts import ARRAYS, Contact, Contacts
+from .contacts import ARRAYS, Contact
 from .scene import Scene
 
 Array = np.ndarray
@@ -26,10 +26,12 @@ class Reader(Protocol):
     def name(self, parent: Mapping[str, Any], key: str, where: str = "") -> str: ...
     def part(self, parent: Mapping[str, Any], key: str, kind: type, where: str = "") -> Any: ...
     def array(self, name: str, kind: str, shape: tuple[int | None, ...]) -> Array: ...
+    def nodes(self, name: str, shape: tuple[int | None, ...]) -> Array: ...
 
 
-def written_contacts(contacts: Contacts) -> tuple[dict[str, Any], dict[str, Array]]:
+def written_contacts(scene: Scene) -> tuple[dict[str, Any], dict[str, Array]]:
     """Members of the header and arrays; none of a scene without contacts."""
+    contacts = scene.contacts
     if not contacts.contacts:
         return {}, {}
     colliders = contacts.colliders.items()
@@ -47,7 +49,7 @@ def written_contacts(contacts: Contacts) -> tuple[dict[str, Any], dict[str, Arra
     }
     times = {f"collider_times_{i}": np.asarray(c.poses.times, dtype=float) for i, (_, c) in enumerate(colliders)}
     pairs = {
-        f"contact_{i}": np.column_stack([c.particles, c.carried]).astype(np.int64)
+        f"contact_{i}": np.column_stack([c.particles, scene.places_of(c.carried)])
         for i, c in enumerate(contacts.contacts)
     }
     return header, times | pairs
@@ -65,7 +67,7 @@ def read_contacts(reader: Reader, scene: Scene, take: Callable[..., Array], fix:
     contacts = scene.contacts
     for i, about in enumerate(reader.records("contacts")):
         where = f"contacts[{i}]."
-        pairs = reader.array(f"contact_{i}", "i4", (None, 2))
+        pairs = reader.nodes(f"contact_{i}", (None, 2))
         numbers = [
             reader.part(about, key, kind, where)
             for key, kind in (("collider", int), ("rigid", bool), ("bounces", bool))

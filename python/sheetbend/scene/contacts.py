@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import index_array, is_number
+from ..arrays.checks import is_number, node_array
 from ..errors import SceneError
 from ..quantities.quantities import ZERO_OR_MORE, Builder, Term
 from .colliders import Collider
@@ -35,7 +35,7 @@ class Contact:
         name: of its quantities.
         collider: place in `Contacts.colliders`.
         particles: (n,).
-        carried: (n,) pinned particles whose coordinates are the tangential forces that are carried from substep to
+        carried: (n,) hidden, pinned nodes whose coordinates are the tangential forces that are carried from substep to
             substep [N], in the collider's frame.
         rigid: whether it is as stiff as masses and substeps allow.
         bounces: whether it has a restitution.
@@ -125,7 +125,7 @@ class Contacts:
         name = name or collider.name or collider.shape
         if any(c.name == name for c in self.contacts):
             raise SceneError("contact.name", "is taken by another contact", name, "give each contact a name of its own")
-        which = index_array(f"{name}.contact.particles", particles, count)
+        which = node_array(f"{name}.contact.particles", particles, count)
         if len(np.unique(which)) < len(which):
             raise SceneError(f"{name}.contact.particles", "are listed twice", which.tolist(), "list each particle once")
         numbers.check(name)
@@ -172,8 +172,8 @@ class Contacts:
         )
         scene.add_terms([Term(array, at, 1.0, ((quantity, "identity"),))])
 
-    def specification(self) -> dict[str, Any]:
-        """The topology, as the compiled core is made from it."""
+    def specification(self, places_of: Callable[[Array], Array]) -> dict[str, Any]:
+        """The topology, as the compiled core is made from it, with the places of nodes in arrays over all of them."""
         return {
             "colliders": [{"name": name, **c.specification} for name, c in self.colliders.items()],
             "contacts": [
@@ -181,7 +181,7 @@ class Contacts:
                     "name": c.name,
                     "collider": c.collider,
                     "particles": c.particles,
-                    "carried": c.carried,
+                    "carried": places_of(c.carried),
                     "rigid": c.rigid,
                     "bounces": c.bounces,
                 }

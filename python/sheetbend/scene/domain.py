@@ -38,7 +38,7 @@ class Domain:
         for arrays, least in ((NOT_NEGATIVE, 0.0), (POSITIVE, TINY)):
             for array in arrays:
                 self._part(self.least, array)[:] = least
-        self._part(self.least, "mass")[scene.free] = TINY
+        self._part(self.least, "mass")[scene.free_nodes] = TINY
         if not scene.has_drag:
             for array in ("drag_linear", "drag_quadratic"):
                 self._part(self.most, array)[:] = 0.0
@@ -133,7 +133,7 @@ class Domain:
         """The quantities that an input is made from: those that are zero, else those of either sign, else all."""
         names: dict[str, None] = {}
         for t in self._scene.every_term:
-            if (np.ravel(t.index) + self._layout[t.array][0] == column).any():
+            if (t.places(*self._layout[t.array]) == column).any():
                 names |= dict.fromkeys(t.quantities)
         quantities = self._scene.quantities
         values = {n: quantities[n].value for n in names}
@@ -145,11 +145,9 @@ class Domain:
     def _entry(self, array: str, i: int) -> str:
         """Which number of an array, in words."""
         if array in ("position", "velocity"):
-            return f"particle {i // 3}"
+            return self._scene.node_in_words(i // 3)
         if array in ("mass", "drag_linear", "drag_quadratic"):
-            bodies = {int(p): (k, b.name) for b in self._scene.bodies.values() for k, p in enumerate(b.particles)}
-            axis, body = bodies.get(i, (0, ""))
-            return f"axis {axis} of the body '{body}'" if axis else f"particle {i}"
+            return self._scene.node_in_words(i)
         if array.startswith("volume"):
             return f"'{list(self._scene.volumes.triangles)[i]}'"
         if array in ("friction", "contact_radius"):

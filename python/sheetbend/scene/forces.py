@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_increasing, finite, indices
+from ..arrays.checks import check_increasing, finite
 from ..errors import SceneError
 from ..quantities.expression import Factors, by_factors
 from ..quantities.quantities import Term
@@ -40,9 +40,9 @@ class Forces:
         self._values: list[Array] = []
         self._terms: list[tuple[int, int, int, float, Factors]] = []
 
-    def add(self, particles: ArrayLike, forces: ArrayLike, times: ArrayLike, particle_count: int) -> None:
+    def add(self, particles: Array, forces: ArrayLike, times: ArrayLike) -> None:
         """See `Scene.add_force`."""
-        which = indices("add_force.particles", particles, particle_count)
+        which: list[int] = particles.tolist()
         t = self._checked(times)
         f = spread_over(forces, (len(t), len(which), 3))
         twice = set(which) & set(self.particles)

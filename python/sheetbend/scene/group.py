@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import index_array, per_item
+from ..arrays.checks import node_array, per_item
 from ..errors import SceneError
 from ..quantities.kinds import KINDS, VISCOUS_COMPLIANCE
 from .rest_values import rest_values
@@ -34,6 +34,7 @@ def make_group(
     kind: str,
     particles: ArrayLike,
     positions: Array,
+    hidden: int,
     *,
     compliance: ArrayLike | None,
     damping: ArrayLike | None,
@@ -41,13 +42,13 @@ def make_group(
     rest: ArrayLike | None,
     normal: ArrayLike | None,
 ) -> Group:
-    """A group among particles at positions (n, 3) m; the rest as in `Scene.add_constraints`.
+    """A group among nodes at positions (n, 3) m, of which the last are hidden; the rest as in `Scene.add_constraints`.
 
     Raises:
         SceneError: wrong shapes, negative or missing values, zero lengths.
     """
     arity = KINDS[kind]["arity"]
-    flat = index_array(f"{name}.particles", particles, len(positions))
+    flat = node_array(f"{name}.particles", particles, len(positions) - hidden, hidden)
     if np.ndim(particles) != 2 or np.shape(particles)[1] != arity:
         raise SceneError(
             f"{name}.particles", "have the wrong shape", np.shape(particles), f"give (count, {arity}) for {kind}"

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import indices
 from .moving_clamp import clamped_ends, keep_direction, let_go
 from .nodes import SceneNodes
 
@@ -33,7 +32,7 @@ class HeldScene(SceneNodes):
         if ends and x.ndim == 3 and x.shape[1] == len(which):
             x = np.concatenate([x, x[:, [slot for slot, _ in ends]]], axis=1)
             which = [*which, *(ghost for _, ghost in ends)]
-        self.boundary.drive(which, times, x, interpolation, self.particle_count)
+        self.boundary.drive(which, times, x, interpolation)
         keep_direction(self, which, ends)
 
     def follow(
@@ -72,12 +71,12 @@ class HeldScene(SceneNodes):
             if placed is not None:
                 placed = np.concatenate([np.asarray(placed, dtype=float), np.asarray(placed, dtype=float)[slots]])
             which = [*which, *(ghost for _, ghost in ends)]
-        self.boundary.follow(which, times, motion, markers, weights, placed, interpolation, self.particle_count)
+        self.boundary.follow(which, times, motion, markers, weights, placed, interpolation)
         keep_direction(self, which, ends)
 
     def _with_clamps(self, field: str, particles: ArrayLike) -> tuple[list[int], list[tuple[int, int]]]:
         """Particles to be driven, and those of them that are clamped ends of ropes, which are let go."""
-        which = indices(field, particles, self.particle_count)
+        which: list[int] = self.node_array(field, particles).tolist()
         ends = clamped_ends(self, which)
         let_go(self, which, ends)
         return which, ends

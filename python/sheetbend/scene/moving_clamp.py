@@ -28,7 +28,7 @@ def let_go(scene: SceneData, particles: Sequence[int], ends: Sequence[tuple[int,
 def keep_direction(scene: SceneData, particles: Sequence[int], ends: Sequence[tuple[int, int]]) -> None:
     """Hold ghosts that are driven with the motion of their ends where they stand off them, and let the angle of a clamp
     turn them as before."""
-    start, knots = scene.positions, (len(scene.boundary.times), 1)
+    start, knots = scene.nodes, (len(scene.boundary.times), 1)
     for slot, ghost in ends:
         scene.boundary.add_term(ghost, np.tile(start[ghost] - start[particles[slot]], knots), {}, scene.quantities)
         for term in [t for t in scene.terms if t.array == "position"]:

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import indices, per_item
+from ..arrays.checks import node_array, per_item
 from ..errors import SceneError
 from ..quantities.kinds import KINDS
 from ..quantities.quantities import ZERO_OR_MORE, Term, product
@@ -16,6 +16,7 @@ from .bodies import (
     HasPoses,
     Path,
     add_drag,
+    add_nodes,
     check_name,
     checked_inertia,
     checked_start,
@@ -103,7 +104,7 @@ class Scene(HeldScene):
         start = checked_start(name, at, rotation, velocity, spin) if path is None else path.start()
         role = "pinned" if pinned else "free" if path is None else "driven"
         x, v = nodes_of(given, start)
-        nodes = self.add_particles(x, 0.0, v if role == "free" else None)
+        nodes = add_nodes(self, x, v if role == "free" else np.zeros_like(v))
         body = make_body(self, name, given, nodes, named_start(self, name, start, role), role)
         if path is not None:
             drive_body(self, body, path, getattr(poses, "frame", None))
@@ -113,8 +114,7 @@ class Scene(HeldScene):
             self.add_constraints("rigid", [nodes[1:].tolist()], name=f"{name}_rigid")
             add_drag(self, body, drag, turn_drag)
             if keep_spin:
-                body.spin_node = int(self.add_particles(np.zeros((1, 3)), 1.0)[0])
-                self.pin([body.spin_node])
+                body.spin_node = int(self.add_hidden(np.zeros((1, 3)), 1.0, pinned=True)[0])
         return body
 
     def add_force(
@@ -142,7 +142,7 @@ class Scene(HeldScene):
         elif name is not None:
             raise SceneError("add_force.name", "names a force on particles", name, "leave it out")
         else:
-            self.forces.add(particles, forces, times, self.particle_count)
+            self.forces.add(self.node_array("add_force.particles", particles), forces, times)
 
     def add_constraints(
         self,
@@ -163,7 +163,7 @@ class Scene(HeldScene):
 
         Args:
             kind: a name in `sheetbend.KINDS`, which holds what follows of each kind; docs/constraints.md lists them.
-            particles: (count, arity) indices.
+            particles: (count, arity) particles; of some kinds also hidden nodes, as `add_directors` returns them.
             name: of the group; the kind by default.
             compliance: 0 = rigid, in the kind's unit; what it is made of is in KINDS, such as "Voronoi length / EI".
             damping: beta of the Rayleigh dissipation (Macklin et al. 2016, eq. 26): force per rate of C.
@@ -187,7 +187,8 @@ class Scene(HeldScene):
             name,
             kind,
             particles,
-            self.positions,
+            self.nodes,
+            self.hidden_count,
             compliance=compliance,
             damping=damping,
             viscosity=viscosity,
@@ -205,7 +206,7 @@ class Scene(HeldScene):
 
     def add_point_mass(self, particle: int, mass: float, name: str) -> None:
         """Hang a mass [kg] on a particle as the quantity `<name>_mass`."""
-        (index,) = indices("add_point_mass.particle", [particle], self.particle_count)
+        (index,) = node_array("add_point_mass.particle", [particle], self.particle_count).tolist()
         self.add_quantity(f"{name}_mass", mass, "kg")
         self.add_terms([product("mass", index, 1.0, {f"{name}_mass": "identity"})])
 
@@ -330,8 +331,7 @@ class Scene(HeldScene):
         self._building()
         numbers = ContactNumbers(friction, radius, stiffness, restitution)
         which, name = self.contacts.check(what, collider, self.particle_count, numbers, name)
-        carried = self.add_particles(np.zeros((len(which), 3)), 1.0)
-        self.pin(carried)
+        carried = self.add_hidden(np.zeros((len(which), 3)), 1.0, pinned=True)
         self.contacts.add(self, collider, which, carried, numbers, name)
         self.contacts.settling |= {name} if settle else set()
         return name

@@ -10,14 +10,14 @@ from .scene_data import SceneData
 
 def validate(scene: SceneData) -> None:
     """Refuse a scene that cannot be simulated; see `Scene.freeze`."""
-    if scene.particle_count == 0:
+    if scene.node_count == 0:
         raise SceneError(scene.name, "has no particles", 0, "add particles or a rope")
-    free = scene.free
+    free = scene.free_nodes
     if len(free) == 0:
         raise SceneError(
             scene.name,
             "has nothing that can move: every particle is pinned or driven",
-            scene.particle_count,
+            scene.node_count,
             "release at least one",
         )
     heavy = scene.base_arrays()["mass"] > 0
@@ -26,17 +26,19 @@ def validate(scene: SceneData) -> None:
             heavy[t.index] = True
     light = free[~heavy[free]]
     if light.size:
-        raise SceneError("mass", "is zero for free particles", light[:5].tolist(), "give them a mass, or pin them")
+        names = ", ".join(scene.node_in_words(place) for place in light[:5])
+        raise SceneError("mass", "is zero for free particles", names, "give them a mass, or pin them")
     if scene.groups:
         touching = (c.particles for c in scene.contacts.contacts)
-        used = np.zeros(scene.particle_count, dtype=bool)
+        used = np.zeros(scene.node_count, dtype=bool)
         for particles in (*(g.particles for g in scene.groups), *scene.volumes.triangles.values(), *touching):
             used[particles] = True
-        used[scene.body_nodes[:, :4]] = True
+        used[scene.body_nodes] = True
         loose = free[~used[free]]
         if loose.size:
             fix = "constrain them, pin them or leave them out"
-            raise SceneError("particles", "are connected to nothing", loose[:5].tolist(), fix)
+            names = ", ".join(scene.node_in_words(place) for place in loose[:5])
+            raise SceneError("particles", "are connected to nothing", names, fix)
     held = scene.pinned & set(scene.boundary.driven)
     if held:
         raise SceneError("drive.particles", "are pinned too", sorted(held), "either pin or drive a particle")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import finite
+from ..arrays.checks import finite, node_array
 from ..arrays.column import Column
 from ..errors import SceneError
 from ..quantities.kinds import KINDS
@@ -23,6 +23,18 @@ from .group import Group
 from .volume import Volumes
 
 Array = np.ndarray
+
+
+class Rows:
+    """Where nodes start (n, 3) m, how fast they move (n, 3) m/s, and their masses (n,) kg, in the order of creation."""
+
+    def __init__(self) -> None:
+        self.positions, self.velocities, self.mass = Column(3), Column(3), Column()
+
+    def extend(self, positions: Array, velocities: Array, mass: Array) -> None:
+        self.positions.extend(positions)
+        self.velocities.extend(velocities)
+        self.mass.extend(mass)
 
 
 class SceneData:
@@ -45,8 +57,8 @@ class SceneData:
         self.cloths: dict[str, Any] = {}
         self.solids: dict[str, Any] = {}
         self.bodies: dict[str, Body] = {}
-        self.rotors: dict[str, Array] = {}  # (5,) nodes by joint, of which the second turns
-        self._positions, self._velocities, self._mass = Column(3), Column(3), Column()
+        self.rotors: dict[str, list[int | None]] = {}  # five nodes by joint, of which the second turns
+        self._particles, self._hidden = Rows(), Rows()
         self._frozen = False
         self._drag: dict[str, Array] = {}
         self._gravity = finite("gravity", gravity, (3,), SceneError)
@@ -88,11 +100,15 @@ class SceneData:
         self.terms += terms
 
     @property
+    def with_axes(self) -> list[list[int | None]]:
+        """Five nodes of each body and of what else has axes: the center, three axes, and the node that keeps the spin,
+        or None."""
+        return [*([*b.particles.tolist(), b.spin_node] for b in self.bodies.values()), *self.rotors.values()]
+
+    @property
     def body_nodes(self) -> Array:
-        """(n, 5) nodes of the bodies and of what else has axes: the center, three axes, and the node that keeps the
-        spin, or -1."""
-        nodes = [*([*b.particles, b.spin_node] for b in self.bodies.values()), *self.rotors.values()]
-        return np.array(nodes, dtype=np.int64).reshape(-1, 5)
+        """(n, 4) nodes of the bodies and of what else has axes: the center and three axes."""
+        return np.array([nodes[:4] for nodes in self.with_axes], dtype=np.int64).reshape(-1, 4)
 
     @property
     def every_term(self) -> list[Term]:
@@ -111,24 +127,76 @@ class SceneData:
 
     @property
     def particle_count(self) -> int:
-        return len(self._positions)
+        return len(self._particles.mass)
+
+    @property
+    def hidden_count(self) -> int:
+        """How many nodes are no particles."""
+        return len(self._hidden.mass)
+
+    @property
+    def node_count(self) -> int:
+        """How many particles and hidden nodes there are."""
+        return self.particle_count + self.hidden_count
 
     @property
     def positions(self) -> Array:
-        """Initial positions as given, (n, 3) m."""
-        return self._positions.values.copy()
+        """Initial positions of the particles as given, (particles, 3) m."""
+        return self._particles.positions.values.copy()
+
+    @property
+    def nodes(self) -> Array:
+        """Initial positions of all nodes as given, (nodes, 3) m: those of the particles, then those of the hidden
+        nodes, which their own, negative numbers index."""
+        return self._of_nodes("positions")
+
+    def node_array(self, field: str, nodes: ArrayLike) -> Array:
+        """Numbers of particles or hidden nodes as one array.
+
+        Raises:
+            SceneError: no such node.
+        """
+        return node_array(field, nodes, self.particle_count, self.hidden_count)
+
+    def places_of(self, nodes: ArrayLike) -> Array:
+        """Where particles or hidden nodes stand in arrays over all nodes, counted from 0."""
+        own = np.asarray(nodes, dtype=np.int64)
+        return np.where(own < 0, own + self.node_count, own)
 
     @property
     def gravity(self) -> Array:
         """(3,) m/s^2."""
         return self._gravity.copy()
 
+    def node_in_words(self, place: int) -> str:
+        """What stands at a place of an array over all nodes, counted from 0."""
+        if place < self.particle_count:
+            return f"particle {place}"
+        node = place - self.node_count
+        axes = {int(p): (k, b.name) for b in self.bodies.values() for k, p in enumerate(b.particles)}
+        if node in axes:
+            return "axis {} of the body '{}'".format(*axes[node])
+        if node in self.directors:
+            return "the frame of the edge from particle {} to {}".format(*self.directors[node][:2])
+        return f"hidden node {node}"
+
     @property
     def free(self) -> Array:
-        """Indices of the particles that can move."""
-        held = np.zeros(self.particle_count, dtype=bool)
-        held[[*self.pinned, *self.boundary.driven]] = True
+        """Numbers of the particles that can move."""
+        free = self.free_nodes
+        return free[free < self.particle_count]
+
+    @property
+    def free_nodes(self) -> Array:
+        """Where the nodes that can move stand in arrays over all nodes, counted from 0."""
+        held = np.zeros(self.node_count, dtype=bool)
+        held[self.held] = True
         return np.flatnonzero(~held)
+
+    @property
+    def held(self) -> list[int]:
+        """Pinned and driven nodes in the order in which they stand in arrays over all nodes: particles first."""
+        return sorted(self.pinned | set(self.boundary.driven), key=lambda n: n if n >= 0 else n + self.node_count)
 
     def group(self, name: str) -> tuple[Group, int, int]:
         """A group with its first constraint and its first multiplier row.
@@ -145,11 +213,11 @@ class SceneData:
         raise SceneError("group", "does not exist", name, f"name one of: {', '.join(g.name for g in self.groups)}")
 
     def base_arrays(self) -> dict[str, Array]:
-        """The plain parts of all input arrays, to which the quantities' terms are added."""
+        """The plain parts of all input arrays, to which the quantities' terms are added; over all nodes."""
         return {
-            "position": self.positions,
-            "velocity": self._velocities.values.copy(),
-            "mass": self._mass.values.copy(),
+            "position": self.nodes,
+            "velocity": self._of_nodes("velocities"),
+            "mass": self._of_nodes("mass"),
             "compliance": self._concatenated("compliance"),
             "damping": self._concatenated("damping"),
             "rest": self._concatenated("rest"),
@@ -175,7 +243,12 @@ class SceneData:
     def _concatenated(self, field: str) -> Array:
         return np.concatenate([np.ravel(getattr(g, field)) for g in self.groups]) if self.groups else np.zeros(0)
 
+    def _of_nodes(self, field: str) -> Array:
+        """Of all nodes: particles in their order, then hidden nodes, the first one last."""
+        particles, hidden = (getattr(rows, field).values for rows in (self._particles, self._hidden))
+        return np.concatenate([particles, hidden[::-1]])
+
     def _drag_of(self, field: str) -> Array:
-        """Zero for particles that came after the drag was set."""
+        """Zero for hidden nodes, and for particles that came after the drag was set."""
         given = self._drag.get(field, np.zeros(0))
-        return np.concatenate([given, np.zeros(self.particle_count - len(given))])
+        return np.concatenate([given, np.zeros(self.node_count - len(given))])

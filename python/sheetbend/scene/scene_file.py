@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import SceneError
 from ..files.whole import written
+from .compiled import specification
 from .contact_file import written_contacts
 from .scene import Scene
 from .scene_reader import (
@@ -93,7 +94,7 @@ def _header(scene: Scene) -> dict[str, Any]:
         ],
         "following": [{"markers": list(f.markers), "from_placed": f.from_placed} for f in scene.boundary.following],
     }
-    named |= written_contacts(scene.contacts)[0]
+    named |= written_contacts(scene)[0]
     parts = ("groups", "volumes", "quantities", "colliders", "contacts")
     every = [scene.name, *(n["name"] for part in parts for n in named.get(part, ()))]
     for text in (*every, *(q.unit for q in scene.quantities.values()), *_markers(scene)):
@@ -103,6 +104,7 @@ def _header(scene: Scene) -> dict[str, Any]:
         "format": "sheetbend scene",
         "version": VERSION,
         **named,
+        "particles": scene.particle_count,
         "interpolation": scene.boundary.interpolation,
         "has_drag": bool(scene.has_drag),
         "layout": file_layout(scene),
@@ -110,21 +112,21 @@ def _header(scene: Scene) -> dict[str, Any]:
 
 
 def _arrays(scene: Scene) -> dict[str, Array]:
-    map_ = scene.compiled.map()
+    map_, own = scene.compiled.map(), specification(scene)
     whole = np.int64
     return {
-        "directors": np.array([(d, *frame) for d, frame in scene.directors.items()], whole).reshape(-1, 4),
-        "pinned": np.array(sorted(scene.pinned), whole),
-        "driven": np.array(scene.boundary.driven, whole),
+        "directors": np.array(own["directors"], whole).reshape(-1, 4),
+        "pinned": np.array(own["pinned"], whole),
+        "driven": np.array(own["driven"], whole),
         "boundary_times": scene.boundary.times if scene.boundary.driven else np.zeros(0),
-        "loaded": np.array(scene.forces.particles, whole),
+        "loaded": np.array(own["loaded"], whole),
         "force_times": scene.forces.times,
         "air": scene.air.triangles.reshape(-1, 3),
         "wind_times": scene.air.times,
-        **({"bodies": scene.body_nodes} if len(scene.body_nodes) else {}),
-        **{f"stencil_{i}": g.particles for i, g in enumerate(scene.groups)},
+        **({"bodies": np.array(own["bodies"], whole)} if own["bodies"] else {}),
+        **{f"stencil_{i}": scene.places_of(g.particles) for i, g in enumerate(scene.groups)},
         **{f"volume_{i}": t for i, t in enumerate(scene.volumes.triangles.values())},
-        **written_contacts(scene.contacts)[1],
+        **written_contacts(scene)[1],
         **{f"following_{i}": f.slots for i, f in enumerate(scene.boundary.following)},
         **{f"weights_{i}": f.weights for i, f in enumerate(scene.boundary.following)},
         **{name: np.asarray(values) for name, values in map_.items()},

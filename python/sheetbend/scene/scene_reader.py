@@ -118,6 +118,28 @@ class SceneReader:
         self.known[name] = values.astype(np.int64 if kind == "i4" else float)
         return self.known[name]
 
+    def nodes(self, name: str, shape: Sequence[int | None]) -> Array:
+        """An array of nodes, which the file names by their places in arrays over all nodes, as a scene numbers them;
+        -1, which stands for none, and what is no place stays for the core to refuse."""
+        places = self.array(name, "i4", shape)
+        if places.size and places.min() < -1:
+            self.fail(name, "names particles that do not exist", int(places.min()), DAMAGED)
+        nodes, particles = self._counts()
+        none = nodes + 1  # that the core refuses where it means a node
+        return np.where(places < 0, none, np.where((places >= particles) & (places < nodes), places - nodes, places))
+
+    def _counts(self) -> tuple[int, int]:
+        """How many nodes and how many particles the scene has; all nodes of older files are particles."""
+        placed = self.part(self.part(self.header, "layout", dict), "position", list, "layout.")
+        most = len(self.array("base", "f8", (None,)))
+        if len(placed) != 2 or not isinstance(placed[1], int) or not 0 < placed[1] <= most or placed[1] % 3:
+            self.fail("layout.position", "is no place", placed, DAMAGED)
+        nodes = placed[1] // 3
+        particles = self.part(self.header, "particles", int) if "particles" in self.header else nodes
+        if not 0 <= particles <= nodes:
+            self.fail("particles", f"are not 0 to {nodes}", particles, DAMAGED)
+        return nodes, particles
+
     def scene(self) -> Scene:
         scene = Scene(self.name(self.header, "name"))
         scene.quantities = self._quantities()
@@ -169,13 +191,18 @@ class SceneReader:
 
     def _topology(self, scene: Scene) -> None:
         scene.has_drag = self.part(self.header, "has_drag", bool)
-        scene.pinned = set(self.array("pinned", "i4", (None,)).tolist())
+        scene.pinned = set(self.nodes("pinned", (None,)).tolist())
         if "bodies" in self.described:  # older files have none
-            nodes = self.array("bodies", "i4", (None, 5))
-            scene.rotors = {f"body {k}": own for k, own in enumerate(nodes)}
-        scene.directors = {d: (a, b, n) for d, a, b, n in self.array("directors", "i4", (None, 4)).tolist()}
+            bodies, spins = self.nodes("bodies", (None, 5)).tolist(), self.array("bodies", "i4", (None, 5))[:, 4]
+            scene.rotors = {
+                f"body {k}": [*own[:4], None if spin == -1 else own[4]]
+                for k, (own, spin) in enumerate(zip(bodies, spins, strict=True))
+            }
+        frames, normals = self.nodes("directors", (None, 4)).tolist(), self.array("directors", "i4", (None, 4))[:, 3]
+        for (d, a, b, n), normal in zip(frames, normals, strict=True):
+            scene.directors[d] = (a, b, None if normal == -1 else n)
         boundary = scene.boundary
-        boundary.driven = self.array("driven", "i4", (None,)).tolist()
+        boundary.driven = self.nodes("driven", (None,)).tolist()
         boundary.times = self.array("boundary_times", "f8", (None,))
         boundary.interpolation = self.part(self.header, "interpolation", str)
         for i, about in enumerate(self.records("following")):
@@ -189,7 +216,7 @@ class SceneReader:
             weights = self.array(f"weights_{i}", "f8", (len(slots), len(markers)))
             placed = self.part(about, "from_placed", bool, where)
             boundary.following.append(Following(slots, tuple(markers), weights, placed))
-        scene.forces.particles = self.array("loaded", "i4", (None,)).tolist()
+        scene.forces.particles = self.nodes("loaded", (None,)).tolist()
         scene.forces.times = self.array("force_times", "f8", (None,))
         scene.air.triangles = self.array("air", "i4", (None, 3))
         scene.air.times = self.array("wind_times", "f8", (None,))
@@ -216,16 +243,13 @@ class SceneReader:
                 self.fail(f"base.{name}", "must not be negative", float(values.min()), DAMAGED)
             return values
 
-        placed = self.part(self.part(self.header, "layout", dict), "position", list, "layout.")
-        if len(placed) != 2 or not isinstance(placed[1], int) or not 0 < placed[1] <= len(base) or placed[1] % 3:
-            self.fail("layout.position", "is no place", placed, DAMAGED)
-        n = placed[1] // 3
+        n, particles = self._counts()
         groups = [(r, self._stencil(i, r)) for i, r in enumerate(self.records("groups"))]
         constraints = sum(len(stencil) for _, stencil in groups)
         driven, loaded, air = scene.boundary.driven, scene.forces.particles, scene.air
-        scene._positions.extend(take("position", n, 3))
-        scene._velocities.extend(take("velocity", n, 3))
-        scene._mass.extend(take("mass", n))
+        rows = take("position", n, 3), take("velocity", n, 3), take("mass", n)
+        scene._particles.extend(*(own[:particles] for own in rows))
+        scene._hidden.extend(*(own[particles:][::-1] for own in rows))
         compliance, damping = take("compliance", constraints), take("damping", constraints)
         first = 0
         for about, stencil in groups:
@@ -258,7 +282,7 @@ class SceneReader:
         kind = self.part(about, "kind", str, where)
         if kind not in KINDS:
             self.fail(where + "kind", "is no known constraint", kind, f"use one of: {', '.join(KINDS)}")
-        return self.array(f"stencil_{i}", "i4", (self.part(about, "count", int, where), KINDS[kind]["arity"]))
+        return self.nodes(f"stencil_{i}", (self.part(about, "count", int, where), KINDS[kind]["arity"]))
 
     def _terms(self, scene: Scene) -> list[Term]:
         """One term for each run of entries with the same array and factors, in order."""

@@ -34,13 +34,13 @@ def settled(scene: SceneData, core: Any, inputs: Array, first: int) -> tuple[Arr
         inputs: at the values of the scene; first: where its positions begin.
 
     Returns:
-        (particles, 3) m, and by contact what moved. Held and driven particles stay where they are.
+        (nodes, 3) m, and by contact what moved. Held and driven particles stay where they are.
     """
     at = inputs.copy()
-    positions = at[first : first + 3 * scene.particle_count].reshape(-1, 3)
+    positions = at[first : first + 3 * scene.node_count].reshape(-1, 3)
     before = positions.copy()
-    held = np.zeros(scene.particle_count, dtype=bool)
-    held[[*scene.pinned, *scene.boundary.driven]] = True
+    held = np.zeros(scene.node_count, dtype=bool)
+    held[scene.held] = True
     for _ in range(ROUNDS):
         deepest = 0.0
         for k, contact in enumerate(scene.contacts.contacts):

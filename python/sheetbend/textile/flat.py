@@ -47,8 +47,7 @@ def specimen(fabric: Fabric, mesh: TriangleMesh) -> tuple[Scene, Cloth]:
 
 def jaw(scene: Scene, cloth: Cloth, vertices: Array, name: str) -> Array:
     """Clamp vertices rigidly to anchors, which are returned; the forces of the group `name` are those on the cloth."""
-    anchors = scene.add_particles(cloth.mesh.vertices[vertices], 1.0)
-    scene.pin(anchors)
+    anchors = scene.add_hidden(cloth.mesh.vertices[vertices], 1.0, pinned=True)
     pairs = np.column_stack([cloth.particles[vertices], anchors])
     scene.add_constraints("attachment", pairs, name=name, rest=np.zeros((len(pairs), 3)))
     return anchors
@@ -78,7 +77,7 @@ def strip_strain(fabric: Fabric, along: str, load: float) -> float:
 
 def flat_rest(scene: Scene, cloth: Cloth, start: ArrayLike, **settings: float) -> Equilibrium:
     """The rest in the plane; start (vertices, 3) m, `settings` are the jaws' travels."""
-    x = scene.positions
+    x = scene.nodes
     x[cloth.particles] = start
     return equilibrium(scene, x, settings)
 

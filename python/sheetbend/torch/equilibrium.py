@@ -10,9 +10,7 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from .. import _core
-from ..arrays.checks import finite
-from ..errors import SceneError
-from ..motion.equilibrium import NoEquilibriumError
+from ..motion.equilibrium import NoEquilibriumError, whole_start
 from ..motion.simulate import forces_by_group, pressures_by_volume
 from ..scene.scene import Scene
 from .function import respond
@@ -28,11 +26,13 @@ class Equilibrium(NamedTuple):
         positions: (*batch, particles, 3) m.
         forces: per group the multipliers (*batch, count, rows), as in `sheetbend.Equilibrium`.
         pressures: per volume that is kept (*batch,) Pa.
+        nodes: (*batch, nodes, 3) m, the positions of all nodes, see `sheetbend.Trajectory.nodes`.
     """
 
     positions: Tensor
     forces: Mapping[str, Tensor]
     pressures: Mapping[str, Tensor]
+    nodes: Tensor
 
 
 class Equilibria:
@@ -94,7 +94,8 @@ def equilibrium(
 
     Args:
         scene: is frozen by this.
-        start: (particles, 3) m, not differentiated; the scene's initial positions by default.
+        start: (particles, 3) m, or (nodes, 3) m as of `sheetbend.simulate`, not differentiated; the scene's initial
+            positions by default.
         values: quantities to change, by name: tensors (*batch,), or plain numbers.
         inputs: input arrays to replace, as in `simulate`.
         stable: leave saddles; False goes to the nearest equilibrium whatever its stability.
@@ -106,11 +107,12 @@ def equilibrium(
             negative stiffness, mass or length; the message names the quantity and the scene of the batch.
         NoEquilibriumError: not converged; says how far it came and what to try.
     """
-    x = None if start is None else finite("start", start, (scene.particle_count, 3), SceneError).ravel()
+    x = None if start is None else whole_start(scene, start, scene.compiled.inputs())
     flat = InputMap(scene)(values or {}, inputs or {})
     batch, dofs = flat.shape[:-1], scene.compiled.core.dofs
     equilibria = Equilibria(scene, x, stable, threads, tuple(inputs or ()))
     states = respond(equilibria, flat.reshape(-1, flat.shape[-1])).reshape(*batch, -1)
     multipliers: Any = states[..., dofs:]  # slices and reshapes only, so tensors pass
     forces, pressures = forces_by_group(scene, multipliers), pressures_by_volume(scene, multipliers)
-    return Equilibrium(states[..., :dofs].reshape(*batch, -1, 3), cast(Any, forces), cast(Any, pressures))
+    nodes = states[..., :dofs].reshape(*batch, -1, 3)
+    return Equilibrium(nodes[..., : scene.particle_count, :], cast(Any, forces), cast(Any, pressures), nodes)

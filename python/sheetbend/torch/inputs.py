@@ -72,8 +72,9 @@ class InputMap:
     def __init__(self, scene: Scene) -> None:
         compiled = scene.compiled
         self._names, self._layout, self._domain = compiled.names, compiled.layout, compiled.domain
+        self._given = compiled.given
         self._without_effect = _without_effect(scene)
-        self._shapes = {name: tuple(array.shape) for name, array in scene.base_arrays().items()}
+        self._shapes = compiled.shapes
         self._theta = torch.tensor(compiled.theta, dtype=torch.float64)
         self._map = ParameterMap(scene)
 
@@ -90,12 +91,13 @@ class InputMap:
         flat = self._map(self._quantities(values, batch))
         if not arrays:
             return flat
-        parts = [
-            arrays[name].reshape(*batches[name], size).expand(*batch, size)
-            if name in arrays
-            else flat[..., offset : offset + size]
-            for name, (offset, size) in self._layout.items()
-        ]
+        parts = []
+        for name, (offset, size) in self._layout.items():
+            start, own = offset, self._given[name][1]
+            if name in arrays:
+                parts.append(arrays[name].reshape(*batches[name], own).expand(*batch, own))
+                start += own  # hidden nodes stay
+            parts.append(flat[..., start : offset + size])
         return torch.cat(parts, -1)
 
     def _batch_of_value(self, name: str, value: Tensor | float) -> tuple[int, ...]:
@@ -106,7 +108,7 @@ class InputMap:
 
     def _batch_of_array(self, name: str, array: Tensor) -> tuple[int, ...]:
         field = f"inputs.{name}"
-        present = [n for n, (_, size) in self._layout.items() if size > 0]
+        present = [n for n, (_, size) in self._given.items() if size > 0]
         if name not in present:
             raise InputError(field, "is no input array of the scene", name, f"name one of: {', '.join(present)}")
         if name in self._without_effect:

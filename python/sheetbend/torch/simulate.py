@@ -21,8 +21,9 @@ from .inputs import InputMap
 class Simulation:
     """A scene, its frame times and its solver, prepared for many calls; see `simulate` for the arguments."""
 
-    def __init__(self, scene: Scene, times: ArrayLike, solver: Solver | None = None) -> None:
+    def __init__(self, scene: Scene, times: ArrayLike, solver: Solver | None = None, nodes: bool = False) -> None:
         self.scene, self.solver = scene, solver or Solver()
+        self._shown = scene.node_count if nodes else scene.particle_count
         self._steps = substeps(times, self.solver.h)
         self._inputs = InputMap(scene)
         self._core = self.solver.core(scene.compiled)
@@ -39,7 +40,7 @@ class Simulation:
         own = None if lengths is None else _checked(lengths, batch, len(self._steps))
         rollouts = Rollouts(self.scene, self._core, self._steps, keep_tape, self.solver, own, tuple(inputs or ()))
         states = respond(rollouts, flat.reshape(-1, flat.shape[-1]))
-        return states.reshape(*batch, len(self._steps), -1, 3)
+        return states.reshape(*batch, len(self._steps), -1, 3)[..., : self._shown, :]
 
 
 def simulate(
@@ -49,6 +50,7 @@ def simulate(
     values: Mapping[str, Tensor | float] | None = None,
     inputs: Mapping[str, Tensor] | None = None,
     lengths: ArrayLike | None = None,
+    nodes: bool = False,
 ) -> Tensor:
     """Positions of a simulated scene, differentiable in every tensor given.
 
@@ -75,9 +77,11 @@ def simulate(
         lengths: (*batch,) how many of the frames each scene has, where recordings differ in length; all by default.
             After its last frame a scene stands still, and what a loss makes of those frames has no gradient. Scenes of
             like length share a vector, so short ones do not pay for long ones.
+        nodes: return the positions of all nodes, hidden ones behind the particles, as `sheetbend.Trajectory.nodes` has
+            them: the axes of bodies and the directors of rods are among these.
 
     Returns:
-        (*batch, frames, particles, 3) m, float64.
+        (*batch, frames, particles, 3) m, or (*batch, frames, nodes, 3) m, float64.
 
     Raises:
         InputError: times off the grid; lengths that fit neither batch nor frames; a budget below the least that works;
@@ -85,7 +89,7 @@ def simulate(
             negative stiffness, mass or length; the message names the quantity and the scene of the batch.
         DivergenceError: a state became infinite; says when and where.
     """
-    return Simulation(scene, times, solver)(values, inputs, lengths)
+    return Simulation(scene, times, solver, nodes)(values, inputs, lengths)
 
 
 def _checked(lengths: ArrayLike, batch: tuple[int, ...], frames: int) -> np.ndarray:

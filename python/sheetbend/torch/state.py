@@ -23,34 +23,46 @@ class State:
     be at different substeps.
 
     Attributes:
-        numbers: (*batch, 12 particles + 2) float64: positions, positions a substep earlier, velocities, velocities a
-            substep earlier, the number of substeps since the start, and how many substeps an impact still affects. The
-            last two are whole numbers and have no derivatives.
+        numbers: (*batch, 12 nodes + 2) float64, of particles and hidden nodes: positions, positions a substep earlier,
+            velocities, velocities a substep earlier, the number of substeps since the start, and how many substeps an
+            impact still affects. The last two are whole numbers and have no derivatives.
         dtype: of what the properties return.
+        hidden: how many of the nodes, the last ones, are no particles.
     """
 
     numbers: Tensor
     dtype: torch.dtype = torch.float64
+    hidden: int = 0
 
     @property
     def positions(self) -> Tensor:
         """(*batch, particles, 3) m."""
-        return self._part(0)
+        return self._of_particles(0)
 
     @property
     def positions_before(self) -> Tensor:
         """(*batch, particles, 3) m, a substep earlier; the same as `positions` at the start."""
-        return self._part(1)
+        return self._of_particles(1)
 
     @property
     def velocities(self) -> Tensor:
         """(*batch, particles, 3) m/s."""
-        return self._part(2)
+        return self._of_particles(2)
 
     @property
     def velocities_before(self) -> Tensor:
         """(*batch, particles, 3) m/s, a substep earlier; the same as `velocities` at the start."""
-        return self._part(3)
+        return self._of_particles(3)
+
+    @property
+    def nodes(self) -> Tensor:
+        """(*batch, nodes, 3) m, the positions of all nodes, see `sheetbend.Trajectory.nodes`."""
+        return self._part(0)
+
+    @property
+    def node_velocities(self) -> Tensor:
+        """(*batch, nodes, 3) m/s, the velocities of all nodes."""
+        return self._part(2)
 
     @property
     def substep(self) -> Tensor:
@@ -59,11 +71,11 @@ class State:
 
     def detach(self) -> State:
         """The same state without what led to it: gradients stop here."""
-        return State(self.numbers.detach(), self.dtype)
+        return State(self.numbers.detach(), self.dtype, self.hidden)
 
     def __getitem__(self, index: Any) -> State:
         """Some states of a batch."""
-        return State(self.numbers[index], self.dtype)
+        return State(self.numbers[index], self.dtype, self.hidden)
 
     def __len__(self) -> int:
         if self.numbers.dim() < 2:
@@ -73,7 +85,11 @@ class State:
     @staticmethod
     def stack(states: Sequence[State]) -> State:
         """A batch of states of the same scene; it gets a new first dimension."""
-        return State(torch.stack([state.numbers for state in states]), states[0].dtype)
+        return State(torch.stack([state.numbers for state in states]), states[0].dtype, states[0].hidden)
+
+    def _of_particles(self, i: int) -> Tensor:
+        part = self._part(i)
+        return part[..., : part.shape[-2] - self.hidden, :]
 
     def _part(self, i: int) -> Tensor:
         size = (self.numbers.shape[-1] - _WHOLE) // 4
@@ -87,8 +103,8 @@ def _collated(batch: Sequence[State], **_: Any) -> State:
 
 pytree.register_pytree_node(
     State,
-    lambda state: ([state.numbers], state.dtype),
-    lambda numbers, dtype: State(*numbers, dtype),  # type: ignore[call-arg]
+    lambda state: ([state.numbers], (state.dtype, state.hidden)),
+    lambda numbers, rest: State(*numbers, *rest),
     serialized_type_name="sheetbend.torch.State",
 )
 default_collate_fn_map[State] = _collated

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -41,7 +42,7 @@ class Stepper:
     Everything is computed in float64.
 
     A stepper can be copied and pickled, and so can be used in the workers of a DataLoader. Backward needs no memory but
-    the states: about 100 bytes per particle and substep.
+    the states: about 100 bytes per node and substep.
 
     Args:
         scene: is frozen by this.
@@ -62,9 +63,9 @@ class Stepper:
         self._map = InputMap(scene)
         self._default = torch.from_numpy(compiled.inputs())
         self._shapes = {
-            name: tuple(array.shape[1:] if name in _MOTIONS else array.shape)
-            for name, array in scene.base_arrays().items()
-            if array.size
+            name: tuple(shape[1:] if name in _MOTIONS else shape)
+            for name, shape in compiled.shapes.items()
+            if math.prod(shape)
         }
         self._solver_core = self.solver.core(compiled)
         self._steppers: dict[frozenset[str], Any] = {}
@@ -109,7 +110,7 @@ class Stepper:
         x = respond(first, rows).reshape(*flat.shape[:-1], -1)
         offset, size = self._layout["velocity"]
         v = flat[..., offset : offset + size]
-        return State(torch.cat([x, x, v, v, x.new_zeros(*x.shape[:-1], 2)], -1), self.dtype)
+        return self._state(torch.cat([x, x, v, v, x.new_zeros(*x.shape[:-1], 2)], -1))
 
     def __call__(self, state: State, inputs: Tensor | None = None, **given: Tensor) -> State:
         """The state a substep later.
@@ -140,11 +141,14 @@ class Stepper:
         arrays = [self._array(name, array) for name, array in given.items()]
         batches = [numbers.shape[:-1], flat.shape[:-1], *(batch for _, batch in arrays)]
         if not any(batches):
-            return State(take_substep(core, [numbers, flat, *(array for array, _ in arrays)]), self.dtype)
+            return self._state(take_substep(core, [numbers, flat, *(array for array, _ in arrays)]))
         batch = broadcast({name: tuple(b) for name, b in zip(("state", "inputs", *names), batches, strict=True)})
         every = zip([numbers, flat, *(array for array, _ in arrays)], batches, strict=True)
         together = [t.expand(*batch, *t.shape[len(own) :]).reshape(-1, *t.shape[len(own) :]) for t, own in every]
-        return State(take_substep(core, together).reshape(*batch, -1), self.dtype)
+        return self._state(take_substep(core, together).reshape(*batch, -1))
+
+    def _state(self, numbers: Tensor) -> State:
+        return State(numbers, self.dtype, self.scene.hidden_count)
 
     def _array(self, name: str, array: Tensor) -> tuple[Tensor, torch.Size]:
         """An array (*batch, ...) in float64, and its batch."""
