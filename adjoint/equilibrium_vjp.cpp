@@ -1,5 +1,6 @@
 #include "adjoint/equilibrium_vjp.h"
 
+#include "adjoint/resting_vjp.h"
 #include "adjoint/step/substep.h"
 
 namespace sheetbend {
@@ -7,19 +8,25 @@ namespace sheetbend {
 EquilibriumDerivative::EquilibriumDerivative(const Scene& scene, const double* inputs, const Equilibrium& at)
     : scene_(scene), inputs_(inputs, inputs + scene.layout.total()), at_(at), kkt_(scene) {
   if (!at.converged) throw NoEquilibrium(at.message);
+  const Inputs<const double> in{scene.layout, inputs_.data()};
+  const RestingContacts<double> contacts(scene, in, at_.t0,
+                                         at_.held.empty() ? in.of(Quantity::position) : at_.held.data());
+  RestingModes modes;
+  modes.decide(contacts, at_.x.data(), 0.0);
   kkt_.assemble(inputs, at_.x.data(), at_.lambda.data(), at_.force_stiffness, at_.left_out);
-  if (!kkt_.factorize(0.0, compliances(scene, {scene.layout, inputs_.data()}).data()))
+  kkt_.take_contacts(modes.blocks(contacts, at_.x.data()));
+  if (!kkt_.factorize(0.0, compliances(scene, in).data()))
     throw NoEquilibrium(
         "equilibrium: the Newton matrix is singular, so the shape has no derivative (a fold, or a part that moves "
         "freely). Fix: hold "
         "every part, or move away from the critical load");
 }
 
-void EquilibriumDerivative::solve(std::vector<double>& x, std::vector<double>& lambda) const {
-  if (!kkt_.solve(x.data(), lambda.data()))
+void EquilibriumDerivative::solve(std::vector<double>& x, std::vector<double>& lambda, bool transposed) const {
+  if (!kkt_.solve(x.data(), lambda.data(), 1e-13, transposed))
     throw NoEquilibrium(
         "equilibrium: the linear solve of the derivative lost its accuracy. Fix: check for redundant rigid "
-        "constraints");
+        "constraints, or for friction that holds a part at its limit alone");
 }
 
 void EquilibriumDerivative::vjp(const double* x_bar, const double* lambda_bar, double* inputs_bar) const {
@@ -33,7 +40,7 @@ void EquilibriumDerivative::vjp(const double* x_bar, const double* lambda_bar, d
   }
   if (lambda_bar) v.assign(lambda_bar, lambda_bar + scene_.multipliers());
   for (const RedundantRow& r : at_.left_out) v[r.row] = 0.0;
-  solve(u, v);
+  solve(u, v, true);
 
   for_each_constraint(scene_, [&]<class K>(K, const Group& group, int item) {
     const int first_row = group.first_row + item * K::rows;
@@ -88,6 +95,13 @@ void EquilibriumDerivative::vjp(const double* x_bar, const double* lambda_bar, d
     bar.of(Quantity::volume)[i] += v_here;
     bar.of(Quantity::volume_compliance)[i] -= v_here * p;
   }
+
+  std::vector<double> away(u.size());
+  for (std::size_t i = 0; i < u.size(); ++i) away[i] = -u[i];
+  std::vector<double> given(at_.held.size());
+  const RestingContacts<double> contacts(scene_, in, at_.t0,
+                                         given.empty() ? in.of(Quantity::position) : at_.held.data());
+  resting_vjp(contacts, at_.x.data(), away.data(), given.empty() ? bar.of(Quantity::position) : given.data(), bar);
 
   const Vec3<double> gravity(in.of(Quantity::gravity));
   const KnotWeights boundary = scene_.driven.empty() ? KnotWeights{} : scene_.boundary.at(at_.t0);

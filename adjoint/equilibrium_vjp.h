@@ -12,6 +12,7 @@
 #include "adjoint/equilibrium_tangents.h"
 #include "core/equilibrium/equilibrium.h"
 #include "core/equilibrium/residual.h"
+#include "core/equilibrium/resting.h"
 #include "core/scalar/complex.h"
 #include "core/scalar/dual.h"
 
@@ -44,7 +45,7 @@ class EquilibriumDerivative {
   void jvp(const T* inputs, T* x, T* lambda) const;
 
  private:
-  void solve(std::vector<double>& x, std::vector<double>& lambda) const;
+  void solve(std::vector<double>& x, std::vector<double>& lambda, bool transposed) const;
 
   const Scene& scene_;
   std::vector<double> inputs_;
@@ -59,12 +60,15 @@ void EquilibriumDerivative::jvp(const T* inputs, T* x, T* lambda) const {
   place_fixed(scene_, in, at_.t0, at_x.data());
   std::vector<T> r_x(at_x.size()), r_l(at_lambda.size());
   equilibrium_residual(scene_, in, at_.t0, at_x.data(), at_lambda.data(), r_x.data(), r_l.data());
+  const std::vector<T> held(at_.held.begin(), at_.held.end());
+  RestingContacts<T>(scene_, in, at_.t0, held.empty() ? in.of(Quantity::position) : held.data())
+      .add_forces(at_x.data(), r_x.data());
   std::vector<double> x_dot(r_x.size()), lambda_dot(r_l.size());
   for (int k = 0; k < Tangents<T>::count; ++k) {
     for (std::size_t i = 0; i < r_x.size(); ++i) x_dot[i] = -Tangents<T>::part(r_x[i], k);
     for (std::size_t i = 0; i < r_l.size(); ++i) lambda_dot[i] = -Tangents<T>::part(r_l[i], k);
     for (const RedundantRow& r : at_.left_out) lambda_dot[r.row] = 0.0;
-    solve(x_dot, lambda_dot);
+    solve(x_dot, lambda_dot, false);
     for (std::size_t i = 0; i < r_x.size(); ++i) Tangents<T>::part(at_x[i], k) += x_dot[i];
     for (std::size_t i = 0; i < r_l.size(); ++i) Tangents<T>::part(at_lambda[i], k) = lambda_dot[i];
   }

@@ -21,7 +21,8 @@ Equilibrium::Equilibrium(const Scene& scene, std::span<const double> values, std
   if (!start.empty()) check_size("start", start.size(), static_cast<std::size_t>(topology.dofs()));
   check_finite("start", start);
   translated([&] {
-    parts_->at = EquilibriumSolver(topology).solve(parts_->inputs.data(), start.empty() ? nullptr : start.data());
+    const double* from = start.empty() ? nullptr : start.data();
+    parts_->at = EquilibriumSolver(topology).solve(parts_->inputs.data(), from, nullptr, {.held = from});
   });
   if (!parts_->at.converged) throw ConvergenceError(parts_->at.message);
 }

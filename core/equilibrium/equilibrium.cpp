@@ -79,7 +79,7 @@ void EquilibriumSolver::find_redundant_rows(State& s) {
 
 // The multipliers that would hold the start best: those of one heavily damped step from it, which is not taken.
 void EquilibriumSolver::estimate_multipliers(State& s) {
-  kkt_.assemble(s.in.data, s.x.data(), s.lambda.data(), s.force_stiffness(), s.left_out);
+  assemble(s);
   const double mu = s.first_pseudo_stiffness(kkt_);
   std::vector<double> x = s.r_x, lambda = s.r_l;
   for (double& r : x) r = -r;
@@ -88,6 +88,11 @@ void EquilibriumSolver::estimate_multipliers(State& s) {
     s.lambda = lambda;
   else
     s.take_elastic_multipliers();
+}
+
+void EquilibriumSolver::assemble(State& s) {
+  kkt_.assemble(s.in.data, s.x.data(), s.lambda.data(), s.force_stiffness(), s.left_out);
+  kkt_.take_contacts(s.modes.blocks(s.contacts, s.x.data()));
 }
 
 // Moves a little along a direction of negative curvature, found by inverse iteration on the smallest K + mu that is positive definite.
@@ -126,7 +131,7 @@ Equilibrium EquilibriumSolver::solve(const double* inputs, const double* start_x
       find_redundant_rows(s);
       s.measure();
     }
-    kkt_.assemble(inputs, s.x.data(), s.lambda.data(), s.force_stiffness(), s.left_out);
+    assemble(s);
     ++result.iterations;
     if (s.converged() || s.find_unstressed()) {
       result.unstable_modes = kkt_.factorize(0.0, s.compliance.data()) ? kkt_.negative_modes() : -1;
@@ -144,7 +149,7 @@ Equilibrium EquilibriumSolver::solve(const double* inputs, const double* start_x
       if (mu == 0.0) {
         if (!start_lambda && result.iterations == 1) {
           std::fill(s.lambda.begin(), s.lambda.end(), 0.0);
-          kkt_.assemble(inputs, s.x.data(), s.lambda.data(), s.force_stiffness(), s.left_out);
+          assemble(s);
         }
         mu = s.first_pseudo_stiffness(kkt_);
       }
@@ -165,6 +170,7 @@ Equilibrium EquilibriumSolver::solve(const double* inputs, const double* start_x
   result.energy = s.energy();
   if (!result.converged) result.message = not_converged(result, options.tolerance);
   result.left_out = std::move(s.left_out);
+  if (options.held) result.held.assign(options.held, options.held + scene_.dofs());
   result.x = std::move(s.x);
   result.lambda = std::move(s.lambda);
   return result;

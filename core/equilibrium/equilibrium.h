@@ -8,6 +8,8 @@
 // start violates by far are softened at first. Saddles are left along a direction of negative curvature. So a solution is stable
 // wherever the start allows; soft wires have several, and which one is found depends on the start (see branches.h).
 //
+// Contacts push and pull while Newton's method takes a step; between steps the law decides which of them are apart, stick or slide (an active set).
+//
 // Rigid rows that others say already have no multipliers of their own, and A no inverse: they are left out, as a direct block leaves them out.
 #pragma once
 
@@ -22,10 +24,11 @@
 namespace sheetbend {
 
 struct EquilibriumOptions {
-  int max_iterations = 500;  // evaluations of the Newton matrix
-  double tolerance = 1e-12;  // of the relative residual, or of Newton's step relative to the scene's size
-  double t0 = 0.0;           // time at which boundary and force are taken  [s]
-  bool stable = true;        // false: go to the nearest equilibrium, saddle or not
+  int max_iterations = 500;      // evaluations of the Newton matrix
+  double tolerance = 1e-12;      // of the relative residual, or of Newton's step relative to the scene's size
+  double t0 = 0.0;               // time at which boundary and force are taken  [s]
+  bool stable = true;            // false: go to the nearest equilibrium, saddle or not
+  const double* held = nullptr;  // coordinates (dofs) that friction counts from; null: Quantity::position
 };
 
 struct Equilibrium {
@@ -39,8 +42,9 @@ struct Equilibrium {
   int unstable_modes = -1;  // negative eigenvalues of the energy's Hessian (on the tangent space of rigid constraints)
   bool converged = false;
   double t0 = 0.0;
-  double force_stiffness = 0.0;  // scale of stiffness where the multipliers give none  [N/m]
+  double force_stiffness = 0.0;        // scale of stiffness where the multipliers give none  [N/m]
   std::vector<RedundantRow> left_out;  // rigid rows that others say already at x; their multipliers are zero
+  std::vector<double> held;            // that friction counts from; empty: Quantity::position
   std::string message;                 // why not converged and what to do; empty otherwise
 };
 
@@ -61,6 +65,7 @@ class EquilibriumSolver {
  private:
   using State = EquilibriumState;
   bool step(State& s, double mu, const double* alpha, double share = 1.0);
+  void assemble(State& s);
   void estimate_multipliers(State& s);
   void leave_saddle(State& s);
 

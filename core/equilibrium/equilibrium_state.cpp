@@ -12,6 +12,7 @@ namespace sheetbend {
 namespace {
 
 constexpr double energy_share = 0.1;  // of the loads' energy that softened constraints may hold
+constexpr double rounding = 1e-14;    // of the scene's size, by which a contact may be above a surface
 constexpr double stiffening = 0.9;    // of softened constraints, per iteration
 
 // Diagonal of the box around all particles, with bodies that have a width.
@@ -61,12 +62,6 @@ void expect_no_unilateral(const Scene& scene) {
       throw std::invalid_argument("equilibrium: group " + group.name + " may go slack. Fix: leave it out");
 }
 
-void expect_no_contact(const Scene& scene) {
-  if (!scene.contacts.empty())
-    throw std::invalid_argument("equilibrium: contact " + scene.contacts.front().name +
-                                " is not known here. Fix: let it come to rest in a simulation, or leave contacts out");
-}
-
 }  // namespace
 
 double largest(const std::vector<double>& v) {
@@ -88,12 +83,13 @@ EquilibriumState::EquilibriumState(const Scene& scene_, const double* inputs, co
       r_l(scene_.multipliers()),
       compliance(compliances(scene_, in)),
       softened(compliance),
-      soft(scene_.groups.size() + scene_.volumes.size(), std::numeric_limits<double>::infinity()) {
+      soft(scene_.groups.size() + scene_.volumes.size(), std::numeric_limits<double>::infinity()),
+      contacts(scene_, in, o.t0, o.held ? o.held : in.of(Quantity::position)) {
   expect_energy(scene, in, o.t0);
   expect_no_unilateral(scene);
-  expect_no_contact(scene);
   if (!scene.loads.empty())
-    throw std::invalid_argument("equilibrium: loads act along rows. Fix: leave them out, or simulate with drag until the motion has died down");
+    throw std::invalid_argument(
+        "equilibrium: loads act along rows. Fix: leave them out, or simulate with drag until the motion has died down");
   const double* from = start_x ? start_x : in.of(Quantity::position);
   x.assign(from, from + scene.dofs());
   lambda.assign(scene.multipliers(), 0.0);
@@ -105,6 +101,7 @@ EquilibriumState::EquilibriumState(const Scene& scene_, const double* inputs, co
   external_force(scene, in, o.t0, x.data(), r_x.data());
   weight = largest(r_x);
   for (const double f : r_x) total += std::abs(f);
+  modes.decide(contacts, x.data(), 0.0);
   evaluate(x, lambda);
   if (!finite(x) || !finite(r_x) || !finite(r_l))
     throw std::invalid_argument(
@@ -181,14 +178,17 @@ bool EquilibriumState::any_rigid() const {
 
 void EquilibriumState::evaluate(const std::vector<double>& at_x, const std::vector<double>& at_lambda) {
   equilibrium_residual(scene, in, options.t0, at_x.data(), at_lambda.data(), r_x.data(), r_l.data());
+  modes.add_forces(contacts, at_x.data(), r_x);
   for (const RedundantRow& r : left_out) r_l[r.row] = 0.0;
 }
 
 void EquilibriumState::measure() {
+  if (modes.decide(contacts, x.data(), rounding * size)) last_step = std::numeric_limits<double>::infinity();
   evaluate(x, lambda);
   std::vector<double> force(scene.dofs());
   external_force(scene, in, options.t0, x.data(), force.data());
   for (double& f : force) f = std::abs(f);
+  modes.add_sizes(contacts, x.data(), force);
   residual = 0.0;
   for_each_constraint(scene, [&]<class K>(K, const Group& group, int item) {
     double local[K::dofs];
@@ -240,7 +240,7 @@ bool EquilibriumState::find_unstressed() {
 double EquilibriumState::energy() const {
   std::vector<double> f(scene.dofs());
   dead_load(scene, in, options.t0, f.data());
-  double sum = pressure_energy(scene, in, x.data());
+  double sum = pressure_energy(scene, in, x.data()) + modes.energy(contacts, x.data());
   for (int i = 0; i < scene.dofs(); ++i) sum -= f[i] * x[i];
   for_each_constraint(scene, [&]<class K>(K, const Group& group, int item) {
     for (int j = 0; j < K::rows; ++j) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/equilibrium/equilibrium.h"
+#include "core/equilibrium/resting_modes.h"
 
 namespace sheetbend {
 
@@ -24,6 +25,8 @@ struct EquilibriumState {
   std::vector<double> inflation;  // per volume, what changing the start's to its own takes by the first estimate  [J]
   double residual = 0.0, last_step = std::numeric_limits<double>::infinity();
   std::vector<RedundantRow> left_out;
+  RestingContacts<double> contacts;
+  RestingModes modes;
 
   // Throws std::invalid_argument where a scene has no energy, a group may go slack, or the start is not finite.
   EquilibriumState(const Scene& scene, const double* inputs, const double* start_x, const double* start_lambda,
@@ -57,7 +60,7 @@ struct EquilibriumState {
   }
 
   void evaluate(const std::vector<double>& at_x, const std::vector<double>& at_lambda);  // r_x and r_l
-  // The residual at (x, lambda), relative to the forces that cancel in it and, by |J|, to the scene's size.
+  // Lets contacts be decided anew, and takes the residual at (x, lambda), relative to the forces that cancel in it and, by |J|, to the scene's size.
   void measure();
   // A Newton step of no length counts near rest only: at a fold K is so stiff that every step is short. Without loads the residual at rest
   // is rounding relative to rounding.

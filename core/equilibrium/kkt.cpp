@@ -58,6 +58,13 @@ Kkt::Kkt(const Scene& scene) : scene_(scene), unknown_(scene.dofs(), -1), presse
   };
   std::vector<Eigen::Triplet<double>> entries;
   for (int i = 0; i < free_; ++i) entries.emplace_back(i, i, 1.0);
+  for (const Contact& contact : scene.contacts)
+    for (const int n : contact.particles)
+      if (scene.role[n] == Role::free) {
+        contact_dof_.push_back(scene.first_dof[n]);
+        for (int e = 0; e < 9; ++e)
+          entries.emplace_back(free_dof[contact_dof_.back() + e / 3], free_dof[contact_dof_.back() + e % 3], 1.0);
+      }
   for_each_pair(free_dof, [&](int a, int b) {
     if (a >= 0 && b >= 0) entries.emplace_back(a, b, 1.0);
   });
@@ -86,6 +93,11 @@ Kkt::Kkt(const Scene& scene) : scene_(scene), unknown_(scene.dofs(), -1), presse
   };
   for_each_pair(unknown_, [&](int a, int b) { position_.push_back(a >= 0 && a <= b ? position(a, b) : -1); });
   for (int i = 0; i < unknowns; ++i) diagonal_.push_back(position(i, i));
+  for (const int dof : contact_dof_)
+    for (int e = 0; e < 9; ++e) {
+      const int a = unknown_[dof + e / 3], b = unknown_[dof + e % 3];
+      contact_position_.push_back(a <= b ? position(a, b) : -1);
+    }
   for (const Director& d : scene.directors)
     for (int e = 0; e < 9; ++e) {
       const int a = unknown_[scene.first_dof[d.node] + e / 3], b = unknown_[scene.first_dof[d.node] + e % 3];
@@ -187,6 +199,9 @@ bool Kkt::factorize(double mu, const double* compliance) {
       }
     J += K::rows * K::dofs;
   });
+  for (std::size_t i = 0; i < contacts_.size(); ++i)
+    for (int e = 0; e < 9; ++e)
+      if (const int at = contact_position_[9 * i + e]; at >= 0) values[at] += contacts_[i].symmetric[e];
   for (std::size_t i = 0; i < idle_.size(); ++i) {
     const int* at = &director_position_[9 * i];
     if (at[0] < 0) continue;
@@ -203,12 +218,31 @@ bool Kkt::factorize(double mu, const double* compliance) {
   factor_.factorize(K_);
   if (factor_.info() != Eigen::Success || !factor_.vectorD().allFinite()) return false;
   negative_ = static_cast<int>((factor_.vectorD().array() < 0.0).count() - border_.size());
-  return true;
+  return !slides_ || factorize_whole();
+}
+
+void Kkt::take_contacts(std::vector<ContactBlock> blocks) {
+  contacts_ = std::move(blocks);
+  slides_ = std::ranges::any_of(contacts_, &ContactBlock::slides);
+}
+
+bool Kkt::factorize_whole() {
+  Eigen::SparseMatrix<double> K = K_.selfadjointView<Eigen::Upper>();
+  for (std::size_t i = 0; i < contacts_.size(); ++i)
+    for (int e = 0; e < 9; ++e)
+      K.coeffRef(unknown_[contact_dof_[i] + e / 3], unknown_[contact_dof_[i] + e % 3]) +=
+          contacts_[i].whole[e] - contacts_[i].symmetric[e];
+  if (!whole_) {
+    whole_ = std::make_unique<Eigen::SparseLU<Eigen::SparseMatrix<double>>>();
+    whole_->analyzePattern(K);
+  }
+  whole_->factorize(K);
+  return whole_->info() == Eigen::Success;
 }
 
 // K x - g p = J^T alpha^-1 b_l - b_x,  lambda = alpha^-1 (b_l - J x), with the softened compliances;  -g.x - alpha p = -b_p.
-void Kkt::condensed_solve(const std::vector<double>& b_x, const std::vector<double>& b_l, std::vector<double>& x,
-                          std::vector<double>& lambda) const {
+void Kkt::condensed_solve(const std::vector<double>& b_x, const std::vector<double>& b_l, bool transposed,
+                          std::vector<double>& x, std::vector<double>& lambda) const {
   Eigen::VectorXd b(K_.rows());
   for (int i = 0; i < scene_.dofs(); ++i)
     if (unknown_[i] >= 0) b[unknown_[i]] = -b_x[i];
@@ -227,7 +261,13 @@ void Kkt::condensed_solve(const std::vector<double>& b_x, const std::vector<doub
       if (const int u = unknown_[scene_.first_dof[nodes[d / 3]] + d % 3]; u >= 0) b[u] += stiffness * push[d];
   });
   for (std::size_t v = 0; v < border_.size(); ++v) b[free_ + v] = -b_l[scene_.rows + v];
-  const Eigen::VectorXd solution = factor_.solve(b);
+  Eigen::VectorXd solution;
+  if (!slides_)
+    solution = factor_.solve(b);
+  else if (transposed)
+    solution = whole_->transpose().solve(b);
+  else
+    solution = whole_->solve(b);
   for (std::size_t v = 0; v < border_.size(); ++v) lambda[scene_.rows + v] = solution[free_ + v];
   for (int i = 0; i < scene_.dofs(); ++i) x[i] = unknown_[i] >= 0 ? solution[unknown_[i]] : 0.0;
   for_each_gradient([&]<class K>(K, const Group& group, int item, const double* J, double stiffness) {
@@ -242,9 +282,13 @@ void Kkt::condensed_solve(const std::vector<double>& b_x, const std::vector<doub
   });
 }
 
-// r -= A (x, lambda), with the true compliances.
-void Kkt::subtract_product(const std::vector<double>& x, const std::vector<double>& lambda, std::vector<double>& r_x,
-                           std::vector<double>& r_l) const {
+// r -= A (x, lambda) or A^T (x, lambda), with the true compliances.
+void Kkt::subtract_product(const std::vector<double>& x, const std::vector<double>& lambda, bool transposed,
+                           std::vector<double>& r_x, std::vector<double>& r_l) const {
+  for (std::size_t i = 0; i < contacts_.size(); ++i)
+    for (int e = 0; e < 9; ++e)
+      r_x[contact_dof_[i] + e / 3] +=
+          contacts_[i].whole[transposed ? 3 * (e % 3) + e / 3 : e] * x[contact_dof_[i] + e % 3];
   const double *H = H_.data(), *J = J_.data();
   for (int i = 0; i < scene_.dofs(); ++i)
     if (unknown_[i] >= 0) r_x[i] += mu_ * metric_[i] * x[i];
@@ -285,7 +329,7 @@ void Kkt::subtract_product(const std::vector<double>& x, const std::vector<doubl
     r_l[scene_.rows + v] -= alpha_[scene_.constraints + v] * lambda[scene_.rows + v];
 }
 
-bool Kkt::solve(double* x, double* lambda, double accuracy) const {
+bool Kkt::solve(double* x, double* lambda, double accuracy, bool transposed) const {
   std::vector<double> r_x(x, x + scene_.dofs()), r_l(lambda, lambda + scene_.multipliers()), dx(r_x.size()),
       dl(r_l.size());
   std::vector<double> z_x(r_x.size(), 0.0), z_l(r_l.size(), 0.0);
@@ -303,14 +347,14 @@ bool Kkt::solve(double* x, double* lambda, double accuracy) const {
   };
   double change = 1.0;
   for (int pass = 0; pass < 20; ++pass) {
-    condensed_solve(r_x, r_l, dx, dl);
+    condensed_solve(r_x, r_l, transposed, dx, dl);
     for (std::size_t i = 0; i < dx.size(); ++i) z_x[i] += dx[i];
     for (std::size_t i = 0; i < dl.size(); ++i) z_l[i] += dl[i];
     const double before = std::exchange(change, std::max(ratio(largest(dx), std::max(largest(z_x), move)),
                                                          ratio(push(dl), std::max(push(z_l), geometric_ * move))));
     if (!std::isfinite(change)) return false;
     if (change <= accuracy || (pass > 0 && change > 0.5 * before)) break;
-    subtract_product(dx, dl, r_x, r_l);
+    subtract_product(dx, dl, transposed, r_x, r_l);
   }
   std::copy(z_x.begin(), z_x.end(), x);
   std::copy(z_l.begin(), z_l.end(), lambda);

@@ -10,17 +10,22 @@
 // Directors may grow and lean along their axis, normals may grow, without changing any constraint. K gets a stiffness of its own in these directions, in
 // which nothing pushes, so that it is regular.
 //
+// Contacts that slide make K unsymmetric. Then it has an LU factorization besides, and the pivots are those of its symmetric part.
+//
 // Negative pivots, less one per kept volume, count the unstable modes (Sylvester's law of inertia); in the limit of rigid rows K has one positive
 // eigenvalue per row and those of the energy's Hessian on the rows' tangent space (Gould 1985).
 #pragma once
 
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
+#include <Eigen/SparseLU>
 #include <array>
+#include <memory>
 #include <vector>
 
-#include "core/scene/scene.h"
+#include "core/equilibrium/resting_modes.h"
 #include "core/rollout/redundant_rows.h"
+#include "core/scene/scene.h"
 
 namespace sheetbend {
 
@@ -34,6 +39,9 @@ class Kkt {
   void assemble(const double* inputs, const double* x, const double* lambda, double force_stiffness,
                 const std::vector<RedundantRow>& left_out);
 
+  // The contacts' share, one block for each free particle of each contact, in the scene's order.
+  void take_contacts(std::vector<ContactBlock> blocks);
+
   // Factors K for mu >= 0 [N/m] and the compliance of each constraint and volume. False where K is singular to rounding.
   bool factorize(double mu, const double* compliance);
   int negative_modes() const { return negative_; }
@@ -44,15 +52,16 @@ class Kkt {
 
   // Solves A (x, lambda) = (x, lambda) in place; entries of fixed nodes come out zero. Refines until corrections are below `accuracy`
   // relative to the solution or stop shrinking; false if that leaves more than 1e-6.
-  bool solve(double* x, double* lambda, double accuracy = 1e-13) const;
+  bool solve(double* x, double* lambda, double accuracy = 1e-13, bool transposed = false) const;
 
  private:
   using Factor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Upper, Eigen::NaturalOrdering<int>>;
 
-  void condensed_solve(const std::vector<double>& b_x, const std::vector<double>& b_l, std::vector<double>& x,
-                       std::vector<double>& lambda) const;
-  void subtract_product(const std::vector<double>& x, const std::vector<double>& lambda, std::vector<double>& r_x,
-                        std::vector<double>& r_l) const;
+  void condensed_solve(const std::vector<double>& b_x, const std::vector<double>& b_l, bool transposed,
+                       std::vector<double>& x, std::vector<double>& lambda) const;
+  bool factorize_whole();
+  void subtract_product(const std::vector<double>& x, const std::vector<double>& lambda, bool transposed,
+                        std::vector<double>& r_x, std::vector<double>& r_l) const;
 
   const Scene& scene_;
   int free_ = 0;                             // unknowns that are coordinates; one per volume follows
@@ -68,10 +77,14 @@ class Kkt {
   std::vector<int> director_position_;       // into K's values, 9 per director, -1 as in position_
   std::vector<std::array<double, 9>> idle_;  // per director: projection onto the directions that nothing depends on
   std::vector<double> idle_stiffness_;       // per director
+  std::vector<ContactBlock> contacts_;
+  bool slides_ = false;
+  std::vector<int> contact_dof_, contact_position_;  // per block; 9 per block into K's values, -1 as in position_
   double mu_ = 0.0, force_stiffness_ = 0.0, geometric_ = 0.0, largest_diagonal_ = 0.0;
   int negative_ = 0;
   Eigen::SparseMatrix<double> K_;
   Factor factor_;
+  std::unique_ptr<Eigen::SparseLU<Eigen::SparseMatrix<double>>> whole_;  // of K with what slides
 };
 
 }  // namespace sheetbend

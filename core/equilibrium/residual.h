@@ -8,7 +8,7 @@
 // J^T lambda is the force of the constraints on the particles, so a stretched link (C = length - rest > 0) has lambda = -tension.
 // For an elastic constraint lambda = -C/alpha, and the pair is the stationarity of the energy -f.x + C.C/(2 alpha), with -p V for
 // pressure (pressure.h).
-// Pinned nodes stay at Quantity::position, driven ones on their boundary at t0; drag, damping and still air do not act at rest.
+// What contacts add to r_x stands in resting.h. Pinned nodes stay at Quantity::position, driven ones on their boundary at t0; drag, damping and still air do not act at rest.
 #pragma once
 
 #include <algorithm>

@@ -16,19 +16,26 @@ from pathlib import Path
 
 import numpy as np
 import sheetbend as sb
-from cube import CORNERS, MASS, RATE, SIDE
+from cube import MASS, RATE, SIDE
+from scipy.stats.qmc import Sobol
 from sheetbend.arrays.rotations import matrices_of
 from sheetbend.quantities.quantities import Term
 
 DATA = Path(__file__).parent / "data" / "tosses.npz"
 SCALE = 1.0176  # of the data's lengths, from free flight
 SEEN = 8  # frames that a prediction starts from
-SIGMA = 5e-3  # m: what the model is asked to explain
 H = 1 / (4 * RATE)
 SOLVER = sb.Solver(h=H, method="implicit")
 CUBE = SIDE / 2 * np.array([[0, 0, 0], *([x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1))])
-START = {"table_friction": 0.18, "table_restitution": 0.125, "hollow": 0.2, "table_z": 0.0, "stretch": 0.0}  # the fit's
-AUTHORS = {"table_friction": 0.18, "table_restitution": 0.125}
+BOX = {  # in which the fit searches
+    "table_friction": (0.16, 0.2),
+    "table_restitution": (0.0, 0.4),
+    "hollow": (0.0, 1.2),
+    "table_z": (-2e-3, 1e-3),
+    "stretch": (-0.008, 0.008),
+}
+ROUNDS, POINTS, BEST = 3, 16, 4
+AUTHORS = {"table_friction": 0.18, "table_restitution": 0.125, "hollow": 0.0, "table_z": 0.0, "stretch": 0.0}
 
 
 @dataclass(frozen=True)
@@ -93,8 +100,8 @@ def scene_of(toss: Toss, seen: int) -> sb.Scene:
     pairs = np.array(rigid_pairs())
     lengths = np.linalg.norm(arms[pairs[:, 0]] - arms[pairs[:, 1]], axis=1)
     scene.add_constraints("distance", pairs, name="cube", compliance=0.0, rest=lengths)
-    scene.add_quantity("stretch", START["stretch"], "", positive=False, scale=0.01)
-    scene.add_quantity("hollow", START["hollow"], "", positive=False, scale=0.3)
+    scene.add_quantity("stretch", AUTHORS["stretch"], "", positive=False, scale=0.01)
+    scene.add_quantity("hollow", AUTHORS["hollow"], "", positive=False, scale=0.3)
     stretch, hollow = (("stretch", "identity"),), (("hollow", "identity"),)
     corners = np.arange(3, 27)
     scene.add_terms(
@@ -106,31 +113,39 @@ def scene_of(toss: Toss, seen: int) -> sb.Scene:
             Term("mass", np.arange(9), np.array([-MASS / 3, *np.full(8, MASS / 24)]), hollow),
         ]
     )
-    friction, restitution = START["table_friction"], START["table_restitution"]
+    friction, restitution = AUTHORS["table_friction"], AUTHORS["table_restitution"]
     scene.contact(np.arange(1, 9), sb.Plane(name="table"), friction=friction, restitution=restitution, settle=True)
     return scene
 
 
-def fitted(group: list[Toss], frames: int = 4) -> sb.FitResult:
-    """What all tosses share, from every so many frames of the center and of four corners."""
-    corner = [int(np.argmin(np.linalg.norm(CUBE - c, axis=1))) for c in CORNERS]
-    experiments = []
-    for toss in group:
-        few = slice(0, None, frames)
-        points = np.vstack([np.zeros(3), CORNERS]) / SCALE
-        recording = sb.Recording.from_poses(
-            toss.times[few], toss.positions[few], toss.quaternions[few], points, name=toss.name.replace(" ", "_")
-        )
-        places = [sb.on_particle(k) for k in (0, *corner)]
-        scene = scene_of(toss, toss.free)
-        experiments.append(sb.Experiment(scene=scene, recording=recording, markers=places, solver=SOLVER, sigma=SIGMA))
-    return sb.fit(experiments, parameters=list(START), refine=False, beginnings=False)
+def fitted(group: list[Toss], rounds: int = ROUNDS, points: int = POINTS) -> dict[str, float]:
+    """The numbers that all tosses share, by search: each round tries points spread evenly over a box, and the next box
+    is around the best of them, half as wide.
+
+    The score of a point is the mean error of the center over time plus a third of that at rest.
+    """
+    names, box = list(BOX), np.array(list(BOX.values()))
+    scenes = [scene_of(toss, toss.free) for toss in group]
+    tried: list[tuple[float, np.ndarray]] = []
+    for k in range(rounds):
+        spread = Sobol(len(names), seed=k).random(points)
+        for share in spread:
+            point = box[:, 0] + share * (box[:, 1] - box[:, 0])
+            found = np.array(
+                [errors(t, dict(zip(names, point, strict=True)), s) for t, s in zip(group, scenes, strict=True)]
+            )
+            tried.append((float(found[:, 0].mean() + found[:, 1].mean() / 3), point))
+        tried.sort(key=lambda one: one[0])
+        best = [point for _, point in tried[:BEST]]
+        middle, half = np.mean(best, axis=0), 0.25 * (box[:, 1] - box[:, 0])
+        box = np.column_stack([np.maximum(middle - half, box[:, 0]), np.minimum(middle + half, box[:, 1])])
+        score, point = tried[0]
+        print(f"round {k + 1}: best score {score:.2f} mm at {np.array2string(point, precision=4)}", flush=True)
+    return dict(zip(names, (float(a) for a in np.mean(best, axis=0)), strict=True))
 
 
-def errors(toss: Toss, values: dict[str, float], seen: int = SEEN) -> np.ndarray:
-    """Of a prediction from the first frames: of the center in mm, mean over time and at rest, and of the attitude in
-    degrees, likewise."""
-    scene = scene_of(toss, seen)
+def errors(toss: Toss, values: dict[str, float], scene: sb.Scene) -> np.ndarray:
+    """Of a prediction: of the center in mm, mean over time and at rest, and of the attitude in degrees, likewise."""
     motion = sb.simulate(scene, toss.times, SOLVER, values)
     x = motion.positions[:, :9]
     apart = 1e3 * np.linalg.norm(x[:, 0] - toss.positions, axis=1)
@@ -155,26 +170,31 @@ def without_physics(toss: Toss, seen: int = SEEN) -> np.ndarray:
     return np.array([[a.mean(), a[-1]] for a in apart])
 
 
+def report(label: str, group: list[Toss], values: dict[str, float], seen: int | None) -> None:
+    found = np.array([errors(toss, values, scene_of(toss, seen or toss.free)) for toss in group])
+    mean, middle = found.mean(axis=0), np.median(found, axis=0)
+    frames = "all frames before contact" if seen is None else f"the first {seen} frames"
+    print(
+        f"{label}, from {frames}: center {mean[0]:.1f} mm over time (median {middle[0]:.1f}), {mean[1]:.1f} at rest "
+        f"({middle[1]:.1f}); attitude {mean[2]:.0f} degrees ({middle[2]:.0f}), {mean[3]:.0f} at rest ({middle[3]:.0f})",
+        flush=True,
+    )
+
+
 def main(count: int) -> None:
     every = tosses()
     data = every[::2][:count]
     rest = [toss for toss in every if toss not in data]
-    result = fitted(data)
-    print(result.report())
-    found = {e.name: e.value for e in result.estimates}
-    for label, values in (("fitted", found), ("authors", AUTHORS | {"hollow": 0.0})):
-        for what, group in ((f"{len(data)} fitted tosses", data), (f"{len(rest)} others", rest)):
-            all_errors = np.array([errors(toss, values) for toss in group])
-            mean, middle = all_errors.mean(axis=0), np.median(all_errors, axis=0)
-            print(
-                f"{label}, {what}, from the first {SEEN} frames: center {mean[0]:.1f} mm over time (median "
-                f"{middle[0]:.1f}), {mean[1]:.1f} at rest ({middle[1]:.1f}); attitude {mean[2]:.1f} degrees "
-                f"({middle[2]:.1f}), {mean[3]:.1f} at rest ({middle[3]:.1f})"
-            )
+    found = fitted(data)
+    print("fitted: " + ", ".join(f"{name} {value:.4g}" for name, value in found.items()))
+    report(f"fitted, the {len(data)} tosses of the fit", data, found, None)
+    for seen in (None, SEEN):
+        report(f"fitted, {len(rest)} others", rest, found, seen)
+        report(f"authors, {len(rest)} others", rest, AUTHORS, seen)
+    report(f"fitted but without restitution, {len(rest)} others", rest, found | {"table_restitution": 0.0}, None)
     plain = np.mean([without_physics(toss) for toss in rest], axis=0)
-    for label, row in zip(
-        ("lies where it was seen last", "flies on until it is as low as it rests"), plain, strict=True
-    ):
+    guesses = ("lies where it was seen last", "flies on until it is as low as it rests")
+    for label, row in zip(guesses, plain, strict=True):
         print(f"without physics, {label}: {row[0]:.0f} mm over time, {row[1]:.0f} at rest")
 
 

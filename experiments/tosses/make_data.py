@@ -85,7 +85,8 @@ def main(folder: Path) -> None:
         "licence": told["licence"],
         "attribution": told["attribution"],
     }
-    (DATA / "flights.json").write_text(json.dumps(about, indent=1) + "\n")
+    for name in ("flights.json", "tosses.json"):
+        (DATA / name).write_text(json.dumps(about, indent=1) + "\n")
     shutil.copyfile(folder / "LICENSE.source", DATA / "LICENSE.source")
     print(f"{len(numbers)} flights, {flights[-1]} frames")
 

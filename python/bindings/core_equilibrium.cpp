@@ -33,6 +33,7 @@ std::vector<Solution> solve_batch(const std::shared_ptr<Scene>& scene, const Arr
   const double* from = start ? start->data() : nullptr;
   EquilibriumOptions options;
   options.stable = stable;
+  options.held = from;
   py::gil_scoped_release release;
   SignalInterrupt interrupt;
   parallel_for(static_cast<int>(count), threads, 1, [&](int begin, int end) {

@@ -2,7 +2,6 @@
 #include <list>
 #include <map>
 
-#include "core/equilibrium/equilibrium.h"
 #include "core/rollout/rollout.h"
 #include "tests/cpp/support/contact_scenes.h"
 #include "tests/cpp/support/lanes.h"
@@ -347,7 +346,6 @@ TEST(Contact, IsRefusedWhereItIsNotMade) {
     options.partition = other;
     EXPECT_THROW(make_plan(s.scene, options), std::invalid_argument);
   }
-  EXPECT_THROW(EquilibriumSolver(s.scene).solve(s.inputs.data()), std::invalid_argument);
 }
 
 }  // namespace

@@ -154,11 +154,6 @@ def test_other_methods_name_the_one_that_can(method):
         sb.simulate(rope_above(), TIMES, sb.Solver(h=1e-3, method=method, integrator="bdf1"))
 
 
-def test_what_does_not_know_contacts_says_so():
-    with pytest.raises(sb.SceneError, match="contacts"):
-        sb.equilibrium(rope_above())
-
-
 def test_a_compiled_scene_is_the_same_after_pickling():
     core = rope_above(stiffness=500.0).compiled.core
     again = pickle.loads(pickle.dumps(core))

@@ -132,15 +132,19 @@ def equilibrium(
 ) -> Equilibrium:
     """Find the equilibrium that a start leads to.
 
+    Friction holds the particles that touch their collider at the start: they stick, or slide to Coulomb's limit. What
+    comes to touch later slides without friction, because nothing tells where it would have stuck. So let what is draped
+    come to rest in a simulation, and start here where it ends.
+
     Args:
         scene: is frozen by this.
-        start: (particles, 3) m, or (nodes, 3) m as of `simulate`; the scene's initial positions by default.
+        start: (particles, 3) m, or (nodes, 3) m as of `simulate`; the scene's initial positions by default. Friction
+            counts from there; gradients take a given start as constant.
         values: quantities to change, by name.
         stable: leave saddles; False goes to the nearest equilibrium whatever its stability.
 
     Raises:
-        SceneError: the start has the wrong shape or leaves out hidden nodes that can move, or particles may touch
-            colliders.
+        SceneError: the start has the wrong shape or leaves out hidden nodes that can move.
         ValueError: air blows on triangles at the start; still air leaves a scene at rest as it is.
         NoEquilibriumError: not converged; says how far it came and what to try.
 
@@ -148,9 +152,6 @@ def equilibrium(
         RedundantConstraintsWarning: some rigid constraints follow from others at rest.
     """
     compiled = scene.compiled
-    if compiled.contacts:
-        fix = "let it come to rest in a simulation, or leave its contacts out"
-        raise SceneError(scene.name, "has contacts, which equilibria do not know", list(compiled.contacts), fix)
     theta = compiled.values(values)
     inputs = compiled.inputs(theta)
     x = None if start is None else whole_start(scene, start, inputs)

@@ -1,0 +1,72 @@
+// Contacts at rest, over any scalar. The law is that of a substep (core/contact/law.h) from coordinates that friction counts from, `held`: the particles that
+// touch there stick where they are, or slide at Coulomb's limit. Others have no history of friction, and slide without any. A rigid contact is as stiff
+// as in a substep of 1 ms, so that a particle that rests is 1e-8 m deep.
+#pragma once
+
+#include "core/solver/contact_source.h"
+#include "core/step/carry_friction.h"
+
+namespace sheetbend {
+
+template <class T>
+class RestingContacts {
+ public:
+  static constexpr double substep = 1e-3;  // s, in which forces are multipliers
+  static constexpr double per_force = substep * substep;
+  static constexpr double touching = 1e-6;  // m, of a gap that is none
+
+  // `held`: (dofs). Reads it and the inputs later on.
+  RestingContacts(const Scene& scene, const Inputs<const T>& in, double t0, const T* held)
+      : w_(scene.contacts.empty() ? 0 : scene.nodes()), still_(scene.contacts.empty() ? 0 : scene.dofs(), T(0.0)) {
+    if (scene.contacts.empty()) return;
+    for (int n = 0; n < scene.nodes(); ++n)
+      if (scene.role[n] == Role::free && scene.inertial[n]) w_[n] = T(1.0) / in.of(Quantity::mass)[n];
+    source.emplace(ContactSource<T>{
+        scene, in, Bdf::first_order(substep), t0, substep, {held, held, still_.data(), still_.data()}, w_.data(), 0});
+    poses = source->poses();
+    poses.now = poses.next;
+    for (int c = 0; c < static_cast<int>(scene.contacts.size()); ++c) {
+      const Contact& contact = scene.contacts[c];
+      for (int i = 0; i < static_cast<int>(contact.particles.size()); ++i) {
+        const int node = contact.particles[i];
+        if (scene.role[node] != Role::free) continue;
+        ContactNumbers<T> n = source->numbers(poses, c, i);
+        const bool rubs = value_of(n.friction) > 0.0 &&
+                          value_of(source->gap(poses.next[contact.collider], c, source->at(held, node))) <= touching;
+        if (!rubs) {
+          n.friction = T(0.0);
+          n.carried = {T(1.0), T(1.7), T(2.9)};  // it slides, whatever the direction
+        }
+        items.push_back({c, i, scene.first_dof[node], scene.colliders[contact.collider].any(), rubs, n});
+      }
+    }
+  }
+  RestingContacts(const RestingContacts&) = delete;
+  RestingContacts& operator=(const RestingContacts&) = delete;
+
+  // A free particle that may touch a collider.
+  struct Item {
+    int contact, item, dof;
+    AnyShape shape;
+    bool rubs;  // has friction
+    ContactNumbers<T> numbers;
+  };
+  std::vector<Item> items;
+  std::optional<ContactSource<T>> source;  // none without contacts
+  ColliderPoses<T> poses;
+
+  const Pose<T>& pose(const Item& i) const { return poses.next[source->scene.contacts[i.contact].collider]; }
+  Vec3<T> in_frame(const Item& i, const T* x) const { return pose(i).in_frame(Vec3<T>(x + i.dof)); }
+
+  // f += what the law has at x (dofs)  [N]
+  void add_forces(const T* x, T* f) const {
+    for (const Item& i : items)
+      if (const Touch<T> t = touch(i.shape, in_frame(i, x), i.numbers); t.pushes)
+        (T(1.0 / per_force) * pose(i).turned(t.force)).add_to(f + i.dof);
+  }
+
+ private:
+  std::vector<T> w_, still_;
+};
+
+}  // namespace sheetbend
