@@ -148,8 +148,7 @@ std::vector<CorrectedMotion::Stretch> CorrectedMotion::stretches() const {
         if (next < count && until[i] > s.end) s.onward.push_back(i);
     const auto frame_from = [&](int step) {
       std::size_t f = 0;
-      while (f < e_.observed.times.size() &&
-             FramePlace<double>(e_, e_.plan, f, inputs_.back(), last_).base - 1 < step)
+      while (f < e_.observed.times.size() && FramePlace<double>(e_, e_.plan, f, inputs_.back(), last_).base - 1 < step)
         ++f;
       return f;
     };

@@ -72,8 +72,7 @@ void Experiment::check() const {
 }
 
 template <class T, class Frame>
-void Experiment::run(const Plan& own, const T* in, Frame&& frame, double weight, T* means,
-                     Interrupt* interrupt) const {
+void Experiment::run(const Plan& own, const T* in, Frame&& frame, double weight, T* means, Interrupt* interrupt) const {
   const T time_offset = in[time_offset_at()];
   const int last = steps_at(own, in);
   const std::size_t dofs = scene->dofs();
@@ -155,9 +154,8 @@ void Experiment::residuals(const T* theta, const T* b, T* r, T* simulated, T* se
   std::vector<T> means(readings(), T(0.0));
   if (finer.empty()) {
     run(
-        plan, in.data(),
-        [&](std::size_t f, const T* x) { r = frame_residuals(observed, f, x, offsets, r, simulated); }, 1.0,
-        means.data(), interrupt);
+        plan, in.data(), [&](std::size_t f, const T* x) { r = frame_residuals(observed, f, x, offsets, r, simulated); },
+        1.0, means.data(), interrupt);
   } else {
     const std::vector<T> markers = extrapolated(in.data(), means.data(), interrupt);
     if (simulated) std::copy(markers.begin(), markers.end(), simulated);

@@ -59,8 +59,9 @@ struct Experiment {
 
   std::size_t time_offset_at() const { return scene->layout.total() + 3 * observed.markers.size(); }
   std::size_t inputs() const { return time_offset_at() + 1 + ForceSensor::inputs * sensors.size(); }
-  std::size_t residual_count() const;  // one per axis of every marker and frame that was seen, then those of the sensors
-  std::size_t readings() const;        // six per sample of every sensor
+  std::size_t residual_count()
+      const;                     // one per axis of every marker and frame that was seen, then those of the sensors
+  std::size_t readings() const;  // six per sample of every sensor
   int steps() const { return steps(plan); }
   int steps(const Plan& run) const;  // substeps until the last frame and sample
   // The same where the sensors' clocks are shifted, by no more than the motion is long.

@@ -34,7 +34,7 @@ struct ForceSensor {
 
   SupportReader reader;
   std::array<double, 3> arm{};
-  double sign = 1.0;               // -1 where the body's force on the support is read
+  double sign = 1.0;              // -1 where the body's force on the support is read
   std::vector<double> times;      // (instants) [s], ascending
   std::vector<int> sample;        // (instants)
   std::vector<double> share;      // (instants) in the mean of the sample

@@ -11,6 +11,7 @@ template Tape<double> record_rollout<double>(const Scene&, const Plan&, const do
                                              double*, int, Interrupt*);
 template long reverse_rollout<double>(const Scene&, const Plan&, const double*, double, Tape<double>&,
                                       const std::vector<int>&, const double*, double*, Interrupt*);
-template void single_step_vjp<double>(const Scene&, const Plan&, int, Scenes, const double*, const double*, const double*, double*, double*, double*);
+template void single_step_vjp<double>(const Scene&, const Plan&, int, Scenes, const double*, const double*,
+                                      const double*, double*, double*, double*);
 
 }  // namespace sheetbend

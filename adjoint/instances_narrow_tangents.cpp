@@ -1,6 +1,6 @@
 // Rollouts along four directions, which experiment.cpp steps itself.
-#include "core/scalar/dual.h"
 #include "core/rollout/rollout.h"
+#include "core/scalar/dual.h"
 
 namespace sheetbend {
 

@@ -11,6 +11,7 @@ template Tape<Pack> record_rollout<Pack>(const Scene&, const Plan&, const Pack*,
                                          int, Interrupt*);
 template long reverse_rollout<Pack>(const Scene&, const Plan&, const Pack*, double, Tape<Pack>&,
                                     const std::vector<int>&, const Pack*, Pack*, Interrupt*);
-template void single_step_vjp<Pack>(const Scene&, const Plan&, int, Scenes, const Pack*, const Pack*, const Pack*, Pack*, Pack*, Pack*);
+template void single_step_vjp<Pack>(const Scene&, const Plan&, int, Scenes, const Pack*, const Pack*, const Pack*,
+                                    Pack*, Pack*, Pack*);
 
 }  // namespace sheetbend

@@ -94,7 +94,8 @@ class StateReverse {
 
 // Cotangents of the initial state to those of the inputs: driven nodes started on their boundary.
 template <class T>
-void initial_state_vjp(const Scene& scene, const Inputs<const T>& in, double t0, T* x_bar, T* v_bar, const Inputs<T>& in_bar) {
+void initial_state_vjp(const Scene& scene, const Inputs<const T>& in, double t0, T* x_bar, T* v_bar,
+                       const Inputs<T>& in_bar) {
   start_spins_vjp(scene, in.of(Quantity::mass), in.of(Quantity::position), in.of(Quantity::velocity), x_bar, v_bar,
                   in_bar.of(Quantity::mass));
   const KnotWeights boundary = scene.driven.empty() ? KnotWeights{} : scene.boundary.at(t0);

@@ -35,7 +35,8 @@ class SingleStep {
   // A rollout keeps what it has computed from masses and the like, so other ones ask for another rollout. Forces, gravity and motions are read anew in
   // each substep.
   void take(const T* inputs) {
-    constexpr Quantity anew[] = {Quantity::boundary, Quantity::force, Quantity::gravity, Quantity::wind, Quantity::pressure, Quantity::load};
+    constexpr Quantity anew[] = {Quantity::boundary, Quantity::force,    Quantity::gravity,
+                                 Quantity::wind,     Quantity::pressure, Quantity::load};
     bool same = rollout_.has_value();
     for (int q = 0; q < quantity_count && same; ++q) {
       const std::size_t first = scene_.layout.offset[q], size = scene_.layout.size[q];
@@ -55,7 +56,7 @@ class SingleStep {
 // The reverse of SingleStep::forward from `state` to `next`, which went with BDF1 in the scenes `first_order`: cotangents of the next state, used up, to
 // those of the state and of the inputs (layout.total()), added. T: double, Pack.
 template <class T>
-void single_step_vjp(const Scene& scene, const Plan& plan, int step, Scenes first_order, const T* inputs, const T* state, const T* next, T* next_bar,
-                     T* state_bar, T* inputs_bar);
+void single_step_vjp(const Scene& scene, const Plan& plan, int step, Scenes first_order, const T* inputs,
+                     const T* state, const T* next, T* next_bar, T* state_bar, T* inputs_bar);
 
 }  // namespace sheetbend

@@ -7,8 +7,8 @@
 namespace sheetbend {
 
 template <class T>
-void single_step_vjp(const Scene& scene, const Plan& plan, int step, Scenes first_order, const T* inputs, const T* state, const T* next, T* next_bar,
-                     T* state_bar, T* inputs_bar) {
+void single_step_vjp(const Scene& scene, const Plan& plan, int step, Scenes first_order, const T* inputs,
+                     const T* state, const T* next, T* next_bar, T* state_bar, T* inputs_bar) {
   const std::size_t dofs = scene.dofs();
   SubstepRecord<T> record;
   record.resize(scene, plan, true);
@@ -26,7 +26,8 @@ void single_step_vjp(const Scene& scene, const Plan& plan, int step, Scenes firs
   }
   const SubstepStates<T> from{state, state + dofs, state + 2 * dofs, state + 3 * dofs, step, next};
   try {
-    substep_vjp(Step<T>{scene, plan, in, bdf, t_next, from, all_scenes<T>}, q.data(), next_bar, next_bar + 2 * dofs, record, scratch, bar, in_bar);
+    substep_vjp(Step<T>{scene, plan, in, bdf, t_next, from, all_scenes<T>}, q.data(), next_bar, next_bar + 2 * dofs,
+                record, scratch, bar, in_bar);
   } catch (const Unbalanced& e) {
     throw Unbalanced(e, step + 1, t_next);
   }

@@ -129,7 +129,7 @@ class Tape {
   std::unique_ptr<std::timed_mutex> mutex_ = std::make_unique<std::timed_mutex>();  // apart, so that tapes can be moved
   std::vector<int> slot_, spare_;  // per boundary where it stands in x_, or -1
   std::vector<T> x_;
-  std::vector<Scenes> first_order_;  // per substep
+  std::vector<Scenes> first_order_;                 // per substep
   std::map<int, std::vector<Bounced<T>>> bounced_;  // by the boundary at which a substep with bounces ends
 };
 

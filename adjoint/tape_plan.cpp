@@ -36,11 +36,13 @@ TapePlan plan_tape(const Scene& scene, const Plan& plan, int steps, std::size_t 
   const int window = Tape<T>::window(plan), least = Schedule::least(steps, window);
   const std::size_t state = p.at_once * sizeof(T) * dofs;
   const int ends = Tape<T>::ends(plan);
-  const std::size_t formulas =
-      changes_at_contacts(scene, plan.options) ? p.at_once * sizeof(Scenes) * static_cast<std::size_t>(std::max(1, steps)) : 0;
+  const std::size_t formulas = changes_at_contacts(scene, plan.options)
+                                   ? p.at_once * sizeof(Scenes) * static_cast<std::size_t>(std::max(1, steps))
+                                   : 0;
   p.least = p.working() + (least + ends) * state + formulas;
   if (budget < p.least) throw BudgetTooSmall(p.least);
-  p.states = static_cast<int>(std::min<std::size_t>(std::max(1, steps), (budget - p.working() - formulas) / state - ends));
+  p.states =
+      static_cast<int>(std::min<std::size_t>(std::max(1, steps), (budget - p.working() - formulas) / state - ends));
   p.tape = (p.states + ends) * state + formulas;
   p.recomputed = recomputed_steps(steps, p.states, window);
   return p;

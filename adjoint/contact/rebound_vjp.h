@@ -8,7 +8,8 @@ namespace sheetbend {
 
 // Cotangents of what a rebound reads, given those of what it gives.
 template <class S>
-Falling<S> rebound_vjp(const AnyShape& shape, double h, bool impacts, const Falling<S>& falling, const Rebound<S>& bar) {
+Falling<S> rebound_vjp(const AnyShape& shape, double h, bool impacts, const Falling<S>& falling,
+                       const Rebound<S>& bar) {
   constexpr int all = Falling<S>::numbers, directions = 11;
   static_assert(all % directions == 0);
   using D = Dual<S, directions>;

@@ -147,11 +147,13 @@ class SceneReader {
 
   void contacts(SceneSpec& spec) {
     for_each_record("colliders", [&](const Json& c, const std::string& i, const std::string& where) {
-      spec.colliders.push_back({file_.name(c, "name", where), file_.text(c, "shape", where),
+      spec.colliders.push_back({file_.name(c, "name", where),
+                                file_.text(c, "shape", where),
                                 {file_.numbers("collider_times_" + i), interpolation(c, where)}});
     });
     for_each_record("contacts", [&](const Json& c, const std::string& i, const std::string& where) {
-      ContactSpec contact{file_.name(c, "name", where), -1, {}, {}, file_.flag(c, "rigid", where), file_.flag(c, "bounces", where)};
+      ContactSpec contact{file_.name(c, "name", where),   -1, {}, {}, file_.flag(c, "rigid", where),
+                          file_.flag(c, "bounces", where)};
       if (const long long own = file_.whole(c, "collider", where); own < static_cast<long long>(spec.colliders.size()))
         contact.collider = static_cast<int>(std::max(own, -1LL));
       const std::vector<int> pairs = file_.whole_numbers("contact_" + i, 2);
@@ -221,9 +223,10 @@ class SceneReader {
       const double *first = map.base.data() + layout.offset[q], *last = first + layout.size[q];
       if (not_negative(array) && std::any_of(first, last, [](double v) { return v < 0.0; }))
         file_.fail(std::string("base.") + quantity_names[q], "must not be negative");
-      const bool made = array == Quantity::volume || array == Quantity::volume_compliance || array == Quantity::friction ||
-                        array == Quantity::contact_radius || array == Quantity::contact_stiffness ||
-                        array == Quantity::collider_size || array == Quantity::restitution;
+      const bool made = array == Quantity::volume || array == Quantity::volume_compliance ||
+                        array == Quantity::friction || array == Quantity::contact_radius ||
+                        array == Quantity::contact_stiffness || array == Quantity::collider_size ||
+                        array == Quantity::restitution;
       if (made && std::any_of(first, last, [](double v) { return v != 0.0; }))
         file_.fail(std::string("base.") + quantity_names[q], "must be zero, quantities make it");
     }

@@ -56,8 +56,8 @@ struct BlockCotangents {
       sum += sizeof(VolumeValues) + sizeof(Vec3<T>) * volume.particles.size();
     if (block.implicit)
       sum += 2 * sizeof(T) * 3 * block.movable +  // p and what it gathers
-             scenes_of<T> * (sizeof(BlockContactCotangents<Single<T>>) +
-                             BlockContactCotangents<Single<T>>::bytes(scene, block));
+             scenes_of<T> *
+                 (sizeof(BlockContactCotangents<Single<T>>) + BlockContactCotangents<Single<T>>::bytes(scene, block));
     return sum;
   }
 };
@@ -169,8 +169,9 @@ void add_particles(const Scene& scene, const DirectBlock& block, std::size_t beg
 
 // The reverse of damping_references(): adds to the cotangents of the states at n and n-1, for movable nodes.
 template <class T>
-void damping_references_vjp(const SubstepState<T>& s, const DirectBlock& block, const sheetbend_packs::KernelTable& table,
-                     double before, BlockState<T>& state, T* x_bar, T* x_before_bar, BlockCotangents<T>& bar) {
+void damping_references_vjp(const SubstepState<T>& s, const DirectBlock& block,
+                            const sheetbend_packs::KernelTable& table, double before, BlockState<T>& state, T* x_bar,
+                            T* x_before_bar, BlockCotangents<T>& bar) {
   if (!block.damped) return;
   const auto& runs = runs_of(s, block, state, &bar.values);
   const auto pull_back = [&](typename BlockState<T>::Values& values, double scale, Numbers<T>& rows, T* to) {

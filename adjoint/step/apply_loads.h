@@ -36,7 +36,8 @@ void row_loads_vjp(const Step<T>& step, Z&& z, const StateCotangents<T>& from, c
         pull_back_extrapolated(step.bdf, Vec3<T>(x_bar + 3 * k), from.x + dof, from.x_before + dof);
       }
       T* values_bar = in_bar.of(Quantity::load) + loads.knots.first * step.scene.loads.size() + i;
-      for (int k = 0; k < loads.knots.count; ++k) values_bar[k * step.scene.loads.size()] += T(loads.knots.weight[k]) * (eta2 * sum);
+      for (int k = 0; k < loads.knots.count; ++k)
+        values_bar[k * step.scene.loads.size()] += T(loads.knots.weight[k]) * (eta2 * sum);
     });
   }
 }
@@ -54,7 +55,9 @@ struct ReverseOf<ApplyLoads> {
       if (scene.inertial[n]) bar.w.of(n) += dot(push, Vec3<T>(bar.q.of(n)));
     });
     const Vec3<T> none(T(0.0), T(0.0), T(0.0));
-    row_loads_vjp(step, [&](int n) { return scene.inertial[n] ? work.masses.w[n] * Vec3<T>(bar.q.of(n)) : none; }, bar.from, bar.in);
+    row_loads_vjp(
+        step, [&](int n) { return scene.inertial[n] ? work.masses.w[n] * Vec3<T>(bar.q.of(n)) : none; }, bar.from,
+        bar.in);
   }
 };
 

@@ -44,7 +44,8 @@ struct ReverseOf<KeepSpin> {
       push.resize(scene.nodes());
     }
     static std::size_t bytes(const Scene& scene, const Plan&) {
-      return scene.keeps_spin ? sizeof(T) * (2 * scene.dofs() + scene.multipliers()) + sizeof(Vec3<T>) * scene.nodes() : 0;
+      return scene.keeps_spin ? sizeof(T) * (2 * scene.dofs() + scene.multipliers()) + sizeof(Vec3<T>) * scene.nodes()
+                              : 0;
     }
   };
 
@@ -71,13 +72,14 @@ struct ReverseOf<KeepSpin> {
       const int dof = step.scene.first_dof[n];
       const Vec3<T> x(work.q.of(n));
       x.store(s.x.data() + dof);
-      (rate * (x - history(step.bdf, Exactly<T>{}, step.from.x + dof, step.from.x_before + dof))).store(s.v.data() + dof);
+      (rate * (x - history(step.bdf, Exactly<T>{}, step.from.x + dof, step.from.x_before + dof)))
+          .store(s.v.data() + dof);
     }
   }
 
   template <class T>
-  static void turn_back(const Step<T>& step, const Body& body, const InverseMasses<T>& masses, const KeepSpin::Record<T>& record,
-                        Scratch<T>& s, const StepCotangents<T>& bar) {
+  static void turn_back(const Step<T>& step, const Body& body, const InverseMasses<T>& masses,
+                        const KeepSpin::Record<T>& record, Scratch<T>& s, const StepCotangents<T>& bar) {
     const Scene& scene = step.scene;
     const int spin_dof = scene.first_dof[body.spin];
     const T* mass = step.in.of(Quantity::mass);
@@ -92,7 +94,7 @@ struct ReverseOf<KeepSpin> {
     std::fill_n(bar.x_next + spin_dof, 3, T(0.0));
     for (int k = 0; k < 3; ++k) {
       const int n = body.axes[k], dof = scene.first_dof[n];
-      const Vec3<T> &a = at.a[k], &v = at.v[k], next_bar(bar.v_next + dof), F_bar = rate * cross(L_bar, a);
+      const Vec3<T>&a = at.a[k], &v = at.v[k], next_bar(bar.v_next + dof), F_bar = rate * cross(L_bar, a);
       const T &J = at.J[k], along = dot(a, dw), across_ = dot(a, r), both = dot(r, dw);
       mass_bar[n] += across_ * along - dot(cross(a, v), r) - dot(a, a) * both;
       Vec3<T> a_bar = cross(next_bar, dw) - J * (cross(v, r) + (two * both) * a - along * r - across_ * dw);
@@ -115,7 +117,8 @@ struct ReverseOf<KeepSpin> {
 
   // F = J^T lambda of the constraints.
   template <class T>
-  static void all_pushes_vjp(const Step<T>& step, const KeepSpin::Record<T>& record, Scratch<T>& s, const StepCotangents<T>& bar) {
+  static void all_pushes_vjp(const Step<T>& step, const KeepSpin::Record<T>& record, Scratch<T>& s,
+                             const StepCotangents<T>& bar) {
     const Scene& scene = step.scene;
     std::fill(s.multipliers.begin(), s.multipliers.end(), T(0.0));
     for_each_turning(scene, [&]<class K>(K, const Group& group, int item) {

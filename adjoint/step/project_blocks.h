@@ -52,9 +52,9 @@ struct ReverseOf<ProjectBlocks> {
       add_fixed(step.scene, plan.blocks[b], scratch.blocks[b], bar.q.data, bar.from.x, bar.from.x_before);
       auto& contacts = scratch.blocks[b].contacts;
       for (std::size_t lane = 0; lane < contacts.size(); ++lane)
-        spread_contacts(
-            contact_source(step, work.masses, static_cast<int>(lane)), plan.blocks[b], record.blocks[b].contacts[lane],
-            contacts[lane], bar.from, bar.in, [&](int node) -> T& { return bar.w.of(node); });
+        spread_contacts(contact_source(step, work.masses, static_cast<int>(lane)), plan.blocks[b],
+                        record.blocks[b].contacts[lane], contacts[lane], bar.from, bar.in,
+                        [&](int node) -> T& { return bar.w.of(node); });
     }
   }
 

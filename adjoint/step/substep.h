@@ -35,13 +35,13 @@ void substep_vjp(const Step<T>& step, T* q, T* x_next_bar, const T* v_next_bar, 
   auto& colors = scratch.template of<SweepColors>();
   std::fill(masses.w.begin(), masses.w.end(), T(0.0));
   StepCotangents<T> cotangents{x_next_bar,
-                                     v_next_bar,
-                                     colors.of_coordinates(step.plan, scratch.template of<UpdateVelocities>().q.data()),
-                                     colors.of_inverse_masses(step.plan, masses.w.data()),
-                                     masses.kept.data(),
-                                     masses.w_of_forces.data(),
-                                     bar,
-                                     in_bar};
+                               v_next_bar,
+                               colors.of_coordinates(step.plan, scratch.template of<UpdateVelocities>().q.data()),
+                               colors.of_inverse_masses(step.plan, masses.w.data()),
+                               masses.kept.data(),
+                               masses.w_of_forces.data(),
+                               bar,
+                               in_bar};
   if (auto& own = scratch.template of<KeepSpin>().multipliers; !own.empty()) cotangents.multipliers = own.data();
   List::backward([&]<class Stage>(Stage) {
     ReverseOf<Stage>::run(step, work, record.template of<Stage>(), scratch.template of<Stage>(), cotangents);

@@ -63,8 +63,7 @@ struct ReverseOf<SweepColors> {
     for (auto* buffer : {&scratch.C_r, &scratch.fixed, &scratch.lambda})
       std::fill(buffer->begin(), buffer->end(), T(0.0));
     if constexpr (in_packs<T>)
-      if (swept)
-        begin_sweeps_vjp(step.scene, step.plan.packs, o.threads, step.in, record.packs, bar.in, scratch.packs);
+      if (swept) begin_sweeps_vjp(step.scene, step.plan.packs, o.threads, step.in, record.packs, bar.in, scratch.packs);
     for (int iteration = o.iterations - 1; iteration >= 0; --iteration) {
       const bool last = iteration == o.iterations - 1;
       project_volumes_vjp(step.scene, step.in, step.bdf.eta, work.masses.w.data(), iteration, last, record.volumes,

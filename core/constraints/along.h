@@ -23,7 +23,9 @@ struct Progress {
 
 struct Along : OnTwoBodies<Progress, BodyPoint<0, 2>, BodyPoint<1, 5>, BodyDirection<2>> {
   static constexpr const char* name = "along";
-  static constexpr const char* about = "how far a point of the second body lies from one of the first along a direction of the first, less a rest length";
+  static constexpr const char* about =
+      "how far a point of the second body lies from one of the first along a direction of the first, less a rest "
+      "length";
   static constexpr Unit unit = units::meters;
   static constexpr Compliance compliance{"displacement / force, 0 for a joint"};
   static constexpr int offsets = 1;

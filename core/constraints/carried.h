@@ -148,11 +148,13 @@ constexpr auto joined(const std::array<Parameter, N>&... parts) {
   return all;
 }
 constexpr std::array<Parameter, 3> place_in_body(const char* x, const char* y, const char* z) {
-  return {Parameter{x, units::meters, ranges::any, defaults::given}, Parameter{y, units::meters, ranges::any, defaults::given},
+  return {Parameter{x, units::meters, ranges::any, defaults::given},
+          Parameter{y, units::meters, ranges::any, defaults::given},
           Parameter{z, units::meters, ranges::any, defaults::given}};
 }
 constexpr std::array<Parameter, 3> direction_in_body(const char* x, const char* y, const char* z) {
-  return {Parameter{x, units::none, ranges::any, defaults::given}, Parameter{y, units::none, ranges::any, defaults::given},
+  return {Parameter{x, units::none, ranges::any, defaults::given},
+          Parameter{y, units::none, ranges::any, defaults::given},
           Parameter{z, units::none, ranges::any, defaults::given}};
 }
 

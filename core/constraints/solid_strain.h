@@ -258,8 +258,9 @@ struct SolidStrain : OnPoints<N> {
 // The parameters of the first N nodes but one.
 template <int N>
 constexpr auto solid_parameters() {
-  constexpr const char* names[] = {"N1_1", "N1_2", "N1_3", "N2_1", "N2_2", "N2_3", "N3_1", "N3_2", "N3_3", "N4_1", "N4_2",
-                                   "N4_3", "N5_1", "N5_2", "N5_3", "N6_1", "N6_2", "N6_3", "N7_1", "N7_2", "N7_3"};
+  constexpr const char* names[] = {"N1_1", "N1_2", "N1_3", "N2_1", "N2_2", "N2_3", "N3_1",
+                                   "N3_2", "N3_3", "N4_1", "N4_2", "N4_3", "N5_1", "N5_2",
+                                   "N5_3", "N6_1", "N6_2", "N6_3", "N7_1", "N7_2", "N7_3"};
   constexpr Default none = defaults::usually(0.0), one = defaults::usually(1.0), two = defaults::usually(2.0);
   std::array<Parameter, 3 * (N - 1) + 8> all{};
   int k = 0;

@@ -28,7 +28,8 @@ struct BrickVolume : OnPoints<8> {
   static constexpr std::array parameters{Parameter{"rest", units::cubic_meters, ranges::positive, defaults::measured}};
   static constexpr int offsets = 1;
 
-  static constexpr int faces[6][4] = {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};
+  static constexpr int faces[6][4] = {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4},
+                                      {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};
 
   // A face a, b, c, d encloses with the origin (det(a, b, c) + det(a, c, d) + det(a, b, d) + det(b, c, d))/12.
   template <class T>

@@ -44,7 +44,9 @@ struct DistanceField {
     for (int i = 0; i < 4; ++i) {
       T value(0.0), along_y(0.0), along_z(0.0);
       for (int j = 0; j < 4; ++j) {
-        const double* c = &grid.coefficients[(static_cast<std::size_t>(cell[0] + i) * grid.count[1] + cell[1] + j) * grid.count[2] + cell[2]];
+        const double* c =
+            &grid.coefficients[(static_cast<std::size_t>(cell[0] + i) * grid.count[1] + cell[1] + j) * grid.count[2] +
+                               cell[2]];
         const T row = weight[2][0] * T(c[0]) + weight[2][1] * T(c[1]) + weight[2][2] * T(c[2]) + weight[2][3] * T(c[3]);
         const T steep = slope[2][0] * T(c[0]) + slope[2][1] * T(c[1]) + slope[2][2] * T(c[2]) + slope[2][3] * T(c[3]);
         value += weight[1][j] * row;

@@ -99,7 +99,8 @@ struct Approach {
 
 // Whether a flight begins outside a surface and ends inside.
 inline bool meets(const ImpactRule& rule, const Flight<double>& f, const Surface<double>& s) {
-  return f.left > 0.0 && Approach<double>(rule, f, s, f.left).gap < 0.0 && !(Approach<double>(rule, f, s, 0.0).gap < 0.0);
+  return f.left > 0.0 && Approach<double>(rule, f, s, f.left).gap < 0.0 &&
+         !(Approach<double>(rule, f, s, 0.0).gap < 0.0);
 }
 
 // When it gets there, by bisection with steps of Newton's method.

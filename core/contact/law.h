@@ -18,8 +18,8 @@ inline constexpr double rigidity = 1e3;
 
 template <class T>
 struct ContactForce {
-  T normal{};          // lambda_n
-  Vec3<T> tangential;  // lambda_t
+  T normal{};                                         // lambda_n
+  Vec3<T> tangential;                                 // lambda_t
   bool pushes = false, slides = false, rubs = false;  // rubs: pushes, and friction may act
 };
 

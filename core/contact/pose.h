@@ -29,8 +29,10 @@ void turn_by(const Vec3<T>& r, T* turn) {
   const T squared = dot(r, r);
   T a, b;
   if (value_of(squared) < 1e-3) {
-    a = T(1.0) + squared * (T(-1.0 / 6.0) + squared * (T(1.0 / 120.0) + squared * (T(-1.0 / 5040.0) + squared * T(1.0 / 362880.0))));
-    b = T(0.5) + squared * (T(-1.0 / 24.0) + squared * (T(1.0 / 720.0) + squared * (T(-1.0 / 40320.0) + squared * T(1.0 / 3628800.0))));
+    a = T(1.0) + squared * (T(-1.0 / 6.0) +
+                            squared * (T(1.0 / 120.0) + squared * (T(-1.0 / 5040.0) + squared * T(1.0 / 362880.0))));
+    b = T(0.5) + squared * (T(-1.0 / 24.0) +
+                            squared * (T(1.0 / 720.0) + squared * (T(-1.0 / 40320.0) + squared * T(1.0 / 3628800.0))));
   } else {
     const T angle = sqrt(squared);
     a = sin(angle) / angle;

@@ -77,9 +77,9 @@ Rebound<S> rebound(const AnyShape& shape, double h, bool impacts, const Falling<
   const S below = gap_at(f.surface.next, f.x + S(h) * (f.v + S(h) * f.gravity), n_end);
   if (!(value_of(below) < 0.0)) return r;
   const bool touches = value_of(gap) < 0.0;
-  const S approach = gap - below;                              // h v_end
-  const S left = touches ? S(1.0) : -(below / approach);       // 1 - s
-  const S met = approach - left * fall;                        // h v
+  const S approach = gap - below;                                      // h v_end
+  const S left = touches ? S(1.0) : -(below / approach);               // 1 - s
+  const S met = approach - left * fall;                                // h v
   const S leaves = (S(1.0) + f.surface.restitution) * met - approach;  // h u
   const double pressed = std::max(value_of(fall), touches ? -rigidity * value_of(gap) : 0.0);
   const double back = value_of(f.surface.restitution) * value_of(met);

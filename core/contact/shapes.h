@@ -54,8 +54,7 @@ inline int shape_of(const std::string& name) {
       if (name == S::name) found = shape;
       known += (shape ? ", " : "") + std::string(S::name);
     });
-  if (found < 0)
-    throw std::invalid_argument("colliders: no shape is called '" + name + "'. Fix: use one of " + known);
+  if (found < 0) throw std::invalid_argument("colliders: no shape is called '" + name + "'. Fix: use one of " + known);
   return found;
 }
 

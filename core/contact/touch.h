@@ -25,7 +25,8 @@ struct Touch : ContactForce<T> {
 
 // At this distance, with this gradient. The push is along the gradient, so that it has a potential, and Coulomb's limit is that of the whole push.
 template <class T>
-Touch<T> touch(const AnyShape& shape, const T& distance, const Vec3<T>& n, const Vec3<T>& z, const ContactNumbers<T>& c) {
+Touch<T> touch(const AnyShape& shape, const T& distance, const Vec3<T>& n, const Vec3<T>& z,
+               const ContactNumbers<T>& c) {
   const T gap = T(c.firm) * (distance - c.radius - c.lift);
   const T friction = shape.grid ? sqrt(dot(n, n)) * c.friction : c.friction;
   Touch<T> t{contact_force(gap, unit_normal(shape, n), z - c.from, c.carried, friction, c.kappa), {}};
@@ -45,15 +46,16 @@ Touch<T> touch(const AnyShape& shape, const Vec3<T>& z, const ContactNumbers<T>&
 template <class U, class T>
 ContactNumbers<U> constants(const ContactNumbers<T>& c) {
   const auto vector = [](const Vec3<T>& v) { return Vec3<U>(U(v.x), U(v.y), U(v.z)); };
-  ContactNumbers<U> u{vector(c.from), vector(c.carried), U(c.friction), U(c.radius), U(c.kappa), {}, U(c.lift), U(c.leaving), c.firm};
+  ContactNumbers<U> u{vector(c.from), vector(c.carried), U(c.friction), U(c.radius), U(c.kappa), {},
+                      U(c.lift),      U(c.leaving),      c.firm};
   for (int k = 0; k < most_sizes; ++k) u.size[k] = U(c.size[k]);
   return u;
 }
 
 // A = -d force/dz, row by row, with or without the curvature of the shape: without it the normal stays, as Newton's method may have it. Returns
 // what acts.
-inline Touch<double> touch_matrix(const AnyShape& shape, const Vec3<double>& z, const ContactNumbers<double>& c, bool curved,
-                                  double* A) {
+inline Touch<double> touch_matrix(const AnyShape& shape, const Vec3<double>& z, const ContactNumbers<double>& c,
+                                  bool curved, double* A) {
   using D = Dual<double, 3>;
   double at[3], distance, n[3];
   z.store(at);

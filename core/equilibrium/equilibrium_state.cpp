@@ -140,7 +140,8 @@ void EquilibriumState::soften() {
       for (int i = 0; i < group.count; ++i) {
         double local[K::dofs];
         gather<K>(scene, group, i, x.data(), local);
-        for (const double c : SharedEvaluation<K, double>(local, rest_parameters<K>(in, group, i)).C) sum += 0.5 * c * c;
+        for (const double c : SharedEvaluation<K, double>(local, rest_parameters<K>(in, group, i)).C)
+          sum += 0.5 * c * c;
       }
     });
     soft[g] = budget > 0.0 ? std::min(sum / budget, stiffening * soft[g]) : 0.0;

@@ -25,9 +25,10 @@ struct Points {
 
 // Of the points [begin, end).
 struct Kernels {
-  void (*effective_masses)(const Points&, int begin, int end);   // w and kept of what has inertia, with drag
-  void (*predict)(const Points&, int begin, int end);            // q, without forces, of points that nothing holds
-  bool (*update_velocities)(const Points&, int begin, int end);  // x_next and v_next from q; whether all of it is finite
+  void (*effective_masses)(const Points&, int begin, int end);  // w and kept of what has inertia, with drag
+  void (*predict)(const Points&, int begin, int end);           // q, without forces, of points that nothing holds
+  bool (*update_velocities)(const Points&, int begin,
+                            int end);  // x_next and v_next from q; whether all of it is finite
   void (*retract)(const Frame*, int frames, double* x);
   // A point at `to`: the sum of weight[k] times the one at values + between k (in scalars), which stands at a knot.
   void (*interpolate)(const double* values, long between, const double* weight, int knots, double* to);

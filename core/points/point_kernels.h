@@ -117,7 +117,8 @@ struct PointKernels {
     }
   }
 
-  static constexpr sheetbend_points::Kernels all{&effective_masses, &predict, &update_velocities, &retract, &interpolate};
+  static constexpr sheetbend_points::Kernels all{&effective_masses, &predict, &update_velocities, &retract,
+                                                 &interpolate};
 };
 
 }  // namespace sheetbend

@@ -10,8 +10,8 @@ namespace sheetbend {
 
 // Of one contact. A particle that touches in the first substep has not begun to; one that bounces begins and ends.
 struct ContactCounts {
-  int most = 0;                  // particles that touched at once
-  int began = 0, ended = 0;      // how often one did
+  int most = 0;                    // particles that touched at once
+  int began = 0, ended = 0;        // how often one did
   long touching = 0, sliding = 0;  // particles, summed over substeps
 };
 

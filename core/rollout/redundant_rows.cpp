@@ -9,7 +9,7 @@
 namespace sheetbend {
 namespace {
 
-constexpr double least_share = 1e-6;  // of a row's own size: what a row that says it has at least in it
+constexpr double least_share = 1e-6;         // of a row's own size: what a row that says it has at least in it
 constexpr double told_contradiction = 1e-6;  // of the scene's size
 constexpr std::size_t most_named = 4, most_others = 8;
 

@@ -12,7 +12,8 @@ namespace sheetbend {
 struct RedundantRow {
   int row;                  // of the scene's multipliers: the one that is left out
   std::vector<int> others;  // the rows that say it already
-  double contradiction;     // by how much of a length (of an angle for rows between directions) they disagree about it there
+  double
+      contradiction;  // by how much of a length (of an angle for rows between directions) they disagree about it there
 };
 
 // The rows that the blocks of a plan leave out of a projection at x (dofs), with inverse masses w (nodes) and eta as in element.h. With an eta of

@@ -41,7 +41,9 @@ class Rollout {
   const T* x() const { return x_.data(); }
 
   // All that the next substep begins with.
-  SubstepStates<T> state() const { return {x_.data(), x_before_.data(), v_.data(), v_before_.data(), step_, nullptr, after_impact_}; }
+  SubstepStates<T> state() const {
+    return {x_.data(), x_before_.data(), v_.data(), v_before_.data(), step_, nullptr, after_impact_};
+  }
 
   // Calls sink(step, x, v) for the initial state and after every substep. Throws Diverged, also for a finite state that means nothing.
   template <class Sink>

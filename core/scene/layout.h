@@ -37,11 +37,12 @@ enum class Quantity : int {
 inline constexpr int quantity_count = 24;
 inline constexpr int oldest_quantity_count = 17;  // those after it are left out of saved scenes that have none of them
 inline constexpr std::array<const char*, quantity_count> quantity_names{
-    "position",      "velocity",         "mass",           "compliance",        "damping",       "rest",
-    "boundary",      "force",            "gravity",        "drag_linear",       "drag_quadratic", "wind",
-    "air_normal",    "air_tangential",   "pressure",       "volume",            "volume_compliance", "friction",
-    "contact_radius", "contact_stiffness", "collider_pose", "collider_size",
-    "restitution",     "load"};
+    "position",          "velocity",       "mass",           "compliance",
+    "damping",           "rest",           "boundary",       "force",
+    "gravity",           "drag_linear",    "drag_quadratic", "wind",
+    "air_normal",        "air_tangential", "pressure",       "volume",
+    "volume_compliance", "friction",       "contact_radius", "contact_stiffness",
+    "collider_pose",     "collider_size",  "restitution",    "load"};
 
 struct Layout {
   std::array<std::size_t, quantity_count> size{};

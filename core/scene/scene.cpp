@@ -63,7 +63,9 @@ Group build_group(const GroupSpec& spec, const Scene& scene) {
         if (nodes[a] == nodes[b])
           refuse(where + " uses particle " + std::to_string(nodes[a]) + " twice. Fix: use distinct particles");
     if (std::none_of(nodes.begin(), nodes.end(), [&](int n) { return scene.role[n] == Role::free; }))
-      refuse(where + " holds only pinned or driven particles. Fix: leave it out, since nothing can move; of a cloth, pass the pinned or driven vertices as `held`");
+      refuse(where +
+             " holds only pinned or driven particles. Fix: leave it out, since nothing can move; of a cloth, pass the "
+             "pinned or driven vertices as `held`");
   }
   return g;
 }
@@ -80,7 +82,8 @@ void check_triangles(const std::string& field, const std::vector<std::array<int,
     if (a == b || b == c || c == a)
       refuse(field + ": triangle " + which + " has no area. Fix: give distinct particles");
     for (const int n : {a, b, c})
-      if (!scene.is_place[n]) refuse(field + ": triangle " + which + " holds " + a_direction(scene, n) + ". Fix: use particles");
+      if (!scene.is_place[n])
+        refuse(field + ": triangle " + which + " holds " + a_direction(scene, n) + ". Fix: use particles");
   }
 }
 
@@ -168,9 +171,11 @@ void check_grid(const ColliderSpec& c) {
   std::size_t size = 1;
   for (const int n : g->count) size *= static_cast<std::size_t>(std::max(n, 0));
   const auto finite = [](double a) { return std::isfinite(a); };
-  if (std::ranges::any_of(g->count, [](int n) { return n < 4; }) || size != g->coefficients.size() || !(g->spacing > 0.0) ||
-      !finite(g->spacing) || !std::ranges::all_of(g->origin, finite) || !std::ranges::all_of(g->coefficients, finite))
-    refuse(c.name + ".grid: has fewer than two points along an axis, or numbers that are not finite. "
+  if (std::ranges::any_of(g->count, [](int n) { return n < 4; }) || size != g->coefficients.size() ||
+      !(g->spacing > 0.0) || !finite(g->spacing) || !std::ranges::all_of(g->origin, finite) ||
+      !std::ranges::all_of(g->coefficients, finite))
+    refuse(c.name +
+           ".grid: has fewer than two points along an axis, or numbers that are not finite. "
            "Fix: give distances on two points or more along each axis");
 }
 
@@ -197,10 +202,10 @@ std::array<std::size_t, 6> add_contacts(const SceneSpec& spec, Scene& s) {
 void add_loads(const SceneSpec& spec, Scene& s) {
   check_knots("load_times", spec.load, !spec.loads.empty());
   for (const Load& l : spec.loads)
-    if (l.group < 0 || l.group >= static_cast<int>(s.groups.size()) || l.item < 0 || l.item >= s.groups[l.group].count ||
-        l.row < 0 || l.row >= s.groups[l.group].rows)
-      refuse("loads: group " + std::to_string(l.group) + ", constraint " + std::to_string(l.item) + ", row " + std::to_string(l.row) +
-             " does not exist. Fix: give the numbers of a constraint and a row that it has");
+    if (l.group < 0 || l.group >= static_cast<int>(s.groups.size()) || l.item < 0 ||
+        l.item >= s.groups[l.group].count || l.row < 0 || l.row >= s.groups[l.group].rows)
+      refuse("loads: group " + std::to_string(l.group) + ", constraint " + std::to_string(l.item) + ", row " +
+             std::to_string(l.row) + " does not exist. Fix: give the numbers of a constraint and a row that it has");
   s.loads = spec.loads;
   s.load = spec.load;
 }
@@ -212,7 +217,8 @@ void find_turning(Scene& s) {
     for (const int n : b.axes) turns[n] = b.spin >= 0;
   for (int g = 0; g < static_cast<int>(s.groups.size()); ++g)
     for (int i = 0; i < s.groups[g].count; ++i)
-      if (s.groups[g].kind != kind_of(Rigid::name) && std::ranges::any_of(s.groups[g].nodes(i), [&](int n) { return turns[n]; }))
+      if (s.groups[g].kind != kind_of(Rigid::name) &&
+          std::ranges::any_of(s.groups[g].nodes(i), [&](int n) { return turns[n]; }))
         s.turning.push_back({g, i});
 }
 
@@ -222,7 +228,8 @@ void add_bodies(const SceneSpec& spec, Scene& s) {
     for (const int n : {b.center, b.axes[0], b.axes[1], b.axes[2]}) {
       check_nodes("bodies", {n}, s.nodes());
       if (taken[n])
-        refuse("bodies: node " + std::to_string(n) + " is a director or in a body already. Fix: give each body a center and three axes of its own");
+        refuse("bodies: node " + std::to_string(n) +
+               " is a director or in a body already. Fix: give each body a center and three axes of its own");
       taken[n] = true;
     }
     for (const int n : b.axes) {
@@ -234,7 +241,8 @@ void add_bodies(const SceneSpec& spec, Scene& s) {
     if (taken[b.spin] || s.role[b.spin] != Role::pinned)
       refuse("bodies: node " + std::to_string(b.spin) + " keeps a spin. Fix: give each a pinned node of its own");
     if (std::ranges::any_of(b.axes, [&](int n) { return s.role[n] != Role::free; }))
-      refuse("bodies: the spin of center " + std::to_string(b.center) + " is kept, but its axes are held. Fix: leave its spin out");
+      refuse("bodies: the spin of center " + std::to_string(b.center) +
+             " is kept, but its axes are held. Fix: leave its spin out");
     taken[b.spin] = true;
     s.is_place[b.spin] = false;
     s.keeps_spin = true;

@@ -58,9 +58,9 @@ struct Volume {
 // A closed shape that stands, or moves as its poses say.
 struct Collider {
   std::string name;
-  int shape;                            // in core/contact/shapes.h
-  Knots motion;                         // when it has its poses; one knot for a shape that stands
-  std::size_t first_pose, first_size;   // into Quantity::collider_pose and collider_size
+  int shape;                                 // in core/contact/shapes.h
+  Knots motion;                              // when it has its poses; one knot for a shape that stands
+  std::size_t first_pose, first_size;        // into Quantity::collider_pose and collider_size
   std::shared_ptr<const DistanceGrid> grid;  // of a distance field
 
   AnyShape any() const { return {shape, grid.get()}; }

@@ -25,8 +25,9 @@ auto coefficient(const T& a) {
 
 template <class T>
 struct BlockNumbers {
-  const T *gradients, *x;  // rows of four: gradients in the order of the window; coordinates of the particles with their inverse masses
-  const T* diagonal;       // D = a/(1+g), per row
+  const T *gradients,
+      *x;  // rows of four: gradients in the order of the window; coordinates of the particles with their inverse masses
+  const T* diagonal;         // D = a/(1+g), per row
   const int *window, *rows;  // as in sheetbend_blocks::Block
   int movable, size;
   int volumes = 0;  // rows of kept volumes, the last of `size`

@@ -14,8 +14,8 @@ namespace sheetbend {
 struct CondensedPattern {
   FactorStructure structure{0, {}, false};
   CondensedShares shares;
-  std::vector<int> dof_of;           // per movable particle: first dof in H
-  std::vector<std::size_t> entries;  // per pair of the shares, three: where its columns stand in H
+  std::vector<int> dof_of;                               // per movable particle: first dof in H
+  std::vector<std::size_t> entries;                      // per pair of the shares, three: where its columns stand in H
   std::optional<UnsymmetricStructure> unsymmetric = {};  // of the same matrix, where contacts may slide
 
   std::size_t bytes() const {

@@ -14,7 +14,8 @@ namespace {
 
 constexpr double fast = 1e4, stretched = 1e3, shrunk = 10.0;  // over the energy put in
 constexpr double wide = 2.0, narrow = 0.01;                   // over a stencil's width at the start
-constexpr double least_gravity = 9.81;  // a motion of this acceleration over the scene's size needs no explanation [m/s^2]
+constexpr double least_gravity =
+    9.81;  // a motion of this acceleration over the scene's size needs no explanation [m/s^2]
 
 double squared_distance(const double* a, const double* b) {
   const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
@@ -168,8 +169,7 @@ Lead lead_until(const Scene& scene, const Inputs<const double>& in, double size,
 double longest(const double* rows, std::size_t count, std::size_t stride) {
   constexpr std::array<double, 3> zero{};
   double most = 0.0;
-  for (std::size_t k = 0; k < count; ++k)
-    most = std::max(most, squared_distance(rows + 3 * k * stride, zero.data()));
+  for (std::size_t k = 0; k < count; ++k) most = std::max(most, squared_distance(rows + 3 * k * stride, zero.data()));
   return std::sqrt(most);
 }
 
@@ -184,7 +184,8 @@ double work_of_forces(const Scene& scene, const Moved& s, const Inputs<const dou
     if (scene.has_weight[n]) work += s.mass[n] * (gravity * moved(n) + std::max(gravity, least_gravity) * size);
   const std::size_t loads = scene.loaded.size();
   for (std::size_t i = 0; i < loads; ++i)
-    work += longest(in.of(Quantity::force) + 3 * i, scene.force.times.size(), loads) * (moved(scene.loaded[i]) + (scene.is_place[scene.loaded[i]] ? size : 1.0));
+    work += longest(in.of(Quantity::force) + 3 * i, scene.force.times.size(), loads) *
+            (moved(scene.loaded[i]) + (scene.is_place[scene.loaded[i]] ? size : 1.0));
   const double wind = longest(in.of(Quantity::wind), scene.wind.times.size(), 1);
   for (std::size_t i = 0; i < scene.air.size(); ++i) {
     const auto& [a, b, c] = scene.air[i];
@@ -289,8 +290,9 @@ std::optional<Finding> StateCheck::find(const Moved& s, const Inputs<const doubl
   if (energy > stretched * given) return widest;
   const Shape shape = shape_of(scene_, s, size);
   if (shape.collapsed() && collapsed > shrunk * given)
-    return Finding{scene_.groups[0].stencil[0], "is at one point with its neighbors: more than half of all constraints "
-                                                "are below a hundredth of their width"};
+    return Finding{scene_.groups[0].stencil[0],
+                   "is at one point with its neighbors: more than half of all constraints "
+                   "are below a hundredth of their width"};
   kinetic_ = 2.0 * kinetic;
   widening_ = 1.5 * shape.widening;
   return std::nullopt;

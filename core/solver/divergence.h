@@ -100,8 +100,8 @@ class Watch {
   // Throws Diverged.
   void look(int step, double t, const T* x, const T* v) {
     for (int lane = 0; lane < lanes_in<T>; ++lane) {
-      const std::vector<double> start = lane_of(start_.data(), start_.size(), lane), xs = lane_of(x, start.size(), lane),
-                                vs = lane_of(v, start.size(), lane),
+      const std::vector<double> start = lane_of(start_.data(), start_.size(), lane),
+                                xs = lane_of(x, start.size(), lane), vs = lane_of(v, start.size(), lane),
                                 mass = lane_of(in_.of(Quantity::mass), scene_.nodes(), lane);
       const Moved state{start.data(), xs.data(), vs.data(), mass.data()};
       if (!checks_[lane].suspects(state)) continue;

@@ -28,7 +28,7 @@ using Scenes = unsigned char;
 static_assert(Pack::lanes <= 8);
 
 template <class T>
-inline constexpr Scenes all_scenes = static_cast<Scenes>((1u << scenes_of<T>) - 1u);
+inline constexpr Scenes all_scenes = static_cast<Scenes>((1u << scenes_of<T>)-1u);
 
 inline bool has(Scenes scenes, int scene) { return (scenes >> scene & 1) != 0; }
 

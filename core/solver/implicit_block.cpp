@@ -16,12 +16,13 @@ constexpr int most_halvings = 60;
 constexpr int turns = 8;                  // in which a direction of negative curvature gets steeper
 constexpr double first_departure = 1e-4;  // along it, of the block's size
 constexpr double first_share = 0.25, least_share = 1.0 / 256.0;  // of friction, that a step adds
-constexpr double firmer = 10.0;  // contacts that lift (core/contact/rebound.h) get stiffer by this from balance to balance
+constexpr double firmer =
+    10.0;                    // contacts that lift (core/contact/rebound.h) get stiffer by this from balance to balance
 constexpr int patience = 4;  // steps without progress before a leap over a kink
 // How far leaps go, of a whole step. Whole steps alone may lead back to the same kink again and again.
 constexpr double leap_shares[] = {1.0, 0.5, 2.0, 0.25, 1.5, 0.75, 0.35, 0.6};
 constexpr int most_leaps = static_cast<int>(std::size(leap_shares));
-constexpr double near_saddle = 1e-3;      // so little of the largest force is left where it may be a saddle's
+constexpr double near_saddle = 1e-3;  // so little of the largest force is left where it may be a saddle's
 
 std::string words(const Unbalanced& e, int substep, double time) {
   std::ostringstream out;

@@ -36,7 +36,7 @@ class ImplicitBlock {
   void solve(const Scene& scene, const DirectBlock& block, const SolverOptions& options);
   // The movable particles' guess is the solution, found before.
   void take_guess(const DirectBlock& block);
-  const double* x() { return x_.data(); }  // the solution, rows of four
+  const double* x() { return x_.data(); }                     // the solution, rows of four
   const RigidRows& rigid() const { return potential.rigid; }  // with the solution's multipliers
 
   // The largest |R| over the largest force, at the start and after each Newton step of the last solve.
@@ -62,7 +62,8 @@ class ImplicitBlock {
   void begin();
   bool find_balance(const Scene& scene, const DirectBlock& block, const SolverOptions& options);
   bool raise_friction(const Scene& scene, const DirectBlock& block, const SolverOptions& options);
-  static constexpr double all_digits = 1e-15, enough_digits = 1e-8;  // of multipliers, for derivatives and for Newton steps
+  static constexpr double all_digits = 1e-15,
+                          enough_digits = 1e-8;  // of multipliers, for derivatives and for Newton steps
   void expect_digits(const DirectBlock& block, double share) const;
   double look(const DirectBlock& block);
   double look(const DirectBlock& block, double t);
@@ -87,8 +88,8 @@ class ImplicitBlock {
   std::vector<double> d_, balance_;
   std::vector<double> firm_;         // of the contacts: how firm they are in the end
   std::vector<double> lambda_, dl_;  // of the rigid rows at x_, and their step
-  double phi_ = 0.0, merit_ = 0.0;  // at x_
-  bool by_merit_ = false;           // likewise, whether steps are judged by the merit
+  double phi_ = 0.0, merit_ = 0.0;   // at x_
+  bool by_merit_ = false;            // likewise, whether steps are judged by the merit
   double convexity_ = 0.0;  // of the last matrix: 0 for K, 1 where no constraint's share has negative eigenvalues
   int matrices_ = 0;
   std::size_t first_ = 0;  // of balance_ since Newton's method began, for the last time

@@ -13,10 +13,10 @@ constexpr int row = sheetbend_blocks::row;
 constexpr double sufficient = 1e-4;  // share of the slope's promise that a step has to keep (Armijo)
 constexpr double flat = 1e-8;        // relative changes of Phi that rounding may hide
 constexpr int most_halvings = 60;
-constexpr int most_kinks = 10;  // full steps in a row that may raise the merit
-constexpr double no_slip = 1e30;    // a friction
-constexpr int most_sections = 36;   // of the way, where its lowest point is looked for
-constexpr double well_down = 0.9;   // of the merit: less than this is gained where a kink holds it up
+constexpr int most_kinks = 10;     // full steps in a row that may raise the merit
+constexpr double no_slip = 1e30;   // a friction
+constexpr int most_sections = 36;  // of the way, where its lowest point is looked for
+constexpr double well_down = 0.9;  // of the merit: less than this is gained where a kink holds it up
 
 // What sticks does so within a slip of next to nothing, and steps of a matrix that has it sliding go back and forth over that. From one point to another some
 // contacts turn to slide the other way: they are to stick, as if friction had no bound. Says whether there are any.

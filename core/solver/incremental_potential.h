@@ -39,7 +39,7 @@ class IncrementalPotential {
   double rounding() const { return rounding_; }  // of R, from that of the coordinates
   double balance() const { return force_ > 0.0 ? largest_ / force_ : 0.0; }
   double merit() const { return merit_; }
-  bool rubs() const { return rubs_; }  // whether friction acts anywhere
+  bool rubs() const { return rubs_; }                        // whether friction acts anywhere
   bool by_merit() const { return rubs_ || !rigid.empty(); }  // whether steps are judged by the merit
   int worst_node(const DirectBlock& block) const;
 

@@ -45,9 +45,8 @@ class NewtonMatrix {
   template <class U>
   void solve_transposed(const DirectBlock& block, U* z) const {
     if (!as_lu_) return solve(block, z);
-    in_places(block, z, [&](const CondensedPattern& pattern, U* room) {
-      lu_.solve_transposed(*pattern.unsymmetric, room);
-    });
+    in_places(block, z,
+              [&](const CondensedPattern& pattern, U* room) { lu_.solve_transposed(*pattern.unsymmetric, room); });
   }
 
   // Kz = K z on rows of four; of fixed particles what the constraints alone make of it.

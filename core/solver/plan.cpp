@@ -363,7 +363,8 @@ Plan make_plan(const Scene& scene, const SolverOptions& options) {
     expect_no_contact(scene);
   }
   if (scene.keeps_spin && options.partition != Partition::direct)
-    throw std::invalid_argument("solver.method: bodies keep their spin in direct alone. Fix: use direct, or leave their spin out");
+    throw std::invalid_argument(
+        "solver.method: bodies keep their spin in direct alone. Fix: use direct, or leave their spin out");
   Plan plan{options, {}, {}, {}};
   if (options.partition == Partition::gauss_seidel) {
     plan.colors = color_constraints(scene);

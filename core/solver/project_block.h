@@ -55,9 +55,9 @@ struct BlockState {
     int step = -1;  // of the state, as in SubstepStates
   };
   Values now, before;
-  std::vector<ImplicitBlock> implicit;  // one per scene, where substeps are solved until forces balance
+  std::vector<ImplicitBlock> implicit;             // one per scene, where substeps are solved until forces balance
   std::vector<BlockContacts<Single<T>>> contacts;  // likewise
-  double eta = 0.0;                     // of `values` and `diagonal`; 0 where they are not filled yet
+  double eta = 0.0;                                // of `values` and `diagonal`; 0 where they are not filled yet
 
   void resize(const Scene& scene, const DirectBlock& block, int kept_iterations);
   static std::size_t bytes(const Scene& scene, const DirectBlock& block, int kept_iterations);
@@ -121,9 +121,10 @@ std::size_t BlockState<T>::bytes(const Scene& scene, const DirectBlock& block, i
   std::size_t factor = sizeof(Factor<T>) + sizeof(CondensedSolver<T>) + Factor<T>::bytes(block.structure);
   if (block.condensation && !block.implicit)
     factor += CondensedSolver<T>::bytes(*block.condensation, block.movable, block.size(), block.volumes.size());
-  std::size_t sum = 2 * of(block.size()) + (block.damped ? 2 * (particles + of(block.size())) : 0) +
-                    iterations * (of(sheetbend_blocks::row * block.window_rows.size()) + of(rows) + particles + factor) +
-                    (kept_iterations + 1) * (particles + of(block.size()));
+  std::size_t sum =
+      2 * of(block.size()) + (block.damped ? 2 * (particles + of(block.size())) : 0) +
+      iterations * (of(sheetbend_blocks::row * block.window_rows.size()) + of(rows) + particles + factor) +
+      (kept_iterations + 1) * (particles + of(block.size()));
   if (block.implicit)
     sum += scenes_of<T> * (ImplicitBlock::bytes(scene, block) + sizeof(BlockContacts<Single<T>>) +
                            BlockContacts<Single<T>>::bytes(scene, block));
@@ -290,7 +291,7 @@ void solve_sparse(const DirectBlock& block, BlockState<T>& state, int iteration,
 // The damping references; `before` is that of Bdf. One of the two states was looked at in the substep before, or in the one after on the way back.
 template <class T>
 void damping_references(const SubstepState<T>& s, const DirectBlock& block, const sheetbend_packs::KernelTable& table,
-                 double before, const SubstepStates<T>& states, BlockState<T>& state) {
+                        double before, const SubstepStates<T>& states, BlockState<T>& state) {
   if (!block.damped) return;
   const auto& runs = runs_of(s, block, state);
   const auto find = [&](typename BlockState<T>::Values& values, const T* at, int step) {

@@ -24,7 +24,8 @@ void find_rigid(const SubstepState<T>& s, const DirectBlock& block, IncrementalP
   for (std::size_t p = 0; p < block.particles.size(); ++p) {
     const int node = block.particles[p];
     for (int d = 0; d < 3; ++d)
-      at[sheetbend_blocks::row * p + d] = number_of(s.inputs.of(Quantity::position)[s.scene.first_dof[node] + d], scene);
+      at[sheetbend_blocks::row * p + d] =
+          number_of(s.inputs.of(Quantity::position)[s.scene.first_dof[node] + d], scene);
     if (p >= static_cast<std::size_t>(block.movable)) continue;
     const double mass = number_of(s.inputs.of(Quantity::mass)[node], scene);
     at[sheetbend_blocks::row * p + 3] = 1.0 / (s.scene.inertial[node] ? mass : mass * s.eta * s.eta);
@@ -80,8 +81,8 @@ int particle_of(const MemberRun& run, int i, int k) {
 // Calls f(K{}, run, i, J, lambda) for every constraint over T, at the coordinates at(particle, d): lambda = -(C + g (C - C_r))/a. That of a rigid row is
 // the one in the state; c (rigid rows) gets their residuals.
 template <class T, class At, class F>
-void for_each_elastic(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state, std::vector<T>& c, At&& at,
-                      F&& f) {
+void for_each_elastic(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state, std::vector<T>& c,
+                      At&& at, F&& f) {
   const RigidRows& rigid = state.implicit[0].rigid();
   c.assign(rigid.size(), T(0.0));
   for (const MemberRun& run : block.runs) {
@@ -147,7 +148,9 @@ void carry_multipliers(const SubstepState<T>& s, const DirectBlock& block, Block
   std::vector<T> c;
   for_each_elastic(
       s, block, state, c,
-      [&](int particle, int d) { return T(state.x[0][sheetbend_blocks::row * static_cast<std::size_t>(particle) + d]); },
+      [&](int particle, int d) {
+        return T(state.x[0][sheetbend_blocks::row * static_cast<std::size_t>(particle) + d]);
+      },
       [&]<class K>(K, const MemberRun& run, int i, const T*, const T* lambda) {
         for (int j = 0; j < K::rows; ++j) state.lambda[0][run.first_row[i] + j] = lambda[j];
       });

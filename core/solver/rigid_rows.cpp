@@ -11,9 +11,9 @@ namespace sheetbend {
 namespace {
 
 constexpr int at_row = sheetbend_blocks::row;
-constexpr double gives_way = 1e-10;   // D of a row that does, of J W J^T
-constexpr double softening = 1e-5;    // S, of J diag(K)^-1 J^T
-constexpr std::size_t few = 256;      // rows whose order is kept, as a border of H does (condensed.h)
+constexpr double gives_way = 1e-10;     // D of a row that does, of J W J^T
+constexpr double softening = 1e-5;      // S, of J diag(K)^-1 J^T
+constexpr std::size_t few = 256;        // rows whose order is kept, as a border of H does (condensed.h)
 constexpr double no_stiffness = 1e150;  // a of a member that has been taken out: products with zero stay zero
 
 // A member's numbers as its kind wants them.

@@ -35,7 +35,7 @@ class RigidRows {
   void find(const Scene& scene, const Given& given, const double* at);
   bool empty() const { return members_.empty(); }
   int size() const { return static_cast<int>(D_.size()); }
-  int row(int j) const { return rows_[j]; }  // of the block
+  int row(int j) const { return rows_[j]; }                             // of the block
   int own_row(int row) const { return empty() ? -1 : own_rows_[row]; }  // of a row of the block, -1 where it gives way
   bool left_out(int j) const { return left_out_[j]; }
   bool moves(int j) const { return weight_[j] > 0.0; }  // whether anything of it can
@@ -50,7 +50,7 @@ class RigidRows {
   // C, J and c there.
   void evaluate(const Given& given, const double* at);
   double residual(int j) const { return c_[j]; }
-  double weight(int j) const { return weight_[j]; }    // 1/(J W J^T + D) of where leave_out() was
+  double weight(int j) const { return weight_[j]; }      // 1/(J W J^T + D) of where leave_out() was
   double steepest(int j) const { return steepest_[j]; }  // the largest number of its gradient
   // Adds J^T lambda and the magnitudes of its terms, (particles, 4).
   void push(const DirectBlock& block, double* force, double* magnitude) const;
@@ -145,9 +145,9 @@ class RigidRows {
   std::vector<double> matrix(const DirectBlock& block, const double* at, int column) const;
 
   std::vector<Member> members_;
-  std::vector<int> rows_, own_rows_;                 // per row: that of the block, and back
-  std::vector<char> left_out_;                       // likewise, and all below
-  std::vector<double> a_, g_, D_, S_;                // S: softened D
+  std::vector<int> rows_, own_rows_;   // per row: that of the block, and back
+  std::vector<char> left_out_;         // likewise, and all below
+  std::vector<double> a_, g_, D_, S_;  // S: softened D
   std::vector<double> C_, c_, weight_, steepest_;
   std::vector<double> J_;
   struct Use {

@@ -29,7 +29,8 @@ class UnsymmetricStructure {
     std::array<std::size_t, 9> from;
   };
 
-  std::vector<int> lower_start_{0}, lower_, upper_start_, upper_;  // per row its columns before and after the diagonal, ascending
+  std::vector<int> lower_start_{0}, lower_, upper_start_,
+      upper_;  // per row its columns before and after the diagonal, ascending
   std::vector<Entry> entries_;
 };
 
@@ -85,8 +86,9 @@ class UnsymmetricFactor {
     for (int a = 0; a < 3; ++a) b[a] = M[row * a] * x + M[row * a + column] * y + M[row * a + 2 * column] * z;
   }
 
-  std::vector<double> lower_, upper_, inverse_;  // L with a unit diagonal, U above its diagonal, the inverses of its diagonal blocks
-  std::vector<double*> place_;                   // of a column in the row that is being made
+  std::vector<double> lower_, upper_,
+      inverse_;                 // L with a unit diagonal, U above its diagonal, the inverses of its diagonal blocks
+  std::vector<double*> place_;  // of a column in the row that is being made
 };
 
 }  // namespace sheetbend

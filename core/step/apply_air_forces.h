@@ -47,7 +47,9 @@ struct Airflow {
   Vec3<T> wind;
 
   explicit Airflow(const Step<T>& step_)
-      : step(step_), knots(step_.scene.wind.at(step_.t_next)), wind(at_knots(knots, step_.in.of(Quantity::wind), 1, 0)) {}
+      : step(step_),
+        knots(step_.scene.wind.at(step_.t_next)),
+        wind(at_knots(knots, step_.in.of(Quantity::wind), 1, 0)) {}
 
   AirTriangle<T> at(int triangle) const {
     const SubstepStates<T>& s = step.from;

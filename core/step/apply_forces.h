@@ -31,8 +31,7 @@ struct ApplyForces {
     const T eta(step.bdf.eta);
     for (std::size_t i = 0; i < scene.loaded.size(); ++i) {
       const int n = scene.loaded[i];
-      if (scene.inertial[n])
-        (eta * (work.masses.w[n] * impulses.of(static_cast<int>(i)))).add_to(work.q.of(n));
+      if (scene.inertial[n]) (eta * (work.masses.w[n] * impulses.of(static_cast<int>(i)))).add_to(work.q.of(n));
     }
   }
 };

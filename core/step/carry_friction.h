@@ -55,8 +55,9 @@ struct CarryFriction {
       auto carried = S(rate) * found.tangential;
       if (found.pushes && contact.rebounds(i)) carried = carried + numbers.leaving * normal_at(shape, z, numbers.size);
       source.write(carried, work.x_next + scene.first_dof[contact.carried[i]]);
-      record.modes[source.lane * count + contact.first + i] =
-          !found.pushes ? ContactMode::apart : found.slides ? ContactMode::slides : ContactMode::sticks;
+      record.modes[source.lane * count + contact.first + i] = !found.pushes  ? ContactMode::apart
+                                                              : found.slides ? ContactMode::slides
+                                                                             : ContactMode::sticks;
     });
   }
 };

@@ -19,9 +19,10 @@ struct Predict {
     if constexpr (std::is_same_v<T, double>)
       free_motion(step, work);
     else
-      parallel_for(
-          step.scene.nodes(), step.threads(), points_per_thread,
-          [points = points_of(step, work.masses, &work)](int begin, int end) { point_kernels<T>().predict(points, begin, end); });
+      parallel_for(step.scene.nodes(), step.threads(), points_per_thread,
+                   [points = points_of(step, work.masses, &work)](int begin, int end) {
+                     point_kernels<T>().predict(points, begin, end);
+                   });
     weightless_nodes(step, work);
     fixed_nodes(step, work);
   }

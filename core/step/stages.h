@@ -64,9 +64,7 @@ struct Records<T, Stages<S...>> : private RecordOf<S, T>... {
   const auto& of() const {
     return static_cast<const RecordOf<Stage, T>&>(*this).record;
   }
-  void resize(const Scene& scene, const Plan& plan, bool reversed) {
-    (of<S>().resize(scene, plan, reversed), ...);
-  }
+  void resize(const Scene& scene, const Plan& plan, bool reversed) { (of<S>().resize(scene, plan, reversed), ...); }
   static std::size_t bytes(const Scene& scene, const Plan& plan, bool reversed) {
     return (std::size_t{0} + ... + S::template Record<T>::bytes(scene, plan, reversed));
   }

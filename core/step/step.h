@@ -21,7 +21,7 @@ struct Step {
   Inputs<const T> in;
   Bdf bdf;
   double t_next;
-  SubstepStates<T> from;  // the states at n and n-1
+  SubstepStates<T> from;          // the states at n and n-1
   Scenes scenes = all_scenes<T>;  // that are solved; the others' numbers are left over
 
   int threads() const { return plan.options.threads; }
@@ -56,9 +56,9 @@ struct Impact {
 template <class T>
 struct Work {
   InverseMasses<T>& masses;
-  Coordinates<T> q;    // predicted, then corrected: in the rows of the kernels that sweep, otherwise in x_next
-  T *x_next, *v_next;  // (dofs); the repetition for a reverse has no v_next
-  bool finite = true;  // whether all of x_next is
+  Coordinates<T> q;          // predicted, then corrected: in the rows of the kernels that sweep, otherwise in x_next
+  T *x_next, *v_next;        // (dofs); the repetition for a reverse has no v_next
+  bool finite = true;        // whether all of x_next is
   T* multipliers = nullptr;  // of the substep, where a later stage reads them
   const std::vector<Impact<Single<T>>>* impacts = nullptr;  // particle by particle, in order; none where it is null
 };

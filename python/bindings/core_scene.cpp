@@ -25,7 +25,8 @@ std::shared_ptr<const DistanceGrid> grid_of(const py::handle& collider) {
   if (!collider.contains("grid")) return nullptr;
   using Values = py::array_t<double, py::array::c_style | py::array::forcecast>;
   const auto [origin, spacing, values] = collider["grid"].cast<std::tuple<std::array<double, 3>, double, Values>>();
-  if (values.ndim() != 3) throw std::invalid_argument("collider.grid: has no three axes. Fix: give coefficients (x, y, z)");
+  if (values.ndim() != 3)
+    throw std::invalid_argument("collider.grid: has no three axes. Fix: give coefficients (x, y, z)");
   DistanceGrid grid{origin, spacing, {}, std::vector<double>(values.data(), values.data() + values.size())};
   for (int d = 0; d < 3; ++d) grid.count[d] = static_cast<int>(values.shape(d));
   return std::make_shared<const DistanceGrid>(std::move(grid));
@@ -55,14 +56,17 @@ std::shared_ptr<Scene> make_scene(const py::kwargs& given) {
   for (const py::handle v : given["volumes"])
     spec.volumes.push_back({v["name"].cast<std::string>(), v["triangles"].cast<Triangles>()});
   for (const py::handle c : given["colliders"])
-    spec.colliders.push_back({c["name"].cast<std::string>(), c["shape"].cast<std::string>(),
-                              {c["times"].cast<std::vector<double>>(), interpolation_of(c["interpolation"].cast<std::string>())},
-                              grid_of(c)});
+    spec.colliders.push_back(
+        {c["name"].cast<std::string>(),
+         c["shape"].cast<std::string>(),
+         {c["times"].cast<std::vector<double>>(), interpolation_of(c["interpolation"].cast<std::string>())},
+         grid_of(c)});
   for (const py::handle c : given["contacts"])
     spec.contacts.push_back({c["name"].cast<std::string>(), c["collider"].cast<int>(), whole_numbers(c["particles"]),
                              whole_numbers(c["carried"]), c["rigid"].cast<bool>(), c["bounces"].cast<bool>()});
   if (given.contains("loads")) {
-    for (const auto& [group, item, row] : given["loads"].cast<std::vector<std::array<int, 3>>>()) spec.loads.push_back({group, item, row});
+    for (const auto& [group, item, row] : given["loads"].cast<std::vector<std::array<int, 3>>>())
+      spec.loads.push_back({group, item, row});
     spec.load = {given["load_times"].cast<std::vector<double>>(), Interpolation::linear};
   }
   return std::make_shared<Scene>(build_scene(spec));
@@ -81,8 +85,9 @@ py::dict arguments_of(const Scene& s) {
       with_kind(g.kind, [&]<class K>(K) { name = K::name; });
       return name;
     }();
-    groups.append(py::dict("name"_a = g.name, "kind"_a = kind, "damped"_a = g.damped,
-                           "stencil"_a = py::array_t<int>(static_cast<py::ssize_t>(g.stencil.size()), g.stencil.data())));
+    groups.append(
+        py::dict("name"_a = g.name, "kind"_a = kind, "damped"_a = g.damped,
+                 "stencil"_a = py::array_t<int>(static_cast<py::ssize_t>(g.stencil.size()), g.stencil.data())));
   }
   std::vector<std::array<int, 3>> loads;
   for (const Load& l : s.loads) loads.push_back({l.group, l.item, l.row});
@@ -95,22 +100,25 @@ py::dict arguments_of(const Scene& s) {
   py::list colliders, contacts;
   for (const Collider& c : s.colliders)
     with_shape(c.shape, [&]<class S>(S) {
-      colliders.append(py::dict("name"_a = c.name, "shape"_a = S::name, "times"_a = c.motion.times,
-                                "interpolation"_a = c.motion.interpolation == Interpolation::cubic ? "cubic" : "linear"));
+      colliders.append(
+          py::dict("name"_a = c.name, "shape"_a = S::name, "times"_a = c.motion.times,
+                   "interpolation"_a = c.motion.interpolation == Interpolation::cubic ? "cubic" : "linear"));
       if (c.grid)
-        colliders[colliders.size() - 1]["grid"] =
-            py::make_tuple(c.grid->origin, c.grid->spacing, py::array_t<double>(c.grid->count, c.grid->coefficients.data()));
+        colliders[colliders.size() - 1]["grid"] = py::make_tuple(
+            c.grid->origin, c.grid->spacing, py::array_t<double>(c.grid->count, c.grid->coefficients.data()));
     });
   for (const Contact& c : s.contacts)
-    contacts.append(py::dict("name"_a = c.name, "collider"_a = c.collider, "particles"_a = py::array_t<int>(py::cast(c.particles)),
+    contacts.append(py::dict("name"_a = c.name, "collider"_a = c.collider,
+                             "particles"_a = py::array_t<int>(py::cast(c.particles)),
                              "carried"_a = py::array_t<int>(py::cast(c.carried)), "rigid"_a = c.stiffness < 0,
                              "bounces"_a = c.restitution >= 0));
   const bool cubic = s.boundary.interpolation == Interpolation::cubic;
-  return py::dict("particles"_a = s.nodes(), "directors"_a = directors, "bodies"_a = bodies, "pinned"_a = s.pinned, "driven"_a = s.driven,
-                  "boundary_times"_a = s.boundary.times, "boundary_interpolation"_a = cubic ? "cubic" : "linear",
-                  "loaded"_a = s.loaded, "force_times"_a = s.force.times, "has_drag"_a = s.has_drag, "air"_a = s.air,
-                  "wind_times"_a = s.wind.times, "groups"_a = groups, "volumes"_a = volumes,
-                  "colliders"_a = colliders, "contacts"_a = contacts, "loads"_a = loads, "load_times"_a = s.load.times);
+  return py::dict("particles"_a = s.nodes(), "directors"_a = directors, "bodies"_a = bodies, "pinned"_a = s.pinned,
+                  "driven"_a = s.driven, "boundary_times"_a = s.boundary.times,
+                  "boundary_interpolation"_a = cubic ? "cubic" : "linear", "loaded"_a = s.loaded,
+                  "force_times"_a = s.force.times, "has_drag"_a = s.has_drag, "air"_a = s.air,
+                  "wind_times"_a = s.wind.times, "groups"_a = groups, "volumes"_a = volumes, "colliders"_a = colliders,
+                  "contacts"_a = contacts, "loads"_a = loads, "load_times"_a = s.load.times);
 }
 
 }  // namespace
@@ -142,7 +150,8 @@ void bind_scene(py::module_& m) {
         const Inputs<const double> in{s.layout, inputs.data()};
         const auto gaps = contact_gaps(s, in, in.of(Quantity::position), t, contact);
         py::array_t<double> out({static_cast<py::ssize_t>(gaps.size()), static_cast<py::ssize_t>(4)});
-        for (std::size_t i = 0; i < gaps.size(); ++i) std::copy(gaps[i].begin(), gaps[i].end(), out.mutable_data() + 4 * i);
+        for (std::size_t i = 0; i < gaps.size(); ++i)
+          std::copy(gaps[i].begin(), gaps[i].end(), out.mutable_data() + 4 * i);
         return out;
       });
 }

@@ -16,7 +16,8 @@ namespace {
 class Stepper {
  public:
   // `held`: motions whose first knot holds at all times.
-  Stepper(const Solver& solver, const std::vector<std::string>& held) : solver_{std::make_shared<Scene>(*solver.scene), solver.plan} {
+  Stepper(const Solver& solver, const std::vector<std::string>& held)
+      : solver_{std::make_shared<Scene>(*solver.scene), solver.plan} {
     for (const std::string& name : held) knots(name).times.resize(1);
   }
 
@@ -60,8 +61,8 @@ class Stepper {
       const auto end = rows.read(next.data(), 4 * dofs(), width());
       auto bar = rows.read(next_bar.data(), 4 * dofs(), width());
       std::vector<T> state_bar(4 * dofs()), in_bar(total());
-      single_step_vjp<T>(*s.scene, s.plan, rows.substep, first_order(rows, states.data(), next.data()), in.data(), state.data(), end.data(), bar.data(),
-                         state_bar.data(), in_bar.data());
+      single_step_vjp<T>(*s.scene, s.plan, rows.substep, first_order(rows, states.data(), next.data()), in.data(),
+                         state.data(), end.data(), bar.data(), state_bar.data(), in_bar.data());
       rows.write(state_bar, bars, stride);
       rows.write(in_bar, bars + width(), stride);
     });
@@ -69,7 +70,8 @@ class Stepper {
   }
 
   // Tangents (B, width) along (states_dot, inputs_dot).
-  py::array_t<double> jvp(const Array& states, const Array& inputs, const Array& states_dot, const Array& inputs_dot) const {
+  py::array_t<double> jvp(const Array& states, const Array& inputs, const Array& states_dot,
+                          const Array& inputs_dot) const {
     using One = Dual<double, 1>;
     const std::size_t batch = check(states, inputs);
     expect_size(states_dot, batch * width(), "states_dot");
@@ -87,7 +89,8 @@ class Stepper {
       const auto state = duals(row, states_dot.data() + b * width(), 4 * dofs());
       auto after_impact = std::bit_cast<AfterImpact<One>>(Rows<double>(0, *this, row).impacts(row, width()));
       std::vector<One> to(4 * dofs());
-      SingleStep<One>(*solver_.scene, solver_.plan).forward(substep_of(row), in.data(), state.data(), after_impact, to.data());
+      SingleStep<One>(*solver_.scene, solver_.plan)
+          .forward(substep_of(row), in.data(), state.data(), after_impact, to.data());
       for (std::size_t i = 0; i < to.size(); ++i) next_dot[b * width() + i] = to[i].d[0];
     });
     return out;
@@ -119,7 +122,9 @@ class Stepper {
     int count = 1;
     int substep;
 
-    Rows(std::size_t first, const Stepper& s, const double* state) : substep(s.substep_of(state)) { std::ranges::fill(row, first); }
+    Rows(std::size_t first, const Stepper& s, const double* state) : substep(s.substep_of(state)) {
+      std::ranges::fill(row, first);
+    }
 
     std::vector<T> read(const double* data, std::size_t size, std::size_t stride) const {
       if constexpr (std::is_same_v<T, double>) {
@@ -173,8 +178,8 @@ class Stepper {
   // A substep to which an impact has left some, or in which a contact began, which leaves two more, goes with BDF1.
   template <class T>
   Scenes first_order(const Rows<T>& rows, const double* states, const double* next) const {
-    const bool first = solver_.plan.options.integrator == Integrator::bdf1 || rows.substep == 0 || rows.impacts(states, width())[0] > 0 ||
-                       rows.impacts(next, width())[0] == 2;
+    const bool first = solver_.plan.options.integrator == Integrator::bdf1 || rows.substep == 0 ||
+                       rows.impacts(states, width())[0] > 0 || rows.impacts(next, width())[0] == 2;
     return first ? all_scenes<T> : Scenes{0};
   }
 
@@ -214,7 +219,8 @@ class Stepper {
 
 void bind_stepper(py::module_& m) {
   py::class_<Stepper>(m, "Stepper")
-      .def(py::init<const Solver&, const std::vector<std::string>&>(), py::arg("solver"), py::arg("held") = std::vector<std::string>())
+      .def(py::init<const Solver&, const std::vector<std::string>&>(), py::arg("solver"),
+           py::arg("held") = std::vector<std::string>())
       .def_property_readonly("width", &Stepper::width)
       .def("step", &Stepper::step, py::arg("states"), py::arg("inputs"))
       .def("vjp", &Stepper::vjp, py::arg("states"), py::arg("inputs"), py::arg("next"), py::arg("next_bar"))

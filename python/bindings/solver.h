@@ -21,11 +21,12 @@ struct Solver {
   Plan plan;
 };
 
-inline constexpr std::array<std::pair<const char*, Partition>, 5> partitions{{{"direct", Partition::direct},
-                                                                              {"newton", Partition::newton},
-                                                                              {"newton_cg", Partition::newton_cg},
-                                                                              {"implicit", Partition::implicit},
-                                                                              {"gauss_seidel", Partition::gauss_seidel}}};
+inline constexpr std::array<std::pair<const char*, Partition>, 5> partitions{
+    {{"direct", Partition::direct},
+     {"newton", Partition::newton},
+     {"newton_cg", Partition::newton_cg},
+     {"implicit", Partition::implicit},
+     {"gauss_seidel", Partition::gauss_seidel}}};
 
 inline const char* name_of(Partition partition) {
   return std::ranges::find(partitions, partition, &std::pair<const char*, Partition>::second)->first;

@@ -10,19 +10,24 @@
 namespace sheetbend::testing {
 namespace {
 
-constexpr std::array<double, 3> box_inertia{0.01083333333333333, 0.00833333333333333, 0.00416666666666667};  // 1 kg, .1 x .2 x .3 m
+constexpr std::array<double, 3> box_inertia{0.01083333333333333, 0.00833333333333333,
+                                            0.00416666666666667};  // 1 kg, .1 x .2 x .3 m
 
-std::vector<double> run(const Scene& scene, const std::vector<double>& inputs, double h, int steps, int iterations = 2) {
+std::vector<double> run(const Scene& scene, const std::vector<double>& inputs, double h, int steps,
+                        int iterations = 2) {
   const Plan plan = make_plan(scene, {.h = h, .partition = Partition::direct, .iterations = iterations});
   std::vector<double> x(scene.dofs());
   rollout_states<double>(scene, plan, inputs.data(), 0.0, {steps}, x.data(), nullptr);
   return x;
 }
 
-Vec3<double> at(const Scene& scene, const std::vector<double>& x, int node) { return Vec3<double>(&x[scene.first_dof[node]]); }
+Vec3<double> at(const Scene& scene, const std::vector<double>& x, int node) {
+  return Vec3<double>(&x[scene.first_dof[node]]);
+}
 
 // The largest difference between the body's axes and those given.
-double attitude_error(const Scene& scene, const std::vector<double>& x, const Body& b, const std::array<Vec3<double>, 3>& exact) {
+double attitude_error(const Scene& scene, const std::vector<double>& x, const Body& b,
+                      const std::array<Vec3<double>, 3>& exact) {
   double error = 0.0;
   for (int k = 0; k < 3; ++k) {
     const Vec3<double> off = at(scene, x, b.axes[k]) - exact[k];
@@ -32,10 +37,13 @@ double attitude_error(const Scene& scene, const std::vector<double>& x, const Bo
 }
 
 // R after `time` of a body that turns freely from omega (in its axes): Euler's equations and R' = R [omega], by Runge and Kutta's fourth order.
-std::array<Vec3<double>, 3> free_attitude(const std::array<double, 3>& I, const Vec3<double>& omega, double time, int steps) {
+std::array<Vec3<double>, 3> free_attitude(const std::array<double, 3>& I, const Vec3<double>& omega, double time,
+                                          int steps) {
   struct Turn {
     Vec3<double> w, R[3];
-    Turn plus(double s, const Turn& d) const { return {w + s * d.w, {R[0] + s * d.R[0], R[1] + s * d.R[1], R[2] + s * d.R[2]}}; }
+    Turn plus(double s, const Turn& d) const {
+      return {w + s * d.w, {R[0] + s * d.R[0], R[1] + s * d.R[1], R[2] + s * d.R[2]}};
+    }
   };
   const auto rate = [&](const Turn& s) {
     const auto& [a, b, c] = I;
@@ -69,7 +77,9 @@ TEST(FreeBox, TurnsAsEulersEquationsSayToSecondOrder) {
     const double error = attitude_error(scene, x, box, exact);
     record_error(("attitude_" + std::to_string(rate)).c_str(), error);
     EXPECT_LE(error, most);
-    if (before > 0.0) { EXPECT_NEAR(std::log2(before / error), 2.0, 0.15); }
+    if (before > 0.0) {
+      EXPECT_NEAR(std::log2(before / error), 2.0, 0.15);
+    }
     before = error;
     for (int j = 0; j < 3; ++j)
       for (int k = 0; k < 3; ++k)
@@ -99,10 +109,11 @@ TEST(Body, DragOnAxesIsTwiceAsMuchAboutTheCenter) {
     auto inputs = s.inputs(scene);
     for (const int n : ball.axes) inputs[scene.layout.of(Quantity::drag_linear) + n] = kappa;
     const double angle = omega * I / (2 * kappa) * (1.0 - std::exp(-2 * kappa * time / I));
-    const double error =
-        attitude_error(scene, run(scene, inputs, time / steps, steps), ball, BodyScene::turned(angle));
+    const double error = attitude_error(scene, run(scene, inputs, time / steps, steps), ball, BodyScene::turned(angle));
     EXPECT_LE(error, 1e-3 * 100 / steps * 100 / steps);
-    if (before > 0.0) { EXPECT_NEAR(before / error, 4.0, 0.4); }
+    if (before > 0.0) {
+      EXPECT_NEAR(before / error, 4.0, 0.4);
+    }
     before = error;
   }
 }
@@ -111,7 +122,8 @@ TEST(Body, DragOnAxesIsTwiceAsMuchAboutTheCenter) {
 TEST(Body, GradientMatchesComplexStep) {
   BodyScene s;
   s.spec.has_drag = true;
-  const Body box = s.add_body({0.1, 0.0, 0.0}, 1.0, box_inertia, BodyScene::turned(0.4), {0.5, 4.0, -1.0}, {0.3, 0.1, 1.0});
+  const Body box =
+      s.add_body({0.1, 0.0, 0.0}, 1.0, box_inertia, BodyScene::turned(0.4), {0.5, 4.0, -1.0}, {0.3, 0.1, 1.0});
   const Body rod = s.add_body({0.3, 0.1, 0.0}, 0.4, {3e-3, 2e-3, 2.5e-3}, BodyScene::turned(-0.2), {1.0, -2.0, 3.0});
   s.add("distance", {box.center, rod.center}, {0.21});
   s.spec.loaded = {box.axes[0], rod.axes[2], rod.center};
@@ -132,7 +144,8 @@ TEST(Body, GradientMatchesComplexStep) {
                            Quantity::drag_linear, Quantity::drag_quadratic, Quantity::rest}) {
     const std::size_t first = scene.layout.of(q), count = scene.layout.count(q);
     EXPECT_GT(largest(std::span(oracle).subspan(first, count)), 0.0);
-    const double error = relative_error(std::span(found).subspan(first, count), std::span(oracle).subspan(first, count));
+    const double error =
+        relative_error(std::span(found).subspan(first, count), std::span(oracle).subspan(first, count));
     EXPECT_LE(error, 1e-10) << quantity_names[static_cast<int>(q)];
     record_error(quantity_names[static_cast<int>(q)], error);
   }

@@ -140,7 +140,8 @@ Sample juggled(double e) {
   b.particle({0.02, 0.03, 0.04}, 0.1, {-2.5, -0.4, -3.0});
   b.collider("plane", {}, {0.0, 0.0, 0.0, 0.05, -0.1, 0.3});
   b.collider("sphere", {0.05}, {0.28, 0.0, 0.0, 0.1, 0.2, 0.0, 0.27, 0.02, 0.03, 0.4, 1.2, -0.5}, {0.0, 0.08});
-  b.collider("rounded_box", {0.02, 0.08, 0.08, 0.01}, {-0.06, 0.0, 0.03, 0.0, 0.1, 0.2, -0.05, 0.0, 0.04, 0.3, 0.2, 0.4}, {0.0, 0.08});
+  b.collider("rounded_box", {0.02, 0.08, 0.08, 0.01},
+             {-0.06, 0.0, 0.03, 0.0, 0.1, 0.2, -0.05, 0.0, 0.04, 0.3, 0.2, 0.4}, {0.0, 0.08});
   b.contact(0.2, 0.003, 0.0, e);
   return b.build(g);
 }
@@ -167,8 +168,9 @@ TEST_P(Juggling, HasTheGradientOfComplexSteps) {
   const auto found = gradient(p, s.inputs);
   double largest = 0.0;
   for (const double a : found) largest = std::max(largest, std::abs(a));
-  for (const Quantity q : {Quantity::position, Quantity::velocity, Quantity::mass, Quantity::gravity, Quantity::friction,
-                           Quantity::restitution, Quantity::contact_radius, Quantity::collider_pose, Quantity::collider_size}) {
+  for (const Quantity q :
+       {Quantity::position, Quantity::velocity, Quantity::mass, Quantity::gravity, Quantity::friction,
+        Quantity::restitution, Quantity::contact_radius, Quantity::collider_pose, Quantity::collider_size}) {
     const bool of_particles = q == Quantity::position || q == Quantity::velocity;
     for (std::size_t i = 0; i < (of_particles ? 9 : q == Quantity::mass ? 3 : s.scene.layout.count(q)); ++i) {
       const std::size_t at = s.scene.layout.of(q) + i;

@@ -12,7 +12,8 @@ namespace {
 
 constexpr double sizes[shape_count][most_sizes] = {{}, {0.8}, {0.5, 0.7}, {0.9, 0.7, 0.5, 0.15}};
 // Near a face, an edge and a corner of the box, and likewise around the others; all below their surface or above.
-constexpr double points[][3] = {{0.3, -0.2, 0.45}, {-0.3, 0.3, 0.8}, {0.85, 0.66, 0.1}, {-0.84, 0.6, -0.42}, {0.2, 0.3, -1.0}};
+constexpr double points[][3] = {
+    {0.3, -0.2, 0.45}, {-0.3, 0.3, 0.8}, {0.85, 0.66, 0.1}, {-0.84, 0.6, -0.42}, {0.2, 0.3, -1.0}};
 
 const auto ball = ball_on_grid(0.8, 0.21);
 AnyShape any(int shape) { return {shape, shape == shape_of("distance_field") ? ball.get() : nullptr}; }
@@ -180,7 +181,8 @@ TEST(Law, HasTheMatrixOfComplexSteps) {
 TEST(Poses, TurnAboutTheirAxisByItsLength) {
   double turn[9];
   turn_by(Vec3<double>(0.0, 0.0, M_PI / 2.0), turn);
-  const Pose<double> quarter{{1.0, 2.0, 3.0}, {turn[0], turn[1], turn[2], turn[3], turn[4], turn[5], turn[6], turn[7], turn[8]}};
+  const Pose<double> quarter{{1.0, 2.0, 3.0},
+                             {turn[0], turn[1], turn[2], turn[3], turn[4], turn[5], turn[6], turn[7], turn[8]}};
   const Vec3<double> v = quarter.turned({1.0, 0.0, 0.5});
   EXPECT_NEAR(v.x, 0.0, 1e-15);
   EXPECT_NEAR(v.y, 1.0, 1e-15);

@@ -19,7 +19,8 @@ Landing land(double h) {
   b.collider("plane", {}, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0});
   b.contact(0.3, 0.0);
   const Sample s = b.build(g);
-  const Program p{s.scene, make_plan(s.scene, contact_options(h, Integrator::bdf2)), static_cast<int>(std::lround(0.8 / h))};
+  const Program p{s.scene, make_plan(s.scene, contact_options(h, Integrator::bdf2)),
+                  static_cast<int>(std::lround(0.8 / h))};
   Rollout<double> rollout(s.scene, p.plan, s.inputs.data());
   Landing found{0.0, -1.0, 0.0, 0.0, 0.0, 0};
   bool touched = false;

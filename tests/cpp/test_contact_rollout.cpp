@@ -159,7 +159,8 @@ Sample tumbling(const Tumble& t) {
   b.collider(t.field ? "distance_field" : "sphere", t.field ? std::vector<double>{} : std::vector<double>{0.05},
              {0.02, 0.02, -0.04, 0.1, 0.2, 0.0, 0.02, 0.02, -0.03, 0.4, 1.2, -0.5}, {0.0, 0.06});
   if (t.field) b.spec.colliders.back().grid = ball_on_grid(0.05, 0.01);
-  b.collider("capsule", {0.03, 0.1}, {0.11, 0.0, -0.015, 1.5, 0.0, 0.0, 0.11, 0.01, -0.025, 1.2, 0.5, 0.0, 0.10, 0.0, -0.01, 1.6, 0.9, 0.1},
+  b.collider("capsule", {0.03, 0.1},
+             {0.11, 0.0, -0.015, 1.5, 0.0, 0.0, 0.11, 0.01, -0.025, 1.2, 0.5, 0.0, 0.10, 0.0, -0.01, 1.6, 0.9, 0.1},
              {0.0, 0.03, 0.06});
   b.collider("rounded_box", {0.04, 0.05, 0.02, 0.01}, {0.17, 0.03, -0.012, 0.0, 0.0, 0.5});
   b.contact(t.mu, 0.003, t.stiffness, t.restitution);
@@ -181,7 +182,11 @@ Modes modes_of(const Program& p, const std::vector<double>& inputs) {
     x.assign(rollout.x(), rollout.x() + p.scene.dofs());
     x_before.assign(rollout.state().x_before, rollout.state().x_before + p.scene.dofs());
     rollout.advance();
-    const Step<double> step{p.scene, p.plan, {p.scene.layout, inputs.data()}, rollout.bdf(), rollout.time(n + 1),
+    const Step<double> step{p.scene,
+                            p.plan,
+                            {p.scene.layout, inputs.data()},
+                            rollout.bdf(),
+                            rollout.time(n + 1),
                             {x.data(), x_before.data(), x.data(), x.data(), n}};
     ComputeEffectiveMasses::compute(step, masses);
     for_each_contact(step, masses, [&](const auto& source, const auto& poses, int c, int i) {
@@ -225,9 +230,10 @@ TEST_P(Tumbling, HasTheTangentsOfComplexSteps) {
   using D = Dual<double, 4>;
   const Layout& layout = s.scene.layout;
   std::vector<D> inputs(s.inputs.begin(), s.inputs.end());
-  const std::size_t along[] = {layout.of(Quantity::friction) + 1, layout.of(Quantity::collider_pose) + 8,
-                               layout.of(GetParam().restitution >= 0.0 ? Quantity::restitution : Quantity::collider_size),
-                               layout.of(Quantity::velocity)};
+  const std::size_t along[] = {
+      layout.of(Quantity::friction) + 1, layout.of(Quantity::collider_pose) + 8,
+      layout.of(GetParam().restitution >= 0.0 ? Quantity::restitution : Quantity::collider_size),
+      layout.of(Quantity::velocity)};
   for (int d = 0; d < 4; ++d) inputs[along[d]].d[d] = 1.0;
   Rollout<D> rollout(s.scene, p.plan, inputs.data());
   for (int n = 0; n < p.steps; ++n) rollout.advance();
@@ -261,7 +267,8 @@ TEST_P(Tumbling, HasTheSameBitsWhateverKeepsItsStates) {
 INSTANTIATE_TEST_SUITE_P(Contact, Tumbling,
                          ::testing::Values(Tumble{0.8, 0.0}, Tumble{0.4, 300.0}, Tumble{0.0, 0.0},
                                            Tumble{0.8, 0.0, Integrator::bdf2}, Tumble{0.4, 300.0, Integrator::bdf2},
-                                           Tumble{0.4, 0.0, Integrator::bdf1, 0.6}, Tumble{0.4, 0.0, Integrator::bdf2, 0.6},
+                                           Tumble{0.4, 0.0, Integrator::bdf1, 0.6},
+                                           Tumble{0.4, 0.0, Integrator::bdf2, 0.6},
                                            Tumble{0.8, 0.0, Integrator::bdf1, -1.0, true},
                                            Tumble{0.4, 0.0, Integrator::bdf2, 0.6, true}));
 
@@ -278,8 +285,7 @@ TEST(Contact, GoesOnFromAnyState) {
       if (n < 10) continue;
       others.emplace_back(s.scene, plan, s.inputs.data()).restart(n + 1, whole.state());
     }
-    for (const auto& other : others)
-      EXPECT_TRUE(std::equal(whole.x(), whole.x() + s.scene.dofs(), other.x()));
+    for (const auto& other : others) EXPECT_TRUE(std::equal(whole.x(), whole.x() + s.scene.dofs(), other.x()));
   }
 }
 
@@ -296,7 +302,8 @@ TEST(Contact, HasTheGradientOfDifferencesAroundASmallBall) {
     EXPECT_GT(modes_of(p, s.inputs).slid, 3);
     const auto found = gradient(p, s.inputs);
     std::vector<double> own, expected, differences;
-    for (const Quantity q : {Quantity::velocity, Quantity::friction, Quantity::collider_size, Quantity::collider_pose}) {
+    for (const Quantity q :
+         {Quantity::velocity, Quantity::friction, Quantity::collider_size, Quantity::collider_pose}) {
       std::vector<Complex> probe(s.inputs.begin(), s.inputs.end());
       probe[s.scene.layout.of(q)].im = complex_step;
       expected.push_back(loss(p, probe).im / complex_step);

@@ -31,8 +31,7 @@ AtRest every_kind() {
   const int directors = n + 2, sets = directors + n, normals = sets + n, leaning = normals + n;
   const int axes = leaning + n, centers[2] = {3, 7};
   spec.particles = axes + 6;
-  for (int b = 0; b < 2; ++b)
-    spec.bodies.push_back({centers[b], {axes + 3 * b, axes + 3 * b + 1, axes + 3 * b + 2}});
+  for (int b = 0; b < 2; ++b) spec.bodies.push_back({centers[b], {axes + 3 * b, axes + 3 * b + 1, axes + 3 * b + 2}});
   spec.pinned = {0, directors, normals, leaning};
   for (int k = 0; k < n; ++k) spec.pinned.push_back(sets + k);
   for (const int k : {0, 1, 4, 5}) spec.pinned.push_back(axes + k);

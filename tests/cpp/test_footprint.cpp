@@ -74,7 +74,8 @@ void expect_footprint(const Scene& scene, const Plan& plan, const std::vector<T>
 }
 
 TEST_P(Footprint, IsWhatIsAllocated) {
-  const bool sweeps_or_blocks = GetParam().partition != Partition::newton && GetParam().partition != Partition::newton_cg;
+  const bool sweeps_or_blocks =
+      GetParam().partition != Partition::newton && GetParam().partition != Partition::newton_cg;
   const Sample sample = random_scene(77, GetParam().shape(sweeps_or_blocks ? 60 : 12));
   SolverOptions options = GetParam().options(3);
   options.cg_tolerance = 1e-6;  // to be fast: bytes do not depend on it

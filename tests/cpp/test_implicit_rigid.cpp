@@ -20,7 +20,8 @@ Sample cube(bool all, double mu, const Vec3<double>& at, const Vec3<double>& tur
   turn_by(turn, R);
   std::vector<Vec3<double>> x;
   for (int k = 0; k < 9; ++k) {
-    const double c[3] = {k == 8 ? 0.0 : (k & 1) - 0.5, k == 8 ? 0.0 : (k >> 1 & 1) - 0.5, k == 8 ? 0.0 : (k >> 2) - 0.5};
+    const double c[3] = {k == 8 ? 0.0 : (k & 1) - 0.5, k == 8 ? 0.0 : (k >> 1 & 1) - 0.5,
+                         k == 8 ? 0.0 : (k >> 2) - 0.5};
     double r[3];
     for (int d = 0; d < 3; ++d) r[d] = edge * (R[3 * d] * c[0] + R[3 * d + 1] * c[1] + R[3 * d + 2] * c[2]);
     x.push_back(at + Vec3<double>(r));
@@ -137,7 +138,8 @@ INSTANTIATE_TEST_SUITE_P(RigidCube, RigidTumble,
 
 TEST_P(RigidTumble, HasTheGradientOfComplexSteps) {
   const auto of = [&](const std::vector<Complex>& probe) { return loss_of_particles(program, probe); };
-  expect_some_entries_agree(sample.scene.layout, of, sample.inputs, gradient_of_particles(program, sample.inputs), 1e-10);
+  expect_some_entries_agree(sample.scene.layout, of, sample.inputs, gradient_of_particles(program, sample.inputs),
+                            1e-10);
 }
 
 TEST_P(RigidTumble, HasTheGradientOfDifferences) {
@@ -146,7 +148,8 @@ TEST_P(RigidTumble, HasTheGradientOfDifferences) {
   std::vector<double> v(sample.inputs.size());
   const Layout& layout = sample.scene.layout;
   for (const Quantity q : {Quantity::velocity, Quantity::mass, Quantity::gravity, Quantity::friction})
-    for (std::size_t i = 0; i < layout.count(q); ++i) v[layout.of(q) + i] = random(-1.0, 1.0) * (q == Quantity::mass ? 0.01 : 1.0);
+    for (std::size_t i = 0; i < layout.count(q); ++i)
+      v[layout.of(q) + i] = random(-1.0, 1.0) * (q == Quantity::mass ? 0.01 : 1.0);
   const auto moved = [&](double size) {
     std::vector<double> in = sample.inputs;
     for (std::size_t i = 0; i < in.size(); ++i) in[i] += size * v[i];
@@ -161,8 +164,8 @@ TEST_P(RigidTumble, HasTheTangentsOfComplexSteps) {
   using D = Dual<double, 4>;
   const Layout& layout = sample.scene.layout;
   std::vector<D> inputs(sample.inputs.begin(), sample.inputs.end());
-  const std::size_t along[] = {layout.of(Quantity::friction), layout.of(Quantity::mass) + 3, layout.of(Quantity::rest) + 2,
-                               layout.of(Quantity::velocity)};
+  const std::size_t along[] = {layout.of(Quantity::friction), layout.of(Quantity::mass) + 3,
+                               layout.of(Quantity::rest) + 2, layout.of(Quantity::velocity)};
   for (int d = 0; d < 4; ++d) inputs[along[d]].d[d] = 1.0;
   Rollout<D> rollout(sample.scene, program.plan, inputs.data());
   for (int n = 0; n < program.steps; ++n) rollout.advance();
@@ -233,7 +236,8 @@ TEST(RigidCube, LeavesOutTheRowsThatFollow) {
     return states(Program{s.scene, make_plan(s.scene, contact_options(1e-3)), 200}, s.inputs);
   };
   const auto x = at(few), y = at(all);
-  for (int i = 0; i < 27; ++i) EXPECT_NEAR(x[x.size() - few.scene.dofs() + i], y[y.size() - all.scene.dofs() + i], 1e-9);
+  for (int i = 0; i < 27; ++i)
+    EXPECT_NEAR(x[x.size() - few.scene.dofs() + i], y[y.size() - all.scene.dofs() + i], 1e-9);
   const Plan plan = make_plan(all.scene, contact_options(1e-3));
   const auto redundant = redundant_rows(all.scene, plan, all.inputs.data(), 0.0);
   ASSERT_EQ(redundant.size(), 15u);
@@ -241,8 +245,9 @@ TEST(RigidCube, LeavesOutTheRowsThatFollow) {
     EXPECT_GE(row.others.size(), 2u);  // the halves of a diagonal
     EXPECT_LE(row.contradiction, 1e-14);
   }
-  EXPECT_NE(describe(all.scene, redundant, all.inputs.data() + all.scene.layout.of(Quantity::position)).find("follows from"),
-            std::string::npos);
+  EXPECT_NE(
+      describe(all.scene, redundant, all.inputs.data() + all.scene.layout.of(Quantity::position)).find("follows from"),
+      std::string::npos);
   EXPECT_TRUE(redundant_rows(few.scene, make_plan(few.scene, contact_options(1e-3)), few.inputs.data(), 0.0).empty());
 }
 

@@ -12,8 +12,8 @@ namespace {
 
 constexpr double pi = 3.14159265358979323846;
 
-std::vector<double> trajectory(const Scene& scene, const std::vector<double>& inputs, double h, int steps, int every = 1,
-                               int iterations = 2) {
+std::vector<double> trajectory(const Scene& scene, const std::vector<double>& inputs, double h, int steps,
+                               int every = 1, int iterations = 2) {
   const Plan plan = make_plan(scene, {.h = h, .partition = Partition::direct, .iterations = iterations});
   std::vector<int> kept;
   for (int n = 0; n <= steps; n += every) kept.push_back(n);
@@ -57,7 +57,8 @@ Body ground(BodyScene& s, const std::array<Vec3<double>, 3>& R = hanging(0.0)) {
 }
 
 // Links hinged one below the other from the ground, `length` apart.
-std::vector<Body> chain(BodyScene& s, const std::vector<Link>& links, double length, const std::vector<double>& angles) {
+std::vector<Body> chain(BodyScene& s, const std::vector<Link>& links, double length,
+                        const std::vector<double>& angles) {
   Body above = ground(s);
   std::vector<Body> bodies;
   Vec3<double> joint{};
@@ -91,7 +92,8 @@ TEST(RodPendulum, SwingsWithItsPeriod) {
   const auto x = trajectory(scene, s.inputs(scene), h, 10 * 240);
   std::vector<double> crossings;
   for (int n = 1; n <= 10 * 240; ++n) {
-    const double before = angle_of(scene, &x[(n - 1) * scene.dofs()], rod), now = angle_of(scene, &x[n * scene.dofs()], rod);
+    const double before = angle_of(scene, &x[(n - 1) * scene.dofs()], rod),
+                 now = angle_of(scene, &x[n * scene.dofs()], rod);
     if (before > 0.0 && now <= 0.0) crossings.push_back(h * (n - 1 + before / (before - now)));
   }
   const double period = (crossings.back() - crossings.front()) / (static_cast<double>(crossings.size()) - 1.0);
@@ -120,7 +122,8 @@ TEST(HingeSpring, SwingsWithItsPeriodAndItsDerivative) {
     const double time = 1.2 * period, omega = std::sqrt(k / I), exact = theta0 * std::cos(omega * time);
     const Program program{scene, make_plan(scene, {.h = time / steps, .partition = Partition::direct}), steps};
     std::vector<double> x(scene.dofs()), x_bar(scene.dofs()), bar(inputs.size());
-    Tape<double> tape = record_rollout<double>(scene, program.plan, inputs.data(), 0.0, {steps}, x.data(), every_state, nullptr);
+    Tape<double> tape =
+        record_rollout<double>(scene, program.plan, inputs.data(), 0.0, {steps}, x.data(), every_state, nullptr);
     const double* a = &x[scene.first_dof[wheel.axes[0]]];
     const double size2 = a[0] * a[0] + a[2] * a[2];
     x_bar[scene.first_dof[wheel.axes[0]]] = -a[2] / size2;
@@ -150,7 +153,9 @@ TEST(DoublePendulum, OfBodiesWithSmallMomentsSwingsAsOneOfPoints) {
     const double error = std::hypot(tip[0] - 1.47346567, tip[2] + 1.20038944);
     record_error("tip_" + std::to_string(rate), error);
     EXPECT_LE(error, 2e-3);
-    if (before > 0.0) { EXPECT_NEAR(before / error, 4.0, 0.5); }
+    if (before > 0.0) {
+      EXPECT_NEAR(before / error, 4.0, 0.5);
+    }
     before = error;
   }
 }
@@ -215,11 +220,12 @@ TEST(Joints, GradientMatchesComplexStep) {
   const Program program{scene, make_plan(scene, {.h = 4e-3, .partition = Partition::direct, .iterations = 2}), 60};
   const auto oracle = complex_step_gradient([&](const std::vector<Complex>& z) { return loss(program, z); }, inputs);
   const auto found = gradient(program, inputs);
-  for (const Quantity q : {Quantity::position, Quantity::velocity, Quantity::mass, Quantity::compliance, Quantity::damping,
-                           Quantity::rest, Quantity::boundary, Quantity::gravity}) {
+  for (const Quantity q : {Quantity::position, Quantity::velocity, Quantity::mass, Quantity::compliance,
+                           Quantity::damping, Quantity::rest, Quantity::boundary, Quantity::gravity}) {
     const std::size_t first = scene.layout.of(q), count = scene.layout.count(q);
     EXPECT_GT(largest(std::span(oracle).subspan(first, count)), 0.0);
-    const double error = relative_error(std::span(found).subspan(first, count), std::span(oracle).subspan(first, count));
+    const double error =
+        relative_error(std::span(found).subspan(first, count), std::span(oracle).subspan(first, count));
     EXPECT_LE(error, 1e-9) << quantity_names[static_cast<int>(q)];
     record_error(quantity_names[static_cast<int>(q)], error);
   }
@@ -241,7 +247,8 @@ BodyScene four_bar() {
   const auto bar = [&](const Vec3<double>& from, const Vec3<double>& to) {
     const Vec3<double> e = (1.0 / norm(to - from)) * (to - from);
     const double l = norm(to - from);
-    return s.add_body(0.5 * (from + to), l, {1e-3 * l, l * l * l / 12, l * l * l / 12}, {e, {0, 1, 0}, cross(e, {0, 1, 0})});
+    return s.add_body(0.5 * (from + to), l, {1e-3 * l, l * l * l / 12, l * l * l / 12},
+                      {e, {0, 1, 0}, cross(e, {0, 1, 0})});
   };
   const Vec3<double> A, B(0.02, 0, 0.1), C(0.25, 0, 0.2), D(0.2, 0, 0);
   const Body crank = bar(A, B), coupler = bar(B, C), rocker = bar(C, D);
@@ -258,7 +265,8 @@ struct TooManyRows : ::testing::TestWithParam<int> {
   Scene scene = build_scene(s.spec);
   std::vector<double> inputs = s.inputs(scene);
 };
-INSTANTIATE_TEST_SUITE_P(, TooManyRows, ::testing::Values(5, 3), [](const auto& info) { return info.param == 5 ? "Door" : "FourBar"; });
+INSTANTIATE_TEST_SUITE_P(, TooManyRows, ::testing::Values(5, 3),
+                         [](const auto& info) { return info.param == 5 ? "Door" : "FourBar"; });
 
 TEST_P(TooManyRows, AreNamed) {
   const Plan plan = make_plan(scene, {.h = 1.0 / 480, .partition = Partition::direct});
@@ -279,7 +287,8 @@ TEST_P(TooManyRows, MoveAndDifferentiateAsWithoutThem) {
       for (int i = 0; i < group.count; ++i) {
         double local[K::dofs];
         for (int k = 0; k < K::arity; ++k) std::copy_n(x + scene.first_dof[group.nodes(i)[k]], 3, local + 3 * k);
-        const Evaluation<K, double> at(local, &inputs[scene.layout.of(Quantity::rest)] + group.first_value + i * group.parameters);
+        const Evaluation<K, double> at(
+            local, &inputs[scene.layout.of(Quantity::rest)] + group.first_value + i * group.parameters);
         for (const double c : at.C) EXPECT_NEAR(c, 0.0, 1e-12) << group.name << i;
       }
     });
@@ -287,7 +296,8 @@ TEST_P(TooManyRows, MoveAndDifferentiateAsWithoutThem) {
   const auto found = gradient(program, inputs);
   for (const Quantity q : {Quantity::velocity, Quantity::mass, Quantity::rest, Quantity::position}) {
     const std::size_t first = scene.layout.of(q), count = scene.layout.count(q);
-    const double error = relative_error(std::span(found).subspan(first, count), std::span(oracle).subspan(first, count));
+    const double error =
+        relative_error(std::span(found).subspan(first, count), std::span(oracle).subspan(first, count));
     EXPECT_LE(error, 1e-8) << quantity_names[static_cast<int>(q)];
     record_error(quantity_names[static_cast<int>(q)], error);
   }

@@ -59,8 +59,8 @@ TEST(Rebound, HasTheDerivativesOfComplexSteps) {
     const auto expected = complex_step_gradient(
         [&](const std::vector<Complex>& a) {
           const Rebound<Complex> there = rebound(shape, h, true, falling(a));
-          return dot(Vec3<Complex>(bar.carried.x, bar.carried.y, bar.carried.z), there.carried) + bar.lift * there.lift +
-                 bar.leaving * there.leaving;
+          return dot(Vec3<Complex>(bar.carried.x, bar.carried.y, bar.carried.z), there.carried) +
+                 bar.lift * there.lift + bar.leaving * there.leaving;
         },
         flat(f));
     EXPECT_LE(relative_error(flat(rebound_vjp(shape, h, true, f, bar)), expected), 1e-12) << returning;
@@ -72,7 +72,8 @@ Sample plate(double tilt, double mu) {
   ContactBuilder b;
   const Vec3<double> at[] = {{0.0, 0.0, 1.0}, {0.1, 0.0, 1.0 + tilt}, {0.05, 0.08, 1.0}};
   for (const auto& x : at) b.particle(x, 0.1);
-  for (const auto& [i, j] : {std::pair{0, 1}, {1, 2}, {0, 2}}) b.constraint("distance", {i, j}, 0.0, {norm(at[i] - at[j])});
+  for (const auto& [i, j] : {std::pair{0, 1}, {1, 2}, {0, 2}})
+    b.constraint("distance", {i, j}, 0.0, {norm(at[i] - at[j])});
   b.collider("plane", {}, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0});
   b.contact(mu, 0.0, 0.0, 0.8);
   return b.build(g);
@@ -81,7 +82,8 @@ Sample plate(double tilt, double mu) {
 // What falls flat bounces as a particle does: y = e v (T - t) - g (T - t)^2/2 with v = g t, t = sqrt(2 h0/g).
 TEST(Rebound, OfAFlatPlateIsThatOfAParticle) {
   constexpr double height = 0.5776531, by_height = 0.19055156;
-  for (const auto& [integrator, worst, slope] : {std::tuple{Integrator::bdf1, 4e-3, 0.05}, {Integrator::bdf2, 2e-4, 0.01}}) {
+  for (const auto& [integrator, worst, slope] :
+       {std::tuple{Integrator::bdf1, 4e-3, 0.05}, {Integrator::bdf2, 2e-4, 0.01}}) {
     const Sample s = plate(0.0, 0.1);
     const Program p{s.scene, make_plan(s.scene, contact_options(1.0 / 480.0, integrator)), 336};
     const auto all = states(p, s.inputs);

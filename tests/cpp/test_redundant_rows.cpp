@@ -23,8 +23,7 @@ Sample net(int cells, double bulge = 0.0) {
     for (int j = 0; j < side; ++j) {
       if (j < cells) pairs.insert(pairs.end(), {at(i, j), at(i, j + 1)});
       if (i < cells) pairs.insert(pairs.end(), {at(i, j), at(i + 1, j)});
-      if (i < cells && j < cells)
-        pairs.insert(pairs.end(), {at(i, j), at(i + 1, j + 1), at(i, j + 1), at(i + 1, j)});
+      if (i < cells && j < cells) pairs.insert(pairs.end(), {at(i, j), at(i + 1, j + 1), at(i, j + 1), at(i + 1, j)});
     }
   spec.groups = {{"links", "distance", false, pairs}};
   Sample sample{build_scene(spec), {}};

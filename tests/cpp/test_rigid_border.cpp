@@ -21,7 +21,8 @@ Sample rigid_net() {
 struct RigidBorder : ::testing::TestWithParam<Solver> {
   Sample sample = rigid_net();
   Program program{sample.scene, make_plan(sample.scene, GetParam().options(2)), 2};
-  Program direct{sample.scene, make_plan(sample.scene, Solver{"", Integrator::bdf2, Partition::direct, true}.options(2)), 2};
+  Program direct{sample.scene,
+                 make_plan(sample.scene, Solver{"", Integrator::bdf2, Partition::direct, true}.options(2)), 2};
 };
 INSTANTIATE_TEST_SUITE_P(, RigidBorder, ::testing::Values(newton, newton_by_cg), solver_name);
 

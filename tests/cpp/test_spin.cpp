@@ -27,7 +27,8 @@ std::vector<int> both(const Body& a, const Body& b, bool centers) {
 TEST(FreeBox, KeepsItsSpin) {
   const Vec3<double> omega(1e-3, 5.0, 1e-3);
   const std::array<double, 3> I{0.01083333333333333, 0.00833333333333333, 0.00416666666666667};
-  constexpr double exact[3][3]{{.6748674, .0021918, -.7379358}, {.0075491, -.9999638, .0039339}, {-.7379004, -.0082256, -.6748595}};
+  constexpr double exact[3][3]{
+      {.6748674, .0021918, -.7379358}, {.0075491, -.9999638, .0039339}, {-.7379004, -.0082256, -.6748595}};
   double before = 0.0;
   for (const int rate : {240, 480}) {
     BodyScene s;
@@ -48,13 +49,16 @@ TEST(FreeBox, KeepsItsSpin) {
     });
     for (int k = 0; k < 3; ++k) {
       const Vec3<double> a = at(scene, rollout.x(), box.axes[k]);
-      for (int row = 0; row < 3; ++row) error = std::max(error, std::abs((row == 0 ? a.x : row == 1 ? a.y : a.z) - exact[row][k]));
+      for (int row = 0; row < 3; ++row)
+        error = std::max(error, std::abs((row == 0 ? a.x : row == 1 ? a.y : a.z) - exact[row][k]));
     }
     record_error("attitude_" + std::to_string(rate), error);
     record_error("momentum_" + std::to_string(rate), drift);
     EXPECT_LE(error, rate == 240 ? 3.3e-3 : 9e-4);
     EXPECT_LE(drift, 1e-9);
-    if (before > 0.0) { EXPECT_NEAR(std::log2(before / error), 2.0, 0.3); }
+    if (before > 0.0) {
+      EXPECT_NEAR(std::log2(before / error), 2.0, 0.3);
+    }
     before = error;
   }
 }
@@ -62,7 +66,8 @@ TEST(FreeBox, KeepsItsSpin) {
 struct Top {
   BodyScene s;
   Body disk;
-  static constexpr double m = 0.1, R = 0.05, t = 1e-3, l = 0.04, spin = 200.0, tilt = 20.0 * 3.14159265358979323846 / 180, precession = 1.5907643;
+  static constexpr double m = 0.1, R = 0.05, t = 1e-3, l = 0.04, spin = 200.0,
+                          tilt = 20.0 * 3.14159265358979323846 / 180, precession = 1.5907643;
 };
 
 Top heavy_top(bool keeps_spin) {
@@ -75,7 +80,8 @@ Top heavy_top(bool keeps_spin) {
   top.s.spec.pinned = {pivot};
   top.disk = top.s.add_body(Top::l * R[2], Top::m, {I1, I1, I3}, R, omega, cross(omega, Top::l * R[2]));
   if (keeps_spin) top.s.keep_spin(top.disk);
-  top.s.add("coincide_particle", {top.disk.center, pivot, top.disk.axes[0], top.disk.axes[1], top.disk.axes[2]}, {0, 0, -Top::l});
+  top.s.add("coincide_particle", {top.disk.center, pivot, top.disk.axes[0], top.disk.axes[1], top.disk.axes[2]},
+            {0, 0, -Top::l});
   return top;
 }
 
@@ -99,8 +105,10 @@ Precession precess(bool keeps_spin) {
                           Top::m * 9.81 * at(scene, x, top.disk.center).z;
     const Vec3<double> axis = at(scene, x, top.disk.axes[2]);
     const double now = std::atan2(axis.y, axis.x);
-    if (step == 0) start = energy;
-    else angle += std::remainder(now - last, 2 * 3.14159265358979323846);
+    if (step == 0)
+      start = energy;
+    else
+      angle += std::remainder(now - last, 2 * 3.14159265358979323846);
     last = now;
     drift = std::max(drift, std::abs(energy / start - 1.0));
   });
@@ -161,11 +169,13 @@ TEST(KeptSpin, GradientMatchesComplexStep) {
   const Program program{e.scene, direct(e.scene, 4e-3), 30};
   const auto oracle = complex_step_gradient([&](const std::vector<Complex>& z) { return loss(program, z); }, e.inputs);
   const auto found = gradient(program, e.inputs);
-  for (const Quantity q : {Quantity::position, Quantity::velocity, Quantity::mass, Quantity::compliance, Quantity::damping, Quantity::rest,
-                           Quantity::force, Quantity::load, Quantity::gravity, Quantity::drag_linear, Quantity::drag_quadratic}) {
+  for (const Quantity q :
+       {Quantity::position, Quantity::velocity, Quantity::mass, Quantity::compliance, Quantity::damping, Quantity::rest,
+        Quantity::force, Quantity::load, Quantity::gravity, Quantity::drag_linear, Quantity::drag_quadratic}) {
     const std::size_t first = e.scene.layout.of(q), count = e.scene.layout.count(q);
     EXPECT_GT(largest(std::span(oracle).subspan(first, count)), 0.0) << quantity_names[static_cast<int>(q)];
-    const double error = relative_error(std::span(found).subspan(first, count), std::span(oracle).subspan(first, count));
+    const double error =
+        relative_error(std::span(found).subspan(first, count), std::span(oracle).subspan(first, count));
     EXPECT_LE(error, 1e-9) << quantity_names[static_cast<int>(q)];
     record_error(quantity_names[static_cast<int>(q)], error);
   }
@@ -222,9 +232,12 @@ TEST(RowLoad, OnAJointsAngleIsATorque) {
     std::vector<double> x(scene.dofs());
     rollout_states<double>(scene, direct(scene, time / steps), inputs.data(), 0.0, {steps}, x.data(), nullptr);
     const Vec3<double> a = at(scene, x.data(), wheel.axes[0]);
-    const double exact = tau * time * time / (3 * I), error = std::abs(std::remainder(std::atan2(-a.z, a.x) - exact, 2 * 3.14159265358979323846));
+    const double exact = tau * time * time / (3 * I),
+                 error = std::abs(std::remainder(std::atan2(-a.z, a.x) - exact, 2 * 3.14159265358979323846));
     EXPECT_LE(error, 2e-2 * exact);
-    if (before > 0.0) { EXPECT_NEAR(std::log2(before / error), 2.0, 0.4); }
+    if (before > 0.0) {
+      EXPECT_NEAR(std::log2(before / error), 2.0, 0.4);
+    }
     before = error;
   }
 }

@@ -274,7 +274,8 @@ TEST(RolloutOfAStageMore, HasItsGradient) {
 struct ADynamicSet : ::testing::TestWithParam<Integrator> {
   ADynamicSet() {
     ContactBuilder b;
-    for (int i = 0; i < particles; ++i) b.particle({0.05 * i, 0.01 * (i % 2), 0.01 * i}, 0.01, {0.3, 0.0, -1.0 - 0.1 * i});
+    for (int i = 0; i < particles; ++i)
+      b.particle({0.05 * i, 0.01 * (i % 2), 0.01 * i}, 0.01, {0.3, 0.0, -1.0 - 0.1 * i});
     for (int i = 0; i + 1 < particles; ++i) b.constraint("distance", {i, i + 1}, 1e-3, {0.05});
     HoldInLayer::pairs.clear();
     for (int i = 0; i < particles; ++i) {

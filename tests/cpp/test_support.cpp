@@ -1,8 +1,8 @@
 // What force sensors read along rollouts: values with tangents have the bits of those without, and the tangents are those of the complex step.
 #include "adjoint/force_sensor.h"
+#include "core/rollout/rollout.h"
 #include "core/scalar/complex.h"
 #include "core/scalar/dual.h"
-#include "core/rollout/rollout.h"
 #include "tests/cpp/support/programs.h"
 
 namespace sheetbend::testing {
@@ -79,8 +79,8 @@ TEST_P(Sensors, HaveTheTangentsOfTheComplexStep) {
   EXPECT_LE(relative_error(part(found, -1), read(p, shifted, values)), 1e-13);
   double worst = 0.0;
   for (int k = 0; k < 8; ++k) {
-    const auto oracle = complex_step_along([&](const std::vector<Complex>& z) { return read(p, shifted, z); }, values,
-                                           part(inputs, k));
+    const auto oracle =
+        complex_step_along([&](const std::vector<Complex>& z) { return read(p, shifted, z); }, values, part(inputs, k));
     worst = std::max(worst, relative_error(part(found, k), oracle));
   }
   EXPECT_LE(worst, 1e-10);

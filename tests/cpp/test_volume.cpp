@@ -1,6 +1,6 @@
 // The volume of a closed surface: its gradient, what one projection does to it, and what is refused.
-#include "core/scalar/complex.h"
 #include "core/rollout/rollout.h"
+#include "core/scalar/complex.h"
 #include "tests/cpp/support/bipyramid.h"
 
 namespace sheetbend::testing {

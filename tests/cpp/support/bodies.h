@@ -20,7 +20,8 @@ struct BodyScene {
   Vec3<double> gravity{0.0, 0.0, -9.81};
 
   int add_node(const Vec3<double>& at, double m, const Vec3<double>& velocity = {}) {
-    for (const auto& [from, to] : {std::pair{&at, &x}, {&velocity, &v}}) to->insert(to->end(), {from->x, from->y, from->z});
+    for (const auto& [from, to] : {std::pair{&at, &x}, {&velocity, &v}})
+      to->insert(to->end(), {from->x, from->y, from->z});
     mass.push_back(m);
     return spec.particles++;
   }
@@ -29,8 +30,7 @@ struct BodyScene {
   Body add_body(const Vec3<double>& at, double m, const std::array<double, 3>& I, const std::array<Vec3<double>, 3>& R,
                 const Vec3<double>& omega = {}, const Vec3<double>& velocity = {}) {
     Body b{add_node(at, m, velocity), {}};
-    for (int k = 0; k < 3; ++k)
-      b.axes[k] = add_node(R[k], 0.5 * (I[0] + I[1] + I[2]) - I[k], cross(omega, R[k]));
+    for (int k = 0; k < 3; ++k) b.axes[k] = add_node(R[k], 0.5 * (I[0] + I[1] + I[2]) - I[k], cross(omega, R[k]));
     spec.bodies.push_back(b);
     add("rigid", {b.axes.begin(), b.axes.end()}, {});
     return b;
@@ -68,7 +68,8 @@ struct BodyScene {
     std::copy(v.begin(), v.end(), in.of(Quantity::velocity));
     std::copy(mass.begin(), mass.end(), in.of(Quantity::mass));
     gravity.store(in.of(Quantity::gravity));
-    double *compliance = in.of(Quantity::compliance), *damping = in.of(Quantity::damping), *rest = in.of(Quantity::rest);
+    double *compliance = in.of(Quantity::compliance), *damping = in.of(Quantity::damping),
+           *rest = in.of(Quantity::rest);
     for (const auto& group : groups)
       for (const Values& c : group) {
         *compliance++ = c.compliance;

@@ -457,14 +457,14 @@ inline Case solid_case(std::vector<double> x, std::vector<double> gradients) {
   for (int k = 6; k < static_cast<int>(row.p.size()); ++k) row.parameter_relabeling.push_back(k);
   return row;
 }
-inline const std::vector<double> brick_sample{0,    0,    0,   0.1,  0.01, 0.02,  0.11, 0.11, 0.03,  -0.01, 0.09, 0.01,
+inline const std::vector<double> brick_sample{0,    0,    0,   0.1,  0.01,  0.02, 0.11, 0.11, 0.03, -0.01, 0.09, 0.01,
                                               0.02, 0.01, 0.1, 0.12, -0.01, 0.11, 0.13, 0.12, 0.12, 0.01,  0.1,  0.09};
 inline const std::vector<double> tetrahedron_sample{0, 0, 0, 0.1, 0.01, 0.02, -0.01, 0.11, 0.01, 0.02, -0.02, 0.09};
 
 template <>
 inline Case case_of<BrickStrain>() {
-  return solid_case(brick_sample, {2.5, -1.6, -4.9, 1.6, 1.9, -3.2, -0.9, 1, -1.3, -4.4, -2.3,
-                                   3.2, 3.3, -4.4, 3.5, 2.1, 4, 2.5, -3, 2.2, 2.2});
+  return solid_case(brick_sample, {2.5, -1.6, -4.9, 1.6, 1.9, -3.2, -0.9, 1,  -1.3, -4.4, -2.3,
+                                   3.2, 3.3,  -4.4, 3.5, 2.1, 4,    2.5,  -3, 2.2,  2.2});
 }
 
 template <>

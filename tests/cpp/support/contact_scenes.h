@@ -67,7 +67,8 @@ struct ContactBuilder {
     put(Quantity::position, x), put(Quantity::velocity, velocity), put(Quantity::mass, mass);
     put(Quantity::compliance, compliance), put(Quantity::rest, rest), put(Quantity::gravity, {0.0, 0.0, -gravity});
     put(Quantity::friction, friction), put(Quantity::contact_radius, radius);
-    put(Quantity::contact_stiffness, stiffness), put(Quantity::restitution, restitution), put(Quantity::collider_pose, pose), put(Quantity::collider_size, size);
+    put(Quantity::contact_stiffness, stiffness), put(Quantity::restitution, restitution),
+        put(Quantity::collider_pose, pose), put(Quantity::collider_size, size);
     return s;
   }
 

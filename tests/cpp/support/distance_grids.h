@@ -16,8 +16,8 @@ inline std::shared_ptr<const DistanceGrid> ball_on_grid(double radius, double sp
   for (int i = 0; i < count; ++i)
     for (int j = 0; j < count; ++j)
       for (int k = 0; k < count; ++k)
-        grid.coefficients.push_back(
-            norm(Vec3<double>(first + i * spacing, first + j * spacing, first + k * spacing)) - radius);
+        grid.coefficients.push_back(norm(Vec3<double>(first + i * spacing, first + j * spacing, first + k * spacing)) -
+                                    radius);
   return std::make_shared<const DistanceGrid>(std::move(grid));
 }
 

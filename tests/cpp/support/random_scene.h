@@ -92,8 +92,8 @@ struct SceneBuilder {
     std::vector<double> p = case_of<K>().p;
     for (double& v : p) {
       const double by = random(-0.02, 0.02);
-      v += K::unit.meters > 1 ? by * v
-                              : by;  // areas and volumes stay positive: at none there is no shape to go back to
+      v +=
+          K::unit.meters > 1 ? by * v : by;  // areas and volumes stay positive: at none there is no shape to go back to
     }
     return p;
   }
@@ -278,7 +278,8 @@ inline Sample random_scene(unsigned seed, const SceneShape& shape = {}) {
   for (const auto& g : b.groups)
     b.spec.groups.push_back({g.kind + (g.damped ? "_damped" : ""), g.kind, g.damped, g.stencil});
   for (std::size_t g = 0; g < b.groups.size(); g += 3)  // the last row of every third group
-    with_kind(kind_of(b.groups[g].kind), [&]<class K>(K) { b.spec.loads.push_back({static_cast<int>(g), 0, K::rows - 1}); });
+    with_kind(kind_of(b.groups[g].kind),
+              [&]<class K>(K) { b.spec.loads.push_back({static_cast<int>(g), 0, K::rows - 1}); });
   b.spec.load = {{0.0, 0.02}, Interpolation::linear};
   Sample sample{build_scene(b.spec), {}};
   sample.inputs.resize(sample.scene.layout.total());
