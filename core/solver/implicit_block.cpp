@@ -264,13 +264,13 @@ void ImplicitBlock::solve(const Scene& scene, const DirectBlock& block, const So
   for (std::size_t i = 0; i < numbers.size(); ++i) firmest = std::max(firmest, firm_[i] = numbers[i].firm);
   for (double most = 1.0;; most = std::min(firmest, firmer * most)) {  // how firm contacts are at most
     for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i].firm = std::min(most, firm_[i]);
+    SolverOptions again = options;
+    again.iterations += matrices_;
     begin();
     if (most == 1.0)
       take_first_step(scene, block);
     else
       accept(look(block));
-    SolverOptions again = options;
-    again.iterations += matrices_;
     if (!find_balance(scene, block, again) && !raise_friction(scene, block, again)) give_up(block);
     if (most == firmest) return;
   }
