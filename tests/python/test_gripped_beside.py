@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sheetbend.gripped import GrippedMotion
+from sheetbend.gripped import GrippedMotion, RopeReport, fit_rope
 from sheetbend.gripped.beside import beside, frames_of, offsets_found
 from sheetbend.gripped.climb import Climb, Rope
 from sheetbend.gripped.judging import predict
@@ -101,3 +101,19 @@ def test_recordings_stay_as_they_are_where_the_rung_does_not_help(monkeypatch: p
     monkeypatch.setattr(Climb, "_judged", lambda self, rope: climb.rope)  # no better
     assert not climb._climbed(BESIDE)
     assert climb.beside == () and climb.split is before and climb.whole == motions
+
+
+def test_a_fit_predicts_with_its_offsets_and_reports_them() -> None:
+    motions, unseen = [recorded(OFFSETS, k, f"{k}") for k in range(4)], recorded(OFFSETS, 9)
+    twist = replace(TWIST, parameters=tuple(p for p in TWIST.parameters if p.name in ("rope_EI", "rope_length")))
+    spans = ((0.5, 1.0), (1.0, 3.0))
+    found = fit_rope(
+        motions, density=0.06, ladder=(twist, BESIDE), bending_lengths=(0.3,), windows=spans, max_segments=12
+    )
+    assert np.abs(np.subtract(found.model.beside, OFFSETS)).mean() < 0.3 * np.abs(OFFSETS).mean()
+    (bare,) = predict(replace(found.model, beside=()), [unseen], found.values)
+    error, less = (coordinate_error(unseen.recording, x) for x in (bare, found.predict(unseen)))
+    assert less < 0.6 * error
+    report = RopeReport("arch", found)
+    assert report.to_dict()["markers_beside"] == [list(pair) for pair in found.model.beside]
+    assert "Markers beside the rope" in report.plain()
