@@ -22,8 +22,9 @@ from ..minimum.problem import FitProblem
 from ..motion.simulate import divergence
 from ..objects.markers import Place
 from ..quantities.quantities import Quantity
+from ..quantities.wording import short
 from ..recording.recording import Recording
-from .tangents import tangents
+from .tangents import Input, tangents
 
 Rows = slice | NDArray[np.bool_]
 
@@ -56,7 +57,7 @@ class Told:
         value: of a quantity.
         relative: whether `step` and `column` are.
         marker: whose place it is.
-        missing: of what the model lacks (`missing_parts`): what a size of it says.
+        missing: of what has no number in the model, such as what it lacks (`missing_parts`): what a size of it says.
         signed: whether there may be less than none of what is missing.
     """
 
@@ -118,9 +119,13 @@ def _collect(
         asked.append((name, k, log))
     made += [(1.0, Told(i, "gravity", name, "rad", STEPS["rad"], _NONE)) for name in names]
     made += [(1.0, Told(i, "", SIZE, "m/s^2", (0.01, "1 %"), _NONE, relative=True)) for _ in size]
+    turns = _turns(e)
+    made += [
+        (1.0, Told(i, "", label, "rad", STEPS["rad"], _NONE, missing=_turned(label), signed=True)) for label in turns
+    ]
     by_gravity: dict[int, Array] = {}
     if made:
-        columns = tangents(problem, u, i, names | size, asked, corrected)
+        columns = tangents(problem, u, i, names | size | turns, asked, corrected)
         for (weight, one), column in zip(made, columns.T, strict=True):
             yield replace(one, column=weight * column)
         by_gravity = {axis: columns[:, len(asked) + n] for n, axis in enumerate(toward)}
@@ -136,6 +141,25 @@ def _step(q: Quantity, value: float, log: bool) -> tuple[bool, float, str] | Non
     if value != 0.0 and q.scale is None:
         return True, 0.01, "1 %"
     return None if q.scale is None else (False, 0.1 * q.scale, f"{0.1 * q.scale:g} {q.unit}".rstrip())
+
+
+def _turns(e: Experiment) -> dict[str, Input]:
+    """What turns each collider about an axis through its place, at all knots of its motion."""
+    found: dict[str, Input] = {}
+    first = 0
+    for name, collider in e.scene.contacts.colliders.items():
+        knots = first + 6 * np.arange(len(collider.poses.times))
+        first += 6 * len(knots)
+        for axis in range(3):
+            found[f"{name} about {AXES[axis]}"] = "collider_pose", knots + 3 + axis, np.ones(len(knots))
+    return found
+
+
+def _turned(label: str) -> Callable[[float], str]:
+    name, _, axis = label.rpartition(" about ")
+    return lambda size: (
+        f"{name} were turned by {short(abs(size) / DEGREE, 2)} degrees about {'' if size > 0 else '-'}{axis}"
+    )
 
 
 def _gravity(e: Experiment) -> dict[int, Array]:

@@ -133,7 +133,7 @@ def _lacking(problem: FitProblem, u: Array, i: int) -> list[Told]:
 
 def _possible(one: Told, more: float) -> bool:
     """Whether an error of this size can be: small enough for first order, and of what is missing no less than none."""
-    if one.missing is not None:
+    if one.missing is not None and not one.unit:
         return more > 0.0 or one.signed
     return abs(more) < FARTHEST.get("" if one.relative else one.unit, np.inf)
 
