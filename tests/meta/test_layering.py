@@ -75,6 +75,7 @@ ALLOWED = {
         "adjoint/element",
         "adjoint/packs",
         "adjoint/blocks",
+        "adjoint/solver",
         "adjoint/step",
     },
     "adjoint/fit": {"adjoint", "core/scalar", "core/threads", "core/solver"},

@@ -1,4 +1,4 @@
-"""Free flights of a tossed cube: gravity from four of them, and a prediction of the others."""
+"""A tossed cube: gravity from four free flights, a prediction of the others, and where tosses come to rest."""
 
 from __future__ import annotations
 
@@ -29,3 +29,16 @@ def test_gravity_of_a_few_flights_predicts_the_others_from_their_first_frames() 
     assert np.median(errors[:, 1]) < 0.5
     assert errors[:, 0].max() < 2e-3
     assert errors[:, 1].max() < 2.0
+
+
+def test_tosses_come_to_rest_as_predicted() -> None:
+    from landings import AUTHORS, errors, scene_of, tosses, without_physics
+
+    every = tosses()
+    assert len(every) == 63
+    group = every[1:16:2]
+    fitted = AUTHORS | {"table_restitution": 0.232, "hollow": 0.614, "stretch": 0.00124}  # expected/landings.txt
+    found = np.array([errors(toss, fitted, scene_of(toss, toss.free)) for toss in group])
+    assert found[:, 0].mean() < 14.0  # mm
+    assert found[:, 1].mean() < 26.0
+    assert found[:, 0].mean() < 0.1 * np.mean([without_physics(toss)[1, 0] for toss in group])
