@@ -98,7 +98,8 @@ def _differences(
     scene: Scene, cloth: Cloth, ends: list[Scene], values: Mapping[str, float]
 ) -> Iterator[tuple[str, Input]]:
     layout = ends[0].compiled.layout
-    low, high = (end.compiled.inputs(np.array([values[name] for name in end.quantities])) for end in ends)
+    at: Array = np.array([values[name] for name in ends[0].quantities])
+    low, high = (end.compiled.inputs(at) for end in ends)
     slope = (high - low) / (2.0 * STEP)
     firsts, others = _firsts(scene), _firsts(ends[0])
     for array in (*OWN, *PARTICLES):
