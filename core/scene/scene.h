@@ -76,7 +76,7 @@ struct Contact {
   int stiffness;             // place in Quantity::contact_stiffness, -1 where it is rigid
   int restitution;           // place in Quantity::restitution, -1 where nothing bounces
   std::size_t first = 0;     // of its particles, in arrays of all contacts' particles
-  std::vector<char> held;    // per particle where something bounces: whether constraints hold it
+  std::vector<char> held{};  // per particle where something bounces: whether constraints hold it
 
   bool rebounds(int item) const { return !held.empty() && held[item]; }
 };
