@@ -18,6 +18,7 @@ PYBIND11_MODULE(_core, m) {
   static py::exception<Unbalanced> unbalanced(m, "Unbalanced", unconverged);
   static py::exception<NoEquilibrium> no_equilibrium(m, "NoEquilibrium", PyExc_RuntimeError);
   static py::exception<BudgetTooSmall> too_small(m, "BudgetTooSmall", PyExc_ValueError);
+  // NOLINTNEXTLINE(performance-unnecessary-value-param)
   py::register_exception_translator([](std::exception_ptr p) {
     try {
       if (p) std::rethrow_exception(p);

@@ -118,7 +118,7 @@ def test_slides_and_sticks_are_those_of_a_block_on_a_slope(integrator: str) -> N
         (block,) = scene.add_particles([[0.0, 0.0, 0.0]], 0.1)
         plane = sb.Plane(normal=(0.0, -0.2, 1.0), name="slope")
         scene.contact([block], plane, friction=friction)
-        scene.set_drag(linear=[1e-3, 0.0])
+        scene.set_drag(linear=[1e-3])
         motion = sb.simulate(scene, np.linspace(0.0, 0.2, 11), replace(SOLVER, integrator=integrator))
         modes = motion.contact_modes["slope"]
         assert modes.shape == (11, 1)

@@ -111,7 +111,7 @@ def test_tangents_are_the_transpose_of_gradients():
     rng = np.random.default_rng(1)
     along = rng.normal(size=len(scene.compiled.inputs(scene.compiled.values({})))) * 1e-3
     states = _core.equilibria_jvp([rest.solution], along[None])[0]
-    seed = rng.normal(size=rest.positions.size)
+    seed = rng.normal(size=rest.nodes.size)
     assert seed @ states[: seed.size] == pytest.approx(rest.solution.vjp(seed, None) @ along, rel=1e-7)
 
 
@@ -130,15 +130,15 @@ def test_a_draped_cloth_stays_as_it_lies_and_has_derivatives():
     scene = cloth_on_a_ball()
     motion = sb.simulate(scene, [0.0, 8.0], sb.Solver(h=2e-2, method="implicit", integrator="bdf1"))
     assert motion.contacts["ball"].most > 3
-    end = motion.positions[-1]
+    end = motion.nodes[-1]  # with the friction forces
     rest = sb.equilibrium(scene, end)
     cloth = scene.cloths["cloth"].particles
-    assert np.abs(rest.positions - end)[cloth].max() < 1e-6
+    assert np.abs(rest.nodes - end)[cloth].max() < 1e-6
     assert rest.unstable_modes == 0
     # Less friction lets it slide on. At that of the simulation itself some particles are at their limit, a kink.
     less = {"ball_friction": 0.27}
     rest = sb.equilibrium(scene, end, less)
-    assert 1e-6 < np.abs(rest.positions - end)[cloth].max() < 1e-2
+    assert 1e-6 < np.abs(rest.nodes - end)[cloth].max() < 1e-2
     seed = np.zeros_like(end)
     seed[cloth, 2] = 1.0 / len(cloth)
     gradient = rest.gradient(seed)

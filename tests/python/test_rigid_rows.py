@@ -12,8 +12,9 @@ IMPLICIT = sb.Solver(h=1e-3, method="implicit", integrator="bdf1")
 def stick(friction: float = 0.3) -> sb.Scene:
     """A triangle of rigid distances that drops on a table, sliding."""
     scene = sb.Scene("stick")
-    particles = scene.add_particles([[0, 0, 0.002], [0.1, 0, 0.004], [0.05, 0.08, 0.003]], [0.1, 0.2, 0.15])
-    scene._velocities.values[:] = [0.5, 0.1, 0.0]
+    particles = scene.add_particles(
+        [[0, 0, 0.002], [0.1, 0, 0.004], [0.05, 0.08, 0.003]], [0.1, 0.2, 0.15], [[0.5, 0.1, 0.0]] * 3
+    )
     scene.add_constraints("distance", [[0, 1], [1, 2], [2, 0]], name="sides", compliance=0.0)
     scene.contact(particles, sb.Plane(name="table"), friction=friction)
     return scene

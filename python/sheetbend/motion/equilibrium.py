@@ -138,8 +138,8 @@ def equilibrium(
 
     Args:
         scene: is frozen by this.
-        start: (particles, 3) m, or (nodes, 3) m as of `simulate`; the scene's initial positions by default. Friction
-            counts from there; gradients take a given start as constant.
+        start: (particles, 3) m, or (nodes, 3) m as of `simulate`, with the friction forces that act there; the scene's
+            initial positions by default. Friction counts from there; gradients take a given start as constant.
         values: quantities to change, by name.
         stable: leave saddles; False goes to the nearest equilibrium whatever its stability.
 
