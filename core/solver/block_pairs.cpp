@@ -9,7 +9,7 @@ namespace {
 constexpr int row = sheetbend_blocks::row;
 constexpr double margin = 0.1;       // beyond the free motion, of the radius
 constexpr double farther = 1.5;      // than asked for, where particles leave what was looked for
-constexpr double farthest = 16.0;    // that a step may leave it, of the radius and of the reach
+constexpr double farthest = 8.0;     // that a step may lead, of the free motion and the radius: pairs would be too many
 constexpr double nearest_yet = 0.1;  // that two may come, of where they touch
 constexpr int most_advances = 64;
 constexpr std::size_t usual_pairs = 4;  // per edge and triangle
@@ -49,13 +49,18 @@ void BlockPairs::find(const DirectBlock& block, Numbers<double>& from, Numbers<d
   pairs_.clear();
   if (block.surface.empty()) return;
   origin_ = from;
-  reach_.assign(block.particles.size(), 0.0);
-  for (int p = 0; p < static_cast<int>(reach_.size()); ++p) {
+  const int count = static_cast<int>(block.particles.size());
+  reach_.assign(2 * count, 0.0);
+  double driven = 0.0;
+  for (int p = 0; p < count; ++p) {
     if (block.surface.radius[p] < 0) continue;
-    Numbers<double>& to = p < block.movable ? guess : target;
-    const double way = distance_between(from.data() + row * p, to.data() + row * p);
-    reach_[p] = (std::isfinite(way) ? way : 0.0) + margin * radius[p];
+    const double* at = from.data() + row * p;
+    const double forced = distance_between(at, target.data() + row * p);
+    const double way = p < block.movable ? std::max(forced, distance_between(at, guess.data() + row * p)) : forced;
+    reach_[p] = reach_[count + p] = (std::isfinite(way) ? way : 0.0) + margin * radius[p];
+    if (p >= block.movable) driven = std::max(driven, reach_[p]);
   }
+  for (int p = 0; p < count; ++p) reach_[count + p] = farthest * (reach_[count + p] + driven + radius[p]);
   search(block);
 }
 
@@ -63,7 +68,7 @@ void BlockPairs::find_at(const DirectBlock& block, Numbers<double>& rows) {
   pairs_.clear();
   if (block.surface.empty()) return;
   origin_ = rows;
-  reach_.assign(block.particles.size(), 0.0);
+  reach_.assign(2 * block.particles.size(), 0.0);
   search(block);
 }
 
@@ -88,8 +93,8 @@ bool BlockPairs::can_go(const DirectBlock& block, Numbers<double>& from, Numbers
     if (block.surface.radius[p] < 0) continue;
     const double away = distance_between(origin_.data() + row * p, to.data() + row * p);
     if (away <= reach_[p]) continue;
-    if (!(away <= farthest * (reach_[p] + radius[p]))) return false;
-    reach_[p] = farther * away;
+    if (!(away <= reach_[block.particles.size() + p])) return false;
+    reach_[p] = std::min(farther * away, reach_[block.particles.size() + p]);
     leaves = true;
   }
   if (leaves) search(block);

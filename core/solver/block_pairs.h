@@ -55,7 +55,7 @@ class BlockPairs {
 
   std::vector<BlockPair> pairs_;
   Numbers<double> origin_;     // where the particles' reach counts from
-  std::vector<double> reach_;  // per particle
+  std::vector<double> reach_;  // per particle; behind these, how large that may become
 };
 
 }  // namespace sheetbend

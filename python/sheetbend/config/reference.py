@@ -56,6 +56,7 @@ HEADERS: dict[str, type[Section]] = {
     "[[scene.drive]]": scene_schema.Drive,
     "[[scene.collider]]": contact_schema.ColliderSection,
     "[[scene.contact]]": contact_schema.ContactSection,
+    "[scene.self_contact]": contact_schema.SelfContactSection,
     "[scene.quantities.NAME]": scene_schema.ExtraQuantity,
     "[[recording]]": schema.RecordingSection,
     "[[recording.force]]": schema.ForceSection,

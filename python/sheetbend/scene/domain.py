@@ -152,7 +152,7 @@ class Domain:
             return f"'{list(self._scene.volumes.triangles)[i]}'"
         if array in ("friction", "contact_radius"):
             contacts = self._scene.contacts
-            return f"'{[*contacts.contacts, *contacts.pieces][i].name}'"
+            return f"'{[*(c.name for c in contacts.contacts), *(p.name for p in contacts.pieces)][i]}'"
         if array not in ("compliance", "damping", "rest"):
             return f"entry {i}"
         for g in self._scene.groups:

@@ -43,7 +43,8 @@ class SelfTouchingScene(HeldScene):
         if friction != 0:
             problem = "is not offered for what touches itself, which slides without friction"
             raise SceneError("self_contact.friction", problem, friction, "leave it out")
-        radii = [radius] * len(own) if np.ndim(radius) == 0 else list(np.asarray(radius).tolist())  # type: ignore[arg-type]
+        given = np.atleast_1d(np.asarray(radius, dtype=object)).ravel().tolist()
+        radii: list[float] = given * len(own) if np.ndim(radius) == 0 else given
         if len(radii) != len(own) or not all(is_number(r) and r > 0 for r in radii):
             fix = f"give m, one for all or {len(own)}, one for each piece"
             raise SceneError("self_contact.radius", "must be positive", radius, fix)
