@@ -30,6 +30,7 @@ struct BlockCotangents {
   };
   std::vector<VolumeValues> volumes;
   std::vector<BlockContactCotangents<Single<T>>> contacts;  // per scene, of implicit blocks
+  std::vector<T> radii;                                     // of contacts and of what touches itself, of such a block
   double eta = 0.0;
 
   void resize(const Scene& scene, const DirectBlock& block) {
@@ -44,6 +45,7 @@ struct BlockCotangents {
     volumes.resize(block.volumes.size());
     for (std::size_t v = 0; v < volumes.size(); ++v) volumes[v].v.resize(block.volumes[v].particles.size());
     contacts.resize(block.implicit ? scenes_of<T> : 0);
+    radii.assign(block.surface.empty() ? 0 : scene.layout.count(Quantity::contact_radius), T(0.0));
     for (auto& scene_ : contacts) scene_.resize(scene, block);
   }
   // What resize() allocates, and what project_implicit_vjp() does.
@@ -54,6 +56,7 @@ struct BlockCotangents {
     for (const MemberRun& run : block.runs) sum += of(run.items.size() * (2 + scene.groups[run.group].parameters));
     for (const BlockVolume& volume : block.volumes)
       sum += sizeof(VolumeValues) + sizeof(Vec3<T>) * volume.particles.size();
+    if (!block.surface.empty()) sum += sizeof(T) * scene.layout.count(Quantity::contact_radius);
     if (block.implicit)
       sum += 2 * sizeof(T) * 3 * block.movable +  // p and what it gathers
              scenes_of<T> *

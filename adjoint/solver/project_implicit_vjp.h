@@ -9,6 +9,7 @@
 // unknown beside p, with J p = D y.
 #pragma once
 
+#include "adjoint/solver/block_pairs_vjp.h"
 #include "adjoint/solver/project_block_vjp.h"
 #include "core/solver/project_implicit.h"
 
@@ -92,6 +93,44 @@ void pull_back_contacts(const DirectBlock& block, BlockState<T>& state, const st
     }
 }
 
+// Likewise that of pairs that touch; what goes to radii gathers.
+template <class T>
+void pull_back_pairs(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state, const std::vector<T>& p,
+                     BlockCotangents<T>& bar) {
+  using S = Single<T>;
+  for (int scene = 0; scene < static_cast<int>(state.implicit.size()); ++scene) {
+    const PairSource<T> source{s, block, state.implicit[scene].potential.pairs, scene};
+    const auto add = [&](const S& a, T& to) {
+      if constexpr (std::is_same_v<T, Pack>)
+        to.set(scene, to[scene] + a);
+      else
+        to += a;
+    };
+    const auto row_of = [](int particle) { return sheetbend_blocks::row * static_cast<std::size_t>(particle); };
+    source.for_each_touching(
+        [&](int particle) { return &state.x[0][row_of(particle)]; },
+        [&](const BlockPair& pair, Part part, const S* x, const PairNumbers<S>& numbers) {
+          S along[12], x_bar[12], force[12], w_bar[4];
+          for (int d = 0; d < 12; ++d) {
+            const int particle = pair.particles[d / 3];
+            along[d] =
+                particle < block.movable ? source.read(p[3 * static_cast<std::size_t>(particle) + d % 3]) : S(0.0);
+          }
+          const auto numbers_bar = meet_vjp(pair.key.triangle, part, x, numbers, along, x_bar, force);
+          kappa_vjp(pair.key.triangle, numbers, source.pairs.stiffness, numbers_bar.kappa, w_bar);
+          for (int k = 0; k < 4; ++k) {
+            const std::size_t at = row_of(pair.particles[k]);
+            for (int d = 0; d < 3; ++d) add(x_bar[3 * k + d], bar.x[at + d]);
+            if (pair.particles[k] >= block.movable) continue;
+            const S work = dot(Vec3<S>(force + 3 * k), Vec3<S>(along + 3 * k));
+            add(work / source.read(state.x[0][at + 3]) + w_bar[k], bar.x[at + 3]);
+          }
+          for (const int k : {0, source.second_side(pair)})
+            add(numbers_bar.touching, bar.radii[source.radius_of(pair, k)]);
+        });
+  }
+}
+
 template <class T>
 void project_implicit_vjp(const SubstepState<T>& s, const DirectBlock& block, Scenes scenes,
                           const sheetbend_packs::KernelTable& table, BlockState<T>& state, BlockCotangents<T>& bar) {
@@ -101,6 +140,7 @@ void project_implicit_vjp(const SubstepState<T>& s, const DirectBlock& block, Sc
   for (int scene = 0; scene < static_cast<int>(state.implicit.size()); ++scene)
     if (has(scenes, scene)) state.implicit[scene].factorize(s.scene, block);
   for (auto& scene : bar.contacts) scene.clear();
+  std::fill(bar.radii.begin(), bar.radii.end(), T(0.0));
   auto& own = state.at(0);
   state.lambda[0].clear();  // all of it is dl
   own.u.clear();            // J stands in no linearized row
@@ -141,6 +181,7 @@ void project_implicit_vjp(const SubstepState<T>& s, const DirectBlock& block, Sc
     }
     reverse_kernels<T>(table).pull_back(arrays);
     pull_back_contacts(block, state, p, bar);
+    pull_back_pairs(s, block, state, p, bar);
   }
   for (std::size_t i = 0; i < p.size(); ++i) bar.x[sheetbend_blocks::row * (i / 3) + i % 3] = x_bar[i];
 }

@@ -50,6 +50,8 @@ struct ReverseOf<ProjectBlocks> {
       if (changes_at_contacts(step.scene, plan.options))
         finish_block(step.scene, plan.blocks[b], step.in, bar.in, scratch.blocks[b]);
       add_fixed(step.scene, plan.blocks[b], scratch.blocks[b], bar.q.data, bar.from.x, bar.from.x_before);
+      for (std::size_t i = 0; i < scratch.blocks[b].radii.size(); ++i)
+        bar.in.of(Quantity::contact_radius)[i] += scratch.blocks[b].radii[i];
       auto& contacts = scratch.blocks[b].contacts;
       for (std::size_t lane = 0; lane < contacts.size(); ++lane)
         spread_contacts(contact_source(step, work.masses, static_cast<int>(lane)), plan.blocks[b],

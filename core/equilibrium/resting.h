@@ -18,6 +18,11 @@ class RestingContacts {
   // `held`: (dofs). Reads it and the inputs later on.
   RestingContacts(const Scene& scene, const Inputs<const T>& in, double t0, const T* held)
       : w_(scene.contacts.empty() ? 0 : scene.nodes()), still_(scene.contacts.empty() ? 0 : scene.dofs(), T(0.0)) {
+    if (!scene.self_contact.empty())
+      throw std::invalid_argument(
+          "self_contact: states of rest are not found where ropes or cloths may touch themselves. Fix: let them come "
+          "to "
+          "rest in a simulation, or leave it out");
     if (scene.contacts.empty()) return;
     for (int n = 0; n < scene.nodes(); ++n)
       if (scene.role[n] == Role::free && scene.inertial[n]) w_[n] = T(1.0) / in.of(Quantity::mass)[n];

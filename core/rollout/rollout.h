@@ -82,6 +82,7 @@ class Rollout {
  private:
   bool take(const Bdf& bdf, Scenes scenes);
   Scenes find_bounced();
+  Scenes where_pairs_begin(Scenes scenes);
   void throw_diverged() const;
 
   const Scene& scene_;
@@ -140,7 +141,8 @@ void Rollout<T, List>::advance(std::optional<Scenes> first_order) {
   const bool watches = changes_at_contacts(scene_, o) && !first_order;
   const auto begins = [&](Scenes scenes) -> Scenes {
     if (!watches) return 0;
-    return where_contact_begins(Step<T>{scene_, plan_, in_, bdf_, time(step_ + 1), state(), scenes}, x_next_.data());
+    const Step<T> step{scene_, plan_, in_, bdf_, time(step_ + 1), state(), scenes};
+    return where_contact_begins(step, x_next_.data()) | where_pairs_begin(scenes);
   };
   constexpr Scenes all = all_scenes<T>;
   Scenes first = o.integrator == Integrator::bdf1 || step_ == 0 ? all : first_order.value_or(after_impact_.scenes());
@@ -171,6 +173,16 @@ void Rollout<T, List>::advance(std::optional<Scenes> first_order) {
   std::swap(v_before_, v_);
   std::swap(v_, v_next_);
   if (!finite) throw_diverged();
+}
+
+// Of some scenes, in the substep that was taken last: those where two come to touch that did not.
+template <class T, class List>
+Scenes Rollout<T, List>::where_pairs_begin(Scenes scenes) {
+  Scenes begun = 0;
+  for (BlockState<T>& block : record_.template of<ProjectBlocks>().blocks)
+    for (int lane = 0; lane < static_cast<int>(block.implicit.size()); ++lane)
+      if (has(scenes, lane) && block.implicit[lane].pair_begins()) begun |= static_cast<Scenes>(1u << lane);
+  return begun;
 }
 
 // Of the last substep; returns the scenes in which some have.

@@ -27,7 +27,7 @@ enum class Quantity : int {
   volume,             // per closed surface: the one that it keeps  [m^3]
   volume_compliance,  // likewise  [m^3/Pa]
   friction,           // per contact: Coulomb's coefficient  [-]
-  contact_radius,     // per contact: of its particles, from their center to where they touch  [m]
+  contact_radius,  // per contact: of its particles, from their center to where they touch; then of what touches itself  [m]
   contact_stiffness,  // per contact that is not rigid  [N/m]
   collider_pose,      // per collider and knot: position [m] and rotation vector [rad] of its frame (2 x 3)
   collider_size,      // per collider: the lengths of its shape  [m]

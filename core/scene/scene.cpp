@@ -162,6 +162,40 @@ void add_bouncers(Scene& s) {
   for (auto& [node, own] : contacts) s.bouncers.push_back({node, std::move(own)});
 }
 
+// The radii of pieces stand behind those of contacts. Where any piece has triangles, the points of all pieces may touch them.
+void add_self_contact(const SceneSpec& spec, Scene& s) {
+  SelfContact& own = s.self_contact;
+  const std::string field = "self_contact";
+  own.radius.assign(s.nodes(), -1);
+  int place = static_cast<int>(s.contacts.size());
+  for (const SelfContactSpec::Piece& piece : spec.self_contact.pieces) {
+    if (piece.edges.empty()) refuse(field + ": a piece has no edges. Fix: give ropes, cloths or both");
+    std::vector<int> nodes;
+    for (const auto& [a, b] : piece.edges) {
+      check_nodes(field, {a, b}, s.nodes());
+      if (a == b) refuse(field + ": an edge from particle " + std::to_string(a) + " to itself. Fix: leave it out");
+      nodes.insert(nodes.end(), {a, b});
+    }
+    check_triangles(field, piece.triangles, s);
+    for (const auto& t : piece.triangles) nodes.insert(nodes.end(), t.begin(), t.end());
+    std::sort(nodes.begin(), nodes.end());
+    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+    for (const int n : nodes) {
+      if (!s.is_place[n])
+        refuse(field + ": node " + std::to_string(n) + " is " + a_direction(s, n) + ". Fix: use particles");
+      if (own.radius[n] >= 0)
+        refuse(field + ": particle " + std::to_string(n) + " is in two pieces. Fix: list each piece once");
+      own.radius[n] = place;
+      own.points.push_back(n);
+    }
+    own.edges.insert(own.edges.end(), piece.edges.begin(), piece.edges.end());
+    own.triangles.insert(own.triangles.end(), piece.triangles.begin(), piece.triangles.end());
+    ++place;
+  }
+  if (own.empty()) own.radius.clear();
+  if (own.triangles.empty()) own.points.clear();
+}
+
 // A distance field has a grid, and nothing else has one.
 void check_grid(const ColliderSpec& c) {
   const DistanceGrid* g = c.grid.get();
@@ -196,7 +230,8 @@ std::array<std::size_t, 6> add_contacts(const SceneSpec& spec, Scene& s) {
                           c.bounces ? static_cast<int>(bouncing++) : -1, particles_in_contact(s)});
   }
   add_bouncers(s);
-  return {s.contacts.size(), s.contacts.size(), soft, poses, sizes, bouncing};
+  add_self_contact(spec, s);
+  return {s.contacts.size(), s.contacts.size() + spec.self_contact.pieces.size(), soft, poses, sizes, bouncing};
 }
 
 void add_loads(const SceneSpec& spec, Scene& s) {

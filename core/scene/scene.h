@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/contact/self_contact.h"
 #include "core/contact/shapes.h"
 #include "core/scene/bodies.h"
 #include "core/scene/fields.h"
@@ -123,6 +124,7 @@ struct Scene {
   std::vector<Collider> colliders;
   std::vector<Contact> contacts;
   std::vector<Bouncer> bouncers;  // by node
+  SelfContact self_contact;
   int constraints = 0, rows = 0;
   std::size_t stencil_coordinates = 0, gradient_entries = 0;
   Layout layout;
@@ -158,6 +160,15 @@ struct ContactSpec {
   bool bounces = false;  // has a restitution
 };
 
+// Each piece has a radius of its own; pieces share no particle.
+struct SelfContactSpec {
+  struct Piece {
+    std::vector<std::array<int, 2>> edges;
+    std::vector<std::array<int, 3>> triangles;
+  };
+  std::vector<Piece> pieces;
+};
+
 struct SceneSpec {
   int particles = 0;  // nodes, directors and axes among them
   std::vector<Director> directors;
@@ -171,6 +182,7 @@ struct SceneSpec {
   std::vector<VolumeSpec> volumes;
   std::vector<ColliderSpec> colliders;
   std::vector<ContactSpec> contacts;
+  SelfContactSpec self_contact;
 };
 
 // Rows whose damping needs a reference: all of them, or none.

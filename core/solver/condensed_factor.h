@@ -17,6 +17,7 @@ struct CondensedPattern {
   std::vector<int> dof_of;                               // per movable particle: first dof in H
   std::vector<std::size_t> entries;                      // per pair of the shares, three: where its columns stand in H
   std::optional<UnsymmetricStructure> unsymmetric = {};  // of the same matrix, where contacts may slide
+  std::vector<std::vector<int>> joined = {};  // of blocks that may touch themselves: particles with entries in common
 
   std::size_t bytes() const {
     return structure.bytes() + shares.bytes() + sizeof(int) * dof_of.size() + sizeof(std::size_t) * entries.size() +

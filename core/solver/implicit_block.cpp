@@ -86,7 +86,7 @@ bool ImplicitBlock::slow() const {
 // The matrix of a Newton step from x_, where the potential was looked at last.
 void ImplicitBlock::factorize_newton(const Scene& scene, const DirectBlock& block) {
   ++matrices_;
-  matrix_.find(block, potential, x_);
+  matrix_.find(scene, block, potential, x_);
   if (!potential.by_merit()) {
     convexity_ = matrix_.factorize_convex_enough(scene, block);
     return;
@@ -165,9 +165,11 @@ void ImplicitBlock::take_first_step(const Scene& scene, const DirectBlock& block
   for (Numbers<double>* rows : {&x_, &trial_})
     std::copy(potential.target.data() + row * block.movable, potential.target.data() + row * block.particles.size(),
               rows->data() + row * block.movable);
+  expect_none_passes(block, start, x_);
   accept(look(block));
   potential.rigid.lambda = dl_;
-  const double there = potential.evaluate(block, trial_);
+  const double there =
+      potential.pairs.can_go(block, x_, trial_) ? potential.evaluate(block, trial_) : potential.refuse();
   const bool falls = by_merit_ || potential.by_merit() ? potential.merit() < merit_ : there < phi_;
   if (falls || !std::isfinite(phi_)) {
     std::swap(x_, trial_);
@@ -175,6 +177,18 @@ void ImplicitBlock::take_first_step(const Scene& scene, const DirectBlock& block
   } else {
     look(block);
   }
+}
+
+// Of what is driven through something.
+void ImplicitBlock::expect_none_passes(const DirectBlock& block, Numbers<double>& from, Numbers<double>& to) const {
+  const BlockPair* pair = potential.pairs.passing(from, to);
+  if (!pair) return;
+  std::ostringstream problem;
+  problem << "particles";
+  for (int k = 0; k < 4; ++k) problem << (k ? ", " : " ") << block.particles[pair->particles[k]];
+  problem << " are driven through each other, or start there";
+  throw Unbalanced(problem.str(), "use a smaller substep, or drive them around each other", matrices_,
+                   potential.balance(), block.particles[pair->particles[0]]);
 }
 
 // Of K along d_, which is made as long as one in its largest number; Kz_ is K d_.
@@ -219,10 +233,7 @@ bool ImplicitBlock::descend(const DirectBlock& block, double curvature) {
   const auto lowers = [&](double by, double there) {
     return there < phi_ + sufficient * by * slope + 0.25 * by * by * curvature;
   };
-  const auto phi_at = [&](double by) {
-    move(x_, by, d_, trial_);
-    return potential.evaluate(block, trial_);
-  };
+  const auto phi_at = [&](double by) { return look(block, by); };
   t *= first_departure;
   double found = phi_at(t);
   for (int halving = 0; halving < most_halvings && !lowers(t, found); ++halving) found = phi_at(t *= 0.5);
@@ -259,6 +270,7 @@ void ImplicitBlock::solve(const Scene& scene, const DirectBlock& block, const So
     std::fill(potential.rigid.lambda.begin(), potential.rigid.lambda.end(), 0.0);
     return;
   }
+  potential.pairs.find(block, start, guess, potential.target);
   auto& numbers = potential.contacts.numbers;
   double firmest = 1.0;
   for (std::size_t i = 0; i < numbers.size(); ++i) firmest = std::max(firmest, firm_[i] = numbers[i].firm);
@@ -370,13 +382,14 @@ bool ImplicitBlock::raise_friction(const Scene& scene, const DirectBlock& block,
 void ImplicitBlock::take_guess(const DirectBlock& block) {
   x_ = potential.target;
   std::copy_n(guess.data(), row * block.movable, x_.data());
+  potential.pairs.find_at(block, x_);
   if (rigid().empty()) return;
   potential.rigid.leave_out(potential.given(block), start.data());
   balance_rigid(block, potential, x_);
 }
 
 void ImplicitBlock::factorize(const Scene& scene, const DirectBlock& block) {
-  matrix_.find(block, potential, x_, true);
+  matrix_.find(scene, block, potential, x_, true);
   if (matrix_.symmetric() && matrix_.factorize(scene, block, 0.0)) return;
   potential.evaluate(block, x_);
   const bool has_lu = potential.by_merit() ? !block.contacts.empty() : !matrix_.symmetric();

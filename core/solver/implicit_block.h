@@ -39,6 +39,9 @@ class ImplicitBlock {
   const double* x() { return x_.data(); }                     // the solution, rows of four
   const RigidRows& rigid() const { return potential.rigid; }  // with the solution's multipliers
 
+  // Whether a pair touches in the end that did not at n.
+  bool pair_begins() { return potential.pairs.begins(start, x_); }
+
   // The largest |R| over the largest force, at the start and after each Newton step of the last solve.
   const std::vector<double>& balance() const { return balance_; }
 
@@ -65,6 +68,7 @@ class ImplicitBlock {
   static constexpr double all_digits = 1e-15,
                           enough_digits = 1e-8;  // of multipliers, for derivatives and for Newton steps
   void expect_digits(const DirectBlock& block, double share) const;
+  void expect_none_passes(const DirectBlock& block, Numbers<double>& from, Numbers<double>& to) const;
   double look(const DirectBlock& block);
   double look(const DirectBlock& block, double t);
   void find_step(const DirectBlock& block);

@@ -65,6 +65,7 @@ double ImplicitBlock::look(const DirectBlock& block) {
 double ImplicitBlock::look(const DirectBlock& block, double t) {
   move(x_, t, d_, trial_);
   for (std::size_t j = 0; j < lambda_.size(); ++j) potential.rigid.lambda[j] = lambda_[j] + t * dl_[j];
+  if (!potential.pairs.can_go(block, x_, trial_)) return potential.refuse();
   return potential.evaluate(block, trial_);
 }
 

@@ -8,11 +8,13 @@
 // (rigid_rows.h), and their residuals are part of the merit.
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "core/blocks/potential_kernels.h"
 #include "core/scalar/numbers.h"
 #include "core/solver/block_contacts.h"
+#include "core/solver/block_pairs.h"
 #include "core/solver/plan.h"
 #include "core/solver/rigid_rows.h"
 
@@ -25,6 +27,7 @@ class IncrementalPotential {
   Numbers<double> C_r;
   std::vector<Numbers<double>> values;
   BlockContacts<double> contacts;
+  BlockPairs pairs;
   RigidRows rigid;
   double eta = 0.0;  // of `values`; 0 where they are not filled yet
 
@@ -33,6 +36,8 @@ class IncrementalPotential {
 
   // Phi at `at`; R, three numbers per movable particle, and the following are then of there.
   double evaluate(const DirectBlock& block, Numbers<double>& at);
+  // Instead, where the coordinates could not be reached: all that steps are judged by is infinite.
+  double refuse() { return merit_ = largest_ = std::numeric_limits<double>::infinity(); }
   const std::vector<double>& R() const { return R_; }
   double largest() const { return largest_; }    // |R|
   double force() const { return force_; }        // the largest sum of forces' magnitudes
@@ -55,6 +60,7 @@ class IncrementalPotential {
  private:
   void add_rigid_residuals();
   double add_contacts(const DirectBlock& block, const double* x);
+  double add_pairs(const double* x);
 
   std::vector<sheetbend_blocks::Run> runs_;
   Numbers<double> push_, magnitude_, stiffness_;

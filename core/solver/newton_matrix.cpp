@@ -53,22 +53,26 @@ void NewtonMatrix::resize(const Scene& scene, const DirectBlock& block) {
   element_numbers_.clear();
   element_numbers_.reserve(elements_.size());
   for (auto& run : elements_) element_numbers_.push_back(run.numbers());
+  pairs_.clear();
+  paired_.reset();
   factor_.reset(pattern_of(block).structure);
   contacts_.assign(9 * block.contacts.size(), 0.0);
   if (const auto& unsymmetric = pattern_of(block).unsymmetric) lu_.resize(*unsymmetric);
 }
 
 std::size_t NewtonMatrix::bytes(const Scene& scene, const DirectBlock& block) {
-  const FactorStructure& structure = pattern_of(block).structure;
+  const CondensedPattern& pattern = std::get<CondensedPattern>(*block.condensation);
+  const FactorStructure& structure = pattern.structure;
   std::size_t bytes = sizeof(double) * (block.movable + structure.size()) + Factor<double>::bytes(structure);
   bytes += sizeof(double) * 9 * block.contacts.size();
-  if (const auto& unsymmetric = pattern_of(block).unsymmetric) bytes += UnsymmetricFactor::bytes(*unsymmetric);
+  if (const auto& unsymmetric = pattern.unsymmetric) bytes += UnsymmetricFactor::bytes(*unsymmetric);
   for (const MemberRun& run : block.runs)
     bytes += 2 * (sizeof(Numbers<double>) + Numbers<double>::bytes(numbers_of(scene, run))) + sizeof(double*);
   return bytes;
 }
 
-void NewtonMatrix::find(const DirectBlock& block, IncrementalPotential& potential, Numbers<double>& at, bool curved) {
+void NewtonMatrix::find(const Scene& scene, const DirectBlock& block, IncrementalPotential& potential,
+                        Numbers<double>& at, bool curved) {
   for (int p = 0; p < block.movable; ++p) masses_[p] = 1.0 / at[row * p + 3];
   arrays_ = potential.arrays(block, at);
   arrays_.elements = element_numbers_.data();
@@ -76,6 +80,7 @@ void NewtonMatrix::find(const DirectBlock& block, IncrementalPotential& potentia
   potential.add_rigid_elements(block, at, elements_);
   convex_found_ = false;
   find_contacts(block, potential.contacts, at.data(), curved);
+  find_pairs(scene, block, potential.pairs, at.data());
 }
 
 void NewtonMatrix::find_contacts(const DirectBlock& block, const BlockContacts<double>& contacts, const double* x,
@@ -95,6 +100,26 @@ void NewtonMatrix::find_contacts(const DirectBlock& block, const BlockContacts<d
       for (int b = 0; b < 3; ++b) M[3 * a + b] = R[3 * a] * AR[b] + R[3 * a + 1] * AR[3 + b] + R[3 * a + 2] * AR[6 + b];
     symmetric_ = symmetric_ && is_symmetric(M);
   }
+}
+
+// The pattern depends on the pairs of the substep alone, so that bits do not depend on where a rollout begins.
+void NewtonMatrix::find_pairs(const Scene& scene, const DirectBlock& block, const BlockPairs& pairs, const double* x) {
+  pairs_.clear();
+  for (const BlockPair& pair : pairs.all()) {
+    double at[12];
+    gather(pair, x, at);
+    const Part part = nearest_part(pair.key.triangle, at, softness_of(pair.numbers));
+    double force[12];
+    if (!(meet(pair.key.triangle, part, at, pair.numbers, force) > 0.0)) continue;
+    pairs_.push_back({pair.particles, {}});
+    meeting_matrix(pair.key.triangle, part, at, pair.numbers, pairs_.back().matrix.data());
+  }
+  if (pairs_.empty()) return;
+  std::vector<std::array<int, 4>> all;
+  for (const BlockPair& pair : pairs.all()) all.push_back(pair.particles);
+  if (paired_ && all == in_pattern_) return;
+  paired_ = pattern_with(scene, block, all);
+  in_pattern_ = std::move(all);
 }
 
 void NewtonMatrix::find_convex(const Scene& scene, const DirectBlock& block) {
@@ -124,10 +149,30 @@ void NewtonMatrix::assemble(const Scene& scene, const DirectBlock& block, double
   if (convexity > 0.0 && !convex_found_) find_convex(scene, block);
   double* values = factor_.values.data();
   for (std::size_t r = 0; r < block.runs.size(); ++r) {
-    const std::vector<int>& entries = block.runs[r].entries;
+    const std::vector<int>& entries = entries_of_run(block, r);
     const double *E = elements_[r].data(), *convex = convex_[r].data();
     for (std::size_t e = 0; e < entries.size(); ++e)
       if (entries[e] >= 0) values[entries[e]] += convexity > 0.0 ? E[e] + convexity * (convex[e] - E[e]) : E[e];
+  }
+  add_pairs(block, convexity);
+}
+
+void NewtonMatrix::add_pairs(const DirectBlock& block, double convexity) {
+  const CondensedPattern& pattern = pattern_of(block);
+  for (const TouchingPair& pair : pairs_) {
+    auto E = pair.matrix;
+    if (convexity > 0.0) {
+      make_convex(12, E.data());
+      for (std::size_t i = 0; i < E.size(); ++i) E[i] = pair.matrix[i] + convexity * (E[i] - pair.matrix[i]);
+    }
+    const auto dof = [&](int d) {
+      const int particle = pair.particles[d / 3];
+      return particle < block.movable ? pattern.dof_of[particle] + d % 3 : -1;
+    };
+    for (int a = 0; a < 12; ++a)
+      for (int b = 0; b < 12; ++b)
+        if (const int row = dof(a), column = dof(b); column >= 0 && column <= row)
+          factor_.values[pattern.structure.position(row, column)] += E[12 * a + b];
   }
 }
 
@@ -150,6 +195,7 @@ bool NewtonMatrix::factorize_unsymmetric(const Scene& scene, const DirectBlock& 
   const CondensedPattern& pattern = pattern_of(block);
   assemble(scene, block, convexity);
   as_lu_ = true;
+  lu_.resize(*pattern.unsymmetric);
   lu_.load(*pattern.unsymmetric, factor_.values.data());
   for (std::size_t i = 0; i < block.contacts.size(); ++i)
     lu_.add(pattern.dof_of[block.contacts[i].particle] / 3, &contacts_[9 * i]);
@@ -173,6 +219,10 @@ void NewtonMatrix::multiply(const DirectBlock& block, Numbers<double>& z, Number
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b) Kz[at + a] += contacts_[9 * i + 3 * a + b] * z[at + b];
   }
+  for (const TouchingPair& pair : pairs_)
+    for (int a = 0; a < 12; ++a)
+      for (int b = 0; b < 12; ++b)
+        Kz[row * pair.particles[a / 3] + a % 3] += pair.matrix[12 * a + b] * z[row * pair.particles[b / 3] + b % 3];
 }
 
 bool NewtonMatrix::find_negative_direction(const DirectBlock& block, double* d) {

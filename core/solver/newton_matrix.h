@@ -4,12 +4,14 @@
 //
 // as the sum of masses and one symmetric matrix per constraint, and its factors. Where K is not positive definite, a part of the way to the matrix in
 // which no constraint's share has negative eigenvalues (Teran et al. 2005; on demand: Longva et al. 2023) is. Contacts add a 3 x 3 matrix to their
-// particle. Those that slide are not symmetric, and K is factored as LU then. Rows that do not give way add what rigid_rows.h says: K is softened there.
+// particle, and pairs that touch one of 12 x 12. Those that slide are not symmetric, and K is factored as LU then. Rows that do not give way add what rigid_rows.h says: K is softened there.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "core/solver/incremental_potential.h"
+#include "core/solver/paired_pattern.h"
 
 namespace sheetbend {
 
@@ -22,7 +24,8 @@ class NewtonMatrix {
   static std::size_t bytes(const Scene& scene, const DirectBlock& block);
 
   // K at `at`; Newton's method does without the curvature of colliders, derivatives do not.
-  void find(const DirectBlock& block, IncrementalPotential& potential, Numbers<double>& at, bool curved = false);
+  void find(const Scene& scene, const DirectBlock& block, IncrementalPotential& potential, Numbers<double>& at,
+            bool curved = false);
   bool symmetric() const { return symmetric_; }
 
   // Factors K so much of the way to the convex matrix, from 0 for K itself to 1. Says whether that is positive definite.
@@ -56,11 +59,15 @@ class NewtonMatrix {
   bool find_negative_direction(const DirectBlock& block, double* d);
 
  private:
-  static const CondensedPattern& pattern_of(const DirectBlock& block) {
-    return std::get<CondensedPattern>(*block.condensation);
+  // The plan's pattern, or one with pairs where any touches.
+  const CondensedPattern& pattern_of(const DirectBlock& block) const {
+    return pairs_.empty() ? std::get<CondensedPattern>(*block.condensation) : paired_->pattern;
+  }
+  const std::vector<int>& entries_of_run(const DirectBlock& block, std::size_t r) const {
+    return pairs_.empty() ? block.runs[r].entries : paired_->entries[r];
   }
   template <class U, class F>
-  static void in_places(const DirectBlock& block, U* z, F&& solve) {
+  void in_places(const DirectBlock& block, U* z, F&& solve) const {
     const CondensedPattern& pattern = pattern_of(block);
     thread_local std::vector<U> room;
     room.resize(pattern.structure.size());
@@ -70,6 +77,8 @@ class NewtonMatrix {
   }
   void find_convex(const Scene& scene, const DirectBlock& block);
   void find_contacts(const DirectBlock& block, const BlockContacts<double>& contacts, const double* x, bool curved);
+  void find_pairs(const Scene& scene, const DirectBlock& block, const BlockPairs& pairs, const double* x);
+  void add_pairs(const DirectBlock& block, double convexity);
   void assemble(const Scene& scene, const DirectBlock& block, double convexity);
 
   sheetbend_blocks::Potential arrays_{};            // of the last find()
@@ -77,6 +86,14 @@ class NewtonMatrix {
   std::vector<Numbers<double>> elements_, convex_;  // per run: (packs, triangle(dofs), 8)
   std::vector<double*> element_numbers_;
   std::vector<double> contacts_;  // per contact: its matrix (3, 3)
+  // Of pairs that touch: their matrices, and the pattern with all pairs that may touch in the substep, kept while they recur.
+  struct TouchingPair {
+    std::array<int, 4> particles;
+    std::array<double, 144> matrix;
+  };
+  std::vector<TouchingPair> pairs_;
+  std::vector<std::array<int, 4>> in_pattern_;
+  std::optional<PairedPattern> paired_;
   bool convex_found_ = false, symmetric_ = true, as_lu_ = false;
   Factor<double> factor_;
   UnsymmetricFactor lu_;

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "core/solver/ordering.h"
+#include "core/solver/paired_pattern.h"
 
 namespace sheetbend {
 namespace {
@@ -149,25 +150,6 @@ CondensedShares shares_of(const Scene& scene, const DirectBlock& block, const st
   return shares;
 }
 
-// Where the lower triangle of every member's own matrix stands in the condensed one.
-void place_matrices(const Scene& scene, const CondensedPattern& c, DirectBlock& block) {
-  for (MemberRun& run : block.runs) {
-    const int arity = scene.groups[run.group].arity, dofs = 3 * arity;
-    run.entries.assign(run.items.size() * triangle(dofs), -1);
-    for (int i = 0; i < run.count; ++i) {
-      const auto dof = [&](int d) {
-        const int particle = run.nodes[lane_at(i, arity, d / 3)] / sheetbend_blocks::row;
-        return particle < block.movable ? c.dof_of[particle] + d % 3 : -1;
-      };
-      for (int a = 0; a < dofs; ++a)
-        for (int b = 0; b <= a; ++b)
-          if (const auto [column, row] = std::minmax({dof(a), dof(b)}); column >= 0)
-            run.entries[lane_at(i, triangle(dofs), triangle(a) + b)] =
-                static_cast<int>(c.structure.position(row, column));
-    }
-  }
-}
-
 // The contacts of the block's movable particles.
 std::vector<BlockContact> contacts_of(const Scene& scene, const std::map<int, int>& particle_of) {
   std::vector<BlockContact> contacts;
@@ -180,6 +162,48 @@ std::vector<BlockContact> contacts_of(const Scene& scene, const std::map<int, in
   std::stable_sort(contacts.begin(), contacts.end(),
                    [](const BlockContact& a, const BlockContact& b) { return a.particle < b.particle; });
   return contacts;
+}
+
+bool touches_itself(const Scene& scene, int node) {
+  return !scene.self_contact.empty() && scene.self_contact.radius[node] >= 0;
+}
+
+// What may touch itself, in a block that has all of it. Fixed nodes are particles of the block that no row knows.
+SelfContact surface_of(const Scene& scene, const std::map<int, int>& particle_of, DirectBlock& block) {
+  const SelfContact& whole = scene.self_contact;
+  const auto own = std::ranges::find_if(particle_of, [&](const auto& at) { return touches_itself(scene, at.first); });
+  if (own == particle_of.end()) return {};
+  std::vector<int> place(scene.nodes(), -1);
+  SelfContact s = whole;
+  for (int n = 0; n < scene.nodes(); ++n)
+    if (whole.radius[n] >= 0) place[n] = scene.role[n] == Role::free ? particle_of.at(n) : add_particle(block, n, {});
+  for (auto& edge : s.edges)
+    for (int& n : edge) n = place[n];
+  for (auto& corners : s.triangles)
+    for (int& n : corners) n = place[n];
+  for (int& n : s.points) n = place[n];
+  s.radius.assign(block.particles.size(), -1);
+  for (int n = 0; n < scene.nodes(); ++n)
+    if (place[n] >= 0) s.radius[place[n]] = whole.radius[n];
+  return s;
+}
+
+// Makes one set of all members that hold what may touch itself.
+void join_what_touches(const Scene& scene, std::vector<std::vector<Member>>& chains) {
+  if (scene.self_contact.empty()) return;
+  std::vector<Member>* first = nullptr;
+  for (auto& chain : chains) {
+    const bool touches = std::ranges::any_of(chain, [&](const Member& m) {
+      return std::ranges::any_of(scene.groups[m.group].nodes(m.item),
+                                 [&](int n) { return scene.role[n] == Role::free && touches_itself(scene, n); });
+    });
+    if (!touches) continue;
+    if (first)
+      first->insert(first->end(), chain.begin(), chain.end()), chain.clear();
+    else
+      first = &chain;
+  }
+  std::erase_if(chains, [](const auto& chain) { return chain.empty(); });
 }
 
 // The movable particles of contacts that are in none of these blocks.
@@ -205,6 +229,7 @@ CondensedPattern factored(const Scene& scene, const DirectBlock& block, const st
   }
   for (const int place : places_for_low_fill(block.movable, joined)) c.dof_of.push_back(3 * place);
   c.dof_of.shrink_to_fit();
+  if (!block.surface.empty()) c.joined = joined;
   c.shares = shares_of(scene, block, particle_of, c.dof_of);
   const std::vector<int>& dofs = c.shares.dofs;
   std::vector<std::pair<int, int>> entries;
@@ -281,9 +306,12 @@ DirectBlock make_block(const Scene& scene, std::vector<Member> members, const So
   for (const int g : groups) block.runs.push_back(make_run(scene, g, particle_of, block));
   add_volumes(scene, particle_of, block);
   block.contacts = contacts_of(scene, particle_of);
+  block.surface = surface_of(scene, particle_of, block);
   if (options.partition == Partition::newton || block.implicit)
     block.condensation = factored(scene, block, particle_of);
-  if (block.implicit) place_matrices(scene, std::get<CondensedPattern>(*block.condensation), block);
+  if (block.implicit)
+    for (MemberRun& run : block.runs)
+      run.entries = entries_of(scene, block, run, std::get<CondensedPattern>(*block.condensation));
   if (options.partition == Partition::newton_cg) block.condensation = iterated(scene, block, particle_of, options);
   return block;
 }
@@ -322,6 +350,10 @@ void expect_no_volume(const Scene& scene) {
 
 // Contact stands in the balance of forces, which only implicit substeps find.
 void expect_no_contact(const Scene& scene) {
+  if (!scene.self_contact.empty())
+    throw std::invalid_argument(
+        "solver.method: ropes or cloths may touch themselves, which needs substeps whose forces balance. Fix: use "
+        "implicit");
   if (!scene.contacts.empty())
     throw std::invalid_argument("solver.method: particles of " + scene.contacts.front().name +
                                 " may touch a collider, which needs substeps whose forces balance. Fix: use implicit");
@@ -369,8 +401,11 @@ Plan make_plan(const Scene& scene, const SolverOptions& options) {
   if (options.partition == Partition::gauss_seidel) {
     plan.colors = color_constraints(scene);
     plan.packs = pack_colors(scene, plan.colors);
-  } else
-    for (auto& members : connected_chains(scene)) plan.blocks.push_back(make_block(scene, std::move(members), options));
+  } else {
+    auto chains = connected_chains(scene);
+    join_what_touches(scene, chains);
+    for (auto& members : chains) plan.blocks.push_back(make_block(scene, std::move(members), options));
+  }
   if (const std::vector<int> loose = loose_in_contact(scene, plan.blocks); !loose.empty())
     plan.blocks.push_back(make_block(scene, {}, options, loose));
   return plan;

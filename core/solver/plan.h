@@ -61,6 +61,7 @@ struct DirectBlock {
   std::optional<Condensation> condensation = {};
   std::vector<BlockVolume> volumes = {};
   std::vector<BlockContact> contacts = {};  // by particle
+  SelfContact surface = {};                 // in the block's order, fixed particles included
 
   int size() const { return static_cast<int>(multipliers.size()); }
   bool banded() const { return !condensation && structure.banded(); }

@@ -3,6 +3,7 @@
 // K dx = -dR, the implicit function theorem, R being evaluated over them.
 #pragma once
 
+#include "core/solver/pair_source.h"
 #include "core/solver/project_block.h"
 
 namespace sheetbend {
@@ -65,6 +66,12 @@ void load_implicit(const SubstepState<T>& s, const DirectBlock& block, const Sub
   }
   if (block.damped)
     for (int j = 0; j < block.size(); ++j) potential.C_r[j] = number_of<T>(state.C_r[j], scene);
+  if (!block.surface.empty()) {
+    potential.pairs.stiffness = rigidity * (s.eta / h) * (s.eta / h);
+    for (std::size_t p = 0; p < block.particles.size(); ++p)
+      if (const int place = block.surface.radius[p]; place >= 0)
+        potential.pairs.radius[p] = number_of(s.inputs.of(Quantity::contact_radius)[place], scene);
+  }
   if (block.contacts.empty()) return;
   if constexpr (is_plain<T>)
     potential.contacts = state.contacts[scene];
@@ -142,6 +149,21 @@ void subtract_contact_forces(const DirectBlock& block, const BlockState<T>& stat
   }
 }
 
+// Likewise pairs that touch.
+template <class T>
+void subtract_pair_forces(const SubstepState<T>& s, const DirectBlock& block, const BlockState<T>& state,
+                          const std::vector<T>& x, std::vector<T>& R) {
+  const PairSource<T> source{s, block, state.implicit[0].potential.pairs, 0};
+  source.for_each_touching([&](int particle) { return &x[3 * static_cast<std::size_t>(particle)]; },
+                           [&](const BlockPair& pair, Part part, const T* at, const PairNumbers<T>& numbers) {
+                             T force[12];
+                             meet(pair.key.triangle, part, at, numbers, force);
+                             for (int k = 0; k < 4; ++k)
+                               if (const int p = pair.particles[k]; p < block.movable)
+                                 (-Vec3<T>(force + 3 * k)).add_to(&R[3 * static_cast<std::size_t>(p)]);
+                           });
+}
+
 // The multipliers of scalars that carry tangents, which the solution comes without.
 template <class T>
 void carry_multipliers(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state) {
@@ -168,6 +190,7 @@ void find_first_order(const SubstepState<T>& s, const DirectBlock& block, BlockS
   }
   subtract_elastic_forces(s, block, state, x, R, c);
   subtract_contact_forces(block, state, x, R);
+  subtract_pair_forces(s, block, state, x, R);
   for (auto* residuals : {&R, &c})
     for (T& r : *residuals) r = r - T(value_of(r));
 }

@@ -1,11 +1,13 @@
 // Scenes from Python, and back to what they were made from.
 #include "core/scene/scene.h"
 
+#include <map>
 #include <memory>
 
 #include "core/constraints/registry.h"
 #include "core/contact/shapes.h"
 #include "core/scene/contact_gaps.h"
+#include "core/scene/pair_gaps.h"
 #include "python/bindings/core_module.h"
 
 namespace sheetbend::bindings {
@@ -64,6 +66,10 @@ std::shared_ptr<Scene> make_scene(const py::kwargs& given) {
   for (const py::handle c : given["contacts"])
     spec.contacts.push_back({c["name"].cast<std::string>(), c["collider"].cast<int>(), whole_numbers(c["particles"]),
                              whole_numbers(c["carried"]), c["rigid"].cast<bool>(), c["bounces"].cast<bool>()});
+  if (given.contains("self_contact"))
+    for (const py::handle p : given["self_contact"])
+      spec.self_contact.pieces.push_back(
+          {p["edges"].cast<std::vector<std::array<int, 2>>>(), p["triangles"].cast<Triangles>()});
   if (given.contains("loads")) {
     for (const auto& [group, item, row] : given["loads"].cast<std::vector<std::array<int, 3>>>())
       spec.loads.push_back({group, item, row});
@@ -112,13 +118,19 @@ py::dict arguments_of(const Scene& s) {
                              "particles"_a = py::array_t<int>(py::cast(c.particles)),
                              "carried"_a = py::array_t<int>(py::cast(c.carried)), "rigid"_a = c.stiffness < 0,
                              "bounces"_a = c.restitution >= 0));
+  std::map<int, std::pair<std::vector<std::array<int, 2>>, Triangles>> touching;  // by the place of its radius
+  for (const auto& edge : s.self_contact.edges) touching[s.self_contact.radius[edge[0]]].first.push_back(edge);
+  for (const auto& t : s.self_contact.triangles) touching[s.self_contact.radius[t[0]]].second.push_back(t);
+  py::list pieces;
+  for (const auto& [place, piece] : touching)
+    pieces.append(py::dict("edges"_a = piece.first, "triangles"_a = piece.second));
   const bool cubic = s.boundary.interpolation == Interpolation::cubic;
   return py::dict("particles"_a = s.nodes(), "directors"_a = directors, "bodies"_a = bodies, "pinned"_a = s.pinned,
                   "driven"_a = s.driven, "boundary_times"_a = s.boundary.times,
                   "boundary_interpolation"_a = cubic ? "cubic" : "linear", "loaded"_a = s.loaded,
                   "force_times"_a = s.force.times, "has_drag"_a = s.has_drag, "air"_a = s.air,
                   "wind_times"_a = s.wind.times, "groups"_a = groups, "volumes"_a = volumes, "colliders"_a = colliders,
-                  "contacts"_a = contacts, "loads"_a = loads, "load_times"_a = s.load.times);
+                  "contacts"_a = contacts, "loads"_a = loads, "load_times"_a = s.load.times, "self_contact"_a = pieces);
 }
 
 }  // namespace
@@ -146,13 +158,26 @@ void bind_scene(py::module_& m) {
       .def_property_readonly("constraints", [](const Scene& s) { return s.constraints; })
       .def_property_readonly("rows", [](const Scene& s) { return s.rows; })
       .def_property_readonly("dofs", &Scene::dofs)
-      .def("contact_gaps", [](const Scene& s, const Array& inputs, double t, int contact) {
+      .def("contact_gaps",
+           [](const Scene& s, const Array& inputs, double t, int contact) {
+             const Inputs<const double> in{s.layout, inputs.data()};
+             const auto gaps = contact_gaps(s, in, in.of(Quantity::position), t, contact);
+             py::array_t<double> out({static_cast<py::ssize_t>(gaps.size()), static_cast<py::ssize_t>(4)});
+             for (std::size_t i = 0; i < gaps.size(); ++i)
+               std::copy(gaps[i].begin(), gaps[i].end(), out.mutable_data() + 4 * i);
+             return out;
+           })
+      .def("pair_gaps", [](const Scene& s, const Array& inputs) {
         const Inputs<const double> in{s.layout, inputs.data()};
-        const auto gaps = contact_gaps(s, in, in.of(Quantity::position), t, contact);
-        py::array_t<double> out({static_cast<py::ssize_t>(gaps.size()), static_cast<py::ssize_t>(4)});
-        for (std::size_t i = 0; i < gaps.size(); ++i)
-          std::copy(gaps[i].begin(), gaps[i].end(), out.mutable_data() + 4 * i);
-        return out;
+        const auto found = pair_gaps(s, in, in.of(Quantity::position));
+        const auto count = static_cast<py::ssize_t>(found.size());
+        py::array_t<double> gaps(count);
+        py::array_t<int> nodes({count, static_cast<py::ssize_t>(4)});
+        for (std::size_t i = 0; i < found.size(); ++i) {
+          gaps.mutable_data()[i] = found[i].gap;
+          std::copy(found[i].nodes.begin(), found[i].nodes.end(), nodes.mutable_data() + 4 * i);
+        }
+        return py::make_tuple(gaps, nodes);
       });
 }
 

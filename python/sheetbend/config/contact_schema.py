@@ -118,3 +118,28 @@ class ContactSection(Section):
     def touching(self) -> list[str]:
         """Names of what may touch."""
         return [self.of] if isinstance(self.of, str) else self.of
+
+
+class SelfContactSection(Section):
+    """[scene.self_contact]: ropes and cloths that touch themselves and each other without friction,
+    `Scene.self_contact` (docs/contact.md). It needs method = "implicit" in [solver]. The radius is the quantity
+    self_contact_radius (m), or self_contact_radius_0 and so on where there are several."""
+
+    of: Name | list[Name] | None = key(None, "a rope or a cloth, or several; all of the scene when left out")
+    radius: Finite | list[Finite] = key(
+        ..., "of ropes, or half the thickness of cloths: one for all, or one for each that is named in `of`", "m"
+    )
+
+    @model_validator(mode="after")
+    def _radii_are_positive(self) -> Self:
+        radii = self.radius if isinstance(self.radius, list) else [self.radius]
+        if not all(r > 0 for r in radii):
+            raise ValueError(f"has a radius of {min(radii)}|give positive radii")
+        if isinstance(self.radius, list) and len(radii) != len(self.pieces):
+            raise ValueError(f"has {len(radii)} radii for {len(self.pieces)} names|name each piece in `of`")
+        return self
+
+    @property
+    def pieces(self) -> list[str]:
+        """Names of what may touch; none where it is everything."""
+        return [] if self.of is None else [self.of] if isinstance(self.of, str) else self.of

@@ -25,8 +25,8 @@ def check_solver(section: SceneSection, solver: SolverSection) -> None:
         ConfigError: another method, with the line that [solver] needs.
     """
     method = solver.model_dump()["method"]
-    if section.contact and method != "implicit":
-        problem = "does not know the contacts of [[scene.contact]]"
+    if (section.contact or section.self_contact) and method != "implicit":
+        problem = f"does not know {'[[scene.contact]]' if section.contact else '[scene.self_contact]'}"
         raise ConfigError("solver.method", problem, method, 'write method = "implicit" in [solver]')
 
 
@@ -64,6 +64,24 @@ def add_contacts(
         numbers = contact.model_dump(include={"friction", "radius", "stiffness", "restitution", "settle"})
         with located(path, f"{contact.name or contact.collider}.contact"):
             scene.contact(particles, colliders[contact.collider], name=contact.name, **numbers)
+    _add_self_contact(scene, section)
+
+
+def _add_self_contact(scene: Scene, section: SceneSection) -> None:
+    given = section.self_contact
+    if given is None:
+        return
+    every = {*(strand.name for _, strand in section.strands), *(cloth.name for cloth in section.cloth)}
+    unknown = [name for name in given.pieces if name not in every]
+    if unknown:
+        fix = f"use some of: {', '.join(sorted(every)) or 'none yet'}"
+        raise ConfigError("scene.self_contact.of", "names no rope or cloth", unknown, fix)
+    built = scene.ropes | scene.cloths
+    names = [name for name in given.pieces or built if name in built]
+    radii = dict(zip(given.pieces, given.radius, strict=True)) if isinstance(given.radius, list) else {}
+    if names:
+        with located("scene.self_contact", "self_contact"):
+            scene.self_contact(*(built[n] for n in names), radius=[radii[n] for n in names] if radii else given.radius)
 
 
 def _colliders(section: SceneSection, tools: Mapping[str, Tool], folder: Path) -> dict[str, Collider]:

@@ -8,7 +8,7 @@ from pydantic import model_validator
 
 from .body_schema import BodySection, JointSection
 from .cloth_schema import Cloth, with_fabrics
-from .contact_schema import ColliderSection, ContactSection
+from .contact_schema import ColliderSection, ContactSection, SelfContactSection
 from .rope_schema import Rod, Rope
 from .section import Finite, Name, Quaternion, Reference, Section, Vector, key
 from .solid_schema import SolidSection
@@ -233,6 +233,7 @@ class SceneSection(Section):
     drive: list[Drive] = key([], "motion taken from markers, or from a tool")
     collider: list[ColliderSection] = key([], "shapes that ropes and cloths touch")
     contact: list[ContactSection] = key([], "who may touch them")
+    self_contact: SelfContactSection | None = key(None, "[scene.self_contact]; nothing touches itself when left out")
     quantities: dict[Name, ExtraQuantity] = key({}, "further named numbers")
 
     @property

@@ -60,7 +60,7 @@ def missing_loss(
 def _by_other_integrator(
     problem: FitProblem, u: Array, fitted: tuple[FitProblem, Array], known: Mapping[str, float]
 ) -> dict[str, str]:
-    if any(e.scene.compiled.contacts for e in problem.experiments):
+    if any(e.scene.compiled.contacts or e.scene.compiled.touches_itself for e in problem.experiments):
         return {}
     ok, _, J = problem.evaluate(u)
     change = of_more_loss(*fitted)

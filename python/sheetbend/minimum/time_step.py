@@ -143,7 +143,7 @@ def order_left(experiments: Iterable[Experiment]) -> float:
     what contacts leave changes with their place in a substep (measured: halvings shrink it by 1.7 to 3).
     """
     moving = [e for e in experiments if not e.static]
-    if any(e.scene.compiled.contacts for e in moving):
+    if any(e.scene.compiled.contacts or e.scene.compiled.touches_itself for e in moving):
         return 2.0
     return SECOND_ORDER if any(e.solver.integrator == "bdf1" for e in moving) else THIRD_ORDER
 

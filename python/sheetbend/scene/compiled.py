@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from .. import _core
 from ..errors import SceneError, refusal
 from ..quantities.quantities import FUNCTIONS, Term
+from . import pieces
 from .domain import Domain
 from .fast import Fastest, fastest
 from .kinks import kinks
@@ -46,6 +47,7 @@ def specification(scene: SceneData) -> dict[str, Any]:
             {"name": name, "triangles": triangles.tolist()} for name, triangles in scene.volumes.triangles.items()
         ],
         **scene.contacts.specification(places),
+        "self_contact": pieces.specification(scene.contacts.pieces, places),
         "bodies": places_or_none(scene, scene.with_axes).tolist(),
     }
 
@@ -70,6 +72,7 @@ class CompiledScene:
         names: quantity names in the order of theta.
         theta: their values.
         contacts: names of those that particles may have with colliders.
+        touches_itself: whether any rope or cloth may touch itself or another.
         kinks: what beside contacts makes its motions not smooth in time, in words; empty if nothing.
         settled: by contact, what started inside a collider and was moved to its surface.
         fastest: the colliders that move and could pass particles unseen.
@@ -96,13 +99,16 @@ class CompiledScene:
         self._base = self._pack(scene)
         self._terms = scene.every_term
         self.contacts = tuple(c.name for c in scene.contacts.contacts)
+        self.touches_itself = bool(scene.contacts.pieces)
         self.settled: dict[str, SettledStart] = {}
         self.fastest: tuple[Fastest, ...] = ()
         if self.contacts:
             self._settle(scene)
             self._expect_apart(scene)
-            first, size = self.layout["contact_radius"]
-            self.fastest = fastest(scene.contacts, self.inputs()[first : first + size])
+            first, _ = self.layout["contact_radius"]
+            self.fastest = fastest(scene.contacts, self.inputs()[first : first + len(self.contacts)])
+        if self.touches_itself:
+            pieces.expect_apart(self.core, self.inputs(), scene.node_in_words)
 
     def _settle(self, scene: SceneData) -> None:
         first, size = self.layout["position"]

@@ -32,6 +32,9 @@ class Reader(Protocol):
 def written_contacts(scene: Scene) -> tuple[dict[str, Any], dict[str, Array]]:
     """Members of the header and arrays; none of a scene without contacts."""
     contacts = scene.contacts
+    if contacts.pieces:
+        fix = "leave it out, or keep the program that makes the scene"
+        raise SceneError("self_contact", "is not held by scene files", [p.name for p in contacts.pieces], fix)
     if not contacts.contacts:
         return {}, {}
     colliders = contacts.colliders.items()

@@ -13,6 +13,7 @@ from ..arrays.checks import is_number, node_array
 from ..errors import SceneError
 from ..quantities.quantities import ZERO_OR_MORE, Builder, Term
 from .colliders import Collider
+from .pieces import Piece
 
 Array = np.ndarray
 ARRAYS = ("friction", "contact_radius", "contact_stiffness", "collider_pose", "collider_size", "restitution")
@@ -86,6 +87,7 @@ class Contacts:
         self.colliders: dict[str, Collider] = {}
         self.contacts: list[Contact] = []
         self.settling: set[str] = set()  # those that move what starts inside to the surface
+        self.pieces: list[Piece] = []  # what may touch itself
 
     def _place(self, scene: Builder, collider: Collider) -> int:
         """The place of a collider, which is added unless it is there."""
@@ -196,7 +198,7 @@ class Contacts:
         ]
         return {
             "friction": np.zeros(len(self.contacts)),
-            "contact_radius": np.zeros(len(self.contacts)),
+            "contact_radius": np.zeros(len(self.contacts) + len(self.pieces)),
             "contact_stiffness": np.zeros(sum(not c.rigid for c in self.contacts)),
             "collider_pose": np.concatenate([np.zeros(0), *poses]),
             "collider_size": np.zeros(sum(len(c.sizes) for c in self.colliders.values())),

@@ -151,7 +151,8 @@ class Domain:
         if array.startswith("volume"):
             return f"'{list(self._scene.volumes.triangles)[i]}'"
         if array in ("friction", "contact_radius"):
-            return f"'{self._scene.contacts.contacts[i].name}'"
+            contacts = self._scene.contacts
+            return f"'{[*contacts.contacts, *contacts.pieces][i].name}'"
         if array not in ("compliance", "damping", "rest"):
             return f"entry {i}"
         for g in self._scene.groups:

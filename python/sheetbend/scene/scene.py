@@ -31,14 +31,14 @@ from .colliders import Collider
 from .compiled import CompiledScene
 from .contacts import ContactNumbers, HasParticles
 from .group import make_group
-from .held import HeldScene
 from .inertia import Inertia
 from .scene_checks import validate
+from .self_contact import SelfTouchingScene
 
 Array = np.ndarray
 
 
-class Scene(HeldScene):
+class Scene(SelfTouchingScene):
     """A scene under construction; `freeze()` (done by the first simulation) ends the construction.
 
     Every number enters either as a plain value or as a named quantity (`<group>_<quantity>`), by which gradients, fits

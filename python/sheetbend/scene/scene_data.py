@@ -20,6 +20,7 @@ from .contacts import Contacts
 from .forces import Forces
 from .frames import Frame
 from .group import Group
+from .pieces import radius_terms
 from .volume import Volumes
 
 Array = np.ndarray
@@ -114,7 +115,8 @@ class SceneData:
     def every_term(self) -> list[Term]:
         """Those that were added, of the boundary, and of the start of bodies."""
         starts = (t for body in self.bodies.values() for t in body.start_terms())
-        return [*self.terms, *self.boundary.terms(), *self.forces.terms(), *starts]
+        radii = radius_terms(self.contacts.pieces, len(self.contacts.contacts))
+        return [*self.terms, *self.boundary.terms(), *self.forces.terms(), *starts, *radii]
 
     @property
     def sheets(self) -> list[Any]:

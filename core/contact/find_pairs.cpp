@@ -1,0 +1,74 @@
+#include "core/contact/find_pairs.h"
+
+#include <algorithm>
+#include <span>
+
+#include "core/contact/box_grid.h"
+#include "core/contact/meeting.h"
+
+namespace sheetbend {
+namespace {
+
+// Around nodes, as far as they reach, and half of what must stay free around them.
+Box box_around(std::span<const int> nodes, const Whereabouts& at) {
+  double reach = 0.0;
+  for (const int n : nodes) reach = std::max(reach, at.reach[n]);
+  reach += at.radius[nodes.front()];
+  Box box;
+  for (int d = 0; d < 3; ++d) {
+    box.low[d] = box.high[d] = at.of(nodes.front())[d];
+    for (const int n : nodes) {
+      box.low[d] = std::min(box.low[d], at.of(n)[d]);
+      box.high[d] = std::max(box.high[d], at.of(n)[d]);
+    }
+    box.low[d] -= reach;
+    box.high[d] += reach;
+  }
+  return box;
+}
+
+template <class Items>
+std::vector<Box> boxes_around(const Items& items, const Whereabouts& at) {
+  std::vector<Box> boxes;
+  boxes.reserve(items.size());
+  for (const auto& nodes : items) boxes.push_back(box_around(nodes, at));
+  return boxes;
+}
+
+bool may_touch(const SelfContact& s, const PairKey& key, const Whereabouts& at) {
+  const auto nodes = nodes_of(s, key);
+  for (int i = 0; i < 4; ++i)
+    for (int k = 0; k < i; ++k)
+      if (nodes[i] == nodes[k]) return false;
+  double x[12];
+  gather(nodes, at.x, at.stride, x);
+  const auto reach = [&](int from, int to) {
+    double most = 0.0;
+    for (int k = from; k < to; ++k) most = std::max(most, at.reach[nodes[k]]);
+    return most;
+  };
+  const int side = key.triangle ? 1 : 2;  // where the second one begins
+  const double touching = at.radius[nodes[0]] + at.radius[nodes[side]];
+  return distance_of(key.triangle, x, {touching, 1.0}) <= touching + reach(0, side) + reach(side, 4);
+}
+
+}  // namespace
+
+std::vector<PairKey> find_pairs(const SelfContact& s, const Whereabouts& at) {
+  std::vector<PairKey> pairs;
+  const auto take = [&](bool triangle, const std::vector<std::pair<int, int>>& found) {
+    for (const auto& [first, second] : found)
+      if (const PairKey key{triangle, first, second}; may_touch(s, key, at)) pairs.push_back(key);
+  };
+  const std::vector<Box> edges = boxes_around(s.edges, at);
+  take(false, overlaps(edges, edges, true));
+  if (!s.triangles.empty()) {
+    std::vector<std::array<int, 1>> points;
+    for (const int n : s.points) points.push_back({n});
+    take(true, overlaps(boxes_around(points, at), boxes_around(s.triangles, at), false));
+  }
+  std::sort(pairs.begin(), pairs.end());
+  return pairs;
+}
+
+}  // namespace sheetbend

@@ -1,0 +1,54 @@
+#include "core/solver/paired_pattern.h"
+
+#include <algorithm>
+
+#include "core/solver/ordering.h"
+
+namespace sheetbend {
+
+std::vector<int> entries_of(const Scene& scene, const DirectBlock& block, const MemberRun& run,
+                            const CondensedPattern& pattern) {
+  const int arity = scene.groups[run.group].arity, dofs = 3 * arity;
+  std::vector<int> entries(run.items.size() * triangle(dofs), -1);
+  for (int i = 0; i < run.count; ++i) {
+    const auto dof = [&](int d) {
+      const int particle = run.nodes[lane_at(i, arity, d / 3)] / sheetbend_blocks::row;
+      return particle < block.movable ? pattern.dof_of[particle] + d % 3 : -1;
+    };
+    for (int a = 0; a < dofs; ++a)
+      for (int b = 0; b <= a; ++b)
+        if (const auto [column, row] = std::minmax({dof(a), dof(b)}); column >= 0)
+          entries[lane_at(i, triangle(dofs), triangle(a) + b)] =
+              static_cast<int>(pattern.structure.position(row, column));
+  }
+  return entries;
+}
+
+PairedPattern pattern_with(const Scene& scene, const DirectBlock& block, const std::vector<std::array<int, 4>>& pairs) {
+  std::vector<std::vector<int>> joined = std::get<CondensedPattern>(*block.condensation).joined;
+  for (const auto& pair : pairs) {
+    joined.emplace_back();
+    for (const int p : pair)
+      if (p < block.movable) joined.back().push_back(p);
+  }
+  PairedPattern all;
+  CondensedPattern& c = all.pattern;
+  for (const int place : places_for_low_fill(block.movable, joined)) c.dof_of.push_back(3 * place);
+  std::vector<std::pair<int, int>> places;  // (row, column) of blocks of three
+  for (const auto& own : joined)
+    for (const int p : own)
+      for (const int q : own)
+        if (c.dof_of[q] <= c.dof_of[p]) places.emplace_back(c.dof_of[p] / 3, c.dof_of[q] / 3);
+  std::sort(places.begin(), places.end());
+  places.erase(std::unique(places.begin(), places.end()), places.end());
+  std::vector<std::pair<int, int>> entries;
+  for (const auto& [row, column] : places)
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < (row == column ? a + 1 : 3); ++b) entries.emplace_back(3 * row + a, 3 * column + b);
+  c.structure = FactorStructure(3 * block.movable, entries, false);
+  if (!block.contacts.empty()) c.unsymmetric.emplace(block.movable, std::move(places), c.structure);
+  for (const MemberRun& run : block.runs) all.entries.push_back(entries_of(scene, block, run, c));
+  return all;
+}
+
+}  // namespace sheetbend

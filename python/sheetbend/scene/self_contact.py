@@ -1,0 +1,73 @@
+"""Ropes and cloths that touch themselves and each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..arrays.checks import is_number
+from ..errors import SceneError
+from .held import HeldScene
+from .pieces import Piece
+
+
+class SelfTouchingScene(HeldScene):
+    """A scene under construction whose ropes and cloths may touch themselves."""
+
+    def self_contact(
+        self, *pieces: Any, radius: float | Sequence[float], friction: float = 0.0, name: str = "self"
+    ) -> None:
+        """Let ropes and cloths touch themselves and each other, without friction; see docs/contact.md.
+
+        Links of ropes and edges and triangles of cloths push each other apart and never pass through. Needs method
+        "implicit". Once per scene, with all pieces.
+
+        Args:
+            pieces: ropes and cloths, such as `scene.ropes["rope"]`; all of the scene by default.
+            radius: m, of a rope, or half the thickness of a cloth; one for all (`<name>_contact_radius`), or one for
+                each piece (`<name>_contact_radius_0` and so on). Of a rope at most half a link.
+            friction: not offered, 0.
+            name: of its quantities.
+
+        Raises:
+            SceneError: what is no rope or cloth, radii out of range; when it is compiled: a start too near to itself.
+        """
+        self._building()
+        own = list(pieces) or [*self.ropes.values(), *self.cloths.values()]
+        if self.contacts.pieces:
+            raise SceneError("self_contact", "was given before", name, "give all ropes and cloths in one call")
+        if not own:
+            raise SceneError("self_contact.pieces", "are none", [], "add a rope or a cloth first")
+        if friction != 0:
+            problem = "is not offered for what touches itself, which slides without friction"
+            raise SceneError("self_contact.friction", problem, friction, "leave it out")
+        radii = [radius] * len(own) if np.ndim(radius) == 0 else list(np.asarray(radius).tolist())  # type: ignore[arg-type]
+        if len(radii) != len(own) or not all(is_number(r) and r > 0 for r in radii):
+            fix = f"give m, one for all or {len(own)}, one for each piece"
+            raise SceneError("self_contact.radius", "must be positive", radius, fix)
+        names = [f"{name}_contact_radius"] * len(own)
+        if np.ndim(radius):
+            names = [f"{name}_contact_radius_{i}" for i in range(len(own))]
+        found = [self._piece(p, r, q) for p, r, q in zip(own, radii, names, strict=True)]
+        for quantity, value in dict(zip(names, radii, strict=True)).items():
+            self.add_quantity(quantity, value, "m")
+        self.contacts.pieces = found
+
+    def _piece(self, piece: Any, radius: float, quantity: str) -> Piece:
+        if any(piece is cloth for cloth in self.cloths.values()):
+            triangles = np.asarray(piece.particles)[piece.mesh.triangles]
+            edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+            return Piece(piece.name, np.unique(edges, axis=0), triangles, quantity)
+        if not any(piece is rope for rope in self.ropes.values()):
+            fix = "give scene.ropes[...] and scene.cloths[...]"
+            raise SceneError("self_contact.pieces", "hold no rope or cloth of the scene", piece, fix)
+        nodes = np.asarray(piece.particles)
+        edges = np.stack([nodes[:-1], nodes[1:]], axis=1)
+        x = self.nodes
+        shortest = float(np.linalg.norm(x[edges[:, 1]] - x[edges[:, 0]], axis=1).min())
+        if radius > 0.5 * shortest * (1.0 + 1e-9):
+            problem = f"is more than half a link of '{piece.name}', {0.5 * shortest:.3g} m"
+            raise SceneError("self_contact.radius", problem, radius, "use fewer segments, or a smaller radius")
+        return Piece(piece.name, edges, np.zeros((0, 3), dtype=int), quantity)

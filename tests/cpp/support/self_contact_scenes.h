@@ -1,0 +1,62 @@
+// Scenes in which ropes and cloths touch themselves and each other.
+#pragma once
+
+#include "tests/cpp/support/contact_scenes.h"
+
+namespace sheetbend::testing {
+
+// Adds pieces to what a ContactBuilder has; after its contacts with shapes.
+struct TouchingBuilder : ContactBuilder {
+  // A rope through places, its particles moving with v.
+  void rope(const std::vector<Vec3<double>>& at, double m, const Vec3<double>& v, double r, double EA = 200.0,
+            double EI = 1e-4) {
+    SelfContactSpec::Piece piece;
+    const int first = static_cast<int>(mass.size()), count = static_cast<int>(at.size());
+    for (const auto& p : at) particle(p, m, v);
+    for (int i = first; i + 1 < first + count; ++i) {
+      const double link = norm(at[i + 1 - first] - at[i - first]);
+      constraint("distance", {i, i + 1}, link / EA, {link});
+      if (i + 2 < first + count) constraint("bend", {i, i + 1, i + 2}, link / EI, {});
+      piece.edges.push_back({i, i + 1});
+    }
+    add(piece, r);
+  }
+  // A sheet of nx by ny squares that are cut in two, at corner(i, j).
+  template <class F>
+  void sheet(int nx, int ny, F&& corner, double m, const Vec3<double>& v, double r, double k) {
+    SelfContactSpec::Piece piece;
+    const int first = static_cast<int>(mass.size());
+    const auto at = [&](int i, int j) { return first + i * (ny + 1) + j; };
+    for (int i = 0; i <= nx; ++i)
+      for (int j = 0; j <= ny; ++j) particle(corner(i, j), m, v);
+    const auto edge = [&](int a, int b) {
+      piece.edges.push_back({a, b});
+      const double length = norm(Vec3<double>(&x[3 * a]) - Vec3<double>(&x[3 * b]));
+      constraint("distance", {a, b}, 1.0 / k, {length});
+    };
+    for (int i = 0; i <= nx; ++i)
+      for (int j = 0; j <= ny; ++j) {
+        if (i < nx) edge(at(i, j), at(i + 1, j));
+        if (j < ny) edge(at(i, j), at(i, j + 1));
+        if (i == nx || j == ny) continue;
+        edge(at(i, j), at(i + 1, j + 1));
+        piece.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
+        piece.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
+      }
+    add(piece, r);
+  }
+
+ private:
+  void add(const SelfContactSpec::Piece& piece, double r) {
+    spec.self_contact.pieces.push_back(piece);
+    radius.push_back(r);
+  }
+};
+
+inline std::vector<Vec3<double>> line(const Vec3<double>& from, const Vec3<double>& step, int count) {
+  std::vector<Vec3<double>> at;
+  for (int i = 0; i < count; ++i) at.push_back(from + static_cast<double>(i) * step);
+  return at;
+}
+
+}  // namespace sheetbend::testing

@@ -1,0 +1,152 @@
+// Pairs that touch: distances against a search over their points, forces against the potential, and which pairs are found.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "core/contact/box_grid.h"
+#include "core/contact/find_pairs.h"
+#include "core/contact/meeting.h"
+#include "core/scalar/complex.h"
+
+namespace sheetbend::testing {
+namespace {
+
+using Coordinates = std::array<double, 12>;
+
+std::mt19937& random() {
+  static std::mt19937 engine(7);
+  return engine;
+}
+double uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random()); }
+
+Coordinates somewhere() {
+  Coordinates x;
+  for (double& a : x) a = uniform(-1.0, 1.0);
+  return x;
+}
+
+// The least of what nearest.h says, over a fine grid of places.
+double searched(bool triangle, const double* x, double softness) {
+  constexpr int n = 200;
+  double least = 1e300;
+  for (int i = 0; i <= n; ++i)
+    for (int k = 0; k <= (triangle ? n - i : n); ++k) {
+      const double s = static_cast<double>(i) / n, t = static_cast<double>(k) / n;
+      double squared = 0.0;
+      if (triangle) {
+        for (int d = 0; d < 3; ++d) {
+          const double a = x[d] - (1.0 - s - t) * x[3 + d] - s * x[6 + d] - t * x[9 + d];
+          squared += a * a;
+        }
+      } else {
+        squared = segments_at(x, softness, s, t).squared;
+      }
+      least = std::min(least, squared);
+    }
+  return least;
+}
+
+TEST(Pairs, AreAsFarApartAsTheirNearestPoints) {
+  int inside = 0, edges = 0, corners = 0;
+  for (int trial = 0; trial < 400; ++trial) {
+    const bool triangle = trial % 2;
+    const Coordinates x = somewhere();
+    const double softness = 1e-2;
+    const Part part = nearest_part(triangle, x.data(), softness);
+    const double squared = nearest_points(triangle, x.data(), softness, part).squared;
+    const double found = searched(triangle, x.data(), softness);
+    EXPECT_LE(squared, found + 1e-12);
+    EXPECT_NEAR(squared, found, 1e-2 * (0.05 + found)) << trial;
+    (part.first < 0 && (triangle || part.second < 0)    ? inside
+     : part.second < 0 || (!triangle && part.first < 0) ? edges
+                                                        : corners) += 1;
+  }
+  EXPECT_GT(inside, 50);
+  EXPECT_GT(edges, 50);
+  EXPECT_GT(corners, 50);
+}
+
+// Segments that lie side by side touch at the middle of what is beside each other, and a tilt moves that place only little.
+TEST(Pairs, TouchInTheMiddleOfParallelSegments) {
+  const double touching = 0.02, softness = segment_softness * touching * touching;
+  Coordinates x{0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.5, 0.0, 0.02, 1.5, 0.0, 0.02};
+  const auto place = [&] {
+    return nearest_points(false, x.data(), softness, nearest_part(false, x.data(), softness)).weight[1];
+  };
+  EXPECT_NEAR(place(), 0.75, 1e-5);
+  x[11] += 1e-9;
+  EXPECT_NEAR(place(), 0.75, 1e-4);
+}
+
+TEST(Pairs, PushAlongTheGradientOfTheirPotentialAndKeepMomentum) {
+  int pushed = 0;
+  for (int trial = 0; trial < 400; ++trial) {
+    const bool triangle = trial % 2;
+    Coordinates x = somewhere();
+    for (double& a : x) a *= 0.5;
+    const PairNumbers<double> numbers{0.6, 3.0};
+    const Part part = nearest_part(triangle, x.data(), softness_of(numbers));
+    double force[12], E[144];
+    const double depth = meet(triangle, part, x.data(), numbers, force);
+    if (!(depth > 0.0)) continue;
+    ++pushed;
+    meeting_matrix(triangle, part, x.data(), numbers, E);
+    double scale = 0.0;
+    for (const double f : force) scale = std::max(scale, std::abs(f));
+    for (int i = 0; i < 12; ++i) {
+      Complex moved[12], own[12];
+      for (int d = 0; d < 12; ++d) moved[d] = Complex(x[d]);
+      moved[i].im = 1e-30;
+      // The potential of the same part: the derivative leaves out that of the weights.
+      const PairNumbers<Complex> n{Complex(numbers.touching), Complex(numbers.kappa)};
+      const Complex deep = meet<Complex>(triangle, part, moved, n, own);
+      EXPECT_NEAR(-(numbers.kappa * depth * deep.im / 1e-30), force[i], 1e-10 * scale) << trial;
+      for (int k = 0; k < 12; ++k) {
+        EXPECT_NEAR(E[12 * k + i], -own[k].im / 1e-30, 1e-9 * (1.0 + std::abs(E[12 * k + i])));
+        EXPECT_NEAR(E[12 * k + i], E[12 * i + k], 1e-9 * (1.0 + std::abs(E[12 * k + i])));
+      }
+    }
+    Vec3<double> sum(0.0, 0.0, 0.0), moment = sum;
+    for (int k = 0; k < 4; ++k) {
+      const Vec3<double> f(force + 3 * k), at(&x[3 * k]);
+      sum = sum + f;
+      moment = moment + cross(at, f);
+    }
+    EXPECT_LE(norm(sum), 1e-13 * scale);
+    EXPECT_LE(norm(moment), 1e-12 * scale);
+  }
+  EXPECT_GT(pushed, 100);
+}
+
+TEST(Pairs, AreFoundByAGridAsByLookingAtAll) {
+  for (const double size : {0.02, 0.2, 1.5}) {
+    std::vector<Box> a, b;
+    for (int i = 0; i < 150; ++i)
+      for (auto* list : {&a, &b}) {
+        Box box;
+        for (int d = 0; d < 3; ++d) {
+          box.low[d] = uniform(-1.0, 1.0);
+          box.high[d] = box.low[d] + uniform(0.0, i == 7 ? 3.0 : size);
+        }
+        list->push_back(box);
+      }
+    const auto meet = [](const Box& p, const Box& q) {
+      for (int d = 0; d < 3; ++d)
+        if (p.high[d] < q.low[d] || q.high[d] < p.low[d]) return false;
+      return true;
+    };
+    for (const bool itself : {false, true}) {
+      auto found = overlaps(a, b, itself);
+      std::sort(found.begin(), found.end());
+      std::vector<std::pair<int, int>> expected;
+      for (int i = 0; i < 150; ++i)
+        for (int k = itself ? i + 1 : 0; k < 150; ++k)
+          if (meet(a[i], itself ? a[k] : b[k])) expected.emplace_back(i, k);
+      EXPECT_EQ(found, expected);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace sheetbend::testing

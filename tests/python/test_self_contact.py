@@ -1,0 +1,210 @@
+"""Ropes and cloths that touch themselves and each other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from sheetbend.config import parse, scene_alone
+from sheetbend.mesh import grid
+
+SOLVER = sb.Solver(h=1e-3, method="implicit", integrator="bdf1")
+
+
+def nearest(x: np.ndarray, edges: np.ndarray) -> float:
+    """The least distance between edges that share no particle."""
+    a, b = np.triu_indices(len(edges), 1)
+    apart = (edges[a][:, :, None] != edges[b][:, None, :]).all(axis=(1, 2))
+    a, b = edges[a[apart]], edges[b[apart]]
+    u, v, r = x[a[:, 1]] - x[a[:, 0]], x[b[:, 1]] - x[b[:, 0]], x[a[:, 0]] - x[b[:, 0]]
+    uu, uv, vv = (u * u).sum(1), (u * v).sum(1), (v * v).sum(1)
+    ur, vr = (u * r).sum(1), (v * r).sum(1)
+    s = np.clip((uv * vr - vv * ur) / np.maximum(uu * vv - uv * uv, 1e-12 * uu * vv), 0, 1)
+    for _ in range(100):  # alternating projections, for pairs at the ends of segments
+        t = np.clip((vr + s * uv) / vv, 0, 1)
+        s = np.clip((t * uv - ur) / uu, 0, 1)
+    return float(np.linalg.norm(r + s[:, None] * u - t[:, None] * v, axis=1).min())
+
+
+def crossed(height: float = 0.012, **options: object) -> sb.Scene:
+    """A rope between two posts, and a softer one that hangs across it."""
+    scene = sb.Scene("crossed")
+    for name, EA, start, along in (
+        ("lower", 5000.0, (-0.15, 0, 0), (1, 0, 0)),
+        ("upper", 200.0, (0.002, -0.15, height), (0, 1, 0)),
+    ):
+        numbers = {"length": 0.3, "segments": 15, "density": 0.05, "EA": EA, "EI": 1e-4, **options}
+        rope = sb.add_rope(scene, name, start=start, direction=along, **numbers)  # type: ignore[arg-type]
+        scene.pin(rope.particles[[0, -1]])
+    return scene
+
+
+def test_two_ropes_rest_across_each_other():
+    scene = crossed(stretch_damping=0.02)
+    scene.self_contact(radius=0.005)
+    motion = sb.simulate(scene, [0.0, 0.5, 1.0, 1.5], SOLVER)
+    edges = np.concatenate([np.stack([p[:-1], p[1:]], 1) for p in (r.particles for r in scene.ropes.values())])
+    gaps = [nearest(x, edges) - 0.01 for x in motion.positions]
+    assert gaps[-1] == pytest.approx(0.0, abs=1e-6)  # it lies on the other one
+    middle = motion.positions[-1][scene.ropes["lower"].particles[7], 2]
+    free = sb.simulate(crossed(stretch_damping=0.02), [0.0, 1.5], SOLVER).positions[-1]
+    assert middle < free[scene.ropes["lower"].particles[7], 2] - 1e-4  # and presses it down
+
+
+def test_momentum_is_kept():
+    scene = sb.Scene("thrown", gravity=(0, 0, 0))
+    for name, y, v in (("a", 0.0, 0.0), ("b", 0.03, -1.5)):
+        points = np.stack([np.linspace(0, 0.2, 3), np.full(3, y), 0.02 * np.sin(np.arange(3) + y)], 1)
+        sb.add_rope(
+            scene, name, points=points, segments=6, density=0.05, EA=200.0, EI=1e-4,
+            velocity=np.tile([0.1, v, 0.2], (3, 1)),
+        )  # fmt: skip
+    scene.self_contact(radius=[0.004, 0.006])
+    h = SOLVER.h
+    motion = sb.simulate(scene, np.arange(81) * h, SOLVER)
+    inputs = scene.compiled.unpack(scene.compiled.inputs())
+    momentum = inputs["mass"] @ (np.diff(motion.positions, axis=0) / h)
+    started = inputs["mass"] @ inputs["velocity"]
+    assert np.abs(momentum - started).max() <= 1e-12 * np.abs(started).max()
+    one = scene.ropes["a"].particles  # which the other one has pushed
+    moved = inputs["mass"][one] @ (np.diff(motion.positions, axis=0)[-1, one] / h)
+    assert moved[1] < -1e-3
+
+
+def knotted() -> sb.Scene:
+    """An open overhand knot whose ends are drawn apart at 0.1 m/s."""
+    t = np.linspace(-2.15, 2.15, 1001)
+    points = np.stack([t**3 - 3 * t, t**4 - 4 * t**2, 0.55 * (t**5 - 10 * t)], 1) * 0.02
+    scene = sb.Scene("knot", gravity=(0, 0, 0))
+    rope = sb.add_rope(
+        scene, points=points, segments=60, density=0.02, EA=100.0, EI=5e-6, stretch_damping=5e-3, bend_damping=5e-3,
+        drag_linear=0.05,
+    )  # fmt: skip
+    ends = rope.particles[[0, -1]]
+    x = scene.nodes[ends]
+    away = (x - x.mean(0)) / np.linalg.norm(x - x.mean(0), axis=1)[:, None]
+    scene.drive(ends, [0.0, 3.0], np.stack([x, x + 0.3 * away]), "linear")
+    scene.self_contact(rope, radius=0.003)
+    return scene
+
+
+def test_a_knot_is_drawn_tight_and_nothing_passes_through():
+    scene = knotted()
+    edges = scene.contacts.pieces[0].edges
+    motion = sb.simulate(scene, np.linspace(0.0, 1.5, 376), sb.Solver(h=2e-3, method="implicit", integrator="bdf1"))
+    least = [nearest(x, edges) for x in motion.positions]
+    assert min(least) > 0.95 * 0.006
+    steps = np.linalg.norm(np.diff(motion.positions, axis=0), axis=2).max()
+    assert 2 * steps < min(least)  # so that nothing passes unseen between frames
+    assert least[-1] < 0.006 + 1e-4
+
+
+def folded() -> sb.Scene:
+    """A cloth that hangs over itself: one half falls on the other."""
+    mesh = grid(0.2, 0.1, 8, 4, "one_way")
+    scene = sb.Scene("folded")
+    angle = 0.35
+    x = mesh.vertices.copy()
+    flap = x[:, 0] > 0.1
+    x[flap] = np.stack(
+        [0.1 - (x[flap, 0] - 0.1) * np.cos(angle), x[flap, 1], (x[flap, 0] - 0.1) * np.sin(angle)], axis=1
+    )
+    cloth = sb.add_cloth(scene, mesh, density=0.2, warp=200.0, shear=50.0, bending=1e-5, positions=x)
+    scene.contact(cloth, sb.Plane(point=(0, 0, -0.002), name="table"), friction=0.3, radius=0.001)
+    scene.self_contact(cloth, radius=0.001)
+    return scene
+
+
+def test_a_cloth_folded_once_lies_on_itself():
+    scene = folded()
+    motion = sb.simulate(scene, [0.0, 0.1, 0.2, 0.3], SOLVER)
+    edges = scene.contacts.pieces[0].edges
+    assert nearest(motion.positions[-1], edges) > 0.95 * 0.002
+    assert motion.positions[-1][:, 2].max() < 0.05
+
+
+def test_the_gradient_is_that_of_differences():
+    scene = crossed(height=0.0105)
+    scene.self_contact(radius=[0.005, 0.004])
+    report = sb.check_gradients(scene, np.linspace(0, 0.1, 6), SOLVER)
+    assert report.passed, report
+    assert {"self_contact_radius_0", "self_contact_radius_1"} <= set(scene.quantities)
+
+
+def test_what_cannot_be_is_refused(tmp_path: Path):
+    rope = {"length": 0.3, "segments": 15, "density": 0.05, "EA": 500.0, "EI": 1e-4}
+    for radius, friction, words in ((0.011, 0, "half a link"), (-1.0, 0, "must be positive"), (0.005, 0.3, "friction")):
+        scene = sb.rope(**rope)
+        with pytest.raises(sb.SceneError, match=words):
+            scene.self_contact(radius=radius, friction=friction)
+    scene = crossed(height=0.007)
+    scene.self_contact(radius=0.005)
+    with pytest.raises(sb.SceneError, match=r"0\.00\d+ m too near"):
+        sb.simulate(scene, 0.01, SOLVER)
+    scene = crossed()
+    scene.self_contact(radius=0.005)
+    with pytest.raises(sb.SceneError, match="in one call"):
+        scene.self_contact(radius=0.004)
+    with pytest.raises(ValueError, match="implicit"):
+        sb.simulate(scene, 0.01, sb.Solver(h=1e-3, method="newton"))
+    with pytest.raises(sb.SceneError, match="scene files"):
+        sb.save_scene(scene, tmp_path / "scene.npz")
+    with pytest.raises(ValueError, match="rest"):
+        sb.equilibrium(scene)
+
+
+TWO = """\
+[experiment]
+name = "crossed"
+
+[solver]
+h = 1e-3
+method = "implicit"
+integrator = "bdf1"
+
+[[scene.rope]]
+name = "lower"
+length = 0.3
+segments = 15
+density = 0.05
+EA = 5000.0
+EI = 1e-4
+start = [-0.15, 0.0, 0.0]
+direction = [1.0, 0.0, 0.0]
+pinned = [0, -1]
+
+[[scene.rope]]
+name = "upper"
+length = 0.3
+segments = 15
+density = 0.05
+EA = 200.0
+EI = 1e-4
+start = [0.002, -0.15, 0.012]
+direction = [0.0, 1.0, 0.0]
+pinned = [0, -1]
+
+[scene.self_contact]
+radius = 0.005
+"""
+
+
+def test_a_file_builds_what_python_builds(tmp_path: Path):
+    path = tmp_path / "crossed.toml"
+    path.write_text(TWO)
+    read, solver = scene_alone(parse(path))
+    scene = crossed()
+    scene.self_contact(radius=0.005)
+    assert np.array_equal(*(sb.simulate(s, [0.0, 0.1], solver).positions for s in (read, scene)))
+    path.write_text(TWO.replace("radius = 0.005", 'of = ["lower", "upper"]\nradius = [0.005, 0.004]'))
+    assert scene_alone(parse(path))[0].quantities["self_contact_radius_1"].value == 0.004
+    for old, new, words in (
+        ("radius = 0.005", 'of = "cord"\nradius = 0.005', "no rope or cloth"),
+        ("radius = 0.005", "radius = [0.005, 0.004]", "name each piece"),
+        ('method = "implicit"', 'method = "direct"', "implicit"),
+    ):
+        path.write_text(TWO.replace(old, new))
+        with pytest.raises(sb.ConfigError, match=words):
+            scene_alone(parse(path))
