@@ -109,3 +109,28 @@ def test_restitutions_that_cannot_be_are_refused(restitution):
     with pytest.raises(sb.SceneError) as error:
         ball(restitution=restitution)
     assert error.value.field == "table.contact.restitution"
+
+
+def test_plain_gradient_descent_throws_a_ball_by_floor_and_wall_into_a_target():
+    """Task 2 of Zhong et al. (2023), with friction and gravity: e = 0.92, the target (-2, 1.5) at 0.6 s."""
+    target, velocity = np.array([-2.0, 0.0, 1.5]), np.array([5.0, 0.0, -5.0])
+    solver = sb.Solver(h=1 / 240, method="implicit")
+
+    def thrown(velocity):
+        scene = sb.Scene("ball")
+        scene.add_particles([[-0.5, 0.0, 1.0]], 1.0, [velocity])
+        for name, point, normal in (("floor", (0, 0, 0), (0, 0, 1)), ("wall", (1.75, 0, 0), (-1, 0, 0))):
+            plane = sb.Plane(point=point, normal=normal, name=name)
+            scene.contact([0], plane, friction=0.1, restitution=0.92, radius=0.1)
+        return sb.rollout(scene, [0.0, 0.6], solver)
+
+    losses = []
+    for _ in range(300):
+        rollout = thrown(velocity)
+        missed = rollout.positions[-1, 0] - target
+        losses.append(missed @ missed)
+        bar = np.zeros_like(rollout.positions)
+        bar[-1, 0] = 2 * missed
+        velocity = velocity - 0.05 * rollout.gradient(bar).inputs["velocity"][0]
+    assert losses[0] > 10.0
+    assert losses[-1] < 0.005

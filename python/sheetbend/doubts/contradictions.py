@@ -19,6 +19,7 @@ from ..result.result import UNSOUND, Estimate, RecordingFit
 from ..statistics.blocks import Difference, Split, contradiction
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
+from ..statistics.left_out import LeftOut, left_out
 from ..statistics.profile import FARTHEST, NOISELESS
 from .driven_errors import driven_errors
 from .prediction import Comparison
@@ -67,7 +68,8 @@ def between_parts(
 
     All parameters together must differ between the parts by more than chance explains at the 1 % level. Those are named
     of which a part differs from the others by more than its 95 % interval, and from the estimate by more than the
-    estimate's, what the discretization moves in that part counted. No simulation is needed beyond the last Jacobian,
+    estimate's, what the discretization moves in that part counted; and those which the data without a part know, and
+    place farther from the estimate than either interval reaches. No simulation is needed beyond the last Jacobian,
     unless parts differ: then what noise of driven particles does to all parts alike counts too (`driven_errors`).
 
     Args:
@@ -95,16 +97,11 @@ def _between(
     ]
     if not used or not np.isfinite(J[:, used]).all() or float(r[:rows] @ r[:rows]) < NOISELESS * rows:
         return {}
-    found = contradiction(
-        r,
-        J[:, used],
-        splits(problem, J[:rows, used]),
-        layout=problem.rows_layout(),
-        within=_private(problem, J[:rows, used]),
-        shifts=np.column_stack(shifts) if shifts else None,
-        taken=sum(map(problem.core.absorbed, range(len(problem.experiments)))),
-        errors=errors,
-    )
+    layout, within = problem.rows_layout(), _private(problem, J[:rows, used])
+    known = np.column_stack(shifts) if shifts else None
+    taken = sum(map(problem.core.absorbed, range(len(problem.experiments))))
+    every = splits(problem, J[:rows, used])
+    found = contradiction(r, J[:, used], every, layout=layout, within=within, shifts=known, taken=taken, errors=errors)
     if found is None:
         return {}
     words = {}
@@ -113,6 +110,11 @@ def _between(
         reach = reach_of(problem.parameters[name], estimates[name]) + SECOND_ORDER * d.shift
         if abs(d.steps[0] - d.steps[1]) > d.reach + SECOND_ORDER * d.shift and abs(d.steps[0]) > reach:
             words[name] = _difference_words(problem.parameters[name], u[column], d)
+    for without in left_out(r, J[:, used], found.split, layout, within, known, taken, errors):
+        name, column = names[used[without.column]], used[without.column]
+        reach = max(reach_of(problem.parameters[name], estimates[name]), without.reach)
+        if name not in words and abs(without.step) > reach + SECOND_ORDER * without.shift:
+            words[name] = _without_words(problem.parameters[name], u[column], without)
     return drawn_along(judged, words)
 
 
@@ -154,6 +156,14 @@ def _difference_words(p: Parameter, at: float, found: Difference) -> str:
     return (
         f"parts of the data contradict each other: {found.name} asks for {said[0]}, the rest for {said[1]} (to first "
         "order); the model lacks something, or this is not its lowest minimum"
+    )
+
+
+def _without_words(p: Parameter, at: float, found: LeftOut) -> str:
+    value = value_words(p, at, found.step, found.reach)
+    return (
+        f"parts of the data contradict each other: without {found.name} it would be {value} (to first order); the "
+        "model lacks something, or this is not its lowest minimum"
     )
 
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -77,10 +77,12 @@ class Contradiction:
 
     Attributes:
         chance: that a right model shows such a difference, before counting the splits that were tried.
+        split: the data into these parts.
         differences: of each parameter that was compared.
     """
 
     chance: float
+    split: Split
     differences: tuple[Difference, ...]
 
 
@@ -144,7 +146,8 @@ def _compared(
         kept = np.append(mine, np.ones(len(residuals) - len(mine), dtype=bool))
         own = [(slice(int(mine[: k.start].sum()), int(mine[: k.stop].sum())), columns) for k, columns in within]
         rest = Split(split.part[mine], split.names)
-        return _compared(residuals[kept], jacobian[kept], rest, layout.of(mine), own, known[kept], taken, drawn[kept])
+        found = _compared(residuals[kept], jacobian[kept], rest, layout.of(mine), own, known[kept], taken, drawn[kept])
+        return found and replace(found, split=split)
     rows, parts = len(layout.frame), len(split.names)
     private = {column for _, columns in within for column in columns}
     shared = [column for column in range(jacobian.shape[1]) if column not in private]
@@ -156,7 +159,7 @@ def _compared(
     coding = np.vstack([coding, np.zeros((len(residuals) - rows, parts - 1))])
     opposed = [jacobian[:, shared] * coding[:, [k]] for k in range(parts - 1)]
     columns = np.hstack([jacobian[:, shared], *opposed, known, drawn])
-    every, left = _solved_within(jacobian, within, columns, residuals, rows)
+    every, left = solved_within(jacobian, within, columns, residuals, rows)
     every, drawn = np.split(every, [every.shape[1] - drawn.shape[1]], axis=1)
     used = _independent(every)
     compared = [i for i, c in enumerate(used) if count <= c < count * parts]
@@ -219,10 +222,11 @@ def _told(
     def clear(found: Difference) -> float:
         return abs(found.steps[0] - found.steps[1]) / found.reach if found.reach > 0 else 0.0
 
-    return Contradiction(chance, tuple(max((difference(j, k) for k in range(parts)), key=clear) for j in range(count)))
+    most = tuple(max((difference(j, k) for k in range(parts)), key=clear) for j in range(count))
+    return Contradiction(chance, split, most)
 
 
-def _solved_within(
+def solved_within(
     jacobian: Array, within: Sequence[tuple[slice, Sequence[int]]], every: Array, residuals: Array, rows: int
 ) -> tuple[Array, Array]:
     """Columns and residuals less what the parameters of single recordings can explain of them."""

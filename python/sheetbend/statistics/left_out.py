@@ -1,0 +1,109 @@
+"""What an estimate would be without one part of the data.
+
+A part that hardly tells a parameter by itself may still decide it. Example: windows of a pendulum's swing each know one
+combination of dry friction and drag. Only together do they tell the two apart, so that a slow error of one window moves
+both by far more than the residuals suggest.
+
+Parameters u in all data but part k, and others there, have the columns [J, J s_k], with s_k = 1 in the rows of part k
+and 0 elsewhere. The least-squares step of the first ones leads to the estimate without part k, and their covariance
+(`covariance`) is that of this estimate. Priors and rows of no part belong to the rest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays.timeseries import Array
+from ..optional import require
+from .blocks import Split, short_of_frames, solved_within
+from .covariance import Layout, covariance
+from .gauge import null_space
+from .shared_errors import variance_of
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """The estimate of one parameter without one part of the data.
+
+    Attributes:
+        column: of the parameter.
+        name: of the part.
+        step: internal, by which the estimate moves without it.
+        reach: 95 % half-width of the estimate without it.
+        shift: by which the known errors of the residuals would move it.
+    """
+
+    column: int
+    name: str
+    step: float
+    reach: float
+    shift: float
+
+
+def left_out(
+    residuals: Array,
+    jacobian: Array,
+    split: Split,
+    layout: Layout,
+    within: Sequence[tuple[slice, Sequence[int]]] = (),
+    shifts: Array | None = None,
+    taken: float = 0.0,
+    errors: Array | None = None,
+) -> tuple[LeftOut, ...]:
+    """Of each parameter that recordings share, the part that moves it most, against its reach.
+
+    Parameters that the rest of the data leaves open are not in it, and parts of which the rest has too few rows.
+
+    Args: those of `blocks.contradiction`.
+
+    Raises:
+        MissingExtraError: scipy is not installed.
+    """
+    rows, extra = len(layout.frame), len(residuals) - len(layout.frame)
+    private = {column for _, columns in within for column in columns}
+    shared = [column for column in range(jacobian.shape[1]) if column not in private]
+    known = _padded(shifts, rows, extra)
+    drawn = _padded(errors, rows, extra)
+    most: dict[int, LeftOut] = {}
+    for k, name in enumerate(split.names):
+        inside = np.append(split.part == k, np.zeros(extra, dtype=bool))
+        columns = np.hstack([jacobian[:, shared], jacobian[:, shared] * inside[:, None], known, drawn])
+        every, left = solved_within(jacobian, within, columns, residuals, rows)
+        every, noise = np.split(every, [every.shape[1] - drawn.shape[1]], axis=1)
+        names = [str(i) for i in range(every.shape[1])]
+        pivots = null_space(every, names, [False] * len(names)).pivots
+        used = [c for c in range(len(names)) if c not in pivots]
+        if rows <= len(used) + len(private):
+            continue
+        size = np.linalg.norm(every[:, used], axis=0)
+        step = -np.linalg.lstsq(every[:, used] / size, left, rcond=None)[0] / size
+        left = left + every[:, used] @ step
+        spread = covariance(left[:rows], every[:rows, used], layout, every[rows:, used], taken + len(private))
+        V = short_of_frames(spread, int(np.ptp(layout.frame)) + 1) * spread.matrix
+        if noise.any():
+            V = V + variance_of(every[:, used], noise)
+        own = [c for c in used if c < 2 * len(shared)]
+        scale = np.linalg.norm(every[:, own], axis=0)
+        moved = np.linalg.lstsq(every[:, own] / scale, known, rcond=None)[0] / scale[:, None]
+        for i, c in enumerate(used):
+            if c >= len(shared):
+                break
+            degrees = max(float(spread.degrees[i] / (2 - 1 / spread.inflation[i])), 1.0)
+            t = float(require("scipy.special", "fit").stdtrit(degrees, 0.975))
+            reach = t * math.sqrt(max(float(V[i, i]), 0.0))
+            found = LeftOut(shared[c], name, float(step[i]), reach, float(np.abs(moved[i]).sum()))
+            if c not in most or abs(found.step) * most[c].reach > abs(most[c].step) * found.reach:
+                most[c] = found
+    return tuple(most[c] for c in sorted(most))
+
+
+def _padded(columns: Array | None, rows: int, extra: int) -> Array:
+    """(rows + extra, n) with zeros in the rows that are no data."""
+    found = np.zeros((rows + extra, 0 if columns is None else columns.shape[1]))
+    if columns is not None:
+        found[:rows] = columns
+    return found
