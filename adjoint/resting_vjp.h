@@ -26,9 +26,10 @@ inline void resting_vjp(const RestingContacts<double>& contacts, const double* x
         touch_vjp(i.shape, z, i.numbers, turned_vjp(pose, t.force, world, pose_bar), none, numbers_bar);
     in_frame_vjp(pose, Vec3<double>(x + i.dof), z_bar, pose_bar);
     if (!i.rubs) numbers_bar.friction = 0.0, numbers_bar.carried = none;
-    const double w_bar = numbers_vjp(source, contacts.poses, i.contact, i.item, numbers_bar, poses_bar,
-                                     {held_bar, nullptr, velocities_bar.data(), nullptr}, bar);
-    const int node = source.scene.contacts[i.contact].particles[i.item];
+    const int node = source.scene.contacts[i.contact].first_node(i.item);
+    double w_bar = 0.0;
+    numbers_vjp(source, contacts.poses, i.contact, i.item, numbers_bar, poses_bar,
+                {held_bar, nullptr, velocities_bar.data(), nullptr}, bar, [&](int) -> double& { return w_bar; });
     bar.of(Quantity::mass)[node] -= w_bar * source.w[node] * source.w[node];
   }
   for (std::size_t c = 0; c < poses_bar.next.size(); ++c) {  // `held` is seen from the same poses

@@ -154,12 +154,15 @@ class SceneReader {
     for_each_record("contacts", [&](const Json& c, const std::string& i, const std::string& where) {
       ContactSpec contact{file_.name(c, "name", where),   -1, {}, {}, file_.flag(c, "rigid", where),
                           file_.flag(c, "bounces", where)};
+      if (c.contains("nodes")) contact.arity = static_cast<int>(file_.whole(c, "nodes", where));  // of points of bodies
+      if (contact.arity < 1 || contact.arity > most_point_nodes)
+        file_.fail(where + "nodes", "must lie in 1 to " + std::to_string(most_point_nodes));
       if (const long long own = file_.whole(c, "collider", where); own < static_cast<long long>(spec.colliders.size()))
         contact.collider = static_cast<int>(std::max(own, -1LL));
-      const std::vector<int> pairs = file_.whole_numbers("contact_" + i, 2);
-      for (std::size_t k = 0; k < pairs.size(); k += 2) {
-        contact.particles.push_back(pairs[k]);
-        contact.carried.push_back(pairs[k + 1]);
+      const std::vector<int> rows = file_.whole_numbers("contact_" + i, contact.arity + 1);
+      for (std::size_t k = 0; k < rows.size(); k += contact.arity + 1) {
+        contact.nodes.insert(contact.nodes.end(), &rows[k], &rows[k] + contact.arity);
+        contact.carried.push_back(rows[k + contact.arity]);
       }
       spec.contacts.push_back(std::move(contact));
     });
@@ -226,7 +229,7 @@ class SceneReader {
       const bool made = array == Quantity::volume || array == Quantity::volume_compliance ||
                         array == Quantity::friction || array == Quantity::contact_radius ||
                         array == Quantity::contact_stiffness || array == Quantity::collider_size ||
-                        array == Quantity::restitution;
+                        array == Quantity::restitution || array == Quantity::contact_weight;
       if (made && std::any_of(first, last, [](double v) { return v != 0.0; }))
         file_.fail(std::string("base.") + quantity_names[q], "must be zero, quantities make it");
     }

@@ -11,32 +11,36 @@ namespace sheetbend {
 template <class S>
 struct BlockContactCotangents {
   std::vector<ContactNumbers<S>> numbers;
+  std::vector<std::array<S, most_point_nodes>> weights;
   std::vector<Pose<S>> poses;  // at n+1, per collider
 
   void resize(const Scene& scene, const DirectBlock& block) {
     if (block.contacts.empty()) return;
     numbers.resize(block.contacts.size());
+    weights.resize(block.contacts.size());
     poses.resize(scene.colliders.size());
   }
   static std::size_t bytes(const Scene& scene, const DirectBlock& block) {
     if (block.contacts.empty()) return 0;
-    return sizeof(ContactNumbers<S>) * block.contacts.size() + sizeof(Pose<S>) * scene.colliders.size();
+    return (sizeof(ContactNumbers<S>) + sizeof(S) * most_point_nodes) * block.contacts.size() +
+           sizeof(Pose<S>) * scene.colliders.size();
   }
   void clear() {
     std::fill(numbers.begin(), numbers.end(), ContactNumbers<S>{});
+    std::fill(weights.begin(), weights.end(), std::array<S, most_point_nodes>{});
     std::fill(poses.begin(), poses.end(), Pose<S>{});
   }
 
-  // Contact i with its particle at x, along p: returns what goes to x, and force . p in `along`.
+  // Contact i with its point at x, along p: returns what goes to x, and the force in `force`, both in the world's frame.
   Vec3<S> pull_back(const DirectBlock& block, const BlockContacts<S>& contacts, int i, const Vec3<S>& x,
-                    const Vec3<S>& p, S& along) {
+                    const Vec3<S>& p, Vec3<S>& force) {
     const BlockContact& own = block.contacts[i];
     const Pose<S>& pose = contacts.pose(block, i);
     const Vec3<S> z = pose.in_frame(x), none(S(0.0), S(0.0), S(0.0));
     const Touch<S> at = touch(own.shape, z, contacts.numbers[i]);
-    along = S(0.0);
+    force = none;
     if (!at.pushes) return none;
-    along = dot(pose.turned(at.force), p);
+    force = pose.turned(at.force);
     const Vec3<S> force_bar = turned_vjp(pose, at.force, p, poses[own.collider]);
     const Vec3<S> z_bar = touch_vjp(own.shape, z, contacts.numbers[i], force_bar, none, numbers[i]);
     return in_frame_vjp(pose, x, z_bar, poses[own.collider]);
@@ -52,9 +56,10 @@ void spread_contacts(const ContactSource<T>& source, const DirectBlock& block, c
   auto poses_bar = no_pose_cotangents(source);
   poses_bar.next = bar.poses;
   for (std::size_t i = 0; i < block.contacts.size(); ++i) {
-    const auto [contact, item, collider, shape, particle] = block.contacts[i];
-    source.add(numbers_vjp(source, contacts.poses, contact, item, bar.numbers[i], poses_bar, from_bar, in_bar),
-               w_bar(source.scene.contacts[contact].particles[item]));
+    const BlockContact& own = block.contacts[i];
+    numbers_vjp(source, contacts.poses, own.contact, own.item, bar.numbers[i], poses_bar, from_bar, in_bar, w_bar);
+    for (int k = 0; own.nodes > 1 && k < own.nodes; ++k)
+      source.add(bar.weights[i][k], weight_in(in_bar, source.scene.contacts[own.contact], own.item, k));
   }
   poses_vjp(source, poses_bar, in_bar);
 }

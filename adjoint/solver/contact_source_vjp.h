@@ -16,6 +16,40 @@ ColliderPoses<Single<T>> no_pose_cotangents(const ContactSource<T>& source) {
   return {none, none, source.bdf.before == 0.0 ? std::vector<Pose<Single<T>>>{} : none};
 }
 
+// Reverse of ContactSource::point_at: cotangents of a point go to its nodes, by to(node), and to its weights. at(node) are its nodes'.
+template <class T, class At, class To>
+void point_vjp(const ContactSource<T>& source, const Contact& c, int item, const Vec3<Single<T>>& bar, At&& at, To&& to,
+               const Inputs<T>& in_bar) {
+  const auto nodes = c.nodes_of(item);
+  if (c.arity == 1) return source.add(bar, to(nodes[0]));
+  for (int k = 0; k < c.arity; ++k) {
+    source.add(source.weight(c, item, k) * bar, to(nodes[k]));
+    source.add(dot(at(nodes[k]), bar), weight_in(in_bar, c, item, k));
+  }
+}
+// Of ContactSource::point.
+template <class T>
+void point_vjp(const ContactSource<T>& source, const Contact& c, int item, const Vec3<Single<T>>& bar, const T* state,
+               T* state_bar, const Inputs<T>& in_bar) {
+  point_vjp(
+      source, c, item, bar, [&](int node) { return source.at(state, node); },
+      [&](int node) { return state_bar + source.scene.first_dof[node]; }, in_bar);
+}
+
+// Reverse of ContactSource::inverse_mass; w_bar(node) takes cotangents of inverse masses.
+template <class T, class W>
+void inverse_mass_vjp(const ContactSource<T>& source, const Contact& c, int item, const Single<T>& bar, W&& w_bar,
+                      const Inputs<T>& in_bar) {
+  using S = Single<T>;
+  const auto nodes = c.nodes_of(item);
+  if (c.arity == 1) return source.add(bar, w_bar(nodes[0]));
+  for (int k = 0; k < c.arity; ++k) {
+    const S b = source.weight(c, item, k);
+    source.add(b * b * bar, w_bar(nodes[k]));
+    source.add(S(2.0) * b * source.read(source.w[nodes[k]]) * bar, weight_in(in_bar, c, item, k));
+  }
+}
+
 // Cotangents of a collider's lengths.
 template <class T>
 void size_vjp(const ContactSource<T>& source, const Collider& collider, const Single<T>* bar, const Inputs<T>& in_bar) {
@@ -52,29 +86,28 @@ void rebound_vjp(const ContactSource<T>& source, const ColliderPoses<Single<T>>&
   const Contact& c = scene.contacts[contact];
   const auto f = rebound_vjp(scene.colliders[c.collider].any(), source.h, source.bdf.before == 0.0,
                              source.falling(poses, contact, item), bar);
-  const int node = c.particles[item], dof = scene.first_dof[node];
-  source.add(f.x, from_bar.x + dof);
-  source.add(f.v, from_bar.v + dof);
+  point_vjp(source, c, item, f.x, source.from.x, from_bar.x, in_bar);
+  point_vjp(source, c, item, f.v, source.from.v, from_bar.v, in_bar);
   source.add(f.gravity, in_bar.of(Quantity::gravity));
   source.add(f.carried, from_bar.x + scene.first_dof[c.carried[item]]);
-  source.add(f.mass, in_bar.of(Quantity::mass)[node]);
+  source.add(f.mass, in_bar.of(Quantity::mass)[c.first_node(item)]);
   surface_vjp(source, contact, f.surface, poses_bar, in_bar);
 }
 
-// Reverse of ContactSource::numbers. Returns the cotangent of the particle's inverse mass.
-template <class T>
-Single<T> numbers_vjp(const ContactSource<T>& source, const ColliderPoses<Single<T>>& poses, int contact, int item,
-                      const ContactNumbers<Single<T>>& bar, ColliderPoses<Single<T>>& poses_bar,
-                      const StateCotangents<T>& from_bar, const Inputs<T>& in_bar) {
+// Reverse of ContactSource::numbers; w_bar(node) takes cotangents of inverse masses.
+template <class T, class W>
+void numbers_vjp(const ContactSource<T>& source, const ColliderPoses<Single<T>>& poses, int contact, int item,
+                 const ContactNumbers<Single<T>>& bar, ColliderPoses<Single<T>>& poses_bar,
+                 const StateCotangents<T>& from_bar, const Inputs<T>& in_bar, W&& w_bar) {
   using S = Single<T>;
   const Scene& scene = source.scene;
   const Contact& c = scene.contacts[contact];
   const Collider& collider = scene.colliders[c.collider];
-  const int node = c.particles[item], dof = scene.first_dof[node];
   const auto history = [&](double weight, const std::vector<Pose<S>>& pose, std::vector<Pose<S>>& pose_bar, const T* x,
                            T* x_bar) {
-    source.add(in_frame_vjp(pose[c.collider], source.at(x, node), S(weight) * bar.from, pose_bar[c.collider]),
-               x_bar + dof);
+    const Vec3<S> point_bar =
+        in_frame_vjp(pose[c.collider], source.point(c, item, x), S(weight) * bar.from, pose_bar[c.collider]);
+    point_vjp(source, c, item, point_bar, x, x_bar, in_bar);
   };
   history(source.bdf.now, poses.now, poses_bar.now, source.from.x, from_bar.x);
   if (source.bdf.before != 0.0)
@@ -89,11 +122,11 @@ Single<T> numbers_vjp(const ContactSource<T>& source, const ColliderPoses<Single
   size_vjp(source, collider, bar.size, in_bar);
   if (c.stiffness >= 0) {
     source.add(eta2 * bar.kappa, in_bar.of(Quantity::contact_stiffness)[c.stiffness]);
-    return S(0.0);
+    return;
   }
-  const S w = source.read(source.w[node]);
+  const S w = source.inverse_mass(c, item);
   const double share = source.bdf.eta / source.h;
-  return -(S(rigidity * share * share) * bar.kappa / (w * w));
+  inverse_mass_vjp(source, c, item, -(S(rigidity * share * share) * bar.kappa / (w * w)), w_bar, in_bar);
 }
 
 // Reverse of ContactSource::poses.

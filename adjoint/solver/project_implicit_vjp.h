@@ -64,31 +64,47 @@ void keep_rigid_rows(BlockState<T>& state, const std::vector<T>& y, std::vector<
   }
 }
 
-// The contacts' share along p: to the coordinates of their particles, and gathered for spread_contacts().
+// The contacts' share along p: to the coordinates of the particles that carry their points, and gathered for spread_contacts().
 template <class T>
 void pull_back_contacts(const DirectBlock& block, BlockState<T>& state, const std::vector<T>& p,
                         BlockCotangents<T>& bar) {
   for (int scene = 0; scene < static_cast<int>(state.contacts.size()); ++scene)
     for (int i = 0; i < static_cast<int>(block.contacts.size()); ++i) {
-      const int particle = block.contacts[i].particle;
-      const std::size_t at = sheetbend_blocks::row * static_cast<std::size_t>(particle);
-      const auto read = [&](const T* from) {
+      using S = Single<T>;
+      const BlockContact& contact = block.contacts[i];
+      const BlockContacts<S>& contacts = state.contacts[scene];
+      const auto number = [&](const T& a) {
         if constexpr (std::is_same_v<T, Pack>)
-          return Vec3<double>(from[0][scene], from[1][scene], from[2][scene]);
+          return a[scene];
         else
-          return Vec3<T>(from);
+          return a;
       };
-      Single<T> along;
-      const auto x_bar = bar.contacts[scene].pull_back(block, state.contacts[scene], i, read(&state.x[0][at]),
-                                                       read(&p[3 * particle]), along);
-      Single<T> by[4];
-      x_bar.store(by);
-      if constexpr (std::is_same_v<T, Pack>) {
-        by[3] = along / state.x[0][at + 3][scene];
-        for (int d = 0; d < 4; ++d) bar.x[at + d].set(scene, bar.x[at + d][scene] + by[d]);
-      } else {
-        by[3] = along / state.x[0][at + 3];
-        for (int d = 0; d < 4; ++d) bar.x[at + d] += by[d];
+      const auto read = [&](const T* from) { return Vec3<S>(number(from[0]), number(from[1]), number(from[2])); };
+      const auto row_of = [](int particle) { return sheetbend_blocks::row * static_cast<std::size_t>(particle); };
+      const auto x_of = [&](int particle) { return read(&state.x[0][row_of(particle)]); };
+      const auto p_of = [&](int particle) { return read(&p[3 * static_cast<std::size_t>(particle)]); };
+      Vec3<S> force;
+      const Vec3<S> x_bar = bar.contacts[scene].pull_back(block, contacts, i, contacts.point(block, i, x_of),
+                                                          contacts.point(block, i, p_of), force);
+      for (int k = 0; k < contact.nodes; ++k) {
+        const int particle = contact.particles[k];
+        const std::size_t at = row_of(particle);
+        S by[4], along = dot(force, p_of(particle));
+        Vec3<S> own_bar = x_bar;
+        if (contact.nodes > 1) {
+          const S weight = contacts.weights[i][k];
+          bar.contacts[scene].weights[i][k] += along + dot(x_bar, x_of(particle));
+          along = weight * along, own_bar = weight * x_bar;
+        }
+        own_bar.store(by);
+        by[3] = along / number(state.x[0][at + 3]);
+        for (int d = 0; d < 4; ++d) {
+          T& to = bar.x[at + d];
+          if constexpr (std::is_same_v<T, Pack>)
+            to.set(scene, to[scene] + by[d]);
+          else
+            to += by[d];
+        }
       }
     }
 }

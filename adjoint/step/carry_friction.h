@@ -33,9 +33,9 @@ struct ReverseOf<CarryFriction> {
       }
       const Contact& contact = scene.contacts[c];
       const AnyShape shape = scene.colliders[contact.collider].any();
-      const int dof = scene.first_dof[contact.particles[i]];
       const Vec3<S> carried_bar = source.at(bar.x_next, contact.carried[i]), tangential_bar = rate * carried_bar;
-      const Vec3<S> x = source.read(Vec3<T>(work.q.of(contact.particles[i])));
+      const auto at = [&](int node) { return source.read(Vec3<T>(work.q.of(node))); };
+      const Vec3<S> x = source.point_at(contact, i, at);
       const ContactNumbers<S> numbers = source.numbers(poses, c, i);
       ContactNumbers<S> numbers_bar{};
       const Vec3<S> z = poses.next[contact.collider].in_frame(x);
@@ -44,17 +44,17 @@ struct ReverseOf<CarryFriction> {
         numbers_bar.leaving += dot(normal_at(shape, z, numbers.size), carried_bar);
         z_bar = z_bar + normal_vjp(shape, z, numbers.size, numbers.leaving * carried_bar, numbers_bar.size);
       }
-      source.add(in_frame_vjp(poses.next[contact.collider], x, z_bar, poses_bar.next[contact.collider]),
-                 bar.x_next + dof);
-      source.add(numbers_vjp(source, poses, c, i, numbers_bar, poses_bar, bar.from, bar.in),
-                 bar.w.of(contact.particles[i]));
+      point_vjp(
+          source, contact, i, in_frame_vjp(poses.next[contact.collider], x, z_bar, poses_bar.next[contact.collider]),
+          at, [&](int node) { return bar.x_next + scene.first_dof[node]; }, bar.in);
+      numbers_vjp(source, poses, c, i, numbers_bar, poses_bar, bar.from, bar.in,
+                  [&](int node) -> T& { return bar.w.of(node); });
     });
     if (last) poses_vjp(*last, poses_bar, bar.in);
     // They were written, whatever they were before.
     for (const Contact& contact : scene.contacts)
-      for (std::size_t i = 0; i < contact.particles.size(); ++i)
-        if (scene.role[contact.particles[i]] == Role::free)
-          std::fill_n(bar.x_next + scene.first_dof[contact.carried[i]], 3, T(0.0));
+      for (int i = 0; i < contact.points(); ++i)
+        if (moves(scene, contact, i)) std::fill_n(bar.x_next + scene.first_dof[contact.carried[i]], 3, T(0.0));
   }
 };
 

@@ -111,7 +111,7 @@ void multiply_elements_of_run(const sheetbend_blocks::Run& r, const double* elem
 
 template <class K>
 constexpr sheetbend_blocks::PotentialOfKind potential_of_kind() {
-  if constexpr (holds_points<K>)
+  if constexpr (balances<K>)
     return {&evaluate_potential_of_run<K>, &find_elements_of_run<K>, &multiply_elements_of_run<K>};
   else
     return {};  // plan.cpp refuses it

@@ -100,7 +100,45 @@ struct CarriedOn : OnPoints<Points + 3 * Bodies + Dials> {
     spread(bar, p, x_bar);
   }
 
+  // H += sum_j lambda_j B^T Hess(K_j) B.
+  template <class T>
+  static void add_hessian(const T* x, const T* p, const T* lambda, T* H) {
+    if constexpr (!Law::linear) {
+      using D = Dual<T, width>;
+      D at[width], own[16], C[rows], by[rows * width];
+      T y[width], bend[width * width];
+      sums(x, p, y);
+      for (int d = 0; d < width; ++d) at[d].v = y[d], at[d].d[d] = T(1.0);
+      for (int k = 0; k < Law::parameters; ++k) own[k].v = p[weights + k];
+      Law::evaluate(at, own, C, by);
+      for (int a = 0; a < width; ++a)
+        for (int b = 0; b < width; ++b) {
+          bend[a * width + b] = T(0.0);
+          for (int j = 0; j < rows; ++j) bend[a * width + b] += lambda[j] * by[j * width + a].d[b];
+        }
+      for_each_part(p, [&](int k, int i, const T& weight) {
+        for_each_part(p, [&](int l, int n, const T& other) {
+          if (n > i) return;
+          const T both = weight * other;
+          for (int a = 0; a < 3; ++a)
+            for (int b = 0; b < (n == i ? a + 1 : 3); ++b)
+              H[triangle(3 * i + a) + 3 * n + b] += both * bend[(3 * k + a) * width + 3 * l + b];
+        });
+      });
+    }
+  }
+
  private:
+  // Calls f(vector, node, weight) for every node of every vector.
+  template <class T, class F>
+  static void for_each_part(const T* p, F&& f) {
+    int vector = 0;
+    (..., [&] {
+      Vectors::each([&](int node, int i) { f(vector, node, p[i]); }, [&](int node) { f(vector, node, T(1.0)); });
+      ++vector, p += Vectors::weights;
+    }());
+  }
+
   // Calls f(vector, node, parameter).
   template <class F>
   static void for_each_weight(F&& f) {

@@ -77,9 +77,9 @@ concept HasHessian = requires(const double* in, double* out) { K::add_hessian(in
 template <class K>
 inline constexpr bool Yields = requires { K::yield_parameter; };
 
-// Kinds on points alone that always hold.
+// Kinds that a balance of forces can have (core/solver/implicit_block.h): those that always hold, and have no set.
 template <class K>
-inline constexpr bool holds_points = K::points == K::arity && !K::unilateral;
+inline constexpr bool balances = !K::unilateral && !Yields<K>;
 
 // Numbers of the lower triangle of a symmetric matrix of n rows, row after row.
 constexpr int triangle(int n) { return n * (n + 1) / 2; }

@@ -59,7 +59,7 @@ Kkt::Kkt(const Scene& scene) : scene_(scene), unknown_(scene.dofs(), -1), presse
   std::vector<Eigen::Triplet<double>> entries;
   for (int i = 0; i < free_; ++i) entries.emplace_back(i, i, 1.0);
   for (const Contact& contact : scene.contacts)
-    for (const int n : contact.particles)
+    for (const int n : contact.nodes)
       if (scene.role[n] == Role::free) {
         contact_dof_.push_back(scene.first_dof[n]);
         for (int e = 0; e < 9; ++e)

@@ -32,9 +32,9 @@ class RestingContacts {
     poses.now = poses.next;
     for (int c = 0; c < static_cast<int>(scene.contacts.size()); ++c) {
       const Contact& contact = scene.contacts[c];
-      for (int i = 0; i < static_cast<int>(contact.particles.size()); ++i) {
-        const int node = contact.particles[i];
-        if (scene.role[node] != Role::free) continue;
+      for (int i = 0; i < contact.points(); ++i) {
+        const int node = contact.first_node(i);
+        if (!moves(scene, contact, i)) continue;
         ContactNumbers<T> n = source->numbers(poses, c, i);
         const bool rubs = value_of(n.friction) > 0.0 &&
                           value_of(source->gap(poses.next[contact.collider], c, source->at(held, node))) <= touching;

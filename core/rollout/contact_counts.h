@@ -29,7 +29,7 @@ class CountContacts {
     }
     const bool first = before_.empty();
     for (std::size_t c = 0; c < counts_.size(); ++c) {
-      const std::size_t begin = scene_.contacts[c].first, end = begin + scene_.contacts[c].particles.size();
+      const std::size_t begin = scene_.contacts[c].first, end = begin + scene_.contacts[c].carried.size();
       ContactCounts& count = counts_[c];
       int touching = 0;
       for (std::size_t i = begin; i < end; ++i) {

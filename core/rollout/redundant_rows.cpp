@@ -64,7 +64,8 @@ void find_among_rigid(const SubstepState<double>& substep, const DirectBlock& bl
   state.resize(substep.scene, block, 0);
   begin_block(substep, block, state);
   RigidRows rigid;
-  const RigidRows::Given given{block, state.values, state.C_r};
+  const std::vector<double> unit(block.particles.size(), 1.0);
+  const RigidRows::Given given{block, state.values, state.C_r, unit};
   const double* at = state.x[0].data();
   rigid.find(substep.scene, given, at);
   if (rigid.empty()) return;

@@ -2,6 +2,7 @@
 
 #include "core/contact/pose.h"
 #include "core/contact/shapes.h"
+#include "core/scene/point_of.h"
 
 namespace sheetbend {
 
@@ -15,9 +16,10 @@ std::vector<std::array<double, 4>> contact_gaps(const Scene& scene, const Inputs
   pose.position = at_knots(knots, poses, 2, 0);
   turn_by(at_knots(knots, poses, 2, 1), pose.turn);
   std::vector<std::array<double, 4>> gaps;
-  for (const int node : c.particles) {
+  for (int item = 0; item < c.points(); ++item) {
     double z[3], distance, n[3];
-    pose.in_frame(Vec3<double>(x + scene.first_dof[node])).store(z);
+    const Vec3<double> point = point_of(c, item, in, [&](int node) { return Vec3<double>(x + scene.first_dof[node]); });
+    pose.in_frame(point).store(z);
     distance_from(collider.any(), z, in.of(Quantity::collider_size) + collider.first_size, distance, n);
     const Vec3<double> normal = pose.turned(unit_normal(collider.any(), Vec3<double>(n)));
     gaps.push_back({distance - in.of(Quantity::contact_radius)[contact], normal.x, normal.y, normal.z});

@@ -118,18 +118,36 @@ Volume build_volume(const VolumeSpec& spec, const Scene& scene) {
   return v;
 }
 
+// Of a body: the center and the axes of one, all of them.
+void check_points_of_bodies(const ContactSpec& spec, const Scene& scene) {
+  for (auto p = spec.nodes.begin(); p != spec.nodes.end(); p += spec.arity) {
+    const bool known = std::ranges::any_of(scene.bodies, [&](const Body& b) {
+      return b.center == p[0] && std::equal(b.axes.begin(), b.axes.end(), p + 1);
+    });
+    if (!known || std::any_of(p, p + spec.arity, [&](int n) { return scene.role[n] != scene.role[p[0]]; }))
+      refuse(spec.name + ": the point of node " + std::to_string(p[0]) +
+             " is of no body. Fix: give a body's center and its three axes, which all move or all stand");
+  }
+}
+
 void check_contact(const ContactSpec& spec, const Scene& scene, std::vector<char>& carries) {
-  check_nodes(spec.name, spec.particles, scene.nodes());
+  check_nodes(spec.name, spec.nodes, scene.nodes());
   check_nodes(spec.name + ".carried", spec.carried, scene.nodes());
   if (spec.collider < 0 || spec.collider >= static_cast<int>(scene.colliders.size()))
     refuse(spec.name + ": collider " + std::to_string(spec.collider) + " does not exist. Fix: add it first");
-  if (spec.particles.empty()) refuse(spec.name + ": no particles. Fix: give those that may touch");
-  if (spec.carried.size() != spec.particles.size())
-    refuse(spec.name + ".carried: " + std::to_string(spec.carried.size()) + " nodes. Fix: give one for each particle");
-  slots(spec.particles, scene.nodes(), spec.name);
-  for (const int n : spec.particles)
-    if (!scene.is_place[n])
-      refuse(spec.name + ": node " + std::to_string(n) + " is " + a_direction(scene, n) + ". Fix: use particles");
+  if (spec.nodes.empty()) refuse(spec.name + ": no particles. Fix: give those that may touch");
+  if (spec.arity != 1 && spec.arity != most_point_nodes)
+    refuse(spec.name + ".arity: " + std::to_string(spec.arity) + ". Fix: give 1 for particles, 4 for points of bodies");
+  if (spec.nodes.size() != spec.carried.size() * spec.arity)
+    refuse(spec.name + ".carried: " + std::to_string(spec.carried.size()) + " nodes. Fix: give one for each point");
+  if (spec.arity > 1) {
+    check_points_of_bodies(spec, scene);
+  } else {
+    slots(spec.nodes, scene.nodes(), spec.name);
+    for (const int n : spec.nodes)
+      if (!scene.is_place[n])
+        refuse(spec.name + ": node " + std::to_string(n) + " is " + a_direction(scene, n) + ". Fix: use particles");
+  }
   for (const int n : spec.carried) {
     if (carries[n] || scene.role[n] != Role::pinned)
       refuse(spec.name + ".carried: node " + std::to_string(n) + ". Fix: give each particle a pinned node of its own");
@@ -149,7 +167,8 @@ void add_bouncers(Scene& s) {
   for (std::size_t c = 0; c < s.contacts.size(); ++c) {
     Contact& contact = s.contacts[c];
     if (contact.restitution < 0) continue;
-    for (const int n : contact.particles) {
+    for (int item = 0; item < contact.points(); ++item) {
+      const int n = contact.first_node(item);
       contact.held.push_back(held[n]);
       if (s.role[n] != Role::free) continue;
       if (!held[n])
@@ -214,8 +233,8 @@ void check_grid(const ColliderSpec& c) {
 }
 
 // Colliders and contacts; returns how many numbers there are of each of their quantities.
-std::array<std::size_t, 6> add_contacts(const SceneSpec& spec, Scene& s) {
-  std::size_t poses = 0, sizes = 0, soft = 0, bouncing = 0;
+std::array<std::size_t, 7> add_contacts(const SceneSpec& spec, Scene& s) {
+  std::size_t poses = 0, sizes = 0, soft = 0, bouncing = 0, weights = 0;
   for (const ColliderSpec& c : spec.colliders) {
     check_knots(c.name + ".times", c.motion, true);
     check_grid(c);
@@ -226,12 +245,13 @@ std::array<std::size_t, 6> add_contacts(const SceneSpec& spec, Scene& s) {
   std::vector<char> carries(s.nodes(), false);
   for (const ContactSpec& c : spec.contacts) {
     check_contact(c, s, carries);
-    s.contacts.push_back({c.name, c.collider, c.particles, c.carried, c.rigid ? -1 : static_cast<int>(soft++),
-                          c.bounces ? static_cast<int>(bouncing++) : -1, particles_in_contact(s)});
+    s.contacts.push_back({c.name, c.collider, c.arity, c.nodes, c.carried, c.rigid ? -1 : static_cast<int>(soft++),
+                          c.bounces ? static_cast<int>(bouncing++) : -1, points_in_contact(s), weights});
+    if (c.arity > 1) weights += c.nodes.size();
   }
   add_bouncers(s);
   add_self_contact(spec, s);
-  return {s.contacts.size(), s.contacts.size() + spec.self_contact.pieces.size(), soft, poses, sizes, bouncing};
+  return {s.contacts.size(), s.contacts.size() + spec.self_contact.pieces.size(), soft, poses, sizes, bouncing, weights};
 }
 
 void add_loads(const SceneSpec& spec, Scene& s) {
@@ -371,7 +391,7 @@ Scene build_scene(const SceneSpec& spec) {
 
   for (const VolumeSpec& v : spec.volumes) s.volumes.push_back(build_volume(v, s));
 
-  const auto [frictions, radii, stiffnesses, poses, sizes, restitutions] = add_contacts(spec, s);
+  const auto [frictions, radii, stiffnesses, poses, sizes, restitutions, weights] = add_contacts(spec, s);
 
   const std::size_t dofs = s.dofs(), nodes = s.nodes(), m = s.constraints;
   s.layout.size = {dofs,
@@ -397,7 +417,8 @@ Scene build_scene(const SceneSpec& spec) {
                    poses,
                    sizes,
                    restitutions,
-                   s.load.times.size() * s.loads.size()};
+                   s.load.times.size() * s.loads.size(),
+                   weights};
   s.layout.close();
   return s;
 }

@@ -56,6 +56,9 @@ struct Volume {
   std::vector<std::array<int, 3>> triangles;  // places in `nodes`, counterclockwise from outside
 };
 
+// The most nodes that a point of a contact is a sum of.
+inline constexpr int most_point_nodes = 4;
+
 // A closed shape that stands, or moves as its poses say.
 struct Collider {
   std::string name;
@@ -67,18 +70,27 @@ struct Collider {
   AnyShape any() const { return {shape, grid.get()}; }
 };
 
-// Particles that may touch a collider. The tangential force that a particle is held by is carried from substep to substep [N], in the collider's
-// frame: it stands in the state as a pinned node that the substep moves (core/step/carry_friction.h).
+// Points that may touch a collider: particles, or points of bodies. A point is a weighted sum of nodes; a particle is one node with the weight 1, whose
+// numbers stand nowhere, and a body's point X its center and axes with 1, X1, X2, X3. The tangential force that a point is held by is carried from substep to
+// substep [N], in the collider's frame: it stands in the state as a pinned node that the substep moves (core/step/carry_friction.h).
 struct Contact {
   std::string name;
   int collider;
-  std::vector<int> particles;
-  std::vector<int> carried;  // per particle: that node
-  int stiffness;             // place in Quantity::contact_stiffness, -1 where it is rigid
-  int restitution;           // place in Quantity::restitution, -1 where nothing bounces
-  std::size_t first = 0;     // of its particles, in arrays of all contacts' particles
-  std::vector<char> held{};  // per particle where something bounces: whether constraints hold it
+  int arity;                     // nodes of a point; they all move, or none does
+  std::vector<int> nodes;        // (points, arity)
+  std::vector<int> carried;      // per point: that node
+  int stiffness;                 // place in Quantity::contact_stiffness, -1 where it is rigid
+  int restitution;               // place in Quantity::restitution, -1 where nothing bounces
+  std::size_t first = 0;         // of its points, in arrays of all contacts' points
+  std::size_t first_weight = 0;  // in Quantity::contact_weight, where a point has several nodes: (points, arity)
+  std::vector<char> held{};      // per point where something bounces: whether constraints hold it
 
+  int points() const { return static_cast<int>(carried.size()); }
+  // Of a point; the first one is a place: a particle, or the center of a body.
+  std::span<const int> nodes_of(int item) const {
+    return {nodes.data() + static_cast<std::size_t>(arity) * item, static_cast<std::size_t>(arity)};
+  }
+  int first_node(int item) const { return nodes[static_cast<std::size_t>(arity) * item]; }
   bool rebounds(int item) const { return !held.empty() && held[item]; }
 };
 
@@ -155,9 +167,10 @@ struct ColliderSpec {
 struct ContactSpec {
   std::string name;
   int collider;
-  std::vector<int> particles, carried;  // as in Contact; those that carry are pinned
+  std::vector<int> nodes, carried;  // as in Contact; those that carry are pinned
   bool rigid = true;
   bool bounces = false;  // has a restitution
+  int arity = 1;
 };
 
 // Each piece has a radius of its own; pieces share no particle.
@@ -192,9 +205,14 @@ inline std::size_t damped_rows(const Scene& scene) {
   return 0;
 }
 
-// Particles of all contacts, each as often as it stands in one.
-inline std::size_t particles_in_contact(const Scene& scene) {
-  return scene.contacts.empty() ? 0 : scene.contacts.back().first + scene.contacts.back().particles.size();
+// Points of all contacts, each as often as it stands in one.
+inline std::size_t points_in_contact(const Scene& scene) {
+  return scene.contacts.empty() ? 0 : scene.contacts.back().first + scene.contacts.back().carried.size();
+}
+
+// Whether a point of a contact does.
+inline bool moves(const Scene& scene, const Contact& contact, int item) {
+  return scene.role[contact.first_node(item)] == Role::free;
 }
 
 // Builds and validates the topology. Throws std::invalid_argument("field: what, got, fix").

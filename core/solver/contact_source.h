@@ -1,4 +1,4 @@
-// Where the numbers of contacts come from: the poses of colliders around a substep, and what the law reads of a particle and a collider. Contacts
+// Where the numbers of contacts come from: the poses of colliders around a substep, and what the law reads of a point and a collider. Contacts
 // of a pack's scenes are looked at one after the other.
 #pragma once
 
@@ -9,6 +9,7 @@
 #include "core/contact/rebound.h"
 #include "core/contact/touch.h"
 #include "core/scalar/pack.h"
+#include "core/scene/point_of.h"
 #include "core/scene/scene.h"
 #include "core/solver/options.h"
 #include "core/solver/states.h"
@@ -58,6 +59,27 @@ struct ContactSource {
   }
   void add(const Vec3<S>& v, T* to) const { add(v.x, to[0]), add(v.y, to[1]), add(v.z, to[2]); }
 
+  // A point of a contact, of coordinates or of velocities; at(node) are its nodes'.
+  template <class At>
+  Vec3<S> point_at(const Contact& c, int item, At&& at_node) const {
+    return point_of(c, item, in, at_node, [&](const T& a) { return read(a); });
+  }
+  Vec3<S> point(const Contact& c, int item, const T* state) const {
+    return point_at(c, item, [&](int node) { return at(state, node); });
+  }
+  S weight(const Contact& c, int item, int k) const { return c.arity == 1 ? S(1.0) : read(weight_in(in, c, item, k)); }
+  // The inverse mass of a point: sum b^2 w.
+  S inverse_mass(const Contact& c, int item) const {
+    const auto nodes = c.nodes_of(item);
+    if (c.arity == 1) return read(w[nodes[0]]);
+    S sum(0.0);
+    for (int k = 0; k < c.arity; ++k) {
+      const S b = weight(c, item, k);
+      sum += b * b * read(w[nodes[k]]);
+    }
+    return sum;
+  }
+
   // The rotation vector (slot 1) or the position (slot 0) of a collider.
   Vec3<S> pose_part(const Collider& c, double t, int slot) const {
     return read(at_knots(c.motion.at(t), in.of(Quantity::collider_pose) + c.first_pose, 2, slot));
@@ -82,11 +104,10 @@ struct ContactSource {
   ContactNumbers<S> numbers(const ColliderPoses<S>& poses, int contact, int item) const {
     const Contact& c = scene.contacts[contact];
     const Collider& collider = scene.colliders[c.collider];
-    const int node = c.particles[item];
     ContactNumbers<S> numbers{};
-    numbers.from = S(bdf.now) * poses.now[c.collider].in_frame(at(from.x, node));
+    numbers.from = S(bdf.now) * poses.now[c.collider].in_frame(point(c, item, from.x));
     if (bdf.before != 0.0)
-      numbers.from = numbers.from + S(bdf.before) * poses.before[c.collider].in_frame(at(from.x_before, node));
+      numbers.from = numbers.from + S(bdf.before) * poses.before[c.collider].in_frame(point(c, item, from.x_before));
     const double share = bdf.eta / h;
     const S eta2(bdf.eta * bdf.eta);
     numbers.carried = eta2 * at(from.x, c.carried[item]);
@@ -97,7 +118,7 @@ struct ContactSource {
     }
     numbers.friction = read(in.of(Quantity::friction)[contact]);
     numbers.radius = read(in.of(Quantity::contact_radius)[contact]);
-    numbers.kappa = c.stiffness < 0 ? S(rigidity * share * share) / read(w[node])
+    numbers.kappa = c.stiffness < 0 ? S(rigidity * share * share) / inverse_mass(c, item)
                                     : eta2 * read(in.of(Quantity::contact_stiffness)[c.stiffness]);
     read_size(collider, numbers.size);
     return numbers;
@@ -117,15 +138,14 @@ struct ContactSource {
     return s;
   }
 
-  // Of a particle that constraints hold, at a contact with restitution.
+  // Of a point that constraints hold, at a contact with restitution. Its mass only carries a speed on; that of its first node does.
   Falling<S> falling(const ColliderPoses<S>& poses, int contact, int item) const {
     const Contact& c = scene.contacts[contact];
-    const int node = c.particles[item];
-    return {at(from.x, node),
-            at(from.v, node),
+    return {point(c, item, from.x),
+            point(c, item, from.v),
             read(Vec3<T>(in.of(Quantity::gravity))),
             at(from.x, c.carried[item]),
-            read(in.of(Quantity::mass)[node]),
+            read(in.of(Quantity::mass)[c.first_node(item)]),
             surface(poses, contact)};
   }
   Rebound<S> rebound(const ColliderPoses<S>& poses, int contact, int item) const {
@@ -133,7 +153,7 @@ struct ContactSource {
                               falling(poses, contact, item));
   }
 
-  // The gap of a particle at x from a contact's surface, with its collider at a pose.
+  // The gap of a point at x from a contact's surface, with its collider at a pose.
   S gap(const Pose<S>& pose, int contact, const Vec3<S>& x) const {
     const Collider& collider = scene.colliders[scene.contacts[contact].collider];
     S size[most_sizes], at[3], n[3], distance;

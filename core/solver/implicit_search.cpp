@@ -23,9 +23,9 @@ constexpr double well_down = 0.9;  // of the merit: less than this is gained whe
 bool hold_turning(const DirectBlock& block, IncrementalPotential& potential, const double* from, const double* to) {
   bool any = false;
   for (int i = 0; i < static_cast<int>(block.contacts.size()); ++i) {
-    const int at = row * block.contacts[i].particle;
-    const Touch<double> before = potential.contacts.at(block, i, Vec3<double>(from + at)),
-                        after = potential.contacts.at(block, i, Vec3<double>(to + at));
+    const BlockContacts<double>& contacts = potential.contacts;
+    const Touch<double> before = contacts.at(block, i, contacts.point(block, i, from)),
+                        after = contacts.at(block, i, contacts.point(block, i, to));
     if (!before.slides || !after.slides || !(dot(before.tangential, after.tangential) < 0.0)) continue;
     potential.contacts.numbers[i].friction = no_slip;
     any = true;

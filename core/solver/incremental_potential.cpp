@@ -14,6 +14,7 @@ constexpr double nothing = 1e-8;  // a displacement, of the coordinates
 
 void IncrementalPotential::resize(const Scene& scene, const DirectBlock& block) {
   for (auto* a : {&target, &push_, &magnitude_, &stiffness_}) a->assign(row * block.particles.size());
+  unit.assign(block.particles.size(), 1.0);
   C_r.assign(block.size());
   R_.assign(3 * block.movable, 0.0);
   contacts.resize(block);
@@ -33,8 +34,8 @@ void IncrementalPotential::resize(const Scene& scene, const DirectBlock& block) 
 
 std::size_t IncrementalPotential::bytes(const Scene& scene, const DirectBlock& block) {
   std::size_t bytes = Numbers<double>::bytes(block.size()) + 4 * Numbers<double>::bytes(row * block.particles.size()) +
-                      sizeof(double) * 3 * block.movable + BlockContacts<double>::bytes(scene, block) +
-                      BlockPairs::bytes(block);
+                      sizeof(double) * (3 * block.movable + block.particles.size()) +
+                      BlockContacts<double>::bytes(scene, block) + BlockPairs::bytes(block);
   for (const MemberRun& run : block.runs) {
     const Group& group = scene.groups[run.group];
     bytes += sizeof(sheetbend_blocks::Run) + sizeof(Numbers<double>) +
@@ -60,18 +61,22 @@ sheetbend_blocks::Potential IncrementalPotential::arrays(const DirectBlock& bloc
 double IncrementalPotential::add_contacts(const DirectBlock& block, const double* x) {
   double energy = 0.0;
   for (int i = 0; i < static_cast<int>(block.contacts.size()); ++i) {
-    const int at = row * block.contacts[i].particle;
-    const Touch<double> touch = contacts.at(block, i, Vec3<double>(x + at));
+    const Touch<double> touch = contacts.at(block, i, contacts.point(block, i, x));
     if (!touch.pushes) continue;
     const double kappa = contacts.numbers[i].kappa;
     energy += 0.5 * touch.normal * touch.normal / (contacts.numbers[i].firm * kappa);
     rubs_ |= touch.rubs;
     double force[3];
     contacts.pose(block, i).turned(touch.force).store(force);
-    for (int d = 0; d < 3; ++d) {
-      push_[at + d] += force[d];
-      magnitude_[at + d] += std::abs(force[d]);
-      stiffness_[at + d] += kappa;
+    const BlockContact& c = block.contacts[i];
+    for (int k = 0; k < c.nodes; ++k) {
+      const int at = row * c.particles[k];
+      const double weight = contacts.weights[i][k];
+      for (int d = 0; d < 3; ++d) {
+        push_[at + d] += weight * force[d];
+        magnitude_[at + d] += std::abs(weight * force[d]);
+        stiffness_[at + d] += weight * weight * kappa;
+      }
     }
   }
   return energy;
@@ -111,17 +116,17 @@ double IncrementalPotential::evaluate(const DirectBlock& block, Numbers<double>&
   const double *push = push_.data(), *magnitude = magnitude_.data(), *stiffness = stiffness_.data();
   largest_ = force_ = merit_ = 0.0;
   for (int p = 0; p < block.movable; ++p) {
-    const double mass = 1.0 / x[row * p + 3];
-    lightest = std::min(lightest, mass);
+    const double mass = 1.0 / x[row * p + 3], length = unit[p], per_length = 1.0 / length;
+    lightest = std::min(lightest, mass * per_length * per_length);
     for (int i = row * p, d = 3 * p; d < 3 * p + 3; ++i, ++d) {
       const double away = x[i] - predicted[i];
       R_[d] = mass * away - push[i];
       inertial += mass * away * away;
       merit_ += R_[d] * R_[d] * x[row * p + 3];
-      largest_ = std::max(largest_, std::abs(R_[d]));
-      force_ = std::max(force_, mass * std::abs(away) + magnitude[i]);
-      stiffest = std::max(stiffest, mass + stiffness[i]);
-      farthest = std::max(farthest, std::abs(x[i]));
+      largest_ = std::max(largest_, per_length * std::abs(R_[d]));
+      force_ = std::max(force_, per_length * (mass * std::abs(away) + magnitude[i]));
+      stiffest = std::max(stiffest, per_length * per_length * (mass + stiffness[i]));
+      farthest = std::max(farthest, length * std::abs(x[i]));
     }
   }
   for (const auto& contact : contacts.numbers)  // but rigid rows need not be as firm
@@ -142,9 +147,11 @@ void IncrementalPotential::add_rigid_residuals() {
 }
 
 int IncrementalPotential::worst_node(const DirectBlock& block) const {
-  const auto worst =
-      std::max_element(R_.begin(), R_.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
-  return block.particles[(worst - R_.begin()) / 3];
+  int worst = 0;
+  double most = 0.0;
+  for (int d = 0; d < 3 * block.movable; ++d)
+    if (const double own = std::abs(R_[d]) / unit[d / 3]; own > most) most = own, worst = d / 3;
+  return block.particles[worst];
 }
 
 }  // namespace sheetbend

@@ -30,6 +30,9 @@ class IncrementalPotential {
   BlockPairs pairs;
   RigidRows rigid;
   double eta = 0.0;  // of `values`; 0 where they are not filled yet
+  // Per particle, fixed ones included: the length that a coordinate of one is [m]: 1 but of axes of bodies, whose coordinates have no unit. What forces
+  // are judged by is of lengths.
+  std::vector<double> unit;
 
   void resize(const Scene& scene, const DirectBlock& block);
   static std::size_t bytes(const Scene& scene, const DirectBlock& block);
@@ -51,7 +54,7 @@ class IncrementalPotential {
   // The constraints' runs at `at`, as the kernels take them.
   sheetbend_blocks::Potential arrays(const DirectBlock& block, Numbers<double>& at);
 
-  RigidRows::Given given(const DirectBlock& block) { return {block, values, C_r}; }
+  RigidRows::Given given(const DirectBlock& block) { return {block, values, C_r, unit}; }
   // Adds the rigid rows' matrices to those of all members; `at` is where evaluate() looked last.
   void add_rigid_elements(const DirectBlock& block, Numbers<double>& at, std::vector<Numbers<double>>& elements) {
     if (!rigid.empty()) rigid.add_elements(given(block), at.data(), stiffness_.data(), elements);

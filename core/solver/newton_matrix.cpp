@@ -14,7 +14,7 @@ constexpr int row = sheetbend_blocks::row, lanes = sheetbend_blocks::lanes;
 constexpr double convexities[] = {1.0 / 64.0, 1.0 / 8.0, 1.0};
 
 constexpr int most_dofs = []<class... K>(std::tuple<K...>*) {
-  return std::max({(holds_points<K> ? K::dofs : 0)...});
+  return std::max({(balances<K> ? K::dofs : 0)...});
 }(static_cast<Registry*>(nullptr));
 
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, most_dofs, most_dofs>;
@@ -57,6 +57,7 @@ void NewtonMatrix::resize(const Scene& scene, const DirectBlock& block) {
   paired_.reset();
   factor_.reset(pattern_of(block).structure);
   contacts_.assign(9 * block.contacts.size(), 0.0);
+  weights_.resize(block.contacts.size());
   if (const auto& unsymmetric = pattern_of(block).unsymmetric) lu_.resize(*unsymmetric);
 }
 
@@ -64,7 +65,7 @@ std::size_t NewtonMatrix::bytes(const Scene& scene, const DirectBlock& block) {
   const CondensedPattern& pattern = std::get<CondensedPattern>(*block.condensation);
   const FactorStructure& structure = pattern.structure;
   std::size_t bytes = sizeof(double) * (block.movable + structure.size()) + Factor<double>::bytes(structure);
-  bytes += sizeof(double) * 9 * block.contacts.size();
+  bytes += sizeof(double) * (9 + most_point_nodes) * block.contacts.size();
   if (const auto& unsymmetric = pattern.unsymmetric) bytes += UnsymmetricFactor::bytes(*unsymmetric);
   for (const MemberRun& run : block.runs)
     bytes += 2 * (sizeof(Numbers<double>) + Numbers<double>::bytes(numbers_of(scene, run))) + sizeof(double*);
@@ -86,9 +87,10 @@ void NewtonMatrix::find(const Scene& scene, const DirectBlock& block, Incrementa
 void NewtonMatrix::find_contacts(const DirectBlock& block, const BlockContacts<double>& contacts, const double* x,
                                  bool curved) {
   symmetric_ = true;
+  weights_ = contacts.weights;
   for (int i = 0; i < static_cast<int>(block.contacts.size()); ++i) {
     const Pose<double>& pose = contacts.pose(block, i);
-    const Vec3<double> z = pose.in_frame(Vec3<double>(x + row * block.contacts[i].particle));
+    const Vec3<double> z = pose.in_frame(contacts.point(block, i, x));
     double A[9], AR[9], *M = &contacts_[9 * i];
     std::fill_n(M, 9, 0.0);
     if (!touch_matrix(block.contacts[i].shape, z, contacts.numbers[i], curved, A).pushes) continue;
@@ -180,12 +182,13 @@ bool NewtonMatrix::factorize(const Scene& scene, const DirectBlock& block, doubl
   const CondensedPattern& pattern = pattern_of(block);
   assemble(scene, block, convexity);
   as_lu_ = false;
-  for (std::size_t i = 0; i < block.contacts.size(); ++i) {
-    const int dof = pattern.dof_of[block.contacts[i].particle];
+  for_each_contact(block, [&](int p, int q, double weight, const double* M) {
+    const int row_dof = pattern.dof_of[p], column_dof = pattern.dof_of[q];
     for (int a = 0; a < 3; ++a)
-      for (int b = 0; b <= a; ++b)
-        factor_.values[pattern.structure.position(dof + a, dof + b)] += contacts_[9 * i + 3 * a + b];
-  }
+      for (int b = 0; b < 3; ++b)
+        if (column_dof + b <= row_dof + a)
+          factor_.values[pattern.structure.position(row_dof + a, column_dof + b)] += weight * M[3 * a + b];
+  });
   factor_.factorize(pattern.structure, pack_kernels().blocks->one.forward.factor_supernodes);
   // A pivot that is not positive has zero for its inverse.
   return std::all_of(factor_.inverse.begin(), factor_.inverse.end(), [](double p) { return p > 0.0; });
@@ -197,8 +200,9 @@ bool NewtonMatrix::factorize_unsymmetric(const Scene& scene, const DirectBlock& 
   as_lu_ = true;
   lu_.resize(*pattern.unsymmetric);
   lu_.load(*pattern.unsymmetric, factor_.values.data());
-  for (std::size_t i = 0; i < block.contacts.size(); ++i)
-    lu_.add(pattern.dof_of[block.contacts[i].particle] / 3, &contacts_[9 * i]);
+  for_each_contact(block, [&](int p, int q, double weight, const double* M) {
+    lu_.add(*pattern.unsymmetric, pattern.dof_of[p] / 3, pattern.dof_of[q] / 3, weight, M);
+  });
   return lu_.factorize(*pattern.unsymmetric);
 }
 
@@ -214,11 +218,10 @@ void NewtonMatrix::multiply(const DirectBlock& block, Numbers<double>& z, Number
   for (int p = 0; p < block.movable; ++p)
     for (int d = row * p; d < row * p + 3; ++d) Kz[d] = masses_[p] * z[d];
   pack_kernels().potential->multiply(arrays_, z.numbers(), Kz.numbers());
-  for (std::size_t i = 0; i < block.contacts.size(); ++i) {
-    const int at = row * block.contacts[i].particle;
+  for_each_contact(block, [&](int p, int q, double weight, const double* M) {
     for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b) Kz[at + a] += contacts_[9 * i + 3 * a + b] * z[at + b];
-  }
+      for (int b = 0; b < 3; ++b) Kz[row * p + a] += weight * M[3 * a + b] * z[row * q + b];
+  });
   for (const TouchingPair& pair : pairs_)
     for (int a = 0; a < 12; ++a)
       for (int b = 0; b < 12; ++b)

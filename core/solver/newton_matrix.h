@@ -3,8 +3,9 @@
 //   K = W^-1 + J^T D^-1 J - sum lambda Hess(C)         D = a/(1+g)
 //
 // as the sum of masses and one symmetric matrix per constraint, and its factors. Where K is not positive definite, a part of the way to the matrix in
-// which no constraint's share has negative eigenvalues (Teran et al. 2005; on demand: Longva et al. 2023) is. Contacts add a 3 x 3 matrix to their
-// particle, and pairs that touch one of 12 x 12. Those that slide are not symmetric, and K is factored as LU then. Rows that do not give way add what rigid_rows.h says: K is softened there.
+// which no constraint's share has negative eigenvalues (Teran et al. 2005; on demand: Longva et al. 2023) is. Contacts add a 3 x 3 matrix M to the
+// particle that touches, or b_i b_k M to the pairs of particles that carry the point, and pairs that touch add one of 12 x 12. Contacts that slide are
+// not symmetric, and K is factored as LU then. Rows that do not give way add what rigid_rows.h says: K is softened there.
 #pragma once
 
 #include <optional>
@@ -76,6 +77,17 @@ class NewtonMatrix {
     for (std::size_t p = 0; p < pattern.dof_of.size(); ++p) std::copy_n(&room[pattern.dof_of[p]], 3, z + 3 * p);
   }
   void find_convex(const Scene& scene, const DirectBlock& block);
+  // f(particle, particle, weight, matrix) over the pairs of particles that contacts add to.
+  template <class F>
+  void for_each_contact(const DirectBlock& block, F&& f) const {
+    for (std::size_t i = 0; i < block.contacts.size(); ++i) {
+      const BlockContact& c = block.contacts[i];
+      const auto& b = weights_[i];
+      for (int k = 0; k < c.nodes; ++k)
+        for (int l = 0; l < c.nodes; ++l)
+          f(c.particles[k], c.particles[l], c.nodes == 1 ? 1.0 : b[k] * b[l], &contacts_[9 * i]);
+    }
+  }
   void find_contacts(const DirectBlock& block, const BlockContacts<double>& contacts, const double* x, bool curved);
   void find_pairs(const Scene& scene, const DirectBlock& block, const BlockPairs& pairs, const double* x);
   void add_pairs(const DirectBlock& block, double convexity);
@@ -85,7 +97,8 @@ class NewtonMatrix {
   std::vector<double> masses_;                      // per movable particle
   std::vector<Numbers<double>> elements_, convex_;  // per run: (packs, triangle(dofs), 8)
   std::vector<double*> element_numbers_;
-  std::vector<double> contacts_;  // per contact: its matrix (3, 3)
+  std::vector<double> contacts_;                               // per contact: its matrix (3, 3)
+  std::vector<std::array<double, most_point_nodes>> weights_;  // likewise, of its particles
   // Of pairs that touch: their matrices, and the pattern with all pairs that may touch in the substep, kept while they recur.
   struct TouchingPair {
     std::array<int, 4> particles;

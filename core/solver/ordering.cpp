@@ -20,11 +20,14 @@ bool movable(const Scene& scene, int node) { return scene.role[node] == Role::fr
 
 std::vector<std::vector<int>> movable_neighbors(const Scene& scene) {
   std::vector<std::vector<int>> neighbors(scene.nodes());
-  for_each_constraint(scene, [&](int, int, std::span<const int> nodes) {
+  const auto join = [&](std::span<const int> nodes) {
     for (const int a : nodes)
       for (const int b : nodes)
         if (a != b && movable(scene, a) && movable(scene, b)) neighbors[a].push_back(b);
-  });
+  };
+  for_each_constraint(scene, [&](int, int, std::span<const int> nodes) { join(nodes); });
+  for (const Contact& contact : scene.contacts)  // a point needs all its nodes in one block
+    for (int i = 0; contact.arity > 1 && i < contact.points(); ++i) join(contact.nodes_of(i));
   for (auto& list : neighbors) {
     std::sort(list.begin(), list.end());
     list.erase(std::unique(list.begin(), list.end()), list.end());

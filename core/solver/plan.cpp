@@ -10,6 +10,7 @@
 
 #include "core/solver/ordering.h"
 #include "core/solver/paired_pattern.h"
+#include "core/solver/plan_checks.h"
 
 namespace sheetbend {
 namespace {
@@ -150,17 +151,20 @@ CondensedShares shares_of(const Scene& scene, const DirectBlock& block, const st
   return shares;
 }
 
-// The contacts of the block's movable particles.
+// The contacts of points that the block's movable particles carry.
 std::vector<BlockContact> contacts_of(const Scene& scene, const std::map<int, int>& particle_of) {
   std::vector<BlockContact> contacts;
   for (int c = 0; c < static_cast<int>(scene.contacts.size()); ++c) {
     const Contact& contact = scene.contacts[c];
-    for (int i = 0; i < static_cast<int>(contact.particles.size()); ++i)
-      if (const auto at = particle_of.find(contact.particles[i]); at != particle_of.end())
-        contacts.push_back({c, i, contact.collider, scene.colliders[contact.collider].any(), at->second});
+    for (int i = 0; i < contact.points(); ++i) {
+      if (!particle_of.contains(contact.first_node(i))) continue;
+      BlockContact own{c, i, contact.collider, scene.colliders[contact.collider].any(), contact.arity, {}};
+      for (int k = 0; k < contact.arity; ++k) own.particles[k] = particle_of.at(contact.nodes_of(i)[k]);
+      contacts.push_back(own);
+    }
   }
   std::stable_sort(contacts.begin(), contacts.end(),
-                   [](const BlockContact& a, const BlockContact& b) { return a.particle < b.particle; });
+                   [](const BlockContact& a, const BlockContact& b) { return a.particles[0] < b.particles[0]; });
   return contacts;
 }
 
@@ -206,6 +210,21 @@ void join_what_touches(const Scene& scene, std::vector<std::vector<Member>>& cha
   std::erase_if(chains, [](const auto& chain) { return chain.empty(); });
 }
 
+// The nodes of points of contacts that no constraint of these holds, and that belong to their block: a free body's center, which its axes' constraint leaves out.
+std::vector<int> loose_beside(const Scene& scene, const std::vector<Member>& members) {
+  std::set<int> held, loose;
+  for (const Member& m : members)
+    for (const int n : scene.groups[m.group].nodes(m.item)) held.insert(n);
+  for (const Contact& contact : scene.contacts)
+    for (int i = 0; contact.arity > 1 && i < contact.points(); ++i) {
+      const auto nodes = contact.nodes_of(i);
+      if (moves(scene, contact, i) && std::ranges::any_of(nodes, [&](int n) { return held.contains(n); }))
+        for (const int n : nodes)
+          if (!held.contains(n)) loose.insert(n);
+    }
+  return {loose.begin(), loose.end()};
+}
+
 // The movable particles of contacts that are in none of these blocks.
 std::vector<int> loose_in_contact(const Scene& scene, const std::vector<DirectBlock>& blocks) {
   std::vector<char> known(scene.nodes(), false);
@@ -213,7 +232,7 @@ std::vector<int> loose_in_contact(const Scene& scene, const std::vector<DirectBl
     for (int p = 0; p < block.movable; ++p) known[block.particles[p]] = true;
   std::vector<int> loose;
   for (const Contact& contact : scene.contacts)
-    for (const int node : contact.particles)
+    for (const int node : contact.nodes)
       if (scene.role[node] == Role::free && !std::exchange(known[node], true)) loose.push_back(node);
   return loose;
 }
@@ -227,6 +246,8 @@ CondensedPattern factored(const Scene& scene, const DirectBlock& block, const st
     for (const int node : scene.groups[m.group].nodes(m.item))
       if (scene.role[node] == Role::free) joined.back().push_back(particle_of.at(node));
   }
+  for (const BlockContact& contact : block.contacts)
+    if (contact.nodes > 1) joined.emplace_back(contact.particles.begin(), contact.particles.begin() + contact.nodes);
   for (const int place : places_for_low_fill(block.movable, joined)) c.dof_of.push_back(3 * place);
   c.dof_of.shrink_to_fit();
   if (!block.surface.empty()) c.joined = joined;
@@ -238,13 +259,21 @@ CondensedPattern factored(const Scene& scene, const DirectBlock& block, const st
       for (int b = 0; b < 3; ++b)
         if (dofs[k] + b <= dofs[i] + a) entries.emplace_back(dofs[i] + a, dofs[k] + b);
   });
+  std::vector<std::pair<int, int>> touching;  // dofs of the particles that carry a point together
   for (const BlockContact& contact : block.contacts)
+    for (int i = 0; i < contact.nodes; ++i)
+      for (int k = 0; k < contact.nodes; ++k)
+        if (const int row = c.dof_of[contact.particles[i]], column = c.dof_of[contact.particles[k]]; column <= row)
+          touching.emplace_back(row, column);
+  for (const auto& [row, column] : touching)
     for (int a = 0; a < 3; ++a)
-      for (int b = 0; b <= a; ++b) entries.emplace_back(c.dof_of[contact.particle] + a, c.dof_of[contact.particle] + b);
+      for (int b = 0; b < 3; ++b)
+        if (column + b <= row + a) entries.emplace_back(row + a, column + b);
   c.structure = FactorStructure(3 * block.movable, entries, false);
   if (!block.contacts.empty()) {
     std::vector<std::pair<int, int>> pairs;
     c.shares.for_each_pair([&](const auto&, int i, int k) { pairs.emplace_back(dofs[i] / 3, dofs[k] / 3); });
+    for (const auto& [row, column] : touching) pairs.emplace_back(row / 3, column / 3);
     c.unsymmetric.emplace(block.movable, std::move(pairs), c.structure);
   }
   if (block.implicit) {
@@ -316,87 +345,10 @@ DirectBlock make_block(const Scene& scene, std::vector<Member> members, const So
   return block;
 }
 
-void check(const SolverOptions& o) {
-  if (!(o.h > 0.0) || !std::isfinite(o.h))
-    throw std::invalid_argument("h: the substep is " + std::to_string(o.h) + " s. Fix: give a positive time");
-  if (o.iterations < 1)
-    throw std::invalid_argument("iterations: got " + std::to_string(o.iterations) + ". Fix: give at least 1");
-  if (!(o.cg_tolerance > 0.0 && o.cg_tolerance < 1.0))
-    throw std::invalid_argument("cg_tolerance: got " + std::to_string(o.cg_tolerance) +
-                                ". Fix: give a relative residual between 0 and 1");
-  if (o.cg_iterations < 1)
-    throw std::invalid_argument("cg_iterations: got " + std::to_string(o.cg_iterations) + ". Fix: give at least 1");
-  if (!(o.force_tolerance > 0.0 && o.force_tolerance < 1.0))
-    throw std::invalid_argument("force_tolerance: got " + std::to_string(o.force_tolerance) +
-                                ". Fix: give a share of the largest force between 0 and 1");
-  if (o.threads < 1)
-    throw std::invalid_argument("threads: got " + std::to_string(o.threads) + ". Fix: give at least 1");
-}
-
-// Which of them push is not known before a block is solved.
-void expect_no_unilateral(const Scene& scene) {
-  for (const Group& group : scene.groups)
-    if (group.unilateral)
-      throw std::invalid_argument("solver.method: group " + group.name +
-                                  " may go slack, which only sweeps allow. Fix: use gauss_seidel, or leave it out");
-}
-
-void expect_no_volume(const Scene& scene) {
-  if (!scene.volumes.empty())
-    throw std::invalid_argument("solver.method: the volume of " + scene.volumes.front().name +
-                                " is to be kept, which implicit substeps do not do. Fix: use newton, newton_cg, direct "
-                                "or gauss_seidel, or give a pressure instead");
-}
-
-// Contact stands in the balance of forces, which only implicit substeps find.
-void expect_no_contact(const Scene& scene) {
-  if (!scene.self_contact.empty())
-    throw std::invalid_argument(
-        "solver.method: ropes or cloths may touch themselves, which needs substeps whose forces balance. Fix: use "
-        "implicit");
-  if (!scene.contacts.empty())
-    throw std::invalid_argument("solver.method: particles of " + scene.contacts.front().name +
-                                " may touch a collider, which needs substeps whose forces balance. Fix: use implicit");
-}
-
-// Blocks are made of constraints and what they join.
-void expect_constraints_around_volumes(const Scene& scene) {
-  if (scene.volumes.empty()) return;
-  std::vector<char> joined(scene.nodes(), false);
-  for (const Group& group : scene.groups)
-    for (const int node : group.stencil) joined[node] = true;
-  for (const Volume& volume : scene.volumes)
-    for (const int node : volume.nodes)
-      if (scene.role[node] == Role::free && !joined[node])
-        throw std::invalid_argument("solver.method: particle " + std::to_string(node) + " of the volume of " +
-                                    volume.name + " is in no constraint. Fix: use gauss_seidel, or give it a skin");
-}
-
-// Next to torques the inertia of a director is nothing, and a Newton step turns it as far as it likes.
-void expect_points(const Scene& scene) {
-  for (const Group& group : scene.groups)
-    if (group.points != group.arity)
-      throw std::invalid_argument("solver.method: group " + group.name +
-                                  " has frames of rods, for which implicit substeps are not made. Fix: use direct");
-}
-
 }  // namespace
 
 Plan make_plan(const Scene& scene, const SolverOptions& options) {
-  check(options);
-  if (options.partition != Partition::gauss_seidel) {
-    expect_no_unilateral(scene);
-    expect_constraints_around_volumes(scene);
-  }
-  if (options.partition == Partition::implicit) {
-    expect_points(scene);
-    expect_no_volume(scene);
-  } else {
-    expect_no_contact(scene);
-  }
-  if (scene.keeps_spin && options.partition != Partition::direct)
-    throw std::invalid_argument(
-        "solver.method: bodies keep their spin in direct alone. Fix: use direct, or leave their spin out");
+  check_solver(scene, options);
   Plan plan{options, {}, {}, {}};
   if (options.partition == Partition::gauss_seidel) {
     plan.colors = color_constraints(scene);
@@ -404,7 +356,10 @@ Plan make_plan(const Scene& scene, const SolverOptions& options) {
   } else {
     auto chains = connected_chains(scene);
     join_what_touches(scene, chains);
-    for (auto& members : chains) plan.blocks.push_back(make_block(scene, std::move(members), options));
+    for (auto& members : chains) {
+      const std::vector<int> loose = loose_beside(scene, members);
+      plan.blocks.push_back(make_block(scene, std::move(members), options, loose));
+    }
   }
   if (const std::vector<int> loose = loose_in_contact(scene, plan.blocks); !loose.empty())
     plan.blocks.push_back(make_block(scene, {}, options, loose));

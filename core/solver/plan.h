@@ -2,6 +2,7 @@
 // share no movable particle); a connected set can be one direct block. The plan is found once per scene and shared.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -37,12 +38,13 @@ struct BlockVolume {
   std::vector<int> gradients;  // likewise, its gradient row
 };
 
-// A particle of an implicit block that may touch a collider.
+// A point of an implicit block that may touch a collider: of one particle, or of several with weights (BlockContacts).
 struct BlockContact {
   int contact, item;  // in the scene
   int collider;
   AnyShape shape;
-  int particle;  // in the block's order
+  int nodes;                                    // how many
+  std::array<int, most_point_nodes> particles;  // in the block's order; they can move
 };
 
 struct DirectBlock {
@@ -60,7 +62,7 @@ struct DirectBlock {
   FactorStructure structure;  // of its constraints' matrix; empty where it is condensed
   std::optional<Condensation> condensation = {};
   std::vector<BlockVolume> volumes = {};
-  std::vector<BlockContact> contacts = {};  // by particle
+  std::vector<BlockContact> contacts = {};  // by first particle
   SelfContact surface = {};                 // in the block's order, fixed particles included
 
   int size() const { return static_cast<int>(multipliers.size()); }

@@ -17,6 +17,20 @@ double number_of(const T& a, [[maybe_unused]] int scene) {
     return value_of(a);
 }
 
+// The length of a body's axis is that of its mass's moments about the center.
+template <class T>
+void find_units(const SubstepState<T>& s, const DirectBlock& block, IncrementalPotential& potential, int scene) {
+  if (s.scene.bodies.empty()) return;
+  std::vector<double> of_node(s.scene.nodes(), 1.0);
+  const auto mass = [&](int node) { return number_of(s.inputs.of(Quantity::mass)[node], scene); };
+  for (const Body& body : s.scene.bodies) {
+    const double length = std::sqrt((mass(body.axes[0]) + mass(body.axes[1]) + mass(body.axes[2])) / mass(body.center));
+    for (const int axis : body.axes)
+      if (s.scene.role[axis] == Role::free && length > 0.0 && std::isfinite(length)) of_node[axis] = length;
+  }
+  for (std::size_t p = 0; p < block.particles.size(); ++p) potential.unit[p] = of_node[block.particles[p]];
+}
+
 // Which rows do not give way: judged by inputs alone, so that it does not depend on where a rollout begins.
 template <class T>
 void find_rigid(const SubstepState<T>& s, const DirectBlock& block, IncrementalPotential& potential, int scene) {
@@ -31,6 +45,7 @@ void find_rigid(const SubstepState<T>& s, const DirectBlock& block, IncrementalP
     const double mass = number_of(s.inputs.of(Quantity::mass)[node], scene);
     at[sheetbend_blocks::row * p + 3] = 1.0 / (s.scene.inertial[node] ? mass : mass * s.eta * s.eta);
   }
+  find_units(s, block, potential, scene);
   potential.rigid.find(s.scene, potential.given(block), at.data());
 }
 
@@ -95,7 +110,7 @@ void for_each_elastic(const SubstepState<T>& s, const DirectBlock& block, BlockS
   for (const MemberRun& run : block.runs) {
     const Group& group = s.scene.groups[run.group];
     with_kind(group.kind, [&]<class K>(K kind) {
-      if constexpr (holds_points<K>)
+      if constexpr (balances<K>)
         for (int i = 0; i < run.count; ++i) {
           const int item = run.items[i];
           constexpr int P = parameter_count<K>;
@@ -143,9 +158,12 @@ void subtract_contact_forces(const DirectBlock& block, const BlockState<T>& stat
                              std::vector<T>& R) {
   const BlockContacts<T>& contacts = state.contacts[0];
   for (int i = 0; i < static_cast<int>(block.contacts.size()); ++i) {
-    const std::size_t at = 3 * static_cast<std::size_t>(block.contacts[i].particle);
-    const Touch<T> touch = contacts.at(block, i, Vec3<T>(&x[at]));
-    if (touch.pushes) (-contacts.pose(block, i).turned(touch.force)).add_to(&R[at]);
+    const BlockContact& c = block.contacts[i];
+    const Vec3<T> point = contacts.point(block, i, [&](int particle) { return Vec3<T>(&x[3 * particle]); });
+    const Touch<T> touch = contacts.at(block, i, point);
+    if (!touch.pushes) continue;
+    const Vec3<T> force = contacts.pose(block, i).turned(touch.force);
+    for (int k = 0; k < c.nodes; ++k) (-(contacts.weights[i][k] * force)).add_to(&R[3 * c.particles[k]]);
   }
 }
 

@@ -40,7 +40,7 @@ void RigidRows::find(const Scene& scene, const Given& given, const double* at) {
     const int count = sheetbend_blocks::value_count(group.damped, group.parameters);
     double* values = given.values[r].data();
     with_kind(group.kind, [&]<class K>(K) {
-      if constexpr (holds_points<K>)
+      if constexpr (balances<K>)
         for (int i = 0; i < run.count; ++i) {
           double& a = values[lane_at(i, count, 0)];
           const double g = group.damped ? values[lane_at(i, count, 1)] : 0.0;
@@ -125,7 +125,7 @@ void RigidRows::place_rows(const DirectBlock& block) {
 void RigidRows::evaluate(const Given& given, const double* at) {
   for (const Member& m : members_)
     with_kind(m.kind, [&]<class K>(K) {
-      if constexpr (holds_points<K>) {
+      if constexpr (balances<K>) {
         const MemberRun& run = given.block.runs[m.run];
         const int count = sheetbend_blocks::value_count(m.damped, parameter_count<K>);
         const Numbered<K> own(run, given.values[m.run].data(), count, m.place, at);
@@ -136,7 +136,8 @@ void RigidRows::evaluate(const Given& given, const double* at) {
           C_[row] = value.C[j];
           steepest_[row] = 0.0;
           for (int d = 0; d < K::dofs; ++d)
-            steepest_[row] = std::max(steepest_[row], std::abs(value.J[j * K::dofs + d]));
+            steepest_[row] = std::max(steepest_[row],
+                                      std::abs(value.J[j * K::dofs + d]) / given.unit[particle(given.block, m, d / 3)]);
           double residual = value.C[j] + a_[row] * lambda[row];
           if (m.damped) residual += g_[row] * difference<K>(value.C[j], given.C_r[rows_[row]]);
           c_[row] = left_out_[row] ? 0.0 : residual / (1.0 + g_[row]);
@@ -228,7 +229,7 @@ void RigidRows::add_elements(const Given& given, double* at, const double* stiff
   for (int j = 0; j < size(); ++j) S_[j] = std::max({D_[j], soft[j], left_out_[j] ? 1.0 : 0.0});
   for (const Member& m : members_)
     with_kind(m.kind, [&]<class K>(K) {
-      if constexpr (holds_points<K>) {
+      if constexpr (balances<K>) {
         const MemberRun& run = given.block.runs[m.run];
         const int count = sheetbend_blocks::value_count(m.damped, parameter_count<K>);
         const Numbered<K> own(run, given.values[m.run].data(), count, m.place, at);

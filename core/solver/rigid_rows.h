@@ -27,6 +27,8 @@ class RigidRows {
     const DirectBlock& block;
     std::vector<Numbers<double>>& values;
     Numbers<double>& C_r;
+    const std::vector<double>&
+        unit;  // per particle of the block: the length of a coordinate of one (IncrementalPotential)
   };
 
   std::vector<double> lambda;  // per row
@@ -51,7 +53,7 @@ class RigidRows {
   void evaluate(const Given& given, const double* at);
   double residual(int j) const { return c_[j]; }
   double weight(int j) const { return weight_[j]; }      // 1/(J W J^T + D) of where leave_out() was
-  double steepest(int j) const { return steepest_[j]; }  // the largest number of its gradient
+  double steepest(int j) const { return steepest_[j]; }  // the largest number of its gradient, per length
   // Adds J^T lambda and the magnitudes of its terms, (particles, 4).
   void push(const DirectBlock& block, double* force, double* magnitude) const;
   // The multipliers that leave the least of R, three numbers per movable particle, sum w |R - J^T lambda|^2, once J W J^T is factored where J is.

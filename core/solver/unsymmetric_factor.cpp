@@ -62,10 +62,6 @@ UnsymmetricStructure::UnsymmetricStructure(int places, std::vector<std::pair<int
     upper_.insert(upper_.end(), row.begin(), row.end());
     upper_start_.push_back(static_cast<int>(upper_.size()));
   }
-  const auto slot = [](const std::vector<int>& start, const std::vector<int>& columns, int row, int column) {
-    return static_cast<int>(std::lower_bound(columns.begin() + start[row], columns.begin() + start[row + 1], column) -
-                            columns.begin());
-  };
   for (const auto& [i, j] : pairs) {
     Entry e{i == j ? i : -1, 0, 0, {}};
     if (i != j) e.lower = slot(lower_start_, lower_, i, j), e.upper = slot(upper_start_, upper_, j, i);
@@ -76,6 +72,11 @@ UnsymmetricStructure::UnsymmetricStructure(int places, std::vector<std::pair<int
       }
     entries_.push_back(e);
   }
+}
+
+int UnsymmetricStructure::slot(const std::vector<int>& start, const std::vector<int>& columns, int row, int column) {
+  return static_cast<int>(std::lower_bound(columns.begin() + start[row], columns.begin() + start[row + 1], column) -
+                          columns.begin());
 }
 
 std::size_t UnsymmetricStructure::bytes() const {
@@ -110,8 +111,11 @@ void UnsymmetricFactor::load(const UnsymmetricStructure& s, const double* values
       }
 }
 
-void UnsymmetricFactor::add(int place, const double* block) {
-  for (int k = 0; k < 9; ++k) inverse_[9 * place + k] += block[k];
+void UnsymmetricFactor::add(const UnsymmetricStructure& s, int row, int column, double scale, const double* block) {
+  double* to = row == column  ? &inverse_[9 * row]
+               : row > column ? &lower_[9 * s.slot(s.lower_start_, s.lower_, row, column)]
+                              : &upper_[9 * s.slot(s.upper_start_, s.upper_, row, column)];
+  for (int k = 0; k < 9; ++k) to[k] += scale * block[k];
 }
 
 bool UnsymmetricFactor::factorize(const UnsymmetricStructure& s) {

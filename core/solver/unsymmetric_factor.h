@@ -29,6 +29,9 @@ class UnsymmetricStructure {
     std::array<std::size_t, 9> from;
   };
 
+  // Where a column stands among those of a row, in all of them.
+  static int slot(const std::vector<int>& start, const std::vector<int>& columns, int row, int column);
+
   std::vector<int> lower_start_{0}, lower_, upper_start_,
       upper_;  // per row its columns before and after the diagonal, ascending
   std::vector<Entry> entries_;
@@ -41,8 +44,8 @@ class UnsymmetricFactor {
 
   // Takes the values of a symmetric matrix, by FactorStructure::position.
   void load(const UnsymmetricStructure& s, const double* values);
-  // Adds to the diagonal block of a place, (3, 3) row by row.
-  void add(int place, const double* block);
+  // Adds scale times a block (3, 3), row by row, to that of two places.
+  void add(const UnsymmetricStructure& s, int row, int column, double scale, const double* block);
   // Says whether every pivot has an inverse.
   bool factorize(const UnsymmetricStructure& s);
 

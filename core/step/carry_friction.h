@@ -7,7 +7,7 @@
 
 namespace sheetbend {
 
-// Calls f(source, poses, contact, item) for every contact of a movable particle, one of the step's scenes after the other.
+// Calls f(source, poses, contact, item) for every contact of a movable point, one of the step's scenes after the other.
 template <class T, class F>
 void for_each_contact(const Step<T>& step, const InverseMasses<T>& masses, F&& f) {
   if (step.scene.contacts.empty()) return;
@@ -16,27 +16,27 @@ void for_each_contact(const Step<T>& step, const InverseMasses<T>& masses, F&& f
     const ContactSource<T> source = contact_source(step, masses, lane);
     const auto poses = source.poses();
     for (int c = 0; c < static_cast<int>(step.scene.contacts.size()); ++c)
-      for (int i = 0; i < static_cast<int>(step.scene.contacts[c].particles.size()); ++i)
-        if (step.scene.role[step.scene.contacts[c].particles[i]] == Role::free) f(source, poses, c, i);
+      for (int i = 0; i < step.scene.contacts[c].points(); ++i)
+        if (moves(step.scene, step.scene.contacts[c], i)) f(source, poses, c, i);
   }
 }
 
-// What a particle does at a collider in a substep.
+// What a point does at a collider in a substep.
 enum class ContactMode : char { apart, sticks, slides };
 
 struct CarryFriction {
   static constexpr bool repeated = false;
 
-  // What each particle of each contact did last, contact after contact; in a pack one scene after the other.
+  // What each point of each contact did last, contact after contact; in a pack one scene after the other.
   template <class T>
   struct Record {
     std::vector<ContactMode> modes;
 
     void resize(const Scene& scene, const Plan&, bool reversed) {
-      if (!reversed) modes.assign(scenes_of<T> * particles_in_contact(scene), ContactMode::apart);
+      if (!reversed) modes.assign(scenes_of<T> * points_in_contact(scene), ContactMode::apart);
     }
     static std::size_t bytes(const Scene& scene, const Plan&, bool reversed) {
-      return reversed ? 0 : scenes_of<T> * particles_in_contact(scene);
+      return reversed ? 0 : scenes_of<T> * points_in_contact(scene);
     }
   };
 
@@ -44,11 +44,11 @@ struct CarryFriction {
   static void forward(const Step<T>& step, Work<T>& work, Record<T>& record) {
     const Scene& scene = step.scene;
     const double rate = 1.0 / (step.bdf.eta * step.bdf.eta);
-    const std::size_t count = particles_in_contact(scene);
+    const std::size_t count = points_in_contact(scene);
     for_each_contact(step, work.masses, [&](const auto& source, const auto& poses, int c, int i) {
       using S = Single<T>;
       const Contact& contact = scene.contacts[c];
-      const auto z = poses.next[contact.collider].in_frame(source.at(work.x_next, contact.particles[i]));
+      const auto z = poses.next[contact.collider].in_frame(source.point(contact, i, work.x_next));
       const AnyShape shape = scene.colliders[contact.collider].any();
       const auto numbers = source.numbers(poses, c, i);
       const auto found = touch(shape, z, numbers);

@@ -1,4 +1,4 @@
-// Where a contact begins in a substep: its particle is inside the surface at the end, or as low as restitution lifts it, and was not inside at the
+// Where a contact begins in a substep: its point is inside the surface at the end, or as low as restitution lifts it, and was not inside at the
 // start. By values, of which nothing is differentiated.
 #pragma once
 
@@ -15,17 +15,16 @@ Scenes where_contact_begins(const Step<T>& step, const T* x_next) {
     const ContactSource<T> source{scene, step.in, step.bdf, step.t_next, step.plan.options.h, step.from, nullptr, lane};
     const auto poses = source.poses();
     const auto begins = [&](const Contact& c, int contact, int item) {
-      const int node = c.particles[item];
       double above = 0.0;
       if (c.rebounds(item))
         if (const auto r = source.rebound(poses, contact, item); r.lifts) above = value_of(r.lift);
-      return scene.role[node] == Role::free &&
-             value_of(source.gap(poses.next[c.collider], contact, source.at(x_next, node))) < above &&
-             !(value_of(source.gap(poses.now[c.collider], contact, source.at(step.from.x, node))) < 0.0);
+      return moves(scene, c, item) &&
+             value_of(source.gap(poses.next[c.collider], contact, source.point(c, item, x_next))) < above &&
+             !(value_of(source.gap(poses.now[c.collider], contact, source.point(c, item, step.from.x))) < 0.0);
     };
     const auto any_begins = [&](int contact) {
       const Contact& c = scene.contacts[contact];
-      for (int item = 0; item < static_cast<int>(c.particles.size()); ++item)
+      for (int item = 0; item < c.points(); ++item)
         if (begins(c, contact, item)) return true;
       return false;
     };

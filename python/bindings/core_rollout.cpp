@@ -55,7 +55,7 @@ py::dict simulate(const Solver& s, const Array& inputs, const Steps& steps, doub
   double *x = positions.mutable_data(), *v = velocities.mutable_data(), *force = multipliers.mutable_data();
   int first_order = 0;
   CountContacts contacts(*s.scene);
-  const std::size_t touching = particles_in_contact(*s.scene);
+  const std::size_t touching = points_in_contact(*s.scene);
   py::array_t<unsigned char> modes({frames, touching});
   unsigned char* mode = modes.mutable_data();
   {

@@ -64,8 +64,9 @@ std::shared_ptr<Scene> make_scene(const py::kwargs& given) {
          {c["times"].cast<std::vector<double>>(), interpolation_of(c["interpolation"].cast<std::string>())},
          grid_of(c)});
   for (const py::handle c : given["contacts"])
-    spec.contacts.push_back({c["name"].cast<std::string>(), c["collider"].cast<int>(), whole_numbers(c["particles"]),
-                             whole_numbers(c["carried"]), c["rigid"].cast<bool>(), c["bounces"].cast<bool>()});
+    spec.contacts.push_back({c["name"].cast<std::string>(), c["collider"].cast<int>(), whole_numbers(c["nodes"]),
+                             whole_numbers(c["carried"]), c["rigid"].cast<bool>(), c["bounces"].cast<bool>(),
+                             c["arity"].cast<int>()});
   if (given.contains("self_contact"))
     for (const py::handle p : given["self_contact"])
       spec.self_contact.pieces.push_back(
@@ -114,8 +115,8 @@ py::dict arguments_of(const Scene& s) {
             c.grid->origin, c.grid->spacing, py::array_t<double>(c.grid->count, c.grid->coefficients.data()));
     });
   for (const Contact& c : s.contacts)
-    contacts.append(py::dict("name"_a = c.name, "collider"_a = c.collider,
-                             "particles"_a = py::array_t<int>(py::cast(c.particles)),
+    contacts.append(py::dict("name"_a = c.name, "collider"_a = c.collider, "arity"_a = c.arity,
+                             "nodes"_a = py::array_t<int>(py::cast(c.nodes)),
                              "carried"_a = py::array_t<int>(py::cast(c.carried)), "rigid"_a = c.stiffness < 0,
                              "bounces"_a = c.restitution >= 0));
   std::map<int, std::pair<std::vector<std::array<int, 2>>, Triangles>> touching;  // by the place of its radius

@@ -69,6 +69,7 @@ from .recording.recording import Recording
 from .report.fit_result import FitResult
 from .report.scores import Score, Scores, coordinate_error, scores
 from .scene.body import Body
+from .scene.body_points import box_corners
 from .scene.colliders import Box, Capsule, Plane, Sphere
 from .scene.distance_field import DistanceField
 from .scene.inertia import Inertia
@@ -163,6 +164,7 @@ __all__ = [
     "ball",
     "baseline",
     "between",
+    "box_corners",
     "check_gradients",
     "cloth",
     "constraint_values",

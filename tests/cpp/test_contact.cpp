@@ -236,7 +236,7 @@ TEST(UnsymmetricFactor, SolvesBothWays) {
   for (const int place : {0, 7, 24}) {
     std::vector<double> block = random.vector(9, -4.0, 4.0);
     block[0] = -A(3 * place, 3 * place);  // nothing on the diagonal is left to begin with
-    factor.add(place, block.data());
+    factor.add(structure, place, place, 1.0, block.data());
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b) A(3 * place + a, 3 * place + b) += block[3 * a + b];
   }

@@ -91,8 +91,8 @@ double longest_error(const Sample& s, const double* x) {
 double check_contacts(const Sample& s, const double* x, double h, double mu) {
   const Contact& contact = s.scene.contacts[0];
   double deepest = 0.0;
-  for (std::size_t i = 0; i < contact.particles.size(); ++i) {
-    const int n = contact.particles[i];
+  for (int i = 0; i < contact.points(); ++i) {
+    const int n = contact.first_node(i);
     const double depth = std::max(0.0, -x[3 * n + 2]);
     const double* f = x + 3 * contact.carried[i];
     const double normal = rigidity * s.inputs[s.scene.layout.of(Quantity::mass) + n] * depth / (h * h);

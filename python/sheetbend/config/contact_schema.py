@@ -101,7 +101,12 @@ class ContactSection(Section):
     and where given <name>_contact_stiffness (N/m) and <name>_restitution."""
 
     name: Name | None = key(None, "prefix of its quantities; the collider's name when left out")
-    of: Name | list[Name] = key(..., "a rope, a cloth or a set of particles, or several: all of their particles")
+    of: Name | list[Name] = key(
+        ..., "a rope, a cloth or a set of particles, or several: all of their particles; or a body"
+    )
+    points: list[Vector] | None = key(
+        None, "of a body: those that may touch, in its frame; the corners of its box when left out", "m", min_length=1
+    )
     collider: Name = key(..., "the [[scene.collider]] that they may touch")
     friction: Finite = key(..., "Coulomb's coefficient; 0 is smooth", ge=0)
     radius: Finite = key(

@@ -6,12 +6,16 @@ import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from numpy.typing import ArrayLike
+
 from ..errors import ConfigError
 from ..mesh import TriangleMesh, read_mesh
 from ..objects.tool import Tool
+from ..scene.body_points import box_corners
 from ..scene.colliders import Collider
 from ..scene.scene import Scene
-from .contact_schema import SHAPES, ColliderSection, arguments
+from .body_schema import BodySection
+from .contact_schema import SHAPES, ColliderSection, ContactSection, arguments
 from .errors import located
 from .scene_schema import SceneSection
 from .solver_schema import SolverSection
@@ -51,19 +55,22 @@ def add_contacts(
     known |= {some.name for some in section.particles}
     for i, contact in enumerate(section.contact):
         path = f"scene.contact[{i}]"
-        unknown = [name for name in contact.touching if name not in known]
+        bodies = [body for body in section.body if body.name in contact.touching]
+        unknown = [name for name in contact.touching if name not in known and not bodies]
         if unknown:
-            fix = f"use some of: {', '.join(named) or 'none yet'}"
-            raise ConfigError(f"{path}.of", "names no rope, cloth or set of particles", unknown, fix)
+            fix = f"use some of: {', '.join([*named, *scene.bodies]) or 'none yet'}"
+            raise ConfigError(f"{path}.of", "names no rope, cloth, set of particles or body", unknown, fix)
         if contact.collider not in colliders:
             fix = f"name one of: {', '.join(colliders) or 'none, add a [[scene.collider]]'}"
             raise ConfigError(f"{path}.collider", "is no collider of the scene", contact.collider, fix)
         particles = [p for name in contact.touching for p in named.get(name, ())]
-        if not particles:
-            continue
         numbers = contact.model_dump(include={"friction", "radius", "stiffness", "restitution", "settle"})
+        points = _points(path, contact, bodies)
+        if not particles and not bodies:
+            continue
+        what = scene.bodies[bodies[0].name] if bodies else particles
         with located(path, f"{contact.name or contact.collider}.contact"):
-            scene.contact(particles, colliders[contact.collider], name=contact.name, **numbers)
+            scene.contact(what, colliders[contact.collider], name=contact.name, points=points, **numbers)
     _add_self_contact(scene, section)
 
 
@@ -82,6 +89,25 @@ def _add_self_contact(scene: Scene, section: SceneSection) -> None:
     if names:
         with located("scene.self_contact", "self_contact"):
             scene.self_contact(*(built[n] for n in names), radius=[radii[n] for n in names] if radii else given.radius)
+
+
+def _points(path: str, contact: ContactSection, bodies: Sequence[BodySection]) -> ArrayLike | None:
+    """The points of a body that touches: those given, or the corners of its box."""
+    if not bodies:
+        if contact.points is not None:
+            problem = "are given, and what touches is no body"
+            raise ConfigError(f"{path}.points", problem, contact.touching, "leave them out")
+        return None
+    if len(contact.touching) > 1:
+        problem = "names a body beside others"
+        raise ConfigError(f"{path}.of", problem, contact.touching, "give each body a [[scene.contact]] of its own")
+    if contact.points is not None:
+        return contact.points
+    body = bodies[0]
+    if body.box is None:
+        fix = "give those that may touch, in the body's frame"
+        raise ConfigError(f"{path}.points", "are missing: the body has no box", body.name, fix)
+    return box_corners(body.box, body.center)
 
 
 def _colliders(section: SceneSection, tools: Mapping[str, Tool], folder: Path) -> dict[str, Collider]:

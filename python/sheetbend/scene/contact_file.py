@@ -13,6 +13,7 @@ from .contacts import ARRAYS, Contact
 from .scene import Scene
 
 Array = np.ndarray
+BODY = 4  # nodes of a point of a body
 MADE_BY_QUANTITIES = tuple(name for name in ARRAYS if name != "collider_pose")
 
 
@@ -47,15 +48,17 @@ def written_contacts(scene: Scene) -> tuple[dict[str, Any], dict[str, Array]]:
             {"name": name, "shape": c.shape, "interpolation": c.poses.interpolation} for name, c in colliders
         ],
         "contacts": [
-            {"name": c.name, "collider": c.collider, "rigid": c.rigid, "bounces": c.bounces} for c in contacts.contacts
+            {"name": c.name, "collider": c.collider, "rigid": c.rigid, "bounces": c.bounces}
+            | ({"nodes": c.nodes.shape[1]} if c.of_body else {})
+            for c in contacts.contacts
         ],
     }
     times = {f"collider_times_{i}": np.asarray(c.poses.times, dtype=float) for i, (_, c) in enumerate(colliders)}
-    pairs = {
-        f"contact_{i}": np.column_stack([c.particles, scene.places_of(c.carried)])
+    rows = {
+        f"contact_{i}": np.column_stack([scene.places_of(c.nodes), scene.places_of(c.carried)])
         for i, c in enumerate(contacts.contacts)
     }
-    return header, times | pairs
+    return header, times | rows
 
 
 def read_contacts(reader: Reader, scene: Scene, take: Callable[..., Array], fix: str) -> None:
@@ -70,13 +73,16 @@ def read_contacts(reader: Reader, scene: Scene, take: Callable[..., Array], fix:
     contacts = scene.contacts
     for i, about in enumerate(reader.records("contacts")):
         where = f"contacts[{i}]."
-        pairs = reader.nodes(f"contact_{i}", (None, 2))
+        nodes = reader.part(about, "nodes", int, where) if "nodes" in about else 1
+        if nodes not in (1, BODY):
+            reader.fail(where + "nodes", "is no number of nodes of a point", nodes, fix)
+        rows = reader.nodes(f"contact_{i}", (None, nodes + 1))
         numbers = [
             reader.part(about, key, kind, where)
             for key, kind in (("collider", int), ("rigid", bool), ("bounces", bool))
         ]
         contacts.contacts.append(
-            Contact(reader.name(about, "name", where), numbers[0], pairs[:, 0], pairs[:, 1], *numbers[1:])
+            Contact(reader.name(about, "name", where), numbers[0], rows[:, :-1], rows[:, -1], *numbers[1:])
         )
     count, soft = len(contacts.contacts), sum(not c.rigid for c in contacts.contacts)
     made = [take("friction", count), take("contact_radius", count), take("contact_stiffness", soft)]
@@ -98,6 +104,7 @@ def read_contacts(reader: Reader, scene: Scene, take: Callable[..., Array], fix:
     made += [
         take("collider_size", sum(len(c.sizes) for c in contacts.colliders.values())),
         take("restitution", sum(c.bounces for c in contacts.contacts)),
+        take("contact_weight", sum(c.nodes.size for c in contacts.contacts if c.of_body)),
     ]
     for name, values in zip(MADE_BY_QUANTITIES, made, strict=True):
         if values.any():

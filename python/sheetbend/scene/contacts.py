@@ -1,4 +1,4 @@
-"""Which particles of a scene may touch which shapes, and how rough and how stiff that is."""
+"""Which particles of a scene and points of its bodies may touch which shapes, and how rough and stiff that is."""
 
 from __future__ import annotations
 
@@ -11,12 +11,17 @@ from numpy.typing import ArrayLike
 
 from ..arrays.checks import is_number, node_array
 from ..errors import SceneError
+from ..quantities.expression import terms_of
 from ..quantities.quantities import ZERO_OR_MORE, Builder, Term
+from .body_points import BodyPoints
 from .colliders import Collider
 from .pieces import Piece
 
 Array = np.ndarray
-ARRAYS = ("friction", "contact_radius", "contact_stiffness", "collider_pose", "collider_size", "restitution")
+ARRAYS = (
+    *("friction", "contact_radius", "contact_stiffness", "collider_pose", "collider_size", "restitution"),
+    "contact_weight",
+)
 TOUCHES = 1e-6  # m: so deep a particle may be at the start, as under its own weight
 
 
@@ -30,12 +35,13 @@ class HasParticles(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """Particles that may touch a collider.
+    """Particles, or points of a body, that may touch a collider.
 
     Attributes:
         name: of its quantities.
         collider: place in `Contacts.colliders`.
-        particles: (n,).
+        nodes: (n, 1) particles, or (n, 4) the nodes of the body, again for each of its points. A point is the sum of
+            its nodes times the weights of the input array "contact_weight".
         carried: (n,) hidden, pinned nodes whose coordinates are the tangential forces that are carried from substep to
             substep [N], in the collider's frame.
         rigid: whether it is as stiff as masses and substeps allow.
@@ -44,10 +50,20 @@ class Contact:
 
     name: str
     collider: int
-    particles: Array
+    nodes: Array
     carried: Array
     rigid: bool
     bounces: bool
+
+    @property
+    def particles(self) -> Array:
+        """(n,) the particle of each point, which is the center of mass for a body."""
+        return np.asarray(self.nodes[:, 0])
+
+    @property
+    def of_body(self) -> bool:
+        """Whether it is points of a body that touch."""
+        return bool(self.nodes.shape[1] > 1)
 
 
 @dataclass(frozen=True)
@@ -112,24 +128,28 @@ class Contacts:
 
     def check(
         self,
-        what: ArrayLike | HasParticles,
+        what: ArrayLike | HasParticles | BodyPoints,
         collider: Collider,
         count: int,
         numbers: ContactNumbers,
         name: str | None,
     ) -> tuple[Array, str]:
-        """The particles of a new contact, of `count` in the scene, and its name."""
+        """The nodes (n, k) of the points of a new contact, of `count` particles in the scene, and its name."""
         if not isinstance(collider, Collider):
             raise SceneError(
                 "contact.collider", "is no shape", collider, "give a Plane, Sphere, Capsule, Box or DistanceField"
             )
-        particles = what.particles if isinstance(what, HasParticles) else what
         name = name or collider.name or collider.shape
         if any(c.name == name for c in self.contacts):
             raise SceneError("contact.name", "is taken by another contact", name, "give each contact a name of its own")
-        which = node_array(f"{name}.contact.particles", particles, count)
-        if len(np.unique(which)) < len(which):
-            raise SceneError(f"{name}.contact.particles", "are listed twice", which.tolist(), "list each particle once")
+        if isinstance(what, BodyPoints):
+            which = np.tile(what.body.particles, (len(what.places), 1))
+        else:
+            particles = what.particles if isinstance(what, HasParticles) else what
+            which = node_array(f"{name}.contact.particles", particles, count)[:, None]
+            if len(np.unique(which)) < len(which):
+                fix = "list each particle once"
+                raise SceneError(f"{name}.contact.particles", "are listed twice", which.ravel().tolist(), fix)
         numbers.check(name)
         if not numbers.radius < collider.reach:
             problem = f"is not below the {collider.reach:.3g} m around '{collider.name}' in which distances are known"
@@ -146,8 +166,9 @@ class Contacts:
         carried: Array,
         numbers: ContactNumbers,
         name: str,
+        points: BodyPoints | None = None,
     ) -> None:
-        """See `Scene.contact`."""
+        """See `Scene.contact`; `points` are those of a body."""
         at, place = len(self.contacts), self._place(scene, collider)
         self._name(scene, f"{name}_friction", "friction", at, numbers.friction, "")
         if numbers.radius > 0:
@@ -160,6 +181,11 @@ class Contacts:
             quantity = f"{name}_restitution"
             scene.add_quantity(quantity, numbers.restitution, "", positive=False, scale=0.1, limits=(0.0, 1.0))
             scene.add_terms([Term("restitution", bouncing, 1.0, ((quantity, "identity"),))])
+        if points is not None:
+            first = sum(c.nodes.size for c in self.contacts if c.of_body)
+            weights = points.weights()
+            index = first + np.arange(weights.size).reshape(weights.shape)
+            scene.add_terms(terms_of("contact_weight", index, weights))
         rigid, bounces = numbers.stiffness is None, numbers.restitution is not None
         self.contacts.append(Contact(name, place, which, carried, rigid, bounces))
 
@@ -182,7 +208,8 @@ class Contacts:
                 {
                     "name": c.name,
                     "collider": c.collider,
-                    "particles": c.particles,
+                    "arity": c.nodes.shape[1],
+                    "nodes": places_of(c.nodes).ravel(),
                     "carried": places_of(c.carried),
                     "rigid": c.rigid,
                     "bounces": c.bounces,
@@ -203,6 +230,7 @@ class Contacts:
             "collider_pose": np.concatenate([np.zeros(0), *poses]),
             "collider_size": np.zeros(sum(len(c.sizes) for c in self.colliders.values())),
             "restitution": np.zeros(sum(c.bounces for c in self.contacts)),
+            "contact_weight": np.zeros(sum(c.nodes.size for c in self.contacts if c.of_body)),
         }
 
     def expect_apart(self, core: Any, inputs: Array, masses: Array, gravity: Array, held: set[int]) -> None:
@@ -216,11 +244,12 @@ class Contacts:
             worst = int(np.argmax(depth))
             if depth[worst] > 0:
                 name = list(self.colliders)[c.collider]
-                problem = (
-                    f"starts with particle {c.particles[worst]} inside '{name}', which is {-gaps[worst]:.3g} m deep"
-                )
-                fix = (
-                    "let it start outside, counted from the contact's radius, or give settle=True (settle = true in a "
-                    "configuration), which moves such particles to the surface before the motion starts"
-                )
+                point = f"point {worst} of a body" if c.of_body else f"particle {c.particles[worst]}"
+                problem = f"starts with {point} inside '{name}', which is {-gaps[worst]:.3g} m deep"
+                fix = "let it start outside, counted from the contact's radius"
+                if not c.of_body:
+                    fix += (
+                        ", or give settle=True (settle = true in a configuration), which moves such particles to the "
+                        "surface before the motion starts"
+                    )
                 raise SceneError(f"{c.name}.contact", problem, int((depth > 0).sum()), fix)

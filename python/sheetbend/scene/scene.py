@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays.checks import node_array, per_item
 from ..errors import SceneError
+from ..mesh.triangle_mesh import TriangleMesh
 from ..quantities.kinds import KINDS
 from ..quantities.quantities import ZERO_OR_MORE, Term, product
 from .bodies import (
@@ -27,6 +28,7 @@ from .bodies import (
 )
 from .body import Body, BodyPoint
 from .body_force import push_body
+from .body_points import points_of
 from .colliders import Collider
 from .compiled import CompiledScene
 from .contacts import ContactNumbers, HasParticles
@@ -309,6 +311,7 @@ class Scene(SelfTouchingScene):
         restitution: float | None = None,
         name: str | None = None,
         settle: bool = False,
+        points: ArrayLike | TriangleMesh | None = None,
     ) -> str:
         """Let particles (no links or triangles) touch a shape, and return the contact's name; see docs/contact.md.
 
@@ -317,22 +320,26 @@ class Scene(SelfTouchingScene):
         `<collider>_x`, `_y` and `_z`, m from where it was given, and its lengths, such as `<collider>_radius` m.
 
         Args:
-            what: a rope, a cloth, or particles (n,).
+            what: a rope, a cloth, particles (n,), or a body.
             collider: `Plane`, `Sphere`, `Capsule`, `Box` or `DistanceField`; one object may serve several contacts.
             friction: Coulomb's coefficient (`<name>_friction`); 0 is smooth.
             radius: m, of a rope, or half the thickness of cloth (`<name>_contact_radius` unless zero).
             stiffness: N/m per particle (`<name>_contact_stiffness`). By default rigid: h^2 g/1000 deep under weight.
             restitution: 0 to 1 (`<name>_restitution`), the speed after an impact over that before; by default 0.
             name: by default that of the collider.
-            settle: move what starts inside to the surface, at the values that the scene is given with.
+            settle: move what starts inside to the surface, at the values that the scene is given with; not of bodies.
+            points: of a body, (n, 3) m in its frame or the vertices of a mesh: `sb.box_corners(sides)`, or with a
+                `radius` the middle of a ball. They touch, edges and faces between them do not.
         Raises:
-            SceneError: numbers out of range; when it is compiled: a start inside, restitution of what is held and soft.
+            SceneError: numbers out of range; a body without points; when it is compiled: a start inside, restitution
+                of what is held and soft.
         """
         self._building()
         numbers = ContactNumbers(friction, radius, stiffness, restitution)
-        which, name = self.contacts.check(what, collider, self.particle_count, numbers, name)
+        own = points_of(what, points, settle, name)
+        which, name = self.contacts.check(own or what, collider, self.particle_count, numbers, name)
         carried = self.add_hidden(np.zeros((len(which), 3)), 1.0, pinned=True)
-        self.contacts.add(self, collider, which, carried, numbers, name)
+        self.contacts.add(self, collider, which, carried, numbers, name, own)
         self.contacts.settling |= {name} if settle else set()
         return name
 

@@ -328,8 +328,10 @@ class SceneReader:
 
 def file_layout(scene: Scene) -> dict[str, list[int]]:
     """Where the input arrays stand, as a file says it: without those of contacts where there are none."""
+    touches = bool(scene.contacts.contacts)
+    left_out = {"contact_weight"} if touches else set(CONTACT_ARRAYS)  # the first of those that files did not have
     own = scene.compiled.layout.items()
-    return {name: list(place) for name, place in own if scene.contacts.contacts or name not in CONTACT_ARRAYS}
+    return {name: list(place) for name, place in own if place[1] or name not in left_out}
 
 
 def _layout(scene: Scene) -> Mapping[str, tuple[int, int]]:

@@ -9,7 +9,8 @@ namespace sheetbend::testing {
 // Builds a scene whose particles all may touch all colliders; nodes that carry friction follow the particles.
 struct ContactBuilder {
   SceneSpec spec;
-  std::vector<double> x, velocity, mass, compliance, rest, friction, radius, stiffness, restitution, pose, size;
+  std::vector<double> x, velocity, mass, compliance, rest, friction, radius, stiffness, restitution, pose, size,
+      weights;
 
   int particle(const Vec3<double>& at, double m, const Vec3<double>& v = {0.0, 0.0, 0.0}) {
     x.insert(x.end(), {at.x, at.y, at.z});
@@ -40,7 +41,7 @@ struct ContactBuilder {
     for (int c = 0; c < static_cast<int>(spec.colliders.size()); ++c) {
       ContactSpec contact{"contact", c, {}, {}, k == 0.0, e >= 0.0};
       for (int n = 0; n < moving; ++n) {
-        contact.particles.push_back(n);
+        contact.nodes.push_back(n);
         contact.carried.push_back(particle({0.0, 0.0, 0.0}, 1.0));
         spec.pinned.push_back(contact.carried.back());
       }
@@ -48,6 +49,37 @@ struct ContactBuilder {
       friction.push_back(mu);
       radius.push_back(r);
       if (k > 0.0) stiffness.push_back(k);
+      if (e >= 0.0) restitution.push_back(e);
+    }
+  }
+  // A body of a mass and moments of inertia about its center; the number of its center, three axes after it.
+  int body(double m, const Vec3<double>& I, const Vec3<double>& at, const Vec3<double>& turn, const Vec3<double>& v,
+           const Vec3<double>& omega) {
+    double R[9];
+    turn_by(turn, R);
+    const int center = particle(at, m, v);
+    for (int k = 0; k < 3; ++k) {
+      const Vec3<double> axis(R[k], R[3 + k], R[6 + k]);
+      const double moments[3] = {I.x, I.y, I.z};
+      particle(axis, 0.5 * (I.x + I.y + I.z) - moments[k], cross(omega, axis));
+    }
+    spec.bodies.push_back({center, {center + 1, center + 2, center + 3}});
+    constraint("rigid", {center + 1, center + 2, center + 3}, 0.0, {});
+    return center;
+  }
+  // Points of a body, and every collider, in the place of contact().
+  void contact_of(int center, const std::vector<Vec3<double>>& points, double mu, double r, double e = -1.0) {
+    for (int c = 0; c < static_cast<int>(spec.colliders.size()); ++c) {
+      ContactSpec contact{"contact", c, {}, {}, true, e >= 0.0, 4};
+      for (const Vec3<double>& p : points) {
+        for (int k = 0; k < 4; ++k) contact.nodes.push_back(center + k);
+        weights.insert(weights.end(), {1.0, p.x, p.y, p.z});
+        contact.carried.push_back(particle({0.0, 0.0, 0.0}, 1.0));
+        spec.pinned.push_back(contact.carried.back());
+      }
+      spec.contacts.push_back(contact);
+      friction.push_back(mu);
+      radius.push_back(r);
       if (e >= 0.0) restitution.push_back(e);
     }
   }
@@ -68,7 +100,7 @@ struct ContactBuilder {
     put(Quantity::compliance, compliance), put(Quantity::rest, rest), put(Quantity::gravity, {0.0, 0.0, -gravity});
     put(Quantity::friction, friction), put(Quantity::contact_radius, radius);
     put(Quantity::contact_stiffness, stiffness), put(Quantity::restitution, restitution),
-        put(Quantity::collider_pose, pose), put(Quantity::collider_size, size);
+        put(Quantity::collider_pose, pose), put(Quantity::collider_size, size), put(Quantity::contact_weight, weights);
     return s;
   }
 

@@ -1,0 +1,100 @@
+"""Bodies in implicit substeps, and their points that touch shapes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sheetbend as sb
+
+SIDES = (0.1, 0.1, 0.12)
+TIMES = [0.0, 0.1, 0.3]
+SOLVER = sb.Solver(h=1e-3, method="implicit", integrator="bdf1")
+
+
+def tossed(touches: bool = True, **contact) -> tuple[sb.Scene, sb.Body]:
+    scene = sb.Scene("toss")
+    start = {"at": (0, 0, 0.2), "velocity": (0.8, 0.1, -0.5), "spin": (1, -3, 2)}
+    body = scene.add_body("cube", of=sb.Inertia.box(0.37, SIDES), **start)
+    if touches:
+        options = {"friction": 0.2, "points": sb.box_corners(SIDES)} | contact
+        scene.contact(body, sb.Plane(name="table"), **options)
+    return scene, body
+
+
+@pytest.mark.parametrize(("h", "most"), [(1e-2, 1e-7), (2e-3, 3e-10)])
+def test_a_free_body_moves_as_in_direct_blocks(h, most):
+    ends = [
+        sb.simulate(tossed(touches=False)[0], [0.0, 0.5], sb.Solver(h=h, method=method)).nodes[-1]
+        for method in ("direct", "implicit")
+    ]
+    assert np.abs(ends[0] - ends[1]).max() < most
+
+
+def test_a_tossed_box_comes_to_rest_on_a_face():
+    scene, body = tossed()
+    motion = sb.simulate(scene, [0.0, 1.0, 1.2], SOLVER)
+    place, axes = body.pose(motion)
+    assert np.abs(place[2] - place[1]).max() < 1e-9
+    assert min(abs(place[-1, 2] - 0.5 * side) for side in SIDES) < 1e-6
+    assert motion.contacts["table"].most == 4
+    assert np.abs(axes[-1] @ axes[-1].T - np.eye(3)).max() < 1e-12
+
+
+def test_quantities_have_gradients_as_differences_have():
+    scene, _ = tossed()
+    rollout = sb.rollout(scene, TIMES, SOLVER)
+    bar = np.zeros_like(rollout.positions)
+    bar[-1, 0, 0] = 1.0
+    found = rollout.gradient(bar).quantities
+
+    def loss(**values):
+        return sb.rollout(scene, TIMES, SOLVER, values=values).positions[-1, 0, 0]
+
+    names = ("table_friction", "table_z", "cube_mass", "cube_inertia_1", "cube_center_x", "cube_axes_turn_x")
+    for name, step in zip(names, (1e-6, 1e-8, 1e-6, 1e-9, 1e-7, 1e-6), strict=True):
+        value = scene.quantities[name].value
+        expected = (loss(**{name: value + step}) - loss(**{name: value - step})) / (2 * step)
+        assert found[name] == pytest.approx(expected, rel=1e-4, abs=1e-6), name
+
+
+def test_a_plug_on_a_cable_rests_on_a_table():
+    scene = sb.Scene("plug")
+    plug = scene.add_body("plug", of=sb.Inertia.box(0.02, (0.03, 0.01, 0.01)), at=(0.115, 0, 0.0051))
+    rope = sb.add_rope(scene, length=0.1, segments=10, density=0.02, EA=200.0, EI=1e-5, start=(0, 0, 0.0051))
+    stencil = [[plug.particles[0], rope.particles[-1], *plug.particles[1:]]]
+    scene.add_constraints("coincide_particle", stencil, name="hold", compliance=0.0, rest=[[-0.015, 0, 0]])
+    table = sb.Plane(name="table")
+    scene.contact(rope, table, friction=0.3, radius=0.004, name="cable")
+    scene.contact(plug, table, friction=0.3, points=sb.box_corners((0.03, 0.01, 0.01)), name="plug_on_table")
+    motion = sb.simulate(scene, [0.0, 0.5], SOLVER)
+    place, axes = plug.pose(motion)
+    assert place[-1, 2] == pytest.approx(0.005, abs=1e-6)
+    assert abs(axes[-1][2, 2]) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_scene_files_hold_points_of_bodies(tmp_path):
+    scene, _ = tossed()
+    sb.save_scene(scene, tmp_path / "toss.sheetbend")
+    again = sb.load_scene(tmp_path / "toss.sheetbend")
+    ends = [sb.simulate(s, [0.0, 0.2], SOLVER).positions[-1] for s in (scene, again)]
+    np.testing.assert_array_equal(*ends)
+
+
+@pytest.mark.parametrize(
+    ("contact", "field"),
+    [
+        ({"points": None}, "contact.points"),
+        ({"points": [[0, 0]]}, "contact.points"),
+        ({"points": [[0, 0, 0], [0, 0, 0]]}, "contact.points"),
+        ({"settle": True}, "contact.settle"),
+    ],
+)
+def test_what_is_no_contact_of_a_body_is_refused(contact, field):
+    with pytest.raises(sb.SceneError, match=field):
+        tossed(**contact)
+
+
+def test_particles_have_no_points():
+    scene = sb.rope(0.2, 8, density=0.05, EA=200.0, EI=1e-4, start=(0, 0, 0.1))
+    with pytest.raises(sb.SceneError, match="no body"):
+        scene.contact(scene.ropes["rope"], sb.Plane(name="table"), friction=0.1, points=[[0, 0, 0]])
