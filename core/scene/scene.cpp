@@ -251,7 +251,8 @@ std::array<std::size_t, 7> add_contacts(const SceneSpec& spec, Scene& s) {
   }
   add_bouncers(s);
   add_self_contact(spec, s);
-  return {s.contacts.size(), s.contacts.size() + spec.self_contact.pieces.size(), soft, poses, sizes, bouncing, weights};
+  return {
+      s.contacts.size(), s.contacts.size() + spec.self_contact.pieces.size(), soft, poses, sizes, bouncing, weights};
 }
 
 void add_loads(const SceneSpec& spec, Scene& s) {

@@ -142,7 +142,8 @@ TEST(IncrementalPotential, HasTheForcesForItsGradient) {
     EXPECT_NEAR(slope, expected, 1e-12 * size);
   }
   for (int kind = 0; kind < kind_count; ++kind)
-    with_kind(kind, [&]<class K>(K) { EXPECT_EQ(kinds.contains(kind), balances<K> && K::points == K::arity) << K::name; });
+    with_kind(kind,
+              [&]<class K>(K) { EXPECT_EQ(kinds.contains(kind), balances<K> && K::points == K::arity) << K::name; });
 }
 
 TEST(NewtonMatrix, IsTheDerivativeOfTheForces) {
