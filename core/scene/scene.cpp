@@ -7,36 +7,11 @@
 #include <stdexcept>
 
 #include "core/constraints/registry.h"
+#include "core/scene/add_contacts.h"
+#include "core/scene/spec_checks.h"
 
 namespace sheetbend {
 namespace {
-
-[[noreturn]] void refuse(const std::string& message) { throw std::invalid_argument(message); }
-
-void check_nodes(const std::string& field, const std::vector<int>& nodes, int count) {
-  for (const int node : nodes)
-    if (node < 0 || node >= count)
-      refuse(field + ": particle " + std::to_string(node) + " does not exist. Fix: use 0 to " +
-             std::to_string(count - 1));
-}
-
-void check_knots(const std::string& field, const Knots& knots, bool needed) {
-  if (needed && knots.times.empty()) refuse(field + ": no knot times. Fix: give at least one");
-  for (std::size_t i = 1; i < knots.times.size(); ++i)
-    if (!(knots.times[i] > knots.times[i - 1]))
-      refuse(field + ": time " + std::to_string(knots.times[i]) + " at knot " + std::to_string(i) +
-             " does not increase. Fix: sort the knots");
-}
-
-std::vector<int> slots(const std::vector<int>& list, int count, const std::string& field) {
-  std::vector<int> slot(count, -1);
-  for (std::size_t i = 0; i < list.size(); ++i) {
-    if (slot[list[i]] >= 0)
-      refuse(field + ": particle " + std::to_string(list[i]) + " is listed twice. Fix: list it once");
-    slot[list[i]] = static_cast<int>(i);
-  }
-  return slot;
-}
 
 Group build_group(const GroupSpec& spec, const Scene& scene) {
   Group g;
@@ -70,23 +45,6 @@ Group build_group(const GroupSpec& spec, const Scene& scene) {
   return g;
 }
 
-// What a node is that is no place.
-std::string a_direction(const Scene& scene, int node) {
-  return scene.is_director[node] ? "a director" : "an axis of a body";
-}
-
-void check_triangles(const std::string& field, const std::vector<std::array<int, 3>>& triangles, const Scene& scene) {
-  for (const auto& [a, b, c] : triangles) {
-    check_nodes(field, {a, b, c}, scene.nodes());
-    const std::string which = std::to_string(a) + ", " + std::to_string(b) + ", " + std::to_string(c);
-    if (a == b || b == c || c == a)
-      refuse(field + ": triangle " + which + " has no area. Fix: give distinct particles");
-    for (const int n : {a, b, c})
-      if (!scene.is_place[n])
-        refuse(field + ": triangle " + which + " holds " + a_direction(scene, n) + ". Fix: use particles");
-  }
-}
-
 // Every edge is there once in either direction.
 void check_closed(const std::string& field, const std::vector<std::array<int, 3>>& triangles) {
   std::set<std::pair<int, int>> edges;
@@ -116,143 +74,6 @@ Volume build_volume(const VolumeSpec& spec, const Scene& scene) {
   if (std::none_of(v.nodes.begin(), v.nodes.end(), [&](int n) { return scene.role[n] == Role::free; }))
     refuse(field + ": holds only pinned or driven particles. Fix: leave it out, nothing can move");
   return v;
-}
-
-// Of a body: the center and the axes of one, all of them.
-void check_points_of_bodies(const ContactSpec& spec, const Scene& scene) {
-  for (auto p = spec.nodes.begin(); p != spec.nodes.end(); p += spec.arity) {
-    const bool known = std::ranges::any_of(scene.bodies, [&](const Body& b) {
-      return b.center == p[0] && std::equal(b.axes.begin(), b.axes.end(), p + 1);
-    });
-    if (!known || std::any_of(p, p + spec.arity, [&](int n) { return scene.role[n] != scene.role[p[0]]; }))
-      refuse(spec.name + ": the point of node " + std::to_string(p[0]) +
-             " is of no body. Fix: give a body's center and its three axes, which all move or all stand");
-  }
-}
-
-void check_contact(const ContactSpec& spec, const Scene& scene, std::vector<char>& carries) {
-  check_nodes(spec.name, spec.nodes, scene.nodes());
-  check_nodes(spec.name + ".carried", spec.carried, scene.nodes());
-  if (spec.collider < 0 || spec.collider >= static_cast<int>(scene.colliders.size()))
-    refuse(spec.name + ": collider " + std::to_string(spec.collider) + " does not exist. Fix: add it first");
-  if (spec.nodes.empty()) refuse(spec.name + ": no particles. Fix: give those that may touch");
-  if (spec.arity != 1 && spec.arity != most_point_nodes)
-    refuse(spec.name + ".arity: " + std::to_string(spec.arity) + ". Fix: give 1 for particles, 4 for points of bodies");
-  if (spec.nodes.size() != spec.carried.size() * spec.arity)
-    refuse(spec.name + ".carried: " + std::to_string(spec.carried.size()) + " nodes. Fix: give one for each point");
-  if (spec.arity > 1) {
-    check_points_of_bodies(spec, scene);
-  } else {
-    slots(spec.nodes, scene.nodes(), spec.name);
-    for (const int n : spec.nodes)
-      if (!scene.is_place[n])
-        refuse(spec.name + ": node " + std::to_string(n) + " is " + a_direction(scene, n) + ". Fix: use particles");
-  }
-  for (const int n : spec.carried) {
-    if (carries[n] || scene.role[n] != Role::pinned)
-      refuse(spec.name + ".carried: node " + std::to_string(n) + ". Fix: give each particle a pinned node of its own");
-    carries[n] = true;
-  }
-}
-
-// Of contacts with restitution: the free particles that nothing holds, and which ones constraints hold. A soft contact of what is held gives back
-// by itself.
-void add_bouncers(Scene& s) {
-  std::vector<char> held(s.nodes(), false);
-  for (const Group& g : s.groups)
-    for (const int n : g.stencil) held[n] = true;
-  for (const Volume& v : s.volumes)
-    for (const int n : v.nodes) held[n] = true;
-  std::map<int, std::vector<int>> contacts;
-  for (std::size_t c = 0; c < s.contacts.size(); ++c) {
-    Contact& contact = s.contacts[c];
-    if (contact.restitution < 0) continue;
-    for (int item = 0; item < contact.points(); ++item) {
-      const int n = contact.first_node(item);
-      contact.held.push_back(held[n]);
-      if (s.role[n] != Role::free) continue;
-      if (!held[n])
-        contacts[n].push_back(static_cast<int>(c));
-      else if (contact.stiffness >= 0)
-        refuse(contact.name + ".restitution: particle " + std::to_string(n) +
-               " is held by constraints, and the contact has a stiffness. Fix: leave out one of the two");
-    }
-  }
-  for (auto& [node, own] : contacts) s.bouncers.push_back({node, std::move(own)});
-}
-
-// The radii of pieces stand behind those of contacts. Where any piece has triangles, the points of all pieces may touch them.
-void add_self_contact(const SceneSpec& spec, Scene& s) {
-  SelfContact& own = s.self_contact;
-  const std::string field = "self_contact";
-  own.radius.assign(s.nodes(), -1);
-  int place = static_cast<int>(s.contacts.size());
-  for (const SelfContactSpec::Piece& piece : spec.self_contact.pieces) {
-    if (piece.edges.empty()) refuse(field + ": a piece has no edges. Fix: give ropes, cloths or both");
-    std::vector<int> nodes;
-    for (const auto& [a, b] : piece.edges) {
-      check_nodes(field, {a, b}, s.nodes());
-      if (a == b) refuse(field + ": an edge from particle " + std::to_string(a) + " to itself. Fix: leave it out");
-      nodes.insert(nodes.end(), {a, b});
-    }
-    check_triangles(field, piece.triangles, s);
-    for (const auto& t : piece.triangles) nodes.insert(nodes.end(), t.begin(), t.end());
-    std::sort(nodes.begin(), nodes.end());
-    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
-    for (const int n : nodes) {
-      if (!s.is_place[n])
-        refuse(field + ": node " + std::to_string(n) + " is " + a_direction(s, n) + ". Fix: use particles");
-      if (own.radius[n] >= 0)
-        refuse(field + ": particle " + std::to_string(n) + " is in two pieces. Fix: list each piece once");
-      own.radius[n] = place;
-      own.points.push_back(n);
-    }
-    own.edges.insert(own.edges.end(), piece.edges.begin(), piece.edges.end());
-    own.triangles.insert(own.triangles.end(), piece.triangles.begin(), piece.triangles.end());
-    ++place;
-  }
-  if (own.empty()) own.radius.clear();
-  if (own.triangles.empty()) own.points.clear();
-}
-
-// A distance field has a grid, and nothing else has one.
-void check_grid(const ColliderSpec& c) {
-  const DistanceGrid* g = c.grid.get();
-  if ((c.shape == DistanceField::name) != (g != nullptr))
-    refuse(c.name + ".grid: is of distance fields alone. Fix: give one to them, and none to other shapes");
-  if (!g) return;
-  std::size_t size = 1;
-  for (const int n : g->count) size *= static_cast<std::size_t>(std::max(n, 0));
-  const auto finite = [](double a) { return std::isfinite(a); };
-  if (std::ranges::any_of(g->count, [](int n) { return n < 4; }) || size != g->coefficients.size() ||
-      !(g->spacing > 0.0) || !finite(g->spacing) || !std::ranges::all_of(g->origin, finite) ||
-      !std::ranges::all_of(g->coefficients, finite))
-    refuse(c.name +
-           ".grid: has fewer than two points along an axis, or numbers that are not finite. "
-           "Fix: give distances on two points or more along each axis");
-}
-
-// Colliders and contacts; returns how many numbers there are of each of their quantities.
-std::array<std::size_t, 7> add_contacts(const SceneSpec& spec, Scene& s) {
-  std::size_t poses = 0, sizes = 0, soft = 0, bouncing = 0, weights = 0;
-  for (const ColliderSpec& c : spec.colliders) {
-    check_knots(c.name + ".times", c.motion, true);
-    check_grid(c);
-    s.colliders.push_back({c.name, shape_of(c.shape), c.motion, poses, sizes, c.grid});
-    poses += 6 * c.motion.times.size();
-    with_shape(s.colliders.back().shape, [&]<class S>(S) { sizes += size_count<S>; });
-  }
-  std::vector<char> carries(s.nodes(), false);
-  for (const ContactSpec& c : spec.contacts) {
-    check_contact(c, s, carries);
-    s.contacts.push_back({c.name, c.collider, c.arity, c.nodes, c.carried, c.rigid ? -1 : static_cast<int>(soft++),
-                          c.bounces ? static_cast<int>(bouncing++) : -1, points_in_contact(s), weights});
-    if (c.arity > 1) weights += c.nodes.size();
-  }
-  add_bouncers(s);
-  add_self_contact(spec, s);
-  return {
-      s.contacts.size(), s.contacts.size() + spec.self_contact.pieces.size(), soft, poses, sizes, bouncing, weights};
 }
 
 void add_loads(const SceneSpec& spec, Scene& s) {

@@ -24,12 +24,6 @@ constexpr double leap_shares[] = {1.0, 0.5, 2.0, 0.25, 1.5, 0.75, 0.35, 0.6};
 constexpr int most_leaps = static_cast<int>(std::size(leap_shares));
 constexpr double near_saddle = 1e-3;  // so little of the largest force is left where it may be a saddle's
 
-std::string words(const Unbalanced& e, int substep, double time) {
-  std::ostringstream out;
-  out << e.problem << ", in substep " << substep << " (t = " << time << " s). Fix: " << e.fix;
-  return out.str();
-}
-
 // The multipliers of rigid rows that leave the least of R at the solution x. What is left of it is rounding, which contacts make large: on the way back these
 // multipliers are found again from x, and have to be the same. The second pass takes back the rounding of the first.
 void balance_rigid(const DirectBlock& block, IncrementalPotential& potential, Numbers<double>& x) {
@@ -45,17 +39,6 @@ void balance_rigid(const DirectBlock& block, IncrementalPotential& potential, Nu
 }
 
 }  // namespace
-
-Unbalanced::Unbalanced(const std::string& problem_, const std::string& fix_, int matrices, double residual_, int node_)
-    : Unconverged(problem_ + ". Fix: " + fix_, matrices, residual_), problem(problem_), fix(fix_), node(node_) {}
-
-Unbalanced::Unbalanced(const Unbalanced& e, int substep_, double time_)
-    : Unconverged(words(e, substep_, time_), e.iterations, e.residual),
-      problem(e.problem),
-      fix(e.fix),
-      substep(substep_),
-      node(e.node),
-      time(time_) {}
 
 void ImplicitBlock::resize(const Scene& scene, const DirectBlock& block) {
   potential.resize(scene, block);

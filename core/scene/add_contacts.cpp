@@ -1,0 +1,150 @@
+#include "core/scene/add_contacts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "core/scene/spec_checks.h"
+
+namespace sheetbend {
+namespace {
+
+// Of a body: the center and the axes of one, all of them.
+void check_points_of_bodies(const ContactSpec& spec, const Scene& scene) {
+  for (auto p = spec.nodes.begin(); p != spec.nodes.end(); p += spec.arity) {
+    const bool known = std::ranges::any_of(scene.bodies, [&](const Body& b) {
+      return b.center == p[0] && std::equal(b.axes.begin(), b.axes.end(), p + 1);
+    });
+    if (!known || std::any_of(p, p + spec.arity, [&](int n) { return scene.role[n] != scene.role[p[0]]; }))
+      refuse(spec.name + ": the point of node " + std::to_string(p[0]) +
+             " is of no body. Fix: give a body's center and its three axes, which all move or all stand");
+  }
+}
+
+void check_contact(const ContactSpec& spec, const Scene& scene, std::vector<char>& carries) {
+  check_nodes(spec.name, spec.nodes, scene.nodes());
+  check_nodes(spec.name + ".carried", spec.carried, scene.nodes());
+  if (spec.collider < 0 || spec.collider >= static_cast<int>(scene.colliders.size()))
+    refuse(spec.name + ": collider " + std::to_string(spec.collider) + " does not exist. Fix: add it first");
+  if (spec.nodes.empty()) refuse(spec.name + ": no particles. Fix: give those that may touch");
+  if (spec.arity != 1 && spec.arity != most_point_nodes)
+    refuse(spec.name + ".arity: " + std::to_string(spec.arity) + ". Fix: give 1 for particles, 4 for points of bodies");
+  if (spec.nodes.size() != spec.carried.size() * spec.arity)
+    refuse(spec.name + ".carried: " + std::to_string(spec.carried.size()) + " nodes. Fix: give one for each point");
+  if (spec.arity > 1) {
+    check_points_of_bodies(spec, scene);
+  } else {
+    slots(spec.nodes, scene.nodes(), spec.name);
+    for (const int n : spec.nodes)
+      if (!scene.is_place[n])
+        refuse(spec.name + ": node " + std::to_string(n) + " is " + a_direction(scene, n) + ". Fix: use particles");
+  }
+  for (const int n : spec.carried) {
+    if (carries[n] || scene.role[n] != Role::pinned)
+      refuse(spec.name + ".carried: node " + std::to_string(n) + ". Fix: give each particle a pinned node of its own");
+    carries[n] = true;
+  }
+}
+
+// Of contacts with restitution: the free particles that nothing holds, and which ones constraints hold. A soft contact of what is held gives back
+// by itself.
+void add_bouncers(Scene& s) {
+  std::vector<char> held(s.nodes(), false);
+  for (const Group& g : s.groups)
+    for (const int n : g.stencil) held[n] = true;
+  for (const Volume& v : s.volumes)
+    for (const int n : v.nodes) held[n] = true;
+  std::map<int, std::vector<int>> contacts;
+  for (std::size_t c = 0; c < s.contacts.size(); ++c) {
+    Contact& contact = s.contacts[c];
+    if (contact.restitution < 0) continue;
+    for (int item = 0; item < contact.points(); ++item) {
+      const int n = contact.first_node(item);
+      contact.held.push_back(held[n]);
+      if (s.role[n] != Role::free) continue;
+      if (!held[n])
+        contacts[n].push_back(static_cast<int>(c));
+      else if (contact.stiffness >= 0)
+        refuse(contact.name + ".restitution: particle " + std::to_string(n) +
+               " is held by constraints, and the contact has a stiffness. Fix: leave out one of the two");
+    }
+  }
+  for (auto& [node, own] : contacts) s.bouncers.push_back({node, std::move(own)});
+}
+
+// The radii of pieces stand behind those of contacts. Where any piece has triangles, the points of all pieces may touch them.
+void add_self_contact(const SceneSpec& spec, Scene& s) {
+  SelfContact& own = s.self_contact;
+  const std::string field = "self_contact";
+  own.radius.assign(s.nodes(), -1);
+  int place = static_cast<int>(s.contacts.size());
+  for (const SelfContactSpec::Piece& piece : spec.self_contact.pieces) {
+    if (piece.edges.empty()) refuse(field + ": a piece has no edges. Fix: give ropes, cloths or both");
+    std::vector<int> nodes;
+    for (const auto& [a, b] : piece.edges) {
+      check_nodes(field, {a, b}, s.nodes());
+      if (a == b) refuse(field + ": an edge from particle " + std::to_string(a) + " to itself. Fix: leave it out");
+      nodes.insert(nodes.end(), {a, b});
+    }
+    check_triangles(field, piece.triangles, s);
+    for (const auto& t : piece.triangles) nodes.insert(nodes.end(), t.begin(), t.end());
+    std::sort(nodes.begin(), nodes.end());
+    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+    for (const int n : nodes) {
+      if (!s.is_place[n])
+        refuse(field + ": node " + std::to_string(n) + " is " + a_direction(s, n) + ". Fix: use particles");
+      if (own.radius[n] >= 0)
+        refuse(field + ": particle " + std::to_string(n) + " is in two pieces. Fix: list each piece once");
+      own.radius[n] = place;
+      own.points.push_back(n);
+    }
+    own.edges.insert(own.edges.end(), piece.edges.begin(), piece.edges.end());
+    own.triangles.insert(own.triangles.end(), piece.triangles.begin(), piece.triangles.end());
+    ++place;
+  }
+  if (own.empty()) own.radius.clear();
+  if (own.triangles.empty()) own.points.clear();
+}
+
+// A distance field has a grid, and nothing else has one.
+void check_grid(const ColliderSpec& c) {
+  const DistanceGrid* g = c.grid.get();
+  if ((c.shape == DistanceField::name) != (g != nullptr))
+    refuse(c.name + ".grid: is of distance fields alone. Fix: give one to them, and none to other shapes");
+  if (!g) return;
+  std::size_t size = 1;
+  for (const int n : g->count) size *= static_cast<std::size_t>(std::max(n, 0));
+  const auto finite = [](double a) { return std::isfinite(a); };
+  if (std::ranges::any_of(g->count, [](int n) { return n < 4; }) || size != g->coefficients.size() ||
+      !(g->spacing > 0.0) || !finite(g->spacing) || !std::ranges::all_of(g->origin, finite) ||
+      !std::ranges::all_of(g->coefficients, finite))
+    refuse(c.name +
+           ".grid: has fewer than two points along an axis, or numbers that are not finite. "
+           "Fix: give distances on two points or more along each axis");
+}
+
+}  // namespace
+
+ContactSizes add_contacts(const SceneSpec& spec, Scene& s) {
+  std::size_t poses = 0, sizes = 0, soft = 0, bouncing = 0, weights = 0;
+  for (const ColliderSpec& c : spec.colliders) {
+    check_knots(c.name + ".times", c.motion, true);
+    check_grid(c);
+    s.colliders.push_back({c.name, shape_of(c.shape), c.motion, poses, sizes, c.grid});
+    poses += 6 * c.motion.times.size();
+    with_shape(s.colliders.back().shape, [&]<class S>(S) { sizes += size_count<S>; });
+  }
+  std::vector<char> carries(s.nodes(), false);
+  for (const ContactSpec& c : spec.contacts) {
+    check_contact(c, s, carries);
+    s.contacts.push_back({c.name, c.collider, c.arity, c.nodes, c.carried, c.rigid ? -1 : static_cast<int>(soft++),
+                          c.bounces ? static_cast<int>(bouncing++) : -1, points_in_contact(s), weights});
+    if (c.arity > 1) weights += c.nodes.size();
+  }
+  add_bouncers(s);
+  add_self_contact(spec, s);
+  return {
+      s.contacts.size(), s.contacts.size() + spec.self_contact.pieces.size(), soft, poses, sizes, bouncing, weights};
+}
+
+}  // namespace sheetbend
