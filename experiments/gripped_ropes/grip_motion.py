@@ -6,7 +6,7 @@ import numpy as np
 from sheetbend.objects.grip import Grip, any_across, carried
 from true_ropes import Array, Rope
 
-KNOTS = 400  # Hz
+KNOTS = 4  # in each frame
 UP, ALONG, ACROSS = np.eye(3)[[2, 0, 1]]
 DROOP = np.radians(35.0)  # the rope leaves its grips downwards
 NOMINAL = [np.cos(DROOP) * ALONG - side * np.sin(DROOP) * UP for side in (1.0, -1.0)]  # directions at start and end
@@ -18,7 +18,8 @@ REST, START = 0.1, 1.0  # s, at rest, and how long the motion takes to reach its
 
 def motion(rope: Rope, rng: np.random.Generator, seconds: float) -> tuple[Grip, Grip]:
     """Two grips that start at rest and move at random, as smoothly as two robot arms."""
-    times = np.arange(round(seconds * KNOTS) + 1) / KNOTS
+    knots = KNOTS * rope.rate
+    times = np.arange(round(seconds * knots) + 1) / knots
     base = MEAN_APART * rope.length * ALONG
     while True:
         (x0, d0), (x1, d1) = (_wander(rng, times, nominal) for nominal in NOMINAL)

@@ -31,6 +31,10 @@ class Rope:
         marker_mass: kg of each free marker.
         lists: whether its pickles hold lists of numbers instead of NumPy arrays.
         weighed: whether whoever fits it knows its density.
+        knot: where it is, as a share of the free length, and its mass, kg.
+        rate: Hz, of the frames.
+        louder: noise of its markers over that of the others.
+        axes: which axes of the simulation, whose third one points up, are the first to third of a recording.
     """
 
     name: str
@@ -43,6 +47,10 @@ class Rope:
     marker_mass: float = 0.0
     lists: bool = False
     weighed: bool = True
+    knot: tuple[float, float] = (0.0, 0.0)
+    rate: int = 100
+    louder: float = 1.0
+    axes: tuple[int, int, int] = (0, 1, 2)
 
     @property
     def free_length(self) -> float:

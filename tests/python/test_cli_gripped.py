@@ -57,7 +57,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
         script = importlib.import_module("make_data")
         patch.setattr(script, "CREEP", ((1 / 100, 10.0),))  # not quite at rest, which a fit does not need
         script.main(folder, train=3, evaluation=1, count=1, seconds=2.0, seed=7)
-        for name in ("make_data", "grip_motion", "spoil", "true_ropes"):
+        for name in ("make_data", "grip_motion", "spoil", "strange", "true_ropes"):
             del sys.modules[name]
     return folder
 

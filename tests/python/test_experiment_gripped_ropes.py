@@ -14,7 +14,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend.gripped import RopeModel
+from sheetbend.gripped import GrippedMotion, RopeModel
 from sheetbend.gripped.start import started
 from sheetbend.objects.grip import Grip
 
@@ -28,7 +28,7 @@ def script() -> Iterator[ModuleType]:
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(FOLDER))
         yield importlib.import_module("make_data")
-        for name in ("make_data", "grip_motion", "spoil", "true_ropes"):
+        for name in ("make_data", "grip_motion", "spoil", "strange", "true_ropes"):
             del sys.modules[name]
 
 
@@ -129,7 +129,7 @@ def folder(script: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path
     folder = tmp_path_factory.mktemp("nasty")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(script, "SEGMENTS", 40)
-        patch.setattr(script, "H", 1 / 800)
+        patch.setattr(script, "SUBSTEPS", 8)
         patch.setattr(script, "CREEP", ((1 / 100, 10.0),))
         script.main(folder, train=4, evaluation=1, count=1, seconds=0.5, seed=7, nasty=True)
     return folder
@@ -189,3 +189,26 @@ class TestNasty:
         return compiled.unpack(compiled.inputs())["mass"]
 
     ENDS = ((0.0, 0.0, 0.0), (0.6, 0.0, 0.0))
+
+
+class TestStrange:
+    """Ropes of which the recipe has no model."""
+
+    def test_a_recording_tells_its_rate_and_holds_the_knot_and_the_turned_axes(
+        self, script: ModuleType, tmp_path: Path
+    ) -> None:
+        knotted, flat, _, stretching = script.strange(7)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(script, "SEGMENTS", 40)
+            patch.setattr(script, "SUBSTEPS", 8)
+            patch.setattr(script, "CREEP", ((1 / 100, 10.0),))
+            script.main(tmp_path, train=1, evaluation=1, count=2, seconds=0.5, seed=7, odd=True)
+        turned, quick = (sb.read_recordings(tmp_path / f"rope_{k}" / "train")[0] for k in (1, 2))
+        assert turned.positions.shape == (50, 16, 3) and quick.positions.shape == (60, 8, 3)
+        assert quick.times[1] == pytest.approx(1 / 120)
+        sag = GrippedMotion.of(turned, 0.08).sag
+        assert sag[1] < -0.9 * np.linalg.norm(sag)
+        assert truth(tmp_path)["knot"] == list(knotted.knot) and truth(tmp_path)["made_with"]["noise"] == 1e-3
+        assert flat.values["EI2"] == pytest.approx(0.4 * flat.values["EI"])
+        sags = stretching.values["density"] * 9.81 * stretching.length / stretching.values["EA"]
+        assert sags == pytest.approx(0.02)

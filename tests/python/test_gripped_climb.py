@@ -169,7 +169,7 @@ class TestClimb:
         climb = Climb(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, said.append)
         model = RopeModel(density=0.06, nominal=MODEL.nominal, values={}, smoothing=0.0)
         twist = replace(TWIST, parameters=TWIST.parameters[:4])
-        climb.run(model, [twist, *more], (0.3,), 12)
+        climb.run([model], [twist, *more], (0.3,), 12)
         return climb, said
 
     def test_one_recording_that_flies_apart_is_left_out_with_a_word(self) -> None:
@@ -180,6 +180,13 @@ class TestClimb:
         assert [m.recording.name for m in climb.whole] == ["0", "1", "2", "3", "4"]
         (sentence,) = climb.left_out
         assert sentence.startswith("bad is left out of the fit: its prediction diverges") and sentence in said
+
+    def test_of_two_gravities_the_one_that_predicts_better_is_taken(self) -> None:
+        climb = Climb([shown("only")], 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None)
+        model = RopeModel(density=0.06, nominal=MODEL.nominal, values={}, smoothing=0.0)
+        models = [replace(model, gravity=g) for g in ((0.0, -9.81, 0.0), model.gravity)]
+        climb.run(models, [replace(TWIST, parameters=TWIST.parameters[:4])], (0.3,), 12)
+        assert climb.rope is not None and climb.rope.model.gravity == model.gravity
 
     def test_from_one_recording_a_rung_is_judged_by_its_end(self) -> None:
         """Once nothing was left to judge by, and every rung stayed."""

@@ -7,7 +7,7 @@ import pytest
 import sheetbend as sb
 from sheetbend.gripped import GrippedMotion
 from sheetbend.gripped.order import marker_order
-from sheetbend.gripped.plausible import doubts
+from sheetbend.gripped.plausible import doubts, gravities
 
 Array = np.ndarray
 TIMES = np.arange(101) / 100.0
@@ -90,6 +90,16 @@ class TestDoubts:
     def test_a_straight_rope_says_nothing_of_gravity(self) -> None:
         straight = np.tile(np.linspace(0.0, 1.0, 12)[:, None] * [1.0, 0.0, 0.0], (101, 1, 1))
         assert doubts([GrippedMotion.of(recorded(straight), 0.08)], (0.0, -9.81, 0.0)) == ()
+
+    def test_an_axis_along_which_the_rope_sags_may_point_down_too(self) -> None:
+        upright, turned = (GrippedMotion.of(recorded(bending()[:, :, axes]), 0.08) for axes in ([0, 1, 2], [1, 2, 0]))
+        assert gravities([upright]) == (DOWN,)
+        assert gravities([turned]) == (DOWN, (0.0, -9.81, 0.0))
+
+    def test_a_sag_along_no_axis_adds_no_gravity(self) -> None:
+        c = np.sqrt(0.5)
+        askew = bending() @ np.array([[1.0, 0.0, 0.0], [0.0, c, c], [0.0, c, -c]])
+        assert gravities([GrippedMotion.of(recorded(askew), 0.08)]) == (DOWN,)
 
     @pytest.mark.parametrize("unit", [1e3, 1e-3], ids=["mm read as m", "m read as mm"])
     def test_another_unit_is_named(self, unit: float) -> None:

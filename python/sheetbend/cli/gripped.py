@@ -186,7 +186,7 @@ def _fit(console: Console, config: GrippedConfig, rope: RopeData, ladder: Sequen
         substeps=s.substeps,
         smoothing=s.smoothing,
         sigma=s.sigma,
-        gravity=(s.gravity[0], s.gravity[1], s.gravity[2]),
+        gravity=None if s.gravity is None else (s.gravity[0], s.gravity[1], s.gravity[2]),
         given=None if s.density_sd is None else {f"{NAME}_density": s.density_sd},
         threads=config.fit.threads,
         say=lambda text: console.print(f"  {time.perf_counter() - began:6.1f} s  {text}", soft_wrap=True),

@@ -75,7 +75,12 @@ class GrippedRopeSection(Section):
         '{ "train/02" = [0, 1, 2, 3, 5, 4, 6, 7] } or with their names; all markers of the file, once each. Exchanged '
         "markers of a grip need no entry: they are found and put back",
     )
-    gravity: Vector = key(_default("gravity"), "in the axes of the recordings, where their JSONs do not tell", "m/s^2")
+    gravity: Vector | None = key(
+        None,
+        "in the axes of the recordings, where their JSONs do not tell; when left out, 9.81 along -z, or along the axis "
+        "of the rope's sag where that is another one and predicts better, which a warning names",
+        "m/s^2",
+    )
     nominal: Directions | None = key(
         None,
         "[start, end], directions from which the frames of the grips are carried by the shortest rotation, the same "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 
 import numpy as np
 
@@ -95,10 +96,12 @@ class Climb:
         self.rope: Rope | None = None
         self.beside: Offsets = ()
 
-    def run(self, model: RopeModel, ladder: Sequence[Rung], bending_lengths: Sequence[float], most_links: int) -> None:
-        """Climb; Ctrl-C passes, and leaves what is finished."""
+    def run(
+        self, models: Sequence[RopeModel], ladder: Sequence[Rung], bending_lengths: Sequence[float], most_links: int
+    ) -> None:
+        """Climb, from the best start of any of the models; Ctrl-C passes, and leaves what is finished."""
         began = time.perf_counter()
-        self._keep(ladder[0], self._straight(model, ladder[0], bending_lengths, most_links), None, began)
+        self._keep(ladder[0], self._straight(models, ladder[0], bending_lengths, most_links), None, began)
         stayed = [self._climbed(rung) for rung in ladder[1:]]
         last = max((k for k, stays in enumerate(stayed) if stays), default=-1)
         dropped = []
@@ -217,23 +220,25 @@ class Climb:
             errors += f", {step.ratio:.3g} times without it, better on {step.better} of {step.count}"
         self.say(f"{step.name}: {errors}{'' if step.stays else ', does not stay'}")
 
-    def _straight(self, model: RopeModel, rung: Rung, bending_lengths: Sequence[float], most_links: int) -> Rope:
+    def _straight(
+        self, models: Sequence[RopeModel], rung: Rung, bending_lengths: Sequence[float], most_links: int
+    ) -> Rope:
         """The first rung, from the best start that gets to its end.
 
         Raises:
             SheetbendError: none does.
         """
-        for start in self._started(model, rung, bending_lengths):
+        for start in self._started(models, rung, bending_lengths):
             try:
                 return self._refined(start, most_links)
             except SheetbendError as error:
                 self.say(f"from EI {start.values[f'{NAME}_EI']:.3g}: {error}; on to the next start")
         raise SheetbendError("no start of a straight rope gives a motion that does not diverge")
 
-    def _started(self, model: RopeModel, rung: Rung, bending_lengths: Sequence[float]) -> list[Rope]:
+    def _started(self, models: Sequence[RopeModel], rung: Rung, bending_lengths: Sequence[float]) -> list[Rope]:
         """Starts fitted to short windows, best first: by the median error of predictions, then by the cost."""
         ends = []
-        for length in bending_lengths:
+        for model, length in product(models, bending_lengths):
             candidate = started(model, self.split.motions, length)
             own = about(rung.wanted(self.split.fitted[0]), candidate)
             found = self._descended(Rope(candidate, own, {}), self.windows[0], SHORT)

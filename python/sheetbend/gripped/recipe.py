@@ -30,7 +30,7 @@ from .ladder import LADDER, Rung
 from .model import GRAVITY, NAME, RopeModel, nominal_directions, shared_gravity
 from .motion import Array, GrippedMotion, motions_of
 from .over_density import UNIT, as_quantities, named_over_density, over_density, said_over_density
-from .plausible import doubts
+from .plausible import doubts, gravities
 from .screening import screened
 from .windows import SPANS, Span, everything
 
@@ -91,7 +91,7 @@ def fit_rope(
     substeps: int = 2,
     smoothing: float = 0.08,
     sigma: float = 5e-3,
-    gravity: tuple[float, float, float] = GRAVITY,
+    gravity: tuple[float, float, float] | None = None,
     given: Mapping[str, float] | None = None,
     threads: int = 1,
     say: Say = lambda text: None,
@@ -121,7 +121,8 @@ def fit_rope(
         smoothing: s, of the starts; grips are smoothed over that or more, as their noise asks for. 0 = as recorded. In
             these frames what had slid inside a rope that yields shows, with which each window starts.
         sigma: m, expected error of a marker.
-        gravity: m/s^2, where the recordings do not tell.
+        gravity: m/s^2, where the recordings do not tell. None = 9.81 along -z; or along the axis of the rope's sag
+            where that is another one and starts with it predict better, which a warning names.
         given: standard deviations of what the fit takes as given, such as {"rope_density": 0.02}; see `sheetbend.fit`.
         threads: the result does not depend on it.
         say: called with a line on each step.
@@ -151,11 +152,11 @@ def fit_rope(
         say = said_over_density(say)
     usable = screened(recordings, smoothing)
     motions = usable.motions
-    shared_gravity([m.recording for m in motions])
-    doubtful = doubts(motions, gravity)
+    told = shared_gravity([m.recording for m in motions])
+    meant = (gravity,) if gravity is not None else (GRAVITY,) if told is not None else gravities(motions)
     for note in usable.notes:
         say(note)
-    for doubt in doubtful:
+    for doubt in doubts(motions, meant[-1]):
         say(f"doubtful: {doubt}")
     model = RopeModel(
         density=UNIT if density is None else density,
@@ -168,12 +169,12 @@ def fit_rope(
         substeps=substeps,
         smoothing=smoothing,
         sigma=sigma,
-        gravity=gravity,
+        gravity=meant[0],
     )
     spans: Sequence[Span] = SPANS if isinstance(windows, str) else windows
     climb, interrupted = Climb(motions, validate, spans, threads, say), False
     try:
-        climb.run(model, ladder, bending_lengths, max_segments)
+        climb.run([replace(model, gravity=g) for g in meant], ladder, bending_lengths, max_segments)
     except KeyboardInterrupt:
         if climb.rope is None:
             raise
@@ -189,7 +190,8 @@ def fit_rope(
     rope, values = climb.rope, {**found.values, **found.on_mesh}  # of the model's own mesh
     warnings = (
         *usable.notes,
-        *doubtful,
+        *doubts(motions, rope.model.gravity),
+        *_found_gravity(rope.model, meant),
         *climb.left_out,
         *at_bounds(rope.parameters, values, rope.model, kept, last[0]),
         *_short_links(rope.model, values),
@@ -200,6 +202,14 @@ def fit_rope(
         found, values = replace(found, result=result), named_over_density(values, result)
         spread = named_over_density(spread, result)
     return RopeFit(model, values, tuple(climb.steps), found, warnings, density is not None, spread)
+
+
+def _found_gravity(model: RopeModel, meant: Sequence[Sequence[float]]) -> list[str]:
+    """A gravity that was chosen."""
+    if len(meant) < 2 or model.gravity == meant[0]:
+        return []
+    along = ", ".join(f"{g:.3g}" for g in model.gravity)
+    return [f"no gravity is given; it is taken as [{along}] m/s^2, since the rope sags along it and moves as it asks"]
 
 
 def _short_links(model: RopeModel, values: Mapping[str, float]) -> list[str]:
