@@ -17,6 +17,7 @@ namespace sheetbend::v0 {
 struct Model {
   std::string name;
   sheetbend::Scene topology;
+  int particles = 0;  // the first of the nodes; the others are hidden
   ParameterMap map;
   std::vector<Quantity> quantities;
   std::vector<Group> groups = {};

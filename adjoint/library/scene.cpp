@@ -27,7 +27,8 @@ Scene Scene::load(const std::filesystem::path& path) {
 }
 
 const std::string& Scene::name() const { return model_->name; }
-std::size_t Scene::particles() const { return static_cast<std::size_t>(model_->topology.nodes()); }
+std::size_t Scene::particles() const { return static_cast<std::size_t>(model_->particles); }
+std::size_t Scene::nodes() const { return static_cast<std::size_t>(model_->topology.nodes()); }
 std::size_t Scene::inputs() const { return model_->topology.layout.total(); }
 std::span<const Quantity> Scene::quantities() const { return model_->quantities; }
 std::span<const Group> Scene::groups() const { return model_->groups; }

@@ -29,6 +29,7 @@ class SceneReader {
       const InputError error = v0::refusal(e.what());
       file_.fail(error.field(), error.problem(), error.fix());
     }
+    m.particles = particles(m.topology.nodes());
     follow(m.topology);
     check_layout(m.topology.layout);
     m.map = map(m.topology.layout, m.quantities.size());
@@ -137,6 +138,13 @@ class SceneReader {
     });
     if (header_.contains("contacts")) contacts(spec);  // older files have none
     return spec;
+  }
+
+  int particles(int nodes) {
+    if (!header_.contains("particles")) return nodes;  // older files have no hidden nodes
+    const long long count = file_.whole(header_, "particles");
+    if (count < 0 || count > nodes) file_.fail("particles", "are not 0 to " + std::to_string(nodes));
+    return static_cast<int>(count);
   }
 
   Interpolation interpolation(const Json& parent, const std::string& where = "") {

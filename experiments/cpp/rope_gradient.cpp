@@ -18,8 +18,8 @@ int main(int count, char** arguments) {
     // The loss is the mean height of the last frame: its derivative with respect to every z is 1/particles.
     std::vector<double> positions_bar(rollout.positions().size());
     double height = 0.0;
-    const std::size_t last = positions_bar.size() - 3 * scene.particles();
-    for (std::size_t i = last + 2; i < positions_bar.size(); i += 3) {
+    const std::size_t last = positions_bar.size() - 3 * scene.nodes();
+    for (std::size_t i = last + 2; i < last + 3 * scene.particles(); i += 3) {
       positions_bar[i] = 1.0 / static_cast<double>(scene.particles());
       height += rollout.positions()[i] * positions_bar[i];
     }

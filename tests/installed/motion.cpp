@@ -6,8 +6,9 @@ int main(int count, char** arguments) {
   return shown([&] {
     const Scene scene = Scene::load(arguments[1]);
     const Solver solver = solver_of(count, arguments);
-    std::printf("scene %s %zu %zu %s %d.%d.%d\n", scene.name().c_str(), scene.particles(), scene.inputs(),
-                SHEETBEND_VERSION, SHEETBEND_VERSION_MAJOR, SHEETBEND_VERSION_MINOR, SHEETBEND_VERSION_PATCH);
+    std::printf("scene %s %zu %zu %zu %s %d.%d.%d\n", scene.name().c_str(), scene.particles(), scene.nodes(),
+                scene.inputs(), SHEETBEND_VERSION, SHEETBEND_VERSION_MAJOR, SHEETBEND_VERSION_MINOR,
+                SHEETBEND_VERSION_PATCH);
     for (const Group& g : scene.groups())
       std::printf("group.%s %s %d\n", g.name.c_str(), g.kind.c_str(), g.constraints);
     for (const Quantity& q : scene.quantities()) {

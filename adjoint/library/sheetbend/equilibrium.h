@@ -14,7 +14,7 @@ namespace sheetbend::SHEETBEND_INLINE v0 {
 class SHEETBEND_API Equilibrium {
  public:
   /// @param values  one for each quantity; the scene's own where they are left out
-  /// @param start   (particles, 3) [m]; the scene's initial positions where they are left out
+  /// @param start   (nodes, 3) [m]; the scene's initial positions where they are left out
   /// @throws InputError  values that make no sense, wrong sizes.
   /// @throws ConvergenceError  none was found.
   explicit Equilibrium(const Scene& scene, std::span<const double> values = {}, std::span<const double> start = {});
@@ -22,7 +22,7 @@ class SHEETBEND_API Equilibrium {
   Equilibrium(Equilibrium&&) noexcept;
   Equilibrium& operator=(Equilibrium&&) noexcept;
 
-  std::span<const double> positions() const;  ///< (particles, 3) [m]
+  std::span<const double> positions() const;  ///< (nodes, 3) [m]
   double energy() const;                      ///< elastic, and of weight and forces [J]
   int unstable_modes() const;                 ///< negative eigenvalues of the energy's Hessian; 0 where it is stable
 

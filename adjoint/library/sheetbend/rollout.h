@@ -45,18 +45,18 @@ class SHEETBEND_API Rollout {
   Rollout& operator=(Rollout&&) noexcept;
 
   std::span<const double> times() const;
-  std::span<const double> positions() const;  ///< (frames, particles, 3) [m], row by row
+  std::span<const double> positions() const;  ///< (frames, nodes, 3) [m], row by row
 
-  /// The positions of one frame, (particles, 3).
+  /// The positions of one frame, (nodes, 3).
   std::span<const double> frame(std::size_t i) const;
 
-  /// The gradient of a loss whose derivatives with respect to the positions are positions_bar (frames, particles, 3):
+  /// The gradient of a loss whose derivatives with respect to the positions are positions_bar (frames, nodes, 3):
   /// one reverse pass, whatever the number of inputs.
   /// @throws InputError  a wrong size, or numbers that are not finite.
   /// @throws DivergenceError  the gradient grew so much on its way back that rounding decides it.
   Gradient gradient(std::span<const double> positions_bar) const;
 
-  /// How the positions (frames, particles, 3) change when the values change by values_dot: one forward pass.
+  /// How the positions (frames, nodes, 3) change when the values change by values_dot: one forward pass.
   std::vector<double> tangent(std::span<const double> values_dot) const;
 
  private:

@@ -53,7 +53,10 @@ class SHEETBEND_API Scene {
   static Scene load(const std::filesystem::path& path);
 
   const std::string& name() const;
-  std::size_t particles() const;
+  std::size_t particles() const;  ///< the first of the nodes
+  /// How many rows arrays of positions have: the particles in order, and behind them the hidden nodes, such as the
+  /// stub of a clamp, the frames of a rod or the axes of a body.
+  std::size_t nodes() const;
   std::size_t inputs() const;  ///< the length of the flat vector of inputs
 
   std::span<const Quantity> quantities() const;  ///< in the order of values

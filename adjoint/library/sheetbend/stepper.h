@@ -15,9 +15,9 @@ namespace sheetbend::SHEETBEND_INLINE v0 {
 /// All that the next substep begins with.
 struct State {
   int substep = 0;
-  std::vector<double> positions;          ///< (particles, 3) [m]
+  std::vector<double> positions;          ///< (nodes, 3) [m]
   std::vector<double> positions_before;   ///< the same a substep earlier
-  std::vector<double> velocities;         ///< (particles, 3) [m/s]
+  std::vector<double> velocities;         ///< (nodes, 3) [m/s]
   std::vector<double> velocities_before;  ///< the same a substep earlier
 };
 
@@ -50,8 +50,8 @@ class SHEETBEND_API Stepper {
 
   int substep() const;
   double time() const;                         ///< [s]
-  std::span<const double> positions() const;   ///< (particles, 3) [m]; until the next step
-  std::span<const double> velocities() const;  ///< (particles, 3) [m/s]; until the next step
+  std::span<const double> positions() const;   ///< (nodes, 3) [m]; until the next step
+  std::span<const double> velocities() const;  ///< (nodes, 3) [m/s]; until the next step
 
   /// Numbers that may be written between steps, and act on all later ones: "force" (knots, loaded particles, 3) [N],
   /// "gravity" (3) [m/s^2], "wind" (knots, 3) [m/s], "pressure" (triangles) [Pa]. Between several knots in time values
