@@ -14,6 +14,7 @@ from ..config import GrippedConfig, Study, load, parse_any, scene_alone
 from ..experiment.experiment import Experiment
 from ..gripped.model import RopeModel, nominal_directions
 from ..gripped.over_density import UNIT
+from ..gripped.plausible import gravities
 from ..gripped.start import started, whole
 from ..gripped.windows import SPANS
 from ..minimum.growth import in_words, over_fit
@@ -116,7 +117,7 @@ def _started(rope: RopeData) -> tuple[Experiment, Parameters]:
         substeps=s.substeps,
         smoothing=s.smoothing,
         sigma=s.sigma,
-        gravity=(s.gravity[0], s.gravity[1], s.gravity[2]),
+        gravity=gravities(rope.train)[-1] if s.gravity is None else (s.gravity[0], s.gravity[1], s.gravity[2]),
     )
     model = started(model, rope.train, s.bending_lengths[0])
     return whole(

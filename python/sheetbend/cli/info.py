@@ -16,7 +16,7 @@ from ..config import GrippedConfig, build, parse_any, scene_alone
 from ..errors import ConfigError
 from ..experiment.experiment import Experiment
 from ..files.door import reading
-from ..gripped.plausible import doubts
+from ..gripped.plausible import doubts, gravities
 from ..minimum.growth import in_words, over_fit
 from ..minimum.optimizers import ceres_trouble, has_ceres
 from ..quantities.kinds import KINDS
@@ -156,7 +156,7 @@ def _ropes(console: Console, config: GrippedConfig, ropes: list[RopeData]) -> di
     """Ropes between grips: what was recorded, and what is to be fitted."""
     heading(console, config.experiment.name, config.experiment.about, above="\n")
     told: dict[str, dict[str, Any]] = {}
-    doubtful = {rope.section.name: doubts(rope.train, rope.section.gravity) for rope in ropes}
+    doubtful = {r.section.name: doubts(r.train, r.section.gravity or gravities(r.train)[-1]) for r in ropes}
     for rope in ropes:
         motions = rope.train
         told[rope.section.name] = {
