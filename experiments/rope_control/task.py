@@ -32,6 +32,7 @@ class Task:
         speed: of the same, in m/s: that of the rope in the last two frames, where it is fastest or where it matters.
         reached: of an error and a speed.
         effort: what an effort of 1 costs beside the loss.
+        posts: (x, y, radius) m of upright posts on a table; pictures of such a task look from above.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Task:
     speed: Callable[[Array], float]
     reached: Callable[[float, float], bool]
     effort: float
+    posts: tuple[tuple[float, float, float], ...] = ()
 
     @property
     def size(self) -> int:

@@ -14,7 +14,7 @@ import pytest
 import sheetbend as sb
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "rope_control"
-MODULES = ("motion", "task", "whip", "shape", "search", "drawn", "control")
+MODULES = ("motion", "task", "whip", "shape", "posts", "search", "drawn", "control")
 LONG = 60.0  # s; searches end by their number of rollouts
 
 
@@ -60,6 +60,13 @@ def test_knots_by_complex_step(scripts, shape, name):
     assert all(row.passed for row in rows), str(report)
 
 
+@pytest.mark.parametrize("name", ["wrap", "gap"])
+def test_gradient_beside_posts(scripts, name):
+    """The rope sticks to the table, slides and touches posts; differences over a kink would say something else."""
+    task = getattr(scripts.posts, name)()
+    assert scripts.search.gradient_gap(task, somewhere(task, 0.05), np.eye(task.size)[::5], step=1e-5) < 1e-6
+
+
 # --- targets
 
 
@@ -96,6 +103,36 @@ def test_effort_is_the_sum_of_the_unknowns_squares(scripts):
     effort = (places**2).sum(axis=1).mean() / whip.REACH**2
     effort += (accelerations**2).sum(axis=1).mean() / whip.ACCELERATION**2
     assert u @ u == pytest.approx(effort, rel=1e-2)  # the form's mean is over coarser times
+
+
+@pytest.mark.slow
+def test_a_rope_is_drawn_towards_the_gap(scripts):
+    search = scripts.search.descend_again(scripts.posts.gap(), LONG, tries=2, most=6)
+    first, last = search.outcomes[0], search.outcomes[-1]
+    assert first.error > 0.9
+    assert last.error < 0.15
+    assert len(search.outcomes) > 10  # both descents are there
+    assert all(b.cost <= a.cost for a, b in zip(search.outcomes[:-1], search.outcomes[1:], strict=True))
+    assert (np.diff(search.seconds) > 0.0).all()
+
+
+def test_a_motion_that_cannot_be_simulated_costs_more_than_the_start(scripts):
+    task = scripts.whip.whip()
+
+    class Torn:
+        size = task.size
+        require_gradient = staticmethod(lambda unknowns: None)
+
+        @staticmethod
+        def outcome_and_gradient(unknowns):
+            if np.linalg.norm(unknowns) > 0.5:
+                raise sb.UnbalancedError("forces do not balance", "use a smaller substep", 1, 0.0, 0, 1.0, "whip")
+            return task.outcome_and_gradient(unknowns)
+
+    search = scripts.search.descend(Torn(), LONG, most=20)
+    assert search.lost > 0
+    assert search.outcomes[-1].cost < search.outcomes[0].cost
+    assert np.linalg.norm(search.best) <= 0.5
 
 
 # --- where there is no gradient
