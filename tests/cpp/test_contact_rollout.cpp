@@ -191,7 +191,7 @@ Modes modes_of(const Program& p, const std::vector<double>& inputs) {
     ComputeEffectiveMasses::compute(step, masses);
     for_each_contact(step, masses, [&](const auto& source, const auto& poses, int c, int i) {
       const Contact& contact = p.scene.contacts[c];
-      const auto z = poses.next[contact.collider].in_frame(source.at(rollout.x(), contact.particles[i]));
+      const auto z = poses.next[contact.collider].in_frame(source.point(contact, i, rollout.x()));
       const auto at = touch(p.scene.colliders[contact.collider].any(), z, source.numbers(poses, c, i));
       bool& before = touching[{c, i}];
       modes.began += at.pushes && !before;
