@@ -152,7 +152,7 @@ TEST(NewtonMatrix, IsTheDerivativeOfTheForces) {
     auto p = c.problem(block);
     NewtonMatrix matrix;
     matrix.resize(c.scene(), block);
-    matrix.find(block, p.potential, p.x);
+    matrix.find(c.scene(), block, p.potential, p.x);
     Numbers<double> z, Kz;
     for (auto* rows : {&z, &Kz}) rows->assign(row * block.particles.size());
     std::vector<double> x(p.x.data(), p.x.data() + row * block.particles.size()), along(x.size());
