@@ -147,6 +147,7 @@ class TestMotionPage:
         scene = sb.Scene()
         mesh = grid(0.2, 0.2, 4, 4)
         sb.add_cloth(scene, mesh, density=0.1, warp=20.0, weft=20.0, shear=5.0, bending=1e-5, held=[0, 1, 2])
+        scene.pin([0, 1, 2])
         motion = sb.simulate(scene, np.arange(5) / 50, sb.Solver(h=1 / 200))
         (packed,) = packed_motions([of_trajectory(scene, motion, "cloth")])
         (sheet,) = packed["sheets"]
