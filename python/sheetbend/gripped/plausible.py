@@ -33,7 +33,7 @@ def _sag(motions: Sequence[GrippedMotion]) -> Array:
     return np.asarray(np.mean([m.sag for m in motions], axis=0))
 
 
-def _contradicts(motions: Sequence[GrippedMotion], gravity: Sequence[float]) -> bool:
+def _contradicts(motions: Sequence[GrippedMotion], gravity: Sequence[float] | Array) -> bool:
     """Whether the rope sags clearly, and along another direction."""
     sag, g = _sag(motions), np.array(gravity)
     size, length = float(np.linalg.norm(g)), float(np.mean([m.length for m in motions]))
