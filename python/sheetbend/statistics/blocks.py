@@ -115,12 +115,7 @@ def contradiction(
     """
     layout = Layout.series(len(residuals)) if layout is None else layout
     rows = len(layout.frame)
-    known = np.zeros((len(residuals), 0 if shifts is None else shifts.shape[1]))
-    if shifts is not None:
-        known[:rows] = shifts
-    drawn = np.zeros((len(residuals), 0 if errors is None else errors.shape[1]))
-    if errors is not None:
-        drawn[:rows] = errors
+    known, drawn = (padded(columns, rows, len(residuals) - rows) for columns in (shifts, errors))
     compared = [
         found
         for split in splits
@@ -161,7 +156,7 @@ def _compared(
     columns = np.hstack([jacobian[:, shared], *opposed, known, drawn])
     every, left = solved_within(jacobian, within, columns, residuals, rows)
     every, drawn = np.split(every, [every.shape[1] - drawn.shape[1]], axis=1)
-    used = _independent(every)
+    used = independent(every)
     compared = [i for i, c in enumerate(used) if count <= c < count * parts]
     if not compared:
         return None
@@ -194,7 +189,15 @@ def short_of_frames(spread: Covariance, frames: int) -> float:
     return float((1 + _SHORT * (spread.autocorrelation_time - 1) / frames) ** 2)
 
 
-def _independent(every: Array) -> list[int]:
+def padded(columns: Array | None, rows: int, extra: int) -> Array:
+    """(rows + extra, n) with zeros in the rows that are no data."""
+    found = np.zeros((rows + extra, 0 if columns is None else columns.shape[1]))
+    if columns is not None:
+        found[:rows] = columns
+    return found
+
+
+def independent(every: Array) -> list[int]:
     """Columns that have a unique answer once the others are held."""
     names = [str(i) for i in range(every.shape[1])]
     pivots = null_space(every, names, [False] * len(names)).pivots

@@ -19,9 +19,8 @@ import numpy as np
 
 from ..arrays.timeseries import Array
 from ..optional import require
-from .blocks import Split, short_of_frames, solved_within
+from .blocks import Split, independent, padded, short_of_frames, solved_within
 from .covariance import Layout, covariance
-from .gauge import null_space
 from .shared_errors import variance_of
 
 
@@ -66,17 +65,15 @@ def left_out(
     rows, extra = len(layout.frame), len(residuals) - len(layout.frame)
     private = {column for _, columns in within for column in columns}
     shared = [column for column in range(jacobian.shape[1]) if column not in private]
-    known = _padded(shifts, rows, extra)
-    drawn = _padded(errors, rows, extra)
+    known = padded(shifts, rows, extra)
+    drawn = padded(errors, rows, extra)
     most: dict[int, LeftOut] = {}
     for k, name in enumerate(split.names):
         inside = np.append(split.part == k, np.zeros(extra, dtype=bool))
         columns = np.hstack([jacobian[:, shared], jacobian[:, shared] * inside[:, None], known, drawn])
         every, left = solved_within(jacobian, within, columns, residuals, rows)
         every, noise = np.split(every, [every.shape[1] - drawn.shape[1]], axis=1)
-        names = [str(i) for i in range(every.shape[1])]
-        pivots = null_space(every, names, [False] * len(names)).pivots
-        used = [c for c in range(len(names)) if c not in pivots]
+        used = independent(every)
         if rows <= len(used) + len(private):
             continue
         size = np.linalg.norm(every[:, used], axis=0)
@@ -99,11 +96,3 @@ def left_out(
             if c not in most or abs(found.step) * most[c].reach > abs(most[c].step) * found.reach:
                 most[c] = found
     return tuple(most[c] for c in sorted(most))
-
-
-def _padded(columns: Array | None, rows: int, extra: int) -> Array:
-    """(rows + extra, n) with zeros in the rows that are no data."""
-    found = np.zeros((rows + extra, 0 if columns is None else columns.shape[1]))
-    if columns is not None:
-        found[:rows] = columns
-    return found
