@@ -27,7 +27,7 @@ X, T = np.arange(24.0).reshape(4, 2, 3), np.arange(4.0)
 
 @pytest.fixture(autouse=True)
 def quickly() -> Iterator[None]:
-    """No file below takes long; on the machine that this was written on none took 0.6 s of its own processor time."""
+    """No file below takes long: at most 1.4 s of processor time on the machine that this was written on."""
     begun = time.process_time()
     yield
     assert time.process_time() - begun < 5.0
@@ -259,7 +259,7 @@ CURVES = {
     "rows without cells": "Weg [mm];Kraft [N]\n1;2;;;\n;\n2;3;;;\n",
     "many columns": ";".join("1" for _ in range(20_000)) + "\n",
     "a cell without end": 'Weg [mm];Kraft [N]\n1;"' + "2" * 200_000 + "\n",
-    "lines that begin with numbers": "1;x\n" * 50_000 + "1;2\n",
+    "lines that begin with numbers": "1;x\n" * 20_000 + "1;2\n",
     "blanks in a name": "Weg [mm];F" + " " * 3000 + "in x y" + "\n1;2\n2;3\n",
     "brackets in a name": "Weg [mm];" + "(" * 30_000 + "\n1;2\n2;3\n",
     "points behind the words": "Width " + "." * 3000 + "!\nWeg [mm];Kraft [N]\n1;2\n2;3\n",
