@@ -5,6 +5,7 @@
 #include "adjoint/blocks/every_kind.h"
 #include "adjoint/element/rates_vjp.h"
 #include "adjoint/solver/block_contacts_vjp.h"
+#include "adjoint/solver/block_pairs_vjp.h"
 #include "adjoint/solver/volume_vjp.h"
 #include "core/solver/project_block.h"
 
@@ -30,6 +31,7 @@ struct BlockCotangents {
   };
   std::vector<VolumeValues> volumes;
   std::vector<BlockContactCotangents<Single<T>>> contacts;  // per scene, of implicit blocks
+  std::vector<PairFrictionCotangents<Single<T>>> friction;  // likewise
   std::vector<T> radii;                                     // of contacts and of what touches itself, of such a block
   double eta = 0.0;
 
@@ -47,6 +49,8 @@ struct BlockCotangents {
     contacts.resize(block.implicit ? scenes_of<T> : 0);
     radii.assign(block.surface.empty() ? 0 : scene.layout.count(Quantity::contact_radius), T(0.0));
     for (auto& scene_ : contacts) scene_.resize(scene, block);
+    friction.resize(contacts.size());
+    for (auto& scene_ : friction) scene_.resize(block);
   }
   // What resize() allocates, and what project_implicit_vjp() does.
   static std::size_t bytes(const Scene& scene, const DirectBlock& block) {
@@ -60,7 +64,8 @@ struct BlockCotangents {
     if (block.implicit)
       sum += 2 * sizeof(T) * 3 * block.movable +  // p and what it gathers
              scenes_of<T> *
-                 (sizeof(BlockContactCotangents<Single<T>>) + BlockContactCotangents<Single<T>>::bytes(scene, block));
+                 (sizeof(BlockContactCotangents<Single<T>>) + BlockContactCotangents<Single<T>>::bytes(scene, block) +
+                  sizeof(PairFrictionCotangents<Single<T>>) + PairFrictionCotangents<Single<T>>::bytes(block));
     return sum;
   }
 };

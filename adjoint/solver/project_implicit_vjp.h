@@ -9,7 +9,6 @@
 // unknown beside p, with J p = D y.
 #pragma once
 
-#include "adjoint/solver/block_pairs_vjp.h"
 #include "adjoint/solver/project_block_vjp.h"
 #include "core/solver/project_implicit.h"
 
@@ -115,7 +114,8 @@ void pull_back_pairs(const SubstepState<T>& s, const DirectBlock& block, BlockSt
                      BlockCotangents<T>& bar) {
   using S = Single<T>;
   for (int scene = 0; scene < static_cast<int>(state.implicit.size()); ++scene) {
-    const PairSource<T> source{s, block, state.implicit[scene].potential.pairs, scene};
+    const PairFriction<S>& friction = state.friction[scene];
+    const PairSource<T> source{s, block, state.implicit[scene].potential.pairs, friction, scene};
     const auto add = [&](const S& a, T& to) {
       if constexpr (std::is_same_v<T, Pack>)
         to.set(scene, to[scene] + a);
@@ -125,14 +125,22 @@ void pull_back_pairs(const SubstepState<T>& s, const DirectBlock& block, BlockSt
     const auto row_of = [](int particle) { return sheetbend_blocks::row * static_cast<std::size_t>(particle); };
     source.for_each_touching(
         [&](int particle) { return &state.x[0][row_of(particle)]; },
-        [&](const BlockPair& pair, Part part, const S* x, const PairNumbers<S>& numbers) {
+        [&](const BlockPair& pair, Part part, const S* x, const PairNumbers<S>& numbers, const Rub<S>* rub) {
           S along[12], x_bar[12], force[12], w_bar[4];
           for (int d = 0; d < 12; ++d) {
             const int particle = pair.particles[d / 3];
             along[d] =
                 particle < block.movable ? source.read(p[3 * static_cast<std::size_t>(particle) + d % 3]) : S(0.0);
           }
-          const auto numbers_bar = meet_vjp(pair.key.triangle, part, x, numbers, along, x_bar, force);
+          PairNumbers<S> numbers_bar;
+          if (rub) {
+            Rub<S> rub_bar;
+            const Vec3<S> none(S(0.0), S(0.0), S(0.0));
+            numbers_bar = rub_vjp(pair.key.triangle, part, x, numbers, *rub, along, none, x_bar, force, rub_bar);
+            bar.friction[scene].add(friction, pair, rub_bar);
+          } else {
+            numbers_bar = meet_vjp(pair.key.triangle, part, x, numbers, along, x_bar, force);
+          }
           kappa_vjp(pair.key.triangle, numbers, source.pairs.stiffness, numbers_bar.kappa, w_bar);
           for (int k = 0; k < 4; ++k) {
             const std::size_t at = row_of(pair.particles[k]);
@@ -156,6 +164,7 @@ void project_implicit_vjp(const SubstepState<T>& s, const DirectBlock& block, Sc
   for (int scene = 0; scene < static_cast<int>(state.implicit.size()); ++scene)
     if (has(scenes, scene)) state.implicit[scene].factorize(s.scene, block);
   for (auto& scene : bar.contacts) scene.clear();
+  for (auto& scene : bar.friction) scene.clear();
   std::fill(bar.radii.begin(), bar.radii.end(), T(0.0));
   auto& own = state.at(0);
   state.lambda[0].clear();  // all of it is dl

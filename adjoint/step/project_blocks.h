@@ -53,10 +53,12 @@ struct ReverseOf<ProjectBlocks> {
       for (std::size_t i = 0; i < scratch.blocks[b].radii.size(); ++i)
         bar.in.of(Quantity::contact_radius)[i] += scratch.blocks[b].radii[i];
       auto& contacts = scratch.blocks[b].contacts;
-      for (std::size_t lane = 0; lane < contacts.size(); ++lane)
-        spread_contacts(contact_source(step, work.masses, static_cast<int>(lane)), plan.blocks[b],
-                        record.blocks[b].contacts[lane], contacts[lane], bar.from, bar.in,
+      for (std::size_t lane = 0; lane < contacts.size(); ++lane) {
+        const auto source = contact_source(step, work.masses, static_cast<int>(lane));
+        spread_contacts(source, plan.blocks[b], record.blocks[b].contacts[lane], contacts[lane], bar.from, bar.in,
                         [&](int node) -> T& { return bar.w.of(node); });
+        spread_friction(source, plan.blocks[b], scratch.blocks[b].friction[lane], bar.from, bar.in);
+      }
     }
   }
 

@@ -6,6 +6,7 @@
 #include "adjoint/step/apply_loads.h"
 #include "adjoint/step/bounce.h"
 #include "adjoint/step/carry_friction.h"
+#include "adjoint/step/carry_pair_friction.h"
 #include "adjoint/step/effective_masses.h"
 #include "adjoint/step/keep_spin.h"
 #include "adjoint/step/predict.h"

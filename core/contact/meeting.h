@@ -2,9 +2,11 @@
 //
 //   kappa/2 max(0, D - d)^2          d: their distance (nearest.h),  D: the sum of their radii
 //
-// in multipliers, force times eta^2. There is no friction.
+// in multipliers, force times eta^2. Friction is that of law.h between the nearest points of both, as material points of their middle lines: slip is how
+// much farther one went than the other in the substep, and the tangential force acts on both, against each other.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/contact/law.h"
@@ -17,6 +19,21 @@ template <class T>
 struct PairNumbers {
   T touching{};  // D
   T kappa{};
+};
+
+// What friction reads besides, in the axes of the scene.
+template <class T>
+struct Rub {
+  T friction{};
+  Vec3<T> carried;  // tangential force on the first side before
+  T from[12];       // history of the nodes, as for Bdf: slip is counted from there
+};
+
+template <class T>
+struct Meeting {
+  T depth{};           // 0 where it does not push
+  Vec3<T> tangential;  // on the first side
+  bool rubs = false, slides = false;
 };
 
 // D and kappa = stiffness/w of a pair, w the inverse mass of the middles of its sides. stiffness: rigidity (eta/h)^2.
@@ -38,30 +55,80 @@ inline double distance_of(bool triangle, const double* x, const PairNumbers<doub
   return std::sqrt(nearest_points(triangle, x, softness, nearest_part(triangle, x, softness)).squared);
 }
 
-// What acts on the nodes (12) of a pair that touches in this part; returns how deep. Without force where it does not push.
-template <class T>
-T meet(bool triangle, Part part, const T* x, const PairNumbers<T>& numbers, T* force) {
-  const Nearest<T> n = nearest_points(triangle, x, softness_of(numbers), part);
-  for (int d = 0; d < 12; ++d) force[d] = T(0.0);
-  if (!(value_of(n.squared) > 0.0)) return T(0.0);
-  const T distance = sqrt(n.squared), depth = numbers.touching - distance;
-  if (!(value_of(depth) > 0.0)) return T(0.0);
-  const T push = numbers.kappa * depth / distance;
-  for (int k = 0; k < 4; ++k) ((push * n.weight[k]) * n.apart).store(force + 3 * k);
-  return depth;
+// Whether the boxes around both sides, whose nodes are in the first `count` of these places (12 numbers each), are farther apart than `room`. Most pairs that are
+// looked at are, and their nearest points are not asked for.
+inline bool boxes_are_apart(bool triangle, const double (*places)[12], int count, double room) {
+  const int second = triangle ? 3 : 6;
+  for (int d = 0; d < 3; ++d) {
+    double low[2] = {places[0][d], places[0][second + d]}, high[2] = {low[0], low[1]};
+    for (int p = 0; p < count; ++p)
+      for (int i = d; i < 12; i += 3) {
+        const int side = i < second ? 0 : 1;
+        low[side] = std::min(low[side], places[p][i]);
+        high[side] = std::max(high[side], places[p][i]);
+      }
+    if (low[1] - high[0] > room || low[0] - high[1] > room) return true;
+  }
+  return false;
 }
 
-// E = -d force/dx (12, 12), row by row.
-inline void meeting_matrix(bool triangle, Part part, const double* x, const PairNumbers<double>& numbers, double* E) {
+// Whether a pair touches with its nodes at x (12).
+inline bool touches(bool triangle, const double* x, const PairNumbers<double>& n) {
+  constexpr double rounding = 1.0 + 1e-12;
+  double place[1][12];
+  std::copy_n(x, 12, place[0]);
+  return !boxes_are_apart(triangle, place, 1, rounding * n.touching) && distance_of(triangle, x, n) < n.touching;
+}
+
+// What acts on the nodes (12) of a pair that touches in this part; without friction where `rub` is null. Nothing where it does not push.
+template <class T>
+Meeting<T> meet(bool triangle, Part part, const T* x, const PairNumbers<T>& numbers, const Rub<T>* rub, T* force) {
+  const Nearest<T> n = nearest_points(triangle, x, softness_of(numbers), part);
+  Meeting<T> met;
+  for (int d = 0; d < 12; ++d) force[d] = T(0.0);
+  if (!(value_of(n.squared) > 0.0)) return met;
+  const T distance = sqrt(n.squared), depth = numbers.touching - distance;
+  if (!(value_of(depth) > 0.0)) return met;
+  met.depth = depth;
+  const T push = numbers.kappa * depth / distance;
+  for (int k = 0; k < 4; ++k) ((push * n.weight[k]) * n.apart).store(force + 3 * k);
+  if (!rub) return met;
+  Vec3<T> slip;
+  for (int k = 0; k < 4; ++k) slip = slip + n.weight[k] * (Vec3<T>(x + 3 * k) - Vec3<T>(rub->from + 3 * k));
+  const T length = sqrt(dot(n.apart, n.apart));  // below the distance of segments, and the push with it
+  const ContactForce<T> c = contact_force(-depth, (T(1.0) / length) * n.apart, slip, rub->carried,
+                                          rub->friction * length / distance, numbers.kappa);
+  met.tangential = c.tangential, met.rubs = c.rubs, met.slides = c.slides;
+  for (int k = 0; k < 4; ++k) (n.weight[k] * c.tangential).add_to(force + 3 * k);
+  return met;
+}
+
+// The same numbers over a larger scalar.
+template <class U, class T>
+Rub<U> constants(const Rub<T>& rub) {
+  Rub<U> u{U(rub.friction), {U(rub.carried.x), U(rub.carried.y), U(rub.carried.z)}, {}};
+  for (int d = 0; d < 12; ++d) u.from[d] = U(rub.from[d]);
+  return u;
+}
+
+// E = -d force/dx (12, 12), row by row. Returns what acts; without finding E where it does not push.
+inline Meeting<double> meeting_matrix(bool triangle, Part part, const double* x, const PairNumbers<double>& numbers,
+                                      const Rub<double>* rub, double* E) {
   using D = Dual<double, 12>;
+  double plain[12];
+  const Meeting<double> met = meet(triangle, part, x, numbers, rub, plain);
+  if (!(met.depth > 0.0)) return met;
   D at[12], force[12];
   for (int d = 0; d < 12; ++d) {
     at[d] = D(x[d]);
     at[d].d[d] = 1.0;
   }
-  meet<D>(triangle, part, at, {D(numbers.touching), D(numbers.kappa)}, force);
+  Rub<D> rub_d;
+  if (rub) rub_d = constants<D>(*rub);
+  meet<D>(triangle, part, at, {D(numbers.touching), D(numbers.kappa)}, rub ? &rub_d : nullptr, force);
   for (int a = 0; a < 12; ++a)
     for (int b = 0; b < 12; ++b) E[12 * a + b] = -force[a].d[b];
+  return met;
 }
 
 }  // namespace sheetbend

@@ -21,9 +21,19 @@ void check_points_of_bodies(const ContactSpec& spec, const Scene& scene) {
   }
 }
 
+// Nodes that carry what a substep leaves to the next: each pinned, and listed once in the scene.
+void check_carried(const std::string& field, const std::vector<int>& nodes, const Scene& scene,
+                   std::vector<char>& carries) {
+  check_nodes(field, nodes, scene.nodes());
+  for (const int n : nodes) {
+    if (carries[n] || scene.role[n] != Role::pinned)
+      refuse(field + ": node " + std::to_string(n) + ". Fix: give each particle a pinned node of its own");
+    carries[n] = true;
+  }
+}
+
 void check_contact(const ContactSpec& spec, const Scene& scene, std::vector<char>& carries) {
   check_nodes(spec.name, spec.nodes, scene.nodes());
-  check_nodes(spec.name + ".carried", spec.carried, scene.nodes());
   if (spec.collider < 0 || spec.collider >= static_cast<int>(scene.colliders.size()))
     refuse(spec.name + ": collider " + std::to_string(spec.collider) + " does not exist. Fix: add it first");
   if (spec.nodes.empty()) refuse(spec.name + ": no particles. Fix: give those that may touch");
@@ -39,11 +49,7 @@ void check_contact(const ContactSpec& spec, const Scene& scene, std::vector<char
       if (!scene.is_place[n])
         refuse(spec.name + ": node " + std::to_string(n) + " is " + a_direction(scene, n) + ". Fix: use particles");
   }
-  for (const int n : spec.carried) {
-    if (carries[n] || scene.role[n] != Role::pinned)
-      refuse(spec.name + ".carried: node " + std::to_string(n) + ". Fix: give each particle a pinned node of its own");
-    carries[n] = true;
-  }
+  check_carried(spec.name + ".carried", spec.carried, scene, carries);
 }
 
 // Of contacts with restitution: the free particles that nothing holds, and which ones constraints hold. A soft contact of what is held gives back
@@ -72,8 +78,20 @@ void add_bouncers(Scene& s) {
   for (auto& [node, own] : contacts) s.bouncers.push_back({node, std::move(own)});
 }
 
+// Its coefficient stands behind those of contacts.
+void add_pair_friction(const SelfContactSpec& spec, Scene& s, std::vector<char>& carries) {
+  if (spec.carried.empty()) return;
+  const std::string field = "self_contact.carried";
+  if (spec.pieces.empty() || spec.carried.size() % 2)
+    refuse(field + ": " + std::to_string(spec.carried.size()) + " nodes for " + std::to_string(spec.pieces.size()) +
+           " pieces. Fix: give two for each pair that may touch at a time, where anything does");
+  check_carried(field, spec.carried, s, carries);
+  s.self_contact.friction = static_cast<int>(s.contacts.size());
+  for (auto n = spec.carried.begin(); n != spec.carried.end(); n += 2) s.self_contact.carried.push_back({n[0], n[1]});
+}
+
 // The radii of pieces stand behind those of contacts. Where any piece has triangles, the points of all pieces may touch them.
-void add_self_contact(const SceneSpec& spec, Scene& s) {
+void add_self_contact(const SceneSpec& spec, Scene& s, std::vector<char>& carries) {
   SelfContact& own = s.self_contact;
   const std::string field = "self_contact";
   own.radius.assign(s.nodes(), -1);
@@ -102,6 +120,7 @@ void add_self_contact(const SceneSpec& spec, Scene& s) {
     own.triangles.insert(own.triangles.end(), piece.triangles.begin(), piece.triangles.end());
     ++place;
   }
+  add_pair_friction(spec.self_contact, s, carries);
   if (own.empty()) own.radius.clear();
   if (own.triangles.empty()) own.points.clear();
 }
@@ -142,9 +161,14 @@ ContactSizes add_contacts(const SceneSpec& spec, Scene& s) {
     if (c.arity > 1) weights += c.nodes.size();
   }
   add_bouncers(s);
-  add_self_contact(spec, s);
-  return {
-      s.contacts.size(), s.contacts.size() + spec.self_contact.pieces.size(), soft, poses, sizes, bouncing, weights};
+  add_self_contact(spec, s, carries);
+  return {s.contacts.size() + s.self_contact.rubs(),
+          s.contacts.size() + spec.self_contact.pieces.size(),
+          soft,
+          poses,
+          sizes,
+          bouncing,
+          weights};
 }
 
 }  // namespace sheetbend

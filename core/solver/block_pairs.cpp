@@ -18,13 +18,17 @@ double distance_between(const double* a, const double* b) { return std::hypot(a[
 
 // Whether two come too near while their nodes go straight from x by `d`: by conservative advancement, as in Li et al. (2021), sec. 4.
 bool passes(bool triangle, const double* x, double* d, const PairNumbers<double>& n) {
-  double mean[3] = {0.0, 0.0, 0.0}, speed[4], at[12];
+  double mean[3] = {0.0, 0.0, 0.0}, speed[4], at[12], ends[2][12];
   for (int i = 0; i < 12; ++i) mean[i % 3] += 0.25 * d[i];
-  for (int i = 0; i < 12; ++i) d[i] -= mean[i % 3];
+  for (int i = 0; i < 12; ++i) {
+    d[i] -= mean[i % 3];
+    ends[0][i] = x[i], ends[1][i] = x[i] + d[i];
+  }
+  const double least = nearest_yet * n.touching;
+  if (boxes_are_apart(triangle, ends, 2, least)) return false;
   for (int k = 0; k < 4; ++k) speed[k] = std::hypot(d[3 * k], d[3 * k + 1], d[3 * k + 2]);
   const double approach = triangle ? speed[0] + std::max({speed[1], speed[2], speed[3]})
                                    : std::max(speed[0], speed[1]) + std::max(speed[2], speed[3]);
-  const double least = nearest_yet * n.touching;
   double t = 0.0;
   for (int advance = 0; advance < most_advances; ++advance) {
     for (int i = 0; i < 12; ++i) at[i] = x[i] + t * d[i];
@@ -116,9 +120,9 @@ bool BlockPairs::begins(Numbers<double>& now, Numbers<double>& next) const {
   return std::any_of(pairs_.begin(), pairs_.end(), [&](const BlockPair& pair) {
     double x[12];
     gather(pair, next.data(), x);
-    if (!(distance_of(pair.key.triangle, x, pair.numbers) < pair.numbers.touching)) return false;
+    if (!touches(pair.key.triangle, x, pair.numbers)) return false;
     gather(pair, now.data(), x);
-    return !(distance_of(pair.key.triangle, x, pair.numbers) < pair.numbers.touching);
+    return !touches(pair.key.triangle, x, pair.numbers);
   });
 }
 

@@ -75,7 +75,7 @@ void ImplicitBlock::factorize_newton(const Scene& scene, const DirectBlock& bloc
     return;
   }
   convexity_ = 0.0;  // what has no potential has no saddles to be left
-  if (block.contacts.empty()) {
+  if (!block.may_slide()) {
     matrix_.factorize_convex_enough(scene, block);
     return;
   }
@@ -324,9 +324,12 @@ bool ImplicitBlock::raise_friction(const Scene& scene, const DirectBlock& block,
   auto& numbers = potential.contacts.numbers;
   std::vector<double> friction;
   for (const auto& n : numbers) friction.push_back(n.friction);
+  double& of_pairs = potential.friction.friction;
+  friction.push_back(of_pairs);
   if (std::all_of(friction.begin(), friction.end(), [](double mu) { return mu == 0.0; })) return false;
   const auto take = [&](double share) {
     for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i].friction = share * friction[i];
+    of_pairs = share * friction.back();
     begin();
   };
   const auto balances = [&] {
@@ -375,7 +378,7 @@ void ImplicitBlock::factorize(const Scene& scene, const DirectBlock& block) {
   matrix_.find(scene, block, potential, x_, true);
   if (matrix_.symmetric() && matrix_.factorize(scene, block, 0.0)) return;
   potential.evaluate(block, x_);
-  const bool has_lu = potential.by_merit() ? !block.contacts.empty() : !matrix_.symmetric();
+  const bool has_lu = potential.by_merit() ? block.may_slide() : !matrix_.symmetric();
   if (has_lu && matrix_.factorize_unsymmetric(scene, block, 0.0)) return;
   throw Unbalanced(
       "forces balance where they have no stiffness against some motion, at the point of buckling: no derivative",

@@ -93,7 +93,7 @@ bool ImplicitBlock::search_line(const DirectBlock& block, int most_trials) {
 
 // Where the Newton step does not lower the merit, those of more convex matrices may.
 bool ImplicitBlock::search_where_it_rubs(const Scene& scene, const DirectBlock& block) {
-  if (block.contacts.empty()) return false;
+  if (!block.may_slide()) return false;
   for (const double convexity : {1.0 / 8.0, 1.0}) {
     look(block);
     ++matrices_;

@@ -18,6 +18,7 @@ void IncrementalPotential::resize(const Scene& scene, const DirectBlock& block) 
   C_r.assign(block.size());
   R_.assign(3 * block.movable, 0.0);
   contacts.resize(block);
+  friction.resize(block);
   pairs.radius.assign(block.surface.empty() ? 0 : block.particles.size(), 0.0);
   eta = 0.0;
   values.resize(block.runs.size());
@@ -35,7 +36,8 @@ void IncrementalPotential::resize(const Scene& scene, const DirectBlock& block) 
 std::size_t IncrementalPotential::bytes(const Scene& scene, const DirectBlock& block) {
   std::size_t bytes = Numbers<double>::bytes(block.size()) + 4 * Numbers<double>::bytes(row * block.particles.size()) +
                       sizeof(double) * (3 * block.movable + block.particles.size()) +
-                      BlockContacts<double>::bytes(scene, block) + BlockPairs::bytes(block);
+                      BlockContacts<double>::bytes(scene, block) + BlockPairs::bytes(block) +
+                      PairFriction<double>::bytes(block);
   for (const MemberRun& run : block.runs) {
     const Group& group = scene.groups[run.group];
     bytes += sizeof(sheetbend_blocks::Run) + sizeof(Numbers<double>) +
@@ -83,15 +85,18 @@ double IncrementalPotential::add_contacts(const DirectBlock& block, const double
 }
 
 // Likewise pairs that touch.
-double IncrementalPotential::add_pairs(const double* x) {
+double IncrementalPotential::add_pairs(const DirectBlock& block, const double* x) {
   double energy = 0.0;
   for (const BlockPair& pair : pairs.all()) {
     double at[12], force[12];
     gather(pair, x, at);
+    if (!touches(pair.key.triangle, at, pair.numbers)) continue;
     const Part part = nearest_part(pair.key.triangle, at, softness_of(pair.numbers));
-    const double depth = meet(pair.key.triangle, part, at, pair.numbers, force);
-    if (!(depth > 0.0)) continue;
-    energy += 0.5 * pair.numbers.kappa * depth * depth;
+    const Rub<double> rub = block.surface.rubs() ? friction.of(pair.key, pair.particles) : Rub<double>{};
+    const auto met = meet(pair.key.triangle, part, at, pair.numbers, block.surface.rubs() ? &rub : nullptr, force);
+    if (!(met.depth > 0.0)) continue;
+    energy += 0.5 * pair.numbers.kappa * met.depth * met.depth;
+    rubs_ |= met.rubs;
     for (int i = 0; i < 12; ++i) {
       const int to = row * pair.particles[i / 3] + i % 3;
       push_[to] += force[i];
@@ -106,7 +111,7 @@ double IncrementalPotential::evaluate(const DirectBlock& block, Numbers<double>&
   double elastic = pack_kernels().potential->evaluate(arrays(block, at));
   rubs_ = false;
   if (!block.contacts.empty()) elastic += add_contacts(block, at.data());
-  if (!pairs.empty()) elastic += add_pairs(at.data());
+  if (!pairs.empty()) elastic += add_pairs(block, at.data());
   if (!rigid.empty()) {
     rigid.evaluate(given(block), at.data());
     rigid.push(block, push_.data(), magnitude_.data());

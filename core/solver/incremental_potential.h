@@ -15,6 +15,7 @@
 #include "core/scalar/numbers.h"
 #include "core/solver/block_contacts.h"
 #include "core/solver/block_pairs.h"
+#include "core/solver/pair_friction.h"
 #include "core/solver/plan.h"
 #include "core/solver/rigid_rows.h"
 
@@ -28,6 +29,7 @@ class IncrementalPotential {
   std::vector<Numbers<double>> values;
   BlockContacts<double> contacts;
   BlockPairs pairs;
+  PairFriction<double> friction;  // of pairs
   RigidRows rigid;
   double eta = 0.0;  // of `values`; 0 where they are not filled yet
   // Per particle, fixed ones included: the length that a coordinate of one is [m]: 1 but of axes of bodies, whose coordinates have no unit. What forces
@@ -63,7 +65,7 @@ class IncrementalPotential {
  private:
   void add_rigid_residuals();
   double add_contacts(const DirectBlock& block, const double* x);
-  double add_pairs(const double* x);
+  double add_pairs(const DirectBlock& block, const double* x);
 
   std::vector<sheetbend_blocks::Run> runs_;
   Numbers<double> push_, magnitude_, stiffness_;

@@ -81,7 +81,7 @@ void NewtonMatrix::find(const Scene& scene, const DirectBlock& block, Incrementa
   potential.add_rigid_elements(block, at, elements_);
   convex_found_ = false;
   find_contacts(block, potential.contacts, at.data(), curved);
-  find_pairs(scene, block, potential.pairs, at.data());
+  find_pairs(scene, block, potential, at.data());
 }
 
 void NewtonMatrix::find_contacts(const DirectBlock& block, const BlockContacts<double>& contacts, const double* x,
@@ -105,16 +105,20 @@ void NewtonMatrix::find_contacts(const DirectBlock& block, const BlockContacts<d
 }
 
 // The pattern depends on the pairs of the substep alone, so that bits do not depend on where a rollout begins.
-void NewtonMatrix::find_pairs(const Scene& scene, const DirectBlock& block, const BlockPairs& pairs, const double* x) {
+void NewtonMatrix::find_pairs(const Scene& scene, const DirectBlock& block, const IncrementalPotential& potential,
+                              const double* x) {
+  const BlockPairs& pairs = potential.pairs;
   pairs_.clear();
   for (const BlockPair& pair : pairs.all()) {
     double at[12];
     gather(pair, x, at);
+    if (!touches(pair.key.triangle, at, pair.numbers)) continue;
     const Part part = nearest_part(pair.key.triangle, at, softness_of(pair.numbers));
-    double force[12];
-    if (!(meet(pair.key.triangle, part, at, pair.numbers, force) > 0.0)) continue;
+    const Rub<double> rub = block.surface.rubs() ? potential.friction.of(pair.key, pair.particles) : Rub<double>{};
     pairs_.push_back({pair.particles, {}});
-    meeting_matrix(pair.key.triangle, part, at, pair.numbers, pairs_.back().matrix.data());
+    const auto met = meeting_matrix(pair.key.triangle, part, at, pair.numbers, block.surface.rubs() ? &rub : nullptr,
+                                    pairs_.back().matrix.data());
+    symmetric_ = symmetric_ && !met.rubs;
   }
   if (pairs_.empty()) return;
   std::vector<std::array<int, 4>> all;
@@ -156,7 +160,6 @@ void NewtonMatrix::assemble(const Scene& scene, const DirectBlock& block, double
     for (std::size_t e = 0; e < entries.size(); ++e)
       if (entries[e] >= 0) values[entries[e]] += convexity > 0.0 ? E[e] + convexity * (convex[e] - E[e]) : E[e];
   }
-  add_pairs(block, convexity);
 }
 
 void NewtonMatrix::add_pairs(const DirectBlock& block, double convexity) {
@@ -181,6 +184,7 @@ void NewtonMatrix::add_pairs(const DirectBlock& block, double convexity) {
 bool NewtonMatrix::factorize(const Scene& scene, const DirectBlock& block, double convexity) {
   const CondensedPattern& pattern = pattern_of(block);
   assemble(scene, block, convexity);
+  add_pairs(block, convexity);
   as_lu_ = false;
   for_each_contact(block, [&](int p, int q, double weight, const double* M) {
     const int row_dof = pattern.dof_of[p], column_dof = pattern.dof_of[q];
@@ -203,6 +207,15 @@ bool NewtonMatrix::factorize_unsymmetric(const Scene& scene, const DirectBlock& 
   for_each_contact(block, [&](int p, int q, double weight, const double* M) {
     lu_.add(*pattern.unsymmetric, pattern.dof_of[p] / 3, pattern.dof_of[q] / 3, weight, M);
   });
+  for (const TouchingPair& pair : pairs_)
+    for (int k = 0; k < 4; ++k)
+      for (int l = 0; l < 4; ++l) {
+        const int p = pair.particles[k], q = pair.particles[l];
+        if (p >= block.movable || q >= block.movable) continue;
+        double M[9];
+        for (int a = 0; a < 9; ++a) M[a] = pair.matrix[12 * (3 * k + a / 3) + 3 * l + a % 3];
+        lu_.add(*pattern.unsymmetric, pattern.dof_of[p] / 3, pattern.dof_of[q] / 3, 1.0, M);
+      }
   return lu_.factorize(*pattern.unsymmetric);
 }
 

@@ -89,9 +89,9 @@ class NewtonMatrix {
     }
   }
   void find_contacts(const DirectBlock& block, const BlockContacts<double>& contacts, const double* x, bool curved);
-  void find_pairs(const Scene& scene, const DirectBlock& block, const BlockPairs& pairs, const double* x);
+  void find_pairs(const Scene& scene, const DirectBlock& block, const IncrementalPotential& potential, const double* x);
   void add_pairs(const DirectBlock& block, double convexity);
-  void assemble(const Scene& scene, const DirectBlock& block, double convexity);
+  void assemble(const Scene& scene, const DirectBlock& block, double convexity);  // without contacts and pairs
 
   sheetbend_blocks::Potential arrays_{};            // of the last find()
   std::vector<double> masses_;                      // per movable particle

@@ -1,8 +1,8 @@
-// The numbers of an implicit block's pairs over any scalar: radii and masses, of one of a pack's scenes.
+// The numbers of an implicit block's pairs over any scalar: radii, masses and what friction reads, of one of a pack's scenes.
 #pragma once
 
 #include "core/solver/block_pairs.h"
-#include "core/solver/contact_source.h"
+#include "core/solver/pair_friction.h"
 #include "core/solver/placed.h"
 
 namespace sheetbend {
@@ -13,6 +13,7 @@ struct PairSource {
   const SubstepState<T>& s;
   const DirectBlock& block;
   const BlockPairs& pairs;
+  const PairFriction<S>& friction;
   int lane;
 
   S read(const T& a) const {
@@ -35,7 +36,7 @@ struct PairSource {
                         read(radius[radius_of(pair, second_side(pair))]), w, pairs.stiffness);
   }
 
-  // Calls f(pair, part, x, numbers) for each that touches, its nodes being at rows(particle) (3 of a T).
+  // Calls f(pair, part, x, numbers, rub) for each that touches, its nodes being at rows(particle) (3 of a T); `rub` is null without friction.
   template <class F, class At>
   void for_each_touching(At&& rows, F&& f) const {
     for (const BlockPair& pair : pairs.all()) {
@@ -45,8 +46,11 @@ struct PairSource {
         x[d] = read(rows(pair.particles[d / 3])[d % 3]);
         at[d] = value_of(x[d]);
       }
+      if (!touches(pair.key.triangle, at, pair.numbers)) continue;
       const Part part = nearest_part(pair.key.triangle, at, softness_of(pair.numbers));
-      if (distance_of(pair.key.triangle, at, pair.numbers) < pair.numbers.touching) f(pair, part, x, numbers(pair));
+      Rub<S> rub;
+      if (block.surface.rubs()) rub = friction.of(pair.key, pair.particles);
+      f(pair, part, x, numbers(pair), block.surface.rubs() ? &rub : nullptr);
     }
   }
 };

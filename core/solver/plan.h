@@ -66,6 +66,7 @@ struct DirectBlock {
   SelfContact surface = {};                 // in the block's order, fixed particles included
 
   int size() const { return static_cast<int>(multipliers.size()); }
+  bool may_slide() const { return !contacts.empty() || surface.rubs(); }  // something, with friction
   bool banded() const { return !condensation && structure.banded(); }
 };
 

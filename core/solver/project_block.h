@@ -57,6 +57,7 @@ struct BlockState {
   Values now, before;
   std::vector<ImplicitBlock> implicit;             // one per scene, where substeps are solved until forces balance
   std::vector<BlockContacts<Single<T>>> contacts;  // likewise
+  std::vector<PairFriction<Single<T>>> friction;   // likewise, of pairs
   double eta = 0.0;                                // of `values` and `diagonal`; 0 where they are not filled yet
 
   void resize(const Scene& scene, const DirectBlock& block, int kept_iterations);
@@ -99,6 +100,8 @@ void BlockState<T>::resize(const Scene& scene, const DirectBlock& block, int kep
   for (ImplicitBlock& scene_ : implicit) scene_.resize(scene, block);
   contacts.resize(implicit.size());
   for (auto& scene_ : contacts) scene_.resize(block);
+  friction.resize(implicit.size());
+  for (auto& scene_ : friction) scene_.resize(block);
   volumes.resize(block.volumes.size());
   for (std::size_t v = 0; v < volumes.size(); ++v) volumes[v].resize(block.volumes[v]);
   runs.reserve(block.runs.size());
@@ -127,7 +130,8 @@ std::size_t BlockState<T>::bytes(const Scene& scene, const DirectBlock& block, i
       (kept_iterations + 1) * (particles + of(block.size()));
   if (block.implicit)
     sum += scenes_of<T> * (ImplicitBlock::bytes(scene, block) + sizeof(BlockContacts<Single<T>>) +
-                           BlockContacts<Single<T>>::bytes(scene, block));
+                           BlockContacts<Single<T>>::bytes(scene, block) + sizeof(PairFriction<Single<T>>) +
+                           PairFriction<Single<T>>::bytes(block));
   for (const MemberRun& run : block.runs) {
     const Group& group = scene.groups[run.group];
     sum += of(run.items.size() * sheetbend_blocks::value_count(group.damped, group.parameters));
@@ -188,8 +192,10 @@ void begin_block(const SubstepState<T>& s, const DirectBlock& block, BlockState<
 // What contacts read of a substep; source_of(lane) says where it comes from for a scene of a pack.
 template <class T, class F>
 void load_contacts(const DirectBlock& block, F&& source_of, BlockState<T>& state) {
-  for (int scene = 0; scene < static_cast<int>(state.contacts.size()); ++scene)
+  for (int scene = 0; scene < static_cast<int>(state.contacts.size()); ++scene) {
     state.contacts[scene].load(source_of(scene), block);
+    state.friction[scene].load(source_of(scene), block);
+  }
 }
 
 // The runs of a block; the reverse gives cotangents for their values. They stand in the state, so that a substep allocates nothing.

@@ -49,6 +49,16 @@ void find_rigid(const SubstepState<T>& s, const DirectBlock& block, IncrementalP
   potential.rigid.find(s.scene, potential.given(block), at.data());
 }
 
+// The radii and the stiffness of a scene's pairs.
+template <class T>
+void load_pairs(const SubstepState<T>& s, const DirectBlock& block, double h, int scene, BlockPairs& pairs) {
+  if (block.surface.empty()) return;
+  pairs.stiffness = rigidity * (s.eta / h) * (s.eta / h);
+  for (std::size_t p = 0; p < block.particles.size(); ++p)
+    if (const int place = block.surface.radius[p]; place >= 0)
+      pairs.radius[p] = number_of(s.inputs.of(Quantity::contact_radius)[place], scene);
+}
+
 // Hands a scene's numbers to its solver; the guess is where the substep ends if that is known.
 template <class T>
 void load_implicit(const SubstepState<T>& s, const DirectBlock& block, const SubstepStates<T>& states, double h,
@@ -81,17 +91,14 @@ void load_implicit(const SubstepState<T>& s, const DirectBlock& block, const Sub
   }
   if (block.damped)
     for (int j = 0; j < block.size(); ++j) potential.C_r[j] = number_of<T>(state.C_r[j], scene);
-  if (!block.surface.empty()) {
-    potential.pairs.stiffness = rigidity * (s.eta / h) * (s.eta / h);
-    for (std::size_t p = 0; p < block.particles.size(); ++p)
-      if (const int place = block.surface.radius[p]; place >= 0)
-        potential.pairs.radius[p] = number_of(s.inputs.of(Quantity::contact_radius)[place], scene);
+  load_pairs(s, block, h, scene, potential.pairs);
+  if constexpr (is_plain<T>) {
+    if (block.surface.rubs()) potential.friction = state.friction[scene];
+    if (!block.contacts.empty()) potential.contacts = state.contacts[scene];
+  } else {
+    if (block.surface.rubs()) take_values(state.friction[scene], potential.friction);
+    if (!block.contacts.empty()) take_values(state.contacts[scene], potential.contacts);
   }
-  if (block.contacts.empty()) return;
-  if constexpr (is_plain<T>)
-    potential.contacts = state.contacts[scene];
-  else
-    take_values(state.contacts[scene], potential.contacts);
 }
 
 // The particle, in the block's order, of place k of a run's constraint.
@@ -171,15 +178,16 @@ void subtract_contact_forces(const DirectBlock& block, const BlockState<T>& stat
 template <class T>
 void subtract_pair_forces(const SubstepState<T>& s, const DirectBlock& block, const BlockState<T>& state,
                           const std::vector<T>& x, std::vector<T>& R) {
-  const PairSource<T> source{s, block, state.implicit[0].potential.pairs, 0};
-  source.for_each_touching([&](int particle) { return &x[3 * static_cast<std::size_t>(particle)]; },
-                           [&](const BlockPair& pair, Part part, const T* at, const PairNumbers<T>& numbers) {
-                             T force[12];
-                             meet(pair.key.triangle, part, at, numbers, force);
-                             for (int k = 0; k < 4; ++k)
-                               if (const int p = pair.particles[k]; p < block.movable)
-                                 (-Vec3<T>(force + 3 * k)).add_to(&R[3 * static_cast<std::size_t>(p)]);
-                           });
+  const PairSource<T> source{s, block, state.implicit[0].potential.pairs, state.friction[0], 0};
+  source.for_each_touching(
+      [&](int particle) { return &x[3 * static_cast<std::size_t>(particle)]; },
+      [&](const BlockPair& pair, Part part, const T* at, const PairNumbers<T>& numbers, const Rub<T>* rub) {
+        T force[12];
+        meet(pair.key.triangle, part, at, numbers, rub, force);
+        for (int k = 0; k < 4; ++k)
+          if (const int p = pair.particles[k]; p < block.movable)
+            (-Vec3<T>(force + 3 * k)).add_to(&R[3 * static_cast<std::size_t>(p)]);
+      });
 }
 
 // The multipliers of scalars that carry tangents, which the solution comes without.

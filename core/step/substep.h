@@ -7,6 +7,7 @@
 #include "core/step/apply_loads.h"
 #include "core/step/bounce.h"
 #include "core/step/carry_friction.h"
+#include "core/step/carry_pair_friction.h"
 #include "core/step/effective_masses.h"
 #include "core/step/keep_spin.h"
 #include "core/step/predict.h"
@@ -31,7 +32,8 @@ using Substep = Stages<ComputeEffectiveMasses,  // w = 1/(m + eta c), c the impl
                        KeepSpin,                // bodies that keep their spin: v += dw x a on their axes
                        RetractDirectors,        // rods: frames are made orthonormal again
                        Yield,                   // joints that slide: their set follows
-                       CarryFriction            // contacts: their tangential forces go on to the next substep
+                       CarryFriction,           // contacts: their tangential forces go on to the next substep
+                       CarryPairFriction        // likewise those of pairs that touch
                        >;
 
 template <class T, class List = Substep>

@@ -71,6 +71,7 @@ std::shared_ptr<Scene> make_scene(const py::kwargs& given) {
     for (const py::handle p : given["self_contact"])
       spec.self_contact.pieces.push_back(
           {p["edges"].cast<std::vector<std::array<int, 2>>>(), p["triangles"].cast<Triangles>()});
+  if (given.contains("self_carried")) spec.self_contact.carried = whole_numbers(given["self_carried"]);
   if (given.contains("loads")) {
     for (const auto& [group, item, row] : given["loads"].cast<std::vector<std::array<int, 3>>>())
       spec.loads.push_back({group, item, row});
@@ -131,7 +132,8 @@ py::dict arguments_of(const Scene& s) {
                   "boundary_interpolation"_a = cubic ? "cubic" : "linear", "loaded"_a = s.loaded,
                   "force_times"_a = s.force.times, "has_drag"_a = s.has_drag, "air"_a = s.air,
                   "wind_times"_a = s.wind.times, "groups"_a = groups, "volumes"_a = volumes, "colliders"_a = colliders,
-                  "contacts"_a = contacts, "loads"_a = loads, "load_times"_a = s.load.times, "self_contact"_a = pieces);
+                  "contacts"_a = contacts, "loads"_a = loads, "load_times"_a = s.load.times, "self_contact"_a = pieces,
+                  "self_carried"_a = s.self_contact.carried);
 }
 
 }  // namespace

@@ -227,27 +227,12 @@ TEST_P(Tumbling, HasTheGradientOfComplexSteps) {
 TEST_P(Tumbling, HasTheTangentsOfComplexSteps) {
   const Sample s = tumbling(GetParam());
   const Program p{s.scene, make_plan(s.scene, contact_options(1e-3, GetParam().integrator)), steps};
-  using D = Dual<double, 4>;
   const Layout& layout = s.scene.layout;
-  std::vector<D> inputs(s.inputs.begin(), s.inputs.end());
-  const std::size_t along[] = {
-      layout.of(Quantity::friction) + 1, layout.of(Quantity::collider_pose) + 8,
-      layout.of(GetParam().restitution >= 0.0 ? Quantity::restitution : Quantity::collider_size),
-      layout.of(Quantity::velocity)};
-  for (int d = 0; d < 4; ++d) inputs[along[d]].d[d] = 1.0;
-  Rollout<D> rollout(s.scene, p.plan, inputs.data());
-  for (int n = 0; n < p.steps; ++n) rollout.advance();
-  for (int d = 0; d < 4; ++d) {
-    std::vector<Complex> probe(s.inputs.begin(), s.inputs.end());
-    probe[along[d]].im = complex_step;
-    const auto all = states(p, probe);
-    std::vector<double> found, expected;
-    for (int i = 0; i < s.scene.dofs(); ++i) {
-      expected.push_back(all[p.steps * s.scene.dofs() + i].im / complex_step);
-      found.push_back(rollout.x()[i].d[d]);
-    }
-    EXPECT_LE(relative_error(found, expected), bound()) << d;
-  }
+  expect_tangents_agree(p, s.inputs,
+                        {layout.of(Quantity::friction) + 1, layout.of(Quantity::collider_pose) + 8,
+                         layout.of(GetParam().restitution >= 0.0 ? Quantity::restitution : Quantity::collider_size),
+                         layout.of(Quantity::velocity)},
+                        bound());
 }
 
 TEST_P(Tumbling, HasTheSameBitsWhateverKeepsItsStates) {

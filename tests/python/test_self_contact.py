@@ -53,7 +53,8 @@ def test_two_ropes_rest_across_each_other():
     assert middle < free[scene.ropes["lower"].particles[7], 2] - 1e-4  # and presses it down
 
 
-def test_momentum_is_kept():
+@pytest.mark.parametrize("friction", [0.0, 0.4])
+def test_momentum_is_kept(friction: float):
     scene = sb.Scene("thrown", gravity=(0, 0, 0))
     for name, y, v in (("a", 0.0, 0.0), ("b", 0.03, -1.5)):
         points = np.stack([np.linspace(0, 0.2, 3), np.full(3, y), 0.02 * np.sin(np.arange(3) + y)], 1)
@@ -61,7 +62,7 @@ def test_momentum_is_kept():
             scene, name, points=points, segments=6, density=0.05, EA=200.0, EI=1e-4,
             velocity=np.tile([0.1, v, 0.2], (3, 1)),
         )  # fmt: skip
-    scene.self_contact(radius=[0.004, 0.006])
+    scene.self_contact(radius=[0.004, 0.006], friction=friction)
     h = SOLVER.h
     motion = sb.simulate(scene, np.arange(81) * h, SOLVER)
     inputs = scene.compiled.unpack(scene.compiled.inputs())
@@ -125,9 +126,10 @@ def test_a_cloth_folded_once_lies_on_itself():
     assert motion.positions[-1][:, 2].max() < 0.05
 
 
-def test_the_gradient_is_that_of_differences():
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_the_gradient_is_that_of_differences(friction: float):
     scene = crossed(height=0.0105)
-    scene.self_contact(radius=[0.005, 0.004])
+    scene.self_contact(radius=[0.005, 0.004], friction=friction)
     report = sb.check_gradients(scene, np.linspace(0, 0.05, 3), SOLVER, samples=2)
     assert report.passed, report
     assert {"self_contact_radius_0", "self_contact_radius_1"} <= set(scene.quantities)
@@ -135,7 +137,11 @@ def test_the_gradient_is_that_of_differences():
 
 def test_what_cannot_be_is_refused(tmp_path: Path):
     rope = {"length": 0.3, "segments": 15, "density": 0.05, "EA": 500.0, "EI": 1e-4}
-    for radius, friction, words in ((0.011, 0, "half a link"), (-1.0, 0, "must be positive"), (0.005, 0.3, "friction")):
+    for radius, friction, words in (
+        (0.011, 0, "half a link"),
+        (-1.0, 0, "must be positive"),
+        (0.005, -0.3, "negative"),
+    ):
         scene = sb.rope(**rope)
         with pytest.raises(sb.SceneError, match=words):
             scene.self_contact(radius=radius, friction=friction)
@@ -198,11 +204,13 @@ def test_a_file_builds_what_python_builds(tmp_path: Path):
     scene = crossed()
     scene.self_contact(radius=0.005)
     assert np.array_equal(*(sb.simulate(s, [0.0, 0.1], solver).positions for s in (read, scene)))
-    path.write_text(TWO.replace("radius = 0.005", 'of = ["lower", "upper"]\nradius = [0.005, 0.004]'))
-    assert scene_alone(parse(path))[0].quantities["self_contact_radius_1"].value == 0.004
+    path.write_text(TWO.replace("radius = 0.005", 'of = ["lower", "upper"]\nradius = [0.005, 0.004]\nfriction = 0.3'))
+    quantities = scene_alone(parse(path))[0].quantities
+    assert (quantities["self_contact_radius_1"].value, quantities["self_friction"].value) == (0.004, 0.3)
     for old, new, words in (
         ("radius = 0.005", 'of = "cord"\nradius = 0.005', "no rope or cloth"),
         ("radius = 0.005", "radius = [0.005, 0.004]", "name each piece"),
+        ("radius = 0.005", "radius = 0.005\nfriction = -0.3", "friction"),
         ('method = "implicit"', 'method = "direct"', "implicit"),
     ):
         path.write_text(TWO.replace(old, new))

@@ -88,7 +88,8 @@ def _add_self_contact(scene: Scene, section: SceneSection) -> None:
     radii = dict(zip(given.pieces, given.radius, strict=True)) if isinstance(given.radius, list) else {}
     if names:
         with located("scene.self_contact", "self_contact"):
-            scene.self_contact(*(built[n] for n in names), radius=[radii[n] for n in names] if radii else given.radius)
+            radius = [radii[n] for n in names] if radii else given.radius
+            scene.self_contact(*(built[n] for n in names), radius=radius, friction=given.friction, pairs=given.pairs)
 
 
 def _points(path: str, contact: ContactSection, bodies: Sequence[BodySection]) -> ArrayLike | None:

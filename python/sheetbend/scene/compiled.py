@@ -47,7 +47,7 @@ def specification(scene: SceneData) -> dict[str, Any]:
             {"name": name, "triangles": triangles.tolist()} for name, triangles in scene.volumes.triangles.items()
         ],
         **scene.contacts.specification(places),
-        "self_contact": pieces.specification(scene.contacts.pieces, places),
+        **pieces.specification(scene.contacts.pieces, scene.contacts.pair_friction, places),
         "bodies": places_or_none(scene, scene.with_axes).tolist(),
     }
 

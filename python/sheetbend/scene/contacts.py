@@ -15,7 +15,7 @@ from ..quantities.expression import terms_of
 from ..quantities.quantities import ZERO_OR_MORE, Builder, Term
 from .body_points import BodyPoints
 from .colliders import Collider
-from .pieces import Piece
+from .pieces import PairFriction, Piece
 
 Array = np.ndarray
 ARRAYS = (
@@ -104,6 +104,7 @@ class Contacts:
         self.contacts: list[Contact] = []
         self.settling: set[str] = set()  # those that move what starts inside to the surface
         self.pieces: list[Piece] = []  # what may touch itself
+        self.pair_friction: PairFriction | None = None  # of these
 
     def _place(self, scene: Builder, collider: Collider) -> int:
         """The place of a collider, which is added unless it is there."""
@@ -224,7 +225,7 @@ class Contacts:
             np.concatenate([c.poses.positions, c.poses.rotations], axis=1).ravel() for c in self.colliders.values()
         ]
         return {
-            "friction": np.zeros(len(self.contacts)),
+            "friction": np.zeros(len(self.contacts) + (self.pair_friction is not None)),
             "contact_radius": np.zeros(len(self.contacts) + len(self.pieces)),
             "contact_stiffness": np.zeros(sum(not c.rigid for c in self.contacts)),
             "collider_pose": np.concatenate([np.zeros(0), *poses]),

@@ -32,14 +32,32 @@ class Piece:
     quantity: str
 
 
-def radius_terms(pieces: Sequence[Piece], first: int) -> list[Term]:
-    """What makes the radii of pieces, which stand in the inputs from `first` on."""
-    return [Term("contact_radius", first + i, 1.0, ((p.quantity, "identity"),)) for i, p in enumerate(pieces)]
+@dataclass(frozen=True, eq=False)
+class PairFriction:
+    """Friction between pieces.
+
+    Attributes:
+        quantity: Coulomb's coefficient.
+        carried: (2 n,) hidden, pinned nodes, two for each pair that may touch at a time: the coordinates of the first
+            say which pair, those of the second are the tangential force that is carried from substep to substep [N].
+    """
+
+    quantity: str
+    carried: Array
 
 
-def specification(pieces: Sequence[Piece], places_of: Callable[[Array], Array]) -> list[dict[str, Any]]:
+def piece_terms(pieces: Sequence[Piece], friction: PairFriction | None, first: int) -> list[Term]:
+    """What makes the radii of pieces and their friction, which stand in the inputs from `first` on."""
+    terms = [Term("contact_radius", first + i, 1.0, ((p.quantity, "identity"),)) for i, p in enumerate(pieces)]
+    return terms if friction is None else [*terms, Term("friction", first, 1.0, ((friction.quantity, "identity"),))]
+
+
+def specification(
+    pieces: Sequence[Piece], friction: PairFriction | None, places_of: Callable[[Array], Array]
+) -> dict[str, Any]:
     """The pieces as the compiled core is made from them."""
-    return [{"edges": places_of(p.edges).tolist(), "triangles": places_of(p.triangles).tolist()} for p in pieces]
+    own = [{"edges": places_of(p.edges).tolist(), "triangles": places_of(p.triangles).tolist()} for p in pieces]
+    return {"self_contact": own, "self_carried": [] if friction is None else places_of(friction.carried)}
 
 
 def expect_apart(core: Any, inputs: Array, name_of: Callable[[int], str]) -> None:

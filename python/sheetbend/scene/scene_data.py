@@ -20,7 +20,7 @@ from .contacts import Contacts
 from .forces import Forces
 from .frames import Frame
 from .group import Group
-from .pieces import radius_terms
+from .pieces import piece_terms
 from .volume import Volumes
 
 Array = np.ndarray
@@ -115,8 +115,9 @@ class SceneData:
     def every_term(self) -> list[Term]:
         """Those that were added, of the boundary, and of the start of bodies."""
         starts = (t for body in self.bodies.values() for t in body.start_terms())
-        radii = radius_terms(self.contacts.pieces, len(self.contacts.contacts))
-        return [*self.terms, *self.boundary.terms(), *self.forces.terms(), *starts, *radii]
+        contacts = self.contacts
+        between = piece_terms(contacts.pieces, contacts.pair_friction, len(contacts.contacts))
+        return [*self.terms, *self.boundary.terms(), *self.forces.terms(), *starts, *between]
 
     @property
     def sheets(self) -> list[Any]:

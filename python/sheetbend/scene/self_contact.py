@@ -10,16 +10,21 @@ import numpy as np
 from ..arrays.checks import is_number
 from ..errors import SceneError
 from .held import HeldScene
-from .pieces import Piece
+from .pieces import PairFriction, Piece
 
 
 class SelfTouchingScene(HeldScene):
     """A scene under construction whose ropes and cloths may touch themselves."""
 
     def self_contact(
-        self, *pieces: Any, radius: float | Sequence[float], friction: float = 0.0, name: str = "self"
+        self,
+        *pieces: Any,
+        radius: float | Sequence[float],
+        friction: float = 0.0,
+        pairs: int | None = None,
+        name: str = "self",
     ) -> None:
-        """Let ropes and cloths touch themselves and each other, without friction; see docs/contact.md.
+        """Let ropes and cloths touch themselves and each other; see docs/contact.md.
 
         Links of ropes and edges and triangles of cloths push each other apart and never pass through. Needs method
         "implicit". Once per scene, with all pieces.
@@ -28,11 +33,16 @@ class SelfTouchingScene(HeldScene):
             pieces: ropes and cloths, such as `scene.ropes["rope"]`; all of the scene by default.
             radius: m, of a rope, or half the thickness of a cloth; one for all (`<name>_contact_radius`), or one for
                 each piece (`<name>_contact_radius_0` and so on). Of a rope at most half a link.
-            friction: not offered, 0.
+            friction: Coulomb's coefficient between any two (`<name>_friction`). Without friction, 0, there is no such
+                quantity, and substeps are cheaper.
+            pairs: with friction, how many pairs of edges and of particles and triangles may touch at a time; twice as
+                many as there are edges and particles of cloths by default. A simulation in which more touch ends with
+                an error. Each adds two hidden nodes to the scene.
             name: of its quantities.
 
         Raises:
-            SceneError: what is no rope or cloth, radii out of range; when it is compiled: a start too near to itself.
+            SceneError: what is no rope or cloth, radii, friction or pairs out of range; when it is compiled: a start
+                too near to itself.
         """
         self._building()
         own = list(pieces) or [*self.ropes.values(), *self.cloths.values()]
@@ -40,9 +50,10 @@ class SelfTouchingScene(HeldScene):
             raise SceneError("self_contact", "was given before", name, "give all ropes and cloths in one call")
         if not own:
             raise SceneError("self_contact.pieces", "are none", [], "add a rope or a cloth first")
-        if friction != 0:
-            problem = "is not offered for what touches itself, which slides without friction"
-            raise SceneError("self_contact.friction", problem, friction, "leave it out")
+        if not (is_number(friction) and friction >= 0):
+            raise SceneError("self_contact.friction", "must not be negative", friction, "give a coefficient, or 0")
+        if pairs is not None and not (is_number(pairs) and pairs == int(pairs) and pairs > 0):
+            raise SceneError("self_contact.pairs", "must be a positive number", pairs, "give one, or leave it out")
         given = np.atleast_1d(np.asarray(radius, dtype=object)).ravel().tolist()
         radii: list[float] = given * len(own) if np.ndim(radius) == 0 else given
         if len(radii) != len(own) or not all(is_number(r) and r > 0 for r in radii):
@@ -55,6 +66,12 @@ class SelfTouchingScene(HeldScene):
         for quantity, value in dict(zip(names, radii, strict=True)).items():
             self.add_quantity(quantity, value, "m")
         self.contacts.pieces = found
+        if friction > 0:
+            cloths = sum(len(np.unique(p.triangles)) for p in found)
+            count = int(pairs or 2 * (sum(len(p.edges) for p in found) + cloths))
+            quantity = self.add_quantity(f"{name}_friction", friction, "")
+            carried = self.add_hidden(np.zeros((2 * count, 3)), 1.0, pinned=True)
+            self.contacts.pair_friction = PairFriction(quantity, carried)
 
     def _piece(self, piece: Any, radius: float, quantity: str) -> Piece:
         if any(piece is cloth for cloth in self.cloths.values()):

@@ -1,6 +1,7 @@
 // Scenes in which particles touch shapes.
 #pragma once
 
+#include "core/rollout/rollout.h"
 #include "tests/cpp/support/distance_grids.h"
 #include "tests/cpp/support/programs.h"
 
@@ -110,6 +111,27 @@ struct ContactBuilder {
 
 inline SolverOptions contact_options(double h, Integrator integrator = Integrator::bdf1) {
   return {.h = h, .integrator = integrator, .partition = Partition::implicit, .iterations = 100};
+}
+
+// The tangents of a program's end along four inputs are those of complex steps.
+inline void expect_tangents_agree(const Program& p, const std::vector<double>& inputs,
+                                  const std::array<std::size_t, 4>& along, double bound) {
+  using D = Dual<double, 4>;
+  std::vector<D> moving(inputs.begin(), inputs.end());
+  for (int d = 0; d < 4; ++d) moving[along[d]].d[d] = 1.0;
+  Rollout<D> rollout(p.scene, p.plan, moving.data());
+  for (int n = 0; n < p.steps; ++n) rollout.advance();
+  for (int d = 0; d < 4; ++d) {
+    std::vector<Complex> probe(inputs.begin(), inputs.end());
+    probe[along[d]].im = complex_step;
+    const auto all = states(p, probe);
+    std::vector<double> found, expected;
+    for (int i = 0; i < p.scene.dofs(); ++i) {
+      expected.push_back(all[p.steps * p.scene.dofs() + i].im / complex_step);
+      found.push_back(rollout.x()[i].d[d]);
+    }
+    EXPECT_LE(relative_error(found, expected), bound) << d;
+  }
 }
 
 // d x_dof/d inputs at the last step of a program.

@@ -21,6 +21,13 @@ struct TouchingBuilder : ContactBuilder {
     }
     add(piece, r);
   }
+  // One edge, whose ends are pinned.
+  void held_edge(const Vec3<double>& from, const Vec3<double>& to, double r) {
+    const int first = particle(from, 1.0);
+    particle(to, 1.0);
+    for (const int n : {first, first + 1}) spec.pinned.push_back(n);
+    add({{{first, first + 1}}, {}}, r);
+  }
   // A sheet of nx by ny squares that are cut in two, at corner(i, j).
   template <class F>
   void sheet(int nx, int ny, F&& corner, double m, const Vec3<double>& v, double r, double k) {
@@ -44,6 +51,14 @@ struct TouchingBuilder : ContactBuilder {
         piece.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
       }
     add(piece, r);
+  }
+  // Last: nodes for as many pairs to carry friction, which is in the place of a contact's.
+  void rub(double mu, int pairs) {
+    for (int i = 0; i < 2 * pairs; ++i) {
+      spec.self_contact.carried.push_back(particle({0.0, 0.0, 0.0}, 1.0));
+      spec.pinned.push_back(spec.self_contact.carried.back());
+    }
+    friction.push_back(mu);
   }
 
  private:
