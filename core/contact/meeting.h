@@ -55,8 +55,8 @@ inline double distance_of(bool triangle, const double* x, const PairNumbers<doub
   return std::sqrt(nearest_points(triangle, x, softness, nearest_part(triangle, x, softness)).squared);
 }
 
-// Whether the boxes around both sides, whose nodes are in the first `count` of these places (12 numbers each), are farther apart than `room`. Most pairs that are
-// looked at are, and their nearest points are not asked for.
+// Whether the boxes around both sides, whose nodes are in the first `count` of these places (12 numbers each), are farther apart than `room`. Most pairs that
+// are looked at are, and their nearest points are not asked for.
 inline bool boxes_are_apart(bool triangle, const double (*places)[12], int count, double room) {
   const int second = triangle ? 3 : 6;
   for (int d = 0; d < 3; ++d) {
