@@ -116,7 +116,8 @@ class ContactSection(Section):
     restitution: Finite | None = key(None, "speed after an impact over that before; 0 when left out", ge=0, le=1)
     settle: bool = key(
         False,
-        "move particles that start inside, as measured ones may by noise, to the surface before the motion starts",
+        "move particles that start inside, as measured ones may by noise, to the surface before the motion starts; "
+        "a body as a whole",
     )
 
     @property
