@@ -93,6 +93,22 @@ def test_what_is_no_contact_of_a_body_is_refused(contact, field):
         tossed(**contact)
 
 
+@pytest.mark.parametrize(("integrator", "off"), [("bdf1", 6e-3), ("bdf2", 2e-3)])
+def test_a_free_body_bounces_with_its_restitution(integrator, off):
+    # Nothing else holds the body: its rows alone hold its points.
+    scene = sb.Scene("box")
+    sides = (0.1, 0.1, 0.1)
+    box = scene.add_body("box", of=sb.Inertia.box(0.1, sides), at=(0, 0, 0.3))
+    scene.contact(box, sb.Plane(name="table"), friction=0.1, restitution=0.5, points=sb.box_corners(sides))
+    fall = np.sqrt(2 * 0.25 / 9.81)
+    solver = sb.Solver(h=1 / 960, method="implicit", integrator=integrator)
+    for e in (0.5, 0.8):
+        motion = sb.simulate(scene, [0.0, 0.4], solver, {"table_restitution": e})
+        after = 0.4 - fall
+        expected = 0.05 + e * 9.81 * fall * after - 0.5 * 9.81 * after**2
+        assert motion.positions[-1, 0, 2] == pytest.approx(expected, abs=off)
+
+
 def test_settle_moves_a_body_as_a_whole_out_of_all_shapes():
     scene = sb.Scene("corner")
     body = scene.add_body("cube", of=sb.Inertia.box(0.37, SIDES), at=(0.046, 0, 0.057), rotation=(0, 0, 0.1))
