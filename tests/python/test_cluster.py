@@ -27,23 +27,28 @@ from test_journal import swinging
 from test_workers import GIVEN, Backwards, bits, several
 
 distributed = pytest.importorskip("distributed")
+dask_config = pytest.importorskip("dask").config
 
 SLOW = 0.05  # s, of a task
-SMALL: dict[str, Any] = {**GIVEN, "starts": 2, "leave_one_out": False}
+SMALL: dict[str, Any] = {**GIVEN, "parameters": {"rope_EI": {}}, "starts": 2, "leave_one_out": False}
 
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
     """Three workers, threads of this process that are talked to over TCP."""
-    with distributed.LocalCluster(
-        n_workers=3,
-        threads_per_worker=1,
-        processes=False,
-        protocol="tcp",
-        host="127.0.0.1",
-        dashboard_address=None,
-        worker_dashboard_address=None,
-    ) as cluster:
+    quiet = {"distributed.worker.profile.enabled": False}  # samples stacks every 10 ms
+    with (
+        dask_config.set(quiet),
+        distributed.LocalCluster(
+            n_workers=3,
+            threads_per_worker=1,
+            processes=False,
+            protocol="tcp",
+            host="127.0.0.1",
+            dashboard_address=":0",
+            worker_dashboard_address=None,
+        ) as cluster,
+    ):
         yield cluster
 
 
