@@ -41,6 +41,7 @@ NEGLIGIBLE = 1e-10  # share of a parameter's variance
 _MAX_ORDER = 20
 _ZERO = 1e-290  # sum of squares: the numbers are so small that ratios of them are rounding
 _SILENT = 1e-20  # of the loudest kind's sum of squares: rounding, which has no spectrum
+_KEPT = 1 << 22  # complex numbers of transforms, 64 MB
 _CORRECTIONS = 2  # the second already changes the intervals by less than 1 %
 
 
@@ -317,8 +318,9 @@ def _spectral(grid: _Grid, jacobian: Array, root: Array, kinds: Integers) -> tup
     seen = np.abs(grid.transform(grid.mask)) ** 2
     pairs = [grid.lags(seen[:, mine] @ np.diag(mixing)[mine], most) for mine in own]
     spectra = observed
+    colored = _Colored(parts, mixing, grid.length)
     for step in range(_CORRECTIONS + 1):
-        spread = [_colored(part, parts, spectra, grid.length, mixing) for part in parts]
+        spread = [colored(part, spectra) for part in parts]
         inner = np.zeros_like(root)
         for part, a in zip(parts, spread, strict=True):
             inner += np.tensordot(part.columns, a, ([0, 2], [0, 2]))
@@ -332,20 +334,38 @@ def _spectral(grid: _Grid, jacobian: Array, root: Array, kinds: Integers) -> tup
     return root @ (inner + inner.T) @ root.T / 2, time
 
 
-def _colored(part: _Part, parts: list[_Part], spectra: list[Array], length: int, mixing: Array) -> Array:
-    """That part of Omega times the columns; between kinds with the geometric mean of their spectra of that length."""
-    frames = len(part.columns)
-    padded = 2 << (frames - 1).bit_length()
-    total = np.zeros((padded // 2 + 1, *part.columns.shape[1:]), dtype=complex)
-    for other in parts:
-        if other.recording != part.recording:
-            continue
-        mine, its = spectra[part.kind], spectra[other.kind]
-        kernel = np.fft.irfft(mine if its is mine else np.sqrt(mine * its), length)[:frames]
-        around = np.concatenate([kernel, np.zeros(padded - 2 * frames + 1), kernel[:0:-1]])
-        mixed = other.columns @ mixing[np.ix_(other.channels, part.channels)]
-        total += np.fft.rfft(mixed, padded, axis=0) * np.fft.rfft(around).real[:, None, None]
-    return np.asarray(part.mask * np.fft.irfft(total, padded, axis=0)[:frames])
+class _Colored:
+    """(part, spectra) -> that part of Omega times the columns; between kinds with the geometric mean of their spectra.
+    The columns' transforms are kept from one to the next, where they are not many."""
+
+    def __init__(self, parts: list[_Part], mixing: Array, length: int) -> None:
+        """With spectra of that length."""
+        self._parts, self._mixing, self._length = parts, mixing, length
+        self._kept: dict[tuple[int, int, int], NDArray[np.complex128]] = {}
+
+    def __call__(self, part: _Part, spectra: list[Array]) -> Array:
+        frames = len(part.columns)
+        padded = 2 << (frames - 1).bit_length()
+        total = np.zeros((padded // 2 + 1, *part.columns.shape[1:]), dtype=complex)
+        for other in self._parts:
+            if other.recording != part.recording:
+                continue
+            mine, its = spectra[part.kind], spectra[other.kind]
+            kernel = np.fft.irfft(mine if its is mine else np.sqrt(mine * its), self._length)[:frames]
+            around = np.concatenate([kernel, np.zeros(padded - 2 * frames + 1), kernel[:0:-1]])
+            total += self._mixed(part, other, padded) * np.fft.rfft(around).real[:, None, None]
+        return np.asarray(part.mask * np.fft.irfft(total, padded, axis=0)[:frames])
+
+    def _mixed(self, part: _Part, other: _Part, padded: int) -> NDArray[np.complex128]:
+        """The transform of another part's columns, as its channels are alike with those of a part."""
+        key = part.recording, part.kind, other.kind
+        if key in self._kept:
+            return self._kept[key]
+        mixed = other.columns @ self._mixing[np.ix_(other.channels, part.channels)]
+        made = np.fft.rfft(mixed, padded, axis=0)
+        if sum(k.size for k in self._kept.values()) + made.size <= _KEPT:
+            self._kept[key] = made
+        return made
 
 
 def _expected_lags(
