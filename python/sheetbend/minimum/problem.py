@@ -269,8 +269,7 @@ class FitProblem:
         return found
 
     def keep(self, u: np.ndarray, r: np.ndarray, J: np.ndarray) -> None:
-        """Take what was evaluated at u past the problem for the last Jacobian; not where evaluations change what the
-        next one does, as with corrections."""
+        """Take what was evaluated at u past the problem for the last Jacobian; not where corrections go on from it."""
         if not self.estimates_corrections:
             self._last = np.array(u, dtype=float), (True, r, J)
 
