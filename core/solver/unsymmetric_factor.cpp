@@ -6,30 +6,42 @@
 namespace sheetbend {
 namespace {
 
-// inverse = A^-1 by elimination with rows exchanged; false where there is none.
-bool invert(const double* A, double* inverse) {
-  double M[3][6] = {};
-  for (int a = 0; a < 3; ++a) {
-    for (int b = 0; b < 3; ++b) M[a][b] = A[3 * a + b];
-    M[a][3 + a] = 1.0;
-  }
-  for (int k = 0; k < 3; ++k) {
-    int pivot = k;
-    for (int a = k + 1; a < 3; ++a)
-      if (std::abs(M[a][k]) > std::abs(M[pivot][k])) pivot = a;
-    for (int b = 0; b < 6; ++b) std::swap(M[k][b], M[pivot][b]);
-    if (!(std::abs(M[k][k]) > 0.0) || !std::isfinite(M[k][k])) return false;
-    const double scale = 1.0 / M[k][k];
-    for (int b = 0; b < 6; ++b) M[k][b] *= scale;
+// A block of the diagonal as L U with rows exchanged, largest first. Blocks are divided by it, not multiplied by its inverse: where one direction of a
+// particle is far stiffer than the others, as of a rod's directors, an inverse has lost that direction's digits.
+class Pivot {
+ public:
+  // False where it has no inverse.
+  bool factorize(const double* A) {
     for (int a = 0; a < 3; ++a) {
-      const double factor = M[a][k];
-      for (int b = 0; a != k && b < 6; ++b) M[a][b] -= factor * M[k][b];
+      row_[a] = a;
+      for (int b = 0; b < 3; ++b) M_[a][b] = A[3 * a + b];
     }
+    for (int k = 0; k < 3; ++k) {
+      int largest = k;
+      for (int a = k + 1; a < 3; ++a)
+        if (std::abs(M_[a][k]) > std::abs(M_[largest][k])) largest = a;
+      std::swap(row_[k], row_[largest]);
+      for (int b = 0; b < 3; ++b) std::swap(M_[k][b], M_[largest][b]);
+      if (!(std::abs(M_[k][k]) > 0.0) || !std::isfinite(M_[k][k])) return false;
+      for (int a = k + 1; a < 3; ++a) {
+        M_[a][k] /= M_[k][k];
+        for (int b = k + 1; b < 3; ++b) M_[a][b] -= M_[a][k] * M_[k][b];
+      }
+    }
+    return true;
   }
-  for (int a = 0; a < 3; ++a)
-    for (int b = 0; b < 3; ++b) inverse[3 * a + b] = M[a][3 + b];
-  return true;
-}
+  // e <- e A^-1, a row.
+  void divide(double* e) const {
+    const double x = e[0] / M_[0][0], y = (e[1] - x * M_[0][1]) / M_[1][1],
+                 z = (e[2] - x * M_[0][2] - y * M_[1][2]) / M_[2][2];
+    const double second = y - z * M_[2][1], first = x - second * M_[1][0] - z * M_[2][0];
+    e[row_[0]] = first, e[row_[1]] = second, e[row_[2]] = z;
+  }
+
+ private:
+  double M_[3][3];
+  int row_[3];
+};
 
 }  // namespace
 
@@ -119,19 +131,16 @@ void UnsymmetricFactor::add(const UnsymmetricStructure& s, int row, int column, 
 }
 
 bool UnsymmetricFactor::factorize(const UnsymmetricStructure& s) {
+  thread_local std::vector<Pivot> pivots;
+  pivots.resize(s.size());
   for (int i = 0; i < s.size(); ++i) {
     for (int k = s.lower_start_[i]; k < s.lower_start_[i + 1]; ++k) place_[s.lower_[k]] = &lower_[9 * k];
     for (int k = s.upper_start_[i]; k < s.upper_start_[i + 1]; ++k) place_[s.upper_[k]] = &upper_[9 * k];
     place_[i] = &inverse_[9 * i];
     for (int k = s.lower_start_[i]; k < s.lower_start_[i + 1]; ++k) {
       const int before = s.lower_[k];
-      double *own = &lower_[9 * k], L[9];
-      for (int a = 0; a < 3; ++a)
-        for (int b = 0; b < 3; ++b) {
-          const double* inverse = &inverse_[9 * before];
-          L[3 * a + b] = own[3 * a] * inverse[b] + own[3 * a + 1] * inverse[3 + b] + own[3 * a + 2] * inverse[6 + b];
-        }
-      std::copy_n(L, 9, own);
+      double* L = &lower_[9 * k];
+      for (int a = 0; a < 3; ++a) pivots[before].divide(L + 3 * a);
       for (int u = s.upper_start_[before]; u < s.upper_start_[before + 1]; ++u) {
         const double* U = &upper_[9 * u];
         double* to = place_[s.upper_[u]];
@@ -140,9 +149,12 @@ bool UnsymmetricFactor::factorize(const UnsymmetricStructure& s) {
             to[3 * a + b] -= L[3 * a] * U[b] + L[3 * a + 1] * U[3 + b] + L[3 * a + 2] * U[6 + b];
       }
     }
-    double pivot[9];
-    std::copy_n(&inverse_[9 * i], 9, pivot);
-    if (!invert(pivot, &inverse_[9 * i])) return false;
+    double* own = &inverse_[9 * i];
+    if (!pivots[i].factorize(own)) return false;
+    for (int a = 0; a < 3; ++a) {
+      for (int b = 0; b < 3; ++b) own[3 * a + b] = a == b ? 1.0 : 0.0;
+      pivots[i].divide(own + 3 * a);
+    }
   }
   return true;
 }

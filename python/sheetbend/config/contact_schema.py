@@ -102,7 +102,7 @@ class ContactSection(Section):
 
     name: Name | None = key(None, "prefix of its quantities; the collider's name when left out")
     of: Name | list[Name] = key(
-        ..., "a rope, a cloth or a set of particles, or several: all of their particles; or a body"
+        ..., "a rope, a rod, a cloth or a set of particles, or several: all of their particles; or a body"
     )
     points: list[Vector] | None = key(
         None, "of a body: those that may touch, in its frame; the corners of its box when left out", "m", min_length=1

@@ -320,7 +320,7 @@ class Scene(SelfTouchingScene):
         `<collider>_x`, `_y` and `_z`, m from where it was given, and its lengths, such as `<collider>_radius` m.
 
         Args:
-            what: a rope, a cloth, particles (n,), or a body.
+            what: a rope, a rod, a cloth, particles (n,), or a body.
             collider: `Plane`, `Sphere`, `Capsule`, `Box` or `DistanceField`; one object may serve several contacts.
             friction: Coulomb's coefficient (`<name>_friction`); 0 is smooth.
             radius: m, of a rope, or half the thickness of cloth (`<name>_contact_radius` unless zero).
