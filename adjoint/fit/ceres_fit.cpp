@@ -155,7 +155,6 @@ CeresResult minimize_with_ceres(const EvaluationFunction& evaluation, std::vecto
   o.function_tolerance = options.function_tolerance;
   o.gradient_tolerance = options.gradient_tolerance;
   o.parameter_tolerance = options.parameter_tolerance;
-  o.initial_trust_region_radius = options.radius;
   o.max_num_consecutive_invalid_steps = 20;
   // With bounds Ceres also searches along each step; cubic interpolation would ask for a Jacobian at every trial of it.
   o.line_search_interpolation_type = ceres::QUADRATIC;

@@ -14,7 +14,6 @@ struct CeresOptions {
   double function_tolerance = 1e-12, gradient_tolerance = 1e-12, parameter_tolerance = 1e-12;
   std::vector<double> longest_step;  // of each parameter; infinite where there is none
   std::vector<int> held;             // parameters that stay, in order; not all of them
-  double radius = 1e4;               // initial trust region: its inverse damps the first step
 };
 
 struct CeresProgress {
@@ -28,8 +27,8 @@ struct CeresResult {
   int iterations = 0, evaluations = 0, jacobians = 0;
   bool converged = false, stopped = false;  // stopped: by Ctrl-C or by the observer
   std::string message;
-  std::vector<double> residual,
-      jacobian;  // at u, (rows) and (rows, parameters); empty where the last Jacobian was made elsewhere
+  // At u, (rows) and (rows, parameters); empty where the last Jacobian was made elsewhere.
+  std::vector<double> residual, jacobian;
 };
 
 // Called after every iteration with the current point; returning false ends the fit with its best so far.

@@ -1,50 +1,8 @@
 #include "core/solver/unsymmetric_factor.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace sheetbend {
-namespace {
-
-// A block of the diagonal as L U with rows exchanged, largest first. Blocks are divided by it, not multiplied by its inverse: where one direction of a
-// particle is far stiffer than the others, as of a rod's directors, an inverse has lost that direction's digits.
-class Pivot {
- public:
-  // False where it has no inverse.
-  bool factorize(const double* A) {
-    for (int a = 0; a < 3; ++a) {
-      row_[a] = a;
-      for (int b = 0; b < 3; ++b) M_[a][b] = A[3 * a + b];
-    }
-    for (int k = 0; k < 3; ++k) {
-      int largest = k;
-      for (int a = k + 1; a < 3; ++a)
-        if (std::abs(M_[a][k]) > std::abs(M_[largest][k])) largest = a;
-      std::swap(row_[k], row_[largest]);
-      for (int b = 0; b < 3; ++b) std::swap(M_[k][b], M_[largest][b]);
-      if (!(std::abs(M_[k][k]) > 0.0) || !std::isfinite(M_[k][k])) return false;
-      for (int a = k + 1; a < 3; ++a) {
-        M_[a][k] /= M_[k][k];
-        for (int b = k + 1; b < 3; ++b) M_[a][b] -= M_[a][k] * M_[k][b];
-      }
-    }
-    return true;
-  }
-  // e <- e A^-1, a row.
-  void divide(double* e) const {
-    const double x = e[0] / M_[0][0], y = (e[1] - x * M_[0][1]) / M_[1][1],
-                 z = (e[2] - x * M_[0][2] - y * M_[1][2]) / M_[2][2];
-    const double second = y - z * M_[2][1], first = x - second * M_[1][0] - z * M_[2][0];
-    e[row_[0]] = first, e[row_[1]] = second, e[row_[2]] = z;
-  }
-
- private:
-  double M_[3][3];
-  int row_[3];
-};
-
-}  // namespace
-
 UnsymmetricStructure::UnsymmetricStructure(int places, std::vector<std::pair<int, int>> pairs,
                                            const FactorStructure& symmetric) {
   for (int i = 0; i < places; ++i) pairs.emplace_back(i, i);
@@ -99,12 +57,12 @@ std::size_t UnsymmetricStructure::bytes() const {
 void UnsymmetricFactor::resize(const UnsymmetricStructure& s) {
   lower_.resize(9 * s.blocks());
   upper_.resize(9 * s.blocks());
-  inverse_.resize(9 * static_cast<std::size_t>(s.size()));
+  pivots_.resize(s.size());
   place_.resize(s.size());
 }
 
 std::size_t UnsymmetricFactor::bytes(const UnsymmetricStructure& s) {
-  return sizeof(double) * 9 * (2 * s.blocks() + s.size()) + sizeof(double*) * s.size();
+  return sizeof(double) * 9 * 2 * s.blocks() + (sizeof(PivotBlock) + sizeof(double*)) * s.size();
 }
 
 void UnsymmetricFactor::load(const UnsymmetricStructure& s, const double* values) {
@@ -115,7 +73,7 @@ void UnsymmetricFactor::load(const UnsymmetricStructure& s, const double* values
       for (int b = 0; b < 3; ++b) {
         const double value = values[e.from[3 * a + b]];
         if (e.place >= 0) {
-          inverse_[9 * e.place + 3 * a + b] = value;
+          pivots_[e.place].entries[3 * a + b] = value;
         } else {
           lower_[9 * e.lower + 3 * a + b] = value;
           upper_[9 * e.upper + 3 * b + a] = value;
@@ -124,23 +82,21 @@ void UnsymmetricFactor::load(const UnsymmetricStructure& s, const double* values
 }
 
 void UnsymmetricFactor::add(const UnsymmetricStructure& s, int row, int column, double scale, const double* block) {
-  double* to = row == column  ? &inverse_[9 * row]
+  double* to = row == column  ? pivots_[row].entries
                : row > column ? &lower_[9 * s.slot(s.lower_start_, s.lower_, row, column)]
                               : &upper_[9 * s.slot(s.upper_start_, s.upper_, row, column)];
   for (int k = 0; k < 9; ++k) to[k] += scale * block[k];
 }
 
 bool UnsymmetricFactor::factorize(const UnsymmetricStructure& s) {
-  thread_local std::vector<Pivot> pivots;
-  pivots.resize(s.size());
   for (int i = 0; i < s.size(); ++i) {
     for (int k = s.lower_start_[i]; k < s.lower_start_[i + 1]; ++k) place_[s.lower_[k]] = &lower_[9 * k];
     for (int k = s.upper_start_[i]; k < s.upper_start_[i + 1]; ++k) place_[s.upper_[k]] = &upper_[9 * k];
-    place_[i] = &inverse_[9 * i];
+    place_[i] = pivots_[i].entries;
     for (int k = s.lower_start_[i]; k < s.lower_start_[i + 1]; ++k) {
       const int before = s.lower_[k];
       double* L = &lower_[9 * k];
-      for (int a = 0; a < 3; ++a) pivots[before].divide(L + 3 * a);
+      for (int a = 0; a < 3; ++a) pivots_[before].solve_transposed(L + 3 * a);
       for (int u = s.upper_start_[before]; u < s.upper_start_[before + 1]; ++u) {
         const double* U = &upper_[9 * u];
         double* to = place_[s.upper_[u]];
@@ -149,12 +105,7 @@ bool UnsymmetricFactor::factorize(const UnsymmetricStructure& s) {
             to[3 * a + b] -= L[3 * a] * U[b] + L[3 * a + 1] * U[3 + b] + L[3 * a + 2] * U[6 + b];
       }
     }
-    double* own = &inverse_[9 * i];
-    if (!pivots[i].factorize(own)) return false;
-    for (int a = 0; a < 3; ++a) {
-      for (int b = 0; b < 3; ++b) own[3 * a + b] = a == b ? 1.0 : 0.0;
-      pivots[i].divide(own + 3 * a);
-    }
+    if (!pivots_[i].factorize()) return false;
   }
   return true;
 }

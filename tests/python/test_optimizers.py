@@ -336,32 +336,3 @@ def test_the_last_jacobian_of_ceres_is_not_made_again(monkeypatch: pytest.Monkey
     monkeypatch.setattr(problem, "evaluator", None)
     _, r, J = problem.evaluate(end.u)
     assert np.array_equal(r, fresh[1]) and np.array_equal(J, fresh[2])
-
-
-@needs_ceres
-def test_near_the_minimum_ceres_hardly_damps_its_steps() -> None:
-    """Two columns that differ by a thousandth: with the first damping most steps go into that."""
-    from sheetbend import _ceres, _core
-
-    J = np.array([[1.0, 1.0], [0.0, 1e-3], [0.0, 0.0]])
-
-    def linear(u: np.ndarray, jacobian: bool) -> tuple[tuple[bool, np.ndarray, np.ndarray], float]:
-        return (True, J @ (u - 1.0) + np.array([0.0, 0.0, 1e-6]), J), 1.0
-
-    ends = {}
-    for radius in (optimizers.RADIUS, optimizers.NEAR_RADIUS):
-        ends[radius] = _ceres.minimize(
-            evaluation=_core.evaluation_of(3, 2, linear),
-            u=[2.0, 3.0],
-            lower=[-np.inf] * 2,
-            upper=[np.inf] * 2,
-            longest_step=[np.inf] * 2,
-            held=[],
-            max_iterations=50,
-            tolerance=1e-10,
-            radius=radius,
-            observe=lambda *_: True,
-        )
-    damped, free = ends.values()
-    assert free["u"] == approx([1.0, 1.0], abs=1e-4)
-    assert free["iterations"] < 0.6 * damped["iterations"]

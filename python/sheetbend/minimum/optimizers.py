@@ -22,10 +22,6 @@ from .counts import count, counted
 from .problem import FitProblem
 
 OPTIMIZERS = ("auto", "ceres", "scipy")
-RADIUS, NEAR_RADIUS = 1e4, 1e8
-"""Of Ceres' first trust region. Its inverse, against the square of a column's size, is added to the normal equations:
-1e4 holds up directions that the data see a hundred times less than single parameters, for five steps or more. Where the
-last step was short and as good as promised nothing needs to be held up; each step has its own limit anyway."""
 LOST = 0.1  # of the cost: a slope that promises so much is no end
 STUCK = 1e-5  # of the cost: a third of a standard error where residuals are ten thousand
 ROUNDING = 1e-12  # of the first cost: residuals of data without noise end as rounding errors, which have any slope
@@ -111,14 +107,12 @@ def minimize(
     tolerance: float = 1e-10,
     observe: Observer | None = None,
     first: float | None = None,
-    near: bool = False,
 ) -> tuple[Minimum, str]:
     """Minimize half the sum of squared residuals from u (free,), inside the parameters' limits, no step longer than
     `approach.step_limits`; also returns the optimizer's name.
 
     Args:
         first: the cost at u, where it is known.
-        near: the last step to u was as good as promised and short: Ceres then begins with steps that are hardly damped.
 
     Raises:
         InputError: see `named`.
@@ -130,11 +124,8 @@ def minimize(
         if not ok:
             raise SheetbendError(f"the fit cannot start: {problem.failure}")
         first = 0.5 * float(r @ r)
-    at, best = np.array(u, dtype=float), _Best(observe, u, first)
-    if name == "ceres":
-        end = _ceres(problem, at, max_iterations, tolerance, best, NEAR_RADIUS if near else RADIUS)
-    else:
-        end = _scipy(problem, at, max_iterations, tolerance, best)
+    run = _ceres if name == "ceres" else _scipy
+    end = run(problem, np.array(u, dtype=float), max_iterations, tolerance, _Best(observe, u, first))
     return replace(end, first=first), name
 
 
@@ -191,17 +182,15 @@ class _Best:
             self.observe(Progress(iteration, cost, np.array(u, dtype=float)))
 
 
-def _ceres(
-    problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: float, best: _Best, radius: float = RADIUS
-) -> Minimum:
+def _ceres(problem: FitProblem, u: np.ndarray, max_iterations: int, tolerance: float, best: _Best) -> Minimum:
     """Ceres, with parameters that rest at a limit held there: it searches along every step that it projects."""
     lower, upper = problem.parameters.limits()
     u = np.clip(u, lower, upper)
     held = _resting(problem, u)
-    end = _ceres_holding(problem, u, held, max_iterations, tolerance, best, radius)
+    end = _ceres_holding(problem, u, held, max_iterations, tolerance, best)
     if end.interrupted or not held or _resting(problem, end.u) >= held:
         return end
-    again = _ceres_holding(problem, end.u, frozenset(), max_iterations, tolerance, best, RADIUS)
+    again = _ceres_holding(problem, end.u, frozenset(), max_iterations, tolerance, best)
     return replace(
         again,
         iterations=end.iterations + again.iterations,
@@ -224,13 +213,7 @@ def _resting(problem: FitProblem, u: np.ndarray) -> frozenset[int]:
 
 
 def _ceres_holding(
-    problem: FitProblem,
-    u: np.ndarray,
-    held: frozenset[int],
-    max_iterations: int,
-    tolerance: float,
-    best: _Best,
-    radius: float,
+    problem: FitProblem, u: np.ndarray, held: frozenset[int], max_iterations: int, tolerance: float, best: _Best
 ) -> Minimum:
     from .. import _ceres as ceres
 
@@ -252,7 +235,6 @@ def _ceres_holding(
             held=sorted(held),
             max_iterations=max_iterations,
             tolerance=tolerance,
-            radius=radius,
             observe=observe,
         )
     except KeyboardInterrupt:

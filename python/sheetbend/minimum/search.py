@@ -241,8 +241,7 @@ class _Way:
     def _optimized(self, walk: Approach, most: int) -> Minimum:
         """On from a walk by the optimizer."""
         observe, first = self._observer(None, self.taken.iterations), walk.cost if np.isfinite(walk.cost) else None
-        options = self.optimizer, most, self.search.tolerance, observe
-        return minimize(self.problem, walk.u, *options, first=first, near=walk.near)[0]
+        return minimize(self.problem, walk.u, self.optimizer, most, self.search.tolerance, observe, first=first)[0]
 
     def _began(self, u: np.ndarray, cost: float) -> None:
         if np.isfinite(cost):
