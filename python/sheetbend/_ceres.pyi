@@ -15,6 +15,5 @@ def minimize(
     held: Sequence[int],
     max_iterations: int,
     tolerance: float,
-    radius: float = 1e4,
     observe: Callable[..., bool],
 ) -> dict[str, Any]: ...
