@@ -29,7 +29,7 @@ from test_workers import GIVEN, Backwards, bits, several
 distributed = pytest.importorskip("distributed")
 dask_config = pytest.importorskip("dask").config
 
-SLOW = 0.05  # s, of a task
+SLOW = 0.02  # s of processor time, of a task
 SMALL: dict[str, Any] = {**GIVEN, "parameters": {"rope_EI": {}}, "starts": 2, "leave_one_out": False}
 
 
@@ -64,12 +64,11 @@ def alone() -> str:
     return bits(sb.fit(several(2), **SMALL))
 
 
-def _slowly(common: int, item: int) -> int:
-    time.sleep(SLOW)
+def _product(common: int, item: int) -> int:
     return common * item
 
 
-@pytest.mark.parametrize("count", [1, 2, 3])
+@pytest.mark.parametrize("count", [1, 3])
 def test_the_bits_do_not_depend_on_the_workers(client: Any, alone: str, count: int) -> None:
     chosen = sorted(client.scheduler_info(n_workers=-1)["workers"])[:count]
     executor = client.get_executor(workers=chosen, retries=3, pure=False)
@@ -115,7 +114,7 @@ def test_workers_of_another_version_are_refused(monkeypatch: pytest.MonkeyPatch)
         common.packed()
         monkeypatch.setattr(content, "of_software", lambda: here | changed)
         with working_on(Backwards()):
-            found = common.map(_slowly, [1, 2])
+            found = common.map(_product, [1, 2])
         monkeypatch.setattr(content, "of_software", lambda: here)
         return found
 
@@ -132,11 +131,13 @@ def test_traffic_is_counted(client: Any) -> None:
         assert Common(np.arange(1000)).map(_sum, list(range(8))) == [499500 + 1000 * k for k in range(8)]
     assert traffic.tasks == 8 and traffic.working >= 8 * SLOW
     assert 8 * 8000 < traffic.sent < 8 * 10000 and 0 < traffic.received < 8 * 200
-    assert 0 < traffic.own < traffic.working
+    assert traffic.own > 0
 
 
 def _sum(common: Any, item: int) -> int:
-    time.sleep(SLOW)
+    until = time.thread_time() + SLOW
+    while time.thread_time() < until:
+        pass
     return int(np.sum(common + item))
 
 

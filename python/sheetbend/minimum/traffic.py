@@ -12,7 +12,7 @@ class Traffic:
     Attributes:
         tasks: their number.
         sent, received: bytes of them all, without the envelopes of the executor.
-        working: s, that workers took.
+        working: s of processor time, that workers took.
         own: s of processor time, that this process took to send tasks and to receive answers.
         warned: whether it was warned of unlike machines.
     """

@@ -64,7 +64,7 @@ class Answer(NamedTuple):
 
     Attributes:
         packed: the result.
-        seconds: that it took.
+        seconds: of processor time, that it took.
         unlike: what of the worker's software or machine is not that of the client.
     """
 
@@ -158,7 +158,7 @@ _kept = _Kept()
 
 def _answer(work: Callable[[Any, Any], T], key: bytes, common: bytes | None, item: bytes) -> Answer | None:
     """In a worker; None where it does not have the common part."""
-    began, values = time.perf_counter(), _kept.values
+    began, values = time.thread_time(), _kept.values
     if key not in values:
         if common is None:
             return None
@@ -170,7 +170,7 @@ def _answer(work: Callable[[Any, Any], T], key: bytes, common: bytes | None, ite
     values.move_to_end(key)
     value, unlike = values[key]
     packed = pickle.dumps(work(value, pickle.loads(item)), pickle.HIGHEST_PROTOCOL)
-    return Answer(packed, time.perf_counter() - began, unlike)
+    return Answer(packed, time.thread_time() - began, unlike)
 
 
 P = ParamSpec("P")
