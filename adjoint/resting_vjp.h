@@ -21,20 +21,16 @@ inline void resting_vjp(const RestingContacts<double>& contacts, const double* x
     if (!t.pushes) continue;
     Pose<double>& pose_bar = poses_bar.next[source.scene.contacts[i.contact].collider];
     const Contact& contact = contacts.contact(i);
-    const auto at = [&](const double* of, int node) { return Vec3<double>(of + source.scene.first_dof[node]); };
-    const auto sum_of = [&](const double* of) { return source.point(contact, i.item, of); };
-    const Vec3<double> force = (1.0 / RestingContacts<double>::per_force) * pose.turned(t.force);
-    if (contact.arity > 1)
-      for (int k = 0; k < contact.arity; ++k)
-        weight_in(bar, contact, i.item, k) += dot(force, at(force_bar, contact.nodes_of(i.item)[k]));
-    const Vec3<double> world = (1.0 / RestingContacts<double>::per_force) * sum_of(force_bar);
+    const auto weights_take = [&](const Vec3<double>& own, const double* of) {
+      weights_vjp(source, contact, i.item, own, [&](int node) { return source.at(of, node); }, bar);
+    };
+    weights_take((1.0 / RestingContacts<double>::per_force) * pose.turned(t.force), force_bar);
+    const Vec3<double> world = (1.0 / RestingContacts<double>::per_force) * source.point(contact, i.item, force_bar);
     ContactNumbers<double> numbers_bar{};
     const Vec3<double> z_bar =
         touch_vjp(i.shape, z, i.numbers, turned_vjp(pose, t.force, world, pose_bar), none, numbers_bar);
-    const Vec3<double> point_bar = in_frame_vjp(pose, sum_of(x), z_bar, pose_bar);
-    if (contact.arity > 1)
-      for (int k = 0; k < contact.arity; ++k)
-        weight_in(bar, contact, i.item, k) += dot(point_bar, at(x, contact.nodes_of(i.item)[k]));
+    const Vec3<double> point_bar = in_frame_vjp(pose, source.point(contact, i.item, x), z_bar, pose_bar);
+    weights_take(point_bar, x);
     if (!i.rubs) numbers_bar.friction = 0.0, numbers_bar.carried = none;
     numbers_vjp(source, contacts.poses, i.contact, i.item, numbers_bar, poses_bar,
                 {held_bar, nullptr, velocities_bar.data(), nullptr}, bar, [&](int n) -> double& { return w_bar[n]; });

@@ -61,6 +61,7 @@ lower = 0.01
 upper = 1.0
 """
 CONTACT = 'of = "box"\ncollider = "table"\nfriction = 0.2\n'
+SOLVER = sb.Solver(h=2e-3, method="implicit", integrator="bdf1")
 SIDES, CENTER = (0.1, 0.08, 0.06), (0.002, 0.0, 0.0)  # the box is around its center of mass
 
 
@@ -75,8 +76,7 @@ def in_python(**contact) -> tuple[sb.Scene, sb.Body]:
 
 
 def ends(*scenes: sb.Scene) -> list[np.ndarray]:
-    solver = sb.Solver(h=2e-3, method="implicit", integrator="bdf1")
-    return [sb.simulate(scene, [0.0, 0.1], solver).positions[-1] for scene in scenes]
+    return [sb.simulate(scene, [0.0, 0.1], SOLVER).positions[-1] for scene in scenes]
 
 
 def built(folder: Path, text: str) -> sb.Scene:
@@ -97,7 +97,7 @@ def test_corners_of_a_box_touch_unless_points_are_given(tmp_path: Path) -> None:
 
 def test_a_box_that_slides_tells_its_friction(tmp_path: Path) -> None:
     scene, body = in_python()
-    motion = sb.simulate(scene, np.arange(7) * 0.02, sb.Solver(h=2e-3, method="implicit", integrator="bdf1"))
+    motion = sb.simulate(scene, np.arange(7) * 0.02, SOLVER)
     place, frame = body.pose(motion)
     sb.Recording((place + frame @ [0.0, 0.0, 0.02])[:, None], motion.times).save(tmp_path / "slide.npz")
     (tmp_path / "slide.toml").write_text(TEXT)

@@ -13,7 +13,7 @@ from rich.console import Console
 from ..config import GrippedConfig, parse_any
 from ..errors import ConfigError, SheetbendError
 from ..files.door import noting, reading
-from ..minimum.workers import lost
+from ..minimum.workers import naming_losses
 from .journals import NAME
 from .outcome import Code, Outcome
 from .screen import Screen
@@ -47,7 +47,8 @@ def fit_all(
             if executor is None:
                 codes[folder.name] = _told(single, console, path, folder, strict)
             else:
-                text, codes[folder.name] = _answer(futures[i])
+                with naming_losses():
+                    text, codes[folder.name] = futures[i].result()
                 console.print(text, soft_wrap=True, end="")
             if codes[folder.name] in (Code.INTERRUPTED, Code.TERMINATED):
                 break
@@ -102,20 +103,6 @@ def _told(single: Single, console: Console, path: Path, folder: Path, strict: bo
     except SheetbendError as error:
         console.print(f"{path}: {error}", soft_wrap=True)
         return Code.BAD_INPUT if isinstance(error, ConfigError) else Code.NOT_CONVERGED
-
-
-def _answer(future: Future[tuple[str, Code]]) -> tuple[str, Code]:
-    """Of a worker.
-
-    Raises:
-        SheetbendError: the executor lost it.
-    """
-    try:
-        return future.result()
-    except Exception as error:
-        if (told := lost(error)) is not None:
-            raise told from error
-        raise
 
 
 def _apart(single: Single, path: Path, folder: Path, strict: bool) -> tuple[str, Code]:

@@ -64,15 +64,16 @@ def two_directions(r: Array, beside: Array, left: float, one: float, least: floa
     ]
 
 
-def chance_of_two(
-    r: Array, J: Array, columns: Sequence[Array], mine: Array, layout: Layout, errors: Array | None
-) -> float:
-    """Chance that a right model asks for the less sure of two columns beside the other; 1 where it asks for none."""
+def chance_of(r: Array, J: Array, columns: Sequence[Array], mine: Array, layout: Layout, errors: Array | None) -> float:
+    """Chance that a right model asks for a column, or for the less sure of two beside each other; 1 where it asks for
+    none. No step of the parameters, J (rows, p), lowers the residuals r (rows,)."""
     chances = []
-    for column, other in (columns, columns[::-1]):
-        J_other = np.column_stack([J, other])
-        size = np.maximum(np.linalg.norm(J_other, axis=0), np.finfo(float).tiny)
-        after = r - J_other / size @ np.linalg.lstsq(J_other / size, r, rcond=None)[0]
-        asked = asked_for(after, J_other, column, mine, layout, errors=errors)
+    for k, column in enumerate(columns):
+        after, beside = r, J
+        for other in [*columns[:k], *columns[k + 1 :]]:
+            beside = np.column_stack([beside, other])
+            size = np.maximum(np.linalg.norm(beside, axis=0), np.finfo(float).tiny)
+            after = r - beside / size @ np.linalg.lstsq(beside / size, r, rcond=None)[0]
+        asked = asked_for(after, beside, column, mine, layout, errors=errors)
         chances.append(1.0 if asked is None else asked.chance)
     return max(chances)

@@ -12,6 +12,7 @@ what these move is among what the result rests on (`given.premises`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -27,13 +28,13 @@ from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
 from .cloth_size import cloth_sizes
 from .contradictions import residual_shifts, value_words
-from .directions import LEVEL, asked_for, noise_in, rows_of, tied
+from .directions import LEVEL, noise_in, rows_of, tied
 from .driven_errors import FEW, driven_errors
 from .held_losses import held_names
 from .missing_parts import missing_parts
 from .other_losses import LEAVES
 from .told import DEGREE, LARGER, LATER, MILLIMETER, SIZE, SLOWER, Told
-from .two_directions import chance_of_two, two_directions
+from .two_directions import chance_of, two_directions
 
 MOST = 0.85
 """Of what a fit leaves beyond noise: the part that one error must explain. The one that was made explains 0.88 to 1.1
@@ -116,14 +117,9 @@ def _asked(
         told_errors = errors if errors.size else None
         sure = []
         for cause in causes:
-            if len(cause.parts) == 2:
-                tests = len(tried) * (len(tried) - 1) // 2
-                chance = chance_of_two(r, J, [column for *_, column in cause.parts], mine, layout, told_errors)
-            else:
-                tests = len(tried)
-                answer = asked_for(r, J, cause.parts[0][2], mine, layout, errors=told_errors)
-                chance = 1.0 if answer is None else answer.chance
-            if chance < LEVEL / (tests * len(groups)):
+            tests = math.comb(len(tried), len(cause.parts)) * len(groups)
+            columns = [column for *_, column in cause.parts]
+            if chance_of(r, J, columns, mine, layout, told_errors) < LEVEL / tests:
                 sure.append(cause)
         if sure:
             words = tuple(" and ".join(_off(one, more, problem, group) for one, more, _ in c.parts) for c in sure)

@@ -51,12 +51,21 @@ def current() -> Executor | None:
     return None if found is None else found[0]
 
 
-def lost(error: BaseException) -> SheetbendError | None:
-    """What to raise where an executor lost its workers; None for an error of the work itself."""
-    package = type(error).__module__.partition(".")[0]
-    if not isinstance(error, BrokenExecutor) and package != "distributed":  # Dask's own, such as KilledWorker
-        return None
-    return SheetbendError(f"a worker ended before its work was done ({error}); with a journal the fit can go on")
+@contextmanager
+def naming_losses() -> Iterator[None]:
+    """Passes errors of the work itself on, and tells where an executor lost its workers.
+
+    Raises:
+        SheetbendError: it did.
+    """
+    try:
+        yield
+    except Exception as error:
+        package = type(error).__module__.partition(".")[0]
+        if not isinstance(error, BrokenExecutor) and package != "distributed":  # Dask's own, such as KilledWorker
+            raise
+        told = f"a worker ended before its work was done ({error}); with a journal the fit can go on"
+        raise SheetbendError(told) from error
 
 
 class Answer(NamedTuple):
@@ -109,23 +118,20 @@ class Common(Generic[S]):
         packed = [pickle.dumps(item, pickle.HIGHEST_PROTOCOL) for item in items]
         began = time.process_time()
         try:
-            futures += [executor.submit(_answer, work, key, None if sent else common, item) for item in packed]
-            traffic.sent += sum(map(len, packed)) + (0 if sent else len(common) * len(items))
-            answers = []
-            for item, future in zip(packed, futures, strict=True):
-                answer = future.result()
-                if answer is None:  # a worker that came later, or has kept other things since
-                    traffic.sent += len(common) + len(item)
-                    answer = executor.submit(_answer, work, key, common, item).result()
-                assert answer is not None
-                _compare(answer.unlike, traffic)
-                traffic.add(len(answer.packed), answer.seconds)
-                answers.append(pickle.loads(answer.packed))  # which a worker of this client packed
-            return answers
-        except Exception as error:
-            if (told := lost(error)) is not None:
-                raise told from error
-            raise
+            with naming_losses():
+                futures += [executor.submit(_answer, work, key, None if sent else common, item) for item in packed]
+                traffic.sent += sum(map(len, packed)) + (0 if sent else len(common) * len(items))
+                answers = []
+                for item, future in zip(packed, futures, strict=True):
+                    answer = future.result()
+                    if answer is None:  # a worker that came later, or has kept other things since
+                        traffic.sent += len(common) + len(item)
+                        answer = executor.submit(_answer, work, key, common, item).result()
+                    assert answer is not None
+                    _compare(answer.unlike, traffic)
+                    traffic.add(len(answer.packed), answer.seconds)
+                    answers.append(pickle.loads(answer.packed))  # which a worker of this client packed
+                return answers
         finally:
             traffic.own += time.process_time() - began
             for future in futures:

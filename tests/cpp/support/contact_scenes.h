@@ -1,6 +1,7 @@
 // Scenes in which particles touch shapes.
 #pragma once
 
+#include "core/rollout/rollout.h"
 #include "core/scalar/across.h"
 #include "tests/cpp/support/distance_grids.h"
 #include "tests/cpp/support/programs.h"
@@ -131,6 +132,22 @@ struct ContactBuilder {
 
 inline SolverOptions contact_options(double h, Integrator integrator = Integrator::bdf1) {
   return {.h = h, .integrator = integrator, .partition = Partition::implicit, .iterations = 100};
+}
+
+// A program whose loss counts what moves alone: forces that contacts carry are as stiff as these, and would drown all else.
+inline Program moving_program(const Sample& s, const SolverOptions& options, int steps) {
+  return {s.scene, make_plan(s.scene, options), steps, 0.0, 3 * s.scene.contacts[0].carried[0]};
+}
+
+// How often a point touches in a program, over all its substeps.
+inline int times_touching(const Program& p, const std::vector<double>& inputs) {
+  Rollout<double> rollout(p.scene, p.plan, inputs.data());
+  int touching = 0;
+  for (int n = 0; n < p.steps; ++n) {
+    rollout.advance();
+    for (const ContactMode mode : rollout.contact_modes()) touching += mode != ContactMode::apart;
+  }
+  return touching;
 }
 
 // d x_dof/d inputs at the last step of a program.
