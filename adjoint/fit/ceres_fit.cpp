@@ -15,6 +15,9 @@ namespace {
 // A Jacobian that costs less than this many times the residuals alone is made with them: most steps are taken, and then Ceres asks for it.
 constexpr double cheap = 3.0;
 
+// Entries of the largest Jacobian that is kept for the caller, 64 MB.
+constexpr std::size_t most_kept = std::size_t{1} << 23;
+
 // All experiments are simulated once per point, here, before Ceres asks for residuals.
 class Point : public ceres::EvaluationCallback {
  public:
@@ -26,6 +29,15 @@ class Point : public ceres::EvaluationCallback {
         jacobian(static_cast<std::size_t>(evaluation.rows) * u.size()) {}
 
   void PrepareForEvaluation(bool with_jacobian, bool new_point) override {
+    prepare(with_jacobian, new_point);
+    if (!with_jacobian || status != EvaluationStatus::ok || jacobian.size() > most_kept) return;
+    accepted_u = u_;
+    accepted_residual = residual;
+    accepted_jacobian = jacobian;
+  }
+
+ private:
+  void prepare(bool with_jacobian, bool new_point) {
     if (with_jacobian) last_ = u_;  // also where the Jacobian was made along before: steps must not depend on that
     if ((!new_point || u_ == at_) && (!with_jacobian || has_jacobian_)) return;
     if (status == EvaluationStatus::interrupted) return;
@@ -46,7 +58,6 @@ class Point : public ceres::EvaluationCallback {
     jacobians += both;
   }
 
- private:
   // A step longer than it may be is refused without a run, so that the trust region shrinks at no cost: its radius is in units of the
   // Jacobian's columns, no limit in logarithms. Ceres asks for a Jacobian only at points that it goes on from.
   bool too_far() const {
@@ -65,6 +76,7 @@ class Point : public ceres::EvaluationCallback {
 
  public:
   std::vector<double> residual, jacobian;
+  std::vector<double> accepted_u, accepted_residual, accepted_jacobian;  // where Ceres last asked for a Jacobian
   EvaluationStatus status = EvaluationStatus::ok;
   int evaluations = 0, jacobians = 0;
 };
@@ -162,6 +174,10 @@ CeresResult minimize_with_ceres(const EvaluationFunction& evaluation, std::vecto
   result.converged = summary.termination_type == ceres::CONVERGENCE;
   result.stopped = summary.termination_type == ceres::USER_FAILURE || point.status == EvaluationStatus::interrupted;
   result.message = summary.message;
+  if (point.accepted_u == u) {
+    result.residual = std::move(point.accepted_residual);
+    result.jacobian = std::move(point.accepted_jacobian);
+  }
   return result;
 }
 

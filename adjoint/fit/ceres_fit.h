@@ -27,6 +27,8 @@ struct CeresResult {
   int iterations = 0, evaluations = 0, jacobians = 0;
   bool converged = false, stopped = false;  // stopped: by Ctrl-C or by the observer
   std::string message;
+  // At u, (rows) and (rows, parameters); empty where the last Jacobian was made elsewhere.
+  std::vector<double> residual, jacobian;
 };
 
 // Called after every iteration with the current point; returning false ends the fit with its best so far.

@@ -16,16 +16,22 @@ ColliderPoses<Single<T>> no_pose_cotangents(const ContactSource<T>& source) {
   return {none, none, source.bdf.before == 0.0 ? std::vector<Pose<Single<T>>>{} : none};
 }
 
+// Of the weights alone, of a sum of at(node) over the nodes of a point.
+template <class T, class At>
+void weights_vjp(const ContactSource<T>& source, const Contact& c, int item, const Vec3<Single<T>>& bar, At&& at,
+                 const Inputs<T>& in_bar) {
+  if (c.arity == 1) return;
+  for (int k = 0; k < c.arity; ++k) source.add(dot(at(c.nodes_of(item)[k]), bar), weight_in(in_bar, c, item, k));
+}
+
 // Reverse of ContactSource::point_at: cotangents of a point go to its nodes, by to(node), and to its weights. at(node) are its nodes'.
 template <class T, class At, class To>
 void point_vjp(const ContactSource<T>& source, const Contact& c, int item, const Vec3<Single<T>>& bar, At&& at, To&& to,
                const Inputs<T>& in_bar) {
   const auto nodes = c.nodes_of(item);
   if (c.arity == 1) return source.add(bar, to(nodes[0]));
-  for (int k = 0; k < c.arity; ++k) {
-    source.add(source.weight(c, item, k) * bar, to(nodes[k]));
-    source.add(dot(at(nodes[k]), bar), weight_in(in_bar, c, item, k));
-  }
+  for (int k = 0; k < c.arity; ++k) source.add(source.weight(c, item, k) * bar, to(nodes[k]));
+  weights_vjp(source, c, item, bar, at, in_bar);
 }
 // Of ContactSource::point.
 template <class T>

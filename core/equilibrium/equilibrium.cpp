@@ -14,12 +14,16 @@ constexpr int max_corrections = 5;        // simplified Newton steps per factori
 constexpr int max_departures = 5;         // from saddles
 constexpr double almost_no_eta = 1e-100;  // to which only rigid rows count, see redundant_rows.h
 
-std::string not_converged(const Equilibrium& e, double tolerance) {
+std::string not_converged(const Equilibrium& e, double tolerance, bool touching) {
   std::ostringstream text;
   text << "equilibrium: no rest found in " << e.iterations << " iterations, relative residual " << e.residual
-       << " (tolerance " << tolerance
-       << "). Fix: start nearer to the shape, give more iterations, or check that supports hold every part against its "
-          "loads";
+       << " (tolerance " << tolerance << ")";
+  if (touching && e.residual <= near_rest)
+    text << ". Forces nearly balance, but a part moves freely. Fix: hold it, or let friction hold it, which acts on "
+            "what touches at the start (to 1e-6 m)";
+  else
+    text << ". Fix: start nearer to the shape, give more iterations, or check that supports"
+         << (touching ? " and friction" : "") << " hold every part against its loads";
   return text.str();
 }
 
@@ -70,6 +74,7 @@ void EquilibriumSolver::find_redundant_rows(State& s) {
   if (!blocks_) {
     Scene constraints = scene_;
     constraints.volumes.clear();
+    constraints.contacts.clear();
     blocks_ = make_plan(constraints, {});
   }
   std::vector<double> w(scene_.nodes());
@@ -168,7 +173,7 @@ Equilibrium EquilibriumSolver::solve(const double* inputs, const double* start_x
   result.residual = s.residual;
   result.force_stiffness = s.force_stiffness();
   result.energy = s.energy();
-  if (!result.converged) result.message = not_converged(result, options.tolerance);
+  if (!result.converged) result.message = not_converged(result, options.tolerance, !scene_.contacts.empty());
   result.left_out = std::move(s.left_out);
   if (options.held) result.held.assign(options.held, options.held + scene_.dofs());
   result.x = std::move(s.x);

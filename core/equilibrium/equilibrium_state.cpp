@@ -87,11 +87,6 @@ EquilibriumState::EquilibriumState(const Scene& scene_, const double* inputs, co
       contacts(scene_, in, o.t0, o.held ? o.held : in.of(Quantity::position)) {
   expect_energy(scene, in, o.t0);
   expect_no_unilateral(scene);
-  for (const Contact& contact : scene.contacts)
-    if (contact.arity > 1)
-      throw std::invalid_argument("equilibrium: points of bodies of " + contact.name +
-                                  " may touch a collider, which is not made at rest. Fix: let it come to rest with "
-                                  "sb.simulate, or leave the contact out");
   if (!scene.loads.empty())
     throw std::invalid_argument(
         "equilibrium: loads act along rows. Fix: leave them out, or simulate with drag until the motion has died down");
@@ -103,6 +98,7 @@ EquilibriumState::EquilibriumState(const Scene& scene_, const double* inputs, co
   retract_directors(scene, x.data());
   size = scene_size(scene, x.data(), in.of(Quantity::mass));
   edge = mean_edge(scene, x.data());
+  if (edge == 0.0) edge = width_of_bodies(scene.bodies, in.of(Quantity::mass));
   external_force(scene, in, o.t0, x.data(), r_x.data());
   weight = largest(r_x);
   for (const double f : r_x) total += std::abs(f);

@@ -34,6 +34,19 @@ constexpr double rigid_stiffness = 1e8;
 
 }  // namespace
 
+// Calls f(block, entry, weights, row, column) for the 9 entries of each pair of nodes of each contact's point, rows and columns being dofs.
+template <class F>
+void Kkt::for_each_contact_entry(F&& f) const {
+  for (std::size_t i = 0; i < contact_dofs_.size(); ++i) {
+    const PointDofs& p = contact_dofs_[i];
+    for (int k = 0; k < p.count; ++k)
+      for (int l = 0; l < p.count; ++l) {
+        const double weights = contacts_.empty() ? 1.0 : contacts_[i].weight[k] * contacts_[i].weight[l];
+        for (int e = 0; e < 9; ++e) f(i, e, weights, p.first[k] + e / 3, p.first[l] + e % 3);
+      }
+  }
+}
+
 Kkt::Kkt(const Scene& scene) : scene_(scene), unknown_(scene.dofs(), -1), pressed_(scene.air) {
   std::vector<int> free_dof(scene.dofs(), -1);
   for (int n = 0; n < scene.nodes(); ++n)
@@ -59,12 +72,14 @@ Kkt::Kkt(const Scene& scene) : scene_(scene), unknown_(scene.dofs(), -1), presse
   std::vector<Eigen::Triplet<double>> entries;
   for (int i = 0; i < free_; ++i) entries.emplace_back(i, i, 1.0);
   for (const Contact& contact : scene.contacts)
-    for (const int n : contact.nodes)
-      if (scene.role[n] == Role::free) {
-        contact_dof_.push_back(scene.first_dof[n]);
-        for (int e = 0; e < 9; ++e)
-          entries.emplace_back(free_dof[contact_dof_.back() + e / 3], free_dof[contact_dof_.back() + e % 3], 1.0);
-      }
+    for (int item = 0; item < contact.points(); ++item) {
+      if (!moves(scene, contact, item)) continue;
+      PointDofs& dofs = contact_dofs_.emplace_back(PointDofs{contact.arity, {}});
+      for (int k = 0; k < contact.arity; ++k) dofs.first[k] = scene.first_dof[contact.nodes_of(item)[k]];
+    }
+  for_each_contact_entry([&](std::size_t, int, double, int row, int column) {
+    entries.emplace_back(free_dof[row], free_dof[column], 1.0);
+  });
   for_each_pair(free_dof, [&](int a, int b) {
     if (a >= 0 && b >= 0) entries.emplace_back(a, b, 1.0);
   });
@@ -93,11 +108,10 @@ Kkt::Kkt(const Scene& scene) : scene_(scene), unknown_(scene.dofs(), -1), presse
   };
   for_each_pair(unknown_, [&](int a, int b) { position_.push_back(a >= 0 && a <= b ? position(a, b) : -1); });
   for (int i = 0; i < unknowns; ++i) diagonal_.push_back(position(i, i));
-  for (const int dof : contact_dof_)
-    for (int e = 0; e < 9; ++e) {
-      const int a = unknown_[dof + e / 3], b = unknown_[dof + e % 3];
-      contact_position_.push_back(a <= b ? position(a, b) : -1);
-    }
+  for_each_contact_entry([&](std::size_t, int, double, int row, int column) {
+    const int a = unknown_[row], b = unknown_[column];
+    contact_position_.push_back(a <= b ? position(a, b) : -1);
+  });
   for (const Director& d : scene.directors)
     for (int e = 0; e < 9; ++e) {
       const int a = unknown_[scene.first_dof[d.node] + e / 3], b = unknown_[scene.first_dof[d.node] + e % 3];
@@ -199,9 +213,10 @@ bool Kkt::factorize(double mu, const double* compliance) {
       }
     J += K::rows * K::dofs;
   });
-  for (std::size_t i = 0; i < contacts_.size(); ++i)
-    for (int e = 0; e < 9; ++e)
-      if (const int at = contact_position_[9 * i + e]; at >= 0) values[at] += contacts_[i].symmetric[e];
+  const int* at = contact_position_.data();
+  for_each_contact_entry([&](std::size_t i, int e, double weights, int, int) {
+    if (const int own = *at++; own >= 0) values[own] += weights * contacts_[i].symmetric[e];
+  });
   for (std::size_t i = 0; i < idle_.size(); ++i) {
     const int* at = &director_position_[9 * i];
     if (at[0] < 0) continue;
@@ -228,10 +243,9 @@ void Kkt::take_contacts(std::vector<ContactBlock> blocks) {
 
 bool Kkt::factorize_whole() {
   Eigen::SparseMatrix<double> K = K_.selfadjointView<Eigen::Upper>();
-  for (std::size_t i = 0; i < contacts_.size(); ++i)
-    for (int e = 0; e < 9; ++e)
-      K.coeffRef(unknown_[contact_dof_[i] + e / 3], unknown_[contact_dof_[i] + e % 3]) +=
-          contacts_[i].whole[e] - contacts_[i].symmetric[e];
+  for_each_contact_entry([&](std::size_t i, int e, double weights, int row, int column) {
+    K.coeffRef(unknown_[row], unknown_[column]) += weights * (contacts_[i].whole[e] - contacts_[i].symmetric[e]);
+  });
   if (!whole_) {
     whole_ = std::make_unique<Eigen::SparseLU<Eigen::SparseMatrix<double>>>();
     whole_->analyzePattern(K);
@@ -285,10 +299,9 @@ void Kkt::condensed_solve(const std::vector<double>& b_x, const std::vector<doub
 // r -= A (x, lambda) or A^T (x, lambda), with the true compliances.
 void Kkt::subtract_product(const std::vector<double>& x, const std::vector<double>& lambda, bool transposed,
                            std::vector<double>& r_x, std::vector<double>& r_l) const {
-  for (std::size_t i = 0; i < contacts_.size(); ++i)
-    for (int e = 0; e < 9; ++e)
-      r_x[contact_dof_[i] + e / 3] +=
-          contacts_[i].whole[transposed ? 3 * (e % 3) + e / 3 : e] * x[contact_dof_[i] + e % 3];
+  for_each_contact_entry([&](std::size_t i, int e, double weights, int row, int column) {
+    r_x[row] += weights * contacts_[i].whole[transposed ? 3 * (e % 3) + e / 3 : e] * x[column];
+  });
   const double *H = H_.data(), *J = J_.data();
   for (int i = 0; i < scene_.dofs(); ++i)
     if (unknown_[i] >= 0) r_x[i] += mu_ * metric_[i] * x[i];

@@ -39,7 +39,7 @@ class Kkt {
   void assemble(const double* inputs, const double* x, const double* lambda, double force_stiffness,
                 const std::vector<RedundantRow>& left_out);
 
-  // The contacts' share, one block for each free particle of each contact, in the scene's order.
+  // The contacts' share, one block for each free point of each contact, in the scene's order.
   void take_contacts(std::vector<ContactBlock> blocks);
 
   // Factors K for mu >= 0 [N/m] and the compliance of each constraint and volume. False where K is singular to rounding.
@@ -60,6 +60,8 @@ class Kkt {
   void condensed_solve(const std::vector<double>& b_x, const std::vector<double>& b_l, bool transposed,
                        std::vector<double>& x, std::vector<double>& lambda) const;
   bool factorize_whole();
+  template <class F>
+  void for_each_contact_entry(F&& f) const;
   void subtract_product(const std::vector<double>& x, const std::vector<double>& lambda, bool transposed,
                         std::vector<double>& r_x, std::vector<double>& r_l) const;
 
@@ -79,7 +81,11 @@ class Kkt {
   std::vector<double> idle_stiffness_;       // per director
   std::vector<ContactBlock> contacts_;
   bool slides_ = false;
-  std::vector<int> contact_dof_, contact_position_;  // per block; 9 per block into K's values, -1 as in position_
+  struct PointDofs {
+    int count, first[most_point_nodes];  // per node
+  };
+  std::vector<PointDofs> contact_dofs_;  // per block
+  std::vector<int> contact_position_;    // of the blocks' entries in K's values, -1 as in position_
   double mu_ = 0.0, force_stiffness_ = 0.0, geometric_ = 0.0, largest_diagonal_ = 0.0;
   int negative_ = 0;
   Eigen::SparseMatrix<double> K_;

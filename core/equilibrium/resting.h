@@ -1,6 +1,6 @@
-// Contacts at rest, over any scalar. The law is that of a substep (core/contact/law.h) from coordinates that friction counts from, `held`: the particles that
+// Contacts at rest, over any scalar. The law is that of a substep (core/contact/law.h) from coordinates that friction counts from, `held`: the points that
 // touch there stick where they are, or slide at Coulomb's limit. Others have no history of friction, and slide without any. A rigid contact is as stiff
-// as in a substep of 1 ms, so that a particle that rests is 1e-8 m deep.
+// as in a substep of 1 ms, so that a particle that rests is 1e-8 m deep. A point of a body passes its force on to the nodes that it is a sum of.
 #pragma once
 
 #include "core/solver/contact_source.h"
@@ -33,25 +33,25 @@ class RestingContacts {
     for (int c = 0; c < static_cast<int>(scene.contacts.size()); ++c) {
       const Contact& contact = scene.contacts[c];
       for (int i = 0; i < contact.points(); ++i) {
-        const int node = contact.first_node(i);
         if (!moves(scene, contact, i)) continue;
         ContactNumbers<T> n = source->numbers(poses, c, i);
-        const bool rubs = value_of(n.friction) > 0.0 &&
-                          value_of(source->gap(poses.next[contact.collider], c, source->at(held, node))) <= touching;
+        const bool rubs =
+            value_of(n.friction) > 0.0 &&
+            value_of(source->gap(poses.next[contact.collider], c, source->point(contact, i, held))) <= touching;
         if (!rubs) {
           n.friction = T(0.0);
           n.carried = {T(1.0), T(1.7), T(2.9)};  // it slides, whatever the direction
         }
-        items.push_back({c, i, scene.first_dof[node], scene.colliders[contact.collider].any(), rubs, n});
+        items.push_back({c, i, scene.colliders[contact.collider].any(), rubs, n});
       }
     }
   }
   RestingContacts(const RestingContacts&) = delete;
   RestingContacts& operator=(const RestingContacts&) = delete;
 
-  // A free particle that may touch a collider.
+  // A free point that may touch a collider.
   struct Item {
-    int contact, item, dof;
+    int contact, item;
     AnyShape shape;
     bool rubs;  // has friction
     ContactNumbers<T> numbers;
@@ -60,14 +60,21 @@ class RestingContacts {
   std::optional<ContactSource<T>> source;  // none without contacts
   ColliderPoses<T> poses;
 
-  const Pose<T>& pose(const Item& i) const { return poses.next[source->scene.contacts[i.contact].collider]; }
-  Vec3<T> in_frame(const Item& i, const T* x) const { return pose(i).in_frame(Vec3<T>(x + i.dof)); }
+  const Contact& contact(const Item& i) const { return source->scene.contacts[i.contact]; }
+  const Pose<T>& pose(const Item& i) const { return poses.next[contact(i).collider]; }
+  Vec3<T> in_frame(const Item& i, const T* x) const { return pose(i).in_frame(source->point(contact(i), i.item, x)); }
+  // f += a force on a point, at its nodes
+  void add(const Item& i, const Vec3<T>& force, T* f) const {
+    const auto nodes = contact(i).nodes_of(i.item);
+    for (int k = 0; k < contact(i).arity; ++k)
+      (source->weight(contact(i), i.item, k) * force).add_to(f + source->scene.first_dof[nodes[k]]);
+  }
 
   // f += what the law has at x (dofs)  [N]
   void add_forces(const T* x, T* f) const {
     for (const Item& i : items)
       if (const Touch<T> t = touch(i.shape, in_frame(i, x), i.numbers); t.pushes)
-        (T(1.0 / per_force) * pose(i).turned(t.force)).add_to(f + i.dof);
+        add(i, T(1.0 / per_force) * pose(i).turned(t.force), f);
   }
 
  private:

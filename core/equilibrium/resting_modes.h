@@ -6,10 +6,11 @@
 
 namespace sheetbend {
 
-// Of one contact on its particle's 3 x 3 block of the matrix, -d force/dx [N/m].
+// Of one contact on its point, -d force/dx [N/m]: the 3 x 3 block of the matrix of nodes k and l of the point is that times weight[k] weight[l].
 struct ContactBlock {
-  double whole[9], symmetric[9];  // the latter without what the push adds to Coulomb's limit
-  bool slides;                    // and has friction
+  double whole[9], symmetric[9];    // the latter without what the push adds to Coulomb's limit
+  double weight[most_point_nodes];  // of the nodes in the point
+  bool slides;                      // and has friction
 };
 
 class RestingModes {
@@ -35,7 +36,7 @@ class RestingModes {
       const auto& numbers = item.numbers;
       const Vec3<double> z = contacts.in_frame(item, x);
       const Vec3<double> force = decided(item.shape, mode, z, numbers, push(item.shape, z, numbers));
-      ((1.0 / RestingContacts<double>::per_force) * contacts.pose(item).turned(force)).add_to(&f[item.dof]);
+      contacts.add(item, (1.0 / RestingContacts<double>::per_force) * contacts.pose(item).turned(force), f.data());
     });
   }
 
@@ -61,6 +62,8 @@ class RestingModes {
     std::vector<ContactBlock> all(contacts.items.size(), ContactBlock{});
     for_each_touching(contacts, [&](std::size_t i, const auto& item, ContactMode mode) {
       using D = Dual<double, 3>;
+      const Contact& contact = contacts.contact(item);
+      for (int k = 0; k < contact.arity; ++k) all[i].weight[k] = contacts.source->weight(contact, item.item, k);
       const Vec3<double> z = contacts.in_frame(item, x);
       D at[3] = {D(z.x), D(z.y), D(z.z)};
       for (int d = 0; d < 3; ++d) at[d].d[d] = 1.0;

@@ -66,12 +66,13 @@ void add_bouncers(Scene& s) {
     if (contact.restitution < 0) continue;
     for (int item = 0; item < contact.points(); ++item) {
       const int n = contact.first_node(item);
-      contact.held.push_back(held[n]);
+      contact.held.push_back(held[n] || contact.arity > 1);  // a body holds its points
       if (s.role[n] != Role::free) continue;
-      if (!held[n])
+      if (!contact.held.back())
         contacts[n].push_back(static_cast<int>(c));
       else if (contact.stiffness >= 0)
-        refuse(contact.name + ".restitution: particle " + std::to_string(n) +
+        refuse(contact.name + ".restitution: " + (contact.arity > 1 ? "the body of node " : "particle ") +
+               std::to_string(n) +
                " is held by constraints, and the contact has a stiffness. Fix: leave out one of the two");
     }
   }

@@ -56,8 +56,7 @@ std::size_t ImplicitBlock::bytes(const Scene& scene, const DirectBlock& block) {
 
 // Rounding counts once Newton's steps no longer help.
 bool ImplicitBlock::balanced(double tolerance) const {
-  return potential.largest() <= tolerance * potential.force() ||
-         (slow() && potential.largest() <= potential.rounding());
+  return potential.balanced(tolerance) || (slow() && potential.at_rounding());
 }
 
 // Whether the last step has left more than half of the force that there was before it.
@@ -117,6 +116,7 @@ void ImplicitBlock::accept(double phi) {
 // One Newton step from the guess, to the first order in where fixed particles go; or the state at n with those moved, where Phi is lower.
 void ImplicitBlock::take_first_step(const Scene& scene, const DirectBlock& block) {
   x_ = guess;
+  settle_frames(block, potential.target, x_);
   if (!rigid().empty()) {
     potential.rigid.leave_out(potential.given(block), start.data());
     lambda_.assign(rigid().size(), 0.0);
@@ -148,11 +148,14 @@ void ImplicitBlock::take_first_step(const Scene& scene, const DirectBlock& block
   for (Numbers<double>* rows : {&x_, &trial_})
     std::copy(potential.target.data() + row * block.movable, potential.target.data() + row * block.particles.size(),
               rows->data() + row * block.movable);
+  for (const BlockFrame& f : block.frames) std::copy_n(&potential.target[row * f.particle], 3, &x_[row * f.particle]);
+  settle_frames(block, potential.target, x_);
   expect_none_passes(block, start, x_);
   accept(look(block));
   potential.rigid.lambda = dl_;
-  const double there =
-      potential.pairs.can_go(block, x_, trial_) ? potential.evaluate(block, trial_) : potential.refuse();
+  const double there = settle_frames(block, potential.target, trial_) && potential.pairs.can_go(block, x_, trial_)
+                           ? potential.evaluate(block, trial_)
+                           : potential.refuse();
   const bool falls = by_merit_ || potential.by_merit() ? potential.merit() < merit_ : there < phi_;
   if (falls || !std::isfinite(phi_)) {
     std::swap(x_, trial_);
@@ -230,17 +233,6 @@ bool ImplicitBlock::descend(const DirectBlock& block, double curvature) {
   return true;
 }
 
-void ImplicitBlock::give_up(const DirectBlock& block) const {
-  const int node = potential.worst_node(block);
-  std::ostringstream problem;
-  problem.precision(2);
-  problem << "forces do not balance: after " << matrices_ << " Newton matrices " << std::scientific
-          << potential.balance() << " of the largest force is left at particle " << node;
-  throw Unbalanced(problem.str(),
-                   "use a smaller substep, allow more iterations, or check boundary motion near that time", matrices_,
-                   potential.balance(), node);
-}
-
 void ImplicitBlock::solve(const Scene& scene, const DirectBlock& block, const SolverOptions& options) {
   balance_.clear();
   matrices_ = 0;
@@ -313,7 +305,9 @@ bool ImplicitBlock::find_balance(const Scene& scene, const DirectBlock& block, c
     }
     if (!go_down(scene, block, options.iterations)) {
       look(block);
-      return false;
+      if (convexity_ > 0.0 || !potential.at_rounding()) return false;
+      balance_rigid(block, potential, x_);
+      return true;
     }
   }
 }
@@ -368,6 +362,7 @@ bool ImplicitBlock::raise_friction(const Scene& scene, const DirectBlock& block,
 void ImplicitBlock::take_guess(const DirectBlock& block) {
   x_ = potential.target;
   std::copy_n(guess.data(), row * block.movable, x_.data());
+  settle_frames(block, potential.target, x_);
   potential.pairs.find_at(block, x_);
   if (rigid().empty()) return;
   potential.rigid.leave_out(potential.given(block), start.data());

@@ -2,12 +2,13 @@
 // linearized iteration of it. The coordinates of the movable particles go to a minimum of the incremental potential by Newton's method
 // with a line search. A saddle, such as a flat sheet that is pressed in its plane, is left along a direction of negative curvature. Where friction acts
 // there is no potential: the same Newton method with the whole unsymmetric matrix goes down in the merit sum w |R|^2, for which its steps always are a
-// direction of descent. The same holds where rows do not give way, whose multipliers are unknowns beside the coordinates (rigid_rows.h).
+// direction of descent. The same holds where rows do not give way, whose multipliers are unknowns beside the coordinates (rigid_rows.h). Frames of rods stay settled (block_frames.h).
 #pragma once
 
 #include <stdexcept>
 #include <vector>
 
+#include "core/solver/block_frames.h"
 #include "core/solver/conjugate_gradients.h"
 #include "core/solver/newton_matrix.h"
 

@@ -65,7 +65,8 @@ double ImplicitBlock::look(const DirectBlock& block) {
 double ImplicitBlock::look(const DirectBlock& block, double t) {
   move(x_, t, d_, trial_);
   for (std::size_t j = 0; j < lambda_.size(); ++j) potential.rigid.lambda[j] = lambda_[j] + t * dl_[j];
-  if (!potential.pairs.can_go(block, x_, trial_)) return potential.refuse();
+  if (!settle_frames(block, potential.target, trial_) || !potential.pairs.can_go(block, x_, trial_))
+    return potential.refuse();
   return potential.evaluate(block, trial_);
 }
 
@@ -77,7 +78,7 @@ bool ImplicitBlock::search_line(const DirectBlock& block, int most_trials) {
     const double there = look(block, t);
     if (by_merit_ || potential.by_merit()) {
       const bool falls = potential.merit() <= (1.0 - 2.0 * sufficient * t) * merit_;
-      if (!falls && potential.largest() > potential.rounding()) continue;
+      if (!falls && !potential.at_rounding()) continue;
     } else {
       const bool falls = there <= phi_ + sufficient * t * slope;
       // Near the minimum rounding hides what Phi does, not what its slope does (Hager & Zhang 2005).

@@ -9,6 +9,16 @@ namespace {
 
 constexpr int row = sheetbend_blocks::row;
 constexpr double nothing = 1e-8;  // a displacement, of the coordinates
+constexpr double roundings = 256.0 * std::numeric_limits<double>::epsilon();
+
+// Of those that frames stand on, whose directions have the rounding of their ends; 1 where there is none.
+double shortest_edge(const DirectBlock& block, const double* x) {
+  double shortest = std::numeric_limits<double>::infinity();
+  for (const BlockFrame& f : block.frames)
+    if (f.tail >= 0)
+      shortest = std::min(shortest, norm(Vec3<double>(x + row * f.head) - Vec3<double>(x + row * f.tail)));
+  return std::isfinite(shortest) ? shortest : 1.0;
+}
 
 }  // namespace
 
@@ -17,6 +27,8 @@ void IncrementalPotential::resize(const Scene& scene, const DirectBlock& block) 
   unit.assign(block.particles.size(), 1.0);
   C_r.assign(block.size());
   R_.assign(3 * block.movable, 0.0);
+  turns_.assign(block.movable, false);
+  for (const BlockFrame& f : block.frames) turns_[f.particle] = true;
   contacts.resize(block);
   friction.resize(block);
   pairs.radius.assign(block.surface.empty() ? 0 : block.particles.size(), 0.0);
@@ -35,7 +47,7 @@ void IncrementalPotential::resize(const Scene& scene, const DirectBlock& block) 
 
 std::size_t IncrementalPotential::bytes(const Scene& scene, const DirectBlock& block) {
   std::size_t bytes = Numbers<double>::bytes(block.size()) + 4 * Numbers<double>::bytes(row * block.particles.size()) +
-                      sizeof(double) * (3 * block.movable + block.particles.size()) +
+                      sizeof(double) * (3 * block.movable + block.particles.size()) + block.movable +
                       BlockContacts<double>::bytes(scene, block) + BlockPairs::bytes(block) +
                       PairFriction<double>::bytes(block);
   for (const MemberRun& run : block.runs) {
@@ -119,17 +131,24 @@ double IncrementalPotential::evaluate(const DirectBlock& block, Numbers<double>&
   double inertial = 0.0, stiffest = 0.0, farthest = 0.0, lightest = std::numeric_limits<double>::infinity();
   const double *x = at.data(), *predicted = target.data();
   const double *push = push_.data(), *magnitude = magnitude_.data(), *stiffness = stiffness_.data();
-  largest_ = force_ = merit_ = 0.0;
+  forces_ = torques_ = {};
+  merit_ = 0.0;
   for (int p = 0; p < block.movable; ++p) {
     const double mass = 1.0 / x[row * p + 3], length = unit[p], per_length = 1.0 / length;
-    lightest = std::min(lightest, mass * per_length * per_length);
+    if (!turns_[p]) lightest = std::min(lightest, mass * per_length * per_length);
     for (int i = row * p, d = 3 * p; d < 3 * p + 3; ++i, ++d) {
       const double away = x[i] - predicted[i];
       R_[d] = mass * away - push[i];
       inertial += mass * away * away;
       merit_ += R_[d] * R_[d] * x[row * p + 3];
-      largest_ = std::max(largest_, per_length * std::abs(R_[d]));
-      force_ = std::max(force_, per_length * (mass * std::abs(away) + magnitude[i]));
+      if (turns_[p]) {
+        torques_.left = std::max(torques_.left, std::abs(R_[d]));
+        torques_.largest = std::max(torques_.largest, mass + magnitude[i]);
+        torques_.rounding = std::max(torques_.rounding, mass + stiffness[i]);
+        continue;
+      }
+      forces_.left = std::max(forces_.left, per_length * std::abs(R_[d]));
+      forces_.largest = std::max(forces_.largest, per_length * (mass * std::abs(away) + magnitude[i]));
       stiffest = std::max(stiffest, per_length * per_length * (mass + stiffness[i]));
       farthest = std::max(farthest, length * std::abs(x[i]));
     }
@@ -138,7 +157,9 @@ double IncrementalPotential::evaluate(const DirectBlock& block, Numbers<double>&
     if (contact.firm > 1.0) stiffest = std::max(stiffest, contact.firm * contact.kappa);
   if (!rigid.empty()) add_rigid_residuals();
   // No more than what moves a particle by nothing: near a collapsed triangle any force is rounding.
-  rounding_ = std::min(256.0 * std::numeric_limits<double>::epsilon() * stiffest, nothing * lightest) * farthest;
+  forces_.rounding = std::min(roundings * stiffest, nothing * lightest) * farthest;
+  torques_.rounding *= 0.25 * roundings * (1.0 + farthest / shortest_edge(block, x));
+  if (torques_.left <= torques_.rounding) torques_.left = 0.0;
   return elastic + 0.5 * inertial;
 }
 
@@ -147,15 +168,19 @@ void IncrementalPotential::add_rigid_residuals() {
   for (int j = 0; j < rigid.size(); ++j) {
     const double c = rigid.residual(j), multiplier = c * rigid.weight(j);
     merit_ += c * multiplier;
-    largest_ = std::max(largest_, std::abs(multiplier) * rigid.steepest(j));
+    forces_.left = std::max(forces_.left, std::abs(multiplier) * rigid.steepest(j));
   }
 }
 
 int IncrementalPotential::worst_node(const DirectBlock& block) const {
   int worst = 0;
   double most = 0.0;
+  const auto share = [&](int d) {
+    if (turns_[d / 3]) return torques_.left > 0.0 ? std::abs(R_[d]) / torques_.largest : 0.0;
+    return std::abs(R_[d]) / unit[d / 3] / (forces_.largest > 0.0 ? forces_.largest : 1.0);
+  };
   for (int d = 0; d < 3 * block.movable; ++d)
-    if (const double own = std::abs(R_[d]) / unit[d / 3]; own > most) most = own, worst = d / 3;
+    if (const double own = share(d); own > most) most = own, worst = d / 3;
   return block.particles[worst];
 }
 

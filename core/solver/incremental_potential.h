@@ -8,6 +8,7 @@
 // (rigid_rows.h), and their residuals are part of the merit.
 #pragma once
 
+#include <algorithm>
 #include <limits>
 #include <vector>
 
@@ -42,12 +43,13 @@ class IncrementalPotential {
   // Phi at `at`; R, three numbers per movable particle, and the following are then of there.
   double evaluate(const DirectBlock& block, Numbers<double>& at);
   // Instead, where the coordinates could not be reached: all that steps are judged by is infinite.
-  double refuse() { return merit_ = largest_ = std::numeric_limits<double>::infinity(); }
+  double refuse() { return merit_ = forces_.left = std::numeric_limits<double>::infinity(); }
   const std::vector<double>& R() const { return R_; }
-  double largest() const { return largest_; }    // |R|
-  double force() const { return force_; }        // the largest sum of forces' magnitudes
-  double rounding() const { return rounding_; }  // of R, from that of the coordinates
-  double balance() const { return force_ > 0.0 ? largest_ / force_ : 0.0; }
+  double largest() const { return forces_.left; }  // |R| of particles
+  double balance() const { return std::max(forces_.share(), torques_.share()); }
+  bool balanced(double tolerance) const { return forces_.within(tolerance) && torques_.within(tolerance); }
+  // Whether no more than rounding is left of the particles' forces.
+  bool at_rounding() const { return forces_.left <= forces_.rounding && torques_.within(1e-10); }
   double merit() const { return merit_; }
   bool rubs() const { return rubs_; }                        // whether friction acts anywhere
   bool by_merit() const { return rubs_ || !rigid.empty(); }  // whether steps are judged by the merit
@@ -70,7 +72,16 @@ class IncrementalPotential {
   std::vector<sheetbend_blocks::Run> runs_;
   Numbers<double> push_, magnitude_, stiffness_;
   std::vector<double> R_;
-  double largest_ = 0.0, force_ = 0.0, rounding_ = 0.0, merit_ = 0.0;
+  // The largest |R|, the largest sum of magnitudes, and what of R is rounding of the coordinates: of particles, and of directors and normals, whose
+  // coordinates are lengths of one. Torques count as balanced where only rounding is left.
+  struct Judged {
+    double left, largest, rounding;
+    double share() const { return largest > 0.0 ? left / largest : 0.0; }
+    bool within(double tolerance) const { return left <= tolerance * largest; }
+  };
+  Judged forces_{}, torques_{};
+  double merit_ = 0.0;
+  std::vector<char> turns_;  // per movable particle, whether it is a director or a normal
   bool rubs_ = false;
 };
 

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/constraints/registry.h"
+#include "core/solver/block_frames.h"
 
 namespace sheetbend {
 namespace {
@@ -79,6 +80,7 @@ void NewtonMatrix::find(const Scene& scene, const DirectBlock& block, Incrementa
   arrays_.elements = element_numbers_.data();
   pack_kernels().potential->find_elements(arrays_);
   potential.add_rigid_elements(block, at, elements_);
+  if (!curved) leave_out_idle(scene, block, at, elements_);
   convex_found_ = false;
   find_contacts(block, potential.contacts, at.data(), curved);
   find_pairs(scene, block, potential, at.data());

@@ -24,7 +24,7 @@ class NewtonMatrix {
   void resize(const Scene& scene, const DirectBlock& block);
   static std::size_t bytes(const Scene& scene, const DirectBlock& block);
 
-  // K at `at`; Newton's method does without the curvature of colliders, derivatives do not.
+  // K at `at`; Newton's method does without the curvature of colliders and what frames do along idle directions (block_frames.h), derivatives do not.
   void find(const Scene& scene, const DirectBlock& block, IncrementalPotential& potential, Numbers<double>& at,
             bool curved = false);
   bool symmetric() const { return symmetric_; }

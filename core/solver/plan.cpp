@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/solver/block_frames.h"
 #include "core/solver/ordering.h"
 #include "core/solver/paired_pattern.h"
 #include "core/solver/plan_checks.h"
@@ -338,6 +339,7 @@ DirectBlock make_block(const Scene& scene, std::vector<Member> members, const So
   block.surface = surface_of(scene, particle_of, block);
   if (options.partition == Partition::newton || block.implicit)
     block.condensation = factored(scene, block, particle_of);
+  if (block.implicit) block.frames = frames_of_block(scene, block);
   if (block.implicit)
     for (MemberRun& run : block.runs)
       run.entries = entries_of(scene, block, run, std::get<CondensedPattern>(*block.condensation));

@@ -47,6 +47,12 @@ struct BlockContact {
   std::array<int, most_point_nodes> particles;  // in the block's order; they can move
 };
 
+// A director or normal of an implicit block (block_frames.h), of an axis: from the tail to the head, or the head where the tail is -1.
+struct BlockFrame {
+  int particle, tail, head;  // in the block's order
+  bool is_normal;
+};
+
 struct DirectBlock {
   std::vector<Member> members;  // in elimination order
   std::vector<MemberRun> runs;  // the same by group
@@ -63,6 +69,7 @@ struct DirectBlock {
   std::optional<Condensation> condensation = {};
   std::vector<BlockVolume> volumes = {};
   std::vector<BlockContact> contacts = {};  // by first particle
+  std::vector<BlockFrame> frames = {};      // of implicit blocks, normals first
   SelfContact surface = {};                 // in the block's order, fixed particles included
 
   int size() const { return static_cast<int>(multipliers.size()); }

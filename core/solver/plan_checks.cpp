@@ -66,18 +66,14 @@ void expect_constraints_around_volumes(const Scene& scene) {
                                     volume.name + " is in no constraint. Fix: use gauss_seidel, or give it a skin");
 }
 
-// Next to torques the inertia of a director is nothing, and a Newton step turns it as far as it likes. What yields has no place in a balance yet.
+// What yields has no place in a balance yet.
 void expect_balanced(const Scene& scene) {
-  for (const Group& group : scene.groups) {
-    if (std::ranges::any_of(group.stencil, [&](int n) { return scene.is_director[n] && scene.role[n] == Role::free; }))
-      throw std::invalid_argument("solver.method: group " + group.name +
-                                  " has frames of rods, for which implicit substeps are not made. Fix: use direct");
+  for (const Group& group : scene.groups)
     with_kind(group.kind, [&]<class K>(K) {
       if constexpr (Yields<K>)
         throw std::invalid_argument("solver.method: group " + group.name +
                                     " yields or slides, for which implicit substeps are not made. Fix: use direct");
     });
-  }
 }
 
 }  // namespace

@@ -83,9 +83,10 @@ void load_implicit(const SubstepState<T>& s, const DirectBlock& block, const Sub
     for (int d = 0; d < 3; ++d) {
       const int dof = s.scene.first_dof[node] + d;
       own.start[at + d] = number_of(states.x[dof], scene);
-      own.guess[at + d] = states.x_next ? number_of(states.x_next[dof], scene)
-                                        : own.start[at + d] + h * number_of(states.v[dof], scene);
       potential.target[at + d] = number_of(s.q[dof], scene);
+      own.guess[at + d] = states.x_next               ? number_of(states.x_next[dof], scene)
+                          : s.scene.is_director[node] ? potential.target[at + d]
+                                                      : own.start[at + d] + h * number_of(states.v[dof], scene);
     }
     own.start[at + 3] = own.guess[at + 3] = potential.target[at + 3] = number_of(s.w[node], scene);
   }
@@ -313,6 +314,20 @@ void keep_rigid(const std::vector<T>& lambda, BlockState<T>& state) {
   }
 }
 
+// The settled frames of the solution in state.x, whose directors are those of the substep's end (block_frames.h).
+template <class T>
+void settle_again(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state) {
+  if (block.frames.empty()) return;
+  std::vector<T> x(3 * block.particles.size());
+  const auto row_of = [](std::size_t i) { return sheetbend_blocks::row * (i / 3) + i % 3; };
+  for (std::size_t i = 0; i < x.size(); ++i) x[i] = T(state.x[0][row_of(i)]);
+  for (const BlockFrame& f : block.frames)
+    settle<T>(
+        f, [&](int particle) { return &x[3 * static_cast<std::size_t>(particle)]; },
+        [&](int particle) { return s.q + s.scene.first_dof[block.particles[particle]]; });
+  for (std::size_t i = 0; i < 3 * static_cast<std::size_t>(block.movable); ++i) state.x[0][row_of(i)] = x[i];
+}
+
 // From the predicted coordinates in state.x to those at which forces balance, with gradients and multipliers. Nothing is solved where these coordinates
 // are known, as on the way back, nor in scenes other than `scenes`.
 template <class T>
@@ -327,12 +342,14 @@ void project_implicit(const SubstepState<T>& s, const DirectBlock& block, const 
       state.implicit[scene].solve(s.scene, block, options);
   }
   set_rigid(state);
-  if (states.x_next)
+  if (states.x_next) {
     for (int p = 0; p < block.movable; ++p)
       for (int d = 0; d < 3; ++d)
         state.x[0][sheetbend_blocks::row * p + d] = states.x_next[s.scene.first_dof[block.particles[p]] + d];
-  else
+    settle_again(s, block, state);
+  } else {
     write_solution(s, block, state);
+  }
   if constexpr (!carries_tangents<T>) {  // whose multipliers are found where they are asked for
     const auto arrays = arrays_of(block, runs_of(s, block, state), state, 0);
     forward_kernels<T>(table).evaluate(arrays);

@@ -1,6 +1,7 @@
 #include <sstream>
 
 #include "core/solver/implicit_block.h"
+#include "core/solver/moved_rows.h"
 
 namespace sheetbend {
 namespace {
@@ -23,5 +24,23 @@ Unbalanced::Unbalanced(const Unbalanced& e, int substep_, double time_)
       substep(substep_),
       node(e.node),
       time(time_) {}
+
+void ImplicitBlock::give_up(const DirectBlock& block) const {
+  const int node = potential.worst_node(block);
+  std::string fix = "use a smaller substep, allow more iterations, or check boundary motion near that time";
+  std::ostringstream problem;
+  problem.precision(2);
+  problem << "forces do not balance: after " << matrices_ << " Newton matrices " << std::scientific
+          << potential.balance() << " of the largest force is left at particle " << node;
+  Numbers<double> from = x_, to = x_, predicted = potential.target;
+  move(from, 1.0, d_, to);
+  if (!settle_frames(block, predicted, to)) {
+    problem << ", where frames of a rod turn by more than 84 degrees in one substep";
+    fix =
+        "begin where its frames are at rest (an equilibrium), give it a director that fits its rest shape, or use a "
+        "smaller substep";
+  }
+  throw Unbalanced(problem.str(), fix, matrices_, potential.balance(), node);
+}
 
 }  // namespace sheetbend

@@ -1,38 +1,8 @@
 #include "core/solver/unsymmetric_factor.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace sheetbend {
-namespace {
-
-// inverse = A^-1 by elimination with rows exchanged; false where there is none.
-bool invert(const double* A, double* inverse) {
-  double M[3][6] = {};
-  for (int a = 0; a < 3; ++a) {
-    for (int b = 0; b < 3; ++b) M[a][b] = A[3 * a + b];
-    M[a][3 + a] = 1.0;
-  }
-  for (int k = 0; k < 3; ++k) {
-    int pivot = k;
-    for (int a = k + 1; a < 3; ++a)
-      if (std::abs(M[a][k]) > std::abs(M[pivot][k])) pivot = a;
-    for (int b = 0; b < 6; ++b) std::swap(M[k][b], M[pivot][b]);
-    if (!(std::abs(M[k][k]) > 0.0) || !std::isfinite(M[k][k])) return false;
-    const double scale = 1.0 / M[k][k];
-    for (int b = 0; b < 6; ++b) M[k][b] *= scale;
-    for (int a = 0; a < 3; ++a) {
-      const double factor = M[a][k];
-      for (int b = 0; a != k && b < 6; ++b) M[a][b] -= factor * M[k][b];
-    }
-  }
-  for (int a = 0; a < 3; ++a)
-    for (int b = 0; b < 3; ++b) inverse[3 * a + b] = M[a][3 + b];
-  return true;
-}
-
-}  // namespace
-
 UnsymmetricStructure::UnsymmetricStructure(int places, std::vector<std::pair<int, int>> pairs,
                                            const FactorStructure& symmetric) {
   for (int i = 0; i < places; ++i) pairs.emplace_back(i, i);
@@ -87,12 +57,12 @@ std::size_t UnsymmetricStructure::bytes() const {
 void UnsymmetricFactor::resize(const UnsymmetricStructure& s) {
   lower_.resize(9 * s.blocks());
   upper_.resize(9 * s.blocks());
-  inverse_.resize(9 * static_cast<std::size_t>(s.size()));
+  pivots_.resize(s.size());
   place_.resize(s.size());
 }
 
 std::size_t UnsymmetricFactor::bytes(const UnsymmetricStructure& s) {
-  return sizeof(double) * 9 * (2 * s.blocks() + s.size()) + sizeof(double*) * s.size();
+  return sizeof(double) * 9 * 2 * s.blocks() + (sizeof(PivotBlock) + sizeof(double*)) * s.size();
 }
 
 void UnsymmetricFactor::load(const UnsymmetricStructure& s, const double* values) {
@@ -103,7 +73,7 @@ void UnsymmetricFactor::load(const UnsymmetricStructure& s, const double* values
       for (int b = 0; b < 3; ++b) {
         const double value = values[e.from[3 * a + b]];
         if (e.place >= 0) {
-          inverse_[9 * e.place + 3 * a + b] = value;
+          pivots_[e.place].entries[3 * a + b] = value;
         } else {
           lower_[9 * e.lower + 3 * a + b] = value;
           upper_[9 * e.upper + 3 * b + a] = value;
@@ -112,7 +82,7 @@ void UnsymmetricFactor::load(const UnsymmetricStructure& s, const double* values
 }
 
 void UnsymmetricFactor::add(const UnsymmetricStructure& s, int row, int column, double scale, const double* block) {
-  double* to = row == column  ? &inverse_[9 * row]
+  double* to = row == column  ? pivots_[row].entries
                : row > column ? &lower_[9 * s.slot(s.lower_start_, s.lower_, row, column)]
                               : &upper_[9 * s.slot(s.upper_start_, s.upper_, row, column)];
   for (int k = 0; k < 9; ++k) to[k] += scale * block[k];
@@ -122,16 +92,11 @@ bool UnsymmetricFactor::factorize(const UnsymmetricStructure& s) {
   for (int i = 0; i < s.size(); ++i) {
     for (int k = s.lower_start_[i]; k < s.lower_start_[i + 1]; ++k) place_[s.lower_[k]] = &lower_[9 * k];
     for (int k = s.upper_start_[i]; k < s.upper_start_[i + 1]; ++k) place_[s.upper_[k]] = &upper_[9 * k];
-    place_[i] = &inverse_[9 * i];
+    place_[i] = pivots_[i].entries;
     for (int k = s.lower_start_[i]; k < s.lower_start_[i + 1]; ++k) {
       const int before = s.lower_[k];
-      double *own = &lower_[9 * k], L[9];
-      for (int a = 0; a < 3; ++a)
-        for (int b = 0; b < 3; ++b) {
-          const double* inverse = &inverse_[9 * before];
-          L[3 * a + b] = own[3 * a] * inverse[b] + own[3 * a + 1] * inverse[3 + b] + own[3 * a + 2] * inverse[6 + b];
-        }
-      std::copy_n(L, 9, own);
+      double* L = &lower_[9 * k];
+      for (int a = 0; a < 3; ++a) pivots_[before].solve_transposed(L + 3 * a);
       for (int u = s.upper_start_[before]; u < s.upper_start_[before + 1]; ++u) {
         const double* U = &upper_[9 * u];
         double* to = place_[s.upper_[u]];
@@ -140,9 +105,7 @@ bool UnsymmetricFactor::factorize(const UnsymmetricStructure& s) {
             to[3 * a + b] -= L[3 * a] * U[b] + L[3 * a + 1] * U[3 + b] + L[3 * a + 2] * U[6 + b];
       }
     }
-    double pivot[9];
-    std::copy_n(&inverse_[9 * i], 9, pivot);
-    if (!invert(pivot, &inverse_[9 * i])) return false;
+    if (!pivots_[i].factorize()) return false;
   }
   return true;
 }

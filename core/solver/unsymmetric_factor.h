@@ -6,6 +6,7 @@
 #include <array>
 #include <vector>
 
+#include "core/solver/pivot_block.h"
 #include "core/solver/symmetric_factor.h"
 
 namespace sheetbend {
@@ -58,13 +59,13 @@ class UnsymmetricFactor {
     for (int i = s.size(); i-- > 0;) {
       for (int k = s.upper_start_[i]; k < s.upper_start_[i + 1]; ++k)
         subtract(&upper_[9 * k], b + 3 * s.upper_[k], b + 3 * i);
-      multiply<false>(&inverse_[9 * i], b + 3 * i);
+      pivots_[i].solve(b + 3 * i);
     }
   }
   template <class U>
   void solve_transposed(const UnsymmetricStructure& s, U* b) const {
     for (int i = 0; i < s.size(); ++i) {
-      multiply<true>(&inverse_[9 * i], b + 3 * i);
+      pivots_[i].solve_transposed(b + 3 * i);
       for (int k = s.upper_start_[i]; k < s.upper_start_[i + 1]; ++k)
         subtract_transposed(&upper_[9 * k], b + 3 * i, b + 3 * s.upper_[k]);
     }
@@ -82,16 +83,9 @@ class UnsymmetricFactor {
   static void subtract_transposed(const double* M, const U* from, U* to) {
     for (int a = 0; a < 3; ++a) to[a] -= M[a] * from[0] + M[3 + a] * from[1] + M[6 + a] * from[2];
   }
-  template <bool Transposed, class U>
-  static void multiply(const double* M, U* b) {
-    constexpr int row = Transposed ? 1 : 3, column = Transposed ? 3 : 1;
-    const U x = b[0], y = b[1], z = b[2];
-    for (int a = 0; a < 3; ++a) b[a] = M[row * a] * x + M[row * a + column] * y + M[row * a + 2 * column] * z;
-  }
-
-  std::vector<double> lower_, upper_,
-      inverse_;                 // L with a unit diagonal, U above its diagonal, the inverses of its diagonal blocks
-  std::vector<double*> place_;  // of a column in the row that is being made
+  std::vector<double> lower_, upper_;  // L with a unit diagonal, and U above its diagonal
+  std::vector<PivotBlock> pivots_;     // U's diagonal
+  std::vector<double*> place_;         // of a column in the row that is being made
 };
 
 }  // namespace sheetbend

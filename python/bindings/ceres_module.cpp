@@ -1,5 +1,6 @@
 // The module sheetbend._ceres, loaded when a fit with Ceres starts.
 #include <pybind11/functional.h>
+#include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
@@ -50,6 +51,11 @@ py::dict minimize(const py::capsule& evaluation, std::vector<double> u, const st
   out["converged"] = r.converged;
   out["stopped"] = r.stopped;
   out["message"] = r.message;
+  if (!r.residual.empty()) {
+    out["residual"] = py::array_t<double>(static_cast<py::ssize_t>(r.residual.size()), r.residual.data());
+    out["jacobian"] = py::array_t<double>(
+        {static_cast<py::ssize_t>(r.residual.size()), static_cast<py::ssize_t>(r.u.size())}, r.jacobian.data());
+  }
   return out;
 }
 

@@ -44,37 +44,9 @@ Sample tossed(const Toss& toss) {
   return b.build(g);
 }
 
-// Coordinates that the loss counts: those of the body, and of the cord.
-int counted(const Sample& s) { return 3 * s.scene.contacts[0].carried[0]; }
-
-template <class T>
-T loss_of_motion(const Program& p, int dofs, const std::vector<T>& inputs) {
-  const auto all = states(p, inputs);
-  T sum(0.0);
-  for (int step = 0; step <= p.steps; ++step)
-    for (int i = 0; i < dofs; ++i) {
-      const T& x = all[static_cast<std::size_t>(step) * p.scene.dofs() + i];
-      sum += T(weight(step, i)) * x * x;
-    }
-  return sum;
-}
-
-std::vector<double> gradient_of_motion(const Program& p, int dofs, const std::vector<double>& inputs) {
-  auto recorded = record(p, inputs);
-  std::vector<double> x_bar(recorded.states.size()), bar(inputs.size());
-  for (int step = 0; step <= p.steps; ++step)
-    for (int i = 0; i < dofs; ++i) {
-      const std::size_t at = static_cast<std::size_t>(step) * p.scene.dofs() + i;
-      x_bar[at] = 2.0 * weight(step, i) * recorded.states[at];
-    }
-  reverse_rollout<double>(p.scene, p.plan, inputs.data(), p.t0, recorded.tape, every_step(p), x_bar.data(), bar.data(),
-                          nullptr);
-  return bar;
-}
-
 struct TossedBox : ::testing::TestWithParam<std::tuple<Toss, Integrator>> {
   Sample sample = tossed(std::get<0>(GetParam()));
-  Program program{sample.scene, make_plan(sample.scene, contact_options(2e-3, std::get<1>(GetParam()))), 60};
+  Program program = moving_program(sample, contact_options(2e-3, std::get<1>(GetParam())), 60);
 };
 INSTANTIATE_TEST_SUITE_P(Bodies, TossedBox,
                          ::testing::Values(std::tuple{Toss{}, Integrator::bdf1}, std::tuple{Toss{}, Integrator::bdf2},
@@ -83,16 +55,9 @@ INSTANTIATE_TEST_SUITE_P(Bodies, TossedBox,
                                            std::tuple{Toss{.mu = 0.3, .cable = true, .ball = true}, Integrator::bdf2}));
 
 TEST_P(TossedBox, TouchesSlidesAndHasTheGradientOfComplexSteps) {
-  Rollout<double> rollout(sample.scene, program.plan, sample.inputs.data());
-  int touching = 0;
-  for (int n = 0; n < program.steps; ++n) {
-    rollout.advance();
-    for (const ContactMode mode : rollout.contact_modes()) touching += mode != ContactMode::apart;
-  }
-  EXPECT_GE(touching, 5);
-  const auto of = [&](const std::vector<Complex>& probe) { return loss_of_motion(program, counted(sample), probe); };
-  expect_some_entries_agree(sample.scene.layout, of, sample.inputs,
-                            gradient_of_motion(program, counted(sample), sample.inputs), 1e-9);
+  EXPECT_GE(times_touching(program, sample.inputs), 5);
+  const auto of = [&](const std::vector<Complex>& probe) { return loss(program, probe); };
+  expect_some_entries_agree(sample.scene.layout, of, sample.inputs, gradient(program, sample.inputs), 1e-9);
 }
 
 TEST_P(TossedBox, HasTheSameBitsWhateverKeepsItsStates) {
@@ -105,9 +70,9 @@ TEST_P(TossedBox, HasTheSameBitsWhateverKeepsItsStates) {
 
 TEST(BouncingBox, HasTheGradientOfComplexSteps) {
   const Sample s = tossed({.mu = 0.2, .restitution = 0.4});
-  const Program p{s.scene, make_plan(s.scene, contact_options(2e-3)), 40};
-  const auto of = [&](const std::vector<Complex>& probe) { return loss_of_motion(p, counted(s), probe); };
-  expect_some_entries_agree(s.scene.layout, of, s.inputs, gradient_of_motion(p, counted(s), s.inputs), 1e-6);
+  const Program p = moving_program(s, contact_options(2e-3), 40);
+  const auto of = [&](const std::vector<Complex>& probe) { return loss(p, probe); };
+  expect_some_entries_agree(s.scene.layout, of, s.inputs, gradient(p, s.inputs), 1e-6);
 }
 
 // On 30 degrees a block slides with a friction below tan(30 degrees) and stays with one above it.

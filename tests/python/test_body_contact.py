@@ -86,12 +86,53 @@ def test_scene_files_hold_points_of_bodies(tmp_path):
         ({"points": None}, "contact.points"),
         ({"points": [[0, 0]]}, "contact.points"),
         ({"points": [[0, 0, 0], [0, 0, 0]]}, "contact.points"),
-        ({"settle": True}, "contact.settle"),
     ],
 )
 def test_what_is_no_contact_of_a_body_is_refused(contact, field):
     with pytest.raises(sb.SceneError, match=field):
         tossed(**contact)
+
+
+@pytest.mark.parametrize(("integrator", "off"), [("bdf1", 6e-3), ("bdf2", 2e-3)])
+def test_a_free_body_bounces_with_its_restitution(integrator, off):
+    # Nothing else holds the body: its rows alone hold its points.
+    scene = sb.Scene("box")
+    sides = (0.1, 0.1, 0.1)
+    box = scene.add_body("box", of=sb.Inertia.box(0.1, sides), at=(0, 0, 0.3))
+    scene.contact(box, sb.Plane(name="table"), friction=0.1, restitution=0.5, points=sb.box_corners(sides))
+    fall = np.sqrt(2 * 0.25 / 9.81)
+    solver = sb.Solver(h=1 / 960, method="implicit", integrator=integrator)
+    for e in (0.5, 0.8):
+        motion = sb.simulate(scene, [0.0, 0.4], solver, {"table_restitution": e})
+        after = 0.4 - fall
+        expected = 0.05 + e * 9.81 * fall * after - 0.5 * 9.81 * after**2
+        assert motion.positions[-1, 0, 2] == pytest.approx(expected, abs=off)
+
+
+def test_settle_moves_a_body_as_a_whole_out_of_all_shapes():
+    scene = sb.Scene("corner")
+    body = scene.add_body("cube", of=sb.Inertia.box(0.37, SIDES), at=(0.046, 0, 0.057), rotation=(0, 0, 0.1))
+    turned = body.pose(scene.nodes)[1]
+    points = sb.box_corners(SIDES)
+    for name, normal in (("floor", (0, 0, 1)), ("wall", (1, 0, 0))):
+        scene.contact(body, sb.Plane(normal=normal, name=name), friction=0.1, points=points, settle=True)
+    motion = sb.simulate(scene, [0.0, 2e-3], SOLVER)
+    place, axes = body.pose(motion)
+    assert place[0] == pytest.approx([(turned @ points.T)[0].max(), 0, 0.06], abs=1e-12)
+    np.testing.assert_allclose(axes[0], turned, atol=1e-15)
+    assert np.abs(place[1] - place[0]).max() < 1e-4  # weight alone
+    assert {name: (s.particles, round(s.farthest, 6)) for name, s in scene.compiled.settled.items()} == {
+        name: (1, round(float(np.linalg.norm(place[0] - (0.046, 0, 0.057))), 6)) for name in ("floor", "wall")
+    }
+
+
+def test_settle_moves_no_body_that_something_holds():
+    scene = sb.Scene("door")
+    door = scene.add_body("door", of=sb.Inertia.box(0.37, SIDES), at=(0, 0, 0.05))
+    sb.hinge(None, door, at=(0.05, 0, 0), axis=(0, 1, 0))
+    scene.contact(door, sb.Plane(name="table"), friction=0.2, points=sb.box_corners(SIDES), settle=True)
+    with pytest.raises(sb.SceneError, match="joined to nothing: 'door' is held by 'hinge_"):
+        scene.compiled  # noqa: B018
 
 
 def test_particles_have_no_points():

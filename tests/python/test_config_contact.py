@@ -81,6 +81,13 @@ def test_a_file_builds_the_scene_that_python_builds():
     assert np.array_equal(ours, theirs)
 
 
+def test_a_rod_touches_as_a_rope_does():
+    read, solver = scene_alone(parsed(DRAGGED.replace("[[scene.rope]]", '[[scene.rod]]\nname = "rope"\nGJ = 1e-4')))
+    motion = sb.simulate(read, [0.0, 0.05], solver)
+    assert motion.contacts["table"].most == 9
+    assert np.abs(motion.positions[-1, :9, 2] - 0.005).max() < 1e-6
+
+
 def test_a_collider_moves_at_knots_and_with_a_tool(tmp_path: Path):
     times = np.linspace(0.0, 1.0, 21)
     angle = 1.5 * np.pi * times  # beyond half a turn

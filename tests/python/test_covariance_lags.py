@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from pytest import approx
 from sheetbend.errors import InputError
-from sheetbend.statistics.covariance import Layout, _colored, _columns, _expected_lags, _Grid, _lagged
+from sheetbend.statistics.colored import Colored
+from sheetbend.statistics.covariance import Layout, _columns, _expected_lags, _Grid, _lagged
 
 
 def uneven() -> tuple[Layout, np.random.Generator]:
@@ -42,7 +43,13 @@ def test_the_covariance_of_rows_and_of_what_a_fit_leaves_of_them() -> None:
             shared = np.fft.irfft(np.sqrt(spectra[kind[i]] * spectra[kind[j]]), grid.length)
             omega[i, j] = mixing[channel[i], channel[j]] * shared[abs(frame[i] - frame[j])]
     parts = grid.parts(Q, grid.kinds)
-    spread = [_colored(part, parts, spectra, grid.length, mixing) for part in parts]
+    colored = Colored(parts, mixing, grid.length)
+    for part in parts:
+        colored(part, spectra[::-1])  # transforms are kept from here on
+    spread = [colored(part, spectra) for part in parts]
+    assert all(
+        (Colored(parts, mixing, grid.length)(part, spectra) == a).all() for part, a in zip(parts, spread, strict=True)
+    )
     found = sum(np.tensordot(part.columns, a, ([0, 2], [0, 2])) for part, a in zip(parts, spread, strict=True))
     assert found == approx(Q.T @ omega @ Q, rel=1e-10, abs=1e-10)
     pairs = [

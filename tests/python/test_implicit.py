@@ -254,8 +254,8 @@ def test_a_tolerance_that_is_none_is_named(given: float) -> None:
         replace(IMPLICIT, force_tolerance=given)
 
 
-def test_rods_are_refused() -> None:
-    """Tethers and volumes: tests/cpp/test_implicit.cpp, test_tethers.py, test_volume.py."""
-    scene = sb.rod(0.5, 8, density=0.05, EI=1e-3, GJ=1e-3, EA=1e3)
-    with pytest.raises(sb.InputError, match=r"has frames of rods.*Fix: use direct"):
+def test_rods_that_yield_are_refused() -> None:
+    """Tethers, volumes, rods: tests/cpp/test_implicit.cpp, test_tethers.py, test_volume.py, test_implicit_rods.py."""
+    scene = sb.rod(0.5, 8, density=0.05, EI=1e-3, GJ=1e-3, EA=1e3, yield_curvature=5.0, yield_share=0.5)
+    with pytest.raises(sb.InputError, match=r"yields or slides.*Fix: use direct"):
         sb.simulate(scene, [0.0, 0.1], replace(IMPLICIT, h=0.1))

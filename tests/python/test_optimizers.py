@@ -325,3 +325,14 @@ def test_a_slope_at_the_end_is_told_and_a_steep_one_is_no_end(monkeypatch, promi
     found = optimizers.judged(None, end, first=10.0)
     assert (found.converged, bool(found.doubt)) == (converged, doubted)
     assert found.message.endswith("small steps")
+
+
+@needs_ceres
+def test_the_last_jacobian_of_ceres_is_not_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It has the bits of one that is."""
+    problem = problem_of(swinging())
+    end = minimize(problem, problem.parameters.initial(), "ceres")[0]
+    fresh = problem_of(swinging()).evaluate(end.u)
+    monkeypatch.setattr(problem, "evaluator", None)
+    _, r, J = problem.evaluate(end.u)
+    assert np.array_equal(r, fresh[1]) and np.array_equal(J, fresh[2])

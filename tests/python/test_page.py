@@ -237,17 +237,35 @@ def test_vendored_scripts_are_as_they_were_made() -> None:
     )
 
 
+def drawn_by_chromium(page: Path, folder: Path, at: str = "") -> str:
+    """The page's elements as the browser leaves them, without a network."""
+    command = ["chromium", "--headless", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    command += ["--host-resolver-rules=MAP * ~NOTFOUND", "--window-size=1400,1000", f"--user-data-dir={folder / 'u'}"]
+    command += ["--virtual-time-budget=3000", "--dump-dom", page.as_uri() + at]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+
+
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="Chromium is not installed")
 @pytest.mark.slow
 def test_a_browser_draws_it_without_a_network(fitted: sb.Fit, tmp_path: Path) -> None:
     (tmp_path / "report.html").write_text(fit_page(fitted, "swing"))
-    command = ["chromium", "--headless", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-    command += ["--host-resolver-rules=MAP * ~NOTFOUND", "--window-size=1400,1000", f"--user-data-dir={tmp_path / 'u'}"]
-    command += ["--virtual-time-budget=3000", "--dump-dom", (tmp_path / "report.html").as_uri() + "#t=0.2"]
-    page = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+    page = drawn_by_chromium(tmp_path / "report.html", tmp_path, "#t=0.2")
     assert "<title>swing \u2713</title>" in page  # set when all is drawn
     assert re.search(r'<div id="space">\s*<canvas', page) and "0.200 s" in page
     assert page.count('class="uplot') >= 4
+    assert '<span id="controls">' in page and "<h2>Motion</h2>" in page
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="Chromium is not installed")
+@pytest.mark.slow
+def test_a_shape_at_rest_has_nothing_to_play(tmp_path: Path) -> None:
+    """A wire at rest had a button, a slider and a choice of speeds at 0.000 s."""
+    x = np.linspace([0.0, 0.0, 0.0], [0.4, 0.0, -0.1], 5)[None]
+    page = motion_page([of_recording(sb.Recording(x, [0]), "wire")], "wire")
+    (tmp_path / "wire.html").write_text(page)
+    page = drawn_by_chromium(tmp_path / "wire.html", tmp_path)
+    assert "<title>wire \u2713</title>" in page
+    assert re.search(r'<span id="controls" hidden="">', page) and "<h2>Shape at rest</h2>" in page
 
 
 def test_a_late_camera_s_motion_is_drawn_where_its_markers_are() -> None:

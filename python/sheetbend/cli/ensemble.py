@@ -13,6 +13,7 @@ from rich.console import Console
 from ..config import GrippedConfig, parse_any
 from ..errors import ConfigError, SheetbendError
 from ..files.door import noting, reading
+from ..minimum.workers import naming_losses
 from .journals import NAME
 from .outcome import Code, Outcome
 from .screen import Screen
@@ -23,7 +24,7 @@ Single = Callable[[Console, Path, Path, bool], Outcome]
 
 
 def fit_all(
-    console: Console, pattern: str, output: Path | None, strict: bool, single: Single, executor: Executor | None
+    console: Console, pattern: str, output: Path, strict: bool, single: Single, executor: Executor | None
 ) -> Outcome:
     """Fit every configuration of a pattern, each into OUTPUT/NAME. One that fails is told, and the others go on.
 
@@ -34,7 +35,7 @@ def fit_all(
     Raises:
         ConfigError: the pattern names no configuration, one is none, or two have the same name.
     """
-    tasks = _tasks(pattern, output or Path("out"))
+    tasks = _tasks(pattern, output)
     left = [(path, folder) for path, folder in tasks if not _done(path, folder)]
     console.print(f"{len(tasks)} configurations, {len(tasks) - len(left)} of them done", soft_wrap=True)
     codes: dict[str, Code] = {folder.name: Code.DONE for path, folder in tasks if (path, folder) not in left}
@@ -46,7 +47,8 @@ def fit_all(
             if executor is None:
                 codes[folder.name] = _told(single, console, path, folder, strict)
             else:
-                text, codes[folder.name] = futures[i].result()
+                with naming_losses():
+                    text, codes[folder.name] = futures[i].result()
                 console.print(text, soft_wrap=True, end="")
             if codes[folder.name] in (Code.INTERRUPTED, Code.TERMINATED):
                 break
@@ -56,9 +58,9 @@ def fit_all(
     failed = [name for name, code in codes.items() if code is not Code.DONE]
     if failed:
         console.print(f"\nnot done, not converged or not identifiable: {', '.join(failed)}", soft_wrap=True)
-    console.print(f"\n`sheetbend collect {output or 'out'}` puts them into one table", soft_wrap=True)
+    console.print(f"\n`sheetbend collect {output}` puts them into one table", soft_wrap=True)
     worst = next((code for code in WORST_FIRST if code in codes.values()), Code.DONE)
-    data = {"fits": {name: int(code) for name, code in codes.items()}, "output": str(output or Path("out"))}
+    data = {"fits": {name: int(code) for name, code in codes.items()}, "output": str(output)}
     return Outcome(data, worst)
 
 

@@ -18,9 +18,10 @@ from ..files.door import reading
 from ..files.whole import write_text
 from ..fitting.fit import Fit
 from ..fitting.fit import fit as run_fit
+from ..minimum.cluster import workers as workers_of
 from ..minimum.journal import Journal
 from ..minimum.problem import FitProblem, as_parameters
-from ..minimum.workers import processes, working_on
+from ..minimum.workers import working_on
 from ..pictures.movie import movie_paths
 from ..recording.recording import Recording
 from ..report.fit_result import FitResult
@@ -69,6 +70,14 @@ def fit(
     workers: Annotated[
         int, typer.Option(min=1, help="Processes that share out recordings, raced starts and leave-one-out.")
     ] = 1,
+    dask: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Share out to the workers of a Dask scheduler, given its address or file (docs/cluster.md).",
+            show_default=False,
+        ),
+    ] = None,
     strict: Annotated[
         bool, typer.Option("--strict", help="Exit 3 when any parameter is not identifiable, not only when all are.")
     ] = False,
@@ -86,13 +95,18 @@ def fit(
             if start is not None or movie is not None:
                 option = "--from" if start is not None else OPTION
                 raise ConfigError(option, "is not for several fits", str(start or movie), "leave it out")
-            with processes(workers) as executor:
-                return fit_all(console, str(config), output, strict, _single, executor)
+            with workers_of(workers, dask) as executor:
+                where = Path.cwd() if dask else Path()  # workers elsewhere know no relative paths
+                place = where / (output or "out")
+                return fit_all(console, str(where / config), place, strict, _single, executor)
         if more:
             fix = "give one configuration; values of an earlier fit are started from with --from fit.json"
             raise ConfigError("--resume" if resume else "arguments", "are too many", [str(config), *more], fix)
-        with processes(workers) as executor, working_on(executor):
-            return _fit(console, config, output, start, resume, movie, strict)
+        with workers_of(workers, dask) as executor, working_on(executor) as traffic:
+            outcome = _fit(console, config, output, start, resume, movie, strict)
+            if executor is not None:
+                console.print(str(traffic), soft_wrap=True)
+            return outcome
 
     run(command, json)
 

@@ -102,7 +102,7 @@ class ContactSection(Section):
 
     name: Name | None = key(None, "prefix of its quantities; the collider's name when left out")
     of: Name | list[Name] = key(
-        ..., "a rope, a cloth or a set of particles, or several: all of their particles; or a body"
+        ..., "a rope, a rod, a cloth or a set of particles, or several: all of their particles; or a body"
     )
     points: list[Vector] | None = key(
         None, "of a body: those that may touch, in its frame; the corners of its box when left out", "m", min_length=1
@@ -116,7 +116,8 @@ class ContactSection(Section):
     restitution: Finite | None = key(None, "speed after an impact over that before; 0 when left out", ge=0, le=1)
     settle: bool = key(
         False,
-        "move particles that start inside, as measured ones may by noise, to the surface before the motion starts",
+        "move particles that start inside, as measured ones may by noise, to the surface before the motion starts; "
+        "a body as a whole",
     )
 
     @property

@@ -165,9 +165,7 @@ class Profiles:
 
     def _part(self, name: str) -> FitProblem:
         if name not in self._parts:
-            part = self._problem.around(name)
-            whole = len(part.experiments) == len(self._problem.experiments)
-            self._parts[name] = self._problem if whole else part
+            self._parts[name] = self._problem.around(name)
         return self._parts[name]
 
     def _nearest(self, held: FitProblem, part: FitProblem, name: str, at: float) -> tuple[Array, float]:

@@ -254,6 +254,8 @@ def _ceres_holding(
     if not 0.0 <= out["cost"] < np.inf:  # Ceres tells a cost of -1 where its first point has no derivatives
         counts = out["iterations"], out["evaluations"]
         return Minimum(best.u, best.cost, *counts, False, False, out["message"], jacobians=out["jacobians"])
+    if "jacobian" in out:
+        problem.keep(np.array(out["u"]), out["residual"], out["jacobian"])
     return Minimum(
         np.array(out["u"]),
         out["cost"],

@@ -183,14 +183,14 @@ class FitProblem:
 
     def around(self, name: str) -> FitProblem:
         """The part that one free (expanded) parameter is tied to, through shared parameters; the rest of the minimum
-        does not depend on it."""
+        does not depend on it. The problem itself where that is all of it."""
         free_of = [set(self.acting_on(e)) for e in self.experiments]
         names: set[str] = {name}
         chosen: list[int] = []
         while (reached := [i for i, mine in enumerate(free_of) if mine & names]) != chosen:
             chosen = reached
             names |= set().union(*(free_of[i] for i in chosen))
-        return self.piece(chosen)
+        return self if len(chosen) == len(self.experiments) else self.piece(chosen)
 
     def piece(self, chosen: Sequence[int]) -> FitProblem:
         """The part of some experiments, by number, with the parameters that reach them."""
@@ -267,6 +267,11 @@ class FitProblem:
         if jacobian:
             self._last = np.array(u, dtype=float), found
         return found
+
+    def keep(self, u: np.ndarray, r: np.ndarray, J: np.ndarray) -> None:
+        """Take what was evaluated at u past the problem for the last Jacobian; not where corrections go on from it."""
+        if not self.estimates_corrections:
+            self._last = np.array(u, dtype=float), (True, r, J)
 
     def cost(self, u: np.ndarray) -> float:
         """Half the sum of squares at u (free,); infinite where the physics has no answer."""

@@ -9,22 +9,25 @@ a worker makes inside a piece of work of its own are made again by a fit that go
 from __future__ import annotations
 
 import hashlib
-import os
 import pickle
-import signal
 import threading
+import time
+import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import wraps
-from typing import Any, Generic, ParamSpec, TypeVar
+from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 
 from ..errors import InputError, SheetbendError
+from . import content
+from .traffic import Traffic
 
 KEPT = 8  # things that calls have in common, in each worker
-_current: ContextVar[Executor | None] = ContextVar("workers", default=None)
+MACHINE = ("Python", "processor", "C library", "NumPy", "SciPy")  # which may change the last digits
+_current: ContextVar[tuple[Executor, Traffic] | None] = ContextVar("workers", default=None)
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -32,18 +35,51 @@ A = TypeVar("A")
 
 
 @contextmanager
-def working_on(executor: Executor | None) -> Iterator[None]:
-    """Shares out work inside this context; with None nothing is."""
-    token = _current.set(executor)
+def working_on(executor: Executor | None) -> Iterator[Traffic]:
+    """Shares out work inside this context, and counts it; with None nothing is shared out."""
+    traffic = Traffic()
+    token = _current.set(None if executor is None else (executor, traffic))
     try:
-        yield
+        yield traffic
     finally:
         _current.reset(token)
 
 
 def current() -> Executor | None:
     """The workers in use here, if any."""
-    return _current.get()
+    found = _current.get()
+    return None if found is None else found[0]
+
+
+@contextmanager
+def naming_losses() -> Iterator[None]:
+    """Passes errors of the work itself on, and tells where an executor lost its workers.
+
+    Raises:
+        SheetbendError: it did.
+    """
+    try:
+        yield
+    except Exception as error:
+        package = type(error).__module__.partition(".")[0]
+        if not isinstance(error, BrokenExecutor) and package != "distributed":  # Dask's own, such as KilledWorker
+            raise
+        told = f"a worker ended before its work was done ({error}); with a journal the fit can go on"
+        raise SheetbendError(told) from error
+
+
+class Answer(NamedTuple):
+    """What a worker sends back.
+
+    Attributes:
+        packed: the result.
+        seconds: of processor time, that it took.
+        unlike: what of the worker's software or machine is not that of the client.
+    """
+
+    packed: bytes
+    seconds: float
+    unlike: dict[str, tuple[str, str]]
 
 
 class Common(Generic[S]):
@@ -59,95 +95,88 @@ class Common(Generic[S]):
         self._sent = False
 
     def packed(self) -> tuple[bytes, bytes]:
-        """Its key and its content."""
+        """Its key and its content, with what the results' bits depend on besides."""
         if self._packed is None:
-            content = pickle.dumps(self.value, pickle.HIGHEST_PROTOCOL)
-            self._packed = hashlib.blake2b(content, digest_size=16).digest(), content
+            packed = pickle.dumps((content.of_software(), self.value), pickle.HIGHEST_PROTOCOL)
+            self._packed = hashlib.blake2b(packed, digest_size=16).digest(), packed
         return self._packed
 
     def map(self, work: Callable[[S, A], T], items: Sequence[A]) -> list[T]:
         """work(value, item) of every item, in their order.
 
         Raises:
+            InputError: a worker has another version of the software.
             What the work raises, of the first item in order that does.
         """
-        executor = current()
-        if executor is None:
+        found = _current.get()
+        if found is None:
             return [work(self.value, item) for item in items]
-        key, content = self.packed()
+        executor, traffic = found
+        key, common = self.packed()
         sent, self._sent = self._sent, True
-        futures: list[Future[tuple[T] | None]] = []
+        futures: list[Future[Answer | None]] = []
+        packed = [pickle.dumps(item, pickle.HIGHEST_PROTOCOL) for item in items]
+        began = time.process_time()
         try:
-            futures += [executor.submit(_answer, work, key, None if sent else content, item) for item in items]
-            answers = []
-            for item, future in zip(items, futures, strict=True):
-                answer = future.result()
-                if answer is None:  # a worker that came later, or has kept other things since
-                    answer = executor.submit(_answer, work, key, content, item).result()
-                assert answer is not None
-                answers.append(answer[0])
-            return answers
-        except BrokenExecutor as error:
-            words = f"a worker ended before its work was done ({error}); with a journal the fit can go on from here"
-            raise SheetbendError(words) from error
+            with naming_losses():
+                futures += [executor.submit(_answer, work, key, None if sent else common, item) for item in packed]
+                traffic.sent += sum(map(len, packed)) + (0 if sent else len(common) * len(items))
+                answers = []
+                for item, future in zip(packed, futures, strict=True):
+                    answer = future.result()
+                    if answer is None:  # a worker that came later, or has kept other things since
+                        traffic.sent += len(common) + len(item)
+                        answer = executor.submit(_answer, work, key, common, item).result()
+                    assert answer is not None
+                    _compare(answer.unlike, traffic)
+                    traffic.add(len(answer.packed), answer.seconds)
+                    answers.append(pickle.loads(answer.packed))  # which a worker of this client packed
+                return answers
         finally:
+            traffic.own += time.process_time() - began
             for future in futures:
                 future.cancel()
 
 
+def _compare(unlike: dict[str, tuple[str, str]], traffic: Traffic) -> None:
+    """Refuses a worker with other software; warns once of another kind of machine."""
+    if not unlike:
+        return
+    differs = "; ".join(f"{name}: {mine} here, {other} there" for name, (mine, other) in unlike.items())
+    if not set(unlike) <= set(MACHINE):
+        raise InputError("workers", "have another sheetbend", differs, "install the same version on all machines")
+    if not traffic.warned:
+        traffic.warned = True
+        words = f"workers differ in what decides the last digits of results ({differs}); results may differ in these"
+        warnings.warn(words, RuntimeWarning, stacklevel=3)
+
+
 class _Kept(threading.local):
-    """In each thread of a worker: what calls have in common, by key, the last used one last."""
+    """In each thread of a worker: what calls have in common, by key, the last used one last, and what of the client's
+    software and machine is not that of the worker."""
 
     def __init__(self) -> None:
-        self.values: OrderedDict[bytes, Any] = OrderedDict()
+        self.values: OrderedDict[bytes, tuple[Any, dict[str, tuple[str, str]]]] = OrderedDict()
 
 
 _kept = _Kept()
 
 
-def _answer(work: Callable[[Any, Any], T], key: bytes, content: bytes | None, item: Any) -> tuple[T] | None:
-    """In a worker: a tuple with the answer; None where it does not have the common part."""
-    values = _kept.values
+def _answer(work: Callable[[Any, Any], T], key: bytes, common: bytes | None, item: bytes) -> Answer | None:
+    """In a worker; None where it does not have the common part."""
+    began, values = time.thread_time(), _kept.values
     if key not in values:
-        if content is None:
+        if common is None:
             return None
-        values[key] = pickle.loads(content)  # which this worker's own client packed
+        software, value = pickle.loads(common)  # which this worker's own client packed
+        here = content.of_software()
+        values[key] = value, {name: (text, here[name]) for name, text in software.items() if here[name] != text}
         while len(values) > KEPT:
             values.popitem(last=False)
     values.move_to_end(key)
-    return (work(values[key], item),)
-
-
-@contextmanager
-def processes(count: int) -> Iterator[Executor | None]:
-    """That many processes of this machine, each with one thread of linear algebra; None for one or none."""
-    if count < 2:
-        yield None
-        return
-    import multiprocessing  # here, since importing sheetbend is to stay light
-    from concurrent.futures import ProcessPoolExecutor
-
-    with ExitStack() as undone:
-        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-            undone.callback(_set, name, os.environ.get(name))
-            os.environ[name] = "1"
-        pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _ignore_interrupts)
-        try:
-            yield pool
-        finally:
-            pool.shutdown(cancel_futures=True)
-
-
-def _set(name: str, value: str | None) -> None:
-    if value is None:
-        os.environ.pop(name, None)
-    else:
-        os.environ[name] = value
-
-
-def _ignore_interrupts() -> None:
-    """Ctrl-C reaches all processes; this one's client decides what comes of it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    value, unlike = values[key]
+    packed = pickle.dumps(work(value, pickle.loads(item)), pickle.HIGHEST_PROTOCOL)
+    return Answer(packed, time.thread_time() - began, unlike)
 
 
 P = ParamSpec("P")

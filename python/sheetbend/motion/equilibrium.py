@@ -132,7 +132,7 @@ def equilibrium(
 ) -> Equilibrium:
     """Find the equilibrium that a start leads to.
 
-    Friction holds the particles that touch their collider at the start: they stick, or slide to Coulomb's limit. What
+    Friction holds the points that touch their collider at the start: they stick, or slide to Coulomb's limit. What
     comes to touch later slides without friction, because nothing tells where it would have stuck. So let what is draped
     come to rest in a simulation, and start here where it ends.
 

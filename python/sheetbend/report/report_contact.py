@@ -34,7 +34,10 @@ def _contacts(result: FitData) -> Section:
         ("bdf1", "share of the substeps of backward Euler, which damps vibrations"),
         ("losses", NO_LOSSES),
         *(
-            (f"start of {c.recording}", f"settle moved {c.settled} particles out of {c.contact}, by up to {_mm(c)} mm")
+            (
+                f"start of {c.recording}",
+                f"settle moved {c.settled} particle{'s' * (c.settled > 1)} out of {c.contact}, by up to {_mm(c)} mm",
+            )
             for c in result.contacts
             if c.settled
         ),

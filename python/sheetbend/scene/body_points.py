@@ -50,13 +50,11 @@ class BodyPoints:
         return np.stack([np.append(expressions(1.0), self.body.coordinates(place)) for place in self.places])
 
 
-def points_of(
-    what: object, points: ArrayLike | TriangleMesh | None, settle: bool, name: str | None
-) -> BodyPoints | None:
+def points_of(what: object, points: ArrayLike | TriangleMesh | None, name: str | None) -> BodyPoints | None:
     """The points of a body that `Scene.contact` was given, checked; None of anything else.
 
     Raises:
-        SceneError: points of what is no body, none of a body, shapes, NaN, two at one place, or a body that settles.
+        SceneError: points of what is no body, none of a body, shapes, NaN, or two at one place.
     """
     where = f"{name or 'contact'}.points"
     if not isinstance(what, Body):
@@ -66,9 +64,6 @@ def points_of(
     if points is None:
         fix = "give those that may touch, (n, 3) m in its frame, such as points=sb.box_corners(sides)"
         raise SceneError(where, f"are missing: '{what.name}' is a body", None, fix)
-    if settle:
-        fix = "start the body outside, or leave settle out"
-        raise SceneError(f"{name or 'contact'}.settle", f"moves particles alone: '{what.name}' is a body", settle, fix)
     given = points.vertices if isinstance(points, TriangleMesh) else points
     places = np.atleast_2d(finite(where, given, None, SceneError))
     if places.ndim != 2 or places.shape[1] != 3 or not len(places):

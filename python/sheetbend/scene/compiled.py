@@ -138,9 +138,22 @@ class CompiledScene:
     def map(self, extra: int = 0, terms: Sequence[Term] = (), names: Sequence[str] | None = None) -> dict[str, Any]:
         """The parameter map as plain arrays, one entry per term and input that it goes to; `extra` more inputs (array
         "extra") may follow the scene's, with their own terms."""
-        order = {name: i for i, name in enumerate(self.names if names is None else names)}
+        names = self.names if names is None else tuple(names)
+        known = names[: len(self.names)] == self.names
+        own = self._entries if known else self._entries_of(self._terms, names)
+        if terms:
+            own = _followed_by(own, self._entries_of(terms, names, extra))
+        return {"base": np.concatenate([self._base, np.zeros(extra)]) if extra else self._base, **own}
+
+    @cached_property
+    def _entries(self) -> dict[str, np.ndarray]:
+        """Of the scene's own terms, which every problem on it asks for."""
+        return self._entries_of(self._terms, self.names)
+
+    def _entries_of(self, every: Sequence[Term], names: Sequence[str], extra: int = 0) -> dict[str, np.ndarray]:
+        """The arrays of some terms, without the base."""
+        order = {name: i for i, name in enumerate(names)}
         arrays = self.layout | {"extra": (self.core.inputs, extra)}
-        every = [*self._terms, *terms]
         entries = np.array([np.size(t.index) for t in every], dtype=int)
         lengths = np.array([len(t.quantities) for t in every], dtype=int)
         parameter = np.array([order[name] for t in every for name in t.quantities], dtype=int)
@@ -158,7 +171,6 @@ class CompiledScene:
                 width = len(t.quantities)
                 weight[start + e : start + k * width : width] = own
         return {
-            "base": np.concatenate([self._base, np.zeros(extra)]) if extra else self._base,
             "target": _joined([t.places(*arrays[t.array]) for t in every]),
             "coefficient": _joined(coefficients).astype(float),
             "first_factor": first_factor,
@@ -227,6 +239,13 @@ class CompiledScene:
             part = flat[offset : offset + size]
             shaped[array] = part.reshape(-1, 3) if array in VECTORS else part
         return shaped
+
+
+def _followed_by(first: Mapping[str, np.ndarray], more: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Entries of a map behind others."""
+    joined = {name: np.concatenate([values, more[name]]) for name, values in first.items()}
+    end = first["first_factor"][-1]
+    return joined | {"first_factor": np.concatenate([first["first_factor"], end + more["first_factor"][1:]])}
 
 
 def _spread(coefficient: ArrayLike, entries: int) -> np.ndarray:

@@ -247,10 +247,9 @@ class Contacts:
                 name = list(self.colliders)[c.collider]
                 point = f"point {worst} of a body" if c.of_body else f"particle {c.particles[worst]}"
                 problem = f"starts with {point} inside '{name}', which is {-gaps[worst]:.3g} m deep"
-                fix = "let it start outside, counted from the contact's radius"
-                if not c.of_body:
-                    fix += (
-                        ", or give settle=True (settle = true in a configuration), which moves such particles to the "
-                        "surface before the motion starts"
-                    )
+                fix = (
+                    "let it start outside, counted from the contact's radius, or give settle=True (settle = true in a "
+                    f"configuration), which moves {'the body' if c.of_body else 'such particles'} to the surface "
+                    "before the motion starts"
+                )
                 raise SceneError(f"{c.name}.contact", problem, int((depth > 0).sum()), fix)

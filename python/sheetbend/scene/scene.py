@@ -320,14 +320,15 @@ class Scene(SelfTouchingScene):
         `<collider>_x`, `_y` and `_z`, m from where it was given, and its lengths, such as `<collider>_radius` m.
 
         Args:
-            what: a rope, a cloth, particles (n,), or a body.
+            what: a rope, a rod, a cloth, particles (n,), or a body.
             collider: `Plane`, `Sphere`, `Capsule`, `Box` or `DistanceField`; one object may serve several contacts.
             friction: Coulomb's coefficient (`<name>_friction`); 0 is smooth.
             radius: m, of a rope, or half the thickness of cloth (`<name>_contact_radius` unless zero).
             stiffness: N/m per particle (`<name>_contact_stiffness`). By default rigid: h^2 g/1000 deep under weight.
             restitution: 0 to 1 (`<name>_restitution`), the speed after an impact over that before; by default 0.
             name: by default that of the collider.
-            settle: move what starts inside to the surface, at the values that the scene is given with; not of bodies.
+            settle: move what starts inside to the surface, at the values that the scene is given with; a body as a
+                whole, which must be joined to nothing.
             points: of a body, (n, 3) m in its frame or the vertices of a mesh: `sb.box_corners(sides)`, or with a
                 `radius` the middle of a ball. They touch, edges and faces between them do not.
         Raises:
@@ -336,7 +337,7 @@ class Scene(SelfTouchingScene):
         """
         self._building()
         numbers = ContactNumbers(friction, radius, stiffness, restitution)
-        own = points_of(what, points, settle, name)
+        own = points_of(what, points, name)
         which, name = self.contacts.check(own or what, collider, self.particle_count, numbers, name)
         carried = self.add_hidden(np.zeros((len(which), 3)), 1.0, pinned=True)
         self.contacts.add(self, collider, which, carried, numbers, name, own)

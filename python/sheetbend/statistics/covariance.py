@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 from ..arrays.timeseries import Array
 from ..errors import InputError
 from .autoregression import levinson, spectrum_of
+from .colored import Colored, Part
 
 Integers = NDArray[np.integer[Any]]
 
@@ -191,18 +192,6 @@ def autocorrelation(residuals: Array, layout: Layout, lags: int = _MAX_ORDER) ->
     return np.asarray(sums[1:] / sums[0])
 
 
-@dataclass(frozen=True)
-class _Part:
-    """The channels of one kind in one recording: where they are among all, p columns of rows as (frames, p, channels),
-    zero where there is no row, and the mask (frames, 1, channels) of rows."""
-
-    recording: int
-    kind: int
-    channels: Integers
-    columns: Array
-    mask: Array
-
-
 def _columns(places: Integers) -> tuple[Integers, Integers]:
     """(2, k) the different columns of (2, n) in order, and (n,) which of them each is. NumPy's own `unique` of columns
     takes ten times as long."""
@@ -248,7 +237,7 @@ class _Grid:
         array[self._frame, self._channel] = column
         return array
 
-    def parts(self, columns: Array, kinds: Integers) -> list[_Part]:
+    def parts(self, columns: Array, kinds: Integers) -> list[Part]:
         """(rows, p) by recording and kind of channel."""
         owner, part_of = _columns(np.stack([self.recordings, kinds]))
         place, found = np.zeros(len(kinds), dtype=int), []
@@ -262,7 +251,7 @@ class _Grid:
             made = np.zeros((frames[recording], columns.shape[1], len(channels)))
             made[self._frame[rows], :, place[self._channel[rows]]] = columns[rows]
             mask = self.mask[: len(made), None, channels]
-            found.append(_Part(recording, kind, channels, made, mask))
+            found.append(Part(recording, kind, channels, made, mask))
         return found
 
     def scores(self, influence: Array) -> list[Array]:
@@ -317,8 +306,9 @@ def _spectral(grid: _Grid, jacobian: Array, root: Array, kinds: Integers) -> tup
     seen = np.abs(grid.transform(grid.mask)) ** 2
     pairs = [grid.lags(seen[:, mine] @ np.diag(mixing)[mine], most) for mine in own]
     spectra = observed
+    colored = Colored(parts, mixing, grid.length)
     for step in range(_CORRECTIONS + 1):
-        spread = [_colored(part, parts, spectra, grid.length, mixing) for part in parts]
+        spread = [colored(part, spectra) for part in parts]
         inner = np.zeros_like(root)
         for part, a in zip(parts, spread, strict=True):
             inner += np.tensordot(part.columns, a, ([0, 2], [0, 2]))
@@ -332,27 +322,11 @@ def _spectral(grid: _Grid, jacobian: Array, root: Array, kinds: Integers) -> tup
     return root @ (inner + inner.T) @ root.T / 2, time
 
 
-def _colored(part: _Part, parts: list[_Part], spectra: list[Array], length: int, mixing: Array) -> Array:
-    """That part of Omega times the columns; between kinds with the geometric mean of their spectra of that length."""
-    frames = len(part.columns)
-    padded = 2 << (frames - 1).bit_length()
-    total = np.zeros((padded // 2 + 1, *part.columns.shape[1:]), dtype=complex)
-    for other in parts:
-        if other.recording != part.recording:
-            continue
-        mine, its = spectra[part.kind], spectra[other.kind]
-        kernel = np.fft.irfft(mine if its is mine else np.sqrt(mine * its), length)[:frames]
-        around = np.concatenate([kernel, np.zeros(padded - 2 * frames + 1), kernel[:0:-1]])
-        mixed = other.columns @ mixing[np.ix_(other.channels, part.channels)]
-        total += np.fft.rfft(mixed, padded, axis=0) * np.fft.rfft(around).real[:, None, None]
-    return np.asarray(part.mask * np.fft.irfft(total, padded, axis=0)[:frames])
-
-
 def _expected_lags(
     grid: _Grid,
     spectra: list[Array],
     pairs: list[Array],
-    parts: list[_Part],
+    parts: list[Part],
     spread: list[Array],
     inner: Array,
 ) -> list[Array]:

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/rollout/rollout.h"
+#include "core/scalar/across.h"
 #include "tests/cpp/support/distance_grids.h"
 #include "tests/cpp/support/programs.h"
 
@@ -42,6 +43,7 @@ struct ContactBuilder {
     for (int c = 0; c < static_cast<int>(spec.colliders.size()); ++c) {
       ContactSpec contact{"contact", c, {}, {}, k == 0.0, e >= 0.0};
       for (int n = 0; n < moving; ++n) {
+        if (std::ranges::any_of(spec.directors, [&](const Director& d) { return d.node == n; })) continue;
         contact.nodes.push_back(n);
         contact.carried.push_back(particle({0.0, 0.0, 0.0}, 1.0));
         spec.pinned.push_back(contact.carried.back());
@@ -67,6 +69,25 @@ struct ContactBuilder {
     spec.bodies.push_back({center, {center + 1, center + 2, center + 3}});
     constraint("rigid", {center + 1, center + 2, center + 3}, 0.0, {});
     return center;
+  }
+  // A rod through these points; its first particle, directors after the last. Links that stretch where EA is positive.
+  int rod(const std::vector<Vec3<double>>& at, double density, double EA, double EI, double GJ,
+          const Vec3<double>& across, const Vec3<double>& v = {0.0, 0.0, 0.0}) {
+    const int links = static_cast<int>(at.size()) - 1, first = static_cast<int>(mass.size());
+    const double l = norm(at[1] - at[0]);
+    for (int k = 0; k <= links; ++k) particle(at[k], density * l * (k == 0 || k == links ? 0.5 : 1.0), v);
+    const int director = first + links + 1;
+    for (int k = 0; k < links; ++k) {
+      spec.directors.push_back(
+          {particle(Across<double>(at[k + 1] - at[k], across).m1, 1e-4 * GJ / (links * l)), first + k, first + k + 1});
+      constraint("distance", {first + k, first + k + 1}, EA > 0.0 ? l / EA : 0.0, {l});
+    }
+    for (int k = 0; k + 1 < links; ++k) {
+      const std::vector<int> joint{first + k, first + k + 1, first + k + 2, director + k, director + k + 1};
+      constraint("material_curvature", joint, l / EI, {1.0, 0.0, 0.0});
+      constraint("twist", joint, l / GJ, {0.0});
+    }
+    return first;
   }
   // Points of a body, and every collider, in the place of contact().
   void contact_of(int center, const std::vector<Vec3<double>>& points, double mu, double r, double e = -1.0) {
@@ -132,6 +153,22 @@ inline void expect_tangents_agree(const Program& p, const std::vector<double>& i
     }
     EXPECT_LE(relative_error(found, expected), bound) << d;
   }
+}
+
+// A program whose loss counts what moves alone: forces that contacts carry are as stiff as these, and would drown all else.
+inline Program moving_program(const Sample& s, const SolverOptions& options, int steps) {
+  return {s.scene, make_plan(s.scene, options), steps, 0.0, 3 * s.scene.contacts[0].carried[0]};
+}
+
+// How often a point touches in a program, over all its substeps.
+inline int times_touching(const Program& p, const std::vector<double>& inputs) {
+  Rollout<double> rollout(p.scene, p.plan, inputs.data());
+  int touching = 0;
+  for (int n = 0; n < p.steps; ++n) {
+    rollout.advance();
+    for (const ContactMode mode : rollout.contact_modes()) touching += mode != ContactMode::apart;
+  }
+  return touching;
 }
 
 // d x_dof/d inputs at the last step of a program.

@@ -2,6 +2,7 @@
 // scalars.
 #pragma once
 
+#include <limits>
 #include <numeric>
 
 #include "adjoint/rollout.h"
@@ -14,6 +15,7 @@ struct Program {
   Plan plan;
   int steps;
   double t0 = 0.0;
+  int counted = std::numeric_limits<int>::max();  // dofs from there on are not in the loss
 };
 
 // Weight of x[dof]^2 at a step in the loss sum_step sum_dof weight x^2.
@@ -51,7 +53,8 @@ T loss(const Program& p, const std::vector<T>& inputs) {
   const std::vector<T> all = states(p, inputs);
   T sum(0.0);
   for (int step = 0, at = 0; step <= p.steps; ++step)
-    for (int i = 0; i < p.scene.dofs(); ++i, ++at) sum += T(weight(step, i)) * all[at] * all[at];
+    for (int i = 0; i < p.scene.dofs(); ++i, ++at)
+      if (i < p.counted) sum += T(weight(step, i)) * all[at] * all[at];
   return sum;
 }
 
@@ -60,7 +63,8 @@ template <class T>
 std::vector<T> gradient(const Program& p, const std::vector<T>& inputs, Recorded<T>& recorded) {
   std::vector<T> x_bar, inputs_bar(inputs.size());
   for (int step = 0, at = 0; step <= p.steps; ++step)
-    for (int i = 0; i < p.scene.dofs(); ++i, ++at) x_bar.push_back(T(2.0 * weight(step, i)) * recorded.states[at]);
+    for (int i = 0; i < p.scene.dofs(); ++i, ++at)
+      x_bar.push_back(i < p.counted ? T(2.0 * weight(step, i)) * recorded.states[at] : T(0.0));
   reverse_rollout<T>(p.scene, p.plan, inputs.data(), p.t0, recorded.tape, every_step(p), x_bar.data(),
                      inputs_bar.data(), nullptr);
   return inputs_bar;

@@ -21,7 +21,7 @@ struct SceneShape {
   bool net = false;
   bool unilateral = false;  // also those kinds, which direct blocks do not hold
   bool volumes = false;     // which leave no chain, and implicit blocks do not hold
-  bool directors = true;    // kinds that have them, which implicit blocks do not hold
+  bool directors = true;    // kinds that have them; in implicit blocks these random frames would turn too far at once
 };
 
 namespace detail {

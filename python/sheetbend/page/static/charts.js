@@ -13,7 +13,7 @@ function curves(id, motion, series, height) {
     height,
     legend: { show: false },
     cursor: { y: false },
-    scales: { x: { time: false }, y: { range: (u, low, high) => (low < high ? uPlot.rangeNum(low, high, 0.1, true) : [low - 1e-3, low + 1e-3]) } },
+    scales: { x: { time: false }, y: { range: (u, low, high) => (low < high ? uPlot.rangeNum(low, high, 0.1, true) : [low - 1e-2, low + 1e-2]) } },
     axes: [{ ...axis(), size: 28 }, axis()],
     series: [{}, ...series.map((s) => ({ label: s.label, stroke: color(s.tone), width: s.width || 1.6, dash: s.dashed ? [4, 4] : undefined, spanGaps: false }))],
     hooks: { drawClear: [(u) => shadeHeldOut(u, motion)], draw: [(u) => frameLine(u, motion)] },

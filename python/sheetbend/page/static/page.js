@@ -40,7 +40,8 @@ const page = {
     this.frame = 0;
     const { motion } = this, scrub = this.element("scrub");
     scrub.max = motion.frames - 1;
-    this.element("play").disabled = motion.frames < 2;
+    this.element("controls").hidden = motion.frames < 2; // a shape at rest has nothing to play
+    this.element("motion").querySelector("h2").textContent = motion.frames < 2 ? "Shape at rest" : "Motion";
     this.space.show(motion);
     this.switches();
     const drawn = motion.frames < motion.recorded ? `${motion.frames} of ${motion.recorded} frames are drawn. ` : "";

@@ -1,0 +1,95 @@
+"""Workers for the command line: processes of this machine, or those of a Dask scheduler."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from contextlib import ExitStack, contextmanager
+
+from ..errors import ConfigError
+from ..optional import require
+
+RETRIES = 3  # of a task that failed, such as by memory
+TIMEOUT = 30.0  # s, to reach a scheduler, or until it has written its file
+
+
+@contextmanager
+def workers(count: int, address: str | None) -> Iterator[Executor | None]:
+    """Those of a scheduler where an address is given, else `count` processes of this machine.
+
+    Raises:
+        ConfigError: both are given, or the scheduler cannot be reached.
+        MissingExtraError: Dask is not installed.
+    """
+    if address is None:
+        with processes(count) as executor:
+            yield executor
+        return
+    if count > 1:
+        raise ConfigError("--workers", "does not go with --dask, whose scheduler has workers", count, "leave one out")
+    with dask(address) as executor:
+        yield executor
+
+
+@contextmanager
+def dask(address: str) -> Iterator[Executor]:
+    """The workers of a Dask scheduler, which gives the work of a lost one to another.
+
+    Args:
+        address: of the scheduler, such as tcp://10.0.0.1:8786, or the file (.json) that it writes.
+
+    Raises:
+        ConfigError: there is no scheduler at the address.
+        MissingExtraError: Dask is not installed.
+    """
+    distributed = require("distributed", "cluster")
+    file = address if address.endswith(".json") else None
+    until = time.monotonic() + TIMEOUT
+    while file is not None and not os.path.exists(file):  # Dask waits for it without an end
+        if time.monotonic() > until:
+            fix = "start the scheduler: dask scheduler --scheduler-file FILE"
+            raise ConfigError("--dask", "names no file of a scheduler", address, fix)
+        time.sleep(0.05)
+    try:
+        client = distributed.Client(None if file else address, scheduler_file=file, timeout=TIMEOUT)
+    except (OSError, ValueError) as error:
+        fix = "start one with `dask scheduler`, and give the address that it prints, such as tcp://10.0.0.1:8786"
+        raise ConfigError("--dask", f"reaches no scheduler ({error})", address, fix) from error
+    with client:
+        # Not pure: whether a worker still has what tasks share decides what it answers.
+        yield client.get_executor(retries=RETRIES, pure=False)
+
+
+@contextmanager
+def processes(count: int) -> Iterator[Executor | None]:
+    """That many processes of this machine, each with one thread of linear algebra; None for one or none."""
+    if count < 2:
+        yield None
+        return
+    import multiprocessing  # here, since importing sheetbend is to stay light
+    from concurrent.futures import ProcessPoolExecutor
+
+    with ExitStack() as undone:
+        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+            undone.callback(_set, name, os.environ.get(name))
+            os.environ[name] = "1"
+        pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _ignore_interrupts)
+        try:
+            yield pool
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _set(name: str, value: str | None) -> None:
+    if value is None:
+        os.environ.pop(name, None)
+    else:
+        os.environ[name] = value
+
+
+def _ignore_interrupts() -> None:
+    """Ctrl-C reaches all processes; this one's client decides what comes of it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
