@@ -13,7 +13,7 @@ struct SelfContact {
   std::vector<int> points;  // that may touch triangles
   std::vector<int> radius;  // per node: place in Quantity::contact_radius, -1 where it touches nothing
   // With friction: its place in Quantity::friction, and pinned nodes of the scene, two for each pair that may touch at a time. One's coordinates say which
-  // pair (coded() below), the other's are the tangential force that it carries [N].
+  // pair, and what it does (coded() below), the other's are the tangential force that it carries [N].
   int friction = -1;
   std::vector<std::array<int, 2>> carried = {};
 
@@ -28,13 +28,15 @@ struct PairKey {
   auto operator<=>(const PairKey&) const = default;
 };
 
-// A key as three coordinates; zeros are none.
-inline std::array<double, 3> coded(const PairKey& key) {
-  return {key.triangle ? 2.0 : 1.0, static_cast<double>(key.first), static_cast<double>(key.second)};
+// A key, and whether the pair slides, as three coordinates; zeros are none.
+inline std::array<double, 3> coded(const PairKey& key, bool slides) {
+  return {(key.triangle ? 2.0 : 1.0) + (slides ? 2.0 : 0.0), static_cast<double>(key.first),
+          static_cast<double>(key.second)};
 }
-inline bool is_coded(double kind) { return kind == 1.0 || kind == 2.0; }
+inline bool is_coded(double kind) { return kind >= 1.0; }
+inline bool slides_of(double kind) { return kind > 2.0; }
 inline PairKey decoded(double kind, double first, double second) {
-  return {kind == 2.0, static_cast<int>(first), static_cast<int>(second)};
+  return {kind == 2.0 || kind == 4.0, static_cast<int>(first), static_cast<int>(second)};
 }
 
 // The four nodes: two of each edge, or the point and the corners.

@@ -8,7 +8,8 @@
 
 namespace sheetbend {
 
-// Of one contact. A particle that touches in the first substep has not begun to; one that bounces begins and ends.
+// Of one contact. A particle that touches in the first substep has not begun to; one that bounces begins and ends. Of what touches itself with friction the
+// same of pairs.
 struct ContactCounts {
   int most = 0;                    // particles that touched at once
   int began = 0, ended = 0;        // how often one did
@@ -45,14 +46,41 @@ class CountContacts {
       count.most = std::max(count.most, touching);
     }
     before_ = modes;
+    look_at_pairs(rollout.x());
   }
 
   const std::vector<ContactCounts>& counts() const { return counts_; }
+  const ContactCounts& pairs() const { return pairs_; }
 
  private:
+  // They are in the state, in the order of keys.
+  void look_at_pairs(const double* x) {
+    std::vector<PairKey> now;
+    for (const auto& [key, force] : scene_.self_contact.carried) {
+      const double* code = x + scene_.first_dof[key];
+      if (!is_coded(code[0])) break;
+      now.push_back(decoded(code[0], code[1], code[2]));
+      pairs_.sliding += slides_of(code[0]);
+    }
+    pairs_.touching += static_cast<long>(now.size());
+    pairs_.most = std::max(pairs_.most, static_cast<int>(now.size()));
+    const auto new_of = [](const std::vector<PairKey>& all, const std::vector<PairKey>& old) {
+      return std::ranges::count_if(all, [&](const PairKey& k) { return !std::ranges::binary_search(old, k); });
+    };
+    if (looked_) {
+      pairs_.began += static_cast<int>(new_of(now, touched_));
+      pairs_.ended += static_cast<int>(new_of(touched_, now));
+    }
+    looked_ = true;
+    touched_ = std::move(now);
+  }
+
   const Scene& scene_;
   std::vector<ContactCounts> counts_;
   std::vector<ContactMode> before_;
+  ContactCounts pairs_;
+  std::vector<PairKey> touched_;
+  bool looked_ = false;
 };
 
 }  // namespace sheetbend

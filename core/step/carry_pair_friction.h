@@ -60,7 +60,7 @@ struct CarryPairFriction {
               if (count == places.size()) refuse(block, pair, count);
               S force[12];
               const auto met = meet(pair.key.triangle, part, x, numbers, &rub, force);
-              const auto code = coded(pair.key);
+              const auto code = coded(pair.key, met.slides);
               source.write(Vec3<S>(S(code[0]), S(code[1]), S(code[2])), &list[6 * count]);
               source.write(S(1.0 / (step.bdf.eta * step.bdf.eta)) * met.tangential, &list[6 * count + 3]);
               ++count;

@@ -88,9 +88,12 @@ py::dict simulate(const Solver& s, const Array& inputs, const Steps& steps, doub
   out["multipliers"] = multipliers;
   out["first_order"] = first_order;
   py::list counts;
-  for (const ContactCounts& c : contacts.counts())
+  const auto counted = [&](const ContactCounts& c) {
     counts.append(py::dict("most"_a = c.most, "began"_a = c.began, "ended"_a = c.ended, "touching"_a = c.touching,
                            "sliding"_a = c.sliding));
+  };
+  for (const ContactCounts& c : contacts.counts()) counted(c);
+  if (s.scene->self_contact.rubs()) counted(contacts.pairs());
   out["contacts"] = counts;
   out["contact_modes"] = modes;
   return out;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <random>
 
+#include "adjoint/solver/block_pairs_vjp.h"
 #include "core/contact/box_grid.h"
 #include "core/contact/find_pairs.h"
 #include "core/contact/meeting.h"
@@ -79,6 +80,9 @@ TEST(Pairs, TouchInTheMiddleOfParallelSegments) {
   EXPECT_NEAR(place(), 0.75, 1e-4);
 }
 
+template <class T>
+constexpr const Rub<T>* smooth = nullptr;
+
 TEST(Pairs, PushAlongTheGradientOfTheirPotentialAndKeepMomentum) {
   int pushed = 0;
   for (int trial = 0; trial < 400; ++trial) {
@@ -88,10 +92,10 @@ TEST(Pairs, PushAlongTheGradientOfTheirPotentialAndKeepMomentum) {
     const PairNumbers<double> numbers{0.6, 3.0};
     const Part part = nearest_part(triangle, x.data(), softness_of(numbers));
     double force[12], E[144];
-    const double depth = meet(triangle, part, x.data(), numbers, force);
+    const double depth = meet(triangle, part, x.data(), numbers, smooth<double>, force).depth;
     if (!(depth > 0.0)) continue;
     ++pushed;
-    meeting_matrix(triangle, part, x.data(), numbers, E);
+    meeting_matrix(triangle, part, x.data(), numbers, smooth<double>, E);
     double scale = 0.0;
     for (const double f : force) scale = std::max(scale, std::abs(f));
     for (int i = 0; i < 12; ++i) {
@@ -100,7 +104,7 @@ TEST(Pairs, PushAlongTheGradientOfTheirPotentialAndKeepMomentum) {
       moved[i].im = 1e-30;
       // The potential of the same part: the derivative leaves out that of the weights.
       const PairNumbers<Complex> n{Complex(numbers.touching), Complex(numbers.kappa)};
-      const Complex deep = meet<Complex>(triangle, part, moved, n, own);
+      const Complex deep = meet(triangle, part, moved, n, smooth<Complex>, own).depth;
       EXPECT_NEAR(-(numbers.kappa * depth * deep.im / 1e-30), force[i], 1e-10 * scale) << trial;
       for (int k = 0; k < 12; ++k) {
         EXPECT_NEAR(E[12 * k + i], -own[k].im / 1e-30, 1e-9 * (1.0 + std::abs(E[12 * k + i])));
@@ -117,6 +121,84 @@ TEST(Pairs, PushAlongTheGradientOfTheirPotentialAndKeepMomentum) {
     EXPECT_LE(norm(moment), 1e-12 * scale);
   }
   EXPECT_GT(pushed, 100);
+}
+
+// All that a pair with friction reads: coordinates (12), D, kappa, the coefficient, what is carried (3) and where slip is counted from (12).
+template <class T>
+Meeting<T> rubbed(bool triangle, Part part, const std::vector<T>& a, T* force) {
+  Rub<T> rub{a[14], Vec3<T>(&a[15]), {}};
+  std::copy_n(&a[18], 12, rub.from);
+  return meet(triangle, part, a.data(), {a[12], a[13]}, &rub, force);
+}
+
+// Its matrix and its reverse are those of complex steps, whether it sticks or slides. It keeps momentum, and turns the pair by its couple alone.
+TEST(Pairs, RubAgainstEachOther) {
+  int slid = 0, stuck = 0;
+  for (int trial = 0; trial < 400; ++trial) {
+    const bool triangle = trial % 2;
+    Coordinates x = somewhere();
+    for (double& a : x) a *= 0.5;
+    std::vector<double> a(x.begin(), x.end());
+    a.insert(a.end(), {0.6, 3.0, 0.4, 0.02, -0.03, 0.01});
+    const Coordinates aside = somewhere();
+    for (int d = 0; d < 12; ++d) a.push_back(x[d] + 0.05 * aside[d]);
+    const PairNumbers<double> numbers{a[12], a[13]};
+    const Part part = nearest_part(triangle, x.data(), softness_of(numbers));
+    double force[12], plain[12], E[144];
+    const auto met = rubbed(triangle, part, a, force);
+    if (!(met.depth > 0.0)) continue;
+    (met.slides ? slid : stuck) += 1;
+    Rub<double> rub{a[14], Vec3<double>(&a[15]), {}}, rub_bar;
+    std::copy_n(&a[18], 12, rub.from);
+    meeting_matrix(triangle, part, x.data(), numbers, &rub, E);
+    meet(triangle, part, x.data(), numbers, smooth<double>, plain);
+
+    const Coordinates along = somewhere();
+    const Vec3<double> tangential_bar(0.7, -0.4, 1.1);
+    double x_bar[12], same[12];
+    const auto numbers_bar =
+        rub_vjp(triangle, part, x.data(), numbers, rub, along.data(), tangential_bar, x_bar, same, rub_bar);
+    std::vector<double> bar(x_bar, x_bar + 12);
+    bar.insert(bar.end(), {numbers_bar.touching, numbers_bar.kappa, rub_bar.friction, rub_bar.carried.x,
+                           rub_bar.carried.y, rub_bar.carried.z});
+    bar.insert(bar.end(), rub_bar.from, rub_bar.from + 12);
+    double scale = 0.0;
+    for (const double b : bar) scale = std::max(scale, std::abs(b));
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      std::vector<Complex> moved(a.begin(), a.end());
+      moved[i].im = 1e-30;
+      Complex own[12];
+      const auto found = rubbed(triangle, part, moved, own);
+      double sum =
+          dot(tangential_bar, Vec3<double>(found.tangential.x.im, found.tangential.y.im, found.tangential.z.im));
+      for (int d = 0; d < 12; ++d) sum += along[d] * own[d].im;
+      EXPECT_NEAR(bar[i], sum / 1e-30, 1e-10 * scale) << trial << ", " << i;
+      for (int k = 0; k < 12 && i < 12; ++k)
+        EXPECT_NEAR(E[12 * k + i], -own[k].im / 1e-30, 1e-9 * (1.0 + std::abs(E[12 * k + i])));
+    }
+
+    const Nearest<double> n = nearest_points(triangle, x.data(), softness_of(numbers), part);
+    Vec3<double> sum(0.0, 0.0, 0.0), moment = sum - cross(n.apart, met.tangential);
+    double largest = 0.0;
+    for (int k = 0; k < 4; ++k) {
+      const Vec3<double> f(force + 3 * k), at(&x[3 * k]);
+      sum = sum + f;
+      moment = moment + cross(at, f);
+      largest = std::max(largest, norm(f));
+    }
+    EXPECT_LE(norm(sum), 1e-13 * largest);
+    EXPECT_LE(norm(moment), 1e-12 * largest);
+    EXPECT_LE(std::abs(dot(met.tangential, n.apart)), 1e-12 * largest);
+    Vec3<double> pushed(plain);  // the first side
+    if (!triangle) pushed = pushed + Vec3<double>(plain + 3);
+    const double push = norm(pushed);
+    EXPECT_LE(norm(met.tangential), (1.0 + 1e-12) * a[14] * push);
+    if (met.slides) {
+      EXPECT_GE(norm(met.tangential), (1.0 - 1e-12) * a[14] * push);
+    }
+  }
+  EXPECT_GT(slid, 30);
+  EXPECT_GT(stuck, 30);
 }
 
 TEST(Pairs, AreFoundByAGridAsByLookingAtAll) {

@@ -10,6 +10,7 @@ import sheetbend as sb
 from sheetbend.config import parse, scene_alone
 from sheetbend.mesh import grid
 
+G = 9.81
 SOLVER = sb.Solver(h=1e-3, method="implicit", integrator="bdf1")
 
 
@@ -72,6 +73,41 @@ def test_momentum_is_kept(friction: float):
     one = scene.ropes["a"].particles  # which the other one has pushed
     moved = inputs["mass"][one] @ (np.diff(motion.positions, axis=0)[-1, one] / h)
     assert moved[1] < -1e-3
+    assert set(motion.contacts) == ({"self"} if friction else set())
+    for pairs in motion.contacts.values():
+        assert 0 < pairs.most < 2 * len(scene.contacts.pieces) * 6
+        assert pairs.began >= pairs.most and pairs.ended > 0
+        assert pairs.sliding_share + pairs.sticking_share == pytest.approx(1.0, abs=1e-12)
+
+
+def on_a_slope(friction: float) -> sb.Scene:
+    """A rope lies across one that is held, on a slope of 30 degrees."""
+    scene = sb.Scene("slope", gravity=(0.5 * G, 0, -np.sqrt(0.75) * G))
+    held = sb.add_rope(scene, "held", start=(-0.2, 0, 0), length=0.6, segments=2, density=0.05, EA=5000.0, EI=1e-4)
+    scene.pin(held.particles)
+    numbers = {"length": 0.1, "segments": 2, "density": 0.05, "EA": 200.0, "EI": 1e-4}
+    sb.add_rope(scene, "sliding", start=(0, -0.05, 0.01), direction=(0, 1, 0), **numbers)  # type: ignore[arg-type]
+    scene.self_contact(radius=0.005, friction=friction, pairs=4)
+    return scene
+
+
+def test_a_rope_that_slides_on_another_tells_their_friction():
+    true, model = on_a_slope(0.3), on_a_slope(0.2)
+    one = true.ropes["sliding"].particles
+    times = np.linspace(0.0, 0.2, 21)
+    x = sb.simulate(true, times, SOLVER).positions[:, one]
+    path = 0.5 * G * times * (times + SOLVER.h)  # BDF1 has t (t + h) in the place of t^2
+    assert x[:, 1, 0] == pytest.approx((0.5 - 0.3 * np.sqrt(0.75)) * path, abs=1e-4 * path[-1])
+    seen = x + 1e-4 * np.random.default_rng(0).standard_normal(x.shape)
+    recording = sb.Recording(positions=seen, times=times, name="slope")
+    places = [sb.on_particle(int(p)) for p in one]
+    fit = sb.fit(model, recording, ["self_friction"], markers=places, solver=SOLVER, sigma=1e-4)
+    (friction,) = fit.result.estimates
+    assert friction.verdict == "identified"
+    assert friction.lower < 0.3 < friction.upper < friction.lower + 0.01
+    (pairs,) = fit.result.contacts
+    assert (pairs.contact, pairs.particles, pairs.began) == ("self", 4, 0)
+    assert pairs.sliding > 0.9
 
 
 def knotted() -> sb.Scene:
@@ -132,7 +168,9 @@ def test_the_gradient_is_that_of_differences(friction: float):
     scene.self_contact(radius=[0.005, 0.004], friction=friction)
     report = sb.check_gradients(scene, np.linspace(0, 0.05, 3), SOLVER, samples=2)
     assert report.passed, report
-    assert {"self_contact_radius_0", "self_contact_radius_1"} <= set(scene.quantities)
+    names = {"self_contact_radius_0", "self_contact_radius_1"} | ({"self_friction"} if friction else set())
+    assert names <= set(scene.quantities)
+    assert names <= {row.name for row in report.rows}
 
 
 def test_what_cannot_be_is_refused(tmp_path: Path):

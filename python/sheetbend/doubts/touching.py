@@ -30,13 +30,13 @@ def what_touches(problem: FitProblem, u: Array) -> tuple[ContactFit, ...]:
     for e, run in zip(problem.experiments, _runs(problem, u), strict=True):
         if run is None:
             continue
-        for c in e.scene.contacts.contacts:
-            counts, start = run.contacts[c.name], e.scene.compiled.settled.get(c.name)
+        for name, size in e.scene.contacts.counted().items():
+            counts, start = run.contacts[name], e.scene.compiled.settled.get(name)
             rows.append(
                 ContactFit(
                     recording=e.name,
-                    contact=c.name,
-                    particles=len(c.particles),
+                    contact=name,
+                    particles=size,
                     most=counts.most,
                     began=counts.began,
                     ended=counts.ended,
@@ -95,7 +95,7 @@ def _runs(problem: FitProblem, u: Array) -> list[Trajectory | None]:
     found: list[Trajectory | None] = []
     for e, recording in zip(problem.experiments, problem.recordings, strict=True):
         found.append(None)
-        if e.static or not e.scene.compiled.contacts:
+        if e.static or not e.scene.contacts.counted():
             continue
         solver, values = replace(e.solver, extrapolate=1), problem.values_of(e, u)
         times = np.maximum(e.scene_times(recording.times, values), 0.0)

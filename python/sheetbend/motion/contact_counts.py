@@ -21,6 +21,8 @@ class ContactMode(IntEnum):
 class ContactCounts:
     """What the particles of one contact did, over all substeps of a simulation.
 
+    Of self-contact with friction it counts pairs in the place of particles.
+
     Attributes:
         most: how many of them touched at once, at most.
         began: how often one began to touch. Those that touch in the first substep have not begun to; bounces count.

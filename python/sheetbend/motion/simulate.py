@@ -104,9 +104,7 @@ def simulate(
         velocities[:, particles],
         forces_by_group(scene, out["multipliers"]),
         pressures_by_volume(scene, out["multipliers"]),
-        contact_counts(
-            [c.name for c in scene.contacts.contacts], out["contacts"], out["first_order"] / max(steps[-1], 1)
-        ),
+        contact_counts(list(scene.contacts.counted()), out["contacts"], out["first_order"] / max(steps[-1], 1)),
         contact_modes({c.name: len(c.particles) for c in scene.contacts.contacts}, out["contact_modes"]),
         scene,
         nodes,

@@ -31,6 +31,7 @@ def _contacts(result: FitData) -> Section:
     headers = ("recording", "contact", "most at once", "began", "ended", "sliding", "sticking", "bdf1")
     notes = (
         ("sliding, sticking", "shares of all touches, over all substeps"),
+        ("self-contact", "counted in pairs where it has friction, out of those that there is room for"),
         ("bdf1", "share of the substeps of backward Euler, which damps vibrations"),
         ("losses", NO_LOSSES),
         *(

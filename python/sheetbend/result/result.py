@@ -186,7 +186,7 @@ class ContactFit:
 
     Attributes:
         recording, contact: names.
-        particles: that may touch.
+        particles: that may touch; of ropes and cloths that touch themselves with friction, pairs, here and below.
         most: that touch at once.
         began, ended: how often one begins and ends to touch.
         sliding, sticking: shares of all touches, particle by particle and substep by substep.

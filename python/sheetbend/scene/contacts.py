@@ -106,6 +106,11 @@ class Contacts:
         self.pieces: list[Piece] = []  # what may touch itself
         self.pair_friction: PairFriction | None = None  # of these
 
+    def counted(self) -> dict[str, int]:
+        """By name, of each contact how many particles may touch, and of pairs with friction how many of them."""
+        sizes = {c.name: len(c.particles) for c in self.contacts}
+        return sizes if self.pair_friction is None else {**sizes, self.pair_friction.name: self.pair_friction.room}
+
     def _place(self, scene: Builder, collider: Collider) -> int:
         """The place of a collider, which is added unless it is there."""
         for place, known in enumerate(self.colliders.values()):

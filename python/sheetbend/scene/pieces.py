@@ -37,13 +37,21 @@ class PairFriction:
     """Friction between pieces.
 
     Attributes:
+        name: under which its pairs are counted.
         quantity: Coulomb's coefficient.
         carried: (2 n,) hidden, pinned nodes, two for each pair that may touch at a time: the coordinates of the first
-            say which pair, those of the second are the tangential force that is carried from substep to substep [N].
+            say which pair and whether it slides, those of the second are the tangential force that is carried from
+            substep to substep [N].
     """
 
+    name: str
     quantity: str
     carried: Array
+
+    @property
+    def room(self) -> int:
+        """How many pairs may touch at a time."""
+        return len(self.carried) // 2
 
 
 def piece_terms(pieces: Sequence[Piece], friction: PairFriction | None, first: int) -> list[Term]:

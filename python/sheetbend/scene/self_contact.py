@@ -71,7 +71,7 @@ class SelfTouchingScene(HeldScene):
             count = int(pairs or 2 * (sum(len(p.edges) for p in found) + cloths))
             quantity = self.add_quantity(f"{name}_friction", friction, "")
             carried = self.add_hidden(np.zeros((2 * count, 3)), 1.0, pinned=True)
-            self.contacts.pair_friction = PairFriction(quantity, carried)
+            self.contacts.pair_friction = PairFriction(name, quantity, carried)
 
     def _piece(self, piece: Any, radius: float, quantity: str) -> Piece:
         if any(piece is cloth for cloth in self.cloths.values()):
