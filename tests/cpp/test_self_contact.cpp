@@ -76,11 +76,13 @@ TEST_P(Touching, BeginsAndEnds) {
       if (const double kind = rollout.x()[3 * code]; is_coded(kind)) (slides_of(kind) ? slid : stuck) += 1;
     before = now;
   }
-  const bool rubs = GetParam().friction > 0.0;
-  EXPECT_GT(began, rubs ? 2 : 5);
-  EXPECT_GT(ended, rubs ? 1 : 4);
-  EXPECT_GE(points, s.scene.self_contact.triangles.empty() ? 0 : 5);
-  EXPECT_LE(static_cast<double>(matrices) / p.steps, rubs ? 14.0 : 8.0);
+  const bool rubs = GetParam().friction > 0.0, cloth = !s.scene.self_contact.triangles.empty();
+  EXPECT_GT(began, rubs && !cloth ? 4 : 5);  // ropes that rub stay on each other for longer
+  EXPECT_GT(ended, 4);
+  EXPECT_GT(slid, rubs ? 20 : -1);
+  EXPECT_GT(stuck, rubs ? (cloth ? 5 : 0) : -1);
+  EXPECT_GE(points, cloth ? 5 : 0);
+  EXPECT_LE(static_cast<double>(matrices) / p.steps, rubs && cloth ? 12.0 : 8.0);
 }
 
 TEST_P(Touching, HasTheGradientOfComplexSteps) {
@@ -88,20 +90,24 @@ TEST_P(Touching, HasTheGradientOfComplexSteps) {
   expect_some_entries_agree(s.scene.layout, of, s.inputs, gradient(p, s.inputs), 1e-8);
 }
 
-// Complex steps go through the same matrix, so differences tell.
+// Complex steps go through the same matrix, so differences tell. The error of these falls with the step until the rounding of balances shows, about 2e-14 of
+// a loss of 3e-5; between their ends no pair begins, ends, sticks or slides in another substep.
 TEST_P(Touching, HasTheGradientOfDifferences) {
   const auto found = gradient(p, s.inputs);
-  for (const std::size_t i :
-       {s.scene.layout.of(Quantity::contact_radius), s.scene.layout.of(Quantity::contact_radius) + 1,
-        s.scene.layout.of(Quantity::mass) + 4, s.scene.layout.of(Quantity::velocity) + 14}) {
+  const Layout& layout = s.scene.layout;
+  std::vector<std::size_t> inputs{layout.of(Quantity::contact_radius), layout.of(Quantity::contact_radius) + 1,
+                                  layout.of(Quantity::mass) + 4, layout.of(Quantity::velocity) + 14};
+  if (GetParam().friction > 0.0) inputs.push_back(layout.of(Quantity::friction));
+  for (const std::size_t i : inputs) {
     double ends[2];
-    const double away = 1e-6 * std::max(1e-2, std::abs(s.inputs[i]));  // less is within the rounding of balances
+    const bool speed = i >= layout.of(Quantity::velocity) && i < layout.of(Quantity::velocity) + s.scene.dofs();
+    const double away = 1e-5 * (speed ? 1.0 : s.inputs[i]);
     for (const int side : {0, 1}) {
       std::vector<double> moved = s.inputs;
       moved[i] += side ? away : -away;
       ends[side] = loss(p, moved);
     }
-    EXPECT_NEAR(found[i], (ends[1] - ends[0]) / (2.0 * away), 2e-4 * std::abs(found[i])) << i;
+    EXPECT_NEAR(found[i], (ends[1] - ends[0]) / (2.0 * away), 1e-4 * std::abs(found[i])) << i;
   }
 }
 
@@ -115,21 +121,23 @@ TEST_P(Touching, HasTheTangentsOfComplexSteps) {
 }
 
 TEST_P(Touching, HasTheSameBitsWhateverKeepsItsStates) {
-  expect_bits_of_any_tape(p, s.inputs);
+  Program half = p;  // in which most pairs begin that do at all
+  half.steps /= 2;
+  expect_bits_of_any_tape(half, s.inputs);
   const Layout& layout = s.scene.layout;
   InputsOfLanes inputs(Pack::lanes, s.inputs);
   inputs[3][layout.of(Quantity::gravity) + 2] = -9.5;
   inputs[3][layout.of(Quantity::velocity) + 14] = -0.7;
-  for (const int kept : {every_state, Schedule::least(p.steps, Tape<double>::window(p.plan)) + 2})
-    expect_bits_of_lanes(p, inputs, {3, 5}, kept);
+  for (const int kept : {every_state, Schedule::least(half.steps, Tape<double>::window(half.plan)) + 2})
+    expect_bits_of_lanes(half, inputs, {3, 5}, kept);
 }
 
 INSTANTIATE_TEST_SUITE_P(
     SelfContact, Touching,
     ::testing::Values(Case{falling_ropes, Integrator::bdf1, 60}, Case{falling_ropes, Integrator::bdf2, 60},
                       Case{falling_sheet, Integrator::bdf1, 40}, Case{falling_sheet, Integrator::bdf2, 40},
-                      Case{falling_ropes, Integrator::bdf1, 60, 0.3}, Case{falling_ropes, Integrator::bdf2, 60, 0.3},
-                      Case{falling_sheet, Integrator::bdf1, 40, 0.4}, Case{falling_sheet, Integrator::bdf2, 40, 0.4}));
+                      Case{falling_ropes, Integrator::bdf1, 60, 0.2}, Case{falling_ropes, Integrator::bdf2, 60, 0.2},
+                      Case{falling_sheet, Integrator::bdf1, 40, 0.3}, Case{falling_sheet, Integrator::bdf2, 40, 0.3}));
 
 // A short rope lies across one that is held, on a slope of 30 degrees (tan: 0.57735).
 Sample on_a_slope(double mu) {
@@ -207,18 +215,22 @@ std::vector<Carried> carried(const Sample& s, const double* x, double h) {
   return all;
 }
 
-// Two ropes meet in flight. Forces act on middle lines, so that friction turns both by its couple, and nothing else does.
+// Two ropes in flight draw each other tight where they cross. Forces act on middle lines, so that friction turns both by its couple, and nothing else does.
 TEST(SelfContact, KeepsMomentumAndTheConeAndTurnsByItsCouples) {
   TouchingBuilder b;
   b.rope(line({-0.06, 0.004, 0.0}, {0.03, 0.0, 0.002}, 5), 0.003, {0.0, 0.0, 0.0}, 0.005);
-  b.rope(line({0.007, -0.05, 0.0135}, {0.004, 0.03, 0.0}, 5), 0.002, {0.5, 0.1, -1.5}, 0.005);
+  b.rope(line({0.007, -0.05, 0.0103}, {0.004, 0.03, 0.0}, 5), 0.002, {0.5, 0.1, -0.5}, 0.005);
   const int particles = static_cast<int>(b.mass.size());
+  for (const int end : {0, 4, 5, 9}) {
+    b.velocity[3 * end + 2] = end < 5 ? 1.0 : -1.0;
+    b.mass[end] *= 20.0;
+  }
   b.rub(0.3, 4);
   const Sample s = b.build(0.0);
   const double h = 1e-3;
   const Plan plan = make_plan(s.scene, contact_options(h));
   Rollout<double> rollout(s.scene, plan, s.inputs.data());
-  const double speed = 1.6, momentum = 0.01 * speed;
+  const double momentum = 0.2;  // of its parts
   const double* v = rollout.state().v;
   std::vector<double> before(v, v + 3 * particles);
   const auto total = [&](const double* v) {
@@ -241,7 +253,7 @@ TEST(SelfContact, KeepsMomentumAndTheConeAndTurnsByItsCouples) {
     for (const Carried& c : carried(s, rollout.x(), h)) {
       couple = couple + h * cross(c.apart, c.force);
       EXPECT_LE(norm(c.force), (1.0 + 1e-9) * c.limit) << n;
-      EXPECT_LE(std::abs(dot(c.force, c.apart)), 1e-12 * norm(c.force) * norm(c.apart)) << n;
+      EXPECT_LE(std::abs(dot(c.force, c.apart)), 1e-10 * norm(c.force) * norm(c.apart)) << n;
       if (c.slides) {
         EXPECT_GE(norm(c.force), (1.0 - 1e-9) * c.limit) << n;
       }

@@ -81,11 +81,11 @@ def test_momentum_is_kept(friction: float):
 
 
 def on_a_slope(friction: float) -> sb.Scene:
-    """A rope lies across one that is held, on a slope of 30 degrees."""
+    """A rope lies across a stiff one that is held at its ends, on a slope of 30 degrees."""
     scene = sb.Scene("slope", gravity=(0.5 * G, 0, -np.sqrt(0.75) * G))
-    held = sb.add_rope(scene, "held", start=(-0.2, 0, 0), length=0.6, segments=2, density=0.05, EA=5000.0, EI=1e-4)
-    scene.pin(held.particles)
-    numbers = {"length": 0.1, "segments": 2, "density": 0.05, "EA": 200.0, "EI": 1e-4}
+    held = sb.add_rope(scene, "held", start=(-0.2, 0, 0), length=0.6, segments=2, density=0.05, EA=5000.0, EI=100.0)
+    scene.pin(held.particles[[0, -1]])
+    numbers = {"length": 0.1, "segments": 2, "density": 0.05, "EA": 200.0, "EI": 0.1}
     sb.add_rope(scene, "sliding", start=(0, -0.05, 0.01), direction=(0, 1, 0), **numbers)  # type: ignore[arg-type]
     scene.self_contact(radius=0.005, friction=friction, pairs=4)
     return scene
@@ -95,9 +95,10 @@ def test_a_rope_that_slides_on_another_tells_their_friction():
     true, model = on_a_slope(0.3), on_a_slope(0.2)
     one = true.ropes["sliding"].particles
     times = np.linspace(0.0, 0.2, 21)
-    x = sb.simulate(true, times, SOLVER).positions[:, one]
-    path = 0.5 * G * times * (times + SOLVER.h)  # BDF1 has t (t + h) in the place of t^2
-    assert x[:, 1, 0] == pytest.approx((0.5 - 0.3 * np.sqrt(0.75)) * path, abs=1e-4 * path[-1])
+    world = sb.Solver(h=2e-4, method="implicit", integrator="bdf1", extrapolate=2)
+    x = sb.simulate(true, times, world).positions[:, one]
+    path = 0.5 * G * times**2
+    assert x[:, 1, 0] == pytest.approx((0.5 - 0.3 * np.sqrt(0.75)) * path, abs=2e-3 * path[-1])
     seen = x + 1e-4 * np.random.default_rng(0).standard_normal(x.shape)
     recording = sb.Recording(positions=seen, times=times, name="slope")
     places = [sb.on_particle(int(p)) for p in one]
@@ -106,7 +107,7 @@ def test_a_rope_that_slides_on_another_tells_their_friction():
     assert friction.verdict == "identified"
     assert friction.lower < 0.3 < friction.upper < friction.lower + 0.01
     (pairs,) = fit.result.contacts
-    assert (pairs.contact, pairs.particles, pairs.began) == ("self", 4, 0)
+    assert (pairs.contact, pairs.particles) == ("self", 4) and 0 < pairs.most <= 2
     assert pairs.sliding > 0.9
 
 
@@ -162,15 +163,19 @@ def test_a_cloth_folded_once_lies_on_itself():
     assert motion.positions[-1][:, 2].max() < 0.05
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.3])
-def test_the_gradient_is_that_of_differences(friction: float):
+def test_the_gradient_is_that_of_differences():
     scene = crossed(height=0.0105)
-    scene.self_contact(radius=[0.005, 0.004], friction=friction)
+    scene.self_contact(radius=[0.005, 0.004])
     report = sb.check_gradients(scene, np.linspace(0, 0.05, 3), SOLVER, samples=2)
     assert report.passed, report
-    names = {"self_contact_radius_0", "self_contact_radius_1"} | ({"self_friction"} if friction else set())
-    assert names <= set(scene.quantities)
-    assert names <= {row.name for row in report.rows}
+    assert {"self_contact_radius_0", "self_contact_radius_1"} <= set(scene.quantities)
+
+
+def test_the_gradient_with_friction_is_that_of_differences():
+    report = sb.check_gradients(on_a_slope(0.3), [0.0, 0.01, 0.02], SOLVER, samples=2)
+    assert report.passed, report
+    rows = {row.name: row for row in report.rows}
+    assert not rows["self_friction"].unfelt and rows["self_friction"].gradient > 0.0
 
 
 def test_what_cannot_be_is_refused(tmp_path: Path):
