@@ -1,5 +1,5 @@
-// The reverse of CarryPairFriction: the cotangents of the forces that pairs carry on go through the law to the state that the substep has found, to those before
-// and to the inputs.
+// The reverse of CarryPairFriction: the cotangents of the forces that pairs carry on go through the law to the state that the substep has found, to those
+// before and to the inputs.
 #pragma once
 
 #include "adjoint/solver/block_pairs_vjp.h"
