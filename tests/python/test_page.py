@@ -18,6 +18,7 @@ import pytest
 import sheetbend as sb
 from sheetbend.cli.app import app
 from sheetbend.mesh import grid
+from sheetbend.objects.arm import add_pendulum
 from sheetbend.page import Shown, fit_page, motion_page, of_recording, of_trajectory
 from sheetbend.page.packed import MISSING, packed_motions
 from sheetbend.report.fit_result import FitResult
@@ -98,6 +99,7 @@ class TestFitPage:
         assert motion["scale"] < 1e-5 * np.ptp(exact[:, :, 2][np.isfinite(exact[:, :, 2])]) * 10
         # the rope passes through the simulated markers, which are its own nodes
         rope = places_of(motion, motion["lines"][0]["places"])
+        assert motion["lines"][0]["kind"] == "rope"
         away = np.linalg.norm(rope[:, None] - c.simulated[:, :, None], axis=-1).min(axis=-1)
         assert away.max() < 3 * motion["scale"]
         assert motion["heldOut"] == c.held_out.astype(int).tolist()
@@ -117,6 +119,12 @@ class TestFitPage:
         assert "<script>alert(1)" not in page
         shown = replace(of_recording(sb.Recording(np.zeros((2, 1, 3)), [0, 1]), evil), markers=(evil,))
         assert "<script>alert(1)" not in motion_page([shown], evil, evil, evil)
+
+    def test_its_headline_warns_of_how_the_fit_ended_and_not_of_doubtful_values(self, fitted: sb.Fit) -> None:
+        doubtful = tuple(replace(one, verdict="doubtful") for one in fitted.result.estimates)
+        ended = replace(fitted.result, estimates=doubtful, converged=True, interrupted=False)
+        for result, tone in ((ended, "mixed"), (replace(ended, converged=False), "bad")):
+            assert f'<header class="{tone}">' in fit_page(replace(fitted, result=result), "ended")
 
     def test_400_parameters_fit_into_it(self, fitted: sb.Fit) -> None:
         one = fitted.result.estimates[0]
@@ -143,6 +151,13 @@ class TestFitPage:
 
 
 class TestMotionPage:
+    def test_the_arm_of_a_pendulum_is_no_rope(self) -> None:
+        scene = sb.Scene()
+        add_pendulum(scene, length=0.2, angle=1.0)
+        shown = of_trajectory(scene, sb.simulate(scene, [0.0, 0.01], sb.Solver(h=1 / 200)))
+        (motion,) = data_of(motion_page([shown], "pendulum"))["motions"]
+        assert [line["kind"] for line in motion["lines"]] == ["link"]
+
     def test_a_cloth_has_its_strain(self) -> None:
         scene = sb.Scene()
         mesh = grid(0.2, 0.2, 4, 4)

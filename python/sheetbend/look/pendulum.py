@@ -135,20 +135,23 @@ def _states(x: Array, times: Array, joints: list[int]) -> tuple[Array, Array]:
 
 
 def _pieces(s: Seen, take: Take, arms: int) -> list[tuple[dict[str, Any], float]]:
-    """Recordings cut from one: the first part is fitted, in pieces; the rest is predicted from its first moments."""
+    """Recordings cut from one. Of one arm the first part is fitted, in pieces, and the rest is predicted from its first
+    moments. Of two arms, fitted and predicted pieces take turns: friction is seen only where the swing has become
+    small, and wide swings magnify what the model lacks."""
     t = s.recording.times
     start, stop = float(t[0]), float(t[-1])
     longest, most = PIECES[arms]
-    length = min(longest, (stop - start) / (FITTED + 2))
+    length = min(longest, (stop - start) / (FITTED + PREDICTED if arms == 2 else FITTED + 2))
+    rest = start if arms == 2 else start + FITTED * length
+    each = (stop - rest) / PREDICTED
+    ahead = each / 2 if arms == 2 else 0.0  # of each predicted piece: a fitted one begins there
     found: list[tuple[dict[str, Any], float]] = []
     for k in range(FITTED):
-        a = start + k * length
+        a = start + k * (each if arms == 2 else length)
         found.append(({"file": take.file, "name": f"fitted_{k}", "fit": [a, a + length]}, a))
-    rest = start + FITTED * length
-    each = (stop - rest) / PREDICTED
     for k in range(PREDICTED):
-        a = round(rest + k * each, 4)
-        held = [a + LEAD + 1e-3, min(a + min(each, most), stop)]
+        a = round(rest + k * each + ahead, 4)
+        held = [a + LEAD + 1e-3, min(a + min(each - ahead, most), stop)]
         entries = {"file": take.file, "name": f"predicted_{k}", "predict": "window", "fit": [a, a + LEAD]}
         found.append((entries | {"held_out": held}, a))
     return found

@@ -127,7 +127,8 @@ def _markers_alone(c: Comparison) -> Shown:
 
 
 def _tone(result: FitResult) -> str:
-    if not result.converged or result.interrupted or not result.sound:
+    """Of the headline, which tells how the fit ended; doubts about values have their own colors."""
+    if not result.converged or result.interrupted:
         return "bad"
     return "good" if all(e.verdict == "identified" for e in result.estimates) else "mixed"
 

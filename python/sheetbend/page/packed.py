@@ -62,7 +62,10 @@ def _packed(motion: Shown, most: int) -> dict[str, Any]:
         "baseline": places(motion.baseline),
         "residual": _residual(motion, frames),
         "heldOut": [] if motion.held_out is None else motion.held_out[frames].astype(int).tolist(),
-        "lines": [{"name": name, "nodes": x.shape[1], "places": places(x)} for name, x in motion.lines.items()],
+        "lines": [
+            {"name": name, "kind": motion.line_kind, "nodes": x.shape[1], "places": places(x)}
+            for name, x in motion.lines.items()
+        ],
         "ticks": [
             {"name": name, "nodes": 2 * x.shape[1], "places": places(x.reshape(len(x), -1, 3))}
             for name, x in motion.ticks.items()

@@ -39,7 +39,8 @@ class Shown:
     Attributes:
         name: of the recording or the scene.
         times: (frames,) s.
-        lines: ropes by name, (frames, nodes, 3) m.
+        lines: ropes by name, (frames, nodes, 3) m; of a scene without ropes, its links.
+        line_kind: what the legend calls them.
         ticks: short lines by name, (frames, lines, 2, 3) m: "twist" of rods, from an edge's middle along its director,
             and the outlines of colliders.
         sheets: cloths and surfaces of solids by name.
@@ -52,6 +53,7 @@ class Shown:
     name: str
     times: Array
     lines: Mapping[str, Array] = field(default_factory=dict)
+    line_kind: str = "rope"
     ticks: Mapping[str, Array] = field(default_factory=dict)
     sheets: Mapping[str, Sheet] = field(default_factory=dict)
     markers: tuple[str, ...] = ()
@@ -119,8 +121,10 @@ def _shown(name: str, scene: Scene, times: Array, positions: Array, recorded: Ma
     boxes = body_lines(scene, positions)
     if not lines and not sheets and not boxes:  # a scene of bare particles and constraints: its links
         lines = _links(scene, positions)
+    kind = "rope" if scene.ropes else "link"
     ticks = _ticks(scene, positions) | collider_lines(scene, times, positions) | boxes
-    return Shown(name, times, lines, ticks, sheets, up=_unit(-scene.gravity), **recorded)  # type: ignore[arg-type]
+    up = _unit(-scene.gravity)
+    return Shown(name, times, lines, kind, ticks, sheets, up=up, **recorded)  # type: ignore[arg-type]
 
 
 def _sheet(mesh: TriangleMesh, positions: Array) -> Sheet:

@@ -93,7 +93,7 @@ class Space {
       }
       mesh.instanceMatrix.needsUpdate = true;
     };
-    return { name: "rope", tone: "accent", object: mesh, at };
+    return { name: part.kind, tone: "accent", object: mesh, at };
   }
 
   segments(count, tone) {
