@@ -165,6 +165,20 @@ def test_a_shape_at_rest(tmp_path: Path) -> None:
     assert draft["scene"]["rope"][0]["length"] == 1.5  # the file tells it
 
 
+@pytest.mark.parametrize(("wire", "together"), [("red_0", 1.077e-3), ("black_1", 0.891e-3)])
+def test_one_hanging_does_not_tell_a_stiffness_from_the_shape_without_load(
+    tmp_path: Path, wire: str, together: float
+) -> None:
+    """EI was "identified" at 1.55e-3 [1.32e-3, 1.85e-3] and 0.75e-3 [0.63e-3, 0.89e-3] N m^2, where the three hangings
+    of each wire (experiments/wires) say what is told here."""
+    said, text = drafted(tmp_path, sb.Recording.load(ROOT / f"experiments/wires/data/{wire}.npz"), bare=False)
+    assert any("without load" in words for words in said["unknown"])
+    draft = config.build(config.parse(tmp_path / "draft.toml"), tmp_path)
+    EI = sb.fit(draft.experiments, parameters=draft.parameters, profiles=False, refine=False)["rope_EI"]
+    assert EI.verdict in ("weak", "doubtful") and EI.lower is not None and EI.upper is not None
+    assert EI.lower < together < EI.upper and "rope_set_4" in text
+
+
 def test_units_and_the_axis_that_points_up(tmp_path: Path) -> None:
     """Millimeters, y up, and nothing that says so."""
     take = takes.rope_in_hand("one", seconds=1.0)

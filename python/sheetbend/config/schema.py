@@ -189,7 +189,8 @@ class ParameterSection(Section):
 
 class GivenSection(Section):
     """How uncertain a number is that the fit takes as given. One table each: [given.NAME], NAME being a quantity that
-    is not fitted, "gravity" or "clamp_direction" (directions, rad), "clamps" or "markers" (places, m)."""
+    is not fitted, "gravity", "clamp_direction" or "collider_direction" (directions, rad), "clamps" or "markers"
+    (places, m)."""
 
     sd: Finite = key(
         ...,

@@ -62,8 +62,8 @@ def premises(problem: FitProblem, u: Array, given: Mapping[str, float], told: Se
     Args:
         u: (free,) the minimum in internal coordinates.
         given: standard deviations by name: of quantities that must be positive relative to the value, of others in
-            their unit; "gravity" (each of two directions) and "clamp_direction" in rad, "clamps" (each axis) and
-            "markers" (each marker) in m.
+            their unit; "gravity" (each of two directions), "clamp_direction" and "collider_direction" (each
+            axis) in rad, "clamps" (each axis) and "markers" (each marker) in m.
         told: `told_numbers` there.
     """
     errors: dict[str, _Errors] = {}

@@ -35,6 +35,7 @@ GROUPS: Mapping[str, tuple[str, tuple[float, str]]] = {
     "gravity": ("rad", STEPS["rad"]),
     "clamps": ("m", STEPS["m"]),
     "clamp_direction": ("rad", STEPS["rad"]),
+    "collider_direction": ("rad", STEPS["rad"]),
     "markers": ("m", (MILLIMETER, "1 mm each")),
 }
 """Told numbers that are no quantities, by the name under which a standard deviation is given: unit and step."""
@@ -121,7 +122,8 @@ def _collect(
     made += [(1.0, Told(i, "", SIZE, "m/s^2", (0.01, "1 %"), _NONE, relative=True)) for _ in size]
     turns = _turns(e)
     made += [
-        (1.0, Told(i, "", label, "rad", STEPS["rad"], _NONE, missing=_turned(label), signed=True)) for label in turns
+        (1.0, Told(i, "collider_direction", at, "rad", STEPS["rad"], _NONE, missing=_turned(at), signed=True))
+        for at in turns
     ]
     by_gravity: dict[int, Array] = {}
     if made:

@@ -159,8 +159,9 @@ def fit(
             its unit.
         given: standard deviations of numbers that the fit takes as given, by name; they then count in the intervals. Of
             quantities that must be positive it is relative (`{"rope_density": 0.02}` is 2 %), of others in their unit;
-            "gravity" (its direction) and "clamp_direction" are in rad, "clamps" and "markers" (their places) in m. What
-            each of these numbers moves is in `FitResult.premises` in any case.
+            "gravity" (its direction), "clamp_direction" and "collider_direction" (of each about each axis) are in rad,
+            "clamps" and "markers" (their places) in m. What each of these numbers moves is in `FitResult.premises` in
+            any case.
         leave_one_out: also predict every recording that holds nothing out by a fit to the others.
         profiles: follow the cost to the ends of every interval, all other parameters fitted again; of more than 60
             parameters only for weak ones. Without, intervals are the linear ones, which cost nothing beside the fit.

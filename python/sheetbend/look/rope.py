@@ -26,6 +26,14 @@ BRANCHED = 1.1  # times the shortest tree: how much longer the line through all 
 FITTED, LONGEST = 2 / 3, 3.0  # share of the time that is fitted, and s at most; the next third is predicted
 CLAMP_SD = 0.2  # rad, of the direction of a clamp, read off the first markers
 LENGTH_SD = 0.01  # relative, of a length that is a sum of distances between markers
+SET_MODES, SET_SD = (1, 2, 3, 4), 10.0  # of the rest curvature of shapes at rest; 1/m, that of mode k over k^1.5
+HOLDER_SD = 0.5  # rad, of a clamp of a shape at rest, read off the markers of the same shape
+
+UNLOADED = (
+    "the shape that the rope has without load. Shapes at rest under its weight hardly tell it from the stiffness, "
+    "which is fitted beside four modes of a rest curvature. If the rope is straight without load, remove `set_modes` "
+    "and [parameters.rope_set_...]"
+)
 
 
 def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
@@ -51,8 +59,8 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     notes = [f"a rope through {joined(names[k] for k in order)}; {arc[-1]:.4g} m of it are free"]
     if s.static:
         notes = [f"a rope through {joined(names[k] for k in order)}, {arc[-1]:.4g} m from the first to the last"]
-    unknown = [said_length, said_density, *found.unknown]
     flat = plane(r.positions[:, list(order)], length) if s.static else None
+    unknown = [said_length, said_density, *found.unknown, *([] if flat is None else [UNLOADED])]
     # beside a hand that holds its direction a rope bends within a few hundredths of its length
     least = 2 * SEGMENTS if any(len(grip["markers"]) > 1 for grip in found.grips) else SEGMENTS
     segments = int(min(max(least, 2 * (len(order) - 1)), 100))
@@ -61,7 +69,7 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     why = {"EI": "a guess to start from"} | ({} if measured_length else {"length": "not known well: see above"})
     why["density"] = "kg/m" if measured.density is not None else "kg/m, not known: see above"
     if s.static:
-        rope |= {} if flat is None else {"clamp_angles": True, "plane": flat, "set_modes": [1]}
+        rope |= {} if flat is None else {"clamp_angles": True, "plane": flat, "set_modes": list(SET_MODES)}
     else:
         rope |= {"bend_damping": 0.01, "drag_linear": 0.1 * density}
         notes += _beginning(s, found, rope)
@@ -241,9 +249,9 @@ def _parameters(static: bool, density: float, length: float, angles: bool) -> di
         found["rope_bend_damping"] = {"lower": 1e-5, "upper": 1.0}
         found["rope_drag_linear"] = {"lower": 1e-4 * density, "upper": 10.0 * density}
     if angles:
-        found["rope_set_1"] = {"prior": [0.0, 10.0]}
+        found |= {f"rope_set_{k}": {"prior": [0.0, round(SET_SD / k**1.5, 4)]} for k in SET_MODES}
         for end in ("start", "end"):
-            found[f"rope_{end}_angle"] = {"private": True, "lower": -0.785, "upper": 0.785, "prior": [0.0, 0.1745]}
+            found[f"rope_{end}_angle"] = {"private": True, "lower": -0.785, "upper": 0.785, "prior": [0.0, HOLDER_SD]}
     return found
 
 
