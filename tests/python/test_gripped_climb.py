@@ -278,6 +278,9 @@ class TestConclusion:
         assert any(text.startswith("the fit that counts, to 13 windows") for text in said)
         few, every = (int(text.split()[2]) for text in said if text.startswith(("ended after", "not ended after")))
         assert every <= few
+        first = next(text for text in said if not text.startswith("doubtful"))  # before work starts
+        assert first.startswith("the last fit will see 13 windows of ") and "from all 13 recordings: about " in first
+        assert float(first.split("about ")[1].split(" s ")[0]) > 0.0
 
     def test_ctrl_c_in_the_last_fit_costs_no_result(self, monkeypatch: pytest.MonkeyPatch) -> None:
         def stopped(*_: object) -> dict[str, float]:
