@@ -236,6 +236,16 @@ class TestClimb:
         told = climb._first(SHIFTS, rope)
         assert told is not None and told.ratio < 0.3 and told.fitted < 0.3 and told.stays
 
+    def test_the_only_recording_that_judges_can_be_left_out(self) -> None:
+        """It once stayed, and every rung was judged by the one recording that does not belong."""
+        said: list[str] = []
+        motions = [replace(MOTION, recording=replace(MOTION.recording, name=f"{k}")) for k in range(4)]
+        climb = Climb(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, said.append)
+        assert climb.split.judged == (motions[0],)
+        assert climb._leave_out(np.array([1.0, 1.1, 0.9, np.inf]))
+        assert said == ["0 is left out of the fit: its prediction diverges"]
+        assert climb.split.fitted == tuple(motions[1:3]) and climb.split.judged == (motions[3],)
+
     def test_where_everything_diverges_it_says_so(self) -> None:
         with pytest.raises(sb.SheetbendError, match="no start of a straight rope"):
             self.climbed([shaken(f"{k}") for k in range(3)])
@@ -278,6 +288,9 @@ class TestConclusion:
         assert any(text.startswith("the fit that counts, to 13 windows") for text in said)
         few, every = (int(text.split()[2]) for text in said if text.startswith(("ended after", "not ended after")))
         assert every <= few
+        first = next(text for text in said if not text.startswith("doubtful"))  # before work starts
+        assert first.startswith("the last fit will see 13 windows of ") and "from all 13 recordings: about " in first
+        assert float(first.split("about ")[1].split(" s ")[0]) > 0.0
 
     def test_ctrl_c_in_the_last_fit_costs_no_result(self, monkeypatch: pytest.MonkeyPatch) -> None:
         def stopped(*_: object) -> dict[str, float]:

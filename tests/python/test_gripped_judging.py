@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from sheetbend.gripped import GrippedMotion
@@ -55,6 +57,10 @@ class TestVerdict:
         told = verdict(errors([INF] * 4, INF), errors([INF] * 4, INF))
         assert not told.stays and told.count == 0
 
+    def test_a_piece_in_which_nothing_is_seen_has_no_voice(self) -> None:
+        told = verdict(errors([0.9, 0.9, 0.9, np.nan]), errors([1.0, 1.0, 1.0, np.nan]))
+        assert told.stays and (told.better, told.count) == (3, 3)
+
 
 class TestMisfits:
     def test_what_diverges_or_is_far_off_does_not_belong(self) -> None:
@@ -84,6 +90,26 @@ class TestSplit:
         split = Split.of(self.motions(8), 0.25)
         smaller = split.without({0, 7})
         assert smaller.fitted == split.fitted[1:] and smaller.judged == split.judged[:1] and smaller.pieces == 4
+
+    def test_a_fitted_recording_judges_where_the_only_judge_is_left_out(self) -> None:
+        """Of three to five recordings one judges, the first; it may be the one that is spoiled."""
+        split = Split.of(self.motions(4), 0.25)
+        smaller = split.without({3})
+        assert smaller.fitted == split.fitted[:-1] and smaller.judged == split.fitted[-1:]
+        assert smaller.since == (2,) and smaller.pieces == 4
+        assert not smaller.without({1, 2}).judged  # one recording is fitted, and nothing is left to judge
+
+    def test_a_piece_without_free_markers_is_not_judged(self) -> None:
+        """Gripped markers are predicted by themselves: their error there is zero under every model."""
+        (motion,) = self.motions(1)
+        x = motion.recording.positions.copy()
+        x[-10:, list(motion.free)] = np.nan
+        motion = replace(motion, recording=replace(motion.recording, positions=x))
+        values = {"rope_length": motion.length}
+        found = errors_of(model_of(motion), values, Split.of([motion], 0.25))
+        assert np.isnan(found.judged).tolist() == [[False, False, False, True]]
+        assert np.isfinite(found.whole).all() and np.isfinite(found.typical).all()
+        assert verdict(found, found).ratio == 1.0
 
     def test_errors_are_those_of_the_pieces(self) -> None:
         motions = self.motions(4)

@@ -15,17 +15,19 @@ from ..errors import SheetbendError
 from ..experiment.experiment import Experiment
 from ..fitting.fit import Fit, fit
 from ..minimum.discretization import Refinement
+from ..minimum.problem import FitProblem
 from ..quantities.parameters import Parameter
 from ..quantities.wording import short
 from .bounds import bounded
-from .climb import Climb, Rope
+from .climb import FINE, Climb, Rope
 from .descent import bearable, descend, negligible
-from .ladder import TWIST
-from .model import NAME
+from .ladder import TWIST, Rung
+from .model import NAME, RopeModel
 from .motion import GrippedMotion
 from .offsets import offset_reach
 from .over_density import as_quantities
 from .pieces import experiments_of, problem_of, starting
+from .start import whole
 from .windows import Span, counted, places
 
 MOST = 30  # iterations, at most
@@ -144,9 +146,31 @@ def _together(offsets: Mapping[str, float], spread: Mapping[str, float]) -> dict
     return {name: float(np.hypot(reach, spread.get(name, 0.0))) for name, reach in offsets.items()}
 
 
-def _seconds(rope: Rope, motions: Sequence[GrippedMotion], window: Span, threads: int) -> float:
-    one = problem_of(
-        experiments_of(rope.model, motions[:1], (window[0], window[0]), rope.values), rope.parameters, rope.values
+def announced(
+    model: RopeModel, ladder: Sequence[Rung], motions: Sequence[GrippedMotion], window: Span, threads: int
+) -> str:
+    """A sentence on what the fit that counts will see and about how long it takes, before any fit.
+
+    The time is measured with one window of a rope with everything on the ladder and `FINE` links. A rope that keeps
+    less takes less, one with twice the links about twice as long.
+
+    Args:
+        model: with starting values.
+    """
+    e, parameters = whole(replace(model, segments=FINE), ladder, motions[0], window[0])
+    seconds = _of_windows(FitProblem([e], parameters), len(places(motions, window)), threads)
+    return (
+        f"the last fit will see {counted(motions, window)}: about {short(seconds, 1)} s with {FINE} links and "
+        "everything that is tried, beside what comes before it"
     )
+
+
+def _seconds(rope: Rope, motions: Sequence[GrippedMotion], window: Span, threads: int) -> float:
+    one = experiments_of(rope.model, motions[:1], (window[0], window[0]), rope.values)
+    return _of_windows(problem_of(one, rope.parameters, rope.values), len(places(motions, window)), threads)
+
+
+def _of_windows(one: FitProblem, count: int, threads: int) -> float:
+    """Time, s, of the last fit and its intervals, from one derivative of a problem with one window."""
     one.evaluate(one.parameters.initial())
-    return EVALUATIONS * one.seconds.get(True, 0.0) * len(places(motions, window)) / threads
+    return EVALUATIONS * one.seconds.get(True, 0.0) * count / threads

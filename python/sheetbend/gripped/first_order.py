@@ -67,12 +67,12 @@ def first_order(
 
 
 def _errors(problem: FitProblem, r: Array, since: Sequence[int], pieces: int) -> Array:
-    """(experiments, pieces) mean absolute residuals, from a frame of each on."""
+    """(experiments, pieces) mean absolute residuals, from a frame of each on; NaN where no marker is seen."""
     layout, size = problem.rows_layout(), np.abs(r[: problem.core.data_rows])
     found = []
     for i, first in enumerate(since):
         mine = (layout.recording == i) & (layout.frame >= first)
-        at = layout.frame[mine]
-        parts = np.array_split(np.arange(first, int(at.max()) + 1), pieces)
-        found.append([float(size[mine][np.isin(at, part)].mean()) for part in parts])
+        at, off = layout.frame[mine], size[mine]
+        parts = [np.isin(at, part) for part in np.array_split(np.arange(first, int(at.max(initial=first)) + 1), pieces)]
+        found.append([float(off[part].mean()) if part.any() else np.nan for part in parts])
     return np.array(found)

@@ -70,17 +70,19 @@ class Split:
         return (*self.fitted, *self.judged)
 
     def without(self, numbers: Collection[int]) -> Split:
-        """The same without some of `motions`."""
+        """The same without some of `motions`. If none is left to judge, the last of several fitted ones judges."""
         count = len(self.fitted)
         fitted = tuple(m for k, m in enumerate(self.fitted) if k not in numbers)
         kept = [k for k in range(len(self.judged)) if count + k not in numbers]
         judged, since = tuple(self.judged[k] for k in kept), tuple(self.since[k] for k in kept)
+        if self.judged and not judged and len(fitted) > 1:
+            fitted, judged, since = fitted[:-1], fitted[-1:], (GIVEN,)
         return Split(fitted, judged, since, -(-PIECES // max(len(judged), 1)))
 
 
 @dataclass(frozen=True)
 class Errors:
-    """Mean absolute coordinate errors of predictions, m, infinite where one diverges.
+    """Mean absolute coordinate errors of predictions, m, infinite where one diverges, NaN where no free marker is seen.
 
     Attributes:
         fitted: (motions,) of what was fitted.
@@ -98,12 +100,14 @@ class Errors:
     @property
     def whole(self) -> Array:
         """(motions,) of `Split.motions`."""
-        return self.fitted if self.judged is self.fitted else np.concatenate([self.fitted, self.judged.mean(axis=1)])
+        if self.judged is self.fitted:
+            return self.fitted
+        return np.concatenate([self.fitted, [float(np.mean(row[~np.isnan(row)])) for row in self.judged]])
 
     @property
     def typical(self) -> tuple[float, float]:
         """Medians of both."""
-        return float(np.median(self.fitted)), float(np.median(self.judged))
+        return float(np.median(self.fitted)), float(np.nanmedian(self.judged))
 
 
 @dataclass(frozen=True)
@@ -167,7 +171,8 @@ def _error(motion: GrippedMotion, predicted: Array, first: int, pieces: int, rea
     if not (off[seen] <= reach).all():  # false where it is not a number
         return np.full(pieces, np.inf)
     parts = np.array_split(np.arange(first, len(off)), pieces)
-    return np.array([float(np.mean(off[part][seen[part]])) for part in parts])
+    tells = np.asarray(seen[:, list(motion.free)].any(axis=1))  # the gripped markers are driven: they are predicted by themselves
+    return np.array([float(np.mean(off[part][seen[part]])) if tells[part].any() else np.nan for part in parts])
 
 
 def misfits(errors: Array) -> dict[int, str]:

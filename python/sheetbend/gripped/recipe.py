@@ -24,7 +24,7 @@ from ..objects.chain import unit_vector
 from ..recording.recording import Recording
 from .bounds import at_bounds
 from .climb import Climb, Say, Step
-from .conclusion import conclude
+from .conclusion import announced, conclude
 from .judging import predict
 from .ladder import LADDER, Rung
 from .model import GRAVITY, NAME, RopeModel, nominal_directions, shared_gravity
@@ -32,6 +32,7 @@ from .motion import Array, GrippedMotion, motions_of
 from .over_density import UNIT, as_quantities, named_over_density, over_density, said_over_density
 from .plausible import doubts, gravities
 from .screening import screened
+from .start import started
 from .windows import SPANS, Span, everything
 
 BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first
@@ -114,7 +115,7 @@ def fit_rope(
         bending_lengths: m, of the starts.
         windows: (length, total) in s: each fit sees windows of this length, of about this total, the last one those of
             the last entry (half as many decide on rungs). "all" = the default ones, but the last fit sees every window
-            of all recordings.
+            of all recordings; its expected time is said before work starts.
         segments, max_segments: links at the start, and at most; they are doubled until EI moves by less than 5 %. Of
             two numbers from 24 on that agree so the smaller one is taken.
         substeps: per frame.
@@ -172,6 +173,9 @@ def fit_rope(
         gravity=meant[0],
     )
     spans: Sequence[Span] = SPANS if isinstance(windows, str) else windows
+    if isinstance(windows, str):
+        begun = started(model, motions, bending_lengths[0])
+        say(announced(begun, ladder, motions, everything(motions, spans[-1][0]), threads))
     climb, interrupted = Climb(motions, validate, spans, threads, say), False
     try:
         climb.run([replace(model, gravity=g) for g in meant], ladder, bending_lengths, max_segments)
