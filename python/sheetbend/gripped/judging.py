@@ -171,7 +171,7 @@ def _error(motion: GrippedMotion, predicted: Array, first: int, pieces: int, rea
     if not (off[seen] <= reach).all():  # false where it is not a number
         return np.full(pieces, np.inf)
     parts = np.array_split(np.arange(first, len(off)), pieces)
-    tells = np.asarray(seen[:, list(motion.free)].any(axis=1))  # the gripped markers are driven: they are predicted by themselves
+    tells = np.asarray(seen[:, list(motion.free)].any(axis=1))  # gripped markers are driven by themselves
     return np.array([float(np.mean(off[part][seen[part]])) if tells[part].any() else np.nan for part in parts])
 
 
