@@ -8,6 +8,7 @@ import importlib
 import importlib.abc
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -21,6 +22,7 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from commands import last_line, run
+from sheetbend import cli
 from sheetbend.minimum import optimizers
 from sheetbend.minimum.journal import Journal
 from sheetbend.minimum.optimizers import Progress, has_ceres
@@ -264,6 +266,22 @@ class TestFolder:
         monkeypatch.setattr(Journal, "_keep", counted)
         assert run("fit", config, "--resume").exit_code == 0
         assert not evaluated and results() == whole  # all of the work was read
+
+    def test_a_folder_that_is_removed_meanwhile_is_made_again(
+        self, config: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """All of the fit was lost: "cannot be written: No such file or directory"."""
+        fit = cli.fit.run_fit
+
+        def removing(*arguments: Any, **options: Any) -> sb.Fit:
+            shutil.rmtree(OUT)
+            return fit(*arguments, **options)
+
+        monkeypatch.setattr(cli.fit, "run_fit", removing)
+        result = run("fit", config)
+        assert result.exit_code == 0, result.output
+        assert f"{OUT} was removed while the fit ran, and is made again" in result.output
+        assert {p.name for p in OUT.iterdir()} == WRITTEN
 
 
 class Broken(importlib.abc.MetaPathFinder):

@@ -29,7 +29,7 @@ from ..report.parameter_table import TABLE, parameter_table
 from ..report.report import plain, rich_report
 from .ensemble import fit_all
 from .figures import figure_files, figures_form, write_figures
-from .folders import alone, made
+from .folders import alone, made, made_again
 from .gripped import fit_ropes, load_ropes, rope_files
 from .journals import NAME, journal_in, made_from
 from .movies import OPTION, MoviePath, check_before, write_movies
@@ -167,6 +167,8 @@ def _fit_study(console: Console, study: Study, source: Path, folder: Path, movie
         found = run_fit(study.experiments, parameters=study.parameters, progress=progress, **study.options)
     found = replace(found, result=replace(found.result, assumed=study.assumptions))
     show(console, lambda: rich_report(found.result), lambda: plain(found.result))
+    if removed := made_again(folder):
+        console.print(f"\n{removed}", markup=False, soft_wrap=True)
     files = _write(found, study, source, form, page, folder)
     console.print(f"\nwritten to {folder}: {', '.join(files)}", soft_wrap=True)
     if movie is not None:

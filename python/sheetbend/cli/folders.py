@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ..errors import ConfigError
+from ..files.whole import UnwrittenError
 
 ROOM = 4_000_000  # bytes that must be there before work starts: what a fit writes besides figures and movies
 LOCK = ".running"
@@ -31,6 +32,21 @@ def made(option: str, folder: Path) -> Path:
     except OSError as error:
         fix = f"give a folder that you may write to, with room for {ROOM // 1_000_000} MB"
         raise ConfigError(option, f"cannot be written to: {error.strerror}", str(folder), fix) from error
+
+
+def made_again(folder: Path) -> str | None:
+    """Make the folder of a finished fit again if it was removed while the fit ran, and say so; None if it is there.
+
+    Raises:
+        UnwrittenError: it cannot be made.
+    """
+    if folder.is_dir():
+        return None
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UnwrittenError(folder, error) from error
+    return f"{folder} was removed while the fit ran, and is made again"
 
 
 @contextmanager
