@@ -141,17 +141,22 @@ def _pieces(s: Seen, take: Take, arms: int) -> list[tuple[dict[str, Any], float]
     t = s.recording.times
     start, stop = float(t[0]), float(t[-1])
     longest, most = PIECES[arms]
-    length = min(longest, (stop - start) / (FITTED + PREDICTED if arms == 2 else FITTED + 2))
-    rest = start if arms == 2 else start + FITTED * length
-    each = (stop - rest) / PREDICTED
-    ahead = each / 2 if arms == 2 else 0.0  # of each predicted piece: a fitted one begins there
+    if arms == 2:
+        turn = (stop - start) / FITTED
+        length, room = min(longest, turn / 2), turn / 2
+        fitted = [start + k * turn for k in range(FITTED)]
+        predicted = [a + turn / 2 for a in fitted]
+    else:
+        length = min(longest, (stop - start) / (FITTED + 2))
+        fitted = [start + k * length for k in range(FITTED)]
+        rest = start + FITTED * length
+        room = (stop - rest) / PREDICTED
+        predicted = [rest + k * room for k in range(PREDICTED)]
     found: list[tuple[dict[str, Any], float]] = []
-    for k in range(FITTED):
-        a = start + k * (each if arms == 2 else length)
+    for k, a in enumerate(fitted):
         found.append(({"file": take.file, "name": f"fitted_{k}", "fit": [a, a + length]}, a))
-    for k in range(PREDICTED):
-        a = round(rest + k * each + ahead, 4)
-        held = [a + LEAD + 1e-3, min(a + min(each - ahead, most), stop)]
+    for k, a in enumerate(round(a, 4) for a in predicted):
+        held = [a + LEAD + 1e-3, min(a + min(room, most), stop)]
         entries = {"file": take.file, "name": f"predicted_{k}", "predict": "window", "fit": [a, a + LEAD]}
         found.append((entries | {"held_out": held}, a))
     return found
