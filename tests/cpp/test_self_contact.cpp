@@ -132,11 +132,12 @@ TEST_P(Touching, HasTheSameBitsWhateverKeepsItsStates) {
     expect_bits_of_lanes(half, inputs, {3, 5}, kept);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    SelfContact, Touching,
-    ::testing::Values(Case{falling_ropes, Integrator::bdf2, 60}, Case{falling_sheet, Integrator::bdf1, 40},
-                      Case{falling_ropes, Integrator::bdf1, 60, 0.2}, Case{falling_ropes, Integrator::bdf2, 60, 0.2},
-                      Case{falling_sheet, Integrator::bdf2, 40, 0.3}));
+INSTANTIATE_TEST_SUITE_P(SelfContact, Touching,
+                         ::testing::Values(Case{falling_ropes, Integrator::bdf2, 60},
+                                           Case{falling_sheet, Integrator::bdf1, 40},
+                                           Case{falling_ropes, Integrator::bdf1, 60, 0.2},
+                                           Case{falling_ropes, Integrator::bdf2, 60, 0.2},
+                                           Case{falling_sheet, Integrator::bdf2, 40, 0.3}));
 
 // A short rope lies across one that is held, on a slope of 30 degrees (tan: 0.57735).
 Sample on_a_slope(double mu) {
