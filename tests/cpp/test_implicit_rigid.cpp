@@ -113,7 +113,7 @@ INSTANTIATE_TEST_SUITE_P(RigidCube, RigidTumble,
 
 TEST_P(RigidTumble, HasTheGradientOfComplexSteps) {
   const auto of = [&](const std::vector<Complex>& probe) { return loss(program, probe); };
-  expect_sums_agree(sample.scene.layout, of, sample.inputs, gradient(program, sample.inputs), 1e-10);
+  expect_sums_agree(sample.scene.layout, of, sample.inputs, gradient(program, sample.inputs), 1e-9);  // of many entries
 }
 
 TEST_P(RigidTumble, HasTheGradientOfDifferences) {
