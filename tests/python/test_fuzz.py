@@ -20,7 +20,7 @@ CASES = {
     "toml": 400,
     "fit": 1000,
     "mesh": 400,
-    "curve": 500,
+    "curve": 150,
     "trc": 500,
     "poses": 400,
     "scene": 400,
