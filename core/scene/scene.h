@@ -180,8 +180,8 @@ struct SelfContactSpec {
     std::vector<std::array<int, 3>> triangles;
   };
   std::vector<Piece> pieces;
-  std::vector<int>
-      carried;  // with friction: pinned nodes, two for each pair that may touch at a time, as in SelfContact
+  // With friction: pinned nodes, two for each pair that may touch at a time, as in SelfContact.
+  std::vector<int> carried;
 };
 
 struct SceneSpec {
