@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/equilibrium/equilibrium.h"
+#include "core/scalar/dual.h"
 
 namespace sheetbend {
 
@@ -33,5 +34,15 @@ class EquilibriumAnchor {
 template <class T>
 std::vector<T> equilibrium_coordinates(const Scene& scene, const T* inputs, const EquilibriumOptions& options,
                                        EquilibriumAnchor& anchor, Interrupt* interrupt);
+
+template <>
+std::vector<double> equilibrium_coordinates(const Scene&, const double*, const EquilibriumOptions&, EquilibriumAnchor&,
+                                            Interrupt*);
+template <>
+std::vector<Dual<double, 4>> equilibrium_coordinates(const Scene&, const Dual<double, 4>*, const EquilibriumOptions&,
+                                                     EquilibriumAnchor&, Interrupt*);
+template <>
+std::vector<Dual<double, 8>> equilibrium_coordinates(const Scene&, const Dual<double, 8>*, const EquilibriumOptions&,
+                                                     EquilibriumAnchor&, Interrupt*);
 
 }  // namespace sheetbend

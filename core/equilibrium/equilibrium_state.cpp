@@ -64,12 +64,6 @@ void expect_no_unilateral(const Scene& scene) {
 
 }  // namespace
 
-double largest(const std::vector<double>& v) {
-  double m = 0.0;
-  for (const double a : v) m = std::max(m, std::abs(a));
-  return m;
-}
-
 bool finite(const std::vector<double>& v) {
   return std::all_of(v.begin(), v.end(), [](double a) { return std::isfinite(a); });
 }

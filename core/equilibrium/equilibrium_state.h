@@ -13,7 +13,6 @@ namespace sheetbend {
 inline constexpr double near_rest =
     1e-6;  // relative residual below which Newton may go to a saddle (it is left again afterwards)
 
-double largest(const std::vector<double>& v);
 bool finite(const std::vector<double>& v);
 
 struct EquilibriumState {

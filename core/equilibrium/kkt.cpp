@@ -10,13 +10,14 @@
 #include "core/equilibrium/residual.h"
 
 namespace sheetbend {
-namespace {
 
 double largest(const std::vector<double>& v) {
   double m = 0.0;
   for (const double a : v) m = std::max(m, std::abs(a));
   return m;
 }
+
+namespace {
 
 double ratio(double part, double whole) { return part == 0.0 ? 0.0 : part / whole; }
 

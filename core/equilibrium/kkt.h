@@ -29,6 +29,9 @@
 
 namespace sheetbend {
 
+// The largest |entry|.
+double largest(const std::vector<double>& v);
+
 class Kkt {
  public:
   // Finds the pattern and the elimination order; the scene must outlive this.

@@ -6,7 +6,7 @@
 namespace sheetbend {
 namespace {
 
-constexpr int row = sheetbend_blocks::row;
+using sheetbend_blocks::row;
 constexpr double least_kept = 0.1;  // of a prediction: a turn by 84 degrees
 
 // What takes the idle directions out of a vector.

@@ -6,7 +6,8 @@
 namespace sheetbend {
 namespace {
 
-constexpr int row = sheetbend_blocks::row;
+using sheetbend_blocks::row;
+
 constexpr double margin = 0.1;       // beyond the free motion, of the radius
 constexpr double farther = 1.5;      // than asked for, where particles leave what was looked for
 constexpr double farthest = 8.0;     // that a step may lead, of the free motion and the radius: pairs would be too many

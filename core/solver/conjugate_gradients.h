@@ -37,8 +37,9 @@ double lane_of(const Lanes<N>& a, int lane) {
 // The largest a/b of the lanes where a > b; zero where there is none. What is not a number counts as converged, for the rollout to find.
 template <class U>
 double largest_excess(const U& a, const U& b) {
+  constexpr int lanes = sizeof(U) / sizeof(double);  // NOLINT(bugprone-sizeof-expression): one of a double
   double largest = 0.0;
-  for (int lane = 0; lane < static_cast<int>(sizeof(U) / sizeof(double)); ++lane)
+  for (int lane = 0; lane < lanes; ++lane)
     if (lane_of(a, lane) > lane_of(b, lane)) largest = std::max(largest, lane_of(a, lane) / lane_of(b, lane));
   return largest;
 }

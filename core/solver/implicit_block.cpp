@@ -10,9 +10,8 @@
 namespace sheetbend {
 namespace {
 
-constexpr int row = sheetbend_blocks::row;
-constexpr double sufficient = 1e-4;  // share of the slope's promise that a step has to keep (Armijo)
-constexpr int most_halvings = 60;
+using sheetbend_blocks::row;
+
 constexpr int turns = 8;                  // in which a direction of negative curvature gets steeper
 constexpr double first_departure = 1e-4;  // along it, of the block's size
 constexpr double first_share = 0.25, least_share = 1.0 / 256.0;  // of friction, that a step adds

@@ -25,6 +25,8 @@ struct Unbalanced : Unconverged {
 
 class ImplicitBlock {
  public:
+  static constexpr int most_halvings = 60;  // of a step
+
   IncrementalPotential potential;  // the problem
   // Rows of four (particles, 4), as in sheetbend_blocks::Block, with inverse masses.
   Numbers<double> start;  // at n, fixed particles included
@@ -68,6 +70,7 @@ class ImplicitBlock {
   bool raise_friction(const Scene& scene, const DirectBlock& block, const SolverOptions& options);
   static constexpr double all_digits = 1e-15,
                           enough_digits = 1e-8;  // of multipliers, for derivatives and for Newton steps
+  static constexpr double sufficient = 1e-4;     // share of the slope's promise that a step has to keep (Armijo)
   void expect_digits(const DirectBlock& block, double share) const;
   void expect_none_passes(const DirectBlock& block, Numbers<double>& from, Numbers<double>& to) const;
   double look(const DirectBlock& block);

@@ -9,10 +9,9 @@
 namespace sheetbend {
 namespace {
 
-constexpr int row = sheetbend_blocks::row;
-constexpr double sufficient = 1e-4;  // share of the slope's promise that a step has to keep (Armijo)
-constexpr double flat = 1e-8;        // relative changes of Phi that rounding may hide
-constexpr int most_halvings = 60;
+using sheetbend_blocks::row;
+
+constexpr double flat = 1e-8;      // relative changes of Phi that rounding may hide
 constexpr int most_kinks = 10;     // full steps in a row that may raise the merit
 constexpr double no_slip = 1e30;   // a friction
 constexpr int most_sections = 36;  // of the way, where its lowest point is looked for
@@ -39,7 +38,7 @@ double lowest(F&& f, double f0) {
   constexpr double golden = 0.6180339887498949;
   double t = 1.0, best = f(t);
   for (int halving = 0; !(best < f0); best = f(t *= 0.5))
-    if (++halving > most_halvings) return 0.0;
+    if (++halving > ImplicitBlock::most_halvings) return 0.0;
   double low = 0.0, high = std::min(1.0, 2.0 * t), at = t;
   double a = high - golden * (high - low), b = low + golden * (high - low), fa = f(a), fb = f(b);
   for (int section = 0; section < most_sections; ++section) {

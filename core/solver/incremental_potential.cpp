@@ -7,7 +7,8 @@
 namespace sheetbend {
 namespace {
 
-constexpr int row = sheetbend_blocks::row;
+using sheetbend_blocks::row;
+
 constexpr double nothing = 1e-8;  // a displacement, of the coordinates
 constexpr double roundings = 256.0 * std::numeric_limits<double>::epsilon();
 

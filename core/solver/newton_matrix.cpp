@@ -11,7 +11,9 @@
 namespace sheetbend {
 namespace {
 
-constexpr int row = sheetbend_blocks::row, lanes = sheetbend_blocks::lanes;
+using sheetbend_blocks::lanes;
+using sheetbend_blocks::row;
+
 constexpr double convexities[] = {1.0 / 64.0, 1.0 / 8.0, 1.0};
 
 constexpr int most_dofs = []<class... K>(std::tuple<K...>*) {

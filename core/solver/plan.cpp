@@ -16,7 +16,7 @@
 namespace sheetbend {
 namespace {
 
-constexpr int lanes = sheetbend_blocks::lanes;
+using sheetbend_blocks::lanes;
 
 // A movable node and the rows that it takes part in, ascending.
 using Users = std::vector<std::pair<int, std::vector<int>>>;

@@ -84,7 +84,8 @@ class RigidRows {
   template <class U, class Inverse>
   double solve(const DirectBlock& block, U* z, U* mu, Inverse&& inverse, double little) const {
     constexpr int most_passes = 60;
-    const int n = size(), parts = static_cast<int>(sizeof(U) / sizeof(double));
+    constexpr int parts = sizeof(U) / sizeof(double);  // NOLINT(bugprone-sizeof-expression): one of a double
+    const int n = size();
     std::vector<U> g(mu, mu + n), dz(z, z + 3 * static_cast<std::size_t>(block.movable));
     for (int j = 0; j < n; ++j) {
       mu[j] = U(0.0);

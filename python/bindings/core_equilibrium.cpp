@@ -50,7 +50,8 @@ Solution solve(const std::shared_ptr<Scene>& scene, const Array& inputs, const s
   return std::move(solve_batch(scene, inputs, start, stable, 1)[0]);
 }
 
-py::array_t<double> vjp(const Solution& s, const std::optional<Array>& x_bar, const std::optional<Array>& lambda_bar) {
+py::array_t<double> equilibrium_vjp(const Solution& s, const std::optional<Array>& x_bar,
+                                    const std::optional<Array>& lambda_bar) {
   if (x_bar) expect_size(*x_bar, s.scene->dofs(), "x_bar");
   if (lambda_bar) expect_size(*lambda_bar, s.scene->multipliers(), "lambda_bar");
   std::vector<double> bar(s.inputs.size());
@@ -89,7 +90,7 @@ const Scene& scene_of(const std::vector<const Solution*>& solutions) {
 }
 
 // Gradients (B, total) from cotangents (B, dofs + multipliers) of coordinates and multipliers.
-py::array_t<double> vjp_batch(const std::vector<const Solution*>& solutions, const Array& bar, int threads) {
+py::array_t<double> equilibria_vjp(const std::vector<const Solution*>& solutions, const Array& bar, int threads) {
   const Scene& scene = scene_of(solutions);
   const std::size_t total = scene.layout.total(), dofs = scene.dofs(), size = dofs + scene.multipliers();
   expect_size(bar, solutions.size() * size, "bar");
@@ -104,7 +105,8 @@ py::array_t<double> vjp_batch(const std::vector<const Solution*>& solutions, con
 }
 
 // Tangents (B, dofs + multipliers) of coordinates and multipliers, each along a direction (B, total) of its own.
-py::array_t<double> jvp_batch(const std::vector<const Solution*>& solutions, const Array& inputs_dot, int threads) {
+py::array_t<double> equilibria_jvp(const std::vector<const Solution*>& solutions, const Array& inputs_dot,
+                                   int threads) {
   using D = Dual<double, 1>;
   const Scene& scene = scene_of(solutions);
   const std::size_t total = scene.layout.total(), dofs = scene.dofs(), size = dofs + scene.multipliers();
@@ -160,13 +162,13 @@ void bind_equilibrium(py::module_& m) {
       .def_property_readonly("redundant",
                              [](const Solution& s) { return describe(*s.scene, s.at.left_out, s.at.x.data()); })
       .def_property_readonly("message", [](const Solution& s) { return s.at.message; })
-      .def("vjp", &vjp, py::arg("x_bar") = py::none(), py::arg("lambda_bar") = py::none());
+      .def("vjp", &equilibrium_vjp, py::arg("x_bar") = py::none(), py::arg("lambda_bar") = py::none());
   m.def("equilibrium", &solve, py::arg("scene"), py::arg("inputs"), py::arg("start") = py::none(),
         py::arg("stable") = true);
   m.def("equilibria", &solve_batch, py::arg("scene"), py::arg("inputs"), py::arg("start") = py::none(),
         py::arg("stable") = true, py::arg("threads") = 1);
-  m.def("equilibria_vjp", &vjp_batch, py::arg("solutions"), py::arg("bar"), py::arg("threads") = 1);
-  m.def("equilibria_jvp", &jvp_batch, py::arg("solutions"), py::arg("inputs_dot"), py::arg("threads") = 1);
+  m.def("equilibria_vjp", &equilibria_vjp, py::arg("solutions"), py::arg("bar"), py::arg("threads") = 1);
+  m.def("equilibria_jvp", &equilibria_jvp, py::arg("solutions"), py::arg("inputs_dot"), py::arg("threads") = 1);
 }
 
 }  // namespace sheetbend::bindings

@@ -9,7 +9,7 @@
 namespace sheetbend::bindings {
 namespace {
 
-const char* name_of(Source source) {
+const char* source_name(Source source) {
   switch (source) {
     case Source::given: return "given";
     case Source::measured: return "measured";
@@ -25,7 +25,7 @@ py::dict make_parameter(const Parameter& p) {
   parameter["unit"] = unit_name(p.unit);
   parameter["least"] = p.range.least;
   parameter["most"] = p.range.most;
-  parameter["source"] = name_of(p.otherwise.source);
+  parameter["source"] = source_name(p.otherwise.source);
   const bool has_value = p.otherwise.source == Source::usual || p.otherwise.source == Source::preset;
   parameter["value"] = has_value ? py::object(py::float_(p.otherwise.value)) : py::none();
   return parameter;

@@ -34,7 +34,7 @@ Solver make_solver(std::shared_ptr<Scene> scene, double h, const std::string& in
 }
 
 // The arguments of make_solver, in order.
-py::tuple arguments_of(const Solver& s) {
+py::tuple arguments_of_solver(const Solver& s) {
   const SolverOptions& o = s.plan.options;
   return py::make_tuple(s.scene, o.h, o.integrator == Integrator::bdf1 ? "bdf1" : "bdf2", name_of(o.partition),
                         o.iterations, o.force_tolerance, o.threads, o.grain, o.cg_tolerance, o.cg_iterations);
@@ -215,7 +215,7 @@ void bind_rollout(py::module_& m) {
       .def(py::init(&make_solver), py::kw_only(), py::arg("scene"), py::arg("h"), py::arg("integrator"),
            py::arg("partition"), py::arg("iterations"), py::arg("force_tolerance"), py::arg("threads"),
            py::arg("grain"), py::arg("cg_tolerance"), py::arg("cg_iterations"))
-      .def(py::pickle(&arguments_of, &solver_of))
+      .def(py::pickle(&arguments_of_solver, &solver_of))
       .def("simulate", &simulate, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
       .def("states", &states, py::arg("inputs"), py::arg("steps"), py::arg("t0"))
       .def("force_balance", &force_balance, py::arg("inputs"), py::arg("steps"), py::arg("t0"))

@@ -81,7 +81,7 @@ std::shared_ptr<Scene> make_scene(const py::kwargs& given) {
 }
 
 // The keyword arguments that make a scene, again.
-py::dict arguments_of(const Scene& s) {
+py::dict arguments_of_scene(const Scene& s) {
   std::vector<std::array<int, 4>> directors;
   for (const Director& d : s.directors) directors.push_back({d.node, d.tail, d.head, d.normal});
   std::vector<std::array<int, 5>> bodies;
@@ -149,7 +149,7 @@ void bind_scene(py::module_& m) {
   m.attr("SHAPES") = shapes;
   py::class_<Scene, std::shared_ptr<Scene>>(m, "Scene")
       .def(py::init(&make_scene))
-      .def(py::pickle(&arguments_of, [](const py::dict& given) { return make_scene(py::kwargs(given)); }))
+      .def(py::pickle(&arguments_of_scene, [](const py::dict& given) { return make_scene(py::kwargs(given)); }))
       .def_property_readonly("layout",
                              [](const Scene& s) {
                                py::dict layout;

@@ -45,10 +45,10 @@ using Release = py::gil_scoped_release;
 
 void check(const Solver& s, const Array& inputs, std::size_t batch, const Steps& steps);
 
-inline py::array_t<double> empty(std::vector<std::size_t> shape) { return py::array_t<double>(std::move(shape)); }
+inline py::array_t<double> empty(const std::vector<std::size_t>& shape) { return py::array_t<double>(shape); }
 
-inline py::array_t<double> zeros(std::vector<std::size_t> shape) {
-  auto out = empty(std::move(shape));
+inline py::array_t<double> zeros(const std::vector<std::size_t>& shape) {
+  auto out = empty(shape);
   std::fill_n(out.mutable_data(), out.size(), 0.0);
   return out;
 }
