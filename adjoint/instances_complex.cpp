@@ -3,6 +3,8 @@
 
 namespace sheetbend {
 
+template void ProjectBlocks::forward(const Step<Complex>&, Work<Complex>&, Record<Complex>&);
+template void SweepColors::forward(const Step<Complex>&, Work<Complex>&, Record<Complex>&);
 template class Rollout<Complex>;
 template void rollout_states<Complex>(const Scene&, const Plan&, const Complex*, double, const std::vector<int>&,
                                       Complex*, Interrupt*);

@@ -4,6 +4,12 @@
 
 namespace sheetbend {
 
+template void ProjectBlocks::forward(const Step<double>&, Work<double>&, Record<double>&);
+template void SweepColors::forward(const Step<double>&, Work<double>&, Record<double>&);
+template void ReverseOf<ProjectBlocks>::run(const Step<double>&, const Work<double>&, ProjectBlocks::Record<double>&,
+                                            Scratch<double>&, const StepCotangents<double>&);
+template void ReverseOf<SweepColors>::run(const Step<double>&, const Work<double>&, SweepColors::Record<double>&,
+                                          Scratch<double>&, const StepCotangents<double>&);
 template class Rollout<double>;
 template void rollout_states<double>(const Scene&, const Plan&, const double*, double, const std::vector<int>&, double*,
                                      Interrupt*);

@@ -3,6 +3,14 @@
 
 namespace sheetbend {
 
+template void ProjectBlocks::forward(const Step<Dual<double, 1>>&, Work<Dual<double, 1>>&, Record<Dual<double, 1>>&);
+template void SweepColors::forward(const Step<Dual<double, 1>>&, Work<Dual<double, 1>>&, Record<Dual<double, 1>>&);
+template void ReverseOf<ProjectBlocks>::run(const Step<Dual<double, 1>>&, const Work<Dual<double, 1>>&,
+                                            ProjectBlocks::Record<Dual<double, 1>>&, Scratch<Dual<double, 1>>&,
+                                            const StepCotangents<Dual<double, 1>>&);
+template void ReverseOf<SweepColors>::run(const Step<Dual<double, 1>>&, const Work<Dual<double, 1>>&,
+                                          SweepColors::Record<Dual<double, 1>>&, Scratch<Dual<double, 1>>&,
+                                          const StepCotangents<Dual<double, 1>>&);
 template class Rollout<Dual<double, 1>>;
 template Tape<Dual<double, 1>> record_rollout<Dual<double, 1>>(const Scene&, const Plan&, const Dual<double, 1>*,
                                                                double, const std::vector<int>&, Dual<double, 1>*, int,

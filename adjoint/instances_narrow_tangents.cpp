@@ -4,6 +4,8 @@
 
 namespace sheetbend {
 
+template void ProjectBlocks::forward(const Step<Dual<double, 4>>&, Work<Dual<double, 4>>&, Record<Dual<double, 4>>&);
+template void SweepColors::forward(const Step<Dual<double, 4>>&, Work<Dual<double, 4>>&, Record<Dual<double, 4>>&);
 template class Rollout<Dual<double, 4>>;
 
 }  // namespace sheetbend

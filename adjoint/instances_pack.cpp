@@ -4,6 +4,12 @@
 
 namespace sheetbend {
 
+template void ProjectBlocks::forward(const Step<Pack>&, Work<Pack>&, Record<Pack>&);
+template void SweepColors::forward(const Step<Pack>&, Work<Pack>&, Record<Pack>&);
+template void ReverseOf<ProjectBlocks>::run(const Step<Pack>&, const Work<Pack>&, ProjectBlocks::Record<Pack>&,
+                                            Scratch<Pack>&, const StepCotangents<Pack>&);
+template void ReverseOf<SweepColors>::run(const Step<Pack>&, const Work<Pack>&, SweepColors::Record<Pack>&,
+                                          Scratch<Pack>&, const StepCotangents<Pack>&);
 template class Rollout<Pack>;
 template void rollout_states<Pack>(const Scene&, const Plan&, const Pack*, double, const std::vector<int>&, Pack*,
                                    Interrupt*);

@@ -5,6 +5,9 @@
 #include <limits>
 
 #include "adjoint/tape.h"
+#include "core/scalar/complex.h"
+#include "core/scalar/dual.h"
+#include "core/scalar/pack.h"
 
 namespace sheetbend {
 
@@ -25,5 +28,28 @@ Tape<T> record_rollout(const Scene& scene, const Plan& plan, const T* inputs, do
 template <class T>
 long reverse_rollout(const Scene& scene, const Plan& plan, const T* inputs, double t0, Tape<T>& tape,
                      const std::vector<int>& wanted, const T* x_bar, T* inputs_bar, Interrupt* interrupt);
+
+extern template void rollout_states<double>(const Scene&, const Plan&, const double*, double, const std::vector<int>&,
+                                            double*, Interrupt*);
+extern template void rollout_states<Pack>(const Scene&, const Plan&, const Pack*, double, const std::vector<int>&,
+                                          Pack*, Interrupt*);
+extern template void rollout_states<Complex>(const Scene&, const Plan&, const Complex*, double, const std::vector<int>&,
+                                             Complex*, Interrupt*);
+extern template void rollout_states<Dual<double, 8>>(const Scene&, const Plan&, const Dual<double, 8>*, double,
+                                                     const std::vector<int>&, Dual<double, 8>*, Interrupt*);
+extern template Tape<double> record_rollout<double>(const Scene&, const Plan&, const double*, double,
+                                                    const std::vector<int>&, double*, int, Interrupt*);
+extern template long reverse_rollout<double>(const Scene&, const Plan&, const double*, double, Tape<double>&,
+                                             const std::vector<int>&, const double*, double*, Interrupt*);
+extern template Tape<Pack> record_rollout<Pack>(const Scene&, const Plan&, const Pack*, double, const std::vector<int>&,
+                                                Pack*, int, Interrupt*);
+extern template long reverse_rollout<Pack>(const Scene&, const Plan&, const Pack*, double, Tape<Pack>&,
+                                           const std::vector<int>&, const Pack*, Pack*, Interrupt*);
+extern template Tape<Dual<double, 1>> record_rollout<Dual<double, 1>>(const Scene&, const Plan&, const Dual<double, 1>*,
+                                                                      double, const std::vector<int>&, Dual<double, 1>*,
+                                                                      int, Interrupt*);
+extern template long reverse_rollout<Dual<double, 1>>(const Scene&, const Plan&, const Dual<double, 1>*, double,
+                                                      Tape<Dual<double, 1>>&, const std::vector<int>&,
+                                                      const Dual<double, 1>*, Dual<double, 1>*, Interrupt*);
 
 }  // namespace sheetbend

@@ -57,23 +57,7 @@ struct ReverseOf<SweepColors> {
 
   template <class T>
   static void run(const Step<T>& step, const Work<T>& work, SweepColors::Record<T>& record, Scratch<T>& scratch,
-                  const StepCotangents<T>& bar) {
-    const SolverOptions& o = step.plan.options;
-    const bool swept = !step.plan.colors.empty();
-    for (auto* buffer : {&scratch.C_r, &scratch.fixed, &scratch.lambda})
-      std::fill(buffer->begin(), buffer->end(), T(0.0));
-    if constexpr (in_packs<T>)
-      if (swept) begin_sweeps_vjp(step.scene, step.plan.packs, o.threads, step.in, record.packs, bar.in, scratch.packs);
-    for (int iteration = o.iterations - 1; iteration >= 0; --iteration) {
-      const bool last = iteration == o.iterations - 1;
-      project_volumes_vjp(step.scene, step.in, step.bdf.eta, work.masses.w.data(), iteration, last, record.volumes,
-                          bar.q, bar.w, bar.in, scratch.volumes);
-      sweep(step, work, iteration, last, record, scratch, bar);
-    }
-    if (!swept) return;
-    end(step, scratch, bar);
-    damping_references_vjp(step.scene, step.in, step.bdf, step.from, scratch.C_r.data(), bar.from, bar.in);
-  }
+                  const StepCotangents<T>& bar);
 
   // What gathered of the constraints' own values.
   template <class T>
@@ -117,5 +101,34 @@ struct ReverseOf<SweepColors> {
     }
   }
 };
+
+template <class T>
+void ReverseOf<SweepColors>::run(const Step<T>& step, const Work<T>& work, SweepColors::Record<T>& record,
+                                 Scratch<T>& scratch, const StepCotangents<T>& bar) {
+  const SolverOptions& o = step.plan.options;
+  const bool swept = !step.plan.colors.empty();
+  for (auto* buffer : {&scratch.C_r, &scratch.fixed, &scratch.lambda})
+    std::fill(buffer->begin(), buffer->end(), T(0.0));
+  if constexpr (in_packs<T>)
+    if (swept) begin_sweeps_vjp(step.scene, step.plan.packs, o.threads, step.in, record.packs, bar.in, scratch.packs);
+  for (int iteration = o.iterations - 1; iteration >= 0; --iteration) {
+    const bool last = iteration == o.iterations - 1;
+    project_volumes_vjp(step.scene, step.in, step.bdf.eta, work.masses.w.data(), iteration, last, record.volumes, bar.q,
+                        bar.w, bar.in, scratch.volumes);
+    sweep(step, work, iteration, last, record, scratch, bar);
+  }
+  if (!swept) return;
+  end(step, scratch, bar);
+  damping_references_vjp(step.scene, step.in, step.bdf, step.from, scratch.C_r.data(), bar.from, bar.in);
+}
+
+// The scalars of adjoint/instances_*.cpp.
+extern template void ReverseOf<SweepColors>::run(const Step<double>&, const Work<double>&, SweepColors::Record<double>&,
+                                                 Scratch<double>&, const StepCotangents<double>&);
+extern template void ReverseOf<SweepColors>::run(const Step<Pack>&, const Work<Pack>&, SweepColors::Record<Pack>&,
+                                                 Scratch<Pack>&, const StepCotangents<Pack>&);
+extern template void ReverseOf<SweepColors>::run(const Step<Dual<double, 1>>&, const Work<Dual<double, 1>>&,
+                                                 SweepColors::Record<Dual<double, 1>>&, Scratch<Dual<double, 1>>&,
+                                                 const StepCotangents<Dual<double, 1>>&);
 
 }  // namespace sheetbend

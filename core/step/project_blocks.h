@@ -1,6 +1,9 @@
 // The projection of direct blocks.
 #pragma once
 
+#include "core/scalar/complex.h"
+#include "core/scalar/dual.h"
+#include "core/scalar/pack.h"
 #include "core/solver/project_block.h"
 #include "core/solver/project_implicit.h"
 #include "core/step/stages.h"
@@ -35,25 +38,7 @@ struct ProjectBlocks {
   }
 
   template <class T>
-  static void forward(const Step<T>& step, Work<T>& work, Record<T>& record) {
-    const Plan& plan = step.plan;
-    parallel_for(static_cast<int>(plan.blocks.size()), step.threads(), 1, [&](int begin, int end) {
-      const SubstepState<T> state = state_of(step, work.masses, work.x_next);
-      for (int b = begin; b < end; ++b) {
-        const DirectBlock& block = plan.blocks[b];
-        begin_block(state, block, record.blocks[b]);
-        damping_references(state, block, pack_kernels(), step.bdf.before, step.from, record.blocks[b]);
-        load_contacts(block, [&](int lane) { return contact_source(step, work.masses, lane); }, record.blocks[b]);
-        if (block.implicit)
-          project_implicit(state, block, plan.options, step.from, step.scenes, pack_kernels(), record.blocks[b]);
-        else
-          for (int iteration = 0; iteration < plan.options.iterations; ++iteration)
-            project_block(state, block, pack_kernels(), record.blocks[b], iteration);
-        end_block(state, block, record.blocks[b]);
-      }
-    });
-    if (work.multipliers) multipliers(step.scene, plan, step.in, record, work.multipliers);
-  }
+  static void forward(const Step<T>& step, Work<T>& work, Record<T>& record);
 
   // Writes the multipliers of the last substep in the scene's order.
   template <class T>
@@ -69,5 +54,37 @@ struct ProjectBlocks {
     }
   }
 };
+
+template <class T>
+void ProjectBlocks::forward(const Step<T>& step, Work<T>& work, Record<T>& record) {
+  const Plan& plan = step.plan;
+  parallel_for(static_cast<int>(plan.blocks.size()), step.threads(), 1, [&](int begin, int end) {
+    const SubstepState<T> state = state_of(step, work.masses, work.x_next);
+    for (int b = begin; b < end; ++b) {
+      const DirectBlock& block = plan.blocks[b];
+      begin_block(state, block, record.blocks[b]);
+      damping_references(state, block, pack_kernels(), step.bdf.before, step.from, record.blocks[b]);
+      load_contacts(block, [&](int lane) { return contact_source(step, work.masses, lane); }, record.blocks[b]);
+      if (block.implicit)
+        project_implicit(state, block, plan.options, step.from, step.scenes, pack_kernels(), record.blocks[b]);
+      else
+        for (int iteration = 0; iteration < plan.options.iterations; ++iteration)
+          project_block(state, block, pack_kernels(), record.blocks[b], iteration);
+      end_block(state, block, record.blocks[b]);
+    }
+  });
+  if (work.multipliers) multipliers(step.scene, plan, step.in, record, work.multipliers);
+}
+
+// The scalars of adjoint/instances_*.cpp.
+extern template void ProjectBlocks::forward(const Step<double>&, Work<double>&, Record<double>&);
+extern template void ProjectBlocks::forward(const Step<Pack>&, Work<Pack>&, Record<Pack>&);
+extern template void ProjectBlocks::forward(const Step<Complex>&, Work<Complex>&, Record<Complex>&);
+extern template void ProjectBlocks::forward(const Step<Dual<double, 1>>&, Work<Dual<double, 1>>&,
+                                            Record<Dual<double, 1>>&);
+extern template void ProjectBlocks::forward(const Step<Dual<double, 4>>&, Work<Dual<double, 4>>&,
+                                            Record<Dual<double, 4>>&);
+extern template void ProjectBlocks::forward(const Step<Dual<double, 8>>&, Work<Dual<double, 8>>&,
+                                            Record<Dual<double, 8>>&);
 
 }  // namespace sheetbend

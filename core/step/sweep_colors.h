@@ -3,6 +3,9 @@
 
 #include <algorithm>
 
+#include "core/scalar/complex.h"
+#include "core/scalar/dual.h"
+#include "core/scalar/pack.h"
 #include "core/solver/project.h"
 #include "core/solver/volume.h"
 #include "core/step/stages.h"
@@ -53,20 +56,7 @@ struct SweepColors {
   }
 
   template <class T>
-  static void forward(const Step<T>& step, Work<T>& work, Record<T>& record) {
-    const Scene& scene = step.scene;
-    const bool swept = !step.plan.colors.empty();
-    T* q = work.x_next;
-    if (swept) begin(step, work, q, record);
-    record.with_coordinates(step.plan, q, [&](auto at) {
-      for (int iteration = 0; iteration < step.plan.options.iterations; ++iteration) {
-        sweep(step, work, iteration, q, record);
-        project_volumes(scene, step.in, step.bdf.eta, work.masses.w.data(), iteration, at, record.volumes);
-      }
-    });
-    if constexpr (in_packs<T>)
-      if (swept) end_sweeps(scene, record.packs, q);
-  }
+  static void forward(const Step<T>& step, Work<T>& work, Record<T>& record);
 
   // Writes the multipliers of the last substep in the scene's order.
   template <class T>
@@ -140,5 +130,32 @@ std::size_t SweepColors::Record<T>::bytes(const Scene& scene, const Plan& plan, 
   else
     return sum + std::max(1, kept) * IterationRecord<T>::bytes(scene) + sizeof(T) * scene.rows;
 }
+
+template <class T>
+void SweepColors::forward(const Step<T>& step, Work<T>& work, Record<T>& record) {
+  const Scene& scene = step.scene;
+  const bool swept = !step.plan.colors.empty();
+  T* q = work.x_next;
+  if (swept) begin(step, work, q, record);
+  record.with_coordinates(step.plan, q, [&](auto at) {
+    for (int iteration = 0; iteration < step.plan.options.iterations; ++iteration) {
+      sweep(step, work, iteration, q, record);
+      project_volumes(scene, step.in, step.bdf.eta, work.masses.w.data(), iteration, at, record.volumes);
+    }
+  });
+  if constexpr (in_packs<T>)
+    if (swept) end_sweeps(scene, record.packs, q);
+}
+
+// The scalars of adjoint/instances_*.cpp.
+extern template void SweepColors::forward(const Step<double>&, Work<double>&, Record<double>&);
+extern template void SweepColors::forward(const Step<Pack>&, Work<Pack>&, Record<Pack>&);
+extern template void SweepColors::forward(const Step<Complex>&, Work<Complex>&, Record<Complex>&);
+extern template void SweepColors::forward(const Step<Dual<double, 1>>&, Work<Dual<double, 1>>&,
+                                          Record<Dual<double, 1>>&);
+extern template void SweepColors::forward(const Step<Dual<double, 4>>&, Work<Dual<double, 4>>&,
+                                          Record<Dual<double, 4>>&);
+extern template void SweepColors::forward(const Step<Dual<double, 8>>&, Work<Dual<double, 8>>&,
+                                          Record<Dual<double, 8>>&);
 
 }  // namespace sheetbend

@@ -77,7 +77,11 @@ struct Projection {
       std::copy_n(theta.begin(), p.scene.dofs(), out.begin());
       std::copy_n(theta.begin() + static_cast<std::ptrdiff_t>(at[3]), p.scene.rows, out.begin() + p.scene.dofs());
       record.resize(p.scene);
-      for (const Color& color : p.plan.colors) project_color(state, p.plan.options, color, record);
+      // Wide scalars go through colors in kernels (test_packs.cpp).
+      if constexpr (sizeof(T) <= 2 * sizeof(double))
+        for (const Color& color : p.plan.colors) project_color(state, p.plan.options, color, record);
+      else if (!p.plan.colors.empty())
+        throw std::logic_error("colors are projected over one number or two");
       for (std::size_t b = 0; b < p.plan.blocks.size(); ++b) {
         blocks[b].resize(p.scene, p.plan.blocks[b], 1);
         begin_block(state, p.plan.blocks[b], blocks[b]);
