@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 from dataclasses import replace
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +86,7 @@ class TestFitPage:
         for section in sections(fitted.result):
             assert f"<h2>{section.title.replace('<', '&lt;')}</h2>" in page
         for estimate in fitted.result.estimates:
-            assert f'<td class="left">{estimate.name}</td>' in page
+            assert f'class="left">{estimate.name}</td>' in page
         packed = base64.b64decode(data_of(page)["fit"])
         assert FitResult.from_dict(json.loads(gzip.decompress(packed))) == fitted.result
 
@@ -269,6 +270,27 @@ def test_a_browser_draws_it_without_a_network(fitted: sb.Fit, tmp_path: Path) ->
     assert re.search(r'<div id="space">\s*<canvas', page) and "0.200 s" in page
     assert page.count('class="uplot') >= 4
     assert '<span id="controls">' in page and "<h2>Motion</h2>" in page
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="Chromium is not installed")
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [400, 1400])
+def test_every_value_of_a_parameter_stands_in_the_window(fitted: sb.Fit, tmp_path: Path, width: int) -> None:
+    """On 400 pixels the verdicts covered the values."""
+    look = """<script>setTimeout(() => {
+      const cells = [...document.querySelectorAll(".cards td")].map(e => e.getBoundingClientRect()).filter(r => r.width)
+      const beside = (r, s) => r.right < s.left + 1 || r.bottom < s.top + 1
+      const covered = cells.filter((r, i) => cells.some((s, k) => k < i && !beside(r, s) && !beside(s, r)))
+      const outside = cells.filter(r => r.right > innerWidth)
+      parent.document.body.dataset.seen = [cells.length, outside.length, covered.length, innerWidth]
+    }, 1000)</script></body>"""
+    inner = escape(fit_page(fitted, "swing").replace("</body>", look))  # windows are at least 500 pixels wide
+    (tmp_path / "report.html").write_text(f'<body><iframe style="border: 0" width={width} srcdoc="{inner}"></iframe>')
+    page = drawn_by_chromium(tmp_path / "report.html", tmp_path)
+    found = re.search(r'data-seen="(\d+),(\d+),(\d+),(\d+)"', page)
+    assert found
+    cells, outside, covered, seen = map(int, found.groups())
+    assert cells >= 5 and (outside, covered, seen) == (0, 0, width)
 
 
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="Chromium is not installed")
