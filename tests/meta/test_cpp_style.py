@@ -24,9 +24,10 @@ def test_formatted() -> None:
 
 
 def own_units() -> dict[tuple[str, ...], list[Path]]:
-    """What the library and the modules are compiled from, by folder and by the options that its headers depend on. Without
-    what CMake writes, what is compiled once per instruction set, and rollouts over other scalars than double, which read
-    the same headers for a minute and a half."""
+    """What the library and the modules are compiled from, by folder and by the options that its headers depend on.
+
+    Left out is what CMake writes, what is compiled once per instruction set, and rollouts over other scalars than
+    double, which read the same headers for a minute and a half."""
     mine = [ROOT / top for top in ("core", "adjoint", "python/bindings")]
     again = re.compile(r"kernel_table\.cpp$|/instances_(?!double)")
     units = defaultdict(list)
