@@ -2,8 +2,9 @@
 //
 //   z = W^-1 p (of the predicted coordinates)     y = D^-1 J p     w_bar_i = (J^T lambda + F)_i . z_i
 //
-// F: the forces of contacts,
-// and everything else as for a projection (element/element_vjp.h) with dl = lambda and v_j = lambda_j W z. Both y and v are linear in p, and what the
+// F: the forces of contacts. Frames of rods have w_bar_i = W^-1 (x - x~)_i . z_i, which is the same at the balance. It does not lose digits where a
+// balance to a part of the block's largest force leaves much of the small push on a frame.
+// Everything else is as for a projection (element/element_vjp.h) with dl = lambda and v_j = lambda_j W z. Both y and v are linear in p, and what the
 // elements and contacts send to the coordinates is what K^T p leaves of x'_bar: a second pass on that refines p, and brings the first order
 // of scalars that carry one. K is not symmetric where contacts slide. Rows that do not give way (core/solver/rigid_rows.h) have no D^-1: their y is an
 // unknown beside p, with J p = D y.
@@ -209,6 +210,10 @@ void project_implicit_vjp(const SubstepState<T>& s, const DirectBlock& block, Sc
     pull_back_pairs(s, block, state, p, bar);
   }
   for (std::size_t i = 0; i < p.size(); ++i) bar.x[sheetbend_blocks::row * (i / 3) + i % 3] = x_bar[i];
+  for (std::size_t i = 0; i < block.frames.size(); ++i) {
+    const std::size_t at = static_cast<std::size_t>(block.frames[i].particle);
+    bar.x[sheetbend_blocks::row * at + 3] = dot(state.frame_pushes[i], Vec3<T>(&x_bar[3 * at]));
+  }
 }
 
 }  // namespace sheetbend

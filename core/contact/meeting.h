@@ -111,13 +111,10 @@ Rub<U> constants(const Rub<T>& rub) {
   return u;
 }
 
-// E = -d force/dx (12, 12), row by row. Returns what acts; without finding E where it does not push.
-inline Meeting<double> meeting_matrix(bool triangle, Part part, const double* x, const PairNumbers<double>& numbers,
-                                      const Rub<double>* rub, double* E) {
+// E = -d force/dx (12, 12), row by row, where it pushes; otherwise E stays as it is. Returns whether friction acts.
+inline bool meeting_matrix(bool triangle, Part part, const double* x, const PairNumbers<double>& numbers,
+                           const Rub<double>* rub, double* E) {
   using D = Dual<double, 12>;
-  double plain[12];
-  const Meeting<double> met = meet(triangle, part, x, numbers, rub, plain);
-  if (!(met.depth > 0.0)) return met;
   D at[12], force[12];
   for (int d = 0; d < 12; ++d) {
     at[d] = D(x[d]);
@@ -125,10 +122,12 @@ inline Meeting<double> meeting_matrix(bool triangle, Part part, const double* x,
   }
   Rub<D> rub_d;
   if (rub) rub_d = constants<D>(*rub);
-  meet<D>(triangle, part, at, {D(numbers.touching), D(numbers.kappa)}, rub ? &rub_d : nullptr, force);
+  const Meeting<D> met =
+      meet<D>(triangle, part, at, {D(numbers.touching), D(numbers.kappa)}, rub ? &rub_d : nullptr, force);
+  if (!(value_of(met.depth) > 0.0)) return false;
   for (int a = 0; a < 12; ++a)
     for (int b = 0; b < 12; ++b) E[12 * a + b] = -force[a].d[b];
-  return met;
+  return met.rubs;
 }
 
 }  // namespace sheetbend

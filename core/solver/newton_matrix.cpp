@@ -120,9 +120,9 @@ void NewtonMatrix::find_pairs(const Scene& scene, const DirectBlock& block, cons
     const Part part = nearest_part(pair.key.triangle, at, softness_of(pair.numbers));
     const Rub<double> rub = block.surface.rubs() ? potential.friction.of(pair.key, pair.particles) : Rub<double>{};
     pairs_.push_back({pair.particles, {}});
-    const auto met = meeting_matrix(pair.key.triangle, part, at, pair.numbers, block.surface.rubs() ? &rub : nullptr,
-                                    pairs_.back().matrix.data());
-    symmetric_ = symmetric_ && !met.rubs;
+    const bool rubs = meeting_matrix(pair.key.triangle, part, at, pair.numbers, block.surface.rubs() ? &rub : nullptr,
+                                     pairs_.back().matrix.data());
+    symmetric_ = symmetric_ && !rubs;
   }
   if (pairs_.empty()) return;
   std::vector<std::array<int, 4>> all;

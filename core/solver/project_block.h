@@ -58,6 +58,7 @@ struct BlockState {
   std::vector<ImplicitBlock> implicit;             // one per scene, where substeps are solved until forces balance
   std::vector<BlockContacts<Single<T>>> contacts;  // likewise
   std::vector<PairFriction<Single<T>>> friction;   // likewise, of pairs
+  std::vector<Vec3<T>> frame_pushes;               // per frame of the block, on the way back: W^-1 (x - x~)
   double eta = 0.0;                                // of `values` and `diagonal`; 0 where they are not filled yet
 
   void resize(const Scene& scene, const DirectBlock& block, int kept_iterations);
@@ -102,6 +103,7 @@ void BlockState<T>::resize(const Scene& scene, const DirectBlock& block, int kep
   for (auto& scene_ : contacts) scene_.resize(block);
   friction.resize(implicit.size());
   for (auto& scene_ : friction) scene_.resize(block);
+  frame_pushes.resize(block.frames.size());
   volumes.resize(block.volumes.size());
   for (std::size_t v = 0; v < volumes.size(); ++v) volumes[v].resize(block.volumes[v]);
   runs.reserve(block.runs.size());
@@ -132,6 +134,7 @@ std::size_t BlockState<T>::bytes(const Scene& scene, const DirectBlock& block, i
     sum += scenes_of<T> * (ImplicitBlock::bytes(scene, block) + sizeof(BlockContacts<Single<T>>) +
                            BlockContacts<Single<T>>::bytes(scene, block) + sizeof(PairFriction<Single<T>>) +
                            PairFriction<Single<T>>::bytes(block));
+  sum += sizeof(Vec3<T>) * block.frames.size();
   for (const MemberRun& run : block.runs) {
     const Group& group = scene.groups[run.group];
     sum += of(run.items.size() * sheetbend_blocks::value_count(group.damped, group.parameters));

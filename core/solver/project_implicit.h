@@ -314,7 +314,8 @@ void keep_rigid(const std::vector<T>& lambda, BlockState<T>& state) {
   }
 }
 
-// The settled frames of the solution in state.x, whose directors are those of the substep's end (block_frames.h).
+// The settled frames of the solution in state.x, whose directors are those of the substep's end (block_frames.h), and what pushes them from their
+// prediction: read off the motion, since what a balance leaves of its largest force is not small beside it.
 template <class T>
 void settle_again(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state) {
   if (block.frames.empty()) return;
@@ -326,6 +327,11 @@ void settle_again(const SubstepState<T>& s, const DirectBlock& block, BlockState
         f, [&](int particle) { return &x[3 * static_cast<std::size_t>(particle)]; },
         [&](int particle) { return s.q + s.scene.first_dof[block.particles[particle]]; });
   for (std::size_t i = 0; i < 3 * static_cast<std::size_t>(block.movable); ++i) state.x[0][row_of(i)] = x[i];
+  for (std::size_t i = 0; i < block.frames.size(); ++i) {
+    const int particle = block.frames[i].particle, node = block.particles[particle];
+    const Vec3<T> moved = Vec3<T>(&x[3 * static_cast<std::size_t>(particle)]) - Vec3<T>(s.q + s.scene.first_dof[node]);
+    state.frame_pushes[i] = (T(1.0) / s.w[node]) * moved;
+  }
 }
 
 // From the predicted coordinates in state.x to those at which forces balance, with gradients and multipliers. Nothing is solved where these coordinates
