@@ -13,7 +13,7 @@ from sheetbend.gripped.bounds import at_bounds, bounded
 from sheetbend.gripped.climb import Climb, Rope
 from sheetbend.gripped.conclusion import checked, model_spread, spread_words
 from sheetbend.gripped.descent import descend, negligible
-from sheetbend.gripped.judging import Errors, predict
+from sheetbend.gripped.judging import Errors, errors_of, predict
 from sheetbend.gripped.ladder import LADDER, MARKERS, REST, SHIFTS, TILTS, TWIST, VARYING, YIELD, Rung, smooth, together
 from sheetbend.gripped.model import place_of
 from sheetbend.gripped.pieces import experiments_of, problem_of
@@ -245,6 +245,21 @@ class TestClimb:
         assert climb._leave_out(np.array([1.0, 1.1, 0.9, np.inf]))
         assert said == ["0 is left out of the fit: its prediction diverges"]
         assert climb.split.fitted == tuple(motions[1:3]) and climb.split.judged == (motions[3],)
+
+    def test_a_judged_recording_that_shows_nothing_is_left_out_for_that(self) -> None:
+        """Its free markers are lost after the first two frames. Once its prediction was said to diverge."""
+        motions = [replace(MOTION, recording=replace(MOTION.recording, name=f"{k}")) for k in range(5)]
+        climb = Climb(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None)
+        (judged,) = climb.split.judged
+        x = judged.recording.positions.copy()
+        x[2:, list(judged.free)] = np.nan
+        lost = replace(judged, recording=replace(judged.recording, positions=x))
+        climb.split = replace(climb.split, judged=(lost,))
+        assert climb._leave_out(errors_of(MODEL, TRUE, climb.split).whole)
+        name = judged.recording.name
+        unseen = "none of its free markers is seen where it would be judged"
+        assert climb.left_out == [f"{name} is left out of the fit: {unseen}"]
+        assert len(climb.split.fitted) == 3 and len(climb.split.judged) == 1
 
     def test_where_everything_diverges_it_says_so(self) -> None:
         with pytest.raises(sb.SheetbendError, match="no start of a straight rope"):

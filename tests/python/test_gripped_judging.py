@@ -71,6 +71,11 @@ class TestMisfits:
         assert misfits(np.array([3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 13.0])) == {}
         assert misfits(np.array([5.0, 9.9])) == {}
 
+    def test_what_is_not_seen_is_not_said_to_diverge(self) -> None:
+        found = misfits(np.array([5.0, np.nan, 5.5, INF, 4.0]))
+        assert found == {1: "none of its free markers is seen where it would be judged", 3: "its prediction diverges"}
+        assert list(misfits(np.array([np.nan, INF, 5.0]))) == [0]  # half of those that can be judged stay
+
     def test_half_of_them_are_no_misfits(self) -> None:
         assert misfits(np.array([5.0, INF, INF, 6.0])) == {}
 

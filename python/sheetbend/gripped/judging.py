@@ -29,6 +29,7 @@ PIECES = 4  # at least, that a verdict rests on
 FAR = 2.0  # error over the median, beyond which a recording does not belong
 SPREAD = 4.0  # standard deviations of the logarithms of errors (from their median), likewise
 GIVEN = 2  # frames that a prediction starts from
+UNSEEN = "none of its free markers is seen where it would be judged"
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,8 @@ class Errors:
         """(motions,) of `Split.motions`."""
         if self.judged is self.fitted:
             return self.fitted
-        return np.concatenate([self.fitted, [float(np.mean(row[~np.isnan(row)])) for row in self.judged]])
+        seen = [row[~np.isnan(row)] for row in self.judged]
+        return np.concatenate([self.fitted, [float(np.mean(row)) if len(row) else np.nan for row in seen]])
 
     @property
     def typical(self) -> tuple[float, float]:
@@ -176,15 +178,16 @@ def _error(motion: GrippedMotion, predicted: Array, first: int, pieces: int, rea
 
 
 def misfits(errors: Array) -> dict[int, str]:
-    """Numbers of recordings that do not belong to the others, and why; at most half of them.
+    """Numbers of recordings that do not belong to the others, and why; at most half of those that can be judged.
 
     Args:
-        errors: (motions,) m; infinite where a prediction diverges.
+        errors: (motions,) m; infinite where a prediction diverges, NaN where no free marker is seen.
     """
-    finite = np.isfinite(errors)
-    if 2 * finite.sum() <= len(errors):
-        return {}
-    found = {int(k): "its prediction diverges" for k in np.flatnonzero(~finite)}
+    finite, unseen = np.isfinite(errors), np.isnan(errors)
+    found = {int(k): UNSEEN for k in np.flatnonzero(unseen)}
+    if 2 * finite.sum() <= np.count_nonzero(~unseen):
+        return found
+    found |= {int(k): "its prediction diverges" for k in np.flatnonzero(~finite & ~unseen)}
     middle = float(np.median(errors[finite]))
     logs = np.log(np.maximum(errors[finite], 1e-12) / middle)
     spread = 1.4826 * float(np.median(np.abs(logs)))

@@ -1,10 +1,10 @@
 """Mends a single recording of a gripped rope: exchanged neighbors, markers seen elsewhere, and tracking that froze or
 wrote zeros.
 
-All are found from the recording alone. Two neighbors are exchanged at a frame at which the direction from one to
-the other turns round, and throughout where the line through all markers is then shorter. A marker is elsewhere between
-two jumps that no rope makes, and frozen where its numbers repeat exactly although the frame before or after shows it
-moving.
+All but the usual lengths of links are found from the recording alone. Two neighbors are exchanged at a frame at which
+the direction from one to the other turns round, and throughout where the line through all markers is then shorter,
+unless the rope folds back at its grip (`end_links`). A marker is elsewhere between two jumps that no rope makes, and
+frozen where its numbers repeat exactly although the frame before or after shows it moving.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..arrays.timeseries import mean_position
 from ..recording.recording import Recording
+from .end_links import EndLink, end_link
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -25,7 +26,7 @@ Mask = NDArray[np.bool_]
 TURNED = -0.5  # cosine of the angle by which two neighbors turn from frame to frame when they are exchanged
 STRETCHED = 2.0  # by which their distance changes at most in that
 FORGOTTEN = 0.1  # s, after which directions are not compared any more
-SHORTER, SHORTER_AT_END = 0.8, 0.98  # links beside two neighbors, exchanged over given, that exchange them throughout
+SHORTER = 0.8  # links beside two neighbors, exchanged over given, that exchange them throughout; at an end `end_links`
 JUMP = 0.05  # of the rope's length, from one frame to the next beyond the usual way: no marker of a rope does that
 SUDDEN = 200.0  # m/s^2, the same for frames that are far apart in time
 REPEATS, LASTS = 5, 0.05  # frames and s of equal numbers that count as frozen
@@ -33,20 +34,22 @@ STEP = 5e-3  # m, that a frozen marker goes at once before or after
 HELD = 10  # more such times: then the file was made from fewer frames, and nothing froze
 
 
-def mended(recording: Recording, inner: tuple[int, int]) -> tuple[Recording, tuple[str, ...]]:
+def mended(
+    recording: Recording, inner: tuple[int, int], usual: Array | None = None
+) -> tuple[Recording, tuple[str, ...]]:
     """The recording with exchanged neighbors back in place and impossible samples not seen (NaN), and what was done.
 
     Args:
         recording: of a rope with its gripped markers named.
         inner: numbers of the two inner gripped markers.
+        usual: (markers - 1,) m, lengths of the links in other recordings of the rope (`usual_links`).
 
     Returns:
         The recording, the same object where nothing was wrong, and a sentence on each thing that was.
     """
     times, tracks = recording.times, range(recording.positions.shape[1])
-    least = _least_jump(times, recording.positions)
-    lost = np.stack([_at_origin(recording.positions[:, k], least) for k in tracks], axis=1)
-    positions, words = _in_order(recording, np.where(lost[:, :, None], np.nan, recording.positions), inner)
+    least, lost = _least_jump(times, recording.positions), _lost(recording)
+    positions, words = _in_order(recording, inner, usual)
     words = _each(recording, lost, "lay exactly at the origin") + words
     frozen = np.stack([_frozen(times, positions[:, k]) for k in tracks], axis=1) & ~_resting(positions)[:, None]
     positions[frozen] = np.nan
@@ -59,21 +62,34 @@ def mended(recording: Recording, inner: tuple[int, int]) -> tuple[Recording, tup
     return replace(recording, positions=positions), tuple(words)
 
 
-def _in_order(recording: Recording, positions: Array, inner: tuple[int, int]) -> tuple[Array, list[str]]:
-    """Positions (frames, markers, 3) m with neighbors exchanged back in place, and words on each exchange."""
-    pairs = range(positions.shape[1] - 1)
-    wrong = np.zeros((len(pairs), len(positions)), dtype=bool)
-    for k in pairs:
+def steadied_order(recording: Recording) -> tuple[Array, Mask]:
+    """Positions (frames, markers, 3) m with the same order of neighbors in all frames, that of most frames, and NaN in
+    place of zeros; (pairs, frames) where a pair was exchanged for that."""
+    positions = np.where(_lost(recording)[:, :, None], np.nan, recording.positions)
+    wrong = np.zeros((positions.shape[1] - 1, len(positions)), dtype=bool)
+    for k in range(len(wrong)):
         state = _turned(recording.times, positions[:, k + 1] - positions[:, k])
         wrong[k] = state if 2 * state.sum() <= len(state) else ~state
         _exchange(positions, k, wrong[k])
-    for k in _throughout(positions):
+    return positions, wrong
+
+
+def _in_order(recording: Recording, inner: tuple[int, int], usual: Array | None) -> tuple[Array, list[str]]:
+    """Positions (frames, markers, 3) m with neighbors exchanged back in place, and words on each exchange."""
+    positions, wrong = steadied_order(recording)
+    of = {inner[0] - 1: " of the first grip", inner[1]: " of the last grip"}
+    names = {k: f"{a} and {b}{of.get(k, '')}" for k, (a, b) in enumerate(pairwise(recording.markers))}
+    exchanged, ends = _throughout(positions, inner, usual)
+    for k in exchanged:
         wrong[k] = ~wrong[k]
     words = []
-    of = {inner[0] - 1: " of the first grip", inner[1]: " of the last grip"}
     for k in np.flatnonzero(wrong.any(axis=1)).tolist():
-        names = f"{recording.markers[k]} and {recording.markers[k + 1]}{of.get(k, '')}"
-        words.append(f"{names} were exchanged {_when(recording, wrong[k])}, and are put back")
+        or_else = f" (or the rope folds back there: {ends[k].words})" if k in ends and not ends[k].clear else ""
+        words.append(f"{names[k]} were exchanged {_when(recording, wrong[k])}, and are put back{or_else}")
+    for k, end in ends.items():
+        if end.in_order:
+            or_else = "" if end.clear else ", or they were exchanged throughout"
+            words.append(f"the rope folds back at {names[k]}, which stay as they are{or_else}: {end.words}")
     return positions, words
 
 
@@ -92,12 +108,14 @@ def _turned(times: Array, along: Array) -> Mask:
     return np.asarray(np.cumsum(turned) % 2 == 1)
 
 
-def _throughout(positions: Array) -> list[int]:
+def _throughout(positions: Array, inner: tuple[int, int], usual: Array | None) -> tuple[list[int], dict[int, EndLink]]:
     """Exchanges pairs of neighbors back that are so in all frames, by their first markers, as long as the line through
-    all markers becomes clearly shorter about them."""
+    all markers becomes clearly shorter about them; and the links behind pairs at an end whose order was in question."""
     distance = mean_position(np.linalg.norm(positions[:, :, None] - positions[:, None], axis=3))
     order = list(range(positions.shape[1]))
     done: list[int] = []
+    last = len(order) - 2
+    ends = {k: end_link(positions, outer, inner, usual) for k, outer in ((0, 0), (last, last + 1))}
 
     def gain(k: int) -> float:
         """By how much the links beside a pair become shorter when it is exchanged; 0 where that is not clear."""
@@ -105,14 +123,16 @@ def _throughout(positions: Array) -> list[int]:
         before, after = order[k - 1 : k] if k else [], order[k + 2 : k + 3]
         given = sum(distance[c, a] for c in before) + sum(distance[b, c] for c in after)
         exchanged = sum(distance[c, b] for c in before) + sum(distance[a, c] for c in after)
-        clear = exchanged < (SHORTER if before and after else SHORTER_AT_END) * given
-        return float(given - exchanged) if clear else 0.0
+        if before and after:
+            return float(given - exchanged) if exchanged < SHORTER * given else 0.0
+        link = ends[k] if k not in done else None
+        return float(given - exchanged) if link is not None and not link.in_order else 0.0
 
     while True:
         gains = [gain(k) for k in range(len(order) - 1)]
         best = int(np.argmax(gains))
-        if gains[best] == 0.0:
-            return done
+        if gains[best] <= 0.0:
+            return done, {k: link for k, link in ends.items() if link is not None}
         order[best], order[best + 1] = order[best + 1], order[best]
         _exchange(positions, best, np.ones(len(positions), dtype=bool))
         done.append(best)
@@ -122,6 +142,13 @@ def _exchange(positions: Array, k: int, which: Mask) -> None:
     """Exchange markers k and k + 1 in some frames."""
     frames = np.flatnonzero(which)[:, None]
     positions[frames, [k, k + 1]] = positions[frames, [k + 1, k]]
+
+
+def _lost(recording: Recording) -> Mask:
+    """(frames, markers) written as zeros."""
+    least = _least_jump(recording.times, recording.positions)
+    tracks = range(recording.positions.shape[1])
+    return np.stack([_at_origin(recording.positions[:, k], least) for k in tracks], axis=1)
 
 
 def _at_origin(track: Array, least: float) -> Mask:

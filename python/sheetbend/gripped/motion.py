@@ -45,9 +45,12 @@ class GrippedMotion:
     steadied: LocalFit | None = None
 
     @classmethod
-    def of(cls, recording: Recording, smoothing: float) -> GrippedMotion:
+    def of(cls, recording: Recording, smoothing: float, usual: Array | None = None) -> GrippedMotion:
         """Smooth over `smoothing` s (0 = not at all); gripped markers over more, where that leaves nothing but noise
         behind (`steadiest`): what shakes a grip shakes the rope.
+
+        Args:
+            usual: (markers - 1,) m, lengths of the links in other recordings of the rope (`usual_links`).
 
         Raises:
             RecordingError: the rope is not gripped by two markers at each end, its markers are not in order, or too
@@ -57,7 +60,7 @@ class GrippedMotion:
             problem = f"of {recording.name} are fewer than three frames"
             raise RecordingError("times", problem, len(recording.times), "leave the recording out, or record a motion")
         inner = gripped_ends(recording)
-        check_order(recording, inner)
+        check_order(recording, inner, usual)
         recording, positions = _bridged(recording)
         x, v = smoothed(recording.times, positions, smoothing)
         part = slice(inner[0], inner[1] + 1)

@@ -7,17 +7,22 @@ import numpy as np
 from ..arrays.timeseries import Array, mean_position
 from ..errors import RecordingError
 from ..recording.recording import Recording
+from .end_links import end_link
 
 MOST_FRAMES = 200  # of a recording, that its order is judged by
 SHORTER, STEADIER = 0.8, 0.85  # of two links' lengths and of how much these vary: links that are taken instead
 
 
-def check_order(recording: Recording, inner: tuple[int, int]) -> None:
+def check_order(recording: Recording, inner: tuple[int, int], usual: Array | None = None) -> None:
     """Refuse markers out of order along the rope, in time wherever the rope bends.
+
+    Args:
+        inner: numbers of the two inner gripped markers.
+        usual: (markers - 1,) m, lengths of the links in other recordings of the rope (`usual_links`).
 
     Raises:
         RecordingError: another order has shorter links that keep their length better; or a grip points away from the
-            rope.
+            rope, which does not fold back there.
     """
     names = recording.markers
     frames = np.linspace(0, len(recording.times) - 1, min(len(recording.times), MOST_FRAMES)).astype(int)
@@ -30,6 +35,9 @@ def check_order(recording: Recording, inner: tuple[int, int]) -> None:
     for k, ahead, end in ((inner[0], 1, "first"), (inner[1], -1, "last")):
         grip, rope = positions[:, k] - positions[:, k - ahead], positions[:, k + ahead] - positions[:, k]
         if np.nansum((grip * rope).sum(axis=1)) < 0.0:
+            link = end_link(recording.positions, k - ahead, inner, usual)
+            if link is not None and link.in_order:
+                continue
             problem = f"of the {end} grip of {recording.name} are not in order: they point away from the rope"
             got = [names[k - ahead], names[k]]
             raise RecordingError("markers", problem, got, "exchange them (`Recording.select` reorders)")

@@ -8,6 +8,7 @@ of the same rope as most others: another number of markers, other distances betw
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import overload
 
@@ -16,7 +17,8 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError
 from ..recording.recording import Recording
-from .mend import mended
+from .end_links import usual_links
+from .mend import mended, steadied_order
 from .motion import Array, GrippedMotion, gripped_ends
 from .stretch import longest_stretch
 
@@ -64,6 +66,7 @@ def screened(recordings: Sequence[Recording | GrippedMotion], smoothing: float) 
     kept: list[GrippedMotion] = []
     notes: list[str] = []
     errors: list[RecordingError] = []
+    links = _links([r for r in recordings if isinstance(r, Recording)])
     for recording in recordings:
         if isinstance(recording, GrippedMotion):
             kept.append(recording)
@@ -71,8 +74,9 @@ def screened(recordings: Sequence[Recording | GrippedMotion], smoothing: float) 
         words: tuple[str, ...] = ()
         try:
             inner = gripped_ends(recording)
-            sound, words = mended(recording, inner)
-            motion, cut = _usable(sound, inner, smoothing)
+            usual = links.get(len(recording.markers))
+            sound, words = mended(recording, inner, usual)
+            motion, cut = _usable(sound, inner, smoothing, usual)
             kept.append(motion)
         except RecordingError as error:
             reasons = "; ".join(words)
@@ -88,19 +92,31 @@ def screened(recordings: Sequence[Recording | GrippedMotion], smoothing: float) 
     return Screened(tuple(same), (*notes, *others))
 
 
-def _usable(recording: Recording, inner: tuple[int, int], smoothing: float) -> tuple[GrippedMotion, tuple[str, ...]]:
+def _links(recordings: Sequence[Recording]) -> dict[int, Array]:
+    """The usual lengths of links of the recordings that have two grips (`usual_links`)."""
+    positions, inner = [], []
+    for recording in recordings:
+        with suppress(RecordingError):  # the reason is told where the recording itself is screened
+            inner.append(gripped_ends(recording))
+            positions.append(steadied_order(recording)[0])
+    return usual_links(positions, inner)
+
+
+def _usable(
+    recording: Recording, inner: tuple[int, int], smoothing: float, usual: Array | None
+) -> tuple[GrippedMotion, tuple[str, ...]]:
     """A recording as a motion, or else its longest part that can be one, and words on that.
 
     Raises:
         RecordingError: no part can.
     """
     try:
-        return GrippedMotion.of(recording, smoothing), ()
+        return GrippedMotion.of(recording, smoothing, usual), ()
     except RecordingError as error:
         part = longest_stretch(recording, inner)
         if part is None:
             raise
-        motion = GrippedMotion.of(recording.frames(part), smoothing)
+        motion = GrippedMotion.of(recording.frames(part), smoothing, usual)
         first, last = motion.recording.times[[0, -1]]
         return motion, (f"only {first:.4g} to {last:.4g} s are used, since {error.field} {error.problem}",)
 

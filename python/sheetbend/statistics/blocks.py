@@ -6,7 +6,8 @@ of the fit, without a simulation: parameters u + d_k in part k, with sum d_k = 0
 their least-squares step gives all d_k at once. With a right model d is zero but for noise, so d' V^-1 d is compared
 with an F distribution (Hotelling); V is the covariance of all estimates (`covariance`), which knows that residuals are
 alike over time and between channels. A joint test sees what no single parameter shows: where several of them trade,
-each one's own interval is wide.
+each one's own interval is wide. So it is made in directions at right angles in the rows: the covariance allows for
+residuals that are alike by a factor for each column, which tilts what columns that look the same know together.
 
 Priors hold for u, and tell nothing of d. Rows of no part, such as a static experiment's where times are compared, do
 not count: they would hold the mean of the parts at their own value, and what contradicts that would look like a
@@ -162,16 +163,21 @@ def _compared(
         return None
     size = np.linalg.norm(every[:, used], axis=0)
     step = -np.linalg.lstsq(every[:, used] / size, left, rcond=None)[0] / size
-    left = left + every[:, used] @ step
-    spread = covariance(left[:rows], every[:rows, used], layout, every[rows:, used], taken + len(private))
-    V = short_of_frames(spread, int(np.ptp(layout.frame)) + 1) * spread.matrix
+    after = left + every[:, used] @ step
+    spread = covariance(after[:rows], every[:rows, used], layout, every[rows:, used], taken + len(private))
+    short = short_of_frames(spread, int(np.ptp(layout.frame)) + 1)
+    V = short * spread.matrix
     degrees = max(float(np.median((spread.degrees / (2 - 1 / spread.inflation))[compared])), 1.0)
     if drawn.any():
         V, degrees = V + variance_of(every[:, used], drawn), min(degrees, float(drawn.shape[1]))
-    sd = np.sqrt(np.diag(V))
-    values, turn = np.linalg.eigh((V / np.outer(sd, sd))[np.ix_(compared, compared)])
-    told = values > _FLAT * values[-1]
-    scores = (turn.T @ (step / sd)[compared])[told] / np.sqrt(values[told])
+    # correlations of +/-0.9999 do not survive factors of each column's own: so the test has columns at right angles
+    last = [*(i for i in range(len(used)) if i not in set(compared)), *compared]
+    q = np.linalg.qr((every[:, used] / size)[:, last])[0]
+    behind = slice(len(used) - len(compared), None)
+    apart = short * covariance(after[:rows], q[:rows], layout, q[rows:], taken + len(private)).matrix
+    if drawn.any():
+        apart = apart + variance_of(q, drawn)
+    scores = _scores((q.T @ left)[behind], apart[behind, behind])
     chance = float(require("scipy.special", "fit").fdtrc(len(scores), degrees, scores @ scores / len(scores)))
     physical = [c for c in used if c < count * parts]
     moved = np.zeros((every.shape[1], known.shape[1]))
@@ -182,6 +188,14 @@ def _compared(
     return _told(
         chance, split, shared, full, whole, moved, float(require("scipy.special", "fit").stdtrit(degrees, 0.975))
     )
+
+
+def _scores(values: Array, spread: Array) -> Array:
+    """Independent ones of unit variance, from values with that covariance."""
+    sd = np.sqrt(np.diag(spread))
+    sizes, turn = np.linalg.eigh(spread / np.outer(sd, sd))
+    told = sizes > _FLAT * sizes[-1]
+    return np.asarray((turn.T @ (values / sd))[told] / np.sqrt(sizes[told]))
 
 
 def short_of_frames(spread: Covariance, frames: int) -> float:
