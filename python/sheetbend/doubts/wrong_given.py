@@ -15,8 +15,9 @@ result rests on (`given.premises`).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from ..minimum.problem import FitProblem
 from ..optional import require
 from ..quantities.wording import short
 from ..result.result import UNSOUND
+from ..statistics.covariance import Layout
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
@@ -162,21 +164,9 @@ def _asked(
         for least in (MOST, EXPLAINS) if left > MUCH * allowed else (MOST,):
             causes = _causes(r, q, tried, left, least)
             errors = driven_errors(problem, u, FEW) if causes else np.zeros((0, 0))
-            sure = []
-            for cause in causes:
-                tests = math.comb(len(tried), len(cause.parts)) * len(groups)
-                columns = [column for *_, column in cause.parts]
-                chances = (
-                    (
-                        chance_of(r, J, columns, mine, layout, drawn)
-                        if least == MOST
-                        else _of_noise(cause, q, white, drawn)
-                    )
-                    for drawn in (None, errors)
-                    if drawn is None or drawn.size
-                )
-                if all(c < level for c, level in zip(chances, (LEVEL / tests, LEVEL_OF_DRIVEN), strict=False)):
-                    sure.append(cause)
+            chance = partial(_of_what_is_left, r, J, mine, layout) if least == MOST else partial(_of_noise, q, white)
+            tests = [math.comb(len(tried), len(cause.parts)) * len(groups) for cause in causes]
+            sure = [c for c, n in zip(causes, tests, strict=True) if _beyond_chance(partial(chance, c), n, errors)]
             if sure:
                 words = tuple(" and ".join(_off(one, more, problem, group) for one, more, _ in c.parts) for c in sure)
                 moved = [np.sum([more * column for _, more, column in c.parts], axis=0) for c in sure]
@@ -226,9 +216,19 @@ def _causes(r: Array, q: Array, tried: Sequence[tuple[Told, Array]], left: float
     return [cause for cause in causes if cause.explained > causes[0].explained - alike][:MOST_NAMED]
 
 
-def _of_noise(cause: _Cause, q: Array, white: float, errors: Array | None) -> float:
+def _beyond_chance(chance: Callable[[Array | None], float], tests: int, errors: Array) -> bool:
+    """Whether neither noise alone nor with draws of what drives the scene (data rows, draws) asks for a cause."""
+    return chance(None) < LEVEL / tests and (not errors.size or chance(errors) < LEVEL_OF_DRIVEN)
+
+
+def _of_what_is_left(r: Array, J: Array, mine: Array, layout: Layout, cause: _Cause, errors: Array | None) -> float:
+    """Chance of a cause where all that a fit leaves, and how alike it is, counts as noise (`chance_of`)."""
+    return chance_of(r, J, [column for *_, column in cause.parts], mine, layout, errors)
+
+
+def _of_noise(q: Array, white: float, cause: _Cause, errors: Array | None) -> float:
     """Chance that white noise of this variance and draws of errors (data rows, draws) ask for so much of one direction.
-    What else a fit leaves does not count as chance here, as it does where a number is named."""
+    What else a fit leaves does not count as chance here."""
     ((_, more, column),) = cause.parts
     beside = column - q @ (q.T @ column)
     inner = float(beside @ beside)
