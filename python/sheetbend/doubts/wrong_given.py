@@ -6,34 +6,39 @@ with respect to that number beside those of the parameters. Where that direction
 beyond noise, and more than chance does, the number is named with what it would have to be (a score test; Rao 1948,
 Mathematical Proceedings of the Cambridge Philosophical Society 44, 50). Where two together explain nearly all and leave
 a third of what one alone leaves, the two are named. Parameters are doubtful that would then move out of their
-intervals. Numbers that trade with the parameters exactly, as a density does with a stiffness, leave nothing behind:
-what these move is among what the result rests on (`given.premises`).
+intervals. Where much is left and no number explains nearly all of it, as where contacts begin and end at other times
+than to first order, those that explain a third make parameters doubtful which they would move so. Numbers that trade
+with the parameters exactly, as a density does with a stiffness, leave nothing behind: what these move is among what the
+result rests on (`given.premises`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from ..arrays.timeseries import Array
 from ..minimum.discretization import Refinement
 from ..minimum.problem import FitProblem
+from ..optional import require
 from ..quantities.wording import short
 from ..result.result import UNSOUND
+from ..statistics.covariance import Layout
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
 from .cloth_size import cloth_sizes
 from .contradictions import residual_shifts, value_words
-from .directions import LEVEL, noise_in, rows_of, tied
+from .directions import EXPLAINS, LEVEL, noise_in, rows_of, tied
 from .driven_errors import FEW, driven_errors
 from .held_losses import held_names
 from .missing_parts import missing_parts
 from .other_losses import LEAVES
-from .told import DEGREE, LARGER, LATER, MILLIMETER, SIZE, SLOWER, Told
+from .told import DEGREE, LARGER, LATER, MILLIMETER, SIZE, SLOWER, Told, told_numbers
 from .two_directions import chance_of, two_directions
 
 MOST = 0.85
@@ -50,6 +55,9 @@ LEVEL_OF_DRIVEN = 0.01
 `MOST` and that no other noise explains at `LEVEL` and the number of tests. At that level a table turned by 1.1 degrees
 under a drawn rope passed for noise of the hand: chance 8e-5 to 1e-3, 30 tests, friction 37 % off and identified to
 5 % (measured)."""
+MUCH = 2.0
+"""Times the noise, and the told sigma's where that is more: what a fit that misses much leaves beyond it. Residuals are
+1.7 sigma then, or more."""
 ALIKE = 0.05  # by so much less explained, another number is named beside
 MOST_NAMED = 3
 FARTHEST = {"rad": 0.3, "m": 0.1, "s": 0.1, "": 0.7}
@@ -66,12 +74,16 @@ class Wrong:
         words: by how much a number is off, the likeliest first where several explain about as much.
         steps: (free,) of each, internal, what the parameters would move with that number as asked for.
         explained: share of what the fit leaves beyond noise.
+        times: what they leave beyond noise, as a multiple of the noise, or of what sigma allows where that is more.
+        sure: explains nearly all; else a third or more of what is much more than noise.
     """
 
     motions: tuple[int, ...]
     words: tuple[str, ...]
     steps: tuple[Array, ...]
     explained: float
+    times: float
+    sure: bool = True
 
 
 def wrong_given(
@@ -93,6 +105,36 @@ def wrong_given(
     if found and refinement is not None and (shifts := residual_shifts(problem, u, refinement)):
         found = _asked(problem, u, r, J, told, np.column_stack(shifts))
     return found
+
+
+def wrong_in_either(
+    at: tuple[FitProblem, Array],
+    fitted: tuple[FitProblem, Array],
+    told: Sequence[Told],
+    refinement: Refinement | None = None,
+) -> list[Wrong]:
+    """`wrong_given` in the limit of short substeps, and as it was fitted for motions of which much is left and no
+    number is named there: a limit that takes differences of two runs has tangents that contacts spoil first.
+
+    Args:
+        at: the problem and its minimum in that limit.
+        fitted: both before.
+        told: `told_numbers` in the limit.
+    """
+    found = {one.motions: one for one in wrong_given(*at, told, refinement)}
+    if at[0] is fitted[0] or (all(one.sure for one in found.values()) and not _much_left(*at, set(found))):
+        return list(found.values())
+    for one in wrong_given(*fitted, told_numbers(*fitted)[0], refinement):
+        if one.sure and not (one.motions in found and found[one.motions].sure):
+            found[one.motions] = one
+    return list(found.values())
+
+
+def _much_left(problem: FitProblem, u: Array, but: set[tuple[int, ...]]) -> bool:
+    """Whether a fit misses much of some motions but those."""
+    ok, r, _ = problem.evaluate(u, jacobian=False)
+    rows = [rows_of(problem, group) for group in tied(problem, still=True) if tuple(group) not in but]
+    return ok and any(float(r[mine] @ r[mine]) > (1.0 + MUCH) * np.count_nonzero(mine) for mine in rows)
 
 
 def _asked(
@@ -117,21 +159,20 @@ def _asked(
         moving = [i for i in group if not problem.experiments[i].static]
         lacking = [part for i in moving for part in _lacking(problem, u, i)] if left > LEAVES * data else []
         tried = list(_directions(problem, [*told, *lacking], group))
-        causes = _causes(r, q, tried, left)
-        errors = driven_errors(problem, u, FEW) if causes else np.zeros((0, 0))
-        sure = []
-        for cause in causes:
-            tests = math.comb(len(tried), len(cause.parts)) * len(groups)
-            columns = [column for *_, column in cause.parts]
-            if not chance_of(r, J, columns, mine, layout, None) < LEVEL / tests:
-                continue
-            if not errors.size or chance_of(r, J, columns, mine, layout, errors) < LEVEL_OF_DRIVEN:
-                sure.append(cause)
-        if sure:
-            words = tuple(" and ".join(_off(one, more, problem, group) for one, more, _ in c.parts) for c in sure)
-            moved = [np.sum([more * column for _, more, column in c.parts], axis=0) for c in sure]
-            steps = tuple((-inverse @ (q.T @ by))[:count] for by in moved)
-            found.append(Wrong(tuple(group), words, steps, sure[0].explained))
+        allowed = max(float(r[mine] @ r[mine]) - left, float(np.count_nonzero(mine)))
+        white = allowed / np.count_nonzero(mine)
+        for least in (MOST, EXPLAINS) if left > MUCH * allowed else (MOST,):
+            causes = _causes(r, q, tried, left, least)
+            errors = driven_errors(problem, u, FEW) if causes else np.zeros((0, 0))
+            chance = partial(_of_what_is_left, r, J, mine, layout) if least == MOST else partial(_of_noise, q, white)
+            tests = [math.comb(len(tried), len(cause.parts)) * len(groups) for cause in causes]
+            sure = [c for c, n in zip(causes, tests, strict=True) if _beyond_chance(partial(chance, c), n, errors)]
+            if sure:
+                words = tuple(" and ".join(_off(one, more, problem, group) for one, more, _ in c.parts) for c in sure)
+                moved = [np.sum([more * column for _, more, column in c.parts], axis=0) for c in sure]
+                steps = tuple((-inverse @ (q.T @ by))[:count] for by in moved)
+                found.append(Wrong(tuple(group), words, steps, sure[0].explained, left / allowed, least == MOST))
+                break
     return found
 
 
@@ -143,9 +184,9 @@ class _Cause:
     parts: tuple[tuple[Told, float, Array], ...]
 
 
-def _causes(r: Array, q: Array, tried: Sequence[tuple[Told, Array]], left: float) -> list[_Cause]:
-    """The errors that explain most of what residuals r, orthogonal to the parameters' directions q, hold beyond noise:
-    the likeliest first, and those that explain about as much. Chance is not asked yet."""
+def _causes(r: Array, q: Array, tried: Sequence[tuple[Told, Array]], left: float, least: float) -> list[_Cause]:
+    """The errors that explain a share `least` of what residuals r, orthogonal to the parameters' directions q, hold
+    beyond noise: the likeliest first, and of those that explain `MOST` those about as much. Chance is not asked yet."""
     seen, projected = [], []
     for one, column in tried:
         beside = column - q @ (q.T @ column)
@@ -158,9 +199,9 @@ def _causes(r: Array, q: Array, tried: Sequence[tuple[Told, Array]], left: float
         if _possible(one, -along / inner):
             explained = along**2 / inner / left
             most = max(most, explained)
-            if explained > MOST:
+            if explained > least:
                 causes.append(_Cause(explained, ((one, -along / inner, column),)))
-    if most < MOST_OF_TWO:
+    if least == MOST and most < MOST_OF_TWO:
         shared = [k for k, (one, _) in enumerate(seen) if not one.marker]
         pairs = []
         if len(shared) > 1:
@@ -171,7 +212,32 @@ def _causes(r: Array, q: Array, tried: Sequence[tuple[Told, Array]], left: float
                     pairs.append(_Cause(two.explained, tuple((one, more, column) for one, column, more in both)))
         causes = pairs or causes
     causes.sort(key=lambda cause: -cause.explained)
-    return [cause for cause in causes if cause.explained > causes[0].explained - ALIKE][:MOST_NAMED]
+    alike = ALIKE if least == MOST else np.inf
+    return [cause for cause in causes if cause.explained > causes[0].explained - alike][:MOST_NAMED]
+
+
+def _beyond_chance(chance: Callable[[Array | None], float], tests: int, errors: Array) -> bool:
+    """Whether neither noise alone nor with draws of what drives the scene (data rows, draws) asks for a cause."""
+    return chance(None) < LEVEL / tests and (not errors.size or chance(errors) < LEVEL_OF_DRIVEN)
+
+
+def _of_what_is_left(r: Array, J: Array, mine: Array, layout: Layout, cause: _Cause, errors: Array | None) -> float:
+    """Chance of a cause where all that a fit leaves, and how alike it is, counts as noise (`chance_of`)."""
+    return chance_of(r, J, [column for *_, column in cause.parts], mine, layout, errors)
+
+
+def _of_noise(q: Array, white: float, cause: _Cause, errors: Array | None) -> float:
+    """Chance that white noise of this variance and draws of errors (data rows, draws) ask for so much of one direction.
+    What else a fit leaves does not count as chance here."""
+    ((_, more, column),) = cause.parts
+    beside = column - q @ (q.T @ column)
+    inner = float(beside @ beside)
+    variance = white / inner
+    if errors is not None:
+        variance += float(np.mean((beside[: len(errors)] @ errors / inner) ** 2))
+    score = abs(more) / math.sqrt(max(variance, np.finfo(float).tiny))
+    special = require("scipy.special", "fit")
+    return 2.0 * float(special.ndtr(-score) if errors is None else special.stdtr(errors.shape[1], -score))
 
 
 def _lacking(problem: FitProblem, u: Array, i: int) -> list[Told]:
@@ -199,19 +265,25 @@ def doubts_of(problem: FitProblem, u: Array, judged: Identifiability, wrong: Seq
             if e.verdict not in UNSOUND and abs(step) > reach:
                 which = "With that" if len(one.words) == 1 else f"If {words},"
                 there = value_words(p, u[k], step, reach)
-                found[name] = f"{_sentence(problem, one)}. {which} it would be {there} (to first order)"
+                cause = _sentence(problem, one) if one.sure else _unsure(problem, one)
+                found[name] = f"{cause}. {which} it would be {there} (to first order)"
     return found
 
 
 def warnings_of(problem: FitProblem, wrong: Sequence[Wrong]) -> tuple[str, ...]:
-    """The wrong numbers."""
-    return tuple(f"{_sentence(problem, one)}. Check that, and mend the model or the recording" for one in wrong)
+    """The wrong numbers that explain nearly all."""
+    sure = [_sentence(problem, one) for one in wrong if one.sure]
+    return tuple(f"{words}. Check that, and mend the model or the recording" for words in sure)
 
 
 def explained_by(problem: FitProblem, wrong: Sequence[Wrong]) -> dict[str, float]:
     """By free parameter, the share of what its motions leave beyond noise that a wrong number explains."""
     return {
-        name: one.explained for one in wrong for i in one.motions for name in problem.acting_on(problem.experiments[i])
+        name: one.explained
+        for one in wrong
+        if one.sure
+        for i in one.motions
+        for name in problem.acting_on(problem.experiments[i])
     }
 
 
@@ -233,9 +305,21 @@ def _directions(problem: FitProblem, told: Sequence[Told], group: Sequence[int])
     yield from each.values()
 
 
-def _sentence(problem: FitProblem, wrong: Wrong) -> str:
+def _whose(problem: FitProblem, wrong: Wrong) -> str:
     names = [problem.experiments[i].name for i in wrong.motions]
-    whose = names[0] if len(names) == 1 else "the recordings"
+    return names[0] if len(names) == 1 else "the recordings"
+
+
+def _unsure(problem: FitProblem, wrong: Wrong) -> str:
+    part, size = short(100 * wrong.explained, 2), short(math.sqrt(1.0 + wrong.times), 2)
+    return (
+        f"residuals are {size} times the noise of {_whose(problem, wrong)}, and nothing explains nearly all of that. "
+        f"{part} % of it is as if {', or '.join(wrong.words)}"
+    )
+
+
+def _sentence(problem: FitProblem, wrong: Wrong) -> str:
+    whose = _whose(problem, wrong)
     part = short(100 * min(wrong.explained, 1.0), 2)
     return f"{part} % of what the fit leaves of {whose} beyond noise is as if {', or '.join(wrong.words)}"
 

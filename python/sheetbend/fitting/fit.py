@@ -30,7 +30,7 @@ from ..doubts.stuck import bounded_by_sticking
 from ..doubts.told import told_numbers
 from ..doubts.touching import kinks, what_touches
 from ..doubts.unexplained import unexplained
-from ..doubts.wrong_given import doubts_of, explained_by, wrong_given
+from ..doubts.wrong_given import doubts_of, explained_by, wrong_in_either
 from ..doubts.wrong_given import warnings_of as wrong_given_warnings
 from ..errors import InputError
 from ..experiment.clock import outside, told_clocks
@@ -252,7 +252,7 @@ def fit(
             if not lost:
                 doubted, drawn_off = driven_doubts(at.problem, at.u, judged)
                 doubted += loss_doubts(at.problem, at.u, judged)
-                wrong = wrong_given(at.problem, at.u, told, refinement)
+                wrong = wrong_in_either((at.problem, at.u), (problem, best.u), told, refinement)
                 doubted += wrong_given_warnings(at.problem, wrong)
                 lacking = (
                     doubts_of(at.problem, at.u, judged, wrong),
