@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..errors import InputError, refusal
+from ..errors import InputError, choices, refusal
 from ..experiment.experiment import Experiment
 from ..motion.equilibrium import no_rest
 from ..motion.simulate import divergence
@@ -56,7 +56,7 @@ def as_parameters(
     complete = []
     for name, given in items:
         if name not in known:
-            raise InputError("parameters", "name no quantity of the scenes", name, f"name some of: {', '.join(known)}")
+            raise InputError("parameters", "name no quantity of the scenes", name, choices(name, known))
         if isinstance(given, Parameter):
             complete.append(given)
             continue
