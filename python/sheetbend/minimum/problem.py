@@ -47,6 +47,8 @@ def as_parameters(
     Raises:
         InputError: a name that no scene has; the message lists the known ones.
     """
+    if isinstance(wanted, str):
+        raise InputError("parameters", "must be a list of names", wanted, f"write ['{wanted}']")
     known = quantities_of(experiments)
     items = (
         wanted.items()
@@ -60,6 +62,9 @@ def as_parameters(
         if isinstance(given, Parameter):
             complete.append(given)
             continue
+        if not isinstance(given, Mapping | None):
+            fix = "give such as {'initial': 1e-3, 'lower': 1e-5, 'upper': 1.0}"
+            raise InputError(f"parameters.{name}", "must be a mapping of the fields of Parameter", given, fix)
         fields: dict[str, Any] = dict(given or {})
         unknown = set(fields) - set(Parameter.__dataclass_fields__)
         if unknown:
