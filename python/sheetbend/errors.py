@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import reprlib
+from collections.abc import Collection
 
 _short = reprlib.Repr()
 _short.maxstring = _short.maxother = 120
@@ -38,6 +40,14 @@ def refusal(error: ValueError, kind: type[InputError], got: object) -> InputErro
     field, _, rest = str(error).partition(": ")
     problem, _, fix = rest.partition(". Fix: ")
     return kind(field, problem, got, fix or "see above")
+
+
+def choices(name: object, known: Collection[str]) -> str:
+    """A fix for a name that is not known: the ones most like it, in spelling or as their last part, and all."""
+    near = [k for k in known if k.endswith(f"_{name}")] or difflib.get_close_matches(str(name), list(known), n=1)
+    if not near:
+        return f"name one of: {', '.join(known)}"
+    return f"did you mean {' or '.join(repr(k) for k in near)}? There are: {', '.join(known)}"
 
 
 class SceneError(InputError):

@@ -205,7 +205,17 @@ ROPE = {
     "zero density": ("rope.density", lambda: rope(density=0.0)),
     "density not finite": ("rope.density", lambda: rope(density=NAN)),
     "negative EA": ("rope.EA", lambda: rope(EA=-1.0)),
-    "infinite EA": ("rope_EA", lambda: rope(EA=INF)),
+    "infinite EA": ("rope.EA", lambda: rope(EA=INF)),
+    "EI of text": ("rope.EI", lambda: rope(EI="1e-3")),
+    "density per link": ("rope.density", lambda: rope(density=[0.05] * 4)),
+    "length with its unit": ("rope.length", lambda: rope(length="0.6 m")),
+    "pinned by a name": ("rope.pinned", lambda: rope(pinned="start")),
+    "cloth of an array": (
+        "cloth.mesh",
+        lambda: sb.cloth(np.zeros((4, 3)), density=0.2, warp=60, shear=5, poisson=0.2),  # type: ignore[arg-type]
+    ),
+    "marker on a scene": ("rope", lambda: sb.on_rope(rope(), 0.5)),  # type: ignore[arg-type]
+    "markers along a scene": ("rope", lambda: sb.along_rope(rope(), 3)),  # type: ignore[arg-type]
     "zero EI": ("rope.EI", lambda: rope(EI=0.0)),
     "negative stretch damping": ("rope.stretch_damping", lambda: rope(stretch_damping=-1.0)),
     "stretch damping without EA": ("rope.stretch_damping", lambda: rope(EA=None, stretch_damping=1.0)),
@@ -275,6 +285,8 @@ SOLVER = {
 
 EXPERIMENT = {
     "zero sigma": ("r.sigma", lambda: experiment(sigma=0.0)),
+    "sigma with its unit": ("r.sigma", lambda: experiment(sigma="1 mm")),
+    "window of a number": ("r.fit", lambda: experiment(fit=0.2)),
     "sigma not finite": ("r.sigma", lambda: experiment(sigma=NAN)),
     "no axes": ("r.axes", lambda: experiment(axes="")),
     "unknown axis": ("r.axes", lambda: experiment(axes="xw")),
@@ -314,6 +326,9 @@ EXPERIMENT = {
 FIT = {
     "nothing to fit": ("parameters", lambda: fit(parameters=[])),
     "unknown parameter": ("parameters", lambda: fit(parameters=["rope_EB"])),
+    "one name without a list": ("parameters", lambda: fit(parameters="rope_EA")),
+    "a number for a parameter": ("parameters.rope_EA", lambda: fit(parameters={"rope_EA": 1e3})),
+    "bounds without their names": ("parameters.rope_EA", lambda: fit(parameters={"rope_EA": (1.0, 1e6)})),
     "unknown field of a parameter": ("parameters.rope_EA", lambda: fit(parameters={"rope_EA": {"max": 1.0}})),
     "start outside the bounds": ("rope_EA.initial", lambda: fit(parameters={"rope_EA": {"upper": 1.0}})),
     "negative start on a log scale": ("rope_EA.initial", lambda: fit(parameters={"rope_EA": {"initial": -1.0}})),

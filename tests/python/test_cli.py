@@ -387,6 +387,16 @@ class TestBadInput:
         error = last_line(run(command, config, "--json", "--output", folder))["error"]
         assert error["field"] == "--output" and error["got"] == repr(folder)
 
+    def test_a_plan_that_cannot_be_written_costs_no_work(self, config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        from sheetbend.cli import identify
+
+        def work(*_: object, **__: object) -> None:
+            raise AssertionError("it planned")
+
+        monkeypatch.setattr(identify, "run_identify", work)
+        error = last_line(run("identify", config, "--json", "--output", "swing.npz"))["error"]
+        assert error["field"] == "--output" and error["problem"] == "is a file"
+
     @pytest.mark.parametrize("command", ["fit", "simulate"])
     def test_a_movie_that_cannot_be_written_costs_no_work(self, config: Path, command: str) -> None:
         error = last_line(run(command, config, "--json", "--movie", "my.toml/swing.gif"))["error"]

@@ -519,6 +519,18 @@ BAD = [
     ),
     ("sigma = 1e-4", "marker = [{ marker = 'm0', arm = 'a' }]", "recording[0].marker[0]", "give both"),
     ("[parameters.rope_EI]", "[parameters.rope_IE]", "parameters.rope_IE", "did you mean 'rope_EI'"),
+    ("[parameters.rope_EI]", "[parameters.EI]", "parameters.EI", "did you mean 'rope_EI'"),
+    ("[parameters.rope_EI]", "[parameters.stiffness]", "parameters.stiffness", "name one of: rope_EA"),
+    (
+        "[parameters.rope_EI]",
+        "[parameters.rope_drag_linear]",
+        "parameters.rope_drag_linear",
+        "give drag_linear in the [[scene.rope]] named 'rope'",
+    ),
+    ("[[scene.rope]]", "[scene.rope]", "scene.rope", "write [[scene.rope]] in place of [scene.rope]"),
+    ("length = 0.6", 'length = "0.6"', "scene.rope[0].length", "write 0.6 without quotes"),
+    ("length = 0.6", 'length = "60 cm"', "scene.rope[0].length", "without quotes and unit"),
+    ("fit = [0.0, 0.2]", "fit = [-1.0, 0.2]", "recording[0].fit", "begin at 0 s"),
     ("lower = 1e-5", "lower = 0.1", "parameters.rope_EI.initial", "inside the bounds"),
     ("lower = 1e-5", "minimum = 0.1", "parameters.rope_EI.minimum", "lower"),
     ("lower = 1e-5", "initial = -1.0", "parameters.rope_EI", "positive"),
@@ -561,7 +573,16 @@ def test_broken_toml_names_the_line(folder: Path) -> None:
         load(written(folder, '[experiment]\nname = "swing\n'))
 
 
+def test_a_scene_starts_before_its_recording_where_start_time_says_so(folder: Path) -> None:
+    (e,) = load(changed(folder, "fit = [0.0, 0.2]", "fit = [-0.1, 0.2]\nstart_time = -0.1")).experiments
+    assert e.t0 == -0.1
+    (e,) = load(changed(folder, "fit = [0.0, 0.2]", "fit = [-0.01, 0.2]")).experiments  # no more than a frame
+    assert e.t0 == -0.01
+
+
 def test_missing_and_binary_files(folder: Path) -> None:
+    with pytest.raises(sb.ConfigError, match=r"is a recording.*sheetbend new swing\.npz"):
+        load(folder / "swing.npz")
     with pytest.raises(sb.ConfigError, match="is no file"):
         load(folder / "nowhere.toml")
     (folder / "binary.toml").write_bytes(b"\xff\xfe\x00")

@@ -263,6 +263,13 @@ def test_what_no_draft_is_for_is_refused_in_a_sentence(tmp_path: Path, file: str
     assert not (tmp_path / "draft.toml").exists()
 
 
+def test_too_few_frames_are_counted(tmp_path: Path) -> None:
+    still = np.broadcast_to([[0.0, 0.0, 0.0], [0.1, 0.2, 0.3]], (3, 2, 3))
+    sb.Recording(still, np.arange(3) / 100, name="short").save(tmp_path / "short.csv")
+    result = run("new", tmp_path / "short.csv", "--output", tmp_path / "draft.toml")
+    assert result.exit_code == 2 and "too few frames" in result.stderr and "(got 3)" in result.stderr
+
+
 def test_options_are_named_as_they_are_given(tmp_path: Path) -> None:
     takes.let_go(False, 0.3).save(tmp_path / "take.csv")
     for options in (

@@ -111,6 +111,8 @@ def _identify(
         taken = {e.name for e in experiments}
         more = [replace(e, name=f"{e.name} of {other.stem}") if e.name in taken else e for e in more]
         instead[f"with {other.stem}"] = [*experiments, *more]
+    if output is not None:
+        made("--output", output)
     heading(console, config.experiment.name, config.experiment.about)
     parameters = {name: fields_of_parameter(p) for name, p in config.parameters.items()}
     plan = run_identify(
@@ -124,7 +126,7 @@ def _identify(
     show(console, lambda: _rich(plan), plan.report)
     files: list[str] = []
     if output is not None:
-        plan.save(made("--output", output) / FILE)
+        plan.save(output / FILE)
         files = [FILE]
         console.print(f"\nwritten to {output}: {FILE}", soft_wrap=True)
     return Outcome(plan.to_dict() | {"name": config.experiment.name, "files": files}, _code(plan))

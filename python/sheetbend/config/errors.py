@@ -56,12 +56,26 @@ def one(detail: Mapping[str, Any], model: type[BaseModel]) -> ConfigError:
         return ConfigError(field, f"has {limits['actual_length']} entries", got, f"give {wanted}")
     if kind == "literal_error":
         return ConfigError(field, "is none of the choices", got, f"use {limits['expected']}")
+    if kind == "list_type" and isinstance(got, Mapping) and _holds_tables(path, model):
+        header = _table(path)[1:-1]
+        return ConfigError(field, "must be a list of tables", _short(got), f"write [[{header}]] in place of [{header}]")
+    if kind in ("float_type", "int_type") and isinstance(got, str):
+        fix = f"write {got.strip()} without quotes" if _is_number(got) else f"write {wanted}, without quotes and unit"
+        return ConfigError(field, f"must be {wanted}", got, fix)
     return ConfigError(
         field,
         f"must be {wanted}" if wanted else detail["msg"],
         got,
         f"write {wanted}" if wanted else "see docs/configuration.md",
     )
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 _FORMS = {
@@ -162,6 +176,18 @@ def _unknown(path: list[str | int], model: type[BaseModel]) -> ConfigError:
 
 
 def _fields_at(path: Location, model: type[BaseModel]) -> list[str]:
+    here = _annotation(path, model)
+    return list(next(o for o in _options(here) if isinstance(o, type) and issubclass(o, BaseModel)).model_fields)
+
+
+def _holds_tables(path: Location, model: type[BaseModel]) -> bool:
+    """Whether a key holds a list of tables."""
+    lists = [typing.get_args(o)[0] for o in _options(_annotation(path, model)) if typing.get_origin(o) is list]
+    return any(isinstance(o, type) and issubclass(o, BaseModel) for item in lists for o in _options(item))
+
+
+def _annotation(path: Location, model: type[BaseModel]) -> Any:
+    """The type of a key."""
     here: Any = model
     for part in path:
         options = _options(here)
@@ -174,7 +200,7 @@ def _fields_at(path: Location, model: type[BaseModel]) -> list[str]:
             if models
             else typing.get_args(next(o for o in options if typing.get_origin(o) is dict))[1]
         )
-    return list(next(o for o in _options(here) if isinstance(o, type) and issubclass(o, BaseModel)).model_fields)
+    return here
 
 
 def _short(got: Any) -> Any:

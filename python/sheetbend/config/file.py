@@ -13,6 +13,7 @@ from ..errors import ConfigError
 from ..files.door import bounded_bytes, reading
 from ..files.json_file import check_depth
 from ..files.names import steering
+from ..recording.io import FORMATS
 from .build import Study, build
 from .errors import from_validation
 from .fabric_file import with_fabric_files
@@ -73,6 +74,9 @@ def content(path: Path) -> dict[str, Any]:
     """
     if not path.is_file():
         raise ConfigError(str(path), "is no file", str(path), "give the path of a configuration, such as my.toml")
+    if path.suffix.lower() in FORMATS:
+        fix = f"write a configuration for it first, with `sheetbend new {path.name}`"
+        raise ConfigError(str(path), "is a recording, not a configuration", path.name, fix)
     try:
         text = bounded_bytes(path, LARGEST, ConfigError).decode("utf-8")
     except UnicodeDecodeError as error:

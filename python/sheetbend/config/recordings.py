@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..errors import ConfigError, RecordingError
 from ..experiment.experiment import Experiment
 from ..recording.recording import Recording
@@ -65,8 +67,13 @@ def check_windows(path: str, section: RecordingSection, recording: Recording) ->
     """Windows hold frames of the recording.
 
     Raises:
-        ConfigError: one does not.
+        ConfigError: one does not, or the scene would start before the recording although no key asks for that.
     """
+    first, interval = float(recording.times[0]), float(np.diff(recording.times[:2]).sum())
+    window = None if section.start_time is not None or section.static else section.fit
+    if window is not None and window[0] < first - interval * (1.0 + 1e-9):
+        fix = f"begin at {first:.6g} s, the first frame; if the motion starts earlier, give start_time too"
+        raise ConfigError(f"{path}.fit", "begins before the recording", window, fix)
     for name in ("fit", "held_out"):
         window = getattr(section, name)
         if window is not None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from ..errors import ConfigError
+from ..errors import ConfigError, choices
 from ..experiment.experiment import Experiment
 from ..scene.scene import Scene
 from . import schema
@@ -25,11 +24,19 @@ def check_names(config: schema.Config, experiments: tuple[Experiment, ...]) -> N
         for name in getattr(config, section):
             base = name.partition("[")[0]
             if base not in known:
-                near = difflib.get_close_matches(base, known, n=1)
-                hint = f"did you mean '{near[0]}'? " if near else ""
-                raise ConfigError(
-                    f"{section}.{name}", "is no quantity of the scenes", name, f"{hint}There are: {', '.join(known)}"
-                )
+                fix = _left_out(config, base) or choices(base, known)
+                raise ConfigError(f"{section}.{name}", "is no quantity of the scenes", name, fix)
+
+
+def _left_out(config: schema.Config, name: str) -> str | None:
+    """What to write for a quantity that an object of the scene would have if its key were given."""
+    scene = config.scene
+    for table, objects in (("rope", scene.rope), ("rod", scene.rod), ("cloth", scene.cloth)):
+        for one in objects:
+            key = name.removeprefix(f"{one.name}_")
+            if key != name and getattr(one, key, 0) is None:
+                return f"give {key} in the [[scene.{table}]] named '{one.name}', where the fit starts"
+    return None
 
 
 def set_start_values(scene: Scene, config: schema.Config, values: Mapping[str, float], path: str) -> None:

@@ -91,7 +91,7 @@ class Experiment:
             raise InputError("recording", "is no Recording", self.recording, "read the file: sb.Recording.load(path)")
         if not self.name:
             object.__setattr__(self, "name", self.recording.name)
-        if not (math.isfinite(self.sigma) and self.sigma > 0):
+        if not (is_number(self.sigma) and self.sigma > 0):
             raise InputError(
                 f"{self.name}.sigma", "must be positive", self.sigma, "give the expected error of a marker in m"
             )
@@ -126,7 +126,7 @@ class Experiment:
                 f"{self.name}.start_time", "must be finite", self.start_time, "give a time of the recording in s"
             )
         for part, window in (("fit", self.fit), ("held_out", self.held_out)):
-            if window is not None and len(window) != 2:
+            if window is not None and np.shape(window) != (2,):
                 raise InputError(
                     f"{self.name}.{part}", "must be (start, stop)", window, "give two times of the recording in s"
                 )

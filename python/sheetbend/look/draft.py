@@ -46,6 +46,10 @@ def draft(takes: Sequence[Take], name: str, measured: Measured | None = None) ->
         if found is not None:
             break
     else:
+        frames = len(first.recording.times)
+        if frames < pendulum.LEAST_FRAMES:
+            fix = "record the motion for longer or at a higher rate, or write a configuration by hand"
+            raise RecordingError(first.recording.name, "holds too few frames to tell what moves", frames, fix)
         got = joined(first.recording.markers)
         fix = "write a configuration by hand, see docs/configuration.md"
         raise RecordingError("markers", "do not move like a rope, beam, cloth or pendulum", got, fix)

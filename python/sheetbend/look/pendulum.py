@@ -18,6 +18,8 @@ PIECES = {1: (3.0, 5.0), 2: (2.0, 2.0)}  # s that are fitted and predicted at mo
 FITTED, PREDICTED = 4, 4  # pieces
 LEAD = 0.1  # s, at the beginning of a predicted piece, that its start is fitted to
 SUBSTEP = 1 / 1600  # s, at most
+LEAST_FRAMES = 20
+"""Of a recording that tells what moves."""
 
 
 def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
@@ -92,7 +94,7 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
 def _joints(s: Seen) -> list[int] | None:
     """The pivot and the ends of the arms, in order."""
     x, count = s.recording.positions, len(s.recording.markers)
-    if not 2 <= count <= 3 or len(s.still) != 1 or len(s.recording.times) < 20:
+    if not 2 <= count <= 3 or len(s.still) != 1 or len(s.recording.times) < LEAST_FRAMES:
         return None
     if int(np.argmax(np.abs(s.gravity))) != 2:
         return None

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..errors import InputError, refusal
+from ..errors import InputError, choices, refusal
 from ..experiment.experiment import Experiment
 from ..motion.equilibrium import no_rest
 from ..motion.simulate import divergence
@@ -47,6 +47,8 @@ def as_parameters(
     Raises:
         InputError: a name that no scene has; the message lists the known ones.
     """
+    if isinstance(wanted, str):
+        raise InputError("parameters", "must be a list of names", wanted, f"write ['{wanted}']")
     known = quantities_of(experiments)
     items = (
         wanted.items()
@@ -56,10 +58,13 @@ def as_parameters(
     complete = []
     for name, given in items:
         if name not in known:
-            raise InputError("parameters", "name no quantity of the scenes", name, f"name some of: {', '.join(known)}")
+            raise InputError("parameters", "name no quantity of the scenes", name, choices(name, known))
         if isinstance(given, Parameter):
             complete.append(given)
             continue
+        if not isinstance(given, Mapping | None):
+            fix = "give such as {'initial': 1e-3, 'lower': 1e-5, 'upper': 1.0}"
+            raise InputError(f"parameters.{name}", "must be a mapping of the fields of Parameter", given, fix)
         fields: dict[str, Any] = dict(given or {})
         unknown = set(fields) - set(Parameter.__dataclass_fields__)
         if unknown:

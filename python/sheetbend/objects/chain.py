@@ -44,7 +44,7 @@ def straight_or_given(
     """(segments + 1, 3) nodes of a rope along a way, see `straight_way`, or through given points, and its length."""
     if not isinstance(segments, int | np.integer) or segments < 1:
         raise SceneError(f"{name}.segments", "must be a positive whole number", segments, "give at least 1")
-    if length is not None and not (np.isfinite(length) and length > 0):
+    if length is not None and not (is_number(length) and length > 0):
         raise SceneError(f"{name}.length", "must be positive", length, "give m")
     if given is not None:
         shape = resample(given, segments)

@@ -121,6 +121,9 @@ def add_cloth(
     Raises:
         SceneError: wrong or missing values, or others than those of a cut before; a mesh whose diagonals bias bending.
     """
+    if not isinstance(mesh, TriangleMesh):
+        fix = "give a TriangleMesh, such as sb.mesh.equilateral(...) or sb.read_mesh(path)"
+        raise SceneError(f"{name}.mesh", "is no mesh", mesh, fix)
     needed = {"density": density, "warp": warp, "shear": shear}
     optional = {
         "weft": weft,

@@ -93,6 +93,7 @@ def on_rope(rope: Rope, arc_length: float, interpolation: str = "cubic") -> Plac
     Raises:
         SceneError: beyond the ends, or an unknown interpolation.
     """
+    _check_rope(rope)
     s, nodes = rope.arc_length, rope.particles
     if not -1e-9 * s[-1] <= arc_length <= s[-1] * (1.0 + 1e-9):
         raise SceneError("arc_length", f"lies beyond the rope '{rope.name}'", arc_length, f"use 0 to {s[-1]:g} m")
@@ -108,7 +109,14 @@ def on_rope(rope: Rope, arc_length: float, interpolation: str = "cubic") -> Plac
 
 def along_rope(rope: Rope, count: int, interpolation: str = "cubic") -> tuple[Place, ...]:
     """`count` markers at equal arc lengths from end to end."""
+    _check_rope(rope)
     return tuple(on_rope(rope, s, interpolation) for s in np.linspace(0.0, rope.length, count))
+
+
+def _check_rope(rope: object) -> None:
+    if isinstance(rope, Scene):
+        known = " or ".join(f"scene.ropes[{name!r}]" for name in rope.ropes) or "what sb.add_rope returns"
+        raise SceneError("rope", "is a scene", rope.name, f"give one rope of it, {known}")
 
 
 def on_cloth(cloth: Cloth, points: ArrayLike) -> tuple[Place, ...]:

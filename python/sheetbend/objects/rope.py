@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import indices
+from ..arrays.checks import check_positive, indices
 from ..errors import SceneError
 from ..quantities.quantities import Term, product
 from ..scene.body import BodyPoint
@@ -65,7 +65,7 @@ def rope(
     """A scene with one rope; see `add_rope` for the options. `pinned` holds node numbers along the rope (-1 = last)."""
     scene = Scene(name, gravity)
     built = add_rope(scene, name, length=length, segments=segments, density=density, EA=EA, EI=EI, **options)  # type: ignore[arg-type]
-    if len(pinned):
+    if np.size(pinned):
         scene.pin(built.particles[indices("rope.pinned", pinned, len(built.particles))])
     return scene
 
@@ -152,15 +152,8 @@ def add_rope(
         held = [None if grip is None else placed(grip) for grip in grips]
         line = shape if points is None and grips[0] is None else points
         shape, speeds = initial_shape(name, length, segments, line, velocity, held, EA is not None)
-    for field, value in (
-        ("density", density),
-        ("EA", EA),
-        ("EI", EI),
-        ("stretch_damping", stretch_damping),
-        ("bend_damping", bend_damping),
-    ):
-        if value is not None and not value > 0:
-            raise SceneError(f"{name}.{field}", "must be positive", value, "give a positive number, or leave it out")
+    optional = {"EA": EA, "EI": EI, "stretch_damping": stretch_damping, "bend_damping": bend_damping}
+    check_positive(name, {"density": density}, optional)
     if stretch_damping is not None and EA is None:
         raise SceneError(f"{name}.stretch_damping", "needs a finite EA", EA, "give EA, or leave it out")
     if bend_damping is not None and EI is None:

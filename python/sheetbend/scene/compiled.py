@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _core
-from ..errors import SceneError, refusal
+from ..errors import SceneError, choices, refusal
 from ..quantities.quantities import FUNCTIONS, Term
 from . import pieces
 from .domain import Domain
@@ -195,9 +195,7 @@ class CompiledScene:
         theta = self.theta.copy()
         for name, value in (changes or {}).items():
             if name not in self.names:
-                raise SceneError(
-                    "values", "name no quantity of the scene", name, f"name one of: {', '.join(self.names)}"
-                )
+                raise SceneError("values", "name no quantity of the scene", name, choices(name, self.names))
             k = self.names.index(name)
             try:
                 theta[k] = value
