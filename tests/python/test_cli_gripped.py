@@ -154,9 +154,9 @@ class TestFit:
         smoothed = []
         of = GrippedMotion.of
 
-        def counted(recording: sb.Recording, smoothing: float) -> GrippedMotion:
+        def counted(recording: sb.Recording, *arguments: Any) -> GrippedMotion:
             smoothed.append(recording.name)
-            return of(recording, smoothing)
+            return of(recording, *arguments)
 
         monkeypatch.setattr(GrippedMotion, "of", counted)
         assert run("fit", config).exit_code == 0

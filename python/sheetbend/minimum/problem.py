@@ -50,11 +50,8 @@ def as_parameters(
     if isinstance(wanted, str):
         raise InputError("parameters", "must be a list of names", wanted, f"write ['{wanted}']")
     known = quantities_of(experiments)
-    items = (
-        wanted.items()
-        if isinstance(wanted, Mapping)
-        else [(p.name, p) if isinstance(p, Parameter) else (p, None) for p in wanted]
-    )
+    each = ((p.name, p) if isinstance(p, Parameter) else (p, None) for p in wanted)
+    items = wanted.items() if isinstance(wanted, Mapping) else each
     complete = []
     for name, given in items:
         if name not in known:
@@ -68,12 +65,8 @@ def as_parameters(
         fields: dict[str, Any] = dict(given or {})
         unknown = set(fields) - set(Parameter.__dataclass_fields__)
         if unknown:
-            raise InputError(
-                f"parameters.{name}",
-                "has unknown fields",
-                sorted(unknown),
-                f"use: {', '.join(Parameter.__dataclass_fields__)}",
-            )
+            fix = f"use: {', '.join(Parameter.__dataclass_fields__)}"
+            raise InputError(f"parameters.{name}", "has unknown fields", sorted(unknown), fix)
         q = known[name]
         if "tied_to" not in fields and not fields.get("private"):
             fields.setdefault("initial", q.value)
