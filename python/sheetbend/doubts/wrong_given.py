@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -149,6 +149,7 @@ def _asked(
     kept = sizes > RANK_TOLERANCE * sizes.max(initial=0.0)
     q, inverse = q[:, kept], right[kept].T / sizes[kept] / scale[:, None]
     r = r - q @ (q.T @ r)
+    errors = cache(partial(driven_errors, problem, u, FEW))
     found = []
     groups = tied(problem, still=True)
     for group in groups:
@@ -159,19 +160,19 @@ def _asked(
         moving = [i for i in group if not problem.experiments[i].static]
         lacking = [part for i in moving for part in _lacking(problem, u, i)] if left > LEAVES * data else []
         tried = list(_directions(problem, [*told, *lacking], group))
+        seen = _seen(q, tried)
         allowed = max(float(r[mine] @ r[mine]) - left, float(np.count_nonzero(mine)))
         white = allowed / np.count_nonzero(mine)
         for least in (MOST, EXPLAINS) if left > MUCH * allowed else (MOST,):
-            causes = _causes(r, q, tried, left, least)
-            errors = driven_errors(problem, u, FEW) if causes else np.zeros((0, 0))
+            causes = _causes(r, seen, left, least)
             chance = partial(_of_what_is_left, r, J, mine, layout) if least == MOST else partial(_of_noise, q, white)
             tests = [math.comb(len(tried), len(cause.parts)) * len(groups) for cause in causes]
-            sure = [c for c, n in zip(causes, tests, strict=True) if _beyond_chance(partial(chance, c), n, errors)]
-            if sure:
-                words = tuple(" and ".join(_off(one, more, problem, group) for one, more, _ in c.parts) for c in sure)
-                moved = [np.sum([more * column for _, more, column in c.parts], axis=0) for c in sure]
+            likely = [c for c, n in zip(causes, tests, strict=True) if _beyond_chance(partial(chance, c), n, errors)]
+            if likely:
+                words = tuple(" and ".join(_off(one, more, problem, group) for one, more, _ in c.parts) for c in likely)
+                moved = [np.sum([more * column for _, more, column in c.parts], axis=0) for c in likely]
                 steps = tuple((-inverse @ (q.T @ by))[:count] for by in moved)
-                found.append(Wrong(tuple(group), words, steps, sure[0].explained, left / allowed, least == MOST))
+                found.append(Wrong(tuple(group), words, steps, likely[0].explained, left / allowed, least == MOST))
                 break
     return found
 
@@ -184,17 +185,17 @@ class _Cause:
     parts: tuple[tuple[Told, float, Array], ...]
 
 
-def _causes(r: Array, q: Array, tried: Sequence[tuple[Told, Array]], left: float, least: float) -> list[_Cause]:
-    """The errors that explain a share `least` of what residuals r, orthogonal to the parameters' directions q, hold
+def _seen(q: Array, tried: Sequence[tuple[Told, Array]]) -> list[tuple[Told, Array, Array]]:
+    """The directions that parameters do not take up, each with what is left of it beside theirs, q."""
+    beside = ((one, column, column - q @ (q.T @ column)) for one, column in tried)
+    return [(one, column, b) for one, column, b in beside if float(b @ b) > RANK_TOLERANCE * float(column @ column)]
+
+
+def _causes(r: Array, seen: Sequence[tuple[Told, Array, Array]], left: float, least: float) -> list[_Cause]:
+    """The errors that explain a share `least` of what residuals r, orthogonal to the parameters' directions, hold
     beyond noise: the likeliest first, and of those that explain `MOST` those about as much. Chance is not asked yet."""
-    seen, projected = [], []
-    for one, column in tried:
-        beside = column - q @ (q.T @ column)
-        if float(beside @ beside) > RANK_TOLERANCE * float(column @ column):
-            seen.append((one, column))
-            projected.append(beside)
     causes, most = [], 0.0
-    for (one, column), beside in zip(seen, projected, strict=True):
+    for one, column, beside in seen:
         inner, along = float(beside @ beside), float(beside @ r)
         if _possible(one, -along / inner):
             explained = along**2 / inner / left
@@ -202,12 +203,12 @@ def _causes(r: Array, q: Array, tried: Sequence[tuple[Told, Array]], left: float
             if explained > least:
                 causes.append(_Cause(explained, ((one, -along / inner, column),)))
     if least == MOST and most < MOST_OF_TWO:
-        shared = [k for k, (one, _) in enumerate(seen) if not one.marker]
+        shared = [each for each in seen if not each[0].marker]
         pairs = []
         if len(shared) > 1:
-            beside = np.column_stack([projected[k] for k in shared])
+            beside = np.column_stack([b for *_, b in shared])
             for two in two_directions(r, beside, left, most, MOST_OF_TWO):
-                both = [(*seen[shared[k]], more) for k, more in zip(two.places, two.more, strict=True)]
+                both = [(*shared[k][:2], more) for k, more in zip(two.places, two.more, strict=True)]
                 if all(_possible(one, more) for one, _, more in both):
                     pairs.append(_Cause(two.explained, tuple((one, more, column) for one, column, more in both)))
         causes = pairs or causes
@@ -216,9 +217,11 @@ def _causes(r: Array, q: Array, tried: Sequence[tuple[Told, Array]], left: float
     return [cause for cause in causes if cause.explained > causes[0].explained - alike][:MOST_NAMED]
 
 
-def _beyond_chance(chance: Callable[[Array | None], float], tests: int, errors: Array) -> bool:
+def _beyond_chance(chance: Callable[[Array | None], float], tests: int, errors: Callable[[], Array]) -> bool:
     """Whether neither noise alone nor with draws of what drives the scene (data rows, draws) asks for a cause."""
-    return chance(None) < LEVEL / tests and (not errors.size or chance(errors) < LEVEL_OF_DRIVEN)
+    if not chance(None) < LEVEL / tests:
+        return False
+    return not errors().size or chance(errors()) < LEVEL_OF_DRIVEN
 
 
 def _of_what_is_left(r: Array, J: Array, mine: Array, layout: Layout, cause: _Cause, errors: Array | None) -> float:
