@@ -5,7 +5,7 @@
 //   NodeItself      the node's own place
 //
 // so that C = K(y), dC/dx_i = sum_k b_ki dK/dy_k. The weights are parameters, so that gradients with respect to places on bodies follow; they stand first, vector
-// by vector, and K's own parameters, which K subtracts from its rows, after them. The stencil has its points first (centers of bodies, particles), then three
+// by vector, and K's own parameters after them. K subtracts these from its rows, unless it says `inner_parameters = parameters`: then it may use them anywhere. The stencil has its points first (centers of bodies, particles), then three
 // axes per body, then dials.
 //
 //   struct Law { static constexpr int vectors, rows; bool linear;    linear: in the vectors
@@ -55,6 +55,10 @@ struct CarriedOn : OnPoints<Points + 3 * Bodies + Dials> {
   static constexpr int points = Points, axes = 3 * Bodies, dials = Dials, rows = Law::rows;
   static constexpr int dofs = 3 * (Points + 3 * Bodies + Dials), vectors = sizeof...(Vectors), width = 3 * vectors;
   static constexpr int weights = (Vectors::weights + ... + 0);
+  static constexpr int inner = [] {
+    if constexpr (requires { Law::inner_parameters; }) return Law::inner_parameters;
+    return 0;
+  }();
   static_assert(vectors == Law::vectors, "give a vector for each that the law takes");
 
   template <class T>
@@ -69,7 +73,7 @@ struct CarriedOn : OnPoints<Points + 3 * Bodies + Dials> {
   // With v_j = dl_j a - y_j b, summed over its nodes as x is: the law's Hessian takes it, and the weights get what they multiply in C and in v_j . J_j.
   template <class T>
   static void reverse(const T* x, const T* p, const T* dl, const T* y, const T* a, const T* b, T* x_bar, T* p_bar) {
-    using D = Dual<T, 1>;
+    using D = Dual<T, 1 + inner>;
     D at[width], own[16], C[rows], by[rows * width];
     T s[width], along_a[width], along_b[width], bar[width];
     sums(x, p, s);
@@ -77,6 +81,7 @@ struct CarriedOn : OnPoints<Points + 3 * Bodies + Dials> {
     sums(b, p, along_b);
     for (int d = 0; d < width; ++d) at[d].v = s[d], bar[d] = T(0.0);
     for (int k = 0; k < Law::parameters; ++k) own[k].v = p[weights + k];
+    for (int k = 0; k < inner; ++k) own[k].d[1 + k] = T(1.0);
     for (int j = 0; j < rows; ++j) {
       if (j == 0 || !Law::linear) {
         for (int d = 0; d < width; ++d) at[d].d[0] = dl[j] * along_a[d] - y[j] * along_b[d];
@@ -90,7 +95,13 @@ struct CarriedOn : OnPoints<Points + 3 * Bodies + Dials> {
           p_bar[weight] += by[j * width + 3 * vector + d].v * (dl[j] * a[i] - y[j] * (b[i] + x[i]));
         }
       });
-      if constexpr (Law::parameters > 0)
+      if constexpr (inner > 0)
+        for (int k = 0; k < inner; ++k) {
+          p_bar[weights + k] -= y[j] * C[j].d[1 + k];
+          for (int d = 0; d < width; ++d)
+            p_bar[weights + k] += by[j * width + d].d[1 + k] * (dl[j] * along_a[d] - y[j] * along_b[d]);
+        }
+      else if constexpr (Law::parameters > 0)
         if (j < Law::parameters) p_bar[weights + j] += y[j];
     }
     if constexpr (Law::linear) return;

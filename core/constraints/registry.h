@@ -19,6 +19,7 @@
 #include "core/constraints/hinge.h"
 #include "core/constraints/isometric_bending.h"
 #include "core/constraints/joint_angle.h"
+#include "core/constraints/joint_stops.h"
 #include "core/constraints/material_curvature.h"
 #include "core/constraints/planar_bend.h"
 #include "core/constraints/rigid.h"
@@ -66,6 +67,8 @@ using Registry = std::tuple<   //
     DirectionsAcross,          //
     Along,                     //
     JointAngle,                //
+    AngleStop,                 //
+    SlideStop,                 //
     BrickStrain,               //
     BrickVolume,               //
     TetrahedronStrain,         //

@@ -231,6 +231,54 @@ TEST(Joints, GradientMatchesComplexStep) {
   }
 }
 
+// A pendulum that swings onto a stop and a body that falls onto one, with damping: from before they are met until after they are left.
+struct Stops : ::testing::TestWithParam<SolverOptions> {};
+INSTANTIATE_TEST_SUITE_P(
+    , Stops,
+    ::testing::Values(SolverOptions{.h = 2e-3, .partition = Partition::direct, .iterations = 3},
+                      SolverOptions{.h = 2e-3, .partition = Partition::implicit, .iterations = 40},
+                      SolverOptions{
+                          .h = 2e-3, .integrator = Integrator::bdf1, .partition = Partition::direct, .iterations = 3},
+                      SolverOptions{.h = 2e-3, .partition = Partition::gauss_seidel, .iterations = 10}),
+    [](const auto& info) {
+      return std::array{"Direct", "Implicit", "DirectBdf1", "Sweeps"}[static_cast<std::size_t>(info.index)];
+    });
+
+TEST_P(Stops, GradientThroughTheirTouchMatchesComplexStep) {
+  BodyScene s;
+  const Body still = ground(s), link = s.add_body(0.1 * hanging(0.6)[0], 0.3, {6e-4, 1e-3, 7e-4}, hanging(0.6)),
+             weight = s.add_body({0.5, 0.1, -0.1}, 0.2, {1e-3, 2e-3, 1.5e-3}, hanging(0.0));
+  hinge(s, still, {}, link, {-0.1, 0, 0});
+  std::vector<int> nodes(still.axes.begin(), still.axes.end());
+  nodes.insert(nodes.end(), link.axes.begin(), link.axes.end());
+  s.add("angle_stop", nodes, {1, 0, 0, 0, 0, 1, 1, 0, 0, 0.35, 0.45, 0.02}, 0.01, 0.13);
+  nodes = {still.center, weight.center};
+  nodes.insert(nodes.end(), still.axes.begin(), still.axes.end());
+  nodes.insert(nodes.end(), weight.axes.begin(), weight.axes.end());
+  s.add("slide_stop", nodes, {0.12, 0.0, 0.5, 0.02, 0.01, 0.01, 1, 0, 0, 0.0, 0.05, 0.005}, 2e-4, 6.0);
+  const Scene scene = build_scene(s.spec);
+  const auto inputs = s.inputs(scene);
+  constexpr int steps = 140;
+  const Program program{scene, make_plan(scene, GetParam()), steps};
+  const auto all = states(program, inputs);
+  const auto angle = [&](int n) { return angle_of(scene, &all[static_cast<std::size_t>(n) * scene.dofs()], link); };
+  double deepest = 0.0;
+  for (int n = 0; n <= steps; ++n) deepest = std::min(deepest, angle(n) + 0.1);
+  EXPECT_LT(deepest, -0.01);      // beyond the limit of -0.1 rad
+  EXPECT_GT(angle(steps), -0.1);  // and back
+  const auto oracle = complex_step_gradient([&](const std::vector<Complex>& z) { return loss(program, z); }, inputs);
+  const auto found = gradient(program, inputs);
+  for (const Quantity q : {Quantity::position, Quantity::velocity, Quantity::mass, Quantity::compliance,
+                           Quantity::damping, Quantity::rest, Quantity::gravity}) {
+    const std::size_t first = scene.layout.of(q), count = scene.layout.count(q);
+    EXPECT_GT(largest(std::span(oracle).subspan(first, count)), 0.0);
+    const double error =
+        relative_error(std::span(found).subspan(first, count), std::span(oracle).subspan(first, count));
+    EXPECT_LE(error, 1e-9) << quantity_names[static_cast<int>(q)];
+    record_error(quantity_names[static_cast<int>(q)], error);
+  }
+}
+
 // A door on two hinges, and a four-bar linkage in the plane of x and z: five and three rows too many.
 BodyScene door() {
   BodyScene s;

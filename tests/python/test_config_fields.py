@@ -76,6 +76,10 @@ WHOLE: dict[str, Any] = {
                 "servo": {"times": [0.0], "values": [0.0]},
                 "torque": {"times": [0.0], "values": [0.1]},
                 "rotor": 1e-5,
+                "limits": [-1.0, 1.0],
+                "limit_stiffness": 10.0,
+                "limit_damping": 0.1,
+                "limit_depth": 0.01,
             }
         ],
         "collider": [{"name": "table", "shape": "plane"}],

@@ -9,11 +9,12 @@ from pydantic import model_validator
 from .section import Finite, Name, Quaternion, Section, Vector, key
 
 GROUND = "ground"
+LIMITS = ("limits", "limit_stiffness", "limit_damping", "limit_depth")
 JOINTS: dict[str, tuple[str, ...]] = {
     "ball": ("compliance",),
-    "hinge": ("axis", "rate", "stiffness", "rest", "viscosity", "servo", "torque", "rotor"),
+    "hinge": ("axis", "rate", "stiffness", "rest", "viscosity", "servo", "torque", "rotor", *LIMITS),
     "universal": ("axes",),
-    "slider": ("axis", "rate"),
+    "slider": ("axis", "rate", *LIMITS),
     "cylinder": ("axis", "rate", "turn_rate"),
     "fixed": (),
 }
@@ -95,6 +96,25 @@ class JointSection(Section):
         None, "of a motor on a hinge, linear between the times; up to 50 are <name>_torque_0, ...", "s, N m"
     )
     rotor: Finite | None = key(None, "inertia of that motor, as the hinge feels it: <name>_rotor", "kg m^2", gt=0)
+    limits: list[Finite] | None = key(
+        None,
+        "of a hinge or slider: [low, high], counted from the start: <name>_limit_low, <name>_limit_high",
+        "rad or m",
+        min_length=2,
+        max_length=2,
+    )
+    limit_stiffness: Finite | None = key(
+        None,
+        "of the stops at these limits: <name>_limit_stiffness; left out, it turns the lower body back in 20 ms",
+        "N m/rad or N/m",
+        gt=0,
+    )
+    limit_damping: Finite | None = key(
+        None, "of the stops, torque or force over rate: <name>_limit_damping", "N m s/rad or N s/m", ge=0
+    )
+    limit_depth: Finite | None = key(
+        None, "beyond a limit, over which stiffness and damping grow from zero; 0.02 rad or 0.005 m", "rad or m", ge=0
+    )
     compliance: Finite | None = key(None, "of a ball joint that gives way: <name>_compliance", "m/N", gt=0)
 
     @model_validator(mode="after")

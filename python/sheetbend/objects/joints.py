@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ..arrays.checks import finite
 from ..errors import SceneError
 from ..scene.body import Body
+from .joint_limits import add_limits
 from .joint_making import Joint, Making
 from .joint_spring import Knots, add_motor, add_servo, add_spring
 
@@ -53,12 +54,18 @@ def hinge(
     servo: Knots | None = None,
     torque: Knots | None = None,
     rotor: float | None = None,
+    limits: ArrayLike | None = None,
+    limit_stiffness: float | None = None,
+    limit_damping: float | None = None,
+    limit_depth: float | None = None,
 ) -> Joint:
     """Join two bodies by a hinge.
 
     Quantities: its place as of `ball`; `<name>_angle` rad and `<name>_rate` rad/s, the start of the lower body, which
     replace its own place, attitude, velocity and spin; with a spring `<name>_stiffness` N m/rad and `<name>_rest` rad;
-    with viscosity `<name>_viscosity` N m s/rad. The angle counts from how the bodies were given.
+    with viscosity `<name>_viscosity` N m s/rad; with limits `<name>_limit_low`, `<name>_limit_high` and
+    `<name>_limit_depth` rad, `<name>_limit_stiffness` N m/rad, and `<name>_limit_damping` N m s/rad where given. The
+    angle counts from how the bodies were given.
 
     Args:
         upper, lower: the bodies; None is the ground.
@@ -74,9 +81,15 @@ def hinge(
             outside; up to 50 knots are the quantities `<name>_torque_0`, `_1`, and so on.
         rotor: kg m^2, the inertia of the motor seen from the joint, the quantity `<name>_rotor`. With a torque it is
             needed: a torque acts on the rotor, which turns with the joint.
+        limits: (low, high) rad, between which the hinge turns freely. Beyond them a stop pushes back.
+        limit_stiffness: of a stop, torque over angle, N m/rad. By default it would turn the lower body alone back
+            within 20 ms. Take substeps of which at least ten fall into the time of a touch.
+        limit_damping: of a stop, torque over rate, N m s/rad.
+        limit_depth: rad beyond a limit, over which stiffness and damping grow from zero to these values; 0.02 by
+            default. 0 is a linear spring, and excludes damping.
 
     Raises:
-        SceneError: shapes, NaN, negative numbers, or bodies that are none or the same.
+        SceneError: shapes, NaN, negative numbers, limits that are no range, or bodies that are none or the same.
     """
     made = Making("hinge", upper, lower, at, axis, name)
     made.hang(turn=rate)
@@ -87,6 +100,7 @@ def hinge(
     else:
         add_spring(made, stiffness, rest, viscosity)
     add_motor(made, torque, rotor)
+    add_limits(made, "rad", limits, limit_stiffness, limit_damping, limit_depth)
     return made.joint()
 
 
@@ -111,16 +125,30 @@ def universal(upper: Body | None, lower: Body, *, at: ArrayLike, axes: ArrayLike
 
 
 def slider(
-    upper: Body | None, lower: Body, *, at: ArrayLike, axis: ArrayLike, name: str = "slider", rate: float = 0.0
+    upper: Body | None,
+    lower: Body,
+    *,
+    at: ArrayLike,
+    axis: ArrayLike,
+    name: str = "slider",
+    rate: float = 0.0,
+    limits: ArrayLike | None = None,
+    limit_stiffness: float | None = None,
+    limit_damping: float | None = None,
+    limit_depth: float | None = None,
 ) -> Joint:
     """Let one body slide along a line of the other without turning against it.
 
-    Quantities: its place as of `ball`; `<name>_shift` m and `<name>_rate` m/s, the start of the lower body.
+    Quantities: its place as of `ball`; `<name>_shift` m and `<name>_rate` m/s, the start of the lower body; with
+    limits `<name>_limit_low`, `<name>_limit_high` and `<name>_limit_depth` m, `<name>_limit_stiffness` N/m, and
+    `<name>_limit_damping` N s/m where given.
 
     Args:
         at: (3,) m, a point of the lower body in the world that stays on the line.
         axis: (3,) the line's direction in the world.
         rate: m/s, at the start.
+        limits: (low, high) m, between which the body slides freely, counted from how the bodies were given.
+        limit_stiffness, limit_damping, limit_depth: N/m, N s/m and m, as of `hinge`; the depth is 5 mm by default.
 
     Raises:
         SceneError: as `ball`.
@@ -129,6 +157,7 @@ def slider(
     made.hang(shift=rate, fixed=True)
     made.along()
     made.across([(0, 1), (0, 2), (1, 2)])
+    add_limits(made, "m", limits, limit_stiffness, limit_damping, limit_depth)
     return made.joint()
 
 

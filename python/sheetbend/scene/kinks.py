@@ -16,6 +16,8 @@ def kinks(scene: SceneData) -> str:
         found.append("joints that yield")
     if any(group.kind == "friction_hinge" for group in scene.groups):
         found.append("joints with dry friction")
+    if any(group.kind in ("angle_stop", "slide_stop") for group in scene.groups):
+        found.append("joints with limits")
     if scene.boundary.driven and scene.boundary.interpolation == "linear":
         found.append("driven particles with linear knots, which kick them (use 'cubic')")
     return " and ".join(found)

@@ -440,6 +440,28 @@ inline Case case_of<JointAngle>() {
           .parameter_sign = std::vector<int>(10, 1)};
 }
 
+// Beyond its range by less than the depth.
+template <>
+inline Case case_of<AngleStop>() {
+  return {.x = bodies_sample(false),
+          .p = {0.9, 0.1, -0.2, 0.1, 0.8, 0.3, 0.7, 0.5, 0.2, -0.2, 0.3, 0.6},
+          .compliance = 1e-3,
+          .damping = 0.5,
+          .under_rotation = UnderRotation::stays,
+          .relabeling = {0, 1, 2, 3, 4, 5},
+          .sign = {1},
+          .parameter_sign = std::vector<int>(12, 1)};
+}
+
+template <>
+inline Case case_of<SlideStop>() {
+  Case row = case_of<Along>();
+  row.p.pop_back();
+  row.p.insert(row.p.end(), {-0.075, 0.125, 0.7});
+  row.parameter_sign.assign(row.p.size(), 1);
+  return row;
+}
+
 // An element of about the sizes of its gradients, then couplings and ratios of stiffness. Its second and third node change places.
 inline Case solid_case(std::vector<double> x, std::vector<double> gradients) {
   Case row{.x = std::move(x),
