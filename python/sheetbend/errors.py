@@ -43,8 +43,11 @@ def refusal(error: ValueError, kind: type[InputError], got: object) -> InputErro
 
 
 def choices(name: object, known: Collection[str]) -> str:
-    """A fix for a name that is not known: the ones most like it, in spelling or as their last part, and all."""
-    near = [k for k in known if k.endswith(f"_{name}")] or difflib.get_close_matches(str(name), list(known), n=1)
+    """A fix for a name that is not known: the ones most like it, in spelling, in other letters' case, or as their last
+    part; and all."""
+    text = str(name)
+    near = [k for k in known if k.endswith(f"_{text}") or k.lower() == text.lower()]
+    near = near or difflib.get_close_matches(text, list(known), n=1)
     if not near:
         return f"name one of: {', '.join(known)}"
     return f"did you mean {' or '.join(repr(k) for k in near)}? There are: {', '.join(known)}"

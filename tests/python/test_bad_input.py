@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sheetbend as sb
+import sheetbend.torch as st
 from sheetbend.motion.equilibrium import NoEquilibriumError
 from sheetbend.quantities.quantities import term
 
@@ -345,12 +346,46 @@ FIT = {
     "no iterations": ("max_iterations", lambda: fit(max_iterations=0)),
     "no threads": ("threads", lambda: fit(threads=0)),
     "a start not finite": ("rope_EA", lambda: fit(starts=[{"rope_EA": NAN}])),
+    "bounds in the wrong order": ("rope_EA.lower", lambda: fit(parameters={"rope_EA": {"lower": 2e3, "upper": 1.0}})),
+    "fit from before the recording": ("r.fit", lambda: fit(fit=(-1.0, 0.05))),
+    "fit to long after the recording": ("r.fit", lambda: fit(fit=(0.0, 3.0))),
+    "held out until long after it": ("r.held_out", lambda: fit(fit=(0.0, 0.03), held_out=(0.03, 3.0))),
+    "held out before the start": ("r.held_out", lambda: fit(fit=(0.03, 0.07), held_out=(0.0, 0.03))),
+    "held out before start_time": ("r.held_out", lambda: fit(start_time=0.02, fit=(0.03, 0.07), held_out=(0.0, 0.03))),
+    "plan from before the recording": (
+        "r.fit",
+        lambda: sb.identify(experiment(fit=(-1.0, 0.05)), parameters=["links_compliance"]),
+    ),
+    "many from before the recording": (
+        "r.fit",
+        lambda: sb.fit_many([experiment(fit=(-1.0, 0.05))] * 20, ["links_compliance"]),
+    ),
     "unknown name in a start": ("starts", lambda: fit(starts=[{"rope_EI": 1.0}])),
 }
 
 
+TIMES = np.arange(3) * 1e-3
+UNKNOWN = (  # of a quantity, where a near one exists
+    ("values", lambda: sb.simulate(rope(), TIMES, values={"EA": 1.0})),
+    ("scales", lambda: sb.rollout(rope(), TIMES).gradient(np.ones((3, 5, 3))).require({"EA": 1.0})),
+    ("values.EA", lambda: st.simulate(rope(), TIMES, values={"EA": 1.0})),
+    ("learn", lambda: st.SceneModule(rope(), TIMES, learn=["EA"])),
+)
+WRONG_TYPES = {
+    "substep for a solver": ("solver", lambda: sb.simulate(rope(), TIMES, 0.001)),
+    "substep in a rollout": ("solver", lambda: sb.rollout(rope(), TIMES, 0.001)),
+    "substep in a check": ("solver", lambda: sb.check_gradients(rope(), TIMES, 0.001)),
+    "substep in a plan of a tape": ("solver", lambda: sb.tape_plan(rope(), TIMES, "direct")),
+    "substep under torch": ("solver", lambda: st.simulate(rope(), TIMES, 0.001)),
+    "substep of a stepper": ("solver", lambda: st.Stepper(rope(), 0.001)),
+    "nothing to load": ("path", lambda: sb.Recording.load(None)),
+}
+
+
 @pytest.mark.parametrize(
-    "table", [SCENE, ROPE, SOLVER, EXPERIMENT, FIT], ids=["scene", "rope", "solver", "experiment", "fit"]
+    "table",
+    [SCENE, ROPE, SOLVER, EXPERIMENT, FIT, WRONG_TYPES],
+    ids=["scene", "rope", "solver", "experiment", "fit", "types"],
 )
 def test_the_error_names_field_value_and_fix(table):
     for case, (field, act) in table.items():
@@ -361,6 +396,23 @@ def test_the_error_names_field_value_and_fix(table):
         assert error.problem and len(error.fix) > 3 and error.fix != "see above", case
         text = str(error)
         assert text.startswith(f"{field}: ") and "(got " in text and "Fix: " in text, case
+
+
+@pytest.mark.parametrize(("field", "act"), UNKNOWN)
+def test_an_unknown_quantity_is_met_with_the_near_one(field, act):
+    with pytest.raises(sb.InputError, match="did you mean 'rope_EA'") as caught:
+        act()
+    assert caught.value.field == field
+
+
+def test_the_fix_for_a_substep_alone_is_what_to_write():
+    with pytest.raises(sb.InputError, match=r"write sb\.Solver\(h=0\.001\)"):
+        sb.simulate(rope(), TIMES, 0.001)
+
+
+@pytest.mark.parametrize("window", [(0.0, INF), (-1 / 60, 5 / 60), (0.0, 4.5 / 60)])
+def test_windows_may_reach_one_frame_beyond_the_recording_or_have_no_end(window):
+    assert sb.identify(experiment(fit=window), parameters=["links_compliance"]).estimates
 
 
 @pytest.mark.parametrize("step", FROZEN.values(), ids=FROZEN)

@@ -152,7 +152,7 @@ def late_cloth(clock: float = 0.0) -> tuple[sb.Experiment, Array]:
         recording=recording,
         markers=places,
         fit=(LATE, 0.5),
-        held_out=(0.5, 1.2),
+        held_out=(0.5, 1.12),
         start_time=0.0,
         time_offset="clock",
         solver=sb.Solver(h=1 / 50, method="newton"),

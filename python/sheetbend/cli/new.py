@@ -9,10 +9,11 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from ..config import GrippedConfig, build, parse_any
+from ..config import GrippedConfig, build, parse_any, scene_alone
 from ..errors import ConfigError, RecordingError, SheetbendError
 from ..files.names import flaw
 from ..files.whole import write_text
+from ..look import garment
 from ..look.draft import Draft, draft
 from ..look.seen import seen
 from ..look.take import Measured, Take
@@ -29,7 +30,10 @@ from .targets import check_targets
 def new(
     files: Annotated[
         list[Path],
-        typer.Argument(help="A recording, or several of the same rope or cloth.", show_default=False),
+        typer.Argument(
+            help="A recording, or several of the same rope or cloth; or the mesh of a garment (OBJ, PLY, STL).",
+            show_default=False,
+        ),
     ],
     output: Annotated[
         Path | None,
@@ -51,7 +55,8 @@ def new(
 ) -> None:
     """Look at a recording and write a configuration for `sheetbend fit`.
 
-    Comments in the configuration say what the recording shows and what it cannot show.
+    Comments in the configuration say what the recording shows and what it cannot show. From the mesh of a garment it
+    writes a scene for `sheetbend simulate`.
 
     Example: sheetbend new take.csv --density 0.05
     """
@@ -66,39 +71,58 @@ def _new(console: Console, files: list[Path], output: Path | None, measured: Mea
     ):
         if given is not None and not 0 < given < float("inf"):
             raise ConfigError(option, "must be positive", given, fix)
-    with options(units="--units"):
-        recordings = [_read(file, units) for file in files]
-    name = _name(recordings[0][0].name)
+    if is_mesh := files[0].suffix.lower() in garment.FILES:
+        _check_mesh(files, measured)
+        name = _name(files[0].stem)
+    else:
+        with options(units="--units"):
+            recordings = [_read(file, units) for file in files]
+        name = _name(recordings[0][0].name)
     target = output if output is not None else Path(f"{name}.toml")
     if target.suffix.lower() != ".toml":
         raise ConfigError("--output", "is no configuration", str(target), "give a file that ends in .toml")
     check_targets("--output", target.parent, [target])
     if target.exists():
         raise ConfigError("--output", "is there already", str(target), "name another file with --output")
-    takes = [
-        Take(seen(recording), Path(os.path.relpath(file, target.parent)).as_posix(), unit)
-        for file, (recording, unit) in zip(files, recordings, strict=True)
-    ]
+    named = [Path(os.path.relpath(file, target.parent)).as_posix() for file in files]
+    if is_mesh:
+        with options(unit="--units"):
+            found = garment.draft_of_mesh(files[0], named[0], name, measured, units)
+        return _written(console, target, name, found, "the mesh", f"sheetbend simulate {target} --mesh gltf")
+    takes = [Take(seen(r), file, unit) for file, (r, unit) in zip(named, recordings, strict=True)]
     try:
         found = draft(takes, name, measured)
     except RecordingError as error:
         if error.field == "length":
             raise ConfigError("--length", error.problem, error.got, error.fix) from error
         raise
+    return _written(console, target, name, found, "the recording", f"sheetbend fit {target}")
+
+
+def _written(console: Console, target: Path, name: str, found: Draft, source: str, following: str) -> Outcome:
+    """Write a draft, and show what it says; `following` is the command to give next."""
     made("--output", target.parent)
     write_text(target, found.text)
     heading(console, name, f"looks like {found.kind}")
     console.print("seen:")
     listing(console, found.seen)
-    console.print("not known from the recording:")
+    console.print(f"not known from {source}:")
     listing(console, found.unknown)
     try:
         data = _built(console, target)
     except SheetbendError:
         console.print(f"written to {target}, but it does not run as it is:", soft_wrap=True)
         raise
-    console.print(f"written to {target}; next: sheetbend fit {target}", soft_wrap=True)
+    console.print(f"written to {target}; next: {following}", soft_wrap=True)
     return Outcome({"name": name, "config": str(target)} | _said(found) | data)
+
+
+def _check_mesh(files: list[Path], measured: Measured) -> None:
+    """A garment comes in one file, and has no length."""
+    if len(files) > 1:
+        raise ConfigError("FILES", "are several, and the first is a mesh", [str(f) for f in files], "give one mesh")
+    if measured.length is not None:
+        raise ConfigError("--length", "is of a rope or a beam", measured.length, "leave it out")
 
 
 def _built(console: Console, target: Path) -> dict[str, Any]:
@@ -107,6 +131,9 @@ def _built(console: Console, target: Path) -> dict[str, Any]:
     if isinstance(config, GrippedConfig):
         ropes = load_ropes(config, target.parent)
         listing(console, (note for rope in ropes for note in rope.train.notes))
+        return {"parameters": []}
+    if not config.recording:
+        scene_alone(config, target.parent)
         return {"parameters": []}
     study = build(config, target.parent)
     if study.assumptions:

@@ -12,6 +12,7 @@ from ..experiment.experiment import Experiment
 from ..minimum.discretization import Refinement
 from ..minimum.problem import as_parameters
 from ..motion.solver import Solver
+from ..recording.windows import check_windows
 from ..scene.scene import Scene
 from . import schema
 from .contacts import check_solver
@@ -20,7 +21,7 @@ from .forces import force_sensors
 from .held import assumptions
 from .marker_places import Listed
 from .moment import Moment
-from .recordings import check_names_used, check_windows, fields_of_experiment, offset_names, read, start_time
+from .recordings import check_names_used, fields_of_experiment, offset_names, read, start_time, windows
 from .rest import check_rest
 from .scenes import build_scene
 from .shown import ropes_shown, with_grids, without
@@ -114,7 +115,7 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
     recording = read(section, folder, path)
     with located(path):
         t0 = start_time(section, recording)
-        check_windows(path, section, recording)
+        check_windows(recording, *windows(section), section.start_time, section.static)
         part = recording.piece(*(section.fit if section.static and section.fit else (t0, None)))
     moment = Moment(part, recording, t0, section.static, section.max_gap)
     ropes = ropes_shown(config, section, path)

@@ -7,12 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..errors import ConfigError, RecordingError
 from ..experiment.experiment import Experiment
 from ..recording.recording import Recording
 from ..recording.unit_doubt import extent, unit_doubt
+from ..recording.windows import Window
 from ..scene.scene import Scene
 from .schema import RecordingSection
 
@@ -50,10 +49,16 @@ def read(section: RecordingSection, folder: Path, path: str) -> Recording:
     return replace(recording, name=section.name or recording.name)
 
 
+def windows(section: RecordingSection) -> tuple[Window | None, Window | None]:
+    """What is fitted and what is held out, s."""
+    return _window(section.fit), _window(section.held_out)
+
+
 def fields_of_experiment(section: RecordingSection) -> dict[str, Any]:
     """The fields of `Experiment` that the keys of a recording give as they stand, and its windows."""
     plain = section.model_dump(exclude=TAKEN | OF_READER)
-    return {**plain, "fit": _window(section.fit), "held_out": _window(section.held_out)}
+    fit, held_out = windows(section)
+    return {**plain, "fit": fit, "held_out": held_out}
 
 
 def start_time(section: RecordingSection, recording: Recording) -> float:
@@ -61,26 +66,6 @@ def start_time(section: RecordingSection, recording: Recording) -> float:
     if section.start_time is not None:
         return section.start_time
     return section.fit[0] if section.fit is not None else float(recording.times[0])
-
-
-def check_windows(path: str, section: RecordingSection, recording: Recording) -> None:
-    """Windows hold frames of the recording.
-
-    Raises:
-        ConfigError: one does not, or the scene would start before the recording although no key asks for that.
-    """
-    first, interval = float(recording.times[0]), float(np.diff(recording.times[:2]).sum())
-    window = None if section.start_time is not None or section.static else section.fit
-    if window is not None and window[0] < first - interval * (1.0 + 1e-9):
-        fix = f"begin at {first:.6g} s, the first frame; if the motion starts earlier, give start_time too"
-        raise ConfigError(f"{path}.fit", "begins before the recording", window, fix)
-    for name in ("fit", "held_out"):
-        window = getattr(section, name)
-        if window is not None:
-            try:
-                recording.piece(*window)
-            except RecordingError as error:
-                raise ConfigError(f"{path}.{name}", error.problem, window, error.fix) from error
 
 
 def offset_names(
@@ -119,5 +104,5 @@ def _three(path: str, names: list[str], scene: Scene) -> tuple[str | None, str |
     return a, b, c
 
 
-def _window(given: list[float] | None) -> tuple[float, float] | None:
+def _window(given: list[float] | None) -> Window | None:
     return None if given is None else (given[0], given[1])

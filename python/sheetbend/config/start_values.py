@@ -47,12 +47,8 @@ def set_start_values(scene: Scene, config: schema.Config, values: Mapping[str, f
     """
     for name, value in values.items():
         if name not in scene.quantities:
-            raise ConfigError(
-                f"{path}.values.{name}",
-                "is no quantity of the scene",
-                name,
-                f"name some of: {', '.join(scene.quantities)}",
-            )
+            fix = _left_out(config, name) or choices(name, scene.quantities)
+            raise ConfigError(f"{path}.values.{name}", "is no quantity of the scene", name, fix)
         p = config.parameters.get(name)
         if p is not None and not p.private:
             fix = f"set parameters.{name}.initial, or make it private = true"

@@ -53,6 +53,7 @@ from ..report.fit_result import FitResult
 from ..result.result import Estimate, Given, Premise
 from ..scene.scene import Scene
 from ..statistics.identifiability import Identifiability
+from .experiments import experiments_of
 from .rows import curves, every_end, given_rows, growth_rows, recording_fit, start_rows
 
 IGNORED = ", and their standard deviations do not count"
@@ -185,7 +186,7 @@ def fit(
         InputError: anything inconsistent, named, before work starts.
         SheetbendError: the start itself diverges or has no equilibrium.
     """
-    experiments = _experiments(scene, recording, experiment)
+    experiments = experiments_of(scene, recording, experiment)
     wanted = as_parameters(parameters, experiments)
     if threads < 1:
         raise InputError("threads", "must be positive", threads, "give at least 1")
@@ -357,26 +358,6 @@ class _Conclusion:
     doubts: tuple[str, ...]
     premises: tuple[Premise, ...]
     parts: dict[str, str]  # by parameter, of which parts of the data ask for different values
-
-
-def _experiments(
-    scene: Scene | Experiment | Sequence[Experiment], recording: Recording | None, fields: Mapping[str, Any]
-) -> list[Experiment]:
-    if isinstance(scene, Scene):
-        if recording is None:
-            raise InputError("recording", "is missing", None, "give the recording that the scene is to explain")
-        return [Experiment(scene=scene, recording=recording, **fields)]
-    if recording is not None or fields:
-        raise InputError(
-            "recording",
-            "goes with a single scene",
-            sorted(fields) or "recording",
-            "put everything into the experiments",
-        )
-    experiments = [scene] if isinstance(scene, Experiment) else list(scene)
-    if not experiments:
-        raise InputError("experiments", "are empty", 0, "give at least one")
-    return experiments
 
 
 def _moved(judged: Identifiability, by: Mapping[str, float]) -> Identifiability:

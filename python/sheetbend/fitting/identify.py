@@ -33,6 +33,7 @@ from ..statistics.identifiability import Identifiability
 from ..statistics.identifiability import identify as judged
 from ..statistics.intervals import open_estimate
 from ..statistics.judge import Nuisance
+from .experiments import experiments_of
 from .plan import Plan, Variant
 from .variants import changes
 
@@ -139,15 +140,8 @@ def identify(
 def _planned(
     scene: Scene | Experiment | Sequence[Experiment], recording: Recording | None, fields: Mapping[str, Any]
 ) -> list[Experiment]:
-    if isinstance(scene, Scene):
-        if recording is None:
-            fix = "give one with the planned frames and markers; their places do not count"
-            raise InputError("recording", "is missing", None, fix)
-        return [Experiment(scene=scene, recording=recording, **fields)]
-    if recording is not None or fields:
-        fix = "put everything into the experiments"
-        raise InputError("recording", "goes with a single scene", sorted(fields) or "recording", fix)
-    experiments = [e for e in ([scene] if isinstance(scene, Experiment) else scene) if e.predict is None]
+    wanted = "give one with the planned frames and markers; their places do not count"
+    experiments = [e for e in experiments_of(scene, recording, fields, wanted) if e.predict is None]
     if not experiments:
         raise InputError("experiments", "are empty", 0, "give at least one that is fitted")
     return experiments

@@ -24,6 +24,7 @@ from ..result.result import Estimate
 from ..statistics.gauge import RANK_TOLERANCE, NullSpace, null_space
 from ..statistics.intervals import at_far_limit, clipped, half_width, known, linear_ends, open_estimate
 from ..statistics.judge import LEVEL
+from .experiments import within
 
 FEWEST = 20  # recordings
 RESTS = 1e-6  # of a parameter's size: so near a bound it rests there
@@ -62,7 +63,7 @@ def fit_many(
         InputError: anything inconsistent, named, before work starts.
         SheetbendError: a motion diverges at the start.
     """
-    every = list(experiments)
+    every = within(list(experiments))
     if len(every) < FEWEST:
         raise InputError("experiments", "are few", len(every), f"give at least {FEWEST}, or use sheetbend.fit")
     if ahead := [e.name for e in every if e.predict is not None]:

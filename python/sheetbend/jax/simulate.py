@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import InputError
+from ..errors import InputError, choices
 from ..motion.rollouts import Rollouts
 from ..motion.simulate import substeps
 from ..motion.solver import Solver
@@ -48,7 +48,7 @@ def simulate(
         InputError: times off the grid, unknown names, wrong shapes. Values outside their range and motions that diverge
             are found while the program runs; JAX then raises its own error with the package's message.
     """
-    solver = solver or Solver()
+    solver = Solver.given(solver)
     compiled, steps = scene.compiled, substeps(times, solver.h)
     given, arrays = _quantities(scene, values or {}), _arrays(scene, inputs or {})
     rollouts = Rollouts(scene, solver.core(compiled), steps, False, solver, replaced=tuple(arrays))
@@ -86,7 +86,7 @@ def _quantities(scene: Scene, values: Mapping[str, Any]) -> dict[str, Any]:
     names = scene.compiled.names
     for name, value in values.items():
         if name not in names:
-            raise InputError(f"values.{name}", "is no quantity of the scene", name, f"name one of: {', '.join(names)}")
+            raise InputError(f"values.{name}", "is no quantity of the scene", name, choices(name, names))
         if jnp.shape(value) != ():
             raise InputError(f"values.{name}", "is no scalar", jnp.shape(value), "use jax.vmap for batches")
     return dict(values)
@@ -96,8 +96,7 @@ def _arrays(scene: Scene, inputs: Mapping[str, Any]) -> dict[str, Any]:
     shapes = {name: shape for name, shape in scene.compiled.shapes.items() if math.prod(shape)}
     for name, array in inputs.items():
         if name not in shapes:
-            fix = f"name one of: {', '.join(shapes)}"
-            raise InputError(f"inputs.{name}", "is no input array of the scene", name, fix)
+            raise InputError(f"inputs.{name}", "is no input array of the scene", name, choices(name, shapes))
         if jnp.shape(array) != shapes[name]:
             fix = f"give {shapes[name]}; use jax.vmap for batches"
             raise InputError(f"inputs.{name}", "has the wrong shape", jnp.shape(array), fix)

@@ -54,11 +54,24 @@ def draft(takes: Sequence[Take], name: str, measured: Measured | None = None) ->
         fix = "write a configuration by hand, see docs/configuration.md"
         raise RecordingError("markers", "do not move like a rope, beam, cloth or pendulum", got, fix)
     told = (*_told(takes), *found.notes)
-    lines = comment(f"Written by `sheetbend new` from {joined(t.file for t in takes)}. It shows {found.kind}.")
-    lines += ["#", "# Seen:", *(line for s in told for line in _item(s))]
-    lines += ["#", "# Not known from the recording:", *(line for s in found.unknown for line in _item(s))]
-    lines += table("[experiment]", {"name": name, "about": f"{found.kind}, as `sheetbend new` sees it"})
-    return Draft(found.kind, told, tuple(found.unknown), "\n".join([*lines, *found.lines]) + "\n")
+    return written(found.kind, name, [t.file for t in takes], told, found.unknown, found.lines)
+
+
+def written(
+    kind: str,
+    name: str,
+    files: Sequence[str],
+    told: Sequence[str],
+    unknown: Sequence[str],
+    lines: Sequence[str],
+    source: str = "recording",
+) -> Draft:
+    """The configuration with its head: what is seen in the files, and what they do not tell, as comments."""
+    head = comment(f"Written by `sheetbend new` from {joined(files)}. It shows {kind}.")
+    head += ["#", "# Seen:", *(line for s in told for line in _item(s))]
+    head += ["#", f"# Not known from the {source}:", *(line for s in unknown for line in _item(s))]
+    head += table("[experiment]", {"name": name, "about": f"{kind}, as `sheetbend new` sees it"})
+    return Draft(kind, tuple(told), tuple(unknown), "\n".join([*head, *lines]) + "\n")
 
 
 def _item(sentence: str) -> list[str]:

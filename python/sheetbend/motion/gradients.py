@@ -160,7 +160,7 @@ def check_gradients(
     Raises:
         InputError, DivergenceError: as `simulate`; times without a substep, or fewer than one sample.
     """
-    solver = solver or Solver()
+    solver = Solver.given(solver)
     steps = substeps(times, solver.h)
     if steps[-1] == 0:
         raise InputError("times", "hold no substep to check", times, f"give frames up to {4 * solver.h:g} s or later")

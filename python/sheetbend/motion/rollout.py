@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _core
-from ..errors import EmptyGradientError, InputError
+from ..errors import EmptyGradientError, InputError, choices
 from ..scene.scene import Scene
 from .simulate import divergence, substeps, whole
 from .solver import Solver
@@ -59,7 +59,7 @@ class Gradient:
         """
         unknown = [name for name in scales if name not in self.quantities]
         if unknown:
-            fix = f"name some of: {', '.join(self.quantities)}"
+            fix = choices(unknown[0], self.quantities)
             raise InputError("scales", "name no quantity of the scene", unknown[0], fix)
         change = max((abs(self.quantities[name] * scale) for name, scale in scales.items()), default=0.0)
         if not change > self.rounding:
@@ -139,4 +139,4 @@ def rollout(
         UnconvergedError: method "newton_cg" ran out of iterations, here or in a gradient.
         UnbalancedError: method "implicit" did not bring a substep's forces into balance.
     """
-    return Rollout(scene, times, solver or Solver(), values)
+    return Rollout(scene, times, Solver.given(solver), values)

@@ -82,7 +82,7 @@ def simulate(
         UnconvergedError: method "newton_cg" ran out of iterations.
         UnbalancedError: method "implicit" did not bring a substep's forces into balance; says when and where.
     """
-    solver = solver or Solver()
+    solver = Solver.given(solver)
     compiled = scene.compiled
     steps = substeps(times, solver.h)
     inputs = compiled.inputs(compiled.values(values))

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, cast
 
 from .. import _core
+from ..arrays.checks import is_number
 from ..errors import InputError, refusal
 from ..files.memory import free_memory, in_bytes
 from ..scene.compiled import CompiledScene
@@ -77,6 +78,18 @@ class Solver:
     def sweeps(self) -> int:
         """Iterations with the method's default filled in."""
         return self.iterations if self.iterations is not None else ITERATIONS.get(self.method, 2)
+
+    @classmethod
+    def given(cls, solver: Solver | None) -> Solver:
+        """What a caller gave as solver; the default for None.
+
+        Raises:
+            InputError: it is something else, such as a substep alone.
+        """
+        if solver is None or isinstance(solver, cls):
+            return solver or cls()
+        fix = f"write sb.Solver(h={solver!r})" if is_number(solver) else "give such as sb.Solver(h=1e-3)"
+        raise InputError("solver", "is no Solver", solver, fix)
 
     def with_h(self, h: float) -> Solver:
         """The same solver at another substep."""

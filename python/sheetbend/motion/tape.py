@@ -91,7 +91,7 @@ def tape_plan(scene: Scene, times: ArrayLike, solver: Solver | None = None, scen
         InputError: times off the grid; a budget below the least that works, or a gradient that does not fit in the
             free memory.
     """
-    solver = solver or Solver()
+    solver = Solver.given(solver)
     if not isinstance(scenes, int) or scenes < 1:
         raise InputError("scenes", "must be a positive whole number", scenes, "give the size of the batch, at least 1")
     return planned(solver.core(scene.compiled), substeps(times, solver.h), solver, solver.budget, scenes)

@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from ..arrays.checks import is_number
 from ..arrays.timeseries import Array
 from ..errors import InputError
 
@@ -74,13 +75,18 @@ class Parameter:
         raise InputError(f"{self.name}.{field}", problem, got, fix)
 
     def _check_value(self) -> None:
-        bounds, initial = (self.lower, self.upper), self.initial
+        initial = self.initial
         if initial is None and self.private:
             return  # checked when expanded, with the values of the scenes
         if initial is None or not math.isfinite(initial):
             self._fail("initial", "must be a finite number", initial, "give a starting value")
-        if math.isnan(self.lower) or math.isnan(self.upper) or not self.lower < self.upper:
-            self._fail("bounds", "must enclose a range", bounds, "give a lower bound below the upper one")
+        for bound in ("lower", "upper"):
+            value = getattr(self, bound)
+            if not is_number(value) and value not in (-math.inf, math.inf):
+                self._fail(bound, "must be a number", value, f"give one, or leave {bound} out for none")
+        if not self.lower < self.upper:
+            problem = f"must be below upper, which is {self.upper:g}"
+            self._fail("lower", problem, self.lower, "lower it, or raise upper")
         if self.log and initial <= 0:
             self._fail("initial", "must be positive on a log scale", self.initial, "raise it or set log = false")
         if self.log and self.lower <= 0 and math.isfinite(self.lower):
@@ -111,8 +117,9 @@ class Parameter:
                 self._fail(field, problem, getattr(self, field), f"set the {field} of {self.tied_to}")
         if self.fixed:
             self._fail("fixed", problem, True, f"fix {self.tied_to}, or drop the tie")
-        if math.isfinite(self.lower) or math.isfinite(self.upper):
-            self._fail("bounds", problem, (self.lower, self.upper), f"set the bounds of {self.tied_to}")
+        for bound in ("lower", "upper"):
+            if math.isfinite(getattr(self, bound)):
+                self._fail(bound, problem, getattr(self, bound), f"set {bound} of {self.tied_to}")
         if not math.isfinite(self.factor) or self.factor == 0:
             self._fail("factor", "must be finite and not zero", self.factor, "give the ratio of the two values")
 

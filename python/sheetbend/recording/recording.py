@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -60,6 +61,9 @@ class Recording(MarkerData):
         Raises:
             RecordingError: the file is missing, empty, corrupt, of an unknown kind or no valid recording.
         """
+        if not isinstance(path, str | PathLike):
+            fix = "give the path of a file, such as 'take.csv'"
+            raise RecordingError("path", "must be the name of a file or a folder", path, fix)
         recording = object.__new__(cls)
         recording._set(**vars(io.read(Path(path), units)))  # which is checked
         return recording

@@ -51,7 +51,7 @@ def forces(
     numbers = {name: float(v.detach() if isinstance(v, Tensor) else v) for name, v in given.items()}
     made = read_at(times, at, quaternions, **sensor)
     span = (0.0, float(made.recording.times[-1]))
-    problem = readings_problem(made, scene, solver or Solver(), numbers, list(tensors), start, span)
+    problem = readings_problem(made, scene, Solver.given(solver), numbers, list(tensors), start, span)
     scalars = (t.reshape(()) for t in tensors.values())
     read: Tensor = _Readings.apply(problem, scene, *scalars)  # type: ignore[no-untyped-call]
     return read

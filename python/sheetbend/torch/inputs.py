@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 from torch.autograd import Function
 
-from ..errors import InputError
+from ..errors import InputError, choices
 from ..quantities.quantities import FUNCTIONS
 from ..scene.scene import Scene
 
@@ -103,14 +103,14 @@ class InputMap:
     def _batch_of_value(self, name: str, value: Tensor | float) -> tuple[int, ...]:
         field = f"values.{name}"
         if name not in self._names:
-            raise InputError(field, "is no quantity of the scene", name, f"name one of: {', '.join(self._names)}")
+            raise InputError(field, "is no quantity of the scene", name, choices(name, self._names))
         return () if isinstance(value, int | float) else _dense(field, value)
 
     def _batch_of_array(self, name: str, array: Tensor) -> tuple[int, ...]:
         field = f"inputs.{name}"
         present = [n for n, (_, size) in self._given.items() if size > 0]
         if name not in present:
-            raise InputError(field, "is no input array of the scene", name, f"name one of: {', '.join(present)}")
+            raise InputError(field, "is no input array of the scene", name, choices(name, present))
         if name in self._without_effect:
             raise InputError(field, "has no effect on this scene", name, self._without_effect[name])
         shape, wanted = _dense(field, array), self._shapes[name]

@@ -9,7 +9,7 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
-from ..errors import InputError
+from ..errors import InputError, choices
 from ..motion.solver import Solver
 from ..scene.scene import Scene
 from .simulate import Simulation
@@ -32,14 +32,14 @@ class SceneModule(nn.Module):
 
     def __init__(self, scene: Scene, times: ArrayLike, solver: Solver | None = None, *, learn: Sequence[str]) -> None:
         super().__init__()
-        fix = f"name some of: {', '.join(scene.quantities)}"
         if isinstance(learn, str) or len(learn) == 0:
+            fix = f"name some of: {', '.join(scene.quantities)}"
             raise InputError("learn", "must be a list of quantities", learn, fix)
         self._simulation = Simulation(scene, times, solver)
         self._positive: dict[str, bool] = {}
         for name in learn:
             if name not in scene.quantities:
-                raise InputError("learn", "names no quantity of the scene", name, fix)
+                raise InputError("learn", "names no quantity of the scene", name, choices(name, scene.quantities))
             q = scene.quantities[name]
             self._positive[name] = q.positive
             stored = math.log(q.value) if q.positive else q.value

@@ -22,7 +22,7 @@ class Simulation:
     """A scene, its frame times and its solver, prepared for many calls; see `simulate` for the arguments."""
 
     def __init__(self, scene: Scene, times: ArrayLike, solver: Solver | None = None, nodes: bool = False) -> None:
-        self.scene, self.solver = scene, solver or Solver()
+        self.scene, self.solver = scene, Solver.given(solver)
         self._shown = scene.node_count if nodes else scene.particle_count
         self._steps = substeps(times, self.solver.h)
         self._inputs = InputMap(scene)

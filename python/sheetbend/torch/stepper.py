@@ -57,7 +57,7 @@ class Stepper:
     def __init__(self, scene: Scene, solver: Solver | None = None, *, dtype: torch.dtype = torch.float64) -> None:
         if not isinstance(dtype, torch.dtype) or not dtype.is_floating_point:
             raise InputError("dtype", "must be a floating type of torch", dtype, "give torch.float64 or torch.float32")
-        self.scene, self.solver, self.dtype = scene, solver or Solver(), dtype
+        self.scene, self.solver, self.dtype = scene, Solver.given(solver), dtype
         compiled = scene.compiled
         self._layout, self._check = compiled.layout, compiled.domain.check_inputs
         self._map = InputMap(scene)

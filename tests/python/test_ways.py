@@ -1,0 +1,105 @@
+"""The way of each kind of user, with nothing but what the documentation says: its scripts and its commands as they
+stand, in an empty folder."""
+
+from __future__ import annotations
+
+import json
+import re
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sheetbend as sb
+from commands import run
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+
+
+def blocks(page: str, language: str, heading: str = "") -> list[str]:
+    """Code of a page, from a heading on to the next one of its kind; of the whole page without."""
+    text = (DOCS / page).read_text()
+    if heading:
+        _, _, text = text.partition(f"\n## {heading}\n")
+        assert text, heading
+        text = text.partition("\n## ")[0]
+    return re.findall(rf"```{language}\n(.*?)```", text, re.S)
+
+
+def commands(page: str, heading: str = "") -> list[list[str]]:
+    """Arguments of the commands in a page's only block for a shell."""
+    (block,) = blocks(page, "sh", heading)
+    lines = [line.split() for line in block.splitlines()]
+    assert all(line[0] == "sheetbend" for line in lines)
+    return [line[1:] for line in lines]
+
+
+def run_script(block: str) -> dict[str, Any]:
+    names: dict[str, Any] = {}
+    exec(compile(block, "documentation", "exec"), names)
+    return names
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_a_garment_goes_to_gltf_in_two_commands(folder: Path) -> None:
+    page = "tutorials/garment.md"
+    (script,), (seen,) = blocks(page, "python"), blocks(page, "text")
+    run_script(script)
+    new, simulate = commands(page)
+    first = run(*new)
+    assert first.exit_code == 0 and seen in first.stdout
+    assert f"next: sheetbend {' '.join(simulate)}" in first.stdout
+    done = run(*simulate)
+    assert done.exit_code == 0, done.output
+    content = (folder / "out/skirt/skirt.glb").read_bytes()
+    (length,) = struct.unpack("<I", content[12:16])
+    (mesh,) = json.loads(content[20 : 20 + length])["meshes"]
+    assert len(mesh["primitives"][0]["targets"]) > 50  # it moves
+    motion = np.load(folder / "out/skirt/skirt.npz")
+    x = motion["positions"]
+    top = x[0, :, 1] > 0.985
+    assert top.sum() == 24 and np.array_equal(x[-1, top], x[0, top])
+    assert 1e-3 < np.linalg.norm(x[-1] - x[0], axis=1).max() < 0.3  # and hangs
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("cm", 100.0), ("mm", 1000.0)])
+def test_the_unit_of_a_garment_is_told_by_its_size(folder: Path, unit: str, scale: float) -> None:
+    mesh = sb.mesh.grid(0.4, 0.6, 4, 6)
+    sb.mesh.write_obj(folder / "panel.obj", mesh, scale * mesh.vertices)
+    result = run("new", "panel.obj")
+    assert result.exit_code == 0 and f"lengths are taken as {unit}" in result.stdout
+    assert "0.4 x 0.6 x 0 m, 0.24 m^2 of fabric" in result.stdout
+    assert "5 vertices lie within" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["panel.obj", "--length", "1"], "--length"),
+        (["panel.obj", "panel.obj"], "give one mesh"),
+        (["panel.obj", "--units", "inch"], "--units"),
+        (["large.obj"], "--units: is in doubt"),
+        (["none.obj"], "is no file"),
+    ],
+)
+def test_what_is_wrong_with_a_garment_is_named(folder: Path, arguments: list[str], words: str) -> None:
+    mesh = sb.mesh.grid(0.4, 0.6, 2, 2)
+    sb.mesh.write_obj(folder / "panel.obj", mesh)
+    sb.mesh.write_obj(folder / "large.obj", mesh, 1e5 * mesh.vertices)
+    result = run("new", *arguments, "--output", "draft.toml")
+    assert result.exit_code == 2 and words in result.stderr and "Fix:" in result.stderr
+    assert not (folder / "draft.toml").exists()
+
+
+@pytest.mark.slow
+def test_a_policy_is_trained_in_forty_lines(folder: Path) -> None:
+    (script,) = blocks("tutorials/learning.md", "python", "A feedback policy in 40 lines")
+    assert len(script.splitlines()) <= 40
+    worst = run_script(script)["worst"]
+    assert len(worst) == 200 and float((worst < 0.02).float().mean()) > 0.9
