@@ -18,13 +18,13 @@ SPLIT = Split(LAYOUT.recording, ("a", "b", "c", "d"))
 WITHIN = [(slice(k * FRAMES, (k + 1) * FRAMES), [2 + k]) for k in range(WINDOWS)]
 
 
-def losses() -> np.ndarray:
+def losses(windows: int = WINDOWS) -> np.ndarray:
     """Friction and drag of a swing that shrinks from window to window. Each window shows nearly one combination of
     them; each has a start of its own."""
     t = np.linspace(0.0, 1.0, FRAMES)
     slow, wave = t * np.sin(20 * t), t**2 * np.sin(20 * t)
-    columns = np.zeros((WINDOWS * FRAMES, 2 + WINDOWS))
-    for k, size in enumerate(np.linspace(1.0, 0.7, WINDOWS)):
+    columns = np.zeros((windows * FRAMES, 2 + windows))
+    for k, size in enumerate(np.linspace(1.0, 0.7, windows)):
         mine = slice(k * FRAMES, (k + 1) * FRAMES)
         columns[mine, 0] = slow / size
         columns[mine, 1] = slow * size + 0.02 * wave

@@ -16,7 +16,7 @@ from ..minimum.time_step import SECOND_ORDER, halved
 from ..quantities.parameters import Parameter
 from ..quantities.wording import figures, short
 from ..result.result import UNSOUND, Estimate, RecordingFit
-from ..statistics.blocks import Difference, Split, contradiction
+from ..statistics.blocks import FEWEST, MOST_COLUMNS, Difference, Split, contradiction
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
 from ..statistics.left_out import LeftOut, left_out
@@ -28,7 +28,9 @@ from .profiles import Elsewhere
 CLAIMS = ("identified", "weak", "one-sided")  # verdicts that can be contradicted
 DENIES = "not identifiable"  # that the data know a parameter
 ORDINALS = ("first", "second", "third")
-MOST_RECORDINGS = 8  # each of them is compared with the others; more are compared by halves
+MOST_RECORDINGS = 24
+"""Recordings, or groups of them where there are more, that are compared. A single one of n that moves the estimate by
+its half-width differs from the others by 2 sqrt(n) standard deviations, and its group of n/24 still by 2 sqrt(24)."""
 FEWEST_MARKERS = 4  # that are compared by halves
 SEEN = 3.0  # times sigma: an error that can be told from noise
 TRADES = 0.3  # correlation from which on a parameter shares the error of another
@@ -68,8 +70,9 @@ def between_parts(
 
     All parameters together must differ between the parts by more than chance explains at the 1 % level. Those are named
     of which a part differs from the others by more than its 95 % interval, and from the estimate by more than the
-    estimate's, what the discretization moves in that part counted; and those which the data without a part know, and
-    place farther from the estimate than either interval reaches. No simulation is needed beyond the last Jacobian,
+    estimate's, what the discretization moves in that part counted; those which the data without a part know, and place
+    farther from the estimate than either interval reaches; and those of which recordings scatter by more than the
+    estimate's interval tells. No simulation is needed beyond the last Jacobian,
     unless parts differ: then what noise of driven particles does to all parts alike counts too (`driven_errors`).
 
     Args:
@@ -112,9 +115,13 @@ def _between(
             words[name] = _difference_words(problem.parameters[name], u[column], d)
     for without in left_out(r, J[:, used], found.split, layout, within, known, taken, errors):
         name, column = names[used[without.column]], used[without.column]
-        reach = max(reach_of(problem.parameters[name], estimates[name]), without.reach)
-        if name not in words and abs(without.step) > reach + SECOND_ORDER * without.shift:
-            words[name] = _without_words(problem.parameters[name], u[column], without)
+        p = problem.parameters[name]
+        reach = max(reach_of(p, estimates[name]), without.reach)
+        by_mesh = SECOND_ORDER * without.shift
+        if name not in words and abs(without.step) > reach + by_mesh:
+            words[name] = _without_words(p, u[column], without)
+        elif name not in words and found.split.apart and without.surely > reach_of(p, estimates[name]) + by_mesh:
+            words[name] = _scatter_words(p, u[column], without)
     return drawn_along(judged, words)
 
 
@@ -167,6 +174,14 @@ def _without_words(p: Parameter, at: float, found: LeftOut) -> str:
     )
 
 
+def _scatter_words(p: Parameter, at: float, found: LeftOut) -> str:
+    value = value_words(p, at, 0.0, found.scatter)
+    return (
+        "parts of the data contradict each other: recordings differ by more than noise explains. From their scatter it "
+        f"would be {value} (each left out in turn, to first order); the model lacks something that differs between them"
+    )
+
+
 def value_words(p: Parameter, at: float, step: float, reach: float) -> str:
     """The value an internal step away from a point, with its half-width."""
     center, reach = (min(max(x, -FARTHEST), FARTHEST) for x in (step, reach)) if p.log else (step, reach)
@@ -212,14 +227,25 @@ def splits(problem: FitProblem, jacobian: Array) -> list[Split]:
         order = (*ORDINALS[: parts - 1], "last")
         made.append(Split(part, tuple(f"the {which} {name} of the time" for which in order)))
     made.append(Split(place, ("one side's markers", "the other side's markers")))
-    names = [e.name for e in problem.experiments]
-    if 2 <= count <= MOST_RECORDINGS:
-        made.append(Split(layout.recording, tuple(names)))
-    elif count > MOST_RECORDINGS:
-        half = count // 2
-        parts_of = (f"the recordings up to {names[half - 1]}", f"the recordings from {names[half]} on")
-        made.append(Split((layout.recording >= half).astype(int), parts_of))
+    if count > 1:
+        made.append(_by_recording(problem, jacobian))
     return made
+
+
+def _by_recording(problem: FitProblem, jacobian: Array) -> Split:
+    """Each recording, or groups of neighbors where there are too many or too short ones."""
+    layout, names = problem.rows_layout(), [e.name for e in problem.experiments]
+    own = {column for _, columns in _private(problem, jacobian) for column in columns}
+    shared = max(jacobian.shape[1] - len(own), 1)
+    most = min(len(names), MOST_RECORDINGS, MOST_COLUMNS // shared)
+    for parts in range(max(most, 2), 1, -1):
+        group = np.arange(len(names)) * parts // len(names)
+        part = group[layout.recording]
+        if np.bincount(part, minlength=parts).min() >= FEWEST * shared:
+            break
+    members = [np.flatnonzero(group == k) for k in range(parts)]
+    called = [names[m[0]] if len(m) == 1 else f"the group of {names[m[0]]} to {names[m[-1]]}" for m in members]
+    return Split(part, tuple(called), apart=True)
 
 
 def _half(order: Array, weight: Array) -> Array:

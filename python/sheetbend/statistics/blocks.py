@@ -45,10 +45,12 @@ class Split:
     Attributes:
         part: (rows,) number of the part that a row belongs to, -1 for none.
         names: of the parts, in words.
+        apart: whether the parts share no errors, as separate recordings do.
     """
 
     part: Integers
     names: tuple[str, ...]
+    apart: bool = False
 
 
 @dataclass(frozen=True)
@@ -141,7 +143,7 @@ def _compared(
         mine = split.part >= 0
         kept = np.append(mine, np.ones(len(residuals) - len(mine), dtype=bool))
         own = [(slice(int(mine[: k.start].sum()), int(mine[: k.stop].sum())), columns) for k, columns in within]
-        rest = Split(split.part[mine], split.names)
+        rest = replace(split, part=split.part[mine])
         found = _compared(residuals[kept], jacobian[kept], rest, layout.of(mine), own, known[kept], taken, drawn[kept])
         return found and replace(found, split=split)
     rows, parts = len(layout.frame), len(split.names)
