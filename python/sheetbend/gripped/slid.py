@@ -3,13 +3,14 @@
 Internal friction remembers how a rope was bent earlier, which no marker shows. But what has slid pulls: in the first
 frames it moves the rope beside what its shape, its weight and its grips do. So it is looked for in the frames over
 which the start is smoothed anyway, as smooth fields of curvature along the rope. How large they may be is found from
-the same frames (type II maximum likelihood: MacKay 1992), so that noise is not taken for a history.
+the same frames (type II maximum likelihood: MacKay 1992), so that noise is not taken for a history. Where the rope
+rests in these frames, its balance tells more (`rest`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,11 +21,14 @@ from ..minimum.problem import FitProblem
 from ..quantities.parameters import Parameter, Parameters
 from .model import NAME, RopeModel
 from .motion import Array, GrippedMotion
+from .rest import creep, rests
 
 MODES = tuple(range(6))
+DRAG = f"{NAME}_drag_linear"
 LARGEST = 4.0  # standard deviation of mode 0, in yield curvatures: a joint that has slid too far slides back at once
 FIRST = 0.5  # the same, before the frames were seen
-STEPS, ROUNDS = 4, 30  # to what had slid, and to its size in each
+STEPS, MORE, ROUNDS = 4, 4, 30  # to what had slid, and to its size in each
+PARTS = (1.0, 0.4, 0.16, 0.064)  # of a step, the first of which that lowers the cost is taken
 LEAST_NOISE = 1e-4  # m, of a marker
 # The speed at a start comes from the same frames. Its error moves a marker by up to twice the noise there, in all of
 # the some nine frames alike.
@@ -57,22 +61,48 @@ def slid(model: RopeModel, motion: GrippedMotion, first: float, values: Mapping[
     yields = values.get(f"{NAME}_yield_curvature", model.values["yield_curvature"])
     assert yields is not None
     nothing = {f"{NAME}_slid_{axis}_{k}": 0.0 for k in model.slid_modes for axis in (1, 2)}
-    until, times = first + model.smoothing, motion.recording.times
-    if ((times >= first - 1e-9) & (times <= until + 1e-9)).sum() < FEWEST:
+    times, size = motion.recording.times, noise(motion.recording.positions)
+    frames = np.flatnonzero((times >= first - 1e-9) & (times <= first + model.smoothing + 1e-9))
+    if len(frames) < FEWEST:
         return nothing
-    e = replace(model.experiment(motion, (first, until)), sigma=OFF * noise(motion.recording.positions))
-    free = [Parameter(name=name, initial=0.0, scale=1.0, unit="1/m") for name in nothing]
-    held = [Parameter(name=name, initial=values[name], fixed=True) for name in e.scene.quantities if name in values]
-    problem = FitProblem([e], Parameters([*free, *held]))
-    size = np.array([yields / (1.0 + 0.5 * k) for k in model.slid_modes for _ in (1, 2)])
-    at, spread, before = np.zeros(len(free)), FIRST, problem.cost(np.zeros(len(free)))
-    for _ in range(STEPS):
-        ok, r, J = problem.evaluate(at)
-        if not ok:
-            return nothing
-        likely, spread = _likely(J * size, r - J @ at, spread)
-        at = likely * size
-    return dict(zip(nothing, at.tolist(), strict=True)) if problem.cost(at) < before else nothing
+    model = model.at(values)
+    moving = replace(model.experiment(motion, (first, first + model.smoothing)), sigma=OFF * size)
+    largest = np.array([yields / (1.0 + 0.5 * k) for k in model.slid_modes for _ in (1, 2)])
+    at = _searched(_problem([moving], nothing, values), largest, np.zeros(len(largest)), STEPS)
+    if rests(motion, frames, size):
+        both = [moving, creep(model, motion, frames, size)]
+        at = _searched(_problem(both, nothing, values), largest, at, MORE)
+    return dict(zip(nothing, (largest * at).tolist(), strict=True))
+
+
+def _problem(experiments: Sequence[Experiment], names: Iterable[str], values: Mapping[str, float]) -> FitProblem:
+    """Of what had slid; the rope's other quantities are held at their values. Each experiment keeps its drag."""
+    known = experiments[0].scene.quantities
+    free = [Parameter(name=name, initial=0.0, scale=1.0, unit="1/m") for name in names]
+    held = [Parameter(name=k, initial=values[k], fixed=True) for k in known if k in values and k != DRAG]
+    return FitProblem(experiments, Parameters([*free, *held]))
+
+
+def _searched(problem: FitProblem, size: Array, at: Array, steps: int) -> Array:
+    """The most likely numbers from `at` on, in units of `size`: Gauss-Newton steps, and their spread anew at each.
+
+    Joints slide or hold, so the residuals have kinks: a step counts only if it lowers what it is to lower.
+    """
+    spread = FIRST
+    ok, r, J = problem.evaluate(size * at)
+    for _ in range(steps if ok else 0):
+        likely, spread = _likely(J * size, r - J @ (size * at), spread)
+        before = r @ r + at @ at / spread**2
+        for part in PARTS:
+            tried = at + part * (likely - at)
+            ok, r, _ = problem.evaluate(size * tried, jacobian=False)
+            if ok and r @ r + tried @ tried / spread**2 < before:
+                break
+        else:
+            break
+        at = tried
+        ok, r, J = problem.evaluate(size * at)
+    return at
 
 
 def _likely(J: Array, r: Array, spread: float) -> tuple[Array, float]:
