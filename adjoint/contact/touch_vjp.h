@@ -11,7 +11,7 @@ namespace sheetbend {
 template <class S>
 Vec3<S> touch_vjp(const AnyShape& shape, const Vec3<S>& z, const ContactNumbers<S>& c, const Vec3<S>& force_bar,
                   const Vec3<S>& tangential_bar, ContactNumbers<S>& bar) {
-  using D = Dual<S, 12 + most_sizes>;
+  using D = Dual<S, 13 + most_sizes>;
   int next = 0;
   const auto direct = [&](const S& a) {
     D d(a);
@@ -29,6 +29,8 @@ Vec3<S> touch_vjp(const AnyShape& shape, const Vec3<S>& z, const ContactNumbers<
   cd.friction = direct(c.friction);
   cd.radius = direct(c.radius);
   cd.kappa = direct(c.kappa);
+  cd.loss = direct(c.loss);
+  cd.dissipates = c.dissipates;
   for (int k = 0; k < most_sizes; ++k) cd.size[k] = direct(c.size[k]);
   cd.lift = D(c.lift);
   cd.firm = c.firm;
@@ -53,6 +55,7 @@ Vec3<S> touch_vjp(const AnyShape& shape, const Vec3<S>& z, const ContactNumbers<
   bar.radius += nearer;
   bar.lift += nearer;
   bar.kappa += back();
+  bar.loss += back();
   for (int k = 0; k < most_sizes; ++k) bar.size[k] += back();
   return z_bar;
 }

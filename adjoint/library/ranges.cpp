@@ -13,9 +13,9 @@ constexpr double huge = std::numeric_limits<double>::max(), tiny = std::numeric_
 }  // namespace
 
 bool not_negative(Quantity array) {
-  constexpr Quantity all[]{Quantity::mass,           Quantity::compliance,       Quantity::damping,
-                           Quantity::drag_linear,    Quantity::drag_quadratic,   Quantity::air_normal,
-                           Quantity::air_tangential, Quantity::volume_compliance};
+  constexpr Quantity all[]{Quantity::mass,           Quantity::compliance,        Quantity::damping,
+                           Quantity::drag_linear,    Quantity::drag_quadratic,    Quantity::air_normal,
+                           Quantity::air_tangential, Quantity::volume_compliance, Quantity::contact_dissipation};
   return std::ranges::find(all, array) != std::end(all);
 }
 

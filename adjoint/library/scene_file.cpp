@@ -162,6 +162,7 @@ class SceneReader {
     for_each_record("contacts", [&](const Json& c, const std::string& i, const std::string& where) {
       ContactSpec contact{file_.name(c, "name", where),   -1, {}, {}, file_.flag(c, "rigid", where),
                           file_.flag(c, "bounces", where)};
+      if (c.contains("dissipates")) contact.dissipates = file_.flag(c, "dissipates", where);
       if (c.contains("nodes")) contact.arity = static_cast<int>(file_.whole(c, "nodes", where));  // of points of bodies
       if (contact.arity < 1 || contact.arity > most_point_nodes)
         file_.fail(where + "nodes", "must lie in 1 to " + std::to_string(most_point_nodes));
@@ -237,7 +238,8 @@ class SceneReader {
       const bool made = array == Quantity::volume || array == Quantity::volume_compliance ||
                         array == Quantity::friction || array == Quantity::contact_radius ||
                         array == Quantity::contact_stiffness || array == Quantity::collider_size ||
-                        array == Quantity::restitution || array == Quantity::contact_weight;
+                        array == Quantity::restitution || array == Quantity::contact_weight ||
+                        array == Quantity::contact_dissipation;
       if (made && std::any_of(first, last, [](double v) { return v != 0.0; }))
         file_.fail(std::string("base.") + quantity_names[q], "must be zero, quantities make it");
     }

@@ -126,6 +126,8 @@ void numbers_vjp(const ContactSource<T>& source, const ColliderPoses<Single<T>>&
   source.add(bar.friction, in_bar.of(Quantity::friction)[contact]);
   source.add(bar.radius, in_bar.of(Quantity::contact_radius)[contact]);
   size_vjp(source, collider, bar.size, in_bar);
+  if (c.dissipation >= 0)
+    source.add(bar.loss / S(source.bdf.eta), in_bar.of(Quantity::contact_dissipation)[c.dissipation]);
   if (c.stiffness >= 0) {
     source.add(eta2 * bar.kappa, in_bar.of(Quantity::contact_stiffness)[c.stiffness]);
     return;

@@ -1,7 +1,7 @@
 // The law of one contact: a stiff force along the normal that pushes and never pulls, and Coulomb friction by a return mapping (Simo & Hughes 1998,
 // sec. 5) of a tangential force that is carried from substep to substep, so that what sticks does not creep:
 //
-//   lambda_n = kappa max(0, -gap)
+//   lambda_n = kappa max(0, -gap) max(0, 1 - a v)     v = n . u/eta,  a: dissipation (Hunt & Crossley 1975), none of a rigid contact
 //   tau      = P (f - kappa u)                        P = I - n n^T,  u: slip over the substep,  f: tangential force before
 //   lambda_t = tau min(1, mu lambda_n/|tau|)          sticks, or slides along tau
 //
@@ -20,19 +20,24 @@ template <class T>
 struct ContactForce {
   T normal{};                                         // lambda_n
   Vec3<T> tangential;                                 // lambda_t
-  bool pushes = false, slides = false, rubs = false;  // rubs: pushes, and friction may act
+  bool pushes = false, slides = false, rubs = false;  // rubs: pushes, and friction or dissipation may act: no potential
 };
 
-// T is never a pack.
+// T is never a pack. `loss` is a/eta, of a contact that dissipates.
 template <class T>
 ContactForce<T> contact_force(const T& gap, const Vec3<T>& n, const Vec3<T>& slip, const Vec3<T>& carried,
-                              const T& friction, const T& kappa) {
+                              const T& friction, const T& kappa, const T* loss = nullptr) {
   ContactForce<T> c;
   if (!(value_of(gap) < 0.0)) return c;
-  c.pushes = true;
   c.normal = -(kappa * gap);
+  if (loss) {
+    const T share = T(1.0) - *loss * dot(n, slip);
+    if (!(value_of(share) > 0.0)) return c = {};
+    c.normal = c.normal * share;
+  }
+  c.pushes = true;
   const T limit = friction * c.normal;
-  c.rubs = value_of(limit) > 0.0;
+  c.rubs = loss || value_of(limit) > 0.0;
   const Vec3<T> trial = carried - kappa * slip;
   const Vec3<T> tau = trial - dot(n, trial) * n;
   const T squared = dot(tau, tau);

@@ -15,7 +15,9 @@ struct ContactNumbers {
   T friction, radius, kappa;
   T size[most_sizes];
   T lift{}, leaving{};  // of restitution (rebound.h): how far above the surface it pushes to, and what it carries on
-  double firm = 1.0;    // how many times stiffer it is along the normal
+  T loss{};             // of a contact that dissipates: a/eta
+  bool dissipates = false;
+  double firm = 1.0;  // how many times stiffer it is along the normal
 };
 
 template <class T>
@@ -29,7 +31,8 @@ Touch<T> touch(const AnyShape& shape, const T& distance, const Vec3<T>& n, const
                const ContactNumbers<T>& c) {
   const T gap = T(c.firm) * (distance - c.radius - c.lift);
   const T friction = shape.grid ? sqrt(dot(n, n)) * c.friction : c.friction;
-  Touch<T> t{contact_force(gap, unit_normal(shape, n), z - c.from, c.carried, friction, c.kappa), {}};
+  const T* loss = c.dissipates ? &c.loss : nullptr;
+  Touch<T> t{contact_force(gap, unit_normal(shape, n), z - c.from, c.carried, friction, c.kappa, loss), {}};
   if (t.pushes) t.force = t.normal * n + t.tangential;
   return t;
 }
@@ -46,8 +49,8 @@ Touch<T> touch(const AnyShape& shape, const Vec3<T>& z, const ContactNumbers<T>&
 template <class U, class T>
 ContactNumbers<U> constants(const ContactNumbers<T>& c) {
   const auto vector = [](const Vec3<T>& v) { return Vec3<U>(U(v.x), U(v.y), U(v.z)); };
-  ContactNumbers<U> u{vector(c.from), vector(c.carried), U(c.friction), U(c.radius), U(c.kappa), {},
-                      U(c.lift),      U(c.leaving),      c.firm};
+  ContactNumbers<U> u{vector(c.from), vector(c.carried), U(c.friction), U(c.radius),  U(c.kappa), {},
+                      U(c.lift),      U(c.leaving),      U(c.loss),     c.dissipates, c.firm};
   for (int k = 0; k < most_sizes; ++k) u.size[k] = U(c.size[k]);
   return u;
 }

@@ -49,6 +49,9 @@ void check_contact(const ContactSpec& spec, const Scene& scene, std::vector<char
       if (!scene.is_place[n])
         refuse(spec.name + ": node " + std::to_string(n) + " is " + a_direction(scene, n) + ". Fix: use particles");
   }
+  if (spec.dissipates && (spec.rigid || spec.bounces))
+    refuse(spec.name +
+           ".dissipation: the contact is rigid, or has a restitution. Fix: give a stiffness and no restitution");
   check_carried(spec.name + ".carried", spec.carried, scene, carries);
 }
 
@@ -146,7 +149,7 @@ void check_grid(const ColliderSpec& c) {
 }  // namespace
 
 ContactSizes add_contacts(const SceneSpec& spec, Scene& s) {
-  std::size_t poses = 0, sizes = 0, soft = 0, bouncing = 0, weights = 0;
+  std::size_t poses = 0, sizes = 0, soft = 0, bouncing = 0, weights = 0, dissipating = 0;
   for (const ColliderSpec& c : spec.colliders) {
     check_knots(c.name + ".times", c.motion, true);
     check_grid(c);
@@ -158,7 +161,8 @@ ContactSizes add_contacts(const SceneSpec& spec, Scene& s) {
   for (const ContactSpec& c : spec.contacts) {
     check_contact(c, s, carries);
     s.contacts.push_back({c.name, c.collider, c.arity, c.nodes, c.carried, c.rigid ? -1 : static_cast<int>(soft++),
-                          c.bounces ? static_cast<int>(bouncing++) : -1, points_in_contact(s), weights});
+                          c.bounces ? static_cast<int>(bouncing++) : -1,
+                          c.dissipates ? static_cast<int>(dissipating++) : -1, points_in_contact(s), weights});
     if (c.arity > 1) weights += c.nodes.size();
   }
   add_bouncers(s);
@@ -169,7 +173,8 @@ ContactSizes add_contacts(const SceneSpec& spec, Scene& s) {
           poses,
           sizes,
           bouncing,
-          weights};
+          weights,
+          dissipating};
 }
 
 }  // namespace sheetbend

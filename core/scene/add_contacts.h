@@ -9,7 +9,7 @@ namespace sheetbend {
 
 // How many numbers there are of each quantity of contacts.
 struct ContactSizes {
-  std::size_t frictions, radii, stiffnesses, poses, sizes, restitutions, weights;
+  std::size_t frictions, radii, stiffnesses, poses, sizes, restitutions, weights, dissipations;
 };
 
 ContactSizes add_contacts(const SceneSpec& spec, Scene& s);

@@ -34,17 +34,36 @@ enum class Quantity : int {
   restitution,        // per contact off which particles bounce: the speed after an impact over that before  [-]
   load,               // (knots, loads along rows): energy over the unit of C, such as N m where it is an angle
   contact_weight,  // per contact of points that several nodes carry: (points, nodes), of the nodes in their sum; m for axes
+  contact_dissipation,  // per contact that dissipates: the share of its push that a speed along the normal adds  [s/m]
 };
-inline constexpr int quantity_count = 25;
+inline constexpr int quantity_count = 26;
 inline constexpr int oldest_quantity_count = 17;  // those after it are left out of saved scenes that have none of them
-inline constexpr std::array<const char*, quantity_count> quantity_names{
-    "position",          "velocity",       "mass",           "compliance",
-    "damping",           "rest",           "boundary",       "force",
-    "gravity",           "drag_linear",    "drag_quadratic", "wind",
-    "air_normal",        "air_tangential", "pressure",       "volume",
-    "volume_compliance", "friction",       "contact_radius", "contact_stiffness",
-    "collider_pose",     "collider_size",  "restitution",    "load",
-    "contact_weight"};
+inline constexpr std::array<const char*, quantity_count> quantity_names{"position",
+                                                                        "velocity",
+                                                                        "mass",
+                                                                        "compliance",
+                                                                        "damping",
+                                                                        "rest",
+                                                                        "boundary",
+                                                                        "force",
+                                                                        "gravity",
+                                                                        "drag_linear",
+                                                                        "drag_quadratic",
+                                                                        "wind",
+                                                                        "air_normal",
+                                                                        "air_tangential",
+                                                                        "pressure",
+                                                                        "volume",
+                                                                        "volume_compliance",
+                                                                        "friction",
+                                                                        "contact_radius",
+                                                                        "contact_stiffness",
+                                                                        "collider_pose",
+                                                                        "collider_size",
+                                                                        "restitution",
+                                                                        "load",
+                                                                        "contact_weight",
+                                                                        "contact_dissipation"};
 
 struct Layout {
   std::array<std::size_t, quantity_count> size{};

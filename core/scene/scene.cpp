@@ -213,7 +213,7 @@ Scene build_scene(const SceneSpec& spec) {
 
   for (const VolumeSpec& v : spec.volumes) s.volumes.push_back(build_volume(v, s));
 
-  const auto [frictions, radii, stiffnesses, poses, sizes, restitutions, weights] = add_contacts(spec, s);
+  const auto [frictions, radii, stiffnesses, poses, sizes, restitutions, weights, dissipations] = add_contacts(spec, s);
 
   const std::size_t dofs = s.dofs(), nodes = s.nodes(), m = s.constraints;
   s.layout.size = {dofs,
@@ -240,7 +240,8 @@ Scene build_scene(const SceneSpec& spec) {
                    sizes,
                    restitutions,
                    s.load.times.size() * s.loads.size(),
-                   weights};
+                   weights,
+                   dissipations};
   s.layout.close();
   return s;
 }

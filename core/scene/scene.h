@@ -81,6 +81,7 @@ struct Contact {
   std::vector<int> carried;      // per point: that node
   int stiffness;                 // place in Quantity::contact_stiffness, -1 where it is rigid
   int restitution;               // place in Quantity::restitution, -1 where nothing bounces
+  int dissipation;               // place in Quantity::contact_dissipation, -1 where it is elastic
   std::size_t first = 0;         // of its points, in arrays of all contacts' points
   std::size_t first_weight = 0;  // in Quantity::contact_weight, where a point has several nodes: (points, arity)
   std::vector<char> held{};      // per point where something bounces: whether constraints hold it
@@ -171,6 +172,7 @@ struct ContactSpec {
   bool rigid = true;
   bool bounces = false;  // has a restitution
   int arity = 1;
+  bool dissipates = false;  // has a dissipation
 };
 
 // Each piece has a radius of its own; pieces share no particle.

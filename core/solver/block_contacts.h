@@ -77,6 +77,7 @@ void take_values(const BlockContacts<S>& c, BlockContacts<double>& all) {
     to.from = vector(n.from), to.carried = vector(n.carried);
     to.friction = value_of(n.friction), to.radius = value_of(n.radius), to.kappa = value_of(n.kappa);
     for (int k = 0; k < most_sizes; ++k) to.size[k] = value_of(n.size[k]);
+    to.loss = value_of(n.loss), to.dissipates = n.dissipates;
     to.lift = value_of(n.lift), to.leaving = value_of(n.leaving), to.firm = n.firm;
     for (int k = 0; k < most_point_nodes; ++k) all.weights[i][k] = value_of(c.weights[i][k]);
   }

@@ -120,6 +120,8 @@ struct ContactSource {
     numbers.radius = read(in.of(Quantity::contact_radius)[contact]);
     numbers.kappa = c.stiffness < 0 ? S(rigidity * share * share) / inverse_mass(c, item)
                                     : eta2 * read(in.of(Quantity::contact_stiffness)[c.stiffness]);
+    numbers.dissipates = c.dissipation >= 0;
+    if (numbers.dissipates) numbers.loss = read(in.of(Quantity::contact_dissipation)[c.dissipation]) / S(bdf.eta);
     read_size(collider, numbers.size);
     return numbers;
   }

@@ -66,7 +66,7 @@ std::shared_ptr<Scene> make_scene(const py::kwargs& given) {
   for (const py::handle c : given["contacts"])
     spec.contacts.push_back({c["name"].cast<std::string>(), c["collider"].cast<int>(), whole_numbers(c["nodes"]),
                              whole_numbers(c["carried"]), c["rigid"].cast<bool>(), c["bounces"].cast<bool>(),
-                             c["arity"].cast<int>()});
+                             c["arity"].cast<int>(), c["dissipates"].cast<bool>()});
   if (given.contains("self_contact"))
     for (const py::handle p : given["self_contact"])
       spec.self_contact.pieces.push_back(
@@ -119,7 +119,7 @@ py::dict arguments_of_scene(const Scene& s) {
     contacts.append(py::dict("name"_a = c.name, "collider"_a = c.collider, "arity"_a = c.arity,
                              "nodes"_a = py::array_t<int>(py::cast(c.nodes)),
                              "carried"_a = py::array_t<int>(py::cast(c.carried)), "rigid"_a = c.stiffness < 0,
-                             "bounces"_a = c.restitution >= 0));
+                             "bounces"_a = c.restitution >= 0, "dissipates"_a = c.dissipation >= 0));
   std::map<int, std::pair<std::vector<std::array<int, 2>>, Triangles>> touching;  // by the place of its radius
   for (const auto& edge : s.self_contact.edges) touching[s.self_contact.radius[edge[0]]].first.push_back(edge);
   for (const auto& t : s.self_contact.triangles) touching[s.self_contact.radius[t[0]]].second.push_back(t);

@@ -147,6 +147,7 @@ struct Tumble {
   Integrator integrator = Integrator::bdf1;
   double restitution = -1.0;
   bool field = false;  // whether the sphere is given by a grid
+  double dissipation = -1.0;
 };
 Sample tumbling(const Tumble& t) {
   ContactBuilder b;
@@ -163,7 +164,7 @@ Sample tumbling(const Tumble& t) {
              {0.11, 0.0, -0.015, 1.5, 0.0, 0.0, 0.11, 0.01, -0.025, 1.2, 0.5, 0.0, 0.10, 0.0, -0.01, 1.6, 0.9, 0.1},
              {0.0, 0.03, 0.06});
   b.collider("rounded_box", {0.04, 0.05, 0.02, 0.01}, {0.17, 0.03, -0.012, 0.0, 0.0, 0.5});
-  b.contact(t.mu, 0.003, t.stiffness, t.restitution);
+  b.contact(t.mu, 0.003, t.stiffness, t.restitution, t.dissipation);
   return b.build(g);
 }
 
@@ -230,7 +231,9 @@ TEST_P(Tumbling, HasTheTangentsOfComplexSteps) {
   const Layout& layout = s.scene.layout;
   expect_tangents_agree(p, s.inputs,
                         {layout.of(Quantity::friction) + 1, layout.of(Quantity::collider_pose) + 8,
-                         layout.of(GetParam().restitution >= 0.0 ? Quantity::restitution : Quantity::collider_size),
+                         layout.of(GetParam().restitution >= 0.0   ? Quantity::restitution
+                                   : GetParam().dissipation >= 0.0 ? Quantity::contact_dissipation
+                                                                   : Quantity::collider_size),
                          layout.of(Quantity::velocity)},
                         bound());
 }
@@ -255,7 +258,10 @@ INSTANTIATE_TEST_SUITE_P(Contact, Tumbling,
                                            Tumble{0.4, 0.0, Integrator::bdf1, 0.6},
                                            Tumble{0.4, 0.0, Integrator::bdf2, 0.6},
                                            Tumble{0.8, 0.0, Integrator::bdf1, -1.0, true},
-                                           Tumble{0.4, 0.0, Integrator::bdf2, 0.6, true}));
+                                           Tumble{0.4, 0.0, Integrator::bdf2, 0.6, true},
+                                           Tumble{0.4, 300.0, Integrator::bdf1, -1.0, false, 0.7},
+                                           Tumble{0.4, 300.0, Integrator::bdf2, -1.0, true, 0.7},
+                                           Tumble{0.0, 300.0, Integrator::bdf1, -1.0, false, 0.7}));
 
 // Restarting from a state in between gives the same bits, also in the middle of an impact.
 TEST(Contact, GoesOnFromAnyState) {

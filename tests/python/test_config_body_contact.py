@@ -93,6 +93,10 @@ def test_corners_of_a_box_touch_unless_points_are_given(tmp_path: Path) -> None:
     assert "feet_restitution" in scene.quantities
     np.testing.assert_array_equal(*ends(scene, in_python(**own, name="feet", settle=True)[0]))
     assert scene.compiled.settled["feet"].farthest == pytest.approx(1e-3)
+    soft = {"stiffness": 4e3, "dissipation": 0.5}
+    scene = built(tmp_path, TEXT.replace(CONTACT, CONTACT + "stiffness = 4e3\ndissipation = 0.5\n"))
+    np.testing.assert_array_equal(*ends(scene, in_python(**soft)[0]))
+    assert scene.quantities["table_contact_dissipation"].value == 0.5
 
 
 def test_a_box_that_slides_tells_its_friction(tmp_path: Path) -> None:

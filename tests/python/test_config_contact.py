@@ -118,6 +118,8 @@ def test_a_collider_moves_at_knots_and_with_a_tool(tmp_path: Path):
             "scene.table.restitution",
             "leave out one of the two",
         ),
+        ("friction = 0.3", "friction = 0.3\ndissipation = 0.5", "scene.contact[0].dissipation", "give a stiffness"),
+        ("friction = 0.3", "friction = 0.3\ndissipation = -0.5", "scene.contact[0].dissipation", "at least 0"),
         ("radius = 0.02", "", "scene.collider[1]", "add radius"),
         ("radius = 0.02", "radius = 0.0", "scene.collider[1].radius", "greater than 0"),
         ("radius = 0.02", "radius = 0.02\nsize = [1.0, 1.0, 1.0]", "scene.collider[1]", "has start, end, radius"),

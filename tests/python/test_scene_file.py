@@ -56,7 +56,7 @@ def touching() -> sb.Scene:
     scene.contact(rope, table, friction=0.3, radius=0.005)
     scene.contact([loose], table, friction=0.3, restitution=0.4, name="bounce")
     ball = sb.Sphere((0.1, 0.0, -0.025), 0.03, name="ball").moving([0.0, 0.1], [[0, 0, 0], [0, 0, 0.01]])
-    scene.contact(rope, ball, friction=0.2, stiffness=1e3)
+    scene.contact(rope, ball, friction=0.2, stiffness=1e3, dissipation=0.3)
     scene.contact(rope.particles[:2], sb.Capsule((0, -1, -0.05), (0, 1, -0.05), 0.02, name="bar"), friction=0.0)
     scene.contact([3], sb.Box((0.2, 0, -0.06), (0.1, 0.1, 0.1), 0.01, name="box"), friction=0.1)
     return scene

@@ -98,7 +98,7 @@ class ColliderSection(Section):
 class ContactSection(Section):
     """Who may touch a collider, and how rough that is, `Scene.contact` (docs/contact.md). A list: [[scene.contact]].
     It needs method = "implicit" in [solver]. Its quantities are <name>_friction, unless zero <name>_contact_radius (m),
-    and where given <name>_contact_stiffness (N/m) and <name>_restitution."""
+    and where given <name>_contact_stiffness (N/m), <name>_contact_dissipation (s/m) and <name>_restitution."""
 
     name: Name | None = key(None, "prefix of its quantities; the collider's name when left out")
     of: Name | list[Name] = key(
@@ -114,6 +114,9 @@ class ContactSection(Section):
     )
     stiffness: Finite | None = key(None, "per particle; rigid when left out", "N/m", gt=0)
     restitution: Finite | None = key(None, "speed after an impact over that before; 0 when left out", ge=0, le=1)
+    dissipation: Finite | None = key(
+        None, "of a contact with a stiffness: how much more it pushes per speed at which it goes in", "s/m", ge=0
+    )
     settle: bool = key(
         False,
         "move particles that start inside, as measured ones may by noise, to the surface before the motion starts; "

@@ -64,7 +64,9 @@ def add_contacts(
             fix = f"name one of: {', '.join(colliders) or 'none, add a [[scene.collider]]'}"
             raise ConfigError(f"{path}.collider", "is no collider of the scene", contact.collider, fix)
         particles = [p for name in contact.touching for p in named.get(name, ())]
-        numbers = contact.model_dump(include={"friction", "radius", "stiffness", "restitution", "settle"})
+        numbers = contact.model_dump(
+            include={"friction", "radius", "stiffness", "restitution", "dissipation", "settle"}
+        )
         points = _points(path, contact, bodies)
         if not particles and not bodies:
             continue

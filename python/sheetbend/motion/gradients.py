@@ -31,6 +31,7 @@ SHORTER = (1.0, 0.5, 0.25, 0.125)
 POSITIVE = (
     *("mass", "compliance", "damping", "drag_linear", "drag_quadratic", "air_normal", "air_tangential"),
     *("volume", "volume_compliance", "friction", "contact_radius", "contact_stiffness", "collider_size", "restitution"),
+    "contact_dissipation",
 )
 
 

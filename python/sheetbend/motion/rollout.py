@@ -33,8 +33,8 @@ class Gradient:
             "drag_quadratic" (particles,), "wind" (knots, 3), "air_normal", "air_tangential", "pressure" (triangles
             in air,), "volume", "volume_compliance" (volumes,), "friction", "contact_radius" (contacts,),
             "contact_stiffness" (those that are not rigid,), "collider_pose" (position and rotation at each knot of
-            each collider, 3), "collider_size" (lengths of all colliders,), "restitution" (contacts that have
-            one,).
+            each collider, 3), "collider_size" (lengths of all colliders,), "restitution" and
+            "contact_dissipation" (contacts that have one,).
         recomputed: substeps that the forward program ran again: as planned, or more where the same rollout was
             differentiated before and its tape no longer holds what it held.
         tape: bytes of the tape.

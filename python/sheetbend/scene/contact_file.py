@@ -50,6 +50,7 @@ def written_contacts(scene: Scene) -> tuple[dict[str, Any], dict[str, Array]]:
         "contacts": [
             {"name": c.name, "collider": c.collider, "rigid": c.rigid, "bounces": c.bounces}
             | ({"nodes": c.nodes.shape[1]} if c.of_body else {})
+            | ({"dissipates": True} if c.dissipates else {})
             for c in contacts.contacts
         ],
     }
@@ -81,9 +82,9 @@ def read_contacts(reader: Reader, scene: Scene, take: Callable[..., Array], fix:
             reader.part(about, key, kind, where)
             for key, kind in (("collider", int), ("rigid", bool), ("bounces", bool))
         ]
-        contacts.contacts.append(
-            Contact(reader.name(about, "name", where), numbers[0], rows[:, :-1], rows[:, -1], *numbers[1:])
-        )
+        dissipates = "dissipates" in about and reader.part(about, "dissipates", bool, where)
+        name = reader.name(about, "name", where)
+        contacts.contacts.append(Contact(name, numbers[0], rows[:, :-1], rows[:, -1], *numbers[1:], dissipates))
     count, soft = len(contacts.contacts), sum(not c.rigid for c in contacts.contacts)
     made = [take("friction", count), take("contact_radius", count), take("contact_stiffness", soft)]
     colliders = reader.records("colliders")
@@ -105,6 +106,7 @@ def read_contacts(reader: Reader, scene: Scene, take: Callable[..., Array], fix:
         take("collider_size", sum(len(c.sizes) for c in contacts.colliders.values())),
         take("restitution", sum(c.bounces for c in contacts.contacts)),
         take("contact_weight", sum(c.nodes.size for c in contacts.contacts if c.of_body)),
+        take("contact_dissipation", sum(c.dissipates for c in contacts.contacts)),
     ]
     for name, values in zip(MADE_BY_QUANTITIES, made, strict=True):
         if values.any():

@@ -20,7 +20,7 @@ from .pieces import PairFriction, Piece
 Array = np.ndarray
 ARRAYS = (
     *("friction", "contact_radius", "contact_stiffness", "collider_pose", "collider_size", "restitution"),
-    "contact_weight",
+    *("contact_weight", "contact_dissipation"),
 )
 TOUCHES = 1e-6  # m: so deep a particle may be at the start, as under its own weight
 
@@ -46,6 +46,7 @@ class Contact:
             substep [N], in the collider's frame.
         rigid: whether it is as stiff as masses and substeps allow.
         bounces: whether it has a restitution.
+        dissipates: whether it has a dissipation.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Contact:
     carried: Array
     rigid: bool
     bounces: bool
+    dissipates: bool = False
 
     @property
     def particles(self) -> Array:
@@ -75,12 +77,14 @@ class ContactNumbers:
         radius: m.
         stiffness: N/m; None where it is rigid.
         restitution: None where nothing bounces.
+        dissipation: s/m; None where it is elastic.
     """
 
     friction: float
     radius: float
     stiffness: float | None
     restitution: float | None
+    dissipation: float | None = None
 
     def check(self, name: str) -> None:
         """Raises SceneError where a number is none that it could be."""
@@ -94,6 +98,17 @@ class ContactNumbers:
         if self.restitution is not None and not (is_number(self.restitution) and 0 <= self.restitution <= 1):
             fix = "give the speed after an impact over that before, or leave it out"
             raise SceneError(f"{name}.contact.restitution", "must be between 0 and 1", self.restitution, fix)
+        if self.dissipation is None:
+            return
+        field = f"{name}.contact.dissipation"
+        if not (is_number(self.dissipation) and self.dissipation >= 0):
+            fix = "give s/m, 0 for an elastic contact, or leave it out"
+            raise SceneError(field, "must not be negative", self.dissipation, fix)
+        if self.stiffness is None:
+            raise SceneError(field, "is of a rigid contact", self.dissipation, "give a stiffness, N/m, too")
+        if self.restitution is not None:
+            fix = f"leave out the dissipation, or the restitution of {self.restitution}"
+            raise SceneError(field, "is of a contact with a restitution", self.dissipation, fix)
 
 
 class Contacts:
@@ -187,13 +202,16 @@ class Contacts:
             quantity = f"{name}_restitution"
             scene.add_quantity(quantity, numbers.restitution, "", positive=False, scale=0.1, limits=(0.0, 1.0))
             scene.add_terms([Term("restitution", bouncing, 1.0, ((quantity, "identity"),))])
+        if numbers.dissipation is not None:
+            losing = sum(c.dissipates for c in self.contacts)
+            self._name(scene, f"{name}_contact_dissipation", "contact_dissipation", losing, numbers.dissipation, "s/m")
         if points is not None:
             first = sum(c.nodes.size for c in self.contacts if c.of_body)
             weights = points.weights()
             index = first + np.arange(weights.size).reshape(weights.shape)
             scene.add_terms(terms_of("contact_weight", index, weights))
-        rigid, bounces = numbers.stiffness is None, numbers.restitution is not None
-        self.contacts.append(Contact(name, place, which, carried, rigid, bounces))
+        flags = numbers.stiffness is None, numbers.restitution is not None, numbers.dissipation is not None
+        self.contacts.append(Contact(name, place, which, carried, *flags))
 
     def _name(self, scene: Builder, quantity: str, array: str, at: int, value: float, unit: str) -> None:
         scene.add_quantity(
@@ -219,6 +237,7 @@ class Contacts:
                     "carried": places_of(c.carried),
                     "rigid": c.rigid,
                     "bounces": c.bounces,
+                    "dissipates": c.dissipates,
                 }
                 for c in self.contacts
             ],
@@ -237,6 +256,7 @@ class Contacts:
             "collider_size": np.zeros(sum(len(c.sizes) for c in self.colliders.values())),
             "restitution": np.zeros(sum(c.bounces for c in self.contacts)),
             "contact_weight": np.zeros(sum(c.nodes.size for c in self.contacts if c.of_body)),
+            "contact_dissipation": np.zeros(sum(c.dissipates for c in self.contacts)),
         }
 
     def expect_apart(self, core: Any, inputs: Array, masses: Array, gravity: Array, held: set[int]) -> None:

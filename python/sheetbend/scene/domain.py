@@ -19,7 +19,7 @@ HUGE = float(np.finfo(float).max)
 TINY = float(np.nextafter(0.0, 1.0))
 NOT_NEGATIVE = (
     *("mass", "compliance", "damping", "drag_linear", "drag_quadratic", "air_normal", "air_tangential"),
-    *("volume_compliance", "friction", "contact_radius", "restitution"),
+    *("volume_compliance", "friction", "contact_radius", "restitution", "contact_dissipation"),
 )
 POSITIVE = ("volume", "contact_stiffness", "collider_size")
 

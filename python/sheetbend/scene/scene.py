@@ -309,6 +309,7 @@ class Scene(SelfTouchingScene):
         radius: float = 0.0,
         stiffness: float | None = None,
         restitution: float | None = None,
+        dissipation: float | None = None,
         name: str | None = None,
         settle: bool = False,
         points: ArrayLike | TriangleMesh | None = None,
@@ -326,6 +327,9 @@ class Scene(SelfTouchingScene):
             radius: m, of a rope, or half the thickness of cloth (`<name>_contact_radius` unless zero).
             stiffness: N/m per particle (`<name>_contact_stiffness`). By default rigid: h^2 g/1000 deep under weight.
             restitution: 0 to 1 (`<name>_restitution`), the speed after an impact over that before; by default 0.
+            dissipation: s/m (`<name>_contact_dissipation`), of a contact with a stiffness: its push is larger by this
+                times the speed at which it goes in, and smaller on the way out (Hunt & Crossley 1975). Elastic by
+                default.
             name: by default that of the collider.
             settle: move what starts inside to the surface, at the values that the scene is given with; a body as a
                 whole, which must be joined to nothing.
@@ -336,7 +340,7 @@ class Scene(SelfTouchingScene):
                 of what is held and soft.
         """
         self._building()
-        numbers = ContactNumbers(friction, radius, stiffness, restitution)
+        numbers = ContactNumbers(friction, radius, stiffness, restitution, dissipation)
         own = points_of(what, points, name)
         which, name = self.contacts.check(own or what, collider, self.particle_count, numbers, name)
         carried = self.add_hidden(np.zeros((len(which), 3)), 1.0, pinned=True)

@@ -118,9 +118,9 @@ inline bool is_of_volumes(int quantity) {
 
 // Quantities that only scenes with contacts have.
 inline bool is_of_contacts(int quantity) {
-  constexpr Quantity all[]{Quantity::friction,      Quantity::contact_radius, Quantity::contact_stiffness,
-                           Quantity::collider_pose, Quantity::collider_size,  Quantity::restitution,
-                           Quantity::contact_weight};
+  constexpr Quantity all[]{Quantity::friction,       Quantity::contact_radius,     Quantity::contact_stiffness,
+                           Quantity::collider_pose,  Quantity::collider_size,      Quantity::restitution,
+                           Quantity::contact_weight, Quantity::contact_dissipation};
   return std::ranges::find(all, static_cast<Quantity>(quantity)) != std::end(all);
 }
 

@@ -12,7 +12,7 @@ namespace sheetbend::testing {
 struct ContactBuilder {
   SceneSpec spec;
   std::vector<double> x, velocity, mass, compliance, rest, friction, radius, stiffness, restitution, pose, size,
-      weights;
+      weights, dissipation;
 
   int particle(const Vec3<double>& at, double m, const Vec3<double>& v = {0.0, 0.0, 0.0}) {
     x.insert(x.end(), {at.x, at.y, at.z});
@@ -37,11 +37,11 @@ struct ContactBuilder {
     spec.groups.push_back({kind, kind, false, {}});
     constraint(kind, nodes, c, p);
   }
-  // Last: of what was added before. Nothing bounces where e is negative.
-  void contact(double mu, double r, double k = 0.0, double e = -1.0) {
+  // Last: of what was added before. Nothing bounces where e is negative, nor dissipates where a is.
+  void contact(double mu, double r, double k = 0.0, double e = -1.0, double a = -1.0) {
     if (moving < 0) moving = static_cast<int>(mass.size());
     for (int c = 0; c < static_cast<int>(spec.colliders.size()); ++c) {
-      ContactSpec contact{"contact", c, {}, {}, k == 0.0, e >= 0.0};
+      ContactSpec contact{"contact", c, {}, {}, k == 0.0, e >= 0.0, 1, a >= 0.0};
       for (int n = 0; n < moving; ++n) {
         if (std::ranges::any_of(spec.directors, [&](const Director& d) { return d.node == n; })) continue;
         contact.nodes.push_back(n);
@@ -53,6 +53,7 @@ struct ContactBuilder {
       radius.push_back(r);
       if (k > 0.0) stiffness.push_back(k);
       if (e >= 0.0) restitution.push_back(e);
+      if (a >= 0.0) dissipation.push_back(a);
     }
   }
   // A body of a mass and moments of inertia about its center; the number of its center, three axes after it.
@@ -123,6 +124,7 @@ struct ContactBuilder {
     put(Quantity::friction, friction), put(Quantity::contact_radius, radius);
     put(Quantity::contact_stiffness, stiffness), put(Quantity::restitution, restitution),
         put(Quantity::collider_pose, pose), put(Quantity::collider_size, size), put(Quantity::contact_weight, weights);
+    put(Quantity::contact_dissipation, dissipation);
     return s;
   }
 
