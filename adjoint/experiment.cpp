@@ -11,7 +11,7 @@ namespace sheetbend {
 std::size_t Experiment::residual_count() const {
   std::size_t seen = 0;
   for (std::size_t i = 0; i < observed.measured.size(); i += 3) seen += !std::isnan(observed.measured[i]);
-  std::size_t count = observed.axes.size() * seen;
+  std::size_t count = observed.rows_of_one() * seen;
   for (const ForceSensor& sensor : sensors) count += sensor.rows();
   return count;
 }
@@ -44,11 +44,14 @@ int Experiment::steps_at(const Plan& run, const T* in) const {
 }
 
 void Experiment::check() const {
-  const std::size_t frames = observed.times.size(), markers = observed.markers.size();
-  if (frames == 0 || markers == 0)
+  const std::size_t frames = observed.times.size(), columns = observed.columns();
+  if (frames == 0 || columns == 0)
     throw std::invalid_argument(name + ": nothing is observed. Fix: give frames and markers");
-  if (observed.measured.size() != 3 * frames * markers || observed.sigma.size() != frames * markers)
+  if (observed.measured.size() != 3 * frames * columns || observed.sigma.size() != frames * columns ||
+      (observed.is_cloud() ? 0 : columns) != observed.markers.size())
     throw std::invalid_argument(name + ": measured and sigma must be (frames, markers, 3) and (frames, markers)");
+  if (observed.is_cloud() && (!finer.empty() || correction.unknowns() > 0))
+    throw std::invalid_argument(name + ": a cloud goes neither with extrapolation in time nor with corrected markers");
   if (is_static && frames != 1)
     throw std::invalid_argument(name + ": an equilibrium has one frame. Fix: give each shape as a recording");
   if (least.size() != most.size() || (!least.empty() && least.size() != scene->layout.total()))

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "adjoint/boundary_correction.h"
+#include "adjoint/cloud.h"
 #include "adjoint/equilibrium_tangents.h"
 #include "adjoint/force_sensor.h"
 #include "adjoint/markers.h"
@@ -16,16 +17,22 @@
 namespace sheetbend {
 
 enum class Start : int { given, equilibrium };  // where a motion starts
-enum class Loss : int { squares, soft_l1, huber };
+enum class Loss : int { squares, soft_l1, huber, cauchy };
 
+// Either markers, or the points of a cloud: then there are no markers but a surface, and a column holds another point in every frame.
 struct Observations {
   std::vector<Marker> markers;
+  ClothSurface surface;            // of a cloud
   std::vector<double> times;       // (frames) [s]
-  std::vector<double> measured;    // (frames, markers, 3) [m], NaN = not seen
-  std::vector<double> sigma;       // (frames, markers) [m]: residuals are divided by it
-  std::vector<int> axes{0, 1, 2};  // coordinates that count
+  std::vector<double> measured;    // (frames, columns, 3) [m], NaN = not seen; a column is a marker
+  std::vector<double> sigma;       // (frames, columns) [m]: residuals are divided by it
+  std::vector<int> axes{0, 1, 2};  // coordinates that count; of a cloud distances do
   Loss loss = Loss::squares;
   double loss_scale = 1.0;  // in units of sigma
+
+  bool is_cloud() const { return !surface.corners.empty(); }
+  std::size_t columns() const { return times.empty() ? 0 : sigma.size() / times.size(); }
+  std::size_t rows_of_one() const { return is_cloud() ? 1 : axes.size(); }
 };
 
 // A further rollout of the same motion at a shorter substep, for extrapolation in time, and the weight of its markers.
@@ -60,7 +67,7 @@ struct Experiment {
   std::size_t time_offset_at() const { return scene->layout.total() + 3 * observed.markers.size(); }
   std::size_t inputs() const { return time_offset_at() + 1 + ForceSensor::inputs * sensors.size(); }
   std::size_t residual_count()
-      const;                     // one per axis of every marker and frame that was seen, then those of the sensors
+      const;  // one per axis of every marker, or one per point of a cloud, and frame that was seen, then those of the sensors
   std::size_t readings() const;  // six per sample of every sensor
   int steps() const { return steps(plan); }
   int steps(const Plan& run) const;  // substeps until the last frame and sample

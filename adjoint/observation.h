@@ -9,11 +9,15 @@
 namespace sheetbend {
 
 // The factor on a marker's residuals whose squares then sum to the robust loss rho(s) scale^2, s = squared distance / scale^2.
-// Huber 1964 and its smooth form soft-L1; both are the squares themselves for small residuals.
+// Huber 1964 and its smooth form soft-L1, and Cauchy's log(1 + s); all are the squares themselves for small residuals.
 template <class T>
 T robust_scale(const Observations& o, const T& distance2) {
   if (o.loss == Loss::squares) return T(1.0);
   const T s = distance2 * T(1.0 / (o.loss_scale * o.loss_scale));
+  if (o.loss == Loss::cauchy) {
+    if (value_of(s) > 1e-3) return sqrt(log(T(1.0) + s) / s);
+    return sqrt(T(1.0) - s * (T(1.0 / 2.0) - s * (T(1.0 / 3.0) - s * (T(1.0 / 4.0) - s * T(1.0 / 5.0)))));
+  }
   if (o.loss == Loss::soft_l1) return sqrt(T(2.0) / (T(1.0) + sqrt(T(1.0) + s)));
   const auto far = s > T(1.0);
   const T safe = select(far, s, T(1.0));
@@ -34,9 +38,36 @@ T* marker_residuals(const Observations& o, std::size_t at, const Vec3<T>& p, T* 
   return r;
 }
 
+// The same of a cloud, whose residuals are the points' distances from the surface; its simulated points are the closest ones on it.
+template <class T>
+T* cloud_residuals(const Observations& o, std::size_t frame, const T* x, T* r, T* simulated) {
+  const ClothSurface& s = o.surface;
+  std::vector<double> values;
+  for (const int dof : s.vertices)
+    for (int d = 0; d < 3; ++d) values.push_back(value_of(x[dof + d]));
+  const std::size_t count = o.columns(), first = frame * count;
+  const std::vector<ClosestPart> parts = closest_parts(s, values.data(), &o.measured[3 * first], count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t at = first + i;
+    T own[12];
+    for (int d = 0; d < 3; ++d) own[d] = T(o.measured[3 * at + d]);
+    if (parts[i].triangle < 0) {
+      if (simulated) Vec3<T>(own).store(simulated + 3 * at);
+      continue;
+    }
+    for (int k = 0; k < 3; ++k) Vec3<T>(x + s.vertices[s.corners[parts[i].triangle][k]]).store(own + 3 * (k + 1));
+    if (simulated) (Vec3<T>(own) - nearest_on_triangle(own, parts[i].part).apart).store(simulated + 3 * at);
+    if (!r) continue;
+    const T d = T(1.0 / o.sigma[at]) * surface_distance(own, parts[i], o.sigma[at]);
+    *r++ = robust_scale(o, d * d) * d;
+  }
+  return r;
+}
+
 // Residuals of one frame (not where r is null), and simulated markers (likewise), from the coordinates x at its time.
 template <class T>
 T* frame_residuals(const Observations& o, std::size_t frame, const T* x, const T* offsets, T* r, T* simulated) {
+  if (o.is_cloud()) return cloud_residuals(o, frame, x, r, simulated);
   const std::size_t count = o.markers.size();
   for (std::size_t m = 0; m < count; ++m) {
     const std::size_t at = frame * count + m;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <limits>
+#include <map>
 #include <optional>
 
 #include "adjoint/fit/evaluation.h"
@@ -30,10 +31,17 @@ Observations make_observations(const py::dict& d) {
   o.sigma = numbers(d, "sigma");
   o.axes = get<std::vector<int>>(d, "axes");
   const auto loss = get<std::string>(d, "loss");
-  if (loss != "squares" && loss != "soft_l1" && loss != "huber")
-    throw std::invalid_argument("loss: got '" + loss + "'. Fix: use 'squares', 'soft_l1' or 'huber'");
-  o.loss = loss == "squares" ? Loss::squares : loss == "huber" ? Loss::huber : Loss::soft_l1;
+  const std::map<std::string, Loss> losses = {
+      {"squares", Loss::squares}, {"soft_l1", Loss::soft_l1}, {"huber", Loss::huber}, {"cauchy", Loss::cauchy}};
+  if (!losses.contains(loss))
+    throw std::invalid_argument("loss: got '" + loss + "'. Fix: use 'squares', 'soft_l1', 'huber' or 'cauchy'");
+  o.loss = losses.at(loss);
   o.loss_scale = get<double>(d, "loss_scale");
+  if (!d["surface"].is_none()) {
+    const auto surface = get<py::dict>(d, "surface");
+    o.surface = make_cloth_surface(get<std::vector<int>>(surface, "vertices"),
+                                   get<std::vector<std::array<int, 3>>>(surface, "triangles"));
+  }
   for (const py::handle item : d["markers"]) {
     const auto m = item.cast<py::dict>();
     Marker marker;

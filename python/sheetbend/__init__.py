@@ -62,6 +62,7 @@ from .page.notebook import show_in_notebooks
 from .quantities.kinds import KINDS
 from .quantities.parameters import Parameter, Parameters
 from .recording.baseline import baseline
+from .recording.cloud import Cloud
 from .recording.force_recording import ForceRecording
 from .recording.io.folder import read_recordings
 from .recording.of_poses import start_of_poses
@@ -99,6 +100,7 @@ __all__ = [
     "Box",
     "Capsule",
     "Cloth",
+    "Cloud",
     "ConfigError",
     "ContactCounts",
     "ContactMode",

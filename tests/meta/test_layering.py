@@ -63,6 +63,7 @@ ALLOWED = {
     "adjoint": {
         "core/scalar",
         "core/constraints",
+        "core/contact",
         "core/scene",
         "core/element",
         "core/packs",

@@ -42,9 +42,9 @@ def carried_baselines(
 
     Returns:
         "carried" (from each marker's first sight in `target`) and, where `fitted` shows every marker, "carried shape";
-        empty for an equilibrium and for a scene in which nothing is driven.
+        empty for an equilibrium, for a cloud and for a scene in which nothing is driven.
     """
-    grips = [] if e.static else _grips(e.scene)
+    grips = [] if e.static or e.is_cloud else _grips(e.scene)
     if not grips:
         return {}
     values = values or {}

@@ -15,13 +15,17 @@ from ..errors import InputError, RecordingError
 from ..motion.solver import Solver
 from ..objects.markers import Place, places_for
 from ..quantities.quantities import Term, product
+from ..recording.cloud import Cloud
 from ..recording.recording import Recording
 from ..scene.scene import Scene
 from .correction import Correction, recorded_noise
 from .force_sensor import INPUTS, ForceSensor
+from .names import check_names
+from .of_cloud import check_cloud, surface_of
 from .shooting import Shooting
 
 Window = tuple[float, float]
+LOSSES = ("squares", "soft_l1", "huber", "cauchy")  # the last for clouds alone
 NO_SHARE = 1e-9  # interpolation weights below this are zero
 
 
@@ -31,7 +35,7 @@ class Experiment:
 
     Attributes:
         scene: frozen by the fit.
-        recording: times may start anywhere; see `start_time`.
+        recording: of markers, or a `Cloud` of points on the scene's cloths; times may start anywhere, see `start_time`.
         name: the recording's by default.
         markers: places of the markers (see `places_for`).
         fit: (start, stop) in s of the recording's own time, the part that the fit sees; all of it by default.
@@ -55,7 +59,7 @@ class Experiment:
         axes: coordinates that count, such as "xz".
         radius: distance of the markers from a pivot, m: errors are then reported as angles in rad, rms
             distance/radius; None = in m.
-        loss: "squares", "soft_l1" or "huber", with loss_scale in units of sigma.
+        loss: "squares", "soft_l1", "huber" or, of a cloud, "cauchy", with loss_scale in units of sigma.
         shooting: cuts a motion whose errors grow into windows of this length, s, "auto", or a `Shooting`: their states
             at the start are found along with the parameters, and what the model loses over a window is a result.
         forces: sensors whose recorded forces are residuals too, beside those of the markers; for motions.
@@ -92,9 +96,13 @@ class Experiment:
         if not self.name:
             object.__setattr__(self, "name", self.recording.name)
         if not (is_number(self.sigma) and self.sigma > 0):
-            raise InputError(
-                f"{self.name}.sigma", "must be positive", self.sigma, "give the expected error of a marker in m"
-            )
+            fix = "give the expected error of a marker in m"
+            raise InputError(f"{self.name}.sigma", "must be positive", self.sigma, fix)
+        if self.is_cloud:
+            of_markers = {"markers": self.markers, "offsets": self.offsets, "axes": self.axes.removeprefix("xyz")}
+            not_yet = {"driven_sigma": self.driven_sigma, "radius": self.radius, "shooting": self.shooting}
+            more = not self.static and self.solver.extrapolate > 1
+            check_cloud(self.name, self.scene, of_markers, {**not_yet, "solver.extrapolate": more})
         self._check_driven_sigma()
         self._check_forces()
         corrected, late = self.driven_sigma is not None, self.time_offset is not None
@@ -111,8 +119,9 @@ class Experiment:
             )
         if self.start not in ("given", "equilibrium"):
             raise InputError(f"{self.name}.start", "is unknown", self.start, "use 'given' or 'equilibrium'")
-        if self.loss not in ("squares", "soft_l1", "huber"):
-            raise InputError(f"{self.name}.loss", "is unknown", self.loss, "use 'squares', 'soft_l1' or 'huber'")
+        if self.loss not in LOSSES[: len(LOSSES) if self.is_cloud else -1]:
+            known = "'squares', 'soft_l1' or 'huber', or for a cloud 'cauchy'"
+            raise InputError(f"{self.name}.loss", "is unknown", self.loss, f"use {known}")
         if not (math.isfinite(self.loss_scale) and self.loss_scale > 0):
             raise InputError(
                 f"{self.name}.loss_scale", "must be positive", self.loss_scale, "give it in units of sigma"
@@ -193,11 +202,23 @@ class Experiment:
         """Noise that the markers show which the scene follows, m per coordinate; None where there are none, or the
         recording shows too little of them."""
         markers = tuple(dict.fromkeys(m for part in self.scene.boundary.following for m in part.markers))
-        return None if self.static else recorded_noise(self.recording.piece(self.t0, None), markers)
+        return None if self.static or self.is_cloud else recorded_noise(self.recording.piece(self.t0, None), markers)
+
+    @property
+    def is_cloud(self) -> bool:
+        """Whether the recording is a cloud, whose points are compared with the closest points of the scene's cloths."""
+        return isinstance(self.recording, Cloud)
+
+    @property
+    def rows_each(self) -> int:
+        """Residuals of a marker in a frame, one along every axis that counts; of a point of a cloud its distance."""
+        return 1 if self.is_cloud else len(self.axes)
 
     @cached_property
     def places(self) -> tuple[Place | None, ...]:
-        """The markers' places, None where not compared."""
+        """The markers' places, None where not compared; none of a cloud."""
+        if self.is_cloud:
+            return ()
         return places_for(self.scene, self.markers, self.recording.markers, self.recording.positions)
 
     @property
@@ -210,7 +231,7 @@ class Experiment:
         """Indices of the markers that are compared: placed, and not on particles whose motion is given."""
         held = self.scene.pinned | set(self.scene.boundary.driven)
         chosen = tuple(i for i, p in enumerate(self.places) if p is not None and not self._depends_on(i, p) <= held)
-        if not chosen:
+        if not chosen and not self.is_cloud:
             raise RecordingError(
                 f"{self.name}.markers",
                 "leave nothing to compare",
@@ -242,6 +263,8 @@ class Experiment:
 
     def _part(self, window: Window | None) -> Recording:
         part = self.recording if window is None else self.recording.piece(*window)
+        if isinstance(part, Cloud):
+            return part.named(self.name).pooled() if self.static else part.named(self.name)
         positions = part.positions[:, list(self.compared)]
         times = part.times
         if self.static and len(times) > 1:
@@ -281,11 +304,13 @@ class Experiment:
             "loss": self.loss,
             "loss_scale": self.loss_scale,
             "markers": [place.core(self.scene) for place in self.compared_places],
+            "surface": surface_of(self.scene) if self.is_cloud else None,
         }
 
     def extra_terms(self) -> list[Term]:
         """Terms of the inputs that belong to the observation: marker offsets (3 each), then the time offset."""
-        self._check_names()
+        known = self.scene.quantities
+        check_names(self.name, self.recording.markers, known, self.offsets, self.time_offset)
         terms: list[Term] = []
         for m, i in enumerate(self.compared):
             terms += [
@@ -313,30 +338,6 @@ class Experiment:
         """The force sensors for the compiled core, with the samples that (part of) the recording spans."""
         span = (float(recording.times[0]), float(recording.times[-1]))
         return [sensor.core(self.scene, self.t0, span, self.solver.h) for sensor in self.forces]
-
-    def _check_names(self) -> None:
-        known = self.scene.quantities
-        for marker, wanted in self.offsets.items():
-            if marker not in self.recording.markers:
-                raise InputError(
-                    f"{self.name}.offsets",
-                    "name no marker",
-                    marker,
-                    f"use some of: {', '.join(self.recording.markers)}",
-                )
-            unknown = [name for name in wanted if name is not None and name not in known]
-            if unknown or len(wanted) != 3:
-                fix = f"give three, each None or one of: {', '.join(known)}"
-                raise InputError(
-                    f"{self.name}.offsets", f"of '{marker}' are not three quantities of the scene", wanted, fix
-                )
-        if self.time_offset is not None and self.time_offset not in known:
-            raise InputError(
-                f"{self.name}.time_offset",
-                "names no quantity of the scene",
-                self.time_offset,
-                f"use one of: {', '.join(known)}",
-            )
 
     def correction(self, recording: Recording) -> Correction | None:
         """Of the markers that the scene follows, as far as (part of) the recording feels it; None without any."""

@@ -14,20 +14,17 @@ import numpy as np
 from ..doubts.beginnings import Beginning, checked, of_beginnings
 from ..doubts.conclude import judged_parameters, misfit, warnings_of, without_verdict
 from ..doubts.contradictions import between_parts, doubtful, elsewhere, held_out_motion, together
-from ..doubts.driven_noise import driven_doubts
 from ..doubts.floors import at_floor_of_sweeps
 from ..doubts.given import check_given, half_widths, premises
 from ..doubts.implausible import implausible
 from ..doubts.leave_one_out import MEANING, companions, each_left_out
 from ..doubts.losses import loss_doubts
-from ..doubts.misread import misread
 from ..doubts.missing_force import missing_force
 from ..doubts.missing_loss import missing_loss
 from ..doubts.prediction import Comparison, compare, predicted_values
 from ..doubts.profiles import Elsewhere
 from ..doubts.stationary import unfinished
 from ..doubts.stuck import bounded_by_sticking
-from ..doubts.told import told_numbers
 from ..doubts.touching import kinks, what_touches
 from ..doubts.unexplained import unexplained
 from ..doubts.wrong_given import doubts_of, explained_by, wrong_in_either
@@ -53,6 +50,7 @@ from ..report.fit_result import FitResult
 from ..result.result import Estimate, Given, Premise
 from ..scene.scene import Scene
 from ..statistics.identifiability import Identifiability
+from .clouds import driven_beside_clouds, misread_beside_clouds, told_beside_clouds
 from .experiments import experiments_of
 from .rows import curves, every_end, given_rows, growth_rows, recording_fit, start_rows
 
@@ -230,7 +228,7 @@ def fit(
     def conclude(refitter: str | None) -> _Conclusion:
         at, every = settled(refinement, experiments, problem, best, refitter)
         values = problem.parameters.to_physical(at.u)
-        told, silent = ([], "") if refitter is None or lost else told_numbers(at.problem, at.u)
+        told, silent = ([], "") if refitter is None or lost else told_beside_clouds(at.problem, at.u)
         uncounted = f"what errors of the given values would move is not known{IGNORED if given else ''}: {silent}"
         unknown = (uncounted,) if silent else ()
         rests_on = premises(at.problem, at.u, given or {}, told)
@@ -251,7 +249,7 @@ def fit(
             parts = of_beginnings(problem, best.u, judged, begun, refinement)
             parts |= between_parts(at.problem, at.u, judged, refinement)
             if not lost:
-                doubted, drawn_off = driven_doubts(at.problem, at.u, judged)
+                doubted, drawn_off = driven_beside_clouds(at.problem, at.u, judged)
                 doubted += loss_doubts(at.problem, at.u, judged)
                 wrong = wrong_in_either((at.problem, at.u), (problem, best.u), told, refinement)
                 doubted += wrong_given_warnings(at.problem, wrong)
@@ -339,7 +337,7 @@ def fit(
         + at.warnings
         + shifted
         + fallback
-        + (() if interrupted else misread(problem, best.u) + implausible(problem)),
+        + (() if interrupted else misread_beside_clouds(problem, best.u) + implausible(problem)),
     )
     return Fit(result, tuple(comparisons), wanted, corrected, end.values)
 

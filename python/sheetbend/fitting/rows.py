@@ -25,16 +25,24 @@ def recording_fit(
     Args:
         rows: number of residuals by recording.
     """
-    found = c.errors(rows.get(c.experiment.name, 0))
+    found = _errors(c, rows.get(c.experiment.name, 0))
     if c.experiment.name in corrected:
         by = float(np.sqrt(np.mean(corrected[c.experiment.name] ** 2)))
         found = replace(found, driven_sigma=c.experiment.driven_noise, corrected_by=by)
     if c.experiment.name not in left_out:
         return found
-    other = left_out[c.experiment.name].errors(0)
+    other = _errors(left_out[c.experiment.name], 0)
     return replace(
         other, rows=found.rows, rms=found.rms, driven_sigma=found.driven_sigma, corrected_by=found.corrected_by
     )
+
+
+def _errors(c: Comparison, rows: int) -> RecordingFit:
+    """Of a cloud without its motion and its frequencies: no point is followed over time."""
+    found = c.errors(rows)
+    if not c.experiment.is_cloud:
+        return found
+    return replace(found, motion=None, measured_frequency=None, simulated_frequency=None)
 
 
 def growth_rows(start: Sequence[Growth], end: Sequence[Growth]) -> tuple[MotionGrowth, ...]:

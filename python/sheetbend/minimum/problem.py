@@ -360,14 +360,15 @@ class FitProblem:
 
     def rows_layout(self) -> Layout:
         """Where each data row comes from, for the covariance. Markers are on clock 0, force sensors on clocks of their
-        own; each axis of either is a kind of its own, but along a static shape all are one."""
+        own; each axis of either is a kind of its own, but along a static shape all are one. Of a cloud, points in the
+        same row count as one channel, which is as good as any: they are others in every frame."""
         if self._layout is not None:
             return self._layout
         recording, channel, frame, kind, clock = [], [], [], [], []
         for i, (e, r) in enumerate(zip(self.experiments, self.recordings, strict=True)):
             seen_frame, seen_marker = np.nonzero(r.mask)
-            axes = np.tile(np.arange(len(e.axes)), len(seen_frame))
-            frames, markers = np.repeat(seen_frame, len(e.axes)), np.repeat(seen_marker, len(e.axes))
+            axes = np.tile(np.arange(e.rows_each), len(seen_frame))
+            frames, markers = np.repeat(seen_frame, e.rows_each), np.repeat(seen_marker, e.rows_each)
             recording.append(np.full(len(axes), i))
             # Along a static shape the points are the series.
             channel.append(axes if e.static else markers * len(e.axes) + axes)
@@ -390,7 +391,7 @@ class FitProblem:
         for e, r, sensed in zip(self.experiments, self.recordings, self.sensed, strict=True):
             seen_frame, _ = np.nonzero(r.mask)
             when = np.full(len(seen_frame), np.nan) if e.static else r.times[seen_frame]
-            times.append(np.repeat(when, len(e.axes)))
+            times.append(np.repeat(when, e.rows_each))
             for force, sensor in zip(e.forces, sensed, strict=True):
                 span = (float(r.times[0]), float(r.times[-1]))
                 at = force.recording.times[force.kept(e.t0, span)]

@@ -106,7 +106,7 @@ def holds_frames(problem: FitProblem, length: float) -> bool:
 
 def _determined(problem: FitProblem, length: float) -> bool:
     rows = sum(
-        len(e.axes) * int(r.mask[r.times < e.t0 + length].sum() if not e.static else r.mask.sum())
+        e.rows_each * int(r.mask[r.times < e.t0 + length].sum() if not e.static else r.mask.sum())
         for e, r in zip(problem.experiments, problem.recordings, strict=True)
     )
     return rows >= ROWS * len(problem.parameters.free)

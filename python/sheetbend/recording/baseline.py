@@ -7,6 +7,11 @@ blend  on a rope held at both ends, every free marker follows the ends: from whe
        arc length. This is exact when both ends move alike and the rope is carried along. Where a grip drives
        several markers, the end is the one next to the free ones.
 
+A cloud's points have no names; for it there is
+
+still  every point is where the last fitted frame has its closest point. What lies between two points of that frame
+       counts as error, about half the distance of neighbors.
+
 For a scene that drives particles, carried.py adds two more: every marker moves rigidly with the grips.
 
 hold and blend are given where each free marker is first seen in the piece; blend also the recorded ends
@@ -23,12 +28,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.timeseries import Array, mean_position
 from ..errors import RecordingError
+from .cloud import Cloud
 from .recording import Recording
 
 IN_WORDS = {
     "hold": "every marker stays where it is first seen",
     "rest": "every marker stays at its mean position in the fitted data",
     "blend": "every marker follows the two ends, weighted by arc length",
+    "still": "every point is at the closest point of the last fitted frame",
     "carried": "every marker moves rigidly with the grips from where it is first seen",
     "carried shape": "the mean shape of the fitted data moves rigidly with the grips",
 }
@@ -39,7 +46,7 @@ class NoPhysics:
     """The strongest prediction without physics for a held-out piece.
 
     Attributes:
-        kind: "hold", "rest", "blend", "carried" or "carried shape".
+        kind: "hold", "rest", "blend", "still", "carried" or "carried shape".
         words: for reports, what it predicts.
         errors: rms error of each baseline that applies, m.
         positions: (frames, markers, 3) m, the prediction.
@@ -191,6 +198,8 @@ def baseline(
     Raises:
         RecordingError: the markers differ, nothing is left to score, or no baseline applies.
     """
+    if isinstance(held_out, Cloud):
+        return _still([fitted] if isinstance(fitted, Recording) else fitted, held_out)
     rest = rest_baseline(fitted)
     _check_same_markers(fitted if isinstance(fitted, Recording) else fitted[0], held_out)
     scored = _free_and_seen(held_out)
@@ -209,6 +218,15 @@ def baseline(
     kind = min(errors, key=errors.__getitem__)
     words = f"{kind}: {IN_WORDS[kind]}"
     return NoPhysics(kind, words, errors, candidates[kind], errors[kind], scored)
+
+
+def _still(fitted: Sequence[Recording], held_out: Cloud) -> NoPhysics:
+    last = [r.positions[k][r.mask[k]] for r in fitted for k in np.flatnonzero(r.mask.any(axis=1))[-1:]]
+    guesses = [held_out.closest_among(points) for points in last]
+    errors = [rms_about(held_out, guess) for guess in guesses]
+    best = int(np.argmin(errors))
+    words = f"still: {IN_WORDS['still']}"
+    return NoPhysics("still", words, {"still": errors[best]}, guesses[best], errors[best], held_out.mask)
 
 
 def _check_same_markers(one: Recording, other: Recording) -> None:

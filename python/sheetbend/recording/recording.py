@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -242,7 +242,7 @@ class Recording(MarkerData):
             lines.append(f"  source    {told['attribution']}")
         return "\n".join(lines)
 
-    def _derive(self, **fields: Any) -> Recording:
+    def _derive(self, **fields: Any) -> Self:
         """A part of this recording, not checked again: a piece may hold a marker that it never sees."""
         other = copy.copy(self)
         other._set(**{k: read_only(v) if isinstance(v, np.ndarray) else v for k, v in fields.items()})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import operator
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -95,6 +95,21 @@ def checked_positions(values: ArrayLike) -> Array:
             x[frame, marker].tolist(),
             "make all three NaN when it was not seen; planar motion takes a constant third coordinate",
         )
+    return x
+
+
+def padded(frames: Sequence[Array]) -> Array:
+    """(frames, most, 3), points (n, 3) of each frame and behind them NaN.
+
+    Raises:
+        RecordingError: there is no point at all.
+    """
+    most = max((len(x) for x in frames), default=0)
+    if most == 0:
+        raise RecordingError("points", "hold no point", len(frames), "give at least one frame with points")
+    x = np.full((len(frames), most, 3), np.nan)
+    for own, points in zip(x, frames, strict=True):
+        own[: len(points)] = points
     return x
 
 

@@ -69,6 +69,16 @@ def write(recording: MarkerData, path: Path, assumed: tuple[str, ...] = ()) -> N
         RecordingError: the metadata use a reserved key or hold what JSON cannot, or the file holds no times and those
             of the recording do not run evenly from 0 s.
     """
+    names = {"markers": recording.markers, "clamped": [recording.markers[i] for i in recording.clamped]}
+    _write(recording, path, names, assumed)
+
+
+def write_without_names(cloud: MarkerData, path: Path) -> None:
+    """The same beside a cloud, whose points have none."""
+    _write(cloud, path, {}, ())
+
+
+def _write(recording: MarkerData, path: Path, names: dict[str, Any], assumed: tuple[str, ...]) -> None:
     reserved = _reserved(assumed)
     taken = [key for key in reserved if key in recording.metadata]
     if taken:
@@ -77,8 +87,7 @@ def write(recording: MarkerData, path: Path, assumed: tuple[str, ...] = ()) -> N
     content = {
         **({} if recording.name == UNNAMED else {"name": recording.name}),
         "units": "m",
-        "markers": recording.markers,
-        "clamped": [recording.markers[i] for i in recording.clamped],
+        **names,
         **({} if recording.gravity is None else {"gravity": recording.gravity.tolist()}),
         **({"rate": _rate(recording)} if "times" in assumed else {}),
         **recording.metadata,
