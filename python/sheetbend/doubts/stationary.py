@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..arrays.timeseries import Array
+from ..errors import SheetbendError
 from ..minimum.linear_step import gauss_newton
 from ..minimum.optimizers import ROUNDING, Minimum, promised
 from ..minimum.problem import FitProblem
+from ..minimum.search import Search
 from ..quantities.wording import short
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
@@ -24,10 +28,10 @@ NEARBY = 0.1  # of a parameter, or of its scale: where the cost must not be lowe
 def no_minimum(problem: FitProblem, end: Minimum) -> str:
     """Why the end of an optimizer is no minimum, in words; empty where it is one.
 
-    An end that `optimizers.judged` refused is none. One that was stopped (by Ctrl-C, by the number of iterations) is
-    none where a Gauss-Newton step promises more than `FAR` of the cost. One near its start with large residuals is
-    none where a small change of a single parameter lowers the cost: two to four simulations for each, in that case
-    alone.
+    An end above its own start is none: windows led away, and nothing on the whole motion leads back. An end that
+    `optimizers.judged` refused is none. One that was stopped (by Ctrl-C, by the number of iterations) is none where a
+    Gauss-Newton step promises more than `FAR` of the cost. One near its start with large residuals is none where a
+    small change of a single parameter lowers the cost: two to four simulations for each, in that case alone.
     """
     if end.doubt and not end.converged:
         return end.doubt
@@ -36,11 +40,32 @@ def no_minimum(problem: FitProblem, end: Minimum) -> str:
         stopped = "interrupted" if end.interrupted else "the optimizer stopped"
         if left > FAR and not _rounding(left * end.cost, end):
             return f"{stopped} where a step still promises {short(100 * left, 2)} % less"
+    if above_start(end):
+        return f"the fit ended at {short(end.cost / (end.first or 1.0), 2)} times the cost of its own start"
+    if not end.converged:
         return ""
     rows = problem.core.data_rows
     if end.first is None or end.cost <= HARDLY * end.first or 2 * end.cost <= MISSED * rows:
         return ""
     return _lower_nearby(problem, end)
+
+
+def above_start(end: Minimum) -> bool:
+    """Whether a search ended where the cost of the whole motion is higher than where it began."""
+    return end.first is not None and end.first > 0.0 and end.cost > (1.0 + FAR) * end.first
+
+
+def from_start(search: Search, problem: FitProblem, ends: Sequence[Minimum]) -> tuple[Minimum, ...]:
+    """The ends of a search, best first, with that of a search on the whole motion from the start, if it is lower than
+    an end above it. Ctrl-C passes through."""
+    start = problem.parameters.initial()
+    if not above_start(ends[0]) or not problem.cost(start) < ends[0].cost:
+        return tuple(ends)
+    try:
+        other = search.onward(problem, start)
+    except SheetbendError:
+        return tuple(ends)
+    return (other, *ends) if other.cost < ends[0].cost else tuple(ends)
 
 
 def unfinished(problem: FitProblem, end: Minimum, judged: Identifiability) -> tuple[dict[str, str], str]:

@@ -23,7 +23,7 @@ from ..doubts.missing_force import missing_force
 from ..doubts.missing_loss import missing_loss
 from ..doubts.prediction import Comparison, compare, predicted_values
 from ..doubts.profiles import Elsewhere
-from ..doubts.stationary import unfinished
+from ..doubts.stationary import from_start, unfinished
 from ..doubts.stuck import bounded_by_sticking
 from ..doubts.touching import kinks, what_touches
 from ..doubts.unexplained import unexplained
@@ -212,13 +212,19 @@ def fit(
     ends, name, interrupted = found.ends, found.optimizer, found.interrupted
     trouble = ceres_trouble() if optimizer == "auto" else ""
     fallback = (f"SciPy stands in for Ceres, which does not load: {trouble}",) if trouble else ()
-    grown, begun = growths(problem, ends[0].u), tuple[Beginning, ...]()
+    begun = tuple[Beginning, ...]()
+    if not interrupted:
+        try:
+            ends = from_start(search, problem, ends)
+        except KeyboardInterrupt:
+            interrupted = True
+    grown, first = growths(problem, ends[0].u), ends[0]
     if beginnings and not interrupted:
         try:
             ends, begun = checked(search, problem, ends, grown)
         except KeyboardInterrupt:
             interrupted = True
-    if ends[0] is not found.ends[0]:
+    if ends[0] is not first:
         grown = growths(problem, ends[0].u)
     best = ends[0]
     lost = without_verdict(problem, best, grown)
