@@ -107,12 +107,12 @@ def _searched(problem: FitProblem, size: Array, at: Array, steps: int) -> Array:
 
 def _likely(J: Array, r: Array, spread: float) -> tuple[Array, float]:
     """The most likely numbers (k,) of which r + J numbers is noise of size 1, and their standard deviation."""
-    H, g = J.T @ J, J.T @ r
+    curvature, axes = np.linalg.eigh(J.T @ J)
+    slope = axes.T @ (J.T @ r)
     for _ in range(ROUNDS):
-        covariance = np.linalg.inv(H + np.eye(len(H)) / spread**2)
-        likely = -covariance @ g
-        spread = float(np.clip(np.sqrt(np.mean(likely**2 + np.diag(covariance))), 1e-3, LARGEST))
-    return likely, spread
+        variance = 1.0 / (curvature + 1.0 / spread**2)
+        spread = float(np.clip(np.sqrt(np.mean((variance * slope) ** 2 + variance)), 1e-3, LARGEST))
+    return -axes @ (variance * slope), spread
 
 
 def noise(positions: Array) -> float:
