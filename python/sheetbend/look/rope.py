@@ -27,8 +27,17 @@ FITTED, LONGEST = 2 / 3, 3.0  # share of the time that is fitted, and s at most;
 CLAMP_SD = 0.2  # rad, of the direction of a clamp, read off the first markers
 LENGTH_SD = 0.01  # relative, of a length that is a sum of distances between markers
 SET_MODES, SET_SD = (1, 2, 3, 4), 10.0  # of the rest curvature of shapes at rest; 1/m, that of mode k over k^1.5
+ROUND = 0.75  # GJ/EI of a round solid section with a Poisson ratio of 1/3
 HOLDER_SD = 0.5  # rad, of a clamp of a shape at rest, read off the markers of the same shape
 
+TWIST = (
+    "the torsional stiffness and its damping: a motion hardly shows them. They follow the bending stiffness, times "
+    f"{ROUND}, and its damping, as in a solid round section"
+)
+WITHOUT_TWIST = (
+    "its twist: the rope turns in space, where [[scene.rope]] damps a bend that turns, too, so rope_bend_damping comes "
+    "out too small, by a fifth in one example. A [[scene.rod]] does not; write one where the damping matters"
+)
 UNLOADED = (
     "the shape that the rope has without load. Shapes at rest under its weight hardly tell it from the stiffness, "
     "which is fitted beside four modes of a rest curvature. If the rope is straight without load, remove `set_modes` "
@@ -60,7 +69,11 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
     if s.static:
         notes = [f"a rope through {joined(names[k] for k in order)}, {arc[-1]:.4g} m from the first to the last"]
     flat = plane(r.positions[:, list(order)], length) if s.static else None
+    in_space = not s.static and plane(r.positions[:, list(order)], length) is None
+    kind = "rod" if in_space and _can_be_rod(s, found) else "rope"
     unknown = [said_length, said_density, *found.unknown, *([] if flat is None else [UNLOADED])]
+    if in_space:
+        unknown.append(TWIST if kind == "rod" else WITHOUT_TWIST)
     # beside a hand that holds its direction a rope bends within a few hundredths of its length
     least = 2 * SEGMENTS if any(len(grip["markers"]) > 1 for grip in found.grips) else SEGMENTS
     segments = int(min(max(least, 2 * (len(order) - 1)), 100))
@@ -72,25 +85,27 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         rope |= {} if flat is None else {"clamp_angles": True, "plane": flat, "set_modes": list(SET_MODES)}
     else:
         rope |= {"bend_damping": 0.01, "drag_linear": 0.1 * density}
-        notes += _beginning(s, found, rope)
+        if kind == "rod":
+            rope |= {"GJ": ROUND * rope["EI"], "twist_damping": rope["bend_damping"]}
+        notes += _beginning(s, found, rope, kind == "rod")
     lines = [] if r.gravity is not None else table("[scene]", {"gravity": s.gravity.tolist()})
     if not s.static:
         step = float(np.median(np.diff(r.times)))
         lines += table("[solver]", {"substeps": max(1, int(np.ceil(step / SUBSTEP - 1e-9)))}, {"substeps": "per frame"})
-    lines += table("[[scene.rope]]", rope | found.rope, why)
+    lines += table(f"[[scene.{kind}]]", rope | found.rope, why)
     lines += table(
-        "[scene.rope.markers]  # arc lengths in m", dict(zip((names[k] for k in found.order), arc, strict=True))
+        f"[scene.{kind}.markers]  # arc lengths in m", dict(zip((names[k] for k in found.order), arc, strict=True))
     )
     for grip in found.grips:
-        lines += table("[[scene.rope.grip]]", grip)
+        lines += table(f"[[scene.{kind}.grip]]", grip)
     for take in takes:
-        own = _recording(take, flat) | {"max_gap": _max_gap(take, found)}
+        own = _recording(take, flat, "points" in rope) | {"max_gap": _max_gap(take, found)}
         why = {
             "held_out": "predicted, not fitted",
             "max_gap": "s, for which a marker of a grip is lost: closed by a cubic",
         }
         lines += table("[[recording]]", own, why)
-    for name, limits in _parameters(s.static, density, length, flat is not None).items():
+    for name, limits in _parameters(s.static, density, length, flat is not None, kind == "rod").items():
         lines += table(f"[parameters.{name}]", limits)
     for name, sd in found.priors.items():
         lines += table(f"[parameters.rope_{name}]", {"prior": [0.0, sd]})
@@ -176,10 +191,29 @@ def _density(s: Seen, measured: Measured) -> tuple[float, str]:
     )
 
 
-def _beginning(s: Seen, found: Held, rope: dict[str, Any]) -> list[str]:
+def _turns_freely(found: Held) -> bool:
+    """Whether nothing holds a direction of the rope."""
+    clamped = "clamp_start" in found.rope or "clamp_end" in found.rope
+    return not clamped and all(len(grip["markers"]) == 1 and "direction" not in grip for grip in found.grips)
+
+
+def _can_be_rod(s: Seen, found: Held) -> bool:
+    """Whether a rod can be held like this. One that turns freely has no single rest, since it may also turn about its
+    own axis; so it must hang straight there, from its start."""
+    if found.lead:
+        return False
+    from_start = [grip["at"] for grip in found.grips] == ["start"] and not found.rope.get("pinned")
+    return not (s.rest and _turns_freely(found)) or (from_start and _straight(s, found.order) is not None)
+
+
+def _beginning(s: Seen, found: Held, rope: dict[str, Any], rod: bool) -> list[str]:
     """Set how a motion begins; returns what is said of it."""
-    if s.rest:
+    if s.rest and not (rod and _turns_freely(found)):
         return [f"it rests for the first {s.rest:.2g} s"]
+    if s.rest:
+        del rope["points"]
+        rope["direction"] = _straight(s, found.order)
+        return [f"it hangs straight and rests for the first {s.rest:.2g} s"]
     if not _lets_go(s, found.order):
         rope["velocity"] = "recording"
         return ["it moves at the first frame: place and speed at the start are those of the markers"]
@@ -209,24 +243,32 @@ def _lets_go(s: Seen, order: tuple[int, ...]) -> bool:
 
 
 def _straight(s: Seen, order: tuple[int, ...]) -> list[float] | None:
-    """The direction from the first marker, if it stays in place, along a rope that is straight at the first frame."""
-    x = s.recording.positions[0, list(order)]
-    if order[0] not in s.still or np.isnan(x).any():
+    """The direction from the first marker along a rope that is straight, within its noise, while it rests; or at the
+    first frame, if the first marker stays in place."""
+    r = s.recording
+    if not s.rest and order[0] not in s.still:
         return None
-    off = x - mean_position(s.recording.positions)[order[0]]
+    first = mean_position(r.positions)[order[0]]
+    x = r.positions[0, list(order)]
+    if s.rest:
+        x = mean_position(r.positions[r.times < r.times[0] + s.rest])[list(order)]
+        first = x[0]
+    if np.isnan(x).any():
+        return None
+    off = x - first
     way = np.linalg.svd(off, full_matrices=False)[2][0]
     way *= np.sign(way @ off[-1])
     return snapped(way) if np.abs(off - np.outer(off @ way, way)).max() < 4.0 * s.noise else None
 
 
-def _recording(take: Take, flat: list[float] | None) -> dict[str, Any]:
+def _recording(take: Take, flat: list[float] | None, finds_rest: bool) -> dict[str, Any]:
     s, r = take.seen, take.seen.recording
     entries: dict[str, Any] = {"file": take.file, "units": take.units}
     if s.static:
         axes = "".join(axis for k, axis in enumerate("xyz") if flat is None or abs(flat[k]) < 0.99)
         return entries | {"static": True, "sigma": max(s.noise, 0.007 * float(np.nanmax(s.apart))), "axes": axes}
     start, stop = float(r.times[0]), float(r.times[-1])
-    if s.rest:
+    if s.rest and finds_rest:
         entries["start"] = "equilibrium"
     last = round(start + s.rest + min(FITTED * (stop - start - s.rest), LONGEST), 4)
     entries["fit"] = [start, last]
@@ -242,12 +284,15 @@ def _max_gap(take: Take, found: Held) -> float | None:
     return round(longest + 1e-3, 4) if default_max_gap(r.times) < longest <= GAP else None
 
 
-def _parameters(static: bool, density: float, length: float, angles: bool) -> dict[str, dict[str, Any]]:
+def _parameters(static: bool, density: float, length: float, angles: bool, rod: bool) -> dict[str, dict[str, Any]]:
     scale = density * 9.81 * length**3
     found: dict[str, dict[str, Any]] = {"rope_EI": {"lower": 1e-7 * scale, "upper": 10.0 * scale}}
     if not static:
         found["rope_bend_damping"] = {"lower": 1e-5, "upper": 1.0}
         found["rope_drag_linear"] = {"lower": 1e-4 * density, "upper": 10.0 * density}
+    if rod:
+        found["rope_GJ"] = {"tied_to": "rope_EI", "factor": ROUND}
+        found["rope_twist_damping"] = {"tied_to": "rope_bend_damping"}
     if angles:
         found |= {f"rope_set_{k}": {"prior": [0.0, round(SET_SD / k**1.5, 4)]} for k in SET_MODES}
         for end in ("start", "end"):
