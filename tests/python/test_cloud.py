@@ -318,6 +318,8 @@ def test_the_command_line_fits_a_cloud(tmp_path: Path) -> None:
     path = written(tmp_path, fit=[0.0, 0.25], held_out=[0.25, 0.4], loss="cauchy")
     done = run("fit", path, "--output", tmp_path / "out")
     assert done.exit_code == 0, done.output
+    (again,) = build(parse(tmp_path / "out" / "fitted.toml"), tmp_path / "out").experiments
+    assert np.array_equal(again.recording.positions, cloud().positions, equal_nan=True)
     names = {p.name for p in (tmp_path / "out").iterdir()}
     assert {"fit.json", "report.html", "take_cloth.png", "estimates.png"} <= names
     assert not {"take_markers.png", "take_residuals.png", "motions.png"} & names
