@@ -22,7 +22,9 @@ enum class Loss : int { squares, soft_l1, huber, cauchy };
 // Either markers, or the points of a cloud: then there are no markers but a surface, and a column holds another point in every frame.
 struct Observations {
   std::vector<Marker> markers;
-  ClothSurface surface;            // of a cloud
+  std::size_t unplaced =
+      0;                 // points of a cloud: each has the inputs of an offset, as a marker has, and no use for them
+  ClothSurface surface;  // of a cloud
   std::vector<double> times;       // (frames) [s]
   std::vector<double> measured;    // (frames, columns, 3) [m], NaN = not seen; a column is a marker
   std::vector<double> sigma;       // (frames, columns) [m]: residuals are divided by it
@@ -64,7 +66,9 @@ struct Experiment {
   EquilibriumOptions equilibrium;
   std::shared_ptr<EquilibriumAnchor> anchor = std::make_shared<EquilibriumAnchor>();
 
-  std::size_t time_offset_at() const { return scene->layout.total() + 3 * observed.markers.size(); }
+  std::size_t time_offset_at() const {
+    return scene->layout.total() + 3 * (observed.markers.size() + observed.unplaced);
+  }
   std::size_t inputs() const { return time_offset_at() + 1 + ForceSensor::inputs * sensors.size(); }
   std::size_t residual_count()
       const;  // one per axis of every marker, or one per point of a cloud, and frame that was seen, then those of the sensors

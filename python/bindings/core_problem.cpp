@@ -39,6 +39,7 @@ Observations make_observations(const py::dict& d) {
   o.loss_scale = get<double>(d, "loss_scale");
   if (!d["surface"].is_none()) {
     const auto surface = get<py::dict>(d, "surface");
+    o.unplaced = get<std::size_t>(surface, "points");
     o.surface = make_cloth_surface(get<std::vector<int>>(surface, "vertices"),
                                    get<std::vector<std::array<int, 3>>>(surface, "triangles"));
   }

@@ -9,6 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 import sheetbend as sb
+import tomli_w
+from commands import run
+from sheetbend.config import build, parse
 from sheetbend.mesh.places import closest
 from sheetbend.minimum.problem import FitProblem, as_parameters
 
@@ -274,3 +277,66 @@ def test_a_cauchy_loss_is_for_clouds() -> None:
     places = [sb.on_particle(10)]
     with pytest.raises(sb.InputError, match="loss: is unknown"):
         sb.Experiment(scene=scene, recording=sb.Recording(x[:, 10:11], TIMES), markers=places, loss="cauchy")
+
+
+def written(folder: Path, **keys: Any) -> Path:
+    """A configuration of the hammock between bars that two markers move, seen as a cloud."""
+    grips = np.zeros((len(TIMES), 2, 3))
+    grips[:, 1, 0] = 0.3
+    sb.Recording(grips, TIMES, markers=("left", "right")).save(folder / "grips.npz")
+    cloud().save(folder / "take.npz")
+    recording = {"file": "grips.npz", "cloud": "take.npz", "sigma": SIGMA, "name": "take"} | keys
+    mesh = {"kind": "grid", "width": 0.3, "height": 0.12, "nx": 6, "ny": 3}
+    values = {name.removeprefix("cloth_"): 1.3 * value for name, value in TRUE.items()}
+    grip = [{"set": side, "markers": [side]} for side in ("left", "right")]
+    cloth = {"density": 0.2, "membrane_damping": 3e-3, "mesh": mesh, "grip": grip, **values}
+    config = {
+        "experiment": {"name": "hammock"},
+        "solver": {"method": "newton", "h": SOLVER.h},
+        "scene": {"cloth": [cloth]},
+        "recording": [recording],
+        "parameters": {"cloth_warp": {}, "cloth_drag_linear": {}},
+        "fit": {"windows": [], "halve_step": False, "double_segments": False, "profiles": False},
+    }
+    path = folder / "hammock.toml"
+    path.write_text(tomli_w.dumps(config))
+    return path
+
+
+def test_a_configuration_names_a_cloud(tmp_path: Path) -> None:
+    path = written(tmp_path, fit=[0.0, 0.25], held_out=[0.25, 0.4])
+    study = build(parse(path), tmp_path)
+    (e,) = study.experiments
+    assert e.is_cloud and e.name == "take" and len(e.fitted().times) == 10
+    assert np.array_equal(e.recording.times, TIMES)
+    assert e.scene.boundary.following
+    fit = sb.fit(study.experiments, parameters=study.parameters, **study.options)
+    assert off(fit) < 1.5
+
+
+def test_the_command_line_fits_a_cloud(tmp_path: Path) -> None:
+    path = written(tmp_path, fit=[0.0, 0.25], held_out=[0.25, 0.4], loss="cauchy")
+    done = run("fit", path, "--output", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    (again,) = build(parse(tmp_path / "out" / "fitted.toml"), tmp_path / "out").experiments
+    assert np.array_equal(again.recording.positions, cloud().positions, equal_nan=True)
+    names = {p.name for p in (tmp_path / "out").iterdir()}
+    assert {"fit.json", "report.html", "take_cloth.png", "estimates.png"} <= names
+    assert not {"take_markers.png", "take_residuals.png", "motions.png"} & names
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"cloud": "none.npz"}, "recording[0].cloud: does not exist"),
+        ({"cloud": "grips.npz"}, "lacks points and counts"),
+        ({"file": "take.npz"}, "follows markers, and the points of a cloud have no names"),
+        ({"axes": "xz"}, "recording[0].axes: is of markers"),
+        ({"frames": [30, 40]}, "must hold at least one frame"),
+    ],
+)
+def test_configurations_of_clouds_that_are_refused(tmp_path: Path, keys: dict[str, Any], words: str) -> None:
+    path = written(tmp_path, **keys)
+    with pytest.raises(sb.ConfigError) as caught:
+        build(parse(path), tmp_path)
+    assert words in str(caught.value)

@@ -39,7 +39,7 @@ def cloth_figures(found: Fit, c: Comparison) -> dict[str, Axes]:
         mine, places = _markers(c, cloth)
         strain = strain_fields(e.scene, cloth, positions, values)
         where = positions[cloth.particles]
-        seen = c.recording.positions[frame, mine]
+        seen = c.recording.positions[frame] if e.is_cloud else c.recording.positions[frame, mine]
         chart = where if cloth.mesh.material.ndim == 3 else None
         fields = [
             Field("along the warp", 1e2 * strain["strain_warp"], where, measured=seen, scale=_STRAIN),

@@ -90,7 +90,8 @@ def _done(path: Path, folder: Path) -> bool:
     config = parse_any(path)
     if isinstance(config, GrippedConfig):
         return False
-    files = [path, *(path.parent / r.file for r in config.recording)]
+    named = [name for r in config.recording for name in (r.file, r.cloud) if name is not None]
+    files = [path, *(path.parent / name for name in named)]
     made = result.stat().st_mtime_ns
     return all(file.is_file() and file.stat().st_mtime_ns < made for file in files)
 

@@ -48,15 +48,15 @@ def write_figures(found: Fit, config: Config, form: str, folder: Path) -> list[s
     static = [c for c in found.comparisons if c.experiment.static and not c.experiment.scene.cloths]
     if static:
         figures["shapes"] = _shapes(found, static)
-    moving = [c for c in found.comparisons if not c.experiment.static]
+    moving = [c for c in found.comparisons if _follows_markers(c.experiment)]
     if len(moving) > 1:
         figures["motions"] = plotting.plot_motions([_liveliest(c) for c in moving], title=config.experiment.name)
     for c in moving:
         name = c.experiment.name
         figures[f"{name}_markers"] = plotting.plot_trajectories(**plotting.compared(c))
         figures[f"{name}_residuals"] = plotting.plot_residuals(**plotting.compared(c))
-        figures |= {f"{name}_{one.sensor}": plot_forces(one) for one in c.forces}
     for c in found.comparisons:
+        figures |= {f"{c.experiment.name}_{one.sensor}": plot_forces(one) for one in c.forces}
         figures |= {f"{c.experiment.name}_{name}": figure for name, figure in cloth_figures(found, c).items()}
     published = _published(found, config)
     figures["estimates"] = plotting.plot_estimates(
@@ -74,10 +74,15 @@ def figure_files(experiments: Sequence[Experiment], config: Config) -> list[str]
         return []
     names = ["estimates", "shapes", "motions"]
     for e in experiments:
-        names += [] if e.static else [f"{e.name}_markers", f"{e.name}_residuals"]
+        names += [] if not _follows_markers(e) else [f"{e.name}_markers", f"{e.name}_residuals"]
         names += [f"{e.name}_{sensor.name}" for sensor in e.forces]
         names += [f"{e.name}_{cloth}" for cloth in e.scene.cloths]
     return [f"{name}.{form}" for name in names]
+
+
+def _follows_markers(e: Experiment) -> bool:
+    """Whether there are series over time to draw: not at rest, and not of a cloud, whose points have no names."""
+    return not e.static and not e.is_cloud
 
 
 def _shapes(found: Fit, comparisons: list[Comparison]) -> np.ndarray:

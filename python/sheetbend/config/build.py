@@ -21,7 +21,15 @@ from .forces import force_sensors
 from .held import assumptions
 from .marker_places import Listed
 from .moment import Moment
-from .recordings import check_names_used, fields_of_experiment, offset_names, read, start_time, windows
+from .recordings import (
+    check_names_used,
+    fields_of_experiment,
+    offset_names,
+    read,
+    read_cloud,
+    start_time,
+    windows,
+)
 from .rest import check_rest
 from .scenes import build_scene
 from .shown import ropes_shown, with_grids, without
@@ -113,9 +121,10 @@ def scene_alone(config: schema.Config, folder: Path = Path()) -> tuple[Scene, So
 def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Experiment:
     section, path = config.recording[i], f"recording[{i}]"
     recording = read(section, folder, path)
+    shown = recording if section.cloud is None else read_cloud(section, folder, path, recording.name)
     with located(path):
-        t0 = start_time(section, recording)
-        check_windows(recording, *windows(section), section.start_time, section.static)
+        t0 = start_time(section, shown)
+        check_windows(shown, *windows(section), section.start_time, section.static)
         part = recording.piece(*(section.fit if section.static and section.fit else (t0, None)))
     moment = Moment(part, recording, t0, section.static, section.max_gap)
     ropes = ropes_shown(config, section, path)
@@ -132,8 +141,8 @@ def _experiment(config: schema.Config, folder: Path, i: int, finer: int) -> Expe
     with located(path, recording.name):
         experiment = Experiment(
             scene=scene,
-            recording=recording,
-            markers=places or None,
+            recording=shown,
+            markers=None if section.cloud else places or None,
             solver=solver_for(config.solver, recording),
             forces=forces,
             offsets=offset_names(path, section, scene),

@@ -9,6 +9,7 @@ from typing import Any
 
 from ..errors import ConfigError, RecordingError
 from ..experiment.experiment import Experiment
+from ..recording.cloud import Cloud
 from ..recording.recording import Recording
 from ..recording.unit_doubt import extent, unit_doubt
 from ..recording.windows import Window
@@ -16,7 +17,7 @@ from ..scene.scene import Scene
 from .schema import RecordingSection
 
 TAKEN = (
-    {"file", "name", "frames", "fit", "held_out"}  # the recording
+    {"file", "cloud", "name", "frames", "fit", "held_out"}  # the recording
     | {"ropes", "leave_out", "tools", "values", "force", "max_gap"}  # its scene
     | {"marker", "grids", "offsets"}  # the places of its markers
 )
@@ -26,27 +27,43 @@ OF_READER = set(inspect.signature(Recording.load).parameters) - {"path"}
 
 
 def read(section: RecordingSection, folder: Path, path: str) -> Recording:
-    """The recording, its file read with the keys that the reader takes, and its frames chosen.
+    """The recording that drives and holds the scene, its file read with the keys that the reader takes, and its frames
+    chosen.
 
     Raises:
         ConfigError: the file does not exist, cannot be read, or does not hold the frames; or its unit is in doubt.
     """
-    file = folder / section.file
+    if section.cloud == section.file:
+        return read_cloud(section, folder, path, section.name)
+    return _read(section, f"{path}.file", folder / section.file, section.name, section.cloud is None)
+
+
+def read_cloud(section: RecordingSection, folder: Path, path: str, name: str | None) -> Cloud:
+    """The cloud that the recording is compared with, under the name of the recording."""
+    assert section.cloud is not None
+    found = _read(section, f"{path}.cloud", folder / section.cloud, name, True)
+    assert isinstance(found, Cloud)
+    return found
+
+
+def _read(section: RecordingSection, path: str, file: Path, name: str | None, compared: bool) -> Recording:
+    """One of the files; `frames` are those of what is compared."""
     if not file.exists():
-        raise ConfigError(
-            f"{path}.file", "does not exist", str(file), "give a file relative to the configuration's folder"
-        )
+        raise ConfigError(path, "does not exist", str(file), "give a file relative to the configuration's folder")
+    kind = Cloud if path.endswith(".cloud") else Recording
     try:
-        recording = Recording.load(file, **section.model_dump(include=OF_READER))
-        if section.frames is not None:
+        recording = kind.load(file, **section.model_dump(include=OF_READER))
+        if compared and section.frames is not None:
             recording = recording.frames(slice(*section.frames))
     except RecordingError as error:
-        raise ConfigError(f"{path}.{error.field}", error.problem, error.got, error.fix) from error
+        where = path.removesuffix(".file")
+        raise ConfigError(f"{where}.{error.field}", error.problem, error.got, error.fix) from error
     doubt = unit_doubt(recording) if section.units is None else None
     if doubt is not None:
         problem = f"are not said, and in the unit that was read the markers are {extent(recording):.4g} m apart"
-        raise ConfigError(f"{path}.units", problem, None, f'give units = "{doubt}", or "m" if it is so')
-    return replace(recording, name=section.name or recording.name)
+        where = path.rpartition(".")[0]
+        raise ConfigError(f"{where}.units", problem, None, f'give units = "{doubt}", or "m" if it is so')
+    return replace(recording, name=name or recording.name)
 
 
 def windows(section: RecordingSection) -> tuple[Window | None, Window | None]:

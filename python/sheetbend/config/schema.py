@@ -96,6 +96,11 @@ class RecordingSection(Section):
     """A recording. A list: [[recording]]; each gets a scene object of its own from the shared description."""
 
     file: str = key(..., "NPZ, CSV or PKL, relative to the configuration")
+    cloud: str | None = key(
+        None,
+        "an NPZ of a point cloud that is compared with the scene's cloths, in place of the markers of `file`: these "
+        "drive and hold the scene. Where no marker does, `file` names the cloud too",
+    )
     name: Name | None = key(None, "the file's when left out")
     units: Literal["m", "cm", "mm"] | None = key(None, "length unit of the file; its JSON's when left out")
     ropes: list[Name] | None = key(None, "names of the ropes that it shows; all when left out", min_length=1)
@@ -146,7 +151,10 @@ class RecordingSection(Section):
         "m",
         gt=0,
     )
-    loss: Literal["squares", "soft_l1", "huber"] = key("squares", "soft_l1 and huber give large residuals less weight")
+    loss: Literal["squares", "soft_l1", "huber", "cauchy"] = key(
+        "squares",
+        "soft_l1 and huber give large residuals less weight, and cauchy, for a `cloud`, almost none",
+    )
     loss_scale: Finite = key(1.0, "residual beyond which a robust loss grows more slowly, in sigma", gt=0)
     shooting: Finite | Literal["auto"] | None = key(
         None,

@@ -49,7 +49,9 @@ def write(config: Config, path: Path, folder: Path) -> None:
     content: dict[str, Any] = config.model_dump(exclude_unset=True, exclude_none=True)
     meshes = [cloth["mesh"] for cloth in content["scene"].get("cloth", [])]
     tools = content["scene"].get("tool", [])
-    with_files = [(table, "file") for table in (*content.get("recording", []), *meshes, *tools) if "file" in table]
+    recordings = content.get("recording", [])
+    with_files = [(table, "file") for table in (*recordings, *meshes, *tools) if "file" in table]
+    with_files += [(table, "cloud") for table in recordings if "cloud" in table]
     with_files += [(r["tools"], name) for r in content.get("recording", []) for name in r.get("tools", {})]
     for table, at in with_files:
         table[at] = Path(os.path.relpath(folder / table[at], path.parent)).as_posix()

@@ -111,12 +111,8 @@ class Experiment:
         if not self.axes or set(self.axes) - set("xyz") or len(set(self.axes)) != len(self.axes):
             raise InputError(f"{self.name}.axes", "must be some of x, y, z", self.axes, "give such as 'xz'")
         if self.radius is not None and not (math.isfinite(self.radius) and self.radius > 0):
-            raise InputError(
-                f"{self.name}.radius",
-                "must be positive",
-                self.radius,
-                "give the markers' distance from their pivot in m",
-            )
+            fix = "give the markers' distance from their pivot in m"
+            raise InputError(f"{self.name}.radius", "must be positive", self.radius, fix)
         if self.start not in ("given", "equilibrium"):
             raise InputError(f"{self.name}.start", "is unknown", self.start, "use 'given' or 'equilibrium'")
         if self.loss not in LOSSES[: len(LOSSES) if self.is_cloud else -1]:
@@ -223,22 +219,25 @@ class Experiment:
 
     @property
     def compared_places(self) -> list[Place]:
-        """Places of the compared markers."""
-        return [place for i in self.compared if (place := self.places[i]) is not None]
+        """Places of the compared markers; none of a cloud."""
+        return [place for i in self.placed if (place := self.places[i]) is not None]
 
     @cached_property
     def compared(self) -> tuple[int, ...]:
-        """Indices of the markers that are compared: placed, and not on particles whose motion is given."""
+        """Indices of compared markers: placed, and not on particles whose motion is given. All points of a cloud."""
+        if self.is_cloud:
+            return tuple(range(len(self.recording.markers)))
         held = self.scene.pinned | set(self.scene.boundary.driven)
         chosen = tuple(i for i, p in enumerate(self.places) if p is not None and not self._depends_on(i, p) <= held)
-        if not chosen and not self.is_cloud:
-            raise RecordingError(
-                f"{self.name}.markers",
-                "leave nothing to compare",
-                len(self.places),
-                "place markers on particles that move",
-            )
+        if not chosen:
+            fix = "place markers on particles that move"
+            raise RecordingError(f"{self.name}.markers", "leave nothing to compare", len(self.places), fix)
         return chosen
+
+    @property
+    def placed(self) -> tuple[int, ...]:
+        """`compared` markers, which have places; none of a cloud."""
+        return () if self.is_cloud else self.compared
 
     def _depends_on(self, i: int, place: Place) -> set[int]:
         """Particles that move a marker: weights of a node right at its place are rounding errors elsewhere."""
@@ -304,7 +303,7 @@ class Experiment:
             "loss": self.loss,
             "loss_scale": self.loss_scale,
             "markers": [place.core(self.scene) for place in self.compared_places],
-            "surface": surface_of(self.scene) if self.is_cloud else None,
+            "surface": surface_of(self.scene, len(self.compared)) if self.is_cloud else None,
         }
 
     def extra_terms(self) -> list[Term]:
@@ -312,7 +311,7 @@ class Experiment:
         known = self.scene.quantities
         check_names(self.name, self.recording.markers, known, self.offsets, self.time_offset)
         terms: list[Term] = []
-        for m, i in enumerate(self.compared):
+        for m, i in enumerate(self.placed):
             terms += [
                 Term("extra", 3 * m + k, c, factors)
                 for k, one in enumerate(self._offset(i))
@@ -367,11 +366,11 @@ class Experiment:
         compiled = self.scene.compiled
         if not self.static:
             self.solver.check_smooth(compiled)
-        offsets = [[one.constant for one in self._offset(i)] for i in self.compared]
+        offsets = [[one.constant for one in self._offset(i)] for i in self.placed]
         observed = self.observed(recording)
-        for marker, m in zip(observed["markers"], self.compared, strict=True):
+        for marker, m in zip(observed["markers"], self.placed, strict=True):
             marker["carries_offset"] = marker["carries_offset"] or self.recording.markers[m] in self.offsets
-        extra = 3 * len(offsets) + 1 + INPUTS * len(self.forces)
+        extra = 3 * len(self.compared) + 1 + INPUTS * len(self.forces)
         map_ = compiled.map(extra, [*self.extra_terms(), *self.sensor_terms()])
         map_["base"][compiled.core.inputs : compiled.core.inputs + 3 * len(offsets)] = np.ravel(offsets)
         correction = self.correction(recording)

@@ -34,11 +34,16 @@ def check_cloud(name: str, scene: Scene, of_markers: Mapping[str, object], besid
             raise InputError(f"{name}.{field}", "does not go with a cloud", given, "leave it out")
 
 
-def surface_of(scene: Scene) -> dict[str, Any]:
-    """All cloths of a scene for the compiled core: the first coordinate of each vertex, and the triangles' vertices."""
+def surface_of(scene: Scene, points: int) -> dict[str, Any]:
+    """All cloths of a scene for the compiled core: the first coordinate of each vertex, and the triangles' vertices.
+
+    Args:
+        points: of the cloud in a frame at most, which are among the experiment's inputs as markers are.
+    """
     vertices, triangles, first = [], [], 0
     for cloth in scene.cloths.values():
         vertices.append(3 * scene.places_of(cloth.particles))
         triangles.append(cloth.mesh.triangles + first)
         first += len(cloth.particles)
-    return {"vertices": np.concatenate(vertices).tolist(), "triangles": np.concatenate(triangles).tolist()}
+    shape = {"vertices": np.concatenate(vertices).tolist(), "triangles": np.concatenate(triangles).tolist()}
+    return {**shape, "points": points}
