@@ -233,16 +233,14 @@ TEST(Joints, GradientMatchesComplexStep) {
 
 // A pendulum that swings onto a stop and a body that falls onto one, with damping: from before they are met until after they are left.
 struct Stops : ::testing::TestWithParam<SolverOptions> {};
-INSTANTIATE_TEST_SUITE_P(
-    , Stops,
-    ::testing::Values(SolverOptions{.h = 2e-3, .partition = Partition::direct, .iterations = 3},
-                      SolverOptions{.h = 2e-3, .partition = Partition::implicit, .iterations = 40},
-                      SolverOptions{
-                          .h = 2e-3, .integrator = Integrator::bdf1, .partition = Partition::direct, .iterations = 3},
-                      SolverOptions{.h = 2e-3, .partition = Partition::gauss_seidel, .iterations = 10}),
-    [](const auto& info) {
-      return std::array{"Direct", "Implicit", "DirectBdf1", "Sweeps"}[static_cast<std::size_t>(info.index)];
-    });
+const std::vector<SolverOptions> solvers{
+    {.h = 2e-3, .partition = Partition::direct, .iterations = 3},
+    {.h = 2e-3, .integrator = Integrator::bdf1, .partition = Partition::direct, .iterations = 3},
+    {.h = 2e-3, .partition = Partition::gauss_seidel, .iterations = 10}};
+std::string solver_name(const ::testing::TestParamInfo<SolverOptions>& info) {
+  return std::vector<std::string>{"Direct", "DirectBdf1", "Sweeps"}[info.index];
+}
+INSTANTIATE_TEST_SUITE_P(, Stops, ::testing::ValuesIn(solvers), solver_name);
 
 TEST_P(Stops, GradientThroughTheirTouchMatchesComplexStep) {
   BodyScene s;

@@ -12,9 +12,9 @@ MOMENT = float(BAR.matrix[1, 1]) + MASS * BELOW**2  # kg m^2 about the hinge
 SOLVER = sb.Solver(h=1e-3)
 
 
-def pendulum(**options: object) -> tuple[sb.Scene, sb.Joint]:
+def pendulum(g: float = G, **options: object) -> tuple[sb.Scene, sb.Joint]:
     """A bar on a hinge at its end, given as it points along x; its angle grows as it falls."""
-    scene = sb.Scene("pendulum")
+    scene = sb.Scene("pendulum", gravity=(0.0, 0.0, -g))
     bar = scene.add_body("bar", of=BAR, at=(BELOW, 0.0, 0.0))
     return scene, sb.hinge(None, bar, at=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0), **options)  # type: ignore[arg-type]
 
@@ -30,8 +30,6 @@ def carriage(**options: object) -> tuple[sb.Scene, sb.Body]:
 def ramp(beyond: np.ndarray, depth: float) -> tuple[np.ndarray, np.ndarray]:
     """q and its slope, as joint_stops.h says."""
     t = np.maximum(beyond, 0.0)
-    if depth == 0.0:
-        return t, np.where(beyond > 0.0, 1.0, 0.0)
     s = np.minimum(t / depth, 1.0)
     return depth * (s**2 - s**3 / 3.0) + np.maximum(t - depth, 0.0), s * (2.0 - s)
 
@@ -43,10 +41,10 @@ def energies(
     return scene.bodies["bar"].energy(motion) + 0.5 * k * q**2
 
 
-@pytest.mark.parametrize("depth", [0.0, 0.02])
+@pytest.mark.parametrize("depth", [1e-3, 0.02])
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_pendulum_rests_on_a_stop_where_torques_balance(depth: float, side: float) -> None:
-    """k q q' = m g l cos(angle), without a depth k (angle - limit)."""
+    """k q q' = m g l cos(angle)."""
     k = 20.0
     limits = (-0.1, 0.6) if side > 0 else (-0.6, 0.1)
     scene = sb.Scene("rests")
@@ -73,7 +71,7 @@ def test_a_carriage_rests_on_a_stop_where_forces_balance() -> None:
 
 
 @pytest.mark.parametrize(("method", "integrator"), [("direct", "bdf2"), ("direct", "bdf1"), ("implicit", "bdf2")])
-@pytest.mark.parametrize(("damping", "depth"), [(None, 0.0), (None, 0.02), (0.1, 0.02)])
+@pytest.mark.parametrize(("damping", "depth"), [(None, 1e-3), (None, 0.02), (0.1, 0.02)])
 def test_a_bounce_takes_energy_and_never_gives_any(
     method: str, integrator: str, damping: float | None, depth: float
 ) -> None:
@@ -85,7 +83,7 @@ def test_a_bounce_takes_energy_and_never_gives_any(
     energy = energies(scene, joint, motion, 0.6, k, depth)
     fall = MASS * G * BELOW * np.sin(0.6)
     angle = joint.angle(motion)
-    assert 0.61 < angle.max() < 0.66  # it has touched
+    assert 0.62 < angle.max() < 0.68  # it has touched, at 9 rad/s
     assert angle[np.argmax(angle) :].min() < 0.59  # and has left
     assert energy.max() - energy[0] < 1e-3 * fall
     kept = (energy[-1] - energy[0]) / fall
@@ -97,38 +95,37 @@ def test_a_bounce_takes_energy_and_never_gives_any(
 
 def test_the_range_may_lie_anywhere_on_the_circle() -> None:
     """A rate of 6 rad/s without weight, from 0 to limits beyond half a turn."""
-    scene, joint = pendulum(limits=(-0.5, 4.0), rate=6.0)
-    scene.gravity = (0.0, 0.0, 0.0)
-    motion = sb.simulate(scene, np.arange(141) * 0.01, SOLVER)
+    scene, joint = pendulum(g=0.0, limits=(-0.5, 4.0), rate=6.0)
+    motion = sb.simulate(scene, np.arange(161) * 0.01, SOLVER)
     turned = np.unwrap(joint.angle(motion))
     assert 4.0 < turned.max() < 4.0 + 6.0 * 0.02
-    assert -0.5 - 6.0 * 0.02 < turned[-1] < -0.4
+    assert -0.5 - 6.0 * 0.02 < turned.min() < -0.5
     assert np.argmax(turned) == pytest.approx(68, abs=2)
 
 
-LEFT = 0.35  # s, when the pendulum has left the stop again
+LEFT = 0.06  # s, when a pendulum that starts with 6 rad/s has left the stop at 0.1 rad again
 
 
 @pytest.mark.parametrize("method", ["direct", "implicit", "gauss_seidel"])
-@pytest.mark.parametrize("depth", [0.0, 0.02])
+@pytest.mark.parametrize("depth", [1e-3, 0.02])
 def test_gradients_through_a_touch_are_exact(method: str, depth: float) -> None:
-    damping = None if depth == 0.0 else 0.05
-    scene, joint = pendulum(limits=(-1.0, 0.6), limit_damping=damping, limit_depth=depth)
+    damping = None if depth < 0.01 else 0.05
+    scene, joint = pendulum(rate=6.0, limits=(-1.0, 0.1), limit_damping=damping, limit_depth=depth)
     solver = sb.Solver(h=2e-3, method=method)
-    motion = sb.simulate(scene, np.arange(0.0, LEFT + 1e-9, 0.01), solver)
-    assert joint.angle(motion).max() > 0.605 and joint.angle(motion)[-1] < 0.6
+    motion = sb.simulate(scene, np.arange(0.0, LEFT + 1e-9, 2e-3), solver)
+    assert joint.angle(motion).max() > 0.12 and joint.angle(motion)[-1] < 0.1
     report = sb.check_gradients(scene, [LEFT], solver, samples=2)
     assert report.passed, str(report)
     felt = {row.name: row for row in report.rows if not row.unfelt}
-    wanted = {"hinge_limit_high", "hinge_limit_stiffness", "hinge_lower_x", "bar_mass", "bar_inertia_2"}
-    wanted |= {"hinge_limit_damping", "hinge_limit_depth"} if depth else set()
+    wanted = {"hinge_limit_high", "hinge_limit_stiffness", "hinge_limit_depth", "hinge_lower_x", "bar_mass"}
+    wanted |= {"bar_inertia_2"} | ({"hinge_limit_damping"} if damping else set())
     assert wanted <= felt.keys()
     assert "hinge_limit_low" not in felt
 
 
 def test_the_gradient_of_a_slider_through_a_touch_is_exact() -> None:
     scene, body = carriage(limits=(-0.05, 0.1), limit_damping=5.0)
-    times = [0.1, 0.14, 0.2]
+    times = [0.1, 0.112, 0.2]
     z = body.pose(sb.simulate(scene, [0.0, *times], sb.Solver(h=2e-3)))[0][:, 2]
     assert z[2] - z[0] < -0.05 < z[3] - z[0]
     report = sb.check_gradients(scene, times, sb.Solver(h=2e-3), samples=2)
@@ -136,8 +133,8 @@ def test_the_gradient_of_a_slider_through_a_touch_is_exact() -> None:
 
 
 def test_the_gradient_with_respect_to_a_limit_is_the_slope_of_the_motion() -> None:
-    """Also where the substep in which the stop is met changes; between the ends of the secant it does so ten times."""
-    scene, joint = pendulum(limits=(-1.0, 0.6))
+    """Also where the substep in which the stop is met changes; between the ends of the secant it does so four times."""
+    scene, joint = pendulum(limits=(-1.0, 0.6), limit_depth=0.1)
     at = 0.37
     solver = sb.Solver(h=1e-3)
 
@@ -147,7 +144,7 @@ def test_the_gradient_with_respect_to_a_limit_is_the_slope_of_the_motion() -> No
     limits = np.linspace(0.58, 0.62, 9)
     secant = (angle(0.62) - angle(0.58)) / 0.04
     slopes = [(angle(a + 1e-6) - angle(a - 1e-6)) / 2e-6 for a in limits]
-    assert max(abs(np.array(slopes) / np.mean(slopes) - 1.0)) < 0.25
+    assert max(abs(np.array(slopes) / np.mean(slopes) - 1.0)) < 0.1
     assert np.mean(slopes) == pytest.approx(secant, rel=0.05)
 
 
@@ -162,9 +159,12 @@ def test_between_its_limits_a_joint_moves_as_without_them(method: str) -> None:
     assert np.abs(sb.simulate(carriage(limits=(-1.0, 1.0))[0], times, solver).nodes - slides.nodes).max() < 1e-14
 
 
+SOFT = {"limit_damping": 0.05, "limit_depth": 0.1}
+
+
 def swings(noise: float, high: float, until: float = 1.0) -> tuple[sb.Recording, list[list[float]]]:
     """Two markers on the bar of a pendulum that meets its stop at `high`, in noise of so many meters."""
-    scene, _ = pendulum(limits=(-2.0, high), limit_stiffness=60.0, limit_damping=0.05)
+    scene, _ = pendulum(limits=(-2.0, high), limit_stiffness=60.0, **SOFT)
     points = [[0.1, 0.0, 0.0], [0.0, 0.0, 0.02]]
     times = np.arange(round(until * 100) + 1) / 100
     origin, frame = scene.bodies["bar"].pose(sb.simulate(scene, times, sb.Solver(h=5e-4)))
@@ -173,7 +173,7 @@ def swings(noise: float, high: float, until: float = 1.0) -> tuple[sb.Recording,
 
 
 def fitted(recording: sb.Recording, points: list[list[float]], names: list[str], high: float) -> sb.Fit:
-    scene, _ = pendulum(limits=(-2.0, high), limit_stiffness=40.0, limit_damping=0.05)
+    scene, _ = pendulum(limits=(-2.0, high), limit_stiffness=40.0, **SOFT)
     places = sb.on_body(scene.bodies["bar"], points)
     return sb.fit(scene, recording, names, markers=places, solver=sb.Solver(h=1e-3), start_time=0.0, sigma=5e-4)
 
@@ -212,8 +212,8 @@ def test_a_stop_that_is_never_reached_is_not_identified() -> None:
         ({"limit_depth": 3.0}, "hinge.limit_depth: acts at limits"),
         ({"limits": (-1, 1), "limit_stiffness": 0.0}, "hinge.limit_stiffness: must be positive.*N m/rad"),
         ({"limits": (-1, 1), "limit_damping": -1.0}, "hinge.limit_damping: must be zero or more"),
-        ({"limits": (-1, 1), "limit_depth": float("inf")}, "hinge.limit_depth: must be zero or more"),
-        ({"limits": (-1, 1), "limit_depth": 0.0, "limit_damping": 1.0}, "hinge.limit_damping: would jump"),
+        ({"limits": (-1, 1), "limit_depth": float("inf")}, "hinge.limit_depth: must be positive"),
+        ({"limits": (-1, 1), "limit_depth": 0.0}, "hinge.limit_depth: must be positive.*give it in rad"),
     ],
 )
 def test_bad_limits_are_refused(options: dict[str, object], match: str) -> None:

@@ -113,7 +113,7 @@ class JointSection(Section):
         None, "of the stops, torque or force over rate: <name>_limit_damping", "N m s/rad or N s/m", ge=0
     )
     limit_depth: Finite | None = key(
-        None, "beyond a limit, over which stiffness and damping grow from zero; 0.02 rad or 0.005 m", "rad or m", ge=0
+        None, "beyond a limit, over which stiffness and damping grow from zero; 0.02 rad or 0.005 m", "rad or m", gt=0
     )
     compliance: Finite | None = key(None, "of a ball joint that gives way: <name>_compliance", "m/N", gt=0)
 

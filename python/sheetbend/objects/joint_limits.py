@@ -65,7 +65,7 @@ def add_limits(
         Expression.of(scene.add_quantity(f"{name}_limit_{label}", end, unit, positive=False, scale=SIZE[unit]))
         for label, end in zip(("low", "high"), ends, strict=True)
     )
-    grown = Expression.of(scene.add_quantity(f"{name}_limit_depth", d, unit)) if d > 0.0 else 0.0
+    grown = Expression.of(scene.add_quantity(f"{name}_limit_depth", d, unit))
     kind, stencil, weights = _row(made, unit)
     damped = None if damping is None else np.zeros(1)
     group = made.constrain(
@@ -125,13 +125,10 @@ def _check(name: str, stiffness: float, damping: float | None, depth: float, uni
     for label, value, units in given:
         if value is None:
             continue
-        zero = label != "stiffness"
+        zero = label == "damping"
         if not is_number(value) or value < 0.0 or (value == 0.0 and not zero):
             problem = "must be zero or more" if zero else "must be positive"
             raise SceneError(f"{name}.limit_{label}", problem, value, f"give it in {units[unit]}, or leave it out")
-    if damping and depth == 0.0:
-        fix = f"give a limit_depth in {unit}, over which the damping grows, or leave one of them out"
-        raise SceneError(f"{name}.limit_damping", "would jump at the limit, where limit_depth is 0", damping, fix)
 
 
 def _row(made: Making, unit: str) -> tuple[str, list[list[int]], list[Expression | float]]:

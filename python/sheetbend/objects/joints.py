@@ -86,7 +86,7 @@ def hinge(
             within 20 ms. Take substeps of which at least ten fall into the time of a touch.
         limit_damping: of a stop, torque over rate, N m s/rad.
         limit_depth: rad beyond a limit, over which stiffness and damping grow from zero to these values; 0.02 by
-            default. 0 is a linear spring, and excludes damping.
+            default.
 
     Raises:
         SceneError: shapes, NaN, negative numbers, limits that are no range, or bodies that are none or the same.
