@@ -63,9 +63,18 @@ def test_a_rope_at_rest_is_told_from_one_that_moves() -> None:
     assert size == pytest.approx(NOISE, rel=0.1)
     assert rests(motion, frames(0), size)
     assert not any(rests(motion, frames(first), size) for first in range(30, 90, 5))
+
+
+@pytest.mark.parametrize(("first", "resting"), [(2, True), (0, False)])
+def test_markers_that_are_not_seen_at_first(first: int, resting: bool) -> None:
+    """Seen in some of the first frames they have a place at rest; otherwise the motion must do."""
+    motion = recorded()
     gone = motion.recording.positions.copy()
-    gone[:9, 4] = np.nan
-    assert rests(replace(motion, recording=replace(motion.recording, positions=gone)), frames(0), size)
+    gone[first:9, [3, 4, 6, 7]] = np.nan
+    part = GrippedMotion.of(replace(motion.recording, positions=gone), 0.08)
+    assert rests(part, frames(0), NOISE) == resting
+    (x,) = predict(MODEL, [part], {})
+    assert coordinate_error(motion.recording, x) < 1.5e-3
 
 
 def test_a_rope_that_turns_back_does_not_rest() -> None:

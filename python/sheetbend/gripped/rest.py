@@ -22,31 +22,32 @@ SHAPE = 6e-4  # m, error of a shape: of the model, and of markers that sit besid
 
 
 def rests(motion: GrippedMotion, frames: Array, noise: float) -> bool:
-    """Whether all markers stand still in some frames, three or more.
+    """Whether all markers are seen in some frames, three or more, and stand still.
 
     Args:
         frames: numbers.
         noise: m, standard deviation of a coordinate.
     """
     times, x = motion.recording.times[frames], motion.recording.positions[frames].reshape(len(frames), -1)
+    seen = np.isfinite(x)
+    whole = seen.all(axis=0)
+    if not (seen.any(axis=0).all() and whole.any()):
+        return False
     basis = np.linalg.qr(np.vander(times - times.mean(), 3, increasing=True))[0]
-    x = x[:, np.isfinite(x).all(axis=0)]
-    return x.shape[1] > 0 and bool(np.mean((basis[:, 1:].T @ x) ** 2) < RESTS * noise**2)
+    return bool(np.mean((basis[:, 1:].T @ x[:, whole]) ** 2) < RESTS * noise**2)
 
 
 def creep(model: RopeModel, motion: GrippedMotion, frames: Array, noise: float) -> Experiment:
     """The rope in thick air, from its mean shape in some frames on, between grips that stand still.
 
     Args:
-        frames: numbers, in which it rests.
+        frames: numbers, in which it rests (`rests`).
         noise: m, standard deviation of a coordinate.
     """
     recording = motion.recording
     step = float(np.median(np.diff(recording.times)))
     times = recording.times[frames[0]] + step * np.arange(round(SECONDS / step) + 1)
-    seen = np.isfinite(recording.positions[frames]).sum(axis=0)
-    mean = np.where(seen > 0, np.nansum(recording.positions[frames], axis=0), np.nan) / np.maximum(seen, 1)
-    still = np.repeat(mean[None], len(times), axis=0)
+    still = np.repeat(np.nanmean(recording.positions[frames], axis=0)[None], len(times), axis=0)
     held = replace(
         motion,
         recording=replace(recording, times=times, positions=still),

@@ -66,13 +66,24 @@ def slid(model: RopeModel, motion: GrippedMotion, first: float, values: Mapping[
     if len(frames) < FEWEST:
         return nothing
     model = model.at(values)
-    moving = replace(model.experiment(motion, (first, first + model.smoothing)), sigma=OFF * size)
+    moving = replace(_seen(model.experiment(motion, (first, first + model.smoothing))), sigma=OFF * size)
+    if not moving.compared:
+        return nothing
     largest = np.array([yields / (1.0 + 0.5 * k) for k in model.slid_modes for _ in (1, 2)])
     at = _searched(_problem([moving], nothing, values), largest, np.zeros(len(largest)), STEPS)
     if rests(motion, frames, size):
         both = [moving, creep(model, motion, frames, size)]
         at = _searched(_problem(both, nothing, values), largest, at, MORE)
     return dict(zip(nothing, (largest * at).tolist(), strict=True))
+
+
+def _seen(e: Experiment) -> Experiment:
+    """The experiment without markers that none of its few frames shows."""
+    shown = e.recording.mask if e.fit is None else e.recording.piece(*e.fit).mask
+    lost = {k for k in range(shown.shape[1]) if not shown[:, k].any()}
+    markers = [None if k in lost else place for k, place in enumerate(e.places)]
+    names = {e.recording.markers[k] for k in lost}
+    return replace(e, markers=markers, offsets={name: by for name, by in e.offsets.items() if name not in names})
 
 
 def _problem(experiments: Sequence[Experiment], names: Iterable[str], values: Mapping[str, float]) -> FitProblem:
