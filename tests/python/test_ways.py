@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import re
 import struct
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 import sheetbend as sb
 from commands import run
+from test_whole_fabric import pull, wavy
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
@@ -103,3 +105,55 @@ def test_a_policy_is_trained_in_forty_lines(folder: Path) -> None:
     assert len(script.splitlines()) <= 40
     worst = run_script(script)["worst"]
     assert len(worst) == 200 and float((worst < 0.02).float().mean()) > 0.9
+
+
+@pytest.mark.slow
+def test_a_rope_of_mujoco_in_three_commands(folder: Path) -> None:
+    """One marker in the hand, 0.5 mm of noise in each coordinate; new, fit, and a prediction of the next 3 s.
+
+    Measured: EI 0.4 % and drag 0.1 % off. The noise of the one marker in the hand shakes the model: the time constant
+    of the bending damping is 29 % too large, outside of its interval, and the prediction is off by 2.1 mm, of which the
+    markers' own noise is 0.87.
+    """
+    pytest.importorskip("mujoco")
+    import mujoco_rope as truth
+
+    times, x = truth.motion(6.5)
+    markers = x[:, ::3] + np.random.default_rng(0).normal(0.0, 5e-4, x[:, ::3].shape)
+    sb.Recording(markers, times, name="take").save("take.csv")
+    for command in (
+        ["new", "take.csv", "--density", str(truth.DENSITY)],
+        ["fit", "take.toml"],
+        ["simulate", "out/take/fitted.toml", "--output", "out/predicted"],
+    ):
+        done = run(*command)
+        assert done.exit_code == 0, done.output
+    fit = sb.FitResult.load("out/take/fit.json")
+    for name, true in {"rope_EI": truth.EI, "rope_drag_linear": truth.DRAG}.items():
+        assert fit[name].verdict == "identified", name
+        assert fit[name].lower < true < fit[name].upper, name
+        assert fit[name].value == pytest.approx(true, rel=0.03), name
+    predicted = sb.Recording.load("out/predicted/predicted_take.npz").piece(3.4, 6.4)
+    seen = sb.Recording.load("take.csv").select(predicted.markers).piece(3.4, 6.4)
+    error = np.sqrt(np.mean(np.sum((predicted.positions - seen.positions) ** 2, axis=2)))
+    assert error < 2.6e-3
+
+
+@pytest.mark.slow
+def test_a_fabric_in_one_command(folder: Path) -> None:
+    """The file of tests that the page shows, with what it names: pulls of Fung's law, and a drape like the other
+    readings'."""
+    for k, share in enumerate((0.98, 1.0, 1.02), 1):
+        pull(Path(f"warp_{k}.csv"), 600.0, 150.0, share)
+    pull(Path("weft.csv"), 350.0, 150.0, 1.0)
+    np.savetxt("drape_1.csv", 1e3 * wavy(mean=0.138, wave=0.006), fmt="%.2f", delimiter=",")
+    text, scene = blocks("fabric.md", "toml")
+    Path("tests.toml").write_text(text)
+    (command,) = commands("fabric.md")
+    done = run(*command, "--json")
+    assert done.exit_code == 0, done.stderr
+    found = {e["name"]: e for e in json.loads(done.stdout)["estimates"]}
+    for name, true in {"warp": 600.0, "weft": 350.0, "density": 0.2}.items():
+        assert found[name]["lower"] < true < found[name]["upper"], name
+        assert found[name]["value"] == pytest.approx(true, rel=0.1), name
+    assert Path(tomllib.loads(scene)["scene"]["cloth"][0]["fabric_file"]).is_file()
