@@ -33,6 +33,7 @@
 #include "core/constraints/tether.h"
 #include "core/constraints/twist.h"
 #include "core/constraints/yielding_curvature.h"
+#include "core/constraints/yielding_sheet_curvature.h"
 
 namespace sheetbend {
 
@@ -56,6 +57,7 @@ using Registry = std::tuple<   //
     Dihedral,                  //
     IsometricBending,          //
     SheetCurvature,            //
+    YieldingSheetCurvature,    //
     Area,                      //
     Tether,                    //
     FrictionHinge,             //

@@ -201,7 +201,12 @@ Scene build_scene(const SceneSpec& spec) {
     built.first_coordinate = s.stencil_coordinates;
     built.first_gradient = s.gradient_entries;
     s.constraints += built.count;
-    with_kind(built.kind, [&]<class K>(K) { s.yields |= Yields<K>; });
+    with_kind(built.kind, [&]<class K>(K) {
+      if constexpr (Yields<K>) {
+        s.yields = true;
+        for (int i = 0; i < built.count; ++i) s.is_place[built.nodes(i)[K::arity - 1]] = false;
+      }
+    });
     s.rows += built.count * built.rows;
     values += static_cast<std::size_t>(built.count) * built.parameters;
     s.stencil_coordinates += static_cast<std::size_t>(built.count) * 3 * built.arity;

@@ -71,8 +71,9 @@ void expect_balanced(const Scene& scene) {
   for (const Group& group : scene.groups)
     with_kind(group.kind, [&]<class K>(K) {
       if constexpr (Yields<K>)
-        throw std::invalid_argument("solver.method: group " + group.name +
-                                    " yields or slides, for which implicit substeps are not made. Fix: use direct");
+        throw std::invalid_argument(
+            "solver.method: group " + group.name +
+            " yields or slides, for which implicit substeps are not made. Fix: use direct or newton");
     });
 }
 

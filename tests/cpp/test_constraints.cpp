@@ -243,17 +243,18 @@ TYPED_TEST(Constraint, RotationTurnsOrKeepsC) {
   }
 }
 
-// C(s x) = s^meters C(x) when each parameter is scaled by s to the meters in its own unit: the header's units are right.
+// C(s x) = s^meters C(x) when each parameter is scaled by s to the meters in its own unit, and a set as C: the header's units are right.
 TYPED_TEST(Constraint, ScalesWithTheUnitOfLength) {
   using K = TypeParam;
+  const auto meters = [](int d) { return d < in_meters<K> ? 1 : d < spatial<K> ? 0 : K::unit.meters; };
   for (const double scale : {1e-3, 7.0, 1e3}) {
     const Stencil s = jittered<K>(4);
     std::vector<double> x = s.x, p = s.p;
-    for (int d = 0; d < in_meters<K>; ++d) x[d] *= scale;
+    for (int d = 0; d < K::dofs; ++d) x[d] *= std::pow(scale, meters(d));
     for (std::size_t k = 0; k < p.size(); ++k) p[k] *= std::pow(scale, K::parameters[k].unit.meters);
     std::vector<double> expected = evaluate<K>(s.x, s.p);
     for (int i = 0; i < static_cast<int>(expected.size()); ++i)
-      expected[i] *= std::pow(scale, K::unit.meters - (i < K::rows || (i - K::rows) % K::dofs >= in_meters<K> ? 0 : 1));
+      expected[i] *= std::pow(scale, K::unit.meters - (i < K::rows ? 0 : meters((i - K::rows) % K::dofs)));
     const auto found = evaluate<K>(x, p);
     EXPECT_LE(relative_error(std::span(found).first(K::rows), std::span(expected).first(K::rows)), 1e-13);
     EXPECT_LE(relative_error(std::span(found).subspan(K::rows), std::span(expected).subspan(K::rows)), 1e-13);

@@ -52,7 +52,9 @@ def inputs_dot(scene: sb.Scene, direction: Direction) -> Array:
         return compiled.inputs_dot(compiled.theta, theta_dot)
     tangent = np.zeros(compiled.core.inputs)
     for array, values in direction.items():
-        offset, size = compiled.given[array]
+        offset, size = compiled.layout[array]
+        if np.size(values) != size:  # of the particles alone
+            offset, size = compiled.given[array]
         tangent[offset : offset + size] = np.ravel(values)
     return tangent
 

@@ -86,6 +86,30 @@ def test_a_loop_of_shear(tmp_path):
     assert "lose 40 %" in (tmp_path / "out/report.txt").read_text(encoding="utf-8")
 
 
+def test_a_loop_of_bending_tells_a_cloth_that_yields(tmp_path):
+    """B = 20 uN m, of which 0.3 slides beyond 0.4 1/cm; and a specimen without a way back."""
+    curvature = np.concatenate(
+        [np.linspace(0, 250, 101), np.linspace(250, -250, 201)[1:], np.linspace(-250, 0, 101)[1:]]
+    )
+    slid, moment = 0.0, []
+    for kappa in curvature:
+        slid = min(max(slid, kappa - 40.0), kappa + 40.0)
+        moment.append(2e-5 * (kappa - 0.3 * slid))
+    for name, count in (("loop", 401), ("out", 101)):
+        rows = zip(curvature[:count], moment[:count], strict=True)
+        table = "\n".join(f"{k / 100:.6f}\t{m:.9f}" for k, m in rows)
+        (tmp_path / f"{name}.txt").write_text(f"{table}\n")
+    told = ["--column", "deformation=1", "--column", "load=2", "--unit", "deformation=1/cm", "--unit", "load=N.m/m"]
+    files = [str(tmp_path / f"{name}.txt") for name in ("loop", "out")]
+    done = run(*files, "--test", "bending", *told, "--figures", "none", "--output", str(tmp_path / "out"), "--json")
+    assert done.exit_code == 0, done.stderr
+    loop, out = json.loads(done.stdout)["curves"]
+    assert loop["B"] == approx(1.4e-5, rel=1e-3)
+    assert [loop[key] for key in ("bending", "yield_share", "yield_curvature")] == approx([2e-5, 0.3, 40.0], rel=1e-4)
+    assert loop["misfit"] < 1e-3 and out["bending"] is None
+    assert "yield_curvature [1/cm]" in (tmp_path / "out/report.txt").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(
     ("told", "message"),
     [

@@ -56,7 +56,7 @@ figures = "none"
 PLACED = np.array([[0.2, 0.0, 1.0], [0.2, 0.0, 1.1], [0.1, 0.0, 1.05]])  # of a, b and c at the start
 
 
-def scene(shear: float) -> tuple[sb.Scene, sb.Cloth]:
+def scene(shear: float, **options: float) -> tuple[sb.Scene, sb.Cloth]:
     """What CLOTH describes."""
     flat = sb.mesh.grid(0.2, 0.1, 4, 2, "one_way")
     upright = np.array([0, 0, 1]) + flat.vertices[:, [0, 2, 1]]
@@ -64,7 +64,7 @@ def scene(shear: float) -> tuple[sb.Scene, sb.Cloth]:
     built = sb.Scene("sheet")
     fabric = {"warp": 100.0, "weft": 60.0, "shear": shear, "poisson": 0.2, "bending": 1e-3}
     damped = {"membrane_damping": 0.004, "drag_linear": 0.2}
-    cloth = sb.add_cloth(built, mesh, density=0.2, held=mesh.sets["left"], **fabric, **damped)
+    cloth = sb.add_cloth(built, mesh, density=0.2, held=mesh.sets["left"], **fabric, **damped, **options)
     built.pin(cloth.particles[mesh.sets["left"]])
     return built, cloth
 
@@ -99,12 +99,15 @@ def run(*arguments: object) -> dict:
     return json.loads(result.stdout.splitlines()[-1])
 
 
-def test_it_is_the_scene_of_add_cloth(folder: Path) -> None:
-    (e,) = load(changed(folder)).experiments
-    by_hand, cloth = scene(15.0)
+@pytest.mark.parametrize("options", [{}, {"yield_curvature": 20.0, "yield_share": 0.4}], ids=["", "yields"])
+def test_it_is_the_scene_of_add_cloth(folder: Path, options: dict[str, float]) -> None:
+    keys = "".join(f"\n{key} = {value}" for key, value in options.items())
+    (e,) = load(changed(folder, ("bending = 1e-3", f"bending = 1e-3{keys}"))).experiments
+    by_hand, cloth = scene(15.0, **options)
     assert e.scene.positions == pytest.approx(by_hand.positions, abs=1e-12)
     assert {n: q.value for n, q in e.scene.quantities.items()} == {n: q.value for n, q in by_hand.quantities.items()}
-    assert e.scene.pinned == by_hand.pinned == set(cloth.particles[cloth.mesh.sets["left"]].tolist())
+    assert e.scene.pinned == by_hand.pinned
+    assert {n for n in by_hand.pinned if n >= 0} == set(cloth.particles[cloth.mesh.sets["left"]].tolist())
     np.testing.assert_allclose(e.scene.compiled.inputs(), by_hand.compiled.inputs(), rtol=1e-12, atol=1e-12)
 
 
@@ -360,6 +363,9 @@ BAD = [
     ("warp = 100.0\n", "", "scene.cloth[0].warp", "add warp to [[scene.cloth]]"),
     ("poisson = 0.2", "poisson = 1.0", "scene.cloth[0].poisson", "less than 1"),
     ("bending = 1e-3", "bending_weft = 1e-3", "scene.cloth[0].bending_weft", "give bending"),
+    ("bending = 1e-3", "bending = 1e-3\nyield_share = 0.3", "scene.cloth[0].yield_share", "give yield_curvature and"),
+    ("bending = 1e-3", "yield_share = 0.3\nyield_curvature = 9.0", "scene.cloth[0].yield_curvature", "give bending"),
+    ("bending = 1e-3", "bending = 1e-3\nyield_share = 1.0", "scene.cloth[0].yield_share", "less than 1"),
     ("y_axis = [0, 0, 2]", "y_axis = [1, 0, 2]", "scene.cloth[0].y_axis", "turn one of them"),
     ("y_axis = [0, 0, 2]", "y_axis = [0, 0, 0]", "scene.cloth[0].y_axis", "give a direction"),
     ('pinned = ["left"]', 'pinned = ["lift"]', "scene.cloth[0].pinned", "left"),

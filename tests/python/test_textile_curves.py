@@ -257,6 +257,44 @@ def test_bad_curves(change, message):
         replace(tensile(), **change)
 
 
+def sliding(B: float, share: float, yield_curvature: float, offset: float, *stops: float) -> Curve:
+    """The moments of a spring beside one that slides, along a path of curvatures."""
+    x, slid, load = path(*stops), 0.0, []
+    for kappa in x:
+        slid = min(max(slid, kappa - yield_curvature), kappa + yield_curvature)
+        load.append(B * (kappa - share * slid) + offset)
+    return Curve("loop", "bending", x, np.array(load))
+
+
+def test_the_yield_of_a_bending_loop():
+    B, share, kappa, offset = 2e-5, 0.3, 40.0, 1e-4
+    for stops in ((0.0, 250.0, -250.0, 0.0), (0.0, 250.0, 0.0), (0.0, -100.0, 30.0)):
+        found = textile.bending_yield(sliding(B, share, kappa, offset, *stops))
+        values = [found.bending.value, found.yield_share.value, found.yield_curvature.value, found.offset.value]
+        assert values == approx([B, share, kappa, offset], rel=1e-6), stops
+        assert found.misfit < 1e-6
+    curve = sliding(B, share, kappa, offset, 0.0, 250.0, -250.0, 0.0)
+    read = textile.bending_loop(curve)
+    assert read.rigidity.value == approx((1.0 - share) * B, rel=1e-3)
+    found = textile.bending_yield(
+        replace(curve, load=curve.load + 2e-5 * np.random.default_rng(1).standard_normal(601))
+    )
+    assert [found.bending.value, found.yield_share.value] == approx([B, share], rel=0.03)
+    assert found.misfit == approx(2e-5 / (2.0 * share * B * kappa), rel=0.1)
+
+
+def test_what_shows_no_yield_is_refused():
+    curve = sliding(2e-5, 0.3, 40.0, 0.0, 0.0, 250.0, -250.0, 0.0)
+    rng = np.random.default_rng(1)
+    elastic = replace(curve, load=2e-5 * curve.deformation + 1e-6 * rng.standard_normal(601))
+    with pytest.raises(sb.InputError, match="has no loop of a spring that slides"):
+        textile.bending_yield(elastic)
+    with pytest.raises(sb.InputError, match="never turns back"):
+        textile.bending_yield(curve.piece(0, POINTS))
+    with pytest.raises(sb.InputError, match="is no test of bending"):
+        textile.bending_yield(tensile())
+
+
 def test_a_loop_is_not_read_as_another_test():
     for reader in (textile.shear_loop, textile.bending_loop):
         with pytest.raises(sb.InputError, match="is no test of"):

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from ..arrays.timeseries import Array
+from ..errors import InputError
 from ..files.whole import written
 from ..quantities.wording import short
 from ..report.tables import Section, plain_section
-from ..textile import Curve, FabricFit, MeanCurve, Reading, bending_loop, shear_loop, tensile_loop
+from ..textile import Curve, FabricFit, MeanCurve, Reading, bending_loop, bending_yield, shear_loop, tensile_loop
 
 _COLUMNS = {
     "tension": "strain (mm/mm),force (N/m),scatter (N/m)",
@@ -32,7 +33,17 @@ def kes_numbers(curve: Curve, cycle: int) -> tuple[dict[str, Reading | None], fl
         s = shear_loop(curve, cycle)
         return {"G": s.stiffness, "2HG": s.hysteresis, "2HG5": s.hysteresis_far}, s.lost
     b = bending_loop(curve, cycle)
-    return {"B": b.rigidity, "2HB": b.hysteresis}, b.lost
+    return {"B": b.rigidity, "2HB": b.hysteresis, **_yields(curve)}, b.lost
+
+
+def _yields(curve: Curve) -> dict[str, Reading | None]:
+    """What a cloth with the same loop takes, by its keys, and what that leaves of the loop's height."""
+    try:
+        y = bending_yield(curve)
+    except InputError:  # too little of a loop to tell
+        return dict.fromkeys(("bending", "yield_share", "yield_curvature", "misfit"))
+    misfit = Reading(y.misfit, "", {}, "%", 100.0)
+    return {"bending": y.bending, "yield_share": y.yield_share, "yield_curvature": y.yield_curvature, "misfit": misfit}
 
 
 def report(curves: Sequence[Curve], fit: FabricFit | None, cycle: int) -> str:

@@ -183,6 +183,14 @@ class Cloth(Section):
     curved: bool = key(False, "the mesh's own shape is that of bending at rest; flat otherwise")
     membrane_damping: Finite | None = key(None, "Kelvin-Voigt time constant of the membrane", "s", gt=0)
     bend_damping: Finite | None = key(None, "Kelvin-Voigt time constant of bending", "s", gt=0)
+    yield_curvature: Finite | None = key(
+        None,
+        "elastic curvature along the warp beyond which friction between fibers slides, of the curvature model; elastic "
+        "when left out",
+        "1/m",
+        gt=0,
+    )
+    yield_share: Finite | None = key(None, "the part of `bending` that slides", gt=0, lt=1)
     drag_linear: Finite | None = key(None, "linear air drag per area", "N s/m^3", gt=0)
     drag_quadratic: Finite | None = key(None, "quadratic air drag per area", "N s^2/m^4", gt=0)
     air_normal: Finite | None = key(
@@ -267,7 +275,8 @@ class Cloth(Section):
 
 FABRIC = (
     *("density", "warp", "weft", "shear", "poisson", "law", "bending", "bending_weft", "bending_twist"),
-    *("bending_model", "membrane_damping", "bend_damping", "drag_linear", "drag_quadratic"),
+    *("bending_model", "membrane_damping", "bend_damping", "yield_curvature", "yield_share"),
+    *("drag_linear", "drag_quadratic"),
 )
 """Keys of a cloth that tell its fabric."""
 

@@ -46,7 +46,7 @@ class Solver:
             recorded. `tape_plan` tells what a budget costs. Tangents (`fit`, forward mode) keep no tape.
         extrapolate: number of runs that are combined at the frames: 1 (off, the default); 2, at h and h/2, third order
             with "bdf2"; 3, at h, h/2 and h/4, fourth order, in seven times the substeps of one run. For smooth motions:
-            scenes with joints that yield or with linear knots of driven particles are refused, and so is "gauss_seidel"
+            scenes where something yields or with linear knots of driven particles are refused, and so is "gauss_seidel"
             (and with it tethers), whose error comes from sweeps. Scenes with contacts take 2 with "bdf1".
     """
 
@@ -140,7 +140,7 @@ class Solver:
         """The compiled solver for a scene, or what is called as it is and combines several.
 
         Raises:
-            InputError: the method cannot step the scene, such as "implicit" with rods that yield.
+            InputError: the method cannot step the scene, such as "implicit" with what yields.
 
         Warns:
             RedundantConstraintsWarning: some rigid constraints follow from others at the start; "gauss_seidel" leaves

@@ -45,7 +45,8 @@ def elastic_energy(
     `constraint_values`.
 
     Not counted is what is in no group: (V - rest)^2/(2 compliance) of a volume that is kept (`Scene.add_volume`), and
-    -p V of a pressure (`Scene.add_pressure`)."""
+    -p V of a pressure (`Scene.add_pressure`). Nor is what two springs hold against each other where one of them has
+    slid (kinds with a `share`), share (1 - share) set.set/(2 alpha)."""
     compiled, energies = scene.compiled, {}
     C_of = constraint_values(scene, positions, values)
     for group, alpha in _compliances(scene, compiled.inputs(compiled.values(values))):

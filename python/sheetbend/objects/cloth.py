@@ -19,6 +19,7 @@ from .elastic_group import add_elastic_group
 from .hinges import Hinges
 from .laws import Law, Linear
 from .sheet_bending import SheetCurvature
+from .yielding import check_yield
 
 MODELS = ("curvature", "dihedral", "isometric_bending")
 
@@ -83,6 +84,8 @@ def add_cloth(
     positions: ArrayLike | None = None,
     membrane_damping: float | None = None,
     bend_damping: float | None = None,
+    yield_curvature: float | None = None,
+    yield_share: float | None = None,
     drag_linear: float | None = None,
     drag_quadratic: float | None = None,
 ) -> Cloth:
@@ -91,7 +94,7 @@ def add_cloth(
     Quantities: `<fabric>_density` kg/m^2, `_warp`, `_weft`, `_shear` N/m, `_poisson`, the law's coefficients (see
     `sheetbend.laws`) such as `_warp_stiffening`, and where given `_bending`, `_bending_weft`,
     `_bending_twist` N m, `_membrane_damping` s,
-    `_bend_damping` s, `_drag_linear` N s/m^3, `_drag_quadratic` N s^2/m^4.
+    `_bend_damping` s, `_yield_curvature` 1/m, `_yield_share`, `_drag_linear` N s/m^3, `_drag_quadratic` N s^2/m^4.
 
     The membrane's energy per area is Y_warp f(E_uu)^2 + 2 n sqrt(Y_warp Y_weft) f(E_uu) f(E_vv) + Y_weft f(E_vv)^2,
     over 2 (1 - n^2), plus G f(2 E_uv)^2/2, in Green strain (core/constraints/membrane.h).
@@ -116,6 +119,12 @@ def add_cloth(
             and the one before it. A single row is a hinge line.
         positions: (vertices, 3) m, the initial shape; the mesh's vertices by default.
         membrane_damping, bend_damping: Kelvin-Voigt time constants, s.
+        yield_curvature: 1/m, the elastic curvature beyond which friction between fibers slides, of the curvature model:
+            along the warp; the curvature along the weft counts by sqrt(bending_weft/bending). What has slid, the set,
+            starts at zero. None = elastic.
+        yield_share: the part of the bending stiffness that slides, between 0 and 1: beyond yield (1 - share) of it is
+            left. Small motion shows all of it. A strip bent to and fro has a loop of 2 share bending yield_curvature
+            in its moment per width (2HB of a KES test).
         drag_linear, drag_quadratic: air drag per area, isotropic.
 
     Raises:
@@ -132,12 +141,15 @@ def add_cloth(
         "bending_twist": bending_twist,
         "membrane_damping": membrane_damping,
         "bend_damping": bend_damping,
+        "yield_curvature": yield_curvature,
         "drag_linear": drag_linear,
         "drag_quadratic": drag_quadratic,
     }
     check_positive(name, needed, optional)
     fabric = fabric or name
-    numbers = needed | optional | {"poisson": poisson, "law": law or Linear(), "bending_model": bending_model}
+    check_yield(name, yield_curvature, yield_share, "the bending stiffness")
+    named = {"poisson": poisson, "law": law or Linear(), "bending_model": bending_model, "yield_share": yield_share}
+    numbers = needed | optional | named
     _check_cut(scene, name, fabric, numbers)
     if not (is_number(poisson) and -1 < poisson < 1):
         raise SceneError(f"{name}.poisson", "must lie between -1 and 1", poisson, "give sqrt(nu_uv nu_vu)")
@@ -145,7 +157,8 @@ def add_cloth(
         raise SceneError(f"{name}.bending_model", "is unknown", bending_model, f"use one of: {', '.join(MODELS)}")
     if bend_damping is not None and bending is None:
         raise SceneError(f"{name}.bend_damping", "needs bending", bend_damping, "give bending, or leave it out")
-    for field, value in (("bending_weft", bending_weft), ("bending_twist", bending_twist)):
+    of_curvature = {"bending_weft": bending_weft, "bending_twist": bending_twist, "yield_curvature": yield_curvature}
+    for field, value in of_curvature.items():
         if value is not None and (bending is None or bending_model != "curvature"):
             fix = "give bending and keep bending_model = 'curvature', or leave it out"
             raise SceneError(f"{name}.{field}", "belongs to the curvature model", value, fix)
@@ -164,7 +177,10 @@ def add_cloth(
     if bending is not None:
         if bending_model == "curvature":
             sheet = SheetCurvature(mesh, free)
-            sheet.add(scene, name, fabric, particles, bending, bending_weft, bending_twist, curved, bend_damping)
+            yields = None if yield_curvature is None or yield_share is None else (yield_curvature, yield_share)
+            sheet.add(
+                scene, name, fabric, particles, bending, bending_weft, bending_twist, curved, bend_damping, yields
+            )
         else:
             Hinges(mesh, free).add(scene, name, fabric, particles, bending, bending_model, curved, bend_damping)
     built = Cloth(name, mesh, particles, fabric, numbers)

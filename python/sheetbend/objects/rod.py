@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.checks import check_positive, finite, is_number
+from ..arrays.checks import check_positive, finite
 from ..errors import SceneError
 from ..quantities.quantities import product
 from ..scene.body import BodyPoint
@@ -22,6 +22,7 @@ from .rod_joints import Joints, shear, weigh
 from .rod_junction import STUB_MASS, Facing, Junction
 from .rod_shape import initial_frames, initial_shape
 from .rope import Rope
+from .yielding import check_yield
 
 # Torque per angle that holds a director where it was going, over GJ/length: keeps twist well posed and moves nothing.
 # That of a section's normal is over EI/length.
@@ -154,7 +155,7 @@ def add_rod(
             "yield_curvature": yield_curvature,
         },
     )
-    _check_yield(name, yield_curvature, yield_share)
+    check_yield(name, yield_curvature, yield_share, "EI")
     for option, value, least in (("segments", segments, 2), ("turns", turns, None)):
         if not isinstance(value, int | np.integer) or (least is not None and value < least):
             wanted = "must be a whole number" + ("" if least is None else f" from {least} on")
@@ -241,14 +242,6 @@ def add_rod(
     built = Rod(name, nodes, link * np.arange(segments + 1), ghosts[0], ghosts[1], directors, sections)
     scene.ropes[name] = built
     return built
-
-
-def _check_yield(name: str, curvature: float | None, share: float | None) -> None:
-    if (curvature is None) != (share is None):
-        fix = "give yield_curvature and yield_share, or neither"
-        raise SceneError(f"{name}.yield_share", "and yield_curvature belong together", share, fix)
-    if share is not None and not (is_number(share) and 0 < share < 1):
-        raise SceneError(f"{name}.yield_share", "must lie between 0 and 1", share, "give a part of EI")
 
 
 def _is_ring(name: str, ends: tuple[End, End], points: ArrayLike | None, length: float) -> bool:

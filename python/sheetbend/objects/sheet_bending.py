@@ -67,27 +67,37 @@ class SheetCurvature:
         twist: float | None,
         curved: bool,
         damping: float | None,
+        yields: tuple[float, float] | None,
     ) -> None:
         """Add them to a scene as the group `<name>_bend`, with the quantities `<fabric>_bending`, where given
-        `_bending_weft`, `_bending_twist`, N m."""
+        `_bending_weft`, `_bending_twist`, N m, and of what yields `<fabric>_yield_curvature`, 1/m, and `_yield_share`.
+
+        Args:
+            yields: the yield curvature and the share; each triangle then has a set, a hidden node, zero at first.
+        """
         irregular = _irregular(self.mesh)
         if irregular > IRREGULAR:
             warnings.warn(f"{name}: {irregular:.0%} {WEAKER}", UserWarning, stacklevel=3)
         count = len(self.stencils)
-        rest = np.zeros((count, 14))
+        rest = np.zeros((count, 14 if yields is None else 16))
         rest[:, :9] = self.matrix.reshape(count, 9)
         rest[:, 9:11] = (1.0, np.sqrt(2.0))
         if curved:
-            rest[:, 11:] = self.angles
+            rest[:, 11:14] = self.angles
         bending = f"{fabric}_bending"
         ratios = [(9, weft, f"{bending}_weft", 1.0), (10, twist, f"{bending}_twist", np.sqrt(2.0))]
         for place, value, _, _ in ratios:
             if value is not None:
                 rest[:, place] = 0.0
+        kind, stencils = "sheet_curvature", particles[self.stencils]
+        if yields is not None:
+            kind = "yielding_sheet_curvature"
+            stencils = np.column_stack([stencils, scene.add_hidden(np.zeros((count, 3)), 1.0, pinned=True)])
+            rest[:, 15], rest[:, 14] = yields
         values = add_elastic_group(
             scene,
-            "sheet_curvature",
-            particles[self.stencils],
+            kind,
+            stencils,
             name=f"{name}_bend",
             rest=rest,
             scale=self.area,
@@ -98,6 +108,12 @@ class SheetCurvature:
             if value is not None:
                 scene.add_quantity(label, value, "N m", shared=True)
                 scene.add_terms([Term("rest", values + place, factor, ((label, "sqrt"), (bending, "inverse_sqrt")))])
+        if yields is not None:
+            scene.group(f"{name}_bend")[0].rest[:, 14:] = 0.0
+            of_yield = ((14, "yield_share", yields[1], ""), (15, "yield_curvature", yields[0], "1/m"))
+            for place, label, value, unit in of_yield:
+                quantity = scene.add_quantity(f"{fabric}_{label}", value, unit, shared=True)
+                scene.add_terms([Term("rest", values + place, 1.0, ((quantity, "identity"),))])
 
 
 def _hinges_of_triangles(mesh: TriangleMesh) -> Array:

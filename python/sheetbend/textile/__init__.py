@@ -6,6 +6,7 @@ standards. `fit_fabric` goes the other way, from readings to a fabric, and `fit_
 laboratory. `read_curves` and `read_outline` read the files.
 """
 
+from .bending_yield import BendingYield, bending_yield
 from .bias_extension import BiasExtension, bias_extension
 from .cantilever import Cantilever, cantilever
 from .curve import Curve, Cycle, MeanCurve, mean_curve
@@ -25,6 +26,7 @@ from .whole_fabric import FabricTests, WholeFabric, fit_tests
 __all__ = [
     "GRAM_FORCE",
     "BendingLoop",
+    "BendingYield",
     "BiasExtension",
     "Cantilever",
     "Curve",
@@ -45,6 +47,7 @@ __all__ = [
     "Uniaxial",
     "WholeFabric",
     "bending_loop",
+    "bending_yield",
     "bias_extension",
     "cantilever",
     "drape",

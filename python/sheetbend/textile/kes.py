@@ -76,7 +76,7 @@ def tensile_loop(curve: Curve, cycle: int = 0) -> TensileLoop:
     Raises:
         InputError: no test of tension, or no such cycle.
     """
-    _check(curve, "tension")
+    check_test(curve, "tension")
     found = chosen(curve, cycle)
     out = found.loading
     strain, work = float(out.deformation[-1] - out.deformation[0]), out.work
@@ -103,7 +103,7 @@ def shear_loop(
     Raises:
         InputError: no test of shear, no such cycle, or one that does not reach the angles of the slope.
     """
-    _check(curve, "shear")
+    check_test(curve, "shear")
     sides = _sides(curve, cycle)
     low, high = (math.radians(a) for a in slope)
     near, far = (_width(sides, math.radians(a)) for a in at)
@@ -129,7 +129,7 @@ def bending_loop(
     Raises:
         InputError: no test of bending, no such cycle, or one that does not reach the curvatures of the slope.
     """
-    _check(curve, "bending")
+    check_test(curve, "bending")
     sides = _sides(curve, cycle)
     width = _width(sides, at)
     return BendingLoop(
@@ -139,7 +139,12 @@ def bending_loop(
     )
 
 
-def _check(curve: Curve, test: str) -> None:
+def check_test(curve: Curve, test: str) -> None:
+    """Refuse a curve of another test.
+
+    Raises:
+        InputError: names both.
+    """
     if curve.test != test:
         raise InputError(curve.name, f"is no test of {test}", curve.test, "read the file with that test=")
 

@@ -310,6 +310,17 @@ inline Case case_of<SheetCurvature>() {
 }
 
 template <>
+inline Case case_of<YieldingSheetCurvature>() {
+  Case row = case_of<SheetCurvature>();
+  row.x.insert(row.x.end(), {0.3, -0.4, 0.2});
+  row.p.insert(row.p.end(), {0.4, 0.6});
+  row.relabeling.push_back(6);
+  row.parameter_sign.resize(row.p.size(), 1);
+  row.parameter_relabeling.insert(row.parameter_relabeling.end(), {14, 15});
+  return row;
+}
+
+template <>
 inline Case case_of<Area>() {
   return {.x = triangle_sample,
           .p = {0.004},
