@@ -3,13 +3,15 @@
 #include <algorithm>
 #include <span>
 
+#include "core/contact/approach.h"
 #include "core/contact/box_grid.h"
-#include "core/contact/meeting.h"
 
 namespace sheetbend {
 namespace {
 
-// Around nodes, as far as they reach, and half of what must stay free around them.
+constexpr double slack = 0.1;  // of where two touch, by which they may be listed too early
+
+// Around nodes on their ways, as far as they reach, and half of what must stay free around them.
 Box box_around(std::span<const int> nodes, const Whereabouts& at) {
   double reach = 0.0;
   for (const int n : nodes) reach = std::max(reach, at.reach[n]);
@@ -18,8 +20,9 @@ Box box_around(std::span<const int> nodes, const Whereabouts& at) {
   for (int d = 0; d < 3; ++d) {
     box.low[d] = box.high[d] = at.of(nodes.front())[d];
     for (const int n : nodes) {
-      box.low[d] = std::min(box.low[d], at.of(n)[d]);
-      box.high[d] = std::max(box.high[d], at.of(n)[d]);
+      const double from = at.of(n)[d], to = at.way ? from + at.way[3 * static_cast<long>(n) + d] : from;
+      box.low[d] = std::min({box.low[d], from, to});
+      box.high[d] = std::max({box.high[d], from, to});
     }
     box.low[d] -= reach;
     box.high[d] += reach;
@@ -49,7 +52,12 @@ bool may_touch(const SelfContact& s, const PairKey& key, const Whereabouts& at) 
   };
   const int side = key.triangle ? 1 : 2;  // where the second one begins
   const double touching = at.radius[nodes[0]] + at.radius[nodes[side]];
-  return distance_of(key.triangle, x, {touching, 1.0}) <= touching + reach(0, side) + reach(side, 4);
+  const double room = touching + reach(0, side) + reach(side, 4);
+  const PairNumbers<double> numbers{touching, 1.0};
+  if (!at.way) return distance_of(key.triangle, x, numbers) <= room;
+  double way[12];
+  gather(nodes, at.way, 3, way);
+  return comes_nearer(key.triangle, x, way, room, slack * touching, numbers);
 }
 
 }  // namespace

@@ -12,12 +12,15 @@ struct Whereabouts {
   const double* x;
   int stride;
   const double* radius;  // per node
-  const double* reach;   // per node: how far it may go from there
+  const double* reach;   // per node: how far it may be from there, or from a place on its way
+  const double* way =
+      nullptr;  // three numbers per node: where it goes from there, all in the same time; null where they stay
 
   const double* of(int node) const { return x + static_cast<long>(stride) * node; }
 };
 
-// The pairs that touch, or may while no node goes farther than its reach; sorted. Pairs that share a node never touch.
+// The pairs that touch, or may while no node is farther than its reach from where all are at one time of their ways; sorted. Pairs that share a node never
+// touch.
 std::vector<PairKey> find_pairs(const SelfContact& s, const Whereabouts& at);
 
 // The coordinates (12) of a pair's nodes.

@@ -2,43 +2,30 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "core/contact/approach.h"
 
 namespace sheetbend {
 namespace {
 
 using sheetbend_blocks::row;
 
-constexpr double margin = 0.1;       // beyond the free motion, of the radius
-constexpr double farther = 1.5;      // than asked for, where particles leave what was looked for
+constexpr double margin = 0.1;       // beside the ways that were looked for, of the radius
 constexpr double farthest = 8.0;     // that a step may lead, of the free motion and the radius: pairs would be too many
 constexpr double nearest_yet = 0.1;  // that two may come, of where they touch
-constexpr int most_advances = 64;
 constexpr std::size_t usual_pairs = 4;  // per edge and triangle
 
 double distance_between(const double* a, const double* b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
 
-// Whether two come too near while their nodes go straight from x by `d`: by conservative advancement, as in Li et al. (2021), sec. 4.
-bool passes(bool triangle, const double* x, double* d, const PairNumbers<double>& n) {
-  double mean[3] = {0.0, 0.0, 0.0}, speed[4], at[12], ends[2][12];
-  for (int i = 0; i < 12; ++i) mean[i % 3] += 0.25 * d[i];
-  for (int i = 0; i < 12; ++i) {
-    d[i] -= mean[i % 3];
-    ends[0][i] = x[i], ends[1][i] = x[i] + d[i];
-  }
-  const double least = nearest_yet * n.touching;
-  if (boxes_are_apart(triangle, ends, 2, least)) return false;
-  for (int k = 0; k < 4; ++k) speed[k] = std::hypot(d[3 * k], d[3 * k + 1], d[3 * k + 2]);
-  const double approach = triangle ? speed[0] + std::max({speed[1], speed[2], speed[3]})
-                                   : std::max(speed[0], speed[1]) + std::max(speed[2], speed[3]);
-  double t = 0.0;
-  for (int advance = 0; advance < most_advances; ++advance) {
-    for (int i = 0; i < 12; ++i) at[i] = x[i] + t * d[i];
-    const double room = distance_of(triangle, at, n) - least;
-    if (!(room > 0.0)) return true;
-    if (room >= (1.0 - t) * approach) return false;
-    t += room / approach;
-  }
-  return true;
+// Of shares with weights: half of the weight is on either side. They are sorted.
+double median(std::vector<std::pair<double, double>>& shares) {
+  std::sort(shares.begin(), shares.end());
+  double all = 0.0, below = 0.0;
+  for (const auto& [share, weight] : shares) all += weight;
+  for (const auto& [share, weight] : shares)
+    if ((below += weight) >= 0.5 * all) return share;
+  return 1.0;
 }
 
 }  // namespace
@@ -46,7 +33,7 @@ bool passes(bool triangle, const double* x, double* d, const PairNumbers<double>
 std::size_t BlockPairs::bytes(const DirectBlock& block) {
   if (block.surface.empty()) return 0;
   return sizeof(BlockPair) * usual_pairs * (block.surface.edges.size() + block.surface.triangles.size()) +
-         2 * sizeof(double) * block.particles.size() + Numbers<double>::bytes(row * block.particles.size());
+         sizeof(Freedom) * block.particles.size() + Numbers<double>::bytes(row * block.particles.size());
 }
 
 void BlockPairs::find(const DirectBlock& block, Numbers<double>& from, Numbers<double>& guess,
@@ -55,17 +42,25 @@ void BlockPairs::find(const DirectBlock& block, Numbers<double>& from, Numbers<d
   if (block.surface.empty()) return;
   origin_ = from;
   const int count = static_cast<int>(block.particles.size());
-  reach_.assign(2 * count, 0.0);
+  freedom_.assign(count, {});
   double driven = 0.0;
   for (int p = 0; p < count; ++p) {
     if (block.surface.radius[p] < 0) continue;
-    const double* at = from.data() + row * p;
-    const double forced = distance_between(at, target.data() + row * p);
-    const double way = p < block.movable ? std::max(forced, distance_between(at, guess.data() + row * p)) : forced;
-    reach_[p] = reach_[count + p] = (std::isfinite(way) ? way : 0.0) + margin * radius[p];
-    if (p >= block.movable) driven = std::max(driven, reach_[p]);
+    const double *at = from.data() + row * p, *free = guess.data() + row * p, *forced = target.data() + row * p;
+    const bool moves = p < block.movable;
+    const double far = std::max(distance_between(at, forced), moves ? distance_between(at, free) : 0.0);
+    Freedom& f = freedom_[p];
+    std::copy_n(at, 3, f.start);
+    f.limit = f.reach = margin * radius[p];
+    if (!std::isfinite(far)) continue;
+    f.limit += far;
+    f.reach += moves ? distance_between(free, forced) : far;  // a fixed one does not go with the others
+    if (moves)
+      for (int d = 0; d < 3; ++d) f.way[d] = free[d] - at[d];
+    else
+      driven = std::max(driven, f.limit);
   }
-  for (int p = 0; p < count; ++p) reach_[count + p] = farthest * (reach_[count + p] + driven + radius[p]);
+  for (int p = 0; p < count; ++p) freedom_[p].limit = farthest * (freedom_[p].limit + driven + radius[p]);
   search(block);
 }
 
@@ -73,13 +68,18 @@ void BlockPairs::find_at(const DirectBlock& block, Numbers<double>& rows) {
   pairs_.clear();
   if (block.surface.empty()) return;
   origin_ = rows;
-  reach_.assign(2 * block.particles.size(), 0.0);
+  freedom_.assign(block.particles.size(), {});
   search(block);
 }
 
 void BlockPairs::search(const DirectBlock& block) {
   pairs_.clear();
-  for (const PairKey& key : find_pairs(block.surface, {origin_.data(), row, radius.data(), reach_.data()})) {
+  std::vector<double> reach, way;
+  for (const Freedom& f : freedom_) {
+    reach.push_back(f.reach);
+    way.insert(way.end(), f.way, f.way + 3);
+  }
+  for (const PairKey& key : find_pairs(block.surface, {origin_.data(), row, radius.data(), reach.data(), way.data()})) {
     BlockPair pair{key, nodes_of(block.surface, key), {}};
     double w[4], sum = 0.0;
     for (int k = 0; k < 4; ++k)
@@ -91,19 +91,56 @@ void BlockPairs::search(const DirectBlock& block) {
   }
 }
 
-bool BlockPairs::can_go(const DirectBlock& block, Numbers<double>& from, Numbers<double>& to) {
-  if (block.surface.empty()) return true;
-  bool leaves = false;
+// For the way from one state to another.
+void BlockPairs::follow(const DirectBlock& block, Numbers<double>& from, Numbers<double>& to) {
+  origin_ = from;
+  for (int p = 0; p < static_cast<int>(block.particles.size()); ++p) {
+    freedom_[p].reach = margin * radius[p];
+    for (int d = 0; d < 3; ++d) freedom_[p].way[d] = to[row * p + d] - from[row * p + d];
+  }
+  search(block);
+}
+
+// How far a particle is from that share of its way.
+double BlockPairs::beside(int particle, Numbers<double>& rows, double share) {
+  const double *from = &origin_[row * particle], *way = freedom_[particle].way;
+  const double there[3] = {from[0] + share * way[0], from[1] + share * way[1], from[2] + share * way[2]};
+  return distance_between(there, &rows[row * particle]);
+}
+
+// The share of their ways that most particles have gone: all of it, unless a step was shortened.
+double BlockPairs::share_gone(const DirectBlock& block, Numbers<double>& rows) {
+  std::vector<std::pair<double, double>> shares;  // of each particle, with how long its way is
   for (int p = 0; p < block.movable; ++p) {
     if (block.surface.radius[p] < 0) continue;
-    const double away = distance_between(origin_.data() + row * p, to.data() + row * p);
-    if (away <= reach_[p]) continue;
-    if (!(away <= reach_[block.particles.size() + p])) return false;
-    reach_[p] = std::min(farther * away, reach_[block.particles.size() + p]);
-    leaves = true;
+    const Vec3<double> way(freedom_[p].way), gone = Vec3<double>(&rows[row * p]) - Vec3<double>(&origin_[row * p]);
+    if (const double squared = dot(way, way); squared > 0.0)
+      shares.emplace_back(dot(way, gone) / squared, std::sqrt(squared));
   }
-  if (leaves) search(block);
+  return std::clamp(median(shares), 0.0, 1.0);
+}
+
+// Whether the list has all pairs that touch there.
+bool BlockPairs::holds(const DirectBlock& block, Numbers<double>& rows) {
+  const auto at = [&](double share) {
+    for (int p = 0; p < static_cast<int>(block.particles.size()); ++p)
+      if (block.surface.radius[p] >= 0 && !(beside(p, rows, share) <= freedom_[p].reach)) return false;
+    return true;
+  };
+  return at(1.0) || at(0.0) || at(share_gone(block, rows));
+}
+
+bool BlockPairs::can_go(const DirectBlock& block, Numbers<double>& from, Numbers<double>& to) {
+  if (block.surface.empty()) return true;
+  for (int p = 0; p < block.movable; ++p)
+    if (block.surface.radius[p] >= 0 && !(distance_between(freedom_[p].start, &to[row * p]) <= freedom_[p].limit))
+      return false;
+  if (!holds(block, from) || !holds(block, to)) follow(block, from, to);
   return !passing(from, to);
+}
+
+void BlockPairs::stay(const DirectBlock& block, Numbers<double>& rows) {
+  if (!block.surface.empty() && !holds(block, rows)) follow(block, rows, rows);
 }
 
 const BlockPair* BlockPairs::passing(Numbers<double>& from, Numbers<double>& to) const {
@@ -112,7 +149,7 @@ const BlockPair* BlockPairs::passing(Numbers<double>& from, Numbers<double>& to)
     gather(pair, from.data(), x);
     gather(pair, to.data(), d);
     for (int i = 0; i < 12; ++i) d[i] -= x[i];
-    if (passes(pair.key.triangle, x, d, pair.numbers)) return &pair;
+    if (comes_nearer(pair.key.triangle, x, d, nearest_yet * pair.numbers.touching, 0.0, pair.numbers)) return &pair;
   }
   return nullptr;
 }

@@ -1,6 +1,6 @@
-// The pairs of an implicit block that may touch in a substep, of one scene: found where the substep starts, for all that its particles reach on the way to
-// where they would go freely; found again where Newton's method leads them farther. A step along which two would pass through each other is not taken, so
-// that each pair stays on its side, however fast it moves.
+// The pairs of an implicit block that may touch, of one scene: found where the substep starts, for the way on which its particles would go freely, and again
+// for each step of Newton's method that leads away from what was looked for. A step along which two would pass through each other is not taken, so that each
+// pair stays on its side, however fast it moves.
 #pragma once
 
 #include <vector>
@@ -40,9 +40,10 @@ class BlockPairs {
   void find(const DirectBlock& block, Numbers<double>& from, Numbers<double>& guess, Numbers<double>& target);
   void find_at(const DirectBlock& block, Numbers<double>& rows);
 
-  // Whether the particles can go straight from one state to the other without that two pass through each other. What goes farther than was looked for is
-  // looked for.
+  // Whether the particles can go straight from one state to the other without that two pass through each other; looks for pairs on that way.
   bool can_go(const DirectBlock& block, Numbers<double>& from, Numbers<double>& to);
+  // Looks for those that touch at a state where no way has led to.
+  void stay(const DirectBlock& block, Numbers<double>& rows);
 
   // A pair that passes through on the way, or null.
   const BlockPair* passing(Numbers<double>& from, Numbers<double>& to) const;
@@ -52,10 +53,20 @@ class BlockPairs {
 
  private:
   void search(const DirectBlock& block);
+  void follow(const DirectBlock& block, Numbers<double>& from, Numbers<double>& to);
+  bool holds(const DirectBlock& block, Numbers<double>& rows);
+  double beside(int particle, Numbers<double>& rows, double share);
+  double share_gone(const DirectBlock& block, Numbers<double>& rows);
 
   std::vector<BlockPair> pairs_;
-  Numbers<double> origin_;     // where the particles' reach counts from
-  std::vector<double> reach_;  // per particle; behind these, how large that may become
+  // Where a particle may be, while the list has all pairs that touch: no farther than its reach from where it is on its way from the origin, all particles at
+  // the same share of their ways.
+  struct Freedom {
+    double reach, way[3];
+    double start[3], limit;  // of the substep, and how far from there it may go at most
+  };
+  Numbers<double> origin_;
+  std::vector<Freedom> freedom_;  // per particle
 };
 
 }  // namespace sheetbend

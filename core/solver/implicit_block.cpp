@@ -245,6 +245,7 @@ void ImplicitBlock::solve(const Scene& scene, const DirectBlock& block, const So
     return;
   }
   potential.pairs.find(block, start, guess, potential.target);
+  matrix_.begin();
   auto& numbers = potential.contacts.numbers;
   double firmest = 1.0;
   for (std::size_t i = 0; i < numbers.size(); ++i) firmest = std::max(firmest, firm_[i] = numbers[i].firm);
@@ -363,6 +364,7 @@ void ImplicitBlock::take_guess(const DirectBlock& block) {
   std::copy_n(guess.data(), row * block.movable, x_.data());
   settle_frames(block, potential.target, x_);
   potential.pairs.find_at(block, x_);
+  matrix_.begin();
   if (rigid().empty()) return;
   potential.rigid.leave_out(potential.given(block), start.data());
   balance_rigid(block, potential, x_);

@@ -58,6 +58,7 @@ double lowest(F&& f, double f0) {
 // Phi at x_, and at x_ + t d_, which trial_ is then.
 double ImplicitBlock::look(const DirectBlock& block) {
   potential.rigid.lambda = lambda_;
+  potential.pairs.stay(block, x_);
   return potential.evaluate(block, x_);
 }
 

@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "core/constraints/registry.h"
@@ -38,6 +39,13 @@ bool is_symmetric(const double* M) {
   return apart <= 16.0 * std::numeric_limits<double>::epsilon() * largest;
 }
 
+// The part of the matrix of a pair that touches that has no negative eigenvalues, kappa g g^T: the root of kappa times g (12), the gradient of the depth. Without friction.
+void convex_root(bool triangle, Part part, const double* x, const PairNumbers<double>& numbers, double* root) {
+  const Nearest<double> n = nearest_points(triangle, x, softness_of(numbers), part);
+  const double scale = n.squared > 0.0 ? std::sqrt(numbers.kappa / n.squared) : 0.0;
+  for (int k = 0; k < 4; ++k) ((scale * n.weight[k]) * n.apart).store(root + 3 * k);
+}
+
 }  // namespace
 
 void make_convex(int dofs, double* E) {
@@ -58,6 +66,7 @@ void NewtonMatrix::resize(const Scene& scene, const DirectBlock& block) {
   for (auto& run : elements_) element_numbers_.push_back(run.numbers());
   pairs_.clear();
   paired_.reset();
+  in_pattern_.clear();
   factor_.reset(pattern_of(block).structure);
   contacts_.assign(9 * block.contacts.size(), 0.0);
   weights_.resize(block.contacts.size());
@@ -108,7 +117,6 @@ void NewtonMatrix::find_contacts(const DirectBlock& block, const BlockContacts<d
   }
 }
 
-// The pattern depends on the pairs of the substep alone, so that bits do not depend on where a rollout begins.
 void NewtonMatrix::find_pairs(const Scene& scene, const DirectBlock& block, const IncrementalPotential& potential,
                               const double* x) {
   const BlockPairs& pairs = potential.pairs;
@@ -119,16 +127,31 @@ void NewtonMatrix::find_pairs(const Scene& scene, const DirectBlock& block, cons
     if (!touches(pair.key.triangle, at, pair.numbers)) continue;
     const Part part = nearest_part(pair.key.triangle, at, softness_of(pair.numbers));
     const Rub<double> rub = block.surface.rubs() ? potential.friction.of(pair.key, pair.particles) : Rub<double>{};
-    pairs_.push_back({pair.particles, {}});
+    pairs_.push_back({pair.key, pair.particles, {}, {}});
+    convex_root(pair.key.triangle, part, at, pair.numbers, pairs_.back().convex.data());
     const bool rubs = meeting_matrix(pair.key.triangle, part, at, pair.numbers, block.surface.rubs() ? &rub : nullptr,
                                      pairs_.back().matrix.data());
     symmetric_ = symmetric_ && !rubs;
   }
-  if (pairs_.empty()) return;
-  std::vector<std::array<int, 4>> all;
-  for (const BlockPair& pair : pairs.all()) all.push_back(pair.particles);
+  if (!pairs_.empty()) find_pattern(scene, block, pairs);
+}
+
+// With all pairs of the list where a substep's first ones touch, and with those of the list besides where others do later.
+void NewtonMatrix::find_pattern(const Scene& scene, const DirectBlock& block, const BlockPairs& pairs) {
+  const bool known = std::ranges::all_of(
+      pairs_, [&](const TouchingPair& pair) { return std::ranges::binary_search(in_pattern_, pair.key); });
+  if (!begins_ && known) return;
+  std::vector<PairKey> listed, all;
+  for (const BlockPair& pair : pairs.all()) listed.push_back(pair.key);
+  if (begins_)
+    all = std::move(listed);
+  else
+    std::ranges::set_union(in_pattern_, listed, std::back_inserter(all));
+  begins_ = false;
   if (paired_ && all == in_pattern_) return;
-  paired_ = pattern_with(scene, block, all);
+  std::vector<std::array<int, 4>> particles;
+  for (const PairKey& key : all) particles.push_back(nodes_of(block.surface, key));
+  paired_ = pattern_with(scene, block, particles);
   in_pattern_ = std::move(all);
 }
 
@@ -170,10 +193,8 @@ void NewtonMatrix::add_pairs(const DirectBlock& block, double convexity) {
   const CondensedPattern& pattern = pattern_of(block);
   for (const TouchingPair& pair : pairs_) {
     auto E = pair.matrix;
-    if (convexity > 0.0) {
-      make_convex(12, E.data());
-      for (std::size_t i = 0; i < E.size(); ++i) E[i] = pair.matrix[i] + convexity * (E[i] - pair.matrix[i]);
-    }
+    if (convexity > 0.0)
+      for (int i = 0; i < 144; ++i) E[i] += convexity * (pair.convex[i / 12] * pair.convex[i % 12] - E[i]);
     const auto dof = [&](int d) {
       const int particle = pair.particles[d / 3];
       return particle < block.movable ? pattern.dof_of[particle] + d % 3 : -1;

@@ -24,6 +24,9 @@ class NewtonMatrix {
   void resize(const Scene& scene, const DirectBlock& block);
   static std::size_t bytes(const Scene& scene, const DirectBlock& block);
 
+  // A substep begins: the pattern is that of its pairs alone, so that bits do not depend on where a rollout begins.
+  void begin() { begins_ = true; }
+
   // K at `at`; Newton's method does without the curvature of colliders and what frames do along idle directions (block_frames.h), derivatives do not.
   void find(const Scene& scene, const DirectBlock& block, IncrementalPotential& potential, Numbers<double>& at,
             bool curved = false);
@@ -90,6 +93,7 @@ class NewtonMatrix {
   }
   void find_contacts(const DirectBlock& block, const BlockContacts<double>& contacts, const double* x, bool curved);
   void find_pairs(const Scene& scene, const DirectBlock& block, const IncrementalPotential& potential, const double* x);
+  void find_pattern(const Scene& scene, const DirectBlock& block, const BlockPairs& pairs);
   void add_pairs(const DirectBlock& block, double convexity);
   void assemble(const Scene& scene, const DirectBlock& block, double convexity);  // without contacts and pairs
 
@@ -99,15 +103,17 @@ class NewtonMatrix {
   std::vector<double*> element_numbers_;
   std::vector<double> contacts_;                               // per contact: its matrix (3, 3)
   std::vector<std::array<double, most_point_nodes>> weights_;  // likewise, of its particles
-  // Of pairs that touch: their matrices, and the pattern with all pairs that may touch in the substep, kept while they recur.
+  // Of pairs that touch: their matrices, and the pattern with all pairs that may touch, which grows in a substep and is kept while they recur.
   struct TouchingPair {
+    PairKey key;
     std::array<int, 4> particles;
     std::array<double, 144> matrix;
+    std::array<double, 12> convex;  // the root of the convex one
   };
   std::vector<TouchingPair> pairs_;
-  std::vector<std::array<int, 4>> in_pattern_;
+  std::vector<PairKey> in_pattern_;
   std::optional<PairedPattern> paired_;
-  bool convex_found_ = false, symmetric_ = true, as_lu_ = false;
+  bool convex_found_ = false, symmetric_ = true, as_lu_ = false, begins_ = true;
   Factor<double> factor_;
   UnsymmetricFactor lu_;
 };

@@ -201,6 +201,51 @@ TEST(Pairs, RubAgainstEachOther) {
   EXPECT_GT(stuck, 30);
 }
 
+// Whatever comes near on the way is listed, and what goes along beside each other is not.
+TEST(Pairs, AreFoundOnTheirWays) {
+  constexpr int count = 60;
+  constexpr double touching = 0.1, reach = 0.01;
+  SelfContact s;
+  std::vector<double> x, way, radius(2 * count, 0.5 * touching), reaches(2 * count, reach);
+  for (int i = 0; i < count; ++i) {
+    s.edges.push_back({2 * i, 2 * i + 1});
+    const double at[3] = {uniform(-1.0, 1.0), uniform(-1.0, 1.0), uniform(-1.0, 1.0)};
+    const double gone[3] = {uniform(-1.0, 1.0), uniform(-1.0, 1.0), uniform(-1.0, 1.0)};
+    for (int k = 0; k < 2; ++k)
+      for (int d = 0; d < 3; ++d) {
+        x.push_back(at[d] + uniform(-0.1, 0.1));
+        way.push_back(gone[d] + uniform(-0.05, 0.05));
+      }
+  }
+  const Whereabouts at{x.data(), 3, radius.data(), reaches.data(), way.data()};
+  const std::vector<PairKey> found = find_pairs(s, at);
+  const auto is_found = [&](int i, int k) { return std::ranges::binary_search(found, PairKey{false, i, k}); };
+  int near = 0;
+  for (int i = 0; i < count; ++i)
+    for (int k = i + 1; k < count; ++k) {
+      double least = 1e300;
+      for (int step = 0; step <= 400; ++step) {
+        Coordinates there;
+        const auto nodes = nodes_of(s, {false, i, k});
+        for (int d = 0; d < 12; ++d)
+          there[d] = x[3 * nodes[d / 3] + d % 3] + step / 400.0 * way[3 * nodes[d / 3] + d % 3];
+        least = std::min(least, distance_of(false, there.data(), {touching, 1.0}));
+      }
+      if (least <= touching + 2.0 * reach) {
+        EXPECT_TRUE(is_found(i, k)) << i << " " << k;
+        ++near;
+      } else if (least > 1.2 * touching + 2.0 * reach) {
+        EXPECT_FALSE(is_found(i, k)) << i << " " << k;
+      }
+    }
+  EXPECT_GT(near, 10);
+  for (double& d : way) d = 5.0;
+  const Whereabouts standing{x.data(), 3, radius.data(), reaches.data()};
+  const std::vector<PairKey> together = find_pairs(s, at), near_at_rest = find_pairs(s, standing);
+  for (const PairKey& key : near_at_rest) EXPECT_TRUE(std::ranges::binary_search(together, key));
+  EXPECT_LE(together.size(), near_at_rest.size() + 5);
+}
+
 TEST(Pairs, AreFoundByAGridAsByLookingAtAll) {
   for (const double size : {0.02, 0.2, 1.5}) {
     std::vector<Box> a, b;
