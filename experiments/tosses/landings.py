@@ -2,10 +2,11 @@
 
     python experiments/tosses/landings.py [--fit 30]
 
-The cube is a rigid body whose eight corners touch the table. Friction, the dissipation of the contact, the moment of
-inertia, the center of mass, the height of the table and the scale of lengths are fitted to every other toss. The others
-are predicted from their first frames, beside the numbers that the authors of the data state, and beside predictions
-without physics.
+The cube is a rigid body with rounded corners, which touch the table. A fit to the first frames after contact of every
+other toss finds friction, the dissipation of the contact, the rounding, the moments of inertia, the center of mass, the
+height of the table and the scale of lengths. Friction is found again from the whole paths. The other tosses are
+predicted from their frames before contact, beside the numbers that the authors of the data state, and beside
+predictions without physics.
 """
 
 from __future__ import annotations
@@ -18,28 +19,32 @@ from pathlib import Path
 import numpy as np
 import sheetbend as sb
 from cube import MASS, RATE, SIDE
+from scipy.optimize import minimize_scalar
 from sheetbend.arrays.rotations import matrices_of
 from sheetbend.quantities.quantities import Term
 
 DATA = Path(__file__).parent / "data" / "tosses.npz"
 SCALE = 1.0176  # of the data's lengths, from free flight
 SEEN = 8  # frames that a prediction starts from
-SOLVER = sb.Solver(h=1 / (8 * RATE), method="implicit")
+AFTER = 6  # frames from the first contact on that the fit sees
+SOLVER = sb.Solver(h=1 / (16 * RATE), method="implicit")
 CORNERS = sb.box_corners(np.full(3, SIDE / SCALE))
+COMPARED = CORNERS[[0, 3, 5, 6]]  # a tetrahedron
 INERTIA = MASS * (SIDE / SCALE) ** 2 / 6  # kg m^2, of a homogeneous cube
-STIFFNESS = 1e4  # N/m, of a corner
-BEGIN = {  # where the search begins, and how far around it looks: standard deviations
-    "table_friction": (0.18, 0.01),
-    "table_contact_dissipation": (2.0, 1.0),
-    "hollow": (0.3, 0.3),
-    "cube_center_x": (0.0, 2e-3),
-    "cube_center_y": (0.0, 2e-3),
-    "cube_center_z": (0.0, 2e-3),
-    "table_z": (0.0, 5e-4),
-    "stretch": (0.0, 3e-3),
+STIFFNESS = 6e4  # N/m, of a corner
+SIGMA = 1e-3  # m, of a corner: what the model may be off by
+FRICTION = (0.15, 0.2)  # in which that of whole paths is looked for
+FROM = {  # where the fit starts
+    "table_friction": 0.2,
+    "table_contact_dissipation": 2.0,
+    "rounding": 2e-3,
+    **{f"cube_inertia_{axis}": 1.3 * INERTIA for axis in (1, 2, 3)},
+    **{f"cube_center_{axis}": 0.0 for axis in "xyz"},
+    "table_z": 0.0,
+    "stretch": 0.0,
 }
-ROUNDS, POINTS, BEST = 24, 16, 5
-AUTHORS = {"table_friction": 0.18, "table_restitution": 0.125}  # and a homogeneous cube
+SIZES = {"table_z": 1e-3, "stretch": 0.01, **{f"cube_center_{axis}": 1e-3 for axis in "xyz"}}
+AUTHORS = {"table_friction": 0.18, "table_restitution": 0.125, "rounding": 0.0}  # and a homogeneous cube
 
 
 @dataclass(frozen=True)
@@ -74,63 +79,69 @@ def tosses() -> list[Toss]:
 def scene_of(toss: Toss, seen: int, restitution: float | None = None) -> sb.Scene:
     """The cube that flies from its first `seen` frames onto the table, which is soft, or rigid with a restitution.
 
-    `stretch` is what its lengths are longer than SCALE makes them, and gravity with them.
+    `rounding` is the radius of its corners, m. `stretch` is what its lengths are longer than SCALE makes them, and
+    gravity with them.
     """
     down = np.array([0.0, 0.0, -9.81 / SCALE])
     first = slice(0, min(seen, toss.free))
     start = sb.start_of_poses(toss.times[first], toss.positions[first], toss.quaternions[first], down)
     scene = sb.Scene(toss.name, gravity=down)
     cube = scene.add_body("cube", of=sb.Inertia.box(MASS, np.full(3, SIDE / SCALE)), **start)
-    law = {"stiffness": STIFFNESS, "dissipation": BEGIN["table_contact_dissipation"][0]}
-    if restitution is not None:
-        law = {"restitution": restitution}
+    soft = {"stiffness": STIFFNESS, "dissipation": FROM["table_contact_dissipation"]}
+    law = soft if restitution is None else {"restitution": restitution}
     friction = AUTHORS["table_friction"]
     scene.contact(cube, sb.Plane(name="table"), friction=friction, points=CORNERS, settle=True, **law)
+    scene.add_quantity("rounding", 0.0, "m", positive=False, scale=2e-3, limits=(0.0, 0.02))
     scene.add_quantity("stretch", 0.0, "", positive=False, scale=0.01)
-    axes = np.arange(4 * len(CORNERS)).reshape(-1, 4)[:, 1:].ravel()
-    stretch = (("stretch", "identity"),)
-    scene.add_terms([Term("contact_weight", axes, CORNERS.ravel(), stretch), Term("gravity", 2, down[2], stretch)])
+    axes = np.arange(4 * len(CORNERS)).reshape(-1, 4)[:, 1:].ravel()  # of the weights of the corners' nodes
+    rounding, stretch = (("rounding", "identity"),), (("stretch", "identity"),)
+    scene.add_terms(
+        [
+            Term("contact_weight", axes, -np.sign(CORNERS).ravel(), rounding),
+            Term("contact_radius", 0, 1.0, rounding),
+            Term("contact_weight", axes, CORNERS.ravel(), stretch),
+            Term("gravity", 2, down[2], stretch),
+        ]
+    )
     return scene
 
 
-def quantities(point: Mapping[str, float]) -> dict[str, float]:
-    """The scene's quantities of a point of the search: `hollow` is by how much the moments of inertia are larger than
-    those of a homogeneous cube."""
-    values = dict(point)
-    moment = INERTIA * (1.0 + values.pop("hollow", 0.0))
-    return values | {f"cube_inertia_{axis}": moment for axis in (1, 2, 3)}
+def experiment(toss: Toss) -> sb.Experiment:
+    """A toss up to its first frames after contact."""
+    scene, until = scene_of(toss, toss.free), min(toss.free + AFTER, len(toss.times))
+    poses = toss.times[:until], toss.positions[:until], toss.quaternions[:until]
+    return sb.Experiment(
+        scene=scene,
+        recording=sb.Recording.from_poses(*poses, COMPARED, name=toss.name.replace(" ", "_")),
+        markers=sb.on_body(scene.bodies["cube"], COMPARED),
+        solver=SOLVER,
+        sigma=SIGMA,
+        loss="soft_l1",
+        loss_scale=2.0,
+    )
 
 
-def fitted(group: list[Toss], rounds: int = ROUNDS, points: int = POINTS) -> dict[str, float]:
-    """The numbers that all tosses share, by the cross-entropy method (Rubinstein 1999): each round draws points around
-    the best ones of the round before, as widely as those lie apart.
+def fitted(group: list[Toss]) -> sb.Fit:
+    """The numbers that all tosses share. Where each begins is given by its poses before contact."""
+    free = [sb.Parameter(name=name, initial=value, scale=SIZES.get(name)) for name, value in FROM.items()]
+    return sb.fit([experiment(toss) for toss in group], parameters=free, windows=[], refine=False, profiles=False)
 
-    The score of a point is the mean error of the center over time plus a third of that at rest.
-    """
-    names = list(BEGIN)
-    middle, wide = np.array(list(BEGIN.values())).T
+
+def friction_of_whole_paths(group: list[Toss], values: Mapping[str, float]) -> float:
+    """The friction with which the other values predict whole paths best: the score is the mean error of the center over
+    time plus a third of that at rest."""
     scenes = [scene_of(toss, toss.free) for toss in group]
-    random = np.random.default_rng(0)
-    best: tuple[float, np.ndarray] = (np.inf, middle)
-    for k in range(rounds):
-        drawn = np.vstack([middle, middle + wide * random.standard_normal((points - 1, len(names)))])
-        drawn[:, :3] = np.abs(drawn[:, :3])
-        scores = []
-        for point in drawn:
-            values = dict(zip(names, point, strict=True))
-            found = np.array([errors(t, values, s) for t, s in zip(group, scenes, strict=True)])
-            scores.append(float(found[:, 0].mean() + found[:, 1].mean() / 3))
-        order = np.argsort(scores)
-        best = min(best, (scores[order[0]], drawn[order[0]]), key=lambda one: one[0])
-        chosen = drawn[order[:BEST]]
-        middle, wide = 0.3 * best[1] + 0.7 * chosen.mean(axis=0), np.maximum(0.75 * wide, 0.9 * chosen.std(axis=0))
-        print(f"round {k + 1}: best score {best[0]:.2f} mm, around {np.array2string(middle, precision=4)}", flush=True)
-    return dict(zip(names, (float(a) for a in middle), strict=True))
+
+    def score(friction: float) -> float:
+        own = {**values, "table_friction": friction}
+        found = np.array([errors(toss, own, scene) for toss, scene in zip(group, scenes, strict=True)])
+        return float(found[:, 0].mean() + found[:, 1].mean() / 3.0)
+
+    return float(minimize_scalar(score, bounds=FRICTION, method="bounded", options={"xatol": 5e-4}).x)
 
 
-def errors(toss: Toss, point: Mapping[str, float], scene: sb.Scene) -> np.ndarray:
+def errors(toss: Toss, values: Mapping[str, float], scene: sb.Scene) -> np.ndarray:
     """Of a prediction: of the center in mm, mean over time and at rest, and of the attitude in degrees, likewise."""
-    values = quantities(point)
     motion = sb.simulate(scene, toss.times, SOLVER, values)
     places, axes = scene.bodies["cube"].pose(motion, values)
     apart = 1e3 * np.linalg.norm(places - toss.positions, axis=1)
@@ -154,9 +165,9 @@ def without_physics(toss: Toss, seen: int = SEEN) -> np.ndarray:
     return np.array([[a.mean(), a[-1]] for a in apart])
 
 
-def report(label: str, group: list[Toss], point: Mapping[str, float], seen: int | None = None) -> None:
-    scenes = [scene_of(toss, seen or toss.free, point.get("table_restitution")) for toss in group]
-    found = np.array([errors(toss, point, scene) for toss, scene in zip(group, scenes, strict=True)])
+def report(label: str, group: list[Toss], values: Mapping[str, float], seen: int | None = None) -> None:
+    scenes = [scene_of(toss, seen or toss.free, values.get("table_restitution")) for toss in group]
+    found = np.array([errors(toss, values, scene) for toss, scene in zip(group, scenes, strict=True)])
     mean, middle = found.mean(axis=0), np.median(found, axis=0)
     frames = "all frames before contact" if seen is None else f"the first {seen} frames"
     print(
@@ -170,18 +181,18 @@ def main(count: int) -> None:
     every = tosses()
     data = every[::2][:count]
     rest = [toss for toss in every if toss not in data]
-    found = fitted(data)
-    print("fitted: " + ", ".join(f"{name} {value:.4g}" for name, value in found.items()))
+    fit = fitted(data)
+    print(fit.report())
+    impact = {name: fit.values[name] for name in FROM}
+    ratios = ", ".join(f"{impact[f'cube_inertia_{axis}'] / INERTIA:.3f}" for axis in (1, 2, 3))
+    print(f"moments of inertia over those of a homogeneous cube: {ratios} (of a thin shell 1.667)")
+    found = {**impact, "table_friction": friction_of_whole_paths(data, impact)}
+    print(f"friction of whole paths: {found['table_friction']:.4f}")
     report(f"fitted, the {len(data)} tosses of the fit", data, found)
     for seen in (None, SEEN):
         report(f"fitted, {len(rest)} others", rest, found, seen)
         report(f"authors, {len(rest)} others", rest, AUTHORS, seen)
-    centered = found | {f"cube_center_{axis}": 0.0 for axis in "xyz"}
-    report(f"fitted but with the center of mass in the middle, {len(rest)} others", rest, centered)
-    elastic = {name: value for name, value in found.items() if name != "table_contact_dissipation"}
-    for restitution in (0.0, 0.2):
-        label = f"fitted but rigid with restitution {restitution}, {len(rest)} others"
-        report(label, rest, elastic | {"table_restitution": restitution})
+    report(f"fitted to the first {AFTER} frames after contact alone, {len(rest)} others", rest, impact)
     plain = np.mean([without_physics(toss) for toss in rest], axis=0)
     guesses = ("lies where it was seen last", "flies on until it is as low as it rests")
     for label, row in zip(guesses, plain, strict=True):

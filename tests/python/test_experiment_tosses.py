@@ -32,13 +32,27 @@ def test_gravity_of_a_few_flights_predicts_the_others_from_their_first_frames() 
 
 
 def test_tosses_come_to_rest_as_predicted() -> None:
-    from landings import AUTHORS, errors, scene_of, tosses, without_physics
+    from landings import FROM, INERTIA, errors, scene_of, tosses, without_physics
 
     every = tosses()
     assert len(every) == 63
     group = every[1:16:2]
-    fitted = AUTHORS | {"table_restitution": 0.232, "hollow": 0.614, "stretch": 0.00124}  # expected/landings.txt
-    found = np.array([errors(toss, fitted, scene_of(toss, toss.free)) for toss in group])
-    assert found[:, 0].mean() < 14.0  # mm
-    assert found[:, 1].mean() < 26.0
-    assert found[:, 0].mean() < 0.1 * np.mean([without_physics(toss)[1, 0] for toss in group])
+    found = FROM | {"table_friction": 0.178, "table_contact_dissipation": 2.87, "rounding": 3.8e-3, "stretch": 2.6e-3}
+    found |= {f"cube_inertia_{axis}": 1.58 * INERTIA for axis in (1, 2, 3)} | {"cube_center_z": 5.7e-3}
+    off = np.array([errors(toss, found, scene_of(toss, toss.free)) for toss in group])  # as in expected/landings.txt
+    assert off[:, 0].mean() < 10.0  # mm
+    assert off[:, 1].mean() < 18.0
+    assert off[:, 0].mean() < 0.07 * np.mean([without_physics(toss)[1, 0] for toss in group])
+    centered = np.array([errors(toss, found | {"cube_center_z": 0.0}, scene_of(toss, toss.free)) for toss in group])
+    assert off[:, 2].mean() < centered[:, 2].mean()  # the attitude tells where the center of mass is
+
+
+def test_first_frames_after_contact_tell_that_the_cube_is_hollow() -> None:
+    from landings import INERTIA, fitted, tosses
+
+    found = fitted(tosses()[:16:2])
+    for axis in (1, 2, 3):
+        estimate = found[f"cube_inertia_{axis}"]
+        assert 1.3 < estimate.value / INERTIA < 1.9
+    assert 0.15 < found.values["table_friction"] < 0.19
+    assert 2e-3 < found.values["cube_center_z"] < 10e-3
