@@ -379,6 +379,8 @@ WRONG_TYPES = {
     "substep under torch": ("solver", lambda: st.simulate(rope(), TIMES, 0.001)),
     "substep of a stepper": ("solver", lambda: st.Stepper(rope(), 0.001)),
     "nothing to load": ("path", lambda: sb.Recording.load(None)),
+    "name of a particle": ("particle", lambda: sb.on_particle("tip")),
+    "particle that is no number": ("second", lambda: sb.between(0, 1.5, 0.5)),
 }
 
 

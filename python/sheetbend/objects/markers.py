@@ -67,14 +67,29 @@ class Place:
 
 
 def on_particle(particle: int) -> Place:
-    """A marker on a particle."""
-    return Place((int(particle),), (1.0,), (0.0,))
+    """A marker on a particle.
+
+    Raises:
+        SceneError: not the number of a particle.
+    """
+    return Place((_number("particle", particle),), (1.0,), (0.0,))
 
 
 def between(first: int, second: int, fraction: float) -> Place:
-    """A marker on the line through two particles, `fraction` of the way (beyond them for fractions outside 0 to 1)."""
+    """A marker on the line through two particles, `fraction` of the way (beyond them for fractions outside 0 to 1).
+
+    Raises:
+        SceneError: not the numbers of particles.
+    """
     f = float(fraction)
-    return Place((int(first), int(second)), (1.0 - f, f), (-1.0, 1.0))
+    return Place((_number("first", first), _number("second", second)), (1.0 - f, f), (-1.0, 1.0))
+
+
+def _number(field: str, particle: object) -> int:
+    if isinstance(particle, bool) or not isinstance(particle, int | np.integer):
+        fix = "give its number, such as rope.particles[-1] for the end of a rope"
+        raise SceneError(field, "is not the number of a particle", particle, fix)
+    return int(particle)
 
 
 def on_body(body: Body, points: ArrayLike) -> tuple[Place, ...]:
