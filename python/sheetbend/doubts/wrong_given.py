@@ -114,10 +114,10 @@ def wrong_given(
         return found
 
     found = asked()
-    sure = [one for one in found if one.sure]
-    if not _much_left(problem, u, {one.motions for one in sure}) or not (driven := driven_span(problem, u)).size:
+    sure = {one.motions for one in found if one.sure}
+    if not _much_left(problem, u, sure) or not (driven := driven_span(problem, u)).size:
         return found
-    return sure + [one for one in asked(driven) if all(one.motions != other.motions for other in sure)]
+    return _surer(found, asked(driven))
 
 
 def _surer(found: Sequence[Wrong], others: Sequence[Wrong]) -> list[Wrong]:
