@@ -34,6 +34,7 @@ from ..statistics.gauge import RANK_TOLERANCE
 
 DRAWS = 64  # of the noise where parts of the data are compared; eight of them share a rollout
 FEW = 24  # of the noise, for intervals
+MOST_NUMBERS = 192  # of a driven motion, all of which are asked for: eight times as many rollouts as for an interval
 PACK = 8  # draws that share a rollout
 UNFELT = 0.2  # standard errors: what moves estimates by less adds no more than 2 % to an interval
 CHANCE = 0.05  # share of the draws that resemble the others less than residuals of such noise are taken to do
@@ -190,6 +191,20 @@ def driven_errors(problem: FitProblem, u: Array, draws: int = DRAWS) -> Array:
     for i, moved in ({} if found is None else found.moved).items():
         errors[problem.core.first_rows[i] : problem.core.first_rows[i + 1]] = moved.T
     return errors
+
+
+def driven_span(problem: FitProblem, u: Array) -> Array:
+    """(data rows, n) what every change of a driven motion does to the weighted residuals at u (free,), of any size and
+    to first order. Motions are left out that have more numbers than half of their rows or than `MOST_NUMBERS`, or whose
+    noise no interval feels."""
+    first, few = problem.core.first_rows, drawn_noise(problem, u, FEW)
+    counts = {i: drawn.shape[1] for i, drawn in ({} if few is None else few.draws).items()}
+    counts = {i: n for i, n in counts.items() if n <= min((first[i + 1] - first[i]) // 2, MOST_NUMBERS)}
+    errors = driven_errors(problem, u, max(counts.values())) if counts else np.zeros((problem.core.data_rows, 0))
+    span = [np.zeros((len(errors), n)) for n in counts.values()]
+    for made, (i, n) in zip(span, counts.items(), strict=True):
+        made[first[i] : first[i + 1]] = errors[first[i] : first[i + 1], :n]
+    return np.column_stack(span) if span else errors
 
 
 def _shaken(problem: FitProblem) -> dict[int, Experiment]:

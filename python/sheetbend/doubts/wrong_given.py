@@ -34,7 +34,7 @@ from ..statistics.intervals import reach_of
 from .cloth_size import cloth_sizes
 from .contradictions import residual_shifts, value_words
 from .directions import EXPLAINS, LEVEL, noise_in, rows_of, tied
-from .driven_errors import FEW, driven_errors
+from .driven_errors import FEW, driven_errors, driven_span
 from .held_losses import held_names
 from .missing_parts import missing_parts
 from .other_losses import LEAVES
@@ -76,6 +76,7 @@ class Wrong:
         explained: share of what the fit leaves beyond noise.
         times: what they leave beyond noise, as a multiple of the noise, or of what sigma allows where that is more.
         sure: explains nearly all; else a third or more of what is much more than noise.
+        driven: with all taken out that another driven motion would explain.
     """
 
     motions: tuple[int, ...]
@@ -84,6 +85,7 @@ class Wrong:
     explained: float
     times: float
     sure: bool = True
+    driven: bool = False
 
 
 def wrong_given(
@@ -97,14 +99,32 @@ def wrong_given(
         told: `told_numbers` there.
         refinement: of the discretization; where a number is to be named, one simulation each tells what a shorter
             substep and a finer mesh explain, and that counts first.
+
+    Noise of what drives a scene hides a wrong number. So where much is left of a motion and no number explains nearly
+    all of it, they are asked for what no other driven motion explains (`driven_span`).
     """
     ok, r, J = problem.evaluate(u)
     if not ok or not np.isfinite(J).all() or problem.estimates_corrections:
         return []
-    found = _asked(problem, u, r, J, told)
-    if found and refinement is not None and (shifts := residual_shifts(problem, u, refinement)):
-        found = _asked(problem, u, r, J, told, np.column_stack(shifts))
-    return found
+
+    def asked(driven: Array | None = None) -> list[Wrong]:
+        found = _asked(problem, u, r, J, told, driven=driven)
+        if found and refinement is not None and (shifts := residual_shifts(problem, u, refinement)):
+            found = _asked(problem, u, r, J, told, np.column_stack(shifts), driven)
+        return found
+
+    found = asked()
+    sure = {one.motions for one in found if one.sure}
+    if not _much_left(problem, u, sure) or not (driven := driven_span(problem, u)).size:
+        return found
+    return _surer(found, asked(driven))
+
+
+def _surer(found: Sequence[Wrong], others: Sequence[Wrong]) -> list[Wrong]:
+    """What was found, and of motions of which nothing explains nearly all what does among others."""
+    by = {one.motions: one for one in found}
+    by |= {one.motions: one for one in others if one.sure and not (one.motions in by and by[one.motions].sure)}
+    return list(by.values())
 
 
 def wrong_in_either(
@@ -121,13 +141,11 @@ def wrong_in_either(
         fitted: both before.
         told: `told_numbers` in the limit.
     """
-    found = {one.motions: one for one in wrong_given(*at, told, refinement)}
-    if at[0] is fitted[0] or (all(one.sure for one in found.values()) and not _much_left(*at, set(found))):
-        return list(found.values())
-    for one in wrong_given(*fitted, told_numbers(*fitted)[0], refinement):
-        if one.sure and not (one.motions in found and found[one.motions].sure):
-            found[one.motions] = one
-    return list(found.values())
+    found = wrong_given(*at, told, refinement)
+    sure = {one.motions for one in found if one.sure}
+    if at[0] is fitted[0] or (len(sure) == len(found) and not _much_left(*at, sure)):
+        return found
+    return _surer(found, wrong_given(*fitted, told_numbers(*fitted)[0], refinement))
 
 
 def _much_left(problem: FitProblem, u: Array, but: set[tuple[int, ...]]) -> bool:
@@ -138,16 +156,25 @@ def _much_left(problem: FitProblem, u: Array, but: set[tuple[int, ...]]) -> bool
 
 
 def _asked(
-    problem: FitProblem, u: Array, r: Array, J: Array, told: Sequence[Told], known: Array | None = None
+    problem: FitProblem,
+    u: Array,
+    r: Array,
+    J: Array,
+    told: Sequence[Told],
+    known: Array | None = None,
+    driven: Array | None = None,
 ) -> list[Wrong]:
-    """The same, with known errors of the residuals (rows, errors) of any size taken out."""
+    """The same, with known errors of the residuals (rows, errors) of any size taken out, and changes of what drives the
+    scenes (rows, changes). These may have moved the parameters, too."""
     layout, data, count = problem.rows_layout(), problem.core.data_rows, J.shape[1]
-    if known is not None:
-        J = np.hstack([J, np.vstack([known, np.zeros((len(r) - data, known.shape[1]))])])
+    for more in (known, driven):
+        if more is not None:
+            J = np.hstack([J, np.vstack([more, np.zeros((len(r) - data, more.shape[1]))])])
     scale = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)
     q, sizes, right = np.linalg.svd(J / scale, full_matrices=False)
     kept = sizes > RANK_TOLERANCE * sizes.max(initial=0.0)
     q, inverse = q[:, kept], right[kept].T / sizes[kept] / scale[:, None]
+    there = np.zeros(count) if driven is None else (-inverse @ (q.T @ r))[:count]
     r = r - q @ (q.T @ r)
     errors = cache(partial(driven_errors, problem, u, FEW))
     found = []
@@ -171,8 +198,9 @@ def _asked(
             if likely:
                 words = tuple(" and ".join(_off(one, more, problem, group) for one, more, _ in c.parts) for c in likely)
                 moved = [np.sum([more * column for _, more, column in c.parts], axis=0) for c in likely]
-                steps = tuple((-inverse @ (q.T @ by))[:count] for by in moved)
-                found.append(Wrong(tuple(group), words, steps, likely[0].explained, left / allowed, least == MOST))
+                steps = tuple(there + (-inverse @ (q.T @ by))[:count] for by in moved)
+                share, beside = likely[0].explained, driven is not None
+                found.append(Wrong(tuple(group), words, steps, share, left / allowed, least == MOST, beside))
                 break
     return found
 
@@ -324,7 +352,8 @@ def _unsure(problem: FitProblem, wrong: Wrong) -> str:
 def _sentence(problem: FitProblem, wrong: Wrong) -> str:
     whose = _whose(problem, wrong)
     part = short(100 * min(wrong.explained, 1.0), 2)
-    return f"{part} % of what the fit leaves of {whose} beyond noise is as if {', or '.join(wrong.words)}"
+    noise = "noise, that of what drives it included," if wrong.driven else "noise"
+    return f"{part} % of what the fit leaves of {whose} beyond {noise} is as if {', or '.join(wrong.words)}"
 
 
 def _off(one: Told, more: float, problem: FitProblem, group: Sequence[int]) -> str:
