@@ -1,5 +1,5 @@
-"""Cloth with internal friction in bending: the loop of a strip bent to and fro, the crease that is left, gradients, and
-what is refused."""
+"""Cloth with internal friction in bending: the loop of a strip bent back and forth, the crease that is left,
+gradients, and what is refused."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ HEIGHT = 2.0 * SHARE * B * YIELD
 # --- O-40: the loop of Kawabata's bending test
 
 
-def test_the_loop_of_a_strip_bent_to_and_fro():
+def test_the_loop_of_a_strip_bent_back_and_forth():
     """In a closed cycle, wherever both branches slide, the loop is 2 share B yield high and (1 - share) B steep."""
     measured = moments(LOOP)
     assert measured == approx(law(LOOP)[0], abs=1e-3 * B * LOOP.max())

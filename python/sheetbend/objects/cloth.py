@@ -123,8 +123,8 @@ def add_cloth(
             along the warp; the curvature along the weft counts by sqrt(bending_weft/bending). What has slid, the set,
             starts at zero. None = elastic.
         yield_share: the part of the bending stiffness that slides, between 0 and 1: beyond yield (1 - share) of it is
-            left. Small motion shows all of it. A strip bent to and fro has a loop of 2 share bending yield_curvature
-            in its moment per width (2HB of a KES test).
+            left. Small motion shows all of it. A strip bent back and forth has a loop of 2 share bending
+            yield_curvature in its moment per width (2HB of a KES test).
         drag_linear, drag_quadratic: air drag per area, isotropic.
 
     Raises:
