@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <sstream>
 
 #include "core/solver/moved_rows.h"
@@ -18,6 +19,9 @@ constexpr double first_share = 0.25, least_share = 1.0 / 256.0;  // of friction,
 constexpr double firmer =
     10.0;                    // contacts that lift (core/contact/rebound.h) get stiffer by this from balance to balance
 constexpr int patience = 4;  // steps without progress before a leap over a kink
+// Pairs leave little room to leap. After so many steps in which the merit has not become lower by a share, its minimum is given up.
+constexpr int most_idle = 16;
+constexpr double idle_share = 1e-2;
 // How far leaps go, of a whole step. Whole steps alone may lead back to the same kink again and again.
 constexpr double leap_shares[] = {1.0, 0.5, 2.0, 0.25, 1.5, 0.75, 0.35, 0.6};
 constexpr int most_leaps = static_cast<int>(std::size(leap_shares));
@@ -268,7 +272,8 @@ void ImplicitBlock::begin() { first_ = balance_.size(); }
 // Newton's method from x_, where the potential was looked at last. False where it stalls, or takes too many matrices. Where friction acts, its merit may
 // lead to a kink that is no balance; a step that need not lower it leaps over that.
 bool ImplicitBlock::find_balance(const Scene& scene, const DirectBlock& block, const SolverOptions& options) {
-  int leaps = 0;
+  int leaps = 0, idle = 0;
+  double lowest = std::numeric_limits<double>::infinity();  // merit
   std::size_t last_leap = first_;
   const auto stalls = [&](std::size_t since) {
     const std::size_t k = balance_.size();
@@ -287,6 +292,12 @@ bool ImplicitBlock::find_balance(const Scene& scene, const DirectBlock& block, c
       continue;
     }
     if (matrices_ >= options.iterations) return false;
+    if (rigid().empty() && !potential.pairs.empty() && by_merit_ && merit_ > (1.0 - idle_share) * lowest) {
+      if (++idle > most_idle) return false;
+    } else {
+      idle = 0;
+      lowest = merit_;
+    }
     const bool was_convex = convexity_ > 0.0;
     factorize_newton(scene, block);
     // Past a saddle the way is long with a matrix that was made convex.

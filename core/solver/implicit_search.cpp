@@ -11,7 +11,9 @@ namespace {
 
 using sheetbend_blocks::row;
 
-constexpr double flat = 1e-8;      // relative changes of Phi that rounding may hide
+constexpr double flat = 1e-8;  // relative changes of Phi that rounding may hide
+// Of a step that goes down in the merit: shorter ones only run into a kink at which it has a minimum.
+constexpr int most_halvings_of_merit = 30;
 constexpr int most_kinks = 10;     // full steps in a row that may raise the merit
 constexpr double no_slip = 1e30;   // a friction
 constexpr int most_sections = 36;  // of the way, where its lowest point is looked for
@@ -100,7 +102,7 @@ bool ImplicitBlock::search_where_it_rubs(const Scene& scene, const DirectBlock& 
     ++matrices_;
     if (!matrix_.factorize_unsymmetric(scene, block, convexity)) continue;
     take_direction(block);
-    if (search_line(block, most_halvings)) return true;
+    if (search_line(block, most_halvings_of_merit)) return true;
   }
   return false;
 }
@@ -132,7 +134,8 @@ bool ImplicitBlock::step_over_kinks(const Scene& scene, const DirectBlock& block
 
 // Along the Newton step that is in d_. False where nothing lowers what is to fall.
 bool ImplicitBlock::go_down(const Scene& scene, const DirectBlock& block, int most_matrices) {
-  if (rigid().empty()) return search_line(block, most_halvings) || search_where_it_rubs(scene, block);
+  if (rigid().empty())
+    return search_line(block, by_merit_ ? most_halvings_of_merit : most_halvings) || search_where_it_rubs(scene, block);
   if (search_line(block, 1)) return true;
   if (step_over_kinks(scene, block, most_matrices)) return true;
   const double before = merit_;

@@ -1,0 +1,103 @@
+"""A cloth on a table is folded twice, as a letter is: two of its edges are carried over, one after the other.
+
+    python experiments/bench/folding_cloth.py [--vertices 484] [--h 2e-3] [--speed 0.5] [--friction 0.3] [--substeps N]
+
+Prints processor time per substep, and whether anything passed through: no edge of the cloth may cross one of its
+triangles in about 50 of the frames (a test of its own, in NumPy).
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+import numpy as np
+import sheetbend as sb
+from sheetbend.mesh import TriangleMesh, grid
+
+THICKNESS, EDGE = 1e-3, 5e-3  # m
+CLEARANCE = 1.5 * THICKNESS  # between the middles of layers, where an edge is put down
+KNOTS = 241  # of the motion
+
+
+def carried(x: np.ndarray, about: float, height: float, done: np.ndarray) -> np.ndarray:
+    """(times, n, 3) of an edge that goes half a circle about the line at `about`; `done`: its share of the way."""
+    ease = 0.5 * (1.0 - np.cos(np.pi * np.clip(done, 0.0, 1.0)))  # starts and ends at rest
+    radius = x[:, 0] - about
+    path = np.repeat(x[None], len(done), axis=0)
+    path[:, :, 0] = about + radius * np.cos(np.pi * ease)[:, None]
+    path[:, :, 2] += np.abs(radius) * np.sin(np.pi * ease)[:, None] + height * ease[:, None]
+    return path
+
+
+def scene_of(vertices: int, speed: float, friction: float) -> tuple[sb.Scene, TriangleMesh, float]:
+    """The scene, its mesh, and how long both folds take."""
+    side = round(np.sqrt(vertices)) - 1
+    mesh = grid(side * EDGE, side * EDGE, side, side, "one_way")
+    length, third = side * EDGE, side * EDGE / 3
+    x = mesh.vertices + np.array([0.0, 0.0, 0.5 * THICKNESS + 1e-6])
+    scene = sb.Scene("folding")
+    cloth = sb.add_cloth(scene, mesh, density=0.2, warp=300.0, shear=60.0, bending=2e-6, positions=x)
+    seconds = np.pi * third / speed
+    end = 2.2 * seconds
+    right = np.flatnonzero(mesh.vertices[:, 0] > length - 0.5 * EDGE)
+    left = np.flatnonzero(mesh.vertices[:, 0] < 0.5 * EDGE)
+    times = np.linspace(0.0, end, KNOTS)
+    ways = [
+        carried(x[edge], about, height, (times - begin) / seconds)
+        for edge, about, height, begin in (
+            (right, 2 * third, CLEARANCE, 0.0),
+            (left, third, 2 * CLEARANCE, 1.1 * seconds),
+        )
+    ]
+    scene.drive(cloth.particles[np.concatenate([right, left])], times, np.concatenate(ways, axis=1), "linear")
+    scene.contact(cloth, sb.Plane(name="table"), friction=friction, radius=0.5 * THICKNESS)
+    scene.self_contact(cloth, radius=0.5 * THICKNESS, **({"friction": friction} if friction else {}))
+    return scene, mesh, end
+
+
+def crossings(x: np.ndarray, edges: np.ndarray, triangles: np.ndarray) -> int:
+    """How many edges cross triangles with which they share no vertex (Moeller & Trumbore 1997)."""
+    count = 0
+    low, high = x[triangles].min(axis=1), x[triangles].max(axis=1)
+    for a, b in edges:
+        p, q = x[a], x[b]
+        near = (low <= np.maximum(p, q)).all(1) & (high >= np.minimum(p, q)).all(1)
+        near &= ((triangles != a) & (triangles != b)).all(1)
+        t = triangles[near]
+        if not len(t):
+            continue
+        e, f, d, r = x[t[:, 1]] - x[t[:, 0]], x[t[:, 2]] - x[t[:, 0]], q - p, p - x[t[:, 0]]
+        h = np.cross(d, f)
+        det = (e * h).sum(1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u = (r * h).sum(1) / det
+            c = np.cross(r, e)
+            v = (c * d).sum(1) / det
+            s = (f * c).sum(1) / det
+        count += int(((u >= 0) & (v >= 0) & (u + v <= 1) & (s >= 0) & (s <= 1)).sum())
+    return count
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--vertices", type=int, default=484)
+    parser.add_argument("--h", type=float, default=2e-3)
+    parser.add_argument("--speed", type=float, default=0.5, help="mean speed of an edge, m/s")
+    parser.add_argument("--friction", type=float, default=0.3)
+    parser.add_argument("--substeps", type=int, default=0, help="how many at most; all when left out")
+    given = parser.parse_args()
+    scene, mesh, end = scene_of(given.vertices, given.speed, given.friction)
+    solver = sb.Solver(h=given.h, method="implicit", integrator="bdf1")
+    count = given.substeps or int(np.ceil(end / given.h))
+    edges = scene.contacts.pieces[0].edges
+    start = time.process_time()
+    motion = sb.simulate(scene, np.arange(count + 1) * given.h, solver)
+    seconds = (time.process_time() - start) / count
+    print(f"{scene.particle_count} vertices, {count} substeps: {seconds:.3f} s a substep")
+    passed = [crossings(x, edges, mesh.triangles) for x in motion.positions[:: max(1, count // 50)]]
+    print(f"crossings: {max(passed)}")
+
+
+if __name__ == "__main__":
+    main()
