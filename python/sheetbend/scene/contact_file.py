@@ -78,13 +78,13 @@ def read_contacts(reader: Reader, scene: Scene, take: Callable[..., Array], fix:
         if nodes not in (1, BODY):
             reader.fail(where + "nodes", "is no number of nodes of a point", nodes, fix)
         rows = reader.nodes(f"contact_{i}", (None, nodes + 1))
-        numbers = [
+        collider, rigid, bounces = (
             reader.part(about, key, kind, where)
             for key, kind in (("collider", int), ("rigid", bool), ("bounces", bool))
-        ]
+        )
         dissipates = "dissipates" in about and reader.part(about, "dissipates", bool, where)
         name = reader.name(about, "name", where)
-        contacts.contacts.append(Contact(name, numbers[0], rows[:, :-1], rows[:, -1], *numbers[1:], dissipates))
+        contacts.contacts.append(Contact(name, collider, rows[:, :-1], rows[:, -1], rigid, bounces, dissipates))
     count, soft = len(contacts.contacts), sum(not c.rigid for c in contacts.contacts)
     made = [take("friction", count), take("contact_radius", count), take("contact_stiffness", soft)]
     colliders = reader.records("colliders")
