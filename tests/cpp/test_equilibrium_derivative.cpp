@@ -304,7 +304,7 @@ TEST_P(Derivative, MatchesEquilibriaSolvedAgain) {
       EXPECT_TRUE(e.converged) << e.message;
       return e;
     };
-    const double step = 1e-3;
+    const double step = 5e-4;
     const Equilibrium a = moved(step), b = moved(-step), c = moved(0.5 * step), d = moved(-0.5 * step);
     const auto difference = [&](const std::vector<double>& a, const std::vector<double>& b,
                                 const std::vector<double>& c, const std::vector<double>& d, std::size_t i) {

@@ -1,4 +1,6 @@
 // Rollouts with eight directions: the values have the bits of a rollout without them, the directions are those of the complex step.
+#include <limits>
+
 #include "core/scalar/dual.h"
 #include "tests/cpp/support/programs.h"
 
@@ -31,11 +33,18 @@ TEST_P(Tangents, FollowTheRollout) {
   EXPECT_TRUE(same_bits(part(found, -1), states(p, sample.inputs)));
   double worst = 0.0;
   for (int k = 0; k < 8; ++k) {
-    const auto oracle = complex_step_along([&](const std::vector<Complex>& z) { return states(exact, z); },
-                                           sample.inputs, part(inputs, k));
-    worst = std::max(worst, relative_error(part(found, k), oracle));
+    const auto oracle = [&](const std::vector<double>& at) {
+      return complex_step_along([&](const std::vector<Complex>& z) { return states(exact, z); }, at, part(inputs, k));
+    };
+    const std::vector<double> expected = oracle(sample.inputs);
+    const double error = relative_error(part(found, k), expected);
+    worst = std::max(worst, error);
+    if (error <= 1e-12) continue;
+    // No worse than what the last bits of the inputs do to the oracle itself.
+    std::vector<double> near = sample.inputs;
+    for (double& a : near) a *= 1.0 + random(-1.0, 1.0) * std::numeric_limits<double>::epsilon();
+    EXPECT_LE(error, relative_error(oracle(near), expected));
   }
-  EXPECT_LE(worst, 1e-12);
   record_error("tangents", worst);
 }
 
