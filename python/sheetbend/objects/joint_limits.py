@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 from ..arrays.checks import finite, is_number
 from ..errors import SceneError
 from ..quantities.expression import Expression, numbers
-from ..quantities.quantities import ZERO_OR_MORE, Term
 from ..scene.body import Body
 from .joint_making import Making
 
@@ -71,14 +70,9 @@ def add_limits(
     group = made.constrain(
         kind, "stop", stencil, [[*weights, 0.5 * (low + high), 0.5 * (high - low), grown]], [1.0], damped
     )
-    own, first, _ = scene.group(group)
-    own.compliance[:] = 0.0
-    scene.add_quantity(f"{name}_limit_stiffness", k, PER[unit])
-    scene.add_terms([Term("compliance", first, 1.0, ((f"{name}_limit_stiffness", "inverse"),))])
+    made.name_stiffness(group, f"{name}_limit_stiffness", k, PER[unit])
     if damping is not None:
-        bounds = None if damping > 0.0 else ZERO_OR_MORE
-        scene.add_quantity(f"{name}_limit_damping", damping, RATE[unit], positive=damping > 0.0, limits=bounds)
-        scene.add_terms([Term("damping", first, 1.0, ((f"{name}_limit_damping", "identity"),))])
+        made.name_damping(group, f"{name}_limit_damping", damping, RATE[unit])
 
 
 def checked_limits(name: str, unit: str, limits: ArrayLike) -> tuple[float, float]:

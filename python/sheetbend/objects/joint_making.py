@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ..arrays.checks import finite, is_number
 from ..errors import SceneError
 from ..quantities.expression import Array, Expression, cross, expressions, numbers, terms_of, vector
+from ..quantities.quantities import ZERO_OR_MORE, Term
 from ..scene.body import AXES, GROUND, PLACE, Body, FrameState, HasMotion
 from ..scene.scene import Scene
 from .chain import first_value, unit_vector
@@ -207,6 +208,20 @@ class Making:
         group = f"{self.name}_{label}"
         constrain(self.scene, kind, group, stencil, expressions(weights), compliance, damping, viscosity)
         return group
+
+    def name_stiffness(self, group: str, quantity: str, value: float, unit: str) -> None:
+        """Make a quantity of the stiffness of a group of one constraint, which was given a compliance."""
+        own, first, _ = self.scene.group(group)
+        own.compliance[:] = 0.0
+        self.scene.add_quantity(quantity, value, unit)
+        self.scene.add_terms([Term("compliance", first, 1.0, ((quantity, "inverse"),))])
+
+    def name_damping(self, group: str, quantity: str, value: float, unit: str) -> None:
+        """Make a quantity of the damping of a group of one constraint, which was given one of zero."""
+        _, first, _ = self.scene.group(group)
+        limits = None if value > 0.0 else ZERO_OR_MORE
+        self.scene.add_quantity(quantity, value, unit, positive=value > 0.0, limits=limits)
+        self.scene.add_terms([Term("damping", first, 1.0, ((quantity, "identity"),))])
 
 
 def constrain(

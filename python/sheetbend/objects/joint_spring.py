@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..arrays.checks import check_increasing, finite, is_number
 from ..errors import SceneError
 from ..quantities.expression import Expression
-from ..quantities.quantities import ZERO_OR_MORE, Term
+from ..quantities.quantities import Term
 from ..scene.scene import Array
 from .joint_making import Making
 
@@ -88,15 +88,10 @@ def _angle(made: Making, label: str, dial: int, stiffness: float | None, rest: f
     else:
         compliance = None if stiffness is None else one
         group = made.constrain("joint_angle", label, [[*a, *b, dial]], [weights], compliance, damped)
-    own, first, _ = scene.group(group)
     if stiffness is not None:
-        own.compliance[:] = 0.0
-        scene.add_quantity(f"{name}_stiffness", stiffness, "N m/rad")
-        scene.add_terms([Term("compliance", first, 1.0, ((f"{name}_stiffness", "inverse"),))])
+        made.name_stiffness(group, f"{name}_stiffness", stiffness, "N m/rad")
     if viscosity is not None:
-        limits = None if viscosity > 0 else ZERO_OR_MORE
-        scene.add_quantity(f"{name}_viscosity", viscosity, "N m s/rad", positive=viscosity > 0, limits=limits)
-        scene.add_terms([Term("damping", first, 1.0, ((f"{name}_viscosity", "identity"),))])
+        made.name_damping(group, f"{name}_viscosity", viscosity, "N m s/rad")
 
 
 def _knots(field: str, knots: Knots) -> tuple[Array, Array]:
