@@ -35,34 +35,33 @@ def read(section: RecordingSection, folder: Path, path: str) -> Recording:
     """
     if section.cloud == section.file:
         return read_cloud(section, folder, path, section.name)
-    return _read(section, f"{path}.file", folder / section.file, section.name, section.cloud is None)
+    return _read(section, folder, path, "file", section.name, section.cloud is None)
 
 
 def read_cloud(section: RecordingSection, folder: Path, path: str, name: str | None) -> Cloud:
     """The cloud that the recording is compared with, under the name of the recording."""
-    assert section.cloud is not None
-    found = _read(section, f"{path}.cloud", folder / section.cloud, name, True)
+    found = _read(section, folder, path, "cloud", name, True)
     assert isinstance(found, Cloud)
     return found
 
 
-def _read(section: RecordingSection, path: str, file: Path, name: str | None, compared: bool) -> Recording:
-    """One of the files; `frames` are those of what is compared."""
+def _read(section: RecordingSection, folder: Path, path: str, key: str, name: str | None, compared: bool) -> Recording:
+    """The file of a key, "file" or "cloud"; `frames` are those of what is compared."""
+    file = folder / getattr(section, key)
     if not file.exists():
-        raise ConfigError(path, "does not exist", str(file), "give a file relative to the configuration's folder")
-    kind = Cloud if path.endswith(".cloud") else Recording
+        fix = "give a file relative to the configuration's folder"
+        raise ConfigError(f"{path}.{key}", "does not exist", str(file), fix)
+    kind, where = (Cloud, f"{path}.cloud") if key == "cloud" else (Recording, path)
     try:
         recording = kind.load(file, **section.model_dump(include=OF_READER))
         if compared and section.frames is not None:
             recording = recording.frames(slice(*section.frames))
     except RecordingError as error:
-        where = path.removesuffix(".file")
         raise ConfigError(f"{where}.{error.field}", error.problem, error.got, error.fix) from error
     doubt = unit_doubt(recording) if section.units is None else None
     if doubt is not None:
         problem = f"are not said, and in the unit that was read the markers are {extent(recording):.4g} m apart"
-        where = path.rpartition(".")[0]
-        raise ConfigError(f"{where}.units", problem, None, f'give units = "{doubt}", or "m" if it is so')
+        raise ConfigError(f"{path}.units", problem, None, f'give units = "{doubt}", or "m" if it is so')
     return replace(recording, name=name or recording.name)
 
 

@@ -17,6 +17,7 @@ from ..objects.markers import Place, places_for
 from ..quantities.quantities import Term, product
 from ..recording.cloud import Cloud
 from ..recording.recording import Recording
+from ..recording.windows import Window
 from ..scene.scene import Scene
 from .correction import Correction, recorded_noise
 from .force_sensor import INPUTS, ForceSensor
@@ -24,7 +25,6 @@ from .names import check_names
 from .of_cloud import check_cloud, surface_of
 from .shooting import Shooting
 
-Window = tuple[float, float]
 LOSSES = ("squares", "soft_l1", "huber", "cauchy")  # the last for clouds alone
 NO_SHARE = 1e-9  # interpolation weights below this are zero
 

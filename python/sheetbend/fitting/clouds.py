@@ -7,13 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..doubts.driven_noise import driven_doubts
-from ..doubts.misread import misread
+from ..doubts.misread import SEEN, misread
 from ..doubts.told import Told, told_numbers
 from ..minimum.problem import FitProblem
 from ..quantities.wording import short
 from ..statistics.identifiability import Identifiability
 
-SEEN = 3.0  # sigmas: what is left is no noise
 UNTOLD = "the points of a cloud have no places of their own, and where they would go instead is not computed"
 
 

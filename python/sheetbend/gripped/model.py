@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..experiment.experiment import Experiment, Window
+from ..experiment.experiment import Experiment
 from ..motion.solver import Solver
 from ..objects.markers import Place, on_rope
 from ..objects.rod import Rod, add_rod
 from ..quantities.quantities import product
 from ..recording.recording import Recording
+from ..recording.windows import Window
 from ..scene.scene import Scene
 from .motion import Array, GrippedMotion
 

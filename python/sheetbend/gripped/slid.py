@@ -16,9 +16,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays.smoothing import FEWEST
-from ..experiment.experiment import Experiment, Window
+from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
 from ..quantities.parameters import Parameter, Parameters
+from ..recording.windows import Window
 from .model import NAME, RopeModel
 from .motion import Array, GrippedMotion
 from .rest import creep, rests
