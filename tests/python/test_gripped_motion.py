@@ -12,6 +12,7 @@ from sheetbend.gripped.judging import predict
 from sheetbend.gripped.model import nominal_directions, shared_gravity
 from sheetbend.gripped.motion import smoothed
 from sheetbend.gripped.pieces import experiments_of, problem_of
+from sheetbend.motion.simulate import simulate
 from sheetbend.quantities.parameters import Parameter
 
 TIMES = np.arange(101) / 100.0
@@ -45,6 +46,16 @@ def model_of(motion: GrippedMotion, **fields: object) -> RopeModel:
     values = {"EI": 0.02, "GJ": 0.02, "bend_damping": 0.03, "twist_damping": 0.03, "drag_linear": 0.02}
     given = {"density": 0.06, "nominal": nominal_directions([motion]), "values": values, **fields}
     return RopeModel(**given)
+
+
+def simulated(e: sb.Experiment, motion: GrippedMotion, values: dict[str, float] | None = None) -> Array:
+    """(frames, markers, 3) m, the recording's markers, the free ones where the model of an experiment has them."""
+    x, out = simulate(e.scene, e.recording.times, e.solver, values).positions, e.recording.positions.copy()
+    for k in motion.free:
+        place = e.places[k]
+        assert place is not None
+        out[:, k] = np.tensordot(x[:, list(place.particles)], np.asarray(place.weights), axes=(1, 0))
+    return out
 
 
 def pull(e: sb.Experiment) -> Array:

@@ -14,7 +14,7 @@ from sheetbend.gripped.rest import SEEN, creep, rests
 from sheetbend.gripped.slid import MODES, noise
 from sheetbend.motion.simulate import simulate
 from sheetbend.report.scores import coordinate_error
-from test_gripped_motion import GRIP, LENGTH, arch, model_of
+from test_gripped_motion import GRIP, LENGTH, arch, model_of, simulated
 
 NOISE = 3e-4  # m
 STILL, MOVED = 4.0, 1.0  # s: grips that stand still, between which the rope comes to rest, and that move
@@ -41,13 +41,7 @@ MODEL = model_of(WHOLE).with_values(**MODEL_VALUES)
 def recorded(seed: int = 0) -> GrippedMotion:
     """What is recorded of the model's motion once it rests; what had slid by then is in it."""
     e = replace(MODEL, slid_modes=MODES).experiment(WHOLE)
-    times = e.recording.times
-    x = simulate(e.scene, times, e.solver, HISTORY).positions
-    positions = e.recording.positions.copy()
-    for k in WHOLE.free:
-        place = e.places[k]
-        assert place is not None
-        positions[:, k] = np.tensordot(x[:, list(place.particles)], np.asarray(place.weights), axes=(1, 0))
+    times, positions = e.recording.times, simulated(e, WHOLE, HISTORY)
     positions += NOISE * np.random.default_rng(seed).standard_normal(positions.shape)
     part = replace(e.recording, positions=positions[FIRST:], times=times[FIRST:] - times[FIRST])
     return GrippedMotion.of(part, 0.08)

@@ -10,9 +10,8 @@ import sheetbend as sb
 from sheetbend.gripped import GrippedMotion
 from sheetbend.gripped.judging import predict
 from sheetbend.gripped.slid import MODES, noise, slid, window_of
-from sheetbend.motion.simulate import simulate
 from sheetbend.report.scores import coordinate_error
-from test_gripped_motion import carried_about, model_of
+from test_gripped_motion import carried_about, model_of, simulated
 
 MOTION = GrippedMotion.of(carried_about(), 0.08)
 YIELDS = {"EI": 0.05, "yield_curvature": 1.5, "yield_share": 0.5}
@@ -23,13 +22,7 @@ HISTORY = {"rope_slid_1_0": 2.0, "rope_slid_2_1": 2.5}  # 1/m
 def recorded(history: dict[str, float], sd: float = 3e-4) -> GrippedMotion:
     """A recording of the model, in which this had slid before it began."""
     e = replace(MODEL, slid_modes=MODES).experiment(MOTION)
-    times = e.recording.times
-    x = simulate(e.scene, times, e.solver, history).positions
-    positions = e.recording.positions.copy()
-    for k in MOTION.free:
-        place = e.places[k]
-        assert place is not None
-        positions[:, k] = np.tensordot(x[:, list(place.particles)], np.asarray(place.weights), axes=(1, 0))
+    positions = simulated(e, MOTION, history)
     positions += sd * np.random.default_rng(0).standard_normal(positions.shape)
     return GrippedMotion.of(replace(e.recording, positions=positions), 0.08)
 
@@ -41,13 +34,7 @@ def error(motion: GrippedMotion, x: np.ndarray) -> float:
 
 def forgetful(motion: GrippedMotion) -> float:
     """The error of the model whose friction remembers nothing at the start."""
-    e = MODEL.experiment(motion)
-    x, out = simulate(e.scene, e.recording.times, e.solver).positions, motion.recording.positions.copy()
-    for k in motion.free:
-        place = e.places[k]
-        assert place is not None
-        out[:, k] = np.tensordot(x[:, list(place.particles)], np.asarray(place.weights), axes=(1, 0))
-    return error(motion, out)
+    return error(motion, simulated(MODEL.experiment(motion), motion))
 
 
 def test_a_history_is_seen_in_the_first_frames() -> None:
