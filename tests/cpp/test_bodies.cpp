@@ -141,14 +141,8 @@ TEST(Body, GradientMatchesComplexStep) {
   const auto oracle = complex_step_gradient([&](const std::vector<Complex>& z) { return loss(program, z); }, inputs);
   const auto found = gradient(program, inputs);
   for (const Quantity q : {Quantity::position, Quantity::velocity, Quantity::mass, Quantity::force, Quantity::gravity,
-                           Quantity::drag_linear, Quantity::drag_quadratic, Quantity::rest}) {
-    const std::size_t first = scene.layout.of(q), count = scene.layout.count(q);
-    EXPECT_GT(largest(std::span(oracle).subspan(first, count)), 0.0);
-    const double error =
-        relative_error(std::span(found).subspan(first, count), std::span(oracle).subspan(first, count));
-    EXPECT_LE(error, 1e-10) << quantity_names[static_cast<int>(q)];
-    record_error(quantity_names[static_cast<int>(q)], error);
-  }
+                           Quantity::drag_linear, Quantity::drag_quadratic, Quantity::rest})
+    expect_quantity_agrees(scene.layout, q, found, oracle, 1e-10);
 }
 
 // A body on a thread, and a torque that grows with its turn: at rest the axes point where the loads pull them.

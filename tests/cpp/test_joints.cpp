@@ -221,14 +221,8 @@ TEST(Joints, GradientMatchesComplexStep) {
   const auto oracle = complex_step_gradient([&](const std::vector<Complex>& z) { return loss(program, z); }, inputs);
   const auto found = gradient(program, inputs);
   for (const Quantity q : {Quantity::position, Quantity::velocity, Quantity::mass, Quantity::compliance,
-                           Quantity::damping, Quantity::rest, Quantity::boundary, Quantity::gravity}) {
-    const std::size_t first = scene.layout.of(q), count = scene.layout.count(q);
-    EXPECT_GT(largest(std::span(oracle).subspan(first, count)), 0.0);
-    const double error =
-        relative_error(std::span(found).subspan(first, count), std::span(oracle).subspan(first, count));
-    EXPECT_LE(error, 1e-9) << quantity_names[static_cast<int>(q)];
-    record_error(quantity_names[static_cast<int>(q)], error);
-  }
+                           Quantity::damping, Quantity::rest, Quantity::boundary, Quantity::gravity})
+    expect_quantity_agrees(scene.layout, q, found, oracle, 1e-9);
 }
 
 // A pendulum that swings onto a stop and a body that falls onto one, with damping: from before they are met until after they are left.
@@ -267,14 +261,8 @@ TEST_P(Stops, GradientThroughTheirTouchMatchesComplexStep) {
   const auto oracle = complex_step_gradient([&](const std::vector<Complex>& z) { return loss(program, z); }, inputs);
   const auto found = gradient(program, inputs);
   for (const Quantity q : {Quantity::position, Quantity::velocity, Quantity::mass, Quantity::compliance,
-                           Quantity::damping, Quantity::rest, Quantity::gravity}) {
-    const std::size_t first = scene.layout.of(q), count = scene.layout.count(q);
-    EXPECT_GT(largest(std::span(oracle).subspan(first, count)), 0.0);
-    const double error =
-        relative_error(std::span(found).subspan(first, count), std::span(oracle).subspan(first, count));
-    EXPECT_LE(error, 1e-9) << quantity_names[static_cast<int>(q)];
-    record_error(quantity_names[static_cast<int>(q)], error);
-  }
+                           Quantity::damping, Quantity::rest, Quantity::gravity})
+    expect_quantity_agrees(scene.layout, q, found, oracle, 1e-9);
 }
 
 // A door on two hinges, and a four-bar linkage in the plane of x and z: five and three rows too many.

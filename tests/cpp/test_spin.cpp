@@ -171,14 +171,8 @@ TEST(KeptSpin, GradientMatchesComplexStep) {
   const auto found = gradient(program, e.inputs);
   for (const Quantity q :
        {Quantity::position, Quantity::velocity, Quantity::mass, Quantity::compliance, Quantity::damping, Quantity::rest,
-        Quantity::force, Quantity::load, Quantity::gravity, Quantity::drag_linear, Quantity::drag_quadratic}) {
-    const std::size_t first = e.scene.layout.of(q), count = e.scene.layout.count(q);
-    EXPECT_GT(largest(std::span(oracle).subspan(first, count)), 0.0) << quantity_names[static_cast<int>(q)];
-    const double error =
-        relative_error(std::span(found).subspan(first, count), std::span(oracle).subspan(first, count));
-    EXPECT_LE(error, 1e-9) << quantity_names[static_cast<int>(q)];
-    record_error(quantity_names[static_cast<int>(q)], error);
-  }
+        Quantity::force, Quantity::load, Quantity::gravity, Quantity::drag_linear, Quantity::drag_quadratic})
+    expect_quantity_agrees(e.scene.layout, q, found, oracle, 1e-9);
   // a tape that drops states computes them again with the same bits
   auto few = record(program, e.inputs, 6);
   EXPECT_TRUE(same_bits(found, gradient(program, e.inputs, few)));

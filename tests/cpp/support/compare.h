@@ -147,6 +147,17 @@ inline void record_error(const std::string& what, double error) {
   ::testing::Test::RecordProperty(what, (std::ostringstream() << error).str());
 }
 
+// Compares what two gradients have of a quantity, which must matter.
+inline void expect_quantity_agrees(const Layout& layout, Quantity quantity, std::span<const double> found,
+                                   std::span<const double> oracle, double bound) {
+  const char* name = quantity_names[static_cast<int>(quantity)];
+  const auto part = [&](std::span<const double> g) { return g.subspan(layout.of(quantity), layout.count(quantity)); };
+  EXPECT_GT(largest(part(oracle)), 0.0) << name << " does not matter in this scene";
+  const double error = relative_error(part(found), part(oracle));
+  EXPECT_LE(error, bound) << name;
+  record_error(name, error);
+}
+
 // Compares two gradients quantity by quantity; every quantity that the scene has must matter, and only those of volumes and
 // contacts may be missing.
 inline void expect_gradients_agree(const Layout& layout, std::span<const double> found, std::span<const double> oracle,
@@ -154,15 +165,10 @@ inline void expect_gradients_agree(const Layout& layout, std::span<const double>
   ASSERT_EQ(found.size(), layout.total());
   ASSERT_EQ(oracle.size(), layout.total());
   for (int q = 0; q < quantity_count; ++q) {
-    const auto part = [&](std::span<const double> g) { return g.subspan(layout.offset[q], layout.size[q]); };
-    if (layout.size[q] == 0) {
+    if (layout.size[q] == 0)
       EXPECT_TRUE(is_of_volumes(q) || is_of_contacts(q)) << quantity_names[q];
-      continue;
-    }
-    EXPECT_GT(largest(part(oracle)), 0.0) << quantity_names[q] << " does not matter in this scene";
-    const double error = relative_error(part(found), part(oracle));
-    EXPECT_LE(error, bound) << quantity_names[q];
-    record_error(quantity_names[q], error);
+    else
+      expect_quantity_agrees(layout, static_cast<Quantity>(q), found, oracle, bound);
   }
 }
 
