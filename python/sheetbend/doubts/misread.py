@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..arrays.timeseries import Array, mean_position
 from ..errors import SheetbendError
+from ..experiment.experiment import Experiment
 from ..minimum.problem import FitProblem
 from ..optional import require
 from ..quantities.wording import short
@@ -38,21 +39,22 @@ def misread(problem: FitProblem, u: Array) -> tuple[str, ...]:
         return ()
     layout, warnings = problem.rows_layout(), []
     data = r[: len(layout.recording)]
-    simulated: list[list[Array]] | None = None
     for i, (e, recording) in enumerate(zip(problem.experiments, problem.recordings, strict=True)):
+        mine = data[(layout.recording == i) & (layout.clocks == 0)]  # of markers, without force sensors
+        if e.is_cloud:
+            warnings += far_off(e, mine)
+            continue
         axes = ["xyz".index(a) for a in e.axes]
         seen, measured = recording.mask, recording.positions[..., axes]
-        mine = data[(layout.recording == i) & (layout.clocks == 0)]  # of markers, without force sensors
         left = e.sigma * float(np.sqrt(np.sum(mine**2) / max(int(seen.sum()), 1)))
         motion = _rms(np.broadcast_to(mean_position(measured), measured.shape), measured, seen)
         if e.static or not left > max(NOTICEABLE * motion, SEEN * e.sigma * np.sqrt(len(axes))):
             continue
-        if simulated is None:
-            simulated = [shapes for at in (u, problem.parameters.initial()) if (shapes := _simulated(problem, at))]
-        readings = [one for shapes in simulated for one in _better(shapes[i][..., axes], measured, seen)]
+        simulated = [x[..., axes] for at in (u, problem.parameters.initial()) for x in _simulated(problem, i, at)]
+        readings = [one for x in simulated for one in _better(x, measured, seen)]
         if not e.scene.boundary.driven and e.time_offset is None:
             times = recording.times - e.t0
-            readings += [one for shapes in simulated for one in _clocked(shapes[i][..., axes], measured, seen, times)]
+            readings += [one for x in simulated for one in _clocked(x, measured, seen, times)]
         better = min(readings, key=lambda one: one[0], default=(np.inf, ""))
         missed = f"the fit misses {_percent(left, motion)} of the motion of {e.name}"
         if better[0] < EXPLAINS * left:
@@ -67,10 +69,23 @@ def _percent(part: float, whole: float) -> str:
     return f"{short(100 * part / whole, 2)} %" if whole > 0 else "all"
 
 
-def _simulated(problem: FitProblem, u: Array) -> list[Array]:
-    """Markers of all experiments, none where the physics has no answer."""
+def far_off(e: Experiment, residuals: Array) -> list[str]:
+    """A warning for a cloud whose points (residuals in sigmas) lie where no noise puts them. Its points have no names,
+    so no other order of them is tried."""
+    left = float(np.sqrt(np.mean(residuals**2)))
+    if not left > SEEN:
+        return []
+    return [
+        f"{e.name}: the points of the cloud lie {short(1e3 * left * e.sigma, 2)} mm rms off the fitted motion, "
+        f"{short(left, 2)} times their sigma, and the intervals take that for noise. Check sigma, gravity, lengths, "
+        "densities, clamps and clocks, and whether points of other things than the cloth were cut off"
+    ]
+
+
+def _simulated(problem: FitProblem, experiment: int, u: Array) -> list[Array]:
+    """Markers (frames, markers, 3) of one experiment, none where the physics has no answer."""
     try:
-        return problem.simulate(u)
+        return [problem.simulate_one(experiment, u)]
     except SheetbendError:
         return []
 

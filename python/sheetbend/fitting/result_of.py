@@ -1,0 +1,136 @@
+"""The result of a fit, from the minimum that it reached and what follows from it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..doubts.conclude import misfit, warnings_of
+from ..doubts.contradictions import doubtful, elsewhere, held_out_motion
+from ..doubts.implausible import implausible
+from ..doubts.leave_one_out import MEANING
+from ..doubts.misread import misread
+from ..doubts.prediction import Comparison
+from ..doubts.profiles import Elsewhere
+from ..doubts.stationary import unfinished
+from ..doubts.touching import kinks, what_touches
+from ..doubts.unexplained import unexplained
+from ..experiment.clock import outside, told_clocks
+from ..minimum.continuity import shot_motions
+from ..minimum.counts import counted
+from ..minimum.fine_meshes import at_the_limit
+from ..report.fit_result import FitResult
+from .conclusion import Conclusion
+from .reached import Reached
+from .rows import curves, every_end, given_rows, growth_rows, recording_fit, start_rows
+
+
+@dataclass(frozen=True)
+class Clock:
+    """When a fit began, and how many evaluations and Jacobians this process had made by then."""
+
+    began: float
+    evaluations: int
+    jacobians: int
+
+    @classmethod
+    def started(cls) -> Clock:
+        """Now."""
+        return cls(time.perf_counter(), *counted())
+
+    def seconds(self) -> float:
+        """Since then."""
+        return time.perf_counter() - self.began
+
+    def since(self) -> tuple[int, int]:
+        """Evaluations and Jacobians since then."""
+        evaluations, jacobians = counted()
+        return evaluations - self.evaluations, jacobians - self.jacobians
+
+
+def result_of(
+    reached: Reached,
+    conclusion: Conclusion,
+    comparisons: Sequence[Comparison],
+    left_out: Mapping[str, Comparison],
+    corrected: Mapping[str, np.ndarray],
+    interrupted: bool,
+    clock: Clock,
+) -> FitResult:
+    """The result.
+
+    Args:
+        comparisons: measured against simulated, per experiment.
+        left_out: of the experiments that a fit to the others predicts.
+        corrected: corrections of driven markers by experiment.
+        interrupted: by Ctrl-C, at any time.
+    """
+    problem, best, ends, found = reached.problem, reached.best, reached.ends, reached.found
+    at, judged = conclusion.at, conclusion.judged
+    fitted, parameters = problem.experiments, problem.parameters
+    rows = problem.core.first_rows
+    count = {e.name: rows[i + 1] - rows[i] for i, e in enumerate(fitted)}
+    errors = tuple(recording_fit(c, count, left_out, corrected) for c in comparisons)
+    other_starts = [Elsewhere(m.cost - best.cost, parameters.to_physical(m.u), "another start") for m in ends[1:]]
+    stopped, ahead = unfinished(problem, best, judged)
+    missed = unexplained(problem, comparisons, judged.autocorrelation_time, at.u)
+    contradicted = (
+        held_out_motion(problem, comparisons, errors)
+        | elsewhere(problem, judged, best.cost, [*other_starts, *conclusion.lower])
+        | conclusion.contradicted
+        | missed
+        | stopped
+    )
+    estimates, limit = at_the_limit(doubtful(judged.estimates, contradicted, missed), at.refits, parameters, at.u)
+    values = conclusion.values | parameters.to_physical(limit)
+    each = every_end(ends, found.raced)
+    evaluations, jacobians = sum(m.evaluations for m in ends), sum(m.jacobians for m in ends)
+    all_evaluations, all_jacobians = clock.since()
+    baselines = (c.baseline_words for c in (*comparisons, *left_out.values()) if c.baseline_words)
+    warnings = (
+        *warnings_of([m for m, _ in each], interrupted, problem, estimates, ahead),
+        *conclusion.warnings,
+        *at.warnings,
+        *outside(conclusion.experiments, conclusion.values),
+        *(() if interrupted else (*misread(problem, best.u), *implausible(problem))),
+    )
+    return FitResult(
+        estimates=estimates,
+        recordings=told_clocks(errors, conclusion.experiments, conclusion.values, estimates),
+        cost=best.cost if at.problem is problem else at.cost,
+        first_cost=best.first,
+        jacobian_seconds=problem.seconds.get(True),
+        rows=problem.core.data_rows,
+        optimizer=found.optimizer,
+        iterations=best.iterations,
+        seconds=clock.seconds(),
+        converged=best.converged,
+        interrupted=interrupted,
+        message=best.message,
+        given=given_rows(parameters, values) + conclusion.given,
+        correlations=judged.correlations,
+        gauges=tuple(g.words for g in judged.gauges),
+        baseline="; ".join(dict.fromkeys(baselines)),
+        held_out_is=MEANING if left_out else "",
+        autocorrelation_time=judged.autocorrelation_time,
+        starts=start_rows(each, parameters),
+        condition=None if found.condition is None else found.condition.words,
+        profiles=curves(judged.profiles, parameters, limit),
+        refits=at.refits,
+        not_counted=at.not_counted,
+        premises=conclusion.premises,
+        misfit=misfit(at.problem, at.u),
+        forces=tuple(row for c in comparisons for one in c.forces for row in one.fits()),
+        growth=growth_rows(found.growths, reached.growths),
+        contacts=what_touches(at.problem, at.u),
+        shot=shot_motions(problem, best.u),
+        kinks=() if interrupted else kinks(at.problem, at.u, estimates),
+        windows=best.windows,
+        evaluations=evaluations,
+        jacobians=jacobians,
+        judging=(all_evaluations - evaluations, all_jacobians - jacobians),
+        warnings=warnings,
+    )
