@@ -286,8 +286,9 @@ def test_noise_is_hardly_ever_taken_for_a_wrong_number() -> None:
 
 def test_what_a_finer_mesh_explains_is_no_wrong_number(monkeypatch: pytest.MonkeyPatch) -> None:
     """A recording from 32 links, fitted with 8: of the told numbers a place of the clamp explains most, 28 %."""
-    monkeypatch.setattr("sheetbend.doubts.wrong_given.MOST", 0.2)
-    monkeypatch.setattr("sheetbend.doubts.wrong_given.LEVEL", 100.0)  # no chance
+    for module in ("causes", "wrong_given"):
+        monkeypatch.setattr(f"sheetbend.doubts.{module}.MOST", 0.2)
+    monkeypatch.setattr("sheetbend.doubts.causes.LEVEL", 100.0)  # no chance
 
     def made(segments: int) -> tuple[sb.Scene, list[int]]:
         scene = sb.Scene("rope")

@@ -15,7 +15,7 @@ result rests on (`given.premises`).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 
@@ -24,44 +24,25 @@ import numpy as np
 from ..arrays.timeseries import Array
 from ..minimum.discretization import Refinement
 from ..minimum.problem import FitProblem
-from ..optional import require
 from ..quantities.wording import short
 from ..result.result import UNSOUND
-from ..statistics.covariance import Layout
 from ..statistics.gauge import RANK_TOLERANCE
 from ..statistics.identifiability import Identifiability
 from ..statistics.intervals import reach_of
+from .causes import MOST, beyond_chance, causes, of_noise, of_what_is_left, seen_beside
 from .cloth_size import cloth_sizes
 from .contradictions import residual_shifts, value_words
-from .directions import EXPLAINS, LEVEL, noise_in, rows_of, tied
+from .directions import EXPLAINS, noise_in, rows_of, tied
 from .driven_errors import FEW, driven_errors, driven_span
 from .held_losses import held_names
 from .missing_parts import missing_parts
 from .other_losses import LEAVES
-from .told import DEGREE, LARGER, LATER, MILLIMETER, SIZE, SLOWER, Told, told_numbers
-from .two_directions import chance_of, two_directions
+from .told import LARGER, LATER, SLOWER, Told, told_numbers
+from .told_words import words_of
 
-MOST = 0.85
-"""Of what a fit leaves beyond noise: the part that one error must explain. The one that was made explains 0.88 to 1.1
-on small ropes (gravity, lengths, clamps, places, clocks, drag, masses, stretch), and 0.87 where the motion changes by
-more than first order (a table turned by 1.7 degrees, a cloth 0.6 % larger). Others explain at most 0.83, but for those
-that look the same, such as the size of gravity and a clock; a mesh four times finer at most 0.28, and two knots of
-0.1 g that the model lacks 0.76 (measured)."""
-MOST_OF_TWO = 0.97
-"""The same for two errors at once. The two that were made explain 0.99 to 1.0 (a length and gravity); of 138 fits whose
-given numbers were right two others explain 0.94 in one, beside a gust of wind (measured)."""
-LEVEL_OF_DRIVEN = 0.01
-"""Chance that noise of driven particles looks so, above which nothing is named. It is asked of the causes that explain
-`MOST` and that no other noise explains at `LEVEL` and the number of tests. At that level a table turned by 1.1 degrees
-under a drawn rope passed for noise of the hand: chance 8e-5 to 1e-3, 30 tests, friction 37 % off and identified to
-5 % (measured)."""
 MUCH = 2.0
 """Times the noise, and the told sigma's where that is more: what a fit that misses much leaves beyond it. Residuals are
 1.7 sigma then, or more."""
-ALIKE = 0.05  # by so much less explained, another number is named beside
-MOST_NAMED = 3
-FARTHEST = {"rad": 0.3, "m": 0.1, "s": 0.1, "": 0.7}
-"""Largest errors that are told, by unit; "" for relative ones. First order says nothing of larger ones."""
 LONGEST = 5e7  # rows times directions: above, markers are asked only all together
 
 
@@ -187,16 +168,18 @@ def _asked(
         moving = [i for i in group if not problem.experiments[i].static]
         lacking = [part for i in moving for part in _lacking(problem, u, i)] if left > LEAVES * data else []
         tried = list(_directions(problem, [*told, *lacking], group))
-        seen = _seen(q, tried)
+        seen = seen_beside(q, tried)
         allowed = max(float(r[mine] @ r[mine]) - left, float(np.count_nonzero(mine)))
         white = allowed / np.count_nonzero(mine)
         for least in (MOST, EXPLAINS) if left > MUCH * allowed else (MOST,):
-            causes = _causes(r, seen, left, least)
-            chance = partial(_of_what_is_left, r, J, mine, layout) if least == MOST else partial(_of_noise, q, white)
-            tests = [math.comb(len(tried), len(cause.parts)) * len(groups) for cause in causes]
-            likely = [c for c, n in zip(causes, tests, strict=True) if _beyond_chance(partial(chance, c), n, errors)]
+            explaining = causes(r, seen, left, least)
+            chance = partial(of_what_is_left, r, J, mine, layout) if least == MOST else partial(of_noise, q, white)
+            tests = [math.comb(len(tried), len(cause.parts)) * len(groups) for cause in explaining]
+            likely = [c for c, n in zip(explaining, tests, strict=True) if beyond_chance(partial(chance, c), n, errors)]
             if likely:
-                words = tuple(" and ".join(_off(one, more, problem, group) for one, more, _ in c.parts) for c in likely)
+                words = tuple(
+                    " and ".join(words_of(one, more, problem, group) for one, more, _ in c.parts) for c in likely
+                )
                 moved = [np.sum([more * column for _, more, column in c.parts], axis=0) for c in likely]
                 steps = tuple(there + (-inverse @ (q.T @ by))[:count] for by in moved)
                 share, beside = likely[0].explained, driven is not None
@@ -205,82 +188,27 @@ def _asked(
     return found
 
 
-@dataclass(frozen=True)
-class _Cause:
-    """One error or two that explain what a fit leaves: each with its size and what one unit of it changes (rows,)."""
-
-    explained: float
-    parts: tuple[tuple[Told, float, Array], ...]
-
-
-def _seen(q: Array, tried: Sequence[tuple[Told, Array]]) -> list[tuple[Told, Array, Array]]:
-    """The directions that parameters do not take up, each with what is left of it beside theirs, q."""
-    beside = ((one, column, column - q @ (q.T @ column)) for one, column in tried)
-    return [(one, column, b) for one, column, b in beside if float(b @ b) > RANK_TOLERANCE * float(column @ column)]
-
-
-def _causes(r: Array, seen: Sequence[tuple[Told, Array, Array]], left: float, least: float) -> list[_Cause]:
-    """The errors that explain a share `least` of what residuals r, orthogonal to the parameters' directions, hold
-    beyond noise: the likeliest first, and of those that explain `MOST` those about as much. Chance is not asked yet."""
-    causes, most = [], 0.0
-    for one, column, beside in seen:
-        inner, along = float(beside @ beside), float(beside @ r)
-        if _possible(one, -along / inner):
-            explained = along**2 / inner / left
-            most = max(most, explained)
-            if explained > least:
-                causes.append(_Cause(explained, ((one, -along / inner, column),)))
-    if least == MOST and most < MOST_OF_TWO:
-        shared = [each for each in seen if not each[0].marker]
-        pairs = []
-        if len(shared) > 1:
-            beside = np.column_stack([b for *_, b in shared])
-            for two in two_directions(r, beside, left, most, MOST_OF_TWO):
-                both = [(*shared[k][:2], more) for k, more in zip(two.places, two.more, strict=True)]
-                if all(_possible(one, more) for one, _, more in both):
-                    pairs.append(_Cause(two.explained, tuple((one, more, column) for one, column, more in both)))
-        causes = pairs or causes
-    causes.sort(key=lambda cause: -cause.explained)
-    alike = ALIKE if least == MOST else np.inf
-    return [cause for cause in causes if cause.explained > causes[0].explained - alike][:MOST_NAMED]
-
-
-def _beyond_chance(chance: Callable[[Array | None], float], tests: int, errors: Callable[[], Array]) -> bool:
-    """Whether neither noise alone nor with draws of what drives the scene (data rows, draws) asks for a cause."""
-    if not chance(None) < LEVEL / tests:
-        return False
-    return not errors().size or chance(errors()) < LEVEL_OF_DRIVEN
-
-
-def _of_what_is_left(r: Array, J: Array, mine: Array, layout: Layout, cause: _Cause, errors: Array | None) -> float:
-    """Chance of a cause where all that a fit leaves, and how alike it is, counts as noise (`chance_of`)."""
-    return chance_of(r, J, [column for *_, column in cause.parts], mine, layout, errors)
-
-
-def _of_noise(q: Array, white: float, cause: _Cause, errors: Array | None) -> float:
-    """Chance that white noise of this variance and draws of errors (data rows, draws) ask for so much of one direction.
-    What else a fit leaves does not count as chance here."""
-    ((_, more, column),) = cause.parts
-    beside = column - q @ (q.T @ column)
-    inner = float(beside @ beside)
-    variance = white / inner
-    if errors is not None:
-        variance += float(np.mean((beside[: len(errors)] @ errors / inner) ** 2))
-    score = abs(more) / math.sqrt(max(variance, np.finfo(float).tiny))
-    special = require("scipy.special", "fit")
-    return 2.0 * float(special.ndtr(-score) if errors is None else special.stdtr(errors.shape[1], -score))
-
-
 def _lacking(problem: FitProblem, u: Array, i: int) -> list[Told]:
     """Directions of what no number of the model tells."""
     return [*missing_parts(problem, u, i), *cloth_sizes(problem, u, i)]
 
 
-def _possible(one: Told, more: float) -> bool:
-    """Whether an error of this size can be: small enough for first order, and of what is missing no less than none."""
-    if one.missing is not None and not one.unit:
-        return more > 0.0 or one.signed
-    return abs(more) < FARTHEST.get("" if one.relative else one.unit, np.inf)
+def _directions(problem: FitProblem, told: Sequence[Told], group: Sequence[int]) -> Iterator[tuple[Told, Array]]:
+    """The errors that motions may share, or that one of them may have: (rows,) what each changes."""
+    rows, first, losses = problem.core.rows, problem.core.first_rows, set(held_names(problem))
+    within = [one for one in told if one.experiment in group and one.name not in losses]
+    apart = len(within) * rows <= LONGEST
+    each: dict[str, tuple[Told, Array]] = {}
+    for one in within:
+        own = one.name in ("clamps", "clamp_direction") or one.label in (LATER, SLOWER, LARGER)
+        labels = [(f"{one.label} {one.experiment}" if own or one.marker else one.label, one)]
+        if one.marker:
+            together = f"all {one.experiment} {one.label.rsplit(' ', 1)[-1]}", replace(one, marker="")
+            labels = [*labels[: int(apart)], together]
+        for label, of in labels:
+            _, column = each.setdefault(label, (of, np.zeros(rows)))
+            column[first[one.experiment] : first[one.experiment + 1]][one.rows] += one.column
+    yield from each.values()
 
 
 def doubts_of(problem: FitProblem, u: Array, judged: Identifiability, wrong: Sequence[Wrong]) -> dict[str, str]:
@@ -318,24 +246,6 @@ def explained_by(problem: FitProblem, wrong: Sequence[Wrong]) -> dict[str, float
     }
 
 
-def _directions(problem: FitProblem, told: Sequence[Told], group: Sequence[int]) -> Iterator[tuple[Told, Array]]:
-    """The errors that motions may share, or that one of them may have: (rows,) what each changes."""
-    rows, first, losses = problem.core.rows, problem.core.first_rows, set(held_names(problem))
-    within = [one for one in told if one.experiment in group and one.name not in losses]
-    apart = len(within) * rows <= LONGEST
-    each: dict[str, tuple[Told, Array]] = {}
-    for one in within:
-        own = one.name in ("clamps", "clamp_direction") or one.label in (LATER, SLOWER, LARGER)
-        labels = [(f"{one.label} {one.experiment}" if own or one.marker else one.label, one)]
-        if one.marker:
-            together = f"all {one.experiment} {one.label.rsplit(' ', 1)[-1]}", replace(one, marker="")
-            labels = [*labels[: int(apart)], together]
-        for label, of in labels:
-            _, column = each.setdefault(label, (of, np.zeros(rows)))
-            column[first[one.experiment] : first[one.experiment + 1]][one.rows] += one.column
-    yield from each.values()
-
-
 def _whose(problem: FitProblem, wrong: Wrong) -> str:
     names = [problem.experiments[i].name for i in wrong.motions]
     return names[0] if len(names) == 1 else "the recordings"
@@ -354,46 +264,3 @@ def _sentence(problem: FitProblem, wrong: Wrong) -> str:
     part = short(100 * min(wrong.explained, 1.0), 2)
     noise = "noise, that of what drives it included," if wrong.driven else "noise"
     return f"{part} % of what the fit leaves of {whose} beyond {noise} is as if {', or '.join(wrong.words)}"
-
-
-def _off(one: Told, more: float, problem: FitProblem, group: Sequence[int]) -> str:
-    """That a told number is off by `more`, in words."""
-    if one.missing is not None:
-        return one.missing(more)
-    e = problem.experiments[one.experiment]
-    of = f" of {e.name}" if len(group) > 1 else ""
-    size = short(abs(100 * more), 2) + " %"
-    sign = "more" if more > 0 else "less"
-    axis = f"{'' if more > 0 else '-'}{one.label.rsplit(' ', 1)[-1]}"
-    if one.label == SIZE:
-        return f"gravity were {size} {'larger' if more > 0 else 'smaller'}"
-    if one.label == LATER and e.scene.boundary.driven:
-        when = f"{short(1e3 * abs(more), 2)} ms {'early' if more > 0 else 'late'}"
-        return f"the clock of the recording{of} were {when} against that of what drives the scene (time_offset)"
-    if one.label == LATER:
-        when = "earlier" if more > 0 else "later"
-        return f"the motion{of} had begun {short(1e3 * abs(more), 2)} ms {when} than the scene does (start_time)"
-    if one.label == SLOWER:
-        return f"the times of the recording{of} were {size} too {'short' if more > 0 else 'long'} (its frame rate)"
-    if one.label == LARGER:
-        return f"the recording{of} were {size} too {'small' if more < 0 else 'large'} (its scale)"
-    if one.name == "gravity":
-        return f"gravity were turned by {short(abs(more) / DEGREE, 2)} degrees {_way(one.label, more)}"
-    if one.name == "clamp_direction":
-        return f"the clamps{of} and all with them were turned by {short(abs(more) / DEGREE, 2)} degrees about {axis}"
-    if one.name == "clamps":
-        return f"the clamps{of} and all with them stood {short(abs(more) / MILLIMETER, 2)} mm farther along {axis}"
-    if one.name == "markers":
-        who = f"marker {one.marker}" if one.marker else "all markers"
-        along = f"axis {1 + int(one.label.rsplit(' ', 1)[-1])} of the cloth" if e.scene.cloths else "the material"
-        how = "farther" if more > 0 else "less far"
-        return f"{who}{of} sat {short(abs(more) / MILLIMETER, 2)} mm {how} along {along}"
-    if one.relative:
-        return f"{one.name} were {size} {sign}"
-    return f"{one.name} were {short(abs(more), 2)} {one.unit} {sign}"
-
-
-def _way(label: str, more: float) -> str:
-    """Such as "toward -x"."""
-    way = label.removeprefix("gravity ")
-    return way if more > 0 else way.replace("toward ", "toward -")

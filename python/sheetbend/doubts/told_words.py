@@ -1,0 +1,52 @@
+"""What an error of a told number is in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..minimum.problem import FitProblem
+from ..quantities.wording import short
+from .told import DEGREE, LARGER, LATER, MILLIMETER, SIZE, SLOWER, Told
+
+
+def words_of(one: Told, more: float, problem: FitProblem, group: Sequence[int]) -> str:
+    """That a told number is off by `more`, in words."""
+    if one.missing is not None:
+        return one.missing(more)
+    e = problem.experiments[one.experiment]
+    of = f" of {e.name}" if len(group) > 1 else ""
+    size = short(abs(100 * more), 2) + " %"
+    sign = "more" if more > 0 else "less"
+    axis = f"{'' if more > 0 else '-'}{one.label.rsplit(' ', 1)[-1]}"
+    if one.label == SIZE:
+        return f"gravity were {size} {'larger' if more > 0 else 'smaller'}"
+    if one.label == LATER and e.scene.boundary.driven:
+        when = f"{short(1e3 * abs(more), 2)} ms {'early' if more > 0 else 'late'}"
+        return f"the clock of the recording{of} were {when} against that of what drives the scene (time_offset)"
+    if one.label == LATER:
+        when = "earlier" if more > 0 else "later"
+        return f"the motion{of} had begun {short(1e3 * abs(more), 2)} ms {when} than the scene does (start_time)"
+    if one.label == SLOWER:
+        return f"the times of the recording{of} were {size} too {'short' if more > 0 else 'long'} (its frame rate)"
+    if one.label == LARGER:
+        return f"the recording{of} were {size} too {'small' if more < 0 else 'large'} (its scale)"
+    if one.name == "gravity":
+        return f"gravity were turned by {short(abs(more) / DEGREE, 2)} degrees {_way(one.label, more)}"
+    if one.name == "clamp_direction":
+        return f"the clamps{of} and all with them were turned by {short(abs(more) / DEGREE, 2)} degrees about {axis}"
+    if one.name == "clamps":
+        return f"the clamps{of} and all with them stood {short(abs(more) / MILLIMETER, 2)} mm farther along {axis}"
+    if one.name == "markers":
+        who = f"marker {one.marker}" if one.marker else "all markers"
+        along = f"axis {1 + int(one.label.rsplit(' ', 1)[-1])} of the cloth" if e.scene.cloths else "the material"
+        how = "farther" if more > 0 else "less far"
+        return f"{who}{of} sat {short(abs(more) / MILLIMETER, 2)} mm {how} along {along}"
+    if one.relative:
+        return f"{one.name} were {size} {sign}"
+    return f"{one.name} were {short(abs(more), 2)} {one.unit} {sign}"
+
+
+def _way(label: str, more: float) -> str:
+    """Such as "toward -x"."""
+    way = label.removeprefix("gravity ")
+    return way if more > 0 else way.replace("toward ", "toward -")
