@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from ..optional import require
 from ..quantities.wording import figures, short
-from ..result.result import UNSOUND, Estimate, FitData, Given, MotionGrowth, Premise, RecordingFit
+from ..result.result import UNSOUND, Estimate, FitData, Given, MotionGrowth
 from .report_contact import contact_sections
 from .report_driven import driven_sections
+from .report_premises import premises
 from .report_profiles import lopsided_profiles
+from .report_recordings import forces, held_out_motion, recordings
 from .report_shot import shot_motions
 from .report_starts import groups_of_starts, starts_note
 from .tables import Section, plain_section, rich_section
@@ -26,11 +27,6 @@ CORRELATIONS_SHOWN = 15
 """Number of correlations that the report lists at most; fit.json has them all."""
 GROWTH_SHOWN = 10.0
 """Growth of small displacements from which on the report tells it."""
-PREMISES_SHOWN = 8
-"""Number of given values that the report lists at most, those with the strongest effects; fit.json has them all."""
-PREMISE_COLUMNS = 4
-"""Number of parameters above which a given value is listed with the one that it moves most."""
-_FELT = 0.02  # of a half-width: given values that move every parameter by less are not listed
 _SHAKEN = 0.1  # of a half-width: less adds next to nothing to it
 
 
@@ -42,11 +38,11 @@ def sections(result: FitData) -> list[Section]:
         _unsound(result),
         _interval_parts(result),
         _refits(result),
-        _premises(result),
+        premises(result),
         Section("How ropes are held", notes=tuple(_labeled(sentence) for sentence in result.assumed)),
-        _recordings(result),
-        _forces(result),
-        _held_out_motion(result),
+        recordings(result),
+        forces(result),
+        held_out_motion(result),
         *driven_sections(result),
         *contact_sections(result),
         shot_motions(result),
@@ -185,93 +181,6 @@ def _refits(result: FitData) -> Section:
     return Section("What refits on a finer discretization move", headers, tuple(rows))
 
 
-def _recordings(result: FitData) -> Section:
-    rows = [_recording_row(recording) for recording in result.recordings]
-    headers: tuple[str, ...] = (
-        "recording",
-        "rows",
-        "fitted rms",
-        "held-out rms",
-        "baseline rms",
-        "held-out/baseline",
-        "unit",
-    )
-    if all(recording.held_out is None for recording in result.recordings):
-        headers, rows = headers[:3] + headers[-1:], [row[:3] + row[-1:] for row in rows]
-    notes = tuple(
-        (label, words)
-        for label, words in (
-            ("held out", result.held_out_is),
-            ("baseline (no physics)", result.baseline),
-            *((recording.name, _corrected(recording)) for recording in result.recordings),
-        )
-        if words
-    )
-    return Section("Recordings", headers, tuple(rows), notes)
-
-
-def _forces(result: FitData) -> Section:
-    rows = [
-        (f.recording, f.sensor, str(f.rows), *("" if x is None else short(x) for x in (f.rms, f.held_out, f.baseline)))
-        for f in result.forces
-    ]
-    units = [(f.unit,) for f in result.forces]
-    headers: tuple[str, ...] = ("recording", "sensor", "rows", "fitted rms", "held-out rms", "constant", "unit")
-    every = [(*row, *unit) for row, unit in zip(rows, units, strict=True)]
-    if all(f.held_out is None for f in result.forces):
-        headers, every = headers[:4] + headers[5:], [row[:4] + row[5:] for row in every]
-    note = ("constant", "rms of the prediction that the force stays at its mean over the fitted part")
-    return Section("Forces", headers, tuple(every), (note,) if every else ())
-
-
-def _corrected(recording: RecordingFit) -> str:
-    if recording.corrected_by is None or recording.driven_sigma is None:
-        return ""
-    found, prior = (short(1e3 * size, 2) for size in (recording.corrected_by, recording.driven_sigma))
-    return (
-        f"its driven markers are moved by {found} mm in each coordinate (root mean square); driven_sigma is {prior} mm"
-    )
-
-
-def _recording_row(recording: RecordingFit) -> tuple[str, ...]:
-    factor, unit = _readable(recording)
-
-    def number(value: float | None) -> str:
-        return "" if value is None else short(value * factor)
-
-    ratio = ""
-    if recording.held_out is not None and recording.baseline:
-        ratio = f"{100 * recording.held_out / recording.baseline:.3g} %"
-    errors = (number(recording.rms), number(recording.held_out), number(recording.baseline))
-    return (recording.name, f"{recording.rows:,}", *errors, ratio, unit)
-
-
-def _held_out_motion(result: FitData) -> Section:
-    """How much of the motion that the fit did not see is predicted, and its rhythm."""
-    rows = [_motion_row(recording) for recording in result.recordings if recording.motion]
-    headers = ("recording", "motion rms", "unit", "held-out/motion", "frequency measured", "simulated", "difference")
-    note = (
-        "of the measured markers about their mean over the held-out part; "
-        "frequencies in Hz, from the highest peak there"
-    )
-    return Section("Held-out motion", headers, tuple(rows), (("motion", note),) if rows else ())
-
-
-def _motion_row(recording: RecordingFit) -> tuple[str, ...]:
-    factor, unit = _readable(recording)
-    motion, error = recording.motion or 0.0, recording.held_out
-    share = "" if error is None else f"{100 * error / motion:.3g} %"
-    measured, simulated = recording.measured_frequency, recording.simulated_frequency
-    rhythm = ["" if f is None else f"{f:.2f}" for f in (measured, simulated)]
-    difference = f"{100 * (simulated / measured - 1):+.2g} %" if measured and simulated else ""
-    return (recording.name, short(motion * factor), unit, share, *rhythm, difference)
-
-
-def _readable(recording: RecordingFit) -> tuple[float, str]:
-    sizes = (recording.rms or 0.0, recording.held_out or 0.0, recording.baseline or 0.0)
-    return (1e3, "mm") if recording.unit == "m" and max(sizes) < 1 else (1.0, recording.unit)
-
-
 def _unknown(result: FitData) -> Section:
     notes = []
     for gauge in result.gauges:
@@ -330,71 +239,3 @@ def _course(result: FitData) -> Section:
         notes.append(("where it starts", result.condition))
     notes += starts_note(result)
     return Section("Course", notes=tuple(notes))
-
-
-def _premises(result: FitData) -> Section:
-    """What the fit took as given: how far an error of each moves the parameters, the strongest first."""
-    every_one = [e for e in result.estimates if e.half_width]
-    closed = [e for e in every_one if not e.name.endswith("]")] or every_one  # those of one recording: see fit.json
-
-    def strength(premise: Premise, e: Estimate) -> float:
-        return abs(premise.moved.get(e.name, 0.0)) / (e.half_width or 1.0)
-
-    every = [p for p in result.premises if any(strength(p, e) > _FELT for e in closed)]
-    every.sort(key=lambda p: -max(strength(p, e) for e in closed))
-    counted = any(p.sd for p in every)
-    listed = []
-    for p in every[:PREMISES_SHOWN]:
-        value = "" if p.value is None else f"{short(p.value, 4)} {p.unit}".rstrip()
-        sd = "" if p.sd is None else f"{short(p.sd, 2)} {p.unit}".rstrip()
-        listed.append(((p.name, value, p.words), p, (sd,) if counted else ()))
-    ends = ("sd counted",) if counted else ()
-    headers = ("given", "value", "if off by", *(e.name for e in closed), *ends)
-    rows = [(*before, *(_moved(p, e) for e in closed), *after) for before, p, after in listed]
-    if len(closed) > PREMISE_COLUMNS or _wide((headers, *rows)):
-        most = [max(closed, key=lambda e, p=p: strength(p, e)) for _, p, _ in listed]  # type: ignore[misc]
-        headers = ("given", "value", "if off by", "moves most", "half-widths", *ends)
-        rows = [
-            (*before, f"{e.name} {_moved(p, e)}", short(strength(p, e), 2), *after)
-            for (before, p, after), e in zip(listed, most, strict=True)
-        ]
-    return Section("What the result rests on", headers, tuple(rows), _rests_on(every, closed, strength) if rows else ())
-
-
-def _wide(lines: Sequence[tuple[str, ...]]) -> bool:
-    """Whether a table does not fit a report."""
-    return sum(2 + max(map(len, column)) for column in zip(*lines, strict=True)) > 100
-
-
-def _moved(premise: Premise, e: Estimate) -> str:
-    moved = premise.moved.get(e.name)
-    if moved is None:
-        return ""
-    if abs(moved) < 1e-3 * (e.half_width or 0.0):
-        return "0"
-    sign = "" if premise.name == "markers" else "+"
-    if e.half_width is not None and abs(e.value) > e.half_width:
-        return f"{100 * moved / abs(e.value):{sign}.2g} %"
-    return f"{moved:{sign}.2g} {e.unit}".rstrip()
-
-
-def _rests_on(
-    premises: Sequence[Premise], closed: Sequence[Estimate], strength: Callable[[Premise, Estimate], float]
-) -> tuple[tuple[str, str], ...]:
-    """What the reader is to make of the table."""
-    notes = []
-    left = len(premises) - PREMISES_SHOWN
-    if left > 0:
-        notes.append(("not listed", f"{left} given values with weaker effects"))
-    exact = [p for p in premises if p.sd is None]
-    if exact:
-        strongest = max(closed, key=lambda e: strength(exact[0], e))
-        times = strength(exact[0], strongest)
-        words = "The intervals take these values as exact"
-        if len(exact) < len(premises):
-            words = "The intervals take the values without a standard deviation as exact"
-        if times > 1:
-            far = f"an error of {exact[0].words} in {exact[0].name} would move {strongest.name}"
-            words += f", but {far} by {short(times, 2)} half-widths"
-        notes.append(("", f"{words}. Standard deviations (given = ...) make them count"))
-    return tuple(notes)

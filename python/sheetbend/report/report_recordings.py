@@ -1,0 +1,94 @@
+"""How well a fit explains and predicts each recording, in its report: markers, forces, and what it did not see."""
+
+from __future__ import annotations
+
+from ..quantities.wording import short
+from ..result.result import FitData, RecordingFit
+from .tables import Section
+
+
+def recordings(result: FitData) -> Section:
+    rows = [_recording_row(recording) for recording in result.recordings]
+    headers: tuple[str, ...] = (
+        "recording",
+        "rows",
+        "fitted rms",
+        "held-out rms",
+        "baseline rms",
+        "held-out/baseline",
+        "unit",
+    )
+    if all(recording.held_out is None for recording in result.recordings):
+        headers, rows = headers[:3] + headers[-1:], [row[:3] + row[-1:] for row in rows]
+    notes = tuple(
+        (label, words)
+        for label, words in (
+            ("held out", result.held_out_is),
+            ("baseline (no physics)", result.baseline),
+            *((recording.name, _corrected(recording)) for recording in result.recordings),
+        )
+        if words
+    )
+    return Section("Recordings", headers, tuple(rows), notes)
+
+
+def forces(result: FitData) -> Section:
+    rows = [
+        (f.recording, f.sensor, str(f.rows), *("" if x is None else short(x) for x in (f.rms, f.held_out, f.baseline)))
+        for f in result.forces
+    ]
+    units = [(f.unit,) for f in result.forces]
+    headers: tuple[str, ...] = ("recording", "sensor", "rows", "fitted rms", "held-out rms", "constant", "unit")
+    every = [(*row, *unit) for row, unit in zip(rows, units, strict=True)]
+    if all(f.held_out is None for f in result.forces):
+        headers, every = headers[:4] + headers[5:], [row[:4] + row[5:] for row in every]
+    note = ("constant", "rms of the prediction that the force stays at its mean over the fitted part")
+    return Section("Forces", headers, tuple(every), (note,) if every else ())
+
+
+def _corrected(recording: RecordingFit) -> str:
+    if recording.corrected_by is None or recording.driven_sigma is None:
+        return ""
+    found, prior = (short(1e3 * size, 2) for size in (recording.corrected_by, recording.driven_sigma))
+    return (
+        f"its driven markers are moved by {found} mm in each coordinate (root mean square); driven_sigma is {prior} mm"
+    )
+
+
+def _recording_row(recording: RecordingFit) -> tuple[str, ...]:
+    factor, unit = _readable(recording)
+
+    def number(value: float | None) -> str:
+        return "" if value is None else short(value * factor)
+
+    ratio = ""
+    if recording.held_out is not None and recording.baseline:
+        ratio = f"{100 * recording.held_out / recording.baseline:.3g} %"
+    errors = (number(recording.rms), number(recording.held_out), number(recording.baseline))
+    return (recording.name, f"{recording.rows:,}", *errors, ratio, unit)
+
+
+def held_out_motion(result: FitData) -> Section:
+    """How much of the motion that the fit did not see is predicted, and its rhythm."""
+    rows = [_motion_row(recording) for recording in result.recordings if recording.motion]
+    headers = ("recording", "motion rms", "unit", "held-out/motion", "frequency measured", "simulated", "difference")
+    note = (
+        "of the measured markers about their mean over the held-out part; "
+        "frequencies in Hz, from the highest peak there"
+    )
+    return Section("Held-out motion", headers, tuple(rows), (("motion", note),) if rows else ())
+
+
+def _motion_row(recording: RecordingFit) -> tuple[str, ...]:
+    factor, unit = _readable(recording)
+    motion, error = recording.motion or 0.0, recording.held_out
+    share = "" if error is None else f"{100 * error / motion:.3g} %"
+    measured, simulated = recording.measured_frequency, recording.simulated_frequency
+    rhythm = ["" if f is None else f"{f:.2f}" for f in (measured, simulated)]
+    difference = f"{100 * (simulated / measured - 1):+.2g} %" if measured and simulated else ""
+    return (recording.name, short(motion * factor), unit, share, *rhythm, difference)
+
+
+def _readable(recording: RecordingFit) -> tuple[float, str]:
+    sizes = (recording.rms or 0.0, recording.held_out or 0.0, recording.baseline or 0.0)
+    return (1e3, "mm") if recording.unit == "m" and max(sizes) < 1 else (1.0, recording.unit)
