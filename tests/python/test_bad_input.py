@@ -380,6 +380,14 @@ WRONG_TYPES = {
     "substep of a stepper": ("solver", lambda: st.Stepper(rope(), 0.001)),
     "nothing to load": ("path", lambda: sb.Recording.load(None)),
     "name of a particle": ("particle", lambda: sb.on_particle("tip")),
+    "particle for a place": (
+        "markers",
+        lambda: (
+            sb.Experiment(
+                scene=rope(), recording=sb.Recording(np.zeros((2, 1, 3)), np.array([0.0, 0.1])), markers=[3]
+            ).places
+        ),
+    ),
     "particle that is no number": ("second", lambda: sb.between(0, 1.5, 0.5)),
 }
 

@@ -64,6 +64,7 @@ class Study:
             "refine": self._refinement,
             "given": {name: section.sd for name, section in self.config.given.items()},
             "profiles": fit.profiles,
+            "bootstrap": fit.bootstrap,
             "leave_one_out": fit.leave_one_out,
             "max_iterations": fit.max_iterations,
             "threads": fit.threads,

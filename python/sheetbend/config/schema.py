@@ -241,6 +241,12 @@ class FitSection(Section):
     profiles: bool = key(
         True, "follow the cost to the ends of every interval, refitting the others; false: linear intervals, at no cost"
     )
+    bootstrap: int = key(
+        0,
+        "number of fits to data that are drawn from these with replacement, for intervals that assume nothing of the "
+        "noise: whole recordings where there are eight or more, else stretches of each; 0 = none, else at least 50",
+        ge=0,
+    )
     leave_one_out: bool = key(False, "predict every recording that has no held-out part by a fit to the others")
     strict: bool = key(False, "exit 3 when any requested parameter is not identifiable, not only when all are")
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..doubts.beginnings import of_beginnings
+from ..doubts.bootstrap import bootstrap, wider
 from ..doubts.conclude import judged_parameters
 from ..doubts.contradictions import between_parts, together
 from ..doubts.floors import at_floor_of_sweeps
@@ -27,6 +28,7 @@ from ..minimum.discretization import Refinement, settled, to_the_limit, wanted_r
 from ..minimum.problem import FitProblem
 from ..minimum.time_step import Settled
 from ..quantities.parameters import Parameters
+from ..result.bootstrap import Bootstrap
 from ..result.result import Given, Premise
 from ..statistics.identifiability import Identifiability
 from .clouds import driven_beside_clouds, told_beside_clouds
@@ -44,6 +46,7 @@ class Asked:
     systematic: Systematic | None = None
     given: Mapping[str, float] = field(default_factory=dict)
     profiles: bool = True
+    bootstrap: int = 0
     threads: int = 1
 
     def without_refits(self) -> Asked:
@@ -66,6 +69,7 @@ class Conclusion:
         warnings: for the reader.
         premises: what the fit rests on.
         contradicted: by parameter, which parts of the data ask for different values.
+        bootstrap: intervals from data drawn at random, where they were asked for.
     """
 
     at: Settled
@@ -78,6 +82,7 @@ class Conclusion:
     warnings: tuple[str, ...]
     premises: tuple[Premise, ...]
     contradicted: dict[str, str]
+    bootstrap: Bootstrap | None = None
 
 
 def conclude(
@@ -107,10 +112,14 @@ def conclude(
         judged = bounded_by_sticking(at.problem, at.u, judged, refitter)
     predicted = predicted_values(compared, wanted, values, refitter, asked.threads)
     warnings, contradicted = ((), {}) if refitter is None else _doubts(reached, at, judged, told, asked.refinement)
+    drawn: Bootstrap | None = None
+    if asked.bootstrap and refitter is not None and not lost:
+        drawn, why = bootstrap(problem, best.u, asked.bootstrap, judged.autocorrelation_time)
+        warnings += (why,) if drawn is None else wider(drawn, judged.estimates)
     if silent:
         ignored = IGNORED if asked.given else ""
         warnings += (f"what errors of the given values would move is not known{ignored}: {silent}",)
-    return Conclusion(at, tuple(compared), judged, lower, *predicted, warnings, rests_on, contradicted)
+    return Conclusion(at, tuple(compared), judged, lower, *predicted, warnings, rests_on, contradicted, drawn)
 
 
 def _doubts(

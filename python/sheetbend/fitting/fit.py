@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..doubts.bootstrap import check_bootstrap
 from ..doubts.given import check_given
 from ..doubts.leave_one_out import companions, each_left_out
 from ..doubts.prediction import Comparison, compare
@@ -101,6 +102,7 @@ def fit(
     given: Mapping[str, float] | None = None,
     leave_one_out: bool = False,
     profiles: bool = True,
+    bootstrap: int = 0,
     beginnings: bool = True,
     max_iterations: int = 200,
     threads: int = 1,
@@ -140,6 +142,9 @@ def fit(
         leave_one_out: also predict every recording that holds nothing out by a fit to the others.
         profiles: follow the cost to the ends of every interval, all other parameters fitted again; of more than 60
             parameters only for weak ones. Without, intervals are the linear ones, which cost nothing beside the fit.
+        bootstrap: number of fits to data that are drawn from these with replacement, 0 for none: whole recordings where
+            there are eight or more, else stretches of each that are four autocorrelation times long. Each costs some
+            two Jacobians. Their scatter gives intervals that assume nothing of the noise (`FitResult.bootstrap`).
         beginnings: also fit the beginnings of the motions by themselves, to doubt what they contradict and to search on
             from there (`sheetbend.doubts.beginnings`). That costs about as much as the fit itself.
         max_iterations: per start and window.
@@ -148,9 +153,9 @@ def fit(
         journal: file that keeps every evaluation until the fit is done (see `sheetbend.minimum.journal`). After a kill,
             the same call with the same file goes on from there and gives the same bits; with another recording, scene
             or version it is refused.
-        executor: shares out evaluations of several experiments, raced starts, profiles and leave-one-out to its
-            workers, such as those of `concurrent.futures.ProcessPoolExecutor(2)`; the result has the same bits. Only
-            this process writes the journal.
+        executor: shares out evaluations of several experiments, raced starts, profiles, bootstraps and leave-one-out to
+            its workers, such as those of `concurrent.futures.ProcessPoolExecutor(2)`; the result has the same bits.
+            Only this process writes the journal.
 
     Returns:
         Fit. On Ctrl-C it holds the best point so far, marked `interrupted`, with linear intervals: whatever needs a
@@ -165,7 +170,7 @@ def fit(
     if threads < 1:
         raise InputError("threads", "must be positive", threads, "give at least 1")
     require("scipy.special", "fit")  # of intervals, behind all the work
-    asked = Asked(wanted_refinement(refine), systematic, given or {}, profiles, threads)
+    asked = Asked(wanted_refinement(refine), systematic, given or {}, profiles, bootstrap, threads)
     search = Search(optimizer, starts, windows, max_iterations, tolerance, progress)
     clock = Clock.started()
     fitted = _fitted(experiments)
@@ -177,6 +182,7 @@ def fit(
     problem = FitProblem(fitted, wanted, threads=threads, expanded=found_at)
     problem.check_start()
     check_given(asked.given, problem)
+    check_bootstrap(bootstrap, problem)
     reached = reach(search, problem, beginnings)
     if reached.all_lost:
         asked = asked.without_refits()

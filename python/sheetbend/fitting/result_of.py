@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..doubts.bootstrap import moved_by
 from ..doubts.conclude import misfit, warnings_of
 from ..doubts.contradictions import doubtful, elsewhere, held_out_motion
 from ..doubts.implausible import implausible
@@ -69,7 +70,7 @@ def result_of(
         interrupted: by Ctrl-C, at any time.
     """
     problem, best, ends, found = reached.problem, reached.best, reached.ends, reached.found
-    at, judged = conclusion.at, conclusion.judged
+    at, judged, drawn = conclusion.at, conclusion.judged, conclusion.bootstrap
     fitted, parameters = problem.experiments, problem.parameters
     rows = problem.core.first_rows
     count = {e.name: rows[i + 1] - rows[i] for i, e in enumerate(fitted)}
@@ -119,6 +120,7 @@ def result_of(
         starts=start_rows(each, parameters),
         condition=None if found.condition is None else found.condition.words,
         profiles=curves(judged.profiles, parameters, limit),
+        bootstrap=None if drawn is None else moved_by(drawn, parameters, limit - best.u),
         refits=at.refits,
         not_counted=at.not_counted,
         premises=conclusion.premises,

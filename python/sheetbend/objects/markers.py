@@ -181,13 +181,16 @@ def places_for(
         positions: (frames, markers, 3) m, what was recorded.
 
     Raises:
-        SceneError: unknown names, a wrong number, particles that do not exist, or no rope (or several) to spread
-            markers along.
+        SceneError: unknown names, a wrong number, what is no place, particles that do not exist, or no rope (or
+            several) to spread markers along.
     """
     if markers is None and positions is not None and _shows_ghosts(scene, positions):
         markers = [on_particle(p) for p in _as_created(scene)]
     places = _places_for(scene, markers, names)
     for name, place in zip(names, places, strict=True):
+        if place is not None and not isinstance(place, Place):
+            fix = "give sb.on_particle(3) for a particle, a point of a rope, cloth or body, or None"
+            raise SceneError("markers", f"has no place for '{name}'", place, fix)
         if place is not None and not all(-scene.hidden_count <= p < scene.particle_count for p in place.particles):
             fix = f"use particles 0 to {scene.particle_count - 1}"
             raise SceneError("markers", f"put '{name}' on particles that do not exist", place.particles, fix)

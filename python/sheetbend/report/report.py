@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from ..optional import require
 from ..quantities.wording import figures, short
 from ..result.result import UNSOUND, Estimate, FitData, Given, MotionGrowth
+from .report_bootstrap import bootstrap
 from .report_contact import contact_sections
 from .report_driven import driven_sections
 from .report_premises import premises
@@ -49,6 +50,7 @@ def sections(result: FitData) -> list[Section]:
         _unknown(result),
         _correlations(result),
         lopsided_profiles(result),
+        bootstrap(result),
         groups_of_starts(result),
         _course(result),
         Section("Warnings", notes=tuple(("", warning) for warning in result.warnings)),

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from ..errors import InputError
+from .bootstrap import Bootstrap
 from .shot import ShotMotion
 
 UNSOUND = ("rough", "no minimum", "doubtful")
@@ -334,6 +335,7 @@ class FitData:
         contacts: what touches in the fitted motions.
         kinks: of each parameter with an interval, what touches otherwise at its ends.
         profiles: of the parameters whose profiles were followed.
+        bootstrap: intervals from data drawn at random, where they were asked for.
         shot: of every motion that was shot in windows, what its model loses.
         assumed: how the ends of ropes are held and what that assumes, in words, where a configuration says it.
     """
@@ -374,6 +376,7 @@ class FitData:
     condition: str | None = None
     profiles: tuple[ProfileCurve, ...] = ()
     shot: tuple[ShotMotion, ...] = ()
+    bootstrap: Bootstrap | None = None
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of that name; KeyError names the ones there are."""
