@@ -97,7 +97,7 @@ def test_parts_of_a_cloud() -> None:
     ("arrays", "words"),
     [
         ({"points": np.zeros((3, 2))}, "must be numbers of the shape (all, 3)"),
-        ({"points": np.full((3, 3), np.nan)}, "is not finite in row 0"),
+        ({"points": np.full((3, 3), np.nan)}, "is not finite at point 0"),
         ({"counts": np.array([1.0, 2.0])}, "must be one whole number per frame"),
         ({"counts": np.array([1, 1])}, "do not add up to the 3 points"),
         ({"counts": np.array([4, -1])}, "must be one whole number per frame"),

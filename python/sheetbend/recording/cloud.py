@@ -14,7 +14,7 @@ from ..arrays.timeseries import Array
 from ..errors import RecordingError
 from .io import cloud as file_of_cloud
 from .recording import Recording
-from .recording_checks import checked_positions, checked_times, padded
+from .recording_checks import check_points, checked_positions, checked_times, padded
 
 CHUNK = 256  # points whose distances from all others are held at once
 
@@ -158,10 +158,7 @@ def _checked(k: int, given: ArrayLike) -> Array:
         points = np.full(1, np.nan)
     if points.ndim != 2 or points.shape[1] != 3:
         raise RecordingError(f"points[{k}]", "must have the shape (n, 3)", np.shape(given), "give x, y, z of each in m")
-    if not np.isfinite(points).all():
-        bad = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
-        fix = "leave out points that the camera did not see"
-        raise RecordingError(f"points[{k}]", f"is not finite at point {bad}", points[bad].tolist(), fix)
+    check_points(f"points[{k}]", points)
     return points
 
 

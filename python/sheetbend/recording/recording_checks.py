@@ -113,6 +113,14 @@ def padded(frames: Sequence[Array]) -> Array:
     return x
 
 
+def check_points(where: str, points: Array) -> None:
+    """Of a cloud: that points (n, 3) are numbers; `where` they stand is told."""
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if bad.size:
+        fix = "leave out points that the camera did not see"
+        raise RecordingError(where, f"is not finite at point {bad[0]}", points[bad[0]].tolist(), fix)
+
+
 def check_seen(positions: Array, markers: tuple[str, ...]) -> None:
     never = np.isnan(positions[:, :, 0]).all(axis=0)
     if never.any():

@@ -17,7 +17,7 @@ from ...errors import RecordingError
 from ...files.door import check_room, reading
 from ...files.whole import written
 from ..marker_data import MarkerData
-from ..recording_checks import padded
+from ..recording_checks import check_points, padded
 from . import npz, sidecar
 
 REQUIRED = ("points", "counts", "times")
@@ -49,10 +49,7 @@ def read(path: Path) -> MarkerData:
     if int(counts.sum()) != len(points):
         fix = "give one count per frame, whose sum is the number of points"
         raise RecordingError(f"{path}: counts", f"do not add up to the {len(points)} points", int(counts.sum()), fix)
-    if not np.isfinite(points).all():
-        at = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
-        fix = "leave out points that the camera did not see"
-        raise RecordingError(f"{path}: points", f"is not finite in row {at}", points[at].tolist(), fix)
+    check_points(f"{path}: points", points)
     size = 24 * len(counts) * int(counts.max(initial=0))
     check_room(path, f"frames of {int(counts.max(initial=0))} points, which take {size} bytes", size)
     frames = np.split(points.astype(float), np.cumsum(counts)[:-1]) if len(counts) else []
