@@ -1,5 +1,6 @@
 #include "adjoint/equilibrium_vjp.h"
 
+#include "adjoint/element/any_kind_vjp.h"
 #include "adjoint/resting_vjp.h"
 #include "adjoint/step/substep.h"
 
@@ -42,29 +43,21 @@ void EquilibriumDerivative::vjp(const double* x_bar, const double* lambda_bar, d
   for (const RedundantRow& r : at_.left_out) v[r.row] = 0.0;
   solve(u, v, true);
 
-  for_each_constraint(scene_, [&]<class K>(K, const Group& group, int item) {
-    const int first_row = group.first_row + item * K::rows;
-    double x[K::dofs], away[K::dofs], by[K::dofs]{};
-    gather<K>(scene_, group, item, at_.x.data(), x);
-    gather<K>(scene_, group, item, u.data(), away);
-    for (double& a : away) a = -a;
-    const double* p = rest_parameters<K>(in, group, item);
+  AnyConstraint<double> own;
+  for_each_constraint(scene_, [&](const Group& group, int item) {
+    const int first_row = group.first_row + item * group.rows, dofs = 3 * group.arity;
+    double away[largest_kind.dofs], by[largest_kind.dofs]{};
+    evaluate(scene_, in, group, item, at_.x.data(), own);
+    gather(scene_, group, item, u.data(), away);
+    for (int d = 0; d < dofs; ++d) away[d] = -away[d];
+    const double* p = rest_parameters(in, group, item);
     double* p_bar = bar.of(Quantity::rest) + (p - in.of(Quantity::rest));
-    if constexpr (HasReverse<K>) {
-      constexpr double none[K::dofs]{};
-      K::reverse(x, p, &at_.lambda[first_row], &v[first_row], away, none, by, p_bar);
-    } else {
-      double along[K::rows * K::dofs];
-      for (int j = 0; j < K::rows; ++j)
-        for (int d = 0; d < K::dofs; ++d) along[j * K::dofs + d] = at_.lambda[first_row + j] * away[d];
-      gradients_vjp<K>(x, p, &v[first_row], along, by, p_bar);
-    }
-    const SharedEvaluation<K, double> value(x, p);
-    for (int j = 0; j < K::rows; ++j) {
+    pushes_vjp(group.kind, own.x, p, &at_.lambda[first_row], &v[first_row], away, by, p_bar);
+    for (int j = 0; j < group.rows; ++j) {
       bar.of(Quantity::compliance)[group.first + item] -= v[first_row + j] * at_.lambda[first_row + j];
-      for (int d = 0; d < K::dofs; ++d) by[d] -= v[first_row + j] * value.J[j * K::dofs + d];
+      for (int d = 0; d < dofs; ++d) by[d] -= v[first_row + j] * own.J[j * dofs + d];
     }
-    for (int d = 0; d < K::dofs; ++d) fixed[scene_.first_dof[group.nodes(item)[d / 3]] + d % 3] += by[d];
+    for (int d = 0; d < dofs; ++d) fixed[scene_.first_dof[group.nodes(item)[d / 3]] + d % 3] += by[d];
   });
 
   for_each_pressed(scene_, in, [&](int i, const std::array<int, 3>& nodes, double p) {

@@ -80,17 +80,14 @@ class SupportReader {
       }
     };
     const T rate(-1.0 / (eta * eta));
+    AnyConstraint<T> own;
     for (const auto& [g, item] : constraints_) {
       const Group& group = scene.groups[g];
-      with_kind(group.kind, [&]<class K>(K) {
-        T local[K::dofs], push[K::dofs];
-        gather<K>(scene, group, item, x, local);
-        const SharedEvaluation<K, T> value(local, rest_parameters<K>(in, group, item));
-        transpose_times<K>(value.J, lambda + group.first_row + item * K::rows, push);
-        const auto nodes = group.nodes(item);
-        for (int k = 0; k < K::arity; ++k)
-          if (holds(nodes[k])) hold(nodes[k], rate * Vec3<T>(push + 3 * k));
-      });
+      const auto nodes = group.nodes(item);
+      evaluate(scene, in, group, item, x, own);
+      own.set_push(lambda + group.first_row + item * group.rows);
+      for (int k = 0; k < group.arity; ++k)
+        if (holds(nodes[k])) hold(nodes[k], rate * Vec3<T>(own.push + 3 * k));
     }
     std::vector<Vec3<T>> gradient;
     for (const int volume : volumes_) {

@@ -45,4 +45,7 @@ Flight<S> bounced_vjp(const ImpactRule& rule, const Flight<S>& flight, const Sur
   return flight_bar;
 }
 
+extern template Flight<double> bounced_vjp(const ImpactRule&, const Flight<double>&, const Surface<double>&, double,
+                                           const Flight<double>&, Surface<double>&);
+
 }  // namespace sheetbend

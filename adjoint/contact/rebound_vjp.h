@@ -40,4 +40,7 @@ Falling<S> rebound_vjp(const AnyShape& shape, double h, bool impacts, const Fall
   return falling_bar;
 }
 
+extern template Falling<double> rebound_vjp(const AnyShape&, double, bool, const Falling<double>&,
+                                            const Rebound<double>&);
+
 }  // namespace sheetbend

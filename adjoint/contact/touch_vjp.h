@@ -73,6 +73,12 @@ Vec3<S> normal_vjp(const AnyShape& shape, const Vec3<S>& z, const S* size, const
   return {back(0), back(1), back(2)};
 }
 
+// Compiled once (contact_vjp.cpp), for scenes by themselves and in lanes.
+extern template Vec3<double> touch_vjp(const AnyShape&, const Vec3<double>&, const ContactNumbers<double>&,
+                                       const Vec3<double>&, const Vec3<double>&, ContactNumbers<double>&);
+extern template Vec3<double> normal_vjp(const AnyShape&, const Vec3<double>&, const double*, const Vec3<double>&,
+                                        double*);
+
 // turn_bar += world frame^T
 template <class S>
 void add_outer(const Vec3<S>& world, const Vec3<S>& frame, S* turn_bar) {

@@ -2,6 +2,7 @@
 // block). The mathematics is element_vjp.h's; here numbers are gathered and cotangents put where they belong.
 #pragma once
 
+#include "adjoint/element/any_kind_vjp.h"
 #include "adjoint/element/constraint_vjp.h"
 #include "adjoint/element/element_vjp.h"
 #include "adjoint/element/rates_vjp.h"
@@ -82,25 +83,24 @@ void project_color_vjp(const SubstepState<T>& s, const SolverOptions& options, c
 template <class T>
 void damping_references_vjp(const Scene& scene, const Inputs<const T>& in, const Bdf& bdf, const SubstepStates<T>& s,
                             const T* C_r_bar, const StateCotangents<T>& bar, const Inputs<T>& in_bar) {
-  const auto pull_back = [&]<class K>(K, const Group& group, int item, const T* at, const T* C_bar, const T& scale,
-                                      T* x_bar) {
-    const int* nodes = group.stencil.data() + static_cast<std::size_t>(item) * K::arity;
-    const std::size_t value = group.first_value + static_cast<std::size_t>(item) * parameter_count<K>;
-    T x[K::dofs], scaled[K::rows], by[K::dofs]{};
-    for (int d = 0; d < K::dofs; ++d) x[d] = at[scene.first_dof[nodes[d / 3]] + d % 3];
-    for (int j = 0; j < K::rows; ++j) scaled[j] = scale * C_bar[j];
-    values_vjp<K>(x, in.of(Quantity::rest) + value, scaled, by, in_bar.of(Quantity::rest) + value);
-    for (int d = 0; d < K::dofs; ++d) x_bar[scene.first_dof[nodes[d / 3]] + d % 3] += by[d];
+  T x[largest_kind.dofs], scaled[largest_kind.rows], by[largest_kind.dofs];
+  const auto pull_back = [&](const Group& group, int item, const T* at, const T* C_bar, const T& scale, T* x_bar) {
+    const auto nodes = group.nodes(item);
+    const int dofs = 3 * group.arity;
+    const std::size_t value = group.first_value + static_cast<std::size_t>(item) * group.parameters;
+    for (int d = 0; d < dofs; ++d) x[d] = at[scene.first_dof[nodes[d / 3]] + d % 3];
+    for (int j = 0; j < group.rows; ++j) scaled[j] = scale * C_bar[j];
+    std::fill_n(by, dofs, T(0.0));
+    values_vjp(group.kind, x, in.of(Quantity::rest) + value, scaled, by, in_bar.of(Quantity::rest) + value);
+    for (int d = 0; d < dofs; ++d) x_bar[scene.first_dof[nodes[d / 3]] + d % 3] += by[d];
   };
   for (const Group& group : scene.groups) {
     if (!group.damped) continue;
-    with_kind(group.kind, [&]<class K>(K kind) {
-      for (int i = 0; i < group.count; ++i) {
-        const T* C_bar = C_r_bar + group.first_row + i * K::rows;
-        pull_back(kind, group, i, s.x, C_bar, T(1.0 - bdf.before), bar.x);
-        if (bdf.before != 0.0) pull_back(kind, group, i, s.x_before, C_bar, T(bdf.before), bar.x_before);
-      }
-    });
+    for (int i = 0; i < group.count; ++i) {
+      const T* C_bar = C_r_bar + group.first_row + i * group.rows;
+      pull_back(group, i, s.x, C_bar, T(1.0 - bdf.before), bar.x);
+      if (bdf.before != 0.0) pull_back(group, i, s.x_before, C_bar, T(bdf.before), bar.x_before);
+    }
   }
 }
 

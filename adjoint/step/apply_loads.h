@@ -2,7 +2,7 @@
 // positions that the row was taken at.
 #pragma once
 
-#include "adjoint/element/pushes_vjp.h"
+#include "adjoint/element/any_kind_vjp.h"
 #include "adjoint/step/stages.h"
 #include "core/step/apply_loads.h"
 
@@ -13,32 +13,32 @@ template <class T, class Z>
 void row_loads_vjp(const Step<T>& step, Z&& z, const StateCotangents<T>& from, const Inputs<T>& in_bar) {
   const RowLoads<T> loads(step);
   const T eta2(step.bdf.eta * step.bdf.eta);
+  AnyConstraint<T> at;
+  T own[largest_kind.dofs], x_bar[largest_kind.dofs], chosen[largest_kind.rows], none[largest_kind.rows];
+  for (T& a : none) a = T(0.0);
   for (std::size_t i = 0; i < step.scene.loads.size(); ++i) {
     const Load& load = step.scene.loads[i];
     const Group& group = step.scene.groups[load.group];
     const auto nodes = group.nodes(load.item);
     const T size = eta2 * loads.at(i);
-    with_kind(group.kind, [&]<class K>(K) {
-      T x[K::dofs], own[K::dofs], x_bar[K::dofs], chosen[K::rows];
-      loads.template gather<K>(i, x);
-      const SharedEvaluation<K, T> at(x, loads.parameters(i));
-      for (T& a : x_bar) a = T(0.0);
-      for (int j = 0; j < K::rows; ++j) chosen[j] = T(j == load.row ? 1.0 : 0.0);
-      T sum(0.0);
-      for (int k = 0; k < K::arity; ++k) {
-        const Vec3<T> of_node = z(nodes[k]);
-        sum += dot(Vec3<T>(at.J + load.row * K::dofs + 3 * k), of_node);
-        (size * of_node).store(own + 3 * k);
-      }
-      pushes_vjp<K>(x, loads.parameters(i), chosen, own, x_bar, in_bar.of(Quantity::rest) + loads.first_parameter(i));
-      for (int k = 0; k < K::arity; ++k) {
-        const int dof = step.scene.first_dof[nodes[k]];
-        pull_back_extrapolated(step.bdf, Vec3<T>(x_bar + 3 * k), from.x + dof, from.x_before + dof);
-      }
-      T* values_bar = in_bar.of(Quantity::load) + loads.knots.first * step.scene.loads.size() + i;
-      for (int k = 0; k < loads.knots.count; ++k)
-        values_bar[k * step.scene.loads.size()] += T(loads.knots.weight[k]) * (eta2 * sum);
-    });
+    loads.evaluate(i, at);
+    for (T& a : x_bar) a = T(0.0);
+    for (int j = 0; j < group.rows; ++j) chosen[j] = T(j == load.row ? 1.0 : 0.0);
+    T sum(0.0);
+    for (int k = 0; k < group.arity; ++k) {
+      const Vec3<T> of_node = z(nodes[k]);
+      sum += dot(Vec3<T>(at.J + 3 * (load.row * group.arity + k)), of_node);
+      (size * of_node).store(own + 3 * k);
+    }
+    pushes_vjp(group.kind, at.x, loads.parameters(i), chosen, none, own, x_bar,
+               in_bar.of(Quantity::rest) + loads.first_parameter(i));
+    for (int k = 0; k < group.arity; ++k) {
+      const int dof = step.scene.first_dof[nodes[k]];
+      pull_back_extrapolated(step.bdf, Vec3<T>(x_bar + 3 * k), from.x + dof, from.x_before + dof);
+    }
+    T* values_bar = in_bar.of(Quantity::load) + loads.knots.first * step.scene.loads.size() + i;
+    for (int k = 0; k < loads.knots.count; ++k)
+      values_bar[k * step.scene.loads.size()] += T(loads.knots.weight[k]) * (eta2 * sum);
   }
 }
 

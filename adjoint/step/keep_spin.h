@@ -6,7 +6,7 @@
 // and F_bar goes on to the multipliers, as J F_bar, and through J to coordinates and parameters.
 #pragma once
 
-#include "adjoint/element/pushes_vjp.h"
+#include "adjoint/element/any_kind_vjp.h"
 #include "adjoint/step/apply_loads.h"
 #include "adjoint/step/stages.h"
 #include "core/step/keep_spin.h"
@@ -121,23 +121,23 @@ struct ReverseOf<KeepSpin> {
                              const StepCotangents<T>& bar) {
     const Scene& scene = step.scene;
     std::fill(s.multipliers.begin(), s.multipliers.end(), T(0.0));
-    for_each_turning(scene, [&]<class K>(K, const Group& group, int item) {
-      const auto nodes = group.nodes(item);
-      const std::size_t value = group.first_value + static_cast<std::size_t>(item) * group.parameters;
-      const int row = group.first_row + item * K::rows;
-      const T *p = step.in.of(Quantity::rest) + value, *lambda = record.multipliers.data() + row;
-      T x[K::dofs], z[K::dofs], x_bar[K::dofs];
-      for (int k = 0; k < K::arity; ++k) {
-        std::copy_n(s.x.data() + scene.first_dof[nodes[k]], 3, x + 3 * k);
-        s.push[nodes[k]].store(z + 3 * k);
-      }
+    AnyConstraint<T> at;
+    T z[largest_kind.dofs], x_bar[largest_kind.dofs], none[largest_kind.rows];
+    for (T& a : none) a = T(0.0);
+    for (const Turning& turning : scene.turning) {
+      const Group& group = scene.groups[turning.group];
+      const auto nodes = group.nodes(turning.item);
+      const std::size_t value = group.first_value + static_cast<std::size_t>(turning.item) * group.parameters;
+      const int row = group.first_row + turning.item * group.rows, dofs = 3 * group.arity;
+      for (int k = 0; k < group.arity; ++k) s.push[nodes[k]].store(z + 3 * k);
       for (T& a : x_bar) a = T(0.0);
-      const SharedEvaluation<K, T> at(x, p);
-      for (int j = 0; j < K::rows; ++j)
-        for (int d = 0; d < K::dofs; ++d) s.multipliers[row + j] += at.J[j * K::dofs + d] * z[d];
-      pushes_vjp<K>(x, p, lambda, z, x_bar, bar.in.of(Quantity::rest) + value);
-      for (int k = 0; k < K::arity; ++k) Vec3<T>(x_bar + 3 * k).add_to(bar.x_next + scene.first_dof[nodes[k]]);
-    });
+      evaluate_turning(step, turning, s.x.data(), at);
+      for (int j = 0; j < group.rows; ++j)
+        for (int d = 0; d < dofs; ++d) s.multipliers[row + j] += at.J[j * dofs + d] * z[d];
+      pushes_vjp(group.kind, at.x, step.in.of(Quantity::rest) + value, record.multipliers.data() + row, none, z, x_bar,
+                 bar.in.of(Quantity::rest) + value);
+      for (int k = 0; k < group.arity; ++k) Vec3<T>(x_bar + 3 * k).add_to(bar.x_next + scene.first_dof[nodes[k]]);
+    }
   }
 };
 

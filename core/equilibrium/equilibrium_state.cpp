@@ -110,12 +110,12 @@ double EquilibriumState::force_stiffness() const {
   for (const Volume& volume : scene.volumes)
     for (const int n : volume.nodes) counts[n] = true;
   double softest = std::numeric_limits<double>::infinity();
-  for_each_constraint(scene, [&]<class K>(K, const Group& group, int item) {
+  AnyConstraint<double> own;
+  for_each_constraint(scene, [&](const Group& group, int item) {
     if (!std::ranges::all_of(group.nodes(item), [&](int n) { return counts[n]; })) return;
-    double local[K::dofs], J2 = 0.0;
-    gather<K>(scene, group, item, x.data(), local);
-    for (const double j : SharedEvaluation<K, double>(local, rest_parameters<K>(in, group, item)).J)
-      J2 = std::max(J2, j * j);
+    double J2 = 0.0;
+    sheetbend::evaluate(scene, in, group, item, x.data(), own);
+    for (int e = 0; e < group.rows * 3 * group.arity; ++e) J2 = std::max(J2, own.J[e] * own.J[e]);
     if (const double alpha = compliance[group.first + item]; alpha > 0.0) softest = std::min(softest, J2 / alpha);
   });
   return std::isfinite(softest) ? 1e-4 * softest : 0.0;
@@ -128,17 +128,14 @@ double EquilibriumState::first_pseudo_stiffness(Kkt& kkt) const {
 
 void EquilibriumState::soften() {
   const double budget = energy_share * total * size;
+  AnyConstraint<double> own;
   for (std::size_t g = 0; g < scene.groups.size(); ++g) {
     const Group& group = scene.groups[g];
     double sum = 0.0;
-    with_kind(group.kind, [&]<class K>(K) {
-      for (int i = 0; i < group.count; ++i) {
-        double local[K::dofs];
-        gather<K>(scene, group, i, x.data(), local);
-        for (const double c : SharedEvaluation<K, double>(local, rest_parameters<K>(in, group, i)).C)
-          sum += 0.5 * c * c;
-      }
-    });
+    for (int i = 0; i < group.count; ++i) {
+      sheetbend::evaluate(scene, in, group, i, x.data(), own);
+      for (int j = 0; j < group.rows; ++j) sum += 0.5 * own.C[j] * own.C[j];
+    }
     soft[g] = budget > 0.0 ? std::min(sum / budget, stiffening * soft[g]) : 0.0;
     for (int c = group.first; c < group.first + group.count; ++c) softened[c] = std::max(compliance[c], soft[g]);
   }
@@ -186,16 +183,17 @@ void EquilibriumState::measure() {
   for (double& f : force) f = std::abs(f);
   modes.add_sizes(contacts, x.data(), force);
   residual = 0.0;
-  for_each_constraint(scene, [&]<class K>(K, const Group& group, int item) {
-    double local[K::dofs];
-    gather<K>(scene, group, item, x.data(), local);
-    const SharedEvaluation<K, double> value(local, rest_parameters<K>(in, group, item));
-    for (int j = 0; j < K::rows; ++j) {
-      const int row = group.first_row + item * K::rows + j;
+  AnyConstraint<double> own;
+  for_each_constraint(scene, [&](const Group& group, int item) {
+    const int dofs = 3 * group.arity;
+    sheetbend::evaluate(scene, in, group, item, x.data(), own);
+    for (int j = 0; j < group.rows; ++j) {
+      const int row = group.first_row + item * group.rows + j;
       double J2 = 0.0;
-      for (int d = 0; d < K::dofs; ++d) {
-        J2 += value.J[j * K::dofs + d] * value.J[j * K::dofs + d];
-        force[scene.first_dof[group.nodes(item)[d / 3]] + d % 3] += std::abs(value.J[j * K::dofs + d] * lambda[row]);
+      for (int d = 0; d < dofs; ++d) {
+        const double a = own.J[j * dofs + d];
+        J2 += a * a;
+        force[scene.first_dof[group.nodes(item)[d / 3]] + d % 3] += std::abs(a * lambda[row]);
       }
       residual = std::max(residual, std::abs(r_l[row]) / (J2 > 0.0 ? std::sqrt(J2) * size : 1.0));
     }
@@ -238,9 +236,9 @@ double EquilibriumState::energy() const {
   dead_load(scene, in, options.t0, f.data());
   double sum = pressure_energy(scene, in, x.data()) + modes.energy(contacts, x.data());
   for (int i = 0; i < scene.dofs(); ++i) sum -= f[i] * x[i];
-  for_each_constraint(scene, [&]<class K>(K, const Group& group, int item) {
-    for (int j = 0; j < K::rows; ++j) {
-      const double l = lambda[group.first_row + item * K::rows + j];
+  for_each_constraint(scene, [&](const Group& group, int item) {
+    for (int j = 0; j < group.rows; ++j) {
+      const double l = lambda[group.first_row + item * group.rows + j];
       sum += 0.5 * compliance[group.first + item] * l * l;
     }
   });

@@ -6,7 +6,7 @@
 #include <span>
 #include <utility>
 
-#include "core/element/second_order.h"
+#include "core/element/any_kind_hessian.h"
 #include "core/equilibrium/residual.h"
 
 namespace sheetbend {
@@ -139,14 +139,16 @@ void Kkt::assemble(const double* inputs, const double* x, const double* lambda, 
   const Inputs<const double> in{scene_.layout, inputs};
   force_stiffness_ = force_stiffness;
   double *H = H_.data(), *J = J_.data();
-  for_each_constraint(scene_, [&]<class K>(K, const Group& group, int item) {
-    double local[K::dofs], own[triangle(K::dofs)]{};
-    gather<K>(scene_, group, item, x, local);
-    const SecondOrder<K, double> at(local, rest_parameters<K>(in, group, item));
-    at.add_hessian(lambda + group.first_row + item * K::rows, own);
-    for (int a = 0; a < K::dofs; ++a)
-      for (int b = 0; b < K::dofs; ++b) *H++ = own[a >= b ? triangle(a) + b : triangle(b) + a];
-    J = std::copy(std::begin(at.J), std::end(at.J), J);
+  double local[largest_kind.dofs], own[triangle(largest_kind.dofs)];
+  for_each_constraint(scene_, [&](const Group& group, int item) {
+    const int dofs = 3 * group.arity;
+    gather(scene_, group, item, x, local);
+    std::fill_n(own, triangle(dofs), 0.0);
+    add_hessian(group.kind, local, rest_parameters(in, group, item), lambda + group.first_row + item * group.rows, J,
+                own);
+    for (int a = 0; a < dofs; ++a)
+      for (int b = 0; b < dofs; ++b) *H++ = own[a >= b ? triangle(a) + b : triangle(b) + a];
+    J += group.rows * dofs;
   });
   for (const RedundantRow& r : left_out) {
     const Group& group = group_of(scene_, r.row);
@@ -198,21 +200,22 @@ bool Kkt::factorize(double mu, const double* compliance) {
 
   const int* position = position_.data();
   const double* J = J_.data();
-  for_each_constraint(scene_, [&]<class K>(K, const Group& group, int item) {
+  for_each_constraint(scene_, [&](const Group& group, int item) {
+    const int rows = group.rows, dofs = 3 * group.arity;
     double J2 = 0.0;
-    for (int e = 0; e < K::rows * K::dofs; ++e) J2 = std::max(J2, J[e] * J[e]);
+    for (int e = 0; e < rows * dofs; ++e) J2 = std::max(J2, J[e] * J[e]);
     double& alpha = softened_[group.first + item];
     alpha = alpha_[group.first + item];
     if (J2 > 0.0 && geometric_ > 0.0) alpha = std::max(alpha, J2 / (rigid_stiffness * geometric_));
     if (alpha == 0.0) alpha = 1.0;  // a rigid row without any scale of stiffness
-    for (int a = 0; a < K::dofs; ++a)
-      for (int b = 0; b < K::dofs; ++b, ++position) {
+    for (int a = 0; a < dofs; ++a)
+      for (int b = 0; b < dofs; ++b, ++position) {
         if (*position < 0) continue;
         double sum = 0.0;
-        for (int j = 0; j < K::rows; ++j) sum += J[j * K::dofs + a] * J[j * K::dofs + b];
+        for (int j = 0; j < rows; ++j) sum += J[j * dofs + a] * J[j * dofs + b];
         values[*position] += sum / alpha;
       }
-    J += K::rows * K::dofs;
+    J += rows * dofs;
   });
   const int* at = contact_position_.data();
   for_each_contact_entry([&](std::size_t i, int e, double weights, int, int) {
@@ -263,17 +266,18 @@ void Kkt::condensed_solve(const std::vector<double>& b_x, const std::vector<doub
     if (unknown_[i] >= 0) b[unknown_[i]] = -b_x[i];
   const auto for_each_gradient = [&](auto&& f) {
     const double* J = J_.data();
-    for_each_constraint(scene_, [&]<class K>(K kind, const Group& group, int item) {
-      f(kind, group, item, J, 1.0 / softened_[group.first + item]);
-      J += K::rows * K::dofs;
+    for_each_constraint(scene_, [&](const Group& group, int item) {
+      f(group, item, J, 1.0 / softened_[group.first + item]);
+      J += group.rows * 3 * group.arity;
     });
   };
-  for_each_gradient([&]<class K>(K, const Group& group, int item, const double* J, double stiffness) {
+  double local[largest_kind.dofs];
+  for_each_gradient([&](const Group& group, int item, const double* J, double stiffness) {
     const auto nodes = group.nodes(item);
-    double push[K::dofs]{};
-    transpose_times<K>(J, &b_l[group.first_row + item * K::rows], push);
-    for (int d = 0; d < K::dofs; ++d)
-      if (const int u = unknown_[scene_.first_dof[nodes[d / 3]] + d % 3]; u >= 0) b[u] += stiffness * push[d];
+    const int dofs = 3 * group.arity;
+    transpose_times(group.rows, dofs, J, &b_l[group.first_row + item * group.rows], local);
+    for (int d = 0; d < dofs; ++d)
+      if (const int u = unknown_[scene_.first_dof[nodes[d / 3]] + d % 3]; u >= 0) b[u] += stiffness * local[d];
   });
   for (std::size_t v = 0; v < border_.size(); ++v) b[free_ + v] = -b_l[scene_.rows + v];
   Eigen::VectorXd solution;
@@ -285,13 +289,13 @@ void Kkt::condensed_solve(const std::vector<double>& b_x, const std::vector<doub
     solution = whole_->solve(b);
   for (std::size_t v = 0; v < border_.size(); ++v) lambda[scene_.rows + v] = solution[free_ + v];
   for (int i = 0; i < scene_.dofs(); ++i) x[i] = unknown_[i] >= 0 ? solution[unknown_[i]] : 0.0;
-  for_each_gradient([&]<class K>(K, const Group& group, int item, const double* J, double stiffness) {
-    double local[K::dofs];
-    gather<K>(scene_, group, item, x.data(), local);
-    for (int j = 0; j < K::rows; ++j) {
-      const int row = group.first_row + item * K::rows + j;
+  for_each_gradient([&](const Group& group, int item, const double* J, double stiffness) {
+    const int dofs = 3 * group.arity;
+    gather(scene_, group, item, x.data(), local);
+    for (int j = 0; j < group.rows; ++j) {
+      const int row = group.first_row + item * group.rows + j;
       double sum = b_l[row];
-      for (int d = 0; d < K::dofs; ++d) sum -= J[j * K::dofs + d] * local[d];
+      for (int d = 0; d < dofs; ++d) sum -= J[j * dofs + d] * local[d];
       lambda[row] = stiffness * sum;
     }
   });
@@ -311,21 +315,21 @@ void Kkt::subtract_product(const std::vector<double>& x, const std::vector<doubl
     if (unknown_[dof] < 0) continue;
     for (int e = 0; e < 9; ++e) r_x[dof + e / 3] += idle_stiffness_[i] * idle_[i][e] * x[dof + e % 3];
   }
-  for_each_constraint(scene_, [&]<class K>(K, const Group& group, int item) {
+  double local[largest_kind.dofs], push[largest_kind.dofs];
+  for_each_constraint(scene_, [&](const Group& group, int item) {
     const auto nodes = group.nodes(item);
-    const int row = group.first_row + item * K::rows;
-    double local[K::dofs], push[K::dofs]{};
-    gather<K>(scene_, group, item, x.data(), local);
-    transpose_times<K>(J, &lambda[row], push);
-    for (int a = 0; a < K::dofs; ++a, H += K::dofs) {
+    const int row = group.first_row + item * group.rows, dofs = 3 * group.arity;
+    gather(scene_, group, item, x.data(), local);
+    transpose_times(group.rows, dofs, J, &lambda[row], push);
+    for (int a = 0; a < dofs; ++a, H += dofs) {
       const int dof = scene_.first_dof[nodes[a / 3]] + a % 3;
       if (unknown_[dof] < 0) continue;
-      for (int b = 0; b < K::dofs; ++b) push[a] += H[b] * local[b];
+      for (int b = 0; b < dofs; ++b) push[a] += H[b] * local[b];
       r_x[dof] -= push[a];
     }
-    for (int j = 0; j < K::rows; ++j, J += K::dofs) {
+    for (int j = 0; j < group.rows; ++j, J += dofs) {
       double sum = alpha_[group.first + item] * lambda[row + j];
-      for (int d = 0; d < K::dofs; ++d) sum += J[d] * local[d];
+      for (int d = 0; d < dofs; ++d) sum += J[d] * local[d];
       r_l[row + j] -= sum;
     }
   });

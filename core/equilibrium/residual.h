@@ -13,30 +13,37 @@
 
 #include <algorithm>
 
+#include "core/constraints/any_kind.h"
 #include "core/equilibrium/pressure.h"
 #include "core/step/substep.h"
 
 namespace sheetbend {
 
-// Calls f(K{}, group, item) for every constraint, in the scene's order.
+// Calls f(group, item) for every constraint, in the scene's order.
 template <class F>
 void for_each_constraint(const Scene& scene, F&& f) {
   for (const Group& group : scene.groups)
-    with_kind(group.kind, [&]<class K>(K kind) {
-      for (int i = 0; i < group.count; ++i) f(kind, group, i);
-    });
+    for (int i = 0; i < group.count; ++i) f(group, i);
 }
 
-template <class K, class T>
+template <class T>
 const T* rest_parameters(const Inputs<const T>& in, const Group& group, int item) {
-  return in.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(item) * parameter_count<K>;
+  return in.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(item) * group.parameters;
 }
 
 // Copies a per-dof vector to the constraint's stencil.
-template <class K, class T>
+template <class T>
 void gather(const Scene& scene, const Group& group, int item, const T* from, T* local) {
   const auto nodes = group.nodes(item);
-  for (int k = 0; k < K::arity; ++k) std::copy_n(from + scene.first_dof[nodes[k]], 3, local + 3 * k);
+  for (int k = 0; k < group.arity; ++k) std::copy_n(from + scene.first_dof[nodes[k]], 3, local + 3 * k);
+}
+
+// C and J of a constraint at x (dofs).
+template <class T>
+void evaluate(const Scene& scene, const Inputs<const T>& in, const Group& group, int item, const T* x,
+              AnyConstraint<T>& at) {
+  gather(scene, group, item, x, at.x);
+  at.evaluate(group.kind, rest_parameters(in, group, item));
 }
 
 // Writes the coordinates of pinned and driven nodes.
@@ -97,17 +104,16 @@ template <class T>
 void equilibrium_residual(const Scene& scene, const Inputs<const T>& in, double t0, const T* x, const T* lambda, T* r_x,
                           T* r_l) {
   external_force(scene, in, t0, x, r_x);
-  for_each_constraint(scene, [&]<class K>(K, const Group& group, int item) {
-    T local[K::dofs], push[K::dofs]{};
-    gather<K>(scene, group, item, x, local);
-    const SharedEvaluation<K, T> value(local, rest_parameters<K>(in, group, item));
-    const int row = group.first_row + item * K::rows;
+  AnyConstraint<T> own;
+  for_each_constraint(scene, [&](const Group& group, int item) {
+    const int row = group.first_row + item * group.rows;
     const T& alpha = in.of(Quantity::compliance)[group.first + item];
-    for (int j = 0; j < K::rows; ++j) r_l[row + j] = value.C[j] + alpha * lambda[row + j];
-    transpose_times<K>(value.J, lambda + row, push);
+    evaluate(scene, in, group, item, x, own);
+    for (int j = 0; j < group.rows; ++j) r_l[row + j] = own.C[j] + alpha * lambda[row + j];
+    own.set_push(lambda + row);
     const auto nodes = group.nodes(item);
-    for (int k = 0; k < K::arity; ++k)
-      if (scene.role[nodes[k]] == Role::free) Vec3<T>(push + 3 * k).add_to(r_x + scene.first_dof[nodes[k]]);
+    for (int k = 0; k < group.arity; ++k)
+      if (scene.role[nodes[k]] == Role::free) Vec3<T>(own.push + 3 * k).add_to(r_x + scene.first_dof[nodes[k]]);
   });
   std::vector<Vec3<T>> gradient;
   for (int i = 0; i < static_cast<int>(scene.volumes.size()); ++i) {

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <span>
 
-#include "core/constraints/registry.h"
+#include "core/constraints/any_kind.h"
 #include "core/solver/volume.h"
 
 namespace sheetbend {
@@ -81,18 +81,16 @@ void for_each_width(const Scene& scene, const Moved& s, double size, F&& f) {
 template <class F>
 void for_each_row(const Scene& scene, const Inputs<const double>& in, const Group& group, int item, const double* x,
                   F&& f) {
-  with_kind(group.kind, [&]<class K>(K) {
-    double local[K::dofs];
-    const auto nodes = group.nodes(item);
-    for (int k = 0; k < K::arity; ++k) std::copy_n(x + scene.first_dof[nodes[k]], 3, local + 3 * k);
-    const double* rest =
-        in.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(item) * parameter_count<K>;
-    const SharedEvaluation<K, double> at(local, rest);
-    for (int j = 0; j < K::rows; ++j)
-      if (!K::unilateral || at.C[j] < 0.0)
-        f(at.C[j], in.of(Quantity::compliance)[group.first + item],
-          std::span<const double>(at.J + j * K::dofs, K::dofs), nodes);
-  });
+  AnyConstraint<double> at;
+  const auto nodes = group.nodes(item);
+  for (int k = 0; k < group.arity; ++k) std::copy_n(x + scene.first_dof[nodes[k]], 3, at.x + 3 * k);
+  at.evaluate(group.kind,
+              in.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(item) * group.parameters);
+  const std::size_t dofs = 3 * nodes.size();
+  for (int j = 0; j < group.rows; ++j)
+    if (!group.unilateral || at.C[j] < 0.0)
+      f(at.C[j], in.of(Quantity::compliance)[group.first + item], std::span<const double>(at.J + j * dofs, dofs),
+        nodes);
 }
 
 // C^2/(2 alpha); of rigid rows what one projection releases, C^2/(2 eta^2 J W J^T).
@@ -241,6 +239,15 @@ Shape shape_of(const Scene& scene, const Moved& s, double size) {
 }
 
 }  // namespace
+
+Diverged::Diverged(int substep_, int node_, double time_, const std::string& seen_)
+    : std::runtime_error("the rollout diverged at substep " + std::to_string(substep_) +
+                         " (t = " + std::to_string(time_) + " s): particle " + std::to_string(node_) + " " + seen_ +
+                         ". Fix: use a smaller substep, more iterations, or check masses and stiffnesses"),
+      substep(substep_),
+      node(node_),
+      time(time_),
+      seen(seen_) {}
 
 bool StateCheck::suspects(const Moved& s) const {
   const double size = size_of(scene_, s);

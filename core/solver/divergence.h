@@ -36,14 +36,7 @@ struct Diverged : std::runtime_error {
   int substep, node;
   double time;
   std::string seen;
-  Diverged(int substep_, int node_, double time_, const std::string& seen_ = not_finite)
-      : std::runtime_error("the rollout diverged at substep " + std::to_string(substep_) +
-                           " (t = " + std::to_string(time_) + " s): particle " + std::to_string(node_) + " " + seen_ +
-                           ". Fix: use a smaller substep, more iterations, or check masses and stiffnesses"),
-        substep(substep_),
-        node(node_),
-        time(time_),
-        seen(seen_) {}
+  Diverged(int substep, int node, double time, const std::string& seen = not_finite);
 };
 
 // The state of one scene, against the one that it started from; (dofs), (dofs), (dofs) and (nodes) numbers.

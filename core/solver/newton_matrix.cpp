@@ -6,7 +6,7 @@
 #include <iterator>
 #include <limits>
 
-#include "core/constraints/registry.h"
+#include "core/constraints/any_kind.h"
 #include "core/solver/block_frames.h"
 
 namespace sheetbend {
@@ -17,11 +17,8 @@ using sheetbend_blocks::row;
 
 constexpr double convexities[] = {1.0 / 64.0, 1.0 / 8.0, 1.0};
 
-constexpr int most_dofs = []<class... K>(std::tuple<K...>*) {
-  return std::max({(balances<K> ? K::dofs : 0)...});
-}(static_cast<Registry*>(nullptr));
-
-using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, most_dofs, most_dofs>;
+using Matrix =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, largest_kind.dofs, largest_kind.dofs>;
 
 // Numbers of a run's elements.
 std::size_t numbers_of(const Scene& scene, const MemberRun& run) {

@@ -3,6 +3,7 @@
 // K dx = -dR, the implicit function theorem, R being evaluated over them.
 #pragma once
 
+#include "core/constraints/any_kind.h"
 #include "core/solver/pair_source.h"
 #include "core/solver/project_block.h"
 
@@ -103,44 +104,42 @@ void load_implicit(const SubstepState<T>& s, const DirectBlock& block, const Sub
 }
 
 // The particle, in the block's order, of place k of a run's constraint.
-template <class K>
-int particle_of(const MemberRun& run, int i, int k) {
-  return run.nodes[lane_at(i, K::arity, k)] / sheetbend_blocks::row;
+inline int particle_of(const MemberRun& run, int arity, int i, int k) {
+  return run.nodes[lane_at(i, arity, k)] / sheetbend_blocks::row;
 }
 
-// Calls f(K{}, run, i, J, lambda) for every constraint over T, at the coordinates at(particle, d): lambda = -(C + g (C - C_r))/a. That of a rigid row is
-// the one in the state; c (rigid rows) gets their residuals.
+// Calls f(run, i, element, lambda) for every constraint over T, evaluated at the coordinates at(particle, d): lambda = -(C + g (C - C_r))/a.
+// That of a rigid row is the one in the state; c (rigid rows) gets their residuals.
 template <class T, class At, class F>
 void for_each_elastic(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state, std::vector<T>& c,
                       At&& at, F&& f) {
   const RigidRows& rigid = state.implicit[0].rigid();
   c.assign(rigid.size(), T(0.0));
+  AnyConstraint<T> element;
+  T lambda[largest_kind.rows];
   for (const MemberRun& run : block.runs) {
     const Group& group = s.scene.groups[run.group];
-    with_kind(group.kind, [&]<class K>(K kind) {
-      if constexpr (balances<K>)
-        for (int i = 0; i < run.count; ++i) {
-          const int item = run.items[i];
-          constexpr int P = parameter_count<K>;
-          T local[K::dofs], lambda[K::rows];
-          for (int d = 0; d < K::dofs; ++d) local[d] = at(particle_of<K>(run, i, d / 3), d % 3);
-          const Evaluation<K, T> value(
-              local, s.inputs.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(item) * P);
-          const Rates<T> rates(s.inputs.of(Quantity::compliance)[group.first + item],
-                               group.damped ? s.inputs.of(Quantity::damping)[group.first + item] : T(0.0), s.eta);
-          for (int j = 0; j < K::rows; ++j) {
-            T residual = value.C[j];
-            if (group.damped) residual += rates.g * difference<K>(value.C[j], T(state.C_r[run.first_row[i] + j]));
-            if (const int own = rigid.own_row(run.first_row[i] + j); own >= 0) {
-              lambda[j] = T(state.lambda[0][run.first_row[i] + j]);
-              c[own] = rates.scale * (residual + rates.a * lambda[j]);
-            } else {
-              lambda[j] = -(residual / rates.a);
-            }
-          }
-          f(kind, run, i, value.J, lambda);
+    const AnyKind<T>& kind = any_kind<T>(group.kind);
+    if (!kind.balances) continue;
+    for (int i = 0; i < run.count; ++i) {
+      const int item = run.items[i];
+      for (int d = 0; d < kind.dofs; ++d) element.x[d] = at(particle_of(run, group.arity, i, d / 3), d % 3);
+      element.evaluate(group.kind, s.inputs.of(Quantity::rest) + group.first_value +
+                                       static_cast<std::size_t>(item) * group.parameters);
+      const Rates<T> rates(s.inputs.of(Quantity::compliance)[group.first + item],
+                           group.damped ? s.inputs.of(Quantity::damping)[group.first + item] : T(0.0), s.eta);
+      for (int j = 0; j < kind.rows; ++j) {
+        T residual = element.C[j];
+        if (group.damped) residual += rates.g * kind.difference(element.C[j], T(state.C_r[run.first_row[i] + j]));
+        if (const int own = rigid.own_row(run.first_row[i] + j); own >= 0) {
+          lambda[j] = T(state.lambda[0][run.first_row[i] + j]);
+          c[own] = rates.scale * (residual + rates.a * lambda[j]);
+        } else {
+          lambda[j] = -(residual / rates.a);
         }
-    });
+      }
+      f(run, i, element, lambda);
+    }
   }
 }
 
@@ -150,12 +149,12 @@ void subtract_elastic_forces(const SubstepState<T>& s, const DirectBlock& block,
                              const std::vector<T>& x, std::vector<T>& R, std::vector<T>& c) {
   for_each_elastic(
       s, block, state, c, [&](int particle, int d) { return x[3 * particle + d]; },
-      [&]<class K>(K, const MemberRun& run, int i, const T* J, const T* lambda) {
-        T push[K::dofs];
-        transpose_times<K>(J, lambda, push);
-        for (int d = 0; d < K::dofs; ++d) {
-          const int particle = particle_of<K>(run, i, d / 3);
-          if (particle < block.movable) R[3 * particle + d % 3] -= push[d];
+      [&](const MemberRun& run, int i, AnyConstraint<T>& element, const T* lambda) {
+        const int dofs = element.kind->dofs;
+        element.set_push(lambda);
+        for (int d = 0; d < dofs; ++d) {
+          const int particle = particle_of(run, dofs / 3, i, d / 3);
+          if (particle < block.movable) R[3 * particle + d % 3] -= element.push[d];
         }
       });
 }
@@ -200,8 +199,8 @@ void carry_multipliers(const SubstepState<T>& s, const DirectBlock& block, Block
       [&](int particle, int d) {
         return T(state.x[0][sheetbend_blocks::row * static_cast<std::size_t>(particle) + d]);
       },
-      [&]<class K>(K, const MemberRun& run, int i, const T*, const T* lambda) {
-        for (int j = 0; j < K::rows; ++j) state.lambda[0][run.first_row[i] + j] = lambda[j];
+      [&](const MemberRun& run, int i, const AnyConstraint<T>& element, const T* lambda) {
+        for (int j = 0; j < element.kind->rows; ++j) state.lambda[0][run.first_row[i] + j] = lambda[j];
       });
 }
 
@@ -315,7 +314,7 @@ void keep_rigid(const std::vector<T>& lambda, BlockState<T>& state) {
 }
 
 // The settled frames of the solution in state.x, whose directors are those of the substep's end (block_frames.h), and what pushes them from their
-// prediction: read off the motion, since what a balance leaves of its largest force is not small beside it.
+// prediction: read off the motion, since what a balance leaves of its largest_kind force is not small beside it.
 template <class T>
 void settle_again(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state) {
   if (block.frames.empty()) return;

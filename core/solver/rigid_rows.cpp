@@ -2,8 +2,7 @@
 
 #include <algorithm>
 
-#include "core/constraints/registry.h"
-#include "core/element/second_order.h"
+#include "core/element/any_kind_hessian.h"
 #include "core/scalar/pivot.h"
 #include "core/solver/ordering.h"
 
@@ -17,16 +16,19 @@ constexpr std::size_t few = 256;        // rows whose order is kept, as a border
 constexpr double no_stiffness = 1e150;  // a of a member that has been taken out: products with zero stay zero
 
 // A member's numbers as its kind wants them.
-template <class K>
-struct Numbered {
-  double x[K::dofs], w[K::arity], p[parameter_count<K> + 1];
-  Numbered(const MemberRun& run, const double* values, int count, int place, const double* at) {
-    for (int k = 0; k < K::arity; ++k) {
-      const double* from = at + run.nodes[lane_at(place, K::arity, k)];
+struct Numbered : AnyConstraint<double> {
+  double w[largest_kind.dofs / 3], p[largest_kind.parameters];
+
+  void take(int number, const MemberRun& run, const double* values, bool damped, int place, const double* at) {
+    const AnyKind<double>& of = any_kind<double>(number);
+    const int arity = of.dofs / 3, parameters = of.parameters;
+    const int count = sheetbend_blocks::value_count(damped, parameters);
+    for (int k = 0; k < arity; ++k) {
+      const double* from = at + run.nodes[lane_at(place, arity, k)];
       std::copy_n(from, 3, x + 3 * k);
       w[k] = from[3];
     }
-    for (int k = 0; k < parameter_count<K>; ++k) p[k] = values[lane_at(place, count, count - parameter_count<K> + k)];
+    for (int k = 0; k < parameters; ++k) p[k] = values[lane_at(place, count, count - parameters + k)];
   }
 };
 
@@ -34,33 +36,33 @@ struct Numbered {
 
 void RigidRows::find(const Scene& scene, const Given& given, const double* at) {
   *this = {};
+  Numbered own;
   for (int r = 0; r < static_cast<int>(given.block.runs.size()); ++r) {
     const MemberRun& run = given.block.runs[r];
     const Group& group = scene.groups[run.group];
     const int count = sheetbend_blocks::value_count(group.damped, group.parameters);
     double* values = given.values[r].data();
-    with_kind(group.kind, [&]<class K>(K) {
-      if constexpr (balances<K>)
-        for (int i = 0; i < run.count; ++i) {
-          double& a = values[lane_at(i, count, 0)];
-          const double g = group.damped ? values[lane_at(i, count, 1)] : 0.0;
-          const Numbered<K> own(run, values, count, i, at);
-          const SharedEvaluation<K, double> value(own.x, own.p);
-          double stiffest = 0.0;  // J W J^T
-          for (int j = 0; j < K::rows; ++j) {
-            double sum = 0.0;
-            for (int d = 0; d < K::dofs; ++d) sum += own.w[d / 3] * value.J[j * K::dofs + d] * value.J[j * K::dofs + d];
-            stiffest = std::max(stiffest, sum);
-          }
-          if (a != 0.0 && !(a <= gives_way * (1.0 + g) * stiffest)) continue;
-          members_.push_back({group.kind, r, i, run.first_row[i], K::rows, 0, K::arity, group.damped});
-          for (int j = 0; j < K::rows; ++j) {
-            a_.push_back(a);
-            g_.push_back(g);
-          }
-          a = no_stiffness;
-        }
-    });
+    if (!any_kind<double>(group.kind).balances) continue;
+    const int dofs = 3 * group.arity;
+    for (int i = 0; i < run.count; ++i) {
+      double& a = values[lane_at(i, count, 0)];
+      const double g = group.damped ? values[lane_at(i, count, 1)] : 0.0;
+      own.take(group.kind, run, values, group.damped, i, at);
+      own.evaluate(group.kind, own.p);
+      double stiffest = 0.0;  // J W J^T
+      for (int j = 0; j < group.rows; ++j) {
+        double sum = 0.0;
+        for (int d = 0; d < dofs; ++d) sum += own.w[d / 3] * own.J[j * dofs + d] * own.J[j * dofs + d];
+        stiffest = std::max(stiffest, sum);
+      }
+      if (a != 0.0 && !(a <= gives_way * (1.0 + g) * stiffest)) continue;
+      members_.push_back({group.kind, r, i, run.first_row[i], group.rows, 0, group.arity, group.damped});
+      for (int j = 0; j < group.rows; ++j) {
+        a_.push_back(a);
+        g_.push_back(g);
+      }
+      a = no_stiffness;
+    }
   }
   if (!empty()) place_rows(given.block);
 }
@@ -123,27 +125,24 @@ void RigidRows::place_rows(const DirectBlock& block) {
 }
 
 void RigidRows::evaluate(const Given& given, const double* at) {
-  for (const Member& m : members_)
-    with_kind(m.kind, [&]<class K>(K) {
-      if constexpr (balances<K>) {
-        const MemberRun& run = given.block.runs[m.run];
-        const int count = sheetbend_blocks::value_count(m.damped, parameter_count<K>);
-        const Numbered<K> own(run, given.values[m.run].data(), count, m.place, at);
-        const SharedEvaluation<K, double> value(own.x, own.p);
-        std::copy_n(value.J, K::rows * K::dofs, &J_[m.J]);
-        for (int j = 0; j < K::rows; ++j) {
-          const int row = m.first + j;
-          C_[row] = value.C[j];
-          steepest_[row] = 0.0;
-          for (int d = 0; d < K::dofs; ++d)
-            steepest_[row] = std::max(steepest_[row],
-                                      std::abs(value.J[j * K::dofs + d]) / given.unit[particle(given.block, m, d / 3)]);
-          double residual = value.C[j] + a_[row] * lambda[row];
-          if (m.damped) residual += g_[row] * difference<K>(value.C[j], given.C_r[rows_[row]]);
-          c_[row] = left_out_[row] ? 0.0 : residual / (1.0 + g_[row]);
-        }
-      }
-    });
+  Numbered own;
+  for (const Member& m : members_) {
+    const int dofs = 3 * m.arity;
+    own.take(m.kind, given.block.runs[m.run], given.values[m.run].data(), m.damped, m.place, at);
+    own.evaluate(m.kind, own.p);
+    std::copy_n(own.J, m.count * dofs, &J_[m.J]);
+    for (int j = 0; j < m.count; ++j) {
+      const int row = m.first + j;
+      C_[row] = own.C[j];
+      steepest_[row] = 0.0;
+      for (int d = 0; d < dofs; ++d)
+        steepest_[row] =
+            std::max(steepest_[row], std::abs(own.J[j * dofs + d]) / given.unit[particle(given.block, m, d / 3)]);
+      double residual = own.C[j] + a_[row] * lambda[row];
+      if (m.damped) residual += g_[row] * own.kind->difference(own.C[j], given.C_r[rows_[row]]);
+      c_[row] = left_out_[row] ? 0.0 : residual / (1.0 + g_[row]);
+    }
+  }
 }
 
 // A column of J W J^T + D over all rows.
@@ -227,24 +226,21 @@ void RigidRows::add_elements(const Given& given, double* at, const double* stiff
     soft[j] += softening * J * J / (1.0 / at[p + 3] + stiffness[p + dof % 3]);
   });
   for (int j = 0; j < size(); ++j) S_[j] = std::max({D_[j], soft[j], left_out_[j] ? 1.0 : 0.0});
-  for (const Member& m : members_)
-    with_kind(m.kind, [&]<class K>(K) {
-      if constexpr (balances<K>) {
-        const MemberRun& run = given.block.runs[m.run];
-        const int count = sheetbend_blocks::value_count(m.damped, parameter_count<K>);
-        const Numbered<K> own(run, given.values[m.run].data(), count, m.place, at);
-        double E[triangle(K::dofs)]{}, minus[K::rows];
-        for (int j = 0; j < K::rows; ++j) minus[j] = -lambda[m.first + j];
-        const SecondOrder<K, double> value(own.x, own.p);
-        value.add_hessian(minus, E);
-        for (int j = 0; j < K::rows; ++j)
-          if (!left_out_[m.first + j])
-            for (int a = 0; a < K::dofs; ++a)
-              for (int b = 0; b <= a; ++b)
-                E[triangle(a) + b] += value.J[j * K::dofs + a] * value.J[j * K::dofs + b] / S_[m.first + j];
-        for (int e = 0; e < triangle(K::dofs); ++e) elements[m.run][lane_at(m.place, triangle(K::dofs), e)] += E[e];
-      }
-    });
+  Numbered own;
+  double E[triangle(largest_kind.dofs)], minus[largest_kind.rows];
+  for (const Member& m : members_) {
+    const int dofs = 3 * m.arity, numbers = triangle(dofs);
+    own.take(m.kind, given.block.runs[m.run], given.values[m.run].data(), m.damped, m.place, at);
+    for (int j = 0; j < m.count; ++j) minus[j] = -lambda[m.first + j];
+    std::fill_n(E, numbers, 0.0);
+    add_hessian(m.kind, own.x, own.p, minus, own.J, E);
+    for (int j = 0; j < m.count; ++j)
+      if (!left_out_[m.first + j])
+        for (int a = 0; a < dofs; ++a)
+          for (int b = 0; b <= a; ++b)
+            E[triangle(a) + b] += own.J[j * dofs + a] * own.J[j * dofs + b] / S_[m.first + j];
+    for (int e = 0; e < numbers; ++e) elements[m.run][lane_at(m.place, numbers, e)] += E[e];
+  }
 }
 
 void RigidRows::multiply(const DirectBlock& block, const double* z, double* to) const {

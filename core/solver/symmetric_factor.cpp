@@ -149,4 +149,7 @@ std::size_t FactorStructure::position(int row, int column) const {
   return begin + width + static_cast<std::size_t>(found - rows);
 }
 
+template class Factor<double>;
+template void Factor<double>::solve(const FactorStructure&, double*) const;
+
 }  // namespace sheetbend

@@ -106,4 +106,7 @@ class Factor {
   std::vector<int> place_;
 };
 
+extern template class Factor<double>;
+extern template void Factor<double>::solve(const FactorStructure&, double*) const;
+
 }  // namespace sheetbend

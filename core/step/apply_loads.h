@@ -3,7 +3,7 @@
 // n+1 as the air's, so that BDF2 keeps its order; the row's own compliance may be as large as one likes.
 #pragma once
 
-#include "core/constraints/registry.h"
+#include "core/constraints/any_kind.h"
 #include "core/step/stages.h"
 
 namespace sheetbend {
@@ -23,15 +23,16 @@ struct RowLoads {
     return sum;
   }
 
-  // The stencil of load i, extrapolated.
-  template <class K>
-  void gather(std::size_t i, T* x) const {
+  // C and J of the constraint of load i, extrapolated.
+  void evaluate(std::size_t i, AnyConstraint<T>& at) const {
     const Load& load = step.scene.loads[i];
-    const auto nodes = step.scene.groups[load.group].nodes(load.item);
-    for (int k = 0; k < K::arity; ++k) {
+    const Group& group = step.scene.groups[load.group];
+    const auto nodes = group.nodes(load.item);
+    for (int k = 0; k < group.arity; ++k) {
       const int dof = step.scene.first_dof[nodes[k]];
-      extrapolated(step.bdf, step.from.x + dof, step.from.x_before + dof).store(x + 3 * k);
+      extrapolated(step.bdf, step.from.x + dof, step.from.x_before + dof).store(at.x + 3 * k);
     }
+    at.evaluate(group.kind, parameters(i));
   }
   const T* parameters(std::size_t i) const { return step.in.of(Quantity::rest) + first_parameter(i); }
   std::size_t first_parameter(std::size_t i) const {
@@ -44,17 +45,14 @@ struct RowLoads {
   template <class F>
   void for_each_push(F&& f) const {
     const double eta2 = step.bdf.eta * step.bdf.eta;
+    AnyConstraint<T> own;
     for (std::size_t i = 0; i < step.scene.loads.size(); ++i) {
       const Load& load = step.scene.loads[i];
       const Group& group = step.scene.groups[load.group];
       const T size = T(eta2) * at(i);
-      with_kind(group.kind, [&]<class K>(K) {
-        T x[K::dofs];
-        gather<K>(i, x);
-        const SharedEvaluation<K, T> value(x, parameters(i));
-        for (int k = 0; k < K::arity; ++k)
-          f(group.nodes(load.item)[k], size * Vec3<T>(value.J + load.row * K::dofs + 3 * k));
-      });
+      evaluate(i, own);
+      for (int k = 0; k < group.arity; ++k)
+        f(group.nodes(load.item)[k], size * Vec3<T>(own.J + 3 * (load.row * group.arity + k)));
     }
   }
 };

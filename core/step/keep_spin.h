@@ -8,7 +8,7 @@
 // from the velocities there.
 #pragma once
 
-#include "core/constraints/registry.h"
+#include "core/constraints/any_kind.h"
 #include "core/step/apply_forces.h"
 #include "core/step/apply_loads.h"
 #include "core/step/stages.h"
@@ -64,11 +64,14 @@ void start_spins(const Scene& scene, const T* mass, T* x, const T* v) {
     if (body.spin >= 0) Spin<T>(scene, body, mass, x, v).momentum.store(x + scene.first_dof[body.spin]);
 }
 
-// Calls f(K{}, group, item) for the constraints that turn bodies which keep their spin.
-template <class F>
-void for_each_turning(const Scene& scene, F&& f) {
-  for (const Turning& t : scene.turning)
-    with_kind(scene.groups[t.group].kind, [&]<class K>(K kind) { f(kind, scene.groups[t.group], t.item); });
+// C and J of a constraint that turns bodies which keep their spin, at x (dofs).
+template <class T>
+void evaluate_turning(const Step<T>& step, const Turning& turning, const T* x, AnyConstraint<T>& at) {
+  const Group& group = step.scene.groups[turning.group];
+  const auto nodes = group.nodes(turning.item);
+  for (int k = 0; k < group.arity; ++k) std::copy_n(x + step.scene.first_dof[nodes[k]], 3, at.x + 3 * k);
+  at.evaluate(group.kind, step.in.of(Quantity::rest) + group.first_value +
+                              static_cast<std::size_t>(turning.item) * group.parameters);
 }
 
 struct KeepSpin {
@@ -116,15 +119,14 @@ struct KeepSpin {
     const T eta(step.bdf.eta), one(1.0);
     const T* mass = step.in.of(Quantity::mass);
     std::fill(record.push.begin(), record.push.end(), Vec3<T>(T(0.0), T(0.0), T(0.0)));
-    for_each_turning(scene, [&]<class K>(K, const Group& group, int item) {
-      T local[K::dofs], push[K::dofs];
-      const auto nodes = group.nodes(item);
-      for (int k = 0; k < K::arity; ++k) std::copy_n(x + scene.first_dof[nodes[k]], 3, local + 3 * k);
-      const SharedEvaluation<K, T> at(
-          local, step.in.of(Quantity::rest) + group.first_value + static_cast<std::size_t>(item) * group.parameters);
-      transpose_times<K>(at.J, record.multipliers.data() + group.first_row + item * K::rows, push);
-      for (int k = 0; k < K::arity; ++k) record.push[nodes[k]] = record.push[nodes[k]] + Vec3<T>(push + 3 * k);
-    });
+    AnyConstraint<T> at;
+    for (const Turning& turning : scene.turning) {
+      const Group& group = scene.groups[turning.group];
+      const auto nodes = group.nodes(turning.item);
+      evaluate_turning(step, turning, x, at);
+      at.set_push(record.multipliers.data() + group.first_row + turning.item * group.rows);
+      for (int k = 0; k < group.arity; ++k) record.push[nodes[k]] = record.push[nodes[k]] + Vec3<T>(at.push + 3 * k);
+    }
     if (!scene.loads.empty())
       RowLoads<T>(step).for_each_push([&](int n, const Vec3<T>& push) { record.push[n] = record.push[n] + push; });
     for (const Body& body : scene.bodies) {

@@ -15,16 +15,16 @@ py::tuple evaluate_constraints(const std::shared_ptr<Scene>& scene, const Array&
   expect_size(multipliers, scene->multipliers(), "multipliers");
   const Inputs<const double> in{scene->layout, inputs.data()};
   std::vector<double> values(scene->rows), forces(scene->dofs());
-  for_each_constraint(*scene, [&]<class K>(K, const Group& group, int item) {
-    double local[K::dofs];
-    gather<K>(*scene, group, item, positions.data(), local);
-    const Evaluation<K, double> at(local, rest_parameters<K>(in, group, item));
-    const std::size_t first = group.first_row + static_cast<std::size_t>(item) * K::rows;
-    std::copy_n(at.C, K::rows, &values[first]);
-    for (int j = 0; j < K::rows; ++j)
-      for (int d = 0; d < K::dofs; ++d)
+  AnyConstraint<double> at;
+  for_each_constraint(*scene, [&](const Group& group, int item) {
+    const std::size_t first = group.first_row + static_cast<std::size_t>(item) * group.rows;
+    const int dofs = 3 * group.arity;
+    evaluate(*scene, in, group, item, positions.data(), at);
+    std::copy_n(at.C, group.rows, values.begin() + static_cast<std::ptrdiff_t>(first));
+    for (int j = 0; j < group.rows; ++j)
+      for (int d = 0; d < dofs; ++d)
         forces[scene->first_dof[group.nodes(item)[d / 3]] + d % 3] +=
-            at.J[j * K::dofs + d] * multipliers.data()[first + j];
+            at.J[j * dofs + d] * multipliers.data()[first + j];
   });
   std::vector<Vec3<double>> gradient;
   for (std::size_t v = 0; v < scene->volumes.size(); ++v) {

@@ -103,7 +103,7 @@ AtRest every_kind() {
         const std::vector<double> sample = case_of<K>().p;
         for (std::size_t k = 0; k < sample.size(); ++k) p[k] = random(0.95, 1.05) * sample[k];
         double x[K::dofs], force = 0.0;
-        gather<K>(s.scene, group, i, in.of(Quantity::position), x);
+        gather(s.scene, group, i, in.of(Quantity::position), x);
         const Evaluation<K, double> at(x, p);
         for (int j = 0; j < K::rows; ++j)
           for (int d = 0; d < K::dofs; ++d) force = std::max(force, std::abs(at.C[j] * at.J[j * K::dofs + d]));

@@ -1,6 +1,6 @@
 // Colors eight constraints at a time: every instruction set gives the bits of the single-constraint kernels, whatever the color's length.
 #include "adjoint/packs/packed_reverse.h"
-#include "adjoint/solver/project_vjp.h"
+#include "tests/cpp/support/one_by_one.h"
 #include "tests/cpp/support/random_scene.h"
 
 namespace sheetbend::testing {

@@ -76,27 +76,32 @@ double climb(const Projection& p, const std::vector<double>& inputs, unsigned se
   return error;
 }
 
-template <class K>
-std::vector<Partition> partitions() {
-  if (K::unilateral) return {Partition::gauss_seidel};
-  return {Partition::gauss_seidel, Partition::direct, Partition::newton};
-}
+// Of one kind, by its number.
+struct BlockOfOne : ::testing::TestWithParam<int> {
+  int kind = GetParam();
+  Case row = case_of(kind);
 
-template <class K>
-class BlockOfOne : public ::testing::Test {};
-TYPED_TEST_SUITE(BlockOfOne, RegistryTypes, KindName);
+  std::vector<Partition> partitions() const {
+    bool unilateral = false;
+    with_kind(kind, [&]<class K>(K) { unilateral = K::unilateral; });
+    if (unilateral) return {Partition::gauss_seidel};
+    return {Partition::gauss_seidel, Partition::direct, Partition::newton};
+  }
+};
+INSTANTIATE_TEST_SUITE_P(, BlockOfOne, ::testing::Range(0, kind_count),
+                         [](const auto& info) { return kind_name(info.param); });
 
-TYPED_TEST(BlockOfOne, DerivativesMatchComplexStep) {
-  using K = TypeParam;
+TEST_P(BlockOfOne, DerivativesMatchComplexStep) {
+  const int arity = static_cast<int>(row.x.size()) / 3;
   double worst = 0.0;
-  for (const Partition partition : partitions<K>())
+  for (const Partition partition : partitions())
     for (const bool damped : {false, true})
-      for (int pinned = -1; pinned < K::arity; ++pinned)
+      for (int pinned = -1; pinned < arity; ++pinned)
         for (unsigned seed = 0; seed < 5; ++seed) {
           SCOPED_TRACE(::testing::Message()
                        << "direct " << static_cast<int>(partition) << " damped " << damped << " pinned " << pinned);
           const Sample sample =
-              scene_of_one<K>(seed, damped, pinned < 0 ? std::vector<int>{} : std::vector<int>{pinned});
+              scene_of_one(kind, seed, damped, pinned < 0 ? std::vector<int>{} : std::vector<int>{pinned});
           worst = std::max(worst, climb(Projection(sample.scene, partition, eta), sample.inputs, seed));
         }
   record_error("vjp", worst);
@@ -104,53 +109,57 @@ TYPED_TEST(BlockOfOne, DerivativesMatchComplexStep) {
 
 // The formula of the reverse, spelled out for one constraint, so that a mutant can go through it.
 template <class K>
-std::vector<double> reverse_of_one(const Projection& p, const std::vector<double>& theta,
-                                   const std::vector<double>& out_bar) {
-  return p.reverse_with(theta, out_bar, [&](Projection::Run<double>& run, const SubstepCotangent<double>& bar) {
-    const Group& group = p.scene.groups[0];
-    const Placed<K, double> e(run.state, group, 0, run.record.x.data());
-    double x_bar[K::dofs];
-    ElementCotangent<K, double> own;
-    std::copy_n(bar.x, K::dofs, x_bar);
-    correction_vjp(e, Kept<K, double>(e.x), run.record.lambda.data(), e.references(run.state, group),
-                   run.record.dl.data(), bar.lambda, x_bar, bar.w, own);
-    add_element(run.state, group, 0, own, bar);
-    add_cotangent(run.state, e, 0, x_bar, bar);
-  });
+void reverse_element(const Projection& p, Projection::Run<double>& run, const SubstepCotangent<double>& bar) {
+  const Group& group = p.scene.groups[0];
+  const Placed<K, double> e(run.state, group, 0, run.record.x.data());
+  double x_bar[K::dofs];
+  ElementCotangent<K, double> own;
+  std::copy_n(bar.x, K::dofs, x_bar);
+  correction_vjp(e, Kept<K, double>(e.x), run.record.lambda.data(), e.references(run.state, group),
+                 run.record.dl.data(), bar.lambda, x_bar, bar.w, own);
+  add_element(run.state, group, 0, own, bar);
+  add_cotangent(run.state, e, 0, x_bar, bar);
 }
 
-TYPED_TEST(BlockOfOne, MutantIsFlagged) {
-  using K = TypeParam;
-  const Sample sample = scene_of_one<K>(0, true);
+template <template <class> class Form>
+std::vector<double> reverse_of_one(int kind, const Projection& p, const std::vector<double>& theta,
+                                   const std::vector<double>& out_bar) {
+  decltype(&reverse_element<Distance>) reverse = nullptr;
+  with_kind(kind, [&]<class K>(K) { reverse = reverse_element<Form<K>>; });
+  return p.reverse_with(
+      theta, out_bar, [&](Projection::Run<double>& run, const SubstepCotangent<double>& bar) { reverse(p, run, bar); });
+}
+template <class K>
+using Itself = K;
+
+TEST_P(BlockOfOne, MutantIsFlagged) {
+  const Sample sample = scene_of_one(kind, 0, true);
   const Projection p(sample.scene, Partition::gauss_seidel, eta);
   Random random(0);
   const auto theta = p.random_theta(sample.inputs, random);
   const auto out_bar = random.vector(p.scene.dofs() + p.scene.rows);
   const auto oracle = oracle_cotangent(p, theta, out_bar);
-  EXPECT_LE(cotangent_error(p, reverse_of_one<K>(p, theta, out_bar), oracle), bound);
-  const double mutant = cotangent_error(p, reverse_of_one<Mutant<K>>(p, theta, out_bar), oracle);
-  EXPECT_EQ(mutant > 1e4 * bound, case_of<K>().curved)
-      << "error " << mutant << "; a linear C has no Hessian term to scale";
+  EXPECT_LE(cotangent_error(p, reverse_of_one<Itself>(kind, p, theta, out_bar), oracle), bound);
+  const double mutant = cotangent_error(p, reverse_of_one<Mutant>(kind, p, theta, out_bar), oracle);
+  EXPECT_EQ(mutant > 1e4 * bound, row.curved) << "error " << mutant << "; a linear C has no Hessian term to scale";
 }
 
-TYPED_TEST(BlockOfOne, ShortcutsGiveWhatTheGeneralRouteGives) {
-  using K = TypeParam;
+TEST_P(BlockOfOne, ShortcutsGiveWhatTheGeneralRouteGives) {
   for (const bool damped : {false, true}) {
-    const Sample sample = scene_of_one<K>(3, damped);
+    const Sample sample = scene_of_one(kind, 3, damped);
     const Projection p(sample.scene, Partition::gauss_seidel, eta);
     Random random(3);
     const auto theta = p.random_theta(sample.inputs, random);
     const auto out_bar = random.vector(p.scene.dofs() + p.scene.rows);
-    EXPECT_LE(cotangent_error(p, reverse_of_one<K>(p, theta, out_bar),
-                              reverse_of_one<WithoutShortcuts<K>>(p, theta, out_bar)),
+    EXPECT_LE(cotangent_error(p, reverse_of_one<Itself>(kind, p, theta, out_bar),
+                              reverse_of_one<WithoutShortcuts>(kind, p, theta, out_bar)),
               bound);
   }
 }
 
 // At compliance 0 the linearized constraint holds exactly, and small compliances approach that in proportion.
-TYPED_TEST(BlockOfOne, VanishingComplianceIsTheRigidLimit) {
-  using K = TypeParam;
-  Sample sample = scene_of_one<K>(1, true);
+TEST_P(BlockOfOne, VanishingComplianceIsTheRigidLimit) {
+  Sample sample = scene_of_one(kind, 1, true);
   const Projection p(sample.scene, Partition::gauss_seidel, eta);
   Random random(1);
   auto theta = p.random_theta(sample.inputs, random);
@@ -160,18 +169,21 @@ TYPED_TEST(BlockOfOne, VanishingComplianceIsTheRigidLimit) {
 
   compliance = 0.0;
   const auto rigid = p.forward(theta);
-  const Evaluation<K, double> value(theta.data(), &theta[p.inputs_at() + p.scene.layout.of(Quantity::rest)]);
-  for (int j = 0; j < K::rows; ++j) {
+  AnyConstraint<double> value;
+  const int rows = p.scene.rows, dofs = p.scene.dofs();
+  std::copy_n(theta.data(), dofs, value.x);
+  value.evaluate(kind, &theta[p.inputs_at() + p.scene.layout.of(Quantity::rest)]);
+  for (int j = 0; j < rows; ++j) {
     double left = value.C[j];
-    for (int d = 0; d < K::dofs; ++d) left += value.J[j * K::dofs + d] * (rigid[d] - theta[d]);
-    EXPECT_LE(std::abs(left), 1e-13 * largest({value.C, K::rows}));
+    for (int d = 0; d < dofs; ++d) left += value.J[j * dofs + d] * (rigid[d] - theta[d]);
+    EXPECT_LE(std::abs(left), 1e-13 * largest({value.C, static_cast<std::size_t>(rows)}));
   }
   double previous = 0.0;
   for (const double fraction : {1e-4, 1e-5, 1e-6}) {
     compliance = fraction * sample_compliance;
     const auto out = p.forward(theta);
     double distance = 0.0;
-    for (int d = 0; d < K::dofs; ++d) distance = std::max(distance, std::abs(out[d] - rigid[d]));
+    for (int d = 0; d < dofs; ++d) distance = std::max(distance, std::abs(out[d] - rigid[d]));
     EXPECT_GT(distance, 0.0);
     EXPECT_NEAR(previous == 0.0 ? 10.0 : previous / distance, 10.0, 0.1);
     previous = distance;
@@ -180,7 +192,7 @@ TYPED_TEST(BlockOfOne, VanishingComplianceIsTheRigidLimit) {
 
 // Taut, it holds its length; slack, it does nothing, and gives back what its multiplier had done.
 TEST(Tether, PushesInAndNeverOut) {
-  Sample sample = scene_of_one<Tether>(4, false);
+  Sample sample = scene_of_one(kind_of(Tether::name), 4, false);
   const Projection p(sample.scene, Partition::gauss_seidel, eta);
   Random random(4);
   auto theta = p.random_theta(sample.inputs, random);
@@ -214,22 +226,22 @@ std::vector<double> by_formula(const Projection& p, const std::vector<double>& t
   for (int d = 0; d < scene.dofs(); ++d)
     if (scene.role[d / 3] == Role::free) w[d] = theta[at[1] + d / 3];
   for (const Group& group : scene.groups)
-    with_kind(group.kind, [&]<class K>(K) {
-      for (int i = 0; i < group.count; ++i) {
-        std::vector<double> x;
-        for (const int n : group.nodes(i)) x.insert(x.end(), &theta[3 * n], &theta[3 * n] + 3);
-        const Evaluation<K, double> value(x.data(), in.of(Quantity::rest) + group.first_value + i * parameter_count<K>);
-        const double alpha = in.of(Quantity::compliance)[group.first + i],
-                     beta = in.of(Quantity::damping)[group.first + i];
-        for (int j = 0; j < K::rows; ++j) {
-          const int row = group.first_row + i * K::rows + j;
-          a[row] = alpha / (p.eta * p.eta);
-          g[row] = group.damped ? alpha * beta / p.eta : 0.0;
-          s[row] = value.C[j] + a[row] * theta[at[3] + row] + g[row] * difference<K>(value.C[j], theta[at[2] + row]);
-          for (int d = 0; d < K::dofs; ++d) J(row, 3 * group.nodes(i)[d / 3] + d % 3) = value.J[j * K::dofs + d];
-        }
+    for (int i = 0; i < group.count; ++i) {
+      const int dofs = 3 * group.arity;
+      AnyConstraint<double> value;
+      for (int d = 0; d < dofs; ++d) value.x[d] = theta[3 * group.nodes(i)[d / 3] + d % 3];
+      value.evaluate(group.kind, in.of(Quantity::rest) + group.first_value + i * group.parameters);
+      const double alpha = in.of(Quantity::compliance)[group.first + i],
+                   beta = in.of(Quantity::damping)[group.first + i];
+      for (int j = 0; j < group.rows; ++j) {
+        const int row = group.first_row + i * group.rows + j;
+        a[row] = alpha / (p.eta * p.eta);
+        g[row] = group.damped ? alpha * beta / p.eta : 0.0;
+        s[row] =
+            value.C[j] + a[row] * theta[at[3] + row] + g[row] * value.kind->difference(value.C[j], theta[at[2] + row]);
+        for (int d = 0; d < dofs; ++d) J(row, 3 * group.nodes(i)[d / 3] + d % 3) = value.J[j * dofs + d];
       }
-    });
+    }
   Eigen::MatrixXd A = J * w.asDiagonal() * J.transpose();
   A.diagonal().array() += a.array() / (1.0 + g.array());
   Eigen::VectorXd dl = A.partialPivLu().solve(Eigen::VectorXd(-s.array() / (1.0 + g.array())));
@@ -254,11 +266,10 @@ void expect_formula(const Projection& p, const std::vector<double>& theta) {
   EXPECT_LE(relative_error(std::span(found).subspan(dofs), std::span(expected).subspan(dofs)), 1e-12);
 }
 
-TYPED_TEST(BlockOfOne, FollowsTheFormula) {
-  using K = TypeParam;
-  for (const Partition partition : partitions<K>())
+TEST_P(BlockOfOne, FollowsTheFormula) {
+  for (const Partition partition : partitions())
     for (const bool damped : {false, true}) {
-      const Sample sample = scene_of_one<K>(2, damped, {0});
+      const Sample sample = scene_of_one(kind, 2, damped, {0});
       const Projection p(sample.scene, partition, eta);
       Random random(2);
       expect_formula(p, p.random_theta(sample.inputs, random));

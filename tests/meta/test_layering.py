@@ -54,7 +54,7 @@ ALLOWED = {
         "core/step",
         "core/rollout",
     },
-    "adjoint/element": {"core/scalar", "core/scene", "core/element"},
+    "adjoint/element": {"core/scalar", "core/constraints", "core/scene", "core/element"},
     "adjoint/packs": {"core/constraints", "core/scene", "core/packs", "core/threads", "adjoint/element"},
     "adjoint/blocks": {"core/constraints", "core/blocks", "adjoint/element"},
     "adjoint/contact": {"core/contact"},

@@ -1,5 +1,5 @@
 // One row of cases per registered constraint: a sample stencil with parameters, and the symmetries that its C
-// has. Every test that is typed over the Registry, and every random scene, reads this table; a kind without a
+// has. Every test that goes through the Registry, and every random scene, reads this table; a kind without a
 // row does not compile.
 #pragma once
 
@@ -529,24 +529,23 @@ inline Case case_of<TetrahedronVolume>() {
           .parameter_sign = {1}};
 }
 
-// The Registry as GoogleTest's list of types, and the names its reports use.
-template <class Tuple>
-struct AsTypes;
-template <class... K>
-struct AsTypes<std::tuple<K...>> {
-  using type = ::testing::Types<K...>;
-};
-#ifdef SHEETBEND_TEST_KIND  // alone, as tests/meta/test_new_kind.py does
-using RegistryTypes = ::testing::Types<SHEETBEND_TEST_KIND>;
-#else
-using RegistryTypes = AsTypes<Registry>::type;
-#endif
+// The same of a kind by its number, and its name.
+inline Case case_of(int kind) {
+  Case row;
+  with_kind(kind, [&]<class K>(K) { row = case_of<K>(); });
+  return row;
+}
+inline std::string kind_name(int kind) {
+  std::string name;
+  with_kind(kind, [&]<class K>(K) { name = K::name; });
+  return name;
+}
 
-struct KindName {
-  template <class K>
-  static std::string GetName(int) {
-    return K::name;
-  }
-};
+// The kinds that a test of every kind goes through.
+#ifdef SHEETBEND_TEST_KIND  // alone, as tests/meta/test_new_kind.py does
+using TestedKinds = std::tuple<SHEETBEND_TEST_KIND>;
+#else
+using TestedKinds = Registry;
+#endif
 
 }  // namespace sheetbend::testing

@@ -3,9 +3,13 @@
 // color, or direct.
 #pragma once
 
+#include <numeric>
+
 #include "adjoint/solver/project_block_vjp.h"
 #include "adjoint/solver/project_vjp.h"
+#include "core/constraints/any_kind.h"
 #include "core/solver/project.h"
+#include "tests/cpp/support/one_by_one.h"
 #include "tests/cpp/support/random_scene.h"
 
 namespace sheetbend::testing {
@@ -36,17 +40,17 @@ struct Projection {
     append(random.vector(scene.nodes(), 30.0, 100.0));
     std::vector<double> C_r(scene.rows), lambda(scene.rows);
     for (const Group& group : scene.groups)
-      with_kind(group.kind, [&]<class K>(K) {
-        for (int i = 0; i < group.count; ++i) {
-          const Case sample = case_of<K>();
-          const Evaluation<K, double> near(sample.x.data(), sample.p.data());
-          const double a = sample.compliance / (eta * eta);
-          for (int j = 0; j < K::rows; ++j) {
-            C_r[group.first_row + i * K::rows + j] = near.C[j] + random(-0.1, 0.1) * std::abs(near.C[j]);
-            lambda[group.first_row + i * K::rows + j] = random(-1.0, 1.0) * std::abs(near.C[j]) / a;
-          }
+      for (int i = 0; i < group.count; ++i) {
+        const Case sample = case_of(group.kind);
+        AnyConstraint<double> near;
+        std::ranges::copy(sample.x, near.x);
+        near.evaluate(group.kind, sample.p.data());
+        const double a = sample.compliance / (eta * eta);
+        for (int j = 0; j < group.rows; ++j) {
+          C_r[group.first_row + i * group.rows + j] = near.C[j] + random(-0.1, 0.1) * std::abs(near.C[j]);
+          lambda[group.first_row + i * group.rows + j] = random(-1.0, 1.0) * std::abs(near.C[j]) / a;
         }
-      });
+      }
     append(C_r);
     append(lambda);
     append(inputs);
@@ -137,20 +141,19 @@ struct Projection {
 };
 
 // A scene of one constraint with the sample's values; `pinned` lists stencil places that cannot move.
-template <class K>
-Sample scene_of_one(unsigned seed, bool damped, std::vector<int> pinned = {}) {
-  const Case sample = case_of<K>();
+inline Sample scene_of_one(int kind, unsigned seed, bool damped, std::vector<int> pinned = {}) {
+  const Case sample = case_of(kind);
   SceneSpec spec;
-  spec.particles = K::arity;
+  spec.particles = static_cast<int>(sample.x.size()) / 3;
   spec.pinned = std::move(pinned);
-  std::vector<int> stencil(K::arity);
-  for (int k = 0; k < K::arity; ++k) stencil[k] = k;
-  spec.groups = {{"one", K::name, damped, stencil}};
+  std::vector<int> stencil(spec.particles);
+  std::iota(stencil.begin(), stencil.end(), 0);
+  spec.groups = {{"one", kind_name(kind), damped, stencil}};
   Sample out{build_scene(spec), {}};
   Random random(seed);
   out.inputs.resize(out.scene.layout.total());
   const Inputs<double> in{out.scene.layout, out.inputs.data()};
-  for (int d = 0; d < K::dofs; ++d) in.of(Quantity::position)[d] = sample.x[d] + random(-0.005, 0.005);
+  for (std::size_t d = 0; d < sample.x.size(); ++d) in.of(Quantity::position)[d] = sample.x[d] + random(-0.005, 0.005);
   for (std::size_t k = 0; k < sample.p.size(); ++k) in.of(Quantity::rest)[k] = sample.p[k] + random(-0.02, 0.02);
   in.of(Quantity::compliance)[0] = sample.compliance * random(0.5, 1.5);
   in.of(Quantity::damping)[0] = sample.damping * random(0.5, 1.5);
