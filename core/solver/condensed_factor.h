@@ -1,12 +1,10 @@
 // H^-1 by factors: H = W^-1 + J^T D^-1 J is formed and factored.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "core/solver/condensed_shares.h"
 #include "core/solver/symmetric_factor.h"
-#include "core/solver/unsymmetric_factor.h"
 
 namespace sheetbend {
 
@@ -14,14 +12,12 @@ namespace sheetbend {
 struct CondensedPattern {
   FactorStructure structure{0, {}, false};
   CondensedShares shares;
-  std::vector<int> dof_of;                               // per movable particle: first dof in H
-  std::vector<std::size_t> entries;                      // per pair of the shares, three: where its columns stand in H
-  std::optional<UnsymmetricStructure> unsymmetric = {};  // of the same matrix, where contacts may slide
+  std::vector<int> dof_of;                    // per movable particle: first dof in H
+  std::vector<std::size_t> entries;           // per pair of the shares, three: where its columns stand in H
   std::vector<std::vector<int>> joined = {};  // of blocks that may touch themselves: particles with entries in common
 
   std::size_t bytes() const {
-    return structure.bytes() + shares.bytes() + sizeof(int) * dof_of.size() + sizeof(std::size_t) * entries.size() +
-           (unsymmetric ? unsymmetric->bytes() : 0);
+    return structure.bytes() + shares.bytes() + sizeof(int) * dof_of.size() + sizeof(std::size_t) * entries.size();
   }
 };
 

@@ -67,7 +67,7 @@ void NewtonMatrix::resize(const Scene& scene, const DirectBlock& block) {
   factor_.reset(pattern_of(block).structure);
   contacts_.assign(9 * block.contacts.size(), 0.0);
   weights_.resize(block.contacts.size());
-  if (const auto& unsymmetric = pattern_of(block).unsymmetric) lu_.resize(*unsymmetric);
+  if (block.may_slide()) lu_.resize(pattern_of(block).structure);
 }
 
 std::size_t NewtonMatrix::bytes(const Scene& scene, const DirectBlock& block) {
@@ -75,7 +75,7 @@ std::size_t NewtonMatrix::bytes(const Scene& scene, const DirectBlock& block) {
   const FactorStructure& structure = pattern.structure;
   std::size_t bytes = sizeof(double) * (block.movable + structure.size()) + Factor<double>::bytes(structure);
   bytes += sizeof(double) * (9 + most_point_nodes) * block.contacts.size();
-  if (const auto& unsymmetric = pattern.unsymmetric) bytes += UnsymmetricFactor::bytes(*unsymmetric);
+  if (block.may_slide()) bytes += UnsymmetricFactor::bytes(structure);
   for (const MemberRun& run : block.runs)
     bytes += 2 * (sizeof(Numbers<double>) + Numbers<double>::bytes(numbers_of(scene, run))) + sizeof(double*);
   return bytes;
@@ -224,10 +224,10 @@ bool NewtonMatrix::factorize_unsymmetric(const Scene& scene, const DirectBlock& 
   const CondensedPattern& pattern = pattern_of(block);
   assemble(scene, block, convexity);
   as_lu_ = true;
-  lu_.resize(*pattern.unsymmetric);
-  lu_.load(*pattern.unsymmetric, factor_.values.data());
+  lu_.resize(pattern.structure);
+  lu_.load(pattern.structure, factor_.values.data());
   for_each_contact(block, [&](int p, int q, double weight, const double* M) {
-    lu_.add(*pattern.unsymmetric, pattern.dof_of[p] / 3, pattern.dof_of[q] / 3, weight, M);
+    lu_.add(pattern.structure, pattern.dof_of[p], pattern.dof_of[q], weight, M);
   });
   for (const TouchingPair& pair : pairs_)
     for (int k = 0; k < 4; ++k)
@@ -236,9 +236,9 @@ bool NewtonMatrix::factorize_unsymmetric(const Scene& scene, const DirectBlock& 
         if (p >= block.movable || q >= block.movable) continue;
         double M[9];
         for (int a = 0; a < 9; ++a) M[a] = pair.matrix[12 * (3 * k + a / 3) + 3 * l + a % 3];
-        lu_.add(*pattern.unsymmetric, pattern.dof_of[p] / 3, pattern.dof_of[q] / 3, 1.0, M);
+        lu_.add(pattern.structure, pattern.dof_of[p], pattern.dof_of[q], 1.0, M);
       }
-  return lu_.factorize(*pattern.unsymmetric);
+  return lu_.factorize(pattern.structure, unsymmetric_kernel(pack_kernels()));
 }
 
 double NewtonMatrix::factorize_convex_enough(const Scene& scene, const DirectBlock& block) {

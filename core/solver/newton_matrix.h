@@ -13,6 +13,7 @@
 
 #include "core/solver/incremental_potential.h"
 #include "core/solver/paired_pattern.h"
+#include "core/solver/unsymmetric_factor.h"
 
 namespace sheetbend {
 
@@ -44,7 +45,7 @@ class NewtonMatrix {
   void solve(const DirectBlock& block, U* z) const {
     in_places(block, z, [&](const CondensedPattern& pattern, U* room) {
       if (as_lu_)
-        lu_.solve(*pattern.unsymmetric, room);
+        lu_.solve(pattern.structure, room);
       else
         factor_.solve(pattern.structure, room);
     });
@@ -53,7 +54,7 @@ class NewtonMatrix {
   void solve_transposed(const DirectBlock& block, U* z) const {
     if (!as_lu_) return solve(block, z);
     in_places(block, z,
-              [&](const CondensedPattern& pattern, U* room) { lu_.solve_transposed(*pattern.unsymmetric, room); });
+              [&](const CondensedPattern& pattern, U* room) { lu_.solve_transposed(pattern.structure, room); });
   }
 
   // Kz = K z on rows of four; of fixed particles what the constraints alone make of it.

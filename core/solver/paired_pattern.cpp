@@ -46,7 +46,6 @@ PairedPattern pattern_with(const Scene& scene, const DirectBlock& block, const s
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < (row == column ? a + 1 : 3); ++b) entries.emplace_back(3 * row + a, 3 * column + b);
   c.structure = FactorStructure(3 * block.movable, entries, false);
-  if (block.may_slide()) c.unsymmetric.emplace(block.movable, std::move(places), c.structure);
   for (const MemberRun& run : block.runs) all.entries.push_back(entries_of(scene, block, run, c));
   return all;
 }

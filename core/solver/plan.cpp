@@ -271,12 +271,6 @@ CondensedPattern factored(const Scene& scene, const DirectBlock& block, const st
       for (int b = 0; b < 3; ++b)
         if (column + b <= row + a) entries.emplace_back(row + a, column + b);
   c.structure = FactorStructure(3 * block.movable, entries, false);
-  if (block.may_slide()) {
-    std::vector<std::pair<int, int>> pairs;
-    c.shares.for_each_pair([&](const auto&, int i, int k) { pairs.emplace_back(dofs[i] / 3, dofs[k] / 3); });
-    for (const auto& [row, column] : touching) pairs.emplace_back(row / 3, column / 3);
-    c.unsymmetric.emplace(block.movable, std::move(pairs), c.structure);
-  }
   if (block.implicit) {
     c.shares = {};  // implicit blocks add matrices of their own
     return c;

@@ -6,8 +6,8 @@
 namespace sheetbend {
 namespace {
 
-constexpr int widest_supernode =
-    32;  // wider ones are split: updates between panels are faster than elimination inside one
+// Wider ones are split: updates between panels are faster than elimination inside one. Of whole particles where blocks of 3 x 3 are (unsymmetric_factor.h).
+constexpr int widest_supernode = 30;
 
 }  // namespace
 

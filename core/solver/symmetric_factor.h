@@ -24,6 +24,9 @@ class FactorStructure {
   int stored_band() const { return sheetbend::stored_band(band_); }
   std::size_t values() const;
   std::size_t position(int row, int column) const;  // row >= column
+  // Of factors by supernodes: whether two columns are of the same one, and how far apart its columns stand.
+  bool joins(int column, int other) const { return node_[column] == node_[other]; }
+  std::size_t column_length(int column) const { return length_[node_[column]]; }
   std::size_t fill() const { return banded_ ? static_cast<std::size_t>(n_) * (band_ + 1) : fill_; }
   std::size_t bytes() const;  // of the pattern itself
 

@@ -1,113 +1,60 @@
 #include "core/solver/unsymmetric_factor.h"
 
 #include <algorithm>
+#include <stdexcept>
 
 namespace sheetbend {
-UnsymmetricStructure::UnsymmetricStructure(int places, std::vector<std::pair<int, int>> pairs,
-                                           const FactorStructure& symmetric) {
-  for (int i = 0; i < places; ++i) pairs.emplace_back(i, i);
-  std::sort(pairs.begin(), pairs.end());
-  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-  // A row of L reaches what its entries do in the elimination tree.
-  std::vector<int> parent(places, -1), flag(places, -1);
-  std::vector<std::vector<int>> above(places), slot_above(places);
-  auto pair = pairs.begin();
-  for (int i = 0; i < places; ++i) {
-    std::vector<int> row;
-    flag[i] = i;
-    for (auto p = pair; p != pairs.end() && p->first == i; ++p)
-      for (int j = p->second; flag[j] != i; j = parent[j]) {
-        if (parent[j] < 0) parent[j] = i;
-        flag[j] = i;
-        row.push_back(j);
-      }
-    std::sort(row.begin(), row.end());
-    for (const int j : row) above[j].push_back(i);
-    lower_.insert(lower_.end(), row.begin(), row.end());
-    lower_start_.push_back(static_cast<int>(lower_.size()));
-    while (pair != pairs.end() && pair->first == i) ++pair;
-  }
-  upper_start_.push_back(0);
-  for (const auto& row : above) {
-    upper_.insert(upper_.end(), row.begin(), row.end());
-    upper_start_.push_back(static_cast<int>(upper_.size()));
-  }
-  for (const auto& [i, j] : pairs) {
-    Entry e{i == j ? i : -1, 0, 0, {}};
-    if (i != j) e.lower = slot(lower_start_, lower_, i, j), e.upper = slot(upper_start_, upper_, j, i);
-    for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b) {
-        const auto [column, row] = std::minmax({3 * i + a, 3 * j + b});
-        e.from[3 * a + b] = symmetric.position(row, column);
-      }
-    entries_.push_back(e);
+namespace {
+
+std::size_t work_of(const FactorStructure& s) {
+  const auto nodes = s.supernodes();
+  return UnsymmetricSupernodalFactor::most_columns * static_cast<std::size_t>(nodes.widest + nodes.longest);
+}
+
+}  // namespace
+
+void UnsymmetricFactor::resize(const FactorStructure& s) {
+  const auto nodes = s.supernodes();
+  for (int node = 0; node <= nodes.count; ++node)
+    if (nodes.first[node] % 3 != 0) throw std::logic_error("a supernode ends within a particle");
+  for (auto* panels : {&lower_, &upper_}) panels->resize(s.values());
+  inverse_.resize(s.size());
+  work_.resize(work_of(s));
+  for (auto* places : {&from_, &place_}) places->resize(s.size());
+}
+
+std::size_t UnsymmetricFactor::bytes(const FactorStructure& s) {
+  return sizeof(double) * (2 * s.values() + s.size() + work_of(s)) + 2 * sizeof(int) * s.size();
+}
+
+void UnsymmetricFactor::load(const FactorStructure& s, const double* values) {
+  for (auto* panels : {&lower_, &upper_}) std::copy_n(values, s.values(), panels->data());
+  const auto nodes = s.supernodes();
+  for (int node = 0; node < nodes.count; ++node) {
+    double* panel = &lower_[nodes.panel[node]];
+    const long length = nodes.length[node];
+    for (int c = 1; c < nodes.first[node + 1] - nodes.first[node]; ++c)
+      for (int r = 0; r < c; ++r) panel[c * length + r] = panel[r * length + c];
   }
 }
 
-int UnsymmetricStructure::slot(const std::vector<int>& start, const std::vector<int>& columns, int row, int column) {
-  return static_cast<int>(std::lower_bound(columns.begin() + start[row], columns.begin() + start[row + 1], column) -
-                          columns.begin());
+void UnsymmetricFactor::add(const FactorStructure& s, int row, int column, double scale, const double* block) {
+  const bool above = row < column && !s.joins(row, column);
+  const auto [first, last] = std::minmax(row, column);
+  const std::size_t at = s.position(above ? last : std::max(row, column), above ? first : column);
+  double* to = above ? &upper_[at] : &lower_[row < column ? at - (column - row) : at];
+  const std::size_t length = s.column_length(first);
+  for (int a = 0; a < 3; ++a)
+    for (int b = 0; b < 3; ++b) to[above ? b + a * length : a + b * length] += scale * block[3 * a + b];
 }
 
-std::size_t UnsymmetricStructure::bytes() const {
-  return sizeof(int) * (lower_start_.size() + lower_.size() + upper_start_.size() + upper_.size()) +
-         sizeof(Entry) * entries_.size();
-}
-
-void UnsymmetricFactor::resize(const UnsymmetricStructure& s) {
-  lower_.resize(9 * s.blocks());
-  upper_.resize(9 * s.blocks());
-  pivots_.resize(s.size());
-  place_.resize(s.size());
-}
-
-std::size_t UnsymmetricFactor::bytes(const UnsymmetricStructure& s) {
-  return sizeof(double) * 9 * 2 * s.blocks() + (sizeof(PivotBlock) + sizeof(double*)) * s.size();
-}
-
-void UnsymmetricFactor::load(const UnsymmetricStructure& s, const double* values) {
-  std::fill(lower_.begin(), lower_.end(), 0.0);
-  std::fill(upper_.begin(), upper_.end(), 0.0);
-  for (const auto& e : s.entries_)
-    for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b) {
-        const double value = values[e.from[3 * a + b]];
-        if (e.place >= 0) {
-          pivots_[e.place].entries[3 * a + b] = value;
-        } else {
-          lower_[9 * e.lower + 3 * a + b] = value;
-          upper_[9 * e.upper + 3 * b + a] = value;
-        }
-      }
-}
-
-void UnsymmetricFactor::add(const UnsymmetricStructure& s, int row, int column, double scale, const double* block) {
-  double* to = row == column  ? pivots_[row].entries
-               : row > column ? &lower_[9 * s.slot(s.lower_start_, s.lower_, row, column)]
-                              : &upper_[9 * s.slot(s.upper_start_, s.upper_, row, column)];
-  for (int k = 0; k < 9; ++k) to[k] += scale * block[k];
-}
-
-bool UnsymmetricFactor::factorize(const UnsymmetricStructure& s) {
-  for (int i = 0; i < s.size(); ++i) {
-    for (int k = s.lower_start_[i]; k < s.lower_start_[i + 1]; ++k) place_[s.lower_[k]] = &lower_[9 * k];
-    for (int k = s.upper_start_[i]; k < s.upper_start_[i + 1]; ++k) place_[s.upper_[k]] = &upper_[9 * k];
-    place_[i] = pivots_[i].entries;
-    for (int k = s.lower_start_[i]; k < s.lower_start_[i + 1]; ++k) {
-      const int before = s.lower_[k];
-      double* L = &lower_[9 * k];
-      for (int a = 0; a < 3; ++a) pivots_[before].solve_transposed(L + 3 * a);
-      for (int u = s.upper_start_[before]; u < s.upper_start_[before + 1]; ++u) {
-        const double* U = &upper_[9 * u];
-        double* to = place_[s.upper_[u]];
-        for (int a = 0; a < 3; ++a)
-          for (int b = 0; b < 3; ++b)
-            to[3 * a + b] -= L[3 * a] * U[b] + L[3 * a + 1] * U[3 + b] + L[3 * a + 2] * U[6 + b];
-      }
-    }
-    if (!pivots_[i].factorize()) return false;
-  }
-  return true;
+bool UnsymmetricFactor::factorize(const FactorStructure& s, FactorUnsymmetric compiled) {
+  const auto nodes = s.supernodes();
+  if (compiled)
+    return compiled(nodes, lower_.data(), upper_.data(), inverse_.data(), from_.data(), work_.data(), place_.data());
+  return UnsymmetricSupernodalFactor{nodes,        lower_.data(), upper_.data(), inverse_.data(),
+                                     from_.data(), work_.data(),  place_.data()}
+      .factorize();
 }
 
 }  // namespace sheetbend

@@ -1,9 +1,8 @@
-// Shapes, the law of contact, poses and the unsymmetric factor, one by one against complex steps.
+// Shapes, the law of contact and poses, one by one against complex steps.
 #include <Eigen/LU>
 #include <tuple>
 
 #include "adjoint/contact/touch_vjp.h"
-#include "core/solver/unsymmetric_factor.h"
 #include "tests/cpp/support/compare.h"
 #include "tests/cpp/support/distance_grids.h"
 
@@ -207,51 +206,6 @@ TEST(Poses, TurnAboutTheirAxisByItsLength) {
         {r.x, r.y, r.z});
     EXPECT_LE(relative_error(std::vector<double>{back.x, back.y, back.z}, expected), 1e-12) << angle;
   }
-}
-
-// A grid of particles whose matrix is symmetric but for some of the diagonal blocks.
-TEST(UnsymmetricFactor, SolvesBothWays) {
-  constexpr int side = 5, places = side * side, n = 3 * places;
-  Random random(7);
-  std::vector<std::pair<int, int>> pairs, entries;
-  for (int i = 0; i < places; ++i) {
-    if (i % side > 0) pairs.emplace_back(i, i - 1);
-    if (i >= side) pairs.emplace_back(i, i - side);
-    pairs.emplace_back(i, i);
-  }
-  for (const auto& [i, j] : pairs)
-    for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b)
-        if (3 * i + a >= 3 * j + b) entries.emplace_back(3 * i + a, 3 * j + b);
-  const FactorStructure symmetric(n, entries, false);
-  const UnsymmetricStructure structure(places, pairs, symmetric);
-  std::vector<double> values(symmetric.values());
-  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
-  for (const auto& [row, column] : entries)
-    A(row, column) = A(column, row) = values[symmetric.position(row, column)] =
-        random(-1.0, 1.0) + (row == column ? 6.0 : 0.0);
-  UnsymmetricFactor factor;
-  factor.resize(structure);
-  factor.load(structure, values.data());
-  for (const int place : {0, 7, 24}) {
-    std::vector<double> block = random.vector(9, -4.0, 4.0);
-    block[0] = -A(3 * place, 3 * place);  // nothing on the diagonal is left to begin with
-    factor.add(structure, place, place, 1.0, block.data());
-    for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b) A(3 * place + a, 3 * place + b) += block[3 * a + b];
-  }
-  ASSERT_TRUE(factor.factorize(structure));
-  std::vector<double> b = random.vector(n), z = b, transposed = b;
-  factor.solve(structure, z.data());
-  factor.solve_transposed(structure, transposed.data());
-  const Eigen::VectorXd right = Eigen::Map<Eigen::VectorXd>(b.data(), n), solution = A.lu().solve(right),
-                        other = A.transpose().lu().solve(right);
-  EXPECT_LE((Eigen::Map<Eigen::VectorXd>(z.data(), n) - solution).norm(), 1e-13 * solution.norm());
-  EXPECT_LE((Eigen::Map<Eigen::VectorXd>(transposed.data(), n) - other).norm(), 1e-13 * other.norm());
-  EXPECT_GT((solution - other).norm(), 1e-2 * solution.norm());
-
-  factor.load(structure, std::vector<double>(values.size()).data());
-  EXPECT_FALSE(factor.factorize(structure));
 }
 
 }  // namespace

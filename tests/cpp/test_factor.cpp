@@ -233,7 +233,7 @@ TEST(Factor, CanBeUsedAgain) {
 
 TEST(Factor, SplitsWideSupernodes) {
   const FactorStructure s(200, sheet(200));
-  EXPECT_EQ(s.supernodes().widest, 32);
+  EXPECT_EQ(s.supernodes().widest, 30);
   EXPECT_LT(s.supernodes().count, 50);
 }
 
