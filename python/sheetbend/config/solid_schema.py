@@ -34,7 +34,15 @@ class SolidSection(Section):
     material: Name | None = key(None, "prefix of the quantities instead; solids of one material share them")
     density: Finite = key(..., "mass per volume", "kg/m^3", gt=0)
     E: Finite = key(..., "Young's modulus", "Pa", gt=0)
-    poisson: Finite = key(..., "Poisson's number: 0.499 hardly changes its volume", gt=-1, lt=0.5)
+    poisson: Finite | None = key(
+        None, "Poisson's number: 0.499 hardly changes its volume; left out with clusters", gt=-1, lt=0.5
+    )
+    clusters: Finite | None = key(
+        None,
+        "shape matching: the size of boxes, which overlap by half and in which vertices keep their shape",
+        "m",
+        gt=0,
+    )
     damping: Finite | None = key(None, "Kelvin-Voigt time constant", "s", gt=0)
     volume_row: bool | None = key(
         None, "one row for the volume of each element, which lets bricks bend; by default where poisson is positive"
