@@ -30,7 +30,8 @@ def polar(mesh: sb.SolidMesh, x: np.ndarray) -> np.ndarray:
 
 
 def test_axes_at_rest_are_the_polar_rotation():
-    """Of a cube that is turned by 37 degrees and stretched by (1, 1.2, 0.9), with their derivative by the vertices."""
+    """Of a cube that is turned by 37 degrees and stretched by (1, 1.2, 0.9), and their derivative is that of the
+    rotation."""
     unmoved, solid = cube()
     frame = unmoved.rotors["cube_0"][1:4]
     own = unmoved.nodes[frame].T
@@ -144,6 +145,7 @@ def test_refusals():
         ({"clusters": [*whole, mesh.sets["x_min"]]}, "plane"),
         ({"clusters": []}, "none"),
         ({"clusters": whole, "poisson": 0.3}, "poisson"),
+        ({"clusters": whole, "law": "neo_hookean"}, "law"),
         ({"clusters": whole, "E": (E, E)}, "shape"),
         ({"clusters": whole, "E": 0.0}, "positive"),
         ({"clusters": whole, "E": None}, "missing"),

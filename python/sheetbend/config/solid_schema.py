@@ -6,6 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from ..objects.solid import SolidLaw
 from .section import Finite, Name, Section, Vector, key
 
 MOST_BRICKS = 1_000
@@ -44,6 +45,7 @@ class SolidSection(Section):
         gt=0,
     )
     damping: Finite | None = key(None, "Kelvin-Voigt time constant", "s", gt=0)
+    law: SolidLaw = key("strain", "neo_hookean: rubber at large strains")
     volume_row: bool | None = key(
         None, "one row for the volume of each element, which lets bricks bend; by default where poisson is positive"
     )

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +19,8 @@ from ..scene.scene import Array, Scene
 from .locking import LockingWarning, locking
 from .solid_clusters import SHARE, SolidClusters, volumes_of
 from .solid_rows import Orthotropic, SolidRows
+
+SolidLaw = Literal["strain", "neo_hookean"]
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,7 @@ def add_solid(
     orthotropic: Orthotropic | None = None,
     clusters: Sequence[ArrayLike] | None = None,
     damping: float | None = None,
+    law: SolidLaw = "strain",
     volume_row: bool | None = None,
     held: ArrayLike = (),
     positions: ArrayLike | None = None,
@@ -102,9 +105,9 @@ def add_solid(
     Quantities: `<material>_density` kg/m^3, `<material>_E` Pa, `<material>_poisson`, and where given
     `<material>_damping` s.
 
-    The energy is mu V tr E^2 at the quadrature points, in Green strain, and lambda V (J - 1)^2/2 with one mean J = V/V0
-    of an element. Solids need method "newton", "newton_cg" or "implicit"; "direct" and "gauss_seidel" take them in
-    small numbers.
+    The energy is mu V tr E^2 at the quadrature points, in Green strain, or that of rubber, and lambda V (J - 1)^2/2
+    with one mean J = V/V0 of an element. Solids need method "newton", "newton_cg" or "implicit"; "direct" and
+    "gauss_seidel" take them in small numbers.
 
     Args:
         mesh: the shape at rest; of bricks, or of tetrahedra, which are too stiff in bending (a warning says how much).
@@ -118,6 +121,8 @@ def add_solid(
         clusters: shape matching instead of elements: vertices of each cluster, which may share some, such as
             `cluster_boxes` gives. Each cluster is drawn to its own shape at rest, turned. `poisson` is left out.
         damping: Kelvin-Voigt time constant, s.
+        law: "strain", or "neo_hookean" for rubber that is stretched or compressed by more than some tens of percent.
+            Both are linear elasticity for small strains. "neo_hookean" needs a positive `poisson`.
         volume_row: one row for the volume of an element, which lets nearly incompressible bricks bend; `poisson` is
             then between 0 and 0.5. Without it the energy has lambda (tr E)^2/2 at the quadrature points instead, and
             `poisson` may be negative. By default where `poisson` is positive.
@@ -131,7 +136,7 @@ def add_solid(
     Raises:
         SceneError: wrong or missing values, or others than those of a solid of the same material before.
     """
-    numbers = _checked_numbers(name, density, E, poisson, orthotropic, clusters, damping, volume_row)
+    numbers = _checked_numbers(name, density, E, poisson, orthotropic, clusters, damping, law, volume_row)
     material = material or name
     _check_material(scene, name, material, numbers)
     count = len(mesh.vertices)
@@ -154,7 +159,7 @@ def add_solid(
         SolidRows(scene, mesh, name, material, particles, free).add_orthotropic(orthotropic, damping)
     else:
         rows = SolidRows(scene, mesh, name, material, particles, free)
-        rows.add(numbers["E"], numbers["poisson"], damping, numbers["volume_row"])
+        rows.add(numbers["E"], numbers["poisson"], damping, law, numbers["volume_row"])
     built = Solid(name, mesh, particles, material, numbers)
     scene.solids[name] = built
     return built
@@ -168,11 +173,15 @@ def _checked_numbers(
     orthotropic: Orthotropic | None,
     clusters: Sequence[ArrayLike] | None,
     damping: float | None,
+    law: str,
     volume_row: bool | None,
 ) -> dict[str, Any]:
     """The numbers of a material, with what follows from them."""
+    if law not in get_args(SolidLaw):
+        raise SceneError(f"{name}.law", "is no law of solids", law, f"use one of: {', '.join(get_args(SolidLaw))}")
+    rubber = law == "neo_hookean"
     check_positive(name, {"density": density}, {"damping": damping})
-    others = {"poisson": poisson, "volume_row": volume_row or None}
+    others = {"poisson": poisson, "law": law if rubber else None, "volume_row": volume_row or None}
     if orthotropic is not None:
         _refuse_beside(name, "orthotropic", {"E": E, "clusters": clusters and len(clusters), **others})
         return {"density": density, "orthotropic": orthotropic, "damping": damping}
@@ -187,10 +196,13 @@ def _checked_numbers(
         fix = "give one above -1 and below 0.5; 0.499 hardly changes its volume"
         raise SceneError(f"{name}.poisson", "is no Poisson's number of a stable material", poisson, fix)
     by_row = poisson > 0 if volume_row is None else bool(volume_row)
+    if rubber and not by_row:
+        fix = 'give a positive poisson and no volume_row, or law = "strain"'
+        raise SceneError(f"{name}.law", "needs the volume row that a positive poisson has", law, fix)
     if by_row and poisson <= 0:
         fix = "give a positive one, or volume_row = False"
         raise SceneError(f"{name}.poisson", "must be positive with a volume row", poisson, fix)
-    return {"density": density, "E": E, "poisson": poisson, "damping": damping, "volume_row": by_row}
+    return {"density": density, "E": E, "poisson": poisson, "damping": damping, "law": law, "volume_row": by_row}
 
 
 def _refuse_beside(name: str, beside: str, given: Mapping[str, Any]) -> None:
