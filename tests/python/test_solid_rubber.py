@@ -104,10 +104,11 @@ def test_gradients_are_exact(method):
 
 @pytest.mark.parametrize("law", ["strain", "neo_hookean"])
 def test_rows_are_zero_at_rest(law):
-    """So "newton", which leaves out their curvature, moves a swinging bar as "implicit" does, with either law."""
+    """So "newton", which leaves out their curvature, moves a swinging bar as "implicit" does, with either law: within
+    4e-6 m at 1/240 s."""
     times = np.arange(8) / 60
     ends = [sb.simulate(bar(law=law), times, sb.Solver(h=1 / 240, method=m)).positions for m in ("newton", "implicit")]
-    assert np.abs(ends[1] - ends[0]).max() < 1e-3
+    assert np.abs(ends[1] - ends[0]).max() < 1e-5
 
 
 def test_laws_agree_for_small_strains():
