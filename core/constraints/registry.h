@@ -21,6 +21,7 @@
 #include "core/constraints/joint_angle.h"
 #include "core/constraints/joint_stops.h"
 #include "core/constraints/material_curvature.h"
+#include "core/constraints/neo_hookean.h"
 #include "core/constraints/planar_bend.h"
 #include "core/constraints/rigid.h"
 #include "core/constraints/shear.h"
@@ -74,7 +75,9 @@ using Registry = std::tuple<   //
     BrickStrain,               //
     BrickVolume,               //
     TetrahedronStrain,         //
-    TetrahedronVolume>;
+    TetrahedronVolume,         //
+    BrickNeoHookean,           //
+    TetrahedronNeoHookean>;
 
 inline constexpr int kind_count = std::tuple_size_v<Registry>;
 

@@ -1,6 +1,5 @@
-// brick_strain, tetrahedron_strain: the Green strain of a solid at a point of an element, E = (F^T F - 1)/2 with F = sum_k x_k (x) grad N_k, where grad N_k
-// are the gradients of the element's shape functions with respect to the material's own axes 1, 2, 3 at rest; and the rows that carry an orthotropic
-// St. Venant-Kirchhoff energy (Bonet & Wood 2008, ch. 6),
+// brick_strain, tetrahedron_strain: the Green strain of a solid at a point of an element (solid_element.h), E = (F^T F - 1)/2, and the rows that carry an
+// orthotropic St. Venant-Kirchhoff energy (Bonet & Wood 2008, ch. 6),
 //
 //   C1..C3 = M (E_11, E_22, E_33)      C4..C6 = (2 E_23/sqrt(r_23), 2 E_13/sqrt(r_13), 2 E_12/sqrt(r_12))
 //
@@ -9,14 +8,12 @@
 // n = nu and r_ij = 2 (1 + nu). Without couplings and with r_ij = 2, which are the usual values, it is mu V tr E^2 with alpha = 1/(2 mu V): the part that
 // stands beside a volume row (solid_volume.h), for materials that hardly change their volume.
 //
-// An element has one constraint per quadrature point: eight of a brick (2 x 2 x 2 of Gauss), one of a tetrahedron. Parameters are the gradients of all
-// nodes but the first, whose gradient makes their sum zero.
+// An element has one constraint per quadrature point: eight of a brick (2 x 2 x 2 of Gauss), one of a tetrahedron.
 // Degenerate: nothing in space, an element that is turned inside out has finite strain; couplings without a positive definite compliance are no number.
 #pragma once
 
-#include "core/constraints/concept.h"
+#include "core/constraints/solid_element.h"
 #include "core/scalar/dual.h"
-#include "core/scalar/scalar.h"
 
 namespace sheetbend {
 
@@ -57,8 +54,10 @@ struct SolidRows {
 };
 
 template <int N>
-struct SolidStrain : OnPoints<N> {
-  static constexpr int rows = 6, dofs = 3 * N, gradients = 3 * (N - 1);
+struct SolidStrain : SolidElement<N> {
+  static constexpr int rows = 6, dofs = 3 * N;
+  using Element = SolidElement<N>;
+  using Element::gradients;
   // Strain c is of the axes first and second.
   static constexpr int first[rows] = {0, 1, 2, 1, 0, 0}, second[rows] = {0, 1, 2, 2, 2, 1};
   static constexpr int component[3][3] = {{0, 5, 4}, {5, 1, 3}, {4, 3, 2}};
@@ -71,11 +70,8 @@ struct SolidStrain : OnPoints<N> {
 
     Factors(const T* x, const T* p) : M(p + gradients) {
       for (int a = 0; a < 3; ++a) {
-        T sum = p[a];
-        for (int k = 1; k < N; ++k) N_[k][a] = p[3 * (k - 1) + a];
-        for (int k = 2; k < N; ++k) sum += N_[k][a];
-        N_[0][a] = -sum;
-        F[a] = summed(x, p, a);
+        Element::find_gradients(p, N_, a);
+        F[a] = Element::summed(x, p, a);
       }
       T e[rows];
       const T half(0.5), one(1.0);
@@ -177,21 +173,13 @@ struct SolidStrain : OnPoints<N> {
     M.transpose_times(y, Y);
     Vec3<T> F[3], A[3], B[3];
     for (int i = 0; i < 3; ++i) {
-      F[i] = summed(x, p, i);
-      A[i] = summed(a, p, i);
-      B[i] = summed(b, p, i);
+      F[i] = Element::summed(x, p, i);
+      A[i] = Element::summed(a, p, i);
+      B[i] = Element::summed(b, p, i);
     }
     for (int i = 0; i < 3; ++i) {
       const Vec3<T> to = mixed(X, F, i), of = mixed(Y, F, i), bar = mixed(X, A, i) - mixed(Y, B, i);
-      Vec3<T> first_bar = p[i] * bar;
-      for (int k = 1; k < N; ++k) {
-        const int at = 3 * (k - 1) + i;
-        const auto edge = [k](const T* v) { return Vec3<T>(v + 3 * k) - Vec3<T>(v); };
-        (p[at] * bar).add_to(x_bar + 3 * k);
-        if (k > 1) first_bar = first_bar + p[at] * bar;
-        p_bar[at] += dot(edge(x), bar - of) + dot(edge(a), to) - dot(edge(b), of);
-      }
-      (-first_bar).add_to(x_bar);
+      Element::add_reverse(i, x, p, a, b, bar, to, of, x_bar, p_bar);
     }
 
     // dQ/dM_jc, through M's derivatives
@@ -222,12 +210,7 @@ struct SolidStrain : OnPoints<N> {
   static void add_hessian(const T*, const T* p, const T* lambda, T* H) {
     T L[rows], N_[N][3];
     SolidRows<T>(p + gradients).transpose_times(lambda, L);
-    for (int a = 0; a < 3; ++a) {
-      T sum = p[a];
-      for (int k = 1; k < N; ++k) N_[k][a] = p[3 * (k - 1) + a];
-      for (int k = 2; k < N; ++k) sum += N_[k][a];
-      N_[0][a] = -sum;
-    }
+    for (int a = 0; a < 3; ++a) Element::find_gradients(p, N_, a);
     for (int i = 0; i < N; ++i) {
       T by[3];
       for (int b = 0; b < 3; ++b)
@@ -240,14 +223,6 @@ struct SolidStrain : OnPoints<N> {
   }
 
  private:
-  // sum_k dN_k/da v_k.
-  template <class T>
-  static Vec3<T> summed(const T* v, const T* p, int a) {
-    const Vec3<T> origin(v);
-    Vec3<T> sum = p[a] * (Vec3<T>(v + 3) - origin);
-    for (int k = 2; k < N; ++k) sum = sum + p[3 * (k - 1) + a] * (Vec3<T>(v + 3 * k) - origin);
-    return sum;
-  }
   // sum_b e_ab v_b of the symmetric matrix of strains e.
   template <class T>
   static Vec3<T> mixed(const T* e, const Vec3<T>* v, int a) {
@@ -255,16 +230,11 @@ struct SolidStrain : OnPoints<N> {
   }
 };
 
-// The parameters of the first N nodes but one.
 template <int N>
 constexpr auto solid_parameters() {
-  constexpr const char* names[] = {"N1_1", "N1_2", "N1_3", "N2_1", "N2_2", "N2_3", "N3_1",
-                                   "N3_2", "N3_3", "N4_1", "N4_2", "N4_3", "N5_1", "N5_2",
-                                   "N5_3", "N6_1", "N6_2", "N6_3", "N7_1", "N7_2", "N7_3"};
   constexpr Default none = defaults::usually(0.0), one = defaults::usually(1.0), two = defaults::usually(2.0);
   std::array<Parameter, 3 * (N - 1) + 8> all{};
-  int k = 0;
-  for (; k < 3 * (N - 1); ++k) all[k] = {names[k], units::per_meter, ranges::any, defaults::given};
+  int k = name_gradients<N>(all);
   for (const char* name : {"n_12", "n_13", "n_23"})
     all[k++] = {name, units::none, ranges::between_minus_one_and_one, none};
   for (const char* name : {"r_2", "r_3"}) all[k++] = {name, units::none, ranges::positive, one};

@@ -55,6 +55,7 @@ from .objects.rod import Rod, add_rod, rod
 from .objects.rod_junction import Junction
 from .objects.rope import Rope, add_rope, rope
 from .objects.solid import Solid, add_solid, solid
+from .objects.solid_clusters import cluster_boxes
 from .objects.solid_rows import Orthotropic
 from .objects.tethers import add_tethers
 from .objects.tool import Tool
@@ -169,6 +170,7 @@ __all__ = [
     "box_corners",
     "check_gradients",
     "cloth",
+    "cluster_boxes",
     "constraint_values",
     "coordinate_error",
     "cylinder",

@@ -53,6 +53,7 @@ WHOLE: dict[str, Any] = {
                 "density": 1e3,
                 "E": 1e5,
                 "poisson": 0.3,
+                "law": "neo_hookean",
                 "set": [{"name": "low", "lower": [0, 0, 0], "upper": [1, 1, 0]}],
             }
         ],

@@ -85,6 +85,18 @@ def test_what_is_refused(tmp_path: Path, change: dict[str, Any], match: str) -> 
         study(tmp_path, given, marker=[place], recording=[{"file": "bar.npz"}])
 
 
+def test_clusters(tmp_path: Path) -> None:
+    """Boxes of shape matching: their frames are in the scene, and one stiffness for all."""
+    recorded(tmp_path)
+    place = {"marker": "tip", "solid": "bar", "place": [0.1, 0.01, 0.52]}
+    given = {name: value for name, value in (BOX | {"clusters": 0.05}).items() if name != "poisson"}
+    scene = study(tmp_path, given, marker=[place], recording=[{"file": "bar.npz"}]).experiments[0].scene
+    assert len(scene.rotors) == 3
+    assert "bar_E" in scene.quantities and "bar_poisson" not in scene.quantities
+    with pytest.raises(sb.ConfigError, match="poisson"):
+        study(tmp_path, BOX | {"clusters": 0.05}, marker=[place], recording=[{"file": "bar.npz"}])
+
+
 def test_sets_of_a_box(tmp_path: Path) -> None:
     """Its faces, and boxes of space; particles of a set are "bar:SET:0" and so on."""
     recorded(tmp_path)

@@ -29,15 +29,15 @@ def block(n: int = 2, make=sb.mesh.bricks, **options) -> tuple[sb.Scene, sb.Soli
     return scene, sb.add_solid(scene, make((SIDE,) * 3, (n,) * 3), **options)
 
 
-def pulled(s: float, **options) -> sb.Scene:
-    """A cube under the dead tension of a stretch; springs of no account stop its turns."""
+def pulled(tension: float, **options) -> sb.Scene:
+    """A cube under a dead tension [Pa]; springs of no account stop its turns."""
     scene, cube = block(**options)
     x, area = cube.mesh.vertices, (SIDE / 2) ** 2
     load = np.zeros_like(x)
     for face, sign in (("x_min", -1.0), ("x_max", 1.0)):
         ids = cube.mesh.sets[face]
         inside = ((x[ids, 1:] > 1e-9) & (x[ids, 1:] < SIDE - 1e-9)).sum(axis=1)
-        load[ids, 0] += sign * stress(s) * area * np.array([0.25, 0.5, 1.0])[inside]
+        load[ids, 0] += sign * tension * area * np.array([0.25, 0.5, 1.0])[inside]
     scene.add_force(cube.particles, load[None])
     corner = cube.particles[cube.mesh.nearest([[0, 0, 0], [SIDE, 0, 0], [0, SIDE, 0]])]
     scene.pin(corner[:1])
@@ -67,7 +67,7 @@ def test_the_energy_of_a_bar_is_that_of_its_law(s, known):
 
 @pytest.mark.parametrize("s", [1.001, 1.1, 1.5])
 def test_uniaxial_tension(s):
-    rest = sb.equilibrium(pulled(s))
+    rest = sb.equilibrium(pulled(stress(s)))
     cube = rest.scene.solids["solid"]
     corner = cube.particles[cube.mesh.nearest([[SIDE] * 3])]
     assert rest.positions[corner][0] / SIDE == approx([s, narrowed(s), narrowed(s)], abs=1e-8)
@@ -76,7 +76,7 @@ def test_uniaxial_tension(s):
 def test_derivatives_of_uniaxial_tension():
     """By E the stretch falls as if the load fell; by Poisson's number as the closed form's differences."""
     s = 1.1
-    rest = sb.equilibrium(pulled(s))
+    rest = sb.equilibrium(pulled(stress(s)))
     cube = rest.scene.solids["solid"]
     (corner,) = cube.particles[cube.mesh.nearest([[SIDE, 0, 0]])]
     weights = pick(rest.scene, corner, 0, 1 / SIDE)

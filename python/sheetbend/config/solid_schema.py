@@ -6,6 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from ..objects.solid import SolidLaw
 from .section import Finite, Name, Section, Vector, key
 
 MOST_BRICKS = 1_000
@@ -34,8 +35,17 @@ class SolidSection(Section):
     material: Name | None = key(None, "prefix of the quantities instead; solids of one material share them")
     density: Finite = key(..., "mass per volume", "kg/m^3", gt=0)
     E: Finite = key(..., "Young's modulus", "Pa", gt=0)
-    poisson: Finite = key(..., "Poisson's number: 0.499 hardly changes its volume", gt=-1, lt=0.5)
+    poisson: Finite | None = key(
+        None, "Poisson's number: 0.499 hardly changes its volume; left out with clusters", gt=-1, lt=0.5
+    )
+    clusters: Finite | None = key(
+        None,
+        "shape matching: the size of boxes, which overlap by half and in which vertices keep their shape",
+        "m",
+        gt=0,
+    )
     damping: Finite | None = key(None, "Kelvin-Voigt time constant", "s", gt=0)
+    law: SolidLaw = key("strain", "neo_hookean: rubber at large strains")
     volume_row: bool | None = key(
         None, "one row for the volume of each element, which lets bricks bend; by default where poisson is positive"
     )

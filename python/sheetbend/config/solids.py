@@ -10,11 +10,12 @@ from .. import mesh as meshes
 from ..errors import ConfigError
 from ..mesh import SolidMesh
 from ..objects.solid import Solid, add_solid
+from ..objects.solid_clusters import cluster_boxes
 from ..scene.scene import Scene
 from .errors import located
 from .solid_schema import SolidSection
 
-_ELSEWHERE = {"name", "size", "cells", "origin", "file", "unit", "pinned", "set"}
+_ELSEWHERE = {"name", "size", "cells", "origin", "file", "unit", "pinned", "set", "clusters"}
 
 
 def build_solid(scene: Scene, path: str, section: SolidSection, folder: Path, finer: int) -> tuple[Solid, SolidMesh]:
@@ -35,7 +36,8 @@ def build_solid(scene: Scene, path: str, section: SolidSection, folder: Path, fi
     pinned = np.unique(np.concatenate([np.zeros(0, dtype=int), *chosen]))
     fields = section.model_dump(exclude=_ELSEWHERE, exclude_none=True)
     with located(path, section.name):
-        solid = add_solid(scene, mesh, section.name, held=pinned, **fields)
+        clusters = None if section.clusters is None else cluster_boxes(mesh, section.clusters)
+        solid = add_solid(scene, mesh, section.name, clusters=clusters, held=pinned, **fields)
         if len(pinned):
             scene.pin(solid.particles[pinned])
     return solid, configured

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,7 +17,10 @@ from ..mesh import SolidMesh, TriangleMesh
 from ..quantities.quantities import Term
 from ..scene.scene import Array, Scene
 from .locking import LockingWarning, locking
+from .solid_clusters import SHARE, SolidClusters, volumes_of
 from .solid_rows import Orthotropic, SolidRows
+
+SolidLaw = Literal["strain", "neo_hookean"]
 
 
 @dataclass(frozen=True)
@@ -86,10 +89,12 @@ def add_solid(
     *,
     material: str = "",
     density: float,
-    E: float | None = None,
+    E: ArrayLike | None = None,
     poisson: float | None = None,
     orthotropic: Orthotropic | None = None,
+    clusters: Sequence[ArrayLike] | None = None,
     damping: float | None = None,
+    law: SolidLaw = "strain",
     volume_row: bool | None = None,
     held: ArrayLike = (),
     positions: ArrayLike | None = None,
@@ -100,19 +105,24 @@ def add_solid(
     Quantities: `<material>_density` kg/m^3, `<material>_E` Pa, `<material>_poisson`, and where given
     `<material>_damping` s.
 
-    The energy is mu V tr E^2 at the quadrature points, in Green strain, and lambda V (J - 1)^2/2 with one mean J = V/V0
-    of an element. Solids need method "newton", "newton_cg" or "implicit"; "direct" and "gauss_seidel" take them in
-    small numbers.
+    The energy is mu V tr E^2 at the quadrature points, in Green strain, or that of rubber, and lambda V (J - 1)^2/2
+    with one mean J = V/V0 of an element. Solids need method "newton", "newton_cg" or "implicit"; "direct" and
+    "gauss_seidel" take them in small numbers.
 
     Args:
         mesh: the shape at rest; of bricks, or of tetrahedra, which are too stiff in bending (a warning says how much).
         material: prefix of the quantities, `name` by default. Solids of one material share them and have the same
             values.
         density: kg/m^3.
-        E: Young's modulus, Pa.
+        E: Young's modulus, Pa; of clusters one for all, or (clusters,), which are the quantities `<material>_E_0` and
+            so on.
         poisson: Poisson's number, above -1 and below 0.5.
         orthotropic: a material that differs along three axes, instead of these two; it has no volume row.
+        clusters: shape matching instead of elements: vertices of each cluster, which may share some, such as
+            `cluster_boxes` gives. Each cluster is drawn to its own shape at rest, turned. `poisson` is left out.
         damping: Kelvin-Voigt time constant, s.
+        law: "strain", or "neo_hookean" for rubber that is stretched or compressed by more than some tens of percent.
+            Both are linear elasticity for small strains. "neo_hookean" needs a positive `poisson`.
         volume_row: one row for the volume of an element, which lets nearly incompressible bricks bend; `poisson` is
             then between 0 and 0.5. Without it the energy has lambda (tr E)^2/2 at the quadrature points instead, and
             `poisson` may be negative. By default where `poisson` is positive.
@@ -126,7 +136,7 @@ def add_solid(
     Raises:
         SceneError: wrong or missing values, or others than those of a solid of the same material before.
     """
-    numbers = _checked_numbers(name, density, E, poisson, orthotropic, damping, volume_row)
+    numbers = _checked_numbers(name, density, E, poisson, orthotropic, clusters, damping, law, volume_row)
     material = material or name
     _check_material(scene, name, material, numbers)
     count = len(mesh.vertices)
@@ -137,16 +147,19 @@ def add_solid(
         free[indices(f"{name}.held", held, count)] = False
     if not free.any():
         raise SceneError(f"{name}.held", "are all vertices", count, "leave some free")
-    if mesh.elements.shape[1] == 4:
+    if mesh.elements.shape[1] == 4 and clusters is None:
         _warn_locking(name, mesh, 0.3 if poisson is None else poisson, ~free)
 
     particles = scene.add_particles(shape, 0.0, moving)
-    _weigh(scene, mesh, material, particles, density)
-    rows = SolidRows(scene, mesh, name, material, particles, free)
-    if orthotropic is None:
-        rows.add(numbers["E"], numbers["poisson"], damping, numbers["volume_row"])
+    _weigh(scene, mesh, material, particles, density, 1.0 if clusters is None else 1.0 - SHARE)
+    if clusters is not None:
+        matching = SolidClusters(scene, mesh, name, material, particles, free, clusters)
+        matching.add(numbers["E"], damping, shape, moving)
+    elif orthotropic is not None:
+        SolidRows(scene, mesh, name, material, particles, free).add_orthotropic(orthotropic, damping)
     else:
-        rows.add_orthotropic(orthotropic, damping)
+        rows = SolidRows(scene, mesh, name, material, particles, free)
+        rows.add(numbers["E"], numbers["poisson"], damping, law, numbers["volume_row"])
     built = Solid(name, mesh, particles, material, numbers)
     scene.solids[name] = built
     return built
@@ -155,34 +168,61 @@ def add_solid(
 def _checked_numbers(
     name: str,
     density: float,
-    E: float | None,
+    E: ArrayLike | None,
     poisson: float | None,
     orthotropic: Orthotropic | None,
+    clusters: Sequence[ArrayLike] | None,
     damping: float | None,
+    law: str,
     volume_row: bool | None,
 ) -> dict[str, Any]:
     """The numbers of a material, with what follows from them."""
+    if law not in get_args(SolidLaw):
+        raise SceneError(f"{name}.law", "is no law of solids", law, f"use one of: {', '.join(get_args(SolidLaw))}")
+    rubber = law == "neo_hookean"
+    check_positive(name, {"density": density}, {"damping": damping})
+    others = {"poisson": poisson, "law": law if rubber else None, "volume_row": volume_row or None}
     if orthotropic is not None:
-        check_positive(name, {"density": density}, {"damping": damping})
-        given = {"E": E, "poisson": poisson, "volume_row": volume_row or None}
-        both = [field for field, value in given.items() if value is not None]
-        if both:
-            raise SceneError(
-                f"{name}.{both[0]}", "is given beside orthotropic", given[both[0]], "leave one of them out"
-            )
+        _refuse_beside(name, "orthotropic", {"E": E, "clusters": clusters and len(clusters), **others})
         return {"density": density, "orthotropic": orthotropic, "damping": damping}
+    if clusters is not None:
+        _refuse_beside(name, "clusters", others)
+        return {"density": density, "E": _moduli(name, E, len(clusters)), "damping": damping}
     if E is None or poisson is None:
         missing = "E" if E is None else "poisson"
         raise SceneError(f"{name}.{missing}", "is missing", None, "give E and poisson, or orthotropic")
-    check_positive(name, {"density": density, "E": E}, {"damping": damping})
+    check_positive(name, {"E": E}, {})  # type: ignore[dict-item]
     if not (is_number(poisson) and -1 < poisson < 0.5):
         fix = "give one above -1 and below 0.5; 0.499 hardly changes its volume"
         raise SceneError(f"{name}.poisson", "is no Poisson's number of a stable material", poisson, fix)
     by_row = poisson > 0 if volume_row is None else bool(volume_row)
+    if rubber and not by_row:
+        fix = 'give a positive poisson and no volume_row, or law = "strain"'
+        raise SceneError(f"{name}.law", "needs the volume row that a positive poisson has", law, fix)
     if by_row and poisson <= 0:
         fix = "give a positive one, or volume_row = False"
         raise SceneError(f"{name}.poisson", "must be positive with a volume row", poisson, fix)
-    return {"density": density, "E": E, "poisson": poisson, "damping": damping, "volume_row": by_row}
+    return {"density": density, "E": E, "poisson": poisson, "damping": damping, "law": law, "volume_row": by_row}
+
+
+def _refuse_beside(name: str, beside: str, given: Mapping[str, Any]) -> None:
+    for field, value in given.items():
+        if value is not None:
+            raise SceneError(f"{name}.{field}", f"is given beside {beside}", value, "leave one of them out")
+
+
+def _moduli(name: str, E: ArrayLike | None, count: int) -> float | tuple[float, ...]:
+    """Of clusters: one for all, or one each."""
+    if E is None:
+        raise SceneError(f"{name}.E", "is missing", None, "give Young's modulus of the clusters")
+    if count == 0:
+        raise SceneError(
+            f"{name}.clusters", "are none", 0, "give lists of vertices, such as sb.cluster_boxes(mesh, size)"
+        )
+    values = finite(f"{name}.E", E, () if np.ndim(E) == 0 else (count,), SceneError)
+    if not (values > 0).all():
+        raise SceneError(f"{name}.E", "must be positive", values.tolist(), "give Pa")
+    return float(values) if values.ndim == 0 else tuple(values.tolist())
 
 
 def _check_material(scene: Scene, name: str, material: str, numbers: Mapping[str, Any]) -> None:
@@ -204,8 +244,8 @@ def _warn_locking(name: str, mesh: SolidMesh, poisson: float, held: Array) -> No
     warnings.warn(f"{said} (sb.mesh.bricks, or a mesh of hexahedra).", LockingWarning, stacklevel=3)
 
 
-def _weigh(scene: Scene, mesh: SolidMesh, material: str, particles: Array, density: float) -> None:
-    """Masses: each node has its share of the elements around it."""
-    share = np.bincount(mesh.elements.ravel(), mesh.points[2].ravel(), len(mesh.vertices))
+def _weigh(scene: Scene, mesh: SolidMesh, material: str, particles: Array, density: float, part: float) -> None:
+    """Masses of the vertices: this part of what the elements weigh."""
+    share = part * volumes_of(mesh)
     scene.add_quantity(f"{material}_density", density, "kg/m^3", shared=True)
     scene.add_terms([Term("mass", particles, share, ((f"{material}_density", "identity"),))])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ from ..scene.scene import Array, Scene
 from .chain import first_value
 
 STRAIN = {8: "brick_strain", 4: "tetrahedron_strain"}
+RUBBER = {8: "brick_neo_hookean", 4: "tetrahedron_neo_hookean"}
 VOLUME = {8: "brick_volume", 4: "tetrahedron_volume"}
 PAIRS = ("23", "13", "12")
 WORLD = np.eye(3)
@@ -81,7 +83,7 @@ class SolidRows:
         self.mesh = mesh
         self.E, self.nu, self.tau = (f"{material}_{label}" for label in ("E", "poisson", "damping"))
 
-    def add(self, E: float, poisson: float, damping: float | None, by_row: bool) -> None:
+    def add(self, E: float, poisson: float, damping: float | None, law: str, by_row: bool) -> None:
         """An isotropic material, its volume in a row of its own or in the strains."""
         limits = (0.0, 0.5) if by_row else (-1.0, 0.5)
         self.scene.add_quantity(self.E, E, "Pa", shared=True)
@@ -89,7 +91,7 @@ class SolidRows:
         if damping is not None:
             self.scene.add_quantity(self.tau, damping, "s", shared=True)
         if by_row:
-            self._beside_volume(damping is not None)
+            self._beside_volume(damping is not None, law)
         else:
             self._alone(damping is not None)
 
@@ -126,19 +128,25 @@ class SolidRows:
     def _strains(self, damped: bool, axes: Array = WORLD) -> tuple[Array, Array, Array]:
         """Adds the strains along axes, columns (3, 3) or (m, 1, 3, 3), with zero compliance; returns their constraints,
         volumes and first own parameters."""
+        at, volume = self._points(STRAIN, damped, axes, USUAL)
+        width = 3 * (self.mesh.elements.shape[1] - 1) + len(USUAL)
+        return at, volume, first_value(self.scene, f"{self.name}_strain") + width * np.arange(len(volume))
+
+    def _points(self, kinds: Mapping[int, str], damped: bool, axes: Array, more: Array) -> tuple[Array, Array]:
+        """Adds a constraint at every quadrature point, with the gradients along axes and more parameters; returns them
+        and their volumes."""
         gradients, volumes, _ = (part[self.kept] for part in self.mesh.points)
         gradients = gradients @ axes
         count, points, nodes, _ = gradients.shape
         rest = gradients[:, :, 1:].reshape(count * points, 3 * (nodes - 1))
         at = self._group(
-            STRAIN[nodes],
+            kinds[nodes],
             f"{self.name}_strain",
             np.repeat(self.nodes, points, axis=0),
             damped,
-            np.hstack([rest, np.broadcast_to(USUAL, (len(rest), len(USUAL)))]),
+            np.hstack([rest, np.broadcast_to(more, (len(rest), len(more)))]),
         )
-        width = 3 * (nodes - 1) + len(USUAL)
-        return at, volumes.ravel(), first_value(self.scene, f"{self.name}_strain") + width * np.arange(len(rest))
+        return at, volumes.ravel()
 
     def _group(self, kind: str, name: str, stencils: Array, damped: bool, rest: Array) -> Array:
         none = np.zeros(len(stencils))
@@ -148,9 +156,14 @@ class SolidRows:
         first: int = self.scene.group(name)[1]
         return first + np.arange(len(stencils))
 
-    def _beside_volume(self, damped: bool) -> None:
-        """mu V tr E^2 + lambda V (J - 1)^2/2, 2 mu = E/(1 + nu) and lambda = E nu/((1 + nu) (1 - 2 nu))."""
-        at, volume, _ = self._strains(damped)
+    def _beside_volume(self, damped: bool, law: str) -> None:
+        """mu V tr E^2 + lambda V (J - 1)^2/2, 2 mu = E/(1 + nu) and lambda = E nu/((1 + nu) (1 - 2 nu)); of rubber
+        mu V (|F|^2 - 4 J + J^2)/2 beside the same volume row."""
+        if law == "neo_hookean":
+            at, volume = self._points(RUBBER, damped, WORLD, USUAL[:0])
+            volume = volume / 2.0
+        else:
+            at, volume, _ = self._strains(damped)
         E, nu, tau = (self.E, "inverse"), (self.nu, "identity"), (self.tau, "identity")
         terms = [Term("compliance", at, 1.0 / volume, (E,)), Term("compliance", at, 1.0 / volume, (E, nu))]
         stiff = ((self.tau, "identity"), (self.E, "identity"))

@@ -494,15 +494,38 @@ inline const std::vector<double> brick_sample{0,    0,    0,   0.1,  0.01,  0.02
                                               0.02, 0.01, 0.1, 0.12, -0.01, 0.11, 0.13, 0.12, 0.12, 0.01,  0.1,  0.09};
 inline const std::vector<double> tetrahedron_sample{0, 0, 0, 0.1, 0.01, 0.02, -0.01, 0.11, 0.01, 0.02, -0.02, 0.09};
 
+inline const std::vector<double> brick_gradients{2.5, -1.6, -4.9, 1.6, 1.9, -3.2, -0.9, 1,  -1.3, -4.4, -2.3,
+                                                 3.2, 3.3,  -4.4, 3.5, 2.1, 4,    2.5,  -3, 2.2,  2.2};
+inline const std::vector<double> tetrahedron_gradients{9.99, 1.07, -1.94, -1.26, 8.54, 2.13, -2.04, -1.16, 10.96};
+
 template <>
 inline Case case_of<BrickStrain>() {
-  return solid_case(brick_sample, {2.5, -1.6, -4.9, 1.6, 1.9, -3.2, -0.9, 1,  -1.3, -4.4, -2.3,
-                                   3.2, 3.3,  -4.4, 3.5, 2.1, 4,    2.5,  -3, 2.2,  2.2});
+  return solid_case(brick_sample, brick_gradients);
 }
 
 template <>
 inline Case case_of<TetrahedronStrain>() {
-  return solid_case(tetrahedron_sample, {9.99, 1.07, -1.94, -1.26, 8.54, 2.13, -2.04, -1.16, 10.96});
+  return solid_case(tetrahedron_sample, tetrahedron_gradients);
+}
+
+// The same without the ratios of stiffness.
+inline Case neo_hookean_case(std::vector<double> x, std::vector<double> gradients) {
+  const std::size_t count = gradients.size();
+  Case row = solid_case(std::move(x), std::move(gradients));
+  row.p.resize(count);
+  row.parameter_sign.resize(count);
+  row.parameter_relabeling.resize(count);
+  return row;
+}
+
+template <>
+inline Case case_of<BrickNeoHookean>() {
+  return neo_hookean_case(brick_sample, brick_gradients);
+}
+
+template <>
+inline Case case_of<TetrahedronNeoHookean>() {
+  return neo_hookean_case(tetrahedron_sample, tetrahedron_gradients);
 }
 
 template <>
