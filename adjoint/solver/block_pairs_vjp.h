@@ -65,31 +65,62 @@ PairNumbers<S> rub_vjp(bool triangle, Part part, const S* x, const PairNumbers<S
   return {sum.d[touching], sum.d[kappa]};
 }
 
+// The reverse of Spots::at: a cotangent of where a spot is goes to its nodes, by to(node, cotangent), and to its weights, by weight(i, cotangent) in their
+// order. at(node) are its nodes'.
+template <class S, class At, class To, class Weight>
+void spot_vjp(const Spots<S>& spots, int spot, const Vec3<S>& bar, At&& at, To&& to, Weight&& weight) {
+  if (spots.is_node(spot)) return to(spot, bar);
+  std::size_t i = spots.first_weight(spot);
+  spots.for_each_node(spot, [&](int node, const S& b) {
+    to(node, b * bar);
+    weight(i++, dot(at(node), bar));
+  });
+}
+
+// Likewise of Spots::inverse_mass.
+template <class S, class W, class To, class Weight>
+void inverse_mass_vjp(const Spots<S>& spots, int spot, const S& bar, W&& w, To&& to, Weight&& weight) {
+  if (spots.is_node(spot)) return to(spot, bar);
+  std::size_t i = spots.first_weight(spot);
+  spots.for_each_node(spot, [&](int node, const S& b) {
+    to(node, b * b * bar);
+    weight(i++, S(2.0) * b * w(node) * bar);
+  });
+}
+
 // Cotangents of one scene's PairFriction.
 template <class S>
 struct PairFrictionCotangents {
   S friction{};
   std::vector<Vec3<S>> carried;  // per place of a pair
   std::vector<S> from;           // per particle
+  std::vector<S> weights;        // of points of bodies, in their order
 
   void resize(const DirectBlock& block) {
     if (!block.surface.rubs()) return;
     carried.resize(block.surface.carried.size());
     from.resize(3 * block.particles.size());
+    weights.resize(4 * block.surface.on_bodies.size());
   }
   static std::size_t bytes(const DirectBlock& block) {
     if (!block.surface.rubs()) return 0;
-    return sizeof(Vec3<S>) * block.surface.carried.size() + sizeof(S) * 3 * block.particles.size();
+    return sizeof(Vec3<S>) * block.surface.carried.size() +
+           sizeof(S) * (3 * block.particles.size() + 4 * block.surface.on_bodies.size());
   }
   void clear() {
     friction = S(0.0);
     std::fill(carried.begin(), carried.end(), Vec3<S>(S(0.0), S(0.0), S(0.0)));
     std::fill(from.begin(), from.end(), S(0.0));
+    std::fill(weights.begin(), weights.end(), S(0.0));
   }
-  void add(const PairFriction<S>& of, const BlockPair& pair, const Rub<S>& bar) {
+  void add(const PairFriction<S>& of, const Spots<S>& spots, const BlockPair& pair, const Rub<S>& bar) {
     friction += bar.friction;
     if (const int place = of.place_of(pair.key); place >= 0) carried[place] = carried[place] + bar.carried;
-    for (int d = 0; d < 12; ++d) from[3 * static_cast<std::size_t>(pair.particles[d / 3]) + d % 3] += bar.from[d];
+    for (int k = 0; k < 4; ++k)
+      spot_vjp(
+          spots, pair.spots[k], Vec3<S>(bar.from + 3 * k), [&](int p) { return of.history(p); },
+          [&](int p, const Vec3<S>& own) { own.add_to(&from[3 * static_cast<std::size_t>(p)]); },
+          [&](std::size_t i, const S& own) { weights[i] += own; });
   }
 };
 
@@ -102,6 +133,8 @@ void spread_friction(const ContactSource<T>& source, const DirectBlock& block,
   if (!block.surface.rubs()) return;
   const std::vector<int>& first_dof = source.scene.first_dof;
   source.add(bar.friction, in_bar.of(Quantity::friction)[block.surface.friction]);
+  for (std::size_t i = 0; i < bar.weights.size(); ++i)
+    source.add(bar.weights[i], in_bar.of(Quantity::contact_weight)[block.surface.first_weight + i]);
   for (std::size_t p = 0; p < block.particles.size(); ++p) {
     const Vec3<S> history(&bar.from[3 * p]);
     const int dof = first_dof[block.particles[p]];
@@ -113,7 +146,7 @@ void spread_friction(const ContactSource<T>& source, const DirectBlock& block,
                from_bar.x + first_dof[block.surface.carried[i][1]]);
 }
 
-// What kappa leaves to the inverse masses (4).
+// What kappa leaves to the inverse masses (4) of spots.
 template <class S>
 void kappa_vjp(bool triangle, const PairNumbers<S>& numbers, double stiffness, const S& kappa_bar, S* w_bar) {
   const S all = -(kappa_bar * numbers.kappa * numbers.kappa) * S(1.0 / stiffness);

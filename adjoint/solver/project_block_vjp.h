@@ -33,6 +33,7 @@ struct BlockCotangents {
   std::vector<BlockContactCotangents<Single<T>>> contacts;  // per scene, of implicit blocks
   std::vector<PairFrictionCotangents<Single<T>>> friction;  // likewise
   std::vector<T> radii;                                     // of contacts and of what touches itself, of such a block
+  std::vector<T> weights;                                   // of points of bodies that touch something, likewise
   double eta = 0.0;
 
   void resize(const Scene& scene, const DirectBlock& block) {
@@ -48,6 +49,7 @@ struct BlockCotangents {
     for (std::size_t v = 0; v < volumes.size(); ++v) volumes[v].v.resize(block.volumes[v].particles.size());
     contacts.resize(block.implicit ? scenes_of<T> : 0);
     radii.assign(block.surface.empty() ? 0 : scene.layout.count(Quantity::contact_radius), T(0.0));
+    weights.assign(4 * block.surface.on_bodies.size(), T(0.0));
     for (auto& scene_ : contacts) scene_.resize(scene, block);
     friction.resize(contacts.size());
     for (auto& scene_ : friction) scene_.resize(block);
@@ -61,6 +63,7 @@ struct BlockCotangents {
     for (const BlockVolume& volume : block.volumes)
       sum += sizeof(VolumeValues) + sizeof(Vec3<T>) * volume.particles.size();
     if (!block.surface.empty()) sum += sizeof(T) * scene.layout.count(Quantity::contact_radius);
+    sum += sizeof(T) * 4 * block.surface.on_bodies.size();
     if (block.implicit)
       sum += 2 * sizeof(T) * 3 * block.movable +  // p and what it gathers
              scenes_of<T> *

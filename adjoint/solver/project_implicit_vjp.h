@@ -109,7 +109,7 @@ void pull_back_contacts(const DirectBlock& block, BlockState<T>& state, const st
     }
 }
 
-// Likewise that of pairs that touch; what goes to radii gathers.
+// Likewise that of pairs that touch; what goes to radii and to weights of points of bodies gathers.
 template <class T>
 void pull_back_pairs(const SubstepState<T>& s, const DirectBlock& block, BlockState<T>& state, const std::vector<T>& p,
                      BlockCotangents<T>& bar) {
@@ -124,31 +124,40 @@ void pull_back_pairs(const SubstepState<T>& s, const DirectBlock& block, BlockSt
         to += a;
     };
     const auto row_of = [](int particle) { return sheetbend_blocks::row * static_cast<std::size_t>(particle); };
+    const auto x_of = [&](int particle) { return &state.x[0][row_of(particle)]; };
+    const auto p_of = [&](int particle) {
+      const T* at = &p[3 * static_cast<std::size_t>(particle)];
+      return particle < block.movable ? Vec3<S>(source.read(at[0]), source.read(at[1]), source.read(at[2])) : Vec3<S>();
+    };
+    const auto place_of = [&](int particle) { return source.place(particle, x_of); };
     source.for_each_touching(
-        [&](int particle) { return &state.x[0][row_of(particle)]; },
-        [&](const BlockPair& pair, Part part, const S* x, const PairNumbers<S>& numbers, const Rub<S>* rub) {
-          S along[12], x_bar[12], force[12], w_bar[4];
-          for (int d = 0; d < 12; ++d) {
-            const int particle = pair.particles[d / 3];
-            along[d] =
-                particle < block.movable ? source.read(p[3 * static_cast<std::size_t>(particle) + d % 3]) : S(0.0);
-          }
+        x_of, [&](const BlockPair& pair, Part part, const S* x, const PairNumbers<S>& numbers, const Rub<S>* rub) {
+          S along[12], x_bar[12], force[12], w_bar[4], by[3];
+          for (int k = 0; k < 4; ++k) source.spots.at(pair.spots[k], p_of).store(along + 3 * k);
           PairNumbers<S> numbers_bar;
           if (rub) {
             Rub<S> rub_bar;
             const Vec3<S> none(S(0.0), S(0.0), S(0.0));
             numbers_bar = rub_vjp(pair.key.triangle, part, x, numbers, *rub, along, none, x_bar, force, rub_bar);
-            bar.friction[scene].add(friction, pair, rub_bar);
+            bar.friction[scene].add(friction, source.spots, pair, rub_bar);
           } else {
             numbers_bar = meet_vjp(pair.key.triangle, part, x, numbers, along, x_bar, force);
           }
           kappa_vjp(pair.key.triangle, numbers, source.pairs.stiffness, numbers_bar.kappa, w_bar);
           for (int k = 0; k < 4; ++k) {
-            const std::size_t at = row_of(pair.particles[k]);
-            for (int d = 0; d < 3; ++d) add(x_bar[3 * k + d], bar.x[at + d]);
-            if (pair.particles[k] >= block.movable) continue;
-            const S work = dot(Vec3<S>(force + 3 * k), Vec3<S>(along + 3 * k));
-            add(work / source.read(state.x[0][at + 3]) + w_bar[k], bar.x[at + 3]);
+            const int spot = pair.spots[k];
+            const Vec3<S> own_bar(x_bar + 3 * k), push(force + 3 * k);
+            std::size_t i = source.spots.first_weight(spot);
+            source.spots.for_each_node(spot, [&](int particle, const S& b) {
+              T* to = &bar.x[row_of(particle)];
+              (b * own_bar).store(by);
+              for (int d = 0; d < 3; ++d) add(by[d], to[d]);
+              const S work = dot(push, p_of(particle));
+              if (particle < block.movable) add(b * work / source.read(x_of(particle)[3]) + b * b * w_bar[k], to[3]);
+              if (source.spots.is_node(spot)) return;
+              const S of_mass = S(2.0) * b * source.inverse_mass(particle) * w_bar[k];
+              add(work + dot(own_bar, place_of(particle)) + of_mass, bar.weights[i++]);
+            });
           }
           for (const int k : {0, source.second_side(pair)})
             add(numbers_bar.touching, bar.radii[source.radius_of(pair, k)]);
@@ -166,7 +175,7 @@ void project_implicit_vjp(const SubstepState<T>& s, const DirectBlock& block, Sc
     if (has(scenes, scene)) state.implicit[scene].factorize(s.scene, block);
   for (auto& scene : bar.contacts) scene.clear();
   for (auto& scene : bar.friction) scene.clear();
-  std::fill(bar.radii.begin(), bar.radii.end(), T(0.0));
+  for (auto* gathered : {&bar.radii, &bar.weights}) std::fill(gathered->begin(), gathered->end(), T(0.0));
   auto& own = state.at(0);
   state.lambda[0].clear();  // all of it is dl
   own.u.clear();            // J stands in no linearized row

@@ -46,12 +46,21 @@ struct ReverseOf<CarryPairFriction> {
           const Vec3<S> carried_bar = source.at(bar.x_next, block.surface.carried[count++][1]);
           const auto numbers_bar =
               rub_vjp(pair.key.triangle, part, x, numbers, rub, none, rate * carried_bar, x_bar, force, rub_bar);
-          friction_bar.add(of.friction, pair, rub_bar);
+          friction_bar.add(of.friction, of.spots, pair, rub_bar);
           kappa_vjp(pair.key.triangle, numbers, of.pairs.stiffness, numbers_bar.kappa, w_bar);
+          const auto add_to_weight = [&](std::size_t i, const S& own) { friction_bar.weights[i] += own; };
           for (int k = 0; k < 4; ++k) {
-            const int node = block.particles[pair.particles[k]];
-            source.add(Vec3<S>(x_bar + 3 * k), bar.x_next + first_dof[node]);
-            if (pair.particles[k] < block.movable) source.add(w_bar[k], bar.w.of(node));
+            spot_vjp(
+                of.spots, pair.spots[k], Vec3<S>(x_bar + 3 * k),
+                [&](int p) { return source.read(Vec3<T>(work.q.of(block.particles[p]))); },
+                [&](int p, const Vec3<S>& own) { source.add(own, bar.x_next + first_dof[block.particles[p]]); },
+                add_to_weight);
+            inverse_mass_vjp(
+                of.spots, pair.spots[k], w_bar[k], [&](int p) { return of.inverse_mass(p); },
+                [&](int p, const S& own) {
+                  if (p < block.movable) source.add(own, bar.w.of(block.particles[p]));
+                },
+                add_to_weight);
           }
           for (const int k : {0, of.second_side(pair)})
             source.add(numbers_bar.touching, bar.in.of(Quantity::contact_radius)[of.radius_of(pair, k)]);

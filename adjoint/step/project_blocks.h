@@ -65,6 +65,8 @@ void ReverseOf<ProjectBlocks>::run(const Step<T>& step, const Work<T>& work, Pro
     add_fixed(step.scene, plan.blocks[b], scratch.blocks[b], bar.q.data, bar.from.x, bar.from.x_before);
     for (std::size_t i = 0; i < scratch.blocks[b].radii.size(); ++i)
       bar.in.of(Quantity::contact_radius)[i] += scratch.blocks[b].radii[i];
+    for (std::size_t i = 0; i < scratch.blocks[b].weights.size(); ++i)
+      bar.in.of(Quantity::contact_weight)[plan.blocks[b].surface.first_weight + i] += scratch.blocks[b].weights[i];
     auto& contacts = scratch.blocks[b].contacts;
     for (std::size_t lane = 0; lane < contacts.size(); ++lane) {
       const auto source = contact_source(step, work.masses, static_cast<int>(lane));

@@ -11,15 +11,15 @@ namespace {
 
 constexpr double slack = 0.1;  // of where two touch, by which they may be listed too early
 
-// Around nodes on their ways, as far as they reach, and half of what must stay free around them.
-Box box_around(std::span<const int> nodes, const Whereabouts& at) {
+// Around spots on their ways, as far as they reach, and half of what must stay free around them.
+Box box_around(std::span<const int> spots, const Whereabouts& at) {
   double reach = 0.0;
-  for (const int n : nodes) reach = std::max(reach, at.reach[n]);
-  reach += at.radius[nodes.front()];
+  for (const int n : spots) reach = std::max(reach, at.reach[n]);
+  reach += at.radius[spots.front()];
   Box box;
   for (int d = 0; d < 3; ++d) {
-    box.low[d] = box.high[d] = at.of(nodes.front())[d];
-    for (const int n : nodes) {
+    box.low[d] = box.high[d] = at.of(spots.front())[d];
+    for (const int n : spots) {
       const double from = at.of(n)[d], to = at.way ? from + at.way[3 * static_cast<long>(n) + d] : from;
       box.low[d] = std::min({box.low[d], from, to});
       box.high[d] = std::max({box.high[d], from, to});
@@ -34,29 +34,29 @@ template <class Items>
 std::vector<Box> boxes_around(const Items& items, const Whereabouts& at) {
   std::vector<Box> boxes;
   boxes.reserve(items.size());
-  for (const auto& nodes : items) boxes.push_back(box_around(nodes, at));
+  for (const auto& spots : items) boxes.push_back(box_around(spots, at));
   return boxes;
 }
 
 bool may_touch(const SelfContact& s, const PairKey& key, const Whereabouts& at) {
-  const auto nodes = nodes_of(s, key);
-  for (int i = 0; i < 4; ++i)
-    for (int k = 0; k < i; ++k)
-      if (nodes[i] == nodes[k]) return false;
+  const auto spots = spots_of(s, key);
+  const int side = key.triangle ? 1 : 2;  // where the second one begins
+  for (int i = 0; i < side; ++i)
+    for (int k = side; k < 4; ++k)
+      if (s.whole(spots[i]) == s.whole(spots[k])) return false;
   double x[12];
-  gather(nodes, at.x, at.stride, x);
+  gather(spots, at.x, at.stride, x);
   const auto reach = [&](int from, int to) {
     double most = 0.0;
-    for (int k = from; k < to; ++k) most = std::max(most, at.reach[nodes[k]]);
+    for (int k = from; k < to; ++k) most = std::max(most, at.reach[spots[k]]);
     return most;
   };
-  const int side = key.triangle ? 1 : 2;  // where the second one begins
-  const double touching = at.radius[nodes[0]] + at.radius[nodes[side]];
+  const double touching = at.radius[spots[0]] + at.radius[spots[side]];
   const double room = touching + reach(0, side) + reach(side, 4);
   const PairNumbers<double> numbers{touching, 1.0};
   if (!at.way) return distance_of(key.triangle, x, numbers) <= room;
   double way[12];
-  gather(nodes, at.way, 3, way);
+  gather(spots, at.way, 3, way);
   return comes_nearer(key.triangle, x, way, room, slack * touching, numbers);
 }
 

@@ -26,7 +26,7 @@ template <class T>
 struct Rub {
   T friction{};
   Vec3<T> carried;  // tangential force on the first side before
-  T from[12];       // history of the nodes, as for Bdf: slip is counted from there
+  T from[12];       // history of the spots, as for Bdf: slip is counted from there
 };
 
 template <class T>

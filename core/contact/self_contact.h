@@ -1,4 +1,5 @@
-// What may touch itself: segments of ropes and edges of cloth against each other, and particles of cloth against its triangles.
+// What may touch itself: segments of ropes, edges of cloth and capsules of bodies against each other, and particles of cloth against its triangles. Their
+// corners are spots: nodes, or points of bodies, which are weighted sums of a body's center and its axes (core/contact/spots.h).
 #pragma once
 
 #include <array>
@@ -11,12 +12,20 @@ struct SelfContact {
   std::vector<std::array<int, 2>> edges;
   std::vector<std::array<int, 3>> triangles;
   std::vector<int> points;  // that may touch triangles
-  std::vector<int> radius;  // per node: place in Quantity::contact_radius, -1 where it touches nothing
+  std::vector<int> radius;  // per spot: place in Quantity::contact_radius, -1 where it touches nothing
   // With friction: its place in Quantity::friction, and pinned nodes of the scene, two for each pair that may touch at a time. One's coordinates say which
   // pair, and what it does (coded() below), the other's are the tangential force that it carries [N].
   int friction = -1;
   std::vector<std::array<int, 2>> carried = {};
+  // A spot below this number is a node, and one from it on a point of a body: the center and the axes. Their weights (points, 4) stand in
+  // Quantity::contact_weight.
+  int nodes = 0;
+  std::vector<std::array<int, 4>> on_bodies = {};
+  std::size_t first_weight = 0;
 
+  int spots() const { return nodes + static_cast<int>(on_bodies.size()); }
+  // A node that stands for all that moves as one: that of a spot, or the center of its body.
+  int whole(int spot) const { return spot < nodes ? spot : on_bodies[spot - nodes][0]; }
   bool rubs() const { return friction >= 0; }
   bool empty() const { return edges.empty(); }
 };
@@ -39,8 +48,8 @@ inline PairKey decoded(double kind, double first, double second) {
   return {kind == 2.0 || kind == 4.0, static_cast<int>(first), static_cast<int>(second)};
 }
 
-// The four nodes: two of each edge, or the point and the corners.
-inline std::array<int, 4> nodes_of(const SelfContact& s, const PairKey& pair) {
+// The four spots: two of each edge, or the point and the corners.
+inline std::array<int, 4> spots_of(const SelfContact& s, const PairKey& pair) {
   if (pair.triangle) {
     const auto& t = s.triangles[pair.second];
     return {s.points[pair.first], t[0], t[1], t[2]};

@@ -9,16 +9,13 @@
 namespace sheetbend {
 namespace {
 
-// Of a body: the center and the axes of one, all of them.
-void check_points_of_bodies(const ContactSpec& spec, const Scene& scene) {
-  for (auto p = spec.nodes.begin(); p != spec.nodes.end(); p += spec.arity) {
-    const bool known = std::ranges::any_of(scene.bodies, [&](const Body& b) {
-      return b.center == p[0] && std::equal(b.axes.begin(), b.axes.end(), p + 1);
-    });
-    if (!known || std::any_of(p, p + spec.arity, [&](int n) { return scene.role[n] != scene.role[p[0]]; }))
-      refuse(spec.name + ": the point of node " + std::to_string(p[0]) +
-             " is of no body. Fix: give a body's center and its three axes, which all move or all stand");
-  }
+// A point of a body: the center and the axes of one, all of them.
+void check_point_of_body(const std::string& field, const int* p, const Scene& scene) {
+  const bool known = std::ranges::any_of(
+      scene.bodies, [&](const Body& b) { return b.center == p[0] && std::equal(b.axes.begin(), b.axes.end(), p + 1); });
+  if (!known || std::any_of(p, p + most_point_nodes, [&](int n) { return scene.role[n] != scene.role[p[0]]; }))
+    refuse(field + ": the point of node " + std::to_string(p[0]) +
+           " is of no body. Fix: give a body's center and its three axes, which all move or all stand");
 }
 
 // Nodes that carry what a substep leaves to the next: each pinned, and listed once in the scene.
@@ -42,7 +39,8 @@ void check_contact(const ContactSpec& spec, const Scene& scene, std::vector<char
   if (spec.nodes.size() != spec.carried.size() * spec.arity)
     refuse(spec.name + ".carried: " + std::to_string(spec.carried.size()) + " nodes. Fix: give one for each point");
   if (spec.arity > 1) {
-    check_points_of_bodies(spec, scene);
+    for (std::size_t p = 0; p < spec.nodes.size(); p += spec.arity)
+      check_point_of_body(spec.name, &spec.nodes[p], scene);
   } else {
     slots(spec.nodes, scene.nodes(), spec.name);
     for (const int n : spec.nodes)
@@ -94,17 +92,25 @@ void add_pair_friction(const SelfContactSpec& spec, Scene& s, std::vector<char>&
   for (auto n = spec.carried.begin(); n != spec.carried.end(); n += 2) s.self_contact.carried.push_back({n[0], n[1]});
 }
 
-// The radii of pieces stand behind those of contacts. Where any piece has triangles, the points of all pieces may touch them.
-void add_self_contact(const SceneSpec& spec, Scene& s, std::vector<char>& carries) {
+// The radii of pieces stand behind those of contacts, and the weights of points of bodies likewise. Where any piece has triangles, the points of all pieces
+// may touch them.
+void add_self_contact(const SceneSpec& spec, std::size_t weights, Scene& s, std::vector<char>& carries) {
   SelfContact& own = s.self_contact;
   const std::string field = "self_contact";
-  own.radius.assign(s.nodes(), -1);
+  own.nodes = s.nodes();
+  own.on_bodies = spec.self_contact.on_bodies;
+  own.first_weight = weights;
+  for (const auto& nodes : own.on_bodies) {
+    check_nodes(field, {nodes.begin(), nodes.end()}, s.nodes());
+    check_point_of_body(field, nodes.data(), s);
+  }
+  own.radius.assign(own.spots(), -1);
   int place = static_cast<int>(s.contacts.size());
   for (const SelfContactSpec::Piece& piece : spec.self_contact.pieces) {
     if (piece.edges.empty()) refuse(field + ": a piece has no edges. Fix: give ropes, cloths or both");
     std::vector<int> nodes;
     for (const auto& [a, b] : piece.edges) {
-      check_nodes(field, {a, b}, s.nodes());
+      check_nodes(field, {a, b}, own.spots());
       if (a == b) refuse(field + ": an edge from particle " + std::to_string(a) + " to itself. Fix: leave it out");
       nodes.insert(nodes.end(), {a, b});
     }
@@ -113,7 +119,7 @@ void add_self_contact(const SceneSpec& spec, Scene& s, std::vector<char>& carrie
     std::sort(nodes.begin(), nodes.end());
     nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
     for (const int n : nodes) {
-      if (!s.is_place[n])
+      if (n < own.nodes && !s.is_place[n])
         refuse(field + ": node " + std::to_string(n) + " is " + a_direction(s, n) + ". Fix: use particles");
       if (own.radius[n] >= 0)
         refuse(field + ": particle " + std::to_string(n) + " is in two pieces. Fix: list each piece once");
@@ -125,6 +131,9 @@ void add_self_contact(const SceneSpec& spec, Scene& s, std::vector<char>& carrie
     ++place;
   }
   add_pair_friction(spec.self_contact, s, carries);
+  if (const auto loose = std::find(own.radius.begin() + own.nodes, own.radius.end(), -1); loose != own.radius.end())
+    refuse(field + ": point " + std::to_string(loose - own.radius.begin() - own.nodes) +
+           " of a body is in no piece. Fix: leave it out");
   if (own.empty()) own.radius.clear();
   if (own.triangles.empty()) own.points.clear();
 }
@@ -166,14 +175,14 @@ ContactSizes add_contacts(const SceneSpec& spec, Scene& s) {
     if (c.arity > 1) weights += c.nodes.size();
   }
   add_bouncers(s);
-  add_self_contact(spec, s, carries);
+  add_self_contact(spec, weights, s, carries);
   return {s.contacts.size() + s.self_contact.rubs(),
           s.contacts.size() + spec.self_contact.pieces.size(),
           soft,
           poses,
           sizes,
           bouncing,
-          weights,
+          weights + most_point_nodes * s.self_contact.on_bodies.size(),
           dissipating};
 }
 

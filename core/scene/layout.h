@@ -33,7 +33,7 @@ enum class Quantity : int {
   collider_size,      // per collider: the lengths of its shape  [m]
   restitution,        // per contact off which particles bounce: the speed after an impact over that before  [-]
   load,               // (knots, loads along rows): energy over the unit of C, such as N m where it is an angle
-  contact_weight,  // per contact of points that several nodes carry: (points, nodes), of the nodes in their sum; m for axes
+  contact_weight,  // per contact of points that several nodes carry: (points, nodes), of the nodes in their sum; m for axes. Then of what touches itself
   contact_dissipation,  // per contact that dissipates: the share of its push that a speed along the normal adds  [s/m]
 };
 inline constexpr int quantity_count = 26;

@@ -8,7 +8,7 @@
 
 namespace sheetbend {
 
-// A pair of a self-contact: its gap, negative where it is too near, and its four nodes.
+// A pair of a self-contact: its gap, negative where it is too near, and its four nodes; the center of a body for its points.
 struct PairGap {
   double gap;
   std::array<int, 4> nodes;

@@ -175,7 +175,7 @@ struct ContactSpec {
   bool dissipates = false;  // has a dissipation
 };
 
-// Each piece has a radius of its own; pieces share no particle.
+// Each piece has a radius of its own; pieces share no particle. Particles are numbers of nodes; points of bodies count on after all nodes of the scene.
 struct SelfContactSpec {
   struct Piece {
     std::vector<std::array<int, 2>> edges;
@@ -184,6 +184,7 @@ struct SelfContactSpec {
   std::vector<Piece> pieces;
   // With friction: pinned nodes, two for each pair that may touch at a time, as in SelfContact.
   std::vector<int> carried;
+  std::vector<std::array<int, 4>> on_bodies = {};  // per point of a body: its center and its axes
 };
 
 struct SceneSpec {

@@ -174,10 +174,11 @@ void ImplicitBlock::expect_none_passes(const DirectBlock& block, Numbers<double>
   if (!pair) return;
   std::ostringstream problem;
   problem << "particles";
-  for (int k = 0; k < 4; ++k) problem << (k ? ", " : " ") << block.particles[pair->particles[k]];
+  const auto node_of = [&](int k) { return block.particles[block.surface.whole(pair->spots[k])]; };
+  for (int k = 0; k < 4; ++k) problem << (k ? ", " : " ") << node_of(k);
   problem << " are driven through each other, or start there";
   throw Unbalanced(problem.str(), "use a smaller substep, or drive them around each other", matrices_,
-                   potential.balance(), block.particles[pair->particles[0]]);
+                   potential.balance(), node_of(0));
 }
 
 // Of K along d_, which is made as long as one in its largest number; Kz_ is K d_.

@@ -15,6 +15,7 @@ constexpr double flat = 1e-8;  // relative changes of Phi that rounding may hide
 // Of a step that goes down in the merit: shorter ones only run into a kink at which it has a minimum.
 constexpr int most_halvings_of_merit = 30;
 constexpr int most_kinks = 10;     // full steps in a row that may raise the merit
+constexpr double barred = 0x1p-6;  // so short a step is given up where pairs bar longer ones
 constexpr double no_slip = 1e30;   // a friction
 constexpr int most_sections = 36;  // of the way, where its lowest point is looked for
 constexpr double well_down = 0.9;  // of the merit: less than this is gained where a kink holds it up
@@ -108,15 +109,17 @@ bool ImplicitBlock::search_where_it_rubs(const Scene& scene, const DirectBlock& 
 }
 
 // Where contacts begin, end, slide or stick along a step, the merit has kinks that shorter steps only run into; full ones get to the other side, where
-// the next matrix knows what acts there. False, and back at the same point with its Newton step, where the merit has not fallen after some.
+// the next matrix knows what acts there; where pairs bar a full step, one as far as they allow. False, and back at the same point with its Newton step,
+// where the merit has not fallen after some.
 bool ImplicitBlock::step_over_kinks(const Scene& scene, const DirectBlock& block, int most_matrices) {
-  if (block.contacts.empty()) return false;
+  if (block.contacts.empty() && potential.pairs.empty()) return false;
   const Numbers<double> x = x_;
   const std::vector<double> lambda = lambda_, d = d_, dl = dl_;
   const double merit = merit_;
   look(block);
   for (int step = 0; step < most_kinks && matrices_ < most_matrices; ++step) {
-    const double there = look(block, 1.0);
+    double t = 1.0, there = look(block, t);
+    while (!std::isfinite(potential.merit()) && !potential.pairs.empty() && t > barred) there = look(block, t *= 0.5);
     if (!std::isfinite(potential.merit())) break;
     std::swap(x_, trial_);
     accept(there);

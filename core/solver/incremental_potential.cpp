@@ -32,7 +32,7 @@ void IncrementalPotential::resize(const Scene& scene, const DirectBlock& block) 
   for (const BlockFrame& f : block.frames) turns_[f.particle] = true;
   contacts.resize(block);
   friction.resize(block);
-  pairs.radius.assign(block.surface.empty() ? 0 : block.particles.size(), 0.0);
+  pairs.radius.assign(block.surface.empty() ? 0 : block.surface.spots(), 0.0);
   eta = 0.0;
   values.resize(block.runs.size());
   runs_.clear();
@@ -102,20 +102,23 @@ double IncrementalPotential::add_pairs(const DirectBlock& block, const double* x
   double energy = 0.0;
   for (const BlockPair& pair : pairs.all()) {
     double at[12], force[12];
-    gather(pair, x, at);
+    pairs.gather(pair, x, at);
     if (!touches(pair.key.triangle, at, pair.numbers)) continue;
     const Part part = nearest_part(pair.key.triangle, at, softness_of(pair.numbers));
-    const Rub<double> rub = block.surface.rubs() ? friction.of(pair.key, pair.particles) : Rub<double>{};
+    const Rub<double> rub = block.surface.rubs() ? friction.of(pair.key, pair.spots, pairs.spots) : Rub<double>{};
     const auto met = meet(pair.key.triangle, part, at, pair.numbers, block.surface.rubs() ? &rub : nullptr, force);
     if (!(met.depth > 0.0)) continue;
     energy += 0.5 * pair.numbers.kappa * met.depth * met.depth;
     rubs_ |= met.rubs;
-    for (int i = 0; i < 12; ++i) {
-      const int to = row * pair.particles[i / 3] + i % 3;
-      push_[to] += force[i];
-      magnitude_[to] += std::abs(force[i]);
-      stiffness_[to] += pair.numbers.kappa;
-    }
+    for (int k = 0; k < 4; ++k)
+      pairs.spots.for_each_node(pair.spots[k], [&](int particle, double weight) {
+        for (int d = 0; d < 3; ++d) {
+          const int to = row * particle + d;
+          push_[to] += weight * force[3 * k + d];
+          magnitude_[to] += std::abs(weight * force[3 * k + d]);
+          stiffness_[to] += weight * weight * pair.numbers.kappa;
+        }
+      });
   }
   return energy;
 }

@@ -120,17 +120,20 @@ void NewtonMatrix::find_pairs(const Scene& scene, const DirectBlock& block, cons
   pairs_.clear();
   for (const BlockPair& pair : pairs.all()) {
     double at[12];
-    gather(pair, x, at);
+    pairs.gather(pair, x, at);
     if (!touches(pair.key.triangle, at, pair.numbers)) continue;
     const Part part = nearest_part(pair.key.triangle, at, softness_of(pair.numbers));
-    const Rub<double> rub = block.surface.rubs() ? potential.friction.of(pair.key, pair.particles) : Rub<double>{};
-    pairs_.push_back({pair.key, pair.particles, {}, {}});
+    const Rub<double> rub =
+        block.surface.rubs() ? potential.friction.of(pair.key, pair.spots, pairs.spots) : Rub<double>{};
+    pairs_.push_back({pair.key, pair.spots, {}, {}});
     convex_root(pair.key.triangle, part, at, pair.numbers, pairs_.back().convex.data());
     const bool rubs = meeting_matrix(pair.key.triangle, part, at, pair.numbers, block.surface.rubs() ? &rub : nullptr,
                                      pairs_.back().matrix.data());
     symmetric_ = symmetric_ && !rubs;
   }
-  if (!pairs_.empty()) find_pattern(scene, block, pairs);
+  if (pairs_.empty()) return;
+  spots_ = pairs.spots;
+  find_pattern(scene, block, pairs);
 }
 
 // With all pairs of the list where a substep's first ones touch, and with those of the list besides where others do later.
@@ -146,9 +149,7 @@ void NewtonMatrix::find_pattern(const Scene& scene, const DirectBlock& block, co
     std::ranges::set_union(in_pattern_, listed, std::back_inserter(all));
   begins_ = false;
   if (paired_ && all == in_pattern_) return;
-  std::vector<std::array<int, 4>> particles;
-  for (const PairKey& key : all) particles.push_back(nodes_of(block.surface, key));
-  paired_ = pattern_with(scene, block, particles);
+  paired_ = pattern_with(scene, block, all);
   in_pattern_ = std::move(all);
 }
 
@@ -192,14 +193,15 @@ void NewtonMatrix::add_pairs(const DirectBlock& block, double convexity) {
     auto E = pair.matrix;
     if (convexity > 0.0)
       for (int i = 0; i < 144; ++i) E[i] += convexity * (pair.convex[i / 12] * pair.convex[i % 12] - E[i]);
-    const auto dof = [&](int d) {
-      const int particle = pair.particles[d / 3];
-      return particle < block.movable ? pattern.dof_of[particle] + d % 3 : -1;
-    };
-    for (int a = 0; a < 12; ++a)
-      for (int b = 0; b < 12; ++b)
-        if (const int row = dof(a), column = dof(b); column >= 0 && column <= row)
-          factor_.values[pattern.structure.position(row, column)] += E[12 * a + b];
+    for_each_block(pair, [&](int p, int q, double weight, int k, int l) {
+      if (p >= block.movable || q >= block.movable) return;
+      const int row_dof = pattern.dof_of[p], column_dof = pattern.dof_of[q];
+      for (int a = 0; a < 3; ++a)
+        for (int b = 0; b < 3; ++b)
+          if (column_dof + b <= row_dof + a)
+            factor_.values[pattern.structure.position(row_dof + a, column_dof + b)] +=
+                weight * E[12 * (3 * k + a) + 3 * l + b];
+    });
   }
 }
 
@@ -230,14 +232,12 @@ bool NewtonMatrix::factorize_unsymmetric(const Scene& scene, const DirectBlock& 
     lu_.add(pattern.structure, pattern.dof_of[p], pattern.dof_of[q], weight, M);
   });
   for (const TouchingPair& pair : pairs_)
-    for (int k = 0; k < 4; ++k)
-      for (int l = 0; l < 4; ++l) {
-        const int p = pair.particles[k], q = pair.particles[l];
-        if (p >= block.movable || q >= block.movable) continue;
-        double M[9];
-        for (int a = 0; a < 9; ++a) M[a] = pair.matrix[12 * (3 * k + a / 3) + 3 * l + a % 3];
-        lu_.add(pattern.structure, pattern.dof_of[p], pattern.dof_of[q], 1.0, M);
-      }
+    for_each_block(pair, [&](int p, int q, double weight, int k, int l) {
+      if (p >= block.movable || q >= block.movable) return;
+      double M[9];
+      for (int a = 0; a < 9; ++a) M[a] = pair.matrix[12 * (3 * k + a / 3) + 3 * l + a % 3];
+      lu_.add(pattern.structure, pattern.dof_of[p], pattern.dof_of[q], weight, M);
+    });
   return lu_.factorize(pattern.structure, unsymmetric_kernel(pack_kernels()));
 }
 
@@ -258,9 +258,11 @@ void NewtonMatrix::multiply(const DirectBlock& block, Numbers<double>& z, Number
       for (int b = 0; b < 3; ++b) Kz[row * p + a] += weight * M[3 * a + b] * z[row * q + b];
   });
   for (const TouchingPair& pair : pairs_)
-    for (int a = 0; a < 12; ++a)
-      for (int b = 0; b < 12; ++b)
-        Kz[row * pair.particles[a / 3] + a % 3] += pair.matrix[12 * a + b] * z[row * pair.particles[b / 3] + b % 3];
+    for_each_block(pair, [&](int p, int q, double weight, int k, int l) {
+      for (int a = 0; a < 3; ++a)
+        for (int b = 0; b < 3; ++b)
+          Kz[row * p + a] += weight * pair.matrix[12 * (3 * k + a) + 3 * l + b] * z[row * q + b];
+    });
 }
 
 bool NewtonMatrix::find_negative_direction(const DirectBlock& block, double* d) {

@@ -4,7 +4,7 @@
 //
 // as the sum of masses and one symmetric matrix per constraint, and its factors. Where K is not positive definite, a part of the way to the matrix in
 // which no constraint's share has negative eigenvalues (Teran et al. 2005; on demand: Longva et al. 2023) is. Contacts add a 3 x 3 matrix M to the
-// particle that touches, or b_i b_k M to the pairs of particles that carry the point, and pairs that touch add one of 12 x 12. Contacts that slide are
+// particle that touches, or b_i b_k M to the pairs of particles that carry the point, and pairs that touch add one of 12 x 12 likewise. Contacts that slide are
 // not symmetric, and K is factored as LU then. Rows that do not give way add what rigid_rows.h says: K is softened there.
 #pragma once
 
@@ -96,6 +96,16 @@ class NewtonMatrix {
   void find_pairs(const Scene& scene, const DirectBlock& block, const IncrementalPotential& potential, const double* x);
   void find_pattern(const Scene& scene, const DirectBlock& block, const BlockPairs& pairs);
   void add_pairs(const DirectBlock& block, double convexity);
+  struct TouchingPair;
+  // f(particle, particle, weight, k, l) over the pairs of particles that the block (k, l) of a touching pair's matrix adds to.
+  template <class F>
+  void for_each_block(const TouchingPair& pair, F&& f) const {
+    for (int k = 0; k < 4; ++k)
+      for (int l = 0; l < 4; ++l)
+        spots_.for_each_node(pair.spots[k], [&](int p, double b) {
+          spots_.for_each_node(pair.spots[l], [&](int q, double c) { f(p, q, b * c, k, l); });
+        });
+  }
   void assemble(const Scene& scene, const DirectBlock& block, double convexity);  // without contacts and pairs
 
   sheetbend_blocks::Potential arrays_{};            // of the last find()
@@ -107,11 +117,12 @@ class NewtonMatrix {
   // Of pairs that touch: their matrices, and the pattern with all pairs that may touch, which grows in a substep and is kept while they recur.
   struct TouchingPair {
     PairKey key;
-    std::array<int, 4> particles;
+    std::array<int, 4> spots;
     std::array<double, 144> matrix;
     std::array<double, 12> convex;  // the root of the convex one
   };
   std::vector<TouchingPair> pairs_;
+  Spots<double> spots_;
   std::vector<PairKey> in_pattern_;
   std::optional<PairedPattern> paired_;
   bool convex_found_ = false, symmetric_ = true, as_lu_ = false, begins_ = true;

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/contact/meeting.h"
+#include "core/contact/spots.h"
 #include "core/solver/contact_source.h"
 #include "core/solver/plan.h"
 
@@ -48,15 +49,16 @@ struct PairFriction {
     }
   }
 
+  Vec3<S> history(int particle) const { return Vec3<S>(&from[3 * static_cast<std::size_t>(particle)]); }
   // Where a pair's force stands; -1 where it carries none.
   int place_of(const PairKey& key) const {
     const auto at = std::ranges::lower_bound(keys, key);
     return at != keys.end() && *at == key ? static_cast<int>(at - keys.begin()) : -1;
   }
-  Rub<S> of(const PairKey& key, const std::array<int, 4>& particles) const {
+  Rub<S> of(const PairKey& key, const std::array<int, 4>& pair, const Spots<S>& spots) const {
     Rub<S> rub{friction, {S(0.0), S(0.0), S(0.0)}, {}};
     if (const int place = place_of(key); place >= 0) rub.carried = carried[place];
-    for (int d = 0; d < 12; ++d) rub.from[d] = from[3 * static_cast<std::size_t>(particles[d / 3]) + d % 3];
+    for (int k = 0; k < 4; ++k) spots.at(pair[k], [&](int p) { return history(p); }).store(rub.from + 3 * k);
     return rub;
   }
 };

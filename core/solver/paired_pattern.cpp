@@ -5,6 +5,25 @@
 #include "core/solver/ordering.h"
 
 namespace sheetbend {
+namespace {
+
+// The movable particles of a pair, each once.
+std::vector<int> particles_of(const DirectBlock& block, const PairKey& pair) {
+  const SelfContact& s = block.surface;
+  std::vector<int> particles;
+  const auto add = [&](int p) {
+    if (p < block.movable && std::ranges::find(particles, p) == particles.end()) particles.push_back(p);
+  };
+  for (const int spot : spots_of(s, pair)) {
+    if (spot < s.nodes)
+      add(spot);
+    else
+      std::ranges::for_each(s.on_bodies[spot - s.nodes], add);
+  }
+  return particles;
+}
+
+}  // namespace
 
 std::vector<int> entries_of(const Scene& scene, const DirectBlock& block, const MemberRun& run,
                             const CondensedPattern& pattern) {
@@ -24,13 +43,9 @@ std::vector<int> entries_of(const Scene& scene, const DirectBlock& block, const 
   return entries;
 }
 
-PairedPattern pattern_with(const Scene& scene, const DirectBlock& block, const std::vector<std::array<int, 4>>& pairs) {
+PairedPattern pattern_with(const Scene& scene, const DirectBlock& block, const std::vector<PairKey>& pairs) {
   std::vector<std::vector<int>> joined = std::get<CondensedPattern>(*block.condensation).joined;
-  for (const auto& pair : pairs) {
-    joined.emplace_back();
-    for (const int p : pair)
-      if (p < block.movable) joined.back().push_back(p);
-  }
+  for (const PairKey& pair : pairs) joined.push_back(particles_of(block, pair));
   PairedPattern all;
   CondensedPattern& c = all.pattern;
   for (const int place : places_for_low_fill(block.movable, joined)) c.dof_of.push_back(3 * place);

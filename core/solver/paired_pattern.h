@@ -14,7 +14,7 @@ struct PairedPattern {
   std::vector<std::vector<int>> entries;  // per run
 };
 
-// With these particles, each four of the block, joined beside those that the plan knows.
-PairedPattern pattern_with(const Scene& scene, const DirectBlock& block, const std::vector<std::array<int, 4>>& pairs);
+// With the particles of each of these pairs joined beside those that the plan knows.
+PairedPattern pattern_with(const Scene& scene, const DirectBlock& block, const std::vector<PairKey>& pairs);
 
 }  // namespace sheetbend

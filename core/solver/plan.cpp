@@ -5,6 +5,7 @@
 #include <map>
 #include <numeric>
 #include <set>
+#include <span>
 #include <stdexcept>
 #include <string>
 
@@ -169,26 +170,37 @@ std::vector<BlockContact> contacts_of(const Scene& scene, const std::map<int, in
   return contacts;
 }
 
-bool touches_itself(const Scene& scene, int node) {
-  return !scene.self_contact.empty() && scene.self_contact.radius[node] >= 0;
+// Per node: whether it may touch itself, or carries a point of a body that may.
+std::vector<char> touching_itself(const Scene& scene) {
+  const SelfContact& s = scene.self_contact;
+  std::vector<char> touching(scene.nodes(), false);
+  for (int n = 0; !s.empty() && n < scene.nodes(); ++n) touching[n] = s.radius[n] >= 0;
+  for (const auto& nodes : s.on_bodies)
+    for (const int n : nodes) touching[n] = true;
+  return touching;
 }
 
 // What may touch itself, in a block that has all of it. Fixed nodes are particles of the block that no row knows.
 SelfContact surface_of(const Scene& scene, const std::map<int, int>& particle_of, DirectBlock& block) {
   const SelfContact& whole = scene.self_contact;
-  const auto own = std::ranges::find_if(particle_of, [&](const auto& at) { return touches_itself(scene, at.first); });
-  if (own == particle_of.end()) return {};
-  std::vector<int> place(scene.nodes(), -1);
+  if (whole.empty()) return {};
+  const std::vector<char> touching = touching_itself(scene);
+  if (std::ranges::none_of(particle_of, [&](const auto& at) { return touching[at.first]; })) return {};
+  std::vector<int> place(whole.spots(), -1);
   SelfContact s = whole;
   for (int n = 0; n < scene.nodes(); ++n)
-    if (whole.radius[n] >= 0) place[n] = scene.role[n] == Role::free ? particle_of.at(n) : add_particle(block, n, {});
+    if (touching[n]) place[n] = scene.role[n] == Role::free ? particle_of.at(n) : add_particle(block, n, {});
+  s.nodes = static_cast<int>(block.particles.size());
+  for (int n = scene.nodes(); n < whole.spots(); ++n) place[n] = s.nodes + n - whole.nodes;
   for (auto& edge : s.edges)
     for (int& n : edge) n = place[n];
   for (auto& corners : s.triangles)
     for (int& n : corners) n = place[n];
   for (int& n : s.points) n = place[n];
-  s.radius.assign(block.particles.size(), -1);
-  for (int n = 0; n < scene.nodes(); ++n)
+  for (auto& nodes : s.on_bodies)
+    for (int& n : nodes) n = place[n];
+  s.radius.assign(s.spots(), -1);
+  for (int n = 0; n < whole.spots(); ++n)
     if (place[n] >= 0) s.radius[place[n]] = whole.radius[n];
   return s;
 }
@@ -196,11 +208,12 @@ SelfContact surface_of(const Scene& scene, const std::map<int, int>& particle_of
 // Makes one set of all members that hold what may touch itself.
 void join_what_touches(const Scene& scene, std::vector<std::vector<Member>>& chains) {
   if (scene.self_contact.empty()) return;
+  const std::vector<char> touching = touching_itself(scene);
   std::vector<Member>* first = nullptr;
   for (auto& chain : chains) {
     const bool touches = std::ranges::any_of(chain, [&](const Member& m) {
       return std::ranges::any_of(scene.groups[m.group].nodes(m.item),
-                                 [&](int n) { return scene.role[n] == Role::free && touches_itself(scene, n); });
+                                 [&](int n) { return scene.role[n] == Role::free && touching[n]; });
     });
     if (!touches) continue;
     if (first)
@@ -211,18 +224,19 @@ void join_what_touches(const Scene& scene, std::vector<std::vector<Member>>& cha
   std::erase_if(chains, [](const auto& chain) { return chain.empty(); });
 }
 
-// The nodes of points of contacts that no constraint of these holds, and that belong to their block: a free body's center, which its axes' constraint leaves out.
+// The nodes of points of contacts, and of what touches itself, that no constraint of these holds, and that belong to their block: a free body's center, which its axes' constraint leaves out.
 std::vector<int> loose_beside(const Scene& scene, const std::vector<Member>& members) {
   std::set<int> held, loose;
   for (const Member& m : members)
     for (const int n : scene.groups[m.group].nodes(m.item)) held.insert(n);
+  const auto look_at = [&](std::span<const int> nodes) {
+    if (scene.role[nodes[0]] == Role::free && std::ranges::any_of(nodes, [&](int n) { return held.contains(n); }))
+      for (const int n : nodes)
+        if (!held.contains(n)) loose.insert(n);
+  };
   for (const Contact& contact : scene.contacts)
-    for (int i = 0; contact.arity > 1 && i < contact.points(); ++i) {
-      const auto nodes = contact.nodes_of(i);
-      if (moves(scene, contact, i) && std::ranges::any_of(nodes, [&](int n) { return held.contains(n); }))
-        for (const int n : nodes)
-          if (!held.contains(n)) loose.insert(n);
-    }
+    for (int i = 0; contact.arity > 1 && i < contact.points(); ++i) look_at(contact.nodes_of(i));
+  for (const auto& nodes : scene.self_contact.on_bodies) look_at(nodes);
   return {loose.begin(), loose.end()};
 }
 
@@ -249,6 +263,9 @@ CondensedPattern factored(const Scene& scene, const DirectBlock& block, const st
   }
   for (const BlockContact& contact : block.contacts)
     if (contact.nodes > 1) joined.emplace_back(contact.particles.begin(), contact.particles.begin() + contact.nodes);
+  const std::set<std::array<int, 4>> bodies(block.surface.on_bodies.begin(), block.surface.on_bodies.end());
+  for (const auto& body : bodies)
+    if (body[0] < block.movable) joined.emplace_back(body.begin(), body.end());
   for (const int place : places_for_low_fill(block.movable, joined)) c.dof_of.push_back(3 * place);
   c.dof_of.shrink_to_fit();
   if (!block.surface.empty()) c.joined = joined;
@@ -261,11 +278,14 @@ CondensedPattern factored(const Scene& scene, const DirectBlock& block, const st
         if (dofs[k] + b <= dofs[i] + a) entries.emplace_back(dofs[i] + a, dofs[k] + b);
   });
   std::vector<std::pair<int, int>> touching;  // dofs of the particles that carry a point together
-  for (const BlockContact& contact : block.contacts)
-    for (int i = 0; i < contact.nodes; ++i)
-      for (int k = 0; k < contact.nodes; ++k)
-        if (const int row = c.dof_of[contact.particles[i]], column = c.dof_of[contact.particles[k]]; column <= row)
-          touching.emplace_back(row, column);
+  const auto join = [&](std::span<const int> particles) {
+    for (const int p : particles)
+      for (const int q : particles)
+        if (const int row = c.dof_of[p], column = c.dof_of[q]; column <= row) touching.emplace_back(row, column);
+  };
+  for (const BlockContact& contact : block.contacts) join({contact.particles.data(), std::size_t(contact.nodes)});
+  for (const auto& body : bodies)
+    if (body[0] < block.movable) join(body);
   for (const auto& [row, column] : touching)
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b)

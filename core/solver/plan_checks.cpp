@@ -46,7 +46,8 @@ void expect_no_volume(const Scene& scene) {
 void expect_no_contact(const Scene& scene) {
   if (!scene.self_contact.empty())
     throw std::invalid_argument(
-        "solver.method: ropes or cloths may touch themselves, which needs substeps whose forces balance. Fix: use "
+        "solver.method: ropes, cloths or bodies may touch each other, which needs substeps whose forces balance. Fix: "
+        "use "
         "implicit");
   if (!scene.contacts.empty())
     throw std::invalid_argument("solver.method: particles of " + scene.contacts.front().name +

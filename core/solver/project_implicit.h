@@ -50,12 +50,14 @@ void find_rigid(const SubstepState<T>& s, const DirectBlock& block, IncrementalP
   potential.rigid.find(s.scene, potential.given(block), at.data());
 }
 
-// The radii and the stiffness of a scene's pairs.
+// The radii and the stiffness of a scene's pairs, and where its points of bodies are.
 template <class T>
 void load_pairs(const SubstepState<T>& s, const DirectBlock& block, double h, int scene, BlockPairs& pairs) {
   if (block.surface.empty()) return;
   pairs.stiffness = rigidity * (s.eta / h) * (s.eta / h);
-  for (std::size_t p = 0; p < block.particles.size(); ++p)
+  pairs.spots = Spots<double>(
+      block.surface, [&](std::size_t i) { return number_of(s.inputs.of(Quantity::contact_weight)[i], scene); });
+  for (int p = 0; p < block.surface.spots(); ++p)
     if (const int place = block.surface.radius[p]; place >= 0)
       pairs.radius[p] = number_of(s.inputs.of(Quantity::contact_radius)[place], scene);
 }
@@ -185,8 +187,9 @@ void subtract_pair_forces(const SubstepState<T>& s, const DirectBlock& block, co
         T force[12];
         meet(pair.key.triangle, part, at, numbers, rub, force);
         for (int k = 0; k < 4; ++k)
-          if (const int p = pair.particles[k]; p < block.movable)
-            (-Vec3<T>(force + 3 * k)).add_to(&R[3 * static_cast<std::size_t>(p)]);
+          source.spots.for_each_node(pair.spots[k], [&](int p, const T& weight) {
+            if (p < block.movable) (-(weight * Vec3<T>(force + 3 * k))).add_to(&R[3 * static_cast<std::size_t>(p)]);
+          });
       });
 }
 

@@ -22,7 +22,7 @@ struct CarryPairFriction {
     const ContactSource<T> source = contact_source(step, masses, lane);
     const SubstepState<T> state = ProjectBlocks::state_of<T>(step, masses, nullptr);
     BlockPairs pairs;
-    pairs.radius.assign(block.particles.size(), 0.0);
+    pairs.radius.assign(block.surface.spots(), 0.0);
     load_pairs(state, block, step.plan.options.h, lane, pairs);
     Numbers<double> rows;
     rows.assign(row * block.particles.size());
@@ -78,7 +78,7 @@ struct CarryPairFriction {
   [[noreturn]] static void refuse(const DirectBlock& block, const BlockPair& pair, std::size_t places) {
     throw Unbalanced("more than " + std::to_string(places) + " pairs touch with friction",
                      "give self_contact(pairs=...) as many as may touch at a time", 0, 0.0,
-                     block.particles[pair.particles[0]]);
+                     block.particles[block.surface.whole(pair.spots[0])]);
   }
 };
 

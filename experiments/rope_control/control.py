@@ -1,5 +1,5 @@
-"""Ropes controlled by gradient: a whip whose tip shall be at a point, a rod that two grippers bring into a shape, and
-ropes that a hand drags around a post and through a gap.
+"""Ropes controlled by gradient: a whip whose tip shall be at a point, a rod that two grippers bring into a shape,
+ropes that a hand drags around a post and through a gap, and two under a bar, which two hands lift.
 
     python experiments/rope_control/control.py [FOLDER] [--seconds 8] [--posts 150]
 
@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import sheetbend as sb
 from drawn import draw
+from lift import lift
 from posts import gap, wrap
 from search import Search, descend, descend_again, evolve, gradient_gap
 from shape import shape
@@ -28,8 +29,9 @@ def solve(task: Task, seconds: float) -> list[Search]:
     """By both ways, with a report."""
     first = task.outcome(np.zeros(task.size))
     print(f"{task.name}: {task.size} unknowns; without a motion {1e3 * first.error:.0f} mm from the target")
-    searches = [descend_again(task, seconds) if task.posts else descend(task, seconds)]
-    step = 1e-5 if task.posts else 1e-3  # contacts that stick and slip put kinks into the cost
+    touches = bool(task.control.scene.contacts.contacts)  # what sticks and slips puts kinks into the cost
+    searches = [descend_again(task, seconds) if touches else descend(task, seconds)]
+    step = 1e-5 if touches else 1e-3
     differ = gradient_gap(task, 0.5 * searches[0].best, step=step)
     print(f"  gradient against central differences, at half the motion found: {differ:.1e} of the largest entry")
     searches += [found for found in [evolve(task, searches[0].seconds[-1])] if found]
@@ -63,6 +65,7 @@ def main(folder: Path, seconds: float, seconds_beside_posts: float) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     draw(found, folder / "control.png")
     draw([(task, solve(task, seconds_beside_posts)) for task in (wrap(), gap())], folder / "posts.png")
+    solve(lift(), seconds_beside_posts)
 
 
 if __name__ == "__main__":

@@ -72,6 +72,8 @@ std::shared_ptr<Scene> make_scene(const py::kwargs& given) {
       spec.self_contact.pieces.push_back(
           {p["edges"].cast<std::vector<std::array<int, 2>>>(), p["triangles"].cast<Triangles>()});
   if (given.contains("self_carried")) spec.self_contact.carried = whole_numbers(given["self_carried"]);
+  if (given.contains("self_on_bodies"))
+    spec.self_contact.on_bodies = given["self_on_bodies"].cast<std::vector<std::array<int, 4>>>();
   if (given.contains("loads")) {
     for (const auto& [group, item, row] : given["loads"].cast<std::vector<std::array<int, 3>>>())
       spec.loads.push_back({group, item, row});
@@ -133,7 +135,7 @@ py::dict arguments_of_scene(const Scene& s) {
                   "force_times"_a = s.force.times, "has_drag"_a = s.has_drag, "air"_a = s.air,
                   "wind_times"_a = s.wind.times, "groups"_a = groups, "volumes"_a = volumes, "colliders"_a = colliders,
                   "contacts"_a = contacts, "loads"_a = loads, "load_times"_a = s.load.times, "self_contact"_a = pieces,
-                  "self_carried"_a = s.self_contact.carried);
+                  "self_carried"_a = s.self_contact.carried, "self_on_bodies"_a = s.self_contact.on_bodies);
 }
 
 }  // namespace

@@ -206,6 +206,7 @@ TEST(Pairs, AreFoundOnTheirWays) {
   constexpr int count = 60;
   constexpr double touching = 0.1, reach = 0.01;
   SelfContact s;
+  s.nodes = 2 * count;
   std::vector<double> x, way, radius(2 * count, 0.5 * touching), reaches(2 * count, reach);
   for (int i = 0; i < count; ++i) {
     s.edges.push_back({2 * i, 2 * i + 1});
@@ -226,7 +227,7 @@ TEST(Pairs, AreFoundOnTheirWays) {
       double least = 1e300;
       for (int step = 0; step <= 400; ++step) {
         Coordinates there;
-        const auto nodes = nodes_of(s, {false, i, k});
+        const auto nodes = spots_of(s, {false, i, k});
         for (int d = 0; d < 12; ++d)
           there[d] = x[3 * nodes[d / 3] + d % 3] + step / 400.0 * way[3 * nodes[d / 3] + d % 3];
         least = std::min(least, distance_of(false, there.data(), {touching, 1.0}));

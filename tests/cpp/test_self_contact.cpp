@@ -200,7 +200,7 @@ std::vector<Carried> carried(const Sample& s, const double* x, double h) {
   for (const auto& [code, force] : own.carried) {
     if (!is_coded(x[3 * code])) break;
     const PairKey key = decoded(x[3 * code], x[3 * code + 1], x[3 * code + 2]);
-    const auto nodes = nodes_of(own, key);
+    const auto nodes = spots_of(own, key);
     double at[12], w[4];
     for (int d = 0; d < 12; ++d) at[d] = x[3 * nodes[d / 3] + d % 3];
     for (int k = 0; k < 4; ++k) w[k] = 1.0 / in.of(Quantity::mass)[nodes[k]];

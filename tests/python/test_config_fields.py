@@ -66,7 +66,9 @@ WHOLE: dict[str, Any] = {
         "wind": {"velocity": [1, 0, 0]},
         "tool": [{"name": "t"}],
         "drive": [{"particles": ["a"], "markers": ["m0"]}],
-        "body": [{"name": "plug", "mass": 0.1, "box": [0.1, 0.1, 0.1]}],
+        "body": [
+            {"name": "plug", "mass": 0.1, "box": [0.1, 0.1, 0.1], "capsules": [[[-0.1, 0.0, 0.0], [0.1, 0.0, 0.0]]]}
+        ],
         "joint": [
             {
                 "kind": "hinge",

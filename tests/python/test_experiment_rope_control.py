@@ -14,7 +14,7 @@ import pytest
 import sheetbend as sb
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "rope_control"
-MODULES = ("motion", "task", "whip", "shape", "posts", "search", "drawn", "control")
+MODULES = ("motion", "task", "whip", "shape", "posts", "lift", "search", "drawn", "control")
 LONG = 60.0  # s; searches end by their number of rollouts
 
 
@@ -67,7 +67,18 @@ def test_gradient_beside_posts(scripts, name):
     assert scripts.search.gradient_gap(task, somewhere(task, 0.05), np.eye(task.size)[::5], step=1e-5) < 1e-6
 
 
+def test_gradient_of_the_lift(scripts):
+    task = scripts.lift.lift()
+    assert scripts.search.gradient_gap(task, somewhere(task, 0.05), np.eye(task.size)[::8], step=1e-6) < 1e-5
+
+
 # --- targets
+
+
+def test_the_bar_is_lifted_to_its_target(scripts):
+    search = scripts.search.descend_again(scripts.lift.lift(), LONG)
+    assert search.outcomes[0].error > 0.1
+    assert search.outcomes[-1].reached
 
 
 @pytest.mark.parametrize("fast", [0.0, 15.0])

@@ -251,7 +251,7 @@ def test_a_file_builds_what_python_builds(tmp_path: Path):
     quantities = scene_alone(parse(path))[0].quantities
     assert (quantities["self_contact_radius_1"].value, quantities["self_friction"].value) == (0.004, 0.3)
     for old, new, words in (
-        ("radius = 0.005", 'of = "cord"\nradius = 0.005', "no rope or cloth"),
+        ("radius = 0.005", 'of = "cord"\nradius = 0.005', "no rope, cloth or body"),
         ("radius = 0.005", "radius = [0.005, 0.004]", "name each piece"),
         ("radius = 0.005", "radius = 0.005\nfriction = -0.3", "friction"),
         ('method = "implicit"', 'method = "direct"', "implicit"),

@@ -6,7 +6,7 @@ from typing import Literal, Self
 
 from pydantic import model_validator
 
-from .section import Finite, Name, Quaternion, Section, Vector, key
+from .section import Finite, Line, Name, Quaternion, Section, Vector, key
 
 GROUND = "ground"
 LIMITS = ("limits", "limit_stiffness", "limit_damping", "limit_depth")
@@ -32,6 +32,12 @@ class BodySection(Section):
     )
     box: Vector | None = key(None, "sides of a homogeneous box, instead of the inertia; `center` is its middle", "m")
     center: Vector = key([0.0, 0.0, 0.0], "the center of mass in the body's frame", "m")
+    capsules: list[Line] = key(
+        [],
+        "capsules with which it touches what [scene.self_contact] names beside it: both ends of the middle line of "
+        "each, in its frame",
+        "m",
+    )
     at: Vector = key([0.0, 0.0, 0.0], "where the origin of its frame starts", "m")
     quaternion: Quaternion = key([0.0, 0.0, 0.0, 1.0], "(x, y, z, w), how its frame starts: from its axes to the world")
     velocity: Vector = key([0.0, 0.0, 0.0], "of the frame's origin at the start", "m/s")

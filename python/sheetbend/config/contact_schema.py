@@ -130,13 +130,17 @@ class ContactSection(Section):
 
 
 class SelfContactSection(Section):
-    """[scene.self_contact]: ropes and cloths that touch themselves and each other, `Scene.self_contact`
+    """[scene.self_contact]: ropes, cloths and bodies that touch themselves and each other, `Scene.self_contact`
     (docs/contact.md). It needs method = "implicit" in [solver]. The radius is the quantity self_contact_radius (m), or
     self_contact_radius_0 and so on where there are several, and the friction is self_friction."""
 
-    of: Name | list[Name] | None = key(None, "a rope or a cloth, or several; all of the scene when left out")
+    of: Name | list[Name] | None = key(
+        None, "a rope, a cloth or a body with `capsules`, or several; all of the scene when left out"
+    )
     radius: Finite | list[Finite] = key(
-        ..., "of ropes, or half the thickness of cloths: one for all, or one for each that is named in `of`", "m"
+        ...,
+        "of ropes and capsules, or half the thickness of cloths: one for all, or one for each that is named in `of`",
+        "m",
     )
     friction: Finite = key(0.0, "Coulomb's coefficient between any two; 0 is smooth", ge=0)
     pairs: int | None = key(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -81,11 +82,20 @@ def _add_self_contact(scene: Scene, section: SceneSection) -> None:
     if given is None:
         return
     every = {*(strand.name for _, strand in section.strands), *(cloth.name for cloth in section.cloth)}
-    unknown = [name for name in given.pieces if name not in every]
+    capsules = {body.name: f"scene.body[{i}]" for i, body in enumerate(section.body) if body.capsules}
+    if both := sorted(every & set(capsules)):
+        raise ConfigError(
+            "scene.self_contact.of", "names a body as well as a rope or cloth", both, "rename one of them"
+        )
+    unknown = [name for name in given.pieces if name not in every | set(capsules)]
     if unknown:
-        fix = f"use some of: {', '.join(sorted(every)) or 'none yet'}"
-        raise ConfigError("scene.self_contact.of", "names no rope or cloth", unknown, fix)
-    built = scene.ropes | scene.cloths
+        fix = f"use some of: {', '.join(sorted(every | set(capsules))) or 'none yet'}; give a body its capsules"
+        raise ConfigError("scene.self_contact.of", "names no rope, cloth or body with capsules", unknown, fix)
+    built: dict[str, Any] = scene.ropes | scene.cloths
+    for body in section.body:
+        if body.capsules:
+            with located(capsules[body.name], body.name):
+                built[body.name] = scene.bodies[body.name].capsules(body.capsules)
     names = [name for name in given.pieces or built if name in built]
     radii = dict(zip(given.pieces, given.radius, strict=True)) if isinstance(given.radius, list) else {}
     if names:

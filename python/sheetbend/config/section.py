@@ -11,6 +11,7 @@ from ..files.names import flaw
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Vector = Annotated[list[Finite], Field(min_length=3, max_length=3)]
+Line = Annotated[list[Vector], Field(min_length=2, max_length=2)]
 Counts = Annotated[list[Annotated[int, Field(ge=1, le=1000)]], Field(min_length=2, max_length=2)]
 Pair = Annotated[list[Finite], Field(min_length=2, max_length=2)]
 MOST_LINKS, MOST_CELLS = 100_000, 2_000

@@ -126,6 +126,31 @@ class Body:
             raise SceneError(f"{where}.along", "has no length", way.tolist(), "give a direction")
         return BodyPoint(self, place, way / np.linalg.norm(way))
 
+    def capsules(self, ends: ArrayLike) -> BodyCapsules:
+        """Capsules that are part of the body, for `Scene.self_contact`, which gives them their radius.
+
+        Args:
+            ends: (n, 2, 3) m, both ends of the middle line of each in the body's frame, or (2, 3) of one. Capsules
+                that meet may share ends, as the twelve edges of a box do.
+
+        Raises:
+            SceneError: shapes, NaN, or a middle line of no length.
+        """
+        where = f"{self.name}.capsules"
+        lines = finite(where, ends, None, SceneError)
+        lines = lines[None] if lines.ndim == 2 else lines
+        if lines.ndim != 3 or lines.shape[1:] != (2, 3) or not len(lines):
+            raise SceneError(where, "have the wrong shape", np.shape(ends), "give (n, 2, 3) m in the body's frame")
+        places, edges = np.unique(lines.reshape(-1, 3), axis=0, return_inverse=True)
+        edges = np.reshape(edges, (-1, 2))
+        if short := np.flatnonzero(edges[:, 0] == edges[:, 1]).tolist():
+            raise SceneError(where, "begin and end at one place", short, "give two ends, of a ball two near its middle")
+        return BodyCapsules(self, places, edges)
+
+    def weights(self, places: Array) -> Array:
+        """(n, 4) expressions: of the nodes in the sums that the places (n, 3) of the body's frame are."""
+        return np.stack([np.append(expressions(1.0), self.coordinates(place)) for place in places])
+
     def start_terms(self) -> list[Term]:
         """Terms of the nodes' first positions and velocities: what the start makes of the quantities, less what stands
         in the scene's arrays already."""
@@ -253,3 +278,17 @@ class BodyPoint:
             origin + frame @ numbers(self.place, self.body.values()),
             None if self.along is None else frame @ self.along,
         )
+
+
+@dataclass(frozen=True, eq=False)
+class BodyCapsules:
+    """Capsules that are part of a body; `Body.capsules` makes them.
+
+    Attributes:
+        places: (m, 3) m, their ends in the body's frame, each once.
+        edges: (n, 2) places that each goes between.
+    """
+
+    body: Body
+    places: Array = field(repr=False)
+    edges: Array = field(repr=False)

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from ..arrays.checks import finite
 from ..errors import SceneError
 from ..mesh.triangle_mesh import TriangleMesh
-from ..quantities.expression import expressions
 from .body import Body
 
 Array = np.ndarray
@@ -47,7 +46,7 @@ class BodyPoints:
 
     def weights(self) -> Array:
         """(n, 4) expressions: of the body's nodes in the sum that a point is."""
-        return np.stack([np.append(expressions(1.0), self.body.coordinates(place)) for place in self.places])
+        return self.body.weights(self.places)
 
 
 def points_of(what: object, points: ArrayLike | TriangleMesh | None, name: str | None) -> BodyPoints | None:

@@ -47,7 +47,7 @@ def specification(scene: SceneData) -> dict[str, Any]:
             {"name": name, "triangles": triangles.tolist()} for name, triangles in scene.volumes.triangles.items()
         ],
         **scene.contacts.specification(places),
-        **pieces.specification(scene.contacts.pieces, scene.contacts.pair_friction, places),
+        **pieces.specification(scene.contacts.pieces, scene.contacts.pair_friction, places, scene.node_count),
         "bodies": places_or_none(scene, scene.with_axes).tolist(),
     }
 

@@ -121,6 +121,11 @@ class Contacts:
         self.pieces: list[Piece] = []  # what may touch itself
         self.pair_friction: PairFriction | None = None  # of these
 
+    @property
+    def weights(self) -> int:
+        """How many weights the points of bodies in contacts with colliders have; those of pieces follow them."""
+        return sum(c.nodes.size for c in self.contacts if c.of_body)
+
     def counted(self) -> dict[str, int]:
         """By name, of each contact how many particles may touch, and of pairs with friction how many of them."""
         sizes = {c.name: len(c.particles) for c in self.contacts}
@@ -206,9 +211,8 @@ class Contacts:
             losing = sum(c.dissipates for c in self.contacts)
             self._name(scene, f"{name}_contact_dissipation", "contact_dissipation", losing, numbers.dissipation, "s/m")
         if points is not None:
-            first = sum(c.nodes.size for c in self.contacts if c.of_body)
             weights = points.weights()
-            index = first + np.arange(weights.size).reshape(weights.shape)
+            index = self.weights + np.arange(weights.size).reshape(weights.shape)
             scene.add_terms(terms_of("contact_weight", index, weights))
         flags = numbers.stiffness is None, numbers.restitution is not None, numbers.dissipation is not None
         self.contacts.append(Contact(name, place, which, carried, *flags))
@@ -255,7 +259,7 @@ class Contacts:
             "collider_pose": np.concatenate([np.zeros(0), *poses]),
             "collider_size": np.zeros(sum(len(c.sizes) for c in self.colliders.values())),
             "restitution": np.zeros(sum(c.bounces for c in self.contacts)),
-            "contact_weight": np.zeros(sum(c.nodes.size for c in self.contacts if c.of_body)),
+            "contact_weight": np.zeros(self.weights + 4 * sum(p.points for p in self.pieces)),
             "contact_dissipation": np.zeros(sum(c.dissipates for c in self.contacts)),
         }
 

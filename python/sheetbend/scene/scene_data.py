@@ -116,7 +116,7 @@ class SceneData:
         """Those that were added, of the boundary, and of the start of bodies."""
         starts = (t for body in self.bodies.values() for t in body.start_terms())
         contacts = self.contacts
-        between = piece_terms(contacts.pieces, contacts.pair_friction, len(contacts.contacts))
+        between = piece_terms(contacts.pieces, contacts.pair_friction, len(contacts.contacts), contacts.weights)
         return [*self.terms, *self.boundary.terms(), *self.forces.terms(), *starts, *between]
 
     @property
@@ -174,7 +174,8 @@ class SceneData:
     def node_in_words(self, place: int) -> str:
         """What stands at a place of an array over all nodes, counted from 0."""
         if place < self.particle_count:
-            return f"particle {place}"
+            names = {int(b.particles[0]): b.name for b in self.bodies.values()}
+            return f"the body '{names[place]}'" if place in names else f"particle {place}"
         node = place - self.node_count
         axes = {int(p): (k, b.name) for b in self.bodies.values() for k, p in enumerate(b.particles)}
         if node in axes:

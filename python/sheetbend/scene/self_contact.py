@@ -1,4 +1,4 @@
-"""Ropes and cloths that touch themselves and each other."""
+"""Ropes, cloths and bodies that touch themselves and each other."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ import numpy as np
 
 from ..arrays.checks import is_number
 from ..errors import SceneError
+from .body import BodyCapsules
 from .held import HeldScene
 from .pieces import PairFriction, Piece
 
 
 class SelfTouchingScene(HeldScene):
-    """A scene under construction whose ropes and cloths may touch themselves."""
+    """A scene under construction whose ropes, cloths and bodies may touch themselves and each other."""
 
     def self_contact(
         self,
@@ -24,15 +25,17 @@ class SelfTouchingScene(HeldScene):
         pairs: int | None = None,
         name: str = "self",
     ) -> None:
-        """Let ropes and cloths touch themselves and each other; see docs/contact.md.
+        """Let ropes, cloths and bodies touch themselves and each other; see docs/contact.md.
 
-        Links of ropes and edges and triangles of cloths push each other apart and never pass through. Needs method
-        "implicit". Once per scene, with all pieces.
+        Links of ropes, edges and triangles of cloths and capsules of bodies push each other apart and never pass
+        through. Needs method "implicit". Once per scene, with all pieces.
 
         Args:
-            pieces: ropes and cloths, such as `scene.ropes["rope"]`; all of the scene by default.
-            radius: m, of a rope, or half the thickness of a cloth; one for all (`<name>_contact_radius`), or one for
-                each piece (`<name>_contact_radius_0` and so on). Of a rope at most half a link.
+            pieces: ropes and cloths, such as `scene.ropes["rope"]`, and capsules of bodies, such as
+                `bar.capsules([[(-0.1, 0, 0), (0.1, 0, 0)]])`; all ropes and cloths of the scene by default.
+            radius: m, of a rope, of capsules, or half the thickness of a cloth; one for all
+                (`<name>_contact_radius`), or one for each piece (`<name>_contact_radius_0` and so on). Of a rope at
+                most half a link.
             friction: Coulomb's coefficient between any two (`<name>_friction`). Without friction, 0, there is no such
                 quantity, and substeps are cheaper.
             pairs: with friction, how many pairs of edges and of particles and triangles may touch at a time; twice as
@@ -41,13 +44,13 @@ class SelfTouchingScene(HeldScene):
             name: of its quantities.
 
         Raises:
-            SceneError: what is no rope or cloth, radii, friction or pairs out of range; when it is compiled: a start
-                too near to itself.
+            SceneError: what is no rope, cloth or capsules, radii, friction or pairs out of range; when it is compiled:
+                a start too near to itself.
         """
         self._building()
         own = list(pieces) or [*self.ropes.values(), *self.cloths.values()]
         if self.contacts.pieces:
-            raise SceneError("self_contact", "was given before", name, "give all ropes and cloths in one call")
+            raise SceneError("self_contact", "was given before", name, "give all pieces in one call")
         if not own:
             raise SceneError("self_contact.pieces", "are none", [], "add a rope or a cloth first")
         if not (is_number(friction) and friction >= 0):
@@ -74,13 +77,15 @@ class SelfTouchingScene(HeldScene):
             self.contacts.pair_friction = PairFriction(name, quantity, carried)
 
     def _piece(self, piece: Any, radius: float, quantity: str) -> Piece:
+        if isinstance(piece, BodyCapsules) and any(piece.body is body for body in self.bodies.values()):
+            return Piece(piece.body.name, piece.edges, np.zeros((0, 3), dtype=int), quantity, piece)
         if any(piece is cloth for cloth in self.cloths.values()):
             triangles = np.asarray(piece.particles)[piece.mesh.triangles]
             edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
             return Piece(piece.name, np.unique(edges, axis=0), triangles, quantity)
         if not any(piece is rope for rope in self.ropes.values()):
-            fix = "give scene.ropes[...] and scene.cloths[...]"
-            raise SceneError("self_contact.pieces", "hold no rope or cloth of the scene", piece, fix)
+            fix = "give scene.ropes[...], scene.cloths[...] and scene.bodies[...].capsules(...)"
+            raise SceneError("self_contact.pieces", "hold no rope, cloth or capsules of the scene", piece, fix)
         nodes = np.asarray(piece.particles)
         edges = np.stack([nodes[:-1], nodes[1:]], axis=1)
         x = self.nodes

@@ -52,6 +52,36 @@ struct TouchingBuilder : ContactBuilder {
       }
     add(piece, r);
   }
+  // Capsules of a body, between points of its frame that count from its center.
+  void capsules(int center, const std::vector<std::array<Vec3<double>, 2>>& ends, double r) {
+    SelfContactSpec::Piece piece;
+    for (const auto& own : ends) {
+      const int first = static_cast<int>(spec.self_contact.on_bodies.size());
+      for (const Vec3<double>& p : own) {
+        spec.self_contact.on_bodies.push_back({center, center + 1, center + 2, center + 3});
+        weights.insert(weights.end(), {1.0, p.x, p.y, p.z});
+      }
+      piece.edges.push_back({-1 - first, -2 - first});  // numbered in build()
+    }
+    add(piece, r);
+  }
+  // A body that is pinned.
+  int held_body(const Vec3<double>& at, const Vec3<double>& turn) {
+    double R[9];
+    turn_by(turn, R);
+    const int center = particle(at, 1.0);
+    for (int k = 0; k < 3; ++k) particle({R[k], R[3 + k], R[6 + k]}, 1.0);
+    spec.bodies.push_back({center, {center + 1, center + 2, center + 3}});
+    for (int n = center; n < center + 4; ++n) spec.pinned.push_back(n);
+    return center;
+  }
+  testing::Sample build(double gravity) {
+    for (auto& piece : spec.self_contact.pieces)
+      for (auto& edge : piece.edges)
+        for (int& spot : edge)
+          if (spot < 0) spot = static_cast<int>(mass.size()) - 1 - spot;
+    return ContactBuilder::build(gravity);
+  }
   // Last: nodes for as many pairs to carry friction, which is in the place of a contact's.
   void rub(double mu, int pairs) {
     for (int i = 0; i < 2 * pairs; ++i) {
