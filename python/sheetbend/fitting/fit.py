@@ -23,6 +23,7 @@ from ..doubts.missing_force import missing_force
 from ..doubts.missing_loss import missing_loss
 from ..doubts.prediction import Comparison, compare, predicted_values
 from ..doubts.profiles import Elsewhere
+from ..doubts.spin import spins_otherwise
 from ..doubts.stationary import from_start, unfinished
 from ..doubts.stuck import bounded_by_sticking
 from ..doubts.touching import kinks, what_touches
@@ -259,10 +260,13 @@ def fit(
                 doubted += loss_doubts(at.problem, at.u, judged)
                 wrong = wrong_in_either((at.problem, at.u), (problem, best.u), told, refinement)
                 doubted += wrong_given_warnings(at.problem, wrong)
+                spin, undecided = spins_otherwise(problem, best.u, judged)
+                doubted += undecided
                 lacking = (
                     doubts_of(at.problem, at.u, judged, wrong),
                     missing_loss(at.problem, at.u, (problem, best.u), explained_by(at.problem, wrong)),
                     missing_force(at.problem, at.u, judged),
+                    spin,
                 )
                 parts = together(*lacking, drawn_off, parts)
         return _Conclusion(at, tuple(every), judged, lower, *predicted, doubted + unknown, rests_on, parts)
