@@ -74,8 +74,10 @@ def test_a_rope_that_swings_in_space_is_a_rod(tmp_path: Path, held: str) -> None
     (recording,) = draft["recording"]
     if held == "one":
         assert rod["direction"] == [0, 0, -1] and "points" not in rod and "start" not in recording
+        # the hand swings most along x, and the rope points least along y
+        assert rod["hold_roll"] == ["start"] and rod["director"] in ([0, 1, 0], [0, -1, 0])
     else:
-        assert rod["points"] == "recording" and recording["start"] == "equilibrium"
+        assert rod["points"] == "recording" and recording["start"] == "equilibrium" and "hold_roll" not in rod
     assert draft["parameters"]["rope_GJ"] == {"tied_to": "rope_EI", "factor": 0.75}
     assert draft["parameters"]["rope_twist_damping"] == {"tied_to": "rope_bend_damping"}
     config.build(config.parse(tmp_path / "draft.toml"), tmp_path)

@@ -20,7 +20,7 @@ def assumptions(section: SceneSection) -> tuple[str, ...]:
 def _of_end(section: SceneSection, strand: Rope | Rod, end: str) -> str:
     grip = strand.grip_at(end)
     if grip is not None:
-        return _of_grip(grip, isinstance(strand, Rod))
+        return _of_grip(grip, strand)
     node = 0 if end == "start" else strand.segments
     own = {f"{strand.name}:{end}", f"{strand.name}:{node}"} | ({f"{strand.name}:-1"} if end == "end" else set())
     clamped = strand.clamp_start is not None if end == "start" else strand.clamp_end is not None
@@ -28,20 +28,27 @@ def _of_end(section: SceneSection, strand: Rope | Rod, end: str) -> str:
     drive = next((d for d in section.drive if own & set(d.particles)), None)
     if drive is not None:
         mover = f"tool {drive.tool}" if drive.markers is None else "a marker of the recording"
-        kept = "the clamp keeps its direction" if clamped else "its direction is free"
+        kept = "the clamp keeps its direction" if clamped else f"its direction is free{_spin(strand, end)}"
         return f"moved with {mover}; {kept}"
     if clamped:
         return f"clamped in the place and direction that are given; {turning}"
     last = {0} if end == "start" else {-1, strand.segments}
     if last & set(strand.pinned) or own & set(section.pin):
-        return "pinned where it starts; its direction is free"
+        return f"pinned where it starts; its direction is free{_spin(strand, end)}"
     hung = [mass.name for mass in section.point_mass if mass.particle in own]
     if hung:
         return f"free, with the weight of {' and '.join(f'{name}_mass' for name in hung)}"
     return "free"
 
 
-def _of_grip(grip: RopeGrip, twists: bool) -> str:
+def _spin(strand: Rope | Rod, end: str) -> str:
+    """What an end that turns freely does about its own axis."""
+    if isinstance(strand, Rope):
+        return ""
+    return ", but it does not spin" if end in strand.hold_roll else " and it spins freely"
+
+
+def _of_grip(grip: RopeGrip, strand: Rope | Rod) -> str:
     markers = grip.markers or []
     names = ", ".join(str(m) for m in markers) if len(markers) <= _FEW else f"{len(markers)} markers"
     smooth = f"; the motion is smoothed over {grip.smoothing:g} s" if grip.smoothing > 0 else ""
@@ -52,8 +59,10 @@ def _of_grip(grip: RopeGrip, twists: bool) -> str:
     if len(markers) == 1:
         if grip.direction is not None:
             return f"follows marker {names} and keeps the given direction: one marker does not record turning{smooth}"
-        return f"pinned to marker {names}: one marker gives no direction, so the end turns freely there{smooth}"
+        spin = _spin(strand, grip.at)
+        return f"pinned to marker {names}: one marker gives no direction, so the end turns freely there{spin}{smooth}"
     if len(markers) == 2:
+        twists = isinstance(strand, Rod)
         roll = "a roll about it is not recorded and taken as none" if twists else "a rope feels no roll"
         return f"held in the place and direction of markers {names}; {roll}{smooth}"
     given = "given" if grip.direction is not None else "of the rope as placed at the start"

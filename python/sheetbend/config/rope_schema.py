@@ -163,6 +163,11 @@ class Rod(Strand):
     )
     GA: Finite | None = key(None, "shear stiffness; sections stay across the rod when left out", "N", gt=0)
     director: Vector | None = key(None, "the frame's first axis at a start that no grip holds; any when left out")
+    hold_roll: list[Literal["start", "end"]] = key(
+        [],
+        "ends at which it does not spin about its own axis but turns in every direction, as in a hand that one marker "
+        "shows; an end without a grip, or with one marker, spins freely when left out",
+    )
     turns: int = key(0, "whole turns by which the end's frame is ahead at the start")
     roll: bool = key(False, "adds <name>_roll (rad): the twist built in when the rod was gripped at its end")
     twist_damping: Finite | None = key(None, "Kelvin-Voigt time constant of twisting", "s", gt=0)

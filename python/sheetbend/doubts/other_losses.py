@@ -104,20 +104,20 @@ def _reached(more: FitProblem, u: Array, J: Array, groups: list[_Group]) -> Arra
     that first one leaves no less of any group, or where there is no answer."""
     try:
         ok, r, _ = more.evaluate(u, jacobian=False)
-        first = _step(more, u, r, J) if ok else u
+        first = limited_step(more, u, r, J) if ok else u
         ok, r, _ = more.evaluate(first, jacobian=False)
         if not ok or all(_less(group, r) <= 0.0 for group in groups):
             return None
         ok, r, J = more.evaluate(first)
         if not ok or not np.isfinite(J).all():
             return None
-        ok, after, _ = more.evaluate(_step(more, first, r, J), jacobian=False)
+        ok, after, _ = more.evaluate(limited_step(more, first, r, J), jacobian=False)
     except SheetbendError:
         return None
     return after if ok and float(after @ after) < float(r @ r) else r
 
 
-def _step(problem: FitProblem, u: Array, r: Array, J: Array) -> Array:
+def limited_step(problem: FitProblem, u: Array, r: Array, J: Array) -> Array:
     """Where a Gauss-Newton step of limited length from u ends. A number on a logarithmic scale that grows takes the
     step of its own unit: one that ran off to nothing comes back at once."""
     size = np.maximum(np.linalg.norm(J, axis=0), np.finfo(float).tiny)

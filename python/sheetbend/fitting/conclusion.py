@@ -19,6 +19,7 @@ from ..doubts.missing_force import missing_force
 from ..doubts.missing_loss import missing_loss
 from ..doubts.prediction import predicted_values
 from ..doubts.profiles import Elsewhere
+from ..doubts.spin import spins_otherwise
 from ..doubts.stuck import bounded_by_sticking
 from ..doubts.told import Told
 from ..doubts.wrong_given import doubts_of, explained_by, wrong_in_either
@@ -135,10 +136,13 @@ def _doubts(
     warnings += loss_doubts(at.problem, at.u, judged)
     wrong = wrong_in_either((at.problem, at.u), fitted, told, refinement)
     warnings += wrong_given_warnings(at.problem, wrong)
+    spin, undecided = spins_otherwise(*fitted, judged)
+    warnings += undecided
     lacking = (
         doubts_of(at.problem, at.u, judged, wrong),
         missing_loss(at.problem, at.u, fitted, explained_by(at.problem, wrong)),
         missing_force(at.problem, at.u, judged),
+        spin,
     )
     return warnings, together(*lacking, drawn_off, contradicted)
 

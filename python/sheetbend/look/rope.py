@@ -38,6 +38,12 @@ WITHOUT_TWIST = (
     "its twist: the rope turns in space, where [[scene.rope]] damps a bend that turns, too, so rope_bend_damping comes "
     "out too small, by a fifth in one example. A [[scene.rod]] does not; write one where the damping matters"
 )
+SPIN = (
+    "whether the hand lets the rope spin about its own axis, as a swivel does. It is taken not to (`hold_roll`): where "
+    "a bend goes round, every section then bends back and forth, which damps. One that spins with its bend "
+    "is damped less, and the damping would come out too small, by a fifth in one example. If it can spin, remove "
+    "`hold_roll`"
+)
 UNLOADED = (
     "the shape that the rope has without load. Shapes at rest under its weight hardly tell it from the stiffness, "
     "which is fitted beside four modes of a rest curvature. If the rope is straight without load, remove `set_modes` "
@@ -87,6 +93,10 @@ def describe(takes: Sequence[Take], measured: Measured) -> Description | None:
         rope |= {"bend_damping": 0.01, "drag_linear": 0.1 * density}
         if kind == "rod":
             rope |= {"GJ": ROUND * rope["EI"], "twist_damping": rope["bend_damping"]}
+            if _turns_freely(found) and not found.rope.get("pinned"):
+                rope |= _without_spin(s, found)
+                why["hold_roll"] = "the hand lets it turn, but not spin about its own axis"
+                unknown.append(SPIN)
         notes += _beginning(s, found, rope, kind == "rod")
     lines = [] if r.gravity is not None else table("[scene]", {"gravity": s.gravity.tolist()})
     if not s.static:
@@ -195,6 +205,16 @@ def _turns_freely(found: Held) -> bool:
     """Whether nothing holds a direction of the rope."""
     clamped = "clamp_start" in found.rope or "clamp_end" in found.rope
     return not clamped and all(len(grip["markers"]) == 1 and "direction" not in grip for grip in found.grips)
+
+
+def _without_spin(s: Seen, found: Held) -> dict[str, Any]:
+    """The ends that do not spin, and the first axis of their sections: the direction in which the rope points least,
+    since it may not come to lie along it."""
+    at = [grip["at"] for grip in found.grips]
+    near = found.order[:2] if at[0] == "start" else found.order[-2:]
+    chords = s.recording.positions[:, near[1]] - s.recording.positions[:, near[0]]
+    chords = chords[np.isfinite(chords).all(axis=1)]
+    return {"hold_roll": at, "director": snapped(np.linalg.svd(chords, full_matrices=False)[2][-1])}
 
 
 def _can_be_rod(s: Seen, found: Held) -> bool:

@@ -17,7 +17,7 @@ from ..scene.scene import Array, Scene
 from .chain import add_drag, add_links, add_masses
 from .grip import Grip, any_across, carried
 from .grip_freedom import spread_shift
-from .rod_end import End, spread_roll
+from .rod_end import End, check_roll, spread_roll
 from .rod_joints import Joints, shear, weigh
 from .rod_junction import STUB_MASS, Facing, Junction
 from .rod_shape import initial_frames, initial_shape
@@ -72,6 +72,7 @@ def add_rod(
     start: Grip | Junction | Facing | BodyPoint | None = None,
     end: Grip | Junction | Facing | BodyPoint | None = None,
     director: ArrayLike | None = None,
+    hold_roll: Sequence[str] = (),
     turns: int = 0,
     tilts: bool = False,
     shifts: bool = False,
@@ -115,6 +116,9 @@ def add_rod(
             ends of several rods, or both of one, to
             each other.
         director: (3,) the first frame axis at a start without a grip; any by default.
+        hold_roll: ends ("start", "end") without a grip at which the rod does not spin about its own axis. It turns
+            there in every direction, as on a universal joint: the frame's first axis stays in the plane of the edge and
+            of the direction that it has at the start. Elsewhere an end spins freely, and frames have no inertia.
         turns: whole turns by which the end's frame is ahead at the start, beside the part of a turn that grips give.
         tilts: add the four tilts: small angles by which the rod leaves a grip askew, about the frame's axes.
         shifts: add the three shifts of each grip: how far beside the given place the rod leaves it, along the frame's
@@ -172,6 +176,7 @@ def add_rod(
     if roll and ends[1].grip is None:
         raise SceneError(f"{name}.roll", "needs a grip at the end", roll, "give end")
     ring = _is_ring(name, ends, points, length)
+    check_roll(name, hold_roll, [e.label for e in ends if e.held])
 
     link = length / segments
     places = [e.place(scene) for e in ends]
@@ -217,6 +222,8 @@ def add_rod(
         if ghost is not None:
             normal = None if normals is None else int(normals[k])
             e.hold(scene, int(nodes[k]), ghost, int(directors[k]), normal, stub, tilts, shifts, roll and k == -1)
+        if e.label in hold_roll:
+            scene.pin([int(directors[k])])
         if shifts and e.grip is not None:
             share = np.linspace(float(k == 0), float(k == -1), len(nodes))
             spread_shift(scene, e.grip, f"{name}_{e.label}", nodes[1:-1], share[1:-1])

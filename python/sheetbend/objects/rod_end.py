@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -137,6 +138,16 @@ class End:
         """Let the end itself ride on a body, where it is on one."""
         if self.point is not None:
             hold_place(scene, self.point, node, f"{self.name}_{self.label}_on_{self.point.body.name}")
+
+
+def check_roll(name: str, ends: Sequence[str], held: Sequence[str]) -> None:
+    """Raises SceneError where `hold_roll` names something else than an end, or one that a grip, a junction or a body
+    holds."""
+    for end in ends:
+        if end not in ("start", "end"):
+            raise SceneError(f"{name}.hold_roll", "names no end", end, 'give "start", "end" or both')
+        if end in held:
+            raise SceneError(f"{name}.hold_roll", "names an end whose roll is held already", end, "leave it out")
 
 
 def spread_roll(scene: Scene, roll: str, directors: Array, shares: Array) -> None:
