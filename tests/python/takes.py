@@ -147,3 +147,32 @@ def towel(named: bool, seconds: float = 1.5) -> sb.Recording:
     if named:
         markers, names = np.concatenate([markers, ways], axis=1), [*names, "gripper_left", "gripper_right"]
     return sb.Recording(noisy(markers, 5), t, tuple(names), name="towel", gravity=(0, 0, -9.81))
+
+
+def toss(seconds: float = 0.6, caught: float = 0.4) -> sb.Recording:
+    """Five markers on a box that is carried along, let go after 0.1 s, and caught with a jolt at `caught` s."""
+    t = np.arange(round(seconds * 200) + 1) / 200
+    scene = sb.Scene("toss")
+    turned = np.array([[0.6, 0.0, 0.8], [0.0, 1.0, 0.0], [-0.8, 0.0, 0.6]])
+    box = scene.add_body(
+        "box",
+        of=sb.Inertia.box(0.4, (0.12, 0.08, 0.05)),
+        at=(0.1, 0.2, 1.0),
+        rotation=turned,
+        velocity=(0.8, 0.3, 1.6),
+        spin=(1.5, 0.5, -1.0),
+    )
+    free = t - 0.1
+    flying = (free >= 0) & (t <= caught)
+    motion = sb.simulate(scene, np.concatenate([[0.0], free[flying]]), sb.Solver(h=1 / 4000))
+    place, axes = (a[1:] for a in box.pose(motion))
+    points = np.array(
+        [[0.06, 0.04, 0.025], [-0.06, 0.04, 0.0], [0.02, -0.04, 0.025], [-0.05, -0.03, -0.02], [0, 0, 0.03]]
+    )
+    x = np.zeros((len(t), 5, 3))
+    x[flying] = place[:, None] + np.einsum("fab,kb->fka", axes, points)
+    held, late = free < 0, t > caught
+    x[held] = x[flying][0] + free[held, None, None] * np.array([0.8, 0.3, 0.2])
+    x[late] = x[flying][-1] + np.sqrt(t[late] - caught)[:, None, None] * np.array([0.0, 0.0, 0.3])
+    names = tuple(f"box_{k}" for k in range(5))
+    return sb.Recording(x + 1e-4 * np.random.default_rng(6).standard_normal(x.shape), t, names, name="toss")
