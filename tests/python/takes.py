@@ -121,3 +121,58 @@ def cloth(seconds: float = 1.5, wind: float = 0.0) -> sb.Recording:
     x = sb.simulate(scene, t, sb.Solver(h=1 / 240, method="newton")).positions
     inner = [11 * row + column for row in range(1, 10, 2) for column in range(1, 10, 2)]
     return sb.Recording(noisy(x[:, sheet.particles[inner]], 4), t, name="cloth", gravity=(0, 0, -9.81))
+
+
+def towel(named: bool, seconds: float = 1.5) -> sb.Recording:
+    """A cloth that hangs by patches of its two upper corners, which grippers swing and bring nearer to each other; 25
+    markers on it, and one on each gripper at the corner where `named`."""
+    t = np.arange(round(seconds * 60) + 1) / 60
+    mesh = sb.mesh.grid(0.4, 0.4, 10, 10, pattern="one_way")
+    corners = mesh.sets["corners"][2:][::-1]
+    scene = sb.Scene("towel")
+    u, v = mesh.vertices[:, 0] / 0.4, mesh.vertices[:, 1]
+    places = np.stack([0.04 + 0.32 * u, 0.06 * np.sin(np.pi * u), 0.6 + v - 0.06 * np.sin(np.pi * u)], axis=1)
+    sheet = sb.add_cloth(scene, mesh, positions=places, held=corners, **CLOTH)
+    ease = 1.0 - np.exp(-((t / 0.3) ** 2))
+    swing = 0.06 * ease * np.sin(6.0 * t)
+    nearer = 0.03 * ease * np.sin(4.0 * t)
+    ways = np.zeros((len(t), 2, 3)) + places[corners]
+    ways[:, 0, 0] += nearer
+    ways[:, 1, 0] -= nearer
+    ways[..., 1] += swing[:, None]
+    scene.drive(sheet.particles[corners], t, ways)
+    x = sb.simulate(scene, t, sb.Solver(h=1 / 240, method="newton"), start=sb.equilibrium(scene).positions).positions
+    inner = [11 * row + column for row in range(1, 10, 2) for column in range(1, 10, 2)]
+    markers, names = x[:, sheet.particles[inner]], [f"towel_{k}" for k in range(25)]
+    if named:
+        markers, names = np.concatenate([markers, ways], axis=1), [*names, "gripper_left", "gripper_right"]
+    return sb.Recording(noisy(markers, 5), t, tuple(names), name="towel", gravity=(0, 0, -9.81))
+
+
+def toss(seconds: float = 0.6, caught: float = 0.4) -> sb.Recording:
+    """Five markers on a box that is carried along, let go after 0.1 s, and caught with a jolt at `caught` s."""
+    t = np.arange(round(seconds * 200) + 1) / 200
+    scene = sb.Scene("toss")
+    turned = np.array([[0.6, 0.0, 0.8], [0.0, 1.0, 0.0], [-0.8, 0.0, 0.6]])
+    box = scene.add_body(
+        "box",
+        of=sb.Inertia.box(0.4, (0.12, 0.08, 0.05)),
+        at=(0.1, 0.2, 1.0),
+        rotation=turned,
+        velocity=(0.8, 0.3, 1.6),
+        spin=(1.5, 0.5, -1.0),
+    )
+    free = t - 0.1
+    flying = (free >= 0) & (t <= caught)
+    motion = sb.simulate(scene, np.concatenate([[0.0], free[flying]]), sb.Solver(h=1 / 4000))
+    place, axes = (a[1:] for a in box.pose(motion))
+    points = np.array(
+        [[0.06, 0.04, 0.025], [-0.06, 0.04, 0.0], [0.02, -0.04, 0.025], [-0.05, -0.03, -0.02], [0, 0, 0.03]]
+    )
+    x = np.zeros((len(t), 5, 3))
+    x[flying] = place[:, None] + np.einsum("fab,kb->fka", axes, points)
+    held, late = free < 0, t > caught
+    x[held] = x[flying][0] + free[held, None, None] * np.array([0.8, 0.3, 0.2])
+    x[late] = x[flying][-1] + np.sqrt(t[late] - caught)[:, None, None] * np.array([0.0, 0.0, 0.3])
+    names = tuple(f"box_{k}" for k in range(5))
+    return sb.Recording(x + 1e-4 * np.random.default_rng(6).standard_normal(x.shape), t, names, name="toss")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import RecordingError
-from . import cantilever, cloth, gripped, pendulum, rope
+from . import cantilever, cloth, flight, gripped, pendulum, rope
 from .take import Measured, Take
 from .text import comment, joined, table
 
@@ -41,7 +41,7 @@ def draft(takes: Sequence[Take], name: str, measured: Measured | None = None) ->
         if take.seen.recording.markers != first.recording.markers:
             fix = "give recordings of the same markers, or make one configuration for each"
             raise RecordingError("markers", f"of {take.file} differ from the first file's", take.file, fix)
-    for model in (pendulum, cantilever, cloth, gripped, rope):
+    for model in (pendulum, flight, cantilever, cloth, gripped, rope):
         found = model.describe(takes, measured or Measured())
         if found is not None:
             break
@@ -52,8 +52,10 @@ def draft(takes: Sequence[Take], name: str, measured: Measured | None = None) ->
             raise RecordingError(first.recording.name, "holds too few frames to tell what moves", frames, fix)
         got = joined(first.recording.markers)
         fix = "write a configuration by hand, see docs/configuration.md"
-        raise RecordingError("markers", "do not move like a rope, beam, cloth or pendulum", got, fix)
-    told = (*_told(takes), *found.notes)
+        raise RecordingError(
+            "markers", "do not move like a rope, beam, cloth, pendulum or a body in free flight", got, fix
+        )
+    told = (*_told(takes, found.up), *found.notes)
     return written(found.kind, name, [t.file for t in takes], told, found.unknown, found.lines)
 
 
@@ -79,8 +81,8 @@ def _item(sentence: str) -> list[str]:
     return [first, *(line.replace("# ", "#   ", 1) for line in rest)]
 
 
-def _told(takes: Sequence[Take]) -> list[str]:
-    """About the files themselves."""
+def _told(takes: Sequence[Take], up: int | None) -> list[str]:
+    """About the files themselves; `up` is the axis that the motion shows to point up."""
     said = []
     for take in takes:
         r = take.seen.recording
@@ -101,7 +103,9 @@ def _told(takes: Sequence[Take]) -> list[str]:
         said.append(f"the fastest marker moves at {first.speed:.2g} m/s")
     if takes[0].units is not None:
         said.append(f"lengths are taken as {takes[0].units}")
-    if not first.told:
+    if not first.told and up is not None:
+        said.append(f"{'xyz'[up]} points up: gravity accelerates the markers along it")
+    elif not first.told:
         axis = "xyz"[first.up]
         said.append(f"{axis} is taken as up, because the file does not say it: change `gravity` if another axis is up")
     return said

@@ -14,10 +14,10 @@ def spacing(apart: Array) -> float:
     return float(np.median((apart + np.where(np.eye(len(apart)) > 0, np.inf, 0.0)).min(axis=1)))
 
 
-def connected(apart: Array) -> list[int]:
-    """The largest set of markers that hang together by near neighbors."""
+def components(apart: Array) -> list[list[int]]:
+    """Markers that hang together by near neighbors, the largest set first."""
     near = apart < REACH * spacing(apart)
-    left, best = set(range(len(near))), list[int]()
+    left, found = set(range(len(near))), list[list[int]]()
     while left:
         group, border = set[int](), [min(left)]
         while border:
@@ -26,9 +26,8 @@ def connected(apart: Array) -> list[int]:
                 left.remove(k)
                 group.add(k)
                 border += [int(j) for j in np.flatnonzero(near[k])]
-        if len(group) > len(best):
-            best = sorted(group)
-    return best
+        found.append(sorted(group))
+    return sorted(found, key=len, reverse=True)
 
 
 def flattened(apart: Array) -> Array:
@@ -77,10 +76,15 @@ def placed(flat: Array, x: Array, up: Array) -> tuple[Array, Array, Array]:
     for turn in range(4):
         c, s = [(1, 0), (0, 1), (-1, 0), (0, -1)][turn]
         turned = flat @ np.array([[c, -s], [s, c]])
-        mean, center = turned[seen].mean(axis=0), x[seen].mean(axis=0)
-        u, _, vt = np.linalg.svd((turned[seen] - mean).T @ (x[seen] - center), full_matrices=False)
-        axes = u @ vt
+        axes, mean, center = laid(turned[seen], x[seen])
         if axes[1] @ up >= abs(axes[0] @ up) - 1e-9:
             break
     corner = turned.min(axis=0)
     return center + axes.T @ (corner - mean), axes, turned - corner
+
+
+def laid(flat: Array, x: Array) -> tuple[Array, Array, Array]:
+    """Axes (2, 3) along which points (k, 2) lie best on places (k, 3), and the means of both."""
+    mean, center = flat.mean(axis=0), x.mean(axis=0)
+    u, _, vt = np.linalg.svd((flat - mean).T @ (x - center), full_matrices=False)
+    return u @ vt, mean, center

@@ -38,9 +38,11 @@ class Description(NamedTuple):
         notes: sentences about what is seen.
         unknown: sentences about what is not known, and what stands in its place.
         lines: of the configuration, without its head.
+        up: 0, 1 or 2, the axis that points up where the motion shows it.
     """
 
     kind: str
     notes: list[str]
     unknown: list[str]
     lines: list[str]
+    up: int | None = None

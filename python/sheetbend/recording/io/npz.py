@@ -40,7 +40,10 @@ def read(path: Path) -> MarkerData:
         RecordingError: it is no NPZ archive, is damaged, lacks a key, holds more than `door.check_room` allows, or
             an array is not plain numbers.
     """
-    fix = "store positions (frames, markers, 3) and times (frames,) under these names; sb.Cloud.load reads a cloud"
+    fix = (
+        "store positions (frames, markers, 3) and times (frames,) under these names; sb.Cloud.load reads a cloud, and "
+        "sb.Recording.from_poses makes markers of a body's poses"
+    )
     arrays = plain_arrays(path, _REQUIRED, ("clamped",), fix)
     return MarkerData(
         positions=arrays["positions"],

@@ -1,0 +1,172 @@
+"""What holds a cloth in a recording: edges or corners of it, moved by a holder's markers or by its own, or at rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arrays.timeseries import default_max_gap
+from .seen import Seen
+from .sheet import laid, spacing
+
+Array = np.ndarray
+QUIET = 0.1  # of the motion of all: how little a row moves where the edge beyond it is held
+SAGS = 0.03  # of its length: by so much a row of markers hangs below its ends where only these are held
+HANGS = 0.4  # of its length: a cloth of which one end is so much higher than the other is not level
+AROUND = 6  # markers next to a holder show how the cloth lies there
+REACHES = 2.5  # spacings from the nearest marker on the cloth: how near a holder's marker is
+LOOSE = 0.15  # of this distance: by so much it varies at most, a standard deviation
+SIDES = {"left": (0, -1), "right": (0, 1), "bottom": (1, -1), "top": (1, 1)}
+
+
+@dataclass(frozen=True)
+class Hold:
+    """A side of a cloth that is held.
+
+    Attributes:
+        side: of its mesh.
+        markers: that show where the held part is: of a holder, or of the cloth's own row, in order along it.
+        corners: whether each of them holds the vertex next to it, instead of all of them the whole side.
+        moves: whether they move; a side at rest is pinned.
+        beyond: m, from the outer row of markers to the side.
+        own: whether these markers are the cloth's own.
+    """
+
+    side: str
+    markers: tuple[int, ...]
+    corners: bool
+    moves: bool
+    beyond: float
+    own: bool
+
+    def tables(self, names: Sequence[str], s: Seen) -> tuple[list[Any], list[Any], list[Any]]:
+        """Sets that are pinned, sets, and grips of a cloth."""
+        if not self.corners:
+            if not self.moves:
+                return [self.side], [], []
+            return [], [], [{"set": self.side, "markers": [names[k] for k in _without_gaps(s, self.markers)]}]
+        by_set = {f"{self.side}_{j + 1}": [names[k]] for j, k in enumerate(self.markers)}
+        sets = [{"name": name, "markers": markers} for name, markers in by_set.items()]
+        if not self.moves:
+            return list(by_set), sets, []
+        return [], sets, [{"set": name, "markers": markers} for name, markers in by_set.items()]
+
+
+def row_of(flat: Array, side: str, apart: float) -> list[int]:
+    """Numbers in flat (markers, 2) of the outer row of a side, in order along it."""
+    axis, sign = SIDES[side]
+    across = sign * flat[:, axis]
+    return [int(k) for k in np.argsort(flat[:, 1 - axis]) if across[k] > across.max() - 0.5 * apart]
+
+
+def slung(x: Array, flat: Array, up: Array, apart: float) -> tuple[int, float]:
+    """How a cloth that lies about level is slung: the axis of flat along which its middle is lowest or highest, and by
+    what share of the size both ends are above the middle; negative for a cloth that lies over something. Zero for a
+    cloth that hangs."""
+    height = np.nanmean(x, axis=0) @ up
+    best = (0, 0.0)
+    for axis, pair in enumerate((("left", "right"), ("bottom", "top"))):
+        along, size = flat[:, axis], max(float(np.ptp(flat[:, axis])), 1e-12)
+        near = np.abs(along - 0.5 * (along.max() + along.min())) < max(size / 6, 0.75 * apart)
+        ends = [float(np.nanmean(height[row_of(flat, side, apart)])) for side in pair]
+        if abs(ends[1] - ends[0]) > HANGS * size:
+            return axis, 0.0
+        middle = float(np.nanmean(height[near])) if near.any() else 0.5 * sum(ends)
+        rise = min(ends) - middle if min(ends) > middle else min(max(ends) - middle, 0.0)
+        best = max(best, (axis, rise / size), key=lambda found: abs(found[1]))
+    return best
+
+
+def holds(s: Seen, own: Sequence[int], flat: Array, others: Sequence[int], sides: Sequence[str]) -> list[Hold]:
+    """How a cloth is held: by the holder's markers that are near it, else by the outer rows of some sides.
+
+    Args:
+        own: its markers, which lie at `flat` (markers, 2) m.
+        others: markers on no cloth.
+        sides: where it is held if no marker of a holder is near; of two sides that such a marker is beyond, one of
+            these counts.
+    """
+    x, numbers = s.recording.positions, list(own)
+    apart = spacing(s.apart[np.ix_(numbers, numbers)])
+    moved = max(motion(x[:, numbers]), apart)
+    by_side: dict[str, list[tuple[float, float, int]]] = {}
+    for k in others:
+        at = _place(s, numbers, flat, k, apart)
+        if at is None:
+            continue
+        side, beyond = _side(flat, at, sides)
+        if beyond > -0.5 * apart:
+            by_side.setdefault(side, []).append((float(at[1 - SIDES[side][0]]), beyond, k))
+    found = []
+    for side, near in by_side.items():
+        row = [numbers[k] for k in row_of(flat, side, apart)]
+        markers = tuple(k for _, _, k in sorted(near))
+        beyond = max(0.0, float(np.mean([off for _, off, _ in near])))
+        moves = motion(x[:, list(markers)]) >= QUIET * moved and not s.static
+        found.append(Hold(side, markers, _sags(x, row), moves, beyond, False))
+    for side in () if found else sides:
+        row = [numbers[k] for k in row_of(flat, side, apart)]
+        moves = not s.static and motion(x[:, row]) >= QUIET * moved
+        corners = _sags(x, row)
+        beyond = 0.0 if moves or corners else 0.5 * apart
+        found.append(Hold(side, (row[0], row[-1]) if corners else tuple(row), corners, moves, beyond, True))
+    return found
+
+
+def motion(x: Array) -> float:
+    """m, root mean square distance of markers (frames, k, 3) from their mean places."""
+    if len(x) < 2:
+        return 0.0
+    return float(np.sqrt(np.nanmean(np.nanvar(x, axis=0).sum(axis=1))))
+
+
+def _place(s: Seen, own: list[int], flat: Array, k: int, apart: float) -> Array | None:
+    """(2,) m, where another marker is beside the flat cloth, as the markers next to it lie; None where it is far from
+    them or moves against them."""
+    x = s.recording.positions
+    whole = np.flatnonzero(np.isfinite(x[:, [k, *own], 0]).all(axis=1))
+    if not len(whole):
+        return None
+    frame = x[whole[0]]
+    distance = np.linalg.norm(frame[own] - frame[k], axis=1)
+    near = np.argsort(distance)[:AROUND]
+    nearest = float(distance[near[0]])
+    varies = float(np.nanstd(np.linalg.norm(x[:, own[near[0]]] - x[:, k], axis=1)))
+    if nearest > REACHES * apart or varies > LOOSE * max(nearest, apart):
+        return None
+    axes, mean, center = laid(flat[near], frame[own][near])
+    return np.asarray(mean + axes @ (frame[k] - center))
+
+
+def _side(flat: Array, at: Array, sides: Sequence[str]) -> tuple[str, float]:
+    """The side of the markers' box that a place is beyond, and by how much, m; negative inside of it."""
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    off = {side: float(at[a] - high[a] if sign > 0 else low[a] - at[a]) for side, (a, sign) in SIDES.items()}
+    side = max([side for side in sides if off[side] > 0] or off, key=lambda side: off[side])
+    return side, off[side]
+
+
+def _sags(x: Array, row: list[int]) -> bool:
+    """Whether a row of markers (k,) hangs below the line between its ends."""
+    if len(row) < 3:
+        return False
+    line = x[:, row]
+    ends = line[:, -1] - line[:, 0]
+    size = np.linalg.norm(ends, axis=1)
+    share = np.einsum("fkx,fx->fk", line - line[:, :1], ends) / size[:, None] ** 2
+    off = np.nanmean(line - line[:, :1] - share[..., None] * ends[:, None], axis=0)
+    return bool(np.linalg.norm(off, axis=1).max() > SAGS * np.nanmean(size))
+
+
+def _without_gaps(s: Seen, row: Sequence[int]) -> list[int]:
+    """Markers of a row that are never lost for long; all of them where there is none."""
+    r, gap = s.recording, default_max_gap(s.recording.times)
+    kept = []
+    for k in row:
+        t = r.times[r.mask[:, k]]
+        if r.mask[0, k] and r.mask[-1, k] and np.diff(t).max() <= gap:
+            kept.append(k)
+    return kept or list(row)
