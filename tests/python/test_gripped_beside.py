@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from sheetbend.gripped import GrippedMotion, RopeReport, fit_rope
 from sheetbend.gripped.beside import beside, frames_of, offsets_found
-from sheetbend.gripped.climb import Climb, Rope
+from sheetbend.gripped.climb import Climb
 from sheetbend.gripped.judging import predict
 from sheetbend.gripped.ladder import BESIDE, TWIST
 from sheetbend.gripped.offsets import offset_reach
 from sheetbend.gripped.pieces import experiments_of, problem_of
+from sheetbend.gripped.steps import Rope
 from sheetbend.report.scores import coordinate_error
 from test_gripped_motion import carried_about, model_of
 

@@ -10,14 +10,28 @@ import pytest
 import sheetbend as sb
 from sheetbend.gripped import GrippedMotion, RopeModel, descent, fit_rope
 from sheetbend.gripped.bounds import at_bounds, bounded
-from sheetbend.gripped.climb import Climb, Rope
+from sheetbend.gripped.climb import Climb
 from sheetbend.gripped.conclusion import checked, model_spread, spread_words
 from sheetbend.gripped.descent import descend, negligible
-from sheetbend.gripped.judging import Errors, errors_of, predict
-from sheetbend.gripped.ladder import LADDER, MARKERS, REST, SHIFTS, TILTS, TWIST, VARYING, YIELD, Rung, smooth, together
+from sheetbend.gripped.judging import Errors, Split, errors_of, predict
+from sheetbend.gripped.ladder import (
+    BESIDE,
+    LADDER,
+    MARKERS,
+    REST,
+    SHIFTS,
+    TILTS,
+    TWIST,
+    VARYING,
+    YIELD,
+    Rung,
+    smooth,
+    together,
+)
 from sheetbend.gripped.model import place_of
 from sheetbend.gripped.pieces import experiments_of, problem_of
 from sheetbend.gripped.start import about, started, whole
+from sheetbend.gripped.steps import Rope
 from sheetbend.minimum.optimizers import minimize
 from sheetbend.minimum.problem import FitProblem
 from test_gripped_motion import carried_about, model_of
@@ -94,6 +108,17 @@ class TestLadder:
         (p,) = (p for p in about(TWIST.parameters, model) if p.name == "rope_length")
         assert p.prior == (pytest.approx(MOTION.length), 0.02)
         assert [q.name for q in about(TWIST.parameters, model)] == [q.name for q in TWIST.parameters]
+
+    @pytest.mark.parametrize("rung", LADDER, ids=lambda rung: rung.name)
+    def test_what_a_rung_adds_can_be_taken_back(self, rung: Rung) -> None:
+        larger = rung.added_to(MODEL)
+        assert rung.within(larger) and rung.taken_from(larger) == MODEL
+        rope = Rope(
+            larger, (*STIFFNESS, *rung.wanted(MOTION)), {"rope_x": 1.0, **{p.name: 0.1 for p in rung.wanted(MOTION)}}
+        )
+        smaller = rope.without(rung, MOTION)
+        assert smaller.model == MODEL and smaller.values == {"rope_x": 1.0}
+        assert smaller.parameters == tuple(p for p in STIFFNESS if rung is not TWIST)
 
 
 class TestBounds:
@@ -235,6 +260,59 @@ class TestClimb:
         climb = Climb(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None)
         told = climb._first(SHIFTS, rope)
         assert told is not None and told.ratio < 0.3 and told.fitted < 0.3 and told.stays
+
+    def shifted(self, values: dict[str, float]) -> list[GrippedMotion]:
+        """Recordings with noise of a rope with shifted grips."""
+        (x,) = predict(SHIFTS.added_to(MODEL), [MOTION], {**TRUE, **values})
+        rng = np.random.default_rng(0)
+        noisy = [replace(MOTION.recording, positions=x + 3e-4 * rng.standard_normal(x.shape)) for _ in range(5)]
+        return [replace(MOTION, recording=replace(r, name=f"{k}")) for k, r in enumerate(noisy)]
+
+    def reconsidered(self, motions: list[GrippedMotion], shifts: dict[str, float]) -> tuple[Climb, Rope]:
+        """A rope whose grips were shifted before something else stayed, after a second look, and how it was before."""
+        climb = Climb(motions, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None)
+        values = {**TRUE, **{p.name: shifts.get(p.name, 0.0) for p in SHIFTS.parameters}}
+        model = SHIFTS.added_to(MODEL).at(values)
+        before = climb.rope = climb._judged(Rope(model, (*STIFFNESS, *SHIFTS.parameters), values))
+        climb._reconsider((TWIST, TILTS, VARYING, SHIFTS, MARKERS), [VARYING])
+        return climb, before
+
+    def test_offsets_that_stood_in_for_the_rope_are_taken_back(self) -> None:
+        """From one recording of 5 s shifted grips stayed in the place of a rest curvature, and beside it."""
+        climb, before = self.reconsidered(self.shifted({}), {"rope_start_shift_1": 0.004})
+        rope = climb.rope
+        assert rope is not None and not rope.model.shifts and rope.parameters == STIFFNESS
+        assert not any("shift" in name for name in rope.values) and rope.errors.typical < before.errors.typical
+        assert [(s.name, s.stays) for s in climb.steps] == [(f"without {SHIFTS.name}", True), (SHIFTS.name, False)]
+
+    def test_offsets_that_help_beside_what_stayed_later_come_back(self) -> None:
+        moved = {"rope_start_shift_1": 0.006, "rope_end_shift_2": -0.006}
+        climb, before = self.reconsidered(self.shifted(moved), moved)
+        assert climb.rope is not None and climb.rope.model.shifts and climb.rope.values.keys() == before.values.keys()
+        assert [(s.name, s.stays) for s in climb.steps] == [(f"without {SHIFTS.name}", True), (SHIFTS.name, True)]
+
+    def test_all_ends_as_before_where_that_predicts_better(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        moved = {"rope_start_shift_1": 0.006, "rope_end_shift_2": -0.006}
+        monkeypatch.setattr(Climb, "_climbed", lambda self, rung: False)
+        climb, before = self.reconsidered(self.shifted(moved), moved)
+        assert climb.rope is before
+        assert [(s.name, s.stays) for s in climb.steps] == [(f"without {SHIFTS.name}", False)]
+
+    def test_recordings_go_back_to_where_they_were_and_onto_the_axis_again(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        recorded = [shown(f"{k}") for k in range(5)]
+        climb = Climb(recorded, 0.25, ((1.0, 2.0), (1.0, 4.0)), 1, lambda text: None)
+        rope = Rope(MODEL.at(TRUE), STIFFNESS, TRUE)
+        offsets = ((1e-3, 0.0),) * len(MOTION.free)
+        for _ in range(2):
+            climb.given, climb.split = climb._moved(rope, offsets)
+        climb.beside, climb.rope = ((2e-3, 0.0),) * len(MOTION.free), climb._judged(rope)
+        moved, seen = climb.given, list[tuple[GrippedMotion, ...]]()
+        monkeypatch.setattr(Climb, "_climbed", lambda self, rung: seen.append(self.given) or False)
+        climb._reconsider((TWIST, VARYING, BESIDE), [VARYING])
+        assert seen == [tuple(recorded)] and climb.beside == () and climb.rope is not None
+        assert climb.split.motions == Split.of(recorded, 0.25).motions and climb.given != moved
 
     def test_the_only_recording_that_judges_can_be_left_out(self) -> None:
         """It once stayed, and every rung was judged by the one recording that does not belong."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import sheetbend as sb
-from sheetbend.gripped import GrippedMotion
+from sheetbend.gripped import GrippedMotion, RopeModel
+from sheetbend.gripped import slid as slid_before
 from sheetbend.gripped.judging import predict
 from sheetbend.gripped.slid import MODES, noise, slid, window_of
 from sheetbend.report.scores import coordinate_error
@@ -95,3 +97,32 @@ def test_a_rod_that_slid_is_bent_until_it_is_let_go() -> None:
     turned = x[-1] - x[-2]
     along = np.arccos(turned @ (1.0, 0.0, 0.0) / np.linalg.norm(turned))
     assert along == pytest.approx(0.4 * 2.0 * 0.3 * (1 - 0.5 / 12), rel=0.03)
+
+
+def test_what_had_slid_is_looked_for_once_for_each_start_and_rope(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A rung's first step, its fit and the prediction before it start from the same values."""
+    motion, asked = recorded(HISTORY), list[tuple[float, float]]()
+
+    def counted(model: RopeModel, motion: GrippedMotion, first: float, values: Mapping[str, float]) -> dict[str, float]:
+        asked.append((first, values.get("rope_EI", 0.0)))
+        return slid(model, motion, first, values)
+
+    monkeypatch.setattr(slid_before, "slid", counted)
+    (x,) = predict(MODEL, [motion], {})
+    larger = replace(MODEL, tilts=True, places=True, curvature_modes=(0, 1))
+    (same,) = predict(larger, [motion], {})
+    assert len(asked) == 1 and np.array_equal(same, x)
+    changed = {"rope_EI": 0.06}, {"rope_EI": 0.06, "rope_curvature_1_0": 0.1}
+    for values in changed:
+        assert not np.array_equal(predict(larger, [motion], values)[0], x)
+    window_of(MODEL, motion, (0.1, 0.6), {})
+    window_of(replace(MODEL, gravity=(0.0, -9.81, 0.0)), motion, (0.1, 0.6), {})
+    window_of(MODEL, replace(motion), (0.1, 0.6), {})
+    assert asked == [(0.0, 0.0), (0.0, 0.06), (0.0, 0.06), (0.1, 0.0), (0.1, 0.0), (0.1, 0.0)]
+
+
+def test_what_a_rung_adds_at_zero_leaves_what_had_slid_as_it_is() -> None:
+    """To the last bit, so that the order in which models ask does not matter."""
+    motion, remembering = recorded(HISTORY), replace(MODEL, slid_modes=MODES)
+    larger = replace(remembering, tilts=True, shifts=True, places=True, curvature_modes=(0, 3), softness_modes=(1, 2))
+    assert slid(larger, motion, 0.0, {}) == slid(remembering, motion, 0.0, {})

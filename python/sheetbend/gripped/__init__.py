@@ -1,6 +1,5 @@
 """Ropes held by two grips: from recordings to stiffness, twist, damping, rest shape and yield."""
 
-from .climb import Step
 from .evaluation import Evaluation, evaluate
 from .ladder import LADDER, Rung
 from .model import RopeModel
@@ -8,6 +7,7 @@ from .motion import GrippedMotion
 from .recipe import RopeFit, fit_rope
 from .report import RopeReport
 from .screening import Screened, screened
+from .steps import Step
 from .trades import trades
 from .without_twist import WITHOUT_TWIST
 

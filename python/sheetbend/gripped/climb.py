@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -16,12 +16,13 @@ from .beside import Offsets, beside, frames_of, offsets_found
 from .bounds import bounded
 from .descent import bearable, descend
 from .first_order import first_order
-from .judging import BETTER, EQUAL, Errors, Split, Verdict, errors_of, misfits, predict, verdict
-from .ladder import Rung, together
+from .judging import BETTER, EQUAL, Split, Verdict, errors_of, misfits, predict, verdict
+from .ladder import AND, Rung, together
 from .model import NAME, RopeModel
 from .motion import GrippedMotion
 from .pieces import experiments_of, problem_of
 from .start import about, started
+from .steps import Parts, Rope, Step
 from .windows import Span
 
 SETTLED = 0.05  # relative change of EI at which links are short enough
@@ -31,45 +32,6 @@ ENOUGH = 5e-3  # of the cost: what a step must promise while searching
 FEW, SHORT, LONG = 3, 12, 30  # derivatives, at most: of a rung that is nearly linear, of a start, and on long windows
 
 Say = Callable[[str], None]
-Parts = tuple[Parameter, ...]
-
-
-@dataclass(frozen=True)
-class Step:
-    """How a rung did.
-
-    Attributes:
-        name: of the rung.
-        fitted, others: median of the mean absolute coordinate errors of whole recordings that it was fitted to, and of
-            those that it was not, m; without it where it was not tried, since one step promises nothing.
-        stays: whether it is part of the final model.
-        seconds: its time.
-        ratio: median ratio of the errors with and without it, on what it was not fitted to; None of the first. To first
-            order where it was not tried.
-        better: number of recordings (or pieces of them) that it predicts better.
-        count: of how many.
-        EI: bending stiffness with it, N m^2.
-    """
-
-    name: str
-    fitted: float
-    others: float
-    stays: bool
-    seconds: float
-    ratio: float | None = None
-    better: int = 0
-    count: int = 0
-    EI: float | None = None
-
-
-@dataclass(frozen=True)
-class Rope:
-    """A model with its fitted values, what is free in it, and how it predicts."""
-
-    model: RopeModel
-    parameters: Parts
-    values: dict[str, float]
-    errors: Errors = field(default_factory=Errors.none)
 
 
 class Climb:
@@ -95,6 +57,7 @@ class Climb:
         self.tried: list[Rope] = []
         self.rope: Rope | None = None
         self.beside: Offsets = ()
+        self._recorded: dict[GrippedMotion, GrippedMotion] = {}  # by what was moved onto the axis
 
     def run(
         self, models: Sequence[RopeModel], ladder: Sequence[Rung], bending_lengths: Sequence[float], most_links: int
@@ -104,15 +67,15 @@ class Climb:
         self._keep(ladder[0], self._straight(models, ladder[0], bending_lengths, most_links), None, began)
         stayed = [self._climbed(rung) for rung in ladder[1:]]
         last = max((k for k, stays in enumerate(stayed) if stays), default=-1)
-        dropped = []
+        dropped, late = list[Rung](), list[Rung]()
         for k, (rung, stays) in enumerate(zip(ladder[1:], stayed, strict=True)):
-            # what helped nothing before may help beside what stayed later
-            if not stays and not (k < last and self._climbed(rung)):
-                dropped.append(rung)
+            if not stays:  # what helped nothing before may help beside what stayed later
+                (late if k < last and self._climbed(rung) else dropped).append(rung)
         dropped = [rung for rung in dropped if not rung.beside]
         if len(dropped) > 1 and not all(rung.small for rung in dropped):
             # or only beside another: stiffness that varies looks like yield, and yield like it
-            self._climbed(together(dropped))
+            late += dropped if self._climbed(together(dropped)) else []
+        self._reconsider(ladder, late)
         for rung in ladder:
             if rung.beside and self.beside:
                 self._climbed(rung)  # what the rope's shape had taken up of the offsets, and gave back since
@@ -154,12 +117,50 @@ class Climb:
             return None
         return offsets_found(motions, predict(rope.model, motions, rope.values, self.threads), frames)
 
+    def _put_back(self) -> None:
+        """What is given and its split, with the markers where they were recorded."""
+        recorded = [
+            tuple(self._recorded.get(m, m) for m in part) for part in (self.given, self.split.fitted, self.split.judged)
+        ]
+        self.given, self.beside = recorded[0], ()
+        self.split = replace(self.split, fitted=recorded[1], judged=recorded[2])
+
     def _moved(self, rope: Rope, offsets: Offsets) -> tuple[tuple[GrippedMotion, ...], Split]:
         """What is given and its split, with the markers on the rope's axis."""
-        every = {id(m): m for m in (*self.whole, *self.split.motions)}
-        moved = {key: m.moved(-beside(rope.model, m, rope.values, offsets)) for key, m in every.items()}
-        fitted, judged = (tuple(moved[id(m)] for m in part) for part in (self.split.fitted, self.split.judged))
-        return tuple(moved[id(m)] for m in self.whole), replace(self.split, fitted=fitted, judged=judged)
+        every = {m: m.moved(-beside(rope.model, m, rope.values, offsets)) for m in (*self.whole, *self.split.motions)}
+        self._recorded |= {moved: self._recorded.get(m, m) for m, moved in every.items()}
+        fitted, judged = (tuple(every[m] for m in part) for part in (self.split.fitted, self.split.judged))
+        return tuple(every[m] for m in self.whole), replace(self.split, fitted=fitted, judged=judged)
+
+    def _reconsider(self, ladder: Sequence[Rung], late: Sequence[Rung]) -> None:
+        """Take back offsets of grips and markers that stayed before a part of the rope itself did: they may have stood
+        in for it. Each has to help beside it, and all ends as before where that predicts better."""
+        before, began = self.rope, time.perf_counter()
+        assert before is not None
+        since = min((k for k, rung in enumerate(ladder) if rung in late and not rung.offsets), default=len(ladder))
+        again = [r for r in ladder[since:] if r.offsets and (self.beside if r.beside else r.within(before.model))]
+        if not again:
+            return
+        kept, steps = (self.given, self.split, self.beside, self.left_out), self.steps
+        if self.beside:
+            self._put_back()
+        without, name = before, f"without {AND.join(rung.name for rung in again)}"
+        for rung in again:
+            without = without.without(rung, self.split.fitted[0])
+        smaller = self._long(name, without)
+        if smaller is not None:
+            gone = {rung.name for rung in again}
+            self.steps = [replace(s, stays=s.stays and s.name not in gone) for s in steps]
+            self._note(name, smaller, verdict(smaller.errors, before.errors), True, began)
+            self.rope = smaller
+            for rung in again:
+                self._climbed(rung)
+            if not verdict(before.errors, self.rope.errors).stays:
+                return
+            self.say("all offsets together predict better: they stay as they were")
+            self.steps = [*steps, *(replace(s, stays=False) for s in self.steps[len(steps) :])]
+        self.rope = before
+        self.given, self.split, self.beside, self.left_out = kept
 
     def _first(self, rung: Rung, rope: Rope) -> Verdict | None:
         """What one step with the rung would improve."""
@@ -197,19 +198,23 @@ class Climb:
         """Note a rung that was tried, and take it where it stays."""
         first = self.rope is None
         stays = found is not None and (first or (told is not None and told.stays))
-        fitted, others = (np.inf, np.inf) if found is None else found.errors.typical
         if found is not None:
             self.tried.append(found)
             if stays:
                 self.rope = found
-        judged = {} if told is None else {"ratio": told.ratio, "better": told.better, "count": told.count}
-        EI = None if found is None else found.values[f"{NAME}_EI"]
-        step = Step(rung.name, fitted, others, stays, time.perf_counter() - began, EI=EI, **judged)  # type: ignore[arg-type]
-        self.steps.append(step)
-        self._tell(step)  # once it counts: who is told of a step may stop there
+        self._note(rung.name, found, told, stays, began)
         if stays and not first and self.rope is not None and self._leave_out(self.rope.errors.whole):
             # the better the model, the clearer what does not belong; the next rung has to beat a fit without it
             self.rope = self._judged(self._on(self.rope, self.longest))
+
+    def _note(self, name: str, found: Rope | None, told: Verdict | None, stays: bool, began: float) -> None:
+        """Add a step, once it counts: who is told of it may stop there."""
+        fitted, others = (np.inf, np.inf) if found is None else found.errors.typical
+        judged = {} if told is None else {"ratio": told.ratio, "better": told.better, "count": told.count}
+        EI = None if found is None else found.values[f"{NAME}_EI"]
+        step = Step(name, fitted, others, stays, time.perf_counter() - began, EI=EI, **judged)  # type: ignore[arg-type]
+        self.steps.append(step)
+        self._tell(step)
 
     def _tell(self, step: Step) -> None:
         if not np.isfinite(step.others):
@@ -286,7 +291,7 @@ class Climb:
         long ones at once. None where all diverge."""
         larger, parameters = self._with(rung, rope)
         if rung.small:
-            return self._long(rung, Rope(larger, parameters, rope.values), FEW)
+            return self._long(rung.name, Rope(larger, parameters, rope.values), FEW)
         ends = []
         for start in ({}, *rung.starts):
             shifted = {f"{NAME}_{k}": v for k, v in start.items() if k != "EI"}
@@ -296,14 +301,14 @@ class Climb:
                 ends.append(found)
         if not ends:
             return None
-        return self._long(rung, min(ends, key=lambda end: end[1])[0])
+        return self._long(rung.name, min(ends, key=lambda end: end[1])[0])
 
-    def _long(self, rung: Rung, rope: Rope, most: int = LONG) -> Rope | None:
+    def _long(self, name: str, rope: Rope, most: int = LONG) -> Rope | None:
         """Fitted to long windows, and judged; None where it diverges."""
         try:
             return self._judged(self._on(rope, self.longest, most))
         except SheetbendError as error:
-            self.say(f"{rung.name}: {error}")
+            self.say(f"{name}: {error}")
             return None
 
     def _on(self, rope: Rope, window: Span, most: int = LONG) -> Rope:

@@ -19,7 +19,7 @@ from ..minimum.problem import FitProblem
 from ..quantities.parameters import Parameter
 from ..quantities.wording import short
 from .bounds import bounded
-from .climb import FINE, Climb, Rope
+from .climb import FINE, Climb
 from .descent import bearable, descend, negligible
 from .ladder import TWIST, Rung
 from .model import NAME, RopeModel
@@ -28,6 +28,7 @@ from .offsets import offset_reach
 from .over_density import as_quantities
 from .pieces import experiments_of, problem_of, starting
 from .start import whole
+from .steps import Rope
 from .windows import Span, counted, places
 
 MOST = 30  # iterations, at most

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 from ..quantities.parameters import Parameter
 from .model import NAME, RopeModel
@@ -46,6 +46,23 @@ class Rung:
     def added_to(self, model: RopeModel) -> RopeModel:
         """The model with what the rung adds."""
         return replace(model, **dict(self.options), values={**model.values, **self.values})  # type: ignore[arg-type]
+
+    def taken_from(self, model: RopeModel) -> RopeModel:
+        """The model without what the rung adds."""
+        known = {f.name: f.default for f in fields(RopeModel)}
+        values = {k: v for k, v in model.values.items() if k not in self.values}
+        return replace(model, **{k: known[k] for k in self.options}, values=values)  # type: ignore[arg-type]
+
+    def within(self, model: RopeModel) -> bool:
+        """Whether the model has what the rung adds."""
+        return (
+            all(getattr(model, k) == v for k, v in self.options.items()) and self.values.keys() <= model.values.keys()
+        )
+
+    @property
+    def offsets(self) -> bool:
+        """Whether it tells how the rope is held and marked, not what the rope is."""
+        return self.small or self.beside
 
     def wanted(self, motion: GrippedMotion) -> tuple[Parameter, ...]:
         """What it adds to the fit of motions with these markers."""

@@ -23,7 +23,7 @@ from ..minimum.journal import journaled
 from ..objects.chain import unit_vector
 from ..recording.recording import Recording
 from .bounds import at_bounds
-from .climb import Climb, Say, Step
+from .climb import Climb, Say
 from .conclusion import announced, conclude
 from .judging import predict
 from .ladder import LADDER, Rung
@@ -33,6 +33,7 @@ from .over_density import UNIT, as_quantities, named_over_density, over_density,
 from .plausible import doubts, gravities
 from .screening import screened
 from .start import started
+from .steps import Step
 from .windows import SPANS, Span, everything
 
 BENDING_LENGTHS = (0.45, 0.25, 0.12)  # m, of the starts: (EI/(density g))^(1/3), stiff first

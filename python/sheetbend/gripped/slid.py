@@ -10,8 +10,9 @@ rests in these frames, its balance tells more (`rest`).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -45,10 +46,25 @@ def window_of(
         return model.experiment(motion, window)
     remembering = replace(model, slid_modes=MODES)
     first = float(motion.recording.times[0]) if window is None else window[0]
-    e, found = remembering.experiment(motion, window), slid(remembering, motion, first, values)
-    for name, value in found.items():
+    e = remembering.experiment(motion, window)
+    known, key = _known.setdefault(motion, {}), (first, _moves(remembering, e, values))
+    if key not in known:
+        known[key] = slid(remembering, motion, first, values)
+    for name, value in known[key].items():
         e.scene.quantities[name] = replace(e.scene.quantities[name], value=value)
     return e
+
+
+# Found once for each start and rope: a rung's first step and its fit begin where the last prediction was made.
+_known: WeakKeyDictionary[GrippedMotion, dict[Hashable, dict[str, float]]] = WeakKeyDictionary()
+
+
+def _moves(model: RopeModel, e: Experiment, values: Mapping[str, float]) -> Hashable:
+    """All that the motion of a model follows from. What a rung adds at zero changes nothing."""
+    quantities = ((name, values.get(name, q.value)) for name, q in e.scene.quantities.items())
+    made = (model.segments, model.substeps, model.iterations, model.smoothing, model.marker_mass, *model.gravity)
+    nominal = tuple(float(x) for direction in model.nominal for x in direction)
+    return made, nominal, frozenset((name, value) for name, value in quantities if value != 0.0)
 
 
 def slid(model: RopeModel, motion: GrippedMotion, first: float, values: Mapping[str, float]) -> dict[str, float]:
