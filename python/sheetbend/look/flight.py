@@ -18,10 +18,8 @@ from .text import joined, table
 Array = np.ndarray
 FEWEST = 9  # frames of a flight, and of a window in which it is looked for
 WIDTH = 0.04  # s of such a window, at least
-ALLOWED, SURE = (
-    0.1,
-    4.0,
-)  # of what gravity alone does in a window, and times the noise: how little a flight leaves of it
+ALLOWED = 0.1  # of what gravity alone does in a window: how little a flight leaves of it
+SURE = 4.0  # times the noise: the same
 TRIMMED = 2  # frames at an end of a flight that something else begins at: a touch moves the middle only later
 LONG = 0.1  # s, beyond which no more is allowed in a longer flight
 OFF = 0.7  # times the markers' mean distance from their middle: how far from there the center of mass may be
