@@ -201,7 +201,14 @@ def test_several_cloths_of_one_recording(tmp_path: Path) -> None:
     first, *named = tomllib.loads((tmp_path / "draft.toml").read_text())["scene"]["cloth"]
     cloths = {cloth["name"]: cloth for cloth in named}
     assert said["kind"] == "5 cloths" and list(cloths) == ["weft_cut", "bias_cut", "cloth_4", "cloth_5"]
-    assert first["mesh"]["width"] == approx(0.4, rel=0.03)  # the bars' markers are at its ends
+    assert first["mesh"]["width"] == approx(0.4, rel=4e-3)  # the bars' markers are at its ends
+    assert first["markers"]["left"][0] in (0.0, first["mesh"]["width"])
+    # without tension, as the lengths of the hammocks say: 2.5 % longer where it is stretched most
+    density = first["density"]
+    for cloth, stiffness in ((first, 100.0), (cloths["weft_cut"], 60.0)):  # N/m at 0.2 kg/m^2
+        spread = np.ptp([at[0] for name, at in cloth["markers"].items() if name not in ("left", "right")])
+        assert spread == approx(0.8 / 3.0, rel=4e-3)
+        assert cloth["warp"] / density == approx(stiffness / 0.2, rel=0.25)
     assert sorted(grip["markers"] for grip in first["grip"]) == [["left"], ["right"]]
     assert {grip["set"] for grip in cloths["weft_cut"]["grip"]} == {"left", "right"}
     assert {m.rstrip("0123456789") for n in ("cloth_4", "cloth_5") for m in cloths[n]["markers"]} == {"flap_"}

@@ -33,6 +33,7 @@ class Hold:
         moves: whether they move; a side at rest is pinned.
         beyond: m, from the outer row of markers to the side.
         own: whether these markers are the cloth's own.
+        along: m, where they are along the side, in the coordinates of the markers' places; of a holder.
     """
 
     side: str
@@ -41,6 +42,7 @@ class Hold:
     moves: bool
     beyond: float
     own: bool
+    along: tuple[float, ...] = ()
 
     def tables(self, names: Sequence[str], s: Seen) -> tuple[list[Any], list[Any], list[Any]]:
         """Sets that are pinned, sets, and grips of a cloth."""
@@ -103,10 +105,10 @@ def holds(s: Seen, own: Sequence[int], flat: Array, others: Sequence[int], sides
     found = []
     for side, near in by_side.items():
         row = [numbers[k] for k in row_of(flat, side, apart)]
-        markers = tuple(k for _, _, k in sorted(near))
+        along, _, markers = zip(*sorted(near), strict=True)
         beyond = max(0.0, float(np.mean([off for _, off, _ in near])))
         moves = motion(x[:, list(markers)]) >= QUIET * moved and not s.static
-        found.append(Hold(side, markers, _sags(x, row), moves, beyond, False))
+        found.append(Hold(side, markers, _sags(x, row), moves, beyond, False, along))
     for side in () if found else sides:
         row = [numbers[k] for k in row_of(flat, side, apart)]
         moves = not s.static and motion(x[:, row]) >= QUIET * moved
