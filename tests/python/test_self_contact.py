@@ -111,32 +111,53 @@ def test_a_rope_that_slides_on_another_tells_their_friction():
     assert pairs.sliding > 0.9
 
 
-def knotted() -> sb.Scene:
-    """An open overhand knot whose ends are drawn apart at 0.1 m/s."""
+def knotted(friction: float = 0.0, segments: int = 60) -> tuple[sb.Scene, np.ndarray, np.ndarray]:
+    """An open overhand knot, its two ends, and the directions away from each other there."""
     t = np.linspace(-2.15, 2.15, 1001)
     points = np.stack([t**3 - 3 * t, t**4 - 4 * t**2, 0.55 * (t**5 - 10 * t)], 1) * 0.02
     scene = sb.Scene("knot", gravity=(0, 0, 0))
     rope = sb.add_rope(
-        scene, points=points, segments=60, density=0.02, EA=100.0, EI=5e-6, stretch_damping=5e-3, bend_damping=5e-3,
-        drag_linear=0.05,
+        scene, points=points, segments=segments, density=0.02, EA=100.0, EI=5e-6, stretch_damping=5e-3,
+        bend_damping=5e-3, drag_linear=0.05,
     )  # fmt: skip
+    scene.self_contact(rope, radius=0.003, friction=friction)
     ends = rope.particles[[0, -1]]
     x = scene.nodes[ends]
-    away = (x - x.mean(0)) / np.linalg.norm(x - x.mean(0), axis=1)[:, None]
-    scene.drive(ends, [0.0, 3.0], np.stack([x, x + 0.3 * away]), "linear")
-    scene.self_contact(rope, radius=0.003)
-    return scene
+    return scene, ends, (x - x.mean(0)) / np.linalg.norm(x - x.mean(0), axis=1)[:, None]
 
 
-def test_a_knot_is_drawn_tight_and_nothing_passes_through():
-    scene = knotted()
+KNOT_SOLVER = sb.Solver(h=2e-3, method="implicit", integrator="bdf1")
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_a_knot_is_drawn_tight_and_held_and_nothing_passes_through(friction: float):
+    scene, ends, away = knotted(friction)
+    x = scene.nodes[ends]
+    drawn = x + 0.15 * away
+    scene.drive(ends, [0.0, 1.5, 2.0], np.stack([x, drawn, drawn]), "linear")
     edges = scene.contacts.pieces[0].edges
-    motion = sb.simulate(scene, np.linspace(0.0, 1.5, 376), sb.Solver(h=2e-3, method="implicit", integrator="bdf1"))
+    motion = sb.simulate(scene, np.linspace(0.0, 1.9, 476), KNOT_SOLVER)
     least = [nearest(x, edges) for x in motion.positions]
     assert min(least) > 0.95 * 0.006
     steps = np.linalg.norm(np.diff(motion.positions, axis=0), axis=2).max()
     assert 2 * steps < min(least)  # so that nothing passes unseen between frames
     assert least[-1] < 0.006 + 1e-4
+
+
+def test_a_tight_knot_holds_without_load_where_it_rubs_and_opens_where_it_is_smooth():
+    """Its ends are pulled with 4 mN, and then with less and less. What is in the loop shows whether it slips."""
+    opened = {}
+    for friction in (0.0, 0.2):
+        scene, ends, away = knotted(friction)
+        scene.add_force(ends, np.array([1.2e-3, 4e-3, 4e-3, 0.0, 0.0])[:, None, None] * away, [0.0, 2.0, 4.0, 6.0, 6.4])
+        motion = sb.simulate(scene, np.linspace(0.0, 6.4, 129), KNOT_SOLVER)
+        edges = scene.contacts.pieces[0].edges
+        assert min(nearest(x, edges) for x in motion.positions) > 0.95 * 0.006
+        apart = np.linalg.norm(motion.positions[:, ends[1]] - motion.positions[:, ends[0]], axis=1)
+        in_loop = scene.ropes["rope"].length - apart
+        opened[friction] = in_loop[-1] / in_loop[80] - 1.0
+    assert opened[0.0] > 0.5
+    assert opened[0.2] < 0.05
 
 
 def folded() -> sb.Scene:
