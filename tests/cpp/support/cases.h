@@ -508,10 +508,12 @@ inline Case case_of<TetrahedronStrain>() {
   return solid_case(tetrahedron_sample, tetrahedron_gradients);
 }
 
-// The same without the ratios of stiffness.
+// The same material, 1/(mu V) where strains have 1/(2 mu V), without the ratios of stiffness.
 inline Case neo_hookean_case(std::vector<double> x, std::vector<double> gradients) {
   const std::size_t count = gradients.size();
   Case row = solid_case(std::move(x), std::move(gradients));
+  row.compliance *= 2.0;
+  row.damping /= 2.0;
   row.p.resize(count);
   row.parameter_sign.resize(count);
   row.parameter_relabeling.resize(count);
