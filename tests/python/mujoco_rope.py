@@ -1,6 +1,8 @@
 """A rope of another simulator: rigid links and ball joints in MuJoCo, the upper end in a hand that moves in space.
 
-The links move in the frame of the hand, where its acceleration is a gravity and its velocity a wind.
+The uppermost joint turns in every direction. Only inertia and drag of the links keep the rope from spinning with a bend
+that goes round (docs/decisions/a-hand-holds-the-spin-of-a-rope.md). The links move in the frame of the hand, where its
+acceleration is a gravity and its velocity a wind.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ Array = np.ndarray
 LENGTH, DENSITY, EI, DAMPING, DRAG = 0.7, 0.05, 1e-3, 0.01, 0.01
 LINKS, RATE = 24, 100
 STEP = 4e-5  # s; with Runge-Kutta of order 4, stable where joints are damped so much
-THICK = 0.016  # m, of the spin of a link about its own axis, which a free end does not feel
+THICK = 0.016  # m, of the spin of a link about its own axis: little where a bend stays in a plane
 SWING, ANGULAR, EASE = np.array([0.06, 0.03, 0.03]), np.array([5.0, 3.3, 4.1]), 0.3  # m, rad/s, s
 
 

@@ -110,6 +110,7 @@ def test_a_spin_that_is_told_wrong_makes_the_damping_doubtful(true: bool, told: 
     found = fit["rod_bend_damping"]
     if true == told:
         assert found.verdict == "identified"
+        assert found.lower is not None and found.upper is not None
         assert found.lower < 0.03 < found.upper
     else:
         assert found.verdict == "doubtful"

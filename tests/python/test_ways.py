@@ -111,9 +111,9 @@ def test_a_policy_is_trained_in_forty_lines(folder: Path) -> None:
 def test_a_rope_of_mujoco_in_three_commands(folder: Path) -> None:
     """One marker in the hand, 0.5 mm of noise in each coordinate; new, fit, and a prediction of the next 3 s.
 
-    Measured: EI 0.4 % and drag 0.1 % off. The noise of the one marker in the hand shakes the model: the time constant
-    of the bending damping is 29 % too large, outside of its interval, and the prediction is off by 2.1 mm, of which the
-    markers' own noise is 0.87.
+    Measured: EI 1.0 %, drag 0.4 % and the time constant of the bending damping 8 % off, inside their intervals, and the
+    prediction by 1.65 mm, of which the markers' own noise is 0.87. The rest is noise of the hand's one marker. With
+    its exact motion the damping is 3 % off, and a prediction of 1.7 s by 0.91 mm.
     """
     pytest.importorskip("mujoco")
     import mujoco_rope as truth
@@ -129,14 +129,19 @@ def test_a_rope_of_mujoco_in_three_commands(folder: Path) -> None:
         done = run(*command)
         assert done.exit_code == 0, done.output
     fit = sb.FitResult.load("out/take/fit.json")
-    for name, true in {"rope_EI": truth.EI, "rope_drag_linear": truth.DRAG}.items():
+    for name, true in {
+        "rope_EI": truth.EI,
+        "rope_bend_damping": truth.DAMPING,
+        "rope_drag_linear": truth.DRAG,
+    }.items():
         assert fit[name].verdict == "identified", name
         assert fit[name].lower < true < fit[name].upper, name
-        assert fit[name].value == pytest.approx(true, rel=0.03), name
+        assert fit[name].value == pytest.approx(true, rel=0.12 if name == "rope_bend_damping" else 0.03), name
+    assert any("whether rope spins about its own axis" in words for words in fit.warnings)
     predicted = sb.Recording.load("out/predicted/predicted_take.npz").piece(3.4, 6.4)
     seen = sb.Recording.load("take.csv").select(predicted.markers).piece(3.4, 6.4)
     error = np.sqrt(np.mean(np.sum((predicted.positions - seen.positions) ** 2, axis=2)))
-    assert error < 2.6e-3
+    assert error < 1.9e-3
 
 
 @pytest.mark.slow
