@@ -55,6 +55,8 @@ AtRest every_kind() {
       }
     else if constexpr (std::same_as<K, Attachment>)
       group.stencil = {n, n + 1};
+    else if constexpr (std::same_as<K, BrickNeoHookean>)
+      group.stencil = {7, 4, 3, 9, 5, 10, 0, 2};  // in this order the first two columns of F are far from parallel
     else if constexpr (std::same_as<K, Shear>)
       for (int k = 0; k < n; ++k) group.stencil.insert(group.stencil.end(), {k, k + 1, normals + k, leaning + k});
     else if constexpr (K::points == 0)
