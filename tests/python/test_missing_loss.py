@@ -252,7 +252,7 @@ def test_corrected_driven_markers_do_not_hide_a_missing_loss() -> None:
 def test_its_simulation_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     e = fall(rope(drag_linear=0.005), drag_linear=0.005)
     with_it = fitted(e, "rope_EI").result
-    monkeypatch.setattr("sheetbend.fitting.fit.missing_loss", lambda *given: {})
+    monkeypatch.setattr("sheetbend.fitting.conclusion.missing_loss", lambda *given: {})
     without = fitted(e, "rope_EI").result
     assert with_it.judging == (without.judging[0] + 2, without.judging[1] + 1)  # of the given drag, and of all losses
     assert f"besides, for intervals and doubts: {with_it.judging[0]}, " in with_it.report()
