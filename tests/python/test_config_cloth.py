@@ -99,7 +99,11 @@ def run(*arguments: object) -> dict:
     return json.loads(result.stdout.splitlines()[-1])
 
 
-@pytest.mark.parametrize("options", [{}, {"yield_curvature": 20.0, "yield_share": 0.4}], ids=["", "yields"])
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"yield_curvature": 20.0, "yield_share": 0.4}, {"warp_size": 1.01, "weft_size": 0.99}],
+    ids=["", "yields", "sizes"],
+)
 def test_it_is_the_scene_of_add_cloth(folder: Path, options: dict[str, float]) -> None:
     keys = "".join(f"\n{key} = {value}" for key, value in options.items())
     (e,) = load(changed(folder, ("bending = 1e-3", f"bending = 1e-3{keys}"))).experiments
@@ -366,6 +370,13 @@ BAD = [
     ("bending = 1e-3", "bending = 1e-3\nyield_share = 0.3", "scene.cloth[0].yield_share", "give yield_curvature and"),
     ("bending = 1e-3", "yield_share = 0.3\nyield_curvature = 9.0", "scene.cloth[0].yield_curvature", "give bending"),
     ("bending = 1e-3", "bending = 1e-3\nyield_share = 1.0", "scene.cloth[0].yield_share", "less than 1"),
+    ("bending = 1e-3", "bending = 1e-3\nwarp_size = 1.3", "scene.cloth[0].warp_size", "at most 1.25"),
+    (
+        "bending = 1e-3",
+        'bending = 1e-3\nbending_model = "dihedral"\nwarp_size = 1.0',
+        "scene.cloth[0].warp_size",
+        "keep bending_model = 'curvature'",
+    ),
     ("y_axis = [0, 0, 2]", "y_axis = [1, 0, 2]", "scene.cloth[0].y_axis", "turn one of them"),
     ("y_axis = [0, 0, 2]", "y_axis = [0, 0, 0]", "scene.cloth[0].y_axis", "give a direction"),
     ('pinned = ["left"]', 'pinned = ["lift"]', "scene.cloth[0].pinned", "left"),

@@ -193,6 +193,13 @@ class Cloth(Section):
     yield_share: Finite | None = key(None, "the part of `bending` that slides", gt=0, lt=1)
     drag_linear: Finite | None = key(None, "linear air drag per area", "N s/m^3", gt=0)
     drag_quadratic: Finite | None = key(None, "quadratic air drag per area", "N s^2/m^4", gt=0)
+    warp_size: Finite | None = key(
+        None,
+        "size of the flat cloth along the warp over that of the mesh; 1.0 makes <name>_warp_size a quantity to fit",
+        ge=0.8,
+        le=1.25,
+    )
+    weft_size: Finite | None = key(None, "the same along the weft", ge=0.8, le=1.25)
     air_normal: Finite | None = key(
         None, "force of air along the normal of the triangles, air density * drag coefficient / 2", "kg/m^3", gt=0
     )

@@ -1,9 +1,9 @@
 """Whether a cloth is larger than its mesh says, along warp or weft.
 
-A cloth has no quantity for its size. But its masses, areas, and what its membrane and its bending take as the flat
-shape all follow from the material coordinates, so that the cloth made again from slightly longer coordinates tells what
-a larger size changes. Of a cloth that begins flat there are two such errors. Either its start is longer too, and what
-is pinned stands that much farther apart, or the start is as it was told, and the cloth in it is slack.
+A size that is fitted is not asked for. Masses, areas, and what a cloth's membrane and its bending take as the flat
+shape all follow from the material coordinates, so that the cloth made again from slightly longer coordinates tells
+what a larger size changes. Of a cloth that begins flat there are two such errors. Either its start is longer too, and
+what is pinned stands that much farther apart, or the start is as it was told, and the cloth in it is slack.
 """
 
 from __future__ import annotations
@@ -36,10 +36,13 @@ def cloth_sizes(problem: FitProblem, u: Array, i: int) -> list[Told]:
     theta, slots, _ = problem.known(u)
     values = dict(zip(e.scene.quantities, theta[slots[i]].tolist(), strict=True))
     added: dict[str, Input] = {}
+    free = {problem.parameters.roots[name][0] for name in problem.parameters.free}
     directions: list[tuple[str, Callable[[float], str], list[str]]] = []
     for name, cloth in e.scene.cloths.items():
         made, starts = list[str](), list[str]()
         for axis, along in enumerate(AXES):
+            if f"{name}_{along}_size" in free:
+                continue
             label = f"size of {name} along the {along}"
             of = {f"{label}: {array}": one for array, one in _larger(e.scene, cloth, values, axis).items()}
             start = {f"{label}: position": one for one in _longer_start(e.scene, cloth, axis)}
@@ -90,7 +93,7 @@ def _alone(cloth: Cloth, size: float, axis: int, still: tuple[int, ...]) -> Scen
     scale[axis] = size
     scene = Scene("cloth")
     longer = TriangleMesh(mesh.vertices, mesh.triangles, mesh.material * scale, dict(mesh.sets))
-    add_cloth(scene, longer, cloth.name, fabric=cloth.fabric, held=still, **cloth.numbers)
+    add_cloth(scene, longer, cloth.name, fabric=cloth.fabric, held=still, **cloth.numbers, **cloth.sizes)
     return scene
 
 

@@ -16,6 +16,7 @@ from ..mesh import TriangleMesh
 from ..quantities.quantities import Term
 from ..scene.scene import Array, Scene
 from .elastic_group import add_elastic_group
+from .flat_size import FlatSize
 from .hinges import Hinges
 from .laws import Law, Linear
 from .sheet_bending import SheetCurvature
@@ -33,6 +34,7 @@ class Cloth:
         particles: of its vertices.
         fabric: prefix of its fabric's quantities.
         numbers: of its fabric as given, those left out too.
+        sizes: `warp_size` and `weft_size` as given.
     """
 
     name: str
@@ -40,6 +42,7 @@ class Cloth:
     particles: Array
     fabric: str
     numbers: Mapping[str, Any]
+    sizes: Mapping[str, Any]
 
 
 def cloth(
@@ -88,13 +91,16 @@ def add_cloth(
     yield_share: float | None = None,
     drag_linear: float | None = None,
     drag_quadratic: float | None = None,
+    warp_size: float | None = None,
+    weft_size: float | None = None,
 ) -> Cloth:
     """Add a cloth to a scene.
 
     Quantities: `<fabric>_density` kg/m^2, `_warp`, `_weft`, `_shear` N/m, `_poisson`, the law's coefficients (see
     `sheetbend.laws`) such as `_warp_stiffening`, and where given `_bending`, `_bending_weft`,
     `_bending_twist` N m, `_membrane_damping` s,
-    `_bend_damping` s, `_yield_curvature` 1/m, `_yield_share`, `_drag_linear` N s/m^3, `_drag_quadratic` N s^2/m^4.
+    `_bend_damping` s, `_yield_curvature` 1/m, `_yield_share`, `_drag_linear` N s/m^3, `_drag_quadratic` N s^2/m^4;
+    and of this cut alone, where given, `<name>_warp_size` and `<name>_weft_size`.
 
     The membrane's energy per area is Y_warp f(E_uu)^2 + 2 n sqrt(Y_warp Y_weft) f(E_uu) f(E_vv) + Y_weft f(E_vv)^2,
     over 2 (1 - n^2), plus G f(2 E_uv)^2/2, in Green strain (core/constraints/membrane.h).
@@ -126,6 +132,10 @@ def add_cloth(
             left. Small motion shows all of it. A strip bent back and forth has a loop of 2 share bending
             yield_curvature in its moment per width (2HB of a KES test).
         drag_linear, drag_quadratic: air drag per area, isotropic.
+        warp_size, weft_size: size of the flat cloth along warp and weft over that of the mesh, between 0.8 and 1.25:
+            what it would be without tension, its area and its mass follow, and the numbers of the fabric stay. The
+            initial shape, places of markers on the mesh and angles at rest of `curved` are kept. Give 1.0 to fit what a
+            measurement leaves open. None = that of the mesh, and no quantity. Of the curvature model.
 
     Raises:
         SceneError: wrong or missing values, or others than those of a cut before; a mesh whose diagonals bias bending.
@@ -170,20 +180,20 @@ def add_cloth(
         free[indices(f"{name}.held", held, len(shape))] = False
 
     particles = scene.add_particles(shape, 0.0)
-    _weigh(scene, mesh, fabric, particles, density, drag_linear, drag_quadratic)
-    _membrane(
-        scene, mesh, name, fabric, particles, free, (warp, weft, shear, poisson), law or Linear(), membrane_damping
-    )
+    size = FlatSize.add(scene, mesh, name, warp_size, weft_size, None if bending is None else bending_model)
+    _weigh(scene, mesh, fabric, particles, density, drag_linear, drag_quadratic, size)
+    stiffness = (warp, weft, shear, poisson)
+    _membrane(scene, mesh, name, fabric, particles, free, stiffness, law or Linear(), membrane_damping, size)
     if bending is not None:
         if bending_model == "curvature":
             sheet = SheetCurvature(mesh, free)
             yields = None if yield_curvature is None or yield_share is None else (yield_curvature, yield_share)
             sheet.add(
-                scene, name, fabric, particles, bending, bending_weft, bending_twist, curved, bend_damping, yields
+                scene, name, fabric, particles, bending, bending_weft, bending_twist, curved, bend_damping, yields, size
             )
         else:
             Hinges(mesh, free).add(scene, name, fabric, particles, bending, bending_model, curved, bend_damping)
-    built = Cloth(name, mesh, particles, fabric, numbers)
+    built = Cloth(name, mesh, particles, fabric, numbers, {"warp_size": warp_size, "weft_size": weft_size})
     scene.cloths[name] = built
     return built
 
@@ -207,16 +217,17 @@ def _weigh(
     density: float,
     linear: float | None,
     quadratic: float | None,
+    size: FlatSize,
 ) -> None:
     """Masses and drag: every vertex has a third of its triangles."""
     share = np.bincount(mesh.triangles.ravel(), np.repeat(mesh.areas / 3.0, 3), len(mesh.vertices))
     scene.add_quantity(f"{fabric}_density", density, "kg/m^2", shared=True)
-    scene.add_terms([Term("mass", particles, share, ((f"{fabric}_density", "identity"),))])
+    scene.add_terms([Term("mass", particles, share, ((f"{fabric}_density", "identity"), *size.power(1, 1)))])
     for kind, value, unit in (("linear", linear, "N s/m^3"), ("quadratic", quadratic, "N s^2/m^4")):
         if value is not None:
             scene.has_drag = True
             quantity = scene.add_quantity(f"{fabric}_drag_{kind}", value, unit, shared=True)
-            scene.add_terms([Term(f"drag_{kind}", particles, share, ((quantity, "identity"),))])
+            scene.add_terms([Term(f"drag_{kind}", particles, share, ((quantity, "identity"), *size.power(1, 1)))])
 
 
 def _membrane(
@@ -229,6 +240,7 @@ def _membrane(
     stiffness: tuple[float, float | None, float, float],
     law: Law,
     damping: float | None,
+    size: FlatSize,
 ) -> None:
     warp, weft, shear, poisson = stiffness
     kept = np.flatnonzero(free[mesh.triangles].any(axis=1))
@@ -248,7 +260,9 @@ def _membrane(
         scale=areas,
         stiffness=(f"{fabric}_warp", warp, "N/m"),
         damping=(f"{fabric}_membrane_damping", damping),
+        size=size,
     )
+    size.strains(scene, f"{name}_membrane", values)
     terms = []
     over_warp = (f"{fabric}_warp", "inverse_sqrt")
     for place, label, value in ((5, "weft", weft), (6, "shear", shear)):

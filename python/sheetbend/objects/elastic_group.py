@@ -7,6 +7,7 @@ import numpy as np
 from ..quantities.quantities import Term
 from ..scene.scene import Array, Scene
 from .chain import first_value
+from .flat_size import AS_MESH, FlatSize
 
 
 def add_elastic_group(
@@ -19,6 +20,7 @@ def add_elastic_group(
     scale: Array,
     stiffness: tuple[str, float, str],
     damping: tuple[str, float | None],
+    size: FlatSize = AS_MESH,
 ) -> Array:
     """Add constraints of compliance 1/(scale stiffness), damped by stiffness times a Kelvin-Voigt time constant.
 
@@ -29,6 +31,7 @@ def add_elastic_group(
         scale: (count,) what the stiffness counts in each, such as areas.
         stiffness: name, value and unit of its quantity, which groups of equal value share.
         damping: name and value, s, of the time constant's, likewise; None = undamped.
+        size: of the flat cloth, with whose area the scale grows.
 
     Returns:
         (count,) where each constraint's own parameters start in the input array "rest".
@@ -47,9 +50,10 @@ def add_elastic_group(
     group, first, _ = scene.group(name)
     at = first + np.arange(count)
     scene.add_quantity(quantity, value, unit, shared=True)
-    scene.add_terms([Term("compliance", at, 1.0 / scale, ((quantity, "inverse"),))])
+    scene.add_terms([Term("compliance", at, 1.0 / scale, ((quantity, "inverse"), *size.power(-1, -1)))])
     if constant is not None:
         scene.add_quantity(label, constant, "s", shared=True)
-        scene.add_terms([Term("damping", at, scale, ((label, "identity"), (quantity, "identity")))])
+        factors = ((label, "identity"), (quantity, "identity"), *size.power(1, 1))
+        scene.add_terms([Term("damping", at, scale, factors)])
     values: Array = first_value(scene, name) + group.rest.shape[1] * np.arange(count)
     return values

@@ -12,6 +12,7 @@ from ..mesh import TriangleMesh
 from ..quantities.quantities import Term
 from ..scene.scene import Array, Scene
 from .elastic_group import add_elastic_group
+from .flat_size import AS_MESH, FlatSize
 from .hinges import rest_angles
 
 IRREGULAR = 0.2  # share of inner vertices without six neighbors above which a user is told
@@ -30,6 +31,7 @@ class SheetCurvature:
 
     Attributes:
         stencils: (count, 6) vertices: the triangle's, then those opposite across its edges v0v1, v1v2, v2v0.
+        corners: (count, 3, 2) m, of the triangle in material coordinates.
         matrix: (count, 3, 3) 1/m: kappa_uu, kappa_vv and kappa_uv from the three angles.
         area: (count,) m^2.
         angles: (count, 3) rad, of the mesh's shape in space.
@@ -53,6 +55,7 @@ class SheetCurvature:
         stencils = np.column_stack([mesh.triangles[full], across])
         kept = free[stencils].any(axis=1)
         self.stencils, self.area = stencils[kept], area[kept]
+        self.corners = corners[kept]
         self.matrix = _curvature_matrix(corners, _unfolded(mesh, hinge, side, corners))[kept]
         self.angles = rest_angles(mesh, mesh.hinges)[hinge][kept]
 
@@ -68,12 +71,14 @@ class SheetCurvature:
         curved: bool,
         damping: float | None,
         yields: tuple[float, float] | None,
+        size: FlatSize = AS_MESH,
     ) -> None:
         """Add them to a scene as the group `<name>_bend`, with the quantities `<fabric>_bending`, where given
         `_bending_weft`, `_bending_twist`, N m, and of what yields `<fabric>_yield_curvature`, 1/m, and `_yield_share`.
 
         Args:
             yields: the yield curvature and the share; each triangle then has a set, a hidden node, zero at first.
+            size: of the flat cloth; angles at rest are kept.
         """
         irregular = _irregular(self.mesh)
         if irregular > IRREGULAR:
@@ -103,7 +108,9 @@ class SheetCurvature:
             scale=self.area,
             stiffness=(bending, rigidity, "N m"),
             damping=(f"{fabric}_bend_damping", damping),
+            size=size,
         )
+        size.curvatures(scene, f"{name}_bend", values, self.corners)
         for place, value, label, factor in ratios:
             if value is not None:
                 scene.add_quantity(label, value, "N m", shared=True)
