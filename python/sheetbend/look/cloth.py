@@ -24,6 +24,7 @@ WARP, SHEAR = 500.0, 100.0  # N/m per kg/m^2, to start from
 ASKEW = 0.15  # slope at which a cloth hangs that a wind blows on
 AIR = 0.7  # kg/m^3, of a plate across the wind: half the density of air times a drag coefficient of 1.2
 SUBSTEP = 1 / 250  # s, at most
+SIZE = 0.01  # standard deviation of the flat size that markers on a stretched cloth show, relative
 FITTED, LONGEST = 2 / 3, 3.0  # share of the time that is fitted, and s at most
 
 
@@ -153,6 +154,10 @@ def _unknown(s: Seen, sheets: Sequence[Sheet], measured: Measured) -> list[str]:
     )
     if windy:
         said.append(
+            "how much the cloth is stretched: its flat size along warp and weft is fitted beside the tension, with a "
+            "prior of 1 % about what the markers show. Give the sd of your own measurement where you have one"
+        )
+        said.append(
             "the stiffness in tension at the start: warp and shear begin at a guess, and the wind's pull shows them"
         )
     elif any(sheet.slung for sheet in sheets):
@@ -261,6 +266,7 @@ def _cloth(s: Seen, sheet: Sheet, density: float) -> list[str]:
     cloth |= {"bending": 1e-4 * density, "membrane_damping": 5e-3, "bend_damping": 2e-2}
     if not s.static:  # air resists motion across a cloth far more than along it; drag of its particles is alike in both
         cloth |= {"air_normal": AIR, "air_tangential": 0.02}
+    cloth |= dict.fromkeys(_sizes(sheet), 1.0)
     cloth |= {"origin": sheet.origin.tolist(), "x_axis": sheet.axes[0].tolist(), "y_axis": sheet.axes[1].tolist()}
     cloth["shape"] = "recording" if s.recording.mask[0, sheet.own].all() or s.static else None
     pinned, sets, grips = (
@@ -308,7 +314,14 @@ def _parameters(sheet: Sheet, density: float, static: bool) -> list[str]:
     lines = []
     for name, (lower, upper) in found.items():
         lines += table(f"[parameters.{sheet.name}_{name}]", {"lower": lower, "upper": upper})
+    for size in _sizes(sheet):
+        lines += table(f"[parameters.{sheet.name}_{size}]", {"prior": [1.0, SIZE]}, {"prior": "mean and sd"})
     return lines
+
+
+def _sizes(sheet: Sheet) -> tuple[str, ...]:
+    """Of the flat fabric, those that its tension depends on: of what the markers show it is stretched there."""
+    return ("warp_size", "weft_size") if sheet.wind is not None else ("warp_size",) if sheet.slung else ()
 
 
 def _recording(take: Take) -> dict[str, Any]:
