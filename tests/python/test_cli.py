@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -131,6 +132,24 @@ class TestFit:
         for other in (again, resumed):
             assert other["iterations"] <= 1
             assert other["cost"] == pytest.approx(first["cost"], rel=1e-9)
+
+    def test_a_simulation_of_a_fitted_configuration_is_what_the_fit_predicts(self, config: Path) -> None:
+        """On the mesh of the configuration, which values at the limit of fine meshes do not explain."""
+        recorded(Path(), 24)
+        whole = sb.Recording.load("swing.npz")
+        whole.select(whole.markers[::4]).save("swing.npz")
+        edited(config, "segments = 24", "segments = 6")
+        edited(config, "double_segments = false", "double_segments = true\nlinear_refits = true")
+        arcs = "\n".join(f"{marker} = {k / 40}" for k, marker in enumerate(whole.markers) if k % 4 == 0)
+        edited(config, "pinned = [0]\n", f"pinned = [0]\n[scene.rope.markers]\n{arcs}\n")
+        found = last_line(run("fit", config, "--json"))
+        starts = tomllib.loads(Path("out/swing/fitted.toml").read_text())["parameters"]
+        assert abs(starts["rope_EI"]["initial"] / found["parameters"]["rope_EI"]["value"] - 1.0) > 1e-3
+        assert run("simulate", "out/swing/fitted.toml", "--output", "simulated").exit_code == 0
+        fitted, simulated = (
+            sb.Recording.load(f"{folder}/predicted_swing.npz").positions for folder in ("out/swing", "simulated")
+        )
+        assert np.abs(simulated[: len(fitted)] - fitted).max() < 1e-9
 
     def test_private_parameters_start_from_a_fit_too(self, config: Path) -> None:
         edited(config, "[parameters.rope_bend_damping]", "[parameters.rope_bend_damping]\nprivate = true")

@@ -258,7 +258,9 @@ def _write(found: Fit, study: Study, source: Path, form: str, page: bool, folder
     found.save(folder / "fit.json")
     write_text(folder / "report.txt", plain(found.result))
     write_text(folder / TABLE, parameter_table(found.result))
-    write(with_values(study.config, found.values), folder / "fitted.toml", study.folder)
+    # a simulation of it runs on the mesh of the fit, where only these values predict what the report says
+    on_mesh = with_values(study.config, {**found.values, **found.on_mesh})
+    write(on_mesh, folder / "fitted.toml", study.folder)
     pages = write_fit_page(found, study.config, source, folder) if page else []
     markers = [
         file for c in found.comparisons for file in save_predicted(c.recording, c.simulated, c.experiment.name, folder)
