@@ -9,7 +9,7 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   # Sanitizers need minutes per instruction set: there is one.
   if(NOT SHEETBEND_SANITIZE AND NOT SHEETBEND_PORTABLE_KERNELS)
     list(APPEND variants v3 v4)
-    set_source_files_properties(core/packs/choose.cpp core/blocks/unsymmetric_kernel.cpp PROPERTIES COMPILE_DEFINITIONS SHEETBEND_X86_KERNELS)
+    set_source_files_properties(core/packs/choose.cpp PROPERTIES COMPILE_DEFINITIONS SHEETBEND_X86_KERNELS)
   endif()
 endif()
 

@@ -13,6 +13,7 @@
 extern "C" const sheetbend_blocks::Table SHEETBEND_JOIN(sheetbend_blocks_, SHEETBEND_VARIANT);
 extern "C" const sheetbend_blocks::PotentialKernels SHEETBEND_JOIN(sheetbend_potential_, SHEETBEND_VARIANT);
 extern "C" const sheetbend_points::Table SHEETBEND_JOIN(sheetbend_points_, SHEETBEND_VARIANT);
+extern "C" sheetbend_blocks::FactorUnsymmetric SHEETBEND_JOIN(sheetbend_factor_unsymmetric_, SHEETBEND_VARIANT);
 
 namespace {
 
@@ -20,9 +21,12 @@ constexpr auto kinds = []<class... K>(std::tuple<K...>*) {
   return std::array{&sheetbend::PackKernels<K>::all...};
 }(static_cast<sheetbend::Registry*>(nullptr));
 
-constexpr sheetbend_packs::KernelTable kernels{
-    SHEETBEND_VARIANT_NAME, kinds.data(), &SHEETBEND_JOIN(sheetbend_blocks_, SHEETBEND_VARIANT),
-    &SHEETBEND_JOIN(sheetbend_potential_, SHEETBEND_VARIANT), &SHEETBEND_JOIN(sheetbend_points_, SHEETBEND_VARIANT)};
+constexpr sheetbend_packs::KernelTable kernels{SHEETBEND_VARIANT_NAME,
+                                               kinds.data(),
+                                               &SHEETBEND_JOIN(sheetbend_blocks_, SHEETBEND_VARIANT),
+                                               &SHEETBEND_JOIN(sheetbend_potential_, SHEETBEND_VARIANT),
+                                               &SHEETBEND_JOIN(sheetbend_points_, SHEETBEND_VARIANT),
+                                               &SHEETBEND_JOIN(sheetbend_factor_unsymmetric_, SHEETBEND_VARIANT)};
 
 }  // namespace
 

@@ -5,6 +5,11 @@
 namespace sheetbend_blocks {
 struct Table;             // kernels of direct blocks, see core/blocks/kernels.h
 struct PotentialKernels;  // of implicit ones, see core/blocks/potential_kernels.h
+struct Supernodes;        // see core/blocks/supernodes.h
+
+// UnsymmetricSupernodalFactor::factorize, see core/blocks/unsymmetric_supernodes.h
+using FactorUnsymmetric = bool(const Supernodes&, double* lower, double* upper, double* inverse, int* from,
+                               double* work, int* place);
 }  // namespace sheetbend_blocks
 namespace sheetbend_points {
 struct Table;  // of what a substep does point by point, see core/points/kernels.h
@@ -75,6 +80,7 @@ struct KernelTable {
   const sheetbend_blocks::Table* blocks;
   const sheetbend_blocks::PotentialKernels* potential;
   const sheetbend_points::Table* points;
+  sheetbend_blocks::FactorUnsymmetric* factor_unsymmetric;  // of implicit blocks with sliding contacts
 };
 
 }  // namespace sheetbend_packs

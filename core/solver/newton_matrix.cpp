@@ -238,7 +238,7 @@ bool NewtonMatrix::factorize_unsymmetric(const Scene& scene, const DirectBlock& 
       for (int a = 0; a < 9; ++a) M[a] = pair.matrix[12 * (3 * k + a / 3) + 3 * l + a % 3];
       lu_.add(pattern.structure, pattern.dof_of[p], pattern.dof_of[q], weight, M);
     });
-  return lu_.factorize(pattern.structure, unsymmetric_kernel(pack_kernels()));
+  return lu_.factorize(pattern.structure, pack_kernels().factor_unsymmetric);
 }
 
 double NewtonMatrix::factorize_convex_enough(const Scene& scene, const DirectBlock& block) {

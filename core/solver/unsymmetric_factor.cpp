@@ -48,7 +48,7 @@ void UnsymmetricFactor::add(const FactorStructure& s, int row, int column, doubl
     for (int b = 0; b < 3; ++b) to[above ? b + a * length : a + b * length] += scale * block[3 * a + b];
 }
 
-bool UnsymmetricFactor::factorize(const FactorStructure& s, FactorUnsymmetric compiled) {
+bool UnsymmetricFactor::factorize(const FactorStructure& s, sheetbend_blocks::FactorUnsymmetric* compiled) {
   const auto nodes = s.supernodes();
   if (compiled)
     return compiled(nodes, lower_.data(), upper_.data(), inverse_.data(), from_.data(), work_.data(), place_.data());

@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "core/blocks/unsymmetric_kernel.h"
 #include "core/blocks/unsymmetric_supernodes.h"
+#include "core/packs/kernels.h"
 #include "core/solver/symmetric_factor.h"
 
 namespace sheetbend {
@@ -21,7 +21,7 @@ class UnsymmetricFactor {
   // Adds scale times a block (3, 3), row by row, to that of the rows and the columns of two particles, which begin at `row` and `column`.
   void add(const FactorStructure& s, int row, int column, double scale, const double* block);
   // Says whether every pivot has an inverse. `compiled` for this machine's instruction set where it is given, otherwise here.
-  bool factorize(const FactorStructure& s, FactorUnsymmetric compiled = nullptr);
+  bool factorize(const FactorStructure& s, sheetbend_blocks::FactorUnsymmetric* compiled = nullptr);
 
   // b = A^-1 b or b = A^-T b; b may be over a larger scalar.
   template <class U>

@@ -180,7 +180,7 @@ TEST_P(UnsymmetricFactorOf, HasTheSameBitsOnEveryInstructionSet) {
   for (const auto* kernels : available_kernels()) {
     Case c(particles, pairs(particles), 8);
     c.turn(0, 0.0);
-    ASSERT_TRUE(c.factor.factorize(c.structure, unsymmetric_kernel(*kernels)));
+    ASSERT_TRUE(c.factor.factorize(c.structure, kernels->factor_unsymmetric));
     solutions.push_back(std::vector<double>(c.structure.size(), 1.0));
     c.factor.solve(c.structure, solutions.back().data());
     EXPECT_TRUE(same_bits(solutions.back(), solutions.front())) << kernels->name;
