@@ -41,72 +41,28 @@ Sample bodies_on_a_sheet(double mu) {
   return b.build(g);
 }
 
-// Where the spots are at the end of a substep of a rollout.
-std::vector<double> places(const Rollout<double>& rollout, const Scene& scene, const std::vector<double>& inputs) {
-  const SelfContact& s = scene.self_contact;
-  const Inputs<const double> in{scene.layout, inputs.data()};
-  const Spots<double> spots(s, [&](std::size_t i) { return in.of(Quantity::contact_weight)[i]; });
-  std::vector<double> x(3 * s.spots());
-  for (int n = 0; n < s.spots(); ++n)
-    spots.at(n, [&](int node) { return Vec3<double>(rollout.x() + 3 * node); }).store(&x[3 * n]);
-  return x;
-}
-
-// Pairs that touch there.
-std::vector<PairKey> touching(const Rollout<double>& rollout, const Scene& scene, const std::vector<double>& inputs) {
-  const SelfContact& s = scene.self_contact;
-  const Inputs<const double> in{scene.layout, inputs.data()};
-  const std::vector<double> x = places(rollout, scene, inputs);
-  std::vector<double> radius(s.spots(), 0.0), reach(s.spots(), 0.0);
-  for (int n = 0; n < s.spots(); ++n)
-    if (s.radius[n] >= 0) radius[n] = in.of(Quantity::contact_radius)[s.radius[n]];
-  return find_pairs(s, {x.data(), 3, radius.data(), reach.data()});
-}
-
-struct Case {
-  Sample (*make)(double);
-  Integrator integrator;
-  int steps;
-  double friction = 0.0;
-};
-
-class BodyPairs : public ::testing::TestWithParam<Case> {
- protected:
-  const Sample s = GetParam().make(GetParam().friction);
-  const int counted = GetParam().friction > 0.0 ? 3 * s.scene.self_contact.carried[0][0] : s.scene.dofs();
-  const Program p{s.scene, make_plan(s.scene, contact_options(1e-3, GetParam().integrator)), GetParam().steps, 0.0,
-                  counted};
-};
+using BodyPairs = TouchingTest;
 
 TEST_P(BodyPairs, BeginAndEnd) {
-  Rollout<double> rollout(s.scene, p.plan, s.inputs.data());
-  int began = 0, ended = 0, points = 0, between_bodies = 0, of_held = 0;
-  std::vector<PairKey> before;
-  std::size_t matrices = 0;
+  int points = 0, between_bodies = 0, of_held = 0;
   const SelfContact& own = s.scene.self_contact;
-  for (int n = 0; n < p.steps; ++n) {
-    rollout.advance();
-    matrices += rollout.balance()[0].size();
-    const auto now = touching(rollout, s.scene, s.inputs);
+  const Course course = run([&](const Rollout<double>&, const std::vector<PairKey>& now) {
     for (const PairKey& key : now) {
       const auto spots = spots_of(own, key);
       const int first = spots[0], second = spots[key.triangle ? 1 : 2];
       EXPECT_NE(own.whole(first), own.whole(second));
-      began += !std::ranges::binary_search(before, key);
       points += key.triangle && first >= own.nodes;
       between_bodies += first >= own.nodes && second >= own.nodes;
       for (const int spot : {first, second}) of_held += s.scene.role[own.whole(spot)] == Role::pinned;
     }
-    for (const PairKey& key : before) ended += !std::ranges::binary_search(now, key);
-    before = now;
-  }
+  });
   const bool cloth = !own.triangles.empty();
-  EXPECT_GT(began, 1);
-  EXPECT_GT(ended, 1);
+  EXPECT_GT(course.began, 1);
+  EXPECT_GT(course.ended, 1);
   EXPECT_GE(points, cloth ? 3 : 0);
   EXPECT_GE(between_bodies, 3);
   EXPECT_GE(of_held, cloth ? 0 : 3);
-  EXPECT_LE(static_cast<double>(matrices) / p.steps, 12.0);
+  EXPECT_LE(static_cast<double>(course.matrices) / p.steps, 12.0);
 }
 
 TEST_P(BodyPairs, HaveTheGradientOfComplexSteps) {
@@ -135,11 +91,11 @@ TEST_P(BodyPairs, HaveTheSameBitsWhateverKeepsTheirStates) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Bodies, BodyPairs,
-                         ::testing::Values(Case{bar_on_a_rope, Integrator::bdf1, 60},
-                                           Case{bar_on_a_rope, Integrator::bdf2, 60},
-                                           Case{bodies_on_a_sheet, Integrator::bdf1, 50},
-                                           Case{bar_on_a_rope, Integrator::bdf2, 60, 0.2},
-                                           Case{bodies_on_a_sheet, Integrator::bdf1, 50, 0.3}));
+                         ::testing::Values(TouchingCase{bar_on_a_rope, Integrator::bdf1, 60},
+                                           TouchingCase{bar_on_a_rope, Integrator::bdf2, 60},
+                                           TouchingCase{bodies_on_a_sheet, Integrator::bdf1, 50},
+                                           TouchingCase{bar_on_a_rope, Integrator::bdf2, 60, 0.2},
+                                           TouchingCase{bodies_on_a_sheet, Integrator::bdf1, 50, 0.3}));
 
 // A bar and a rope meet in flight: forces leave momentum as it is, and the moment of all forces is zero, axes counted as the nodes that they are.
 TEST(BarInFlight, KeepsMomentum) {
@@ -215,7 +171,7 @@ TEST(BarInFlight, PassesNothingHoweverFast) {
     for (int n = 0; n < static_cast<int>(3 + 40.0 / speed) + 15; ++n) {
       rollout.advance();
       touched = touched || !touching(rollout, s.scene, s.inputs).empty();
-      const std::vector<double> x = places(rollout, s.scene, s.inputs);
+      const std::vector<double> x = spot_places(rollout, s.scene, s.inputs);
       const int last = static_cast<int>(s.scene.self_contact.edges.size()) - 1;  // the bar
       for (int link = 0; link < last; ++link) {
         double at[12];

@@ -35,54 +35,22 @@ Sample falling_sheet(double mu) {
   return b.build(g);
 }
 
-// Pairs that touch at the end of a substep of a rollout.
-std::vector<PairKey> touching(const Rollout<double>& rollout, const Scene& scene, const std::vector<double>& inputs) {
-  std::vector<double> radius(scene.nodes(), 0.0), reach(scene.nodes(), 0.0);
-  for (int n = 0; n < scene.nodes(); ++n)
-    if (scene.self_contact.radius[n] >= 0)
-      radius[n] = inputs[scene.layout.of(Quantity::contact_radius) + scene.self_contact.radius[n]];
-  return find_pairs(scene.self_contact, {rollout.x(), 3, radius.data(), reach.data()});
-}
-
-struct Case {
-  Sample (*make)(double);
-  Integrator integrator;
-  int steps;
-  double friction = 0.0;
-};
-
-class Touching : public ::testing::TestWithParam<Case> {
- protected:
-  const Sample s = GetParam().make(GetParam().friction);
-  // Keys and forces that pairs carry are coordinates too, but are not counted: beside squares of numbers of edges a loss has no digits left for differences.
-  const int counted = GetParam().friction > 0.0 ? 3 * s.scene.self_contact.carried[0][0] : s.scene.dofs();
-  const Program p{s.scene, make_plan(s.scene, contact_options(1e-3, GetParam().integrator)), GetParam().steps, 0.0,
-                  counted};
-};
+using Touching = TouchingTest;
 
 TEST_P(Touching, BeginsAndEnds) {
-  Rollout<double> rollout(s.scene, p.plan, s.inputs.data());
-  int began = 0, ended = 0, points = 0, slid = 0, stuck = 0;
-  std::vector<PairKey> before;
-  std::size_t matrices = 0;
-  for (int n = 0; n < p.steps; ++n) {
-    rollout.advance();
-    matrices += rollout.balance()[0].size();
-    const auto now = touching(rollout, s.scene, s.inputs);
-    for (const PairKey& key : now) began += !std::ranges::binary_search(before, key);
-    for (const PairKey& key : before) ended += !std::ranges::binary_search(now, key);
+  int points = 0, slid = 0, stuck = 0;
+  const Course course = run([&](const Rollout<double>& rollout, const std::vector<PairKey>& now) {
     for (const PairKey& key : now) points += key.triangle;
     for (const auto& [code, force] : s.scene.self_contact.carried)
       if (const double kind = rollout.x()[3 * code]; is_coded(kind)) (slides_of(kind) ? slid : stuck) += 1;
-    before = now;
-  }
+  });
   const bool rubs = GetParam().friction > 0.0, cloth = !s.scene.self_contact.triangles.empty();
-  EXPECT_GT(began, rubs && !cloth ? 4 : 5);  // ropes that rub stay on each other for longer
-  EXPECT_GT(ended, 4);
+  EXPECT_GT(course.began, rubs && !cloth ? 4 : 5);  // ropes that rub stay on each other for longer
+  EXPECT_GT(course.ended, 4);
   EXPECT_GT(slid, rubs ? 20 : -1);
   EXPECT_GT(stuck, rubs ? (cloth ? 5 : 0) : -1);
   EXPECT_GE(points, cloth ? 5 : 0);
-  EXPECT_LE(static_cast<double>(matrices) / p.steps, rubs && cloth ? 12.0 : 8.0);
+  EXPECT_LE(static_cast<double>(course.matrices) / p.steps, rubs && cloth ? 12.0 : 8.0);
 }
 
 TEST_P(Touching, HasTheGradientOfComplexSteps) {
@@ -133,11 +101,11 @@ TEST_P(Touching, HasTheSameBitsWhateverKeepsItsStates) {
 }
 
 INSTANTIATE_TEST_SUITE_P(SelfContact, Touching,
-                         ::testing::Values(Case{falling_ropes, Integrator::bdf2, 60},
-                                           Case{falling_sheet, Integrator::bdf1, 40},
-                                           Case{falling_ropes, Integrator::bdf1, 60, 0.2},
-                                           Case{falling_ropes, Integrator::bdf2, 60, 0.2},
-                                           Case{falling_sheet, Integrator::bdf2, 40, 0.3}));
+                         ::testing::Values(TouchingCase{falling_ropes, Integrator::bdf2, 60},
+                                           TouchingCase{falling_sheet, Integrator::bdf1, 40},
+                                           TouchingCase{falling_ropes, Integrator::bdf1, 60, 0.2},
+                                           TouchingCase{falling_ropes, Integrator::bdf2, 60, 0.2},
+                                           TouchingCase{falling_sheet, Integrator::bdf2, 40, 0.3}));
 
 // A short rope lies across one that is held, on a slope of 30 degrees (tan: 0.57735).
 Sample on_a_slope(double mu) {

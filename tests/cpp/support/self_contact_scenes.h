@@ -104,4 +104,67 @@ inline std::vector<Vec3<double>> line(const Vec3<double>& from, const Vec3<doubl
   return at;
 }
 
+// Where the spots are at the end of a substep of a rollout.
+inline std::vector<double> spot_places(const Rollout<double>& rollout, const Scene& scene,
+                                       const std::vector<double>& inputs) {
+  const SelfContact& s = scene.self_contact;
+  const Inputs<const double> in{scene.layout, inputs.data()};
+  const Spots<double> spots(s, [&](std::size_t i) { return in.of(Quantity::contact_weight)[i]; });
+  std::vector<double> x(3 * s.spots());
+  for (int n = 0; n < s.spots(); ++n)
+    spots.at(n, [&](int node) { return Vec3<double>(rollout.x() + 3 * node); }).store(&x[3 * n]);
+  return x;
+}
+
+// Pairs that touch there.
+inline std::vector<PairKey> touching(const Rollout<double>& rollout, const Scene& scene,
+                                     const std::vector<double>& inputs) {
+  const SelfContact& s = scene.self_contact;
+  const Inputs<const double> in{scene.layout, inputs.data()};
+  const std::vector<double> x = spot_places(rollout, scene, inputs);
+  std::vector<double> radius(s.spots(), 0.0), reach(s.spots(), 0.0);
+  for (int n = 0; n < s.spots(); ++n)
+    if (s.radius[n] >= 0) radius[n] = in.of(Quantity::contact_radius)[s.radius[n]];
+  return find_pairs(s, {x.data(), 3, radius.data(), reach.data()});
+}
+
+struct TouchingCase {
+  Sample (*make)(double friction);
+  Integrator integrator;
+  int steps;
+  double friction = 0.0;
+};
+
+// Steps of a scene whose pieces touch.
+class TouchingTest : public ::testing::TestWithParam<TouchingCase> {
+ protected:
+  const Sample s = GetParam().make(GetParam().friction);
+  // Keys and forces that pairs carry are coordinates too, but are not counted: beside squares of numbers of edges a loss has no digits left for differences.
+  const int counted = GetParam().friction > 0.0 ? 3 * s.scene.self_contact.carried[0][0] : s.scene.dofs();
+  const Program p{s.scene, make_plan(s.scene, contact_options(1e-3, GetParam().integrator)), GetParam().steps, 0.0,
+                  counted};
+
+  // Calls visit(rollout, now) after each substep, with the pairs that touch there. Returns how many begin, how many end, and Newton matrices in all.
+  struct Course {
+    int began = 0, ended = 0;
+    std::size_t matrices = 0;
+  };
+  template <class F>
+  Course run(F&& visit) const {
+    Rollout<double> rollout(s.scene, p.plan, s.inputs.data());
+    Course course;
+    std::vector<PairKey> before;
+    for (int n = 0; n < p.steps; ++n) {
+      rollout.advance();
+      course.matrices += rollout.balance()[0].size();
+      const auto now = touching(rollout, s.scene, s.inputs);
+      for (const PairKey& key : now) course.began += !std::ranges::binary_search(before, key);
+      for (const PairKey& key : before) course.ended += !std::ranges::binary_search(now, key);
+      visit(rollout, now);
+      before = now;
+    }
+    return course;
+  }
+};
+
 }  // namespace sheetbend::testing
