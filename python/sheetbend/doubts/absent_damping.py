@@ -6,7 +6,6 @@ was recorded at these intervals may show.
 
 from __future__ import annotations
 
-import copy
 from dataclasses import replace
 
 import numpy as np
@@ -49,8 +48,7 @@ def _damped(e: Experiment, theta: Array, time: float, only: str) -> Experiment:
     bare = [k for k in undamped(e.scene) if only in ("", e.scene.groups[k].name)]
     at, _ = e.scene.compiled.layout["compliance"]
     compliance = e.scene.compiled.inputs(theta)[at:]
-    scene = copy.copy(e.scene)
-    scene.__dict__.pop("compiled", None)
+    scene = e.scene.shallow()
     scene.groups = list(scene.groups)
     first = 0
     for k, g in enumerate(e.scene.groups):

@@ -6,7 +6,6 @@ a little of each changes the residuals in a direction that one set of tangents t
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
@@ -28,8 +27,7 @@ def missing_parts(problem: FitProblem, u: Array, i: int) -> list[Told]:
     """Directions of what the i-th experiment's model does not have; none where its motion has no answer at u (free,).
     Takes two sets of tangents."""
     e = problem.experiments[i]
-    with_drag = copy.copy(e.scene)
-    with_drag.__dict__.pop("compiled", None)
+    with_drag = e.scene.shallow()
     with_drag.has_drag = True
     made = [replace(e, scene=with_drag) if k == i else other for k, other in enumerate(problem.experiments)]
     theta, slots, _ = problem.known(u)

@@ -9,7 +9,6 @@ warning names them if that was said.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -104,8 +103,7 @@ def _otherwise(e: Experiment, ends: list[TurningEnd]) -> Experiment:
     """The experiment with rods that spin where they did not, and the other way round."""
     if not ends:
         return e
-    scene = copy.copy(e.scene)
-    scene.__dict__.pop("compiled", None)
+    scene = e.scene.shallow()
     scene.pinned = e.scene.pinned ^ {end.director for end in ends}
     return replace(e, scene=scene)
 

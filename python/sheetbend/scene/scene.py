@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -358,6 +359,12 @@ class Scene(SelfTouchingScene):
             validate(self)
             self._frozen = True
         return self
+
+    def shallow(self) -> Scene:
+        """A copy that shares all that it holds and is compiled anew: replace a part of it to have another scene."""
+        made = copy.copy(self)
+        made.__dict__.pop("compiled", None)
+        return made
 
     @cached_property
     def compiled(self) -> CompiledScene:
