@@ -20,8 +20,8 @@ TIGHTENED, HELD, LET_GO = 2.0, 5.0, 11.0  # s
 H, EVERY = 2e-3, 25  # of a substep, s; substeps from frame to frame
 
 
-def scene_of(segments: int, friction: float) -> sb.Scene:
-    """The open knot, a trefoil that is cut, with forces on its ends."""
+def open_knot(segments: int, friction: float) -> tuple[sb.Scene, np.ndarray, np.ndarray]:
+    """The open knot, a trefoil that is cut, its two ends, and the directions away from each other there."""
     t = np.linspace(-2.15, 2.15, 1001)
     points = np.stack([t**3 - 3 * t, t**4 - 4 * t**2, 0.55 * (t**5 - 10 * t)], 1) * 0.02
     scene = sb.Scene("knot", gravity=(0, 0, 0))
@@ -31,10 +31,16 @@ def scene_of(segments: int, friction: float) -> sb.Scene:
     )  # fmt: skip
     scene.self_contact(rope, radius=3e-3, friction=friction)
     ends = rope.particles[[0, -1]]
-    along = np.diff(scene.nodes[ends], axis=0) / np.linalg.norm(np.diff(scene.nodes[ends], axis=0))
+    x = scene.nodes[ends]
+    return scene, ends, (x - x.mean(0)) / np.linalg.norm(x - x.mean(0), axis=1)[:, None]
+
+
+def scene_of(segments: int, friction: float) -> sb.Scene:
+    """The open knot with forces on its ends."""
+    scene, ends, away = open_knot(segments, friction)
     load = PULL * np.array([0.3, 1.0, 1.0, 0.0, 0.0])
     times = [0.0, TIGHTENED, HELD, LET_GO, LET_GO + 0.3]
-    scene.add_force(ends, load[:, None, None] * np.concatenate([-along, along]), times)
+    scene.add_force(ends, load[:, None, None] * away, times)
     return scene
 
 

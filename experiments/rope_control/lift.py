@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import sheetbend as sb
 from motion import RATE, Array, Control, Motion
+from posts import arrived
 from task import Task
 
 MOVING, AT_END = 1.2, 3  # s, of the motion, and how many of the frames look at where the bar is
@@ -17,7 +18,6 @@ RISE = 0.1  # m that both hands rise where the control does nothing: from the ta
 TARGET = np.array([0.1, 0.0, 0.15])  # m, from the middle of the table
 NEAR = 0.05  # m, the distance that costs 1
 PLACE, ACCELERATION, EFFORT = 0.3, 3.0, 1e-5  # m, m/s^2, and what an effort of 1 costs
-REACHED, AT_REST = 1e-2, 0.05  # m and m/s
 SOLVER = sb.Solver(h=1 / 250, method="implicit", integrator="bdf1")
 
 
@@ -81,7 +81,4 @@ def lift() -> Task:
     def speed(x: Array) -> float:
         return float(np.linalg.norm(x[-1, bar] - x[-2, bar]) / (FRAMES[-1] - FRAMES[-2]))
 
-    def reached(error: float, speed: float) -> bool:
-        return error < REACHED and speed < AT_REST
-
-    return Task("lift", control, FRAMES, SOLVER, TARGET, loss, error, speed, reached, EFFORT)
+    return Task("lift", control, FRAMES, SOLVER, TARGET, loss, error, speed, arrived, EFFORT)

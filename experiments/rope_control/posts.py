@@ -20,6 +20,11 @@ REACHED, AT_REST = 1e-2, 0.05  # m and m/s
 SOLVER = sb.Solver(h=1 / 250, method="implicit", integrator="bdf1")
 
 
+def arrived(error: float, speed: float) -> bool:
+    """Whether it is where it shall be, and at rest there."""
+    return error < REACHED and speed < AT_REST
+
+
 def on_table(name: str, points: Array, posts: Sequence[tuple[float, float, float]]) -> Control:
     """A rope that lies on a table beside upright posts (x, y, radius); a hand moves its last particle in the plane."""
     scene = sb.Scene(name)
@@ -67,10 +72,7 @@ def to_target(name: str, control: Control, posts: Sequence[tuple[float, float, f
     def speed(x: Array) -> float:
         return float(np.linalg.norm(x[-1, nodes] - x[-2, nodes], axis=-1).max() / (FRAMES[-1] - FRAMES[-2]))
 
-    def reached(error: float, speed: float) -> bool:
-        return error < REACHED and speed < AT_REST
-
-    return Task(name, control, FRAMES, SOLVER, target, loss, error, speed, reached, EFFORT, tuple(posts))
+    return Task(name, control, FRAMES, SOLVER, target, loss, error, speed, arrived, EFFORT, tuple(posts))
 
 
 def wrap() -> Task:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import sheetbend as sb
 from sheetbend.config import parse, scene_alone
 from sheetbend.mesh import grid
 
+KNOT = runpy.run_path(str(Path(__file__).resolve().parents[2] / "experiments" / "bench" / "knot.py"))
 G = 9.81
 SOLVER = sb.Solver(h=1e-3, method="implicit", integrator="bdf1")
 
@@ -111,27 +113,12 @@ def test_a_rope_that_slides_on_another_tells_their_friction():
     assert pairs.sliding > 0.9
 
 
-def knotted(friction: float = 0.0, segments: int = 60) -> tuple[sb.Scene, np.ndarray, np.ndarray]:
-    """An open overhand knot, its two ends, and the directions away from each other there."""
-    t = np.linspace(-2.15, 2.15, 1001)
-    points = np.stack([t**3 - 3 * t, t**4 - 4 * t**2, 0.55 * (t**5 - 10 * t)], 1) * 0.02
-    scene = sb.Scene("knot", gravity=(0, 0, 0))
-    rope = sb.add_rope(
-        scene, points=points, segments=segments, density=0.02, EA=100.0, EI=5e-6, stretch_damping=5e-3,
-        bend_damping=5e-3, drag_linear=0.05,
-    )  # fmt: skip
-    scene.self_contact(rope, radius=0.003, friction=friction)
-    ends = rope.particles[[0, -1]]
-    x = scene.nodes[ends]
-    return scene, ends, (x - x.mean(0)) / np.linalg.norm(x - x.mean(0), axis=1)[:, None]
-
-
 KNOT_SOLVER = sb.Solver(h=2e-3, method="implicit", integrator="bdf1")
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_a_knot_is_drawn_tight_and_held_and_nothing_passes_through(friction: float):
-    scene, ends, away = knotted(friction)
+    scene, ends, away = KNOT["open_knot"](60, friction)
     x = scene.nodes[ends]
     drawn = x + 0.15 * away
     scene.drive(ends, [0.0, 1.5, 2.0], np.stack([x, drawn, drawn]), "linear")
@@ -148,7 +135,7 @@ def test_a_tight_knot_holds_without_load_where_it_rubs_and_opens_where_it_is_smo
     """Its ends are pulled with 4 mN, and then with less and less. What is in the loop shows whether it slips."""
     opened = {}
     for friction in (0.0, 0.2):
-        scene, ends, away = knotted(friction)
+        scene, ends, away = KNOT["open_knot"](60, friction)
         scene.add_force(ends, np.array([1.2e-3, 4e-3, 4e-3, 0.0, 0.0])[:, None, None] * away, [0.0, 2.0, 4.0, 6.0, 6.4])
         motion = sb.simulate(scene, np.linspace(0.0, 6.4, 129), KNOT_SOLVER)
         edges = scene.contacts.pieces[0].edges
