@@ -1,23 +1,25 @@
 // Compiled once per instruction set, like adjoint/packs/kernel_table.cpp: the kernels of blocks but for those of the kinds.
-#include <tuple>
-
 #include "adjoint/blocks/block_reverse.h"
 #include "adjoint/blocks/kind_kernels.h"
+#include "adjoint/packs/kernels_by_number.h"
 #include "core/blocks/block_tangents.h"
 #include "core/blocks/potential.h"
-#include "core/constraints/registry.h"
 
-#define SHEETBEND_JOIN_(a, b) a##b
-#define SHEETBEND_JOIN(a, b) SHEETBEND_JOIN_(a, b)
+using BlockKinds = const sheetbend_blocks::KindKernels* const*;
+#ifdef SHEETBEND_COLD_VARIANT
+extern "C" BlockKinds SHEETBEND_JOIN(sheetbend_block_kinds_, SHEETBEND_COLD_VARIANT)();
+#endif
 
 namespace sheetbend {
 namespace {
 
 using sheetbend_blocks::KindKernels;
 
-constexpr auto kinds = []<class... K>(std::tuple<K...>*) {
-  return std::array{&BlockKernels<K>::all...};
-}(static_cast<Registry*>(nullptr));
+#ifdef SHEETBEND_COLD_VARIANT
+std::array<const KindKernels*, kind_count> kinds;  // filled by adjoint/packs/kernel_table.cpp
+#else
+constinit const auto kinds = kernels_by_number<BlockKernels, KindKernels>();
+#endif
 
 // Which of a kind's kernels a block's kernels take.
 template <auto part>
@@ -33,6 +35,14 @@ constexpr sheetbend_blocks::Kernels many{ForwardKernels<Pack, Part<&KindKernels:
 }  // namespace
 }  // namespace sheetbend
 
+#ifdef SHEETBEND_COLD_VARIANT
+extern "C" void SHEETBEND_JOIN(sheetbend_fill_blocks_, SHEETBEND_VARIANT)() {
+  sheetbend::kinds = sheetbend::kernels_by_number<sheetbend::BlockKernels>(
+      SHEETBEND_JOIN(sheetbend_block_kinds_, SHEETBEND_COLD_VARIANT)());
+}
+#else
+extern "C" BlockKinds SHEETBEND_JOIN(sheetbend_block_kinds_, SHEETBEND_VARIANT)() { return sheetbend::kinds.data(); }
+#endif
 extern "C" const sheetbend_blocks::Table SHEETBEND_JOIN(sheetbend_blocks_, SHEETBEND_VARIANT){
     sheetbend::one, sheetbend::many,
     sheetbend::TangentKernels<sheetbend::Part<&sheetbend::KindKernels::tangents>>::all};
