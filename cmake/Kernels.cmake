@@ -122,7 +122,7 @@ set(tables adjoint/packs/kernel_table.cpp adjoint/blocks/kernel_table.cpp core/b
 set_source_files_properties(${tables} PROPERTIES SKIP_PRECOMPILE_HEADERS ON)  # they would compile the kernels of every kind
 foreach(variant IN LISTS variants)
   if(variant STREQUAL "v4")
-    # Beside those of v3 for hot kinds alone: AVX-512 gains a third for the others, for a sixth of the module.
+    # For hot kinds alone: the others take the kernels of v3 (docs/decisions/what-a-build-compiles.md).
     sheetbend_add_kernels(v4 hot SOURCES ${tables} ${hot_packs} ${hot_blocks} OPTIONS -O3 ${inlined_whole} COLD_VARIANT v3)
   elseif(variant STREQUAL "v3")
     sheetbend_add_kernels(${variant} hot SOURCES ${tables} ${hot_packs} ${hot_blocks} OPTIONS -O3 ${inlined_whole})
