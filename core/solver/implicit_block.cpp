@@ -153,12 +153,22 @@ void ImplicitBlock::take_first_step(const Scene& scene, const DirectBlock& block
               rows->data() + row * block.movable);
   for (const BlockFrame& f : block.frames) std::copy_n(&potential.target[row * f.particle], 3, &x_[row * f.particle]);
   settle_frames(block, potential.target, x_);
-  expect_none_passes(block, start, x_);
+  const auto at_trial = [&](Numbers<double>& from) {
+    return settle_frames(block, potential.target, trial_) && potential.pairs.can_go(block, from, trial_)
+               ? potential.evaluate(block, trial_)
+               : potential.refuse();
+  };
+  if (potential.pairs.passing(start, x_)) {  // what is driven passes what stays behind, and may not what comes along
+    potential.rigid.lambda = dl_;
+    const double there = at_trial(start);
+    if (!std::isfinite(there)) expect_none_passes(block, start, x_);
+    std::swap(x_, trial_);
+    accept(there);
+    return;
+  }
   accept(look(block));
   potential.rigid.lambda = dl_;
-  const double there = settle_frames(block, potential.target, trial_) && potential.pairs.can_go(block, x_, trial_)
-                           ? potential.evaluate(block, trial_)
-                           : potential.refuse();
+  const double there = at_trial(x_);
   const bool falls = by_merit_ || potential.by_merit() ? potential.merit() < merit_ : there < phi_;
   if (falls || !std::isfinite(phi_)) {
     std::swap(x_, trial_);

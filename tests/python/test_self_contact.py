@@ -56,6 +56,21 @@ def test_two_ropes_rest_across_each_other():
     assert middle < free[scene.ropes["lower"].particles[7], 2] - 1e-4  # and presses it down
 
 
+def test_what_is_driven_may_follow_what_flies_ahead():
+    """By more than the gap in a substep: where nothing but the hand moved, they would pass through each other."""
+    scene = sb.Scene("chase", gravity=(0, 0, 0))
+    rope = {"segments": 4, "density": 0.05, "EA": 500.0, "EI": 1e-4}
+    hand, free = (
+        sb.add_rope(scene, name, points=[[x, y, 0], [0.1 - x, y, 0]], velocity=[[0, 1, 0], [0, 1, 0]], **rope)  # type: ignore[arg-type]
+        for name, x, y in (("hand", 0.0, 0.0), ("free", 0.02, 0.003))
+    )
+    held = [[x, 0, 0] for x in (0.0, 0.05, 0.1)]
+    scene.drive(hand.particles[::2], [0.0, 0.1], np.add(held, [[[0, 0, 0]], [[0, 0.1, 0]]]), "linear")
+    scene.self_contact(radius=0.001)
+    motion = sb.simulate(scene, [0.0, 0.05, 0.1], sb.Solver(h=0.01, method="implicit", integrator="bdf1"))
+    assert motion.positions[:, free.particles, 1] == pytest.approx(0.003 + np.tile(motion.times[:, None], 5), abs=1e-12)
+
+
 @pytest.mark.parametrize("friction", [0.0, 0.4])
 def test_momentum_is_kept(friction: float):
     scene = sb.Scene("thrown", gravity=(0, 0, 0))
