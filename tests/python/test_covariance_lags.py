@@ -7,7 +7,7 @@ import pytest
 from pytest import approx
 from sheetbend.errors import InputError
 from sheetbend.statistics.colored import Colored
-from sheetbend.statistics.covariance import Layout, _columns, _expected_lags, _Grid, _lagged
+from sheetbend.statistics.covariance import Layout, Sandwich, _columns, _expected_lags, _Grid, _lagged, covariance
 
 
 def uneven() -> tuple[Layout, np.random.Generator]:
@@ -62,3 +62,22 @@ def test_the_covariance_of_rows_and_of_what_a_fit_leaves_of_them() -> None:
         for lag in range(lags):
             pair = (channel[:, None] == channel) & (kind[:, None] == k) & (frame[:, None] + lag == frame)
             assert expected[k][lag] == approx(float(left[pair].sum()), rel=1e-9, abs=1e-9)
+
+
+def test_one_sandwich_tells_the_same_as_one_for_each_choice_of_coordinates() -> None:
+    layout, rng = uneven()
+    rows = len(layout.frame)
+    J, priors = rng.standard_normal((rows, 4)) * [1.0, 30.0, 1e-3, 1.0], rng.standard_normal((2, 4))
+    J[:, 3] += 0.999 * J[:, 0]
+    spread = Sandwich(rng.standard_normal(rows), J, layout, priors, taken=1.5)
+    turned = spread.Q.T @ np.vstack([J, priors])  # coordinates along Q, by parameter
+    of_estimate, apart = spread.of_estimate(), spread.at_right_angles()
+    own = covariance(spread._residuals, spread.Q[:rows], layout, spread.Q[rows:], taken=1.5)
+    assert apart.matrix == approx(own.matrix, rel=1e-10, abs=1e-12)
+    assert apart.inflation == approx(own.inflation, rel=1e-10)
+    white = np.linalg.inv(turned.T @ turned)
+    assert np.diag(of_estimate.matrix) == approx(
+        of_estimate.inflation * np.diag(white @ J.T @ J @ white) * of_estimate.residual_variance
+        + np.diag(white @ priors.T @ priors @ white),
+        rel=1e-9,
+    )

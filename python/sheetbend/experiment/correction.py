@@ -17,6 +17,7 @@ from ..arrays import timeseries
 from ..recording.recording import Recording
 
 if TYPE_CHECKING:
+    from ..scene.boundary import Boundary
     from ..scene.scene import Scene
 
 Array = np.ndarray
@@ -53,26 +54,15 @@ class Correction:
         next_knot = int(np.searchsorted(boundary.times, (0.0 if until is None else until) - 1e-9))
         rests_on_knot = until is None and next_knot < every and boundary.times[next_knot] < 1e-9
         knots = min(every, next_knot + (1 if rests_on_knot else KNOTS_BEYOND))
-        length, target, weight = [], [], []
-        for knot in range(knots):
-            for marker in markers:
-                moved, by = [np.zeros(0, dtype=int)], [np.zeros(0)]
-                for part in boundary.following:
-                    if marker not in part.markers:
-                        continue
-                    w = part.weights[:, part.markers.index(marker)]
-                    slots, w = part.slots[w != 0.0], w[w != 0.0]
-                    at = np.array([knot])
-                    if part.from_placed and knot == 0:  # all that follows counts from there
-                        at, w = np.arange(1, every), -w
-                    moved.append((len(boundary.driven) * at[:, None] + slots).ravel())
-                    by.append(np.tile(w, len(at)))
-                for axis in range(3):
-                    target.append(3 * np.concatenate(moved) + axis)
-                    weight.append(np.concatenate(by))
-                    length.append(len(target[-1]))
-        first = np.concatenate([[0], np.cumsum(length)])
-        return cls(markers, knots, first, np.concatenate(target), np.concatenate(weight))
+        # All knots but the first move the same, each at its own place.
+        begin = [_of_knot(boundary, markers, knot) for knot in range(min(2, knots))]
+        later = np.arange(1, knots - len(begin) + 1)
+        length, target, weight = (np.concatenate([part[k] for part in begin]) for k in range(3))
+        each, places, by = begin[-1]
+        length = np.append(length, np.tile(each, len(later)))
+        target = np.append(target, places + 3 * len(boundary.driven) * later[:, None])
+        weight = np.append(weight, np.tile(by, len(later)))
+        return cls(markers, knots, np.concatenate([[0], np.cumsum(length)]), target, weight)
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -97,6 +87,28 @@ class Correction:
             "target": offset + self.target,
             "weight": self.weight,
         }
+
+
+def _of_knot(boundary: Boundary, markers: tuple[str, ...], knot: int) -> tuple[Array, Array, Array]:
+    """How many places each number of a knot moves, the places in the array "boundary", and the weights."""
+    length, target, weight = [], [], []
+    for marker in markers:
+        moved, by = [np.zeros(0, dtype=int)], [np.zeros(0)]
+        for part in boundary.following:
+            if marker not in part.markers:
+                continue
+            w = part.weights[:, part.markers.index(marker)]
+            slots, w = part.slots[w != 0.0], w[w != 0.0]
+            at = np.array([knot])
+            if part.from_placed and knot == 0:  # all that follows counts from there
+                at, w = np.arange(1, len(boundary.times)), -w
+            moved.append((len(boundary.driven) * at[:, None] + slots).ravel())
+            by.append(np.tile(w, len(at)))
+        for axis in range(3):
+            target.append(3 * np.concatenate(moved) + axis)
+            weight.append(np.concatenate(by))
+            length.append(len(target[-1]))
+    return np.array(length), np.concatenate(target), np.concatenate(weight)
 
 
 def recorded_noise(recording: Recording, markers: tuple[str, ...]) -> float | None:

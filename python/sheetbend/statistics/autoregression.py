@@ -12,8 +12,10 @@ def levinson(lags: Array) -> list[tuple[Array, float]]:
     coefficients, noise = np.zeros(0), float(lags[0])
     fits = [(coefficients, noise)]
     for order in range(1, len(lags)):
-        reflection = (lags[order] - coefficients @ lags[order - 1 : 0 : -1]) / noise
-        coefficients = np.append(coefficients - reflection * coefficients[::-1], reflection)
+        reflection = float(lags[order] - coefficients @ lags[order - 1 : 0 : -1]) / noise
+        before, coefficients = coefficients, np.empty(order)
+        coefficients[:-1] = before - reflection * before[::-1]
+        coefficients[-1] = reflection
         noise *= max(1 - reflection**2, 1e-12)
         fits.append((coefficients, noise))
     return fits

@@ -26,7 +26,7 @@ import numpy as np
 
 from ..arrays.timeseries import Array
 from ..optional import require
-from .covariance import Covariance, Integers, Layout, covariance
+from .covariance import Covariance, Integers, Layout, Sandwich
 from .gauge import RANK_TOLERANCE, null_space
 from .shared_errors import variance_of
 
@@ -160,26 +160,24 @@ def _compared(
     every, left = solved_within(jacobian, within, columns, residuals, rows)
     every, drawn = np.split(every, [every.shape[1] - drawn.shape[1]], axis=1)
     used = independent(every)
-    compared = [i for i, c in enumerate(used) if count <= c < count * parts]
+    compared = [c for c in used if count <= c < count * parts]
     if not compared:
         return None
+    used = [*(c for c in used if c not in set(compared)), *compared]
+    behind = slice(len(used) - len(compared), None)
     size = np.linalg.norm(every[:, used], axis=0)
     step = -np.linalg.lstsq(every[:, used] / size, left, rcond=None)[0] / size
     after = left + every[:, used] @ step
-    spread = covariance(after[:rows], every[:rows, used], layout, every[rows:, used], taken + len(private))
-    short = short_of_frames(spread, int(np.ptp(layout.frame)) + 1)
-    V = short * spread.matrix
-    degrees = max(float(np.median((spread.degrees / (2 - 1 / spread.inflation))[compared])), 1.0)
+    spread = Sandwich(after[:rows], every[:rows, used], layout, every[rows:, used], taken + len(private))
+    told, apart = spread.of_estimate(), spread.at_right_angles()
+    short = short_of_frames(told, int(np.ptp(layout.frame)) + 1)
+    V, across = short * told.matrix, short * apart.matrix
+    degrees = max(float(np.median((told.degrees / (2 - 1 / told.inflation))[behind])), 1.0)
     if drawn.any():
         V, degrees = V + variance_of(every[:, used], drawn), min(degrees, float(drawn.shape[1]))
+        across = across + variance_of(spread.Q, drawn)
     # correlations of +/-0.9999 do not survive factors of each column's own: so the test has columns at right angles
-    last = [*(i for i in range(len(used)) if i not in set(compared)), *compared]
-    q = np.linalg.qr((every[:, used] / size)[:, last])[0]
-    behind = slice(len(used) - len(compared), None)
-    apart = short * covariance(after[:rows], q[:rows], layout, q[rows:], taken + len(private)).matrix
-    if drawn.any():
-        apart = apart + variance_of(q, drawn)
-    scores = _scores((q.T @ left)[behind], apart[behind, behind])
+    scores = _scores((spread.Q.T @ left)[behind], across[behind, behind])
     chance = float(require("scipy.special", "fit").fdtrc(len(scores), degrees, scores @ scores / len(scores)))
     physical = [c for c in used if c < count * parts]
     moved = np.zeros((every.shape[1], known.shape[1]))

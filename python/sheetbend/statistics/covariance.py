@@ -26,6 +26,7 @@ shift across the view cover 85 % of the truths, and without it 70 %.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,7 @@ from ..arrays.timeseries import Array
 from ..errors import InputError
 from .autoregression import levinson, spectrum_of
 from .colored import Colored, Part
+from .newey_west import newey_west
 
 Integers = NDArray[np.integer[Any]]
 
@@ -143,44 +145,93 @@ def covariance(
     Raises:
         InputError: shapes disagree, or there are no more rows than parameters.
     """
-    rows, count = jacobian.shape
-    layout = Layout.series(rows) if layout is None else layout
-    if residuals.shape != (rows,) or layout.frame.shape != (rows,):
-        shapes = (residuals.shape, jacobian.shape, layout.frame.shape)
-        raise InputError("residuals", "disagree with the jacobian or the layout", shapes, "give one row to each")
-    prior = np.zeros((0, count)) if prior_jacobian is None else prior_jacobian
-    size = np.sqrt((jacobian**2).sum(0) + (prior**2).sum(0))
-    jacobian, prior = jacobian / size, prior / size
-    root = _root(np.vstack([jacobian, prior]))
-    bread = root @ root.T
-    influence = jacobian @ bread  # of a row on the estimate
-    absorbed = taken + float((influence * jacobian).sum())  # parameters' worth of residual that the fit took away
-    if rows - absorbed < 0.5:
-        raise InputError("residuals", "must outnumber the free parameters", rows, f"give more than {count} rows")
-    if float(residuals @ residuals) < _ZERO:
-        residuals = np.zeros(rows)
-    variance = float(residuals @ residuals) / (rows - absorbed)
-    from_data = variance * (influence.T @ influence)
-    from_prior = bread @ prior.T @ prior @ bread
-    inflation, time = np.ones(count), 1.0
-    white = np.diag(from_data).copy()
-    told = white > NEGLIGIBLE * (white + np.diag(from_prior))  # else the prior says it all, and the rest is rounding
-    if told.any():
-        grid = _Grid(layout, residuals)
-        one_kind = np.zeros_like(grid.kinds)
-        spectral, time = _spectral(grid, jacobian, root, one_kind)
-        robust = _newey_west(grid, influence) * rows / (rows - absorbed)
-        wider = np.maximum(np.diag(spectral), robust)
-        if grid.kinds.any():
-            wider = np.maximum(wider, np.diag(_spectral(grid, jacobian, root, grid.kinds)[0]))
-        inflation[told] = np.maximum(wider[told] / white[told], 1.0)
-        if np.all(np.diag(spectral)[told] > 1e-6 * white[told]):  # else its correlations mean nothing: one frame, say
-            from_data = spectral
-        stretch = np.ones(count)
-        stretch[told] = np.sqrt(inflation[told] * white[told] / np.diag(from_data)[told])
-        from_data = from_data * np.outer(stretch, stretch)
-    matrix = (from_data + from_prior) / np.outer(size, size)
-    return Covariance(matrix, np.maximum((rows - absorbed) / inflation, 1.0), inflation, variance, time)
+    return Sandwich(residuals, jacobian, layout, prior_jacobian, taken).of_estimate()
+
+
+class Sandwich:
+    """What residuals say about the columns of a Jacobian, in whatever coordinates it is told. The expensive part, the
+    covariance of the rows between columns at right angles, is made once for all of these.
+
+    Attributes:
+        Q: (rows + priors, p) the columns at right angles, each beside those before it (QR).
+    """
+
+    def __init__(
+        self,
+        residuals: Array,
+        jacobian: Array,
+        layout: Layout | None = None,
+        prior_jacobian: Array | None = None,
+        taken: float = 0.0,
+    ) -> None:
+        """Arguments and errors: see `covariance`."""
+        rows, count = jacobian.shape
+        layout = Layout.series(rows) if layout is None else layout
+        if residuals.shape != (rows,) or layout.frame.shape != (rows,):
+            shapes = (residuals.shape, jacobian.shape, layout.frame.shape)
+            raise InputError("residuals", "disagree with the jacobian or the layout", shapes, "give one row to each")
+        every = jacobian if prior_jacobian is None else np.vstack([jacobian, prior_jacobian])
+        size = np.linalg.norm(every, axis=0)
+        # Q R, not the product of the columns, which would lose half the digits.
+        self.Q, R = np.linalg.qr(every / size)
+        self._root = np.linalg.solve(R, np.eye(count)) / size[:, None]
+        self._data, prior = self.Q[:rows], self.Q[rows:]
+        self._prior = prior.T @ prior
+        absorbed = taken + float((self._data**2).sum())  # parameters' worth of residual that the fit took away
+        if rows - absorbed < 0.5:
+            raise InputError("residuals", "must outnumber the free parameters", rows, f"give more than {count} rows")
+        self._degrees = rows - absorbed
+        self._residuals = residuals if float(residuals @ residuals) >= _ZERO else np.zeros(rows)
+        self._layout = layout
+
+    def of_estimate(self) -> Covariance:
+        """Of the parameters."""
+        return self._of(self._root)
+
+    def at_right_angles(self) -> Covariance:
+        """Of the coordinates along the columns of `Q`."""
+        return self._of(np.eye(len(self._root)))
+
+    @cached_property
+    def _grid(self) -> _Grid:
+        return _Grid(self._layout, self._residuals)
+
+    @cached_property
+    def _spectral(self) -> tuple[Array, float]:
+        return _spectral(self._grid, self._data, np.zeros_like(self._grid.kinds))
+
+    @cached_property
+    def _by_kind(self) -> Array:
+        return _spectral(self._grid, self._data, self._grid.kinds)[0]
+
+    def _of(self, root: Array) -> Covariance:
+        """Of root (p, p) times the coordinates along `Q`."""
+        influence = self._data @ root.T  # of a row on the estimate
+        variance = float(self._residuals @ self._residuals) / self._degrees
+        from_data = variance * (influence.T @ influence)
+        from_prior = root @ self._prior @ root.T
+        inflation, time = np.ones(len(root)), 1.0
+        white = np.diag(from_data).copy()
+        told = white > NEGLIGIBLE * (
+            white + np.diag(from_prior)
+        )  # else the prior says it all, and the rest is rounding
+        if told.any():
+            inner, time = self._spectral
+            spectral = root @ inner @ root.T
+            robust = newey_west(self._grid.scores(influence)) * len(influence) / self._degrees
+            wider = np.maximum(np.diag(spectral), robust)
+            if self._grid.kinds.any():
+                wider = np.maximum(wider, np.diag(root @ self._by_kind @ root.T))
+            inflation[told] = np.maximum(wider[told] / white[told], 1.0)
+            if np.all(
+                np.diag(spectral)[told] > 1e-6 * white[told]
+            ):  # else its correlations mean nothing: one frame, say
+                from_data = spectral
+            stretch = np.ones(len(root))
+            stretch[told] = np.sqrt(inflation[told] * white[told] / np.diag(from_data)[told])
+            from_data = from_data * np.outer(stretch, stretch)
+        degrees = np.maximum(self._degrees / inflation, 1.0)
+        return Covariance(from_data + from_prior, degrees, inflation, variance, time)
 
 
 def autocorrelation(residuals: Array, layout: Layout, lags: int = _MAX_ORDER) -> Array:
@@ -279,16 +330,10 @@ class _Grid:
         return np.asarray(matrix / np.outer(size, size))
 
 
-def _root(rows: Array) -> Array:
-    """(p, p) W with W W' = (rows' rows)^-1, from the triangle of rows = Q R: the product rows' rows would lose half the
-    digits, and its inverse may have negative eigenvalues."""
-    return np.linalg.solve(np.linalg.qr(rows, mode="r"), np.eye(rows.shape[1]))
-
-
-def _spectral(grid: _Grid, jacobian: Array, root: Array, kinds: Integers) -> tuple[Array, float]:
-    """B J' Omega J B with B = root root', Omega = C (x) rho with one rho for each kind of channel, (channels,), and the
-    autocorrelation time of the first rho in frames."""
-    parts = grid.parts(jacobian @ root, kinds)  # H = Q Q' takes Omega to cov(residuals)
+def _spectral(grid: _Grid, Q: Array, kinds: Integers) -> tuple[Array, float]:
+    """(p, p) Q' Omega Q of columns Q (rows, p) at right angles, Omega = C (x) rho with one rho for each kind of
+    channel, (channels,), and the autocorrelation time of the first rho in frames."""
+    parts = grid.parts(Q, kinds)  # H = Q Q' takes Omega to cov(residuals)
     mixing = grid.channel_covariance(kinds)
     most = min(_MAX_ORDER, int(10 * np.log10(grid.frames)), grid.frames // 4)
     own = [kinds == kind for kind in range(int(kinds.max()) + 1)]
@@ -309,7 +354,7 @@ def _spectral(grid: _Grid, jacobian: Array, root: Array, kinds: Integers) -> tup
     colored = Colored(parts, mixing, grid.length)
     for step in range(_CORRECTIONS + 1):
         spread = [colored(part, spectra) for part in parts]
-        inner = np.zeros_like(root)
+        inner = np.zeros((Q.shape[1], Q.shape[1]))
         for part, a in zip(parts, spread, strict=True):
             inner += np.tensordot(part.columns, a, ([0, 2], [0, 2]))
         if step < _CORRECTIONS:
@@ -319,7 +364,7 @@ def _spectral(grid: _Grid, jacobian: Array, root: Array, kinds: Integers) -> tup
                 for spectrum, first, lags, count, order in zip(spectra, observed, expected, rows, orders, strict=True)
             ]
     time = max(float(spectra[0][0] / np.fft.irfft(spectra[0], grid.length)[0]), 1.0)
-    return root @ (inner + inner.T) @ root.T / 2, time
+    return (inner + inner.T) / 2, time
 
 
 def _expected_lags(
@@ -346,27 +391,3 @@ def _lagged(first: Array, second: Array, count: int) -> Array:
     frames = len(first)
     x, y = np.ascontiguousarray(first).reshape(frames, -1), np.ascontiguousarray(second).reshape(frames, -1)
     return np.array([np.vdot(x[: frames - lag], y[lag:]) if lag < frames else 0.0 for lag in range(count)])
-
-
-def _newey_west(grid: _Grid, influence: Array) -> Array:
-    """(p,) variances by Bartlett-weighted lagged products, with the lag of Newey and West (1994)."""
-    scores = grid.scores(influence)
-    frames = sum(len(part) for part in scores)
-    longest = max(len(part) for part in scores) - 1
-    pilot = min(int(4 * (frames / 100) ** (2 / 9)), longest)
-
-    def product(lag: int) -> Array:
-        parts = [(part[: max(len(part) - lag, 0)] * part[lag:]).sum(0) for part in scores]
-        return np.asarray(np.sum(parts, axis=0))
-
-    lagged = [product(lag) for lag in range(pilot + 1)]
-    level = np.abs(lagged[0] + 2 * sum(lagged[1:]))
-    slope = 2 * sum(lag * lagged[lag] for lag in range(1, pilot + 1)) if pilot else np.zeros_like(level)
-    level = np.maximum(level, 1e-12 * lagged[0])
-    bend = np.divide(slope, level, out=np.zeros_like(slope), where=level > 0)  # zero: no residual where it acts
-    bandwidth = 1.1447 * (bend**2 * frames) ** (1 / 3)
-    lags = np.minimum(bandwidth.astype(int), longest // 4)
-    total = lagged[0].copy()
-    for lag in range(1, int(lags.max()) + 1):
-        total += 2 * np.maximum(1 - lag / (lags + 1), 0.0) * product(lag)
-    return np.maximum(total, 0.0)
