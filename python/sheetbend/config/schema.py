@@ -122,6 +122,9 @@ class RecordingSection(Section):
     fit: Window | None = key(
         None, "[start, stop] in the recording's time: the part that is fitted; all when left out", "s"
     )
+    hidden: list[Window] = key(
+        [], "[start, stop] each: parts that count as not seen, to predict them; markers that drive something stay", "s"
+    )
     held_out: Window | None = key(None, "[start, stop]: the part that is only predicted, from the same start", "s")
     tools: dict[Name, str] = key({}, "poses of tools in this recording: files by tool, see `scene.tool.file`")
     start_time: Finite | None = key(
