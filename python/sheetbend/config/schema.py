@@ -211,6 +211,18 @@ class GivenSection(Section):
     )
 
 
+class SmoothSection(Section):
+    """A field of stiffness that is fitted with a smoothness prior. One table each: [smooth.NAME], NAME being
+    "<solid>_stiffness" of a solid with clusters and `stiffness_modes`, whose modes are then parameters."""
+
+    size: Finite | None = key(
+        None, "root mean square of ln E about its mean; found from the recordings when left out", gt=0
+    )
+    length: Finite | None = key(
+        None, "over which neighbors are alike; found from the recordings when left out", "m", gt=0
+    )
+
+
 class FitSection(Section):
     """[fit]: how the fit runs."""
 
@@ -270,6 +282,7 @@ class Config(Section):
     recording: list[RecordingSection] = key([], "the recordings")
     parameters: dict[str, ParameterSection] = key({}, "what is fitted")
     given: dict[str, GivenSection] = key({}, "how uncertain the numbers are that the fit takes as given")
+    smooth: dict[str, SmoothSection] = key({}, "fields of stiffness that are fitted with a smoothness prior")
     fit: FitSection = key(FitSection(), "how the fit runs")
     output: OutputSection = key(OutputSection(), "what is written")
     published: dict[str, Finite | Window] = key(
