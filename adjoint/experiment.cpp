@@ -50,8 +50,8 @@ void Experiment::check() const {
   if (observed.measured.size() != 3 * frames * columns || observed.sigma.size() != frames * columns ||
       (observed.is_cloud() ? 0 : columns) != observed.markers.size())
     throw std::invalid_argument(name + ": measured and sigma must be (frames, markers, 3) and (frames, markers)");
-  if (observed.is_cloud() && (!finer.empty() || correction.unknowns() > 0))
-    throw std::invalid_argument(name + ": a cloud goes neither with extrapolation in time nor with corrected markers");
+  if (observed.is_cloud() && correction.unknowns() > 0)
+    throw std::invalid_argument(name + ": a cloud does not go with corrected markers");
   if (is_static && frames != 1)
     throw std::invalid_argument(name + ": an equilibrium has one frame. Fix: give each shape as a recording");
   if (least.size() != most.size() || (!least.empty() && least.size() != scene->layout.total()))
@@ -113,24 +113,29 @@ void Experiment::run(const Plan& own, const T* in, Frame&& frame, double weight,
       interrupt);
 }
 
+// Of a cloud the coordinates are combined, since distances from the closest part of a surface are not linear in them.
 template <class T>
 std::vector<T> Experiment::extrapolated(const T* in, T* means, Interrupt* interrupt) const {
   const T* offsets = &in[scene->layout.total()];
-  std::vector<T> markers(observed.measured.size(), T(0.0)), one(markers.size());
+  const std::size_t dofs = scene->dofs(), frames = observed.times.size();
+  std::vector<T> seen(observed.is_cloud() ? frames * dofs : observed.measured.size(), T(0.0)), one(seen.size());
   const auto add = [&](const Plan& own, double weight) {
     run(
         own, in,
         [&](std::size_t f, const T* x) {
-          frame_residuals(observed, f, x, offsets, static_cast<T*>(nullptr), one.data());
+          if (observed.is_cloud())
+            std::copy_n(x, dofs, &one[f * dofs]);
+          else
+            frame_residuals(observed, f, x, offsets, static_cast<T*>(nullptr), one.data());
         },
         weight, means, interrupt);
-    for (std::size_t i = 0; i < markers.size(); ++i) markers[i] += T(weight) * one[i];
+    for (std::size_t i = 0; i < seen.size(); ++i) seen[i] += T(weight) * one[i];
   };
   double rest = 1.0;
   for (const FinerRun& one_more : finer) rest -= one_more.weight;
   add(plan, rest);
   for (const FinerRun& one_more : finer) add(one_more.plan, one_more.weight);
-  return markers;
+  return seen;
 }
 
 void Experiment::refuse(std::size_t input, double value) const {
@@ -160,10 +165,15 @@ void Experiment::residuals(const T* theta, const T* b, T* r, T* simulated, T* se
         plan, in.data(), [&](std::size_t f, const T* x) { r = frame_residuals(observed, f, x, offsets, r, simulated); },
         1.0, means.data(), interrupt);
   } else {
-    const std::vector<T> markers = extrapolated(in.data(), means.data(), interrupt);
-    if (simulated) std::copy(markers.begin(), markers.end(), simulated);
-    for (std::size_t at = 0; r && at < markers.size() / 3; ++at)
-      if (is_seen(observed, at)) r = marker_residuals(observed, at, Vec3<T>(&markers[3 * at]), r);
+    const std::vector<T> seen = extrapolated(in.data(), means.data(), interrupt);
+    if (observed.is_cloud()) {
+      for (std::size_t f = 0; f < observed.times.size(); ++f)
+        r = frame_residuals(observed, f, &seen[f * scene->dofs()], offsets, r, simulated);
+    } else {
+      if (simulated) std::copy(seen.begin(), seen.end(), simulated);
+      for (std::size_t at = 0; r && at < seen.size() / 3; ++at)
+        if (is_seen(observed, at)) r = marker_residuals(observed, at, Vec3<T>(&seen[3 * at]), r);
+    }
   }
   T* mean = means.data();
   for (std::size_t s = 0; s < sensors.size(); mean += sensors[s++].measured.size())

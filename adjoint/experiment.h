@@ -102,7 +102,7 @@ struct Experiment {
   // to their means (readings); `in` as `inputs_at`.
   template <class T, class Frame>
   void run(const Plan& own, const T* in, Frame&& frame, double weight, T* means, Interrupt* interrupt) const;
-  // Predicted markers (frames, markers, 3) of all runs together; means as in `run`.
+  // Predicted markers (frames, markers, 3) of all runs together, or with a cloud coordinates (frames, dofs); means as in `run`.
   template <class T>
   std::vector<T> extrapolated(const T* in, T* means, Interrupt* interrupt) const;
 };

@@ -29,6 +29,7 @@ from .fitting.many import fit_many
 from .fitting.plan import Plan
 from .mesh import SolidMesh, TriangleMesh, read_mesh
 from .minimum.discretization import Refinement
+from .minimum.smooth import Smooth
 from .motion.balance import ForceBalance, force_balance
 from .motion.contact_counts import ContactCounts, ContactMode
 from .motion.equilibrium import Equilibrium, NoEquilibriumError, equilibria, equilibrium
@@ -146,6 +147,7 @@ __all__ = [
     "Scores",
     "SheetbendError",
     "Shooting",
+    "Smooth",
     "Solid",
     "SolidMesh",
     "Solver",

@@ -148,22 +148,23 @@ def test_fields_that_need_markers_are_refused() -> None:
         {"radius": 0.1},
         {"driven_sigma": 1e-3},
         {"shooting": "auto"},
-        {"solver": replace(SOLVER, extrapolate=2)},
     ]
     for fields in refused:
         (name,) = fields
-        with pytest.raises(sb.InputError, match=name.replace("solver", "solver.extrapolate")):
+        with pytest.raises(sb.InputError, match=name):
             experiment(**fields)
 
 
-def test_residuals_are_distances_from_the_closest_point() -> None:
+@pytest.mark.parametrize("runs", [1, 2])
+def test_residuals_are_distances_from_the_closest_point(runs: int) -> None:
     """Against a search over all triangles in NumPy, for points that are not over a border."""
-    e = experiment()
+    solver = replace(SOLVER, extrapolate=runs)
+    e = experiment(solver=solver)
     problem = problem_of(e)
     u = problem.parameters.initial()
     ok, r, _ = problem.evaluate(u, jacobian=False)
     assert ok and len(r) == e.recording.mask.sum() == problem.core.data_rows
-    x = sb.simulate(e.scene, TIMES, SOLVER).positions
+    x = sb.simulate(e.scene, TIMES, solver).positions
     (cloth,) = e.scene.cloths.values()
     measured, shown = e.recording.positions, problem.simulate(u)[0]
     row = compared = 0
@@ -183,10 +184,12 @@ def test_residuals_are_distances_from_the_closest_point() -> None:
     assert compared > 0.85 * len(r)
 
 
-@pytest.mark.parametrize("loss", ["squares", "soft_l1", "huber", "cauchy"])
-def test_jacobian_is_that_of_differences(loss: str) -> None:
+@pytest.mark.parametrize(
+    ("loss", "runs"), [("squares", 1), ("soft_l1", 1), ("huber", 1), ("cauchy", 1), ("squares", 2), ("cauchy", 3)]
+)
+def test_jacobian_is_that_of_differences(loss: str, runs: int) -> None:
     """The closest triangles are found anew at either side of a difference, and held in the derivative."""
-    e = experiment(1.2, loss=loss)
+    e = experiment(1.2, loss=loss, solver=replace(SOLVER, extrapolate=runs))
     problem = problem_of(e)
     u = problem.parameters.initial()
     ok, _, J = problem.evaluate(u)
@@ -245,6 +248,23 @@ def test_a_fit_to_a_cloud_holds_the_truth() -> None:
     assert "still: every point is at the closest point of the last fitted frame" in fit.result.baseline
     assert any("the points of a cloud have no places of their own" in w for w in fit.result.warnings)
     assert not any("off the fitted motion" in w for w in fit.result.warnings)
+
+
+def test_a_cloud_takes_the_estimate_to_the_limit_of_short_substeps() -> None:
+    """Points of a motion at an eighth of the fit's substep, at which the warp reads 1.3 % high and the drag 8 % low."""
+    scene, solver = hammock(), SOLVER.with_h(SOLVER.h / 2)
+    x = sb.simulate(scene, TIMES, solver.with_h(solver.h / 8)).positions
+    seen = sb.Cloud.of(scattered(scene, x, POINTS, 2, noise=1e-6), TIMES, name="take")
+    wanted = {name: {"initial": 1.1 * TRUE[name]} for name in FITTED}
+    e = experiment(recording=seen, sigma=1e-5, solver=solver)
+    at_step, in_limit = (
+        sb.fit(e, parameters=wanted, refine=refine, windows=(), profiles=False) for refine in (False, "auto")
+    )
+    for name in FITTED:
+        left, was = (abs(fit[name].value - TRUE[name]) for fit in (in_limit, at_step))
+        assert left < 0.25 * was, (name, left, was)
+        assert in_limit[name].discretization < 0.25 * was
+    assert off(in_limit) < 1.0
 
 
 def test_a_cauchy_loss_puts_up_with_points_of_other_things() -> None:

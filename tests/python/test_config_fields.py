@@ -101,6 +101,7 @@ WHOLE: dict[str, Any] = {
     ],
     "parameters": {"NAME": {}},
     "given": {"NAME": {"sd": 0.1}},
+    "smooth": {"NAME": {"size": 0.3}},
     "fit": {},
     "output": {},
 }

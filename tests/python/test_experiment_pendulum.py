@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import importlib.util
+import sys
 from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -169,3 +172,34 @@ def test_double_pendulum_is_predicted_over_2_s() -> None:
         ("lower_inertia", 0.00314527),
     ):
         assert found[name].value == pytest.approx(value, rel=0.02)
+
+
+@pytest.fixture(scope="module")
+def whole() -> ModuleType:
+    """experiments/double_pendulum_whole/whole.py"""
+    spec = importlib.util.spec_from_file_location("whole", EXPERIMENTS / "double_pendulum_whole" / "whole.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["whole"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_windows_that_no_fit_saw_are_predicted(whole: ModuleType) -> None:
+    """The first 10.7 s of the whole motion in four windows, of which the second and the fourth are hidden."""
+    every, parameters = whole.study(4)
+    assert [e.name for e in every] == ["whole", "from_2s", "from_8s"]
+    seen = every[0].fitted()
+    hidden = ~seen.mask.any(axis=1)
+    assert 0.45 < hidden.mean() < 0.55
+    for piece in every[1:]:
+        start, stop = piece.fit[0], piece.held_out[1]
+        inside = (seen.times >= start - 1e-9) & (seen.times < stop - 1e-9)
+        assert inside.any() and hidden[inside].all()
+    found = whole.fitted(every[0], parameters)
+    assert found.shot.windows == 4
+    assert 0.0 < found.shot.lower < found.shot.loss < found.shot.upper < 1e-3  # m/s
+    pieces = whole.predicted(every, parameters, found.values)
+    assert set(pieces) == {"from_2s", "from_8s"} and max(pieces.values()) < 0.008, pieces
+    unbroken = whole.fitted(every[0], parameters, 1e-6)
+    assert unbroken.rms > 1.2 * found.rms, (unbroken.rms, found.rms)

@@ -187,6 +187,26 @@ def test_piece_may_lose_sight_of_a_marker_but_is_not_saved(tmp_path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def test_hidden_spans_lose_free_markers_and_no_frame() -> None:
+    recording = moving(frames=101, markers=4, clamped=["m3"])
+    found = recording.hidden([(0.07, 0.29), [0.5, 0.6]])
+    inside = np.zeros(101, dtype=bool)
+    inside[7:29] = inside[50:60] = True
+    assert np.array_equal(found.times, recording.times) and found.clamped == (3,)
+    assert np.array_equal(found.mask[:, :3], np.repeat(~inside[:, None], 3, axis=1)) and found.mask[:, 3].all()
+    assert np.array_equal(found.positions[~inside], recording.positions[~inside])
+    assert recording.mask.all()
+    for spans, words in (
+        ([(5, 6)], r"hidden\[0\]: holds no frame \(got \(5, 6\)\).*0 to 1 s"),
+        ([(0.1, 0.2), (0.4, 0.3)], r"hidden\[1\]: holds no frame"),
+        ([0.1, 0.2], r"hidden\[0\]: is no span.*give \(start, stop\)"),
+        ([(0.0, np.inf)], r"hidden\[0\]: is no span"),
+        ([(0.0, 0.5), (0.5, 2.0)], "hidden: leaves nothing seen"),
+    ):
+        with pytest.raises(RecordingError, match=words):
+            recording.hidden(spans)  # type: ignore[arg-type]
+
+
 def test_frames_select_and_shifted() -> None:
     recording = moving(markers=4, clamped=[0, 3], metadata={"a": 1})
     assert np.array_equal(recording.frames(slice(1, None, 5)).times, recording.times[1::5])

@@ -113,6 +113,15 @@ def test_a_key_of_the_experiment_arrives(name: str, tmp_path: Path, monkeypatch:
     assert told[name] == OF_EXPERIMENT_SAID[name]
 
 
+def test_hidden_parts_are_not_seen(tmp_path: Path) -> None:
+    (e,) = load(written(tmp_path, "hidden = [[0.04, 0.09], [0.15, 0.25]]")).experiments
+    assert e.fitted().mask[:, 0].tolist() == [True, False, True, False, False]
+    with pytest.raises(sb.ConfigError, match=r"recording\[0\].hidden\[1\]: holds no frame"):
+        load(written(tmp_path, "hidden = [[0.04, 0.09], [0.3, 0.4]]"))
+    with pytest.raises(sb.ConfigError, match=r"recording\[0\].hidden: leaves nothing seen"):
+        load(written(tmp_path, "hidden = [[0.0, 0.3]]"))
+
+
 def test_an_unknown_key_is_refused_with_the_known_ones(tmp_path: Path) -> None:
     with pytest.raises(sb.ConfigError) as told:
         parse(written(tmp_path, "sigmma = 1e-3"))

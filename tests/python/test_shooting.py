@@ -143,6 +143,21 @@ def test_hard_continuity_gives_the_estimate_and_the_intervals_of_one_run() -> No
     assert motion.windows == 5 and motion.upper is None and motion.gap < 1e-6
 
 
+def test_a_window_that_nothing_shows_begins_where_the_one_before_ends() -> None:
+    """And the estimates are those of one run that sees as little."""
+    e, wanted = swing(), list(WANTED)
+    e = replace(e, recording=e.recording.hidden([(0.8, 1.2)]))
+    alone = {"refine": False, "beginnings": False, "profiles": False}
+    plain = sb.fit(e, parameters=wanted, **alone)  # type: ignore[arg-type]
+    shot = sb.fit(replace(e, shooting=sb.Shooting(0.4, 1e-6)), parameters=wanted, **alone)  # type: ignore[arg-type]
+    (motion,) = shot.result.shot
+    assert motion.windows == 5 and motion.gap < 1e-6 and shot.result.rows == plain.result.rows
+    for name in wanted:
+        a, b = plain[name], shot[name]
+        assert a.half_width is not None and abs(a.value - b.value) < 0.01 * a.half_width, name
+        assert b.half_width == pytest.approx(a.half_width, rel=0.01), name
+
+
 def test_kicks_that_the_model_does_not_know_are_what_it_loses() -> None:
     kicked, options = swing(kicks=0.3, seed=1), {"refine": False, "beginnings": False, "profiles": False}
     soft = sb.fit(replace(kicked, shooting=0.4), parameters=list(WANTED), **options)  # type: ignore[arg-type]

@@ -11,6 +11,7 @@ from ..errors import ConfigError
 from ..experiment.experiment import Experiment
 from ..minimum.discretization import Refinement
 from ..minimum.problem import as_parameters
+from ..minimum.smooth import Smooth, with_fields
 from ..motion.solver import Solver
 from ..recording.windows import check_windows
 from ..scene.scene import Scene
@@ -63,6 +64,7 @@ class Study:
             "tolerance": fit.tolerance,
             "refine": self._refinement,
             "given": {name: section.sd for name, section in self.config.given.items()},
+            "smooth": {name: Smooth(s.size, s.length) for name, s in self.config.smooth.items()},
             "profiles": fit.profiles,
             "bootstrap": fit.bootstrap,
             "leave_one_out": fit.leave_one_out,
@@ -100,10 +102,13 @@ def build(config: schema.Config, folder: Path, finer: int = 1) -> Study:
     parameters = {name: fields_of_parameter(p) for name, p in config.parameters.items()}
     if experiments:
         check_names(config, experiments)
-    if experiments and parameters:
+    study = Study(config, folder, experiments, parameters)
+    if experiments and parameters:  # raise here, where the path is known
         with located("parameters"):
-            as_parameters(parameters, experiments)  # raise here, where the path is known
-    return Study(config, folder, experiments, parameters)
+            wanted = as_parameters(parameters, experiments)
+        with located("smooth", "smooth"):
+            with_fields(wanted, experiments, study.options["smooth"])
+    return study
 
 
 def scene_alone(config: schema.Config, folder: Path = Path()) -> tuple[Scene, Solver]:

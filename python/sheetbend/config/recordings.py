@@ -17,7 +17,7 @@ from ..scene.scene import Scene
 from .schema import RecordingSection
 
 TAKEN = (
-    {"file", "cloud", "name", "frames", "fit", "held_out"}  # the recording
+    {"file", "cloud", "name", "frames", "hidden", "fit", "held_out"}  # the recording
     | {"ropes", "leave_out", "tools", "values", "force", "max_gap"}  # its scene
     | {"marker", "grids", "offsets"}  # the places of its markers
 )
@@ -56,6 +56,8 @@ def _read(section: RecordingSection, folder: Path, path: str, key: str, name: st
         recording = kind.load(file, **section.model_dump(include=OF_READER))
         if compared and section.frames is not None:
             recording = recording.frames(slice(*section.frames))
+        if compared and section.hidden:
+            recording = recording.hidden(section.hidden)
     except RecordingError as error:
         raise ConfigError(f"{where}.{error.field}", error.problem, error.got, error.fix) from error
     doubt = unit_doubt(recording) if section.units is None else None

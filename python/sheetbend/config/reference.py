@@ -63,6 +63,7 @@ HEADERS: dict[str, type[Section]] = {
     "[[marker]], [[recording.marker]]": schema.Marker,
     "[parameters.NAME]": schema.ParameterSection,
     "[given.NAME]": schema.GivenSection,
+    "[smooth.NAME]": schema.SmoothSection,
     "[fit]": schema.FitSection,
     "[output]": schema.OutputSection,
 }

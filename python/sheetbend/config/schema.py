@@ -122,6 +122,9 @@ class RecordingSection(Section):
     fit: Window | None = key(
         None, "[start, stop] in the recording's time: the part that is fitted; all when left out", "s"
     )
+    hidden: list[Window] = key(
+        [], "[start, stop] each: parts that count as not seen, to predict them; markers that drive something stay", "s"
+    )
     held_out: Window | None = key(None, "[start, stop]: the part that is only predicted, from the same start", "s")
     tools: dict[Name, str] = key({}, "poses of tools in this recording: files by tool, see `scene.tool.file`")
     start_time: Finite | None = key(
@@ -208,6 +211,18 @@ class GivenSection(Section):
     )
 
 
+class SmoothSection(Section):
+    """A field of stiffness that is fitted with a smoothness prior. One table each: [smooth.NAME], NAME being
+    "<solid>_stiffness" of a solid with clusters and `stiffness_modes`, whose modes are then parameters."""
+
+    size: Finite | None = key(
+        None, "root mean square of ln E about its mean; found from the recordings when left out", gt=0
+    )
+    length: Finite | None = key(
+        None, "over which neighbors are alike; found from the recordings when left out", "m", gt=0
+    )
+
+
 class FitSection(Section):
     """[fit]: how the fit runs."""
 
@@ -267,6 +282,7 @@ class Config(Section):
     recording: list[RecordingSection] = key([], "the recordings")
     parameters: dict[str, ParameterSection] = key({}, "what is fitted")
     given: dict[str, GivenSection] = key({}, "how uncertain the numbers are that the fit takes as given")
+    smooth: dict[str, SmoothSection] = key({}, "fields of stiffness that are fitted with a smoothness prior")
     fit: FitSection = key(FitSection(), "how the fit runs")
     output: OutputSection = key(OutputSection(), "what is written")
     published: dict[str, Finite | Window] = key(

@@ -44,6 +44,12 @@ class SolidSection(Section):
         "m",
         gt=0,
     )
+    stiffness_modes: int = key(
+        0,
+        "with clusters: by how many smooth modes ln E varies from cluster to cluster; quantities NAME_stiffness_1, "
+        "..., the smoothest first. [smooth.NAME_stiffness] fits them",
+        ge=0,
+    )
     damping: Finite | None = key(None, "Kelvin-Voigt time constant", "s", gt=0)
     law: SolidLaw = key("strain", "neo_hookean: rubber at large strains")
     volume_row: bool | None = key(

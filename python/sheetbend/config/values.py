@@ -17,13 +17,17 @@ def with_values(config: Config, values: Mapping[str, float]) -> Config:
     """The configuration starting at the values (by expanded name, as in fit.json), without the `windows` that it
     gives, which are for a start far off; names that it does not fit are left out.
 
-    Shared parameters start at `parameters.NAME.initial`, private ones at the recordings' `values`.
+    Shared parameters start at `parameters.NAME.initial`, private ones and modes of stiffness fields at the recordings'
+    `values`.
     """
     parameters = dict(config.parameters)
     recordings = list(config.recording)
     names = [r.name or Path(r.file).stem for r in recordings]
     for name, value in values.items():
         base, _, recording = name.removesuffix("]").partition("[")
+        if any(base.startswith(f"{field}_") for field in config.smooth):  # a mode of a stiffness field
+            recordings = [r.model_copy(update={"values": {**r.values, base: value}}) for r in recordings]
+            continue
         section = parameters.get(base)
         if section is None or section.tied_to is not None or not math.isfinite(value):
             continue

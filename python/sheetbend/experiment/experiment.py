@@ -101,8 +101,7 @@ class Experiment:
         if self.is_cloud:
             of_markers = {"markers": self.markers, "offsets": self.offsets, "axes": self.axes.removeprefix("xyz")}
             not_yet = {"driven_sigma": self.driven_sigma, "radius": self.radius, "shooting": self.shooting}
-            more = not self.static and self.solver.extrapolate > 1
-            check_cloud(self.name, self.scene, of_markers, {**not_yet, "solver.extrapolate": more})
+            check_cloud(self.name, self.scene, of_markers, not_yet)
         self._check_driven_sigma()
         self._check_forces()
         corrected, late = self.driven_sigma is not None, self.time_offset is not None

@@ -22,6 +22,7 @@ from ..minimum.journal import journaled
 from ..minimum.optimizers import Observer, ceres_trouble
 from ..minimum.problem import FitProblem, ParameterLike, as_parameters
 from ..minimum.search import Search
+from ..minimum.smooth import Smooth, settled, with_fields
 from ..minimum.workers import shared_out
 from ..optional import require
 from ..quantities.parameters import Parameter, Parameters
@@ -100,6 +101,7 @@ def fit(
     refine: Refinement | str | bool | None = "auto",
     systematic: Systematic | None = None,
     given: Mapping[str, float] | None = None,
+    smooth: Mapping[str, Smooth] | None = None,
     leave_one_out: bool = False,
     profiles: bool = True,
     bootstrap: int = 0,
@@ -139,6 +141,9 @@ def fit(
             "gravity" (its direction), "clamp_direction" and "collider_direction" (of each about each axis) are in rad,
             "clamps" and "markers" (their places) in m. What each of these numbers moves is in `FitResult.premises` in
             any case.
+        smooth: fields of stiffness (`stiffness_modes` of a solid of clusters) that are fitted with a smoothness prior,
+            by name, such as {"toy_stiffness": sb.Smooth()}. The size and the length of the prior are found from the
+            recordings where `Smooth` does not give them (`FitResult.fields`).
         leave_one_out: also predict every recording that holds nothing out by a fit to the others.
         profiles: follow the cost to the ends of every interval, all other parameters fitted again; of more than 60
             parameters only for weak ones. Without, intervals are the linear ones, which cost nothing beside the fit.
@@ -166,7 +171,7 @@ def fit(
         SheetbendError: the start itself diverges or has no equilibrium.
     """
     experiments = experiments_of(scene, recording, experiment)
-    wanted = as_parameters(parameters, experiments)
+    wanted, fields = with_fields(as_parameters(parameters, experiments), experiments, smooth or {})
     if threads < 1:
         raise InputError("threads", "must be positive", threads, "give at least 1")
     require("scipy.special", "fit")  # of intervals, behind all the work
@@ -179,6 +184,7 @@ def fit(
             companions(e, fitted, wanted)
     experiments, found_at = joined(experiments, wanted, threads, progress)
     fitted = _fitted(experiments)
+    wanted, found_at, fields = settled(fitted, wanted, found_at, fields, threads, progress)
     problem = FitProblem(fitted, wanted, threads=threads, expanded=found_at)
     problem.check_start()
     check_given(asked.given, problem)
@@ -197,7 +203,7 @@ def fit(
         conclusion = conclude(reached, experiments, wanted, asked, None)
     corrected = conclusion.at.problem.corrections(conclusion.at.u) | conclusion.corrected
     comparisons = compare(conclusion.experiments, wanted, conclusion.values, threads, corrected)
-    result = result_of(reached, conclusion, comparisons, left_out, corrected, interrupted, clock)
+    result = result_of(reached, conclusion, comparisons, left_out, corrected, fields, interrupted, clock)
     if optimizer == "auto" and (trouble := ceres_trouble()):
         result = replace(
             result, warnings=(*result.warnings, f"SciPy stands in for Ceres, which does not load: {trouble}")

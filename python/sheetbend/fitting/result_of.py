@@ -23,6 +23,7 @@ from ..experiment.clock import outside, told_clocks
 from ..minimum.continuity import shot_motions
 from ..minimum.counts import counted
 from ..minimum.fine_meshes import at_the_limit
+from ..minimum.smooth import Field, field_fits
 from ..report.fit_result import FitResult
 from .conclusion import Conclusion
 from .reached import Reached
@@ -58,6 +59,7 @@ def result_of(
     comparisons: Sequence[Comparison],
     left_out: Mapping[str, Comparison],
     corrected: Mapping[str, np.ndarray],
+    fields: Sequence[Field],
     interrupted: bool,
     clock: Clock,
 ) -> FitResult:
@@ -67,6 +69,7 @@ def result_of(
         comparisons: measured against simulated, per experiment.
         left_out: of the experiments that a fit to the others predicts.
         corrected: corrections of driven markers by experiment.
+        fields: of stiffness, with their priors.
         interrupted: by Ctrl-C, at any time.
     """
     problem, best, ends, found = reached.problem, reached.best, reached.ends, reached.found
@@ -129,6 +132,7 @@ def result_of(
         growth=growth_rows(found.growths, reached.growths),
         contacts=what_touches(at.problem, at.u),
         shot=shot_motions(problem, best.u),
+        fields=field_fits(at.problem, at.u, fields),
         kinks=() if interrupted else kinks(at.problem, at.u, estimates),
         windows=best.windows,
         evaluations=evaluations,

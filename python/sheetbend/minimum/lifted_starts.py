@@ -53,7 +53,7 @@ def _begun(plain: FitProblem, i: int, e: Experiment, u: Array) -> Experiment:
         count, parts = first[k + 1] - first[k], list[LiftedWindow]()
         while not parts or len(parts) < 1 + math.ceil(math.log(count / FIRST, MORE)):
             parts.append(window(min(count, FIRST * MORE ** len(parts))))
-        if parts[-1].rows > len(names):
+        if any(part.rows > len(names) for part in parts[:-1]):
             for part in parts:
                 if part.rows >= len(names):
                     state = _nearest(partial(part.data, u), state)

@@ -19,6 +19,7 @@ from ..scene.scene import Array, Scene
 from .locking import LockingWarning, locking
 from .solid_clusters import SHARE, SolidClusters, volumes_of
 from .solid_rows import Orthotropic, SolidRows
+from .stiffness_field import StiffnessField
 
 SolidLaw = Literal["strain", "neo_hookean"]
 
@@ -48,6 +49,7 @@ class Solid:
         particles: of its vertices.
         material: prefix of its quantities.
         numbers: of its material as given, those left out too.
+        field: the modes in which its stiffness varies; None where there are none.
     """
 
     name: str
@@ -55,6 +57,7 @@ class Solid:
     particles: Array
     material: str
     numbers: Mapping[str, Any]
+    field: StiffnessField | None = None
 
     @cached_property
     def surface(self) -> SolidSurface:
@@ -93,6 +96,7 @@ def add_solid(
     poisson: float | None = None,
     orthotropic: Orthotropic | None = None,
     clusters: Sequence[ArrayLike] | None = None,
+    stiffness_modes: int = 0,
     damping: float | None = None,
     law: SolidLaw = "strain",
     volume_row: bool | None = None,
@@ -120,6 +124,9 @@ def add_solid(
         orthotropic: a material that differs along three axes, instead of these two; it has no volume row.
         clusters: shape matching instead of elements: vertices of each cluster, which may share some, such as
             `cluster_boxes` gives. Each cluster is drawn to its own shape at rest, turned. `poisson` is left out.
+        stiffness_modes: of clusters with one E: by how many smooth modes ln E varies from cluster to cluster. The
+            quantities are `<material>_stiffness_1` and so on, the smoothest first, each the root mean square of what it
+            adds to ln E; 0 at the start. `smooth` of `fit` gives them a prior.
         damping: Kelvin-Voigt time constant, s.
         law: "strain", or "neo_hookean" for rubber that is stretched or compressed by more than some tens of percent.
             Both are linear elasticity for small strains. "neo_hookean" needs a positive `poisson`.
@@ -137,6 +144,7 @@ def add_solid(
         SceneError: wrong or missing values, or others than those of a solid of the same material before.
     """
     numbers = _checked_numbers(name, density, E, poisson, orthotropic, clusters, damping, law, volume_row)
+    _check_modes(name, stiffness_modes, clusters, E)
     material = material or name
     _check_material(scene, name, material, numbers)
     count = len(mesh.vertices)
@@ -152,15 +160,16 @@ def add_solid(
 
     particles = scene.add_particles(shape, 0.0, moving)
     _weigh(scene, mesh, material, particles, density, 1.0 if clusters is None else 1.0 - SHARE)
+    field = None
     if clusters is not None:
         matching = SolidClusters(scene, mesh, name, material, particles, free, clusters)
-        matching.add(numbers["E"], damping, shape, moving)
+        field = matching.add(numbers["E"], stiffness_modes, damping, shape, moving)
     elif orthotropic is not None:
         SolidRows(scene, mesh, name, material, particles, free).add_orthotropic(orthotropic, damping)
     else:
         rows = SolidRows(scene, mesh, name, material, particles, free)
         rows.add(numbers["E"], numbers["poisson"], damping, law, numbers["volume_row"])
-    built = Solid(name, mesh, particles, material, numbers)
+    built = Solid(name, mesh, particles, material, numbers, field)
     scene.solids[name] = built
     return built
 
@@ -203,6 +212,16 @@ def _checked_numbers(
         fix = "give a positive one, or volume_row = False"
         raise SceneError(f"{name}.poisson", "must be positive with a volume row", poisson, fix)
     return {"density": density, "E": E, "poisson": poisson, "damping": damping, "law": law, "volume_row": by_row}
+
+
+def _check_modes(name: str, modes: int, clusters: Sequence[ArrayLike] | None, E: ArrayLike | None) -> None:
+    field = f"{name}.stiffness_modes"
+    if isinstance(modes, bool) or not isinstance(modes, int) or modes < 0:
+        raise SceneError(field, "must be a whole number", modes, "give how many smooth modes, such as 8, or 0")
+    if modes and clusters is None:
+        raise SceneError(field, "need clusters", modes, "give clusters, or leave stiffness_modes out")
+    if modes and np.ndim(E) > 0:  # type: ignore[arg-type]
+        raise SceneError(field, "need one E, from which they vary", E, "give one number, or leave stiffness_modes out")
 
 
 def _refuse_beside(name: str, beside: str, given: Mapping[str, Any]) -> None:

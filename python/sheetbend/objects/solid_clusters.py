@@ -10,6 +10,7 @@ sum v x X'. A cluster of equal extents that strains evenly has Young's modulus E
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,12 +20,14 @@ from ..errors import SceneError
 from ..mesh import SolidMesh
 from ..quantities.quantities import Term
 from ..scene.scene import Array, Scene
+from .stiffness_field import StiffnessField, modes_of
 
 SHARE = 1e-3
 """The part of the mass that moves with the frames. A frame without inertia would not be found by every method; one with
 this share of its cluster's mass follows within a 30th of the slowest period. What it has, the vertices have not, so
 that the solid keeps its mass and its moments of inertia."""
 FLAT = 1e-6  # the least over the largest second moment of a cluster
+SCALE = 0.3  # of a mode of ln E: what it may well be
 
 
 def cluster_boxes(mesh: SolidMesh, size: float) -> list[Array]:
@@ -95,9 +98,16 @@ class SolidClusters:
             axes[:, 0] *= np.linalg.det(axes)
             self.arms[c], self.moments[c] = (r - v @ r / v.sum()) @ axes, moments
 
-    def add(self, E: ArrayLike, damping: float | None, positions: Array, velocities: Array | None) -> None:
-        """The frames, where they fit the positions (n, 3), and the rows that hold the vertices to them."""
+    def add(
+        self, E: ArrayLike, modes: int, damping: float | None, positions: Array, velocities: Array | None
+    ) -> StiffnessField | None:
+        """The frames, where they fit the positions (n, 3), and the rows that hold the vertices to them.
+
+        Args:
+            modes: by how many smooth modes the logarithm of one E varies over the clusters.
+        """
         tau, names = f"{self.material}_damping", self._moduli(E)
+        field = self._field(names[0], modes) if modes else None
         if damping is not None:
             self.scene.add_quantity(tau, damping, "s", shared=True)
         stencils, places, terms, axes = [], [], [], []
@@ -118,14 +128,34 @@ class SolidClusters:
             rest=np.concatenate(places),
         )
         at = self.scene.group(group)[1]
-        for c, own in self.clusters.items():
+        for k, (c, own) in enumerate(self.clusters.items()):
             v = self.volumes[own]
             stiff, rows = 3.0 * v * v.sum() / self.moments[c].sum(), at + np.arange(len(own))
-            terms.append(Term("compliance", rows, 1.0 / stiff, ((names[c], "inverse"),)))
+            more = () if field is None else tuple(zip(field.modes, field.shapes[k].tolist(), strict=True))
+            less = tuple((mode, -shape) for mode, shape in more)
+            terms.append(Term("compliance", rows, 1.0 / stiff, ((names[c], "inverse"),), less))
             if damping is not None:
-                terms.append(Term("damping", rows, stiff, ((tau, "identity"), (names[c], "identity"))))
+                terms.append(Term("damping", rows, stiff, ((tau, "identity"), (names[c], "identity")), more))
             at += len(own)
         self.scene.add_terms(terms)
+        return field
+
+    def _field(self, stiffness: str, modes: int) -> StiffnessField:
+        """Over the clusters that can move; those that share vertices are neighbors."""
+        every = list(self.clusters.values())
+        if modes >= len(every):
+            most = f"give at most {len(every) - 1}, one fewer than clusters that can move"
+            raise SceneError(f"{self.name}.stiffness_modes", "are more than the clusters have", modes, most)
+        weights = [self.volumes[own] / self.volumes[own].sum() for own in every]
+        centers = np.array([w @ self.mesh.vertices[own] for w, own in zip(weights, every, strict=True)])
+        sets = [set(own.tolist()) for own in every]
+        linked = [(a, b) for a, b in combinations(range(len(every)), 2) if sets[a] & sets[b]]
+        values, shapes = modes_of(centers, np.array(linked, dtype=np.intp).reshape(-1, 2))
+        names = tuple(
+            self.scene.add_quantity(f"{self.material}_stiffness_{k}", 0.0, "", positive=False, scale=SCALE)
+            for k in range(1, modes + 1)
+        )
+        return StiffnessField(stiffness, names, values, shapes[:, 1 : modes + 1], centers)
 
     def _moduli(self, E: ArrayLike) -> list[str]:
         """The quantity of each cluster."""

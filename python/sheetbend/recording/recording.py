@@ -145,6 +145,35 @@ class Recording(MarkerData):
             )
         return self._derive(positions=self.positions[which], times=times)
 
+    def hidden(self, spans: Sequence[Sequence[float]]) -> Self:
+        """The same frames, with every marker that is not clamped unseen within the spans.
+
+        A fit to it knows nothing of these spans, so that they can test its predictions.
+
+        Args:
+            spans: of (start, stop), s, with start <= time < stop as in `piece`.
+
+        Raises:
+            RecordingError: a span is no pair, holds no frame, or nothing is seen outside of them.
+        """
+        inside = np.zeros(len(self.times), dtype=bool)
+        for i, span in enumerate(spans):
+            if np.shape(span) != (2,) or not np.isfinite(np.asarray(span, dtype=float)).all():
+                raise RecordingError(f"hidden[{i}]", "is no span", span, "give (start, stop) in s")
+            own = (self.times >= span[0] - _SAME_TIME) & (self.times < span[1] - _SAME_TIME)
+            if not own.any():
+                known = f"{self.times[0]:.6g} to {self.times[-1]:.6g} s"
+                raise RecordingError(
+                    f"hidden[{i}]", "holds no frame", tuple(span), f"give start < stop within the recording, {known}"
+                )
+            inside |= own
+        free = np.isin(np.arange(len(self.markers)), self.free)
+        if not self.mask[np.ix_(~inside, free)].any():
+            raise RecordingError("hidden", "leaves nothing seen", list(map(tuple, spans)), "hide less")
+        positions = self.positions.copy()
+        positions[np.ix_(inside, free)] = np.nan
+        return self._derive(positions=positions)
+
     def select(self, markers: Sequence[str | int]) -> Recording:
         """The given markers only (names or indices), in the given order; clamped ones stay clamped.
 

@@ -12,6 +12,7 @@ from ..result.result import UNSOUND, Estimate, FitData, Given, MotionGrowth
 from .report_bootstrap import bootstrap
 from .report_contact import contact_sections
 from .report_driven import driven_sections
+from .report_fields import stiffness_fields
 from .report_premises import premises
 from .report_profiles import lopsided_profiles
 from .report_recordings import forces, held_out_motion, recordings
@@ -47,6 +48,7 @@ def sections(result: FitData) -> list[Section]:
         *driven_sections(result),
         *contact_sections(result),
         shot_motions(result),
+        *stiffness_fields(result),
         _unknown(result),
         _correlations(result),
         lopsided_profiles(result),

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 from ..errors import InputError
 from .bootstrap import Bootstrap
+from .field import FieldFit
 from .shot import ShotMotion
 
 UNSOUND = ("rough", "no minimum", "doubtful")
@@ -337,6 +338,7 @@ class FitData:
         profiles: of the parameters whose profiles were followed.
         bootstrap: intervals from data drawn at random, where they were asked for.
         shot: of every motion that was shot in windows, what its model loses.
+        fields: of every stiffness field with a smoothness prior, the prior and the stiffness of each cluster.
         assumed: how the ends of ropes are held and what that assumes, in words, where a configuration says it.
     """
 
@@ -376,6 +378,7 @@ class FitData:
     condition: str | None = None
     profiles: tuple[ProfileCurve, ...] = ()
     shot: tuple[ShotMotion, ...] = ()
+    fields: tuple[FieldFit, ...] = ()
     bootstrap: Bootstrap | None = None
 
     def __getitem__(self, name: str) -> Estimate:

@@ -1,0 +1,302 @@
+"""A smoothness prior of a stiffness field: its size and its length are found from the recordings before a fit searches.
+
+The modes of a field are parameters with independent priors, whose deviations follow from a size and a length
+(`StiffnessField.deviations`). These follow from the marginal likelihood: all parameters integrated out of the linear
+picture at the minimum that belongs to the last ones, as the gaps of windows are found (`continuity`). Data count with
+the variance and the autocorrelation that their residuals show (empirical Bayes; MacKay 1992, Neural Computation 4).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays.checks import is_number
+from ..arrays.timeseries import Array
+from ..errors import InputError
+from ..experiment.experiment import Experiment
+from ..objects.stiffness_field import StiffnessField
+from ..quantities.parameters import Parameter, Parameters
+from ..result.field import FieldFit
+from ..statistics.covariance import autocorrelation
+from .approach import Approach
+from .optimizers import Observer, Progress
+from .problem import FitProblem, expanded_to
+
+FIRST_SIZE, FIRST_LENGTH = 0.5, 0.25  # of ln E; of the extent
+SIZES, LENGTHS = (1e-3, 10.0), (0.1, 10.0)  # that are looked at; lengths of the shortest wave's and of the extent
+LOOKED = 33  # sizes, and as many lengths
+FINER = 4  # times closer, about the best
+ROUNDS, STEPS, TOLERANCE = 12, 20, 1e-3  # of priors, of the walk with each, and of the cost there
+SETTLED = 0.03  # of the logarithms of both
+LIKELY = 3.841  # of twice the logarithm of a likelihood: 95 % of a chi-square with one degree
+Z = 1.96
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """A smoothness prior; what is None is found from the recordings.
+
+    Attributes:
+        size: root mean square of ln E about its mean.
+        length: m, over which neighbors are alike.
+    """
+
+    size: float | None = None
+    length: float | None = None
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field with its prior.
+
+    Attributes:
+        modes: as the scene has them.
+        wanted: as it was asked for.
+        size, length: of the prior.
+        size_ends, length_ends: of their 95 % intervals.
+    """
+
+    modes: StiffnessField
+    wanted: Smooth
+    size: float
+    length: float
+    size_ends: tuple[float | None, float | None] = (None, None)
+    length_ends: tuple[float | None, float | None] = (None, None)
+
+    def carried(self, parameters: Parameters) -> Parameters:
+        """The parameters with this prior."""
+        sds = dict(zip(self.modes.modes, self.modes.deviations(self.size, self.length).tolist(), strict=True))
+        return Parameters(replace(p, prior=(0.0, sds[p.name])) if p.name in sds else p for p in parameters.values())
+
+
+def with_fields(
+    parameters: Parameters, experiments: Sequence[Experiment], smooth: Mapping[str, Smooth]
+) -> tuple[Parameters, tuple[Field, ...]]:
+    """The parameters with those of all fields, under the prior that a search for sizes and lengths begins with.
+
+    Raises:
+        InputError: no scene has such a field, a mode is a parameter already, or a size or length is not positive.
+    """
+    known = {s.field.name: s.field for e in experiments for s in e.scene.solids.values() if s.field is not None}
+    fields = []
+    for name, wanted in smooth.items():
+        if name not in known:
+            fix = f"name one of: {', '.join(known) or 'none, give a solid of clusters stiffness_modes'}"
+            raise InputError(f"smooth.{name}", "names no field of the scenes", name, fix)
+        modes = known[name]
+        for what in ("size", "length"):
+            value = getattr(wanted, what)
+            if value is not None and not (is_number(value) and value > 0):
+                raise InputError(f"smooth.{name}.{what}", "must be positive", value, "or leave it out to have it found")
+        if twice := [mode for mode in modes.modes if mode in parameters]:
+            fix = "leave them out of the parameters: smooth adds them"
+            raise InputError(f"smooth.{name}", "has modes that are parameters already", twice, fix)
+        size, length = wanted.size or FIRST_SIZE, wanted.length or FIRST_LENGTH * modes.extent
+        fields.append(Field(modes, wanted, size, length))
+        quantities = next(e.scene.quantities for e in experiments if modes.modes[0] in e.scene.quantities)
+        own = [Parameter(name=m, initial=quantities[m].value, scale=quantities[m].scale) for m in modes.modes]
+        parameters = fields[-1].carried(Parameters([*parameters.values(), *own]))
+    return parameters, tuple(fields)
+
+
+def settled(
+    experiments: Sequence[Experiment],
+    wanted: Parameters,
+    expanded: Parameters | None,
+    fields: Sequence[Field],
+    threads: int,
+    observe: Observer | None = None,
+) -> tuple[Parameters, Parameters | None, tuple[Field, ...]]:
+    """The parameters with the priors that are most likely, also expanded where the search begins, and the fields.
+
+    Args:
+        expanded: where the search begins so far; None = at the initial values.
+    """
+    if not fields:
+        return wanted, expanded, ()
+    here, found = expanded_to(wanted, experiments) if expanded is None else expanded, tuple(fields)
+    u = here.initial()
+    for _ in range(ROUNDS):
+        for field in found:
+            wanted, here = field.carried(wanted), field.carried(here)
+        problem = FitProblem(experiments, wanted, threads=threads, expanded=here)
+        walk = Approach(problem, u)
+        while walk.iterations < STEPS and walk.step():
+            if observe is not None:
+                observe(Progress(walk.iterations, walk.cost, walk.u.copy()))
+            if walk.promised < TOLERANCE:
+                break
+        u = walk.u
+        picture = _Picture.at(problem, u, found)
+        if picture is None:
+            break
+        before = found
+        for i in range(len(found)):
+            found = (*found[:i], picture.likeliest(found, i), *found[i + 1 :])
+        if all(_apart(a, b) < SETTLED for a, b in zip(before, found, strict=True)):
+            break
+    for field in found:
+        wanted, here = field.carried(wanted), field.carried(here)
+    at = here.to_physical(u)
+    for name in here.free:
+        here = here.replace(name, initial=at[name])
+    return wanted, here, found
+
+
+def field_fits(problem: FitProblem, u: Array, fields: Sequence[Field]) -> tuple[FieldFit, ...]:
+    """What a fit that ended at u (free,) found of its fields."""
+    picture = _Picture.at(problem, u, fields) if fields else None
+    if picture is None:
+        return ()
+    R = np.asarray(np.linalg.qr(picture.rows_with(fields), mode="r"))[: len(u), : len(u)]
+    spread = np.linalg.pinv(R)  # rows (free,): covariance = spread spread'
+    columns, values, found = {name: k for k, name in enumerate(problem.parameters.free)}, dict[str, float](), []
+    values = problem.parameters.to_physical(u)
+    for field in fields:
+        modes = field.modes
+        mine = [columns[name] for name in modes.modes]
+        about = modes.shapes @ spread[mine]
+        whole = about + (spread[columns[modes.stiffness]] if modes.stiffness in columns else 0.0)
+        prior = np.sum((modes.shapes * modes.deviations(field.size, field.length)) ** 2, axis=1)
+        mean = values.get(modes.stiffness, _given(problem, modes.stiffness))
+        E = mean * np.exp(modes.shapes @ u[mine])
+        found.append(
+            FieldFit(
+                name=modes.name,
+                size=field.size,
+                size_lower=field.size_ends[0],
+                size_upper=field.size_ends[1],
+                length=field.length,
+                length_lower=field.length_ends[0],
+                length_upper=field.length_ends[1],
+                centers=tuple((float(x), float(y), float(z)) for x, y, z in modes.centers),
+                stiffness=tuple(E.tolist()),
+                half_widths=tuple((Z * np.sqrt(np.sum(whole**2, axis=1))).tolist()),
+                left=tuple((np.sum(about**2, axis=1) / np.maximum(prior, 1e-300)).tolist()),
+            )
+        )
+    return tuple(found)
+
+
+def _given(problem: FitProblem, name: str) -> float:
+    return next(float(e.scene.quantities[name].value) for e in problem.experiments if name in e.scene.quantities)
+
+
+def _apart(a: Field, b: Field) -> float:
+    return max(abs(math.log(b.size / a.size)), abs(math.log(b.length / a.length)))
+
+
+@dataclass(frozen=True)
+class _Picture:
+    """The least-squares problem to first order, without the fields' priors, in units of the residuals' own size.
+
+    Attributes:
+        triangle: (rows, free + 1) of the Jacobian and the residuals.
+        columns: by field, those of its modes.
+        u: (free,).
+    """
+
+    triangle: Array
+    columns: tuple[Array, ...]
+    u: Array
+
+    @classmethod
+    def at(cls, problem: FitProblem, u: Array, fields: Sequence[Field]) -> _Picture | None:
+        """None where the problem has no answer."""
+        ok, r, J = problem.evaluate(u)
+        if not ok:
+            return None
+        place = {name: k for k, name in enumerate(problem.parameters.free)}
+        columns = tuple(np.array([place[name] for name in field.modes.modes]) for field in fields)
+        rows, prior = np.column_stack([J, r]), problem.prior_rows
+        first, layout = problem.core.first_rows, problem.rows_layout()
+        for i in range(len(problem.experiments)):
+            own = slice(first[i], first[i + 1])
+            taken = len(u) * len(r[own]) / max(problem.core.data_rows, 1) + problem.core.absorbed(i)
+            variance = float(r[own] @ r[own]) / max(len(r[own]) - taken, 1.0)
+            lags = autocorrelation(r[own], layout.of(layout.recording == i))
+            positive = lags[: int(np.argmax(lags <= 0))] if (lags <= 0).any() else lags
+            rows[own] /= math.sqrt(max(variance, 1e-300) * (1.0 + 2.0 * float(positive.sum())))
+        of_fields = np.isin(np.arange(len(u)), np.concatenate(columns))
+        theirs = prior[0] + np.flatnonzero(problem.parameters.prior_jacobian()[:, of_fields].any(axis=1))
+        kept = np.delete(rows, theirs, axis=0)
+        return cls(np.asarray(np.linalg.qr(kept, mode="r")), columns, u)
+
+    def rows_with(self, fields: Sequence[Field]) -> Array:
+        """With the rows of the fields' priors."""
+        below = []
+        for field, own in zip(fields, self.columns, strict=True):
+            weight = 1.0 / field.modes.deviations(field.size, field.length)
+            rows = np.zeros((len(own), self.triangle.shape[1]))
+            rows[np.arange(len(own)), own] = weight
+            rows[:, -1] = weight * self.u[own]
+            below.append(rows)
+        return np.concatenate([self.triangle, *below])
+
+    def deviance(self, fields: Sequence[Field]) -> float:
+        """Minus twice the logarithm of the marginal likelihood, up to a constant."""
+        R = np.asarray(np.linalg.qr(self.rows_with(fields), mode="r"))
+        p = len(self.u)
+        size = np.abs(np.diag(R))[:p]
+        known = size > 1e-9 * size.max(initial=1e-300)
+        spread = sum(float(np.log(f.modes.deviations(f.size, f.length)).sum()) for f in fields)
+        return float(np.sum(R[p:, -1] ** 2)) + 2.0 * (float(np.log(size[known]).sum()) + spread)
+
+    def likeliest(self, fields: Sequence[Field], i: int) -> Field:
+        """One field with the size and the length that are most likely, and their intervals."""
+        field = fields[i]
+        modes, given = field.modes, field.wanted
+        wave = 1.0 / math.sqrt(max(float(modes.eigenvalues[-1]), 1e-300))
+        size = _spaced(*SIZES) if given.size is None else np.array([math.log(given.size)])
+        span = (LENGTHS[0] * wave, LENGTHS[1] * modes.extent)
+        length = _spaced(*span) if given.length is None else np.array([math.log(given.length)])
+
+        def at(s: float, t: float) -> float:
+            trial = replace(field, size=math.exp(s), length=math.exp(t))
+            return self.deviance([*fields[:i], trial, *fields[i + 1 :]])
+
+        heights = np.array([[at(s, t) for t in length] for s in size])
+        best = np.unravel_index(int(np.argmin(heights)), heights.shape)
+        near = [_about(axis, int(k)) for axis, k in zip((size, length), best, strict=True)]
+        finer = np.array([[at(s, t) for t in near[1]] for s in near[0]])
+        row, column = np.unravel_index(int(np.argmin(finer)), finer.shape)
+        least = float(finer[row, column])
+        return replace(
+            field,
+            size=given.size or math.exp(near[0][row]),
+            length=given.length or math.exp(near[1][column]),
+            size_ends=(None, None) if given.size is not None else _ends(size, heights.min(axis=1) - least),
+            length_ends=(None, None) if given.length is not None else _ends(length, heights.min(axis=0) - least),
+        )
+
+
+def _spaced(lower: float, upper: float) -> Array:
+    return np.linspace(math.log(lower), math.log(upper), LOOKED)
+
+
+def _about(axis: Array, k: int) -> Array:
+    """Points about one of an axis, closer to each other."""
+    if len(axis) == 1:
+        return axis
+    step = axis[1] - axis[0]
+    found = axis[k] + step * np.linspace(-1.0, 1.0, 2 * FINER + 1)
+    return np.asarray(found[(found >= axis[0] - 1e-12) & (found <= axis[-1] + 1e-12)])
+
+
+def _ends(axis: Array, heights: Array) -> tuple[float | None, float | None]:
+    """Where a profile's heights over its least cross what is likely, in its unit; 0 and None at open ends."""
+    likely = np.flatnonzero(heights < LIKELY)
+    if not len(likely):
+        k = int(np.argmin(heights))
+        likely = np.array([k, k])
+
+    def crossed(inside: int, outside: int) -> float:
+        a, b = min(heights[inside], LIKELY), heights[outside]
+        return math.exp(axis[inside] + (axis[outside] - axis[inside]) * (LIKELY - a) / max(b - a, 1e-300))
+
+    first, last = int(likely[0]), int(likely[-1])
+    return crossed(first, first - 1) if first else 0.0, crossed(last, last + 1) if last + 1 < len(axis) else None

@@ -1,0 +1,36 @@
+"""What a fit found of a stiffness that varies smoothly, as plain data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+KNOWN, PRIOR_ALONE = 0.1, 0.9  # share of the prior's variance that the data leave
+
+
+@dataclass(frozen=True, kw_only=True)
+class FieldFit:
+    """A field of stiffness with a smoothness prior.
+
+    Attributes:
+        name: of the field, such as "toy_stiffness".
+        size: root mean square of ln E about its mean that the prior expects.
+        size_lower, size_upper: of its 95 % interval, 0 and None at open ends; both None where the size was given.
+        length: m, over which neighbors are alike.
+        length_lower, length_upper: likewise.
+        centers: m, of the clusters at rest.
+        stiffness: Pa, of each cluster.
+        half_widths: of ln E of each cluster, 95 %, with the prior.
+        left: of each cluster, the share of the prior's variance of ln E about its mean that the data leave.
+    """
+
+    name: str
+    size: float
+    size_lower: float | None
+    size_upper: float | None
+    length: float
+    length_lower: float | None
+    length_upper: float | None
+    centers: tuple[tuple[float, float, float], ...]
+    stiffness: tuple[float, ...]
+    half_widths: tuple[float, ...]
+    left: tuple[float, ...]
