@@ -15,7 +15,7 @@ from commands import last_line, run
 from pytest import approx
 from sheetbend.config import load
 from sheetbend.config.driven_motion import as_simulated
-from sheetbend.experiment.driven_motion import estimated_motion, following, recorded_motion
+from sheetbend.experiment.driven_motion import continued, estimated_motion, following, recorded_motion
 from test_driven_noise import NOISE, H, hand, shaken
 
 Array = np.ndarray
@@ -178,15 +178,51 @@ def test_a_scene_follows_what_was_added_to_its_markers(placed: list[list[float]]
     assert recorded is not None
     assert recorded.positions[:, 0] == approx(e.recording.positions[:, 0])
     added = np.random.default_rng(1).normal(0.0, NOISE, (31, 1, 3))
-    motion = estimated_motion(e, added[:20])
+    motion = estimated_motion(e, added)
     assert motion is not None
-    assert motion.positions == approx(recorded.positions + added * (np.arange(31) < 20)[:, None, None])
+    assert motion.positions == approx(recorded.positions + added)
     moved = following(e, motion).scene.boundary.values[:, 0]
     x = motion.positions[:, 0]
     assert moved == approx(x if placed is None else x - x[0] + placed[0], abs=1e-15)
     assert e.scene.boundary.values[:, 0] == approx(
         recorded.positions[:, 0] - (0 if placed is None else recorded.positions[0, 0])
     )
+
+
+def noisy(noise: float, seed: int = 0, frames: int = 241) -> sb.Experiment:
+    """One marker that drives a particle, 0.5 s of it fitted."""
+    times = np.arange(frames) / 60
+    x = hand(times)[:, None] + np.random.default_rng(seed).normal(0.0, noise, (frames, 1, 3))
+    scene = sb.Scene("one")
+    particles = scene.add_particles(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, -0.1]]), 1.0)
+    scene.follow(particles[:1], times, x, ["hand"])
+    recording = sb.Recording(np.tile(x, (1, 2, 1)), times, ("hand", "free"), name="one")
+    places = [None, sb.on_particle(int(particles[1]))]
+    return sb.Experiment(
+        scene=scene, recording=recording, markers=places, fit=(0.0, 0.5), driven_sigma=max(noise, 1e-8)
+    )
+
+
+@pytest.mark.parametrize("noise", [1e-3, 1e-4, 1e-5])
+def test_behind_the_fitted_part_the_motion_is_smoothed(noise: float) -> None:
+    e = noisy(noise)
+    times, true = e.recording.times, hand(e.recording.times)
+    correction = true[:33, None] - e.recording.positions[:33, :1]  # as if the fit had found the truth
+    motion = estimated_motion(e, correction)
+    assert motion is not None
+    x, known = motion.positions[:, 0], times < 0.5
+    assert x[known] == approx(true[known], abs=1e-12)
+    left, before = (np.sqrt(np.mean((y - true)[~known] ** 2)) for y in (x, e.recording.positions[:, 0]))
+    assert left <= {1e-3: 0.5, 1e-4: 0.7, 1e-5: 1.0}[noise] * before
+    step = np.abs((x - true)[30] - (x - true)[29]).max()
+    assert step < 2.0 * noise  # where the correction ends, no more than between frames of the recording
+    assert continued(e, correction)[:, 0] == approx(x - e.recording.positions[:, 0])
+
+
+def test_a_clean_motion_stays_as_recorded() -> None:
+    e = noisy(0.0)
+    motion = estimated_motion(e, np.zeros((33, 1, 3)))
+    assert motion is not None and np.array_equal(motion.positions, e.recording.positions[:, :1])
 
 
 def test_a_shape_at_rest_follows_it_too() -> None:

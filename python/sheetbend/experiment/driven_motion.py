@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..arrays.smoothing import FEWEST, steadiest
 from ..arrays.timeseries import interpolate, mean_position
 from ..errors import RecordingError
 from ..recording.recording import Recording
@@ -15,7 +16,11 @@ from .experiment import Experiment
 
 Array = np.ndarray
 SAME_TIME = 1e-6  # s
-FAR = 10.0  # times `driven_sigma`: a motion that is so far from the recorded one was estimated from another recording
+WIDTHS = tuple(2.0 ** (k / 4) for k in range(4, 30))  # times that of the fewest frames
+FAR, PART = (
+    10.0,
+    0.1,
+)  # times `driven_sigma`, and of its sway: a motion farther off was estimated from another recording
 
 
 def recorded_motion(e: Experiment) -> Recording | None:
@@ -40,15 +45,42 @@ def recorded_motion(e: Experiment) -> Recording | None:
 def estimated_motion(e: Experiment, correction: Array) -> Recording | None:
     """The motion of the followed markers as a fit estimated it; None as for `recorded_motion`.
 
+    Behind the fitted part no compared marker tells of their noise. There the motion is smoothed, by the polynomials
+    that generalized cross-validation chooses; as recorded where these would move it by more than its noise explains.
+
     Args:
         correction: (knots, markers, 3) m, of the fit (`Fit.corrections`), which ends behind the fitted part.
     """
     recorded = recorded_motion(e)
     if recorded is None:
         return None
-    positions = recorded.positions.copy()
-    positions[: len(correction)] += correction[: len(positions)]
+    times, positions = recorded.times, recorded.positions.copy()
+    known = len(times) if e.static else int(np.searchsorted(times, e.fitted().times[-1] + SAME_TIME))
+    positions[:known] += correction[:known]
+    if known < len(times):
+        positions[known:] = _behind(times, recorded.positions, positions, known, e.driven_noise or 0.0)
     return replace(recorded, positions=positions)
+
+
+def continued(e: Experiment, correction: Array) -> Array:
+    """(knots, markers, 3) m, what `estimated_motion` adds to the recorded motion at every knot; the correction itself
+    where that is None."""
+    motion, recorded = estimated_motion(e, correction), recorded_motion(e)
+    return correction if motion is None or recorded is None else motion.positions - recorded.positions
+
+
+def _behind(times: Array, recorded: Array, positions: Array, known: int, noise: float) -> Array:
+    """Positions (knots, markers, 3) from the knot `known` on, smoothed as suits the recorded ones there, whose noise is
+    given. Of a smoother that gives a frame the weight w in its own value, the residuals of noise have the variance
+    (1 - w) noise^2. A bias adds its square to that, and may not exceed what smoothing gains, which is as much again."""
+    then, there = times[known:], recorded[known:]
+    smoother = steadiest(then, there, (FEWEST - 1) * float(np.median(np.diff(times))), WIDTHS)
+    if smoother is None:
+        return positions[known:]
+    value, own = smoother.of(then, there)
+    if np.mean((value - there) ** 2) > 2.0 * (1.0 - own) * noise**2:
+        return positions[known:]
+    return smoother.of(times, positions)[0][known:]
 
 
 def following(e: Experiment, motion: Recording) -> Experiment:
@@ -73,10 +105,24 @@ def following(e: Experiment, motion: Recording) -> Experiment:
     if np.isnan(numbers).any():
         at = recorded.times[np.isnan(numbers).any(axis=(1, 2))][0]
         raise RecordingError("driven_motion", f"has a gap at {at:.6g} s", motion.name, again)
-    far, noise = float(np.sqrt(np.mean(numbers**2))), e.driven_noise
-    if noise is not None and far > FAR * noise:
+    far, sway = float(np.sqrt(np.mean(numbers**2))), recorded.positions - recorded.positions.mean(axis=0)
+    if far > max(FAR * (e.driven_noise or 0.0), PART * float(np.sqrt(np.mean(sway**2)))):
         problem = f"is {1e3 * far:.3g} mm from the recorded motion (of one coordinate), as from another recording"
         raise RecordingError("driven_motion", problem, motion.name, again)
+    return _moved(e, correction, numbers)
+
+
+def corrected(e: Experiment, correction: Array) -> Experiment:
+    """The experiment with a scene that follows what `continued` makes of a fit's correction."""
+    every, numbers = _every_knot(e), continued(e, correction)
+    if every is None:
+        return e
+    full = np.zeros(every.shape)
+    full[: len(numbers)] = numbers[: len(full)]
+    return _moved(e, every, full)
+
+
+def _moved(e: Experiment, correction: Correction, numbers: Array) -> Experiment:
     scene = e.scene.shallow()
     scene.boundary = e.scene.boundary.moved(correction.added(e.scene.boundary.values, numbers))
     return replace(e, scene=scene)
