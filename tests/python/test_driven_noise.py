@@ -17,8 +17,10 @@ from sheetbend.doubts.driven_errors import FEW, drawn_noise, driven_errors
 from sheetbend.doubts.driven_noise import driven_doubts, driven_noises
 from sheetbend.experiment.driven_motion import estimated_motion
 from sheetbend.fitting.fitted_motion import fitted_positions
+from sheetbend.minimum.linear_step import residuals_there
 from sheetbend.minimum.optimizers import Progress, minimize
 from sheetbend.minimum.problem import FitProblem, as_parameters
+from sheetbend.minimum.time_step import halved
 from sheetbend.statistics.identifiability import identify
 from typer.testing import CliRunner
 
@@ -273,6 +275,18 @@ def test_windows_starts_refinement_and_leaving_out_work_with_corrections():
     assert all(row.held_out is not None for row in fit.result.recordings)
     ends = [start.values["rope_EI"] for start in fit.result.starts]
     assert ends[0] == approx(ends[1], rel=1e-4)
+
+
+def test_a_refinement_begins_with_the_corrections_of_the_fit():
+    e = shaken(8, frames=25)
+    problem = problem_of(e)
+    u, _ = at(problem, e)
+    assert problem.evaluate(u)[0]
+    alone, begun, finer = (problem.of(halved([e])) for _ in range(3))
+    found = residuals_there(problem, finer, u)
+    begun.core.restore(problem.core.state())
+    assert np.array_equal(found, begun.evaluate(u, jacobian=False)[1])
+    assert found == approx(alone.evaluate(u, jacobian=False)[1], abs=1e-5)
 
 
 def test_a_recording_fitted_to_its_own_window_is_corrected_there():
